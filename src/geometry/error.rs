@@ -1,0 +1,32 @@
+//! Why geometry is refused. Every refusal names the file (or upload), the part and the reason.
+
+/// A refusal of input geometry.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum GeometryError {
+    /// A file or folder could not be read.
+    #[error("{path}: {reason}")]
+    Unreadable {
+        /// The path.
+        path: String,
+        /// What the reader said.
+        reason: String,
+    },
+    /// A part's mesh cannot be used.
+    #[error("{origin}: part `{part}`: {reason}")]
+    Part {
+        /// The file it came from, or `upload`.
+        origin: String,
+        /// Its name.
+        part: String,
+        /// What is wrong and what to do.
+        reason: String,
+    },
+    /// The assembly as a whole cannot be used.
+    #[error("{origin}: {reason}")]
+    Assembly {
+        /// The folder or file.
+        origin: String,
+        /// What is wrong and what to do.
+        reason: String,
+    },
+}

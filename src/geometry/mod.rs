@@ -1,0 +1,15 @@
+//! Geometry: from files or uploads to healed meshes in the planning frame.
+//!
+//! Conventions, fixed here for the whole project: right-handed frames; radians; triangles
+//! counter-clockwise from outside; signed distances negative inside; a pose `a_from_b` maps
+//! coordinates of `b` to `a`. Input units and frame are the user's ("input frame"); planning
+//! happens in the *planning frame*, the input frame scaled by a power of two so that the
+//! assembly's longest side falls in (5, 10].
+
+mod error;
+mod pose;
+mod source;
+
+pub use error::GeometryError;
+pub use pose::{Pose, Waypoint, interpolate, pose_from_waypoint, waypoint_from_pose};
+pub use source::{SourceAssembly, SourceMesh, SourcePart};

@@ -1,0 +1,34 @@
+//! An assembly as it came in, before anything was healed or scaled.
+
+/// A triangle mesh as given: nothing is known to be valid yet.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SourceMesh {
+    /// Vertex positions in the input's units and frame, at the assembled pose.
+    pub vertices: Vec<[f64; 3]>,
+    /// Vertex indices, three per triangle, counter-clockwise from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// One part as given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SourcePart {
+    /// The part's name: the file stem, or the node's name in a scene. Unique in its assembly.
+    pub name: String,
+    /// Where it came from, for messages: a file path, or `upload`.
+    pub origin: String,
+    /// The geometry.
+    pub mesh: SourceMesh,
+}
+
+/// An assembly as given. Parts stand in natural order of their names ("2" before "10").
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SourceAssembly {
+    /// A name for people.
+    pub name: String,
+    /// The unit of length, if known ("mm").
+    pub units: Option<String>,
+    /// The parts.
+    pub parts: Vec<SourcePart>,
+    /// Names of parts that the assembly's own description declares fixed.
+    pub fixed: Vec<String>,
+}

@@ -1,0 +1,5 @@
+//! Plans: what is returned, and the check that it is true.
+
+mod plan;
+
+pub use plan::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};

@@ -1,0 +1,137 @@
+//! What a planning request returns. All lengths and poses in the input's units and frame.
+
+use crate::geometry::Waypoint;
+
+/// How planning ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PlanStatus {
+    /// Every part that was asked for is out, or was out from the start.
+    Complete,
+    /// A budget ran out (the reason names it); the steps are the best so far.
+    Partial,
+    /// Some parts cannot come off one at a time at the resolution that the reason names.
+    Infeasible,
+    /// The deadline passed.
+    Timeout,
+    /// The request was cancelled.
+    Cancelled,
+}
+
+/// Whether a step turns the part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MotionKind {
+    /// All waypoints have the rotation of the first.
+    Translation,
+    /// Some waypoint's rotation differs from the first.
+    Rotation,
+}
+
+/// One part leaves along a path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanStep {
+    /// Index of the part that moves; all others that remain stand still.
+    pub part: usize,
+    /// Whether the path turns the part.
+    pub motion: MotionKind,
+    /// Transforms of the assembled mesh; the first is the part's pose at the start.
+    pub path: Vec<Waypoint>,
+    /// Deepest penetration found by verification beyond the pair's assembled depth.
+    pub verified_depth: f64,
+    /// Parts that had blocked this one and left before it.
+    pub waited_for: Vec<usize>,
+}
+
+/// Why a part that remains did not move.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Blocked {
+    /// The part that remains.
+    pub part: usize,
+    /// The parts that it met.
+    pub by: Vec<usize>,
+    /// The action that they blocked, as `+x` or `-rz` or `+z+rz`.
+    pub action: String,
+}
+
+/// A pair that overlaps at the assembled pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Overlap {
+    /// The two parts, smaller index first.
+    pub parts: [usize; 2],
+    /// How deep one lies in the other.
+    pub depth: f64,
+}
+
+/// Something the user should know about the input.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Warning {
+    /// The part it is about, if one.
+    pub part: Option<usize>,
+    /// What was found and what was done about it.
+    pub message: String,
+}
+
+/// Counters and times. Times in seconds.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PlanStats {
+    /// Transition functions that the search used, cached ones included.
+    pub simulations: u64,
+    /// Transition functions really computed.
+    pub simulations_run: u64,
+    /// Straight sweeps that proved a removal without simulation.
+    pub sweeps: u64,
+    /// States kept.
+    pub states: u64,
+    /// Building or loading distance fields.
+    pub sdf_time_s: f64,
+    /// Building blocking graphs.
+    pub static_analysis_time_s: f64,
+    /// Simulation (the paper's path-planning time).
+    pub path_time_s: f64,
+    /// Shortening and verification.
+    pub verify_time_s: f64,
+    /// From admission to the last step.
+    pub total_time_s: f64,
+    /// Distance fields that were there already.
+    pub sdf_hits: u64,
+    /// Blocking relations that were there already.
+    pub blocking_hits: u64,
+    /// Motions that were there already.
+    pub motion_hits: u64,
+    /// The whole plan was there already.
+    pub plan_hit: bool,
+}
+
+/// A disassembly plan, complete or not.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// How planning ended.
+    pub status: PlanStatus,
+    /// Why it is not complete.
+    pub reason: Option<String>,
+    /// The planner's name, as `sbdp-star`.
+    pub planner: String,
+    /// The engine's name, as `sliding`.
+    pub engine: String,
+    /// The unit of length, if known.
+    pub units: Option<String>,
+    /// Part names; every index in this plan points here.
+    pub parts: Vec<String>,
+    /// Parts that had been removed before.
+    pub removed: Vec<usize>,
+    /// Parts that must come out, or all.
+    pub targets: Option<Vec<usize>>,
+    /// Parts that may not move.
+    pub fixed: Vec<usize>,
+    /// The removals in order.
+    pub steps: Vec<PlanStep>,
+    /// Parts that stand where they stood.
+    pub remaining: Vec<usize>,
+    /// What blocks the parts that should have come off.
+    pub blocked: Vec<Blocked>,
+    /// Overlaps at the assembled pose.
+    pub overlaps: Vec<Overlap>,
+    /// Findings about the input.
+    pub warnings: Vec<Warning>,
+    /// Counters and times.
+    pub stats: PlanStats,
+}
