@@ -2,6 +2,5 @@
 
 mod request;
 
-pub use request::{
-    ActionSet, Engine, Interrupt, PlanRequest, PlanSink, Planner, Progress, Stage, Termination,
-};
+pub use crate::termination::{Interrupt, Termination};
+pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage};
