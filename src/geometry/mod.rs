@@ -7,9 +7,15 @@
 //! assembly's longest side falls in (5, 10].
 
 mod error;
+mod heal;
+mod load;
+mod mesh;
 mod pose;
 mod source;
 
 pub use error::GeometryError;
+pub use heal::{Healed, heal};
+pub use load::{load_assembly, natural_order};
+pub use mesh::{Edge, Mesh, Solidity};
 pub use pose::{Pose, Waypoint, interpolate, pose_from_waypoint, waypoint_from_pose};
 pub use source::{SourceAssembly, SourceMesh, SourcePart};
