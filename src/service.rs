@@ -2,9 +2,15 @@
 //!
 //! The daemon's workers and the command line without a daemon both call this, so what is
 //! tested is what is used. It knows nothing of shared memory.
+//!
+//! Data flow of a request: assembly (`geometry`) → fields (`sdf`) and overlaps → `search` → plan in
+//! the input's units (`plan`).
 
-use crate::geometry::{GeometryError, SourceAssembly};
-use crate::plan::{Overlap, Plan, Warning};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::geometry::{Assembly, GeometryError, SourceAssembly};
+use crate::plan::{Overlap, Plan, PlanContext, PreparedAssembly, Warning};
 use crate::search::{PlanRequest, PlanSink, Termination};
 
 /// The name of an assembly: the hash of its content.
@@ -38,53 +44,10 @@ pub enum ServiceError {
         /// How many there are.
         count: usize,
     },
+    /// The worker threads for the request could not be started.
+    #[error("cannot start worker threads: {0}")]
+    Threads(String),
     /// The geometry was refused.
     #[error(transparent)]
     Geometry(#[from] GeometryError),
-}
-
-/// The service. Shared by all threads.
-#[derive(Debug, Default)]
-pub struct Service {}
-
-impl Service {
-    /// Validates, heals and registers an assembly. The same content gives the same id, at once.
-    ///
-    /// # Errors
-    /// The geometry was refused; the error names the part and the reason.
-    pub fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError> {
-        let _ = source;
-        Err(ServiceError::UnknownAssembly)
-    }
-
-    /// Whether an assembly is known.
-    #[must_use]
-    pub fn knows(&self, id: AssemblyId) -> bool {
-        let _ = id;
-        false
-    }
-
-    /// The overlaps at the assembled pose, in the input's units.
-    ///
-    /// # Errors
-    /// The id is unknown.
-    pub fn overlaps(&self, id: AssemblyId) -> Result<Vec<Overlap>, ServiceError> {
-        let _ = id;
-        Err(ServiceError::UnknownAssembly)
-    }
-
-    /// Plans. Blocks until done; `termination` ends it early with a plan that says so.
-    ///
-    /// # Errors
-    /// Nothing could be planned: unknown id, part numbers out of range.
-    pub fn plan(
-        &self,
-        id: AssemblyId,
-        request: &PlanRequest,
-        termination: &Termination,
-        sink: &mut dyn PlanSink,
-    ) -> Result<Plan, ServiceError> {
-        let _ = (id, request, termination, sink);
-        Err(ServiceError::UnknownAssembly)
-    }
 }

@@ -44,6 +44,11 @@ impl Blockage {
         self.jointly[action].push(by);
     }
 
+    /// Forgets what simulations said about an action.
+    pub fn reopen(&mut self, action: usize) {
+        self.jointly[action].clear();
+    }
+
     /// Whether nothing is known to block an action.
     #[must_use]
     pub fn is_open(&self, action: usize) -> bool {

@@ -78,3 +78,13 @@ pub struct Scene {
     /// Longest side of the whole, the unit of resolutions.
     pub longest_side: f64,
 }
+
+impl Scene {
+    /// The middle of a part's box at the assembled pose, in its shape's frame: the point that moves
+    /// on a line between the waypoints of a plan.
+    #[must_use]
+    pub fn centre_in_shape(&self, part: usize) -> Point3<f64> {
+        let body = &self.bodies[part];
+        body.planning_from_shape.inverse_transform_point(&body.bounds.centre())
+    }
+}
