@@ -6,10 +6,12 @@
 //! happens in the *planning frame*, the input frame scaled by a power of two so that the
 //! assembly's longest side falls in (5, 10].
 
+mod content_hash;
 mod error;
 mod pose;
 mod source;
 
+pub use content_hash::content_hash;
 pub use error::GeometryError;
 pub use pose::{Pose, Waypoint, interpolate, pose_from_waypoint, waypoint_from_pose};
 pub use source::{SourceAssembly, SourceMesh, SourcePart};
