@@ -9,6 +9,7 @@
 mod assembly;
 mod bounds;
 mod congruence;
+mod content_hash;
 mod error;
 mod heal;
 mod hull;
@@ -24,6 +25,7 @@ mod winding;
 
 pub use assembly::{Assembly, Part};
 pub use bounds::Bounds;
+pub use content_hash::content_hash;
 pub use error::GeometryError;
 pub use heal::{Healed, heal};
 pub use hull::{gap_along, hull_vertices, separating_direction, transformed};
