@@ -136,22 +136,23 @@ fn sample_edges(surface: &Surface, t: u32, spacing: &Spacing, out: &mut Vec<Poin
     }
 }
 
+/// Points on rows parallel to the longest edge, all strictly inside.
 fn sample_face(surface: &Surface, t: u32, step: f64, out: &mut Vec<Point3<f64>>) {
-    let [a, b, c] = surface.corners(t);
-    let area = (b - a).cross(&(c - a)).norm() / 2.0;
+    let corners = surface.corners(t);
+    let side = |e: usize| (corners[(e + 1) % 3] - corners[e]).norm();
+    let base = (0..3).max_by(|&e, &f| side(e).total_cmp(&side(f))).unwrap_or(0);
+    let (a, b, apex) = (corners[base], corners[(base + 1) % 3], corners[(base + 2) % 3]);
+    let height = (b - a).cross(&(apex - a)).norm() / side(base).max(f64::MIN_POSITIVE);
     // Slivers and small faces are held by their edges and vertices.
-    if area < 0.02 * step * step {
+    if height * side(base) < 0.04 * step * step {
         return;
     }
-    let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
-    let n = (longest / step).ceil().max(1.0) as usize;
-    // Centroids of the upright sub-triangles of a regular subdivision: all strictly inside.
-    for i in 0..n {
-        for j in 0..(n - i) {
-            let u = (i as f64 + 1.0 / 3.0) / n as f64;
-            let v = (j as f64 + 1.0 / 3.0) / n as f64;
-            out.push(a + (b - a) * u + (c - a) * v);
-        }
+    let rows = (height / step).ceil().max(1.0) as usize;
+    for row in 0..rows {
+        let v = (row as f64 + 0.5) / rows as f64;
+        let (from, to) = (a + (apex - a) * v, b + (apex - b) * v);
+        let count = ((to - from).norm() / step).ceil().max(1.0) as usize;
+        out.extend((0..count).map(|k| from + (to - from) * ((k as f64 + 0.5) / count as f64)));
     }
 }
 

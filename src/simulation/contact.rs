@@ -10,7 +10,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3, Vector6};
 
-use crate::geometry::{Bounds, Closest, Descend, Pose, SampleTree};
+use crate::geometry::{Bounds, Closest, Descend, Pose, SampleTree, Surface};
 
 use super::projection::Row;
 use super::{Body, Scene, Surroundings};
@@ -132,29 +132,47 @@ impl<'a> Mover<'a> {
         let foot = frame * contact.closest.point;
         let away = world - foot;
         let distance = contact.gap - contact.allowance;
-        // The direction to the closest point: good unless the two coincide.
-        let radial = away.try_normalize(1e-7).map(|d| if distance < 0.0 { -d } else { d });
-        let mut best: Option<(f64, Vector3<f64>, f64)> = None;
-        let mut offer = |n: Vector3<f64>, floor: f64| {
-            let height = n.dot(&away);
-            let score = height + n.dot(&motion);
-            if height >= floor && best.is_none_or(|b| score > b.0 + 1e-12) {
-                best = Some((score, n, height));
-            }
-        };
-        surface.feature_normals(&contact.closest, |n| {
-            offer(frame.rotation * n, distance.min(0.0) - 1e-9);
-        });
-        if let Some(d) = radial {
-            offer(d, f64::NEG_INFINITY);
-        }
-        let (n, height) = match best {
-            Some((_, n, height)) => (n, height),
-            None => (frame.rotation * surface.pseudo_normal(&contact.closest).normalize(), distance),
-        };
+        let (n, height) = self.plane(surface, frame, contact, &away, distance, &motion);
         let (n, moment) = (n * sense, arm.cross(&n) * sense);
         let a = Vector6::new(n.x, n.y, n.z, moment.x, moment.y, moment.z);
         Row { a, b: height + contact.allowance, other: contact.other }
+    }
+
+    /// The plane (unit normal in the planning frame, height of the sample above it) that a
+    /// contact's sample is to stay above.
+    fn plane(
+        &self,
+        surface: &Surface,
+        frame: &Pose,
+        contact: &Contact,
+        away: &Vector3<f64>,
+        distance: f64,
+        motion: &Vector3<f64>,
+    ) -> (Vector3<f64>, f64) {
+        // The direction to the closest point: good unless the two coincide.
+        let radial = away.try_normalize(1e-7).map(|d| if distance < 0.0 { -d } else { d });
+        // Inside, the way out is the shortest one.
+        if let Some(d) = radial
+            && distance < 0.0
+        {
+            return (d, distance);
+        }
+        let mut best: Option<(f64, Vector3<f64>, f64)> = None;
+        let mut offer = |n: Vector3<f64>| {
+            let height = n.dot(away);
+            let score = height + n.dot(motion);
+            if height >= -1e-9 && best.is_none_or(|b| score > b.0 + 1e-12) {
+                best = Some((score, n, height));
+            }
+        };
+        surface.feature_normals(&contact.closest, |n| offer(frame.rotation * n));
+        if let Some(d) = radial {
+            offer(d);
+        }
+        match best {
+            Some((_, n, height)) => (n, height),
+            None => (frame.rotation * surface.pseudo_normal(&contact.closest).normalize(), distance),
+        }
     }
 }
 
@@ -202,29 +220,30 @@ fn box_distance(a: &Bounds, b: &Bounds) -> f64 {
     (a.min - b.max).sup(&(b.min - a.max)).sup(&Vector3::zeros()).norm()
 }
 
-/// Keeps, of rows that point nearly the same way, the tightest. `lever` is the length that makes
-/// moments comparable with forces.
-pub(super) fn reduced(rows: impl IntoIterator<Item = Row>, lever: f64) -> Vec<Row> {
+/// Keeps, of rows that point nearly the same way, the tightest; also returns which they were.
+/// `lever` is the length that makes moments comparable with forces.
+pub(super) fn reduced(rows: impl IntoIterator<Item = Row>, lever: f64) -> (Vec<Row>, Vec<usize>) {
     const BINS: f64 = 24.0;
     let mut index: HashMap<(usize, [i16; 6]), usize> = HashMap::new();
-    let mut out: Vec<Row> = Vec::new();
-    for row in rows {
+    let (mut out, mut kept): (Vec<Row>, Vec<usize>) = (Vec::new(), Vec::new());
+    for (i, row) in rows.into_iter().enumerate() {
         let key = std::array::from_fn(|i| {
             let x = if i < 3 { row.a[i] } else { row.a[i] / lever };
             (x * BINS).round() as i16
         });
         match index.entry((row.other, key)) {
             std::collections::hash_map::Entry::Occupied(e) => {
-                let kept: &mut Row = &mut out[*e.get()];
-                if row.b < kept.b {
-                    *kept = row;
+                let at = *e.get();
+                if row.b < out[at].b {
+                    (out[at], kept[at]) = (row, i);
                 }
             }
             std::collections::hash_map::Entry::Vacant(e) => {
                 e.insert(out.len());
                 out.push(row);
+                kept.push(i);
             }
         }
     }
-    out
+    (out, kept)
 }
