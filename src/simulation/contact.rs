@@ -10,7 +10,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3, Vector6};
 
-use crate::geometry::{Bounds, Closest, Descend, Pose, SampleTree, Surface};
+use crate::geometry::{Bounds, Closest, Descend, Pose, SampleTree};
 
 use super::projection::Row;
 use super::{Body, Scene, Surroundings};
@@ -115,66 +115,92 @@ impl<'a> Mover<'a> {
     /// given the twist that is wanted.
     pub(super) fn row(&self, contact: &Contact, wanted: &Vector6<f64>) -> Row {
         let standing = &self.scene.bodies[contact.other];
-        let (world, surface, frame, sense) = match contact.side {
-            Side::Moving => {
-                let p = self.pose * contact.sample;
-                (p, &standing.shape.surface, &standing.planning_from_shape, 1.0)
-            }
-            Side::Standing => {
-                let p = standing.planning_from_shape * contact.sample;
-                (p, &self.body.shape.surface, &self.pose, -1.0)
-            }
+        let (world, measured, frame, sense) = match contact.side {
+            Side::Moving => (self.pose * contact.sample, standing, &standing.planning_from_shape, 1.0),
+            Side::Standing => (standing.planning_from_shape * contact.sample, self.body, &self.pose, -1.0),
         };
         let arm = world - self.centre();
         let (v, turn) = (wanted.fixed_rows::<3>(0), wanted.fixed_rows::<3>(3));
         // How the sample moves against the measured surface.
         let motion: Vector3<f64> = (v + turn.cross(&arm)) * sense;
-        let foot = frame * contact.closest.point;
-        let away = world - foot;
-        let distance = contact.gap - contact.allowance;
-        let (n, height) = self.plane(surface, frame, contact, &away, distance, &motion);
-        let (n, moment) = (n * sense, arm.cross(&n) * sense);
-        let a = Vector6::new(n.x, n.y, n.z, moment.x, moment.y, moment.z);
-        Row { a, b: height + contact.allowance, other: contact.other }
-    }
-
-    /// The plane (unit normal in the planning frame, height of the sample above it) that a
-    /// contact's sample is to stay above.
-    fn plane(
-        &self,
-        surface: &Surface,
-        frame: &Pose,
-        contact: &Contact,
-        away: &Vector3<f64>,
-        distance: f64,
-        motion: &Vector3<f64>,
-    ) -> (Vector3<f64>, f64) {
-        // The direction to the closest point: good unless the two coincide.
-        let radial = away.try_normalize(1e-7).map(|d| if distance < 0.0 { -d } else { d });
-        // Inside, the way out is the shortest one.
-        if let Some(d) = radial
-            && distance < 0.0
-        {
-            return (d, distance);
-        }
-        let mut best: Option<(f64, Vector3<f64>, f64)> = None;
-        let mut offer = |n: Vector3<f64>| {
-            let height = n.dot(away);
-            let score = height + n.dot(motion);
-            if height >= -1e-9 && best.is_none_or(|b| score > b.0 + 1e-12) {
-                best = Some((score, n, height));
-            }
+        let sample = Sample {
+            point: frame.inverse_transform_point(&world),
+            motion: frame.rotation.inverse() * motion,
+            closest: contact.closest,
+            distance: contact.gap - contact.allowance,
         };
-        surface.feature_normals(&contact.closest, |n| offer(frame.rotation * n));
-        if let Some(d) = radial {
-            offer(d);
-        }
-        match best {
-            Some((_, n, height)) => (n, height),
-            None => (frame.rotation * surface.pseudo_normal(&contact.closest).normalize(), distance),
-        }
+        let plane = sample.plane(measured);
+        let n = frame.rotation * plane.normal * sense;
+        let moment = arm.cross(&n);
+        let a = Vector6::new(n.x, n.y, n.z, moment.x, moment.y, moment.z);
+        Row { a, b: plane.height + contact.allowance, other: contact.other }
     }
 }
+
+/// A sample seen from the surface that it is near to.
+struct Sample {
+    point: Point3<f64>,
+    /// The displacement that is wanted.
+    motion: Vector3<f64>,
+    closest: Closest,
+    distance: f64,
+}
+
+/// A plane that a sample is to stay above.
+#[derive(Clone, Copy)]
+struct Plane {
+    normal: Vector3<f64>,
+    /// Height of the sample above it.
+    height: f64,
+    /// Height after the wanted motion.
+    ahead: f64,
+}
+
+/// A plane separates a sample from the solid only if the sample is not below it.
+const BELOW: f64 = 1e-9;
+
+impl Sample {
+    fn plane(&self, measured: &Body) -> Plane {
+        let surface = &measured.shape.surface;
+        let away = self.point - self.closest.point;
+        // The direction to the closest point: good unless the two coincide.
+        let radial = away.try_normalize(1e-7).map(|d| if self.distance < 0.0 { -d } else { d });
+        let along = |normal: Vector3<f64>, foot: &Point3<f64>| {
+            let height = normal.dot(&(self.point - foot));
+            Plane { normal, height, ahead: height + normal.dot(&self.motion) }
+        };
+        // Inside, the way out is the shortest one.
+        if let (Some(d), true) = (radial, self.distance < 0.0) {
+            return along(d, &self.closest.point);
+        }
+        let mut best: Option<Plane> = None;
+        surface.feature_normals(&self.closest, |n| offer(&mut best, along(n, &self.closest.point), BELOW));
+        if let Some(d) = radial {
+            offer(&mut best, along(d, &self.closest.point), BELOW);
+        }
+        if best.is_some_and(|b| b.ahead < 0.0)
+            && let Some((ahead, _)) = measured.closest(&(self.point + self.motion), self.motion.norm())
+        {
+            // Near a convex edge the face that the motion runs into need not be the closest now:
+            // to stay above the plane that is closest ahead is enough, if the sample is above it.
+            surface.feature_normals(&ahead, |n| offer(&mut best, along(n, &ahead.point), ABOVE_ENOUGH));
+        }
+        best.unwrap_or_else(|| {
+            let normal = surface.pseudo_normal(&self.closest);
+            along(normal.try_normalize(0.0).unwrap_or_else(Vector3::x), &self.closest.point)
+        })
+    }
+}
+
+/// Takes the plane that lets the sample go furthest, of those that it is not below.
+fn offer(best: &mut Option<Plane>, plane: Plane, below: f64) {
+    if plane.height >= -below && best.is_none_or(|b| plane.ahead > b.ahead + 1e-12) {
+        *best = Some(plane);
+    }
+}
+
+/// How far below the plane ahead a sample may be: rounding of poses, far below the tolerance.
+const ABOVE_ENOUGH: f64 = 1e-6;
 
 fn gather(
     tree: &SampleTree,

@@ -229,6 +229,9 @@ impl Drive {
             let touching = others(&result.active, &rows);
             let share = result.w.dot(&target) / target.norm_squared();
             if share < LEAST_SHARE {
+                for (i, m) in &result.active {
+                    tracing::trace!(multiplier = m, row = ?rows[*i], contact = ?working.get(*i), contacts = near.contacts.len(), "stuck");
+                }
                 return if round == 0 { Attempt::Stuck(touching) } else { Attempt::Entered(touching) };
             }
             let twist = result.w.component_div(&self.metric);
@@ -240,6 +243,18 @@ impl Drive {
                     return Attempt::Moved { twist, touching };
                 }
             }
+            tracing::trace!(
+                contacts = near.contacts.len(),
+                rows = rows.len(),
+                round,
+                share,
+                violated = violated.len(),
+                worst = violated.iter().map(|c| c.gap).fold(0.0, f64::min),
+                first = ?violated.first(),
+                row = ?violated.first().map(|c| trial.row(c, &Vector6::zeros())),
+                w = ?twist.as_slice(),
+                "entered"
+            );
             entered = touching;
             let deeper = violated.iter().map(|c| {
                 let row = self.freed(trial.row(c, &Vector6::zeros()));
