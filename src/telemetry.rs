@@ -1,5 +1,7 @@
 //! Logs: standard error, text or JSON, filtered.
 
+use std::io::IsTerminal;
+
 use tracing_subscriber::EnvFilter;
 
 use crate::config::{LogConfig, LogFormat};
@@ -37,7 +39,10 @@ pub fn filter(config: &LogConfig) -> Result<EnvFilter, TelemetryError> {
 /// # Errors
 /// The filter cannot be parsed, or logging was started before.
 pub fn start(config: &LogConfig) -> Result<(), TelemetryError> {
-    let builder = tracing_subscriber::fmt().with_env_filter(filter(config)?).with_writer(std::io::stderr);
+    let builder = tracing_subscriber::fmt()
+        .with_env_filter(filter(config)?)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(std::io::stderr);
     let started = match config.format {
         LogFormat::Text => builder.try_init(),
         LogFormat::Json => builder.json().try_init(),

@@ -127,7 +127,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
 
     pub(crate) fn handle(&mut self, event: Event<L>, now: Instant) {
         match event {
-            Event::Plan(incoming) => self.plan(incoming, now),
+            Event::Plan(incoming) => self.plan(incoming),
             Event::Control(incoming) => self.control(&incoming),
             Event::Status(incoming) => {
                 let status = self.status().encode();
@@ -144,7 +144,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
     }
 
-    fn plan(&mut self, incoming: Incoming<L>, now: Instant) {
+    fn plan(&mut self, incoming: Incoming<L>) {
         self.counters.requests += 1;
         let Incoming { link, client, header, payload } = incoming;
         let key = SessionKey { client, request: header.request };
@@ -155,7 +155,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
         let mut session =
             Session::new(link, header.request, id_of_words(header.listener), self.limits.outbox);
-        if let Err((input, error)) = self.admit(&mut session, key, &payload, now) {
+        if let Err((input, error)) = self.admit(&mut session, key, &payload) {
             session.end_with(input, &error);
         }
         self.sessions.insert(key, session);
@@ -167,7 +167,6 @@ impl<L: Link, P: Planning> Desk<L, P> {
         session: &mut Session<L>,
         key: SessionKey,
         payload: &AlignedBytes,
-        now: Instant,
     ) -> Result<(), (Input, WireError)> {
         let refuse = |code, message: String| (Input::Refuse, WireError::new(code, message));
         if self.closing != Closing::Open {
@@ -182,7 +181,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
             return Err(refuse(ErrorCode::UnknownHandle, "no assembly has this handle".to_owned()));
         }
         let deadline = wire.deadline_ns.and_then(clock::instant_of);
-        if deadline.is_some_and(|d| d <= now) {
+        if wire.deadline_ns.is_some_and(|d| d <= clock::monotonic_ns()) {
             return Err(expired());
         }
         let termination = Termination::new(deadline);

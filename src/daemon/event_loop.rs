@@ -1,9 +1,11 @@
 //! The port thread: waits, receives, copies, hands to the desk, sends. It never plans.
 
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
+use iceoryx2::port::notifier::Notifier;
+use sbdp_ipc::Transport;
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::RequestKind;
@@ -62,24 +64,33 @@ enum Inbound {
     Terminate,
 }
 
+/// Other threads hold the notifier weakly: one that is still busy when the daemon leaves must
+/// not keep the service's files alive.
+fn wake(notifier: &Weak<Notifier<Transport>>) {
+    if let Some(notifier) = notifier.upgrade() {
+        // A failed wake-up costs one tick, no more.
+        let _ = notifier.notify();
+    }
+}
+
 fn reporter(ports: &Ports, sender: Sender<Inbound>) -> Report {
-    let wake = Arc::clone(&ports.wake_self);
+    let notifier = Arc::downgrade(&ports.wake_self);
     let sender = Mutex::new(sender);
     Arc::new(move |event| {
         // A send fails only when the port thread has left; then nobody is interested.
         let _ = sender.lock().unwrap_or_else(PoisonError::into_inner).send(Inbound::Worker(event));
-        let _ = wake.notify();
+        wake(&notifier);
     })
 }
 
 fn watch_signals(ports: &Ports, sender: Sender<Inbound>) -> Result<(), DaemonError> {
     let system = |source| DaemonError::System { what: "watching signals", source };
-    let wake = Arc::clone(&ports.wake_self);
+    let notifier = Arc::downgrade(&ports.wake_self);
     let mut signals = Signals::new([SIGTERM, SIGINT]).map_err(system)?;
     let watch = move || {
         for _ in signals.forever() {
             let _ = sender.send(Inbound::Terminate);
-            let _ = wake.notify();
+            wake(&notifier);
         }
     };
     std::thread::Builder::new().name("sbdp-signals".to_owned()).spawn(watch).map_err(system)?;

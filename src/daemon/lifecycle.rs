@@ -216,6 +216,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let place = place(dir.path());
         let config = place.iceoryx2_config().unwrap();
+        endpoint::create_runtime_dir(&place.runtime_dir).unwrap();
         let services = place.root.join("services");
         fs::create_dir_all(&services).unwrap();
         fs::write(services.join("half.service"), b"").unwrap();
