@@ -50,7 +50,7 @@ pub enum Event<'s> {
     /// borrow of the stream, that is until the next event is asked for.
     Step(StepView<'s>),
     /// The end: everything else about the plan.
-    Done(Summary),
+    Done(Box<Summary>),
 }
 
 /// A plan as it comes in. Dropping it cancels the request.
@@ -92,7 +92,7 @@ struct Parts {
 enum Found {
     Progress(Progress),
     Step(usize),
-    Done(Summary),
+    Done(Box<Summary>),
 }
 
 impl Message {
@@ -296,7 +296,7 @@ impl PlanStream<'_> {
                 let copy = AlignedBytes::copy_of(message.bytes());
                 let summary = Summary::decode(copy.as_slice())?;
                 self.close();
-                Ok(Some(Found::Done(summary)))
+                Ok(Some(Found::Done(Box::new(summary))))
             }
             Some(ResponseKind::Error) => {
                 let copy = AlignedBytes::copy_of(message.bytes());
