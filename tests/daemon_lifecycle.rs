@@ -136,6 +136,47 @@ fn after_a_crash_and_a_restart_the_same_client_goes_on() {
 }
 
 #[test]
+fn a_stopped_client_freezes_nobody() {
+    let daemon = Daemon::start();
+    let observer = daemon.connect();
+    let mut stopped = daemon.client_process("lattice");
+    let _reader = wait_for_upload(&mut stopped);
+    wait_for_request(&observer);
+    let pid = rustix::process::Pid::from_child(&stopped);
+    rustix::process::kill_process(pid, Signal::STOP).unwrap();
+    let handle = observer.upload(&Boxes::two().assembly()).unwrap();
+    let (_, summary) = plan(&observer, handle, &PlanOptions::default());
+    assert_eq!(summary.status, PlanStatus::Complete);
+    stopped.kill().unwrap();
+    stopped.wait().unwrap();
+}
+
+#[test]
+fn a_daemon_starts_over_whatever_a_killed_one_left_damaged() {
+    for damage in [&b""[..], b"garbage"] {
+        let mut daemon = Daemon::start();
+        daemon.kill_and_restart_after(|root| damage_files(root, damage));
+        let client = daemon.connect();
+        let handle = client.upload(&Boxes::two().assembly()).unwrap();
+        let (_, summary) = plan(&client, handle, &PlanOptions::default());
+        assert_eq!(summary.status, PlanStatus::Complete);
+    }
+}
+
+/// Overwrites every file below a folder.
+fn damage_files(folder: &std::path::Path, content: &[u8]) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let entry = entry.unwrap();
+        if entry.file_type().unwrap().is_dir() {
+            damage_files(&entry.path(), content);
+        } else if entry.file_type().unwrap().is_file() {
+            let _ = std::fs::remove_file(entry.path());
+            std::fs::write(entry.path(), content).unwrap();
+        }
+    }
+}
+
+#[test]
 fn a_daemon_that_dies_while_planning_is_a_clear_error() {
     let mut daemon = Daemon::start();
     let client = daemon.connect();

@@ -16,7 +16,7 @@ use signal_hook::iterator::Signals;
 
 use super::DaemonError;
 use super::desk::{Desk, Event, Incoming};
-use super::lifecycle::{Lease, Place, raise_file_limit};
+use super::lifecycle::{Lease, Place, raise_file_limit, warn_of_small_shared_memory};
 use super::ports::{ActiveLink, Ports};
 use super::workers::{AdmitJob, Planning, Queues, Report, WorkerEvent, start};
 use crate::config::{Config, seconds};
@@ -30,6 +30,7 @@ const RECEIVE_AT_ONCE: usize = 64;
 /// The place is taken, or shared memory cannot be set up.
 pub fn run<P: Planning>(config: &Config, service: Arc<P>) -> Result<(), DaemonError> {
     raise_file_limit();
+    warn_of_small_shared_memory();
     let place = Place::of(&config.endpoint)?;
     let iceoryx2 = place.iceoryx2_config()?;
     let lease = Lease::take(place.clone(), &iceoryx2)?;

@@ -168,10 +168,12 @@ fn wipe_if_unused(place: &Place, config: &IoxConfig) -> Result<(), LifecycleErro
     Ok(())
 }
 
+/// We hold the lock and `daemon.json` is gone, so that nobody connects now: a node that cannot
+/// be made out is a damaged leftover, not one that is just being created.
 fn has_live_node(config: &IoxConfig) -> bool {
     let mut live = false;
     let listed = Node::<Transport>::list(config, |node| {
-        live |= !matches!(node, NodeState::Dead(_));
+        live |= matches!(node, NodeState::Alive(_));
         CallbackProgression::Continue
     });
     if let Err(error) = listed {
@@ -187,6 +189,22 @@ pub(crate) fn raise_file_limit() {
     let raised = Rlimit { current: limit.maximum, maximum: limit.maximum };
     if let Err(error) = setrlimit(Resource::Nofile, raised) {
         tracing::debug!(%error, "the limit of open files stays as it is");
+    }
+}
+
+/// Less free shared memory than this is worth a warning.
+const SMALL_SHARED_MEMORY: u64 = 256 << 20;
+
+/// Shared memory that runs full is a SIGBUS, not an error: say so before it happens.
+pub(crate) fn warn_of_small_shared_memory() {
+    let Ok(stat) = rustix::fs::statvfs("/dev/shm") else { return };
+    let free = stat.f_bavail.saturating_mul(stat.f_frsize);
+    if stat.f_blocks > 0 && free < SMALL_SHARED_MEMORY {
+        tracing::warn!(
+            free_mb = free >> 20,
+            "/dev/shm is small: many clients or large uploads may end the daemon; enlarge it \
+             (`mount -o remount,size=…`, `docker run --shm-size`)"
+        );
     }
 }
 

@@ -75,8 +75,14 @@ impl Daemon {
 
     /// SIGKILL, and a new daemon at the same place.
     pub fn kill_and_restart(&mut self) {
+        self.kill_and_restart_after(|_| {});
+    }
+
+    /// The same, after something was done to the folder of iceoryx2's files.
+    pub fn kill_and_restart_after(&mut self, between: impl FnOnce(&Path)) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
+        between(&self.folder.path().join("iox"));
         self.child = spawn_daemon(self.folder.path());
         self.wait_until_ready();
     }
