@@ -211,7 +211,7 @@ pub fn plan(client: &Client, handle: Handle, options: &PlanOptions) -> (Vec<u32>
             Some(Event::Progress(_)) => {}
             Some(Event::Done(summary)) => {
                 assert_eq!(summary.steps as usize, parts.len());
-                return (parts, *summary);
+                return (parts, summary);
             }
             None => panic!("a stream ends with `Done`"),
         }

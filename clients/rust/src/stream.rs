@@ -42,6 +42,7 @@ pub struct Progress {
 }
 
 /// What a stream yields.
+#[allow(clippy::large_enum_variant, reason = "there is one summary in a stream")]
 #[derive(Debug)]
 pub enum Event<'s> {
     /// Something moved on.
@@ -50,7 +51,7 @@ pub enum Event<'s> {
     /// borrow of the stream, that is until the next event is asked for.
     Step(StepView<'s>),
     /// The end: everything else about the plan.
-    Done(Box<Summary>),
+    Done(Summary),
 }
 
 /// A plan as it comes in. Dropping it cancels the request.
@@ -89,10 +90,11 @@ struct Parts {
 }
 
 /// What `advance` found; the borrow of the step is made by the caller.
+#[allow(clippy::large_enum_variant, reason = "there is one summary in a stream")]
 enum Found {
     Progress(Progress),
     Step(usize),
-    Done(Box<Summary>),
+    Done(Summary),
 }
 
 impl Message {
@@ -296,7 +298,7 @@ impl PlanStream<'_> {
                 let copy = AlignedBytes::copy_of(message.bytes());
                 let summary = Summary::decode(copy.as_slice())?;
                 self.close();
-                Ok(Some(Found::Done(Box::new(summary))))
+                Ok(Some(Found::Done(summary)))
             }
             Some(ResponseKind::Error) => {
                 let copy = AlignedBytes::copy_of(message.bytes());
