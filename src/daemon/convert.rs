@@ -182,6 +182,7 @@ pub(crate) fn service_error(error: &ServiceError) -> WireError {
         ServiceError::UnknownAssembly => ErrorCode::UnknownHandle,
         ServiceError::NoSuchPart { .. } => ErrorCode::NoSuchPart,
         ServiceError::Geometry(_) => ErrorCode::Geometry,
+        ServiceError::Threads(_) => ErrorCode::Failed,
     };
     WireError::new(code, error.to_string())
 }

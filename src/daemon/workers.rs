@@ -10,9 +10,9 @@ use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::plan::Step;
 
+use super::convert;
 use super::request_queue::{Rejected, RequestQueue};
-use super::{convert, preload};
-use crate::geometry::SourceAssembly;
+use crate::geometry::{SourceAssembly, load_assembly};
 use crate::plan::{Plan, PlanStep};
 use crate::search::{PlanRequest, PlanSink, Progress, Termination};
 use crate::service::{Admission, AssemblyId, Service, ServiceError};
@@ -241,7 +241,7 @@ fn admit<P: Planning>(service: &P, job: AdmitJob, report: &Report) {
         }
         AdmitJob::Preload(path) => {
             let loaded = contained(|| {
-                preload::load(&path).map_err(ServiceError::from).and_then(|source| {
+                load_assembly(&path).map_err(ServiceError::from).and_then(|source| {
                     let admission = service.admit(&source)?;
                     Ok((source.name, admission.id))
                 })

@@ -1,0 +1,168 @@
+//! Triangles without area, and edges that meet a vertex between their ends.
+
+use nalgebra::Point3;
+
+use super::incidence::sides_by_edge;
+use super::{Draft, Findings};
+use crate::geometry::mesh::directed_edges;
+
+/// Slivers can make new slivers of their neighbours; after so many rounds the rest stays.
+const MAX_ROUNDS: usize = 16;
+
+/// Drops triangles with a repeated vertex or without height. A sliver that belongs to the
+/// surface (a vertex between the ends of a longer edge) hands that vertex to the triangle
+/// across the long edge, so that the surface stays closed.
+pub(super) fn drop_degenerate(draft: &mut Draft, findings: &mut Findings) {
+    let before = draft.triangles.len();
+    draft.triangles.retain(|[a, b, c]| a != b && b != c && c != a);
+    let mut dropped = before - draft.triangles.len();
+    for _ in 0..MAX_ROUNDS {
+        let found = remove_slivers(draft);
+        dropped += found;
+        if found == 0 {
+            break;
+        }
+    }
+    findings.add(dropped, "degenerate triangle", "dropped");
+}
+
+/// A triangle whose middle vertex lies on its longest edge.
+struct Sliver {
+    triangle: u32,
+    ends: [u32; 2],
+    middle: u32,
+}
+
+/// One round; neighbours of a sliver that was treated wait for the next.
+fn remove_slivers(draft: &mut Draft) -> usize {
+    let slivers: Vec<Sliver> =
+        (0u32..).zip(&draft.triangles).filter_map(|(i, t)| as_sliver(draft, i, t)).collect();
+    if slivers.is_empty() {
+        return 0;
+    }
+    let sides = sides_by_edge(&draft.triangles);
+    let others = |a: u32, b: u32| sides.get(&[a.min(b), a.max(b)]).map_or(0, |s| s.len() - 1);
+    let mut removed = vec![false; draft.triangles.len()];
+    let mut touched = removed.clone();
+    let mut added = Vec::new();
+    let mut count = 0;
+    for Sliver { triangle, ends: [p, q], middle } in slivers {
+        if touched[triangle as usize] {
+            continue;
+        }
+        let belongs = others(p, q) == 1 && others(p, middle) % 2 == 1 && others(middle, q) % 2 == 1;
+        let across = sides.get(&[p.min(q), p.max(q)]).and_then(|s| s.iter().find(|s| s.triangle != triangle));
+        if let (true, Some(across)) = (belongs, across) {
+            let n = across.triangle as usize;
+            if touched[n] {
+                continue;
+            }
+            (touched[n], removed[n]) = (true, true);
+            added.extend(split(&draft.triangles[n], [p, q], middle));
+        }
+        (touched[triangle as usize], removed[triangle as usize]) = (true, true);
+        count += 1;
+    }
+    let mut index = 0;
+    draft.triangles.retain(|_| {
+        index += 1;
+        !removed[index - 1]
+    });
+    draft.triangles.extend(added);
+    count
+}
+
+fn as_sliver(draft: &Draft, triangle: u32, t: &[u32; 3]) -> Option<Sliver> {
+    let length = |[a, b]: [u32; 2]| (draft.vertices[a as usize] - draft.vertices[b as usize]).norm();
+    let edges = directed_edges(t);
+    let longest = (0..3).max_by(|&a, &b| length(edges[a]).total_cmp(&length(edges[b])))?;
+    let (ends, middle) = (edges[longest], t[(longest + 2) % 3]);
+    let [p, q] = ends.map(|v| draft.vertices[v as usize]);
+    let on_it = distance_to_line(&draft.vertices[middle as usize], &p, &q) <= draft.tolerance;
+    on_it.then_some(Sliver { triangle, ends, middle })
+}
+
+fn distance_to_line(point: &Point3<f64>, p: &Point3<f64>, q: &Point3<f64>) -> f64 {
+    let along = q - p;
+    let length = along.norm();
+    if length == 0.0 { (point - p).norm() } else { along.cross(&(point - p)).norm() / length }
+}
+
+/// The two halves of a triangle cut from `middle`, a point of its edge `ends`, to the far
+/// corner; none where that corner is the middle itself (two slivers back to back).
+fn split(t: &[u32; 3], ends: [u32; 2], middle: u32) -> Vec<[u32; 3]> {
+    let Some(&apex) = t.iter().find(|v| !ends.contains(v)) else { return Vec::new() };
+    if apex == middle {
+        return Vec::new();
+    }
+    let with = |from: u32| t.map(|v| if v == from { middle } else { v });
+    vec![with(ends[0]), with(ends[1])]
+}
+
+/// Where the border of an open surface runs along one long edge on one side and several
+/// short ones on the other, splits the long one at the vertices between.
+pub(super) fn split_at_junctions(draft: &mut Draft, tolerance: f64, findings: &mut Findings) {
+    let tolerance = tolerance.max(draft.tolerance);
+    let before = super::open_edges(&draft.triangles);
+    let original = draft.triangles.clone();
+    let mut splits = 0;
+    for _ in 0..MAX_ROUNDS {
+        let found = split_round(draft, tolerance);
+        splits += found;
+        if found == 0 {
+            break;
+        }
+    }
+    if splits > 0 && super::open_edges(&draft.triangles) >= before {
+        draft.triangles = original;
+        return;
+    }
+    findings.add(splits, "edge", "split where a vertex of a neighbour lies on it");
+}
+
+fn split_round(draft: &mut Draft, tolerance: f64) -> usize {
+    let mut border: Vec<([u32; 2], u32)> = sides_by_edge(&draft.triangles)
+        .into_iter()
+        .filter(|(_, sides)| sides.len() == 1)
+        .map(|(edge, sides)| (edge, sides[0].triangle))
+        .collect();
+    border.sort_unstable();
+    let mut candidates: Vec<u32> = border.iter().flat_map(|(edge, _)| *edge).collect();
+    let x = |v: u32| draft.vertices[v as usize].x;
+    candidates.sort_by(|&a, &b| x(a).total_cmp(&x(b)).then(a.cmp(&b)));
+    candidates.dedup();
+    let mut touched = vec![false; draft.triangles.len()];
+    let mut count = 0;
+    for (ends, triangle) in border {
+        if std::mem::replace(&mut touched[triangle as usize], true) {
+            continue;
+        }
+        if let Some(middle) = vertex_between(draft, &candidates, ends, tolerance) {
+            if let [a, b] = split(&draft.triangles[triangle as usize], ends, middle)[..] {
+                draft.triangles[triangle as usize] = a;
+                draft.triangles.push(b);
+                count += 1;
+            }
+        } else {
+            touched[triangle as usize] = false;
+        }
+    }
+    count
+}
+
+/// The first border vertex strictly between the ends of an edge, and on it.
+fn vertex_between(draft: &Draft, by_x: &[u32], ends: [u32; 2], tolerance: f64) -> Option<u32> {
+    let [p, q] = ends.map(|v| draft.vertices[v as usize]);
+    let start = by_x.partition_point(|&v| draft.vertices[v as usize].x < p.x.min(q.x) - tolerance);
+    let length = (q - p).norm();
+    by_x[start..]
+        .iter()
+        .copied()
+        .take_while(|&v| draft.vertices[v as usize].x <= p.x.max(q.x) + tolerance)
+        .filter(|v| !ends.contains(v))
+        .find(|&v| {
+            let m = draft.vertices[v as usize];
+            let along = (m - p).dot(&(q - p)) / length;
+            along > tolerance && along < length - tolerance && distance_to_line(&m, &p, &q) <= tolerance
+        })
+}

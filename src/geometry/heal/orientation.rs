@@ -1,0 +1,105 @@
+//! Orientation: all triangles of a surface counter-clockwise from the same side.
+
+use nalgebra::{Point3, Vector3};
+
+use super::incidence::{Side, sides_by_edge};
+use super::{Draft, Findings};
+use crate::geometry::mesh;
+
+/// Triangles made consistent.
+pub(super) struct Oriented {
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Some surface has one side only (a Möbius strip): no orientation is consistent.
+    pub(super) one_sided: bool,
+}
+
+/// Floods each surface over the edges where exactly two triangles meet and turns the minority
+/// of its triangles.
+pub(super) fn orient(draft: &Draft, findings: &mut Findings) -> Oriented {
+    let neighbours = neighbours(&draft.triangles);
+    let mut flood = Flood { turned: vec![None; draft.triangles.len()], one_sided: false };
+    let mut triangles = draft.triangles.clone();
+    let mut count = 0;
+    for seed in 0..triangles.len() {
+        if flood.turned[seed].is_some() {
+            continue;
+        }
+        let surface = flood.run(seed, &neighbours);
+        let turned = surface.iter().filter(|&&t| flood.turned[t] == Some(true)).count();
+        let minority = 2 * turned <= surface.len();
+        for &t in surface.iter().filter(|&&t| flood.turned[t] == Some(minority)) {
+            triangles[t].swap(1, 2);
+            count += 1;
+        }
+    }
+    findings.add(count, "triangle", "turned to agree with their neighbours");
+    Oriented { triangles, one_sided: flood.one_sided }
+}
+
+/// For each triangle its neighbours over manifold edges, and whether they agree with it.
+fn neighbours(triangles: &[[u32; 3]]) -> Vec<Vec<(u32, bool)>> {
+    let mut neighbours = vec![Vec::with_capacity(3); triangles.len()];
+    let mut pairs: Vec<[Side; 2]> =
+        sides_by_edge(triangles).into_values().filter_map(|s| <[Side; 2]>::try_from(s).ok()).collect();
+    pairs.sort_unstable_by_key(|[a, b]| (a.triangle, b.triangle));
+    for [a, b] in pairs {
+        let agree = a.upwards != b.upwards;
+        neighbours[a.triangle as usize].push((b.triangle, agree));
+        neighbours[b.triangle as usize].push((a.triangle, agree));
+    }
+    neighbours
+}
+
+struct Flood {
+    turned: Vec<Option<bool>>,
+    one_sided: bool,
+}
+
+impl Flood {
+    /// The surface of a seed, its triangles marked by whether they must turn to agree with it.
+    fn run(&mut self, seed: usize, neighbours: &[Vec<(u32, bool)>]) -> Vec<usize> {
+        self.turned[seed] = Some(false);
+        let mut surface = vec![seed];
+        let mut next = 0;
+        while let Some(&t) = surface.get(next) {
+            next += 1;
+            let here = self.turned[t] == Some(true);
+            for &(other, agree) in &neighbours[t] {
+                let wanted = here == agree;
+                let other = other as usize;
+                match self.turned[other] {
+                    None => {
+                        self.turned[other] = Some(wanted);
+                        surface.push(other);
+                    }
+                    Some(is) => self.one_sided |= is != wanted,
+                }
+            }
+        }
+        surface
+    }
+}
+
+/// Turns an open part so that its winding number is positive inside in sum. Patches are
+/// turned together: one alone may be flat and has no outside of its own.
+pub(super) fn face_outward(draft: &mut Draft) {
+    if mesh::signed_volume(&draft.vertices, draft.triangles.iter().copied()) < 0.0 {
+        draft.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
+}
+
+/// How often a closed surface winds around a point (van Oosterom and Strackee 1983).
+pub(super) fn winding_number(
+    vertices: &[Point3<f64>],
+    triangles: impl Iterator<Item = [u32; 3]>,
+    at: &Point3<f64>,
+) -> f64 {
+    let solid_angle = |t: [u32; 3]| {
+        let [a, b, c]: [Vector3<f64>; 3] = t.map(|v| vertices[v as usize] - at);
+        let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
+        let det = a.dot(&b.cross(&c));
+        let div = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+        2.0 * det.atan2(div)
+    };
+    triangles.map(solid_angle).sum::<f64>() / (4.0 * std::f64::consts::PI)
+}
