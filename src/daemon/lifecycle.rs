@@ -74,10 +74,11 @@ pub fn check_place(config: &EndpointConfig) -> Result<(), LifecycleError> {
     Place::of(config)?.iceoryx2_config().map(|_| ())
 }
 
-/// The held lock. Dropping it removes `daemon.json`.
+/// The held lock. Dropping it removes `daemon.json`, and what iceoryx2 keeps beyond its ports.
 #[derive(Debug)]
 pub(crate) struct Lease {
     place: Place,
+    config: IoxConfig,
     _lock: File,
 }
 
@@ -88,7 +89,7 @@ impl Lease {
         let lock = take_lock(&place.runtime_dir)?;
         remove_if_there(&place.runtime_dir.join(DAEMON_FILE))?;
         wipe_if_unused(&place, config)?;
-        Ok(Self { place, _lock: lock })
+        Ok(Self { place, config: config.clone(), _lock: lock })
     }
 
     /// Tells clients where we are; to be called when the ports are open.
@@ -101,8 +102,10 @@ impl Lease {
 
 impl Drop for Lease {
     fn drop(&mut self) {
-        if let Err(error) = remove_if_there(&self.place.runtime_dir.join(DAEMON_FILE)) {
-            tracing::warn!(%error, "daemon.json stays behind");
+        let removed = remove_if_there(&self.place.runtime_dir.join(DAEMON_FILE))
+            .and_then(|()| wipe_if_unused(&self.place, &self.config));
+        if let Err(error) = removed {
+            tracing::warn!(%error, "something stays behind");
         }
     }
 }
