@@ -236,7 +236,7 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
 fn admit<P: Planning>(service: &P, job: AdmitJob, report: &Report) {
     match job {
         AdmitJob::Upload { number, bytes } => {
-            let result = contained(|| admit_upload(service, &bytes)).unwrap_or_else(Err);
+            let result = contained(|| admit_upload(service, bytes)).unwrap_or_else(Err);
             report(WorkerEvent::Admitted { number, result });
         }
         AdmitJob::Preload(path) => {
@@ -256,8 +256,10 @@ fn admit<P: Planning>(service: &P, job: AdmitJob, report: &Report) {
     }
 }
 
-fn admit_upload<P: Planning>(service: &P, bytes: &AlignedBytes) -> Result<AssemblyId, WireError> {
-    let source = convert::source_assembly(bytes)?;
+fn admit_upload<P: Planning>(service: &P, bytes: AlignedBytes) -> Result<AssemblyId, WireError> {
+    let source = convert::source_assembly(&bytes)?;
+    // Healing takes memory of its own: an upload need not be there three times.
+    drop(bytes);
     let admission = service.admit(&source).map_err(|e| convert::service_error(&e))?;
     Ok(admission.id)
 }
