@@ -97,13 +97,9 @@ fn face_axes(outline: &[Point]) -> [usize; 3] {
 
 /// Newell's normal, of twice the area.
 fn normal(outline: &[Point]) -> Point {
-    let mut n = [0.0; 3];
-    for (i, p) in outline.iter().enumerate() {
-        let q = outline[(i + 1) % outline.len()];
-        for k in 0..3 {
-            let (l, m) = ((k + 1) % 3, (k + 2) % 3);
-            n[k] += (p[l] - q[l]) * (p[m] + q[m]);
-        }
-    }
-    n
+    let edge = |i: usize| (outline[i], outline[(i + 1) % outline.len()]);
+    std::array::from_fn(|k| {
+        let (l, m) = ((k + 1) % 3, (k + 2) % 3);
+        (0..outline.len()).map(edge).map(|(p, q)| (p[l] - q[l]) * (p[m] + q[m])).sum()
+    })
 }
