@@ -6,6 +6,7 @@
 //! happens in the *planning frame*, the input frame scaled by a power of two so that the
 //! assembly's longest side falls in (5, 10].
 
+mod content_hash;
 mod error;
 mod heal;
 mod load;
@@ -13,6 +14,7 @@ mod mesh;
 mod pose;
 mod source;
 
+pub use content_hash::content_hash;
 pub use error::GeometryError;
 pub use heal::{Healed, heal};
 pub use load::{load_assembly, natural_order};

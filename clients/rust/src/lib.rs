@@ -1,1 +1,42 @@
-//! Client of the sbdp daemon.
+//! Client of the sbdp daemon: hands meshes over and reads plans in shared memory.
+//!
+//! ```no_run
+//! use sbdp_client::{Assembly, Client, Event, PlanOptions};
+//! # fn main() -> Result<(), sbdp_client::ClientError> {
+//! # let assembly = Assembly::default();
+//! let client = Client::connect()?;
+//! let handle = client.upload(&assembly)?;
+//! let mut stream = client.plan(handle, &PlanOptions::default())?;
+//! while let Some(event) = stream.next_event()? {
+//!     match event {
+//!         Event::Progress(progress) => eprintln!("{progress:?}"),
+//!         Event::Step(step) => println!("part {} along {} waypoints", step.part, step.path.len()),
+//!         Event::Done(summary) => println!("{}", summary.status.name()),
+//!     }
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Everything blocks, with timeouts; every [`ClientError`] says what to do.
+
+mod client;
+mod content_hash;
+mod error;
+mod exchange;
+mod options;
+mod stream;
+mod summary;
+mod upload;
+
+pub use client::Client;
+pub use content_hash::content_hash;
+pub use error::ClientError;
+pub use options::{ActionSet, ConnectOptions, Engine, Handle, PlanOptions, Planner};
+pub use sbdp_ipc::error::ErrorCode;
+pub use sbdp_ipc::geometry::{Assembly, Part, Vertices};
+pub use sbdp_ipc::plan::{StepView as Step, Waypoint};
+pub use sbdp_ipc::status::Status;
+pub use sbdp_ipc::summary::Stats;
+pub use stream::{Event, PlanStream, Progress, Stage};
+pub use summary::{Blocked, Overlap, PlanStatus, Summary, Warning};

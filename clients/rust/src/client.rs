@@ -1,0 +1,149 @@
+//! A connection to the daemon.
+
+use std::cell::{Cell, RefCell};
+use std::path::PathBuf;
+
+use iceoryx2::node::Node;
+use iceoryx2::port::listener::{Listener, ListenerCreateError};
+use iceoryx2::port::notifier::Notifier;
+use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
+use iceoryx2::port::{BackpressureAction, BackpressureInfo};
+use iceoryx2::service::port_factory::client::ClientCreateError;
+use sbdp_ipc::endpoint::{Endpoint, default_runtime_dir};
+use sbdp_ipc::headers::RequestKind;
+use sbdp_ipc::layout::{self, WAKE_CLIENT_SERVICE, WAKE_SERVER_SERVICE};
+use sbdp_ipc::progress::ProgressSample;
+use sbdp_ipc::services::{self, ClientPort, ExchangeService, SetupError};
+use sbdp_ipc::status::Status;
+use sbdp_ipc::{Transport, bytes};
+
+use crate::error::ClientError;
+use crate::options::ConnectOptions;
+
+/// A connection to the daemon. It may move between threads but is used by one at a time.
+#[derive(Debug)]
+pub struct Client {
+    pub(crate) options: ConnectOptions,
+    pub(crate) runtime_dir: PathBuf,
+    endpoint: RefCell<Endpoint>,
+    pub(crate) planning: Cell<bool>,
+    next_request: Cell<u64>,
+    pub(crate) plan_port: ClientPort,
+    pub(crate) ask_port: ClientPort,
+    pub(crate) geometry: ExchangeService,
+    pub(crate) progress: Subscriber<Transport, ProgressSample, ()>,
+    pub(crate) listener: Listener<Transport>,
+    pub(crate) notifier: Notifier<Transport>,
+    pub(crate) node: Node<Transport>,
+}
+
+impl Client {
+    /// Connects to the daemon of the default runtime folder.
+    ///
+    /// # Errors
+    /// No daemon runs, it speaks another version, or it serves too many clients.
+    pub fn connect() -> Result<Self, ClientError> {
+        Self::connect_with(ConnectOptions::default())
+    }
+
+    /// Connects as told.
+    ///
+    /// # Errors
+    /// No daemon runs, it speaks another version, or it serves too many clients.
+    pub fn connect_with(options: ConnectOptions) -> Result<Self, ClientError> {
+        let runtime_dir = options.runtime_dir.clone().unwrap_or_else(default_runtime_dir);
+        let endpoint = Endpoint::find(&runtime_dir)?;
+        let config = layout::iceoryx2_config(&endpoint.prefix, &endpoint.root)?;
+        let node = services::node(&config)?;
+
+        let wake_client = services::wake(&node, WAKE_CLIENT_SERVICE)?;
+        let wake_server = services::wake(&node, WAKE_SERVER_SERVICE)?;
+        let plan = services::plan(&node)?.open().map_err(SetupError::at("opening `plan`"))?;
+        let geometry = services::geometry(&node)?.open().map_err(SetupError::at("opening `geometry`"))?;
+        let progress = services::progress(&node)?.open().map_err(SetupError::at("opening `progress`"))?;
+        let wake_client = wake_client.open().map_err(SetupError::at("opening `wake/client`"))?;
+        let wake_server = wake_server.open().map_err(SetupError::at("opening `wake/server`"))?;
+
+        Ok(Self {
+            plan_port: client_port(&plan, layout::PLAN_REQUEST)?,
+            ask_port: client_port(&geometry, 64)?,
+            geometry,
+            progress: progress.subscriber_builder().create().map_err(|e| match e {
+                SubscriberCreateError::ExceedsMaxSupportedSubscribers => ClientError::TooManyClients,
+                e => SetupError::at("subscribing to progress")(e).into(),
+            })?,
+            listener: wake_client.listener_builder().create().map_err(|e| match e {
+                ListenerCreateError::ExceedsMaxSupportedListeners => ClientError::TooManyClients,
+                e => SetupError::at("creating the listener")(e).into(),
+            })?,
+            notifier: wake_server
+                .notifier_builder()
+                .create()
+                .map_err(SetupError::at("creating the notifier"))?,
+            options,
+            runtime_dir,
+            endpoint: RefCell::new(endpoint),
+            planning: Cell::new(false),
+            next_request: Cell::new(1),
+            node,
+        })
+    }
+
+    /// How the daemon is.
+    ///
+    /// # Errors
+    /// The daemon is gone or gives no answer.
+    pub fn status(&self) -> Result<Status, ClientError> {
+        let header = self.header(RequestKind::Status, self.new_request());
+        let pending = self.send("status", &self.plan_port, header, bytes::ALIGNMENT, |_| {})?;
+        let answer = self.answer("status", &pending, self.options.timeout)?;
+        Ok(Status::decode(answer.as_slice())?)
+    }
+
+    /// The daemon's process id.
+    #[must_use]
+    pub fn pid(&self) -> u32 {
+        self.endpoint.borrow().pid
+    }
+
+    pub(crate) fn new_request(&self) -> u64 {
+        self.next_request.replace(self.next_request.get() + 1)
+    }
+
+    /// Fails if the daemon that holds our request is gone.
+    pub(crate) fn check_alive(&self) -> Result<(), ClientError> {
+        if self.endpoint.borrow().is_alive() {
+            return Ok(());
+        }
+        // Let iceoryx2 see the death as well, so that a new daemon finds a clean house.
+        let _ = self.node.try_cleanup_dead_nodes();
+        Err(ClientError::DaemonDied { pid: self.pid() })
+    }
+
+    /// Before a new request: follows a daemon that was restarted at the same place.
+    pub(crate) fn refresh_endpoint(&self) -> Result<(), ClientError> {
+        if self.endpoint.borrow().is_alive() {
+            return Ok(());
+        }
+        let found = Endpoint::find(&self.runtime_dir)?;
+        let mut known = self.endpoint.borrow_mut();
+        if (&found.prefix, &found.root) != (&known.prefix, &known.root) {
+            return Err(ClientError::DaemonDied { pid: known.pid });
+        }
+        *known = found;
+        Ok(())
+    }
+}
+
+/// A client port of a fixed segment that never waits for room at the daemon by itself.
+pub(crate) fn client_port(service: &ExchangeService, longest: usize) -> Result<ClientPort, ClientError> {
+    service
+        .client_builder()
+        .initial_max_slice_len(longest)
+        .set_backpressure_handler(|_: &BackpressureInfo| BackpressureAction::DiscardDataAndFail)
+        .create()
+        .map_err(|e| match e {
+            ClientCreateError::ExceedsMaxSupportedClients => ClientError::TooManyClients,
+            e => SetupError::at("creating the client port")(e).into(),
+        })
+}

@@ -1,0 +1,101 @@
+//! What can go wrong, and what to do then.
+
+use std::time::Duration;
+
+use sbdp_ipc::bytes::Malformed;
+use sbdp_ipc::endpoint::EndpointError;
+use sbdp_ipc::error::{ErrorCode, WireError};
+use sbdp_ipc::layout::{LayoutError, MAX_CLIENTS};
+use sbdp_ipc::services::SetupError;
+
+/// Why the client could not do what was asked.
+#[derive(Debug, thiserror::Error)]
+pub enum ClientError {
+    /// There is no usable daemon: none runs, or another version, or its folder is not safe.
+    #[error(transparent)]
+    Endpoint(#[from] EndpointError),
+    /// `daemon.json` names a prefix or root that cannot be used.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    /// The daemon serves as many clients as it can.
+    #[error("the daemon serves {MAX_CLIENTS} clients already: try again when one has left")]
+    TooManyClients,
+    /// Shared memory could not be set up.
+    #[error("cannot reach the daemon: {0}; if this persists, restart `sbdpd`")]
+    Setup(#[from] SetupError),
+    /// No answer in time.
+    #[error("the daemon gave no answer to `{what}` within {after:?}: it is overloaded or stopped")]
+    Timeout {
+        /// What was asked.
+        what: &'static str,
+        /// How long was waited.
+        after: Duration,
+    },
+    /// The daemon's process ended before it answered.
+    #[error(
+        "the daemon (pid {pid}) went away before it had answered: restart `sbdpd`, upload again, ask again"
+    )]
+    DaemonDied {
+        /// Its process id.
+        pid: u32,
+    },
+    /// A plan is being received on this client already.
+    #[error("this client receives a plan already: finish or drop that stream, or connect another client")]
+    StreamOpen,
+    /// The daemon answered with an error.
+    #[error("{}{}", .0.message, hint(.0.code))]
+    Refused(WireError),
+    /// `/dev/shm` is too small for what is to be handed over.
+    #[error(
+        "{needed} bytes are to be handed over, but /dev/shm has only {free} free: enlarge it \
+         (`mount -o remount,size=…`, `docker run --shm-size`)"
+    )]
+    SharedMemory {
+        /// Bytes needed.
+        needed: u64,
+        /// Bytes free.
+        free: u64,
+    },
+    /// The request is too long for the wire.
+    #[error("the request names too many parts for one message ({bytes} bytes)")]
+    RequestTooLong {
+        /// Its length.
+        bytes: usize,
+    },
+    /// The daemon's answer cannot be read.
+    #[error("the daemon's answer cannot be read ({0}): use matching versions")]
+    Malformed(#[from] Malformed),
+    /// The daemon's answer does not fit the question, or a chunk is missing.
+    #[error("the daemon's answer is wrong: {0}; please report this")]
+    Protocol(String),
+}
+
+impl ClientError {
+    /// The daemon's error code, if it answered with an error.
+    #[must_use]
+    pub fn code(&self) -> Option<ErrorCode> {
+        match self {
+            Self::Refused(error) => Some(error.code),
+            _ => None,
+        }
+    }
+
+    /// Whether there is no daemon to talk to (any more).
+    #[must_use]
+    pub fn is_no_daemon(&self) -> bool {
+        matches!(
+            self,
+            Self::Endpoint(EndpointError::NoDaemon(_) | EndpointError::Gone { .. }) | Self::DaemonDied { .. }
+        )
+    }
+}
+
+fn hint(code: ErrorCode) -> &'static str {
+    match code {
+        ErrorCode::UnknownHandle => " (call `upload` again, then ask again)",
+        ErrorCode::Busy => " (try again later, or raise `queue` in the daemon's configuration)",
+        ErrorCode::Failed => " (the daemon's log says more)",
+        ErrorCode::ShuttingDown => " (start `sbdpd` again)",
+        _ => "",
+    }
+}

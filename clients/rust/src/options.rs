@@ -1,0 +1,129 @@
+//! What a caller chooses.
+
+use std::fmt;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use sbdp_ipc::clock;
+use sbdp_ipc::plan::PlanRequest;
+
+/// The name of an assembly: the hash of its content.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Handle(pub [u8; 32]);
+
+impl fmt::Display for Handle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.iter().try_for_each(|byte| write!(f, "{byte:02x}"))
+    }
+}
+
+/// How to find and treat the daemon.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ConnectOptions {
+    /// The daemon's runtime folder; by default `$SBDP_RUNTIME_DIR`, else
+    /// `$XDG_RUNTIME_DIR/sbdp`, else `/tmp/sbdp-UID`.
+    pub runtime_dir: Option<PathBuf>,
+    /// How long the daemon may take for an answer that needs no planning.
+    pub timeout: Duration,
+    /// How long the daemon may take to check and heal an upload.
+    pub upload_timeout: Duration,
+}
+
+impl Default for ConnectOptions {
+    fn default() -> Self {
+        Self { runtime_dir: None, timeout: Duration::from_secs(10), upload_timeout: Duration::from_secs(300) }
+    }
+}
+
+/// Which search runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Planner {
+    /// State-based planning guided by directional blocking graphs.
+    #[default]
+    SbdpStar,
+    /// State-based planning without blocking graphs.
+    Sbdp,
+    /// Breadth-first search per part, translations.
+    PdpT,
+    /// Breadth-first search per part, translations and rotations.
+    PdpR,
+    /// `PdpT`, then `PdpR` if that failed.
+    PdpStar,
+}
+
+/// Which transition function moves the parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Engine {
+    /// Contact-constrained sliding without inertia.
+    #[default]
+    Sliding,
+    /// The paper's penalty-based simulation.
+    Penalty,
+}
+
+/// Which actions the search may use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ActionSet {
+    /// The paper's.
+    Paper,
+    /// The paper's and pulling while turning.
+    #[default]
+    Extended,
+}
+
+/// What to plan. Part numbers are places in the uploaded assembly's list of parts.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct PlanOptions {
+    /// Which search.
+    pub planner: Planner,
+    /// Which transition function.
+    pub engine: Engine,
+    /// Which actions.
+    pub actions: ActionSet,
+    /// Time from now until the daemon must answer with what it has.
+    pub timeout: Option<Duration>,
+    /// Simulations after which to give up.
+    pub max_simulations: Option<u64>,
+    /// Threads for this request; 0 leaves it to the daemon.
+    pub threads: u32,
+    /// Parts that may not move.
+    pub fixed: Vec<u32>,
+    /// Parts that are gone already.
+    pub removed: Vec<u32>,
+    /// Parts that must come out; `None` for all.
+    pub targets: Option<Vec<u32>>,
+    /// Neither read nor write anything remembered.
+    pub no_cache: bool,
+}
+
+impl PlanOptions {
+    pub(crate) fn to_wire(&self, handle: Handle) -> PlanRequest {
+        PlanRequest {
+            handle: handle.0,
+            planner: self.planner as u32,
+            engine: self.engine as u32,
+            actions: self.actions as u32,
+            no_cache: self.no_cache,
+            threads: self.threads,
+            deadline_ns: self.timeout.map(clock::deadline_in),
+            max_simulations: self.max_simulations,
+            fixed: self.fixed.clone(),
+            removed: self.removed.clone(),
+            targets: self.targets.clone(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sbdp_ipc::plan::{ACTION_SETS, ENGINES, PLANNERS};
+
+    #[test]
+    fn choices_travel_as_the_index_of_their_name() {
+        assert_eq!(PLANNERS[Planner::SbdpStar as usize], "sbdp-star");
+        assert_eq!(PLANNERS[Planner::PdpStar as usize], "pdp-star");
+        assert_eq!(ENGINES[Engine::Penalty as usize], "penalty");
+        assert_eq!(ACTION_SETS[ActionSet::Extended as usize], "extended");
+    }
+}

@@ -1,0 +1,358 @@
+//! A plan as it comes in.
+
+use std::time::{Duration, Instant};
+
+use iceoryx2::prelude::EventId;
+use sbdp_ipc::bytes::AlignedBytes;
+use sbdp_ipc::error::WireError;
+use sbdp_ipc::headers::{CONTROL_CANCEL, RequestKind, ResponseHeader, ResponseKind, id_of_words};
+use sbdp_ipc::layout::{CREDIT_STEP, PLAN_REQUEST};
+use sbdp_ipc::plan::{StepView, StepsView};
+use sbdp_ipc::progress::STAGE_SDF;
+use sbdp_ipc::services::{Answer, Pending};
+
+use crate::client::Client;
+use crate::error::ClientError;
+use crate::options::{Handle, PlanOptions};
+use crate::summary::Summary;
+
+/// No message may announce more than this (it would be put together in memory).
+const LONGEST_MESSAGE: u64 = 1 << 30;
+
+/// The stages of a request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// Building distance fields.
+    Sdf,
+    /// Searching and verifying.
+    Search,
+}
+
+/// What the daemon is doing; some of these are lost on purpose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Progress {
+    /// The stage that runs.
+    pub stage: Stage,
+    /// Units of the stage done.
+    pub done: u32,
+    /// Units of the stage in all.
+    pub total: u32,
+    /// Simulations so far.
+    pub simulations: u64,
+}
+
+/// What a stream yields.
+#[derive(Debug)]
+pub enum Event<'s> {
+    /// Something moved on.
+    Progress(Progress),
+    /// A verified step, in order; its slices lie in shared memory and live as long as the
+    /// borrow of the stream, that is until the next event is asked for.
+    Step(StepView<'s>),
+    /// The end: everything else about the plan.
+    Done(Summary),
+}
+
+/// A plan as it comes in. Dropping it cancels the request.
+#[derive(Debug)]
+pub struct PlanStream<'c> {
+    client: &'c Client,
+    pending: Option<Pending>,
+    /// The last control request: it must live until the daemon saw it or a newer one.
+    control: Option<Pending>,
+    request: u64,
+    received: u64,
+    granted: u64,
+    cancel_wanted: bool,
+    cancel_sent: bool,
+    message: Message,
+    next_step: usize,
+    parts: Option<Parts>,
+}
+
+/// The message that is being read.
+#[derive(Debug)]
+enum Message {
+    None,
+    /// In place.
+    Shared(Answer),
+    /// Put together from several chunks.
+    Owned(AlignedBytes),
+}
+
+/// A message that comes in several chunks.
+#[derive(Debug)]
+struct Parts {
+    kind: u32,
+    bytes: AlignedBytes,
+    filled: u64,
+}
+
+/// What `advance` found; the borrow of the step is made by the caller.
+enum Found {
+    Progress(Progress),
+    Step(usize),
+    Done(Summary),
+}
+
+impl Message {
+    fn bytes(&self) -> &[u8] {
+        match self {
+            Self::None => &[],
+            Self::Shared(answer) => answer.payload(),
+            Self::Owned(bytes) => bytes.as_slice(),
+        }
+    }
+}
+
+impl Client {
+    /// Asks for a plan.
+    ///
+    /// # Errors
+    /// The daemon is gone, or this client receives a plan already. What the daemon refuses
+    /// (`busy`, an unknown handle) comes as the stream's first result.
+    pub fn plan(&self, handle: Handle, options: &PlanOptions) -> Result<PlanStream<'_>, ClientError> {
+        if self.planning.replace(true) {
+            return Err(ClientError::StreamOpen);
+        }
+        let request = self.new_request();
+        let sent = self.send_plan(request, handle, options);
+        if sent.is_err() {
+            self.planning.set(false);
+        }
+        Ok(PlanStream {
+            client: self,
+            pending: Some(sent?),
+            control: None,
+            request,
+            received: 0,
+            granted: 0,
+            cancel_wanted: false,
+            cancel_sent: false,
+            message: Message::None,
+            next_step: 0,
+            parts: None,
+        })
+    }
+
+    fn send_plan(&self, request: u64, handle: Handle, options: &PlanOptions) -> Result<Pending, ClientError> {
+        let bytes = options.to_wire(handle).encode();
+        if bytes.len() > PLAN_REQUEST {
+            return Err(ClientError::RequestTooLong { bytes: bytes.len() });
+        }
+        let header = self.header(RequestKind::Plan, request);
+        self.send("plan", &self.plan_port, header, bytes.len(), |out| out.copy_from_slice(&bytes))
+    }
+}
+
+impl PlanStream<'_> {
+    /// Waits for the next event; `None` after [`Event::Done`]. Waits as long as the daemon
+    /// lives: give [`PlanOptions::timeout`] to bound the planning itself.
+    ///
+    /// # Errors
+    /// The daemon refused, failed or died. The stream is over then.
+    pub fn next_event(&mut self) -> Result<Option<Event<'_>>, ClientError> {
+        self.next_event_until(None, Duration::ZERO)
+    }
+
+    /// Like [`Self::next_event`], but gives up after a while with [`ClientError::Timeout`]; the
+    /// stream can be used further then.
+    ///
+    /// # Errors
+    /// As above, and when nothing came in time.
+    pub fn next_event_within(&mut self, timeout: Duration) -> Result<Option<Event<'_>>, ClientError> {
+        self.next_event_until(Some(Instant::now() + timeout), timeout)
+    }
+
+    /// Asks the daemon to stop soon. The stream goes on until `Done`, which then says
+    /// `cancelled` unless the plan was ready before. To leave without an answer, drop the stream.
+    pub fn cancel(&mut self) {
+        self.cancel_wanted = true;
+        self.send_control();
+    }
+
+    fn next_event_until(
+        &mut self,
+        deadline: Option<Instant>,
+        timeout: Duration,
+    ) -> Result<Option<Event<'_>>, ClientError> {
+        let found = match self.advance(deadline, timeout) {
+            Ok(found) => found,
+            Err(error) => {
+                if !matches!(error, ClientError::Timeout { .. }) {
+                    self.close();
+                }
+                return Err(error);
+            }
+        };
+        Ok(match found {
+            None => None,
+            Some(Found::Progress(progress)) => Some(Event::Progress(progress)),
+            Some(Found::Done(summary)) => Some(Event::Done(summary)),
+            Some(Found::Step(index)) => {
+                let step = StepsView::new(self.message.bytes())?.get(index);
+                step.map(Event::Step)
+            }
+        })
+    }
+
+    fn advance(
+        &mut self,
+        deadline: Option<Instant>,
+        timeout: Duration,
+    ) -> Result<Option<Found>, ClientError> {
+        loop {
+            if let Some(index) = self.step_at_hand()? {
+                return Ok(Some(Found::Step(index)));
+            }
+            let Some(pending) = self.pending.as_ref() else { return Ok(None) };
+            if let Some(answer) = self.client.try_receive(pending)? {
+                if let Some(found) = self.take(answer)? {
+                    return Ok(Some(found));
+                }
+                continue;
+            }
+            self.send_control();
+            if let Some(progress) = self.progress() {
+                return Ok(Some(Found::Progress(progress)));
+            }
+            let now = Instant::now();
+            if deadline.is_some_and(|d| now >= d) {
+                return Err(ClientError::Timeout { what: "plan", after: timeout });
+            }
+            self.client.sleep(deadline.unwrap_or(now + crate::exchange::SLICE));
+        }
+    }
+
+    /// The next step of the message that is being read.
+    fn step_at_hand(&mut self) -> Result<Option<usize>, ClientError> {
+        if matches!(self.message, Message::None) {
+            return Ok(None);
+        }
+        let count = StepsView::new(self.message.bytes())?.len();
+        if self.next_step < count {
+            self.next_step += 1;
+            return Ok(Some(self.next_step - 1));
+        }
+        self.message = Message::None;
+        Ok(None)
+    }
+
+    /// Takes a chunk in.
+    fn take(&mut self, answer: Answer) -> Result<Option<Found>, ClientError> {
+        let header = *answer.user_header();
+        if header.sequence != self.received {
+            return Err(ClientError::Protocol(format!(
+                "chunk {} came where {} was due",
+                header.sequence, self.received
+            )));
+        }
+        self.received += 1;
+        self.send_control();
+        if header.offset == 0 && header.total == answer.payload().len() as u64 {
+            return self.open(header.kind, Message::Shared(answer));
+        }
+        match self.put_together(&header, &answer)? {
+            Some(bytes) => self.open(header.kind, Message::Owned(bytes)),
+            None => Ok(None),
+        }
+    }
+
+    fn put_together(
+        &mut self,
+        header: &ResponseHeader,
+        answer: &Answer,
+    ) -> Result<Option<AlignedBytes>, ClientError> {
+        if header.offset == 0 && header.total <= LONGEST_MESSAGE {
+            let bytes = AlignedBytes::zeroed(header.total as usize);
+            self.parts = Some(Parts { kind: header.kind, bytes, filled: 0 });
+        }
+        let wrong = || ClientError::Protocol("the chunks of a message do not fit together".to_owned());
+        let mut parts = self.parts.take().ok_or_else(wrong)?;
+        let (start, end) = (parts.filled, parts.filled + answer.payload().len() as u64);
+        if header.offset != start || header.kind != parts.kind {
+            return Err(wrong());
+        }
+        let target = parts.bytes.as_mut_slice().get_mut(start as usize..end as usize).ok_or_else(wrong)?;
+        target.copy_from_slice(answer.payload());
+        parts.filled = end;
+        if end == header.total {
+            return Ok(Some(parts.bytes));
+        }
+        self.parts = Some(parts);
+        Ok(None)
+    }
+
+    /// Opens a whole message.
+    fn open(&mut self, kind: u32, message: Message) -> Result<Option<Found>, ClientError> {
+        match ResponseKind::from_wire(kind) {
+            Some(ResponseKind::Steps) => {
+                self.message = message;
+                self.next_step = 0;
+                Ok(None)
+            }
+            Some(ResponseKind::Summary) => {
+                // A copy: it outlives the stream, and nothing decoded may change behind our back.
+                let copy = AlignedBytes::copy_of(message.bytes());
+                let summary = Summary::decode(copy.as_slice())?;
+                self.close();
+                Ok(Some(Found::Done(summary)))
+            }
+            Some(ResponseKind::Error) => {
+                let copy = AlignedBytes::copy_of(message.bytes());
+                Err(ClientError::Refused(WireError::decode(copy.as_slice())?))
+            }
+            _ => Err(ClientError::Protocol(format!("a response of kind {kind} in a plan"))),
+        }
+    }
+
+    /// Grants credit when enough was read, and passes a wish to cancel on. What the daemon has
+    /// no room for now is tried again at the next occasion; both numbers are cumulative.
+    fn send_control(&mut self) {
+        let due = self.received - self.granted >= CREDIT_STEP;
+        if self.pending.is_none() || !(due || self.cancel_wanted && !self.cancel_sent) {
+            return;
+        }
+        self.control = None;
+        let mut header = self.client.header(RequestKind::Control, self.request);
+        header.consumed = self.received;
+        header.flags = if self.cancel_wanted { CONTROL_CANCEL } else { 0 };
+        if let Some(pending) = self.client.try_send_control(header) {
+            self.control = Some(pending);
+            self.granted = self.received;
+            self.cancel_sent = self.cancel_wanted;
+        }
+    }
+
+    fn progress(&self) -> Option<Progress> {
+        let me = self.client.plan_port.id().value();
+        while let Ok(Some(sample)) = self.client.progress.receive() {
+            if id_of_words(sample.client) == me && sample.request == self.request {
+                return Some(Progress {
+                    stage: if sample.stage == STAGE_SDF { Stage::Sdf } else { Stage::Search },
+                    done: sample.done,
+                    total: sample.total,
+                    simulations: sample.simulations,
+                });
+            }
+        }
+        None
+    }
+
+    /// Lets go of the request.
+    fn close(&mut self) {
+        self.message = Message::None;
+        self.control = None;
+        if self.pending.take().is_some() {
+            self.client.planning.set(false);
+            // The daemon asks whether we are still there when it is woken, not before.
+            let _ = self.client.notifier.notify_with_custom_event_id(EventId::new(0));
+        }
+    }
+}
+
+impl Drop for PlanStream<'_> {
+    fn drop(&mut self) {
+        self.close();
+    }
+}

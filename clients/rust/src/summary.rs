@@ -1,0 +1,128 @@
+//! What ends a plan.
+
+use sbdp_ipc::bytes::Malformed;
+use sbdp_ipc::summary::{STATUSES, Stats, SummaryView};
+
+/// How planning ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PlanStatus {
+    /// Every part that was asked for is out.
+    Complete,
+    /// A budget ran out; the steps are the best so far.
+    Partial,
+    /// Some parts cannot come off, at the resolution that the reason names.
+    Infeasible,
+    /// The deadline passed.
+    Timeout,
+    /// The request was cancelled.
+    Cancelled,
+}
+
+impl PlanStatus {
+    const ALL: [Self; 5] = [Self::Complete, Self::Partial, Self::Infeasible, Self::Timeout, Self::Cancelled];
+
+    /// Its name, as in the JSON contract.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        STATUSES[self as usize]
+    }
+}
+
+/// Why a part that remains did not move.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Blocked {
+    /// The part.
+    pub part: u32,
+    /// The parts that it met.
+    pub by: Vec<u32>,
+    /// The action, as `+x`.
+    pub action: String,
+}
+
+/// A pair that overlaps at the assembled pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Overlap {
+    /// The two parts, smaller number first.
+    pub parts: [u32; 2],
+    /// How deep, in the input's units.
+    pub depth: f64,
+}
+
+/// Something to know about the input.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Warning {
+    /// The part it is about, if one.
+    pub part: Option<u32>,
+    /// What was found and what was done about it.
+    pub message: String,
+}
+
+/// Everything about a plan except its steps. Part numbers are places in `parts`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Summary {
+    /// How planning ended.
+    pub status: PlanStatus,
+    /// Why it is not complete.
+    pub reason: Option<String>,
+    /// The planner's name.
+    pub planner: String,
+    /// The engine's name.
+    pub engine: String,
+    /// The unit of length.
+    pub units: Option<String>,
+    /// How many steps there were.
+    pub steps: u32,
+    /// Part names.
+    pub parts: Vec<String>,
+    /// Parts that had been removed before.
+    pub removed: Vec<u32>,
+    /// Parts that must come out; `None` for all.
+    pub targets: Option<Vec<u32>>,
+    /// Parts that may not move.
+    pub fixed: Vec<u32>,
+    /// Parts that stand where they stood.
+    pub remaining: Vec<u32>,
+    /// What blocks the parts that should have come off.
+    pub blocked: Vec<Blocked>,
+    /// Overlaps at the assembled pose.
+    pub overlaps: Vec<Overlap>,
+    /// Findings about the input.
+    pub warnings: Vec<Warning>,
+    /// Counters and times.
+    pub stats: Stats,
+}
+
+impl Summary {
+    pub(crate) fn decode(bytes: &[u8]) -> Result<Self, Malformed> {
+        let view = SummaryView::new(bytes)?;
+        let owned = |text: &str| text.to_owned();
+        let status = PlanStatus::ALL.into_iter().find(|s| s.name() == view.status());
+        Ok(Self {
+            status: status.unwrap_or(PlanStatus::Partial),
+            reason: view.reason().map(owned),
+            planner: view.planner().to_owned(),
+            engine: view.engine().to_owned(),
+            units: view.units().map(owned),
+            steps: view.steps(),
+            parts: view.part_names().map(owned).collect(),
+            removed: view.removed().to_vec(),
+            targets: view.targets().map(<[u32]>::to_vec),
+            fixed: view.fixed().to_vec(),
+            remaining: view.remaining().to_vec(),
+            blocked: view.blocked().map(blocked).collect(),
+            overlaps: view.overlaps().iter().map(|o| Overlap { parts: o.parts, depth: o.depth }).collect(),
+            warnings: view.warnings().map(|(part, m)| Warning { part, message: m.to_owned() }).collect(),
+            stats: view.stats(),
+        })
+    }
+
+    /// A part's name.
+    #[must_use]
+    pub fn part_name(&self, part: u32) -> &str {
+        self.parts.get(part as usize).map_or("?", String::as_str)
+    }
+}
+
+fn blocked(b: sbdp_ipc::summary::Blocked<'_>) -> Blocked {
+    Blocked { part: b.part, by: b.by.to_vec(), action: b.action.to_owned() }
+}

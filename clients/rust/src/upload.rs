@@ -1,0 +1,73 @@
+//! Handing an assembly over.
+
+use sbdp_ipc::bytes::Reader;
+use sbdp_ipc::geometry::{Assembly, HandleResponse};
+use sbdp_ipc::headers::RequestKind;
+
+use crate::client::{Client, client_port};
+use crate::content_hash;
+use crate::error::ClientError;
+use crate::options::Handle;
+
+impl Client {
+    /// Hands an assembly over and returns its handle. The daemon is asked first whether it
+    /// knows the content, so that uploading again copies nothing.
+    ///
+    /// # Errors
+    /// The geometry is refused (the message names part and reason), or the daemon is gone.
+    pub fn upload(&self, assembly: &Assembly<'_>) -> Result<Handle, ClientError> {
+        let handle = content_hash(assembly);
+        if self.knows(handle)? {
+            return Ok(handle);
+        }
+        let answered = self.send_meshes(assembly)?;
+        if answered != handle {
+            return Err(ClientError::Protocol(format!(
+                "it names the assembly {answered} where the content gives {handle}"
+            )));
+        }
+        Ok(handle)
+    }
+
+    /// Whether the daemon knows an assembly.
+    ///
+    /// # Errors
+    /// The daemon is gone or gives no answer.
+    pub fn knows(&self, handle: Handle) -> Result<bool, ClientError> {
+        let header = self.header(RequestKind::Have, 0);
+        let fill = |out: &mut [u8]| out.copy_from_slice(&handle.0);
+        let pending = self.send("have", &self.ask_port, header, handle.0.len(), fill)?;
+        let answer = self.answer("have", &pending, self.options.timeout)?;
+        let response: HandleResponse = Reader::new(answer.as_slice())?.value("handle")?;
+        Ok(response.known != 0)
+    }
+
+    /// The meshes travel through a port of their own, just as large as needed: its memory goes
+    /// back to the system when the daemon has answered.
+    fn send_meshes(&self, assembly: &Assembly<'_>) -> Result<Handle, ClientError> {
+        let length = assembly.encoded_len();
+        check_shared_memory(length as u64)?;
+        let port = client_port(&self.geometry, length)?;
+        let header = self.header(RequestKind::Upload, 0);
+        let fill = |out: &mut [u8]| {
+            let fits = assembly.encode_into(out);
+            debug_assert!(fits, "the port was made as long as the message");
+        };
+        let pending = self.send("upload", &port, header, length, fill)?;
+        let answer = self.answer("upload", &pending, self.options.upload_timeout)?;
+        let response: HandleResponse = Reader::new(answer.as_slice())?.value("handle")?;
+        Ok(Handle(response.handle))
+    }
+}
+
+/// Shared memory that runs full is a SIGBUS on touch, not an error. Another process may still
+/// take what is free now; what is left of that risk is stated in `PROTOCOL.md`.
+fn check_shared_memory(needed: u64) -> Result<(), ClientError> {
+    let Ok(stat) = rustix::fs::statvfs("/dev/shm") else { return Ok(()) };
+    let free = stat.f_bavail.saturating_mul(stat.f_frsize);
+    // A file system without a limit reports no blocks at all.
+    if stat.f_blocks > 0 && needed > free {
+        return Err(ClientError::SharedMemory { needed, free });
+    }
+    Ok(())
+}

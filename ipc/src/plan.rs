@@ -1,0 +1,322 @@
+//! Plan requests, and steps as they stream back.
+
+use std::mem::offset_of;
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::bytes::{Malformed, Reader, Writer};
+
+/// `[x, y, z, qw, qx, qy, qz]` in the input's units and frame.
+pub type Waypoint = [f64; 7];
+
+/// Neither read nor write anything remembered.
+pub const PLAN_NO_CACHE: u32 = 1;
+/// The list of targets is given (it may be empty); without it all parts are meant.
+pub const PLAN_HAS_TARGETS: u32 = 2;
+
+/// Names of the planners; the wire carries the index.
+pub const PLANNERS: [&str; 5] = ["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star"];
+/// Names of the engines; the wire carries the index.
+pub const ENGINES: [&str; 2] = ["sliding", "penalty"];
+/// Names of the action sets; the wire carries the index.
+pub const ACTION_SETS: [&str; 2] = ["paper", "extended"];
+
+/// Header of a plan request; three lists of u32 part numbers follow: fixed, removed, targets.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct PlanRequestHeader {
+    /// Which assembly.
+    pub handle: [u8; 32],
+    /// Index into [`PLANNERS`].
+    pub planner: u32,
+    /// Index into [`ENGINES`].
+    pub engine: u32,
+    /// Index into [`ACTION_SETS`].
+    pub actions: u32,
+    /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`].
+    pub flags: u32,
+    /// Threads for this request; 0 leaves it to the daemon.
+    pub threads: u32,
+    /// Parts that may not move.
+    pub fixed: u32,
+    /// Parts that are gone already.
+    pub removed: u32,
+    /// Parts that must come out.
+    pub targets: u32,
+    /// CLOCK_MONOTONIC nanoseconds; 0 for none.
+    pub deadline_ns: u64,
+    /// Simulations after which to give up; `u64::MAX` for no limit.
+    pub max_simulations: u64,
+}
+
+/// One step's entry in the table.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct StepRecord {
+    /// The part that moves.
+    pub part: u32,
+    /// 0 translation, 1 rotation.
+    pub motion: u32,
+    /// First waypoint in the message's waypoints.
+    pub first_waypoint: u32,
+    /// Waypoints of this step.
+    pub waypoints: u32,
+    /// First part number in the message's blockers.
+    pub first_blocker: u32,
+    /// Blockers of this step.
+    pub blockers: u32,
+    /// Deepest penetration found by verification beyond the assembled depth.
+    pub verified_depth: f64,
+}
+
+/// Header of a steps message; records, waypoints and blockers follow.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct StepsHeader {
+    /// Steps.
+    pub steps: u32,
+    /// Place of the first of them in the plan.
+    pub first_step: u32,
+    /// Waypoints in all.
+    pub waypoints: u32,
+    /// Blockers in all.
+    pub blockers: u32,
+}
+
+const _: () = {
+    assert!(size_of::<PlanRequestHeader>() == 80 && align_of::<PlanRequestHeader>() == 8);
+    assert!(offset_of!(PlanRequestHeader, planner) == 32);
+    assert!(offset_of!(PlanRequestHeader, deadline_ns) == 64);
+    assert!(size_of::<StepRecord>() == 32 && align_of::<StepRecord>() == 8);
+    assert!(offset_of!(StepRecord, first_blocker) == 16);
+    assert!(offset_of!(StepRecord, verified_depth) == 24);
+    assert!(size_of::<StepsHeader>() == 16 && size_of::<Waypoint>() == 56);
+};
+
+/// A plan request, owned.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct PlanRequest {
+    /// Which assembly.
+    pub handle: [u8; 32],
+    /// Index into [`PLANNERS`].
+    pub planner: u32,
+    /// Index into [`ENGINES`].
+    pub engine: u32,
+    /// Index into [`ACTION_SETS`].
+    pub actions: u32,
+    /// Neither read nor write anything remembered.
+    pub no_cache: bool,
+    /// Threads; 0 leaves it to the daemon.
+    pub threads: u32,
+    /// CLOCK_MONOTONIC nanoseconds.
+    pub deadline_ns: Option<u64>,
+    /// Simulations after which to give up.
+    pub max_simulations: Option<u64>,
+    /// Parts that may not move.
+    pub fixed: Vec<u32>,
+    /// Parts that are gone already.
+    pub removed: Vec<u32>,
+    /// Parts that must come out; `None` for all.
+    pub targets: Option<Vec<u32>>,
+}
+
+impl PlanRequest {
+    /// The message's bytes.
+    #[must_use]
+    pub fn encode(&self) -> Vec<u8> {
+        let targets = self.targets.as_deref().unwrap_or(&[]);
+        let flag = |set: bool, bit: u32| if set { bit } else { 0 };
+        let mut writer = Writer::default();
+        writer.value(PlanRequestHeader {
+            handle: self.handle,
+            planner: self.planner,
+            engine: self.engine,
+            actions: self.actions,
+            flags: flag(self.no_cache, PLAN_NO_CACHE) | flag(self.targets.is_some(), PLAN_HAS_TARGETS),
+            threads: self.threads,
+            fixed: self.fixed.len() as u32,
+            removed: self.removed.len() as u32,
+            targets: targets.len() as u32,
+            deadline_ns: self.deadline_ns.unwrap_or(0),
+            max_simulations: self.max_simulations.unwrap_or(u64::MAX),
+        });
+        writer.array(&self.fixed).array(&self.removed).array(targets);
+        writer.finish()
+    }
+
+    /// Reads a request.
+    ///
+    /// # Errors
+    /// The message is malformed.
+    pub fn decode(bytes: &[u8]) -> Result<Self, Malformed> {
+        let mut reader = Reader::new(bytes)?;
+        let h: PlanRequestHeader = reader.value("plan request header")?;
+        let fixed = reader.array::<u32>("fixed", u64::from(h.fixed))?.to_vec();
+        let removed = reader.array::<u32>("removed", u64::from(h.removed))?.to_vec();
+        let targets = reader.array::<u32>("targets", u64::from(h.targets))?.to_vec();
+        if h.flags & !(PLAN_NO_CACHE | PLAN_HAS_TARGETS) != 0 {
+            return Err(Malformed::OutOfRange { field: "flags", value: u64::from(h.flags) });
+        }
+        Ok(Self {
+            handle: h.handle,
+            planner: h.planner,
+            engine: h.engine,
+            actions: h.actions,
+            no_cache: h.flags & PLAN_NO_CACHE != 0,
+            threads: h.threads,
+            deadline_ns: (h.deadline_ns != 0).then_some(h.deadline_ns),
+            max_simulations: (h.max_simulations != u64::MAX).then_some(h.max_simulations),
+            fixed,
+            removed,
+            targets: (h.flags & PLAN_HAS_TARGETS != 0).then_some(targets),
+        })
+    }
+}
+
+/// A step to be sent.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Step {
+    /// The part that moves.
+    pub part: u32,
+    /// The path turns the part.
+    pub rotates: bool,
+    /// The path.
+    pub path: Vec<Waypoint>,
+    /// Deepest penetration beyond the assembled depth.
+    pub verified_depth: f64,
+    /// Parts that had blocked this one and left before it.
+    pub blockers: Vec<u32>,
+}
+
+impl Step {
+    /// An upper bound of the bytes that this step adds to a steps message.
+    #[must_use]
+    pub fn wire_bytes(&self) -> usize {
+        size_of::<StepRecord>() + self.path.len() * size_of::<Waypoint>() + self.blockers.len() * 4 + 8
+    }
+}
+
+/// The bytes of a steps message; `first_step` is the place of its first step in the plan.
+#[must_use]
+pub fn encode_steps<'s>(first_step: u32, steps: impl IntoIterator<Item = &'s Step>) -> Vec<u8> {
+    let (mut records, mut waypoints, mut blockers) = (Vec::new(), Vec::<Waypoint>::new(), Vec::<u32>::new());
+    for step in steps {
+        records.push(StepRecord {
+            part: step.part,
+            motion: u32::from(step.rotates),
+            first_waypoint: waypoints.len() as u32,
+            waypoints: step.path.len() as u32,
+            first_blocker: blockers.len() as u32,
+            blockers: step.blockers.len() as u32,
+            verified_depth: step.verified_depth,
+        });
+        waypoints.extend_from_slice(&step.path);
+        blockers.extend_from_slice(&step.blockers);
+    }
+    let mut writer = Writer::default();
+    writer.value(StepsHeader {
+        steps: records.len() as u32,
+        first_step,
+        waypoints: waypoints.len() as u32,
+        blockers: blockers.len() as u32,
+    });
+    writer.array(&records).array(&waypoints).array(&blockers);
+    writer.finish()
+}
+
+/// Steps read in place; borrows the received bytes.
+#[derive(Debug, Clone, Copy)]
+pub struct StepsView<'a> {
+    first_step: u32,
+    records: &'a [StepRecord],
+    waypoints: &'a [Waypoint],
+    blockers: &'a [u32],
+}
+
+/// One step read in place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepView<'a> {
+    /// Its place in the plan.
+    pub number: u32,
+    /// The part that moves.
+    pub part: u32,
+    /// The path turns the part.
+    pub rotates: bool,
+    /// The path, in shared memory.
+    pub path: &'a [Waypoint],
+    /// Deepest penetration beyond the assembled depth.
+    pub verified_depth: f64,
+    /// Parts that had blocked this one and left before it.
+    pub blockers: &'a [u32],
+}
+
+impl<'a> StepsView<'a> {
+    /// Checks all bounds.
+    ///
+    /// # Errors
+    /// The message is malformed.
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Malformed> {
+        let mut reader = Reader::new(bytes)?;
+        let h: StepsHeader = reader.value("steps header")?;
+        let view = Self {
+            first_step: h.first_step,
+            records: reader.array("step records", u64::from(h.steps))?,
+            waypoints: reader.array("waypoints", u64::from(h.waypoints))?,
+            blockers: reader.array("blockers", u64::from(h.blockers))?,
+        };
+        for record in view.records {
+            check_range("step waypoints", record.first_waypoint, record.waypoints, view.waypoints.len())?;
+            check_range("step blockers", record.first_blocker, record.blockers, view.blockers.len())?;
+        }
+        Ok(view)
+    }
+
+    /// How many steps.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.records.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.records.is_empty()
+    }
+
+    /// A step. Its slices are empty should the sender have changed the bytes since the check.
+    #[must_use]
+    pub fn get(&self, index: usize) -> Option<StepView<'a>> {
+        let r = *self.records.get(index)?;
+        Some(StepView {
+            number: self.first_step.saturating_add(index as u32),
+            part: r.part,
+            rotates: r.motion != 0,
+            path: slice_of(self.waypoints, r.first_waypoint, r.waypoints),
+            verified_depth: r.verified_depth,
+            blockers: slice_of(self.blockers, r.first_blocker, r.blockers),
+        })
+    }
+
+    /// All steps in order.
+    pub fn iter(&self) -> impl Iterator<Item = StepView<'a>> + '_ {
+        (0..self.len()).filter_map(|i| self.get(i))
+    }
+}
+
+pub(crate) fn check_range(
+    section: &'static str,
+    first: u32,
+    count: u32,
+    length: usize,
+) -> Result<(), Malformed> {
+    let needed = u64::from(first) + u64::from(count);
+    if needed > length as u64 {
+        return Err(Malformed::Truncated { section, needed, length: length as u64 });
+    }
+    Ok(())
+}
+
+pub(crate) fn slice_of<T>(all: &[T], first: u32, count: u32) -> &[T] {
+    let first = first as usize;
+    all.get(first..first.saturating_add(count as usize)).unwrap_or(&[])
+}

@@ -1,0 +1,39 @@
+//! Progress: lossy, for display only, nothing a client must have.
+
+use std::mem::offset_of;
+
+use bytemuck::{Pod, Zeroable};
+use iceoryx2::prelude::ZeroCopySend;
+
+/// Building distance fields.
+pub const STAGE_SDF: u32 = 1;
+/// Searching and verifying.
+pub const STAGE_SEARCH: u32 = 2;
+
+/// One sample on `progress`, seen by every client; each picks its own.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
+#[type_name("sbdp/v1/Progress")]
+pub struct ProgressSample {
+    /// Id of the client port that asked, low half first.
+    pub client: [u64; 2],
+    /// Number of its plan request.
+    pub request: u64,
+    /// Simulations so far.
+    pub simulations: u64,
+    /// [`STAGE_SDF`] or [`STAGE_SEARCH`].
+    pub stage: u32,
+    /// Units of the stage done.
+    pub done: u32,
+    /// Units of the stage in all.
+    pub total: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+}
+
+const _: () = {
+    assert!(size_of::<ProgressSample>() == 48 && align_of::<ProgressSample>() == 8);
+    assert!(offset_of!(ProgressSample, request) == 16);
+    assert!(offset_of!(ProgressSample, simulations) == 24);
+    assert!(offset_of!(ProgressSample, stage) == 32);
+};

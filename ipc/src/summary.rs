@@ -1,0 +1,418 @@
+//! The summary that ends a plan: everything but its steps.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::bytes::{Malformed, Reader, Text, TextWriter, Texts, Writer};
+use crate::plan::{check_range, slice_of};
+
+/// Names of the plan statuses; the wire carries the index.
+pub const STATUSES: [&str; 5] = ["complete", "partial", "infeasible", "timeout", "cancelled"];
+
+/// The plan carries a reason.
+pub const SUMMARY_HAS_REASON: u32 = 1;
+/// The assembly's unit of length is known.
+pub const SUMMARY_HAS_UNITS: u32 = 2;
+/// The list of targets is given.
+pub const SUMMARY_HAS_TARGETS: u32 = 4;
+
+/// A warning about the assembly as a whole, not about a part.
+pub const NO_PART: u32 = u32::MAX;
+
+/// Counters and times (in seconds).
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct Stats {
+    /// Transition functions that the search used, cached ones included.
+    pub simulations: u64,
+    /// Transition functions really computed.
+    pub simulations_run: u64,
+    /// Straight sweeps that proved a removal without simulation.
+    pub sweeps: u64,
+    /// States kept.
+    pub states: u64,
+    /// Building or loading distance fields.
+    pub sdf_time_s: f64,
+    /// Building blocking graphs.
+    pub static_analysis_time_s: f64,
+    /// Simulation.
+    pub path_time_s: f64,
+    /// Shortening and verification.
+    pub verify_time_s: f64,
+    /// From admission to the last step.
+    pub total_time_s: f64,
+    /// Distance fields that were there already.
+    pub sdf_hits: u64,
+    /// Blocking relations that were there already.
+    pub blocking_hits: u64,
+    /// Motions that were there already.
+    pub motion_hits: u64,
+    /// 1 when the whole plan was there already.
+    pub plan_hit: u64,
+}
+
+/// Header of a summary message. Sections follow in the order of the counts, then the texts.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct SummaryHeader {
+    /// Index into [`STATUSES`].
+    pub status: u32,
+    /// `SUMMARY_HAS_…` flags.
+    pub flags: u32,
+    /// Steps that were sent.
+    pub steps: u32,
+    /// Part names ([`Text`]).
+    pub parts: u32,
+    /// Overlaps ([`OverlapRecord`]).
+    pub overlaps: u32,
+    /// Blocked parts ([`BlockedRecord`]).
+    pub blocked: u32,
+    /// Warnings ([`WarningRecord`]).
+    pub warnings: u32,
+    /// Parts removed before (u32).
+    pub removed: u32,
+    /// Targets (u32).
+    pub targets: u32,
+    /// Fixed parts (u32).
+    pub fixed: u32,
+    /// Parts that remain (u32).
+    pub remaining: u32,
+    /// Blockers that [`BlockedRecord`]s point to (u32).
+    pub blockers: u32,
+    /// Bytes of text.
+    pub text_bytes: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// Why the plan is not complete.
+    pub reason: Text,
+    /// The planner's name.
+    pub planner: Text,
+    /// The engine's name.
+    pub engine: Text,
+    /// The unit of length.
+    pub units: Text,
+    /// Counters and times.
+    pub stats: Stats,
+}
+
+/// A pair that overlaps at the assembled pose.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct OverlapRecord {
+    /// The two parts, smaller first.
+    pub parts: [u32; 2],
+    /// How deep.
+    pub depth: f64,
+}
+
+/// Why a part that remains did not move.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct BlockedRecord {
+    /// The part.
+    pub part: u32,
+    /// First of its blockers.
+    pub first_blocker: u32,
+    /// How many.
+    pub blockers: u32,
+    /// The blocked action, as `+x`.
+    pub action: Text,
+}
+
+/// Something the user should know about the input.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub struct WarningRecord {
+    /// The part, or [`NO_PART`].
+    pub part: u32,
+    /// What.
+    pub message: Text,
+}
+
+const _: () = {
+    assert!(size_of::<Stats>() == 104 && size_of::<SummaryHeader>() == 192);
+    assert!(std::mem::offset_of!(SummaryHeader, reason) == 56);
+    assert!(std::mem::offset_of!(SummaryHeader, stats) == 88);
+    assert!(size_of::<OverlapRecord>() == 16 && size_of::<BlockedRecord>() == 20);
+    assert!(size_of::<WarningRecord>() == 12);
+};
+
+/// A blocked part to be sent, or as received.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Blocked<'a> {
+    /// The part.
+    pub part: u32,
+    /// The parts that it met.
+    pub by: &'a [u32],
+    /// The action, as `+x`.
+    pub action: &'a str,
+}
+
+/// A summary to be sent. Part numbers are indices into `parts`.
+#[derive(Debug, Clone, Default)]
+pub struct SummaryParts<'a> {
+    /// Index into [`STATUSES`].
+    pub status: u32,
+    /// Steps that were sent.
+    pub steps: u32,
+    /// Why the plan is not complete.
+    pub reason: Option<&'a str>,
+    /// The planner's name.
+    pub planner: &'a str,
+    /// The engine's name.
+    pub engine: &'a str,
+    /// The unit of length.
+    pub units: Option<&'a str>,
+    /// Part names.
+    pub parts: Vec<&'a str>,
+    /// Overlaps.
+    pub overlaps: Vec<OverlapRecord>,
+    /// Blocked parts.
+    pub blocked: Vec<(u32, Vec<u32>, &'a str)>,
+    /// Warnings: part or [`NO_PART`], and text.
+    pub warnings: Vec<(u32, &'a str)>,
+    /// Parts removed before.
+    pub removed: Vec<u32>,
+    /// Targets; `None` for all.
+    pub targets: Option<Vec<u32>>,
+    /// Fixed parts.
+    pub fixed: Vec<u32>,
+    /// Parts that remain.
+    pub remaining: Vec<u32>,
+    /// Counters and times.
+    pub stats: Stats,
+}
+
+impl SummaryParts<'_> {
+    /// The message's bytes.
+    #[must_use]
+    pub fn encode(&self) -> Vec<u8> {
+        let mut texts = TextWriter::default();
+        let names: Vec<Text> = self.parts.iter().map(|n| texts.add(n)).collect();
+        let mut blockers = Vec::new();
+        let mut blocked = Vec::new();
+        for (part, by, action) in &self.blocked {
+            let (first, count) = (blockers.len() as u32, by.len() as u32);
+            let action = texts.add(action);
+            blocked.push(BlockedRecord { part: *part, first_blocker: first, blockers: count, action });
+            blockers.extend_from_slice(by);
+        }
+        let warnings: Vec<WarningRecord> =
+            self.warnings.iter().map(|(p, m)| WarningRecord { part: *p, message: texts.add(m) }).collect();
+        let targets = self.targets.as_deref().unwrap_or(&[]);
+        let header = SummaryHeader {
+            status: self.status,
+            flags: self.flags(),
+            steps: self.steps,
+            parts: names.len() as u32,
+            overlaps: self.overlaps.len() as u32,
+            blocked: blocked.len() as u32,
+            warnings: warnings.len() as u32,
+            removed: self.removed.len() as u32,
+            targets: targets.len() as u32,
+            fixed: self.fixed.len() as u32,
+            remaining: self.remaining.len() as u32,
+            blockers: blockers.len() as u32,
+            reserved: 0,
+            reason: texts.add(self.reason.unwrap_or("")),
+            planner: texts.add(self.planner),
+            engine: texts.add(self.engine),
+            units: texts.add(self.units.unwrap_or("")),
+            text_bytes: texts.bytes().len() as u32,
+            stats: self.stats,
+        };
+        let mut writer = Writer::default();
+        writer.value(header).array(&names).array(&self.overlaps).array(&blocked).array(&warnings);
+        writer.array(&self.removed).array(targets).array(&self.fixed).array(&self.remaining);
+        writer.array(&blockers).array(texts.bytes());
+        writer.finish()
+    }
+
+    fn flags(&self) -> u32 {
+        let flag = |set: bool, bit: u32| if set { bit } else { 0 };
+        flag(self.reason.is_some(), SUMMARY_HAS_REASON)
+            | flag(self.units.is_some(), SUMMARY_HAS_UNITS)
+            | flag(self.targets.is_some(), SUMMARY_HAS_TARGETS)
+    }
+}
+
+/// A summary read in place.
+#[derive(Debug, Clone, Copy)]
+pub struct SummaryView<'a> {
+    header: SummaryHeader,
+    names: &'a [Text],
+    overlaps: &'a [OverlapRecord],
+    blocked: &'a [BlockedRecord],
+    warnings: &'a [WarningRecord],
+    removed: &'a [u32],
+    targets: &'a [u32],
+    fixed: &'a [u32],
+    remaining: &'a [u32],
+    blockers: &'a [u32],
+    texts: Texts<'a>,
+}
+
+impl<'a> SummaryView<'a> {
+    /// Checks all bounds and texts.
+    ///
+    /// # Errors
+    /// The message is malformed.
+    pub fn new(bytes: &'a [u8]) -> Result<Self, Malformed> {
+        let mut reader = Reader::new(bytes)?;
+        let header: SummaryHeader = reader.value("summary header")?;
+        let view = Self {
+            header,
+            names: reader.array("part names", u64::from(header.parts))?,
+            overlaps: reader.array("overlaps", u64::from(header.overlaps))?,
+            blocked: reader.array("blocked", u64::from(header.blocked))?,
+            warnings: reader.array("warnings", u64::from(header.warnings))?,
+            removed: reader.array("removed", u64::from(header.removed))?,
+            targets: reader.array("targets", u64::from(header.targets))?,
+            fixed: reader.array("fixed", u64::from(header.fixed))?,
+            remaining: reader.array("remaining", u64::from(header.remaining))?,
+            blockers: reader.array("blockers", u64::from(header.blockers))?,
+            texts: Texts(reader.array("texts", u64::from(header.text_bytes))?),
+        };
+        view.check()?;
+        Ok(view)
+    }
+
+    fn check(&self) -> Result<(), Malformed> {
+        let h = &self.header;
+        if h.status as usize >= STATUSES.len() {
+            return Err(Malformed::OutOfRange { field: "status", value: u64::from(h.status) });
+        }
+        for text in [h.reason, h.planner, h.engine, h.units].iter().chain(self.names) {
+            self.texts.get(*text, "summary text")?;
+        }
+        for b in self.blocked {
+            check_range("blockers", b.first_blocker, b.blockers, self.blockers.len())?;
+            self.texts.get(b.action, "blocked action")?;
+        }
+        for w in self.warnings {
+            self.texts.get(w.message, "warning")?;
+        }
+        self.check_part_numbers()
+    }
+
+    fn check_part_numbers(&self) -> Result<(), Malformed> {
+        let count = self.names.len();
+        let lists = [self.removed, self.targets, self.fixed, self.remaining, self.blockers];
+        let pairs = self.overlaps.iter().flat_map(|o| o.parts);
+        let singles = self.blocked.iter().map(|b| b.part);
+        let warned = self.warnings.iter().map(|w| w.part).filter(|p| *p != NO_PART);
+        let listed = lists.into_iter().flatten().copied();
+        match listed.chain(pairs).chain(singles).chain(warned).find(|p| *p as usize >= count) {
+            Some(part) => Err(Malformed::OutOfRange { field: "part", value: u64::from(part) }),
+            None => Ok(()),
+        }
+    }
+
+    fn optional(&self, flag: u32, text: Text) -> Option<&'a str> {
+        (self.header.flags & flag != 0).then(|| self.texts.get_checked(text))
+    }
+
+    /// `complete`, `partial`, `infeasible`, `timeout` or `cancelled`.
+    #[must_use]
+    pub fn status(&self) -> &'static str {
+        STATUSES.get(self.header.status as usize).copied().unwrap_or("partial")
+    }
+
+    /// Steps that were sent.
+    #[must_use]
+    pub fn steps(&self) -> u32 {
+        self.header.steps
+    }
+
+    /// Why the plan is not complete.
+    #[must_use]
+    pub fn reason(&self) -> Option<&'a str> {
+        self.optional(SUMMARY_HAS_REASON, self.header.reason)
+    }
+
+    /// The planner's name.
+    #[must_use]
+    pub fn planner(&self) -> &'a str {
+        self.texts.get_checked(self.header.planner)
+    }
+
+    /// The engine's name.
+    #[must_use]
+    pub fn engine(&self) -> &'a str {
+        self.texts.get_checked(self.header.engine)
+    }
+
+    /// The unit of length.
+    #[must_use]
+    pub fn units(&self) -> Option<&'a str> {
+        self.optional(SUMMARY_HAS_UNITS, self.header.units)
+    }
+
+    /// How many parts the assembly has.
+    #[must_use]
+    pub fn part_count(&self) -> usize {
+        self.names.len()
+    }
+
+    /// A part's name.
+    #[must_use]
+    pub fn part_name(&self, part: u32) -> Option<&'a str> {
+        self.names.get(part as usize).map(|t| self.texts.get_checked(*t))
+    }
+
+    /// All part names; every part number points here.
+    pub fn part_names(&self) -> impl Iterator<Item = &'a str> + '_ {
+        self.names.iter().map(|t| self.texts.get_checked(*t))
+    }
+
+    /// Parts that had been removed before.
+    #[must_use]
+    pub fn removed(&self) -> &'a [u32] {
+        self.removed
+    }
+
+    /// Parts that must come out; `None` for all.
+    #[must_use]
+    pub fn targets(&self) -> Option<&'a [u32]> {
+        (self.header.flags & SUMMARY_HAS_TARGETS != 0).then_some(self.targets)
+    }
+
+    /// Parts that may not move.
+    #[must_use]
+    pub fn fixed(&self) -> &'a [u32] {
+        self.fixed
+    }
+
+    /// Parts that stand where they stood.
+    #[must_use]
+    pub fn remaining(&self) -> &'a [u32] {
+        self.remaining
+    }
+
+    /// What blocks the parts that should have come off.
+    pub fn blocked(&self) -> impl Iterator<Item = Blocked<'a>> + '_ {
+        self.blocked.iter().map(|b| Blocked {
+            part: b.part,
+            by: slice_of(self.blockers, b.first_blocker, b.blockers),
+            action: self.texts.get_checked(b.action),
+        })
+    }
+
+    /// Overlaps at the assembled pose.
+    #[must_use]
+    pub fn overlaps(&self) -> &'a [OverlapRecord] {
+        self.overlaps
+    }
+
+    /// Findings about the input: the part, if one, and the text.
+    pub fn warnings(&self) -> impl Iterator<Item = (Option<u32>, &'a str)> + '_ {
+        self.warnings
+            .iter()
+            .map(|w| ((w.part != NO_PART).then_some(w.part), self.texts.get_checked(w.message)))
+    }
+
+    /// Counters and times.
+    #[must_use]
+    pub fn stats(&self) -> Stats {
+        self.header.stats
+    }
+}

@@ -1,0 +1,201 @@
+//! Messages come back as they were written, and no byte string makes a view panic.
+
+use proptest::prelude::*;
+use sbdp_ipc::bytes::AlignedBytes;
+use sbdp_ipc::error::{ErrorCode, WireError};
+use sbdp_ipc::geometry::{Assembly, Part, Vertices};
+use sbdp_ipc::plan::{PlanRequest, Step, StepsView, encode_steps};
+use sbdp_ipc::status::{Status, StatusHeader};
+use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts, SummaryView};
+
+/// Reads everything that a view offers.
+fn read_everything(bytes: &[u8]) {
+    let bytes = AlignedBytes::copy_of(bytes);
+    let bytes = bytes.as_slice();
+    let _ = PlanRequest::decode(bytes);
+    let _ = WireError::decode(bytes);
+    let _ = Status::decode(bytes);
+    if let Ok(steps) = StepsView::new(bytes) {
+        for step in steps.iter() {
+            let _ = (step.path.len(), step.blockers.len());
+        }
+    }
+    if let Ok(view) = SummaryView::new(bytes) {
+        let _ = (view.part_names().count(), view.blocked().count(), view.warnings().count());
+        let _ = (view.reason(), view.units(), view.planner(), view.engine(), view.status());
+    }
+    if let Ok(assembly) = Assembly::decode(bytes) {
+        let _ = assembly.parts.iter().map(|p| p.vertices.iter().count()).sum::<usize>();
+    }
+}
+
+fn two_steps() -> Vec<Step> {
+    let first = Step {
+        part: 1,
+        path: vec![[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 5.0, 1.0, 0.0, 0.0, 0.0]],
+        verified_depth: 0.001,
+        ..Step::default()
+    };
+    let second = Step { part: 0, rotates: true, blockers: vec![1], path: vec![[0.5; 7]; 3], ..first.clone() };
+    vec![first, second]
+}
+
+fn summary() -> Vec<u8> {
+    SummaryParts {
+        status: 2,
+        steps: 2,
+        reason: Some("exhausted"),
+        planner: "sbdp-star",
+        engine: "sliding",
+        units: Some("mm"),
+        parts: vec!["0", "1", "größer"],
+        overlaps: vec![OverlapRecord { parts: [0, 1], depth: 0.25 }],
+        blocked: vec![(2, vec![0, 1], "+x"), (2, vec![], "-rz")],
+        warnings: vec![(NO_PART, "whole"), (1, "one")],
+        removed: vec![0],
+        targets: Some(vec![]),
+        fixed: vec![1],
+        remaining: vec![1, 2],
+        stats: Stats { simulations: 7, total_time_s: 1.5, plan_hit: 1, ..Stats::default() },
+    }
+    .encode()
+}
+
+fn assembly_bytes() -> Vec<u8> {
+    let wide = [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0], [6.0, 7.0, 8.0]];
+    let narrow = [[0.5_f32, 1.0, 2.0]];
+    let assembly = Assembly {
+        name: "demo",
+        units: Some("mm"),
+        parts: vec![
+            Part { name: "a", vertices: Vertices::F64(&wide), triangles: &[[0, 1, 2]] },
+            Part { name: "b", vertices: Vertices::F32(&narrow), triangles: &[] },
+        ],
+        fixed: vec!["b"],
+    };
+    let mut bytes = vec![0; assembly.encoded_len()];
+    assert!(assembly.encode_into(&mut bytes));
+    assert!(!assembly.encode_into(&mut vec![0; assembly.encoded_len() - 8]));
+    let aligned = AlignedBytes::copy_of(&bytes);
+    assert_eq!(Assembly::decode(aligned.as_slice()).unwrap(), assembly);
+    bytes
+}
+
+#[test]
+fn steps_come_back_in_place() {
+    let bytes = AlignedBytes::copy_of(&encode_steps(4, &two_steps()));
+    let view = StepsView::new(bytes.as_slice()).unwrap();
+    let steps: Vec<_> = view.iter().collect();
+    assert_eq!(steps.len(), 2);
+    assert_eq!((steps[0].number, steps[0].part, steps[0].rotates), (4, 1, false));
+    assert_eq!(steps[0].path, two_steps()[0].path);
+    assert_eq!((steps[1].number, steps[1].rotates, steps[1].blockers), (5, true, &[1][..]));
+    assert_eq!(steps[1].path, two_steps()[1].path);
+}
+
+#[test]
+fn a_summary_carries_everything_of_a_plan_but_its_steps() {
+    let bytes = AlignedBytes::copy_of(&summary());
+    let view = SummaryView::new(bytes.as_slice()).unwrap();
+    assert_eq!((view.status(), view.steps(), view.reason()), ("infeasible", 2, Some("exhausted")));
+    assert_eq!((view.planner(), view.engine(), view.units()), ("sbdp-star", "sliding", Some("mm")));
+    assert_eq!(view.part_names().collect::<Vec<_>>(), ["0", "1", "größer"]);
+    assert_eq!((view.removed(), view.targets(), view.fixed()), (&[0][..], Some(&[][..]), &[1][..]));
+    assert_eq!((view.remaining(), view.overlaps()[0].depth), (&[1, 2][..], 0.25));
+    let blocked: Vec<_> = view.blocked().collect();
+    assert_eq!((blocked[0].part, blocked[0].by, blocked[0].action), (2, &[0, 1][..], "+x"));
+    assert_eq!(blocked[1].action, "-rz");
+    assert_eq!(view.warnings().collect::<Vec<_>>(), [(None, "whole"), (Some(1), "one")]);
+    assert_eq!((view.stats().simulations, view.stats().plan_hit), (7, 1));
+}
+
+#[test]
+fn a_summary_that_names_a_part_out_of_range_is_refused() {
+    let bytes = SummaryParts { parts: vec!["0"], remaining: vec![1], ..SummaryParts::default() }.encode();
+    assert!(SummaryView::new(AlignedBytes::copy_of(&bytes).as_slice()).is_err());
+}
+
+#[test]
+fn requests_errors_and_status_come_back() {
+    let request = PlanRequest {
+        handle: [7; 32],
+        no_cache: true,
+        deadline_ns: Some(12),
+        max_simulations: Some(0),
+        fixed: vec![1, 2, 3],
+        targets: Some(vec![]),
+        ..PlanRequest::default()
+    };
+    let bytes = AlignedBytes::copy_of(&request.encode());
+    assert_eq!(PlanRequest::decode(bytes.as_slice()).unwrap(), request);
+
+    let error = WireError::new(ErrorCode::Busy, "ü".repeat(100_000));
+    let bytes = AlignedBytes::copy_of(&error.encode());
+    let back = WireError::decode(bytes.as_slice()).unwrap();
+    assert_eq!(back.code, ErrorCode::Busy);
+    assert_eq!(back.message.len(), 16 * 1024);
+
+    let status = Status {
+        numbers: StatusHeader { pid: 9, ..StatusHeader::default() },
+        version: "0.1.0".into(),
+        preloaded: vec![("a".into(), [1; 32]), ("b".into(), [2; 32])],
+    };
+    let bytes = AlignedBytes::copy_of(&status.encode());
+    let back = Status::decode(bytes.as_slice()).unwrap();
+    assert_eq!((back.numbers.pid, &back.version, &back.preloaded), (9, &status.version, &status.preloaded));
+}
+
+/// A valid message of each kind, to be damaged.
+fn messages() -> Vec<Vec<u8>> {
+    let request = PlanRequest { fixed: vec![1, 2], targets: Some(vec![3]), ..PlanRequest::default() };
+    let status = Status {
+        numbers: StatusHeader::default(),
+        version: "1".into(),
+        preloaded: vec![("a".into(), [1; 32])],
+    };
+    vec![
+        encode_steps(0, &two_steps()),
+        summary(),
+        assembly_bytes(),
+        request.encode(),
+        status.encode(),
+        WireError::new(ErrorCode::Failed, "text").encode(),
+    ]
+}
+
+#[test]
+fn a_truncated_message_is_an_error_and_no_panic() {
+    for message in messages() {
+        for length in 0..message.len() {
+            read_everything(&message[..length]);
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn no_bytes_make_a_view_panic(bytes in proptest::collection::vec(any::<u8>(), 0..600)) {
+        read_everything(&bytes);
+    }
+
+    #[test]
+    fn no_damage_makes_a_view_panic(
+        which in 0_usize..6,
+        damage in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+    ) {
+        let mut message = messages().swap_remove(which);
+        for (index, byte) in damage {
+            let at = index.index(message.len());
+            message[at] = byte;
+        }
+        read_everything(&message);
+    }
+
+    #[test]
+    fn small_numbers_in_headers_make_no_view_panic(
+        words in proptest::collection::vec(prop_oneof![0_u32..4, any::<u32>()], 0..80),
+    ) {
+        let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
+        read_everything(&bytes);
+    }
+}
