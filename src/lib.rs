@@ -1,7 +1,11 @@
 //! sbdp plans how assemblies come apart. The stages, in the order of the data flow:
 
+pub mod blocking_graph;
 pub mod cli;
 pub mod geometry;
+pub mod sdf;
 pub mod plan;
 pub mod search;
 pub mod service;
+pub mod simulation;
+pub mod termination;

@@ -195,8 +195,8 @@ mod tests {
         let text = super::plan(&assembly, &plan);
         for line in [
             "vice: infeasible (exhausted); 2 of 3 parts come off",
-            "1     a     rotation     0, turning 180°  b",
-            "2     c     translation  free already     b",
+            "1     a     rotation     0 mm, turning 180°  b",
+            "2     c     translation  free already        b",
             "  b: +x by a, c; -z by a",
             "  a and b: 0.5000 mm deep",
             "  c: open",

@@ -6,18 +6,34 @@
 //! happens in the *planning frame*, the input frame scaled by a power of two so that the
 //! assembly's longest side falls in (5, 10].
 
+mod assembly;
+mod bounds;
+mod congruence;
 mod content_hash;
 mod error;
 mod heal;
+mod hull;
 mod load;
 mod mesh;
 mod pose;
+mod samples;
+mod shape;
 mod source;
+mod surface;
+mod triangle;
+mod winding;
 
+pub use assembly::{Assembly, Part};
+pub use bounds::Bounds;
 pub use content_hash::content_hash;
 pub use error::GeometryError;
 pub use heal::{Healed, heal};
+pub use hull::{gap_along, hull_vertices, separating_direction, transformed};
 pub use load::{load_assembly, natural_order};
 pub use mesh::{Edge, Mesh, Solidity};
 pub use pose::{Pose, Waypoint, interpolate, pose_from_waypoint, waypoint_from_pose};
+pub use samples::{Descend, Node as SampleNode, SampleTree, Spacing};
+pub use shape::Shape;
 pub use source::{SourceAssembly, SourceMesh, SourcePart};
+pub use surface::{Closest, MassProperties, Surface};
+pub use triangle::{Feature, area_normal, closest_on_triangle};

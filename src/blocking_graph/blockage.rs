@@ -1,0 +1,130 @@
+//! The outgoing edges of one part at one pose, for all actions of a set.
+
+use std::collections::BTreeSet;
+
+/// The paper's (f_c, f_a): smaller is expanded first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Evaluation {
+    /// f_c: distinct parts that block some action.
+    pub colliding_parts: usize,
+    /// f_a: actions that nothing is known to block.
+    pub open_actions: usize,
+}
+
+/// Who blocks which action. A collision is about a set of parts: when any of them is gone the
+/// motion may differ, so the action is open again.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Blockage {
+    /// Per action: parts that each alone block it (static analysis).
+    single: Vec<BTreeSet<usize>>,
+    /// Per action: sets that blocked it in a simulation.
+    jointly: Vec<Vec<Vec<usize>>>,
+    /// Parts that blocked something once and are gone.
+    outlived: BTreeSet<usize>,
+}
+
+impl Blockage {
+    /// Nothing is known to block any of `actions` actions.
+    #[must_use]
+    pub fn open(actions: usize) -> Self {
+        Self {
+            single: vec![BTreeSet::new(); actions],
+            jointly: vec![Vec::new(); actions],
+            outlived: BTreeSet::new(),
+        }
+    }
+
+    /// `by` alone blocks an action.
+    pub fn block_single(&mut self, action: usize, by: usize) {
+        self.single[action].insert(by);
+    }
+
+    /// A simulation of an action ended at these parts (none: it can never succeed from here).
+    pub fn block_jointly(&mut self, action: usize, by: Vec<usize>) {
+        self.jointly[action].push(by);
+    }
+
+    /// Forgets what simulations said about an action.
+    pub fn reopen(&mut self, action: usize) {
+        self.jointly[action].clear();
+    }
+
+    /// Whether nothing is known to block an action.
+    #[must_use]
+    pub fn is_open(&self, action: usize) -> bool {
+        self.single[action].is_empty() && self.jointly[action].is_empty()
+    }
+
+    /// Whether only static analysis speaks against an action.
+    #[must_use]
+    pub fn is_untried(&self, action: usize) -> bool {
+        self.jointly[action].is_empty()
+    }
+
+    /// Actions that are open, in order.
+    pub fn open_actions(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.single.len()).filter(|&a| self.is_open(a))
+    }
+
+    /// A part is gone: deletes its vertex.
+    pub fn remove(&mut self, part: usize) {
+        for set in &mut self.single {
+            if set.remove(&part) {
+                self.outlived.insert(part);
+            }
+        }
+        for sets in &mut self.jointly {
+            let before = sets.len();
+            sets.retain(|s| !s.contains(&part));
+            if sets.len() < before {
+                self.outlived.insert(part);
+            }
+        }
+    }
+
+    /// The evaluation functions f_c and f_a.
+    #[must_use]
+    pub fn evaluation(&self) -> Evaluation {
+        let joint = self.jointly.iter().flatten().flatten();
+        let parts: BTreeSet<_> = self.single.iter().flatten().chain(joint).collect();
+        Evaluation { colliding_parts: parts.len(), open_actions: self.open_actions().count() }
+    }
+
+    /// The parts known to block an action.
+    #[must_use]
+    pub fn blockers(&self, action: usize) -> BTreeSet<usize> {
+        self.single[action].iter().chain(self.jointly[action].iter().flatten()).copied().collect()
+    }
+
+    /// Parts that blocked something once and are gone.
+    #[must_use]
+    pub fn outlived(&self) -> &BTreeSet<usize> {
+        &self.outlived
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn removing_any_witness_of_a_collision_reopens_its_action() {
+        let mut b = Blockage::open(2);
+        b.block_jointly(0, vec![3, 5]);
+        b.block_single(1, 5);
+        assert_eq!(b.evaluation(), Evaluation { colliding_parts: 2, open_actions: 0 });
+        b.remove(3);
+        assert!(b.is_open(0) && !b.is_open(1));
+        b.remove(5);
+        assert_eq!(b.evaluation(), Evaluation { colliding_parts: 0, open_actions: 2 });
+        assert_eq!(b.outlived().iter().copied().collect::<Vec<_>>(), [3, 5]);
+    }
+
+    #[test]
+    fn a_collision_with_nothing_stays() {
+        let mut b = Blockage::open(1);
+        b.block_jointly(0, Vec::new());
+        b.remove(0);
+        assert!(!b.is_open(0) && !b.is_untried(0));
+    }
+}

@@ -1,0 +1,11 @@
+//! Directional blocking graphs: who keeps whom from following an action, per state.
+//!
+//! Source: R. H. Wilson and J.-C. Latombe 1994 for the graphs; the paper (section "Directional
+//! Blocking Graphs") for their use over states. A state is one displaced part among the others at
+//! their assembled poses, so a state's graphs are that part's outgoing edges: its [`Blockage`].
+
+mod blockage;
+mod static_analysis;
+
+pub use blockage::{Blockage, Evaluation};
+pub use static_analysis::{blocked_from, initial_blockages};

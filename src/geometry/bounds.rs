@@ -1,0 +1,107 @@
+//! Axis-aligned boxes.
+
+use nalgebra::{Point3, Vector3};
+
+use super::Pose;
+
+/// An axis-aligned box; `min` > `max` on some axis means empty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Smallest coordinates.
+    pub min: Point3<f64>,
+    /// Largest coordinates.
+    pub max: Point3<f64>,
+}
+
+impl Bounds {
+    /// The box of no points.
+    pub const EMPTY: Self = Self {
+        min: Point3::new(f64::INFINITY, f64::INFINITY, f64::INFINITY),
+        max: Point3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
+    };
+
+    /// The box of points.
+    pub fn of<'a>(points: impl IntoIterator<Item = &'a Point3<f64>>) -> Self {
+        points.into_iter().fold(Self::EMPTY, |b, p| b.with_point(p))
+    }
+
+    /// Grown to hold a point.
+    #[must_use]
+    pub fn with_point(self, p: &Point3<f64>) -> Self {
+        Self { min: self.min.inf(p), max: self.max.sup(p) }
+    }
+
+    /// The box of both.
+    #[must_use]
+    pub fn union(self, other: &Self) -> Self {
+        Self { min: self.min.inf(&other.min), max: self.max.sup(&other.max) }
+    }
+
+    /// Grown by `margin` on every side (shrunk if negative).
+    #[must_use]
+    pub fn grown(self, margin: f64) -> Self {
+        let m = Vector3::repeat(margin);
+        Self { min: self.min - m, max: self.max + m }
+    }
+
+    /// Whether the two share a point.
+    #[must_use]
+    pub fn meets(&self, other: &Self) -> bool {
+        (0..3).all(|a| self.min[a] <= other.max[a] && other.min[a] <= self.max[a])
+    }
+
+    /// Whether `p` lies inside or on the box.
+    #[must_use]
+    pub fn contains(&self, p: &Point3<f64>) -> bool {
+        (0..3).all(|a| self.min[a] <= p[a] && p[a] <= self.max[a])
+    }
+
+    /// Side lengths.
+    #[must_use]
+    pub fn extents(&self) -> Vector3<f64> {
+        self.max - self.min
+    }
+
+    /// The middle.
+    #[must_use]
+    pub fn centre(&self) -> Point3<f64> {
+        nalgebra::center(&self.min, &self.max)
+    }
+
+    /// Distance from `p` to the box; 0 inside.
+    #[must_use]
+    pub fn distance(&self, p: &Point3<f64>) -> f64 {
+        let d = (self.min - p).sup(&(p - self.max)).sup(&Vector3::zeros());
+        d.norm()
+    }
+
+    /// A box that holds this one after `pose` (tight for the eight corners).
+    #[must_use]
+    pub fn transformed(&self, pose: &Pose) -> Self {
+        let half = self.extents() / 2.0;
+        let r = pose.rotation.to_rotation_matrix();
+        let reach = r.matrix().abs() * half;
+        let c = pose * self.centre();
+        Self { min: c - reach, max: c + reach }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turned_box_holds_its_corners() {
+        let b = Bounds { min: Point3::new(-1.0, -2.0, 0.0), max: Point3::new(1.0, 3.0, 4.0) };
+        let pose = Pose::new(Vector3::new(5.0, 0.0, -1.0), Vector3::new(0.3, -0.8, 1.1));
+        let t = b.transformed(&pose).grown(1e-12);
+        for i in 0..8 {
+            let corner = Point3::new(
+                if i & 1 == 0 { b.min.x } else { b.max.x },
+                if i & 2 == 0 { b.min.y } else { b.max.y },
+                if i & 4 == 0 { b.min.z } else { b.max.z },
+            );
+            assert!(t.contains(&(pose * corner)));
+        }
+    }
+}

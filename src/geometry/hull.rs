@@ -1,0 +1,127 @@
+//! Convex hulls and the test whether two of them are apart.
+//!
+//! Hulls are kept as their vertices. Separation is proved by a plane: GJK (parry) proposes a
+//! direction and the projections of both vertex sets certify it, so an answer of "apart" never
+//! rests on an algorithm that gave up.
+
+use nalgebra::{Point3, Vector3};
+use parry3d_f64::math::{Pose as ParryPose, Vector as ParryVector};
+use parry3d_f64::query::gjk::{GJKResult, VoronoiSimplex, closest_points};
+use parry3d_f64::query::gjk::CsoPoint;
+use parry3d_f64::shape::SupportMap;
+use parry3d_f64::transformation::try_convex_hull;
+
+use super::Pose;
+
+/// The vertices of the convex hull of `points`; all points where they are too flat for a hull.
+#[must_use]
+pub fn hull_vertices(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
+    let input: Vec<ParryVector> = points.iter().map(|p| ParryVector::new(p.x, p.y, p.z)).collect();
+    match try_convex_hull(&input) {
+        Ok((vertices, _)) if covers(&vertices, points) => {
+            vertices.iter().map(|v| Point3::new(v.x, v.y, v.z)).collect()
+        }
+        _ => points.to_vec(),
+    }
+}
+
+/// Whether a computed hull reaches as far as the points it is meant to hold, in 26 directions.
+/// Guards against numerical failure of the hull algorithm on coplanar input.
+fn covers(hull: &[ParryVector], points: &[Point3<f64>]) -> bool {
+    let size = super::Bounds::of(points).extents().norm();
+    (0..27).filter(|i| *i != 13).all(|i| {
+        let d = Vector3::new(f64::from(i % 3 - 1), f64::from(i / 3 % 3 - 1), f64::from(i / 9 - 1));
+        let reach = points.iter().map(|p| p.coords.dot(&d)).fold(f64::NEG_INFINITY, f64::max);
+        hull.iter().any(|v| v.x * d.x + v.y * d.y + v.z * d.z >= reach - 1e-7 * size)
+    })
+}
+
+struct Cloud<'a>(&'a [Point3<f64>]);
+
+impl SupportMap for Cloud<'_> {
+    fn local_support_point(&self, dir: ParryVector) -> ParryVector {
+        let d = Vector3::new(dir.x, dir.y, dir.z);
+        let mut best = (f64::NEG_INFINITY, 0);
+        for (i, p) in self.0.iter().enumerate() {
+            let reach = p.coords.dot(&d);
+            if reach > best.0 {
+                best = (reach, i);
+            }
+        }
+        let p = self.0[best.1];
+        ParryVector::new(p.x, p.y, p.z)
+    }
+}
+
+/// How far apart two vertex sets are along a unit direction (positive: `b` lies beyond `a`).
+#[must_use]
+pub fn gap_along(direction: &Vector3<f64>, a: &[Point3<f64>], b: &[Point3<f64>]) -> f64 {
+    let far = a.iter().map(|p| p.coords.dot(direction)).fold(f64::NEG_INFINITY, f64::max);
+    let near = b.iter().map(|p| p.coords.dot(direction)).fold(f64::INFINITY, f64::min);
+    near - far
+}
+
+/// A unit direction along which hull `b` lies at least `margin` beyond hull `a`, if one was found.
+/// `hint` is tried first.
+#[must_use]
+pub fn separating_direction(
+    a: &[Point3<f64>],
+    b: &[Point3<f64>],
+    margin: f64,
+    hint: Option<Vector3<f64>>,
+) -> Option<Vector3<f64>> {
+    if let Some(d) = hint
+        && gap_along(&d, a, b) >= margin
+    {
+        return Some(d);
+    }
+    if a.is_empty() || b.is_empty() {
+        return Some(Vector3::x());
+    }
+    let (ca, cb) = (Cloud(a), Cloud(b));
+    let start = ca.local_support_point(ParryVector::X) - cb.local_support_point(-ParryVector::X);
+    let mut simplex = VoronoiSimplex::new();
+    simplex.reset(CsoPoint::from_shapes(&ParryPose::IDENTITY, &ca, &cb, start));
+    let found = closest_points(&ParryPose::IDENTITY, &ca, &cb, f64::MAX, true, &mut simplex);
+    let d = match found {
+        GJKResult::ClosestPoints(_, _, d) | GJKResult::Proximity(d) | GJKResult::NoIntersection(d) => d,
+        GJKResult::Intersection => return None,
+    };
+    let d = Vector3::new(d.x, d.y, d.z).try_normalize(1e-12)?;
+    (gap_along(&d, a, b) >= margin).then_some(d)
+}
+
+/// Points after a pose.
+#[must_use]
+pub fn transformed(points: &[Point3<f64>], pose: &Pose) -> Vec<Point3<f64>> {
+    points.iter().map(|p| pose * p).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube(at: f64) -> Vec<Point3<f64>> {
+        (0..8).map(|i| Point3::new(at + f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2))).collect()
+    }
+
+    #[test]
+    fn apart_is_certified_and_touching_is_not_apart() {
+        assert!(separating_direction(&cube(0.0), &cube(1.5), 1e-3, None).is_some());
+        assert!(separating_direction(&cube(0.0), &cube(1.0), 1e-3, None).is_none());
+        assert!(separating_direction(&cube(0.0), &cube(0.3), 1e-3, None).is_none());
+    }
+
+    #[test]
+    fn a_contained_hull_is_not_apart() {
+        let inner: Vec<_> = cube(0.0).iter().map(|p| Point3::from(p.coords * 0.2 + Vector3::repeat(0.4))).collect();
+        assert!(separating_direction(&cube(0.0), &inner, 0.0, None).is_none());
+    }
+
+    #[test]
+    fn interior_points_leave_the_hull() {
+        let mut points = cube(0.0);
+        points.push(Point3::new(0.5, 0.5, 0.5));
+        assert_eq!(hull_vertices(&points).len(), 8);
+    }
+}

@@ -1,0 +1,322 @@
+//! A mesh prepared for exact distance questions: closest points, signs, local planes.
+//!
+//! Sign: for closed meshes by the angle-weighted pseudo-normal of the closest feature
+//! (J. A. Bærentzen and H. Aanæs 2005), which is exact for closed, outward oriented meshes that do
+//! not cross themselves; for all others by winding number > 0.5.
+
+use nalgebra::{Point3, Unit, Vector3};
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::math::Vector as ParryVector;
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
+
+use super::triangle::{Feature, area_normal, closest_on_triangle};
+use super::winding::WindingTree;
+use super::{Bounds, Mesh, Solidity};
+
+/// No triangle.
+pub const NO_TRIANGLE: u32 = u32::MAX;
+
+/// The closest surface point to some point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Closest {
+    /// The triangle it lies on.
+    pub triangle: u32,
+    /// Where on the triangle.
+    pub feature: Feature,
+    /// The point.
+    pub point: Point3<f64>,
+    /// Distance, not negative.
+    pub distance: f64,
+}
+
+/// A triangle surface with its adjacency, normals and bounding-volume hierarchy.
+#[derive(Clone)]
+pub struct Surface {
+    vertices: Vec<Point3<f64>>,
+    triangles: Vec<[u32; 3]>,
+    face_normals: Vec<Vector3<f64>>,
+    /// Per triangle and edge: the triangle on the other side.
+    neighbours: Vec<[u32; 3]>,
+    vertex_normals: Vec<Vector3<f64>>,
+    /// Triangles around each vertex, as ranges of `fan`.
+    fan_start: Vec<u32>,
+    fan: Vec<u32>,
+    bvh: Bvh,
+    winding: Option<WindingTree>,
+    bounds: Bounds,
+}
+
+impl std::fmt::Debug for Surface {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Surface({} vertices, {} triangles)", self.vertices.len(), self.triangles.len())
+    }
+}
+
+impl Surface {
+    /// Prepares a healed mesh.
+    #[must_use]
+    pub fn new(mesh: &Mesh) -> Self {
+        let corner = |t: &[u32; 3]| t.map(|i| mesh.vertices[i as usize]);
+        let face_normals = mesh
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = corner(t);
+                area_normal(&a, &b, &c).try_normalize(0.0).unwrap_or_else(Vector3::zeros)
+            })
+            .collect::<Vec<_>>();
+        let boxes = mesh.triangles.iter().enumerate().map(|(i, t)| {
+            let b = Bounds::of(&corner(t));
+            (i, Aabb::new(to_parry(&b.min), to_parry(&b.max)))
+        });
+        let bvh = Bvh::from_iter(BvhBuildStrategy::Binned, boxes);
+        let (fan_start, fan) = fans(mesh);
+        let winding = (mesh.solidity == Solidity::Winding)
+            .then(|| WindingTree::new(&mesh.vertices, &mesh.triangles));
+        Self {
+            neighbours: neighbours(mesh),
+            vertex_normals: vertex_normals(mesh, &face_normals),
+            face_normals,
+            fan_start,
+            fan,
+            bvh,
+            winding,
+            bounds: Bounds::of(&mesh.vertices),
+            vertices: mesh.vertices.clone(),
+            triangles: mesh.triangles.clone(),
+        }
+    }
+
+    /// The vertices.
+    #[must_use]
+    pub fn vertices(&self) -> &[Point3<f64>] {
+        &self.vertices
+    }
+
+    /// The triangles.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
+    /// The box of all vertices.
+    #[must_use]
+    pub fn bounds(&self) -> &Bounds {
+        &self.bounds
+    }
+
+    /// The corners of a triangle.
+    #[must_use]
+    pub fn corners(&self, triangle: u32) -> [Point3<f64>; 3] {
+        self.triangles[triangle as usize].map(|i| self.vertices[i as usize])
+    }
+
+    /// The unit normal of a triangle (zero if degenerate).
+    #[must_use]
+    pub fn face_normal(&self, triangle: u32) -> Vector3<f64> {
+        self.face_normals[triangle as usize]
+    }
+
+    /// The triangle across edge `edge` of `triangle`, or [`NO_TRIANGLE`].
+    #[must_use]
+    pub fn neighbour(&self, triangle: u32, edge: u8) -> u32 {
+        self.neighbours[triangle as usize][edge as usize]
+    }
+
+    /// Whether inside and outside are told apart by winding number.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.winding.is_some()
+    }
+
+    /// The winding number at `p`, where signs come from it.
+    #[must_use]
+    pub fn winding(&self, p: &Point3<f64>) -> Option<f64> {
+        self.winding.as_ref().map(|w| w.winding(p))
+    }
+
+    /// The closest point on one triangle.
+    #[must_use]
+    pub fn closest_on(&self, triangle: u32, p: &Point3<f64>) -> Closest {
+        let [a, b, c] = self.corners(triangle);
+        let (point, feature) = closest_on_triangle(p, &a, &b, &c);
+        Closest { triangle, feature, point, distance: (p - point).norm() }
+    }
+
+    /// The closest surface point nearer than `reach`, if there is one.
+    #[must_use]
+    pub fn closest(&self, p: &Point3<f64>, reach: f64) -> Option<Closest> {
+        let cost = |node: &BvhNode, _| {
+            let (lo, hi) = (node.mins(), node.maxs());
+            let gap = |x: f64, l: f64, h: f64| (l - x).max(x - h).max(0.0);
+            let (dx, dy, dz) = (gap(p.x, lo.x, hi.x), gap(p.y, lo.y, hi.y), gap(p.z, lo.z, hi.z));
+            (dx * dx + dy * dy + dz * dz).sqrt()
+        };
+        let found = self.bvh.find_best(reach, cost, |i, _| Some(self.closest_on(i, p).distance));
+        found.map(|(i, _)| self.closest_on(i, p))
+    }
+
+    /// Signed distance given the closest point: negative inside.
+    #[must_use]
+    pub fn signed(&self, p: &Point3<f64>, closest: &Closest) -> f64 {
+        let inside = match &self.winding {
+            Some(w) => w.winding(p) > 0.5,
+            None => self.pseudo_normal(closest).dot(&(p - closest.point)) < 0.0,
+        };
+        if inside { -closest.distance } else { closest.distance }
+    }
+
+    /// Signed distance to the surface.
+    #[must_use]
+    pub fn signed_distance(&self, p: &Point3<f64>) -> f64 {
+        self.closest(p, f64::INFINITY).map_or(f64::INFINITY, |c| self.signed(p, &c))
+    }
+
+    /// The angle-weighted pseudo-normal of the feature a closest point lies on (not normalised).
+    #[must_use]
+    pub fn pseudo_normal(&self, closest: &Closest) -> Vector3<f64> {
+        let own = self.face_normal(closest.triangle);
+        match closest.feature {
+            Feature::Face => own,
+            Feature::Edge(e) => match self.neighbour(closest.triangle, e) {
+                NO_TRIANGLE => own,
+                other => own + self.face_normal(other),
+            },
+            Feature::Vertex(v) => {
+                self.vertex_normals[self.triangles[closest.triangle as usize][v as usize] as usize]
+            }
+        }
+    }
+
+    /// The unit normals of the faces that meet in the feature a closest point lies on.
+    pub fn feature_normals(&self, closest: &Closest, mut visit: impl FnMut(Vector3<f64>)) {
+        match closest.feature {
+            Feature::Face => visit(self.face_normal(closest.triangle)),
+            Feature::Edge(e) => {
+                visit(self.face_normal(closest.triangle));
+                let other = self.neighbour(closest.triangle, e);
+                if other != NO_TRIANGLE {
+                    visit(self.face_normal(other));
+                }
+            }
+            Feature::Vertex(v) => {
+                for &t in self.fan(self.triangles[closest.triangle as usize][v as usize]) {
+                    visit(self.face_normal(t));
+                }
+            }
+        }
+    }
+
+    /// The triangles around a vertex.
+    #[must_use]
+    pub fn fan(&self, vertex: u32) -> &[u32] {
+        let i = vertex as usize;
+        &self.fan[self.fan_start[i] as usize..self.fan_start[i + 1] as usize]
+    }
+
+    /// Volume, and centroid and squared radius of gyration about it of the enclosed solid; for
+    /// meshes that enclose none, those of the bounding box.
+    #[must_use]
+    pub fn mass_properties(&self) -> MassProperties {
+        let origin = self.bounds.centre();
+        let (mut volume, mut first, mut second) = (0.0, Vector3::zeros(), 0.0);
+        for t in 0..self.triangles.len() as u32 {
+            let [a, b, c] = self.corners(t).map(|p| p - origin);
+            let v = a.dot(&b.cross(&c)) / 6.0;
+            volume += v;
+            first += (a + b + c) * (v / 4.0);
+            let s = a + b + c;
+            second += v / 20.0
+                * (a.norm_squared() + b.norm_squared() + c.norm_squared() + s.norm_squared());
+        }
+        let e = self.bounds.extents();
+        let boxed = MassProperties {
+            volume: e.product(),
+            centre: origin,
+            gyration_squared: e.norm_squared() / 12.0,
+        };
+        if volume <= 1e-3 * boxed.volume {
+            return boxed;
+        }
+        let centre = first / volume;
+        let gyration_squared = second / volume - centre.norm_squared();
+        if !self.bounds.contains(&(origin + centre)) || gyration_squared <= 0.0 {
+            return boxed;
+        }
+        MassProperties { volume, centre: origin + centre, gyration_squared }
+    }
+}
+
+/// What a rigid motion needs to know about a body of uniform density.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MassProperties {
+    /// Enclosed volume.
+    pub volume: f64,
+    /// Centre of mass.
+    pub centre: Point3<f64>,
+    /// Mean squared distance of the mass from the centre.
+    pub gyration_squared: f64,
+}
+
+fn to_parry(p: &Point3<f64>) -> ParryVector {
+    ParryVector::new(p.x, p.y, p.z)
+}
+
+fn neighbours(mesh: &Mesh) -> Vec<[u32; 3]> {
+    let mut sides: Vec<(u32, u32, u32, u8)> = Vec::with_capacity(mesh.triangles.len() * 3);
+    for (i, t) in mesh.triangles.iter().enumerate() {
+        for e in 0..3usize {
+            let (a, b) = (t[e], t[(e + 1) % 3]);
+            sides.push((a.min(b), a.max(b), i as u32, e as u8));
+        }
+    }
+    sides.sort_unstable();
+    let mut out = vec![[NO_TRIANGLE; 3]; mesh.triangles.len()];
+    let mut i = 0;
+    while i < sides.len() {
+        let same = sides[i..].iter().take_while(|s| (s.0, s.1) == (sides[i].0, sides[i].1)).count();
+        // Edges of more than two faces are paired in order: there, any pairing is as good.
+        for pair in sides[i..i + same].chunks_exact(2) {
+            out[pair[0].2 as usize][pair[0].3 as usize] = pair[1].2;
+            out[pair[1].2 as usize][pair[1].3 as usize] = pair[0].2;
+        }
+        i += same;
+    }
+    out
+}
+
+fn vertex_normals(mesh: &Mesh, face_normals: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let mut out = vec![Vector3::zeros(); mesh.vertices.len()];
+    for (t, n) in mesh.triangles.iter().zip(face_normals) {
+        for k in 0..3 {
+            let p = mesh.vertices[t[k] as usize];
+            let a = mesh.vertices[t[(k + 1) % 3] as usize] - p;
+            let b = mesh.vertices[t[(k + 2) % 3] as usize] - p;
+            if let (Some(a), Some(b)) = (Unit::try_new(a, 0.0), Unit::try_new(b, 0.0)) {
+                out[t[k] as usize] += n * a.dot(&b).clamp(-1.0, 1.0).acos();
+            }
+        }
+    }
+    out
+}
+
+fn fans(mesh: &Mesh) -> (Vec<u32>, Vec<u32>) {
+    let mut start = vec![0u32; mesh.vertices.len() + 1];
+    for t in &mesh.triangles {
+        for &v in t {
+            start[v as usize + 1] += 1;
+        }
+    }
+    for i in 0..mesh.vertices.len() {
+        start[i + 1] += start[i];
+    }
+    let mut next = start.clone();
+    let mut fan = vec![0u32; mesh.triangles.len() * 3];
+    for (i, t) in mesh.triangles.iter().enumerate() {
+        for &v in t {
+            fan[next[v as usize] as usize] = i as u32;
+            next[v as usize] += 1;
+        }
+    }
+    (start, fan)
+}

@@ -1,0 +1,86 @@
+//! The closest point of a triangle, with the feature it lies on.
+
+use nalgebra::{Point3, Vector3};
+
+/// The feature of a triangle on which a closest point lies. Edge `i` joins corners `i` and `i + 1`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Feature {
+    /// The interior.
+    Face,
+    /// An edge.
+    Edge(u8),
+    /// A corner.
+    Vertex(u8),
+}
+
+/// The point of triangle `abc` closest to `p`, and its feature (C. Ericson, Real-Time Collision
+/// Detection, 5.1.5: Voronoi regions in barycentric terms).
+#[must_use]
+pub fn closest_on_triangle(
+    p: &Point3<f64>,
+    a: &Point3<f64>,
+    b: &Point3<f64>,
+    c: &Point3<f64>,
+) -> (Point3<f64>, Feature) {
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let (d1, d2) = (ab.dot(&ap), ac.dot(&ap));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return (*a, Feature::Vertex(0));
+    }
+    let bp = p - b;
+    let (d3, d4) = (ab.dot(&bp), ac.dot(&bp));
+    if d3 >= 0.0 && d4 <= d3 {
+        return (*b, Feature::Vertex(1));
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return (a + ab * (d1 / (d1 - d3)), Feature::Edge(0));
+    }
+    let cp = p - c;
+    let (d5, d6) = (ab.dot(&cp), ac.dot(&cp));
+    if d6 >= 0.0 && d5 <= d6 {
+        return (*c, Feature::Vertex(2));
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return (a + ac * (d2 / (d2 - d6)), Feature::Edge(2));
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return (b + (c - b) * w, Feature::Edge(1));
+    }
+    let scale = 1.0 / (va + vb + vc);
+    (a + ab * (vb * scale) + ac * (vc * scale), Feature::Face)
+}
+
+/// Twice the area times the unit normal; zero for a degenerate triangle.
+#[must_use]
+pub fn area_normal(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>) -> Vector3<f64> {
+    (b - a).cross(&(c - a))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn point() -> impl Strategy<Value = Point3<f64>> {
+        prop::array::uniform3(-2.0..2.0f64).prop_map(Point3::from)
+    }
+
+    proptest! {
+        #[test]
+        fn no_point_of_the_triangle_is_closer(p in point(), a in point(), b in point(), c in point()) {
+            let (q, _) = closest_on_triangle(&p, &a, &b, &c);
+            let best = (p - q).norm();
+            for i in 0..=20 {
+                for j in 0..=(20 - i) {
+                    let (u, v) = (f64::from(i) / 20.0, f64::from(j) / 20.0);
+                    let r = a + (b - a) * u + (c - a) * v;
+                    prop_assert!((p - r).norm() >= best - 1e-9);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! Signed distance fields: sparse bricks near the surface, conservative bounds elsewhere.
+//!
+//! A field is made per distinct mesh, in the shape's own frame. Values are negative inside.
+//! Guarantees: at nodes of the narrow band the stored distance is that of the nearest triangle
+//! (exact, then rounded to f32), and that triangle's index is kept, so that whoever needs an exact
+//! distance measures against a few triangles instead of interpolating. Everywhere else a field
+//! only gives bounds that never overstate the distance.
+
+mod build;
+mod far_field;
+mod grid;
+
+pub use grid::{Estimate, Field};

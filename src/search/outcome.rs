@@ -1,0 +1,62 @@
+//! What a search yields, in the planning frame.
+
+use std::time::Duration;
+
+use crate::geometry::Pose;
+use crate::plan::PlanStatus;
+
+/// One part taken out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Removal {
+    /// The part.
+    pub part: usize,
+    /// Poses of its shape, the assembled one first; thinned and verified.
+    pub path: Vec<Pose>,
+    /// Largest depth beyond the pairs' allowances that verification found.
+    pub depth: f64,
+    /// Parts that had blocked it and left before.
+    pub waited_for: Vec<usize>,
+}
+
+/// An action of a part that remains, and who blocks it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct BlockedAction {
+    /// The part.
+    pub part: usize,
+    /// The action's name.
+    pub action: String,
+    /// The parts in its way, ascending.
+    pub by: Vec<usize>,
+}
+
+/// Counts and times of a search.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Transition functions used.
+    pub simulations: u64,
+    /// States kept.
+    pub states: u64,
+    /// Time in static analysis.
+    pub static_analysis: Duration,
+    /// Time in simulation.
+    pub simulation: Duration,
+    /// Time in thinning and verification.
+    pub verification: Duration,
+}
+
+/// How a search ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Its status.
+    pub status: PlanStatus,
+    /// Why it is not complete.
+    pub reason: Option<String>,
+    /// Removals in order.
+    pub removals: Vec<Removal>,
+    /// Parts that remain, ascending.
+    pub remaining: Vec<usize>,
+    /// Why those that should have come out did not.
+    pub blocked: Vec<BlockedAction>,
+    /// Counts and times.
+    pub counters: Counters,
+}

@@ -1,0 +1,103 @@
+//! A planning question in the planning frame, ready to be searched.
+
+use std::collections::HashMap;
+
+use nalgebra::Point3;
+
+use crate::geometry::{Pose, SampleTree};
+use crate::plan::{Entry, Verifier, thinned};
+use crate::simulation::{Action, Scene, TransitionFunction};
+use crate::termination::{Interrupt, Termination};
+
+use super::outcome::Removal;
+use super::request::ActionSet;
+
+/// Is told what a search does.
+pub trait Observer {
+    /// So many parts are out after so many simulations.
+    fn progress(&mut self, removed: usize, simulations: u64);
+    /// A part is out; in order.
+    fn removal(&mut self, removal: &Removal);
+}
+
+/// A verified path with its depth, or the points that refute it.
+pub type Checked = Result<(Vec<Pose>, f64), Vec<Entry>>;
+
+/// What is to be searched.
+pub struct Problem<'a> {
+    /// The bodies. Owned: a search adds samples where verification found some missing.
+    pub scene: Scene,
+    /// The check on the triangles.
+    pub verifier: &'a Verifier,
+    /// The transition function.
+    pub engine: &'a dyn TransitionFunction,
+    /// Parts that are there, ascending.
+    pub present: Vec<usize>,
+    /// Parts that may not move.
+    pub fixed: Vec<usize>,
+    /// Parts that must come out; `None` for all.
+    pub targets: Option<Vec<usize>>,
+    /// Which actions are used.
+    pub actions: ActionSet,
+    /// Simulations after which to give up.
+    pub max_simulations: Option<u64>,
+    /// Ends the search early.
+    pub termination: Termination,
+    /// Points added so far, per part.
+    pub extra_points: HashMap<usize, Vec<Point3<f64>>>,
+}
+
+impl Problem<'_> {
+    /// The translations, and the actions with rotational freedom in the order of trial.
+    #[must_use]
+    pub fn action_lists(&self) -> (Vec<Action>, Vec<Action>) {
+        let rotations = match self.actions {
+            ActionSet::Paper => Action::rotations(),
+            // Where turning helps, pulling while turning mostly leads out in one motion.
+            ActionSet::Extended => Action::screws().into_iter().chain(Action::rotations()).collect(),
+        };
+        (Action::translations(), rotations)
+    }
+
+    /// Whether a part is there and not fixed.
+    #[must_use]
+    pub fn may_move(&self, part: usize) -> bool {
+        self.present.binary_search(&part).is_ok() && !self.fixed.contains(&part)
+    }
+
+    /// Of the parts that remain, those that should come out.
+    #[must_use]
+    pub fn wanted(&self, remaining: &[usize]) -> Vec<usize> {
+        let asked = |p: &usize| self.targets.as_ref().is_none_or(|t| t.contains(p));
+        remaining.iter().copied().filter(|p| !self.fixed.contains(p) && asked(p)).collect()
+    }
+
+    /// Whether nothing more has to come out: a last part alone is apart from all others.
+    #[must_use]
+    pub fn is_goal(&self, remaining: &[usize]) -> bool {
+        remaining.len() <= 1 || self.wanted(remaining).is_empty()
+    }
+
+    /// Thins a path and verifies it on the triangles.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn checked_path(&self, standing: Vec<usize>, part: usize, path: &[Pose]) -> Result<Checked, Interrupt> {
+        let bounds = self.scene.bodies[part].shape.bounds();
+        let thin = thinned(path, bounds, &self.scene.centre_in_shape(part));
+        let Scene { allowances, .. } = &self.scene;
+        let verdict = self.verifier.check(&self.scene, allowances, &standing, part, &thin, &self.termination)?;
+        if verdict.entries.is_empty() { Ok(Ok((thin, verdict.depth))) } else { Ok(Err(verdict.entries)) }
+    }
+
+    /// Makes points that refuted a path samples of their bodies.
+    pub fn add_samples(&mut self, part: usize, entries: &[Entry]) {
+        for entry in entries {
+            let body = if entry.on_moving { part } else { entry.other };
+            self.extra_points.entry(body).or_default().push(entry.point);
+        }
+        for (body, points) in &self.extra_points {
+            self.scene.bodies[*body].extra_samples = SampleTree::over(points.clone());
+        }
+    }
+}

@@ -1,0 +1,582 @@
+//! SBDP*: State-Based Disassembly Planning guided by directional blocking graphs.
+//!
+//! Source: the paper, Algorithm 1 with the evaluation functions (f_c, f_a) and the constraints of
+//! its section on blocking graphs. Departures, each for a reason given in DESIGN 6: a collision is
+//! about a set of parts; translational passes repeat while they find new states, since turning
+//! costs more; the search ends when nothing new can be found. Simulations run ahead in parallel,
+//! but their results are taken in the order of the serial algorithm and thrown away where an
+//! earlier one changed the question, so the plan does not depend on the number of threads.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use crate::blocking_graph::{Blockage, Evaluation, blocked_from, initial_blockages};
+use crate::geometry::Pose;
+use crate::plan::PlanStatus;
+use crate::simulation::{Action, End, Motion, Surroundings, exit_direction};
+use crate::termination::Interrupt;
+
+use super::outcome::{BlockedAction, Counters, Outcome, Removal};
+use super::problem::{Observer, Problem};
+use super::state::{Node, Phase, coarseness, least_travel, same_state};
+
+/// Translational passes in a row before turning is tried, if they only find new states.
+const TRANSLATION_PASSES: usize = 6;
+/// How often a motion is simulated again with the points at which verification refuted it.
+const REFINEMENTS: usize = 4;
+
+/// Why a search stops before it is done.
+pub(super) enum Stop {
+    Interrupted(Interrupt),
+    Budget(u64),
+}
+
+impl From<Interrupt> for Stop {
+    fn from(i: Interrupt) -> Self {
+        Self::Interrupted(i)
+    }
+}
+
+/// What a pass brought.
+#[derive(Debug, Clone, Copy, Default)]
+struct Gain {
+    removed: bool,
+    new_states: bool,
+}
+
+impl Gain {
+    fn any(self) -> bool {
+        self.removed || self.new_states
+    }
+}
+
+/// One simulation to run.
+#[derive(Debug, Clone, Copy)]
+struct Job {
+    node: usize,
+    action: usize,
+}
+
+pub(super) struct Search<'a, 'o> {
+    problem: Problem<'a>,
+    observer: &'o mut dyn Observer,
+    /// All present parts that have not been taken out.
+    everything: Surroundings,
+    around: Vec<Option<Surroundings>>,
+    /// A part whose hull meets this part's, both assembled: proof that it is not free.
+    entangled: Vec<Option<usize>>,
+    nodes: Vec<Node>,
+    states_of: Vec<usize>,
+    translations: Vec<Action>,
+    rotations: Vec<Action>,
+    /// The last resort: actions that static analysis excluded are simulated, too.
+    distrust_static: bool,
+    removals: Vec<Removal>,
+    counters: Counters,
+}
+
+/// Searches until everything asked for is out, nothing more can be found, or a limit is met.
+pub(super) fn sbdp_star(problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
+    let mut search = Search::new(problem, observer);
+    let stop = search.run().err();
+    search.outcome(stop)
+}
+
+impl<'a, 'o> Search<'a, 'o> {
+    fn new(problem: Problem<'a>, observer: &'o mut dyn Observer) -> Self {
+        let count = problem.scene.bodies.len();
+        let everything = Surroundings::new(&problem.scene, problem.present.clone());
+        let (translations, rotations) = problem.action_lists();
+        Self {
+            observer,
+            everything,
+            around: vec![None; count],
+            entangled: vec![None; count],
+            nodes: Vec::new(),
+            states_of: vec![0; count],
+            translations,
+            rotations,
+            distrust_static: false,
+            removals: Vec::new(),
+            counters: Counters::default(),
+            problem,
+        }
+    }
+
+    fn run(&mut self) -> Result<(), Stop> {
+        self.make_roots()?;
+        self.take_free_parts()?;
+        loop {
+            let mut gain = Gain::default();
+            for _ in 0..TRANSLATION_PASSES {
+                let pass = self.pass(Phase::Translation)?;
+                if self.is_done() {
+                    return Ok(());
+                }
+                gain.removed |= pass.removed;
+                gain.new_states |= pass.new_states;
+                if !pass.new_states {
+                    break;
+                }
+            }
+            let turned = self.pass(Phase::Rotation)?;
+            if self.is_done() {
+                return Ok(());
+            }
+            if gain.any() || turned.any() {
+                continue;
+            }
+            self.distrust_static = true;
+            let last = self.pass(Phase::Translation);
+            self.distrust_static = false;
+            if self.is_done() || !last?.any() {
+                return Ok(());
+            }
+        }
+    }
+
+    fn make_roots(&mut self) -> Result<(), Stop> {
+        let started = Instant::now();
+        let Problem { scene, present, termination, .. } = &self.problem;
+        let least = |part| least_travel(scene, part);
+        let blockages = initial_blockages(scene, present, &self.translations, &least, termination)?;
+        self.counters.static_analysis += started.elapsed();
+        for (part, blockage) in blockages.into_iter().enumerate() {
+            if self.problem.may_move(part) {
+                self.add_node(Node {
+                    part,
+                    path: vec![self.problem.scene.bodies[part].planning_from_shape],
+                    translation: Some(blockage),
+                    rotation: Blockage::open(self.rotations.len()),
+                    origin: None,
+                    alive: true,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn add_node(&mut self, node: Node) {
+        self.states_of[node.part] += 1;
+        self.counters.states += 1;
+        self.nodes.push(node);
+    }
+
+    fn actions(&self, phase: Phase) -> &[Action] {
+        match phase {
+            Phase::Translation => &self.translations,
+            Phase::Rotation => &self.rotations,
+        }
+    }
+
+    /// One run of Algorithm 1's `disassembly` over the open list.
+    fn pass(&mut self, phase: Phase) -> Result<Gain, Stop> {
+        let mut gain = Gain::default();
+        let mut open: Vec<usize> = self.alive().collect();
+        while !open.is_empty() && !self.is_done() {
+            self.analyse(phase, &open)?;
+            let batch = self.extract(phase, &mut open);
+            let result = self.expand(phase, &batch)?;
+            gain.new_states |= result.new_states;
+            if result.removed {
+                gain.removed = true;
+                self.take_free_parts()?;
+                if phase == Phase::Rotation {
+                    return Ok(gain);
+                }
+                open = self.alive().collect();
+            }
+        }
+        Ok(gain)
+    }
+
+    fn alive(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.nodes.len()).filter(|&i| self.nodes[i].alive)
+    }
+
+    /// Static analysis of displaced states that have none yet.
+    fn analyse(&mut self, phase: Phase, open: &[usize]) -> Result<(), Stop> {
+        if phase == Phase::Rotation {
+            return Ok(());
+        }
+        let started = Instant::now();
+        let todo: Vec<_> = open.iter().copied().filter(|&i| self.nodes[i].translation.is_none()).collect();
+        for &i in &todo {
+            let part = self.nodes[i].part;
+            self.surroundings(part);
+        }
+        let (scene, around, nodes) = (&self.problem.scene, &self.around, &self.nodes);
+        let translations = &self.translations;
+        let termination = &self.problem.termination;
+        let found = todo
+            .par_iter()
+            .map(|&i| {
+                termination.check()?;
+                let node = &nodes[i];
+                let standing = around[node.part].as_ref().map_or(&[][..], |s| &s.standing);
+                let least = least_travel(scene, node.part);
+                Ok(blocked_from(scene, standing, node.part, node.pose(), translations, least))
+            })
+            .collect::<Result<Vec<_>, Interrupt>>()?;
+        for (i, blockage) in todo.into_iter().zip(found) {
+            self.nodes[i].translation = Some(blockage);
+        }
+        self.counters.static_analysis += started.elapsed();
+        Ok(())
+    }
+
+    /// Takes the best displaced state off the open list, or else the initial state, which comes
+    /// last (its f_c and f_a count as infinite) and stands for all its parts in their order.
+    fn extract(&self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
+        let evaluation = |i: usize| {
+            let zero = Evaluation { colliding_parts: 0, open_actions: 0 };
+            self.nodes[i].blockage(phase).map_or(zero, Blockage::evaluation)
+        };
+        let displaced = open.iter().copied().filter(|&i| !self.nodes[i].is_root());
+        if let Some(best) = displaced.min_by_key(|&i| (evaluation(i), i)) {
+            open.retain(|&i| i != best);
+            return vec![best];
+        }
+        let mut roots = std::mem::take(open);
+        roots.sort_by_key(|&i| (evaluation(i), i));
+        roots
+    }
+
+    /// Simulates the open actions of some states of one priority, in order.
+    fn expand(&mut self, phase: Phase, batch: &[usize]) -> Result<Gain, Stop> {
+        let count = self.actions(phase).len();
+        let jobs: Vec<Job> =
+            batch.iter().flat_map(|&node| (0..count).map(move |action| Job { node, action })).collect();
+        let mut gain = Gain::default();
+        let mut next = 0;
+        while next < jobs.len() {
+            let (window, end) = self.window(phase, &jobs, next);
+            next = end;
+            let motions = self.simulate_all(phase, &window)?;
+            for (job, motion) in window.into_iter().zip(motions) {
+                self.charge()?;
+                if self.take(phase, job, motion, &mut gain)? {
+                    // Later results of this window answer a question that has changed.
+                    next = jobs.iter().position(|j| (j.node, j.action) == (job.node, job.action)).map_or(end, |i| i + 1);
+                    break;
+                }
+            }
+            if self.is_done() {
+                break;
+            }
+        }
+        Ok(gain)
+    }
+
+    /// The next jobs worth running: as many as there are threads.
+    fn window(&self, phase: Phase, jobs: &[Job], from: usize) -> (Vec<Job>, usize) {
+        let mut window = Vec::new();
+        let mut at = from;
+        while at < jobs.len() && window.len() < rayon::current_num_threads() {
+            if self.is_open(phase, jobs[at]) {
+                window.push(jobs[at]);
+            }
+            at += 1;
+        }
+        (window, at)
+    }
+
+    fn is_open(&self, phase: Phase, job: Job) -> bool {
+        let node = &self.nodes[job.node];
+        node.alive
+            && node.blockage(phase).is_some_and(|b| {
+                if self.distrust_static { b.is_untried(job.action) } else { b.is_open(job.action) }
+            })
+    }
+
+    fn simulate_all(&mut self, phase: Phase, window: &[Job]) -> Result<Vec<Motion>, Stop> {
+        let started = Instant::now();
+        for job in window {
+            let part = self.nodes[job.node].part;
+            self.surroundings(part);
+        }
+        let (problem, nodes, around) = (&self.problem, &self.nodes, &self.around);
+        let actions = self.actions(phase);
+        let run = |job: &Job| simulate(problem, &nodes[job.node], around, actions[job.action]);
+        let motions = if window.len() > 1 {
+            window.par_iter().map(run).collect::<Result<Vec<_>, Interrupt>>()
+        } else {
+            window.iter().map(run).collect()
+        };
+        self.counters.simulation += started.elapsed();
+        Ok(motions?)
+    }
+
+    fn charge(&mut self) -> Result<(), Stop> {
+        if let Some(most) = self.problem.max_simulations
+            && self.counters.simulations >= most
+        {
+            return Err(Stop::Budget(most));
+        }
+        self.counters.simulations += 1;
+        self.observer.progress(self.removals.len(), self.counters.simulations);
+        Ok(())
+    }
+
+    /// Takes in a motion; true if the scene changed by it.
+    fn take(&mut self, phase: Phase, job: Job, motion: Motion, gain: &mut Gain) -> Result<bool, Stop> {
+        let Motion { path, end } = motion;
+        let by = match end {
+            End::Disassembled(_) => {
+                let taken = self.take_out(phase, job, path)?;
+                gain.removed |= taken;
+                return Ok(true);
+            }
+            End::Collision { with } => with,
+            End::Undecided { touched, .. } => touched,
+        };
+        self.block(phase, job, by);
+        let node = &self.nodes[job.node];
+        let part = node.part;
+        let Some(end) = path.last() else { return Ok(false) };
+        let coarse = coarseness(self.states_of[part]);
+        let known = |n: &Node| {
+            n.alive && n.part == part && same_state(&self.problem.scene, part, n.pose(), end, coarse)
+        };
+        if !self.nodes.iter().any(known) {
+            gain.new_states = true;
+            let path = joined(&node.path, &path);
+            let rotation = Blockage::open(self.rotations.len());
+            let origin = Some((job.node, phase, job.action));
+            self.add_node(Node { part, path, translation: None, rotation, origin, alive: true });
+        }
+        Ok(false)
+    }
+
+    fn block(&mut self, phase: Phase, job: Job, by: Vec<usize>) {
+        if let Some(b) = self.nodes[job.node].blockage_mut(phase) {
+            b.block_jointly(job.action, by);
+        }
+    }
+
+    /// Thins and verifies a path that leads out. True if the part is out; else the motion is
+    /// simulated again with the refuting points as samples, and given up after some tries.
+    fn take_out(&mut self, phase: Phase, job: Job, mut motion: Vec<Pose>) -> Result<bool, Stop> {
+        let part = self.nodes[job.node].part;
+        for refinement in 0..=REFINEMENTS {
+            let full = joined(&self.nodes[job.node].path, &motion);
+            let started = Instant::now();
+            let checked = self.problem.checked_path(self.standing(part), part, &full);
+            self.counters.verification += started.elapsed();
+            let refuted = match checked? {
+                Ok((path, depth)) => {
+                    self.remove(part, path, depth);
+                    return Ok(true);
+                }
+                Err(entries) => entries,
+            };
+            tracing::debug!(part, refinement, over = refuted.first().map(|e| e.over), "path refuted");
+            self.problem.add_samples(part, &refuted);
+            if self.refuted_before(part, job)? {
+                return Ok(false);
+            }
+            if refinement == REFINEMENTS {
+                let mut by: Vec<_> = refuted.iter().map(|e| e.other).collect();
+                by.sort_unstable();
+                by.dedup();
+                self.block(phase, job, by);
+                return Ok(false);
+            }
+            self.charge()?;
+            let started = Instant::now();
+            let action = self.actions(phase)[job.action];
+            let again = simulate(&self.problem, &self.nodes[job.node], &self.around, action);
+            self.counters.simulation += started.elapsed();
+            let again = again?;
+            if !matches!(again.end, End::Disassembled(_)) {
+                self.take(phase, job, again, &mut Gain::default())?;
+                return Ok(false);
+            }
+            motion = again.path;
+        }
+        Ok(false)
+    }
+
+    /// Whether already the path to a state does not hold; then the state is dropped and the
+    /// action that led to it is open again.
+    fn refuted_before(&mut self, part: usize, job: Job) -> Result<bool, Stop> {
+        let Some((parent, phase, action)) = self.nodes[job.node].origin else { return Ok(false) };
+        let started = Instant::now();
+        let path = self.nodes[job.node].path.clone();
+        let checked = self.problem.checked_path(self.standing(part), part, &path);
+        self.counters.verification += started.elapsed();
+        if checked?.is_ok() {
+            return Ok(false);
+        }
+        self.nodes[job.node].alive = false;
+        if let Some(b) = self.nodes[parent].blockage_mut(phase) {
+            b.reopen(action);
+        }
+        Ok(true)
+    }
+
+    fn standing(&self, part: usize) -> Vec<usize> {
+        self.everything.standing.iter().copied().filter(|&i| i != part).collect()
+    }
+
+    fn surroundings(&mut self, part: usize) -> &Surroundings {
+        let (everything, scene) = (&self.everything, &self.problem.scene);
+        self.around[part].get_or_insert_with(|| everything.without(scene, part))
+    }
+
+    fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) {
+        self.everything = self.everything.without(&self.problem.scene, part);
+        self.around.fill(None);
+        let mut waited_for = Vec::new();
+        for node in &mut self.nodes {
+            if node.part == part {
+                if node.is_root() {
+                    let blockages = [node.translation.as_ref(), Some(&node.rotation)];
+                    waited_for.extend(blockages.into_iter().flatten().flat_map(|b| b.outlived().iter().copied()));
+                }
+                node.alive = false;
+                // Its path and blockages are of no use any more.
+                node.path.truncate(1);
+                continue;
+            }
+            if let Some(b) = &mut node.translation {
+                b.remove(part);
+            }
+            node.rotation.remove(part);
+        }
+        waited_for.sort_unstable();
+        waited_for.dedup();
+        let removal = Removal { part, path, depth, waited_for };
+        self.observer.removal(&removal);
+        self.removals.push(removal);
+    }
+
+    /// Parts whose hull is apart from all others' need no motion.
+    fn take_free_parts(&mut self) -> Result<(), Stop> {
+        let mut changed = true;
+        while changed && !self.is_done() {
+            changed = false;
+            for part in self.everything.standing.clone() {
+                self.problem.termination.check()?;
+                if self.is_done() {
+                    break;
+                }
+                if self.problem.may_move(part) && self.is_free(part) {
+                    let pose = self.problem.scene.bodies[part].planning_from_shape;
+                    self.remove(part, vec![pose], 0.0);
+                    changed = true;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn is_free(&mut self, part: usize) -> bool {
+        if self.everything.standing.len() < 2 {
+            return false;
+        }
+        if let Some(other) = self.entangled[part]
+            && self.everything.standing.binary_search(&other).is_ok()
+        {
+            return false;
+        }
+        let scene = &self.problem.scene;
+        let pose = scene.bodies[part].planning_from_shape;
+        let meets = |&&other: &&usize| {
+            other != part
+                && scene.bodies[other].bounds.meets(&scene.bodies[part].bounds)
+                && exit_direction(scene, &Surroundings::new(scene, vec![other]), part, &pose, None).is_none()
+        };
+        self.entangled[part] = self.everything.standing.iter().find(meets).copied();
+        if self.entangled[part].is_some() {
+            return false;
+        }
+        self.surroundings(part);
+        let around = self.around[part].as_ref();
+        around.is_some_and(|a| exit_direction(&self.problem.scene, a, part, &pose, None).is_some())
+    }
+
+    fn is_done(&self) -> bool {
+        self.problem.is_goal(&self.everything.standing)
+    }
+
+    fn outcome(self, stop: Option<Stop>) -> Outcome {
+        let (status, reason) = match stop {
+            _ if self.is_done() => (PlanStatus::Complete, None),
+            None => (PlanStatus::Infeasible, Some(self.evidence())),
+            Some(Stop::Interrupted(Interrupt::Cancelled)) => {
+                (PlanStatus::Cancelled, Some("cancelled".to_owned()))
+            }
+            Some(Stop::Interrupted(Interrupt::DeadlinePassed)) => {
+                (PlanStatus::Timeout, Some("the deadline passed".to_owned()))
+            }
+            Some(Stop::Budget(n)) => {
+                (PlanStatus::Partial, Some(format!("the budget of {n} simulations is used up")))
+            }
+        };
+        let blocked = if status == PlanStatus::Complete { Vec::new() } else { self.blocked() };
+        Outcome {
+            status,
+            reason,
+            remaining: self.everything.standing.clone(),
+            blocked,
+            removals: self.removals,
+            counters: self.counters,
+        }
+    }
+
+    /// What was tried before the search gave up.
+    fn evidence(&self) -> String {
+        let stuck = self.problem.wanted(&self.everything.standing);
+        let most = stuck.iter().map(|&p| self.states_of[p]).max().unwrap_or(0);
+        let coarse = coarseness(most);
+        format!(
+            "{} of {} parts cannot leave one at a time: every state reached was expanded with {} translations \
+             and {} actions with rotational freedom ({} states in all, told apart at {:.3} of the longest side \
+             and {:.1} rad), also where static analysis saw no way",
+            stuck.len(),
+            self.problem.present.len(),
+            self.translations.len(),
+            self.rotations.len(),
+            self.counters.states,
+            0.05 * coarse / self.problem.scene.longest_side,
+            0.5 * coarse,
+        )
+    }
+
+    fn blocked(&self) -> Vec<BlockedAction> {
+        let wanted = self.problem.wanted(&self.everything.standing);
+        let mut out = Vec::new();
+        for node in self.nodes.iter().filter(|n| n.alive && n.is_root() && wanted.contains(&n.part)) {
+            for phase in [Phase::Translation, Phase::Rotation] {
+                let Some(b) = node.blockage(phase) else { continue };
+                for (i, action) in self.actions(phase).iter().enumerate() {
+                    let by: Vec<_> = b.blockers(i).into_iter().collect();
+                    if !by.is_empty() {
+                        out.push(BlockedAction { part: node.part, action: action.to_string(), by });
+                    }
+                }
+            }
+        }
+        out
+    }
+}
+
+/// A path continued by a motion that starts at its end.
+fn joined(path: &[Pose], motion: &[Pose]) -> Vec<Pose> {
+    path.iter().chain(motion.iter().skip(1)).copied().collect()
+}
+
+fn simulate(
+    problem: &Problem<'_>,
+    node: &Node,
+    around: &[Option<Surroundings>],
+    action: Action,
+) -> Result<Motion, Interrupt> {
+    let Problem { scene, engine, termination, .. } = problem;
+    match &around[node.part] {
+        Some(around) => engine.simulate(scene, around, node.part, node.pose(), action, termination),
+        None => Ok(Motion { path: vec![*node.pose()], end: End::Collision { with: Vec::new() } }),
+    }
+}

@@ -1,0 +1,77 @@
+//! States: one displaced part among the others at their assembled poses.
+
+use crate::blocking_graph::Blockage;
+use crate::geometry::Pose;
+use crate::simulation::Scene;
+
+/// Resolution at which two states of a part count as the same (the paper's rmd).
+const TRANSLATION: f64 = 0.05;
+const ROTATION: f64 = 0.5;
+/// States of one part after which the resolution is halved, and again after as many more: where
+/// there is much free play, states multiply without end.
+const STATES_PER_LEVEL: usize = 24;
+
+/// Translation without, or rotation with, freedom to turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Phase {
+    Translation,
+    Rotation,
+}
+
+/// A state to expand.
+#[derive(Debug, Clone)]
+pub(super) struct Node {
+    pub(super) part: usize,
+    /// Path so far, from the assembled pose to this state's.
+    pub(super) path: Vec<Pose>,
+    /// Blockage under translations; filled when first needed.
+    pub(super) translation: Option<Blockage>,
+    /// Blockage under actions with rotational freedom; starts empty.
+    pub(super) rotation: Blockage,
+    /// Parent node and action, unless assembled.
+    pub(super) origin: Option<(usize, Phase, usize)>,
+    /// False once its part is gone or its path was refuted.
+    pub(super) alive: bool,
+}
+
+impl Node {
+    pub(super) fn pose(&self) -> &Pose {
+        // A path always holds its start.
+        &self.path[self.path.len() - 1]
+    }
+
+    pub(super) fn is_root(&self) -> bool {
+        self.origin.is_none()
+    }
+
+    pub(super) fn blockage(&self, phase: Phase) -> Option<&Blockage> {
+        match phase {
+            Phase::Translation => self.translation.as_ref(),
+            Phase::Rotation => Some(&self.rotation),
+        }
+    }
+
+    pub(super) fn blockage_mut(&mut self, phase: Phase) -> Option<&mut Blockage> {
+        match phase {
+            Phase::Translation => self.translation.as_mut(),
+            Phase::Rotation => Some(&mut self.rotation),
+        }
+    }
+}
+
+/// Least travel that makes a new state of a part: bounded by its own size.
+pub(super) fn least_travel(scene: &Scene, part: usize) -> f64 {
+    TRANSLATION.min(scene.bodies[part].shape.bounds().extents().max() / 20.0)
+}
+
+/// How coarse a part's states are told apart once it has `states` of them: a factor.
+pub(super) fn coarseness(states: usize) -> f64 {
+    2f64.powi((states / STATES_PER_LEVEL).min(10) as i32)
+}
+
+/// Whether two poses of a part are the same state.
+pub(super) fn same_state(scene: &Scene, part: usize, a: &Pose, b: &Pose, coarseness: f64) -> bool {
+    let centre = scene.bodies[part].shape.mass.centre;
+    (a * centre - b * centre).norm() < least_travel(scene, part) * coarseness
+        && a.rotation.angle_to(&b.rotation) < ROTATION * coarseness
+}

@@ -1,0 +1,111 @@
+//! From a search's outcome in the planning frame to a plan in the input's units.
+
+use std::time::Duration;
+
+use crate::geometry::{Assembly, Pose, Waypoint, waypoint_from_pose};
+use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
+use crate::search::{BlockedAction, Engine, Outcome, PlanRequest, Planner, Removal};
+
+/// Turns below this are rounding.
+const NO_TURN: f64 = 1e-9;
+
+/// A removal as a step of a plan.
+pub(super) fn step(assembly: &Assembly, removal: &Removal) -> PlanStep {
+    let start = removal.path.first().copied().unwrap_or_default();
+    let path: Vec<Waypoint> = removal.path.iter().map(|p| waypoint(assembly, &start, p)).collect();
+    let turns = path.iter().any(|w| w[3] < 1.0);
+    PlanStep {
+        part: removal.part,
+        motion: if turns { MotionKind::Rotation } else { MotionKind::Translation },
+        path,
+        verified_depth: removal.depth / assembly.scale,
+        waited_for: removal.waited_for.clone(),
+    }
+}
+
+/// The transform of the assembled mesh that brings it from `start` to `pose`, in input units.
+fn waypoint(assembly: &Assembly, start: &Pose, pose: &Pose) -> Waypoint {
+    let mut moved = pose * start.inverse();
+    if start.rotation.angle_to(&pose.rotation) < NO_TURN {
+        moved = Pose::from(pose.translation.vector - start.translation.vector);
+    }
+    moved.translation.vector /= assembly.scale;
+    moved.rotation.renormalize();
+    waypoint_from_pose(&moved)
+}
+
+pub(super) fn overlaps(assembly: &Assembly, found: &[(usize, usize, f64)]) -> Vec<Overlap> {
+    found.iter().map(|&(a, b, d)| Overlap { parts: [a, b], depth: d / assembly.scale }).collect()
+}
+
+pub(super) fn warnings(assembly: &Assembly) -> Vec<Warning> {
+    let warning = |(part, message): &(usize, String)| Warning { part: Some(*part), message: message.clone() };
+    assembly.findings.iter().map(warning).collect()
+}
+
+/// Everything that is known before the search.
+pub(super) struct Frame<'a> {
+    pub(super) assembly: &'a Assembly,
+    pub(super) request: &'a PlanRequest,
+    pub(super) fixed: Vec<usize>,
+    pub(super) removed: Vec<usize>,
+    pub(super) overlaps: Vec<Overlap>,
+}
+
+impl Frame<'_> {
+    /// The plan of a finished search.
+    pub(super) fn plan(self, outcome: Outcome, sdf_time: Duration, sdf_hits: u64, total: Duration) -> Plan {
+        let c = outcome.counters;
+        let stats = PlanStats {
+            simulations: c.simulations,
+            simulations_run: c.simulations,
+            states: c.states,
+            sdf_time_s: sdf_time.as_secs_f64(),
+            static_analysis_time_s: c.static_analysis.as_secs_f64(),
+            path_time_s: c.simulation.as_secs_f64(),
+            verify_time_s: c.verification.as_secs_f64(),
+            total_time_s: total.as_secs_f64(),
+            sdf_hits,
+            ..PlanStats::default()
+        };
+        let steps = outcome.removals.iter().map(|r| step(self.assembly, r)).collect();
+        let blocked =
+            outcome.blocked.into_iter().map(|BlockedAction { part, action, by }| Blocked { part, by, action });
+        let (status, reason) = (outcome.status, outcome.reason);
+        Plan { steps, remaining: outcome.remaining, blocked: blocked.collect(), stats, ..self.empty(status, reason) }
+    }
+
+    /// A plan without steps, for a request that ended before its search began.
+    pub(super) fn empty(self, status: PlanStatus, reason: Option<String>) -> Plan {
+        let count = self.assembly.parts.len();
+        Plan {
+            status,
+            reason,
+            planner: planner_name(self.request.planner).to_owned(),
+            engine: engine_name(self.request.engine).to_owned(),
+            units: self.assembly.units.clone(),
+            parts: self.assembly.parts.iter().map(|p| p.name.clone()).collect(),
+            remaining: (0..count).filter(|p| !self.removed.contains(p)).collect(),
+            removed: self.removed,
+            targets: self.request.targets.clone(),
+            fixed: self.fixed,
+            steps: Vec::new(),
+            blocked: Vec::new(),
+            overlaps: self.overlaps,
+            warnings: warnings(self.assembly),
+            stats: PlanStats::default(),
+        }
+    }
+}
+
+fn planner_name(planner: Planner) -> &'static str {
+    match planner {
+        Planner::SbdpStar => "sbdp-star",
+    }
+}
+
+fn engine_name(engine: Engine) -> &'static str {
+    match engine {
+        Engine::Sliding => "sliding",
+    }
+}

@@ -1,0 +1,265 @@
+//! The planning service: assemblies that it knows by content, and plans about them.
+//!
+//! The daemon's workers and the command line without a daemon both call this, so what is
+//! tested is what is used. It knows nothing of shared memory.
+//!
+//! Data flow of a request: assembly (`geometry`) → fields (`sdf`) and overlaps → `search` → plan in
+//! the input's units (`plan`).
+
+mod answer;
+mod prepared;
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::{Duration, Instant};
+
+use crate::geometry::{Assembly, GeometryError, SourceAssembly, content_hash};
+use crate::plan::{Overlap, Plan, PlanStatus, Warning};
+use crate::search::{Engine, Observer, PlanRequest, PlanSink, Problem, Progress, Removal, Stage, search};
+use crate::simulation::{SlidingEngine, TransitionFunction};
+use crate::termination::{Interrupt, Termination};
+
+use answer::Frame;
+use prepared::Prepared;
+
+/// The name of an assembly: the hash of its content.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct AssemblyId(pub [u8; 32]);
+
+/// What admission found out about an assembly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Admission {
+    /// Its handle.
+    pub id: AssemblyId,
+    /// It was there before: nothing was done.
+    pub known: bool,
+    /// What healing found.
+    pub warnings: Vec<Warning>,
+}
+
+/// Why a request was not planned at all.
+#[derive(Debug, thiserror::Error)]
+pub enum ServiceError {
+    /// No assembly has this id (it was never uploaded, or it was evicted).
+    #[error("unknown assembly: upload it (again) first")]
+    UnknownAssembly,
+    /// The request names a part that is not there.
+    #[error("the request names part {index} in `{field}`, but the assembly has {count} parts")]
+    NoSuchPart {
+        /// Which list.
+        field: &'static str,
+        /// The index given.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// The worker threads for the request could not be started.
+    #[error("cannot start worker threads: {0}")]
+    Threads(String),
+    /// The geometry was refused.
+    #[error(transparent)]
+    Geometry(#[from] GeometryError),
+}
+
+/// One admitted assembly; fields and overlaps are made when first needed.
+#[derive(Debug)]
+struct Entry {
+    assembly: Assembly,
+    prepared: Mutex<Option<Arc<Prepared>>>,
+}
+
+/// The service. Shared by all threads.
+#[derive(Debug, Default)]
+pub struct Service {
+    entries: Mutex<HashMap<AssemblyId, Arc<Entry>>>,
+}
+
+impl Service {
+    /// Validates, heals and registers an assembly. The same content gives the same id, at once.
+    ///
+    /// # Errors
+    /// The geometry was refused; the error names the part and the reason.
+    pub fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError> {
+        let id = AssemblyId(content_hash(source));
+        if let Ok(entry) = self.entry(id) {
+            return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly) });
+        }
+        let assembly = Assembly::new(source)?;
+        let warnings = answer::warnings(&assembly);
+        let entry = Arc::new(Entry { assembly, prepared: Mutex::default() });
+        self.entries().entry(id).or_insert(entry);
+        Ok(Admission { id, known: false, warnings })
+    }
+
+    /// Whether an assembly is known.
+    #[must_use]
+    pub fn knows(&self, id: AssemblyId) -> bool {
+        self.entries().contains_key(&id)
+    }
+
+    /// The overlaps at the assembled pose, in the input's units.
+    ///
+    /// # Errors
+    /// The id is unknown.
+    pub fn overlaps(&self, id: AssemblyId) -> Result<Vec<Overlap>, ServiceError> {
+        let entry = self.entry(id)?;
+        let found = entry.prepared(&Termination::default(), &mut Silent);
+        Ok(found.map_or_else(|_| Vec::new(), |(p, _)| answer::overlaps(&entry.assembly, &p.overlaps)))
+    }
+
+    /// Plans. Blocks until done; `termination` ends it early with a plan that says so.
+    ///
+    /// # Errors
+    /// Nothing could be planned: unknown id, part numbers out of range.
+    pub fn plan(
+        &self,
+        id: AssemblyId,
+        request: &PlanRequest,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+    ) -> Result<Plan, ServiceError> {
+        let entry = self.entry(id)?;
+        check_parts(request, entry.assembly.parts.len())?;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(request.threads)
+            .build()
+            .map_err(|e| ServiceError::Threads(e.to_string()))?;
+        Ok(pool.install(|| entry.plan(request, termination, sink)))
+    }
+
+    fn entry(&self, id: AssemblyId) -> Result<Arc<Entry>, ServiceError> {
+        self.entries().get(&id).cloned().ok_or(ServiceError::UnknownAssembly)
+    }
+
+    /// A thread that panicked while it held the map cannot have left it half-changed.
+    fn entries(&self) -> MutexGuard<'_, HashMap<AssemblyId, Arc<Entry>>> {
+        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Entry {
+    fn plan(&self, request: &PlanRequest, termination: &Termination, sink: &mut dyn PlanSink) -> Plan {
+        let started = Instant::now();
+        let mut fixed = request.fixed.clone();
+        fixed.extend(&self.assembly.fixed);
+        let mut removed = request.removed.clone();
+        for list in [&mut fixed, &mut removed] {
+            list.sort_unstable();
+            list.dedup();
+        }
+        fixed.retain(|p| removed.binary_search(p).is_err());
+        let frame =
+            Frame { assembly: &self.assembly, request, fixed, removed, overlaps: Vec::new() };
+        let prepared = if request.no_cache {
+            Prepared::new(&self.assembly, termination, sink).map(|p| (Arc::new(p), false))
+        } else {
+            self.prepared(termination, sink)
+        };
+        match prepared {
+            Ok((prepared, hit)) => self.searched(frame, &prepared, hit, termination, sink, started),
+            Err(Interrupt::Cancelled) => frame.empty(PlanStatus::Cancelled, Some("cancelled".to_owned())),
+            Err(Interrupt::DeadlinePassed) => {
+                frame.empty(PlanStatus::Timeout, Some("the deadline passed while fields were built".to_owned()))
+            }
+        }
+    }
+
+    fn searched(
+        &self,
+        mut frame: Frame<'_>,
+        prepared: &Prepared,
+        hit: bool,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+        started: Instant,
+    ) -> Plan {
+        let request = frame.request;
+        frame.overlaps = answer::overlaps(&self.assembly, &prepared.overlaps);
+        let engine: &dyn TransitionFunction = match request.engine {
+            Engine::Sliding => &SlidingEngine,
+        };
+        let present: Vec<usize> =
+            (0..self.assembly.parts.len()).filter(|p| frame.removed.binary_search(p).is_err()).collect();
+        let total = present.len() as u32;
+        let problem = Problem {
+            scene: prepared.scene.clone(),
+            verifier: &prepared.verifier,
+            engine,
+            present,
+            fixed: frame.fixed.clone(),
+            targets: request.targets.clone(),
+            actions: request.actions,
+            max_simulations: request.max_simulations,
+            termination: termination.clone(),
+            extra_points: HashMap::new(),
+        };
+        let mut relay = Relay { assembly: &self.assembly, sink, total };
+        let outcome = search(request.planner, problem, &mut relay);
+        let (sdf_time, hits) =
+            if hit { (Duration::ZERO, self.assembly.shapes.len() as u64) } else { (prepared.sdf_time, 0) };
+        frame.plan(outcome, sdf_time, hits, started.elapsed())
+    }
+
+    /// Fields and overlaps, and whether they were there already. Whoever comes while they are
+    /// being made waits for them, but not beyond its own termination.
+    fn prepared(
+        &self,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+    ) -> Result<(Arc<Prepared>, bool), Interrupt> {
+        loop {
+            let mut slot = match self.prepared.try_lock() {
+                Ok(slot) => slot,
+                Err(TryLockError::Poisoned(slot)) => slot.into_inner(),
+                Err(TryLockError::WouldBlock) => {
+                    termination.check()?;
+                    std::thread::sleep(Duration::from_millis(2));
+                    continue;
+                }
+            };
+            if let Some(prepared) = &*slot {
+                return Ok((Arc::clone(prepared), true));
+            }
+            let prepared = Arc::new(Prepared::new(&self.assembly, termination, sink)?);
+            *slot = Some(Arc::clone(&prepared));
+            return Ok((prepared, false));
+        }
+    }
+}
+
+/// Hands a search's events on, in the input's units.
+struct Relay<'a> {
+    assembly: &'a Assembly,
+    sink: &'a mut dyn PlanSink,
+    total: u32,
+}
+
+impl Observer for Relay<'_> {
+    fn progress(&mut self, removed: usize, simulations: u64) {
+        let (done, total) = (removed as u32, self.total);
+        self.sink.progress(Progress { stage: Stage::Search, done, total, simulations });
+    }
+
+    fn removal(&mut self, removal: &Removal) {
+        self.sink.step(&answer::step(self.assembly, removal));
+    }
+}
+
+/// Nobody listens.
+struct Silent;
+
+impl PlanSink for Silent {
+    fn progress(&mut self, _: Progress) {}
+    fn step(&mut self, _: &crate::plan::PlanStep) {}
+}
+
+fn check_parts(request: &PlanRequest, count: usize) -> Result<(), ServiceError> {
+    let none = Vec::new();
+    let targets = request.targets.as_ref().unwrap_or(&none);
+    for (field, list) in [("fixed", &request.fixed), ("removed", &request.removed), ("targets", targets)] {
+        if let Some(&index) = list.iter().find(|&&i| i >= count) {
+            return Err(ServiceError::NoSuchPart { field, index, count });
+        }
+    }
+    Ok(())
+}

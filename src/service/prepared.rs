@@ -1,0 +1,107 @@
+//! What must be there before an assembly can be searched: fields, overlaps, verification samples.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use rayon::prelude::*;
+
+use crate::geometry::{Assembly, Shape};
+use crate::plan::Verifier;
+use crate::sdf::Field;
+use crate::search::{PlanSink, Progress, Stage};
+use crate::simulation::{Allowances, Body, Scene};
+use crate::termination::{Interrupt, Termination};
+
+/// Overlaps smaller than this share of the longest side are rounding, not modelling.
+const LEAST_OVERLAP: f64 = 1e-6;
+/// Verification refuses paths deeper than this share of the longest side (0.002 where it is 10).
+const DEPTH_LIMIT: f64 = 2e-4;
+
+/// An assembly with everything derived from it.
+#[derive(Debug)]
+pub(super) struct Prepared {
+    /// All parts at their assembled poses.
+    pub(super) scene: Scene,
+    /// The check on the triangles.
+    pub(super) verifier: Verifier,
+    /// Overlapping pairs and their depths in the planning frame.
+    pub(super) overlaps: Vec<(usize, usize, f64)>,
+    /// How long the fields took.
+    pub(super) sdf_time: Duration,
+}
+
+impl Prepared {
+    /// Builds fields in parallel on the current rayon pool and measures all overlaps.
+    pub(super) fn new(
+        assembly: &Assembly,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+    ) -> Result<Self, Interrupt> {
+        let started = Instant::now();
+        let fields = build_fields(&assembly.shapes, termination, sink)?;
+        let sdf_time = started.elapsed();
+        let bodies = assembly.parts.iter().map(|part| Body {
+            shape: Arc::clone(&assembly.shapes[part.shape]),
+            field: Arc::clone(&fields[part.shape]),
+            planning_from_shape: part.planning_from_shape,
+            bounds: part.bounds,
+            extra_samples: Default::default(),
+        });
+        let longest_side = assembly.longest_side();
+        let allowances = Allowances::none(assembly.parts.len());
+        let mut scene = Scene { bodies: bodies.collect(), allowances, longest_side };
+        let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
+        let verifier = Verifier::new(&assembly.shapes, shape_of, DEPTH_LIMIT * longest_side);
+        let overlaps = measure_overlaps(&scene, &verifier, termination)?;
+        for &(a, b, depth) in &overlaps {
+            scene.allowances.grant(a, b, depth);
+        }
+        Ok(Self { scene, verifier, overlaps, sdf_time })
+    }
+}
+
+fn build_fields(
+    shapes: &[Arc<Shape>],
+    termination: &Termination,
+    sink: &mut dyn PlanSink,
+) -> Result<Vec<Arc<Field>>, Interrupt> {
+    let total = shapes.len() as u32;
+    let done = AtomicU32::new(0);
+    let report = |sink: &mut dyn PlanSink, done| {
+        sink.progress(Progress { stage: Stage::Sdf, done, total, simulations: 0 });
+    };
+    report(sink, 0);
+    let sink = std::sync::Mutex::new(sink);
+    shapes
+        .par_iter()
+        .map(|shape| {
+            let field = Field::build(&shape.surface, termination)?;
+            let n = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if let Ok(mut sink) = sink.lock() {
+                report(&mut **sink, n);
+            }
+            Ok(Arc::new(field))
+        })
+        .collect()
+}
+
+fn measure_overlaps(
+    scene: &Scene,
+    verifier: &Verifier,
+    termination: &Termination,
+) -> Result<Vec<(usize, usize, f64)>, Interrupt> {
+    let n = scene.bodies.len();
+    let pairs: Vec<_> = (0..n)
+        .flat_map(|a| (a + 1..n).map(move |b| (a, b)))
+        .filter(|&(a, b)| scene.bodies[a].bounds.meets(&scene.bodies[b].bounds))
+        .collect();
+    let depths = pairs
+        .par_iter()
+        .map(|&(a, b)| {
+            termination.check()?;
+            Ok((a, b, verifier.assembled_depth(scene, a, b)))
+        })
+        .collect::<Result<Vec<_>, Interrupt>>()?;
+    Ok(depths.into_iter().filter(|(_, _, d)| *d > LEAST_OVERLAP * scene.longest_side).collect())
+}

@@ -1,0 +1,230 @@
+//! Contacts of one moving body with those that stand.
+//!
+//! Samples of either surface that are near the other are measured exactly against the triangles
+//! around them. A contact becomes a linear constraint on the twist of the moving body: of the planes
+//! of the closest feature, the one along which the wanted motion may go furthest. That is the right
+//! choice where the feature is convex (staying on the free side of one of its planes is enough);
+//! where it is not, the check at the trial pose finds what is missing.
+
+use std::collections::HashMap;
+
+use nalgebra::{Point3, Vector3, Vector6};
+
+use crate::geometry::{Bounds, Closest, Descend, Pose, SampleTree};
+
+use super::projection::Row;
+use super::{Body, Scene, Surroundings};
+
+/// Whose surface the sample lies on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Side {
+    Moving,
+    Standing,
+}
+
+/// A sample near the other body's surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Contact {
+    /// The standing part of the pair.
+    pub(super) other: usize,
+    side: Side,
+    /// The sample in the frame of the shape it lies on.
+    sample: Point3<f64>,
+    /// Signed distance plus the pair's allowance: negative is deeper than granted.
+    pub(super) gap: f64,
+    closest: Closest,
+    allowance: f64,
+}
+
+/// What is near a pose.
+#[derive(Debug, Clone)]
+pub(super) struct Near {
+    /// All samples with a gap below the reach that was asked for.
+    pub(super) contacts: Vec<Contact>,
+    /// No other sample has a smaller gap than this.
+    pub(super) clearance: f64,
+}
+
+/// The moving body at a pose.
+pub(super) struct Mover<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) body: &'a Body,
+    pub(super) part: usize,
+    pub(super) pose: Pose,
+}
+
+impl<'a> Mover<'a> {
+    pub(super) fn new(scene: &'a Scene, part: usize, pose: Pose) -> Self {
+        Self { scene, body: &scene.bodies[part], part, pose }
+    }
+
+    /// The centre of mass, about which twists turn.
+    pub(super) fn centre(&self) -> Point3<f64> {
+        self.pose * self.body.shape.mass.centre
+    }
+
+    /// Gathers all contacts with a gap below `reach`.
+    pub(super) fn near(&self, surroundings: &Surroundings, reach: f64) -> Near {
+        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+        let bounds = self.body.shape.bounds().transformed(&self.pose);
+        for &other in &surroundings.standing {
+            let apart = box_distance(&bounds, &self.scene.bodies[other].bounds);
+            if apart > reach {
+                near.clearance = near.clearance.min(apart);
+            } else {
+                self.near_pair(other, reach, &mut near);
+            }
+        }
+        near
+    }
+
+    /// Gathers the contacts with one standing part.
+    pub(super) fn near_pair(&self, other: usize, reach: f64, near: &mut Near) {
+        let standing = &self.scene.bodies[other];
+        let allowance = self.scene.allowances.of(self.part, other);
+        let standing_from_moving = standing.planning_from_shape.inverse() * self.pose;
+        let moving_from_standing = standing_from_moving.inverse();
+        for (side, sampled, measured, to_measured) in [
+            (Side::Moving, self.body, standing, &standing_from_moving),
+            (Side::Standing, standing, self.body, &moving_from_standing),
+        ] {
+            for tree in [&sampled.shape.samples, &sampled.extra_samples] {
+                let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
+                gather(tree, measured, to_measured, allowance, reach, near, tag);
+            }
+        }
+    }
+
+    /// The gap of a contact's sample with the mover at its pose, if still below `reach`.
+    pub(super) fn remeasured(&self, contact: &Contact, reach: f64) -> Option<Contact> {
+        let standing = &self.scene.bodies[contact.other];
+        let (measured, p) = match contact.side {
+            Side::Moving => {
+                (standing, standing.planning_from_shape.inverse_transform_point(&(self.pose * contact.sample)))
+            }
+            Side::Standing => {
+                let world = standing.planning_from_shape * contact.sample;
+                (self.body, self.pose.inverse_transform_point(&world))
+            }
+        };
+        let (closest, distance) = measured.closest(&p, (reach - contact.allowance).max(0.0))?;
+        Some(Contact { gap: distance + contact.allowance, closest, ..*contact })
+    }
+
+    /// The constraint that a contact puts on twists (linear part first) about the centre of mass,
+    /// given the twist that is wanted.
+    pub(super) fn row(&self, contact: &Contact, wanted: &Vector6<f64>) -> Row {
+        let standing = &self.scene.bodies[contact.other];
+        let (world, surface, frame, sense) = match contact.side {
+            Side::Moving => {
+                let p = self.pose * contact.sample;
+                (p, &standing.shape.surface, &standing.planning_from_shape, 1.0)
+            }
+            Side::Standing => {
+                let p = standing.planning_from_shape * contact.sample;
+                (p, &self.body.shape.surface, &self.pose, -1.0)
+            }
+        };
+        let arm = world - self.centre();
+        let (v, turn) = (wanted.fixed_rows::<3>(0), wanted.fixed_rows::<3>(3));
+        // How the sample moves against the measured surface.
+        let motion: Vector3<f64> = (v + turn.cross(&arm)) * sense;
+        let foot = frame * contact.closest.point;
+        let away = world - foot;
+        let distance = contact.gap - contact.allowance;
+        // The direction to the closest point: good unless the two coincide.
+        let radial = away.try_normalize(1e-7).map(|d| if distance < 0.0 { -d } else { d });
+        let mut best: Option<(f64, Vector3<f64>, f64)> = None;
+        let mut offer = |n: Vector3<f64>, floor: f64| {
+            let height = n.dot(&away);
+            let score = height + n.dot(&motion);
+            if height >= floor && best.is_none_or(|b| score > b.0 + 1e-12) {
+                best = Some((score, n, height));
+            }
+        };
+        surface.feature_normals(&contact.closest, |n| {
+            offer(frame.rotation * n, distance.min(0.0) - 1e-9);
+        });
+        if let Some(d) = radial {
+            offer(d, f64::NEG_INFINITY);
+        }
+        let (n, height) = match best {
+            Some((_, n, height)) => (n, height),
+            None => (frame.rotation * surface.pseudo_normal(&contact.closest).normalize(), distance),
+        };
+        let (n, moment) = (n * sense, arm.cross(&n) * sense);
+        let a = Vector6::new(n.x, n.y, n.z, moment.x, moment.y, moment.z);
+        Row { a, b: height + contact.allowance, other: contact.other }
+    }
+}
+
+fn gather(
+    tree: &SampleTree,
+    measured: &Body,
+    to_measured: &Pose,
+    allowance: f64,
+    reach: f64,
+    near: &mut Near,
+    tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
+) {
+    // Deeper than nothing cannot be excluded by a bound that is only sure outside.
+    let limit = (reach - allowance).max(0.0);
+    let clearance = std::cell::Cell::new(near.clearance);
+    let keep = |bound: f64| clearance.set(clearance.get().min(bound + allowance));
+    tree.walk(
+        |node| {
+            let bound = measured.field.estimate(&(to_measured * node.centre)).lower_bound - node.radius;
+            if bound > limit {
+                keep(bound);
+                return Descend::Skip;
+            }
+            Descend::Into
+        },
+        |_, sample| {
+            let p = to_measured * sample;
+            let bound = measured.field.estimate(&p).lower_bound;
+            if bound > limit {
+                return keep(bound);
+            }
+            match measured.closest(&p, limit) {
+                Some((closest, distance)) if distance + allowance < reach => {
+                    near.contacts.push(tag(*sample, distance + allowance, closest));
+                }
+                Some((_, distance)) => keep(distance),
+                None => keep(limit),
+            }
+        },
+    );
+    near.clearance = clearance.get();
+}
+
+fn box_distance(a: &Bounds, b: &Bounds) -> f64 {
+    (a.min - b.max).sup(&(b.min - a.max)).sup(&Vector3::zeros()).norm()
+}
+
+/// Keeps, of rows that point nearly the same way, the tightest. `lever` is the length that makes
+/// moments comparable with forces.
+pub(super) fn reduced(rows: impl IntoIterator<Item = Row>, lever: f64) -> Vec<Row> {
+    const BINS: f64 = 24.0;
+    let mut index: HashMap<(usize, [i16; 6]), usize> = HashMap::new();
+    let mut out: Vec<Row> = Vec::new();
+    for row in rows {
+        let key = std::array::from_fn(|i| {
+            let x = if i < 3 { row.a[i] } else { row.a[i] / lever };
+            (x * BINS).round() as i16
+        });
+        match index.entry((row.other, key)) {
+            std::collections::hash_map::Entry::Occupied(e) => {
+                let kept: &mut Row = &mut out[*e.get()];
+                if row.b < kept.b {
+                    *kept = row;
+                }
+            }
+            std::collections::hash_map::Entry::Vacant(e) => {
+                e.insert(out.len());
+                out.push(row);
+            }
+        }
+    }
+    out
+}

@@ -1,0 +1,69 @@
+//! The paper's test: a part is disassembled when its convex hull does not meet the convex hull of
+//! all remaining other parts.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::geometry::{Pose, gap_along, hull_vertices, separating_direction, transformed};
+
+use super::Scene;
+
+/// Hulls count as apart from this gap on, in units of the planning frame.
+pub const HULL_MARGIN: f64 = 1e-3;
+
+/// What stands still while one part moves.
+#[derive(Debug, Clone)]
+pub struct Surroundings {
+    /// The parts that stand, ascending.
+    pub standing: Vec<usize>,
+    /// Vertices of the convex hull of them all.
+    pub hull: Vec<Point3<f64>>,
+}
+
+impl Surroundings {
+    /// The surroundings made of some parts at their assembled poses.
+    #[must_use]
+    pub fn new(scene: &Scene, standing: Vec<usize>) -> Self {
+        let points: Vec<_> = standing
+            .iter()
+            .flat_map(|&i| transformed(&scene.bodies[i].shape.hull, &scene.bodies[i].planning_from_shape))
+            .collect();
+        let hull = if points.is_empty() { points } else { hull_vertices(&points) };
+        Self { standing, hull }
+    }
+
+    /// The same without one part; cheap if that part does not shape the hull.
+    #[must_use]
+    pub fn without(&self, scene: &Scene, part: usize) -> Self {
+        let standing: Vec<_> = self.standing.iter().copied().filter(|&i| i != part).collect();
+        let bounds = scene.bodies[part].bounds.grown(1e-9);
+        if self.hull.iter().any(|v| bounds.contains(v)) {
+            return Self::new(scene, standing);
+        }
+        Self { standing, hull: self.hull.clone() }
+    }
+}
+
+/// A direction along which the surroundings lie apart from the part at `pose`, if there is one.
+/// It is certified on all vertices of the part and of all that stand, not only on hulls.
+#[must_use]
+pub fn exit_direction(
+    scene: &Scene,
+    surroundings: &Surroundings,
+    part: usize,
+    pose: &Pose,
+    hint: Option<Vector3<f64>>,
+) -> Option<Vector3<f64>> {
+    let body = &scene.bodies[part];
+    let mine = transformed(&body.shape.hull, pose);
+    let direction = separating_direction(&mine, &surroundings.hull, HULL_MARGIN, hint)?;
+    let all = transformed(body.shape.surface.vertices(), pose);
+    let apart = surroundings.standing.iter().all(|&i| {
+        let other = &scene.bodies[i];
+        let local = other.planning_from_shape.rotation.inverse() * direction;
+        let shift = other.planning_from_shape.translation.vector.dot(&direction);
+        let far = all.iter().map(|p| p.coords.dot(&direction)).fold(f64::NEG_INFINITY, f64::max);
+        let near = gap_along(&local, &[Point3::origin()], other.shape.surface.vertices()) + shift;
+        near - far >= HULL_MARGIN / 2.0
+    });
+    apart.then_some(direction)
+}

@@ -1,0 +1,20 @@
+//! The transition function f(s, a, p): where a part gets to when it is pushed, pulled or turned.
+//!
+//! Data flow: [`Scene`] (bodies and what each pair may overlap) → broad phase and `contact`
+//! (samples near the other surface, measured exactly) → `projection` (the nearest twist that
+//! contact allows) → `sliding` (steps until the part is out or stuck) → [`Motion`].
+//! Everything here is in the planning frame and knows nothing of search.
+
+mod action;
+mod contact;
+mod disassembled;
+mod projection;
+mod scene;
+mod sliding;
+mod transition;
+
+pub use action::{Action, Axis};
+pub use disassembled::{HULL_MARGIN, Surroundings, exit_direction};
+pub use scene::{Allowances, Body, Scene};
+pub use sliding::{SlidingEngine, pair_blocks};
+pub use transition::{End, Motion, TransitionFunction};

@@ -1,0 +1,90 @@
+//! The bodies of a problem, and how deep each pair may overlap.
+
+use std::sync::Arc;
+
+use nalgebra::Point3;
+
+use crate::geometry::{Bounds, Closest, Pose, SampleTree, Shape};
+use crate::sdf::Field;
+
+/// A part with its field, at its place.
+#[derive(Debug, Clone)]
+pub struct Body {
+    /// The mesh and what derives from it.
+    pub shape: Arc<Shape>,
+    /// Its distance field.
+    pub field: Arc<Field>,
+    /// Where it stands.
+    pub planning_from_shape: Pose,
+    /// Its box there.
+    pub bounds: Bounds,
+    /// Further points to look for contact at, where verification found some missing.
+    pub extra_samples: SampleTree,
+}
+
+impl Body {
+    /// The closest surface point to `p` (shape frame) and the signed distance, if nearer than
+    /// `reach` or inside.
+    #[must_use]
+    pub fn closest(&self, p: &Point3<f64>, reach: f64) -> Option<(Closest, f64)> {
+        let surface = &self.shape.surface;
+        if let Some(found) = self.field.closest(surface, p) {
+            return Some(found);
+        }
+        let estimate = self.field.estimate(p);
+        if estimate.lower_bound > reach {
+            return None;
+        }
+        let reach = if estimate.value < 0.0 { f64::INFINITY } else { reach };
+        let c = surface.closest(p, reach)?;
+        Some((c, surface.signed(p, &c)))
+    }
+}
+
+/// For each pair, how deep the two overlap at the assembled pose: that much is granted.
+#[derive(Debug, Clone, Default)]
+pub struct Allowances {
+    count: usize,
+    depth: Vec<f64>,
+}
+
+impl Allowances {
+    /// No overlap anywhere among `count` parts.
+    #[must_use]
+    pub fn none(count: usize) -> Self {
+        Self { count, depth: vec![0.0; count * count] }
+    }
+
+    /// The depth granted to a pair.
+    #[must_use]
+    pub fn of(&self, a: usize, b: usize) -> f64 {
+        self.depth[a * self.count + b]
+    }
+
+    /// Grants a pair some depth.
+    pub fn grant(&mut self, a: usize, b: usize, depth: f64) {
+        self.depth[a * self.count + b] = depth;
+        self.depth[b * self.count + a] = depth;
+    }
+}
+
+/// All bodies at their assembled poses.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// One per part, in the assembly's order.
+    pub bodies: Vec<Body>,
+    /// Overlaps granted.
+    pub allowances: Allowances,
+    /// Longest side of the whole, the unit of resolutions.
+    pub longest_side: f64,
+}
+
+impl Scene {
+    /// The middle of a part's box at the assembled pose, in its shape's frame: the point that moves
+    /// on a line between the waypoints of a plan.
+    #[must_use]
+    pub fn centre_in_shape(&self, part: usize) -> Point3<f64> {
+        let body = &self.bodies[part];
+        body.planning_from_shape.inverse_transform_point(&body.bounds.centre())
+    }
+}

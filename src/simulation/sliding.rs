@@ -1,0 +1,324 @@
+//! The engine `sliding`: motion in the limit of no inertia.
+//!
+//! At each step the wanted twist is projected onto what contact allows, in the metric of the
+//! part's mass (rotation weighed by the squared radius of gyration), and the pose advances by the
+//! result. Linear constraints are exact only at the pose where they were made, so the result is
+//! checked at the trial pose against the triangles; what enters there adds constraints linearised
+//! at that pose, and the step is projected again (sequential quadratic programming); a step
+//! that still enters is halved. In free space the step is the certified clearance.
+
+use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
+
+use crate::geometry::Pose;
+use crate::termination::{Interrupt, Termination};
+
+use super::contact::{Contact, Mover, Near, reduced};
+use super::projection::{Projected, Row, project};
+use super::{Action, End, Motion, Scene, Surroundings, TransitionFunction, exit_direction};
+
+/// A pair may get this much deeper than its allowance, in the planning frame.
+const DEPTH_TOLERANCE: f64 = 3e-4;
+/// A motion that follows less than this share of the action (cos² of the angle between them) is
+/// stuck.
+const LEAST_SHARE: f64 = 0.05;
+/// Longest contact step and longest step in free space, in the planning frame.
+const CONTACT_STEP: f64 = 0.12;
+const FREE_STEP: f64 = 0.5;
+const ROUNDS: usize = 6;
+/// Steps that the static analysis of a pair looks ahead (the paper's five extensions).
+const STATIC_STEPS: usize = 5;
+const HALVINGS: usize = 5;
+const MOST_STEPS: usize = 8000;
+/// Travel per turn below which a turning part is going nowhere.
+const LEAST_TRAVEL: f64 = 0.01;
+
+/// The engine.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SlidingEngine;
+
+impl TransitionFunction for SlidingEngine {
+    fn name(&self) -> &'static str {
+        "sliding"
+    }
+
+    fn depth_tolerance(&self) -> f64 {
+        DEPTH_TOLERANCE
+    }
+
+    fn simulate(
+        &self,
+        scene: &Scene,
+        surroundings: &Surroundings,
+        part: usize,
+        start: &Pose,
+        action: Action,
+        termination: &Termination,
+    ) -> Result<Motion, Interrupt> {
+        let drive = Drive::new(scene, part, action);
+        let mut mover = Mover::new(scene, part, *start);
+        let mut path = vec![*start];
+        let mut exit = None;
+        let mut turning = Turning::new(&mover);
+        for _ in 0..MOST_STEPS {
+            termination.check()?;
+            let near = mover.near(surroundings, drive.step);
+            match drive.advance(&mover, &near) {
+                Step::Stuck { with } => return Ok(Motion { path, end: End::Collision { with } }),
+                Step::Moved { pose, turned, touching } => {
+                    mover.pose = pose;
+                    path.push(pose);
+                    if let Some(d) = exit_direction(scene, surroundings, part, &pose, exit) {
+                        return Ok(Motion { path, end: End::Disassembled(d) });
+                    }
+                    exit = exit.or_else(|| Some(-action.force()).filter(|f| f.norm() > 0.5));
+                    if turning.is_idle(&mover, turned, &touching) {
+                        let touched = turning.all_touched;
+                        let reason = "a whole turn brought neither travel nor new contact";
+                        return Ok(Motion { path, end: End::Undecided { reason, touched } });
+                    }
+                }
+            }
+        }
+        let touched = turning.all_touched;
+        Ok(Motion { path, end: End::Undecided { reason: "the motion has too many steps", touched } })
+    }
+}
+
+/// For each action, whether `other` alone keeps `part` at `pose` from following it by more than
+/// `least`: the static analysis that suits this engine, which excludes nothing that could slide.
+#[must_use]
+pub fn pair_blocks(
+    scene: &Scene,
+    part: usize,
+    pose: &Pose,
+    other: usize,
+    actions: &[Action],
+    least: f64,
+) -> Vec<bool> {
+    let gathered = |mover: &Mover<'_>, reach| {
+        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+        mover.near_pair(other, reach, &mut near);
+        near
+    };
+    let start = Mover::new(scene, part, *pose);
+    let Some(first) = actions.first() else { return Vec::new() };
+    let near = gathered(&start, Drive::new(scene, part, *first).step);
+    if near.contacts.is_empty() {
+        return vec![false; actions.len()];
+    }
+    let blocked = |action: &Action| {
+        let drive = Drive::new(scene, part, *action);
+        let mut step = drive.advance(&start, &near);
+        for _ in 0..STATIC_STEPS {
+            let Step::Moved { pose: there, .. } = step else { return true };
+            let mover = Mover::new(scene, part, there);
+            if (mover.centre() - start.centre()).norm() > least {
+                return false;
+            }
+            step = drive.advance(&mover, &gathered(&mover, drive.step));
+        }
+        false
+    };
+    actions.iter().map(blocked).collect()
+}
+
+/// Sees when a part turns for ever: a whole turn that brought neither travel nor new contact.
+struct Turning {
+    angle: f64,
+    at: nalgebra::Point3<f64>,
+    new_contact: bool,
+    all_touched: Vec<usize>,
+}
+
+impl Turning {
+    fn new(mover: &Mover<'_>) -> Self {
+        Self { angle: 0.0, at: mover.centre(), new_contact: false, all_touched: Vec::new() }
+    }
+
+    fn is_idle(&mut self, mover: &Mover<'_>, turned: f64, touching: &[usize]) -> bool {
+        for &t in touching {
+            if let Err(at) = self.all_touched.binary_search(&t) {
+                self.all_touched.insert(at, t);
+                self.new_contact = true;
+            }
+        }
+        self.angle += turned;
+        if self.angle < std::f64::consts::TAU {
+            return false;
+        }
+        let travel = (mover.centre() - self.at).norm();
+        let idle = travel < LEAST_TRAVEL && !self.new_contact;
+        self.angle = 0.0;
+        self.at = mover.centre();
+        self.new_contact = false;
+        idle
+    }
+}
+
+enum Step {
+    Moved { pose: Pose, turned: f64, touching: Vec<usize> },
+    Stuck { with: Vec<usize> },
+}
+
+/// The wanted twist of an action for one part, and the metric.
+struct Drive {
+    /// Wanted twist (linear part first) of one contact step.
+    wanted: Vector6<f64>,
+    /// Square roots of the metric's diagonal: 1 for translation, the radius of gyration for rotation.
+    metric: Vector6<f64>,
+    gyration: f64,
+    reach: f64,
+    step: f64,
+    turns: bool,
+}
+
+impl Drive {
+    fn new(scene: &Scene, part: usize, action: Action) -> Self {
+        let shape = &scene.bodies[part].shape;
+        let gyration = shape.mass.gyration_squared.sqrt();
+        let smallest = shape.bounds().extents().min();
+        let step = (smallest * 0.5).clamp(0.03, CONTACT_STEP);
+        let (force, torque) = (action.force(), action.torque());
+        // A force of half the torque over the part's radius, without inertia: v/ω = ρ²/(2r).
+        let (v, turn) = match action {
+            Action::Push(..) | Action::Drag(..) | Action::Turn(..) => (force, torque),
+            Action::Screw(..) => (force * (gyration * gyration / (2.0 * shape.reach)), torque),
+        };
+        let fastest = v.norm() + turn.norm() * shape.reach;
+        let (v, turn) = (v * (step / fastest), turn * (step / fastest));
+        Self {
+            wanted: Vector6::new(v.x, v.y, v.z, turn.x, turn.y, turn.z),
+            metric: Vector6::new(1.0, 1.0, 1.0, gyration, gyration, gyration),
+            gyration,
+            reach: shape.reach,
+            step,
+            turns: action.turns(),
+        }
+    }
+
+    /// One step from the mover's pose.
+    fn advance(&self, mover: &Mover<'_>, near: &Near) -> Step {
+        if near.contacts.is_empty() {
+            let factor = (near.clearance.min(FREE_STEP) / self.step).max(1.0);
+            let twist = self.wanted * if self.turns { factor.min(2.0) } else { factor };
+            return self.moved(mover, &twist, Vec::new());
+        }
+        let mut with = Vec::new();
+        for halving in 0..=HALVINGS {
+            let wanted = self.wanted / f64::from(1u32 << halving);
+            let rows = near.contacts.iter().map(|c| mover.row(c, &wanted));
+            let rows = reduced(rows, self.gyration);
+            match self.attempt(mover, near, &wanted, rows) {
+                Attempt::Moved { twist, touching } => return self.moved(mover, &twist, touching),
+                Attempt::Stuck(by) => return Step::Stuck { with: by },
+                Attempt::Entered(by) => with = by,
+            }
+        }
+        Step::Stuck { with }
+    }
+
+    fn attempt(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>, mut rows: Vec<Row>) -> Attempt {
+        let target = wanted.component_mul(&self.metric);
+        let mut entered = Vec::new();
+        for round in 0..ROUNDS {
+            let Some(result) = self.projected(&target, &rows, round == 0) else {
+                return Attempt::Entered(entered);
+            };
+            let touching = others(&result.active, &rows);
+            let share = result.w.dot(&target) / target.norm_squared();
+            if share < LEAST_SHARE {
+                return if round == 0 { Attempt::Stuck(touching) } else { Attempt::Entered(touching) };
+            }
+            let twist = result.w.component_div(&self.metric);
+            let trial = Mover { pose: self.displaced(mover, &twist), ..*mover };
+            let violated = self.violations(&trial, near, &twist);
+            if violated.is_empty() {
+                return Attempt::Moved { twist, touching };
+            }
+            entered = touching;
+            let deeper = violated.iter().map(|c| {
+                let row = trial.row(c, &Vector6::zeros());
+                // Linearised at the trial pose: gap(u) ≈ gap(u₀) + a·(u − u₀) ≥ 0.
+                Row { b: row.b - row.a.dot(&twist), ..row }
+            });
+            let worst = reduced(deeper, self.gyration);
+            for row in &worst {
+                if let Err(at) = entered.binary_search(&row.other) {
+                    entered.insert(at, row.other);
+                }
+            }
+            rows.extend(worst);
+        }
+        Attempt::Entered(entered)
+    }
+
+    /// Projects in the metric. Rows that are slightly violated at the start ask to be left; if that
+    /// is impossible, they are only kept from getting worse.
+    fn projected(&self, target: &Vector6<f64>, rows: &[Row], first: bool) -> Option<Projected> {
+        let scaled = |floor: f64| -> Vec<Row> {
+            let scale = |r: &Row| Row { a: r.a.component_div(&self.metric), b: r.b.max(floor), ..*r };
+            rows.iter().map(scale).map(|r| if self.turns { r } else { without_moment(r) }).collect()
+        };
+        let result = project(target, &scaled(f64::NEG_INFINITY));
+        if result.is_none() && first { project(target, &scaled(0.0)) } else { result }
+    }
+
+    /// The contacts that are too deep at the trial pose.
+    fn violations(&self, trial: &Mover<'_>, near: &Near, twist: &Vector6<f64>) -> Vec<Contact> {
+        let (v, turn) = (twist.fixed_rows::<3>(0).norm(), twist.fixed_rows::<3>(3).norm());
+        // Standing samples can lie further out than any vertex of the mover, but not by much more
+        // than the step if they are near it.
+        let displacement = v + turn * (self.reach + self.step);
+        near.contacts
+            .iter()
+            .filter(|c| c.gap - displacement < -DEPTH_TOLERANCE)
+            .filter_map(|c| trial.remeasured(c, self.step))
+            .filter(|c| c.gap < -DEPTH_TOLERANCE)
+            .collect()
+    }
+
+    fn moved(&self, mover: &Mover<'_>, twist: &Vector6<f64>, touching: Vec<usize>) -> Step {
+        let turned = twist.fixed_rows::<3>(3).norm();
+        Step::Moved { pose: self.displaced(mover, twist), turned, touching }
+    }
+
+    /// The pose after a twist about the centre of mass.
+    fn displaced(&self, mover: &Mover<'_>, twist: &Vector6<f64>) -> Pose {
+        let v: Vector3<f64> = twist.fixed_rows::<3>(0).into();
+        if !self.turns {
+            return Translation3::from(v) * mover.pose;
+        }
+        let turn: Vector3<f64> = twist.fixed_rows::<3>(3).into();
+        let rotation = UnitQuaternion::from_scaled_axis(turn);
+        let c = mover.centre();
+        let mut pose = mover.pose;
+        pose.append_rotation_wrt_point_mut(&rotation, &c);
+        pose.append_translation_mut(&Translation3::from(v));
+        pose.rotation.renormalize();
+        pose
+    }
+}
+
+enum Attempt {
+    Moved { twist: Vector6<f64>, touching: Vec<usize> },
+    /// The linear constraints alone stop it.
+    Stuck(Vec<usize>),
+    /// No allowed pose was found at this length of step.
+    Entered(Vec<usize>),
+}
+
+fn without_moment(row: Row) -> Row {
+    let mut a = row.a;
+    a.fixed_rows_mut::<3>(3).fill(0.0);
+    Row { a, ..row }
+}
+
+/// The parts behind active rows, ascending; rows that hardly push are left out.
+fn others(active: &[(usize, f64)], rows: &[Row]) -> Vec<usize> {
+    let strongest = active.iter().map(|(_, m)| *m).fold(0.0, f64::max);
+    let mut out: Vec<_> =
+        active.iter().filter(|(_, m)| *m > 1e-6 * strongest).map(|(i, _)| rows[*i].other).collect();
+    out.sort_unstable();
+    out.dedup();
+    out
+}

@@ -1,0 +1,47 @@
+//! The one condition that everything long-running polls: cancelled, or past its deadline.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Why work stopped early.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Interrupt {
+    /// Somebody asked for it.
+    Cancelled,
+    /// The deadline passed.
+    DeadlinePassed,
+}
+
+/// The one condition that everything long-running polls.
+#[derive(Debug, Clone, Default)]
+pub struct Termination {
+    cancelled: Arc<AtomicBool>,
+    deadline: Option<Instant>,
+}
+
+impl Termination {
+    /// A condition with an optional deadline.
+    #[must_use]
+    pub fn new(deadline: Option<Instant>) -> Self {
+        Self { cancelled: Arc::default(), deadline }
+    }
+
+    /// A flag that ends the work when it is set; shared with whoever may cancel.
+    #[must_use]
+    pub fn cancel_flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.cancelled)
+    }
+
+    /// # Errors
+    /// The reason to stop, if there is one.
+    pub fn check(&self) -> Result<(), Interrupt> {
+        if self.cancelled.load(Ordering::Relaxed) {
+            return Err(Interrupt::Cancelled);
+        }
+        match self.deadline {
+            Some(d) if Instant::now() >= d => Err(Interrupt::DeadlinePassed),
+            _ => Ok(()),
+        }
+    }
+}
