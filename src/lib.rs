@@ -3,8 +3,8 @@
 pub mod blocking_graph;
 pub mod cli;
 pub mod geometry;
-pub mod sdf;
 pub mod plan;
+pub mod sdf;
 pub mod search;
 pub mod service;
 pub mod simulation;

@@ -47,7 +47,7 @@ pub(super) struct PlanArguments {
     #[arg(long, value_enum, default_value_t)]
     pub(super) actions: Actions,
     /// Answer after so many seconds with what is there
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) timeout: Option<Duration>,
     /// Give up after so many simulations
     #[arg(long, value_name = "N")]

@@ -88,7 +88,11 @@ pub(super) fn glb_scene() -> Vec<File> {
 
 fn manifest(assembly: &Assembly) -> Vec<u8> {
     let files: Vec<String> = assembly.parts.iter().map(|(name, _)| format!("{name}.obj")).collect();
-    pretty(&json!({"name": assembly.name, "units": "mm", "notes": assembly.notes, "parts": files}))
+    let mut manifest = json!({"name": assembly.name, "units": "mm", "notes": assembly.notes, "parts": files});
+    if let Some(fixed) = assembly.fixed {
+        manifest["fixed"] = json!([fixed]);
+    }
+    pretty(&manifest)
 }
 
 fn pretty(value: &serde_json::Value) -> Vec<u8> {

@@ -34,6 +34,7 @@ pub(super) fn pin_bolt_cover() -> Assembly {
         .with("cover", cover)
         .with("bolt", bolt)
         .with("pin", pin)
+        .on("base")
 }
 
 /// A T-headed pin in an L-shaped undercut slot: along the slot, then up through the opening.
@@ -51,10 +52,11 @@ pub(super) fn l_slot() -> Assembly {
     Assembly::new("l-slot", "two straight moves: along the slot, then up")
         .with("block", block)
         .with("t-pin", pin)
+        .on("block")
 }
 
-/// A bolt and a nut with a coarse thread: a straight pull meets the ridge, about two turns
-/// free the nut.
+/// A bolt and a nut with a coarse thread: a straight pull meets the ridge, more than one turn
+/// frees the nut.
 pub(super) fn threaded_bolt_and_nut() -> Assembly {
     let male =
         Ridge { base: 4.0, crest: 5.0, base_width: 1.6, crest_width: 0.6, pitch: 3.0, start: 3.0, turns: 4 };
@@ -68,7 +70,7 @@ pub(super) fn threaded_bolt_and_nut() -> Assembly {
         start: 10.5,
         turns: 1,
     };
-    Assembly::new("threaded-bolt-and-nut", "a straight pull collides; about two turns free the nut")
+    Assembly::new("threaded-bolt-and-nut", "a straight pull collides; more than one turn frees the nut")
         .with("bolt", threaded_bolt(&male))
         .with("nut", threaded_nut(&female, 8.5, 15.5))
 }
@@ -117,7 +119,7 @@ pub(super) fn bolted_bracket_20() -> Assembly {
     let base = prism(&rectangle([-60.0, -20.0], [60.0, 50.0], 0.0), &holes, 0.0, 10.0);
     let across: Vec<Vec<Point>> = BRACKETS.iter().map(|x| bore(*x, -42.0)).collect();
     let back = prism(&rectangle([-55.0, -58.0], [55.0, -22.0], 0.0), &across, -8.0, 0.0).mapped(laid_down);
-    assembly = assembly.with("base", base).with("back", back);
+    assembly = assembly.with("base", base).on("base").with("back", back);
     for (number, x) in (1..).zip(BRACKETS) {
         assembly = assembly
             .with(format!("bracket-{number}"), bracket(x))

@@ -15,17 +15,23 @@ use solid::Solid;
 pub(crate) struct Assembly {
     name: &'static str,
     notes: &'static str,
+    fixed: Option<&'static str>,
     parts: Vec<(String, Solid)>,
 }
 
 impl Assembly {
     fn new(name: &'static str, notes: &'static str) -> Self {
-        Self { name, notes, parts: Vec::new() }
+        Self { name, notes, fixed: None, parts: Vec::new() }
     }
 
     fn with(mut self, part: impl Into<String>, solid: Solid) -> Self {
         self.parts.push((part.into(), solid));
         self
+    }
+
+    /// The part that stands still.
+    fn on(self, fixed: &'static str) -> Self {
+        Self { fixed: Some(fixed), ..self }
     }
 }
 
