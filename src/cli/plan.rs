@@ -19,7 +19,7 @@ use crate::search::{PlanRequest, Termination};
 pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     let deadline = arguments.timeout.and_then(|t| Instant::now().checked_add(t));
     let termination = Termination::new(deadline);
-    interrupt::cancel_on_interrupt(termination.cancel_flag())?;
+    interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
     let assembly = load_assembly(&arguments.assembly)?;
     let request = request(arguments, &assembly)?;
     let backend = choose_backend(arguments)?;
