@@ -9,7 +9,7 @@ use sbdp_client::{Client, ClientError, ErrorCode, Event, PlanOptions, PlanStream
 
 use super::backend::{Backend, Question};
 use super::error::CliError;
-use crate::geometry::{SourceAssembly, SourcePart};
+use crate::geometry::{SourceAssembly, SourcePart, heal};
 use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
 use crate::search::{ActionSet, Engine, PlanSink, Planner, Progress, Stage};
 
@@ -47,12 +47,17 @@ impl Backend for Daemon {
         answer.or_else(|error| match error.code() {
             Some(ErrorCode::Expired) => Ok(unplanned(question, PlanStatus::Timeout, &error)),
             Some(ErrorCode::Cancelled) => Ok(unplanned(question, PlanStatus::Cancelled, &error)),
-            Some(ErrorCode::Geometry | ErrorCode::NoSuchPart | ErrorCode::Unsupported) => {
-                Err(CliError::Refused(error.to_string()))
-            }
+            Some(ErrorCode::Geometry) => Err(refusal(question.assembly, &error)),
+            Some(ErrorCode::NoSuchPart | ErrorCode::Unsupported) => Err(CliError::Refused(error.to_string())),
             _ => Err(CliError::Failed(error.to_string())),
         })
     }
+}
+
+/// The daemon does not know the files that an upload came from: the same check here does.
+fn refusal(assembly: &SourceAssembly, error: &ClientError) -> CliError {
+    let here = assembly.parts.iter().find_map(|part| heal(part).err());
+    here.map_or_else(|| CliError::Refused(error.to_string()), CliError::from)
 }
 
 fn receive(
