@@ -2,10 +2,13 @@
 
 pub mod blocking_graph;
 pub mod cli;
+pub mod config;
+pub mod daemon;
 pub mod geometry;
 pub mod plan;
 pub mod sdf;
 pub mod search;
 pub mod service;
 pub mod simulation;
+pub mod telemetry;
 pub mod termination;
