@@ -1,6 +1,7 @@
 //! sbdp plans how assemblies come apart. The stages, in the order of the data flow:
 
 pub mod blocking_graph;
+pub mod cli;
 pub mod config;
 pub mod daemon;
 pub mod geometry;
