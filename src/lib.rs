@@ -1,10 +1,14 @@
 //! sbdp plans how assemblies come apart. The stages, in the order of the data flow:
 
 pub mod blocking_graph;
+pub mod cli;
+pub mod config;
+pub mod daemon;
 pub mod geometry;
-pub mod sdf;
 pub mod plan;
+pub mod sdf;
 pub mod search;
 pub mod service;
 pub mod simulation;
+pub mod telemetry;
 pub mod termination;

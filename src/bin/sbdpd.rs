@@ -1,2 +1,71 @@
 //! The daemon.
-fn main() {}
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::Parser;
+use sbdp::config::Config;
+use sbdp::service::Service;
+use sbdp::{daemon, telemetry};
+
+/// Plans how assemblies come apart, for clients on this machine.
+#[derive(Debug, Parser)]
+#[command(name = "sbdpd", version)]
+struct Arguments {
+    /// Configuration file; `config/default.toml` explains every key.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Prefix of all files in shared memory.
+    #[arg(long)]
+    prefix: Option<String>,
+    /// Folder of iceoryx2's files.
+    #[arg(long, value_name = "DIR")]
+    root: Option<PathBuf>,
+    /// Folder of the lock file and daemon.json.
+    #[arg(long, value_name = "DIR")]
+    runtime_dir: Option<PathBuf>,
+    /// Check the configuration and leave.
+    #[arg(long)]
+    check_config: bool,
+}
+
+/// Refused usage or configuration.
+const USAGE: u8 = 2;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let config = match configuration(&arguments) {
+        Ok(config) => config,
+        Err(message) => {
+            eprintln!("sbdpd: {message}");
+            return ExitCode::from(USAGE);
+        }
+    };
+    if arguments.check_config {
+        println!("the configuration is fine");
+        return ExitCode::SUCCESS;
+    }
+    match daemon::run(&config, Arc::new(Service::default())) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("sbdpd: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The file's values, then what the command line says; logging runs afterwards.
+fn configuration(arguments: &Arguments) -> Result<Config, String> {
+    let mut config = match &arguments.config {
+        Some(path) => Config::load(path).map_err(|e| e.to_string())?,
+        None => Config::default(),
+    };
+    let endpoint = &mut config.endpoint;
+    endpoint.prefix = arguments.prefix.clone().or(endpoint.prefix.take());
+    endpoint.root = arguments.root.clone().or(endpoint.root.take());
+    endpoint.runtime_dir = arguments.runtime_dir.clone().or(endpoint.runtime_dir.take());
+    daemon::check_place(endpoint).map_err(|e| e.to_string())?;
+    telemetry::start(&config.log).map_err(|e| e.to_string())?;
+    Ok(config)
+}

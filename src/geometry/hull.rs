@@ -6,8 +6,8 @@
 
 use nalgebra::{Point3, Vector3};
 use parry3d_f64::math::{Pose as ParryPose, Vector as ParryVector};
-use parry3d_f64::query::gjk::{GJKResult, VoronoiSimplex, closest_points};
 use parry3d_f64::query::gjk::CsoPoint;
+use parry3d_f64::query::gjk::{GJKResult, VoronoiSimplex, closest_points};
 use parry3d_f64::shape::SupportMap;
 use parry3d_f64::transformation::try_convex_hull;
 
@@ -114,7 +114,8 @@ mod tests {
 
     #[test]
     fn a_contained_hull_is_not_apart() {
-        let inner: Vec<_> = cube(0.0).iter().map(|p| Point3::from(p.coords * 0.2 + Vector3::repeat(0.4))).collect();
+        let inner: Vec<_> =
+            cube(0.0).iter().map(|p| Point3::from(p.coords * 0.2 + Vector3::repeat(0.4))).collect();
         assert!(separating_direction(&cube(0.0), &inner, 0.0, None).is_none());
     }
 

@@ -48,7 +48,8 @@ impl Mesh {
     /// surface from the box centre, for what it is worth.
     #[must_use]
     pub fn volume(&self) -> f64 {
-        signed_volume(&self.vertices, self.triangles.iter().copied())
+        let (lo, hi) = self.bounds();
+        signed_volume(&self.vertices, self.triangles.iter().copied(), &nalgebra::center(&lo, &hi))
     }
 
     /// The corners of a triangle.
@@ -89,14 +90,16 @@ pub(super) fn bounds(points: &[Point3<f64>]) -> (Point3<f64>, Point3<f64>) {
     points.iter().fold((*first, *first), |(lo, hi), p| (lo.inf(p), hi.sup(p)))
 }
 
-/// Six times the signed volume would lose digits far from the origin: it is summed from the
-/// middle of the box.
-pub(super) fn signed_volume(vertices: &[Point3<f64>], triangles: impl Iterator<Item = [u32; 3]>) -> f64 {
-    let (lo, hi) = bounds(vertices);
-    let middle = nalgebra::center(&lo, &hi);
+/// The volume of the cones over triangles, seen from `about`; of a closed surface it is the
+/// same from everywhere, but near it fewer digits are lost.
+pub(super) fn signed_volume(
+    vertices: &[Point3<f64>],
+    triangles: impl Iterator<Item = [u32; 3]>,
+    about: &Point3<f64>,
+) -> f64 {
     triangles
         .map(|t| {
-            let [a, b, c]: [Vector3<f64>; 3] = t.map(|v| vertices[v as usize] - middle);
+            let [a, b, c]: [Vector3<f64>; 3] = t.map(|v| vertices[v as usize] - about);
             a.dot(&b.cross(&c)) / 6.0
         })
         .sum()

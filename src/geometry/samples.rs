@@ -86,11 +86,7 @@ impl SampleTree {
 
     /// Walks the tree; `enter` decides per sphere, `visit` gets the samples (index and point) of
     /// all leaves entered.
-    pub fn walk(
-        &self,
-        mut enter: impl FnMut(&Node) -> Descend,
-        mut visit: impl FnMut(u32, &Point3<f64>),
-    ) {
+    pub fn walk(&self, mut enter: impl FnMut(&Node) -> Descend, mut visit: impl FnMut(u32, &Point3<f64>)) {
         let mut stack = Vec::with_capacity(48);
         if !self.nodes.is_empty() {
             stack.push(0usize);

@@ -71,8 +71,8 @@ impl Surface {
         });
         let bvh = Bvh::from_iter(BvhBuildStrategy::Binned, boxes);
         let (fan_start, fan) = fans(mesh);
-        let winding = (mesh.solidity == Solidity::Winding)
-            .then(|| WindingTree::new(&mesh.vertices, &mesh.triangles));
+        let winding =
+            (mesh.solidity == Solidity::Winding).then(|| WindingTree::new(&mesh.vertices, &mesh.triangles));
         Self {
             neighbours: neighbours(mesh),
             vertex_normals: vertex_normals(mesh, &face_normals),
@@ -226,15 +226,11 @@ impl Surface {
             volume += v;
             first += (a + b + c) * (v / 4.0);
             let s = a + b + c;
-            second += v / 20.0
-                * (a.norm_squared() + b.norm_squared() + c.norm_squared() + s.norm_squared());
+            second += v / 20.0 * (a.norm_squared() + b.norm_squared() + c.norm_squared() + s.norm_squared());
         }
         let e = self.bounds.extents();
-        let boxed = MassProperties {
-            volume: e.product(),
-            centre: origin,
-            gyration_squared: e.norm_squared() / 12.0,
-        };
+        let boxed =
+            MassProperties { volume: e.product(), centre: origin, gyration_squared: e.norm_squared() / 12.0 };
         if volume <= 1e-3 * boxed.volume {
             return boxed;
         }

@@ -79,7 +79,9 @@ fn build(corners: &mut [[Point3<f64>; 3]], offset: usize, end: usize, nodes: &mu
     let (lo, hi) = corners[offset..end]
         .iter()
         .map(centroid)
-        .fold((Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)), |(l, h), c| (l.inf(&c), h.sup(&c)));
+        .fold((Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)), |(l, h), c| {
+            (l.inf(&c), h.sup(&c))
+        });
     let axis = (hi - lo).imax();
     corners[offset..end]
         .select_nth_unstable_by(mid - offset, |s, t| centroid(s)[axis].total_cmp(&centroid(t)[axis]));
@@ -100,8 +102,7 @@ fn summary(triangles: &[[Point3<f64>; 3]], offset: usize) -> Node {
         dipole += n;
     }
     let centre = Point3::from(if weight > 0.0 { centre / weight } else { Vector3::zeros() });
-    let radius =
-        triangles.iter().flatten().map(|v| (v - centre).norm_squared()).fold(0.0, f64::max).sqrt();
+    let radius = triangles.iter().flatten().map(|v| (v - centre).norm_squared()).fold(0.0, f64::max).sqrt();
     Node { centre, radius, dipole, range: (offset as u32, (offset + triangles.len()) as u32), right: 0 }
 }
 

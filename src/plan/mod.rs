@@ -1,5 +1,6 @@
 //! Plans: what is returned, and the check that it is true.
 
+pub mod export;
 mod plan;
 mod shorten;
 mod verify;

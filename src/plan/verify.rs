@@ -144,8 +144,8 @@ fn deepest_in(
     samples.walk(
         |node| {
             let c = to_measured * node.centre;
-            let apart = bounds.distance(&c) > node.radius
-                || surface.signed_distance(&c) - node.radius > -granted;
+            let apart =
+                bounds.distance(&c) > node.radius || surface.signed_distance(&c) - node.radius > -granted;
             if apart { Descend::Skip } else { Descend::Into }
         },
         |_, sample| {

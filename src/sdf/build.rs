@@ -102,7 +102,8 @@ fn brick_lists(field: &Field, surface: &Surface) -> Option<BrickList> {
         for z in lo[2]..=hi[2] {
             for y in lo[1]..=hi[1] {
                 for x in lo[0]..=hi[0] {
-                    let centre = field.origin + Vector3::new(x as f64 + 0.5, y as f64 + 0.5, z as f64 + 0.5) * side;
+                    let centre =
+                        field.origin + Vector3::new(x as f64 + 0.5, y as f64 + 0.5, z as f64 + 0.5) * side;
                     if normal.dot(&(centre - corners[0])).abs() > reach {
                         continue;
                     }
@@ -209,7 +210,9 @@ fn fill_untouched(values: &mut [f32], band: f32, winding: impl Fn(usize) -> Opti
         head += 1;
         let at = [i % NODES, i / NODES % NODES, i / (NODES * NODES)];
         for a in 0..3 {
-            for (possible, j) in [(at[a] > 0, i.wrapping_sub(STRIDES[a])), (at[a] + 1 < NODES, i + STRIDES[a])] {
+            for (possible, j) in
+                [(at[a] > 0, i.wrapping_sub(STRIDES[a])), (at[a] + 1 < NODES, i + STRIDES[a])]
+            {
                 if possible && values[j].is_nan() {
                     values[j] = band.copysign(values[i]);
                     queue.push(j);

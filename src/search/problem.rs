@@ -82,11 +82,17 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub fn checked_path(&self, standing: Vec<usize>, part: usize, path: &[Pose]) -> Result<Checked, Interrupt> {
+    pub fn checked_path(
+        &self,
+        standing: Vec<usize>,
+        part: usize,
+        path: &[Pose],
+    ) -> Result<Checked, Interrupt> {
         let bounds = self.scene.bodies[part].shape.bounds();
         let thin = thinned(path, bounds, &self.scene.centre_in_shape(part));
         let Scene { allowances, .. } = &self.scene;
-        let verdict = self.verifier.check(&self.scene, allowances, &standing, part, &thin, &self.termination)?;
+        let verdict =
+            self.verifier.check(&self.scene, allowances, &standing, part, &thin, &self.termination)?;
         if verdict.entries.is_empty() { Ok(Ok((thin, verdict.depth))) } else { Ok(Err(verdict.entries)) }
     }
 

@@ -258,7 +258,10 @@ impl<'a, 'o> Search<'a, 'o> {
                 self.charge()?;
                 if self.take(phase, job, motion, &mut gain)? {
                     // Later results of this window answer a question that has changed.
-                    next = jobs.iter().position(|j| (j.node, j.action) == (job.node, job.action)).map_or(end, |i| i + 1);
+                    next = jobs
+                        .iter()
+                        .position(|j| (j.node, j.action) == (job.node, job.action))
+                        .map_or(end, |i| i + 1);
                     break;
                 }
             }
@@ -434,7 +437,8 @@ impl<'a, 'o> Search<'a, 'o> {
             if node.part == part {
                 if node.is_root() {
                     let blockages = [node.translation.as_ref(), Some(&node.rotation)];
-                    waited_for.extend(blockages.into_iter().flatten().flat_map(|b| b.outlived().iter().copied()));
+                    waited_for
+                        .extend(blockages.into_iter().flatten().flat_map(|b| b.outlived().iter().copied()));
                 }
                 node.alive = false;
                 // Its path and blockages are of no use any more.

@@ -69,10 +69,19 @@ impl Frame<'_> {
             ..PlanStats::default()
         };
         let steps = outcome.removals.iter().map(|r| step(self.assembly, r)).collect();
-        let blocked =
-            outcome.blocked.into_iter().map(|BlockedAction { part, action, by }| Blocked { part, by, action });
+        let blocked = outcome.blocked.into_iter().map(|BlockedAction { part, action, by }| Blocked {
+            part,
+            by,
+            action,
+        });
         let (status, reason) = (outcome.status, outcome.reason);
-        Plan { steps, remaining: outcome.remaining, blocked: blocked.collect(), stats, ..self.empty(status, reason) }
+        Plan {
+            steps,
+            remaining: outcome.remaining,
+            blocked: blocked.collect(),
+            stats,
+            ..self.empty(status, reason)
+        }
     }
 
     /// A plan without steps, for a request that ended before its search began.

@@ -148,8 +148,7 @@ impl Entry {
             list.dedup();
         }
         fixed.retain(|p| removed.binary_search(p).is_err());
-        let frame =
-            Frame { assembly: &self.assembly, request, fixed, removed, overlaps: Vec::new() };
+        let frame = Frame { assembly: &self.assembly, request, fixed, removed, overlaps: Vec::new() };
         let prepared = if request.no_cache {
             Prepared::new(&self.assembly, termination, sink).map(|p| (Arc::new(p), false))
         } else {
@@ -158,9 +157,8 @@ impl Entry {
         match prepared {
             Ok((prepared, hit)) => self.searched(frame, &prepared, hit, termination, sink, started),
             Err(Interrupt::Cancelled) => frame.empty(PlanStatus::Cancelled, Some("cancelled".to_owned())),
-            Err(Interrupt::DeadlinePassed) => {
-                frame.empty(PlanStatus::Timeout, Some("the deadline passed while fields were built".to_owned()))
-            }
+            Err(Interrupt::DeadlinePassed) => frame
+                .empty(PlanStatus::Timeout, Some("the deadline passed while fields were built".to_owned())),
         }
     }
 

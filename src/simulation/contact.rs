@@ -99,9 +99,10 @@ impl<'a> Mover<'a> {
     pub(super) fn remeasured(&self, contact: &Contact, reach: f64) -> Option<Contact> {
         let standing = &self.scene.bodies[contact.other];
         let (measured, p) = match contact.side {
-            Side::Moving => {
-                (standing, standing.planning_from_shape.inverse_transform_point(&(self.pose * contact.sample)))
-            }
+            Side::Moving => (
+                standing,
+                standing.planning_from_shape.inverse_transform_point(&(self.pose * contact.sample)),
+            ),
             Side::Standing => {
                 let world = standing.planning_from_shape * contact.sample;
                 (self.body, self.pose.inverse_transform_point(&world))

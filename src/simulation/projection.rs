@@ -40,11 +40,8 @@ pub(super) fn project(wanted: &Vector6<f64>, rows: &[Row]) -> Option<Projected> 
             let r = dual_direction(rows, &active, &n)?;
             let z = active.iter().zip(r.iter()).fold(n, |z, ((i, _), r)| z - rows[*i].a * *r);
             let slope = z.dot(&n);
-            let full = if slope > 1e-9 * n.norm_squared() {
-                Some(-(n.dot(&w) + rows[p].b) / slope)
-            } else {
-                None
-            };
+            let full =
+                if slope > 1e-9 * n.norm_squared() { Some(-(n.dot(&w) + rows[p].b) / slope) } else { None };
             let blocking = active
                 .iter()
                 .zip(r.iter())

@@ -329,7 +329,10 @@ impl Drive {
 }
 
 enum Attempt {
-    Moved { twist: Vector6<f64>, touching: Vec<usize> },
+    Moved {
+        twist: Vector6<f64>,
+        touching: Vec<usize>,
+    },
     /// The linear constraints alone stop it.
     Stuck(Vec<usize>),
     /// No allowed pose was found at this length of step.

@@ -147,3 +147,14 @@ pub(crate) fn client_port(service: &ExchangeService, longest: usize) -> Result<C
             e => SetupError::at("creating the client port")(e).into(),
         })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Client;
+
+    #[test]
+    fn a_client_may_move_between_threads() {
+        fn moves<T: Send>() {}
+        moves::<Client>();
+    }
+}

@@ -1,5 +1,6 @@
 //! What can go wrong, and what to do then.
 
+use std::fmt;
 use std::time::Duration;
 
 use sbdp_ipc::bytes::Malformed;
@@ -9,7 +10,7 @@ use sbdp_ipc::layout::{LayoutError, MAX_CLIENTS};
 use sbdp_ipc::services::SetupError;
 
 /// Why the client could not do what was asked.
-#[derive(Debug, thiserror::Error)]
+#[derive(thiserror::Error)]
 pub enum ClientError {
     /// There is no usable daemon: none runs, or another version, or its folder is not safe.
     #[error(transparent)]
@@ -68,6 +69,13 @@ pub enum ClientError {
     /// The daemon's answer does not fit the question, or a chunk is missing.
     #[error("the daemon's answer is wrong: {0}; please report this")]
     Protocol(String),
+}
+
+/// Like `Display`, so that `fn main() -> Result<(), ClientError>` says what to do as well.
+impl fmt::Debug for ClientError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{self}")
+    }
 }
 
 impl ClientError {

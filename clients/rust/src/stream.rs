@@ -42,6 +42,7 @@ pub struct Progress {
 }
 
 /// What a stream yields.
+#[allow(clippy::large_enum_variant, reason = "there is one summary in a stream")]
 #[derive(Debug)]
 pub enum Event<'s> {
     /// Something moved on.
@@ -89,6 +90,7 @@ struct Parts {
 }
 
 /// What `advance` found; the borrow of the step is made by the caller.
+#[allow(clippy::large_enum_variant, reason = "there is one summary in a stream")]
 enum Found {
     Progress(Progress),
     Step(usize),

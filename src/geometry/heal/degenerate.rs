@@ -1,10 +1,13 @@
 //! Triangles without area, and edges that meet a vertex between their ends.
 
 use nalgebra::Point3;
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::math::Vector;
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 
 use super::incidence::sides_by_edge;
-use super::{Draft, Findings};
-use crate::geometry::mesh::directed_edges;
+use super::{Draft, Findings, RELATIVE_TOLERANCE};
+use crate::geometry::mesh::{self, directed_edges};
 
 /// Slivers can make new slivers of their neighbours; after so many rounds the rest stays.
 const MAX_ROUNDS: usize = 16;
@@ -104,6 +107,9 @@ fn split(t: &[u32; 3], ends: [u32; 2], middle: u32) -> Vec<[u32; 3]> {
 pub(super) fn split_at_junctions(draft: &mut Draft, tolerance: f64, findings: &mut Findings) {
     let tolerance = tolerance.max(draft.tolerance);
     let before = super::open_edges(&draft.triangles);
+    if before == 0 {
+        return;
+    }
     let original = draft.triangles.clone();
     let mut splits = 0;
     for _ in 0..MAX_ROUNDS {
@@ -127,42 +133,66 @@ fn split_round(draft: &mut Draft, tolerance: f64) -> usize {
         .map(|(edge, sides)| (edge, sides[0].triangle))
         .collect();
     border.sort_unstable();
-    let mut candidates: Vec<u32> = border.iter().flat_map(|(edge, _)| *edge).collect();
-    let x = |v: u32| draft.vertices[v as usize].x;
-    candidates.sort_by(|&a, &b| x(a).total_cmp(&x(b)).then(a.cmp(&b)));
-    candidates.dedup();
+    let vertices = BorderVertices::new(draft, &border, tolerance);
     let mut touched = vec![false; draft.triangles.len()];
     let mut count = 0;
     for (ends, triangle) in border {
-        if std::mem::replace(&mut touched[triangle as usize], true) {
+        let triangle = triangle as usize;
+        if touched[triangle] {
             continue;
         }
-        if let Some(middle) = vertex_between(draft, &candidates, ends, tolerance) {
-            if let [a, b] = split(&draft.triangles[triangle as usize], ends, middle)[..] {
-                draft.triangles[triangle as usize] = a;
-                draft.triangles.push(b);
-                count += 1;
-            }
-        } else {
-            touched[triangle as usize] = false;
+        let Some(middle) = vertices.between(draft, ends) else { continue };
+        if let [a, b] = split(&draft.triangles[triangle], ends, middle)[..] {
+            touched[triangle] = true;
+            draft.triangles[triangle] = a;
+            draft.triangles.push(b);
+            count += 1;
         }
     }
     count
 }
 
-/// The first border vertex strictly between the ends of an edge, and on it.
-fn vertex_between(draft: &Draft, by_x: &[u32], ends: [u32; 2], tolerance: f64) -> Option<u32> {
-    let [p, q] = ends.map(|v| draft.vertices[v as usize]);
-    let start = by_x.partition_point(|&v| draft.vertices[v as usize].x < p.x.min(q.x) - tolerance);
-    let length = (q - p).norm();
-    by_x[start..]
-        .iter()
-        .copied()
-        .take_while(|&v| draft.vertices[v as usize].x <= p.x.max(q.x) + tolerance)
-        .filter(|v| !ends.contains(v))
-        .find(|&v| {
-            let m = draft.vertices[v as usize];
+/// The vertices along the border of a surface, in a tree.
+struct BorderVertices {
+    tree: Bvh,
+    tolerance: f64,
+    scale: f64,
+}
+
+impl BorderVertices {
+    fn new(draft: &Draft, border: &[([u32; 2], u32)], tolerance: f64) -> Self {
+        let mut vertices: Vec<u32> = border.iter().flat_map(|(edge, _)| *edge).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        // The tree multiplies lengths: in units of the part's size they stay in range.
+        let scale = RELATIVE_TOLERANCE / draft.tolerance;
+        let leaf = |&v: &u32| (v as usize, around(&[draft.vertices[v as usize]], scale, tolerance));
+        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, vertices.iter().map(leaf));
+        Self { tree, tolerance, scale }
+    }
+
+    /// The first border vertex strictly between the ends of an edge, and on it.
+    fn between(&self, draft: &Draft, ends: [u32; 2]) -> Option<u32> {
+        let [p, q] = ends.map(|v| draft.vertices[v as usize]);
+        let length = (q - p).norm();
+        let on_it = |v: &u32| {
+            let m = draft.vertices[*v as usize];
             let along = (m - p).dot(&(q - p)) / length;
-            along > tolerance && along < length - tolerance && distance_to_line(&m, &p, &q) <= tolerance
-        })
+            along > self.tolerance
+                && along < length - self.tolerance
+                && distance_to_line(&m, &p, &q) <= self.tolerance
+        };
+        let region = around(&[p, q], self.scale, self.tolerance);
+        self.tree.intersect_aabb(&region).filter(|v| !ends.contains(v)).filter(on_it).min()
+    }
+}
+
+/// The box of points, scaled, with a margin.
+fn around(points: &[Point3<f64>], scale: f64, margin: f64) -> Aabb {
+    let (lo, hi) = mesh::bounds(points);
+    let corner = |p: Point3<f64>, d: f64| {
+        let p = p.map(|c| (c + d) * scale);
+        Vector::new(p.x, p.y, p.z)
+    };
+    Aabb::new(corner(lo, -margin), corner(hi, margin))
 }

@@ -86,8 +86,7 @@ fn welded_and_clean(draft: Draft, findings: &mut Findings) -> Result<Draft, Stri
         let mut attempt = weld::weld(&draft, tolerance, &mut notes);
         degenerate::drop_degenerate(&mut attempt, &mut notes);
         duplicate::drop_repeated(&mut attempt, &mut notes);
-        degenerate::split_at_junctions(&mut attempt, tolerance, &mut notes);
-        (open_edges(&attempt.triangles), attempt, notes)
+        (open_edges(&attempt.triangles), attempt, notes, tolerance)
     };
     // Welding by distance could only harm where equal coordinates close the part already.
     let mut best = attempt(0.0);
@@ -100,7 +99,8 @@ fn welded_and_clean(draft: Draft, findings: &mut Findings) -> Result<Draft, Stri
             best = other;
         }
     }
-    let (_, draft, notes) = best;
+    let (_, mut draft, mut notes, tolerance) = best;
+    degenerate::split_at_junctions(&mut draft, tolerance, &mut notes);
     findings.list.extend(notes.list);
     if draft.triangles.is_empty() {
         return Err("no triangle has an area; export the part as a solid".into());

@@ -83,7 +83,10 @@ impl Flood {
 /// Turns an open part so that its winding number is positive inside in sum. Patches are
 /// turned together: one alone may be flat and has no outside of its own.
 pub(super) fn face_outward(draft: &mut Draft) {
-    if mesh::signed_volume(&draft.vertices, draft.triangles.iter().copied()) < 0.0 {
+    // An open surface: seen from its middle.
+    let (lo, hi) = mesh::bounds(&draft.vertices);
+    let middle = nalgebra::center(&lo, &hi);
+    if mesh::signed_volume(&draft.vertices, draft.triangles.iter().copied(), &middle) < 0.0 {
         draft.triangles.iter_mut().for_each(|t| t.swap(1, 2));
     }
 }

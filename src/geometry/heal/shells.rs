@@ -43,10 +43,18 @@ fn turn_patches_outward(draft: &mut Draft) {
     let manifold = sides.values().filter(|s| s.len() == 2).map(|s| [s[0].triangle, s[1].triangle]);
     let patch_of = components(draft.triangles.len(), manifold);
     for patch in members(&patch_of).values() {
-        if mesh::signed_volume(&draft.vertices, patch.iter().map(|&t| draft.triangles[t as usize])) < 0.0 {
+        if volume(draft, patch) < 0.0 {
             patch.iter().for_each(|&t| draft.triangles[t as usize].swap(1, 2));
         }
     }
+}
+
+/// The volume of some of the triangles, seen from one of their corners.
+fn volume(draft: &Draft, triangles: &[u32]) -> f64 {
+    let triangle = |t: &u32| draft.triangles[*t as usize];
+    let Some(first) = triangles.first() else { return 0.0 };
+    let about = draft.vertices[triangle(first)[0] as usize];
+    mesh::signed_volume(&draft.vertices, triangles.iter().map(triangle), &about)
 }
 
 /// Two triangles that continue each other across an edge.
@@ -171,7 +179,7 @@ impl Shells {
     fn settle(&self, draft: &mut Draft, given: &[[u32; 3]], findings: &mut Findings) -> Solidity {
         let count = self.triangles.len();
         for shell in 0..count {
-            if self.volume(draft, shell) < 0.0 {
+            if volume(draft, &self.triangles[shell]) < 0.0 {
                 self.flip(draft, shell);
             }
         }
@@ -203,10 +211,6 @@ impl Shells {
             findings.list.push(format!("{crossing} {shells} {verb}; inside and outside by winding number"));
         }
         if meeting + crossing > 0 { Solidity::Winding } else { Solidity::Closed }
-    }
-
-    fn volume(&self, draft: &Draft, shell: usize) -> f64 {
-        mesh::signed_volume(&draft.vertices, self.of(draft, shell))
     }
 
     fn of(&self, draft: &Draft, shell: usize) -> impl Iterator<Item = [u32; 3]> {

@@ -37,6 +37,7 @@ pub(super) fn parse_obj(bytes: &[u8]) -> Result<SourceMesh, String> {
 fn geometry_lines(text: &str) -> Result<String, String> {
     let mut out = String::with_capacity(text.len());
     let (mut positions, mut faces) = (0usize, 0usize);
+    let mut greatest = (0, 0);
     for (number, line) in logical_lines(text) {
         let mut words = line.split_whitespace();
         match words.next() {
@@ -48,10 +49,19 @@ fn geometry_lines(text: &str) -> Result<String, String> {
             }
             Some("f") => {
                 faces += 1;
-                push_face(&mut out, words, positions).map_err(|e| format!("line {number}: {e}"))?;
+                let index =
+                    push_face(&mut out, words, positions).map_err(|e| format!("line {number}: {e}"))?;
+                greatest = greatest.max((index, number));
             }
             _ => {}
         }
+    }
+    // A face may come before its vertices.
+    if usize::try_from(greatest.0).is_ok_and(|index| index > positions) {
+        let (index, line) = greatest;
+        return Err(format!(
+            "line {line}: vertex {index} is out of bounds, there are {positions}; export the part again"
+        ));
     }
     match (positions, faces) {
         (_, 1..) => Ok(out),
@@ -89,24 +99,27 @@ fn push_position<'a>(out: &mut String, words: impl Iterator<Item = &'a str>) -> 
     Some(())
 }
 
+/// Returns the greatest index.
 fn push_face<'a>(
     out: &mut String,
     words: impl Iterator<Item = &'a str>,
     positions: usize,
-) -> Result<(), String> {
+) -> Result<i64, String> {
     out.push('f');
+    let mut greatest = 0;
     for word in words.take_while(|w| !w.starts_with('#')) {
         let vertex = word.split('/').next().unwrap_or_default();
         let index: i64 = vertex.parse().map_err(|_| format!("`{word}` is not a vertex index"))?;
         check_index(index, positions)?;
+        greatest = greatest.max(index);
         out.extend([" ", vertex]);
     }
     out.push('\n');
-    Ok(())
+    Ok(greatest)
 }
 
-/// tobj counts backwards from what it has read so far and says only that some index is out
-/// of bounds; an index beyond the positions read so far may still be given later in the file.
+/// tobj says only that some index is out of bounds. Negative ones count backwards from what
+/// was read so far; one beyond that may still be given later in the file.
 fn check_index(index: i64, positions: usize) -> Result<(), String> {
     let backwards = usize::try_from(index.unsigned_abs()).unwrap_or(usize::MAX);
     if index == 0 || (index < 0 && backwards > positions) {

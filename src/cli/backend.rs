@@ -1,0 +1,41 @@
+//! Where plans are made: in this process or in the daemon. Both speak the planning modules'
+//! own types.
+
+use std::time::Instant;
+
+use super::error::CliError;
+use crate::geometry::SourceAssembly;
+use crate::plan::Plan;
+use crate::search::{PlanRequest, PlanSink, Termination};
+use crate::service::Service;
+
+/// A question, ready to be asked.
+pub(super) struct Question<'a> {
+    /// The assembly.
+    pub(super) assembly: &'a SourceAssembly,
+    /// What to plan.
+    pub(super) request: PlanRequest,
+    /// When the answer is due.
+    pub(super) deadline: Option<Instant>,
+    /// Ends the work early; knows the deadline too.
+    pub(super) termination: Termination,
+}
+
+/// Something that plans.
+pub(super) trait Backend {
+    /// Plans; blocks until done.
+    fn plan(&self, question: &Question<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError>;
+}
+
+/// The service in this process.
+#[derive(Default)]
+pub(super) struct Embedded {
+    service: Service,
+}
+
+impl Backend for Embedded {
+    fn plan(&self, question: &Question<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError> {
+        let admission = self.service.admit(question.assembly)?;
+        Ok(self.service.plan(admission.id, &question.request, &question.termination, sink)?)
+    }
+}

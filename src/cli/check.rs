@@ -1,0 +1,76 @@
+//! `sbdp check`: what is in an assembly's files, without planning anything.
+
+use std::process::ExitCode;
+
+use super::args::CheckArguments;
+use super::error::CliError;
+use super::print;
+use super::table::{Table, length};
+use crate::geometry::{Healed, Solidity, SourceAssembly, heal, load_assembly};
+use crate::service::Service;
+
+pub(super) fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
+    let assembly = load_assembly(&arguments.assembly)?;
+    let healed = assembly.parts.iter().map(heal).collect::<Result<Vec<_>, _>>()?;
+    let service = Service::default();
+    let admission = service.admit(&assembly)?;
+    let overlaps = service.overlaps(admission.id)?;
+    let mut text = headline(&assembly, &healed);
+    text.push_str(&parts(&assembly, &healed));
+    text.push_str(&findings(&assembly, &healed));
+    text.push_str("\noverlaps at the assembled pose:\n");
+    let name = |part: usize| assembly.parts.get(part).map_or("?", |p| p.name.as_str());
+    for overlap in &overlaps {
+        let [a, b] = overlap.parts.map(name);
+        let depth = length(overlap.depth, assembly.units.as_deref());
+        text.push_str(&format!("  {a} and {b}: {depth} deep\n"));
+    }
+    if overlaps.is_empty() {
+        text.push_str("  none\n");
+    }
+    print(&text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn headline(assembly: &SourceAssembly, healed: &[Healed]) -> String {
+    let triangles: usize = healed.iter().map(|h| h.mesh.triangles.len()).sum();
+    let units = assembly.units.as_deref().unwrap_or("unknown");
+    let fixed = if assembly.fixed.is_empty() { "none".to_owned() } else { assembly.fixed.join(", ") };
+    format!(
+        "{}: {} parts, {triangles} triangles; units {units}; fixed {fixed}\n\n",
+        assembly.name,
+        healed.len()
+    )
+}
+
+fn parts(assembly: &SourceAssembly, healed: &[Healed]) -> String {
+    let mut table = Table::new(&["part", "triangles", "size", "volume", "inside by", "from"]);
+    for (part, Healed { mesh, .. }) in assembly.parts.iter().zip(healed) {
+        let (lo, hi) = mesh.bounds();
+        let size: Vec<String> = (hi - lo).iter().map(|s| length(*s, None)).collect();
+        let sign = match mesh.solidity {
+            Solidity::Closed => "closed surface",
+            Solidity::Winding => "winding number",
+        };
+        table.row([
+            part.name.clone(),
+            mesh.triangles.len().to_string(),
+            size.join(" × "),
+            length(mesh.volume(), None),
+            sign.to_owned(),
+            part.origin.clone(),
+        ]);
+    }
+    table.render()
+}
+
+fn findings(assembly: &SourceAssembly, healed: &[Healed]) -> String {
+    let mut text = String::from("\nfound in healing:\n");
+    let found = assembly.parts.iter().zip(healed).flat_map(|(p, h)| h.findings.iter().map(move |f| (p, f)));
+    let mut lines = found.map(|(part, finding)| format!("  {}: {finding}\n", part.name)).peekable();
+    if lines.peek().is_none() {
+        text.push_str("  nothing\n");
+    }
+    text.extend(lines);
+    text
+}

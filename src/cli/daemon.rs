@@ -1,0 +1,238 @@
+//! The daemon as a backend: the client crate's types on one side, the planning modules' on the
+//! other.
+
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use sbdp_client as client;
+use sbdp_client::{Client, ClientError, ErrorCode, Event, PlanOptions, PlanStream, Summary};
+
+use super::backend::{Backend, Question};
+use super::error::CliError;
+use crate::geometry::{SourceAssembly, SourcePart, heal};
+use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
+use crate::search::{ActionSet, Engine, PlanSink, Planner, Progress, Stage};
+
+/// How long Ctrl-C may go unnoticed while the daemon has nothing to say.
+const CANCEL_POLL: Duration = Duration::from_millis(100);
+
+/// A connection to the daemon.
+pub(super) struct Daemon {
+    client: Client,
+}
+
+impl Daemon {
+    pub(super) fn connect() -> Result<Self, ClientError> {
+        Ok(Self { client: Client::connect()? })
+    }
+
+    pub(super) fn status(&self) -> Result<client::Status, ClientError> {
+        self.client.status()
+    }
+
+    fn ask(&self, question: &Question<'_>, sink: &mut dyn PlanSink) -> Result<Plan, ClientError> {
+        let handle = self.client.upload(&wire_assembly(question.assembly))?;
+        let mut stream = self.client.plan(handle, &options(question))?;
+        receive(&mut stream, question, sink)
+    }
+}
+
+impl Backend for Daemon {
+    fn plan(&self, question: &Question<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError> {
+        let mut answer = self.ask(question, sink);
+        if matches!(&answer, Err(e) if e.code() == Some(ErrorCode::UnknownHandle)) {
+            // Evicted between the two requests.
+            answer = self.ask(question, sink);
+        }
+        answer.or_else(|error| match error.code() {
+            Some(ErrorCode::Expired) => Ok(unplanned(question, PlanStatus::Timeout, &error)),
+            Some(ErrorCode::Cancelled) => Ok(unplanned(question, PlanStatus::Cancelled, &error)),
+            Some(ErrorCode::Geometry) => Err(refusal(question.assembly, &error)),
+            Some(ErrorCode::NoSuchPart | ErrorCode::Unsupported) => Err(CliError::Refused(error.to_string())),
+            _ => Err(CliError::Failed(error.to_string())),
+        })
+    }
+}
+
+/// The daemon does not know the files that an upload came from: the same check here does.
+fn refusal(assembly: &SourceAssembly, error: &ClientError) -> CliError {
+    let here = assembly.parts.iter().find_map(|part| heal(part).err());
+    here.map_or_else(|| CliError::Refused(error.to_string()), CliError::from)
+}
+
+fn receive(
+    stream: &mut PlanStream<'_>,
+    question: &Question<'_>,
+    sink: &mut dyn PlanSink,
+) -> Result<Plan, ClientError> {
+    let cancel = question.termination.cancel_flag();
+    let mut steps = Vec::new();
+    loop {
+        if cancel.load(Ordering::Relaxed) {
+            stream.cancel();
+        }
+        match stream.next_event_within(CANCEL_POLL) {
+            Ok(Some(Event::Progress(p))) => sink.progress(progress(p)),
+            Ok(Some(Event::Step(step))) => {
+                steps.push(plan_step(&step));
+                steps.last().into_iter().for_each(|s| sink.step(s));
+            }
+            Ok(Some(Event::Done(summary))) => return Ok(plan(summary, steps)),
+            Ok(None) => return Err(ClientError::Protocol("the plan ended without its summary".into())),
+            Err(ClientError::Timeout { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+fn wire_assembly(assembly: &SourceAssembly) -> client::Assembly<'_> {
+    client::Assembly {
+        name: &assembly.name,
+        units: assembly.units.as_deref(),
+        parts: assembly.parts.iter().map(wire_part).collect(),
+        fixed: assembly.fixed.iter().map(String::as_str).collect(),
+    }
+}
+
+fn wire_part(part: &SourcePart) -> client::Part<'_> {
+    client::Part {
+        name: &part.name,
+        vertices: client::Vertices::F64(&part.mesh.vertices),
+        triangles: &part.mesh.triangles,
+    }
+}
+
+fn options(question: &Question<'_>) -> PlanOptions {
+    let request = &question.request;
+    let numbers = |parts: &[usize]| parts.iter().map(|&p| p as u32).collect::<Vec<u32>>();
+    PlanOptions {
+        planner: match request.planner {
+            Planner::SbdpStar => client::Planner::SbdpStar,
+        },
+        engine: match request.engine {
+            Engine::Sliding => client::Engine::Sliding,
+        },
+        actions: match request.actions {
+            ActionSet::Paper => client::ActionSet::Paper,
+            ActionSet::Extended => client::ActionSet::Extended,
+        },
+        timeout: question.deadline.map(|d| d.saturating_duration_since(Instant::now())),
+        max_simulations: request.max_simulations,
+        threads: u32::try_from(request.threads).unwrap_or(0),
+        fixed: numbers(&request.fixed),
+        removed: numbers(&request.removed),
+        targets: request.targets.as_deref().map(numbers),
+        no_cache: request.no_cache,
+    }
+}
+
+fn progress(p: client::Progress) -> Progress {
+    let stage = match p.stage {
+        client::Stage::Sdf => Stage::Sdf,
+        client::Stage::Search => Stage::Search,
+    };
+    Progress { stage, done: p.done, total: p.total, simulations: p.simulations }
+}
+
+fn plan_step(step: &client::Step<'_>) -> PlanStep {
+    PlanStep {
+        part: step.part as usize,
+        motion: if step.rotates { MotionKind::Rotation } else { MotionKind::Translation },
+        path: step.path.to_vec(),
+        verified_depth: step.verified_depth,
+        waited_for: indices(step.blockers),
+    }
+}
+
+fn plan(s: Summary, steps: Vec<PlanStep>) -> Plan {
+    Plan {
+        status: status(s.status),
+        reason: s.reason,
+        planner: s.planner,
+        engine: s.engine,
+        units: s.units,
+        parts: s.parts,
+        removed: indices(&s.removed),
+        targets: s.targets.as_deref().map(indices),
+        fixed: indices(&s.fixed),
+        steps,
+        remaining: indices(&s.remaining),
+        blocked: s
+            .blocked
+            .into_iter()
+            .map(|b| Blocked { part: b.part as usize, by: indices(&b.by), action: b.action })
+            .collect(),
+        overlaps: s
+            .overlaps
+            .into_iter()
+            .map(|o| Overlap { parts: o.parts.map(|p| p as usize), depth: o.depth })
+            .collect(),
+        warnings: s
+            .warnings
+            .into_iter()
+            .map(|w| Warning { part: w.part.map(|p| p as usize), message: w.message })
+            .collect(),
+        stats: stats(&s.stats),
+    }
+}
+
+fn status(status: client::PlanStatus) -> PlanStatus {
+    match status {
+        client::PlanStatus::Complete => PlanStatus::Complete,
+        client::PlanStatus::Partial => PlanStatus::Partial,
+        client::PlanStatus::Infeasible => PlanStatus::Infeasible,
+        client::PlanStatus::Timeout => PlanStatus::Timeout,
+        client::PlanStatus::Cancelled => PlanStatus::Cancelled,
+    }
+}
+
+fn stats(s: &client::Stats) -> PlanStats {
+    PlanStats {
+        simulations: s.simulations,
+        simulations_run: s.simulations_run,
+        sweeps: s.sweeps,
+        states: s.states,
+        sdf_time_s: s.sdf_time_s,
+        static_analysis_time_s: s.static_analysis_time_s,
+        path_time_s: s.path_time_s,
+        verify_time_s: s.verify_time_s,
+        total_time_s: s.total_time_s,
+        sdf_hits: s.sdf_hits,
+        blocking_hits: s.blocking_hits,
+        motion_hits: s.motion_hits,
+        plan_hit: s.plan_hit != 0,
+    }
+}
+
+fn indices(parts: &[u32]) -> Vec<usize> {
+    parts.iter().map(|&p| p as usize).collect()
+}
+
+/// The answer to a question that the daemon let go before planning began: everything stands
+/// where it stood.
+fn unplanned(question: &Question<'_>, status: PlanStatus, error: &ClientError) -> Plan {
+    let request = &question.request;
+    let parts: Vec<String> = question.assembly.parts.iter().map(|p| p.name.clone()).collect();
+    let remaining = (0..parts.len()).filter(|p| !request.removed.contains(p)).collect();
+    Plan {
+        status,
+        reason: Some(error.to_string()),
+        planner: match request.planner {
+            Planner::SbdpStar => "sbdp-star".to_owned(),
+        },
+        engine: match request.engine {
+            Engine::Sliding => "sliding".to_owned(),
+        },
+        units: question.assembly.units.clone(),
+        parts,
+        removed: request.removed.clone(),
+        targets: request.targets.clone(),
+        fixed: request.fixed.clone(),
+        steps: Vec::new(),
+        remaining,
+        blocked: Vec::new(),
+        overlaps: Vec::new(),
+        warnings: Vec::new(),
+        stats: PlanStats::default(),
+    }
+}

@@ -1,0 +1,53 @@
+//! Why a command ends early, and with which exit code.
+
+use std::process::ExitCode;
+
+use crate::geometry::GeometryError;
+use crate::plan::PlanStatus;
+use crate::service::ServiceError;
+
+/// Why a command ended without its result.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum CliError {
+    /// The user asked for something that makes no sense, or gave geometry that is refused.
+    #[error("{0}")]
+    Refused(String),
+    /// Anything else.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl CliError {
+    pub(super) fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Refused(_) => ExitCode::from(2),
+            Self::Failed(_) => ExitCode::from(1),
+        }
+    }
+}
+
+impl From<GeometryError> for CliError {
+    fn from(error: GeometryError) -> Self {
+        Self::Refused(error.to_string())
+    }
+}
+
+impl From<ServiceError> for CliError {
+    fn from(error: ServiceError) -> Self {
+        match error {
+            ServiceError::Geometry(_) | ServiceError::NoSuchPart { .. } => Self::Refused(error.to_string()),
+            // The stages behind the service may come to name other failures.
+            other => Self::Failed(other.to_string()),
+        }
+    }
+}
+
+/// The exit code of a plan.
+pub(super) fn exit_code(status: PlanStatus) -> ExitCode {
+    ExitCode::from(match status {
+        PlanStatus::Complete => 0,
+        PlanStatus::Partial | PlanStatus::Infeasible => 3,
+        PlanStatus::Timeout => 4,
+        PlanStatus::Cancelled => 5,
+    })
+}

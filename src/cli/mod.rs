@@ -1,0 +1,50 @@
+//! The command line `sbdp`.
+//!
+//! `plan` asks the daemon if one runs, else a service in this process; `check` always works
+//! here. Results go to stdout; progress, warnings about the way there and errors to stderr.
+
+mod args;
+mod backend;
+mod check;
+mod daemon;
+mod error;
+mod interrupt;
+mod part_names;
+mod plan;
+mod progress;
+mod report;
+mod status;
+mod table;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use args::{Arguments, Command};
+use error::CliError;
+
+/// Runs the command that the process was given.
+#[must_use]
+pub fn run() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Plan(arguments) => plan::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Status => status::run(),
+    };
+    result.unwrap_or_else(|error| {
+        eprintln!("error: {error}");
+        error.exit_code()
+    })
+}
+
+/// Writes a result to stdout. A reader that has seen enough and closed the pipe is no error.
+fn print(text: &str) -> Result<(), CliError> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(CliError::Failed(format!("cannot write to stdout: {e}")))
+        }
+        _ => Ok(()),
+    }
+}

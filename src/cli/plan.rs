@@ -1,0 +1,80 @@
+//! `sbdp plan`.
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use super::args::PlanArguments;
+use super::backend::{Backend, Embedded, Question};
+use super::daemon::Daemon;
+use super::error::{CliError, exit_code};
+use super::part_names::resolve;
+use super::progress::ProgressDisplay;
+use super::{interrupt, print, report};
+use crate::geometry::{SourceAssembly, load_assembly};
+use crate::plan::Plan;
+use crate::plan::export::PlanDocument;
+use crate::search::{PlanRequest, Termination};
+
+pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
+    let deadline = arguments.timeout.and_then(|t| Instant::now().checked_add(t));
+    let termination = Termination::new(deadline);
+    interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
+    let assembly = load_assembly(&arguments.assembly)?;
+    let request = request(arguments, &assembly)?;
+    let backend = choose_backend(arguments)?;
+    let question = Question { assembly: &assembly, request, deadline, termination };
+    let mut display = ProgressDisplay::new();
+    let plan = backend.plan(&question, &mut display);
+    drop(display);
+    let plan = plan?;
+    write_results(arguments.json.as_deref(), &assembly, &plan)?;
+    Ok(exit_code(plan.status))
+}
+
+fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanRequest, CliError> {
+    let fixed = [&assembly.fixed[..], &arguments.fixed[..]].concat();
+    let targets = resolve(assembly, "--target", &arguments.target)?;
+    Ok(PlanRequest {
+        planner: arguments.planner.into(),
+        engine: arguments.engine.into(),
+        actions: arguments.actions.into(),
+        max_simulations: arguments.max_simulations,
+        threads: arguments.threads as usize,
+        fixed: resolve(assembly, "--fixed", &fixed)?,
+        removed: resolve(assembly, "--removed", &arguments.removed)?,
+        targets: (!arguments.target.is_empty()).then_some(targets),
+        no_cache: arguments.no_cache,
+    })
+}
+
+/// The daemon if one runs, else this process; or what the user insists on.
+fn choose_backend(arguments: &PlanArguments) -> Result<Box<dyn Backend>, CliError> {
+    if arguments.embedded {
+        return Ok(Box::<Embedded>::default());
+    }
+    match Daemon::connect() {
+        Ok(daemon) => Ok(Box::new(daemon)),
+        Err(error) if arguments.daemon => Err(CliError::Failed(error.to_string())),
+        Err(error) => {
+            // That none runs is normal; that one runs and cannot be used is worth a word.
+            if !error.is_no_daemon() {
+                eprintln!("warning: {error}; planning in this process");
+            }
+            Ok(Box::<Embedded>::default())
+        }
+    }
+}
+
+fn write_results(json: Option<&Path>, assembly: &SourceAssembly, plan: &Plan) -> Result<(), CliError> {
+    let Some(file) = json else { return print(&report::plan(assembly, plan)) };
+    let mut text = PlanDocument::new(plan)
+        .to_json()
+        .map_err(|e| CliError::Failed(format!("cannot write the plan as JSON: {e}")))?;
+    text.push('\n');
+    if file == Path::new("-") {
+        return print(&text);
+    }
+    std::fs::write(file, text).map_err(|e| CliError::Failed(format!("{}: {e}", file.display())))?;
+    print(&report::plan(assembly, plan))
+}

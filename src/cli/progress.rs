@@ -1,0 +1,61 @@
+//! Progress on a terminal; nothing in pipes.
+
+use std::io::IsTerminal;
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::plan::PlanStep;
+use crate::search::{PlanSink, Progress, Stage};
+
+/// Shows the stages of a request on stderr.
+pub(super) struct ProgressDisplay {
+    bar: ProgressBar,
+    stage: Option<Stage>,
+}
+
+impl ProgressDisplay {
+    pub(super) fn new() -> Self {
+        let bar = ProgressBar::new(0);
+        let target = if std::io::stderr().is_terminal() {
+            ProgressDrawTarget::stderr()
+        } else {
+            ProgressDrawTarget::hidden()
+        };
+        bar.set_draw_target(target);
+        Self { bar, stage: None }
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        if self.stage == Some(stage) {
+            return;
+        }
+        self.stage = Some(stage);
+        let template = match stage {
+            Stage::Sdf => "distance fields {bar:30} {pos}/{len}",
+            Stage::Search => "search          {bar:30} {pos}/{len} parts out, {msg} [{elapsed}]",
+        };
+        // A template that does not parse would only cost the looks.
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            self.bar.set_style(style);
+        }
+    }
+}
+
+impl PlanSink for ProgressDisplay {
+    fn progress(&mut self, progress: Progress) {
+        self.enter(progress.stage);
+        self.bar.set_length(u64::from(progress.total));
+        self.bar.set_position(u64::from(progress.done));
+        self.bar.set_message(format!("{} simulations", progress.simulations));
+    }
+
+    fn step(&mut self, _step: &PlanStep) {
+        self.enter(Stage::Search);
+    }
+}
+
+impl Drop for ProgressDisplay {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,46 @@
+//! `sbdp status`.
+
+use std::process::ExitCode;
+use std::time::Duration;
+
+use sbdp_client::{Handle, Status};
+
+use super::daemon::Daemon;
+use super::error::CliError;
+use super::print;
+
+pub(super) fn run() -> Result<ExitCode, CliError> {
+    let failed = |e: sbdp_client::ClientError| CliError::Failed(e.to_string());
+    let daemon = Daemon::connect().map_err(failed)?;
+    print(&describe(&daemon.status().map_err(failed)?))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn describe(status: &Status) -> String {
+    let n = &status.numbers;
+    let uptime = Duration::from_nanos(n.uptime_ns).as_secs();
+    let mut text = format!(
+        "sbdpd {} (protocol {}), pid {}, up {uptime} s\n\
+         workers   {}, {} busy; {} of {} requests wait\n\
+         requests  {}: {} answered, {} cancelled, {} expired, {} refused, {} failed\n\
+         uploads   {}\n",
+        status.version,
+        n.protocol,
+        n.pid,
+        n.workers,
+        n.running,
+        n.queued,
+        n.queue_limit,
+        n.requests,
+        n.done,
+        n.cancelled,
+        n.expired,
+        n.refused,
+        n.failed,
+        n.uploads
+    );
+    for (name, handle) in &status.preloaded {
+        text.push_str(&format!("preloaded {name} {}\n", Handle(*handle)));
+    }
+    text
+}

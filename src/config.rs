@@ -1,0 +1,229 @@
+//! The daemon's configuration. `config/default.toml` explains every key.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::Deserialize;
+
+/// Why a configuration is refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file cannot be read.
+    #[error("{path}: {source}")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It is not valid: syntax, an unknown key, or a value of the wrong type.
+    #[error("{path}: {source}")]
+    Invalid {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with line and key.
+        source: Box<toml::de::Error>,
+    },
+    /// A value is out of range.
+    #[error("`{key}` is {value}, but must be {range}")]
+    OutOfRange {
+        /// The key.
+        key: &'static str,
+        /// Its value.
+        value: String,
+        /// What it may be.
+        range: &'static str,
+    },
+}
+
+/// The whole configuration.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Where the daemon is found.
+    pub endpoint: EndpointConfig,
+    /// Who works.
+    pub workers: WorkersConfig,
+    /// What requests may do.
+    pub requests: RequestsConfig,
+    /// Housekeeping and shutting down.
+    pub times: TimesConfig,
+    /// Assemblies to load at start.
+    pub preload: PreloadConfig,
+    /// What is logged.
+    pub log: LogConfig,
+}
+
+/// Where the daemon is found.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EndpointConfig {
+    /// Folder of the lock file and `daemon.json`.
+    pub runtime_dir: Option<PathBuf>,
+    /// Prefix of all files in shared memory.
+    pub prefix: Option<String>,
+    /// Folder of iceoryx2's files.
+    pub root: Option<PathBuf>,
+}
+
+/// Who works.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WorkersConfig {
+    /// Requests planned at the same time.
+    pub count: usize,
+    /// Threads that one request may use; 0 for all cores.
+    pub threads_per_request: usize,
+}
+
+/// What requests may do.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RequestsConfig {
+    /// Plan requests that may wait for a worker.
+    pub queue: usize,
+    /// Megabytes that one upload may have.
+    pub max_upload_mb: u64,
+    /// Megabytes of a plan that may wait for a client to read.
+    pub outbox_mb: u64,
+    /// Seconds that a client may leave a waiting plan unread.
+    pub slow_reader_s: f64,
+}
+
+/// Housekeeping and shutting down.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TimesConfig {
+    /// Seconds between two looks for dead clients.
+    pub tick_s: f64,
+    /// Seconds that running requests get at SIGTERM before they are cancelled.
+    pub grace_s: f64,
+    /// Seconds that cancelled requests then get to be answered.
+    pub drain_s: f64,
+}
+
+/// Assemblies to load at start.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PreloadConfig {
+    /// Folders and files, as `sbdp plan` takes them.
+    pub assemblies: Vec<PathBuf>,
+}
+
+/// What is logged.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LogConfig {
+    /// How a line looks.
+    pub format: LogFormat,
+    /// Which lines; the environment variable `SBDP_LOG` takes precedence.
+    pub filter: String,
+}
+
+/// How a log line looks.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LogFormat {
+    /// For people.
+    #[default]
+    Text,
+    /// One JSON object per line.
+    Json,
+}
+
+impl Default for WorkersConfig {
+    fn default() -> Self {
+        Self { count: 2, threads_per_request: 0 }
+    }
+}
+
+impl Default for RequestsConfig {
+    fn default() -> Self {
+        Self { queue: 16, max_upload_mb: 1024, outbox_mb: 64, slow_reader_s: 60.0 }
+    }
+}
+
+impl Default for TimesConfig {
+    fn default() -> Self {
+        Self { tick_s: 1.0, grace_s: 2.0, drain_s: 10.0 }
+    }
+}
+
+impl Default for LogConfig {
+    fn default() -> Self {
+        Self { format: LogFormat::Text, filter: "info".to_owned() }
+    }
+}
+
+impl Config {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// It cannot be read, has an unknown key or a value out of range.
+    pub fn load(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ConfigError::Unreadable { path: path.to_owned(), source })?;
+        let config: Self = toml::from_str(&text)
+            .map_err(|e| ConfigError::Invalid { path: path.to_owned(), source: Box::new(e) })?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    /// A value is out of range.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        within("workers.count", self.workers.count, 1..=256, "1 to 256")?;
+        within("workers.threads_per_request", self.workers.threads_per_request, 0..=1024, "0 to 1024")?;
+        within("requests.queue", self.requests.queue, 1..=4096, "1 to 4096")?;
+        within("requests.max_upload_mb", self.requests.max_upload_mb, 1..=65_536, "1 to 65536")?;
+        within("requests.outbox_mb", self.requests.outbox_mb, 1..=65_536, "1 to 65536")?;
+        within("requests.slow_reader_s", self.requests.slow_reader_s, 0.1..=86_400.0, "0.1 to 86400")?;
+        within("times.tick_s", self.times.tick_s, 0.05..=60.0, "0.05 to 60")?;
+        within("times.grace_s", self.times.grace_s, 0.0..=3600.0, "0 to 3600")?;
+        within("times.drain_s", self.times.drain_s, 0.1..=3600.0, "0.1 to 3600")
+    }
+}
+
+fn within<T: PartialOrd + ToString>(
+    key: &'static str,
+    value: T,
+    allowed: std::ops::RangeInclusive<T>,
+    range: &'static str,
+) -> Result<(), ConfigError> {
+    if allowed.contains(&value) {
+        return Ok(());
+    }
+    Err(ConfigError::OutOfRange { key, value: value.to_string(), range })
+}
+
+/// Seconds of the configuration, which `check` has found to be in range.
+#[must_use]
+pub fn seconds(value: f64) -> Duration {
+    Duration::try_from_secs_f64(value).unwrap_or(Duration::from_secs(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_explained_defaults_are_the_defaults() {
+        let explained: Config = toml::from_str(include_str!("../config/default.toml")).unwrap();
+        assert_eq!(explained, Config::default());
+        explained.check().unwrap();
+    }
+
+    #[test]
+    fn an_unknown_key_is_named() {
+        let error = toml::from_str::<Config>("[workers]\ncuont = 3\n").unwrap_err();
+        assert!(error.to_string().contains("cuont"), "{error}");
+    }
+
+    #[test]
+    fn a_value_out_of_range_is_named() {
+        let config: Config = toml::from_str("[times]\ntick_s = nan\n").unwrap();
+        assert!(config.check().unwrap_err().to_string().contains("times.tick_s"));
+    }
+}

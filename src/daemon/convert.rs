@@ -1,0 +1,188 @@
+//! The only place that sees both wire types and working types.
+
+use sbdp_ipc::bytes::AlignedBytes;
+use sbdp_ipc::error::{ErrorCode, WireError};
+use sbdp_ipc::geometry::Assembly;
+use sbdp_ipc::plan as wire;
+use sbdp_ipc::progress::{ProgressSample, STAGE_SDF, STAGE_SEARCH};
+use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts};
+
+use crate::geometry::{SourceAssembly, SourceMesh, SourcePart};
+use crate::plan::{MotionKind, Plan, PlanStats, PlanStatus, PlanStep};
+use crate::search::{ActionSet, Engine, PlanRequest, Planner, Progress, Stage};
+use crate::service::ServiceError;
+
+/// What a wire request asks; the handle and the deadline are handled by the desk.
+pub(crate) fn plan_request(
+    request: &wire::PlanRequest,
+    most_threads: usize,
+) -> Result<PlanRequest, WireError> {
+    let indices = |list: &[u32]| list.iter().map(|i| *i as usize).collect::<Vec<_>>();
+    Ok(PlanRequest {
+        planner: planner(request.planner)?,
+        engine: engine(request.engine)?,
+        actions: actions(request.actions)?,
+        max_simulations: request.max_simulations,
+        threads: threads(request.threads as usize, most_threads),
+        fixed: indices(&request.fixed),
+        removed: indices(&request.removed),
+        targets: request.targets.as_deref().map(indices),
+        no_cache: request.no_cache,
+    })
+}
+
+/// 0 stands for all on both sides; the configuration is the upper bound.
+fn threads(asked: usize, most: usize) -> usize {
+    match (asked, most) {
+        (0, most) => most,
+        (asked, 0) => asked,
+        (asked, most) => asked.min(most),
+    }
+}
+
+fn planner(index: u32) -> Result<Planner, WireError> {
+    match index {
+        0 => Ok(Planner::SbdpStar),
+        _ => Err(unsupported("planner", index, &wire::PLANNERS)),
+    }
+}
+
+fn engine(index: u32) -> Result<Engine, WireError> {
+    match index {
+        0 => Ok(Engine::Sliding),
+        _ => Err(unsupported("engine", index, &wire::ENGINES)),
+    }
+}
+
+fn actions(index: u32) -> Result<ActionSet, WireError> {
+    match index {
+        0 => Ok(ActionSet::Paper),
+        1 => Ok(ActionSet::Extended),
+        _ => Err(unsupported("action set", index, &wire::ACTION_SETS)),
+    }
+}
+
+fn unsupported(what: &str, index: u32, names: &[&str]) -> WireError {
+    let name = names.get(index as usize).map_or_else(|| format!("number {index}"), |n| format!("`{n}`"));
+    WireError::new(ErrorCode::Unsupported, format!("this daemon does not offer the {what} {name}"))
+}
+
+/// A step as it travels.
+pub(crate) fn step(step: &PlanStep) -> wire::Step {
+    wire::Step {
+        part: step.part as u32,
+        rotates: step.motion == MotionKind::Rotation,
+        path: step.path.clone(),
+        verified_depth: step.verified_depth,
+        blockers: numbers(&step.waited_for),
+    }
+}
+
+fn numbers(list: &[usize]) -> Vec<u32> {
+    list.iter().map(|i| *i as u32).collect()
+}
+
+/// Everything of a plan but its steps, as it travels.
+pub(crate) fn summary(plan: &Plan) -> Vec<u8> {
+    SummaryParts {
+        status: status(plan.status),
+        steps: plan.steps.len() as u32,
+        reason: plan.reason.as_deref(),
+        planner: &plan.planner,
+        engine: &plan.engine,
+        units: plan.units.as_deref(),
+        parts: plan.parts.iter().map(String::as_str).collect(),
+        overlaps: plan
+            .overlaps
+            .iter()
+            .map(|o| OverlapRecord { parts: o.parts.map(|p| p as u32), depth: o.depth })
+            .collect(),
+        blocked: plan.blocked.iter().map(|b| (b.part as u32, numbers(&b.by), b.action.as_str())).collect(),
+        warnings: plan
+            .warnings
+            .iter()
+            .map(|w| (w.part.map_or(NO_PART, |p| p as u32), w.message.as_str()))
+            .collect(),
+        removed: numbers(&plan.removed),
+        targets: plan.targets.as_deref().map(numbers),
+        fixed: numbers(&plan.fixed),
+        remaining: numbers(&plan.remaining),
+        stats: stats(&plan.stats),
+    }
+    .encode()
+}
+
+fn status(status: PlanStatus) -> u32 {
+    match status {
+        PlanStatus::Complete => 0,
+        PlanStatus::Partial => 1,
+        PlanStatus::Infeasible => 2,
+        PlanStatus::Timeout => 3,
+        PlanStatus::Cancelled => 4,
+    }
+}
+
+fn stats(s: &PlanStats) -> Stats {
+    Stats {
+        simulations: s.simulations,
+        simulations_run: s.simulations_run,
+        sweeps: s.sweeps,
+        states: s.states,
+        sdf_time_s: s.sdf_time_s,
+        static_analysis_time_s: s.static_analysis_time_s,
+        path_time_s: s.path_time_s,
+        verify_time_s: s.verify_time_s,
+        total_time_s: s.total_time_s,
+        sdf_hits: s.sdf_hits,
+        blocking_hits: s.blocking_hits,
+        motion_hits: s.motion_hits,
+        plan_hit: u64::from(s.plan_hit),
+    }
+}
+
+/// Progress as it is published.
+pub(crate) fn progress(client: [u64; 2], request: u64, progress: Progress) -> ProgressSample {
+    ProgressSample {
+        client,
+        request,
+        simulations: progress.simulations,
+        stage: match progress.stage {
+            Stage::Sdf => STAGE_SDF,
+            Stage::Search => STAGE_SEARCH,
+        },
+        done: progress.done,
+        total: progress.total,
+        reserved: 0,
+    }
+}
+
+/// An upload as the geometry stage takes it. The bytes are a private copy.
+pub(crate) fn source_assembly(bytes: &AlignedBytes) -> Result<SourceAssembly, WireError> {
+    let upload = Assembly::decode(bytes.as_slice())
+        .map_err(|e| WireError::new(ErrorCode::Malformed, format!("upload: {e}")))?;
+    Ok(SourceAssembly {
+        name: upload.name.to_owned(),
+        units: upload.units.map(str::to_owned),
+        fixed: upload.fixed.iter().map(|n| (*n).to_owned()).collect(),
+        parts: upload
+            .parts
+            .iter()
+            .map(|p| SourcePart {
+                name: p.name.to_owned(),
+                origin: "upload".to_owned(),
+                mesh: SourceMesh { vertices: p.vertices.iter().collect(), triangles: p.triangles.to_vec() },
+            })
+            .collect(),
+    })
+}
+
+/// Why nothing was planned, with its stable code.
+pub(crate) fn service_error(error: &ServiceError) -> WireError {
+    let code = match error {
+        ServiceError::UnknownAssembly => ErrorCode::UnknownHandle,
+        ServiceError::NoSuchPart { .. } => ErrorCode::NoSuchPart,
+        ServiceError::Geometry(_) => ErrorCode::Geometry,
+        ServiceError::Threads(_) => ErrorCode::Failed,
+    };
+    WireError::new(code, error.to_string())
+}

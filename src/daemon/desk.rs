@@ -1,0 +1,442 @@
+//! Admission and bookkeeping: what happens to every request, without any transport.
+
+use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use sbdp_ipc::bytes::AlignedBytes;
+use sbdp_ipc::clock;
+use sbdp_ipc::error::{ErrorCode, WireError};
+use sbdp_ipc::geometry::HandleResponse;
+use sbdp_ipc::headers::{CONTROL_CANCEL, RequestHeader, ResponseHeader, ResponseKind, id_of_words, id_words};
+use sbdp_ipc::plan::PlanRequest;
+use sbdp_ipc::progress::ProgressSample;
+use sbdp_ipc::status::{Status, StatusHeader};
+
+use super::convert;
+use super::request_queue::Rejected;
+use super::session::{End, Input, Link, Session, State};
+use super::workers::{AdmitJob, PlanJob, Planning, Queues, SessionKey, WorkerEvent};
+use crate::config::{Config, seconds};
+use crate::search::Termination;
+use crate::service::AssemblyId;
+
+/// A request as it came in: header and payload are private copies.
+#[derive(Debug)]
+pub(crate) struct Incoming<L> {
+    pub(crate) link: L,
+    pub(crate) client: u128,
+    pub(crate) header: RequestHeader,
+    pub(crate) payload: AlignedBytes,
+}
+
+/// Everything that can happen.
+#[derive(Debug)]
+pub(crate) enum Event<L> {
+    /// A plan is asked for.
+    Plan(Incoming<L>),
+    /// Credit for a plan's stream, or the wish to end it.
+    Control(Incoming<L>),
+    /// The status is asked for.
+    Status(Incoming<L>),
+    /// Is this handle known?
+    Have(Incoming<L>),
+    /// Meshes.
+    Upload(Incoming<L>),
+    /// Something that cannot be taken, and why.
+    Unusable(Incoming<L>, WireError),
+    /// A worker reports.
+    Worker(WorkerEvent),
+    /// SIGTERM or SIGINT.
+    Terminate,
+}
+
+/// How far shutting down is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Closing {
+    /// Not asked for.
+    Open,
+    /// Running requests may finish until then.
+    Grace(Instant),
+    /// They are cancelled and get until then to be answered.
+    Drain(Instant),
+}
+
+/// The limits that the desk keeps.
+#[derive(Debug, Clone, Copy)]
+struct Limits {
+    outbox: usize,
+    patience: Duration,
+    threads: usize,
+    grace: Duration,
+    drain: Duration,
+}
+
+/// The desk.
+#[derive(Debug)]
+pub(crate) struct Desk<L, P> {
+    service: Arc<P>,
+    queues: Queues,
+    limits: Limits,
+    sessions: HashMap<SessionKey, Session<L>>,
+    uploads: HashMap<u64, (L, u128)>,
+    running: BTreeSet<(u128, u64)>,
+    next_upload: u64,
+    closing: Closing,
+    counters: StatusHeader,
+    preloaded: Vec<(String, [u8; 32])>,
+    started: Instant,
+    /// Listeners to wake.
+    pub(crate) wakes: Vec<u128>,
+    /// Progress to publish.
+    pub(crate) samples: Vec<ProgressSample>,
+}
+
+impl<L: Link, P: Planning> Desk<L, P> {
+    pub(crate) fn new(service: Arc<P>, queues: Queues, config: &Config) -> Self {
+        let megabytes = |mb: u64| usize::try_from(mb.saturating_mul(1 << 20)).unwrap_or(usize::MAX);
+        let counters = StatusHeader {
+            pid: std::process::id(),
+            protocol: sbdp_ipc::PROTOCOL,
+            workers: config.workers.count as u32,
+            queue_limit: config.requests.queue as u32,
+            ..StatusHeader::default()
+        };
+        Self {
+            service,
+            queues,
+            limits: Limits {
+                outbox: megabytes(config.requests.outbox_mb),
+                patience: seconds(config.requests.slow_reader_s),
+                threads: config.workers.threads_per_request,
+                grace: seconds(config.times.grace_s),
+                drain: seconds(config.times.drain_s),
+            },
+            sessions: HashMap::new(),
+            uploads: HashMap::new(),
+            running: BTreeSet::new(),
+            next_upload: 0,
+            closing: Closing::Open,
+            counters,
+            preloaded: Vec::new(),
+            started: Instant::now(),
+            wakes: Vec::new(),
+            samples: Vec::new(),
+        }
+    }
+
+    pub(crate) fn handle(&mut self, event: Event<L>, now: Instant) {
+        match event {
+            Event::Plan(incoming) => self.plan(incoming),
+            Event::Control(incoming) => self.control(&incoming),
+            Event::Status(incoming) => {
+                let status = self.status().encode();
+                self.answer(&incoming.link, &incoming.header, ResponseKind::Status, &status);
+            }
+            Event::Have(incoming) => self.have(&incoming),
+            Event::Upload(incoming) => self.upload(incoming),
+            Event::Unusable(incoming, error) => {
+                self.counters.refused += 1;
+                self.answer_error(&incoming.link, &incoming.header, &error);
+            }
+            Event::Worker(event) => self.worker(event),
+            Event::Terminate => self.terminate(now),
+        }
+    }
+
+    fn plan(&mut self, incoming: Incoming<L>) {
+        self.counters.requests += 1;
+        let Incoming { link, client, header, payload } = incoming;
+        let key = SessionKey { client, request: header.request };
+        if self.sessions.contains_key(&key) {
+            let error = WireError::new(ErrorCode::Malformed, "this request number is in use");
+            self.counters.refused += 1;
+            return self.answer_error(&link, &header, &error);
+        }
+        let mut session =
+            Session::new(link, header.request, id_of_words(header.listener), self.limits.outbox);
+        if let Err((input, error)) = self.admit(&mut session, key, &payload) {
+            session.end_with(input, &error);
+        }
+        self.sessions.insert(key, session);
+    }
+
+    /// Reads a plan request and puts it into the queue.
+    fn admit(
+        &self,
+        session: &mut Session<L>,
+        key: SessionKey,
+        payload: &AlignedBytes,
+    ) -> Result<(), (Input, WireError)> {
+        let refuse = |code, message: String| (Input::Refuse, WireError::new(code, message));
+        if self.closing != Closing::Open {
+            return Err(refuse(ErrorCode::ShuttingDown, "the daemon is shutting down".to_owned()));
+        }
+        let wire = PlanRequest::decode(payload.as_slice())
+            .map_err(|e| refuse(ErrorCode::Malformed, format!("plan request: {e}")))?;
+        let request =
+            convert::plan_request(&wire, self.limits.threads).map_err(|error| (Input::Refuse, error))?;
+        let assembly = AssemblyId(wire.handle);
+        if !self.service.knows(assembly) {
+            return Err(refuse(ErrorCode::UnknownHandle, "no assembly has this handle".to_owned()));
+        }
+        let deadline = wire.deadline_ns.and_then(clock::instant_of);
+        if wire.deadline_ns.is_some_and(|d| d <= clock::monotonic_ns()) {
+            return Err(expired());
+        }
+        let termination = Termination::new(deadline);
+        session.admit(termination.cancel_flag(), deadline);
+        match self.queues.plans.push(PlanJob { key, assembly, request, termination }) {
+            Ok(()) => {
+                session.input(Input::Enqueue);
+                Ok(())
+            }
+            Err(Rejected::Full) => Err(refuse(
+                ErrorCode::Busy,
+                format!("busy: {} requests wait already", self.queues.plans.len()),
+            )),
+            Err(Rejected::Closed) => {
+                Err(refuse(ErrorCode::ShuttingDown, "the daemon is shutting down".to_owned()))
+            }
+        }
+    }
+
+    fn control(&mut self, incoming: &Incoming<L>) {
+        let key = SessionKey { client: incoming.client, request: incoming.header.request };
+        let Some(session) = self.sessions.get_mut(&key) else { return };
+        session.grant(incoming.header.consumed);
+        if incoming.header.flags & CONTROL_CANCEL == 0 {
+            return;
+        }
+        session.cancel_work();
+        if session.state() == State::Queued && self.queues.plans.withdraw(|job| job.key == key) {
+            let error = WireError::new(ErrorCode::Cancelled, "cancelled before planning began");
+            session.end_with(Input::Cancel, &error);
+        }
+    }
+
+    fn have(&mut self, incoming: &Incoming<L>) {
+        match <[u8; 32]>::try_from(incoming.payload.as_slice()) {
+            Ok(handle) => {
+                let known = self.service.knows(AssemblyId(handle));
+                self.answer_handle(&incoming.link, &incoming.header, handle, known);
+            }
+            Err(_) => {
+                let error = WireError::new(ErrorCode::Malformed, "a handle has 32 bytes");
+                self.answer_error(&incoming.link, &incoming.header, &error);
+            }
+        }
+    }
+
+    fn upload(&mut self, incoming: Incoming<L>) {
+        self.counters.uploads += 1;
+        let Incoming { link, header, payload, .. } = incoming;
+        let number = self.next_upload;
+        self.next_upload += 1;
+        if self.closing == Closing::Open
+            && self.queues.admissions.push(AdmitJob::Upload { number, bytes: payload }).is_ok()
+        {
+            self.uploads.insert(number, (link, id_of_words(header.listener)));
+            return;
+        }
+        let error = match self.closing {
+            Closing::Open => WireError::new(ErrorCode::Busy, "busy: too many uploads wait"),
+            _ => WireError::new(ErrorCode::ShuttingDown, "the daemon is shutting down"),
+        };
+        self.answer_error(&link, &header, &error);
+    }
+
+    fn worker(&mut self, event: WorkerEvent) {
+        match event {
+            WorkerEvent::Started(key) => {
+                self.running.insert((key.client, key.request));
+                self.with_session(key, |s| {
+                    s.input(Input::Start);
+                });
+            }
+            WorkerEvent::Step(key, step) => self.with_session(key, |s| s.step(step)),
+            WorkerEvent::Progress(key, progress) => {
+                if let Some(session) = self.sessions.get(&key) {
+                    self.samples.push(convert::progress(id_words(key.client), key.request, progress));
+                    self.wakes.push(session.listener);
+                }
+            }
+            WorkerEvent::Planned(key, summary) => {
+                self.running.remove(&(key.client, key.request));
+                self.with_session(key, |s| s.finish(summary));
+            }
+            WorkerEvent::Unplanned(key, error) => {
+                self.running.remove(&(key.client, key.request));
+                let input = if error.code == ErrorCode::Failed { Input::Fail } else { Input::Refuse };
+                self.with_session(key, |s| s.end_with(input, &error));
+            }
+            WorkerEvent::Admitted { number, result } => self.admitted(number, result),
+            WorkerEvent::Preloaded { name, id } => {
+                tracing::info!(name, "preloaded");
+                self.preloaded.push((name, id.0));
+            }
+        }
+    }
+
+    /// A session that is gone was left by its client: its worker's reports come to nothing.
+    fn with_session(&mut self, key: SessionKey, act: impl FnOnce(&mut Session<L>)) {
+        if let Some(session) = self.sessions.get_mut(&key) {
+            act(session);
+        }
+    }
+
+    fn admitted(&mut self, number: u64, result: Result<AssemblyId, WireError>) {
+        let Some((link, listener)) = self.uploads.remove(&number) else { return };
+        let header = RequestHeader { listener: id_words(listener), ..RequestHeader::default() };
+        match result {
+            Ok(id) => self.answer_handle(&link, &header, id.0, true),
+            Err(error) => self.answer_error(&link, &header, &error),
+        }
+    }
+
+    /// First signal: nothing new, and running requests get their grace. Second: no more grace.
+    fn terminate(&mut self, now: Instant) {
+        self.closing = match self.closing {
+            Closing::Open => Closing::Grace(now + self.limits.grace),
+            Closing::Grace(_) => Closing::Grace(now),
+            drain @ Closing::Drain(_) => drain,
+        };
+        self.queues.close();
+        let error = WireError::new(ErrorCode::ShuttingDown, "the daemon is shutting down");
+        for (key, session) in &mut self.sessions {
+            if session.state() == State::Queued && self.queues.plans.withdraw(|job| job.key == *key) {
+                session.end_with(Input::Refuse, &error);
+            }
+        }
+    }
+
+    /// Looks after every session: who left, what expired, what can be sent. Called whenever
+    /// anything happened.
+    pub(crate) fn settle(&mut self, now: Instant) {
+        let mut over = Vec::new();
+        for (key, session) in &mut self.sessions {
+            if !session.state().is_over() && !session.is_connected() {
+                self.queues.plans.withdraw(|job| job.key == *key);
+                session.input(Input::Cancel);
+            }
+            let late = session.deadline.is_some_and(|d| d <= now);
+            if late && session.state() == State::Queued && self.queues.plans.withdraw(|job| job.key == *key) {
+                let (input, error) = expired();
+                session.end_with(input, &error);
+            }
+            if session.pump(now, self.limits.patience) {
+                self.wakes.push(session.listener);
+            }
+            if session.is_finished() {
+                over.push(*key);
+            }
+        }
+        for key in over {
+            self.remove(key);
+        }
+        self.close_down(now);
+    }
+
+    fn remove(&mut self, key: SessionKey) {
+        let Some(session) = self.sessions.remove(&key) else { return };
+        let counter = match session.state() {
+            State::Ended(End::Done) => &mut self.counters.done,
+            State::Ended(End::Cancelled) => &mut self.counters.cancelled,
+            State::Ended(End::Expired) => &mut self.counters.expired,
+            State::Ended(End::Refused) => &mut self.counters.refused,
+            _ => &mut self.counters.failed,
+        };
+        *counter += 1;
+        tracing::debug!(request = key.request, state = ?session.state(), "request over");
+        // The request is let go before its client is woken, so that it sees the end.
+        let listener = session.listener;
+        drop(session);
+        self.wakes.push(listener);
+    }
+
+    fn close_down(&mut self, now: Instant) {
+        match self.closing {
+            Closing::Grace(end) if end <= now => {
+                for session in self.sessions.values() {
+                    session.cancel_work();
+                }
+                self.closing = Closing::Drain(now + self.limits.drain);
+            }
+            Closing::Drain(end) if end <= now => {
+                let error = WireError::new(ErrorCode::ShuttingDown, "the daemon is shutting down");
+                for session in self.sessions.values_mut() {
+                    // Legal from every live state: a worker that does not stop is left behind.
+                    let input =
+                        if matches!(session.state(), State::Streaming) { Input::Fail } else { Input::Refuse };
+                    session.end_with(input, &error);
+                    session.pump(now, self.limits.patience);
+                    self.wakes.push(session.listener);
+                }
+                self.sessions.clear();
+                self.uploads.clear();
+            }
+            _ => {}
+        }
+    }
+
+    /// Shutting down, and everybody is answered.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.closing != Closing::Open && self.sessions.is_empty() && self.uploads.is_empty()
+    }
+
+    /// When `settle` must be called next without anything happening.
+    pub(crate) fn next_deadline(&self) -> Option<Instant> {
+        let queued = self.sessions.values().filter(|s| s.state() == State::Queued).filter_map(|s| s.deadline);
+        let closing = match self.closing {
+            Closing::Open => None,
+            Closing::Grace(end) | Closing::Drain(end) => Some(end),
+        };
+        queued.chain(closing).min()
+    }
+
+    fn status(&self) -> Status {
+        Status {
+            numbers: StatusHeader {
+                uptime_ns: u64::try_from(self.started.elapsed().as_nanos()).unwrap_or(u64::MAX),
+                running: self.running.len() as u32,
+                queued: self.queues.plans.len() as u32,
+                ..self.counters
+            },
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            preloaded: self.preloaded.clone(),
+        }
+    }
+
+    fn answer_handle(&mut self, link: &L, header: &RequestHeader, handle: [u8; 32], known: bool) {
+        let response = HandleResponse { handle, known: u32::from(known), reserved: 0 };
+        self.answer(link, header, ResponseKind::Handle, bytemuck::bytes_of(&response));
+    }
+
+    fn answer_error(&mut self, link: &L, header: &RequestHeader, error: &WireError) {
+        self.answer(link, header, ResponseKind::Error, &error.encode());
+    }
+
+    /// The one response to a request that is not a plan; its buffer is empty, so it fits.
+    fn answer(&mut self, link: &L, request: &RequestHeader, kind: ResponseKind, bytes: &[u8]) {
+        let header = ResponseHeader {
+            kind: kind as u32,
+            request: request.request,
+            total: bytes.len() as u64,
+            sent_ns: clock::monotonic_ns(),
+            ..ResponseHeader::default()
+        };
+        if let Err(error) = link.send(header, bytes) {
+            tracing::debug!(?error, ?kind, "answer not delivered");
+        }
+        self.wakes.push(id_of_words(request.listener));
+    }
+}
+
+fn expired() -> (Input, WireError) {
+    let error = WireError::new(ErrorCode::Expired, "the deadline passed before planning began");
+    (Input::Expire, error)
+}
+
+#[cfg(test)]
+#[path = "desk_tests.rs"]
+mod tests;

@@ -1,0 +1,335 @@
+//! Admission, cancellation and client death with a scripted planner and without any transport.
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Mutex, atomic::AtomicBool, atomic::Ordering};
+
+use sbdp_ipc::headers::RequestKind;
+
+use super::*;
+use crate::daemon::session::Undelivered;
+use crate::daemon::workers::{Report, start};
+use crate::geometry::SourceAssembly;
+use crate::plan::{MotionKind, Plan, PlanStats, PlanStatus, PlanStep};
+use crate::search::{Interrupt, PlanSink};
+use crate::service::{Admission, ServiceError};
+
+/// No test waits longer than this for what must happen.
+const HANG: Duration = Duration::from_secs(60);
+
+/// What the scripted planner does is said by `max_simulations`.
+const QUICK: u64 = 0;
+const PANIC: u64 = 1;
+/// Runs until it is cancelled or let go.
+const HOLD: u64 = 2;
+
+#[derive(Default)]
+struct Scripted {
+    let_go: AtomicBool,
+}
+
+fn plan_with(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
+    Plan {
+        status,
+        reason: None,
+        planner: "sbdp-star".into(),
+        engine: "sliding".into(),
+        units: None,
+        parts: vec!["0".into()],
+        removed: vec![],
+        targets: None,
+        fixed: vec![],
+        steps,
+        remaining: vec![],
+        blocked: vec![],
+        overlaps: vec![],
+        warnings: vec![],
+        stats: PlanStats::default(),
+    }
+}
+
+impl Planning for Scripted {
+    fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError> {
+        assert!(!source.parts.is_empty(), "scripted to panic on an empty assembly");
+        Ok(Admission { id: AssemblyId([7; 32]), known: false, warnings: vec![] })
+    }
+
+    fn knows(&self, id: AssemblyId) -> bool {
+        id.0 == [7; 32]
+    }
+
+    fn plan(
+        &self,
+        _: AssemblyId,
+        request: &crate::search::PlanRequest,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+    ) -> Result<Plan, ServiceError> {
+        let step = PlanStep {
+            part: 0,
+            motion: MotionKind::Translation,
+            path: vec![[0.0; 7]],
+            verified_depth: 0.0,
+            waited_for: vec![],
+        };
+        match request.max_simulations {
+            Some(PANIC) => panic!("scripted panic"),
+            Some(HOLD) => loop {
+                match termination.check() {
+                    Err(Interrupt::Cancelled) => return Ok(plan_with(PlanStatus::Cancelled, vec![])),
+                    Err(Interrupt::DeadlinePassed) => return Ok(plan_with(PlanStatus::Timeout, vec![])),
+                    Ok(()) if self.let_go.load(Ordering::Relaxed) => break,
+                    Ok(()) => std::thread::sleep(Duration::from_millis(1)),
+                }
+            },
+            _ => {}
+        }
+        sink.step(&step);
+        Ok(plan_with(PlanStatus::Complete, vec![step]))
+    }
+}
+
+/// A client's side: what it got, and whether it is there.
+#[derive(Clone, Debug, Default)]
+struct Wire {
+    gone: Rc<Cell<bool>>,
+    got: Rc<RefCell<Vec<(ResponseHeader, AlignedBytes)>>>,
+}
+
+impl Link for Wire {
+    fn send(&self, header: ResponseHeader, payload: &[u8]) -> Result<(), Undelivered> {
+        self.got.borrow_mut().push((header, AlignedBytes::copy_of(payload)));
+        Ok(())
+    }
+
+    fn is_connected(&self) -> bool {
+        !self.gone.get()
+    }
+}
+
+impl Wire {
+    fn kinds(&self) -> Vec<u32> {
+        self.got.borrow().iter().map(|(h, _)| h.kind).collect()
+    }
+
+    fn error(&self) -> Option<ErrorCode> {
+        let got = self.got.borrow();
+        let (header, bytes) = got.last()?;
+        (header.kind == ResponseKind::Error as u32).then(|| WireError::decode(bytes.as_slice()).unwrap().code)
+    }
+
+    fn summary_status(&self) -> Option<&'static str> {
+        let got = self.got.borrow();
+        let (header, bytes) = got.last()?;
+        (header.kind == ResponseKind::Summary as u32)
+            .then(|| sbdp_ipc::summary::SummaryView::new(bytes.as_slice()).unwrap().status())
+    }
+}
+
+struct Bench {
+    desk: Desk<Wire, Scripted>,
+    service: Arc<Scripted>,
+    reports: Receiver<WorkerEvent>,
+    next_request: u64,
+}
+
+impl Bench {
+    fn new(queue: usize) -> Self {
+        let mut config = Config::default();
+        config.workers.count = 1;
+        config.requests.queue = queue;
+        config.times.grace_s = 0.0;
+        let service = Arc::new(Scripted::default());
+        let queues = Queues::new(queue);
+        let (sender, reports): (Sender<WorkerEvent>, _) = channel();
+        let sender = Mutex::new(sender);
+        let report: Report = Arc::new(move |event| {
+            let _ = sender.lock().unwrap().send(event);
+        });
+        start(1, &queues, &service, &report).unwrap();
+        Self { desk: Desk::new(Arc::clone(&service), queues, &config), service, reports, next_request: 0 }
+    }
+
+    fn incoming(&mut self, kind: RequestKind, payload: &[u8]) -> (Wire, Incoming<Wire>) {
+        self.next_request += 1;
+        let wire = Wire::default();
+        let header =
+            RequestHeader { kind: kind as u32, request: self.next_request, ..RequestHeader::default() };
+        let payload = AlignedBytes::copy_of(payload);
+        (wire.clone(), Incoming { link: wire, client: 5, header, payload })
+    }
+
+    fn ask(&mut self, request: &PlanRequest) -> Wire {
+        let (wire, incoming) = self.incoming(RequestKind::Plan, &request.encode());
+        self.handle(Event::Plan(incoming));
+        wire
+    }
+
+    fn script(&mut self, script: u64) -> Wire {
+        self.ask(&PlanRequest {
+            handle: [7; 32],
+            actions: 1,
+            max_simulations: Some(script),
+            ..PlanRequest::default()
+        })
+    }
+
+    fn handle(&mut self, event: Event<Wire>) {
+        self.desk.handle(event, Instant::now());
+        self.desk.settle(Instant::now());
+    }
+
+    /// Lets workers report until something holds.
+    fn until(&mut self, holds: impl Fn(&Desk<Wire, Scripted>) -> bool) {
+        let start = Instant::now();
+        while !holds(&self.desk) {
+            assert!(start.elapsed() < HANG, "this never happens");
+            match self.reports.recv_timeout(Duration::from_millis(5)) {
+                Ok(event) => self.handle(Event::Worker(event)),
+                Err(RecvTimeoutError::Timeout) => self.desk.settle(Instant::now()),
+                Err(RecvTimeoutError::Disconnected) => panic!("the workers are gone"),
+            }
+        }
+    }
+
+    fn until_running(&mut self) {
+        self.until(|desk| desk.sessions.values().any(|s| s.state() == State::Running));
+    }
+}
+
+#[test]
+fn a_plan_is_streamed_and_summed_up() {
+    let mut bench = Bench::new(4);
+    let wire = bench.script(QUICK);
+    bench.until(|desk| desk.counters.done == 1);
+    assert_eq!(wire.kinds(), [ResponseKind::Steps as u32, ResponseKind::Summary as u32]);
+    assert_eq!(wire.summary_status(), Some("complete"));
+}
+
+#[test]
+fn more_than_the_queue_holds_is_answered_busy() {
+    let mut bench = Bench::new(1);
+    bench.script(HOLD);
+    bench.until_running();
+    let waiting = bench.script(QUICK);
+    let refused = bench.script(QUICK);
+    assert_eq!(refused.error(), Some(ErrorCode::Busy));
+    bench.service.let_go.store(true, Ordering::Relaxed);
+    bench.until(|desk| desk.counters.done == 2);
+    assert_eq!(waiting.summary_status(), Some("complete"));
+}
+
+#[test]
+fn a_panic_is_an_answer_and_the_next_request_is_served() {
+    let mut bench = Bench::new(4);
+    let wire = bench.script(PANIC);
+    bench.until(|desk| desk.counters.failed == 1);
+    assert_eq!(wire.error(), Some(ErrorCode::Failed));
+    let wire = bench.script(QUICK);
+    bench.until(|desk| desk.counters.done == 1);
+    assert_eq!(wire.summary_status(), Some("complete"));
+}
+
+#[test]
+fn a_client_that_leaves_frees_its_worker() {
+    let mut bench = Bench::new(4);
+    let held = bench.script(HOLD);
+    bench.until_running();
+    held.gone.set(true);
+    let next = bench.script(QUICK);
+    bench.until(|desk| desk.counters.done == 1);
+    assert_eq!(next.summary_status(), Some("complete"));
+    assert!(held.kinds().is_empty());
+    assert_eq!(bench.desk.counters.cancelled, 1);
+}
+
+#[test]
+fn cancelling_a_running_request_is_answered_with_what_there_is() {
+    let mut bench = Bench::new(4);
+    let wire = bench.script(HOLD);
+    bench.until_running();
+    let (_, mut control) = bench.incoming(RequestKind::Control, &[]);
+    control.header.request = 1;
+    control.header.flags = CONTROL_CANCEL;
+    bench.handle(Event::Control(control));
+    bench.until(|desk| desk.sessions.is_empty());
+    assert_eq!(wire.summary_status(), Some("cancelled"));
+}
+
+#[test]
+fn cancelling_a_waiting_request_takes_it_out_of_the_queue() {
+    let mut bench = Bench::new(4);
+    bench.script(HOLD);
+    bench.until_running();
+    let waiting = bench.script(QUICK);
+    let (_, mut control) = bench.incoming(RequestKind::Control, &[]);
+    control.header.request = 2;
+    control.header.flags = CONTROL_CANCEL;
+    bench.handle(Event::Control(control));
+    assert_eq!(waiting.error(), Some(ErrorCode::Cancelled));
+    bench.service.let_go.store(true, Ordering::Relaxed);
+}
+
+#[test]
+fn a_deadline_that_passes_in_the_queue_is_answered_expired() {
+    let mut bench = Bench::new(4);
+    bench.script(HOLD);
+    bench.until_running();
+    let request = PlanRequest {
+        handle: [7; 32],
+        deadline_ns: Some(clock::deadline_in(Duration::from_millis(20))),
+        ..PlanRequest::default()
+    };
+    let wire = bench.ask(&request);
+    assert!(bench.desk.next_deadline().is_some());
+    bench.until(|desk| desk.counters.expired == 1);
+    assert_eq!(wire.error(), Some(ErrorCode::Expired));
+    bench.service.let_go.store(true, Ordering::Relaxed);
+}
+
+#[test]
+fn requests_that_cannot_be_planned_are_refused_with_their_code() {
+    let mut bench = Bench::new(4);
+    let known = PlanRequest { handle: [7; 32], ..PlanRequest::default() };
+    let unknown = bench.ask(&PlanRequest::default());
+    assert_eq!(unknown.error(), Some(ErrorCode::UnknownHandle));
+    let unsupported = bench.ask(&PlanRequest { planner: 99, ..known.clone() });
+    assert_eq!(unsupported.error(), Some(ErrorCode::Unsupported));
+    let late = bench.ask(&PlanRequest { deadline_ns: Some(1), ..known });
+    assert_eq!(late.error(), Some(ErrorCode::Expired));
+    let (garbage, incoming) = bench.incoming(RequestKind::Plan, &[1, 2, 3]);
+    bench.handle(Event::Plan(incoming));
+    assert_eq!(garbage.error(), Some(ErrorCode::Malformed));
+    assert_eq!((bench.desk.counters.refused, bench.desk.counters.expired), (3, 1));
+}
+
+#[test]
+fn terminating_cancels_what_runs_refuses_what_waits_and_then_is_closed() {
+    let mut bench = Bench::new(4);
+    let running = bench.script(HOLD);
+    bench.until_running();
+    let waiting = bench.script(QUICK);
+    bench.handle(Event::Terminate);
+    assert_eq!(waiting.error(), Some(ErrorCode::ShuttingDown));
+    let late = bench.script(QUICK);
+    assert_eq!(late.error(), Some(ErrorCode::ShuttingDown));
+    bench.until(|desk| desk.is_closed());
+    assert_eq!(running.summary_status(), Some("cancelled"));
+}
+
+#[test]
+fn an_upload_that_makes_admission_panic_is_answered_failed() {
+    let mut bench = Bench::new(4);
+    let empty = sbdp_ipc::geometry::Assembly::default();
+    let mut bytes = vec![0; empty.encoded_len()];
+    assert!(empty.encode_into(&mut bytes));
+    let (wire, incoming) = bench.incoming(RequestKind::Upload, &bytes);
+    bench.handle(Event::Upload(incoming));
+    bench.until(|desk| desk.uploads.is_empty());
+    assert_eq!(wire.error(), Some(ErrorCode::Failed));
+    let (wire, incoming) = bench.incoming(RequestKind::Upload, &[0xff; 200]);
+    bench.handle(Event::Upload(incoming));
+    bench.until(|desk| desk.uploads.is_empty());
+    assert_eq!(wire.error(), Some(ErrorCode::Malformed));
+}

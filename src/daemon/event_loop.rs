@@ -1,0 +1,223 @@
+//! The port thread: waits, receives, copies, hands to the desk, sends. It never plans.
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::{Duration, Instant};
+
+use iceoryx2::port::notifier::Notifier;
+use sbdp_ipc::Transport;
+use sbdp_ipc::bytes::AlignedBytes;
+use sbdp_ipc::error::{ErrorCode, WireError};
+use sbdp_ipc::headers::RequestKind;
+use sbdp_ipc::layout::PLAN_REQUEST;
+use sbdp_ipc::services::{Active, ServerPort};
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use super::DaemonError;
+use super::desk::{Desk, Event, Incoming};
+use super::lifecycle::{Lease, Place, raise_file_limit, warn_of_small_shared_memory};
+use super::ports::{ActiveLink, Ports};
+use super::workers::{AdmitJob, Planning, Queues, Report, WorkerEvent, start};
+use crate::config::{Config, seconds};
+
+/// Requests taken from one port before workers' reports are looked at again.
+const RECEIVE_AT_ONCE: usize = 64;
+
+/// Runs the daemon until SIGTERM or SIGINT.
+///
+/// # Errors
+/// The place is taken, or shared memory cannot be set up.
+pub fn run<P: Planning>(config: &Config, service: Arc<P>) -> Result<(), DaemonError> {
+    raise_file_limit();
+    warn_of_small_shared_memory();
+    let place = Place::of(&config.endpoint)?;
+    let iceoryx2 = place.iceoryx2_config()?;
+    let lease = Lease::take(place.clone(), &iceoryx2)?;
+    let ports = Ports::open(&iceoryx2)?;
+    let (sender, inbox) = channel();
+    watch_signals(&ports, sender.clone())?;
+    let queues = Queues::new(config.requests.queue);
+    start(config.workers.count, &queues, &service, &reporter(&ports, sender))
+        .map_err(|source| DaemonError::System { what: "starting workers", source })?;
+    for path in &config.preload.assemblies {
+        if queues.admissions.push(AdmitJob::Preload(path.clone())).is_err() {
+            tracing::warn!(path = %path.display(), "not preloaded: the list is too long");
+        }
+    }
+    lease.publish()?;
+    tracing::info!(
+        pid = std::process::id(),
+        runtime_dir = %place.runtime_dir.display(),
+        prefix = place.prefix,
+        "sbdpd is ready"
+    );
+    let desk = Desk::new(service, queues, config);
+    EventLoop { ports, desk, inbox, tick: seconds(config.times.tick_s), limits: ReceiveLimits::of(config) }
+        .run();
+    tracing::info!("sbdpd has answered everybody and leaves");
+    Ok(())
+}
+
+/// What comes from other threads of this process.
+enum Inbound {
+    Worker(WorkerEvent),
+    Terminate,
+}
+
+/// Other threads hold the notifier weakly: one that is still busy when the daemon leaves must
+/// not keep the service's files alive.
+fn wake(notifier: &Weak<Notifier<Transport>>) {
+    if let Some(notifier) = notifier.upgrade() {
+        // A failed wake-up costs one tick, no more.
+        let _ = notifier.notify();
+    }
+}
+
+fn reporter(ports: &Ports, sender: Sender<Inbound>) -> Report {
+    let notifier = Arc::downgrade(&ports.wake_self);
+    let sender = Mutex::new(sender);
+    Arc::new(move |event| {
+        // A send fails only when the port thread has left; then nobody is interested.
+        let _ = sender.lock().unwrap_or_else(PoisonError::into_inner).send(Inbound::Worker(event));
+        wake(&notifier);
+    })
+}
+
+fn watch_signals(ports: &Ports, sender: Sender<Inbound>) -> Result<(), DaemonError> {
+    let system = |source| DaemonError::System { what: "watching signals", source };
+    let notifier = Arc::downgrade(&ports.wake_self);
+    let mut signals = Signals::new([SIGTERM, SIGINT]).map_err(system)?;
+    let watch = move || {
+        for _ in signals.forever() {
+            let _ = sender.send(Inbound::Terminate);
+            wake(&notifier);
+        }
+    };
+    std::thread::Builder::new().name("sbdp-signals".to_owned()).spawn(watch).map_err(system)?;
+    Ok(())
+}
+
+/// The longest payloads that are copied at all.
+#[derive(Debug, Clone, Copy)]
+struct ReceiveLimits {
+    upload: u64,
+}
+
+impl ReceiveLimits {
+    fn of(config: &Config) -> Self {
+        Self { upload: config.requests.max_upload_mb.saturating_mul(1 << 20) }
+    }
+}
+
+struct EventLoop<P> {
+    ports: Ports,
+    desk: Desk<ActiveLink, P>,
+    inbox: Receiver<Inbound>,
+    tick: Duration,
+    limits: ReceiveLimits,
+}
+
+impl<P: Planning> EventLoop<P> {
+    fn run(mut self) {
+        let mut next_tick = Instant::now() + self.tick;
+        loop {
+            let more = self.receive_all();
+            self.read_inbox();
+            self.desk.settle(Instant::now());
+            self.deliver();
+            if self.desk.is_closed() {
+                return;
+            }
+            if Instant::now() >= next_tick {
+                // A killed client is seen, and its memory given back, only by this.
+                let _ = self.ports.node.try_cleanup_dead_nodes();
+                next_tick = Instant::now() + self.tick;
+                continue;
+            }
+            if !more {
+                self.wait(next_tick);
+            }
+        }
+    }
+
+    fn wait(&self, next_tick: Instant) {
+        let until = self.desk.next_deadline().map_or(next_tick, |d| d.min(next_tick));
+        let timeout = until.saturating_duration_since(Instant::now());
+        if let Err(error) = self.ports.listener.timed_wait(|_| {}, timeout) {
+            // A signal, or a listener out of order: never spin on it.
+            tracing::debug!(%error, "waiting was interrupted");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn read_inbox(&mut self) {
+        while let Ok(inbound) = self.inbox.try_recv() {
+            let event = match inbound {
+                Inbound::Worker(event) => Event::Worker(event),
+                Inbound::Terminate => Event::Terminate,
+            };
+            self.desk.handle(event, Instant::now());
+        }
+    }
+
+    /// True if there may be more.
+    fn receive_all(&mut self) -> bool {
+        let mut more = false;
+        for geometry in [false, true] {
+            for taken in 0..RECEIVE_AT_ONCE {
+                let port = if geometry { &self.ports.geometry } else { &self.ports.plan };
+                let Some(active) = receive(port) else { break };
+                let event = read(active, geometry, self.limits);
+                self.desk.handle(event, Instant::now());
+                more |= taken + 1 == RECEIVE_AT_ONCE;
+            }
+        }
+        more
+    }
+
+    fn deliver(&mut self) {
+        for sample in self.desk.samples.drain(..) {
+            if let Err(error) = self.ports.progress.send_copy(sample) {
+                tracing::debug!(%error, "progress lost");
+            }
+        }
+        self.desk.wakes.sort_unstable();
+        self.desk.wakes.dedup();
+        self.ports.wake(&self.desk.wakes);
+        self.desk.wakes.clear();
+    }
+}
+
+fn receive(port: &ServerPort) -> Option<Active> {
+    port.receive().unwrap_or_else(|error| {
+        tracing::warn!(%error, "a request could not be received");
+        None
+    })
+}
+
+/// Copies a request out of shared memory: the client may change it after sending.
+fn read(active: Active, geometry: bool, limits: ReceiveLimits) -> Event<ActiveLink> {
+    let header = *active.user_header();
+    let length = active.payload().len();
+    let limit = if geometry { limits.upload } else { PLAN_REQUEST as u64 };
+    let fits = length as u64 <= limit;
+    let payload = if fits { AlignedBytes::copy_of(active.payload()) } else { AlignedBytes::default() };
+    let client = active.origin().value();
+    let incoming = Incoming { link: ActiveLink(active), client, header, payload };
+    if !fits {
+        let message = format!("{length} bytes are more than the {limit} that this daemon takes");
+        return Event::Unusable(incoming, WireError::new(ErrorCode::TooLarge, message));
+    }
+    match (geometry, RequestKind::from_wire(header.kind)) {
+        (false, Some(RequestKind::Plan)) => Event::Plan(incoming),
+        (false, Some(RequestKind::Control)) => Event::Control(incoming),
+        (false, Some(RequestKind::Status)) => Event::Status(incoming),
+        (true, Some(RequestKind::Have)) => Event::Have(incoming),
+        (true, Some(RequestKind::Upload)) => Event::Upload(incoming),
+        _ => {
+            let message = format!("no request of kind {} is known here", header.kind);
+            Event::Unusable(incoming, WireError::new(ErrorCode::Malformed, message))
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! The daemon: the planning service behind shared memory.
+//!
+//! One thread owns the ports (`event_loop`): it receives, copies and checks, admits or refuses,
+//! and sends. It never plans, heals or blocks. `workers` do, and report back as events.
+//! `desk` decides, by the state machine of `session` and the bounded `outbox`; none of these
+//! three knows iceoryx2, so they are tested without it. Only `convert` sees both wire and
+//! working types.
+
+mod convert;
+mod desk;
+mod event_loop;
+mod lifecycle;
+mod outbox;
+mod ports;
+mod request_queue;
+mod session;
+mod workers;
+
+pub use event_loop::run;
+pub use lifecycle::LifecycleError;
+pub use lifecycle::check_place;
+pub use workers::Planning;
+
+use sbdp_ipc::services::SetupError;
+
+/// Why the daemon could not run.
+#[derive(Debug, thiserror::Error)]
+pub enum DaemonError {
+    /// The place is taken or unusable.
+    #[error(transparent)]
+    Lifecycle(#[from] LifecycleError),
+    /// iceoryx2 could not be set up.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// The operating system refused something.
+    #[error("{what}: {source}")]
+    System {
+        /// What was tried.
+        what: &'static str,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}

@@ -1,0 +1,279 @@
+//! The threads that plan and heal. A panic is contained to its request.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use sbdp_ipc::bytes::AlignedBytes;
+use sbdp_ipc::error::{ErrorCode, WireError};
+use sbdp_ipc::plan::Step;
+
+use super::convert;
+use super::request_queue::{Rejected, RequestQueue};
+use crate::geometry::{SourceAssembly, load_assembly};
+use crate::plan::{Plan, PlanStep};
+use crate::search::{PlanRequest, PlanSink, Progress, Termination};
+use crate::service::{Admission, AssemblyId, Service, ServiceError};
+
+/// What the workers ask of the planning service; tests script it.
+pub trait Planning: Send + Sync + 'static {
+    /// See [`Service::admit`].
+    ///
+    /// # Errors
+    /// The geometry was refused.
+    fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError>;
+    /// See [`Service::knows`]. Called on the port thread: it must not block.
+    fn knows(&self, id: AssemblyId) -> bool;
+    /// See [`Service::plan`].
+    ///
+    /// # Errors
+    /// Nothing could be planned.
+    fn plan(
+        &self,
+        id: AssemblyId,
+        request: &PlanRequest,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+    ) -> Result<Plan, ServiceError>;
+}
+
+impl Planning for Service {
+    fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError> {
+        Self::admit(self, source)
+    }
+
+    fn knows(&self, id: AssemblyId) -> bool {
+        Self::knows(self, id)
+    }
+
+    fn plan(
+        &self,
+        id: AssemblyId,
+        request: &PlanRequest,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+    ) -> Result<Plan, ServiceError> {
+        Self::plan(self, id, request, termination, sink)
+    }
+}
+
+/// Which plan request: the client port's id and its number there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct SessionKey {
+    pub(crate) client: u128,
+    pub(crate) request: u64,
+}
+
+/// A plan to make.
+#[derive(Debug)]
+pub(crate) struct PlanJob {
+    pub(crate) key: SessionKey,
+    pub(crate) assembly: AssemblyId,
+    pub(crate) request: PlanRequest,
+    pub(crate) termination: Termination,
+}
+
+/// An assembly to take in.
+#[derive(Debug)]
+pub(crate) enum AdmitJob {
+    /// Received bytes, a private copy.
+    Upload { number: u64, bytes: AlignedBytes },
+    /// A file or folder of the configuration.
+    Preload(PathBuf),
+}
+
+/// What workers report.
+#[derive(Debug)]
+pub(crate) enum WorkerEvent {
+    Started(SessionKey),
+    Step(SessionKey, Step),
+    Progress(SessionKey, Progress),
+    Planned(SessionKey, Vec<u8>),
+    Unplanned(SessionKey, WireError),
+    Admitted { number: u64, result: Result<AssemblyId, WireError> },
+    Preloaded { name: String, id: AssemblyId },
+}
+
+/// Takes reports to the port thread and wakes it.
+pub(crate) type Report = Arc<dyn Fn(WorkerEvent) + Send + Sync>;
+
+/// A queue that threads share.
+#[derive(Debug)]
+pub(crate) struct SharedQueue<J> {
+    queue: Mutex<RequestQueue<J>>,
+    ready: Condvar,
+}
+
+impl<J> SharedQueue<J> {
+    fn new(limit: usize) -> Self {
+        Self { queue: Mutex::new(RequestQueue::new(limit)), ready: Condvar::new() }
+    }
+
+    /// The queue holds plain data: it is whole even if a holder panicked.
+    fn lock(&self) -> MutexGuard<'_, RequestQueue<J>> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn push(&self, job: J) -> Result<(), Rejected> {
+        self.lock().push(job)?;
+        self.ready.notify_one();
+        Ok(())
+    }
+
+    /// Waits for a job; `None` when the queue is closed and empty.
+    fn pop(&self) -> Option<J> {
+        let mut queue = self.lock();
+        loop {
+            if let Some(job) = queue.pop() {
+                return Some(job);
+            }
+            if queue.is_closed() {
+                return None;
+            }
+            queue = self.ready.wait(queue).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    pub(crate) fn withdraw(&self, fits: impl Fn(&J) -> bool) -> bool {
+        self.lock().withdraw(fits)
+    }
+
+    pub(crate) fn close(&self) {
+        self.lock().close();
+        self.ready.notify_all();
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.lock().len()
+    }
+}
+
+/// Uploads that may wait to be healed; each client port has at most one.
+const ADMISSION_QUEUE: usize = 128;
+
+/// The queues that feed the threads.
+#[derive(Debug, Clone)]
+pub(crate) struct Queues {
+    pub(crate) plans: Arc<SharedQueue<PlanJob>>,
+    pub(crate) admissions: Arc<SharedQueue<AdmitJob>>,
+}
+
+impl Queues {
+    pub(crate) fn new(plan_limit: usize) -> Self {
+        Self {
+            plans: Arc::new(SharedQueue::new(plan_limit)),
+            admissions: Arc::new(SharedQueue::new(ADMISSION_QUEUE)),
+        }
+    }
+
+    pub(crate) fn close(&self) {
+        self.plans.close();
+        self.admissions.close();
+    }
+}
+
+/// Starts `count` planning threads, and one that takes assemblies in, so that an upload never
+/// waits behind a long plan.
+pub(crate) fn start<P: Planning>(
+    count: usize,
+    queues: &Queues,
+    service: &Arc<P>,
+    report: &Report,
+) -> std::io::Result<()> {
+    for number in 0..count {
+        let (queue, service, report) = (Arc::clone(&queues.plans), Arc::clone(service), Arc::clone(report));
+        thread::Builder::new().name(format!("sbdp-plan-{number}")).spawn(move || {
+            while let Some(job) = queue.pop() {
+                plan(&*service, &job, &report);
+            }
+        })?;
+    }
+    let (queue, service, report) = (Arc::clone(&queues.admissions), Arc::clone(service), Arc::clone(report));
+    thread::Builder::new().name("sbdp-admit".to_owned()).spawn(move || {
+        while let Some(job) = queue.pop() {
+            admit(&*service, job, &report);
+        }
+    })?;
+    Ok(())
+}
+
+/// Streams what a plan yields to the port thread.
+struct Sink<'r> {
+    key: SessionKey,
+    report: &'r Report,
+    last_progress: Option<Instant>,
+}
+
+/// Progress more often than this would only wake people up.
+const PROGRESS_PAUSE: Duration = Duration::from_millis(50);
+
+impl PlanSink for Sink<'_> {
+    fn progress(&mut self, progress: Progress) {
+        if self.last_progress.is_none_or(|last| last.elapsed() >= PROGRESS_PAUSE) {
+            self.last_progress = Some(Instant::now());
+            (self.report)(WorkerEvent::Progress(self.key, progress));
+        }
+    }
+
+    fn step(&mut self, step: &PlanStep) {
+        (self.report)(WorkerEvent::Step(self.key, convert::step(step)));
+    }
+}
+
+fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
+    report(WorkerEvent::Started(job.key));
+    let mut sink = Sink { key: job.key, report, last_progress: None };
+    let planned = contained(|| service.plan(job.assembly, &job.request, &job.termination, &mut sink));
+    report(match planned {
+        Ok(Ok(plan)) => WorkerEvent::Planned(job.key, convert::summary(&plan)),
+        Ok(Err(error)) => WorkerEvent::Unplanned(job.key, convert::service_error(&error)),
+        Err(panic) => WorkerEvent::Unplanned(job.key, panic),
+    });
+}
+
+fn admit<P: Planning>(service: &P, job: AdmitJob, report: &Report) {
+    match job {
+        AdmitJob::Upload { number, bytes } => {
+            let result = contained(|| admit_upload(service, bytes)).unwrap_or_else(Err);
+            report(WorkerEvent::Admitted { number, result });
+        }
+        AdmitJob::Preload(path) => {
+            let loaded = contained(|| {
+                load_assembly(&path).map_err(ServiceError::from).and_then(|source| {
+                    let admission = service.admit(&source)?;
+                    Ok((source.name, admission.id))
+                })
+            });
+            match loaded.map(|r| r.map_err(|e| convert::service_error(&e))).unwrap_or_else(Err) {
+                Ok((name, id)) => report(WorkerEvent::Preloaded { name, id }),
+                Err(error) => {
+                    tracing::warn!(path = %path.display(), "not preloaded: {}", error.message);
+                }
+            }
+        }
+    }
+}
+
+fn admit_upload<P: Planning>(service: &P, bytes: AlignedBytes) -> Result<AssemblyId, WireError> {
+    let source = convert::source_assembly(&bytes)?;
+    // Healing takes memory of its own: an upload need not be there three times.
+    drop(bytes);
+    let admission = service.admit(&source).map_err(|e| convert::service_error(&e))?;
+    Ok(admission.id)
+}
+
+/// Runs one request's work; a panic becomes an answer. The service must stay usable after one:
+/// it holds no lock across planning.
+fn contained<T>(work: impl FnOnce() -> T) -> Result<T, WireError> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
+        let reason = panic
+            .downcast_ref::<&str>()
+            .map(|s| (*s).to_owned())
+            .or_else(|| panic.downcast_ref::<String>().cloned())
+            .unwrap_or_else(|| "no message".to_owned());
+        tracing::error!("a request panicked: {reason}");
+        WireError::new(ErrorCode::Failed, format!("the daemon failed on this request: {reason}"))
+    })
+}

@@ -1,0 +1,334 @@
+//! Plans as JSON: the contract `sbdp-plan/1`, written by `sbdp plan ASSEMBLY --json FILE` and
+//! documented in the README. Parts go by their names there. Fields may be added; those that
+//! are here keep their meaning.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
+use crate::geometry::Waypoint;
+
+/// The name and version of the contract.
+pub const SCHEMA: &str = "sbdp-plan/1";
+
+/// A plan in the words of the contract.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlanDocument {
+    /// Always [`SCHEMA`].
+    pub schema: String,
+    /// `complete`, `partial`, `infeasible`, `timeout` or `cancelled`.
+    pub status: String,
+    /// Why it is not complete.
+    pub reason: Option<String>,
+    /// The planner, as `sbdp-star`.
+    pub planner: String,
+    /// The engine, as `sliding`.
+    pub engine: String,
+    /// The unit of all lengths, if known.
+    pub units: Option<String>,
+    /// All parts, in natural order.
+    pub parts: Vec<String>,
+    /// What had happened before.
+    pub initial: InitialDocument,
+    /// Parts that must come out, or all.
+    pub targets: Option<Vec<String>>,
+    /// Parts that may not move.
+    pub fixed: Vec<String>,
+    /// The removals in order.
+    pub steps: Vec<StepDocument>,
+    /// Parts that stand where they stood.
+    pub remaining: Vec<String>,
+    /// What blocks the parts that should have come off.
+    pub blocked: Vec<BlockedDocument>,
+    /// Overlaps at the assembled pose.
+    pub overlaps: Vec<OverlapDocument>,
+    /// Findings about the input.
+    pub warnings: Vec<WarningDocument>,
+    /// Counters and times.
+    pub stats: StatsDocument,
+}
+
+/// The state that planning began with, where it differs from the assembly as given.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct InitialDocument {
+    /// Parts that were gone.
+    pub removed: Vec<String>,
+    /// Parts that stood elsewhere, and where.
+    pub poses: BTreeMap<String, Waypoint>,
+}
+
+/// One removal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StepDocument {
+    /// The part that moves.
+    pub part: String,
+    /// `translation`, or `rotation` if any waypoint is turned against the first.
+    pub motion: String,
+    /// Rigid transforms x′ = q·x + t of the assembled mesh, `[x, y, z, qw, qx, qy, qz]`;
+    /// between them the centre of the part's box moves on a line and its rotation slerps.
+    pub path: Vec<Waypoint>,
+    /// Deepest penetration along the path beyond the pair's assembled depth.
+    pub verified_depth: f64,
+}
+
+/// A part that remains and what blocks it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BlockedDocument {
+    /// The part.
+    pub part: String,
+    /// The parts that it met.
+    pub by: Vec<String>,
+    /// The action that they blocked, as `+x`.
+    pub action: String,
+}
+
+/// An overlap at the assembled pose.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OverlapDocument {
+    /// The pair.
+    pub parts: [String; 2],
+    /// Its depth.
+    pub depth: f64,
+}
+
+/// A finding.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct WarningDocument {
+    /// The part it is about, if one.
+    pub part: Option<String>,
+    /// What was found and what was done about it.
+    pub message: String,
+}
+
+/// Counters, and times in seconds.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct StatsDocument {
+    /// Transition functions used, remembered ones included.
+    pub simulations: u64,
+    /// Transition functions computed.
+    pub simulations_run: u64,
+    /// Straight sweeps that proved a removal.
+    pub sweeps: u64,
+    /// States kept.
+    pub states: u64,
+    /// Distance fields.
+    pub sdf_time_s: f64,
+    /// Blocking graphs.
+    pub static_analysis_time_s: f64,
+    /// Simulation.
+    pub path_time_s: f64,
+    /// Shortening and verification.
+    pub verify_time_s: f64,
+    /// All of it.
+    pub total_time_s: f64,
+    /// What was remembered.
+    pub cache: CacheDocument,
+}
+
+/// What was there already.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CacheDocument {
+    /// Distance fields.
+    pub sdf_hits: u64,
+    /// Blocking relations.
+    pub blocking_hits: u64,
+    /// Motions.
+    pub motion_hits: u64,
+    /// The whole plan.
+    pub plan_hit: bool,
+}
+
+impl PlanStatus {
+    /// The status in the words of the contract.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Complete => "complete",
+            Self::Partial => "partial",
+            Self::Infeasible => "infeasible",
+            Self::Timeout => "timeout",
+            Self::Cancelled => "cancelled",
+        }
+    }
+}
+
+impl MotionKind {
+    /// The kind of motion in the words of the contract.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Translation => "translation",
+            Self::Rotation => "rotation",
+        }
+    }
+}
+
+impl Plan {
+    /// The name of a part.
+    #[must_use]
+    pub fn part_name(&self, part: usize) -> &str {
+        self.parts.get(part).map_or("?", String::as_str)
+    }
+
+    fn names(&self, parts: &[usize]) -> Vec<String> {
+        parts.iter().map(|&p| self.part_name(p).to_owned()).collect()
+    }
+}
+
+impl PlanDocument {
+    /// The document of a plan.
+    #[must_use]
+    pub fn new(plan: &Plan) -> Self {
+        Self {
+            schema: SCHEMA.to_owned(),
+            status: plan.status.name().to_owned(),
+            reason: plan.reason.clone(),
+            planner: plan.planner.clone(),
+            engine: plan.engine.clone(),
+            units: plan.units.clone(),
+            parts: plan.parts.clone(),
+            initial: InitialDocument { removed: plan.names(&plan.removed), poses: BTreeMap::new() },
+            targets: plan.targets.as_ref().map(|t| plan.names(t)),
+            fixed: plan.names(&plan.fixed),
+            steps: plan.steps.iter().map(|s| step(plan, s)).collect(),
+            remaining: plan.names(&plan.remaining),
+            blocked: plan.blocked.iter().map(|b| blocked(plan, b)).collect(),
+            overlaps: plan.overlaps.iter().map(|o| overlap(plan, o)).collect(),
+            warnings: plan.warnings.iter().map(|w| warning(plan, w)).collect(),
+            stats: stats(&plan.stats),
+        }
+    }
+
+    /// The document as JSON, on one line.
+    ///
+    /// # Errors
+    /// None that is known: all keys are text.
+    pub fn to_json(&self) -> serde_json::Result<String> {
+        serde_json::to_string(self)
+    }
+
+    /// Reads a document.
+    ///
+    /// # Errors
+    /// It is no JSON, or does not fit the contract.
+    pub fn from_json(text: &str) -> serde_json::Result<Self> {
+        serde_json::from_str(text)
+    }
+}
+
+fn step(plan: &Plan, step: &PlanStep) -> StepDocument {
+    StepDocument {
+        part: plan.part_name(step.part).to_owned(),
+        motion: step.motion.name().to_owned(),
+        path: step.path.clone(),
+        verified_depth: step.verified_depth,
+    }
+}
+
+fn blocked(plan: &Plan, blocked: &Blocked) -> BlockedDocument {
+    BlockedDocument {
+        part: plan.part_name(blocked.part).to_owned(),
+        by: plan.names(&blocked.by),
+        action: blocked.action.clone(),
+    }
+}
+
+fn overlap(plan: &Plan, overlap: &Overlap) -> OverlapDocument {
+    OverlapDocument { parts: overlap.parts.map(|p| plan.part_name(p).to_owned()), depth: overlap.depth }
+}
+
+fn warning(plan: &Plan, warning: &Warning) -> WarningDocument {
+    WarningDocument {
+        part: warning.part.map(|p| plan.part_name(p).to_owned()),
+        message: warning.message.clone(),
+    }
+}
+
+fn stats(stats: &PlanStats) -> StatsDocument {
+    StatsDocument {
+        simulations: stats.simulations,
+        simulations_run: stats.simulations_run,
+        sweeps: stats.sweeps,
+        states: stats.states,
+        sdf_time_s: stats.sdf_time_s,
+        static_analysis_time_s: stats.static_analysis_time_s,
+        path_time_s: stats.path_time_s,
+        verify_time_s: stats.verify_time_s,
+        total_time_s: stats.total_time_s,
+        cache: CacheDocument {
+            sdf_hits: stats.sdf_hits,
+            blocking_hits: stats.blocking_hits,
+            motion_hits: stats.motion_hits,
+            plan_hit: stats.plan_hit,
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan() -> Plan {
+        Plan {
+            status: PlanStatus::Infeasible,
+            reason: Some("nothing moves".into()),
+            planner: "sbdp-star".into(),
+            engine: "sliding".into(),
+            units: Some("mm".into()),
+            parts: vec!["0".into(), "1".into(), "2".into(), "10".into()],
+            removed: vec![3],
+            targets: Some(vec![1]),
+            fixed: vec![0],
+            steps: vec![PlanStep {
+                part: 2,
+                motion: MotionKind::Rotation,
+                path: vec![[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0]],
+                verified_depth: 0.001,
+                waited_for: vec![1],
+            }],
+            remaining: vec![0, 1],
+            blocked: vec![Blocked { part: 1, by: vec![0], action: "+x".into() }],
+            overlaps: vec![Overlap { parts: [0, 1], depth: 0.25 }],
+            warnings: vec![
+                Warning { part: Some(2), message: "open".into() },
+                Warning { part: None, message: "small".into() },
+            ],
+            stats: PlanStats { simulations: 7, plan_hit: true, ..Default::default() },
+        }
+    }
+
+    #[test]
+    fn the_shape_is_the_contract_to_the_letter() {
+        let expected = concat!(
+            r#"{"schema":"sbdp-plan/1","status":"infeasible","reason":"nothing moves","planner":"sbdp-star","#,
+            r#""engine":"sliding","units":"mm","parts":["0","1","2","10"],"#,
+            r#""initial":{"removed":["10"],"poses":{}},"targets":["1"],"fixed":["0"],"#,
+            r#""steps":[{"part":"2","motion":"rotation","#,
+            r#""path":[[0.0,0.0,0.0,1.0,0.0,0.0,0.0],[0.0,0.5,0.0,0.0,1.0,0.0,0.0]],"verified_depth":0.001}],"#,
+            r#""remaining":["0","1"],"blocked":[{"part":"1","by":["0"],"action":"+x"}],"#,
+            r#""overlaps":[{"parts":["0","1"],"depth":0.25}],"#,
+            r#""warnings":[{"part":"2","message":"open"},{"part":null,"message":"small"}],"#,
+            r#""stats":{"simulations":7,"simulations_run":0,"sweeps":0,"states":0,"sdf_time_s":0.0,"#,
+            r#""static_analysis_time_s":0.0,"path_time_s":0.0,"verify_time_s":0.0,"total_time_s":0.0,"#,
+            r#""cache":{"sdf_hits":0,"blocking_hits":0,"motion_hits":0,"plan_hit":true}}}"#,
+        );
+        assert_eq!(PlanDocument::new(&plan()).to_json().unwrap(), expected);
+    }
+
+    #[test]
+    fn what_is_absent_is_null() {
+        let bare = Plan { reason: None, units: None, targets: None, ..plan() };
+        let json: serde_json::Value =
+            serde_json::from_str(&PlanDocument::new(&bare).to_json().unwrap()).unwrap();
+        for key in ["reason", "units", "targets"] {
+            assert!(json[key].is_null());
+        }
+    }
+
+    #[test]
+    fn a_document_reads_back() {
+        let document = PlanDocument::new(&plan());
+        assert_eq!(PlanDocument::from_json(&document.to_json().unwrap()).unwrap(), document);
+    }
+}

@@ -1,0 +1,181 @@
+//! The command line, driven from outside.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use sbdp::plan::export::PlanDocument;
+
+fn assembly(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/assemblies").join(name)
+}
+
+/// The command, kept away from any daemon that runs for this user.
+fn sbdp() -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sbdp"));
+    command.env("SBDP_RUNTIME_DIR", "/nonexistent/sbdp-tests").stdin(Stdio::null());
+    command
+}
+
+fn run(arguments: &[&str]) -> Output {
+    sbdp().args(arguments).output().unwrap()
+}
+
+fn plan(name: &str, options: &[&str]) -> Output {
+    let path = assembly(name);
+    run(&[&["plan", path.to_str().unwrap(), "--embedded"], options].concat())
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+#[track_caller]
+fn refused(output: &Output, words: &[&str]) {
+    let text = stderr(output);
+    assert_eq!(output.status.code(), Some(2), "{text}");
+    assert!(words.iter().all(|w| text.contains(w)), "{words:?}: {text}");
+    assert!(output.stdout.is_empty());
+}
+
+#[test]
+fn wrong_usage_exits_2() {
+    refused(&run(&[]), &["Usage"]);
+    refused(&run(&["plan"]), &["ASSEMBLY"]);
+    refused(&plan("l-slot", &["--planner", "a-star"]), &["a-star", "sbdp-star"]);
+    refused(&plan("l-slot", &["--engine", "x"]), &["sliding"]);
+    refused(&plan("l-slot", &["--timeout", "-1"]), &["--timeout", "seconds"]);
+    refused(&plan("l-slot", &["--daemon"]), &["--embedded", "--daemon"]);
+}
+
+#[test]
+fn help_and_version_exit_0() {
+    for argument in ["--help", "--version"] {
+        assert_eq!(run(&[argument]).status.code(), Some(0));
+    }
+    assert!(stdout(&run(&["--help"])).contains("Exit codes"));
+}
+
+#[test]
+fn unknown_parts_are_refused_with_the_nearest_names() {
+    for option in ["--fixed", "--removed", "--target"] {
+        refused(&plan("bolted-bracket-20", &[option, "blot-1"]), &[option, "`blot-1`", "`bolt-1`"]);
+    }
+}
+
+#[test]
+fn refused_geometry_names_file_part_and_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().to_str().unwrap();
+    for command in ["plan", "check"] {
+        refused(&run(&[command, "/no/such/folder"]), &["/no/such/folder"]);
+        refused(&run(&[command, path]), &[path, "no .obj"]);
+        fs::write(folder.path().join("lid.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+        refused(&run(&[command, path]), &["lid.obj", "part `lid`", "one plane"]);
+        fs::write(folder.path().join("lid.obj"), "").unwrap();
+        refused(&run(&[command, path]), &["lid.obj", "part `lid`", "0 bytes"]);
+        fs::remove_file(folder.path().join("lid.obj")).unwrap();
+    }
+}
+
+#[test]
+fn without_a_daemon_status_and_force_say_so() {
+    let path = assembly("l-slot");
+    for arguments in [&["status"][..], &["plan", path.to_str().unwrap(), "--daemon"]] {
+        let output = run(arguments);
+        assert_eq!(output.status.code(), Some(1));
+        assert!(stderr(&output).contains("daemon"), "{}", stderr(&output));
+    }
+}
+
+#[test]
+fn check_tells_parts_findings_and_overlaps() {
+    let output = run(&["check", assembly("pin-bolt-cover").to_str().unwrap()]);
+    let text = stdout(&output);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    for line in [
+        "pin-bolt-cover: 4 parts",
+        "units mm; fixed base",
+        "32.00 × 4.00 × 4.00",
+        "found in healing:\n  nothing",
+    ] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+    assert!(text.contains("overlaps at the assembled pose:\n  none"), "{text}");
+}
+
+#[test]
+fn the_pin_locks_the_bolt_and_the_bolt_the_cover() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("plan.json");
+    let output = plan("pin-bolt-cover", &["--json", file.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let document = PlanDocument::from_json(&fs::read_to_string(file).unwrap()).unwrap();
+    assert_eq!(document.status, "complete");
+    let order: Vec<&str> = document.steps.iter().map(|s| s.part.as_str()).collect();
+    assert_eq!(order, ["pin", "bolt", "cover"]);
+    assert_eq!((document.fixed, document.remaining), (vec!["base".to_owned()], vec!["base".to_owned()]));
+    let text = stdout(&output);
+    assert!(text.contains("pin-bolt-cover: complete; 3 of 4 parts come off"), "{text}");
+    assert_eq!(stderr(&output), "", "no progress in pipes");
+}
+
+#[test]
+fn json_on_stdout_replaces_the_table() {
+    let output = plan("peg-stl", &["--json", "-", "--no-cache", "--threads", "1"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let document = PlanDocument::from_json(&stdout(&output)).unwrap();
+    assert_eq!(document.steps.len(), 1);
+    assert_eq!(document.steps[0].part, "peg");
+    assert_eq!(document.steps[0].path[0], [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+}
+
+#[test]
+fn removed_parts_and_targets_are_respected() {
+    let output = plan("pin-bolt-cover", &["--removed", "pin", "--target", "bolt", "--json", "-"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let document = PlanDocument::from_json(&stdout(&output)).unwrap();
+    assert_eq!(document.initial.removed, ["pin"]);
+    assert_eq!(document.targets, Some(vec!["bolt".to_owned()]));
+    assert_eq!(document.steps.last().map(|s| s.part.as_str()), Some("bolt"));
+}
+
+#[test]
+fn a_spent_budget_exits_3_and_a_passed_deadline_4() {
+    let spent = plan("threaded-bolt-and-nut", &["--max-simulations", "1", "--json", "-"]);
+    assert_eq!(spent.status.code(), Some(3), "{}", stderr(&spent));
+    assert_eq!(PlanDocument::from_json(&stdout(&spent)).unwrap().status, "partial");
+    let late = plan("linked-rings", &["--timeout", "0", "--json", "-"]);
+    assert_eq!(late.status.code(), Some(4), "{}", stderr(&late));
+    assert_eq!(PlanDocument::from_json(&stdout(&late)).unwrap().status, "timeout");
+}
+
+#[test]
+fn an_unwritable_file_exits_1() {
+    let output = plan("peg-stl", &["--json", "/nonexistent/plan.json"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("/nonexistent/plan.json"));
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupt_ends_with_what_is_there() {
+    let path = assembly("linked-rings");
+    let planning = sbdp()
+        .args(["plan", path.to_str().unwrap(), "--embedded", "--json", "-"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Long enough to listen for it, and far too short to be done.
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    let sent = Command::new("kill").args(["-INT", &planning.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    let output = planning.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(5), "{}", stderr(&output));
+    assert_eq!(PlanDocument::from_json(&stdout(&output)).unwrap().status, "cancelled");
+}
