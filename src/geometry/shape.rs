@@ -1,6 +1,6 @@
 //! A distinct mesh with all that is derived from it alone. Equal parts share one.
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use super::hull::hull_vertices;
 use super::{Bounds, MassProperties, Mesh, SampleTree, Spacing, Surface};
@@ -30,6 +30,13 @@ impl Shape {
             surface.vertices().iter().map(|v| (v - mass.centre).norm_squared()).fold(0.0, f64::max).sqrt();
         let samples = SampleTree::new(&surface, &spacing(surface.bounds()));
         Self { hull: hull_vertices(surface.vertices()), samples, mass, reach, surface }
+    }
+
+    /// Largest distance of a point of the shape from the line through `centre` along the unit
+    /// vector `axis` (both in the shape's frame): how fast turning about it can move a point.
+    #[must_use]
+    pub fn radius_about(&self, centre: &Point3<f64>, axis: &Vector3<f64>) -> f64 {
+        self.hull.iter().map(|p| (p - centre).cross(axis).norm_squared()).fold(0.0, f64::max).sqrt()
     }
 
     /// The box of the mesh in its own frame.

@@ -167,11 +167,12 @@ fn dense(scene: &Scene, part: usize, path: &[Pose]) -> Vec<Pose> {
     let shape = &scene.bodies[part].shape;
     // The point that moves on a line: fixed to the shape, the middle of the assembled part's box.
     let centre = scene.centre_in_shape(part);
-    let radius = shape.bounds().extents().norm();
     let step = DENSITY * scene.longest_side;
     let mut out = Vec::new();
     for (a, b) in path.iter().zip(path.iter().skip(1)) {
-        let travel = (b * centre - a * centre).norm() + radius * a.rotation.angle_to(&b.rotation);
+        let turn = (a.rotation.inverse() * b.rotation).scaled_axis();
+        let radius = turn.try_normalize(1e-12).map_or(0.0, |axis| shape.radius_about(&centre, &axis));
+        let travel = (b * centre - a * centre).norm() + radius * turn.norm();
         let n = (travel / step).ceil().max(1.0) as usize;
         out.extend((0..n).map(|k| interpolate(a, b, &centre, k as f64 / n as f64)));
     }

@@ -112,6 +112,19 @@ impl<'a> Mover<'a> {
         Some(Contact { gap: distance + contact.allowance, closest, ..*contact })
     }
 
+    /// How far a twist that ended at this pose moved a contact's sample against the other surface,
+    /// at most: the arc is bounded by its chord and what a turn adds to second order.
+    pub(super) fn displacement(&self, contact: &Contact, twist: &Vector6<f64>) -> f64 {
+        let world = match contact.side {
+            Side::Moving => self.pose * contact.sample,
+            Side::Standing => self.scene.bodies[contact.other].planning_from_shape * contact.sample,
+        };
+        let arm = world - self.centre();
+        let turn: Vector3<f64> = twist.fixed_rows::<3>(3).into();
+        let linear = twist.fixed_rows::<3>(0) + turn.cross(&arm);
+        linear.norm() + turn.norm_squared() * arm.norm()
+    }
+
     /// The constraint that a contact puts on twists (linear part first) about the centre of mass,
     /// given the twist that is wanted.
     pub(super) fn row(&self, contact: &Contact, wanted: &Vector6<f64>) -> Row {
@@ -250,7 +263,7 @@ fn box_distance(a: &Bounds, b: &Bounds) -> f64 {
 /// Keeps, of rows that point nearly the same way, the tightest; also returns which they were.
 /// `lever` is the length that makes moments comparable with forces.
 pub(super) fn reduced(rows: impl IntoIterator<Item = Row>, lever: f64) -> (Vec<Row>, Vec<usize>) {
-    const BINS: f64 = 24.0;
+    const BINS: f64 = 16.0;
     let mut index: HashMap<(usize, [i16; 6]), usize> = HashMap::new();
     let (mut out, mut kept): (Vec<Row>, Vec<usize>) = (Vec::new(), Vec::new());
     for (i, row) in rows.into_iter().enumerate() {

@@ -24,7 +24,8 @@ const LEAST_SHARE: f64 = 0.05;
 /// Longest contact step and longest step in free space, in the planning frame.
 const CONTACT_STEP: f64 = 0.12;
 const FREE_STEP: f64 = 0.5;
-const ROUNDS: usize = 6;
+const EAGER_ROUNDS: usize = 6;
+const LAZY_ROUNDS: usize = 12;
 /// Steps that the static analysis of a pair looks ahead (the paper's five extensions).
 const STATIC_STEPS: usize = 5;
 const HALVINGS: usize = 3;
@@ -54,7 +55,7 @@ impl TransitionFunction for SlidingEngine {
         action: Action,
         termination: &Termination,
     ) -> Result<Motion, Interrupt> {
-        let drive = Drive::new(scene, part, action);
+        let drive = Drive::new(scene, part, start, action);
         let mut mover = Mover::new(scene, part, *start);
         let mut path = vec![*start];
         let mut exit = None;
@@ -102,12 +103,12 @@ pub fn pair_blocks(
     };
     let start = Mover::new(scene, part, *pose);
     let Some(first) = actions.first() else { return Vec::new() };
-    let near = gathered(&start, Drive::new(scene, part, *first).step);
+    let near = gathered(&start, Drive::new(scene, part, pose, *first).step);
     if near.contacts.is_empty() {
         return vec![false; actions.len()];
     }
     let blocked = |action: &Action| {
-        let drive = Drive::new(scene, part, *action);
+        let drive = Drive::new(scene, part, pose, *action);
         let mut step = drive.advance(&start, &near);
         for _ in 0..STATIC_STEPS {
             let Step::Moved { pose: there, .. } = step else { return true };
@@ -167,13 +168,12 @@ struct Drive {
     /// Square roots of the metric's diagonal: 1 for translation, the radius of gyration for rotation.
     metric: Vector6<f64>,
     gyration: f64,
-    reach: f64,
     step: f64,
     turns: bool,
 }
 
 impl Drive {
-    fn new(scene: &Scene, part: usize, action: Action) -> Self {
+    fn new(scene: &Scene, part: usize, start: &Pose, action: Action) -> Self {
         let shape = &scene.bodies[part].shape;
         let gyration = shape.mass.gyration_squared.sqrt();
         let smallest = shape.bounds().extents().min();
@@ -184,13 +184,14 @@ impl Drive {
             Action::Push(..) | Action::Drag(..) | Action::Turn(..) => (force, torque),
             Action::Screw(..) => (force * (gyration * gyration / (2.0 * shape.reach)), torque),
         };
-        let fastest = v.norm() + turn.norm() * shape.reach;
+        // Turning about the torque's axis keeps it the same in the shape.
+        let axis = start.rotation.inverse() * torque;
+        let fastest = v.norm() + turn.norm() * shape.radius_about(&shape.mass.centre, &axis);
         let (v, turn) = (v * (step / fastest), turn * (step / fastest));
         Self {
             wanted: Vector6::new(v.x, v.y, v.z, turn.x, turn.y, turn.z),
             metric: Vector6::new(1.0, 1.0, 1.0, gyration, gyration, gyration),
             gyration,
-            reach: shape.reach,
             step,
             turns: action.turns(),
         }
@@ -204,72 +205,71 @@ impl Drive {
             return self.moved(mover, &twist, Vec::new());
         }
         let mut with = Vec::new();
-        for halving in 0..=HALVINGS {
-            let wanted = self.wanted / f64::from(1u32 << halving);
-            match self.attempt(mover, near, &wanted) {
-                Attempt::Moved { twist, touching } => return self.moved(mover, &twist, touching),
-                Attempt::Stuck(by) => return Step::Stuck { with: by },
-                Attempt::Entered(by) => with = by,
+        for eager in [true, false] {
+            for halving in 0..=HALVINGS {
+                let wanted = self.wanted / f64::from(1u32 << halving);
+                match self.attempt(mover, near, &wanted, eager) {
+                    Attempt::Moved { twist, touching } => return self.moved(mover, &twist, touching),
+                    Attempt::Stuck(by) => {
+                        with = by;
+                        // A shorter step would be stopped by the same constraints.
+                        break;
+                    }
+                    Attempt::Entered(by) => with = by,
+                }
             }
         }
         Step::Stuck { with }
     }
 
-    fn attempt(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>) -> Attempt {
-        let all = near.contacts.iter().map(|c| self.freed(mover.row(c, wanted)));
-        let (mut rows, kept) = reduced(all, self.gyration);
-        // Checked first at every trial: most of what enters enters here, and these are few.
-        let mut working: Vec<Contact> = kept.into_iter().map(|i| near.contacts[i]).collect();
+    /// Projects the wanted twist until the trial pose is free of entry. `eager` starts from the
+    /// planes of all contacts, which is quick and mostly right; lazily, constraints come only from
+    /// what enters at a trial, linearised there, which finds the way where a plane that was
+    /// chosen before the motion is the wrong one of a corner's.
+    fn attempt(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>, eager: bool) -> Attempt {
         let target = wanted.component_mul(&self.metric);
+        let (mut rows, mut working) = (Vec::new(), Vec::new());
+        if eager {
+            let all = near.contacts.iter().map(|c| self.freed(mover.row(c, wanted)));
+            (rows, working) = reduced(all, self.gyration);
+        }
         let mut entered = Vec::new();
-        for round in 0..ROUNDS {
+        for round in 0..if eager { EAGER_ROUNDS } else { LAZY_ROUNDS } {
             let Some(result) = self.projected(&target, &rows, round == 0) else {
                 return Attempt::Entered(entered);
             };
             let touching = others(&result.active, &rows);
             let share = result.w.dot(&target) / target.norm_squared();
             if share < LEAST_SHARE {
-                for (i, m) in &result.active {
-                    tracing::trace!(multiplier = m, row = ?rows[*i], contact = ?working.get(*i), contacts = near.contacts.len(), "stuck");
-                }
-                return if round == 0 { Attempt::Stuck(touching) } else { Attempt::Entered(touching) };
+                return Attempt::Stuck(touching);
             }
             let twist = result.w.component_div(&self.metric);
             let trial = Mover { pose: self.displaced(mover, &twist), ..*mover };
-            let mut violated = self.violations(&trial, &working, &twist);
+            // Those behind the constraints first: most of what enters is among them.
+            let mut violated = self.violations(&trial, near, &twist, working.iter().copied());
             if violated.is_empty() {
-                violated = self.violations(&trial, &near.contacts, &twist);
+                violated = self.violations(&trial, near, &twist, 0..near.contacts.len());
                 if violated.is_empty() {
                     return Attempt::Moved { twist, touching };
                 }
             }
-            tracing::trace!(
-                contacts = near.contacts.len(),
-                rows = rows.len(),
-                round,
-                share,
-                violated = violated.len(),
-                worst = violated.iter().map(|c| c.gap).fold(0.0, f64::min),
-                first = ?violated.first(),
-                row = ?violated.first().map(|c| trial.row(c, &Vector6::zeros())),
-                w = ?twist.as_slice(),
-                "entered"
-            );
+            tracing::trace!(contacts = near.contacts.len(), rows = rows.len(), round, share, violated = violated.len(), "entered");
             entered = touching;
-            let deeper = violated.iter().map(|c| {
+            entered.extend(violated.iter().map(|(_, c)| c.other));
+            let deeper = violated.iter().map(|(i, c)| {
                 let row = self.freed(trial.row(c, &Vector6::zeros()));
                 // Linearised at the trial pose: gap(u) ≈ gap(u₀) + a·(u − u₀) ≥ 0.
-                Row { b: row.b - row.a.dot(&twist), ..row }
+                let row = Row { b: row.b - row.a.dot(&twist), ..row };
+                // A plane that the sample was beyond already at the start does not separate it.
+                let separates = row.b >= -2.0 * DEPTH_TOLERANCE;
+                if separates { row } else { self.freed(mover.row(&near.contacts[*i], wanted)) }
             });
-            let (worst, deepest) = reduced(deeper, self.gyration);
-            for row in &worst {
-                if let Err(at) = entered.binary_search(&row.other) {
-                    entered.insert(at, row.other);
-                }
-            }
+            let (worst, kept) = reduced(deeper, self.gyration);
             rows.extend(worst);
-            working.extend(deepest.into_iter().map(|i| violated[i]));
+            working.extend(kept.into_iter().map(|i| violated[i].0));
         }
+        entered.sort_unstable();
+        entered.dedup();
         Attempt::Entered(entered)
     }
 
@@ -292,17 +292,19 @@ impl Drive {
         if result.is_none() && first { project(target, &scaled(0.0)) } else { result }
     }
 
-    /// The contacts that are too deep at the trial pose.
-    fn violations(&self, trial: &Mover<'_>, contacts: &[Contact], twist: &Vector6<f64>) -> Vec<Contact> {
-        let (v, turn) = (twist.fixed_rows::<3>(0).norm(), twist.fixed_rows::<3>(3).norm());
-        // Standing samples can lie further out than any vertex of the mover, but not by much more
-        // than the step if they are near it.
-        let displacement = v + turn * (self.reach + self.step);
-        contacts
-            .iter()
-            .filter(|c| c.gap - displacement < -DEPTH_TOLERANCE)
-            .filter_map(|c| trial.remeasured(c, self.step))
-            .filter(|c| c.gap < -DEPTH_TOLERANCE)
+    /// Of some contacts, those that are too deep at the trial pose, measured there.
+    fn violations(
+        &self,
+        trial: &Mover<'_>,
+        near: &Near,
+        twist: &Vector6<f64>,
+        which: impl Iterator<Item = usize>,
+    ) -> Vec<(usize, Contact)> {
+        which
+            .map(|i| (i, &near.contacts[i]))
+            .filter(|(_, c)| c.gap - trial.displacement(c, twist) < -DEPTH_TOLERANCE)
+            .filter_map(|(i, c)| Some((i, trial.remeasured(c, self.step)?)))
+            .filter(|(_, c)| c.gap < -DEPTH_TOLERANCE)
             .collect()
     }
 
