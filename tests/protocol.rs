@@ -6,8 +6,11 @@ use std::time::Duration;
 
 use common::{Boxes, Daemon, HANG, plan};
 use sbdp::geometry::{SourceAssembly, SourceMesh, SourcePart};
+use sbdp::plan::PlanStep;
+use sbdp::search::{PlanRequest, PlanSink, Progress, Termination};
+use sbdp::service::Service;
 use sbdp_client::{
-    Assembly, Client, ErrorCode, Handle, Part, PlanOptions, PlanStatus, Vertices, content_hash,
+    Assembly, Client, ErrorCode, Event, Handle, Part, PlanOptions, PlanStatus, Vertices, content_hash,
 };
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::endpoint::Endpoint;
@@ -116,11 +119,68 @@ fn a_plan_names_its_parts_and_says_how_it_went() {
     assert_eq!((status.numbers.requests, status.numbers.done), (1, 1));
 }
 
+/// Keeps nothing: the plan itself is compared.
+struct Deaf;
+
+impl PlanSink for Deaf {
+    fn progress(&mut self, _: Progress) {}
+    fn step(&mut self, _: &PlanStep) {}
+}
+
+#[test]
+fn the_daemon_answers_to_the_bit_what_the_service_answers_in_process() {
+    let boxes = Boxes::lattice(2);
+    let upload = boxes.assembly();
+    let source = SourceAssembly {
+        units: upload.units.map(str::to_owned),
+        parts: upload.parts.iter().map(source_part).collect(),
+        ..SourceAssembly::default()
+    };
+    let service = Service::default();
+    let id = service.admit(&source).unwrap().id;
+    let request = PlanRequest { fixed: vec![0], ..PlanRequest::default() };
+    let here = service.plan(id, &request, &Termination::new(None), &mut Deaf).unwrap();
+
+    let daemon = Daemon::start();
+    let client = daemon.connect();
+    let handle = client.upload(&upload).unwrap();
+    assert_eq!(handle.0, id.0);
+    let mut stream = client.plan(handle, &PlanOptions { fixed: vec![0], ..PlanOptions::default() }).unwrap();
+    let mut steps = here.steps.iter();
+    loop {
+        match stream.next_event_within(HANG).unwrap().unwrap() {
+            Event::Step(there) => {
+                let here = steps.next().unwrap();
+                assert_eq!((there.part as usize, there.path), (here.part, here.path.as_slice()));
+                assert_eq!(there.verified_depth.to_bits(), here.verified_depth.to_bits());
+                assert_eq!(there.blockers, numbers(&here.waited_for));
+            }
+            Event::Progress(_) => {}
+            Event::Done(there) => {
+                assert!(steps.next().is_none());
+                assert_eq!((there.parts, there.units), (here.parts, here.units));
+                assert_eq!((there.reason, there.remaining), (here.reason, numbers(&here.remaining)));
+                assert_eq!(there.stats.simulations, here.stats.simulations);
+                return;
+            }
+        }
+    }
+}
+
+fn numbers(list: &[usize]) -> Vec<u32> {
+    list.iter().map(|i| *i as u32).collect()
+}
+
+fn source_part(part: &Part<'_>) -> SourcePart {
+    let mesh = SourceMesh { vertices: part.vertices.iter().collect(), triangles: part.triangles.to_vec() };
+    SourcePart { name: part.name.to_owned(), origin: "upload".to_owned(), mesh }
+}
+
 fn refusal(client: &Client, handle: Handle, options: &PlanOptions) -> (ErrorCode, String) {
     let mut stream = client.plan(handle, options).unwrap();
     loop {
         match stream.next_event_within(HANG) {
-            Ok(Some(sbdp_client::Event::Progress(_))) => {}
+            Ok(Some(Event::Progress(_))) => {}
             Ok(event) => panic!("not refused but {event:?}"),
             Err(error) => return (error.code().unwrap(), error.to_string()),
         }

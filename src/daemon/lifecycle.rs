@@ -2,6 +2,7 @@
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
 use iceoryx2::node::{Node, NodeState};
@@ -18,14 +19,14 @@ const LOCK_FILE: &str = "lock";
 #[derive(Debug, thiserror::Error)]
 pub enum LifecycleError {
     /// Another daemon has it.
-    #[error(
-        "another sbdpd (pid {pid}) serves {runtime_dir}: stop it, or give this one another --runtime-dir"
-    )]
+    #[error("another sbdpd (pid {pid}) holds {lock}: stop it, or give this one another {option}")]
     Taken {
         /// The holder's process id, as the lock file says.
         pid: String,
-        /// The runtime folder.
-        runtime_dir: PathBuf,
+        /// The lock file.
+        lock: PathBuf,
+        /// What would have to differ.
+        option: &'static str,
     },
     /// The runtime folder is not usable.
     #[error(transparent)]
@@ -61,6 +62,10 @@ impl Place {
         Ok(Self { runtime_dir, prefix, root })
     }
 
+    fn prefix_lock(&self) -> PathBuf {
+        Path::new("/dev/shm").join(format!("{}{LOCK_FILE}", self.prefix))
+    }
+
     pub(crate) fn iceoryx2_config(&self) -> Result<IoxConfig, LifecycleError> {
         Ok(layout::iceoryx2_config(&self.prefix, &self.root)?)
     }
@@ -74,21 +79,25 @@ pub fn check_place(config: &EndpointConfig) -> Result<(), LifecycleError> {
     Place::of(config)?.iceoryx2_config().map(|_| ())
 }
 
-/// The held lock. Dropping it removes `daemon.json`.
+/// The held lock. Dropping it removes `daemon.json`, and what iceoryx2 keeps beyond its ports.
 #[derive(Debug)]
 pub(crate) struct Lease {
     place: Place,
-    _lock: File,
+    config: IoxConfig,
+    _locks: [File; 2],
 }
 
 impl Lease {
     /// Takes the lock, or says who holds it; then clears what a dead daemon left.
     pub(crate) fn take(place: Place, config: &IoxConfig) -> Result<Self, LifecycleError> {
         endpoint::create_runtime_dir(&place.runtime_dir)?;
-        let lock = take_lock(&place.runtime_dir)?;
+        let folder_lock = take_lock(&place.runtime_dir.join(LOCK_FILE), "--runtime-dir")?;
+        // Shared memory knows no folders: without this, a daemon elsewhere with the same prefix
+        // would be wiped from under its clients.
+        let prefix_lock = take_lock(&place.prefix_lock(), "--prefix")?;
         remove_if_there(&place.runtime_dir.join(DAEMON_FILE))?;
         wipe_if_unused(&place, config)?;
-        Ok(Self { place, _lock: lock })
+        Ok(Self { place, config: config.clone(), _locks: [folder_lock, prefix_lock] })
     }
 
     /// Tells clients where we are; to be called when the ports are open.
@@ -101,8 +110,11 @@ impl Lease {
 
 impl Drop for Lease {
     fn drop(&mut self) {
-        if let Err(error) = remove_if_there(&self.place.runtime_dir.join(DAEMON_FILE)) {
-            tracing::warn!(%error, "daemon.json stays behind");
+        let removed = remove_if_there(&self.place.runtime_dir.join(DAEMON_FILE))
+            .and_then(|()| wipe_if_unused(&self.place, &self.config))
+            .and_then(|()| remove_if_there(&self.place.prefix_lock()));
+        if let Err(error) = removed {
+            tracing::warn!(%error, "something stays behind");
         }
     }
 }
@@ -112,31 +124,31 @@ fn io_error(path: &Path) -> impl FnOnce(std::io::Error) -> LifecycleError {
     move |source| LifecycleError::Io { path, source }
 }
 
-fn take_lock(runtime_dir: &Path) -> Result<File, LifecycleError> {
-    let path = runtime_dir.join(LOCK_FILE);
+fn take_lock(path: &Path, option: &'static str) -> Result<File, LifecycleError> {
     let mut file = OpenOptions::new()
         .read(true)
         .write(true)
         .create(true)
         .truncate(false)
-        .open(&path)
-        .map_err(io_error(&path))?;
+        .mode(0o600)
+        .open(path)
+        .map_err(io_error(path))?;
     match file.try_lock() {
         Ok(()) => {}
         Err(TryLockError::WouldBlock) => {
             let mut pid = String::new();
             let _ = file.read_to_string(&mut pid);
             let pid = if pid.trim().is_empty() { "unknown".to_owned() } else { pid.trim().to_owned() };
-            return Err(LifecycleError::Taken { pid, runtime_dir: runtime_dir.to_owned() });
+            return Err(LifecycleError::Taken { pid, lock: path.to_owned(), option });
         }
-        Err(TryLockError::Error(source)) => return Err(LifecycleError::Io { path, source }),
+        Err(TryLockError::Error(source)) => return Err(io_error(path)(source)),
     }
     let mut write = || {
         file.set_len(0)?;
         file.seek(SeekFrom::Start(0))?;
         writeln!(file, "{}", std::process::id())
     };
-    write().map_err(io_error(&path))?;
+    write().map_err(io_error(path))?;
     Ok(file)
 }
 
@@ -162,8 +174,11 @@ fn wipe_if_unused(place: &Place, config: &IoxConfig) -> Result<(), LifecycleErro
         }
     }
     let shm = Path::new("/dev/shm");
+    let kept = place.prefix_lock();
     for path in layout::shared_memory_files(&place.prefix).map_err(io_error(shm))? {
-        remove_if_there(&path)?;
+        if path != kept {
+            remove_if_there(&path)?;
+        }
     }
     Ok(())
 }
@@ -227,6 +242,18 @@ mod tests {
         assert!(error.contains(&std::process::id().to_string()), "{error}");
         drop(first);
         Lease::take(place, &config).unwrap();
+    }
+
+    #[test]
+    fn a_prefix_in_use_elsewhere_is_refused() {
+        let (here, there) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let first = place(here.path());
+        let config = first.iceoryx2_config().unwrap();
+        let _lease = Lease::take(first.clone(), &config).unwrap();
+        let second = Place { prefix: first.prefix, ..place(there.path()) };
+        let config = second.iceoryx2_config().unwrap();
+        let error = Lease::take(second, &config).unwrap_err().to_string();
+        assert!(error.contains("--prefix"), "{error}");
     }
 
     #[test]

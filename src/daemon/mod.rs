@@ -12,7 +12,6 @@ mod event_loop;
 mod lifecycle;
 mod outbox;
 mod ports;
-mod preload;
 mod request_queue;
 mod session;
 mod workers;

@@ -10,9 +10,9 @@ use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::plan::Step;
 
+use super::convert;
 use super::request_queue::{Rejected, RequestQueue};
-use super::{convert, preload};
-use crate::geometry::SourceAssembly;
+use crate::geometry::{SourceAssembly, load_assembly};
 use crate::plan::{Plan, PlanStep};
 use crate::search::{PlanRequest, PlanSink, Progress, Termination};
 use crate::service::{Admission, AssemblyId, Service, ServiceError};
@@ -236,12 +236,12 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
 fn admit<P: Planning>(service: &P, job: AdmitJob, report: &Report) {
     match job {
         AdmitJob::Upload { number, bytes } => {
-            let result = contained(|| admit_upload(service, &bytes)).unwrap_or_else(Err);
+            let result = contained(|| admit_upload(service, bytes)).unwrap_or_else(Err);
             report(WorkerEvent::Admitted { number, result });
         }
         AdmitJob::Preload(path) => {
             let loaded = contained(|| {
-                preload::load(&path).map_err(ServiceError::from).and_then(|source| {
+                load_assembly(&path).map_err(ServiceError::from).and_then(|source| {
                     let admission = service.admit(&source)?;
                     Ok((source.name, admission.id))
                 })
@@ -256,8 +256,10 @@ fn admit<P: Planning>(service: &P, job: AdmitJob, report: &Report) {
     }
 }
 
-fn admit_upload<P: Planning>(service: &P, bytes: &AlignedBytes) -> Result<AssemblyId, WireError> {
-    let source = convert::source_assembly(bytes)?;
+fn admit_upload<P: Planning>(service: &P, bytes: AlignedBytes) -> Result<AssemblyId, WireError> {
+    let source = convert::source_assembly(&bytes)?;
+    // Healing takes memory of its own: an upload need not be there three times.
+    drop(bytes);
     let admission = service.admit(&source).map_err(|e| convert::service_error(&e))?;
     Ok(admission.id)
 }

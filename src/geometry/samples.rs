@@ -5,6 +5,8 @@
 //! their edges coincide). Both surfaces of a pair are sampled. Known miss: features between two
 //! samples that enter by less than half the spacing.
 
+use std::collections::HashSet;
+
 use nalgebra::Point3;
 
 use super::surface::{NO_TRIANGLE, Surface};
@@ -57,7 +59,7 @@ impl SampleTree {
     /// Samples a surface.
     #[must_use]
     pub fn new(surface: &Surface, spacing: &Spacing) -> Self {
-        let mut points = surface.vertices().to_vec();
+        let mut points = sample_vertices(surface, spacing);
         for t in 0..surface.triangles().len() as u32 {
             sample_edges(surface, t, spacing, &mut points);
             sample_face(surface, t, spacing.face, &mut points);
@@ -106,6 +108,60 @@ impl SampleTree {
     }
 }
 
+/// How an edge is bent, seen from outside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Bend {
+    /// Flat or reentrant: no point of it is first to touch.
+    Inward,
+    /// Convex, but a chord is close to it.
+    Blunt,
+    /// Convex, or the rim of an open surface.
+    Sharp,
+}
+
+fn bend(surface: &Surface, t: u32, e: u8) -> Bend {
+    let other = surface.neighbour(t, e);
+    if other == NO_TRIANGLE {
+        return Bend::Sharp;
+    }
+    let corners = surface.corners(t);
+    let edge = corners[(e as usize + 1) % 3] - corners[e as usize];
+    let (n, m) = (surface.face_normal(t), surface.face_normal(other));
+    // Convex: the neighbour's normal leans away from this face's inside.
+    if n.cross(&m).dot(&edge) <= 1e-3 * edge.norm() {
+        Bend::Inward
+    } else if n.dot(&m) < BLUNT_COS {
+        Bend::Sharp
+    } else {
+        Bend::Blunt
+    }
+}
+
+/// The vertices at convex edges. On finely tessellated surfaces they stand much closer than any
+/// contact needs: sharp ones are thinned to half the edge spacing, blunt ones to all of it. All of
+/// them are still measured when the path is verified with a closer spacing.
+fn sample_vertices(surface: &Surface, spacing: &Spacing) -> Vec<Point3<f64>> {
+    let mut bends = vec![Bend::Inward; surface.vertices().len()];
+    for (i, t) in surface.triangles().iter().enumerate() {
+        for e in 0..3u8 {
+            let bend = bend(surface, i as u32, e);
+            for v in [t[e as usize], t[(e as usize + 1) % 3]] {
+                bends[v as usize] = bends[v as usize].max(bend);
+            }
+        }
+    }
+    let mut taken = HashSet::new();
+    let mut out = Vec::new();
+    for (cell, wanted) in [(spacing.edge / 2.0, Bend::Sharp), (spacing.edge, Bend::Blunt)] {
+        for (p, _) in surface.vertices().iter().zip(&bends).filter(|(_, b)| **b == wanted) {
+            if taken.insert((wanted == Bend::Sharp, p.coords.map(|x| (x / cell).floor() as i64))) {
+                out.push(*p);
+            }
+        }
+    }
+    out
+}
+
 fn sample_edges(surface: &Surface, t: u32, spacing: &Spacing, out: &mut Vec<Point3<f64>>) {
     let corners = surface.corners(t);
     for e in 0..3u8 {
@@ -115,39 +171,33 @@ fn sample_edges(surface: &Surface, t: u32, spacing: &Spacing, out: &mut Vec<Poin
             continue;
         }
         let (a, b) = (corners[e as usize], corners[(e as usize + 1) % 3]);
-        let step = if other == NO_TRIANGLE {
-            spacing.edge
-        } else {
-            let (n, m) = (surface.face_normal(t), surface.face_normal(other));
-            // Convex: the neighbour's normal leans away from this face's inside.
-            let convex = n.cross(&m).dot(&(b - a)) > 1e-3 * (b - a).norm();
-            match (convex, n.dot(&m) < BLUNT_COS) {
-                (false, _) => continue,
-                (true, true) => spacing.edge,
-                (true, false) => spacing.blunt_edge,
-            }
+        let step = match bend(surface, t, e) {
+            Bend::Inward => continue,
+            Bend::Blunt => spacing.blunt_edge,
+            Bend::Sharp => spacing.edge,
         };
         let n = ((b - a).norm() / step).ceil().max(1.0) as usize;
         out.extend((1..n).map(|k| a + (b - a) * (k as f64 / n as f64)));
     }
 }
 
+/// Points on rows parallel to the longest edge, all strictly inside.
 fn sample_face(surface: &Surface, t: u32, step: f64, out: &mut Vec<Point3<f64>>) {
-    let [a, b, c] = surface.corners(t);
-    let area = (b - a).cross(&(c - a)).norm() / 2.0;
+    let corners = surface.corners(t);
+    let side = |e: usize| (corners[(e + 1) % 3] - corners[e]).norm();
+    let base = (0..3).max_by(|&e, &f| side(e).total_cmp(&side(f))).unwrap_or(0);
+    let (a, b, apex) = (corners[base], corners[(base + 1) % 3], corners[(base + 2) % 3]);
+    let height = (b - a).cross(&(apex - a)).norm() / side(base).max(f64::MIN_POSITIVE);
     // Slivers and small faces are held by their edges and vertices.
-    if area < 0.02 * step * step {
+    if height * side(base) < 0.04 * step * step {
         return;
     }
-    let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
-    let n = (longest / step).ceil().max(1.0) as usize;
-    // Centroids of the upright sub-triangles of a regular subdivision: all strictly inside.
-    for i in 0..n {
-        for j in 0..(n - i) {
-            let u = (i as f64 + 1.0 / 3.0) / n as f64;
-            let v = (j as f64 + 1.0 / 3.0) / n as f64;
-            out.push(a + (b - a) * u + (c - a) * v);
-        }
+    let rows = (height / step).ceil().max(1.0) as usize;
+    for row in 0..rows {
+        let v = (row as f64 + 0.5) / rows as f64;
+        let (from, to) = (a + (apex - a) * v, b + (apex - b) * v);
+        let count = ((to - from).norm() / step).ceil().max(1.0) as usize;
+        out.extend((0..count).map(|k| from + (to - from) * ((k as f64 + 0.5) / count as f64)));
     }
 }
 

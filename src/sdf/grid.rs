@@ -89,27 +89,20 @@ impl Field {
     }
 
     /// The closest surface point among the triangles that are nearest to the corners of `p`'s
-    /// cell, and the signed distance to it; `None` outside the band.
-    ///
-    /// It is the true closest point wherever the surface near a cell is made of triangles larger
-    /// than the cell; on finer meshes the distance is overstated by a part of a triangle's sagitta.
+    /// cell; `None` outside the band. Its distance bounds the true one from above, tightly.
     #[must_use]
-    pub fn closest(&self, surface: &Surface, p: &Point3<f64>) -> Option<(Closest, f64)> {
+    pub fn nearby(&self, surface: &Surface, p: &Point3<f64>) -> Option<Closest> {
         let (brick, local) = self.locate(p)?;
         let slot = self.slots[brick];
         if slot == EMPTY {
             return None;
         }
-        let (base, f) = corner(&local, slot);
+        let (base, _) = corner(&local, slot);
         let mut best: Option<Closest> = None;
         let mut seen = [FAR_NODE; 8];
         for (k, offset) in CORNERS.iter().enumerate() {
             let t = self.nearest[base + offset];
-            if t == FAR_NODE {
-                // Some corner lies outside the band: the triangles at hand may not be all.
-                return None;
-            }
-            if seen[..k].contains(&t) {
+            if t == FAR_NODE || seen[..k].contains(&t) {
                 continue;
             }
             seen[k] = t;
@@ -118,26 +111,7 @@ impl Field {
                 best = Some(c);
             }
         }
-        let best = best?;
-        Some((best, self.signed(surface, p, &best, &f, base)))
-    }
-
-    /// Sign from the closest feature where the surface is near, else from the field.
-    fn signed(
-        &self,
-        surface: &Surface,
-        p: &Point3<f64>,
-        closest: &Closest,
-        f: &Vector3<f64>,
-        base: usize,
-    ) -> f64 {
-        let value = trilinear(&self.values[base..], f);
-        let inside = if value.abs() > self.error_bound() {
-            value < 0.0
-        } else {
-            surface.pseudo_normal(closest).dot(&(p - closest.point)) < 0.0
-        };
-        if inside { -closest.distance } else { closest.distance }
+        best
     }
 
     /// Brick index and position inside the brick in cells.

@@ -325,6 +325,8 @@ impl<'a, 'o> Search<'a, 'o> {
     /// Takes in a motion; true if the scene changed by it.
     fn take(&mut self, phase: Phase, job: Job, motion: Motion, gain: &mut Gain) -> Result<bool, Stop> {
         let Motion { path, end } = motion;
+        let (part, action) = (self.nodes[job.node].part, self.actions(phase)[job.action]);
+        tracing::debug!(part, node = job.node, %action, steps = path.len(), ?end, "simulated");
         let by = match end {
             End::Disassembled(_) => {
                 let taken = self.take_out(phase, job, path)?;
@@ -336,7 +338,6 @@ impl<'a, 'o> Search<'a, 'o> {
         };
         self.block(phase, job, by);
         let node = &self.nodes[job.node];
-        let part = node.part;
         let Some(end) = path.last() else { return Ok(false) };
         let coarse = coarseness(self.states_of[part]);
         let known = |n: &Node| {

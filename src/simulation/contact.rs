@@ -116,48 +116,92 @@ impl<'a> Mover<'a> {
     /// given the twist that is wanted.
     pub(super) fn row(&self, contact: &Contact, wanted: &Vector6<f64>) -> Row {
         let standing = &self.scene.bodies[contact.other];
-        let (world, surface, frame, sense) = match contact.side {
-            Side::Moving => {
-                let p = self.pose * contact.sample;
-                (p, &standing.shape.surface, &standing.planning_from_shape, 1.0)
-            }
-            Side::Standing => {
-                let p = standing.planning_from_shape * contact.sample;
-                (p, &self.body.shape.surface, &self.pose, -1.0)
-            }
+        let (world, measured, frame, sense) = match contact.side {
+            Side::Moving => (self.pose * contact.sample, standing, &standing.planning_from_shape, 1.0),
+            Side::Standing => (standing.planning_from_shape * contact.sample, self.body, &self.pose, -1.0),
         };
         let arm = world - self.centre();
         let (v, turn) = (wanted.fixed_rows::<3>(0), wanted.fixed_rows::<3>(3));
         // How the sample moves against the measured surface.
         let motion: Vector3<f64> = (v + turn.cross(&arm)) * sense;
-        let foot = frame * contact.closest.point;
-        let away = world - foot;
-        let distance = contact.gap - contact.allowance;
-        // The direction to the closest point: good unless the two coincide.
-        let radial = away.try_normalize(1e-7).map(|d| if distance < 0.0 { -d } else { d });
-        let mut best: Option<(f64, Vector3<f64>, f64)> = None;
-        let mut offer = |n: Vector3<f64>, floor: f64| {
-            let height = n.dot(&away);
-            let score = height + n.dot(&motion);
-            if height >= floor && best.is_none_or(|b| score > b.0 + 1e-12) {
-                best = Some((score, n, height));
-            }
+        let sample = Sample {
+            point: frame.inverse_transform_point(&world),
+            motion: frame.rotation.inverse() * motion,
+            closest: contact.closest,
+            distance: contact.gap - contact.allowance,
         };
-        surface.feature_normals(&contact.closest, |n| {
-            offer(frame.rotation * n, distance.min(0.0) - 1e-9);
-        });
-        if let Some(d) = radial {
-            offer(d, f64::NEG_INFINITY);
-        }
-        let (n, height) = match best {
-            Some((_, n, height)) => (n, height),
-            None => (frame.rotation * surface.pseudo_normal(&contact.closest).normalize(), distance),
-        };
-        let (n, moment) = (n * sense, arm.cross(&n) * sense);
+        let plane = sample.plane(measured);
+        let n = frame.rotation * plane.normal * sense;
+        let moment = arm.cross(&n);
         let a = Vector6::new(n.x, n.y, n.z, moment.x, moment.y, moment.z);
-        Row { a, b: height + contact.allowance, other: contact.other }
+        Row { a, b: plane.height + contact.allowance, other: contact.other }
     }
 }
+
+/// A sample seen from the surface that it is near to.
+struct Sample {
+    point: Point3<f64>,
+    /// The displacement that is wanted.
+    motion: Vector3<f64>,
+    closest: Closest,
+    distance: f64,
+}
+
+/// A plane that a sample is to stay above.
+#[derive(Clone, Copy)]
+struct Plane {
+    normal: Vector3<f64>,
+    /// Height of the sample above it.
+    height: f64,
+    /// Height after the wanted motion.
+    ahead: f64,
+}
+
+/// A plane separates a sample from the solid only if the sample is not below it.
+const BELOW: f64 = 1e-9;
+
+impl Sample {
+    fn plane(&self, measured: &Body) -> Plane {
+        let surface = &measured.shape.surface;
+        let away = self.point - self.closest.point;
+        // The direction to the closest point: good unless the two coincide.
+        let radial = away.try_normalize(1e-7).map(|d| if self.distance < 0.0 { -d } else { d });
+        let along = |normal: Vector3<f64>, foot: &Point3<f64>| {
+            let height = normal.dot(&(self.point - foot));
+            Plane { normal, height, ahead: height + normal.dot(&self.motion) }
+        };
+        // Inside, the way out is the shortest one.
+        if let (Some(d), true) = (radial, self.distance < 0.0) {
+            return along(d, &self.closest.point);
+        }
+        let mut best: Option<Plane> = None;
+        surface.feature_normals(&self.closest, |n| offer(&mut best, along(n, &self.closest.point), BELOW));
+        if let Some(d) = radial {
+            offer(&mut best, along(d, &self.closest.point), BELOW);
+        }
+        if best.is_some_and(|b| b.ahead < 0.0)
+            && let Some((ahead, _)) = measured.closest(&(self.point + self.motion), self.motion.norm())
+        {
+            // Near a convex edge the face that the motion runs into need not be the closest now:
+            // to stay above the plane that is closest ahead is enough, if the sample is above it.
+            surface.feature_normals(&ahead, |n| offer(&mut best, along(n, &ahead.point), ABOVE_ENOUGH));
+        }
+        best.unwrap_or_else(|| {
+            let normal = surface.pseudo_normal(&self.closest);
+            along(normal.try_normalize(0.0).unwrap_or_else(Vector3::x), &self.closest.point)
+        })
+    }
+}
+
+/// Takes the plane that lets the sample go furthest, of those that it is not below.
+fn offer(best: &mut Option<Plane>, plane: Plane, below: f64) {
+    if plane.height >= -below && best.is_none_or(|b| plane.ahead > b.ahead + 1e-12) {
+        *best = Some(plane);
+    }
+}
+
+/// How far below the plane ahead a sample may be: rounding of poses, far below the tolerance.
+const ABOVE_ENOUGH: f64 = 1e-6;
 
 fn gather(
     tree: &SampleTree,
@@ -203,29 +247,30 @@ fn box_distance(a: &Bounds, b: &Bounds) -> f64 {
     (a.min - b.max).sup(&(b.min - a.max)).sup(&Vector3::zeros()).norm()
 }
 
-/// Keeps, of rows that point nearly the same way, the tightest. `lever` is the length that makes
-/// moments comparable with forces.
-pub(super) fn reduced(rows: impl IntoIterator<Item = Row>, lever: f64) -> Vec<Row> {
+/// Keeps, of rows that point nearly the same way, the tightest; also returns which they were.
+/// `lever` is the length that makes moments comparable with forces.
+pub(super) fn reduced(rows: impl IntoIterator<Item = Row>, lever: f64) -> (Vec<Row>, Vec<usize>) {
     const BINS: f64 = 24.0;
     let mut index: HashMap<(usize, [i16; 6]), usize> = HashMap::new();
-    let mut out: Vec<Row> = Vec::new();
-    for row in rows {
+    let (mut out, mut kept): (Vec<Row>, Vec<usize>) = (Vec::new(), Vec::new());
+    for (i, row) in rows.into_iter().enumerate() {
         let key = std::array::from_fn(|i| {
             let x = if i < 3 { row.a[i] } else { row.a[i] / lever };
             (x * BINS).round() as i16
         });
         match index.entry((row.other, key)) {
             std::collections::hash_map::Entry::Occupied(e) => {
-                let kept: &mut Row = &mut out[*e.get()];
-                if row.b < kept.b {
-                    *kept = row;
+                let at = *e.get();
+                if row.b < out[at].b {
+                    (out[at], kept[at]) = (row, i);
                 }
             }
             std::collections::hash_map::Entry::Vacant(e) => {
                 e.insert(out.len());
                 out.push(row);
+                kept.push(i);
             }
         }
     }
-    out
+    (out, kept)
 }

@@ -24,20 +24,21 @@ pub struct Body {
 
 impl Body {
     /// The closest surface point to `p` (shape frame) and the signed distance, if nearer than
-    /// `reach` or inside.
+    /// `reach` or inside. Exact: the field only proposes how far to look.
     #[must_use]
     pub fn closest(&self, p: &Point3<f64>, reach: f64) -> Option<(Closest, f64)> {
         let surface = &self.shape.surface;
-        if let Some(found) = self.field.closest(surface, p) {
-            return Some(found);
-        }
-        let estimate = self.field.estimate(p);
-        if estimate.lower_bound > reach {
-            return None;
-        }
-        let reach = if estimate.value < 0.0 { f64::INFINITY } else { reach };
-        let c = surface.closest(p, reach)?;
-        Some((c, surface.signed(p, &c)))
+        let closest = match self.field.nearby(surface, p) {
+            Some(near) => surface.closest(p, near.distance).unwrap_or(near),
+            None => {
+                let estimate = self.field.estimate(p);
+                if estimate.lower_bound > reach {
+                    return None;
+                }
+                surface.closest(p, if estimate.value < 0.0 { f64::INFINITY } else { reach })?
+            }
+        };
+        Some((closest, surface.signed(p, &closest)))
     }
 }
 

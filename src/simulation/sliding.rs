@@ -27,7 +27,7 @@ const FREE_STEP: f64 = 0.5;
 const ROUNDS: usize = 6;
 /// Steps that the static analysis of a pair looks ahead (the paper's five extensions).
 const STATIC_STEPS: usize = 5;
-const HALVINGS: usize = 5;
+const HALVINGS: usize = 3;
 const MOST_STEPS: usize = 8000;
 /// Travel per turn below which a turning part is going nowhere.
 const LEAST_TRAVEL: f64 = 0.01;
@@ -206,9 +206,7 @@ impl Drive {
         let mut with = Vec::new();
         for halving in 0..=HALVINGS {
             let wanted = self.wanted / f64::from(1u32 << halving);
-            let rows = near.contacts.iter().map(|c| mover.row(c, &wanted));
-            let rows = reduced(rows, self.gyration);
-            match self.attempt(mover, near, &wanted, rows) {
+            match self.attempt(mover, near, &wanted) {
                 Attempt::Moved { twist, touching } => return self.moved(mover, &twist, touching),
                 Attempt::Stuck(by) => return Step::Stuck { with: by },
                 Attempt::Entered(by) => with = by,
@@ -217,7 +215,11 @@ impl Drive {
         Step::Stuck { with }
     }
 
-    fn attempt(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>, mut rows: Vec<Row>) -> Attempt {
+    fn attempt(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>) -> Attempt {
+        let all = near.contacts.iter().map(|c| self.freed(mover.row(c, wanted)));
+        let (mut rows, kept) = reduced(all, self.gyration);
+        // Checked first at every trial: most of what enters enters here, and these are few.
+        let mut working: Vec<Contact> = kept.into_iter().map(|i| near.contacts[i]).collect();
         let target = wanted.component_mul(&self.metric);
         let mut entered = Vec::new();
         for round in 0..ROUNDS {
@@ -227,29 +229,56 @@ impl Drive {
             let touching = others(&result.active, &rows);
             let share = result.w.dot(&target) / target.norm_squared();
             if share < LEAST_SHARE {
+                for (i, m) in &result.active {
+                    tracing::trace!(multiplier = m, row = ?rows[*i], contact = ?working.get(*i), contacts = near.contacts.len(), "stuck");
+                }
                 return if round == 0 { Attempt::Stuck(touching) } else { Attempt::Entered(touching) };
             }
             let twist = result.w.component_div(&self.metric);
             let trial = Mover { pose: self.displaced(mover, &twist), ..*mover };
-            let violated = self.violations(&trial, near, &twist);
+            let mut violated = self.violations(&trial, &working, &twist);
             if violated.is_empty() {
-                return Attempt::Moved { twist, touching };
+                violated = self.violations(&trial, &near.contacts, &twist);
+                if violated.is_empty() {
+                    return Attempt::Moved { twist, touching };
+                }
             }
+            tracing::trace!(
+                contacts = near.contacts.len(),
+                rows = rows.len(),
+                round,
+                share,
+                violated = violated.len(),
+                worst = violated.iter().map(|c| c.gap).fold(0.0, f64::min),
+                first = ?violated.first(),
+                row = ?violated.first().map(|c| trial.row(c, &Vector6::zeros())),
+                w = ?twist.as_slice(),
+                "entered"
+            );
             entered = touching;
             let deeper = violated.iter().map(|c| {
-                let row = trial.row(c, &Vector6::zeros());
+                let row = self.freed(trial.row(c, &Vector6::zeros()));
                 // Linearised at the trial pose: gap(u) ≈ gap(u₀) + a·(u − u₀) ≥ 0.
                 Row { b: row.b - row.a.dot(&twist), ..row }
             });
-            let worst = reduced(deeper, self.gyration);
+            let (worst, deepest) = reduced(deeper, self.gyration);
             for row in &worst {
                 if let Err(at) = entered.binary_search(&row.other) {
                     entered.insert(at, row.other);
                 }
             }
             rows.extend(worst);
+            working.extend(deepest.into_iter().map(|i| violated[i]));
         }
         Attempt::Entered(entered)
+    }
+
+    /// A row without the freedoms that the action does not give.
+    fn freed(&self, mut row: Row) -> Row {
+        if !self.turns {
+            row.a.fixed_rows_mut::<3>(3).fill(0.0);
+        }
+        row
     }
 
     /// Projects in the metric. Rows that are slightly violated at the start ask to be left; if that
@@ -257,19 +286,19 @@ impl Drive {
     fn projected(&self, target: &Vector6<f64>, rows: &[Row], first: bool) -> Option<Projected> {
         let scaled = |floor: f64| -> Vec<Row> {
             let scale = |r: &Row| Row { a: r.a.component_div(&self.metric), b: r.b.max(floor), ..*r };
-            rows.iter().map(scale).map(|r| if self.turns { r } else { without_moment(r) }).collect()
+            rows.iter().map(scale).collect()
         };
         let result = project(target, &scaled(f64::NEG_INFINITY));
         if result.is_none() && first { project(target, &scaled(0.0)) } else { result }
     }
 
     /// The contacts that are too deep at the trial pose.
-    fn violations(&self, trial: &Mover<'_>, near: &Near, twist: &Vector6<f64>) -> Vec<Contact> {
+    fn violations(&self, trial: &Mover<'_>, contacts: &[Contact], twist: &Vector6<f64>) -> Vec<Contact> {
         let (v, turn) = (twist.fixed_rows::<3>(0).norm(), twist.fixed_rows::<3>(3).norm());
         // Standing samples can lie further out than any vertex of the mover, but not by much more
         // than the step if they are near it.
         let displacement = v + turn * (self.reach + self.step);
-        near.contacts
+        contacts
             .iter()
             .filter(|c| c.gap - displacement < -DEPTH_TOLERANCE)
             .filter_map(|c| trial.remeasured(c, self.step))
@@ -308,12 +337,6 @@ enum Attempt {
     Stuck(Vec<usize>),
     /// No allowed pose was found at this length of step.
     Entered(Vec<usize>),
-}
-
-fn without_moment(row: Row) -> Row {
-    let mut a = row.a;
-    a.fixed_rows_mut::<3>(3).fill(0.0);
-    Row { a, ..row }
 }
 
 /// The parts behind active rows, ascending; rows that hardly push are left out.
