@@ -1,10 +1,15 @@
 //! The command line, driven from outside.
 
+mod common;
+
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
 
-use sbdp::plan::export::PlanDocument;
+use common::Daemon;
+use rustix::process::{Pid, Signal, kill_process};
+use sbdp::plan::export::{PlanDocument, StatsDocument};
 
 fn assembly(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/assemblies").join(name)
@@ -161,21 +166,73 @@ fn an_unwritable_file_exits_1() {
     assert!(stderr(&output).contains("/nonexistent/plan.json"));
 }
 
+/// A plan that takes longer than the tests that cut it short.
+fn start_long(daemon: Option<&Daemon>) -> Child {
+    let mut command = sbdp();
+    let place = match daemon {
+        Some(daemon) => {
+            command.env("SBDP_RUNTIME_DIR", daemon.runtime_dir());
+            "--daemon"
+        }
+        None => "--embedded",
+    };
+    command.arg("plan").arg(assembly("linked-rings")).args([place, "--json", "-"]);
+    let planning = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // Long enough to be at work.
+    std::thread::sleep(Duration::from_secs(1));
+    planning
+}
+
 #[test]
-#[cfg(unix)]
 fn an_interrupt_ends_with_what_is_there() {
-    let path = assembly("linked-rings");
-    let planning = sbdp()
-        .args(["plan", path.to_str().unwrap(), "--embedded", "--json", "-"])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    // Long enough to listen for it, and far too short to be done.
-    std::thread::sleep(std::time::Duration::from_secs(1));
-    let sent = Command::new("kill").args(["-INT", &planning.id().to_string()]).status().unwrap();
-    assert!(sent.success());
+    let daemon = Daemon::start();
+    for daemon in [None, Some(&daemon)] {
+        let planning = start_long(daemon);
+        kill_process(Pid::from_child(&planning), Signal::INT).unwrap();
+        let output = planning.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(5), "{}", stderr(&output));
+        assert_eq!(PlanDocument::from_json(&stdout(&output)).unwrap().status, "cancelled");
+    }
+}
+
+#[test]
+fn a_daemon_that_dies_is_told() {
+    let mut daemon = Daemon::start();
+    let planning = start_long(Some(&daemon));
+    daemon.signal(Signal::KILL);
+    daemon.wait();
     let output = planning.wait_with_output().unwrap();
-    assert_eq!(output.status.code(), Some(5), "{}", stderr(&output));
-    assert_eq!(PlanDocument::from_json(&stdout(&output)).unwrap().status, "cancelled");
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert!(stderr(&output).contains("restart `sbdpd`"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_running_daemon_is_used_and_gives_the_same_plan() {
+    let daemon = Daemon::start();
+    let through = |options: &[&str]| {
+        let mut command = sbdp();
+        command.env("SBDP_RUNTIME_DIR", daemon.runtime_dir()).arg("plan").arg(assembly("pin-bolt-cover"));
+        let output = command.args(options).args(["--json", "-"]).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let document = PlanDocument::from_json(&stdout(&output)).unwrap();
+        PlanDocument { stats: StatsDocument::default(), ..document }
+    };
+    let embedded = through(&["--embedded"]);
+    assert_eq!(daemon.connect().status().unwrap().numbers.requests, 0);
+    assert_eq!(through(&["--daemon"]), embedded);
+    assert_eq!(through(&[]), embedded);
+    assert_eq!(daemon.connect().status().unwrap().numbers.requests, 2);
+    let status = sbdp().env("SBDP_RUNTIME_DIR", daemon.runtime_dir()).arg("status").output().unwrap();
+    assert_eq!(status.status.code(), Some(0));
+    assert!(stdout(&status).contains(&format!("pid {}", daemon.pid())), "{}", stdout(&status));
+}
+
+#[test]
+fn what_the_daemon_refuses_is_told_with_its_file() {
+    let daemon = Daemon::start();
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("lid.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let mut command = sbdp();
+    command.env("SBDP_RUNTIME_DIR", daemon.runtime_dir()).arg("plan").arg(folder.path()).arg("--daemon");
+    refused(&command.output().unwrap(), &["lid.obj", "part `lid`", "one plane"]);
 }
