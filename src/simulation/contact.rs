@@ -142,6 +142,7 @@ impl<'a> Mover<'a> {
             motion: frame.rotation.inverse() * motion,
             closest: contact.closest,
             distance: contact.gap - contact.allowance,
+            below: contact.allowance + ON_SURFACE,
         };
         let plane = sample.plane(measured);
         let n = frame.rotation * plane.normal * sense;
@@ -158,7 +159,13 @@ struct Sample {
     motion: Vector3<f64>,
     closest: Closest,
     distance: f64,
+    /// How far below a plane the sample may be and still count as separated by it.
+    below: f64,
 }
+
+/// Samples no deeper than this count as on the surface: coordinates in files are rounded, and poses
+/// drift by a part of the depth tolerance.
+const ON_SURFACE: f64 = 1e-4;
 
 /// A plane that a sample is to stay above.
 #[derive(Clone, Copy)]
@@ -170,9 +177,6 @@ struct Plane {
     ahead: f64,
 }
 
-/// A plane separates a sample from the solid only if the sample is not below it.
-const BELOW: f64 = 1e-9;
-
 impl Sample {
     fn plane(&self, measured: &Body) -> Plane {
         let surface = &measured.shape.surface;
@@ -183,21 +187,21 @@ impl Sample {
             let height = normal.dot(&(self.point - foot));
             Plane { normal, height, ahead: height + normal.dot(&self.motion) }
         };
-        // Inside, the way out is the shortest one.
-        if let (Some(d), true) = (radial, self.distance < 0.0) {
+        // Too deep, the way out is the shortest one.
+        if let (Some(d), true) = (radial, self.distance < -self.below) {
             return along(d, &self.closest.point);
         }
         let mut best: Option<Plane> = None;
-        surface.feature_normals(&self.closest, |n| offer(&mut best, along(n, &self.closest.point), BELOW));
+        surface.feature_normals(&self.closest, |n| offer(&mut best, along(n, &self.closest.point), self.below));
         if let Some(d) = radial {
-            offer(&mut best, along(d, &self.closest.point), BELOW);
+            offer(&mut best, along(d, &self.closest.point), self.below);
         }
         if best.is_some_and(|b| b.ahead < 0.0)
             && let Some((ahead, _)) = measured.closest(&(self.point + self.motion), self.motion.norm())
         {
             // Near a convex edge the face that the motion runs into need not be the closest now:
             // to stay above the plane that is closest ahead is enough, if the sample is above it.
-            surface.feature_normals(&ahead, |n| offer(&mut best, along(n, &ahead.point), ABOVE_ENOUGH));
+            surface.feature_normals(&ahead, |n| offer(&mut best, along(n, &ahead.point), self.below));
         }
         best.unwrap_or_else(|| {
             let normal = surface.pseudo_normal(&self.closest);
@@ -212,9 +216,6 @@ fn offer(best: &mut Option<Plane>, plane: Plane, below: f64) {
         *best = Some(plane);
     }
 }
-
-/// How far below the plane ahead a sample may be: rounding of poses, far below the tolerance.
-const ABOVE_ENOUGH: f64 = 1e-6;
 
 fn gather(
     tree: &SampleTree,
