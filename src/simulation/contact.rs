@@ -1,10 +1,9 @@
 //! Contacts of one moving body with those that stand.
 //!
 //! Samples of either surface that are near the other are measured exactly against the triangles
-//! around them. A contact becomes a linear constraint on the twist of the moving body: of the planes
-//! of the closest feature, the one along which the wanted motion may go furthest. That is the right
-//! choice where the feature is convex (staying on the free side of one of its planes is enough);
-//! where it is not, the check at the trial pose finds what is missing.
+//! around them. A contact becomes linear constraints on the twist of the moving body, one for each
+//! plane of the closest feature, of which any one is enough where the feature is convex; where it
+//! is not, the check at the trial pose finds what is missing.
 
 use std::collections::HashMap;
 
@@ -125,9 +124,9 @@ impl<'a> Mover<'a> {
         linear.norm() + turn.norm_squared() * arm.norm()
     }
 
-    /// The constraint that a contact puts on twists (linear part first) about the centre of mass,
-    /// given the twist that is wanted.
-    pub(super) fn row(&self, contact: &Contact, wanted: &Vector6<f64>) -> Row {
+    /// The constraints on twists (linear part first) about the centre of mass of which a contact
+    /// demands any one, given the twist that is wanted. Appended to `out`; at least one.
+    pub(super) fn options(&self, contact: &Contact, wanted: &Vector6<f64>, out: &mut Vec<Row>) {
         let standing = &self.scene.bodies[contact.other];
         let (world, measured, frame, sense) = match contact.side {
             Side::Moving => (self.pose * contact.sample, standing, &standing.planning_from_shape, 1.0),
@@ -144,11 +143,21 @@ impl<'a> Mover<'a> {
             distance: contact.gap - contact.allowance,
             below: contact.allowance + ON_SURFACE,
         };
-        let plane = sample.plane(measured);
-        let n = frame.rotation * plane.normal * sense;
-        let moment = arm.cross(&n);
-        let a = Vector6::new(n.x, n.y, n.z, moment.x, moment.y, moment.z);
-        Row { a, b: plane.height + contact.allowance, other: contact.other }
+        let mut planes = Planes::default();
+        sample.planes(measured, &mut planes);
+        for plane in planes.iter() {
+            let n = frame.rotation * plane.normal * sense;
+            let moment = arm.cross(&n);
+            let a = Vector6::new(n.x, n.y, n.z, moment.x, moment.y, moment.z);
+            out.push(Row { a, b: plane.height + contact.allowance, other: contact.other });
+        }
+    }
+
+    /// The constraint that leads a sample that is too deep out the shortest way.
+    pub(super) fn way_out(&self, contact: &Contact, rows: &mut Vec<Row>) -> Option<Row> {
+        rows.clear();
+        self.options(contact, &Vector6::zeros(), rows);
+        rows.first().copied()
     }
 }
 
@@ -167,53 +176,83 @@ struct Sample {
 /// drift by a part of the depth tolerance.
 const ON_SURFACE: f64 = 1e-4;
 
-/// A plane that a sample is to stay above.
+/// A plane that a sample may be asked to stay above.
 #[derive(Clone, Copy)]
 struct Plane {
     normal: Vector3<f64>,
     /// Height of the sample above it.
     height: f64,
-    /// Height after the wanted motion.
-    ahead: f64,
 }
 
+/// A few planes with different normals.
+#[derive(Default)]
+struct Planes {
+    list: [Option<Plane>; 6],
+}
+
+impl Planes {
+    fn iter(&self) -> impl Iterator<Item = &Plane> {
+        self.list.iter().flatten()
+    }
+
+    /// Adds a plane, or keeps the higher of two that are nearly parallel.
+    fn add(&mut self, plane: Plane) {
+        for slot in &mut self.list {
+            match slot {
+                Some(p) if p.normal.dot(&plane.normal) > PARALLEL => {
+                    p.height = p.height.max(plane.height);
+                    return;
+                }
+                Some(_) => {}
+                None => {
+                    *slot = Some(plane);
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// cos of the angle below which two planes are one (about half a degree).
+const PARALLEL: f64 = 0.99996;
+
 impl Sample {
-    fn plane(&self, measured: &Body) -> Plane {
+    /// The planes of which the sample must stay above one: those of the closest feature, and, if
+    /// the wanted motion goes below all of them, those of the feature that is closest ahead. The
+    /// solid near a convex feature lies below all its planes, so to stay above any is enough.
+    fn planes(&self, measured: &Body, out: &mut Planes) {
         let surface = &measured.shape.surface;
         let away = self.point - self.closest.point;
         // The direction to the closest point: good unless the two coincide.
         let radial = away.try_normalize(1e-7).map(|d| if self.distance < 0.0 { -d } else { d });
-        let along = |normal: Vector3<f64>, foot: &Point3<f64>| {
+        let above = |normal: Vector3<f64>, foot: &Point3<f64>| {
             let height = normal.dot(&(self.point - foot));
-            Plane { normal, height, ahead: height + normal.dot(&self.motion) }
+            (height >= -self.below).then_some(Plane { normal, height })
         };
         // Too deep, the way out is the shortest one.
-        if let (Some(d), true) = (radial, self.distance < -self.below) {
-            return along(d, &self.closest.point);
+        if let (Some(normal), true) = (radial, self.distance < -self.below) {
+            return out.add(Plane { normal, height: self.distance });
         }
-        let mut best: Option<Plane> = None;
-        surface.feature_normals(&self.closest, |n| offer(&mut best, along(n, &self.closest.point), self.below));
-        if let Some(d) = radial {
-            offer(&mut best, along(d, &self.closest.point), self.below);
+        surface.feature_normals(&self.closest, |n| {
+            if let Some(p) = above(n, &self.closest.point) {
+                out.add(p);
+            }
+        });
+        if let Some(p) = radial.and_then(|d| above(d, &self.closest.point)) {
+            out.add(p);
         }
-        if best.is_some_and(|b| b.ahead < 0.0)
-            && let Some((ahead, _)) = measured.closest(&(self.point + self.motion), self.motion.norm())
-        {
-            // Near a convex edge the face that the motion runs into need not be the closest now:
-            // to stay above the plane that is closest ahead is enough, if the sample is above it.
-            surface.feature_normals(&ahead, |n| offer(&mut best, along(n, &ahead.point), self.below));
+        let stopped = out.iter().all(|p| p.height + p.normal.dot(&self.motion) < 0.0);
+        if stopped && let Some((ahead, _)) = measured.closest(&(self.point + self.motion), self.motion.norm()) {
+            surface.feature_normals(&ahead, |n| {
+                if let Some(p) = above(n, &ahead.point) {
+                    out.add(p);
+                }
+            });
         }
-        best.unwrap_or_else(|| {
+        if out.iter().next().is_none() {
             let normal = surface.pseudo_normal(&self.closest);
-            along(normal.try_normalize(0.0).unwrap_or_else(Vector3::x), &self.closest.point)
-        })
-    }
-}
-
-/// Takes the plane that lets the sample go furthest, of those that it is not below.
-fn offer(best: &mut Option<Plane>, plane: Plane, below: f64) {
-    if plane.height >= -below && best.is_none_or(|b| plane.ahead > b.ahead + 1e-12) {
-        *best = Some(plane);
+            out.add(Plane { normal: normal.try_normalize(0.0).unwrap_or_else(Vector3::x), height: self.distance });
+        }
     }
 }
 

@@ -230,8 +230,7 @@ impl Drive {
         let target = wanted.component_mul(&self.metric);
         let (mut rows, mut working) = (Vec::new(), Vec::new());
         if eager {
-            let all = near.contacts.iter().map(|c| self.freed(mover.row(c, wanted)));
-            (rows, working) = reduced(all, self.gyration);
+            (rows, working) = self.chosen(mover, near, wanted);
         }
         let mut entered = Vec::new();
         for round in 0..if eager { EAGER_ROUNDS } else { LAZY_ROUNDS } {
@@ -256,13 +255,14 @@ impl Drive {
             tracing::trace!(contacts = near.contacts.len(), rows = rows.len(), round, share, violated = violated.len(), "entered");
             entered = touching;
             entered.extend(violated.iter().map(|(_, c)| c.other));
-            let deeper = violated.iter().map(|(i, c)| {
-                let row = self.freed(trial.row(c, &Vector6::zeros()));
+            let mut options = Vec::new();
+            let deeper = violated.iter().filter_map(|(i, c)| {
+                let row = self.freed(trial.way_out(c, &mut options)?);
                 // Linearised at the trial pose: gap(u) ≈ gap(u₀) + a·(u − u₀) ≥ 0.
                 let row = Row { b: row.b - row.a.dot(&twist), ..row };
                 // A plane that the sample was beyond already at the start does not separate it.
                 let separates = row.b >= -2.0 * DEPTH_TOLERANCE;
-                if separates { row } else { self.freed(mover.row(&near.contacts[*i], wanted)) }
+                if separates { Some(row) } else { mover.way_out(&near.contacts[*i], &mut options).map(|r| self.freed(r)) }
             });
             let (worst, kept) = reduced(deeper, self.gyration);
             rows.extend(worst);
@@ -271,6 +271,37 @@ impl Drive {
         entered.sort_unstable();
         entered.dedup();
         Attempt::Entered(entered)
+    }
+
+    /// One constraint per contact, reduced, and which contacts they come from. Where a contact
+    /// leaves a choice of planes, the one is taken along which the motion gets furthest that the
+    /// contacts without a choice allow: at the rim of a hole, that is the hole's wall.
+    fn chosen(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>) -> (Vec<Row>, Vec<usize>) {
+        let mut options = Vec::with_capacity(near.contacts.len() * 2);
+        let mut ends = Vec::with_capacity(near.contacts.len());
+        for contact in &near.contacts {
+            mover.options(contact, wanted, &mut options);
+            ends.push(options.len());
+        }
+        for row in &mut options {
+            *row = self.freed(*row);
+        }
+        let starts = std::iter::once(&0).chain(&ends);
+        let groups: Vec<&[Row]> = starts.zip(&ends).map(|(a, b)| &options[*a..*b]).collect();
+        let (certain, _) = reduced(groups.iter().filter(|g| g.len() == 1).map(|g| g[0]), self.gyration);
+        let target = wanted.component_mul(&self.metric);
+        let likely = self.projected(&target, &certain, true);
+        let motion = likely.map_or(*wanted, |p| p.w.component_div(&self.metric));
+        let best = |group: &&[Row]| {
+            let mut best = group[0];
+            for row in &group[1..] {
+                if row.b + row.a.dot(&motion) > best.b + best.a.dot(&motion) + 1e-12 {
+                    best = *row;
+                }
+            }
+            best
+        };
+        reduced(groups.iter().map(best), self.gyration)
     }
 
     /// A row without the freedoms that the action does not give.
