@@ -15,7 +15,7 @@ const RESIDUAL: f64 = 1e-5;
 
 /// The pose that maps `from` onto `to`, if they are congruent vertex by vertex.
 #[must_use]
-pub fn congruence(from: &Mesh, to: &Mesh) -> Option<Pose> {
+pub(super) fn congruence(from: &Mesh, to: &Mesh) -> Option<Pose> {
     if from.vertices.len() != to.vertices.len()
         || from.solidity != to.solidity
         || from.triangles != to.triangles

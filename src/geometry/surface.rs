@@ -14,7 +14,7 @@ use super::winding::WindingTree;
 use super::{Bounds, Mesh, Solidity};
 
 /// No triangle.
-pub const NO_TRIANGLE: u32 = u32::MAX;
+pub(super) const NO_TRIANGLE: u32 = u32::MAX;
 
 /// The closest surface point to some point.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -117,7 +117,7 @@ impl Surface {
         self.face_normals[triangle as usize]
     }
 
-    /// The triangle across edge `edge` of `triangle`, or [`NO_TRIANGLE`].
+    /// The triangle across edge `edge` of `triangle`, or `u32::MAX` where there is none.
     #[must_use]
     pub fn neighbour(&self, triangle: u32, edge: u8) -> u32 {
         self.neighbours[triangle as usize][edge as usize]

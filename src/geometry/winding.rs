@@ -26,7 +26,7 @@ struct Node {
 
 /// Answers how often a triangle soup winds around a point (1 inside a closed outward mesh).
 #[derive(Debug, Clone)]
-pub struct WindingTree {
+pub(super) struct WindingTree {
     nodes: Vec<Node>,
     corners: Vec<[Point3<f64>; 3]>,
 }
@@ -34,7 +34,7 @@ pub struct WindingTree {
 impl WindingTree {
     /// Builds the tree over triangles.
     #[must_use]
-    pub fn new(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
+    pub(super) fn new(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
         let mut corners: Vec<_> = triangles.iter().map(|t| t.map(|i| vertices[i as usize])).collect();
         let mut nodes = Vec::new();
         let n = corners.len();
@@ -44,7 +44,7 @@ impl WindingTree {
 
     /// The winding number at `p`.
     #[must_use]
-    pub fn winding(&self, p: &Point3<f64>) -> f64 {
+    pub(super) fn winding(&self, p: &Point3<f64>) -> f64 {
         let mut sum = 0.0;
         let mut stack = Vec::with_capacity(64);
         if !self.nodes.is_empty() {

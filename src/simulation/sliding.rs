@@ -252,7 +252,14 @@ impl Drive {
                     return Attempt::Moved { twist, touching };
                 }
             }
-            tracing::trace!(contacts = near.contacts.len(), rows = rows.len(), round, share, violated = violated.len(), "entered");
+            tracing::trace!(
+                contacts = near.contacts.len(),
+                rows = rows.len(),
+                round,
+                share,
+                violated = violated.len(),
+                "entered"
+            );
             entered = touching;
             entered.extend(violated.iter().map(|(_, c)| c.other));
             let mut options = Vec::new();
