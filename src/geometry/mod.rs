@@ -32,7 +32,7 @@ pub use hull::{gap_along, hull_vertices, separating_direction, transformed};
 pub use load::{load_assembly, natural_order};
 pub use mesh::{Edge, Mesh, Solidity};
 pub use pose::{Pose, Waypoint, interpolate, pose_from_waypoint, waypoint_from_pose};
-pub use samples::{Descend, Node as SampleNode, SampleTree, Spacing};
+pub use samples::{Node as SampleNode, SampleTree, Spacing};
 pub use shape::Shape;
 pub use source::{SourceAssembly, SourceMesh, SourcePart};
 pub use surface::{Closest, MassProperties, Surface};

@@ -35,15 +35,6 @@ pub struct Node {
     right: u32,
 }
 
-/// Whether a subtree can be left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Descend {
-    /// Nothing of interest in this sphere.
-    Skip,
-    /// Look further.
-    Into,
-}
-
 /// Samples of one surface.
 #[derive(Debug, Clone, Default)]
 pub struct SampleTree {
@@ -84,25 +75,29 @@ impl SampleTree {
         &self.points
     }
 
-    /// Walks the tree; `enter` decides per sphere, `visit` gets the samples (index and point) of
-    /// all leaves entered.
-    pub fn walk(&self, mut enter: impl FnMut(&Node) -> Descend, mut visit: impl FnMut(u32, &Point3<f64>)) {
+    /// Walks the tree. `enter` gets a sphere and what was learnt about the sphere around it, and
+    /// returns what is known now, or `None` to leave the subtree out; `visit` gets the samples of
+    /// all leaves entered, with what is known about the leaf.
+    pub fn walk<T: Copy>(
+        &self,
+        root: T,
+        mut enter: impl FnMut(&Node, T) -> Option<T>,
+        mut visit: impl FnMut(&Point3<f64>, T),
+    ) {
         let mut stack = Vec::with_capacity(48);
         if !self.nodes.is_empty() {
-            stack.push(0usize);
+            stack.push((0usize, root));
         }
-        while let Some(i) = stack.pop() {
+        while let Some((i, known)) = stack.pop() {
             let node = &self.nodes[i];
-            if enter(node) == Descend::Skip {
-                continue;
-            }
+            let Some(known) = enter(node, known) else { continue };
             if node.right == 0 {
-                for k in node.start..node.end {
-                    visit(k, &self.points[k as usize]);
+                for p in &self.points[node.start as usize..node.end as usize] {
+                    visit(p, known);
                 }
             } else {
-                stack.push(node.right as usize);
-                stack.push(i + 1);
+                stack.push((node.right as usize, known));
+                stack.push((i + 1, known));
             }
         }
     }

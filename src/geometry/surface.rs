@@ -156,6 +156,14 @@ impl Surface {
         found.map(|(i, _)| self.closest_on(i, p))
     }
 
+    /// The closest surface point, given any triangle that is likely to be near: much quicker than
+    /// without.
+    #[must_use]
+    pub fn closest_from(&self, p: &Point3<f64>, guess: u32) -> Closest {
+        let near = self.closest_on(guess, p);
+        self.closest(p, near.distance).unwrap_or(near)
+    }
+
     /// Signed distance given the closest point: negative inside.
     #[must_use]
     pub fn signed(&self, p: &Point3<f64>, closest: &Closest) -> f64 {

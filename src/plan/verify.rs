@@ -9,7 +9,7 @@
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use crate::geometry::{Bounds, Descend, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
+use crate::geometry::{Bounds, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
 use crate::simulation::{Allowances, Scene};
 use crate::termination::{Interrupt, Termination};
 
@@ -139,21 +139,25 @@ fn deepest_in(
     surface: &Surface,
     granted: f64,
 ) -> Option<(f64, Point3<f64>)> {
-    let bounds = surface.bounds().grown(-granted);
+    let inner = surface.bounds().grown(-granted);
     let mut worst: Option<(f64, Point3<f64>)> = None;
     samples.walk(
-        |node| {
+        0,
+        |node, guess| {
             let c = to_measured * node.centre;
-            let apart =
-                bounds.distance(&c) > node.radius || surface.signed_distance(&c) - node.radius > -granted;
-            if apart { Descend::Skip } else { Descend::Into }
+            if surface.bounds().distance(&c) > node.radius {
+                return None;
+            }
+            let closest = surface.closest_from(&c, guess);
+            let outside = closest.distance > node.radius - granted && surface.signed(&c, &closest) > 0.0;
+            (!outside).then_some(closest.triangle)
         },
-        |_, sample| {
+        |sample, guess| {
             let p = to_measured * sample;
-            if !bounds.contains(&p) {
+            if !inner.contains(&p) {
                 return;
             }
-            let over = -surface.signed_distance(&p) - granted;
+            let over = -surface.signed(&p, &surface.closest_from(&p, guess)) - granted;
             if over > worst.map_or(0.0, |w| w.0) {
                 worst = Some((over, *sample));
             }

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3, Vector6};
 
-use crate::geometry::{Bounds, Closest, Descend, Pose, SampleTree};
+use crate::geometry::{Bounds, Closest, Pose, SampleTree};
 
 use super::projection::Row;
 use super::{Body, Scene, Surroundings};
@@ -242,7 +242,7 @@ impl Sample {
             out.add(p);
         }
         let stopped = out.iter().all(|p| p.height + p.normal.dot(&self.motion) < 0.0);
-        if stopped && let Some((ahead, _)) = measured.closest(&(self.point + self.motion), self.motion.norm()) {
+        if stopped && let Some((ahead, _)) = measured.closest_nearby(&(self.point + self.motion), self.motion.norm()) {
             surface.feature_normals(&ahead, |n| {
                 if let Some(p) = above(n, &ahead.point) {
                     out.add(p);
@@ -270,25 +270,26 @@ fn gather(
     let clearance = std::cell::Cell::new(near.clearance);
     let keep = |bound: f64| clearance.set(clearance.get().min(bound + allowance));
     tree.walk(
-        |node| {
+        (),
+        |node, ()| {
             let bound = measured.field.estimate(&(to_measured * node.centre)).lower_bound - node.radius;
             if bound > limit {
                 keep(bound);
-                return Descend::Skip;
             }
-            Descend::Into
+            (bound <= limit).then_some(())
         },
-        |_, sample| {
+        |sample, ()| {
             let p = to_measured * sample;
             let bound = measured.field.estimate(&p).lower_bound;
             if bound > limit {
                 return keep(bound);
             }
-            match measured.closest(&p, limit) {
+            match measured.closest_nearby(&p, limit) {
                 Some((closest, distance)) if distance + allowance < reach => {
                     near.contacts.push(tag(*sample, distance + allowance, closest));
                 }
-                Some((_, distance)) => keep(distance),
+                // Nearly the distance, so not quite a bound: the field's is.
+                Some(_) => keep(bound.max(0.0)),
                 None => keep(limit),
             }
         },

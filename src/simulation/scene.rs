@@ -42,6 +42,17 @@ impl Body {
     }
 }
 
+impl Body {
+    /// As [`Body::closest`], but where the surface is near only among the triangles that the field
+    /// proposes: quicker, and on meshes finer than the field's cells the distance may come out
+    /// slightly too large. Good for constraints that are checked afterwards.
+    #[must_use]
+    pub fn closest_nearby(&self, p: &Point3<f64>, reach: f64) -> Option<(Closest, f64)> {
+        let Some(near) = self.field.nearby(&self.shape.surface, p) else { return self.closest(p, reach) };
+        Some((near, self.shape.surface.signed(p, &near)))
+    }
+}
+
 /// For each pair, how deep the two overlap at the assembled pose: that much is granted.
 #[derive(Debug, Clone, Default)]
 pub struct Allowances {
