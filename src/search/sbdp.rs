@@ -173,7 +173,7 @@ impl<'a, 'o> Search<'a, 'o> {
     /// One run of Algorithm 1's `disassembly` over the open list.
     fn pass(&mut self, phase: Phase) -> Result<Gain, Stop> {
         let mut gain = Gain::default();
-        let mut open: Vec<usize> = self.alive().collect();
+        let mut open: Vec<usize> = self.expandable(phase);
         while !open.is_empty() && !self.is_done() {
             self.analyse(phase, &open)?;
             let batch = self.extract(phase, &mut open);
@@ -185,14 +185,25 @@ impl<'a, 'o> Search<'a, 'o> {
                 if phase == Phase::Rotation {
                     return Ok(gain);
                 }
-                open = self.alive().collect();
+                open = self.expandable(phase);
             }
         }
         Ok(gain)
     }
 
-    fn alive(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.nodes.len()).filter(|&i| self.nodes[i].alive)
+    /// The states to expand, the initial one included. Of two last parts it is the same which one
+    /// moves against the other: beyond the first push, only the smaller one does.
+    fn expandable(&self, phase: Phase) -> Vec<usize> {
+        let standing = &self.everything.standing;
+        let still = match standing[..] {
+            [a, b] if self.problem.may_move(a) && self.problem.may_move(b) => {
+                let reach = |p: usize| self.problem.scene.bodies[p].shape.reach;
+                Some(if reach(a) < reach(b) { b } else { a })
+            }
+            _ => None,
+        };
+        let skipped = |n: &Node| Some(n.part) == still && (phase == Phase::Rotation || !n.is_root());
+        (0..self.nodes.len()).filter(|&i| self.nodes[i].alive && !skipped(&self.nodes[i])).collect()
     }
 
     /// Static analysis of displaced states that have none yet.
@@ -274,9 +285,14 @@ impl<'a, 'o> Search<'a, 'o> {
 
     /// The next jobs worth running: as many as there are threads.
     fn window(&self, phase: Phase, jobs: &[Job], from: usize) -> (Vec<Job>, usize) {
+        let threads = rayon::current_num_threads();
+        // Pushes from the assembled pose often succeed, which voids what was run ahead; others
+        // seldom do, and long and short ones share the threads better in a longer window.
+        let likely = phase == Phase::Translation && self.nodes[jobs[from].node].is_root();
+        let size = if likely || threads == 1 { threads } else { 4 * threads };
         let mut window = Vec::new();
         let mut at = from;
-        while at < jobs.len() && window.len() < rayon::current_num_threads() {
+        while at < jobs.len() && window.len() < size {
             if self.is_open(phase, jobs[at]) {
                 window.push(jobs[at]);
             }
