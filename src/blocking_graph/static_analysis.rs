@@ -75,7 +75,7 @@ pub fn blocked_from(
 }
 
 /// Boxes further apart than this cannot touch within the look-ahead.
-const NEAR: f64 = 0.12;
+const NEAR: f64 = 0.2;
 
 fn boxes_near(scene: &Scene, a: usize, b: usize) -> bool {
     scene.bodies[a].bounds.grown(NEAR).meets(&scene.bodies[b].bounds)

@@ -22,8 +22,10 @@ const DEPTH_TOLERANCE: f64 = 3e-4;
 /// stuck.
 const LEAST_SHARE: f64 = 0.05;
 /// Longest contact step and longest step in free space, in the planning frame.
-const CONTACT_STEP: f64 = 0.12;
+const CONTACT_STEP: f64 = 0.2;
 const FREE_STEP: f64 = 0.5;
+/// A free turn is at most so many contact steps long: exits show only at the ends of steps.
+const LONGEST_FREE_TURN: f64 = 4.0;
 const EAGER_ROUNDS: usize = 6;
 const LAZY_ROUNDS: usize = 12;
 /// Steps that the static analysis of a pair looks ahead (the paper's five extensions).
@@ -123,17 +125,27 @@ pub fn pair_blocks(
     actions.iter().map(blocked).collect()
 }
 
-/// Sees when a part turns for ever: a whole turn that brought neither travel nor new contact.
+/// Sees when a part turns for ever: a whole turn that took it no further from where it started
+/// than it had been, and brought no new contact. A thread gets further with every turn.
 struct Turning {
     angle: f64,
-    at: nalgebra::Point3<f64>,
+    start: nalgebra::Point3<f64>,
+    farthest: f64,
+    farthest_before: f64,
     new_contact: bool,
     all_touched: Vec<usize>,
 }
 
 impl Turning {
     fn new(mover: &Mover<'_>) -> Self {
-        Self { angle: 0.0, at: mover.centre(), new_contact: false, all_touched: Vec::new() }
+        Self {
+            angle: 0.0,
+            start: mover.centre(),
+            farthest: 0.0,
+            farthest_before: 0.0,
+            new_contact: false,
+            all_touched: Vec::new(),
+        }
     }
 
     fn is_idle(&mut self, mover: &Mover<'_>, turned: f64, touching: &[usize]) -> bool {
@@ -143,14 +155,14 @@ impl Turning {
                 self.new_contact = true;
             }
         }
+        self.farthest = self.farthest.max((mover.centre() - self.start).norm());
         self.angle += turned;
         if self.angle < std::f64::consts::TAU {
             return false;
         }
-        let travel = (mover.centre() - self.at).norm();
-        let idle = travel < LEAST_TRAVEL && !self.new_contact;
+        let idle = self.farthest - self.farthest_before < LEAST_TRAVEL && !self.new_contact;
         self.angle = 0.0;
-        self.at = mover.centre();
+        self.farthest_before = self.farthest;
         self.new_contact = false;
         idle
     }
@@ -201,7 +213,7 @@ impl Drive {
     fn advance(&self, mover: &Mover<'_>, near: &Near) -> Step {
         if near.contacts.is_empty() {
             let factor = (near.clearance.min(FREE_STEP) / self.step).max(1.0);
-            let twist = self.wanted * if self.turns { factor.min(2.0) } else { factor };
+            let twist = self.wanted * if self.turns { factor.min(LONGEST_FREE_TURN) } else { factor };
             return self.moved(mover, &twist, Vec::new());
         }
         let mut with = Vec::new();
