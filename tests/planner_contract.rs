@@ -110,7 +110,7 @@ fn requests() -> impl Iterator<Item = PlanRequest> {
     KINDS.into_iter().map(|(planner, engine)| PlanRequest { planner, engine, ..PlanRequest::default() })
 }
 
-fn order<'a>(plan: &'a Plan) -> Vec<&'a str> {
+fn order(plan: &Plan) -> Vec<&str> {
     plan.steps.iter().map(|s| plan.part_name(s.part)).collect()
 }
 
