@@ -166,8 +166,16 @@ fn an_unwritable_file_exits_1() {
     assert!(stderr(&output).contains("/nonexistent/plan.json"));
 }
 
-/// A plan that takes longer than the tests that cut it short.
-fn start_long(daemon: Option<&Daemon>) -> Child {
+/// A chain of so many rings that a search would take minutes to give up on it.
+fn chain(folder: &Path) {
+    for link in 0..60 {
+        fs::write(folder.join(format!("{link}.obj")), common::ring(link)).unwrap();
+    }
+}
+
+/// A plan that takes longer than the tests that cut it short, at work.
+fn start_long(daemon: Option<&Daemon>, assembly: &Path) -> Child {
+    chain(assembly);
     let mut command = sbdp();
     let place = match daemon {
         Some(daemon) => {
@@ -176,18 +184,32 @@ fn start_long(daemon: Option<&Daemon>) -> Child {
         }
         None => "--embedded",
     };
-    command.arg("plan").arg(assembly("linked-rings")).args([place, "--json", "-"]);
+    command.arg("plan").arg(assembly).args([place, "--json", "-"]);
     let planning = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    // Long enough to be at work.
-    std::thread::sleep(Duration::from_secs(1));
+    while !catches_interrupts(&planning) || daemon.is_some_and(|d| plans_running(d) == 0) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
     planning
+}
+
+/// Whether the process has set its handlers, by the kernel's mask of caught signals.
+fn catches_interrupts(process: &Child) -> bool {
+    let status = fs::read_to_string(format!("/proc/{}/status", process.id())).unwrap();
+    let caught = status.lines().find_map(|l| l.strip_prefix("SigCgt:"));
+    let caught = caught.expect("the process ended early; its status has no signals");
+    u64::from_str_radix(caught.trim(), 16).unwrap() >> (Signal::INT.as_raw() - 1) & 1 == 1
+}
+
+fn plans_running(daemon: &Daemon) -> u32 {
+    daemon.connect().status().unwrap().numbers.running
 }
 
 #[test]
 fn an_interrupt_ends_with_what_is_there() {
     let daemon = Daemon::start();
     for daemon in [None, Some(&daemon)] {
-        let planning = start_long(daemon);
+        let folder = tempfile::tempdir().unwrap();
+        let planning = start_long(daemon, folder.path());
         kill_process(Pid::from_child(&planning), Signal::INT).unwrap();
         let output = planning.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(5), "{}", stderr(&output));
@@ -197,10 +219,11 @@ fn an_interrupt_ends_with_what_is_there() {
 
 #[test]
 fn a_daemon_that_dies_is_told() {
-    let mut daemon = Daemon::start();
-    let planning = start_long(Some(&daemon));
+    let daemon = Daemon::start();
+    let folder = tempfile::tempdir().unwrap();
+    let planning = start_long(Some(&daemon), folder.path());
+    // Killed and not waited for: what remains of it until then must not pass for a daemon.
     daemon.signal(Signal::KILL);
-    daemon.wait();
     let output = planning.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     assert!(stderr(&output).contains("restart `sbdpd`"), "{}", stderr(&output));

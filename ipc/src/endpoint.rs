@@ -141,14 +141,23 @@ impl Endpoint {
         write().map_err(|source| EndpointError::Io { path: path.clone(), source })
     }
 
-    /// Whether its process lives.
+    /// Whether its process lives. One that ended but was not waited for by its parent yet (a
+    /// zombie) can still be signalled, but answers nobody: it counts as dead.
     #[must_use]
     pub fn is_alive(&self) -> bool {
         let Some(pid) = i32::try_from(self.pid).ok().and_then(rustix::process::Pid::from_raw) else {
             return false;
         };
-        rustix::process::test_kill_process(pid) != Err(rustix::io::Errno::SRCH)
+        rustix::process::test_kill_process(pid) != Err(rustix::io::Errno::SRCH) && !has_ended(self.pid)
     }
+}
+
+/// Whether the process is a zombie; `false` where /proc does not tell.
+fn has_ended(pid: u32) -> bool {
+    // "PID (NAME) STATE …", where the name may hold anything, brackets included.
+    let stat = fs::read(format!("/proc/{pid}/stat")).unwrap_or_default();
+    let state = stat.iter().rposition(|&b| b == b')').and_then(|end| stat.get(end + 2));
+    matches!(state, Some(b'Z' | b'X'))
 }
 
 /// The runtime folder: `$SBDP_RUNTIME_DIR`, else `$XDG_RUNTIME_DIR/sbdp`, else `/tmp/sbdp-UID`.
@@ -196,4 +205,35 @@ fn check_folder(path: &Path) -> Result<(), EndpointError> {
         return refuse("others may enter it; run `chmod 700` on it");
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rustix::process::{Pid, WaitId, WaitIdOptions, waitid};
+
+    fn endpoint(pid: u32) -> Endpoint {
+        Endpoint { pid, ..Endpoint::of_this_process("x_", Path::new("/")) }
+    }
+
+    #[test]
+    fn a_process_that_ended_is_dead_before_and_after_its_parent_waited() {
+        assert!(endpoint(std::process::id()).is_alive());
+        let mut child = std::process::Command::new("sleep").arg("1000").spawn().unwrap();
+        let pid = child.id();
+        assert!(endpoint(pid).is_alive());
+        child.kill().unwrap();
+        // Waits for the end and leaves the zombie.
+        let ended = WaitIdOptions::EXITED | WaitIdOptions::NOWAIT;
+        waitid(WaitId::Pid(Pid::from_child(&child)), ended).unwrap();
+        assert!(!endpoint(pid).is_alive(), "a zombie");
+        child.wait().unwrap();
+        assert!(!endpoint(pid).is_alive());
+    }
+
+    #[test]
+    fn no_process_has_number_zero() {
+        assert!(!endpoint(0).is_alive());
+        assert!(!endpoint(u32::MAX).is_alive());
+    }
 }

@@ -197,6 +197,27 @@ impl Boxes {
     }
 }
 
+/// A link of a chain along x as an OBJ file: a torus, flat or upright by turns.
+pub fn ring(link: u32) -> String {
+    const AROUND: u32 = 24;
+    const ACROSS: u32 = 12;
+    let angle = |k: u32, of: u32| std::f64::consts::TAU * f64::from(k) / f64::from(of);
+    let mut text = String::new();
+    for (i, j) in (0..AROUND).flat_map(|i| (0..ACROSS).map(move |j| (i, j))) {
+        let (turn, roll) = (angle(i, AROUND), angle(j, ACROSS));
+        let r = 5.0 + 1.5 * roll.cos();
+        let (x, across, off) = (r * turn.cos() + 6.75 * f64::from(link), r * turn.sin(), 1.5 * roll.sin());
+        let (y, z) = if link.is_multiple_of(2) { (across, off) } else { (-off, across) };
+        text += &format!("v {x} {y} {z}\n");
+    }
+    for (i, j) in (0..AROUND).flat_map(|i| (0..ACROSS).map(move |j| (i, j))) {
+        let vertex = |i: u32, j: u32| 1 + (i % AROUND) * ACROSS + j % ACROSS;
+        let (a, b, c, d) = (vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1));
+        text += &format!("f {a} {b} {c} {d}\n");
+    }
+    text
+}
+
 /// Plans to the end; the steps' parts and the summary.
 pub fn plan(client: &Client, handle: Handle, options: &PlanOptions) -> (Vec<u32>, Summary) {
     let mut stream = client.plan(handle, options).unwrap();
