@@ -22,7 +22,7 @@ const DEPTH_TOLERANCE: f64 = 3e-4;
 /// stuck.
 const LEAST_SHARE: f64 = 0.05;
 /// Longest contact step and longest step in free space, in the planning frame.
-const CONTACT_STEP: f64 = 0.2;
+const CONTACT_STEP: f64 = 0.12;
 const FREE_STEP: f64 = 0.5;
 /// A free turn is at most so many contact steps long: exits show only at the ends of steps.
 const LONGEST_FREE_TURN: f64 = 4.0;
