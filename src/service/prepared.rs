@@ -15,8 +15,8 @@ use crate::termination::{Interrupt, Termination};
 
 /// Overlaps smaller than this share of the longest side are rounding, not modelling.
 const LEAST_OVERLAP: f64 = 1e-6;
-/// Verification refuses paths deeper than this share of the longest side (0.002 where it is 10).
-const DEPTH_LIMIT: f64 = 2e-4;
+/// Verification refuses paths deeper than this share of the longest side (0.004 where it is 10).
+const DEPTH_LIMIT: f64 = 4e-4;
 
 /// An assembly with everything derived from it.
 #[derive(Debug)]
