@@ -34,7 +34,7 @@ pub struct Entry {
 pub struct Verdict {
     /// Largest depth beyond the allowances along the path; 0 if there is none.
     pub depth: f64,
-    /// The deepest points of the poses at which the limit was exceeded; empty if the path is good.
+    /// The points that got deep along a path that exceeds the limit; empty if the path is good.
     pub entries: Vec<Entry>,
 }
 
@@ -66,7 +66,9 @@ impl Verifier {
     #[must_use]
     pub fn assembled_depth(&self, scene: &Scene, a: usize, b: usize) -> f64 {
         let pose = scene.bodies[a].planning_from_shape;
-        self.deepest(scene, a, &pose, b, 0.0).map_or(0.0, |e| e.over)
+        let mut entries = Vec::new();
+        self.entries(scene, a, &pose, b, 0.0, &mut entries);
+        entries.iter().map(|e| e.over).fold(0.0, f64::max)
     }
 
     /// Checks a path of a part (poses of its shape) among the parts that stand.
@@ -86,16 +88,18 @@ impl Verifier {
             .par_iter()
             .map(|pose| {
                 termination.check()?;
-                Ok(self.worst_at(scene, allowances, standing, part, pose))
+                Ok(self.entries_at(scene, allowances, standing, part, pose))
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
         let mut entries: Vec<Entry> = found.into_iter().flatten().collect();
         let depth = entries.iter().map(|e| e.over).fold(0.0, f64::max);
-        entries.retain(|e| e.over > self.limit);
+        if depth <= self.limit {
+            entries.clear();
+        }
         Ok(Verdict { depth, entries })
     }
 
-    fn worst_at(
+    fn entries_at(
         &self,
         scene: &Scene,
         allowances: &Allowances,
@@ -104,23 +108,44 @@ impl Verifier {
         pose: &Pose,
     ) -> Vec<Entry> {
         let bounds = scene.bodies[part].shape.bounds().transformed(pose);
-        standing
-            .iter()
-            .filter(|&&o| scene.bodies[o].bounds.meets(&bounds))
-            .filter_map(|&o| self.deepest(scene, part, pose, o, allowances.of(part, o)))
-            .collect()
+        let mut out = Vec::new();
+        for &other in standing.iter().filter(|&&o| scene.bodies[o].bounds.meets(&bounds)) {
+            self.entries(scene, part, pose, other, allowances.of(part, other), &mut out);
+        }
+        out
     }
 
-    /// The deepest sample of a pair beyond `granted`, on either side.
-    fn deepest(&self, scene: &Scene, part: usize, pose: &Pose, other: usize, granted: f64) -> Option<Entry> {
+    /// The samples of a pair deeper than `granted`, on either side: the deepest of each side, and
+    /// all that are deep enough to help in refining a motion.
+    fn entries(
+        &self,
+        scene: &Scene,
+        part: usize,
+        pose: &Pose,
+        other: usize,
+        granted: f64,
+        out: &mut Vec<Entry>,
+    ) {
         let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
         let to_standing = standing.planning_from_shape.inverse() * pose;
         let samples = |i: usize| &self.samples[self.shape_of[i]];
-        let mine = deepest_in(samples(part), &to_standing, &standing.shape.surface, granted);
-        let theirs = deepest_in(samples(other), &to_standing.inverse(), &moving.shape.surface, granted);
-        let entry = |on_moving| move |(over, point)| Entry { other, on_moving, point, over };
-        let (mine, theirs) = (mine.map(entry(true)), theirs.map(entry(false)));
-        [mine, theirs].into_iter().flatten().max_by(|a, b| a.over.total_cmp(&b.over))
+        let deep = self.limit / 2.0;
+        for (on_moving, tree, to_measured, surface) in [
+            (true, samples(part), &to_standing, &standing.shape.surface),
+            (false, samples(other), &to_standing.inverse(), &moving.shape.surface),
+        ] {
+            let mut worst: Option<Entry> = None;
+            entered(tree, to_measured, surface, granted, |point, over| {
+                let entry = Entry { other, on_moving, point, over };
+                if over > deep {
+                    out.push(entry.clone());
+                }
+                if worst.as_ref().is_none_or(|w| over > w.over) {
+                    worst = Some(entry);
+                }
+            });
+            out.extend(worst.filter(|w| w.over <= deep));
+        }
     }
 }
 
@@ -131,16 +156,16 @@ fn spacing(bounds: &Bounds) -> Spacing {
     Spacing { edge, blunt_edge: edge * 3.0, face: edge * 4.0 }
 }
 
-/// The deepest sample inside `surface` beyond `granted`: its excess and the sample in its own
-/// shape's frame.
-fn deepest_in(
+/// Visits the samples inside `surface` by more than `granted`: the sample in its own shape's frame,
+/// and its depth beyond.
+fn entered(
     samples: &SampleTree,
     to_measured: &Pose,
     surface: &Surface,
     granted: f64,
-) -> Option<(f64, Point3<f64>)> {
+    mut visit: impl FnMut(Point3<f64>, f64),
+) {
     let inner = surface.bounds().grown(-granted);
-    let mut worst: Option<(f64, Point3<f64>)> = None;
     samples.walk(
         0,
         |node, guess| {
@@ -158,12 +183,11 @@ fn deepest_in(
                 return;
             }
             let over = -surface.signed(&p, &surface.closest_from(&p, guess)) - granted;
-            if over > worst.map_or(0.0, |w| w.0) {
-                worst = Some((over, *sample));
+            if over > 0.0 {
+                visit(*sample, over);
             }
         },
     );
-    worst
 }
 
 /// The path's poses and as many between them as the density asks for.

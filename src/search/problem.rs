@@ -1,6 +1,6 @@
 //! A planning question in the planning frame, ready to be searched.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use nalgebra::Point3;
 
@@ -98,9 +98,14 @@ impl Problem<'_> {
 
     /// Makes points that refuted a path samples of their bodies.
     pub fn add_samples(&mut self, part: usize, entries: &[Entry]) {
+        let key = |p: &Point3<f64>| p.coords.map(f64::to_bits);
+        let mut known: HashSet<_> =
+            self.extra_points.iter().flat_map(|(body, list)| list.iter().map(move |p| (*body, key(p)))).collect();
         for entry in entries {
             let body = if entry.on_moving { part } else { entry.other };
-            self.extra_points.entry(body).or_default().push(entry.point);
+            if known.insert((body, key(&entry.point))) {
+                self.extra_points.entry(body).or_default().push(entry.point);
+            }
         }
         for (body, points) in &self.extra_points {
             self.scene.bodies[*body].extra_samples = SampleTree::over(points.clone());
