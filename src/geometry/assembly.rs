@@ -62,6 +62,7 @@ impl Assembly {
         for vertex in meshes.iter_mut().flat_map(|m| &mut m.vertices) {
             *vertex *= scale;
         }
+        findings.extend(odd_sizes(&meshes));
         let names: Vec<_> = source.parts.iter().map(|p| p.name.clone()).collect();
         let (shapes, parts) = share_shapes(meshes, names);
         let fixed = source
@@ -96,6 +97,24 @@ impl Assembly {
     pub fn longest_side(&self) -> f64 {
         self.parts.iter().fold(Bounds::EMPTY, |b, p| b.union(&p.bounds)).extents().max()
     }
+}
+
+/// Parts so much larger than all others that their unit of length is likely another one.
+fn odd_sizes(meshes: &[Mesh]) -> Option<(usize, String)> {
+    const SUSPICIOUS: f64 = 100.0;
+    let size = |m: &Mesh| Bounds::of(&m.vertices).extents().max();
+    let mut sizes: Vec<(f64, usize)> = meshes.iter().map(size).zip(0..).collect();
+    sizes.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let [(largest, part), (next, _), ..] = sizes[..] else { return None };
+    let ratio = largest / next;
+    (ratio > SUSPICIOUS).then(|| {
+        (
+            part,
+            format!(
+                "{ratio:.0} times as large as the next largest part: check that all parts have the same unit"
+            ),
+        )
+    })
 }
 
 /// The power of two that brings the longest side of the box of all parts into (5, 10].

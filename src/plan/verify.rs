@@ -9,7 +9,7 @@
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use crate::geometry::{Bounds, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
+use crate::geometry::{Bounds, Pose, SampleTree, Shape, Spacing, Surface, area_normal, interpolate};
 use crate::simulation::{Allowances, Scene};
 use crate::termination::{Interrupt, Termination};
 
@@ -69,6 +69,18 @@ impl Verifier {
         let mut entries = Vec::new();
         self.entries(scene, a, &pose, b, 0.0, &mut entries);
         entries.iter().map(|e| e.over).fold(0.0, f64::max)
+    }
+
+    /// How deep a point in the middle of one part lies in both, where surfaces show no overlap: two
+    /// parts that coincide have none of their surface inside the other.
+    #[must_use]
+    pub fn coincident_depth(&self, scene: &Scene, a: usize, b: usize) -> f64 {
+        let (one, other) = (&scene.bodies[a], &scene.bodies[b]);
+        let to_other = other.planning_from_shape.inverse() * one.planning_from_shape;
+        let depth = |surface: &Surface, p: &Point3<f64>| -surface.signed_distance(p);
+        interior_points(&one.shape.surface)
+            .map(|p| depth(&one.shape.surface, &p).min(depth(&other.shape.surface, &(to_other * p))))
+            .fold(0.0, f64::max)
     }
 
     /// Checks a path of a part (poses of its shape) among the parts that stand.
@@ -147,6 +159,22 @@ impl Verifier {
             out.extend(worst.filter(|w| w.over <= deep));
         }
     }
+}
+
+/// A few points below the largest faces, by a tenth of the smallest extent.
+fn interior_points(surface: &Surface) -> impl Iterator<Item = Point3<f64>> + '_ {
+    const PROBES: usize = 8;
+    let area = |t: u32| {
+        let [a, b, c] = surface.corners(t);
+        area_normal(&a, &b, &c).norm()
+    };
+    let mut faces: Vec<u32> = (0..surface.triangles().len() as u32).collect();
+    faces.sort_by(|&s, &t| area(t).total_cmp(&area(s)).then(s.cmp(&t)));
+    let below = surface.bounds().extents().min() / 10.0;
+    faces.into_iter().take(PROBES).map(move |t| {
+        let [a, b, c] = surface.corners(t);
+        Point3::from((a.coords + b.coords + c.coords) / 3.0) - surface.face_normal(t) * below
+    })
 }
 
 /// Denser than the engine's samples, and not a multiple of their spacing.

@@ -99,8 +99,11 @@ impl Problem<'_> {
     /// Makes points that refuted a path samples of their bodies.
     pub fn add_samples(&mut self, part: usize, entries: &[Entry]) {
         let key = |p: &Point3<f64>| p.coords.map(f64::to_bits);
-        let mut known: HashSet<_> =
-            self.extra_points.iter().flat_map(|(body, list)| list.iter().map(move |p| (*body, key(p)))).collect();
+        let mut known: HashSet<_> = self
+            .extra_points
+            .iter()
+            .flat_map(|(body, list)| list.iter().map(move |p| (*body, key(p))))
+            .collect();
         for entry in entries {
             let body = if entry.on_moving { part } else { entry.other };
             if known.insert((body, key(&entry.point))) {

@@ -57,6 +57,9 @@ impl Prepared {
         for &(a, b, depth) in &overlaps {
             scene.allowances.grant(a, b, depth);
         }
+        let mut overlaps = overlaps;
+        overlaps.extend(coincident_pairs(&scene, &verifier, termination)?);
+        overlaps.sort_by_key(|&(a, b, _)| (a, b));
         Ok(Self { scene, verifier, overlaps, sdf_time })
     }
 }
@@ -105,3 +108,29 @@ fn measure_overlaps(
         .collect::<Result<Vec<_>, Interrupt>>()?;
     Ok(depths.into_iter().filter(|(_, _, d)| *d > LEAST_OVERLAP * scene.longest_side).collect())
 }
+
+/// Pairs without a granted overlap that share their inside all the same. It is reported, but not
+/// granted: their surfaces coincide.
+fn coincident_pairs(
+    scene: &Scene,
+    verifier: &Verifier,
+    termination: &Termination,
+) -> Result<Vec<(usize, usize, f64)>, Interrupt> {
+    let n = scene.bodies.len();
+    let mut out = Vec::new();
+    for (a, b) in (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))) {
+        termination.check()?;
+        let alike = (scene.bodies[a].bounds.centre() - scene.bodies[b].bounds.centre()).norm()
+            < COINCIDENT * scene.bodies[a].bounds.extents().norm();
+        if alike && scene.allowances.of(a, b) == 0.0 {
+            let depth = verifier.coincident_depth(scene, a, b);
+            if depth > LEAST_OVERLAP * scene.longest_side {
+                out.push((a, b, depth));
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// Middles closer than this share of the size make a pair suspicious.
+const COINCIDENT: f64 = 1e-3;

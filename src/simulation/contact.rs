@@ -242,7 +242,9 @@ impl Sample {
             out.add(p);
         }
         let stopped = out.iter().all(|p| p.height + p.normal.dot(&self.motion) < 0.0);
-        if stopped && let Some((ahead, _)) = measured.closest_nearby(&(self.point + self.motion), self.motion.norm()) {
+        if stopped
+            && let Some((ahead, _)) = measured.closest_nearby(&(self.point + self.motion), self.motion.norm())
+        {
             surface.feature_normals(&ahead, |n| {
                 if let Some(p) = above(n, &ahead.point) {
                     out.add(p);
@@ -251,7 +253,10 @@ impl Sample {
         }
         if out.iter().next().is_none() {
             let normal = surface.pseudo_normal(&self.closest);
-            out.add(Plane { normal: normal.try_normalize(0.0).unwrap_or_else(Vector3::x), height: self.distance });
+            out.add(Plane {
+                normal: normal.try_normalize(0.0).unwrap_or_else(Vector3::x),
+                height: self.distance,
+            });
         }
     }
 }

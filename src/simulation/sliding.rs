@@ -9,7 +9,7 @@
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 
-use crate::geometry::Pose;
+use crate::geometry::{Pose, interpolate};
 use crate::termination::{Interrupt, Termination};
 
 use super::contact::{Contact, Mover, Near, reduced};
@@ -261,7 +261,9 @@ impl Drive {
             if violated.is_empty() {
                 violated = self.violations(&trial, near, &twist, 0..near.contacts.len());
                 if violated.is_empty() {
-                    return Attempt::Moved { twist, touching };
+                    let clear = !self.turns || self.is_clear_between(mover, &trial, near, &twist);
+                    let moved = Attempt::Moved { twist, touching: touching.clone() };
+                    return if clear { moved } else { Attempt::Entered(touching) };
                 }
             }
             tracing::trace!(
@@ -281,7 +283,11 @@ impl Drive {
                 let row = Row { b: row.b - row.a.dot(&twist), ..row };
                 // A plane that the sample was beyond already at the start does not separate it.
                 let separates = row.b >= -2.0 * DEPTH_TOLERANCE;
-                if separates { Some(row) } else { mover.way_out(&near.contacts[*i], &mut options).map(|r| self.freed(r)) }
+                if separates {
+                    Some(row)
+                } else {
+                    mover.way_out(&near.contacts[*i], &mut options).map(|r| self.freed(r))
+                }
             });
             let (worst, kept) = reduced(deeper, self.gyration);
             rows.extend(worst);
@@ -290,6 +296,15 @@ impl Drive {
         entered.sort_unstable();
         entered.dedup();
         Attempt::Entered(entered)
+    }
+
+    /// Whether a turn that is clear at its end is so on the way: points move on arcs, which bulge.
+    fn is_clear_between(&self, from: &Mover<'_>, to: &Mover<'_>, near: &Near, twist: &Vector6<f64>) -> bool {
+        let centre = from.scene.centre_in_shape(from.part);
+        let pose = interpolate(&from.pose, &to.pose, &centre, 0.5);
+        let middle = Mover { pose, ..*from };
+        let entered = self.violations(&middle, near, twist, 0..near.contacts.len());
+        entered.iter().all(|(_, c)| c.gap >= -2.0 * DEPTH_TOLERANCE)
     }
 
     /// One constraint per contact, reduced, and which contacts they come from. Where a contact
