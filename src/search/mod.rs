@@ -5,6 +5,8 @@
 
 mod outcome;
 mod problem;
+mod removal;
+mod report;
 mod request;
 mod sbdp;
 mod state;

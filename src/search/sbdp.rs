@@ -13,19 +13,15 @@ use rayon::prelude::*;
 
 use crate::blocking_graph::{Blockage, Evaluation, blocked_from, initial_blockages};
 use crate::geometry::Pose;
-use crate::plan::PlanStatus;
-use crate::simulation::{Action, End, Motion, Surroundings, exit_direction};
+use crate::simulation::{Action, End, Motion, Surroundings};
 use crate::termination::Interrupt;
 
-use super::outcome::{BlockedAction, Counters, Outcome, Removal};
+use super::outcome::{Counters, Outcome, Removal};
 use super::problem::{Observer, Problem};
 use super::state::{Node, Phase, coarseness, least_travel, same_state};
 
 /// Translational passes in a row before turning is tried, if they only find new states.
 const TRANSLATION_PASSES: usize = 6;
-/// How often a motion is simulated again with the points at which verification refuted it.
-const REFINEMENTS: usize = 4;
-
 /// Why a search stops before it is done.
 pub(super) enum Stop {
     Interrupted(Interrupt),
@@ -40,9 +36,9 @@ impl From<Interrupt> for Stop {
 
 /// What a pass brought.
 #[derive(Debug, Clone, Copy, Default)]
-struct Gain {
-    removed: bool,
-    new_states: bool,
+pub(super) struct Gain {
+    pub(super) removed: bool,
+    pub(super) new_states: bool,
 }
 
 impl Gain {
@@ -53,27 +49,27 @@ impl Gain {
 
 /// One simulation to run.
 #[derive(Debug, Clone, Copy)]
-struct Job {
-    node: usize,
-    action: usize,
+pub(super) struct Job {
+    pub(super) node: usize,
+    pub(super) action: usize,
 }
 
 pub(super) struct Search<'a, 'o> {
-    problem: Problem<'a>,
-    observer: &'o mut dyn Observer,
+    pub(super) problem: Problem<'a>,
+    pub(super) observer: &'o mut dyn Observer,
     /// All present parts that have not been taken out.
-    everything: Surroundings,
-    around: Vec<Option<Surroundings>>,
+    pub(super) everything: Surroundings,
+    pub(super) around: Vec<Option<Surroundings>>,
     /// A part whose hull meets this part's, both assembled: proof that it is not free.
-    entangled: Vec<Option<usize>>,
-    nodes: Vec<Node>,
-    states_of: Vec<usize>,
-    translations: Vec<Action>,
-    rotations: Vec<Action>,
+    pub(super) entangled: Vec<Option<usize>>,
+    pub(super) nodes: Vec<Node>,
+    pub(super) states_of: Vec<usize>,
+    pub(super) translations: Vec<Action>,
+    pub(super) rotations: Vec<Action>,
     /// The last resort: actions that static analysis excluded are simulated, too.
-    distrust_static: bool,
-    removals: Vec<Removal>,
-    counters: Counters,
+    pub(super) distrust_static: bool,
+    pub(super) removals: Vec<Removal>,
+    pub(super) counters: Counters,
 }
 
 /// Searches until everything asked for is out, nothing more can be found, or a limit is met.
@@ -163,7 +159,7 @@ impl<'a, 'o> Search<'a, 'o> {
         self.nodes.push(node);
     }
 
-    fn actions(&self, phase: Phase) -> &[Action] {
+    pub(super) fn actions(&self, phase: Phase) -> &[Action] {
         match phase {
             Phase::Translation => &self.translations,
             Phase::Rotation => &self.rotations,
@@ -327,7 +323,7 @@ impl<'a, 'o> Search<'a, 'o> {
         Ok(motions?)
     }
 
-    fn charge(&mut self) -> Result<(), Stop> {
+    pub(super) fn charge(&mut self) -> Result<(), Stop> {
         if let Some(most) = self.problem.max_simulations
             && self.counters.simulations >= most
         {
@@ -339,7 +335,13 @@ impl<'a, 'o> Search<'a, 'o> {
     }
 
     /// Takes in a motion; true if the scene changed by it.
-    fn take(&mut self, phase: Phase, job: Job, motion: Motion, gain: &mut Gain) -> Result<bool, Stop> {
+    pub(super) fn take(
+        &mut self,
+        phase: Phase,
+        job: Job,
+        motion: Motion,
+        gain: &mut Gain,
+    ) -> Result<bool, Stop> {
         let Motion { path, end } = motion;
         let (part, action) = (self.nodes[job.node].part, self.actions(phase)[job.action]);
         tracing::debug!(part, node = job.node, %action, steps = path.len(), ?end, "simulated");
@@ -369,227 +371,23 @@ impl<'a, 'o> Search<'a, 'o> {
         Ok(false)
     }
 
-    fn block(&mut self, phase: Phase, job: Job, by: Vec<usize>) {
+    pub(super) fn block(&mut self, phase: Phase, job: Job, by: Vec<usize>) {
         if let Some(b) = self.nodes[job.node].blockage_mut(phase) {
             b.block_jointly(job.action, by);
         }
     }
 
-    /// Thins and verifies a path that leads out. True if the part is out; else the motion is
-    /// simulated again with the refuting points as samples, and given up after some tries.
-    fn take_out(&mut self, phase: Phase, job: Job, mut motion: Vec<Pose>) -> Result<bool, Stop> {
-        let part = self.nodes[job.node].part;
-        for refinement in 0..=REFINEMENTS {
-            let full = joined(&self.nodes[job.node].path, &motion);
-            let started = Instant::now();
-            let checked = self.problem.checked_path(self.standing(part), part, &full);
-            self.counters.verification += started.elapsed();
-            let refuted = match checked? {
-                Ok((path, depth)) => {
-                    self.remove(part, path, depth);
-                    return Ok(true);
-                }
-                Err(entries) => entries,
-            };
-            tracing::debug!(part, refinement, over = refuted.first().map(|e| e.over), "path refuted");
-            self.problem.add_samples(part, &refuted);
-            if self.refuted_before(part, job)? {
-                return Ok(false);
-            }
-            if refinement == REFINEMENTS {
-                let mut by: Vec<_> = refuted.iter().map(|e| e.other).collect();
-                by.sort_unstable();
-                by.dedup();
-                self.block(phase, job, by);
-                return Ok(false);
-            }
-            self.charge()?;
-            let started = Instant::now();
-            let action = self.actions(phase)[job.action];
-            let again = simulate(&self.problem, &self.nodes[job.node], &self.around, action);
-            self.counters.simulation += started.elapsed();
-            let again = again?;
-            if !matches!(again.end, End::Disassembled(_)) {
-                self.take(phase, job, again, &mut Gain::default())?;
-                return Ok(false);
-            }
-            motion = again.path;
-        }
-        Ok(false)
-    }
-
-    /// Whether already the path to a state does not hold; then the state is dropped and the
-    /// action that led to it is open again.
-    fn refuted_before(&mut self, part: usize, job: Job) -> Result<bool, Stop> {
-        let Some((parent, phase, action)) = self.nodes[job.node].origin else { return Ok(false) };
-        let started = Instant::now();
-        let path = self.nodes[job.node].path.clone();
-        let checked = self.problem.checked_path(self.standing(part), part, &path);
-        self.counters.verification += started.elapsed();
-        if checked?.is_ok() {
-            return Ok(false);
-        }
-        self.nodes[job.node].alive = false;
-        if let Some(b) = self.nodes[parent].blockage_mut(phase) {
-            b.reopen(action);
-        }
-        Ok(true)
-    }
-
-    fn standing(&self, part: usize) -> Vec<usize> {
-        self.everything.standing.iter().copied().filter(|&i| i != part).collect()
-    }
-
-    fn surroundings(&mut self, part: usize) -> &Surroundings {
-        let (everything, scene) = (&self.everything, &self.problem.scene);
-        self.around[part].get_or_insert_with(|| everything.without(scene, part))
-    }
-
-    fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) {
-        self.everything = self.everything.without(&self.problem.scene, part);
-        self.around.fill(None);
-        let mut waited_for = Vec::new();
-        for node in &mut self.nodes {
-            if node.part == part {
-                if node.is_root() {
-                    let blockages = [node.translation.as_ref(), Some(&node.rotation)];
-                    waited_for
-                        .extend(blockages.into_iter().flatten().flat_map(|b| b.outlived().iter().copied()));
-                }
-                node.alive = false;
-                // Its path and blockages are of no use any more.
-                node.path.truncate(1);
-                continue;
-            }
-            if let Some(b) = &mut node.translation {
-                b.remove(part);
-            }
-            node.rotation.remove(part);
-        }
-        waited_for.sort_unstable();
-        waited_for.dedup();
-        let removal = Removal { part, path, depth, waited_for };
-        self.observer.removal(&removal);
-        self.removals.push(removal);
-    }
-
-    /// Parts whose hull is apart from all others' need no motion.
-    fn take_free_parts(&mut self) -> Result<(), Stop> {
-        let mut changed = true;
-        while changed && !self.is_done() {
-            changed = false;
-            for part in self.everything.standing.clone() {
-                self.problem.termination.check()?;
-                if self.is_done() {
-                    break;
-                }
-                if self.problem.may_move(part) && self.is_free(part) {
-                    let pose = self.problem.scene.bodies[part].planning_from_shape;
-                    self.remove(part, vec![pose], 0.0);
-                    changed = true;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn is_free(&mut self, part: usize) -> bool {
-        if self.everything.standing.len() < 2 {
-            return false;
-        }
-        if let Some(other) = self.entangled[part]
-            && self.everything.standing.binary_search(&other).is_ok()
-        {
-            return false;
-        }
-        let scene = &self.problem.scene;
-        let pose = scene.bodies[part].planning_from_shape;
-        let meets = |&&other: &&usize| {
-            other != part
-                && scene.bodies[other].bounds.meets(&scene.bodies[part].bounds)
-                && exit_direction(scene, &Surroundings::new(scene, vec![other]), part, &pose, None).is_none()
-        };
-        self.entangled[part] = self.everything.standing.iter().find(meets).copied();
-        if self.entangled[part].is_some() {
-            return false;
-        }
-        self.surroundings(part);
-        let around = self.around[part].as_ref();
-        around.is_some_and(|a| exit_direction(&self.problem.scene, a, part, &pose, None).is_some())
-    }
-
-    fn is_done(&self) -> bool {
+    pub(super) fn is_done(&self) -> bool {
         self.problem.is_goal(&self.everything.standing)
-    }
-
-    fn outcome(self, stop: Option<Stop>) -> Outcome {
-        let (status, reason) = match stop {
-            _ if self.is_done() => (PlanStatus::Complete, None),
-            None => (PlanStatus::Infeasible, Some(self.evidence())),
-            Some(Stop::Interrupted(Interrupt::Cancelled)) => {
-                (PlanStatus::Cancelled, Some("cancelled".to_owned()))
-            }
-            Some(Stop::Interrupted(Interrupt::DeadlinePassed)) => {
-                (PlanStatus::Timeout, Some("the deadline passed".to_owned()))
-            }
-            Some(Stop::Budget(n)) => {
-                (PlanStatus::Partial, Some(format!("the budget of {n} simulations is used up")))
-            }
-        };
-        let blocked = if status == PlanStatus::Complete { Vec::new() } else { self.blocked() };
-        Outcome {
-            status,
-            reason,
-            remaining: self.everything.standing.clone(),
-            blocked,
-            removals: self.removals,
-            counters: self.counters,
-        }
-    }
-
-    /// What was tried before the search gave up.
-    fn evidence(&self) -> String {
-        let stuck = self.problem.wanted(&self.everything.standing);
-        let most = stuck.iter().map(|&p| self.states_of[p]).max().unwrap_or(0);
-        let coarse = coarseness(most);
-        format!(
-            "{} of {} parts cannot leave one at a time: every state reached was expanded with {} translations \
-             and {} actions with rotational freedom ({} states in all, told apart at {:.3} of the longest side \
-             and {:.1} rad), also where static analysis saw no way",
-            stuck.len(),
-            self.problem.present.len(),
-            self.translations.len(),
-            self.rotations.len(),
-            self.counters.states,
-            0.05 * coarse / self.problem.scene.longest_side,
-            0.5 * coarse,
-        )
-    }
-
-    fn blocked(&self) -> Vec<BlockedAction> {
-        let wanted = self.problem.wanted(&self.everything.standing);
-        let mut out = Vec::new();
-        for node in self.nodes.iter().filter(|n| n.alive && n.is_root() && wanted.contains(&n.part)) {
-            for phase in [Phase::Translation, Phase::Rotation] {
-                let Some(b) = node.blockage(phase) else { continue };
-                for (i, action) in self.actions(phase).iter().enumerate() {
-                    let by: Vec<_> = b.blockers(i).into_iter().collect();
-                    if !by.is_empty() {
-                        out.push(BlockedAction { part: node.part, action: action.to_string(), by });
-                    }
-                }
-            }
-        }
-        out
     }
 }
 
 /// A path continued by a motion that starts at its end.
-fn joined(path: &[Pose], motion: &[Pose]) -> Vec<Pose> {
+pub(super) fn joined(path: &[Pose], motion: &[Pose]) -> Vec<Pose> {
     path.iter().chain(motion.iter().skip(1)).copied().collect()
 }
 
-fn simulate(
+pub(super) fn simulate(
     problem: &Problem<'_>,
     node: &Node,
     around: &[Option<Surroundings>],
