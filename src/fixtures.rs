@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 use crate::geometry::{
-    Assembly, Mesh, Pose, Solidity, SourceAssembly, SourceMesh, SourcePart, Surface, heal, interpolate,
+    Assembly, Mesh, Pose, Solidity, SourceAssembly, SourceMesh, SourcePart, Surface, heal,
 };
 use crate::plan::Verifier;
 use crate::sdf::Field;
@@ -191,10 +191,4 @@ pub(crate) fn spread(lo: [f64; 3], hi: [f64; 3], count: usize) -> impl Iterator<
             lo[a] + (hi[a] - lo[a]) * (i as f64 * STEPS[a]).fract()
         }))
     })
-}
-
-/// Poses on the way from one to another, both included.
-pub(crate) fn way(from: &Pose, to: &Pose, count: usize) -> Vec<Pose> {
-    let n = (count - 1) as f64;
-    (0..count).map(|k| interpolate(from, to, &Point3::origin(), k as f64 / n)).collect()
 }

@@ -241,7 +241,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::fixtures::{LIMIT, block_on_plate, cells, cuboid, moved, peg_in_hole, scene, way};
+    use crate::fixtures::{LIMIT, block_on_plate, cells, cuboid, moved, peg_in_hole, scene};
 
     /// The path of part 1 by steps from its assembled pose, checked against all others.
     fn checked(scene: &Scene, verifier: &Verifier, steps: &[Vector3<f64>]) -> Verdict {
@@ -263,8 +263,10 @@ mod tests {
         let wall = cuboid([2.5, -4.0, 0.0], [3.0, 4.0, 3.0]);
         let (scene, verifier) = scene([plate, block, wall]);
         let verdict = checked(&scene, &verifier, &[Vector3::x() * 6.0]);
-        // No point of either is further inside than half the wall.
-        assert!((verdict.depth - 0.25).abs() < 0.03, "{}", verdict.depth);
+        // The block gets no deeper into the wall than half its width, the wall into the block likewise.
+        assert!(verdict.depth > 0.25 && verdict.depth <= 1.0, "{}", verdict.depth);
+        let by_block = verdict.entries.iter().filter(|e| e.on_moving).map(|e| e.over).fold(0.0, f64::max);
+        assert!((by_block - 0.25).abs() < 0.03, "{by_block}");
         assert!(verdict.entries.len() > 10);
         for e in &verdict.entries {
             assert!(e.other == 2 || e.over < 1e-9, "{e:?}");
@@ -289,12 +291,12 @@ mod tests {
         let wall = cuboid([1.5, -3.0, -3.0], [1.6, 3.0, 3.0]);
         let (scene, verifier) = scene([wall, cuboid([0.0; 3], [1.0; 3])]);
         let verdict = checked(&scene, &verifier, &[Vector3::x() * 4.0]);
-        assert!(verdict.depth > LIMIT && verdict.depth < 0.051, "{}", verdict.depth);
+        assert!(verdict.depth > 0.05 && verdict.depth <= 0.5, "{}", verdict.depth);
     }
 
     #[test]
     fn flush_sliding_is_not_deep() {
-        let turn = Pose::rotation(Vector3::new(0.3, -0.2, 0.9));
+        let turn = Pose::rotation(Vector3::new(0.2, -0.15, 0.1));
         for pose in [Pose::identity(), turn] {
             let (scene, verifier) = scene(block_on_plate().map(|m| moved(m, &pose)));
             let steps =
@@ -314,9 +316,9 @@ mod tests {
 
     #[test]
     fn what_a_turn_sweeps_over_is_found() {
-        // A bar that points up turns a quarter about y, through a ridge it is clear of at both ends.
+        // A bar that points up turns half-way about y, through a ridge it is clear of at both ends.
         let base =
-            cells([&[-4.0, 2.0, 2.3, 4.0], &[-1.0, 1.0], &[-1.0, 0.0, 2.0]], |c| c[2] == 0 || c[0] == 1);
+            cells([&[-4.0, 1.5, 1.8, 4.0], &[-1.0, 1.0], &[-1.0, 0.0, 2.0]], |c| c[2] == 0 || c[0] == 1);
         let (scene, verifier) = scene([base, cuboid([-0.2, -0.2, 0.5], [0.2, 0.2, 4.5])]);
         let from = scene.bodies[1].planning_from_shape;
         let about = |angle: f64| {
@@ -324,7 +326,7 @@ mod tests {
             foot * Pose::rotation(Vector3::y() * angle) * foot.inverse() * from
         };
         assert!(checked_path(&scene, &verifier, &[from, about(-0.5)]).depth < 1e-9);
-        let path = way(&from, &about(std::f64::consts::PI), 5);
+        let path = [0.0, 1.0, 2.0, 3.0, 4.0].map(|k| about(k * std::f64::consts::FRAC_PI_4));
         assert!(checked_path(&scene, &verifier, &[path[0]]).depth < 1e-9);
         assert!(checked_path(&scene, &verifier, &[path[4]]).depth < 1e-9);
         assert!(checked_path(&scene, &verifier, &path).depth > 0.05);
