@@ -69,6 +69,34 @@ pub(crate) fn l_shape() -> SourceMesh {
     cells([&[0.0, 1.0, 2.0], &[0.0, 1.0, 2.0], &[0.0, 1.0]], |c| c[0] + c[1] < 2)
 }
 
+/// A tube about z with `count` flat sides.
+pub(crate) fn tube(inner: f64, outer: f64, z: [f64; 2], count: u32) -> SourceMesh {
+    let mut mesh = SourceMesh::default();
+    for i in 0..count {
+        let (sin, cos) = (f64::from(i) * std::f64::consts::TAU / f64::from(count)).sin_cos();
+        // Below and above at the outside, then the same at the inside.
+        mesh.vertices.extend(
+            [(outer, z[0]), (outer, z[1]), (inner, z[0]), (inner, z[1])].map(|(r, z)| [r * cos, r * sin, z]),
+        );
+        let (a, b) = (4 * i, 4 * ((i + 1) % count));
+        for [s, t] in [[0, 1], [1, 3], [3, 2], [2, 0]] {
+            mesh.triangles.extend([[a + s, b + s, b + t], [a + s, b + t, a + t]]);
+        }
+    }
+    mesh
+}
+
+/// A rod about z with `count` flat sides.
+pub(crate) fn rod(radius: f64, z: [f64; 2], count: u32) -> SourceMesh {
+    let mut mesh = tube(0.0, radius, z, count);
+    // The inner circle is one point below and one above.
+    mesh.triangles.retain_mut(|t| {
+        t.iter_mut().filter(|v| **v % 4 >= 2).for_each(|v| *v %= 4);
+        t[0] != t[1] && t[1] != t[2] && t[2] != t[0]
+    });
+    mesh
+}
+
 /// A ball of radius 1, its octahedron's faces split `rounds` times.
 pub(crate) fn ball(rounds: u32) -> SourceMesh {
     let mut vertices: Vec<[f64; 3]> = vec![

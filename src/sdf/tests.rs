@@ -3,7 +3,7 @@ use std::sync::atomic::Ordering;
 use nalgebra::{Point3, Vector3};
 
 use super::grid::{BAND, BRICK, CELLS, EMPTY, FAR_NODE, Field, NODES};
-use crate::fixtures::{ball, cuboid, l_shape, moved, open_box, spread, surface};
+use crate::fixtures::{ball, cuboid, l_shape, moved, open_box, spread, surface, winding_surface};
 use crate::geometry::{Pose, Surface};
 use crate::termination::{Interrupt, Termination};
 
@@ -206,6 +206,17 @@ fn an_open_box_is_signed_by_winding_number() {
         let w = s.winding(&p).unwrap();
         if value != 0.0 && (w - 0.5).abs() > 0.02 {
             assert_eq!(value < 0.0, w > 0.5, "winding {w} at {p}");
+        }
+    }
+}
+
+#[test]
+fn a_closed_solid_signed_by_winding_number_has_the_same_field() {
+    for mesh in [l_shape(), ball(3)] {
+        let (by_normal, by_winding) = (field(&surface(mesh.clone())), field(&winding_surface(mesh)));
+        for ((p, v, _), (q, w, _)) in nodes(&by_normal).zip(nodes(&by_winding)) {
+            assert!(p == q && v.abs() == w.abs(), "{v} and {w} at {p}");
+            assert!(v.abs() < 1e-9 || v == w, "{v} and {w} at {p}");
         }
     }
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use nalgebra::{Point3, Vector3};
 
 use super::{Action, Axis, End, HULL_MARGIN, Motion, Scene, SlidingEngine, Surroundings, TransitionFunction};
-use crate::fixtures::{block_on_plate, cells, cuboid, moved, peg_in_hole, scene};
+use crate::fixtures::{block_on_plate, cells, cuboid, moved, peg_in_hole, rod, scene, tube};
 use crate::geometry::{Pose, SourceMesh};
 use crate::plan::Verifier;
 use crate::termination::{Interrupt, Termination};
@@ -21,8 +21,8 @@ const SIDEWAYS: [Action; 4] = [
     Action::Push(Axis::Y, false),
 ];
 
-/// Between two samples of the engine a feature may enter a little deeper than the samples do.
-const BETWEEN_SAMPLES: f64 = 5e-4;
+/// Between two samples or two poses of the engine a feature may be a little deeper than there.
+const BETWEEN_SAMPLES: f64 = 1e-4;
 
 /// A scene in which part 1 moves and part 0 stands.
 struct Case {
@@ -66,6 +66,11 @@ fn block_in_frame() -> [SourceMesh; 2] {
     [frame, cuboid([-0.5, -0.4, -0.3], [0.5, 0.4, 0.3])]
 }
 
+/// A tube with a rod in it that is wider than the bore by `excess` all around.
+fn round_peg(excess: f64) -> [SourceMesh; 2] {
+    [tube(1.0, 3.0, [-2.0, 2.0], 24), rod(1.0 + excess, [-3.0, 3.0], 24)]
+}
+
 fn cases() -> Vec<Case> {
     vec![
         Case::new("block on plate", block_on_plate()),
@@ -74,6 +79,8 @@ fn cases() -> Vec<Case> {
         Case::new("press fit", peg_in_hole(0.02)),
         Case::new("tilted peg", peg_in_hole(0.0).map(|m| moved(m, &tilted()))),
         Case::new("block in frame", block_in_frame()),
+        Case::new("round peg", round_peg(0.0)),
+        Case::new("loose round peg", round_peg(-0.03)),
     ]
 }
 
@@ -145,6 +152,26 @@ fn a_peg_in_a_blind_hole_leaves_only_upwards() {
                 assert_eq!(motion.end, End::Collision { with: vec![0] }, "{action}, excess {excess}");
             }
         }
+    }
+}
+
+#[test]
+fn a_round_peg_leaves_its_bore_both_ways_and_turns_in_it() {
+    for excess in [0.0, -0.03, 0.02] {
+        let case = Case::new("round peg", round_peg(excess));
+        for engine in ENGINES {
+            assert_out(&case, &case.motion(engine, UP));
+            assert_out(&case, &case.motion(engine, DOWN));
+            for action in SIDEWAYS {
+                let motion = case.motion(engine, action);
+                assert_eq!(motion.end, End::Collision { with: vec![0] }, "{action}, excess {excess}");
+            }
+        }
+    }
+    let case = Case::new("loose round peg", round_peg(-0.03));
+    for engine in ENGINES {
+        let motion = case.motion(engine, Action::Turn(Axis::Z, true));
+        assert!(matches!(motion.end, End::Undecided { .. }), "{:?}", motion.end);
     }
 }
 
