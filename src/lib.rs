@@ -4,6 +4,8 @@ pub mod blocking_graph;
 pub mod cli;
 pub mod config;
 pub mod daemon;
+#[cfg(test)]
+mod fixtures;
 pub mod geometry;
 pub mod plan;
 pub mod sdf;

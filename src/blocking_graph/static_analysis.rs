@@ -80,3 +80,138 @@ const NEAR: f64 = 0.2;
 fn boxes_near(scene: &Scene, a: usize, b: usize) -> bool {
     scene.bodies[a].bounds.grown(NEAR).meets(&scene.bodies[b].bounds)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::Ordering;
+
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::fixtures::{block_on_plate, cuboid, moved, peg_in_hole, scene};
+
+    const UP: usize = 4;
+    const DOWN: usize = 5;
+    const LEAST: f64 = 0.05;
+
+    fn initial(scene: &Scene) -> Vec<Blockage> {
+        let all: Vec<_> = (0..scene.bodies.len()).collect();
+        let translations = Action::translations();
+        initial_blockages(scene, &all, &translations, &|_| LEAST, &Termination::default()).unwrap()
+    }
+
+    fn open(b: &Blockage) -> Vec<usize> {
+        b.open_actions().collect()
+    }
+
+    #[test]
+    fn the_six_translations_stand_in_opposite_pairs() {
+        let translations = Action::translations();
+        for (a, action) in translations.iter().enumerate() {
+            assert_eq!(action.force(), -translations[a ^ 1].force());
+        }
+        assert_eq!(
+            (translations[UP].to_string(), translations[DOWN].to_string()),
+            ("+z".into(), "-z".into())
+        );
+    }
+
+    #[test]
+    fn a_plate_blocks_its_block_downwards_and_the_block_its_plate_upwards() {
+        let (scene, _) = scene(block_on_plate());
+        let b = initial(&scene);
+        assert_eq!((open(&b[1]), open(&b[0])), (vec![0, 1, 2, 3, UP], vec![0, 1, 2, 3, DOWN]));
+        assert_eq!(b[1].blockers(DOWN).into_iter().collect::<Vec<_>>(), [0]);
+        assert_eq!(b[0].blockers(UP).into_iter().collect::<Vec<_>>(), [1]);
+    }
+
+    #[test]
+    fn edges_are_symmetric() {
+        let tilt = crate::geometry::Pose::rotation(Vector3::new(0.1, 0.5, 0.0));
+        let [plate, block] = block_on_plate();
+        let stack = vec![
+            plate,
+            block,
+            cuboid([-1.0, -1.0, 2.0], [1.0, 1.0, 3.0]),
+            cuboid([1.0, -1.0, 0.0], [2.0, 1.0, 1.0]),
+        ];
+        for meshes in [
+            stack,
+            peg_in_hole(0.0).into(),
+            peg_in_hole(0.02).into(),
+            peg_in_hole(0.0).map(|m| moved(m, &tilt)).into(),
+        ] {
+            let (scene, _) = scene(meshes);
+            let b = initial(&scene);
+            for (p, o) in (0..b.len()).flat_map(|p| (0..b.len()).map(move |o| (p, o))) {
+                for a in 0..6 {
+                    assert_eq!(
+                        b[p].blockers(a).contains(&o),
+                        b[o].blockers(a ^ 1).contains(&p),
+                        "{p}, {o}, {a}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_peg_in_a_blind_hole_is_open_only_upwards() {
+        for excess in [0.0, 0.02] {
+            let (scene, _) = scene(peg_in_hole(excess));
+            assert_eq!(open(&initial(&scene)[1]), [UP], "excess {excess}");
+        }
+    }
+
+    #[test]
+    fn a_peg_in_a_tilted_hole_is_open_where_it_can_slide() {
+        let tilt = crate::geometry::Pose::rotation(Vector3::new(0.0, 0.5, 0.0));
+        let (scene, _) = scene(peg_in_hole(0.0).map(|m| moved(m, &tilt)));
+        // Out of the hole is towards +x and +z.
+        assert_eq!(open(&initial(&scene)[1]), [0, UP]);
+    }
+
+    #[test]
+    fn absent_and_distant_parts_block_nothing() {
+        let [plate, block] = block_on_plate();
+        let (scene, _) = scene([plate, block, cuboid([3.0, 3.0, 1.0], [4.0, 4.0, 2.0])]);
+        assert_eq!(open(&initial(&scene)[2]).len(), 6);
+        let t = Termination::default();
+        let without = initial_blockages(&scene, &[1, 2], &Action::translations(), &|_| LEAST, &t).unwrap();
+        assert!(without.iter().all(|b| open(b).len() == 6));
+    }
+
+    #[test]
+    fn a_displaced_part_is_blocked_by_what_is_around_it_there() {
+        let (scene, _) = scene(peg_in_hole(0.0));
+        let blockage = |lift: f64| {
+            let pose = Pose::translation(0.0, 0.0, lift) * scene.bodies[1].planning_from_shape;
+            blocked_from(&scene, &[0], 1, &pose, &Action::translations(), LEAST)
+        };
+        assert_eq!(open(&blockage(0.0)), [UP]);
+        assert_eq!(open(&blockage(1.0)), [UP, DOWN], "half-way out there is room below");
+        assert_eq!(open(&blockage(2.0)), [0, 1, 2, 3, UP, DOWN], "on the rim it is over the hole");
+        assert_eq!(open(&blockage(5.0)).len(), 6);
+    }
+
+    #[test]
+    fn a_displaced_part_is_blocked_as_initially_where_it_stands() {
+        let [plate, block] = block_on_plate();
+        let (scene, _) = scene([plate, block, cuboid([1.0, -1.0, 0.0], [2.0, 1.0, 1.0])]);
+        let pose = scene.bodies[1].planning_from_shape;
+        let there = blocked_from(&scene, &[0, 2], 1, &pose, &Action::translations(), LEAST);
+        let initially = &initial(&scene)[1];
+        for a in 0..6 {
+            assert_eq!(there.blockers(a), initially.blockers(a), "action {a}");
+        }
+    }
+
+    #[test]
+    fn a_cancelled_analysis_ends_with_the_reason() {
+        let (scene, _) = scene(block_on_plate());
+        let termination = Termination::default();
+        termination.cancel_flag().store(true, Ordering::Relaxed);
+        let ended = initial_blockages(&scene, &[0, 1], &Action::translations(), &|_| LEAST, &termination);
+        assert_eq!(ended.err(), Some(Interrupt::Cancelled));
+    }
+}

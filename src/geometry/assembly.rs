@@ -162,3 +162,83 @@ fn share_shapes(meshes: Vec<Mesh>, names: Vec<String>) -> (Vec<Arc<Shape>>, Vec<
         .collect();
     (shapes, parts)
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::fixtures::{block_on_plate, cuboid, l_shape, moved, source};
+
+    fn scaled(factor: f64) -> SourceAssembly {
+        source(block_on_plate().map(|mut m| {
+            m.vertices.iter_mut().flatten().for_each(|x| *x *= factor);
+            m
+        }))
+    }
+
+    #[test]
+    fn the_longest_side_falls_into_the_planning_frame() {
+        for size in [1.0, 1e7, 1e-4, 1.25, 0.625, 0.6249999999, 1.2500000001, 3.7e3, 1.0 / 3.0] {
+            let a = Assembly::new(&scaled(size)).unwrap();
+            assert!(a.longest_side() > 5.0 && a.longest_side() <= 10.0, "{} for {size}", a.longest_side());
+            assert_eq!(a.scale.log2().fract(), 0.0, "{} is no power of two", a.scale);
+            assert!((a.longest_side() / a.scale - 8.0 * size).abs() < 1e-9 * size);
+        }
+    }
+
+    #[test]
+    fn copies_share_a_shape_and_stand_at_their_places() {
+        let poses = [
+            Pose::identity(),
+            Pose::translation(4.0, 0.0, 0.0),
+            Pose::new(Vector3::new(0.0, 4.0, 1.0), Vector3::new(0.3, -0.2, 1.0)),
+        ];
+        let meshes = poses.iter().map(|p| moved(l_shape(), p)).chain([cuboid([-2.0; 3], [-1.0; 3])]);
+        let a = Assembly::new(&source(meshes)).unwrap();
+        assert_eq!(a.shapes.len(), 2);
+        assert_eq!(a.parts.iter().map(|p| p.shape).collect::<Vec<_>>(), [0, 0, 0, 1]);
+        assert!(Arc::ptr_eq(a.shape(0), a.shape(2)));
+        for (i, pose) in poses.iter().enumerate() {
+            let part = &a.parts[i];
+            for v in l_shape().vertices {
+                let there = (pose * Point3::from(v)) * a.scale;
+                let d = a.shape(i).surface.signed_distance(&(part.planning_from_shape.inverse() * there));
+                assert!(d.abs() < 1e-9, "{d} off the copy");
+                assert!(part.bounds.grown(1e-9).contains(&there));
+            }
+        }
+    }
+
+    #[test]
+    fn a_shape_has_the_middle_of_its_box_as_origin() {
+        let a = Assembly::new(&source(block_on_plate())).unwrap();
+        for (i, part) in a.parts.iter().enumerate() {
+            assert!(a.shape(i).bounds().centre().coords.norm() < 1e-12);
+            assert_eq!(part.planning_from_shape * Point3::origin(), a.centre(i));
+        }
+    }
+
+    #[test]
+    fn a_fixed_name_must_exist() {
+        let mut s = source(block_on_plate());
+        s.fixed = vec!["1".into()];
+        assert_eq!(Assembly::new(&s).unwrap().fixed, [1]);
+        s.fixed = vec!["bolt".into()];
+        let refusal = Assembly::new(&s).unwrap_err().to_string();
+        assert!(refusal.contains("`bolt`") && refusal.contains("does not exist"), "{refusal}");
+    }
+
+    #[test]
+    fn an_assembly_without_parts_is_refused() {
+        let refusal = Assembly::new(&source([])).unwrap_err().to_string();
+        assert!(refusal.contains("no parts"), "{refusal}");
+    }
+
+    #[test]
+    fn a_part_in_another_unit_is_pointed_out() {
+        let a = Assembly::new(&source([cuboid([0.0; 3], [1.0; 3]), cuboid([0.0; 3], [500.0; 3])])).unwrap();
+        assert!(a.findings.iter().any(|(part, f)| *part == 1 && f.contains("same unit")), "{:?}", a.findings);
+        assert!(Assembly::new(&source(block_on_plate())).unwrap().findings.is_empty());
+    }
+}

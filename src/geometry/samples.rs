@@ -219,3 +219,126 @@ fn build(points: &mut [Point3<f64>], offset: usize, end: usize, nodes: &mut Vec<
     nodes[me].right = nodes.len() as u32;
     build(points, offset + mid, end, nodes);
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::fixtures::{ball, cuboid, l_shape, moved, open_box, surface};
+    use crate::geometry::Pose;
+
+    const SPACING: Spacing = Spacing { edge: 0.1, blunt_edge: 0.3, face: 0.4 };
+
+    /// The largest gap between samples along a segment, its ends counted as places to reach.
+    fn widest_gap(samples: &SampleTree, a: Point3<f64>, b: Point3<f64>) -> f64 {
+        let (d, length) = ((b - a).normalize(), (b - a).norm());
+        let along = samples.points().iter().filter(|p| (*p - a).cross(&d).norm() < 1e-9);
+        let mut at: Vec<f64> =
+            along.map(|p| (p - a).dot(&d)).filter(|u| (-1e-9..=length + 1e-9).contains(u)).collect();
+        at.extend([0.0, length]);
+        at.sort_by(f64::total_cmp);
+        at.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn samples_lie_on_the_surface() {
+        let turn = Pose::new(Vector3::new(3.0, 0.1, -2.0), Vector3::new(0.3, -0.5, 0.2));
+        for mesh in [
+            cuboid([0.0; 3], [1.0, 2.0, 0.05]),
+            ball(3),
+            moved(l_shape(), &turn),
+            open_box([0.0; 3], [1.0; 3]),
+        ] {
+            let s = surface(mesh);
+            let samples = SampleTree::new(&s, &SPACING);
+            assert!(samples.points().len() > 50);
+            for p in samples.points() {
+                let d = s.signed_distance(p).abs();
+                assert!(d < 1e-12, "{d} off at {p}");
+            }
+        }
+    }
+
+    #[test]
+    fn convex_edges_of_a_box_are_sampled_at_the_spacing() {
+        let size = [1.0, 2.33, 0.57];
+        let samples = SampleTree::new(&surface(cuboid([0.0; 3], size)), &SPACING);
+        for axis in 0..3 {
+            for corner in 0..4 {
+                let mut a = Point3::origin();
+                a[(axis + 1) % 3] = size[(axis + 1) % 3] * f64::from(corner & 1);
+                a[(axis + 2) % 3] = size[(axis + 2) % 3] * f64::from(corner >> 1);
+                let mut b = a;
+                b[axis] = size[axis];
+                let gap = widest_gap(&samples, a, b);
+                assert!(gap <= SPACING.edge + 1e-12, "{gap} between {a} and {b}");
+                assert!(samples.points().contains(&a) && samples.points().contains(&b));
+            }
+        }
+    }
+
+    #[test]
+    fn a_reentrant_edge_is_left_out() {
+        let samples = SampleTree::new(&surface(l_shape()), &SPACING);
+        let inner = |p: &&Point3<f64>| p.x == 1.0 && p.y == 1.0 && p.z > 0.0 && p.z < 1.0;
+        assert_eq!(samples.points().iter().filter(inner).count(), 0);
+        assert!(widest_gap(&samples, Point3::new(2.0, 1.0, 0.0), Point3::new(2.0, 1.0, 1.0)) <= 0.1 + 1e-12);
+    }
+
+    #[test]
+    fn the_rim_of_an_open_surface_is_sampled() {
+        let samples = SampleTree::new(&surface(open_box([0.0; 3], [1.0; 3])), &SPACING);
+        assert!(widest_gap(&samples, Point3::new(0.0, 0.0, 1.0), Point3::new(1.0, 0.0, 1.0)) <= 0.1 + 1e-12);
+    }
+
+    #[test]
+    fn no_point_of_a_face_is_far_from_a_sample() {
+        let s = surface(cuboid([0.0; 3], [2.0, 2.0, 1.0]));
+        let samples = SampleTree::new(&s, &SPACING);
+        for (x, y) in (0..=20).flat_map(|i| (0..=20).map(move |j| (f64::from(i) / 10.0, f64::from(j) / 10.0)))
+        {
+            let p = Point3::new(x, y, 1.0);
+            let d = samples.points().iter().map(|q| (p - q).norm()).fold(f64::INFINITY, f64::min);
+            assert!(d <= SPACING.face, "{d} from a sample at {p}");
+        }
+    }
+
+    #[test]
+    fn a_walk_visits_every_sample_within_its_spheres() {
+        let samples = SampleTree::new(&surface(ball(3)), &SPACING);
+        let mut visited = Vec::new();
+        samples.walk(
+            Vec::<(Point3<f64>, f64)>::new().len(),
+            |node, depth| {
+                assert!(node.radius.is_finite());
+                Some(depth + 1)
+            },
+            |p, depth| {
+                assert!(depth > 1);
+                visited.push(*p);
+            },
+        );
+        visited.sort_by_key(|p| p.coords.map(f64::to_bits).data.0);
+        let mut all = samples.points().to_vec();
+        all.sort_by_key(|p| p.coords.map(f64::to_bits).data.0);
+        assert_eq!(visited, all);
+        // A leaf that is entered holds its samples; one that is not visits none.
+        samples.walk(
+            (Point3::origin(), 2.0),
+            |node, _| Some((node.centre, node.radius)),
+            |p, (c, r)| assert!((p - c).norm() <= r * (1.0 + 1e-12)),
+        );
+        samples.walk((), |_, ()| None, |_, ()| panic!("left out"));
+    }
+
+    #[test]
+    fn the_order_of_points_does_not_shape_the_tree() {
+        let points: Vec<_> = crate::fixtures::spread([0.0; 3], [1.0; 3], 40).collect();
+        let mut reversed = points.clone();
+        reversed.reverse();
+        let boxes = |tree: &SampleTree| tree.nodes.iter().map(|n| (n.centre, n.radius)).collect::<Vec<_>>();
+        assert_eq!(boxes(&SampleTree::over(points)), boxes(&SampleTree::over(reversed)));
+        assert!(SampleTree::over(Vec::new()).points().is_empty());
+    }
+}

@@ -52,3 +52,47 @@ fn spacing(bounds: &Bounds) -> Spacing {
     let edge = (size / 40.0).clamp(0.02, 0.1);
     Spacing { edge, blunt_edge: edge * 3.0, face: edge * 4.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{ball, cuboid, healed, l_shape};
+
+    #[test]
+    fn a_box_has_its_corners_as_hull_and_reach() {
+        let shape = Shape::new(&healed(cuboid([-1.0, -2.0, -0.5], [1.0, 2.0, 0.5])));
+        assert_eq!(shape.hull.len(), 8);
+        assert!((shape.reach - (1.0f64 + 4.0 + 0.25).sqrt()).abs() < 1e-12);
+        assert_eq!(shape.bounds().extents(), Vector3::new(2.0, 4.0, 1.0));
+    }
+
+    #[test]
+    fn the_radius_about_an_axis_is_that_of_the_farthest_corner() {
+        let shape = Shape::new(&healed(cuboid([-1.0, -2.0, -0.5], [1.0, 2.0, 0.5])));
+        let about = |c: [f64; 3], axis: Vector3<f64>| shape.radius_about(&Point3::from(c), &axis);
+        assert!((about([0.0; 3], Vector3::z()) - 5f64.sqrt()).abs() < 1e-12);
+        assert!((about([0.0; 3], Vector3::y()) - 1.25f64.sqrt()).abs() < 1e-12);
+        assert!((about([1.0, 2.0, 9.0], Vector3::z()) - 20f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn no_vertex_is_beyond_the_reach_or_an_axis_radius() {
+        for mesh in [ball(3), l_shape()] {
+            let shape = Shape::new(&healed(mesh));
+            let axis = Vector3::new(1.0, -2.0, 0.5).normalize();
+            let radius = shape.radius_about(&shape.mass.centre, &axis);
+            for v in shape.surface.vertices() {
+                let arm = v - shape.mass.centre;
+                assert!(arm.norm() <= shape.reach + 1e-12 && arm.cross(&axis).norm() <= radius + 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn small_parts_are_sampled_closer() {
+        let edge =
+            |size: f64| spacing(&Bounds { min: Point3::origin(), max: Point3::new(size, 0.1, 0.1) }).edge;
+        assert!(edge(0.1) < edge(2.0) && edge(2.0) < edge(10.0));
+        assert_eq!((edge(1e-6), edge(1e3)), (0.02, 0.1));
+    }
+}

@@ -324,3 +324,152 @@ fn fans(mesh: &Mesh) -> (Vec<u32>, Vec<u32>) {
     }
     (start, fan)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::LazyLock;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::fixtures::{ball, cuboid, healed, l_shape, moved, open_box, spread, surface};
+    use crate::geometry::Pose;
+
+    static SOLIDS: LazyLock<Vec<Surface>> = LazyLock::new(|| {
+        let turn = Pose::rotation(Vector3::new(0.3, -0.5, 0.2));
+        vec![
+            surface(ball(3)),
+            surface(l_shape()),
+            surface(moved(l_shape(), &turn)),
+            surface(open_box([0.0; 3], [1.0; 3])),
+        ]
+    });
+
+    fn brute_force(s: &Surface, p: &Point3<f64>) -> f64 {
+        (0..s.triangles().len() as u32).map(|t| s.closest_on(t, p).distance).fold(f64::INFINITY, f64::min)
+    }
+
+    fn point() -> impl Strategy<Value = Point3<f64>> {
+        prop::array::uniform3(-3.0..3.0f64).prop_map(Point3::from)
+    }
+
+    proptest! {
+        #[test]
+        fn the_closest_point_is_that_of_all_triangles(p in point(), guess in 0u32..10) {
+            for s in SOLIDS.iter() {
+                let best = brute_force(s, &p);
+                let found = s.closest(&p, f64::INFINITY).unwrap();
+                prop_assert!((found.distance - best).abs() < 1e-12, "{} for {best}", found.distance);
+                prop_assert!((p - found.point).norm() - found.distance < 1e-12);
+                prop_assert!((s.closest_from(&p, guess).distance - best).abs() < 1e-12);
+                prop_assert!((s.signed_distance(&p).abs() - best).abs() < 1e-12);
+            }
+        }
+
+        #[test]
+        fn only_what_is_within_reach_is_found(p in point(), reach in 0.0..3.0f64) {
+            for s in SOLIDS.iter() {
+                let best = brute_force(s, &p);
+                prop_assume!((best - reach).abs() > 1e-9);
+                prop_assert_eq!(s.closest(&p, reach).is_some(), best < reach);
+            }
+        }
+
+        #[test]
+        fn the_sign_is_right_on_a_solid_with_a_reentrant_edge(p in point()) {
+            let inside = (0.0..2.0).contains(&p.x)
+                && (0.0..2.0).contains(&p.y)
+                && (0.0..1.0).contains(&p.z)
+                && !(p.x > 1.0 && p.y > 1.0);
+            let d = SOLIDS[1].signed_distance(&p);
+            prop_assume!(d.abs() > 1e-9);
+            prop_assert_eq!(d < 0.0, inside, "{}", d);
+        }
+    }
+
+    #[test]
+    fn the_sign_is_right_at_points_closest_to_edges_and_vertices() {
+        let s = surface(l_shape());
+        for (p, d) in [
+            ([-0.1, -0.1, 0.5], 0.1 * 2f64.sqrt()),
+            ([2.1, -0.1, 1.1], 0.1 * 3f64.sqrt()),
+            // Beside the reentrant edge: outside in the notch, inside diagonally behind it.
+            ([1.1, 1.2, 0.5], 0.1),
+            ([0.9, 0.9, 0.5], -0.1 * 2f64.sqrt()),
+            ([0.95, 0.95, 0.5], -0.05 * 2f64.sqrt()),
+        ] {
+            let found = s.signed_distance(&Point3::from(p));
+            assert!((found - d).abs() < 1e-12, "{found} for {d} at {p:?}");
+        }
+    }
+
+    #[test]
+    fn neighbours_are_mutual_and_fans_are_complete() {
+        for s in &SOLIDS[..3] {
+            for t in 0..s.triangles().len() as u32 {
+                for e in 0..3 {
+                    let other = s.neighbour(t, e);
+                    assert!((0..3).any(|f| s.neighbour(other, f) == t), "{t} and {other}");
+                }
+                assert!(s.triangles()[t as usize].iter().all(|&v| s.fan(v).contains(&t)));
+            }
+            let total: usize = (0..s.vertices().len() as u32).map(|v| s.fan(v).len()).sum();
+            assert_eq!(total, 3 * s.triangles().len());
+        }
+    }
+
+    #[test]
+    fn a_feature_has_the_normals_of_its_faces() {
+        let s = surface(cuboid([0.0; 3], [1.0; 3]));
+        for (p, distinct) in [([0.5, 0.4, 2.0], 1), ([0.3, 2.0, 2.0], 2), ([2.0, 2.0, 2.0], 3)] {
+            let c = s.closest(&Point3::from(p), f64::INFINITY).unwrap();
+            let mut normals: Vec<Vector3<f64>> = Vec::new();
+            s.feature_normals(&c, |n| {
+                if normals.iter().all(|m| (m - n).norm() > 1e-9) {
+                    normals.push(n);
+                }
+            });
+            assert_eq!(normals.len(), distinct, "{normals:?} at {p:?}");
+        }
+    }
+
+    #[test]
+    fn mass_properties_of_a_box() {
+        let s = surface(cuboid([1.0, -2.0, 3.0], [3.0, 1.0, 3.5]));
+        let m = s.mass_properties();
+        assert!((m.volume - 3.0).abs() < 1e-12);
+        assert!((m.centre - Point3::new(2.0, -0.5, 3.25)).norm() < 1e-12);
+        assert!((m.gyration_squared - (4.0 + 9.0 + 0.25) / 12.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn mass_properties_of_two_boxes_in_one_are_their_sum() {
+        let m = surface(l_shape()).mass_properties();
+        assert!((m.volume - 3.0).abs() < 1e-12);
+        assert!((m.centre - Point3::new(2.5 / 3.0, 2.5 / 3.0, 0.5)).norm() < 1e-12);
+        // Three unit cubes: each has 3/12 about its own centre.
+        let centres = [[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [0.5, 1.5, 0.5]].map(Point3::from);
+        let offsets = centres.iter().map(|c| (c - m.centre).norm_squared()).sum::<f64>() / 3.0;
+        assert!((m.gyration_squared - 0.25 - offsets).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_surface_without_volume_has_the_mass_of_its_box() {
+        let mut flat = healed(open_box([0.0; 3], [2.0, 2.0, 1.0]));
+        flat.triangles.truncate(2);
+        let m = Surface::new(&flat).mass_properties();
+        assert!(m.gyration_squared > 0.0 && m.centre.coords.iter().all(|x| x.is_finite()), "{m:?}");
+    }
+
+    #[test]
+    fn an_open_surface_is_signed_by_winding_number() {
+        let s = surface(open_box([0.0; 3], [1.0; 3]));
+        assert!(s.is_open());
+        for p in spread([0.05; 3], [0.95, 0.95, 0.6], 500) {
+            assert!(s.signed_distance(&p) < 0.0, "{p}");
+        }
+        for p in spread([-2.0, -2.0, -2.0], [3.0, 3.0, -0.05], 500) {
+            assert!(s.signed_distance(&p) > 0.0, "{p}");
+        }
+    }
+}

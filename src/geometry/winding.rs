@@ -113,3 +113,53 @@ fn solid_angle(p: &Point3<f64>, t: &[Point3<f64>; 3]) -> f64 {
     let den = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
     2.0 * det.atan2(den)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{ball, cuboid, healed, l_shape, spread, surface};
+    use crate::geometry::SourceMesh;
+
+    /// What the expansion may be off by.
+    const ERROR: f64 = 0.05;
+
+    fn tree(mesh: SourceMesh) -> WindingTree {
+        let mesh = healed(mesh);
+        WindingTree::new(&mesh.vertices, &mesh.triangles)
+    }
+
+    #[test]
+    fn a_closed_surface_winds_once_around_its_inside_and_not_around_its_outside() {
+        for mesh in [cuboid([-1.0; 3], [1.0; 3]), ball(4), l_shape()] {
+            let s = surface(mesh.clone());
+            let tree = tree(mesh);
+            for p in spread([-1.5; 3], [2.5; 3], 3000) {
+                let d = s.signed_distance(&p);
+                let expected = if d < 0.0 { 1.0 } else { 0.0 };
+                let w = tree.winding(&p);
+                assert!(d.abs() < 1e-6 || (w - expected).abs() < ERROR, "{w} at {p}, distance {d}");
+            }
+        }
+    }
+
+    #[test]
+    fn far_away_nothing_winds() {
+        let tree = tree(ball(3));
+        for p in [Point3::new(1e3, 0.0, 0.0), Point3::new(-50.0, 70.0, 1e6)] {
+            assert!(tree.winding(&p).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_surface_turned_inside_out_winds_the_other_way() {
+        let mut mesh = healed(cuboid([-1.0; 3], [1.0; 3]));
+        mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+        let w = WindingTree::new(&mesh.vertices, &mesh.triangles).winding(&Point3::new(0.1, 0.2, -0.3));
+        assert!((w + 1.0).abs() < 1e-9, "{w}");
+    }
+
+    #[test]
+    fn no_triangles_wind_around_nothing() {
+        assert_eq!(WindingTree::new(&[], &[]).winding(&Point3::origin()), 0.0);
+    }
+}

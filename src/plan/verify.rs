@@ -285,3 +285,166 @@ fn dense(scene: &Scene, part: usize, path: &[Pose]) -> Vec<Pose> {
     out.extend(path.last());
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::fixtures::{LIMIT, block_on_plate, cells, cuboid, moved, peg_in_hole, scene};
+
+    /// The path of part 1 by steps from its assembled pose, checked against all others.
+    fn checked(scene: &Scene, verifier: &Verifier, steps: &[Vector3<f64>]) -> Verdict {
+        let mut path = vec![scene.bodies[1].planning_from_shape];
+        for s in steps {
+            path.push(nalgebra::Translation3::from(*s) * path[path.len() - 1]);
+        }
+        checked_path(scene, verifier, &path)
+    }
+
+    fn checked_path(scene: &Scene, verifier: &Verifier, path: &[Pose]) -> Verdict {
+        let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != 1).collect();
+        verifier.check(scene, &scene.allowances, &standing, 1, path, &Termination::default()).unwrap()
+    }
+
+    #[test]
+    fn a_path_through_a_wall_is_refused_and_the_wall_named() {
+        let [plate, block] = block_on_plate();
+        let wall = cuboid([2.5, -4.0, 0.0], [3.0, 4.0, 3.0]);
+        let (scene, verifier) = scene([plate, block, wall]);
+        let verdict = checked(&scene, &verifier, &[Vector3::x() * 6.0]);
+        // The block gets no deeper into the wall than half its width, the wall into the block likewise.
+        assert!(verdict.depth > 0.25 && verdict.depth <= 1.0, "{}", verdict.depth);
+        let by_block = verdict.entries.iter().filter(|e| e.on_moving).map(|e| e.over).fold(0.0, f64::max);
+        assert!((by_block - 0.25).abs() < 0.03, "{by_block}");
+        assert!(verdict.entries.len() > 10);
+        for e in &verdict.entries {
+            assert!(e.other == 2 || e.over < 1e-9, "{e:?}");
+        }
+        let deepest = verdict.entries.iter().map(|e| e.over).fold(0.0, f64::max);
+        assert_eq!(deepest, verdict.depth);
+    }
+
+    #[test]
+    fn entries_are_points_of_the_surface_that_they_name() {
+        let (scene, verifier) = scene(block_on_plate());
+        let verdict = checked(&scene, &verifier, &[Vector3::new(0.3, 0.2, -0.1)]);
+        assert!((verdict.depth - 0.1).abs() < 1e-9, "{}", verdict.depth);
+        for e in &verdict.entries {
+            let shape = &scene.bodies[if e.on_moving { 1 } else { e.other }].shape;
+            assert!(shape.surface.signed_distance(&e.point).abs() < 1e-9, "{e:?}");
+        }
+    }
+
+    #[test]
+    fn a_thin_wall_between_two_waypoints_is_found() {
+        let wall = cuboid([1.5, -3.0, -3.0], [1.6, 3.0, 3.0]);
+        let (scene, verifier) = scene([wall, cuboid([0.0; 3], [1.0; 3])]);
+        let verdict = checked(&scene, &verifier, &[Vector3::x() * 4.0]);
+        assert!(verdict.depth > 0.05 && verdict.depth <= 0.5, "{}", verdict.depth);
+    }
+
+    #[test]
+    fn flush_sliding_is_not_deep() {
+        let turn = Pose::rotation(Vector3::new(0.2, -0.15, 0.1));
+        for pose in [Pose::identity(), turn] {
+            let (scene, verifier) = scene(block_on_plate().map(|m| moved(m, &pose)));
+            let steps =
+                [Vector3::new(2.0, 1.0, 0.0), Vector3::new(-4.0, 0.5, 0.0), Vector3::new(8.0, 0.0, 0.0)];
+            let verdict = checked(&scene, &verifier, &steps.map(|s| pose * s));
+            assert!(verdict.depth < 1e-9 && verdict.entries.is_empty(), "{}", verdict.depth);
+        }
+    }
+
+    #[test]
+    fn a_flush_peg_leaves_its_hole_unhindered() {
+        let (scene, verifier) = scene(peg_in_hole(0.0));
+        assert!(checked(&scene, &verifier, &[Vector3::z() * 4.0]).depth < 1e-9);
+        let askew = checked(&scene, &verifier, &[Vector3::z(), Vector3::x() * 0.05]);
+        assert!((askew.depth - 0.05).abs() < 1e-3, "{}", askew.depth);
+    }
+
+    #[test]
+    fn what_a_turn_sweeps_over_is_found() {
+        // A bar that points up turns half-way about y, through a ridge it is clear of at both ends.
+        let base =
+            cells([&[-4.0, 1.5, 1.8, 4.0], &[-1.0, 1.0], &[-1.0, 0.0, 2.0]], |c| c[2] == 0 || c[0] == 1);
+        let (scene, verifier) = scene([base, cuboid([-0.2, -0.2, 0.5], [0.2, 0.2, 4.5])]);
+        let from = scene.bodies[1].planning_from_shape;
+        let about = |angle: f64| {
+            let foot = Pose::translation(0.0, 0.0, 2.5);
+            foot * Pose::rotation(Vector3::y() * angle) * foot.inverse() * from
+        };
+        assert!(checked_path(&scene, &verifier, &[from, about(-0.5)]).depth < 1e-9);
+        let path = [0.0, 1.0, 2.0, 3.0, 4.0].map(|k| about(k * std::f64::consts::FRAC_PI_4));
+        assert!(checked_path(&scene, &verifier, &[path[0]]).depth < 1e-9);
+        assert!(checked_path(&scene, &verifier, &[path[4]]).depth < 1e-9);
+        assert!(checked_path(&scene, &verifier, &path).depth > 0.05);
+    }
+
+    #[test]
+    fn an_overlap_is_measured_and_granted() {
+        let low = cuboid([-3.0, -3.0, -2.0], [3.0, 3.0, 0.0]);
+        let (scene, verifier) = scene([low, cuboid([-1.0, -1.0, -0.3], [1.0, 1.0, 3.0])]);
+        let depth = verifier.assembled_depth(&scene, 0, 1);
+        assert!((depth - 0.3).abs() < 1e-9, "{depth}");
+        assert!((verifier.assembled_depth(&scene, 1, 0) - depth).abs() < 1e-9);
+        assert!(checked(&scene, &verifier, &[Vector3::z() * 0.1, Vector3::x()]).depth < 1e-9);
+        let deeper = checked(&scene, &verifier, &[Vector3::z() * -0.1]);
+        assert!((deeper.depth - 0.1).abs() < 1e-9, "{}", deeper.depth);
+    }
+
+    #[test]
+    fn parts_that_touch_or_are_apart_do_not_overlap() {
+        let (scene, verifier) = scene(block_on_plate());
+        assert!(verifier.assembled_depth(&scene, 0, 1) < 1e-12);
+        assert_eq!(verifier.coincident_depth(&scene, 0, 1), 0.0);
+        assert_eq!(verifier.coincident_depth(&scene, 1, 0), 0.0);
+    }
+
+    #[test]
+    fn coincident_parts_share_their_inside() {
+        let block = || cuboid([-3.0, -2.0, -1.0], [3.0, 2.0, 1.0]);
+        let (scene, verifier) = scene([block(), block()]);
+        assert!(verifier.assembled_depth(&scene, 0, 1) < 1e-9, "no surface is inside the other");
+        let depth = verifier.coincident_depth(&scene, 0, 1);
+        assert!(depth > 0.1 && depth <= 1.0, "{depth}");
+    }
+
+    #[test]
+    fn a_depth_up_to_the_limit_is_told_but_not_refused() {
+        let (scene, verifier) = scene(block_on_plate());
+        let slight = checked(&scene, &verifier, &[Vector3::z() * (-0.9 * LIMIT)]);
+        assert!((slight.depth - 0.9 * LIMIT).abs() < 1e-9 && slight.entries.is_empty());
+        assert!(!checked(&scene, &verifier, &[Vector3::z() * (-1.1 * LIMIT)]).entries.is_empty());
+        assert_eq!(verifier.limit(), LIMIT);
+    }
+
+    #[test]
+    fn a_cancelled_check_ends_with_the_reason() {
+        let (scene, verifier) = scene(block_on_plate());
+        let termination = Termination::default();
+        termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+        let path = [scene.bodies[1].planning_from_shape];
+        let ended = verifier.check(&scene, &scene.allowances, &[0], 1, &path, &termination);
+        assert_eq!(ended, Err(Interrupt::Cancelled));
+    }
+
+    #[test]
+    fn checked_poses_are_dense_and_keep_the_waypoints() {
+        let (scene, _) = scene(block_on_plate());
+        let from = scene.bodies[1].planning_from_shape;
+        let turn = Pose::rotation(Vector3::new(0.0, 0.0, 1.0));
+        let path =
+            [from, Pose::translation(1.0, 0.0, 0.0) * from, Pose::translation(1.0, 0.0, 0.0) * turn * from];
+        let poses = dense(&scene, 1, &path);
+        assert_eq!((poses[0], poses[poses.len() - 1]), (path[0], path[2]));
+        assert!(poses.iter().any(|p| (p.to_matrix() - path[1].to_matrix()).norm() < 1e-12));
+        for w in poses.windows(2) {
+            for v in scene.bodies[1].shape.surface.vertices() {
+                let travel = (w[1] * v - w[0] * v).norm();
+                assert!(travel <= DENSITY * scene.longest_side + 1e-9, "{travel}");
+            }
+        }
+    }
+}

@@ -9,5 +9,7 @@
 mod build;
 mod far_field;
 mod grid;
+#[cfg(test)]
+mod tests;
 
 pub use grid::{Estimate, Field};

@@ -11,6 +11,8 @@ mod disassembled;
 mod projection;
 mod scene;
 mod sliding;
+#[cfg(test)]
+mod tests;
 mod transition;
 
 pub use action::{Action, Axis};

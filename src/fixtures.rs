@@ -1,0 +1,194 @@
+//! Solids, surfaces and scenes that several modules' unit tests are written over.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use nalgebra::Point3;
+
+use crate::geometry::{
+    Assembly, Mesh, Pose, Solidity, SourceAssembly, SourceMesh, SourcePart, Surface, heal,
+};
+use crate::plan::Verifier;
+use crate::sdf::Field;
+use crate::simulation::{Allowances, Body, Scene};
+use crate::termination::Termination;
+
+/// The solid made of the filled cells of a grid with the given planes; all its grid faces are there,
+/// so it is closed without T-junctions.
+pub(crate) fn cells(planes: [&[f64]; 3], filled: impl Fn([usize; 3]) -> bool) -> SourceMesh {
+    let mut mesh = SourceMesh::default();
+    let mut known: HashMap<[usize; 3], u32> = HashMap::new();
+    let count = planes.map(|p| p.len() - 1);
+    for i in 0..count.iter().product() {
+        let cell = [i % count[0], i / count[0] % count[1], i / (count[0] * count[1])];
+        if !filled(cell) {
+            continue;
+        }
+        for axis in 0..3 {
+            for up in [false, true] {
+                let mut beside = cell;
+                beside[axis] = cell[axis].wrapping_add(if up { 1 } else { usize::MAX });
+                if beside[axis] < count[axis] && filled(beside) {
+                    continue;
+                }
+                let mut quad = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[s, t]| {
+                    let mut node = cell;
+                    node[axis] += usize::from(up);
+                    node[(axis + 1) % 3] += s;
+                    node[(axis + 2) % 3] += t;
+                    *known.entry(node).or_insert_with(|| {
+                        mesh.vertices.push(std::array::from_fn(|a| planes[a][node[a]]));
+                        mesh.vertices.len() as u32 - 1
+                    })
+                });
+                if !up {
+                    quad.reverse();
+                }
+                mesh.triangles.extend([[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]);
+            }
+        }
+    }
+    mesh
+}
+
+/// A box.
+pub(crate) fn cuboid(lo: [f64; 3], hi: [f64; 3]) -> SourceMesh {
+    cells([&[lo[0], hi[0]], &[lo[1], hi[1]], &[lo[2], hi[2]]], |_| true)
+}
+
+/// A box without its upper face.
+pub(crate) fn open_box(lo: [f64; 3], hi: [f64; 3]) -> SourceMesh {
+    let mut mesh = cuboid(lo, hi);
+    let SourceMesh { vertices, triangles } = &mut mesh;
+    triangles.retain(|t| !t.iter().all(|&v| vertices[v as usize][2] == hi[2]));
+    mesh
+}
+
+/// 2 × 2 × 1 without a quarter: the corner with x > 1 and y > 1 is missing.
+pub(crate) fn l_shape() -> SourceMesh {
+    cells([&[0.0, 1.0, 2.0], &[0.0, 1.0, 2.0], &[0.0, 1.0]], |c| c[0] + c[1] < 2)
+}
+
+/// A ball of radius 1, its octahedron's faces split `rounds` times.
+pub(crate) fn ball(rounds: u32) -> SourceMesh {
+    let mut vertices: Vec<[f64; 3]> = vec![
+        [1.0, 0.0, 0.0],
+        [-1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+    ];
+    let mut triangles: Vec<[u32; 3]> =
+        vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
+    for _ in 0..rounds {
+        let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
+        let mut middle = |a: u32, b: u32| {
+            *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                let [p, q] = [a, b].map(|v| Point3::from(vertices[v as usize]).coords);
+                vertices.push((p + q).normalize().into());
+                vertices.len() as u32 - 1
+            })
+        };
+        triangles = triangles
+            .iter()
+            .flat_map(|&[a, b, c]| {
+                let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+                [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+            })
+            .collect();
+    }
+    SourceMesh { vertices, triangles }
+}
+
+/// A mesh elsewhere.
+pub(crate) fn moved(mut mesh: SourceMesh, pose: &Pose) -> SourceMesh {
+    for v in &mut mesh.vertices {
+        *v = (pose * Point3::from(*v)).into();
+    }
+    mesh
+}
+
+/// A mesh, healed.
+pub(crate) fn healed(mesh: SourceMesh) -> Mesh {
+    heal(&SourcePart { name: "part".into(), origin: "test".into(), mesh }).unwrap().mesh
+}
+
+/// A mesh, healed and prepared.
+pub(crate) fn surface(mesh: SourceMesh) -> Surface {
+    Surface::new(&healed(mesh))
+}
+
+/// A mesh, healed and prepared, whose sign is asked of the winding number.
+pub(crate) fn winding_surface(mesh: SourceMesh) -> Surface {
+    Surface::new(&Mesh { solidity: Solidity::Winding, ..healed(mesh) })
+}
+
+/// An assembly of meshes, named by their places: "0", "1" …
+pub(crate) fn source(meshes: impl IntoIterator<Item = SourceMesh>) -> SourceAssembly {
+    let part =
+        |(i, mesh): (usize, SourceMesh)| SourcePart { name: i.to_string(), origin: "test".into(), mesh };
+    let parts = meshes.into_iter().enumerate().map(part).collect();
+    SourceAssembly { name: "test".into(), parts, ..SourceAssembly::default() }
+}
+
+/// Depth at which verification refuses a path in a [`scene`].
+pub(crate) const LIMIT: f64 = 4e-3;
+
+/// Bodies at their assembled poses with their overlaps granted, and the check on the triangles.
+/// The longest side must be in (5, 10], so that nothing is scaled.
+pub(crate) fn scene(meshes: impl IntoIterator<Item = SourceMesh>) -> (Scene, Verifier) {
+    let assembly = Assembly::new(&source(meshes)).unwrap();
+    assert_eq!(assembly.scale, 1.0, "fixtures are made in the planning frame");
+    let fields: Vec<_> = assembly
+        .shapes
+        .iter()
+        .map(|s| Arc::new(Field::build(&s.surface, &Termination::default()).unwrap()))
+        .collect();
+    let bodies = assembly.parts.iter().map(|part| Body {
+        shape: Arc::clone(&assembly.shapes[part.shape]),
+        field: Arc::clone(&fields[part.shape]),
+        planning_from_shape: part.planning_from_shape,
+        bounds: part.bounds,
+        extra_samples: Default::default(),
+    });
+    let count = assembly.parts.len();
+    let mut scene = Scene {
+        bodies: bodies.collect(),
+        allowances: Allowances::none(count),
+        longest_side: assembly.longest_side(),
+    };
+    let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
+    let verifier = Verifier::new(&assembly.shapes, shape_of, LIMIT);
+    for (a, b) in (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))) {
+        let depth = verifier.assembled_depth(&scene, a, b);
+        if depth > 1e-6 * scene.longest_side {
+            scene.allowances.grant(a, b, depth);
+        }
+    }
+    (scene, verifier)
+}
+
+/// A plate (part 0) with a block on it (part 1).
+pub(crate) fn block_on_plate() -> [SourceMesh; 2] {
+    [cuboid([-4.0, -4.0, -1.0], [4.0, 4.0, 0.0]), cuboid([-1.0, -1.0, 0.0], [1.0, 1.0, 2.0])]
+}
+
+/// A block (part 0) with a blind square hole from above and a peg in it (part 1) that is wider than
+/// the hole by `excess` on each side.
+pub(crate) fn peg_in_hole(excess: f64) -> [SourceMesh; 2] {
+    let across: &[f64] = &[-3.0, -1.0, 1.0, 3.0];
+    let block = cells([across, across, &[-4.0, -2.0, 0.0]], |c| c != [1, 1, 1]);
+    let w = 1.0 + excess;
+    [block, cuboid([-w, -w, -2.0], [w, w, 1.0])]
+}
+
+/// `count` points spread over a box (R₃ sequence of M. Roberts 2018): no two runs differ.
+pub(crate) fn spread(lo: [f64; 3], hi: [f64; 3], count: usize) -> impl Iterator<Item = Point3<f64>> {
+    const STEPS: [f64; 3] = [0.819_172_513_396_164_4, 0.671_043_606_703_789_2, 0.549_700_477_901_970_5];
+    (1..=count).map(move |i| {
+        Point3::from(std::array::from_fn::<_, 3, _>(|a| {
+            lo[a] + (hi[a] - lo[a]) * (i as f64 * STEPS[a]).fract()
+        }))
+    })
+}
