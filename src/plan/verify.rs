@@ -4,7 +4,9 @@
 //! longest side between two of them, samples of both surfaces (denser ones than the engine's)
 //! are measured exactly against the other's triangles through a bounding-volume hierarchy. What
 //! counts is depth beyond the depth of the same samples at the assembled pose. Known miss:
-//! features that enter only between two samples or two poses.
+//! features that enter only between two samples or two poses. On long paths (screws of many
+//! turns) the poses take turns in checking a half or a quarter of the samples each, so that a
+//! sample is still checked every other or every fourth pose.
 
 use nalgebra::Point3;
 use rayon::prelude::*;
@@ -41,7 +43,8 @@ pub struct Verdict {
 /// The verification samples of all shapes.
 #[derive(Debug, Clone)]
 pub struct Verifier {
-    samples: Vec<SampleTree>,
+    /// Per shape: its samples, dealt out evenly.
+    samples: Vec<[SampleTree; SHARES]>,
     /// Per part: index of its shape.
     shape_of: Vec<usize>,
     /// Depth beyond the allowance that is still accepted, in the planning frame.
@@ -52,7 +55,7 @@ impl Verifier {
     /// Prepares the check for shapes; `shape_of` gives each part's shape.
     #[must_use]
     pub fn new(shapes: &[std::sync::Arc<Shape>], shape_of: Vec<usize>, limit: f64) -> Self {
-        let samples = shapes.par_iter().map(|s| SampleTree::new(&s.surface, &spacing(s.bounds()))).collect();
+        let samples = shapes.par_iter().map(|s| shares(&s.surface)).collect();
         Self { samples, shape_of, limit }
     }
 
@@ -67,7 +70,7 @@ impl Verifier {
     pub fn assembled_depth(&self, scene: &Scene, a: usize, b: usize) -> f64 {
         let pose = scene.bodies[a].planning_from_shape;
         let mut entries = Vec::new();
-        self.entries(scene, a, &pose, b, 0.0, &mut entries);
+        self.entries(scene, a, &pose, b, 0.0, Turn::ALL, &mut entries);
         entries.iter().map(|e| e.over).fold(0.0, f64::max)
     }
 
@@ -96,11 +99,14 @@ impl Verifier {
         path: &[Pose],
         termination: &Termination,
     ) -> Result<Verdict, Interrupt> {
-        let found = dense(scene, part, path)
+        let poses = dense(scene, part, path);
+        let found = poses
             .par_iter()
-            .map(|pose| {
+            .enumerate()
+            .map(|(i, pose)| {
                 termination.check()?;
-                Ok(self.entries_at(scene, allowances, standing, part, pose))
+                let turn = Turn::of(i, poses.len());
+                Ok(self.entries_at(scene, allowances, standing, part, pose, turn))
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
         let mut entries: Vec<Entry> = found.into_iter().flatten().collect();
@@ -118,11 +124,12 @@ impl Verifier {
         standing: &[usize],
         part: usize,
         pose: &Pose,
+        turn: Turn,
     ) -> Vec<Entry> {
         let bounds = scene.bodies[part].shape.bounds().transformed(pose);
         let mut out = Vec::new();
         for &other in standing.iter().filter(|&&o| scene.bodies[o].bounds.meets(&bounds)) {
-            self.entries(scene, part, pose, other, allowances.of(part, other), &mut out);
+            self.entries(scene, part, pose, other, allowances.of(part, other), turn, &mut out);
         }
         out
     }
@@ -136,26 +143,29 @@ impl Verifier {
         pose: &Pose,
         other: usize,
         granted: f64,
+        turn: Turn,
         out: &mut Vec<Entry>,
     ) {
         let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
         let to_standing = standing.planning_from_shape.inverse() * pose;
         let samples = |i: usize| &self.samples[self.shape_of[i]];
         let deep = self.limit / 2.0;
-        for (on_moving, tree, to_measured, surface) in [
+        for (on_moving, trees, to_measured, surface) in [
             (true, samples(part), &to_standing, &standing.shape.surface),
             (false, samples(other), &to_standing.inverse(), &moving.shape.surface),
         ] {
             let mut worst: Option<Entry> = None;
-            entered(tree, to_measured, surface, granted, |point, over| {
-                let entry = Entry { other, on_moving, point, over };
-                if over > deep {
-                    out.push(entry.clone());
-                }
-                if worst.as_ref().is_none_or(|w| over > w.over) {
-                    worst = Some(entry);
-                }
-            });
+            for tree in trees.iter().enumerate().filter(|(i, _)| turn.takes(*i)).map(|(_, t)| t) {
+                entered(tree, to_measured, surface, granted, |point, over| {
+                    let entry = Entry { other, on_moving, point, over };
+                    if over > deep {
+                        out.push(entry.clone());
+                    }
+                    if worst.as_ref().is_none_or(|w| over > w.over) {
+                        worst = Some(entry);
+                    }
+                });
+            }
             out.extend(worst.filter(|w| w.over <= deep));
         }
     }
@@ -177,6 +187,42 @@ fn interior_points(surface: &Surface) -> impl Iterator<Item = Point3<f64>> + '_ 
     })
 }
 
+/// Into so many shares the samples of a shape are dealt.
+const SHARES: usize = 4;
+/// Paths of more poses than this are long.
+const LONG: usize = 400;
+
+/// Which shares a pose checks.
+#[derive(Debug, Clone, Copy)]
+struct Turn {
+    index: usize,
+    of: usize,
+}
+
+impl Turn {
+    const ALL: Self = Self { index: 0, of: 1 };
+
+    /// The turn of pose `index` of `poses`; both ends of a path check all.
+    fn of(index: usize, poses: usize) -> Self {
+        match poses {
+            _ if index == 0 || index + 1 == poses => Self::ALL,
+            0..=LONG => Self::ALL,
+            _ if poses <= 2 * LONG => Self { index, of: 2 },
+            _ => Self { index, of: SHARES },
+        }
+    }
+
+    fn takes(self, share: usize) -> bool {
+        share % self.of == self.index % self.of
+    }
+}
+
+/// The samples of a surface, dealt out in the order of a tree, so that each share covers all of it.
+fn shares(surface: &Surface) -> [SampleTree; SHARES] {
+    let all = SampleTree::new(surface, &spacing(surface.bounds()));
+    std::array::from_fn(|i| SampleTree::over(all.points().iter().skip(i).step_by(SHARES).copied().collect()))
+}
+
 /// Denser than the engine's samples, and not a multiple of their spacing.
 fn spacing(bounds: &Bounds) -> Spacing {
     let size = bounds.extents().max();
@@ -194,20 +240,24 @@ fn entered(
     mut visit: impl FnMut(Point3<f64>, f64),
 ) {
     let inner = surface.bounds().grown(-granted);
+    // What is known about a sphere: a triangle near it, its centre, how far outside that lies.
+    let root = (0, Point3::origin(), f64::NEG_INFINITY);
     samples.walk(
-        0,
-        |node, guess| {
+        root,
+        |node, (guess, _, _)| {
             let c = to_measured * node.centre;
             if surface.bounds().distance(&c) > node.radius {
                 return None;
             }
             let closest = surface.closest_from(&c, guess);
-            let outside = closest.distance > node.radius - granted && surface.signed(&c, &closest) > 0.0;
-            (!outside).then_some(closest.triangle)
+            let distance = surface.signed(&c, &closest);
+            let outside = distance > 0.0 && distance > node.radius - granted;
+            (!outside).then_some((closest.triangle, c, distance))
         },
-        |sample, guess| {
+        |sample, (guess, centre, distance)| {
             let p = to_measured * sample;
-            if !inner.contains(&p) {
+            let outside = distance > 0.0 && distance > (p - centre).norm() - granted;
+            if outside || !inner.contains(&p) {
                 return;
             }
             let over = -surface.signed(&p, &surface.closest_from(&p, guess)) - granted;
