@@ -43,6 +43,8 @@ pub struct SampleTree {
 }
 
 const LEAF: usize = 6;
+/// Sharp vertices closer than this, in units of the planning frame, are one sample.
+const THINNEST: f64 = 0.005;
 /// cos of the dihedral deviation below which an edge counts as blunt (about 20 degrees).
 const BLUNT_COS: f64 = 0.94;
 
@@ -133,7 +135,8 @@ fn bend(surface: &Surface, t: u32, e: u8) -> Bend {
 }
 
 /// The vertices at convex edges. On finely tessellated surfaces they stand much closer than any
-/// contact needs: sharp ones are thinned to half the edge spacing, blunt ones to all of it. All of
+/// contact needs: blunt ones are thinned to the edge spacing, sharp ones only where they nearly
+/// coincide (the crest of a thread is narrow). All of
 /// them are still measured when the path is verified with a closer spacing.
 fn sample_vertices(surface: &Surface, spacing: &Spacing) -> Vec<Point3<f64>> {
     let mut bends = vec![Bend::Inward; surface.vertices().len()];
@@ -147,7 +150,7 @@ fn sample_vertices(surface: &Surface, spacing: &Spacing) -> Vec<Point3<f64>> {
     }
     let mut taken = HashSet::new();
     let mut out = Vec::new();
-    for (cell, wanted) in [(spacing.edge / 2.0, Bend::Sharp), (spacing.edge, Bend::Blunt)] {
+    for (cell, wanted) in [(THINNEST, Bend::Sharp), (spacing.edge, Bend::Blunt)] {
         for (p, _) in surface.vertices().iter().zip(&bends).filter(|(_, b)| **b == wanted) {
             if taken.insert((wanted == Bend::Sharp, p.coords.map(|x| (x / cell).floor() as i64))) {
                 out.push(*p);

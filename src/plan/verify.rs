@@ -70,7 +70,8 @@ impl Verifier {
     pub fn assembled_depth(&self, scene: &Scene, a: usize, b: usize) -> f64 {
         let pose = scene.bodies[a].planning_from_shape;
         let mut entries = Vec::new();
-        self.entries(scene, a, &pose, b, 0.0, Turn::ALL, &mut entries);
+        let pair = Pair { part: a, pose: &pose, other: b, granted: 0.0 };
+        self.entries(scene, &pair, Turn::ALL, &mut entries);
         entries.iter().map(|e| e.over).fold(0.0, f64::max)
     }
 
@@ -129,23 +130,16 @@ impl Verifier {
         let bounds = scene.bodies[part].shape.bounds().transformed(pose);
         let mut out = Vec::new();
         for &other in standing.iter().filter(|&&o| scene.bodies[o].bounds.meets(&bounds)) {
-            self.entries(scene, part, pose, other, allowances.of(part, other), turn, &mut out);
+            let pair = Pair { part, pose, other, granted: allowances.of(part, other) };
+            self.entries(scene, &pair, turn, &mut out);
         }
         out
     }
 
     /// The samples of a pair deeper than `granted`, on either side: the deepest of each side, and
     /// all that are deep enough to help in refining a motion.
-    fn entries(
-        &self,
-        scene: &Scene,
-        part: usize,
-        pose: &Pose,
-        other: usize,
-        granted: f64,
-        turn: Turn,
-        out: &mut Vec<Entry>,
-    ) {
+    fn entries(&self, scene: &Scene, pair: &Pair<'_>, turn: Turn, out: &mut Vec<Entry>) {
+        let Pair { part, pose, other, granted } = *pair;
         let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
         let to_standing = standing.planning_from_shape.inverse() * pose;
         let samples = |i: usize| &self.samples[self.shape_of[i]];
@@ -185,6 +179,14 @@ fn interior_points(surface: &Surface) -> impl Iterator<Item = Point3<f64>> + '_ 
         let [a, b, c] = surface.corners(t);
         Point3::from((a.coords + b.coords + c.coords) / 3.0) - surface.face_normal(t) * below
     })
+}
+
+/// A moving part at a pose, a standing one, and the depth that is granted to the two.
+struct Pair<'a> {
+    part: usize,
+    pose: &'a Pose,
+    other: usize,
+    granted: f64,
 }
 
 /// Into so many shares the samples of a shape are dealt.

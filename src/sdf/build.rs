@@ -51,14 +51,14 @@ impl Field {
             field.values.extend_from_slice(&values);
             field.nearest.extend_from_slice(&nearest);
         }
-        field.fill_far();
+        field.fill_far(surface);
         Ok(field)
     }
 
     /// A grid without bricks around `bounds`; `None` if it would be too large.
     fn empty(bounds: &Bounds, cell: f64) -> Option<Self> {
         let side = cell * CELLS as f64;
-        // One empty brick on every side, so that "outside" is always connected.
+        // A brick of margin on every side, so that "outside" is connected.
         let origin = bounds.min.map(|x| ((x / side).floor() - 1.0) * side);
         let dims = std::array::from_fn(|a| ((bounds.max[a] - origin[a]) / side).ceil() as usize + 1);
         let slots = dims.iter().product::<usize>();
@@ -74,7 +74,7 @@ impl Field {
         })
     }
 
-    fn brick_min(&self, brick: usize) -> Point3<f64> {
+    pub(super) fn brick_min(&self, brick: usize) -> Point3<f64> {
         let [nx, ny, _] = self.dims;
         let at = Vector3::new((brick % nx) as f64, (brick / nx % ny) as f64, (brick / (nx * ny)) as f64);
         self.origin + at * (self.cell * CELLS as f64)

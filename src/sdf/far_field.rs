@@ -1,13 +1,19 @@
 //! Signs and distance bounds of the bricks that hold no nodes.
 
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use crate::geometry::Surface;
+
 use super::grid::{BAND, BRICK, CELLS, EMPTY, Field, NODES};
 
 impl Field {
     /// Fills `far`: Chebyshev steps to the nearest brick with nodes give a distance that is
     /// never overstated; a component of empty bricks has the sign of any node on its rim.
-    pub(super) fn fill_far(&mut self) {
+    pub(super) fn fill_far(&mut self, surface: &Surface) {
         let steps = self.steps_to_surface();
-        let inside = self.inside_components();
+        let inside =
+            if surface.is_open() { self.inside_by_winding(surface) } else { self.inside_components() };
         let side = self.cell * CELLS as f64;
         self.far = (0..self.slots.len())
             .map(|b| {
@@ -59,6 +65,16 @@ impl Field {
             }
         }
         d
+    }
+
+    /// Through an opening, inside and outside are one component: each brick is asked for itself.
+    fn inside_by_winding(&self, surface: &Surface) -> Vec<bool> {
+        let half = Vector3::repeat(self.cell * CELLS as f64 / 2.0);
+        let asked = |brick: usize| {
+            let winding = || surface.winding(&(self.brick_min(brick) + half));
+            self.slots[brick] == EMPTY && winding().is_some_and(|w| w > 0.5)
+        };
+        (0..self.slots.len()).into_par_iter().map(asked).collect()
     }
 
     fn inside_components(&self) -> Vec<bool> {

@@ -9,7 +9,7 @@ const TRANSLATION: f64 = 0.05;
 const ROTATION: f64 = 0.5;
 /// States of one part after which the resolution is halved, and again after as many more: where
 /// there is much free play, states multiply without end.
-const STATES_PER_LEVEL: usize = 4;
+const STATES_PER_LEVEL: usize = 3;
 
 /// Translation without, or rotation with, freedom to turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -24,6 +24,10 @@ const LEAST_SHARE: f64 = 0.05;
 /// Longest contact step and longest step in free space, in the planning frame.
 const CONTACT_STEP: f64 = 0.12;
 const FREE_STEP: f64 = 0.5;
+/// How far the arc of one turning step may bulge from its chord.
+const LARGEST_BULGE: f64 = 1e-3;
+/// A pair may get this much deeper than its allowance half-way through a turning step.
+const BULGE_TOLERANCE: f64 = 1.2e-3;
 /// A free turn is at most so many contact steps long: exits show only at the ends of steps.
 const LONGEST_FREE_TURN: f64 = 4.0;
 const EAGER_ROUNDS: usize = 6;
@@ -189,16 +193,21 @@ impl Drive {
         let shape = &scene.bodies[part].shape;
         let gyration = shape.mass.gyration_squared.sqrt();
         let smallest = shape.bounds().extents().min();
-        let step = (smallest * 0.5).clamp(0.03, CONTACT_STEP);
         let (force, torque) = (action.force(), action.torque());
+        // Turning about the torque's axis keeps it the same in the shape.
+        let axis = start.rotation.inverse() * torque;
+        let radius = shape.radius_about(&shape.mass.centre, &axis);
+        let mut step = (smallest * 0.5).clamp(0.03, CONTACT_STEP);
+        if action.turns() && radius > 0.0 {
+            // An arc of this length bulges by s²/8r.
+            step = step.min((8.0 * radius * LARGEST_BULGE).sqrt());
+        }
         // A force of half the torque over the part's radius, without inertia: v/ω = ρ²/(2r).
         let (v, turn) = match action {
             Action::Push(..) | Action::Drag(..) | Action::Turn(..) => (force, torque),
             Action::Screw(..) => (force * (gyration * gyration / (2.0 * shape.reach)), torque),
         };
-        // Turning about the torque's axis keeps it the same in the shape.
-        let axis = start.rotation.inverse() * torque;
-        let fastest = v.norm() + turn.norm() * shape.radius_about(&shape.mass.centre, &axis);
+        let fastest = v.norm() + turn.norm() * radius;
         let (v, turn) = (v * (step / fastest), turn * (step / fastest));
         Self {
             wanted: Vector6::new(v.x, v.y, v.z, turn.x, turn.y, turn.z),
@@ -217,10 +226,10 @@ impl Drive {
             return self.moved(mover, &twist, Vec::new());
         }
         let mut with = Vec::new();
-        for eager in [true, false] {
+        for start in [Start::Certain, Start::Lazy] {
             for halving in 0..=HALVINGS {
                 let wanted = self.wanted / f64::from(1u32 << halving);
-                match self.attempt(mover, near, &wanted, eager) {
+                match self.attempt(mover, near, &wanted, start) {
                     Attempt::Moved { twist, touching } => return self.moved(mover, &twist, touching),
                     Attempt::Stuck(by) => {
                         with = by;
@@ -234,18 +243,15 @@ impl Drive {
         Step::Stuck { with }
     }
 
-    /// Projects the wanted twist until the trial pose is free of entry. `eager` starts from the
-    /// planes of all contacts, which is quick and mostly right; lazily, constraints come only from
-    /// what enters at a trial, linearised there, which finds the way where a plane that was
-    /// chosen before the motion is the wrong one of a corner's.
-    fn attempt(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>, eager: bool) -> Attempt {
+    /// Projects the wanted twist until the trial pose is free of entry.
+    fn attempt(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>, start: Start) -> Attempt {
         let target = wanted.component_mul(&self.metric);
         let (mut rows, mut working) = (Vec::new(), Vec::new());
-        if eager {
-            (rows, working) = self.chosen(mover, near, wanted);
+        if start != Start::Lazy {
+            (rows, working) = self.chosen(mover, near, wanted, start);
         }
         let mut entered = Vec::new();
-        for round in 0..if eager { EAGER_ROUNDS } else { LAZY_ROUNDS } {
+        for round in 0..if start == Start::Lazy { LAZY_ROUNDS } else { EAGER_ROUNDS } {
             let Some(result) = self.projected(&target, &rows, round == 0) else {
                 return Attempt::Entered(entered);
             };
@@ -304,13 +310,19 @@ impl Drive {
         let pose = interpolate(&from.pose, &to.pose, &centre, 0.5);
         let middle = Mover { pose, ..*from };
         let entered = self.violations(&middle, near, twist, 0..near.contacts.len());
-        entered.iter().all(|(_, c)| c.gap >= -2.0 * DEPTH_TOLERANCE)
+        entered.iter().all(|(_, c)| c.gap >= -BULGE_TOLERANCE)
     }
 
     /// One constraint per contact, reduced, and which contacts they come from. Where a contact
     /// leaves a choice of planes, the one is taken along which the motion gets furthest that the
     /// contacts without a choice allow: at the rim of a hole, that is the hole's wall.
-    fn chosen(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>) -> (Vec<Row>, Vec<usize>) {
+    fn chosen(
+        &self,
+        mover: &Mover<'_>,
+        near: &Near,
+        wanted: &Vector6<f64>,
+        start: Start,
+    ) -> (Vec<Row>, Vec<usize>) {
         let mut options = Vec::with_capacity(near.contacts.len() * 2);
         let mut ends = Vec::with_capacity(near.contacts.len());
         for contact in &near.contacts {
@@ -322,10 +334,15 @@ impl Drive {
         }
         let starts = std::iter::once(&0).chain(&ends);
         let groups: Vec<&[Row]> = starts.zip(&ends).map(|(a, b)| &options[*a..*b]).collect();
-        let (certain, _) = reduced(groups.iter().filter(|g| g.len() == 1).map(|g| g[0]), self.gyration);
-        let target = wanted.component_mul(&self.metric);
-        let likely = self.projected(&target, &certain, true);
-        let motion = likely.map_or(*wanted, |p| p.w.component_div(&self.metric));
+        let motion = match start {
+            Start::Certain => {
+                let certain = groups.iter().filter(|g| g.len() == 1).map(|g| g[0]);
+                let (certain, _) = reduced(certain, self.gyration);
+                let likely = self.projected(&wanted.component_mul(&self.metric), &certain, true);
+                likely.map_or(*wanted, |p| p.w.component_div(&self.metric))
+            }
+            Start::Lazy => *wanted,
+        };
         let best = |group: &&[Row]| {
             let mut best = group[0];
             for row in &group[1..] {
@@ -393,6 +410,17 @@ impl Drive {
         pose.rotation.renormalize();
         pose
     }
+}
+
+/// What the first projection of a step knows of the contacts; tried in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Start {
+    /// One plane each: the one along which the motion gets furthest that contacts without a choice
+    /// allow.
+    Certain,
+    /// None: constraints come only from what enters at a trial, linearised there. Finds the way
+    /// where every plane chosen before the motion is the wrong one of a corner's.
+    Lazy,
 }
 
 enum Attempt {

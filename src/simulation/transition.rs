@@ -29,8 +29,8 @@ pub enum End {
 /// A part's motion under one action.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
-    /// Poses of the part's shape in the planning frame, the start first. Between two of them the
-    /// centre of mass moves by less than a contact step.
+    /// Poses of the part's shape in the planning frame, the start first. In contact they are a
+    /// contact step apart at most, in free space as far as the clearance allows.
     pub path: Vec<Pose>,
     /// How it ended.
     pub end: End,
