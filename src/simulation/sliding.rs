@@ -27,7 +27,7 @@ const FREE_STEP: f64 = 0.5;
 /// How far the arc of one turning step may bulge from its chord.
 const LARGEST_BULGE: f64 = 1e-3;
 /// A pair may get this much deeper than its allowance half-way through a turning step.
-const BULGE_TOLERANCE: f64 = 1.2e-3;
+const BULGE_TOLERANCE: f64 = 2.0 * DEPTH_TOLERANCE;
 /// A free turn is at most so many contact steps long: exits show only at the ends of steps.
 const LONGEST_FREE_TURN: f64 = 4.0;
 const EAGER_ROUNDS: usize = 6;
