@@ -21,6 +21,7 @@ mod shape;
 mod source;
 mod surface;
 mod triangle;
+mod triangle_tree;
 mod winding;
 
 pub use assembly::{Assembly, Part};

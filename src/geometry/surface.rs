@@ -5,11 +5,9 @@
 //! not cross themselves; for all others by winding number > 0.5.
 
 use nalgebra::{Point3, Unit, Vector3};
-use parry3d_f64::bounding_volume::Aabb;
-use parry3d_f64::math::Vector as ParryVector;
-use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 
 use super::triangle::{Feature, area_normal, closest_on_triangle};
+use super::triangle_tree::TriangleTree;
 use super::winding::WindingTree;
 use super::{Bounds, Mesh, Solidity};
 
@@ -41,7 +39,7 @@ pub struct Surface {
     /// Triangles around each vertex, as ranges of `fan`.
     fan_start: Vec<u32>,
     fan: Vec<u32>,
-    bvh: Bvh,
+    tree: TriangleTree,
     winding: Option<WindingTree>,
     bounds: Bounds,
 }
@@ -65,11 +63,6 @@ impl Surface {
                 area_normal(&a, &b, &c).try_normalize(0.0).unwrap_or_else(Vector3::zeros)
             })
             .collect::<Vec<_>>();
-        let boxes = mesh.triangles.iter().enumerate().map(|(i, t)| {
-            let b = Bounds::of(&corner(t));
-            (i, Aabb::new(to_parry(&b.min), to_parry(&b.max)))
-        });
-        let bvh = Bvh::from_iter(BvhBuildStrategy::Binned, boxes);
         let (fan_start, fan) = fans(mesh);
         let winding =
             (mesh.solidity == Solidity::Winding).then(|| WindingTree::new(&mesh.vertices, &mesh.triangles));
@@ -79,7 +72,7 @@ impl Surface {
             face_normals,
             fan_start,
             fan,
-            bvh,
+            tree: TriangleTree::new(&mesh.triangles.iter().map(corner).collect::<Vec<_>>()),
             winding,
             bounds: Bounds::of(&mesh.vertices),
             vertices: mesh.vertices.clone(),
@@ -146,14 +139,7 @@ impl Surface {
     /// The closest surface point nearer than `reach`, if there is one.
     #[must_use]
     pub fn closest(&self, p: &Point3<f64>, reach: f64) -> Option<Closest> {
-        let cost = |node: &BvhNode, _| {
-            let (lo, hi) = (node.mins(), node.maxs());
-            let gap = |x: f64, l: f64, h: f64| (l - x).max(x - h).max(0.0);
-            let (dx, dy, dz) = (gap(p.x, lo.x, hi.x), gap(p.y, lo.y, hi.y), gap(p.z, lo.z, hi.z));
-            (dx * dx + dy * dy + dz * dz).sqrt()
-        };
-        let found = self.bvh.find_best(reach, cost, |i, _| Some(self.closest_on(i, p).distance));
-        found.map(|(i, _)| self.closest_on(i, p))
+        self.tree.closest(p, reach, |t| self.closest_on(t, p))
     }
 
     /// The closest surface point, given any triangle that is likely to be near: much quicker than
@@ -260,10 +246,6 @@ pub struct MassProperties {
     pub centre: Point3<f64>,
     /// Mean squared distance of the mass from the centre.
     pub gyration_squared: f64,
-}
-
-fn to_parry(p: &Point3<f64>) -> ParryVector {
-    ParryVector::new(p.x, p.y, p.z)
 }
 
 fn neighbours(mesh: &Mesh) -> Vec<[u32; 3]> {

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::geometry::{Bounds, Closest, Surface};
+use crate::geometry::Bounds;
 
 /// Cells along a brick's side.
 pub(super) const CELLS: usize = 8;
@@ -88,30 +88,20 @@ impl Field {
         Estimate { lower_bound: (value - self.error_bound()).max(boxed), value }
     }
 
-    /// The closest surface point among the triangles that are nearest to the corners of `p`'s
-    /// cell; `None` outside the band. Its distance bounds the true one from above, tightly.
+    /// A triangle that is likely to be the nearest to `p`, or nearly: that of a node around it;
+    /// `None` outside the band.
     #[must_use]
-    pub fn nearby(&self, surface: &Surface, p: &Point3<f64>) -> Option<Closest> {
+    pub fn likely_nearest(&self, p: &Point3<f64>) -> Option<u32> {
         let (brick, local) = self.locate(p)?;
         let slot = self.slots[brick];
         if slot == EMPTY {
             return None;
         }
-        let (base, _) = corner(&local, slot);
-        let mut best: Option<Closest> = None;
-        let mut seen = [FAR_NODE; 8];
-        for (k, offset) in CORNERS.iter().enumerate() {
-            let t = self.nearest[base + offset];
-            if t == FAR_NODE || seen[..k].contains(&t) {
-                continue;
-            }
-            seen[k] = t;
-            let c = surface.closest_on(t, p);
-            if best.is_none_or(|b| c.distance < b.distance) {
-                best = Some(c);
-            }
-        }
-        best
+        let (base, f) = corner(&local, slot);
+        let closest = usize::from(f.x > 0.5) | usize::from(f.y > 0.5) << 1 | usize::from(f.z > 0.5) << 2;
+        // All corners, the closest first: a cell at the band's edge has nodes beyond it.
+        let known = |k: usize| Some(self.nearest[base + CORNERS[closest ^ k]]).filter(|t| *t != FAR_NODE);
+        (0..8).find_map(known)
     }
 
     /// Brick index and position inside the brick in cells.

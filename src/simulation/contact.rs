@@ -114,14 +114,19 @@ impl<'a> Mover<'a> {
     /// How far a twist that ended at this pose moved a contact's sample against the other surface,
     /// at most: the arc is bounded by its chord and what a turn adds to second order.
     pub(super) fn displacement(&self, contact: &Contact, twist: &Vector6<f64>) -> f64 {
+        let arm = self.arm(contact);
+        let turn: Vector3<f64> = twist.fixed_rows::<3>(3).into();
+        let linear = twist.fixed_rows::<3>(0) + turn.cross(&arm);
+        linear.norm() + turn.norm_squared() * arm.norm()
+    }
+
+    /// From the centre of mass to a contact's sample.
+    pub(super) fn arm(&self, contact: &Contact) -> Vector3<f64> {
         let world = match contact.side {
             Side::Moving => self.pose * contact.sample,
             Side::Standing => self.scene.bodies[contact.other].planning_from_shape * contact.sample,
         };
-        let arm = world - self.centre();
-        let turn: Vector3<f64> = twist.fixed_rows::<3>(3).into();
-        let linear = twist.fixed_rows::<3>(0) + turn.cross(&arm);
-        linear.norm() + turn.norm_squared() * arm.norm()
+        world - self.centre()
     }
 
     /// The constraints on twists (linear part first) about the centre of mass of which a contact
@@ -243,7 +248,7 @@ impl Sample {
         }
         let stopped = out.iter().all(|p| p.height + p.normal.dot(&self.motion) < 0.0);
         if stopped
-            && let Some((ahead, _)) = measured.closest_nearby(&(self.point + self.motion), self.motion.norm())
+            && let Some((ahead, _)) = measured.closest(&(self.point + self.motion), self.motion.norm())
         {
             surface.feature_normals(&ahead, |n| {
                 if let Some(p) = above(n, &ahead.point) {
@@ -289,12 +294,11 @@ fn gather(
             if bound > limit {
                 return keep(bound);
             }
-            match measured.closest_nearby(&p, limit) {
+            match measured.closest(&p, limit) {
                 Some((closest, distance)) if distance + allowance < reach => {
                     near.contacts.push(tag(*sample, distance + allowance, closest));
                 }
-                // Nearly the distance, so not quite a bound: the field's is.
-                Some(_) => keep(bound.max(0.0)),
+                Some((_, distance)) => keep(distance),
                 None => keep(limit),
             }
         },

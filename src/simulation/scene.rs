@@ -24,12 +24,12 @@ pub struct Body {
 
 impl Body {
     /// The closest surface point to `p` (shape frame) and the signed distance, if nearer than
-    /// `reach` or inside. Exact: the field only proposes how far to look.
+    /// `reach` or inside. Exact: the field only proposes where to look first.
     #[must_use]
     pub fn closest(&self, p: &Point3<f64>, reach: f64) -> Option<(Closest, f64)> {
         let surface = &self.shape.surface;
-        let closest = match self.field.nearby(surface, p) {
-            Some(near) => surface.closest(p, near.distance).unwrap_or(near),
+        let closest = match self.field.likely_nearest(p) {
+            Some(guess) => surface.closest_from(p, guess),
             None => {
                 let estimate = self.field.estimate(p);
                 if estimate.lower_bound > reach {
@@ -39,17 +39,6 @@ impl Body {
             }
         };
         Some((closest, surface.signed(p, &closest)))
-    }
-}
-
-impl Body {
-    /// As [`Body::closest`], but where the surface is near only among the triangles that the field
-    /// proposes: quicker, and on meshes finer than the field's cells the distance may come out
-    /// slightly too large. Good for constraints that are checked afterwards.
-    #[must_use]
-    pub fn closest_nearby(&self, p: &Point3<f64>, reach: f64) -> Option<(Closest, f64)> {
-        let Some(near) = self.field.nearby(&self.shape.surface, p) else { return self.closest(p, reach) };
-        Some((near, self.shape.surface.signed(p, &near)))
     }
 }
 

@@ -66,13 +66,15 @@ impl TransitionFunction for SlidingEngine {
         let mut path = vec![*start];
         let mut exit = None;
         let mut turning = Turning::new(&mover);
+        let gather = |mover: &Mover<'_>| mover.near(surroundings, drive.step);
+        let mut near = gather(&mover);
         for _ in 0..MOST_STEPS {
             termination.check()?;
-            let near = mover.near(surroundings, drive.step);
-            match drive.advance(&mover, &near) {
+            match drive.advance(&mover, &near, &gather) {
                 Step::Stuck { with } => return Ok(Motion { path, end: End::Collision { with } }),
-                Step::Moved { pose, turned, touching } => {
+                Step::Moved { pose, turned, touching, near: there } => {
                     mover.pose = pose;
+                    near = there;
                     path.push(pose);
                     if let Some(d) = exit_direction(scene, surroundings, part, &pose, exit) {
                         return Ok(Motion { path, end: End::Disassembled(d) });
@@ -102,27 +104,28 @@ pub fn pair_blocks(
     actions: &[Action],
     least: f64,
 ) -> Vec<bool> {
-    let gathered = |mover: &Mover<'_>, reach| {
+    let start = Mover::new(scene, part, *pose);
+    let Some(first) = actions.first() else { return Vec::new() };
+    let reach = Drive::new(scene, part, pose, *first).step;
+    let gather = |mover: &Mover<'_>| {
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
         mover.near_pair(other, reach, &mut near);
         near
     };
-    let start = Mover::new(scene, part, *pose);
-    let Some(first) = actions.first() else { return Vec::new() };
-    let near = gathered(&start, Drive::new(scene, part, pose, *first).step);
+    let near = gather(&start);
     if near.contacts.is_empty() {
         return vec![false; actions.len()];
     }
     let blocked = |action: &Action| {
         let drive = Drive::new(scene, part, pose, *action);
-        let mut step = drive.advance(&start, &near);
+        let mut step = drive.advance(&start, &near, &gather);
         for _ in 0..STATIC_STEPS {
-            let Step::Moved { pose: there, .. } = step else { return true };
+            let Step::Moved { pose: there, near, .. } = step else { return true };
             let mover = Mover::new(scene, part, there);
             if (mover.centre() - start.centre()).norm() > least {
                 return false;
             }
-            step = drive.advance(&mover, &gathered(&mover, drive.step));
+            step = drive.advance(&mover, &near, &gather);
         }
         false
     };
@@ -172,8 +175,12 @@ impl Turning {
     }
 }
 
+/// What is near a mover's pose.
+type Gather<'a> = &'a dyn Fn(&Mover<'_>) -> Near;
+
 enum Step {
-    Moved { pose: Pose, turned: f64, touching: Vec<usize> },
+    /// What is near the new pose comes along: it was gathered to check that pose.
+    Moved { pose: Pose, turned: f64, touching: Vec<usize>, near: Near },
     Stuck { with: Vec<usize> },
 }
 
@@ -218,19 +225,20 @@ impl Drive {
         }
     }
 
-    /// One step from the mover's pose.
-    fn advance(&self, mover: &Mover<'_>, near: &Near) -> Step {
+    /// One step from the mover's pose; `gather` finds what is near a pose.
+    fn advance(&self, mover: &Mover<'_>, near: &Near, gather: Gather<'_>) -> Step {
         if near.contacts.is_empty() {
             let factor = (near.clearance.min(FREE_STEP) / self.step).max(1.0);
             let twist = self.wanted * if self.turns { factor.min(LONGEST_FREE_TURN) } else { factor };
-            return self.moved(mover, &twist, Vec::new());
+            let there = Mover { pose: self.displaced(mover, &twist), ..*mover };
+            return Self::moved(&there, gather(&there), &twist, Vec::new());
         }
         let mut with = Vec::new();
         for start in [Start::Certain, Start::Lazy] {
             for halving in 0..=HALVINGS {
                 let wanted = self.wanted / f64::from(1u32 << halving);
-                match self.attempt(mover, near, &wanted, start) {
-                    Attempt::Moved { twist, touching } => return self.moved(mover, &twist, touching),
+                match self.attempt(mover, near, &wanted, start, gather) {
+                    Attempt::Moved(step) => return step,
                     Attempt::Stuck(by) => {
                         with = by;
                         // A shorter step would be stopped by the same constraints.
@@ -244,17 +252,22 @@ impl Drive {
     }
 
     /// Projects the wanted twist until the trial pose is free of entry.
-    fn attempt(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>, start: Start) -> Attempt {
+    fn attempt(
+        &self,
+        mover: &Mover<'_>,
+        near: &Near,
+        wanted: &Vector6<f64>,
+        start: Start,
+        gather: Gather<'_>,
+    ) -> Attempt {
         let target = wanted.component_mul(&self.metric);
         let (mut rows, mut working) = (Vec::new(), Vec::new());
         if start != Start::Lazy {
-            (rows, working) = self.chosen(mover, near, wanted, start);
+            (rows, working) = self.chosen(mover, near, wanted);
         }
         let mut entered = Vec::new();
         for round in 0..if start == Start::Lazy { LAZY_ROUNDS } else { EAGER_ROUNDS } {
-            let Some(result) = self.projected(&target, &rows, round == 0) else {
-                return Attempt::Entered(entered);
-            };
+            let Some(result) = self.projected(&target, &rows, round == 0) else { break };
             let touching = others(&result.active, &rows);
             let share = result.w.dot(&target) / target.norm_squared();
             if share < LEAST_SHARE {
@@ -263,13 +276,15 @@ impl Drive {
             let twist = result.w.component_div(&self.metric);
             let trial = Mover { pose: self.displaced(mover, &twist), ..*mover };
             // Those behind the constraints first: most of what enters is among them.
-            let mut violated = self.violations(&trial, near, &twist, working.iter().copied());
+            let mut violated = self.violations(&trial, &working, &twist);
             if violated.is_empty() {
-                violated = self.violations(&trial, near, &twist, 0..near.contacts.len());
+                let there = gather(&trial);
+                violated = there.contacts.iter().filter(|c| c.gap < -DEPTH_TOLERANCE).copied().collect();
                 if violated.is_empty() {
-                    let clear = !self.turns || self.is_clear_between(mover, &trial, near, &twist);
-                    let moved = Attempt::Moved { twist, touching: touching.clone() };
-                    return if clear { moved } else { Attempt::Entered(touching) };
+                    if self.turns && !self.is_clear_between(mover, near, &trial, &there, &twist) {
+                        return Attempt::Entered(touching);
+                    }
+                    return Attempt::Moved(Self::moved(&trial, there, &twist, touching));
                 }
             }
             tracing::trace!(
@@ -281,36 +296,45 @@ impl Drive {
                 "entered"
             );
             entered = touching;
-            entered.extend(violated.iter().map(|(_, c)| c.other));
+            entered.extend(violated.iter().map(|c| c.other));
+            entered.sort_unstable();
+            entered.dedup();
             let mut options = Vec::new();
-            let deeper = violated.iter().filter_map(|(i, c)| {
+            let deeper = violated.iter().filter_map(|c| {
                 let row = self.freed(trial.way_out(c, &mut options)?);
                 // Linearised at the trial pose: gap(u) ≈ gap(u₀) + a·(u − u₀) ≥ 0.
                 let row = Row { b: row.b - row.a.dot(&twist), ..row };
                 // A plane that the sample was beyond already at the start does not separate it.
                 let separates = row.b >= -2.0 * DEPTH_TOLERANCE;
                 if separates {
-                    Some(row)
-                } else {
-                    mover.way_out(&near.contacts[*i], &mut options).map(|r| self.freed(r))
+                    return Some(row);
                 }
+                let at_start = mover.remeasured(c, f64::INFINITY)?;
+                mover.way_out(&at_start, &mut options).map(|r| self.freed(r))
             });
             let (worst, kept) = reduced(deeper, self.gyration);
             rows.extend(worst);
-            working.extend(kept.into_iter().map(|i| violated[i].0));
+            working.extend(kept.into_iter().map(|i| violated[i]));
         }
-        entered.sort_unstable();
-        entered.dedup();
         Attempt::Entered(entered)
     }
 
-    /// Whether a turn that is clear at its end is so on the way: points move on arcs, which bulge.
-    fn is_clear_between(&self, from: &Mover<'_>, to: &Mover<'_>, near: &Near, twist: &Vector6<f64>) -> bool {
+    /// Whether a turn that is clear at both ends is so on the way: points move on arcs, which
+    /// bulge. Contacts further off at both ends than twice the bulge are not asked.
+    fn is_clear_between(
+        &self,
+        from: &Mover<'_>,
+        near: &Near,
+        to: &Mover<'_>,
+        there: &Near,
+        twist: &Vector6<f64>,
+    ) -> bool {
         let centre = from.scene.centre_in_shape(from.part);
-        let pose = interpolate(&from.pose, &to.pose, &centre, 0.5);
-        let middle = Mover { pose, ..*from };
-        let entered = self.violations(&middle, near, twist, 0..near.contacts.len());
-        entered.iter().all(|(_, c)| c.gap >= -BULGE_TOLERANCE)
+        let middle = Mover { pose: interpolate(&from.pose, &to.pose, &centre, 0.5), ..*from };
+        let turn = twist.fixed_rows::<3>(3).norm();
+        let close = |c: &&Contact| c.gap < 0.25 * turn * turn * from.arm(c).norm();
+        let mut closest = near.contacts.iter().chain(&there.contacts).filter(close);
+        closest.all(|c| middle.remeasured(c, 0.0).is_none_or(|c| c.gap >= -BULGE_TOLERANCE))
     }
 
     /// One constraint per contact, reduced, and which contacts they come from. Where a contact
@@ -321,8 +345,7 @@ impl Drive {
         mover: &Mover<'_>,
         near: &Near,
         wanted: &Vector6<f64>,
-        start: Start,
-    ) -> (Vec<Row>, Vec<usize>) {
+    ) -> (Vec<Row>, Vec<Contact>) {
         let mut options = Vec::with_capacity(near.contacts.len() * 2);
         let mut ends = Vec::with_capacity(near.contacts.len());
         for contact in &near.contacts {
@@ -334,15 +357,10 @@ impl Drive {
         }
         let starts = std::iter::once(&0).chain(&ends);
         let groups: Vec<&[Row]> = starts.zip(&ends).map(|(a, b)| &options[*a..*b]).collect();
-        let motion = match start {
-            Start::Certain => {
-                let certain = groups.iter().filter(|g| g.len() == 1).map(|g| g[0]);
-                let (certain, _) = reduced(certain, self.gyration);
-                let likely = self.projected(&wanted.component_mul(&self.metric), &certain, true);
-                likely.map_or(*wanted, |p| p.w.component_div(&self.metric))
-            }
-            Start::Lazy => *wanted,
-        };
+        let certain = groups.iter().filter(|g| g.len() == 1).map(|g| g[0]);
+        let (certain, _) = reduced(certain, self.gyration);
+        let likely = self.projected(&wanted.component_mul(&self.metric), &certain, true);
+        let motion = likely.map_or(*wanted, |p| p.w.component_div(&self.metric));
         let best = |group: &&[Row]| {
             let mut best = group[0];
             for row in &group[1..] {
@@ -352,7 +370,8 @@ impl Drive {
             }
             best
         };
-        reduced(groups.iter().map(best), self.gyration)
+        let (rows, kept) = reduced(groups.iter().map(best), self.gyration);
+        (rows, kept.into_iter().map(|i| near.contacts[i]).collect())
     }
 
     /// A row without the freedoms that the action does not give.
@@ -375,24 +394,17 @@ impl Drive {
     }
 
     /// Of some contacts, those that are too deep at the trial pose, measured there.
-    fn violations(
-        &self,
-        trial: &Mover<'_>,
-        near: &Near,
-        twist: &Vector6<f64>,
-        which: impl Iterator<Item = usize>,
-    ) -> Vec<(usize, Contact)> {
-        which
-            .map(|i| (i, &near.contacts[i]))
-            .filter(|(_, c)| c.gap - trial.displacement(c, twist) < -DEPTH_TOLERANCE)
-            .filter_map(|(i, c)| Some((i, trial.remeasured(c, self.step)?)))
-            .filter(|(_, c)| c.gap < -DEPTH_TOLERANCE)
+    fn violations(&self, trial: &Mover<'_>, contacts: &[Contact], twist: &Vector6<f64>) -> Vec<Contact> {
+        contacts
+            .iter()
+            .filter(|c| c.gap - trial.displacement(c, twist) < -DEPTH_TOLERANCE)
+            .filter_map(|c| trial.remeasured(c, self.step))
+            .filter(|c| c.gap < -DEPTH_TOLERANCE)
             .collect()
     }
 
-    fn moved(&self, mover: &Mover<'_>, twist: &Vector6<f64>, touching: Vec<usize>) -> Step {
-        let turned = twist.fixed_rows::<3>(3).norm();
-        Step::Moved { pose: self.displaced(mover, twist), turned, touching }
+    fn moved(there: &Mover<'_>, near: Near, twist: &Vector6<f64>, touching: Vec<usize>) -> Step {
+        Step::Moved { pose: there.pose, turned: twist.fixed_rows::<3>(3).norm(), touching, near }
     }
 
     /// The pose after a twist about the centre of mass.
@@ -424,10 +436,7 @@ enum Start {
 }
 
 enum Attempt {
-    Moved {
-        twist: Vector6<f64>,
-        touching: Vec<usize>,
-    },
+    Moved(Step),
     /// The linear constraints alone stop it.
     Stuck(Vec<usize>),
     /// No allowed pose was found at this length of step.

@@ -1,0 +1,305 @@
+//! Which triangle is closest to a point: a tree of boxes, eight to a node and eight triangles to a
+//! leaf, so that one pass of vector instructions tests all eight.
+//!
+//! Single precision decides only what cannot be closest, with a margin for its rounding; what
+//! remains is measured in double precision. In a leaf, the bound of a triangle is the distance to
+//! its plane joined with the distance beyond its sides in that plane: exact except beyond corners.
+
+use nalgebra::{Point3, Vector3};
+
+use super::triangle::area_normal;
+use super::{Bounds, Closest};
+
+const WIDTH: usize = 8;
+/// Bits of a child that is a leaf.
+const LEAF: u32 = 1 << 31;
+/// Rounding of coordinates and products, as a share of the coordinates' size.
+const ROUNDING: f64 = 2e-6;
+/// Boxes are split at one of so many places along each axis.
+const BINS: usize = 16;
+/// The smaller side of a split holds at least this share: bounds the depth.
+const LEAST_SHARE: usize = 16;
+
+type Lanes = [f32; WIDTH];
+
+/// Eight boxes and what they hold.
+#[derive(Clone)]
+#[repr(align(32))]
+struct Node {
+    min: [Lanes; 3],
+    max: [Lanes; 3],
+    child: [u32; WIDTH],
+}
+
+/// Eight triangles, each as a plane and three planes through its sides, all with unit normals
+/// (outward, for the sides): a point of the triangle is on the first and below the others.
+#[derive(Clone)]
+#[repr(align(32))]
+struct Leaf {
+    normal: [Lanes; 3],
+    height: Lanes,
+    sides: [[Lanes; 3]; 3],
+    limits: [Lanes; 3],
+    triangle: [u32; WIDTH],
+}
+
+/// The tree of a surface's triangles.
+#[derive(Clone)]
+pub(super) struct TriangleTree {
+    /// Coordinates are relative to this point.
+    origin: Point3<f64>,
+    radius: f64,
+    root: u32,
+    nodes: Vec<Node>,
+    leaves: Vec<Leaf>,
+}
+
+impl TriangleTree {
+    /// The tree of some triangles, given by their corners.
+    pub(super) fn new(triangles: &[[Point3<f64>; 3]]) -> Self {
+        let items: Vec<Bounds> = triangles.iter().map(Bounds::of).collect();
+        let all = items.iter().fold(Bounds::EMPTY, |a, b| a.union(b));
+        let empty = triangles.is_empty();
+        let origin = if empty { Point3::origin() } else { all.centre() };
+        let radius = if empty { 0.0 } else { all.extents().max() * 0.5 };
+        let mut tree = Self { origin, radius, root: 0, nodes: Vec::new(), leaves: Vec::new() };
+        let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
+        tree.root = tree.build(triangles, &items, &mut order);
+        tree
+    }
+
+    fn build(&mut self, triangles: &[[Point3<f64>; 3]], items: &[Bounds], order: &mut [u32]) -> u32 {
+        if order.len() <= WIDTH {
+            self.leaves.push(Leaf::new(triangles, order, &self.origin));
+            return (self.leaves.len() - 1) as u32 | LEAF;
+        }
+        let mut groups = vec![&mut *order];
+        while groups.len() < WIDTH {
+            let largest = (0..groups.len()).max_by_key(|&i| groups[i].len()).unwrap_or(0);
+            if groups[largest].len() <= WIDTH {
+                break;
+            }
+            let group = groups.swap_remove(largest);
+            let (left, right) = split(items, group);
+            groups.extend([left, right]);
+        }
+        let mut node =
+            Node { min: [[f32::INFINITY; WIDTH]; 3], max: [[f32::NEG_INFINITY; WIDTH]; 3], child: [0; WIDTH] };
+        for (k, group) in groups.into_iter().enumerate() {
+            let bounds = group.iter().fold(Bounds::EMPTY, |b, &i| b.union(&items[i as usize]));
+            for a in 0..3 {
+                node.min[a][k] = (bounds.min[a] - self.origin[a]) as f32;
+                node.max[a][k] = (bounds.max[a] - self.origin[a]) as f32;
+            }
+            node.child[k] = self.build(triangles, items, group);
+        }
+        self.nodes.push(node);
+        (self.nodes.len() - 1) as u32
+    }
+
+    /// The triangle whose `measure` is the smallest below `reach`, if there is one.
+    pub(super) fn closest(
+        &self,
+        p: &Point3<f64>,
+        reach: f64,
+        measure: impl Fn(u32) -> Closest,
+    ) -> Option<Closest> {
+        let q = p - self.origin;
+        let slack = ROUNDING * (q.amax() + self.radius);
+        let mut query = Query { q: q.map(|x| x as f32).into(), slack, best: None, limit: 0.0, reach, measure };
+        query.tighten(reach);
+        self.descend(self.root, &mut query);
+        query.best
+    }
+
+    fn descend<M: Fn(u32) -> Closest>(&self, at: u32, query: &mut Query<M>) {
+        if at & LEAF != 0 {
+            return query.visit(&self.leaves[(at & !LEAF) as usize]);
+        }
+        let node = &self.nodes[at as usize];
+        let bounds = node.squared_distances(&query.q);
+        // Nearest first; eight at most.
+        let mut order = [(f32::INFINITY, 0u32); WIDTH];
+        let mut count = 0;
+        for k in 0..WIDTH {
+            if bounds[k] < query.limit {
+                let mut i = count;
+                while i > 0 && order[i - 1].0 > bounds[k] {
+                    order[i] = order[i - 1];
+                    i -= 1;
+                }
+                order[i] = (bounds[k], node.child[k]);
+                count += 1;
+            }
+        }
+        for &(bound, child) in &order[..count] {
+            if bound < query.limit {
+                self.descend(child, query);
+            }
+        }
+    }
+}
+
+struct Query<M> {
+    q: [f32; 3],
+    slack: f64,
+    best: Option<Closest>,
+    reach: f64,
+    /// Squared, what is surely further than the best.
+    limit: f32,
+    measure: M,
+}
+
+impl<M: Fn(u32) -> Closest> Query<M> {
+    fn tighten(&mut self, reach: f64) {
+        self.reach = reach;
+        self.limit = ((reach + self.slack).powi(2) * (1.0 + 1e-6)) as f32;
+    }
+
+    fn visit(&mut self, leaf: &Leaf) {
+        let bounds = leaf.squared_distances(&self.q);
+        for k in 0..WIDTH {
+            if bounds[k] < self.limit {
+                let found = (self.measure)(leaf.triangle[k]);
+                if found.distance < self.reach {
+                    self.tighten(found.distance);
+                    self.best = Some(found);
+                }
+            }
+        }
+    }
+}
+
+impl Node {
+    #[inline]
+    fn squared_distances(&self, q: &[f32; 3]) -> Lanes {
+        let mut sum = [0.0; WIDTH];
+        for a in 0..3 {
+            for k in 0..WIDTH {
+                let outside = larger(larger(self.min[a][k] - q[a], q[a] - self.max[a][k]), 0.0);
+                sum[k] += outside * outside;
+            }
+        }
+        sum
+    }
+}
+
+impl Leaf {
+    fn new(triangles: &[[Point3<f64>; 3]], members: &[u32], origin: &Point3<f64>) -> Self {
+        let mut leaf = Self {
+            normal: [[0.0; WIDTH]; 3],
+            // No point is near the plane of an empty place.
+            height: [f32::INFINITY; WIDTH],
+            sides: [[[0.0; WIDTH]; 3]; 3],
+            limits: [[0.0; WIDTH]; 3],
+            triangle: [0; WIDTH],
+        };
+        for (k, &t) in members.iter().enumerate() {
+            let corners = triangles[t as usize].map(|p| p - origin);
+            let [a, b, c] = triangles[t as usize];
+            // Planes that rounding makes doubtful are left out: the bound becomes weaker.
+            let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+            let normal = area_normal(&a, &b, &c);
+            let sound = normal.norm() > 1e-4 * longest * longest;
+            let normal = if sound { normal.normalize() } else { Vector3::zeros() };
+            let put = |plane: Vector3<f64>, to: &mut [Lanes; 3], limit: &mut Lanes, on: &Vector3<f64>| {
+                for axis in 0..3 {
+                    to[axis][k] = plane[axis] as f32;
+                }
+                limit[k] = plane.dot(on) as f32;
+            };
+            put(normal, &mut leaf.normal, &mut leaf.height, &corners[0]);
+            for e in 0..3 {
+                let along = corners[(e + 1) % 3] - corners[e];
+                let outward = along.cross(&normal).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+                put(outward, &mut leaf.sides[e], &mut leaf.limits[e], &corners[e]);
+            }
+            leaf.triangle[k] = t;
+        }
+        leaf
+    }
+
+    #[inline]
+    fn squared_distances(&self, q: &[f32; 3]) -> Lanes {
+        let height = above(&self.normal, &self.height, q);
+        let [a, b, c] = [0, 1, 2].map(|e| above(&self.sides[e], &self.limits[e], q));
+        let mut out = [0.0; WIDTH];
+        for k in 0..WIDTH {
+            let beyond = larger(larger(larger(a[k], b[k]), c[k]), 0.0);
+            out[k] = height[k] * height[k] + beyond * beyond;
+        }
+        out
+    }
+}
+
+/// Heights of a point above eight planes.
+#[inline]
+fn above(plane: &[Lanes; 3], limit: &Lanes, q: &[f32; 3]) -> Lanes {
+    let mut out = [0.0; WIDTH];
+    for k in 0..WIDTH {
+        out[k] = plane[0][k] * q[0] + plane[1][k] * q[1] + plane[2][k] * q[2] - limit[k];
+    }
+    out
+}
+
+/// One vector instruction, which `f32::max` with its rule for NaN is not.
+#[inline]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// Splits items in two where the boxes' areas times their counts get smallest (surface area
+/// heuristic), or in the middle if all centres coincide.
+fn split<'a>(items: &[Bounds], order: &'a mut [u32]) -> (&'a mut [u32], &'a mut [u32]) {
+    let centre = |i: u32, a: usize| items[i as usize].min[a] + items[i as usize].max[a];
+    let least = order.len().div_ceil(LEAST_SHARE).max(1);
+    let mut best: Option<(f64, usize, f64)> = None;
+    for axis in 0..3 {
+        let (low, high) = order.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &i| {
+            (l.min(centre(i, axis)), h.max(centre(i, axis)))
+        });
+        let scale = BINS as f64 / (high - low);
+        if !(scale.is_finite() && high > low) {
+            continue;
+        }
+        let bin = |i: u32| (((centre(i, axis) - low) * scale) as usize).min(BINS - 1);
+        let mut bins = [(0usize, Bounds::EMPTY); BINS];
+        for &i in order.iter() {
+            let b = &mut bins[bin(i)];
+            *b = (b.0 + 1, b.1.union(&items[i as usize]));
+        }
+        let mut above = [(0usize, Bounds::EMPTY); BINS + 1];
+        for k in (0..BINS).rev() {
+            above[k] = (above[k + 1].0 + bins[k].0, above[k + 1].1.union(&bins[k].1));
+        }
+        let mut below = (0usize, Bounds::EMPTY);
+        for k in 1..BINS {
+            below = (below.0 + bins[k - 1].0, below.1.union(&bins[k - 1].1));
+            let (left, right) = (below.0, above[k].0);
+            if left < least || right < least {
+                continue;
+            }
+            let cost = area(&below.1) * left as f64 + area(&above[k].1) * right as f64;
+            if best.is_none_or(|b| cost < b.0) {
+                best = Some((cost, axis, low + k as f64 / scale));
+            }
+        }
+    }
+    let middle = match best {
+        Some((_, axis, at)) => {
+            order.sort_by_key(|&i| centre(i, axis) >= at);
+            order.partition_point(|&i| centre(i, axis) < at).clamp(least, order.len() - least)
+        }
+        None => {
+            let longest = order.iter().fold(Bounds::EMPTY, |b, &i| b.union(&items[i as usize])).extents().imax();
+            order.sort_by(|&i, &j| centre(i, longest).total_cmp(&centre(j, longest)));
+            order.len() / 2
+        }
+    };
+    order.split_at_mut(middle)
+}
+
+fn area(b: &Bounds) -> f64 {
+    let e = b.extents();
+    e.x * e.y + e.y * e.z + e.z * e.x
+}
