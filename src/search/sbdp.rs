@@ -246,7 +246,14 @@ impl<'a, 'o> Search<'a, 'o> {
             return vec![best];
         }
         let mut roots = std::mem::take(open);
-        roots.sort_by_key(|&i| (evaluation(i), i));
+        // Before anything was turned, what stops pushes tells which part is least held; among
+        // equals the smallest is the likeliest fastener and the cheapest to simulate.
+        let other = |i: usize| self.nodes[i].blockage(Phase::Translation).map(Blockage::evaluation);
+        let reach = |i: usize| self.problem.scene.bodies[self.nodes[i].part].shape.reach.to_bits();
+        roots.sort_by_key(|&i| match phase {
+            Phase::Translation => (evaluation(i), None, 0, i),
+            Phase::Rotation => (evaluation(i), other(i), reach(i), i),
+        });
         roots
     }
 
