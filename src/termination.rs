@@ -1,7 +1,7 @@
 //! The one condition that everything long-running polls: cancelled, or past its deadline.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// Why work stopped early.
@@ -18,13 +18,14 @@ pub enum Interrupt {
 pub struct Termination {
     cancelled: Arc<AtomicBool>,
     deadline: Option<Instant>,
+    race: Option<(Arc<AtomicUsize>, usize)>,
 }
 
 impl Termination {
     /// A condition with an optional deadline.
     #[must_use]
     pub fn new(deadline: Option<Instant>) -> Self {
-        Self { cancelled: Arc::default(), deadline }
+        Self { cancelled: Arc::default(), deadline, race: None }
     }
 
     /// A flag that ends the work when it is set; shared with whoever may cancel.
@@ -33,10 +34,21 @@ impl Termination {
         Arc::clone(&self.cancelled)
     }
 
+    /// The same for work that is in vain as soon as `winner` holds less than `rank`.
+    #[must_use]
+    pub fn unless_won(&self, winner: &Arc<AtomicUsize>, rank: usize) -> Self {
+        Self { race: Some((Arc::clone(winner), rank)), ..self.clone() }
+    }
+
     /// # Errors
     /// The reason to stop, if there is one.
     pub fn check(&self) -> Result<(), Interrupt> {
         if self.cancelled.load(Ordering::Relaxed) {
+            return Err(Interrupt::Cancelled);
+        }
+        if let Some((winner, rank)) = &self.race
+            && winner.load(Ordering::Relaxed) < *rank
+        {
             return Err(Interrupt::Cancelled);
         }
         match self.deadline {

@@ -6,6 +6,7 @@ use crate::geometry::Pose;
 use crate::simulation::{End, Surroundings, exit_direction};
 
 use super::outcome::Removal;
+use super::problem::Problem;
 use super::sbdp::{Gain, Job, Search, Stop, joined, simulate};
 use super::state::Phase;
 
@@ -44,7 +45,8 @@ impl Search<'_, '_> {
             self.charge()?;
             let started = Instant::now();
             let action = self.actions(phase)[job.action];
-            let again = simulate(&self.problem, &self.nodes[job.node], &self.around, action);
+            let Problem { termination, .. } = &self.problem;
+            let again = simulate(&self.problem, &self.nodes[job.node], &self.around, action, termination);
             self.counters.simulation += started.elapsed();
             let again = again?;
             if !matches!(again.end, End::Disassembled(_)) {

@@ -7,6 +7,8 @@
 //! but their results are taken in the order of the serial algorithm and thrown away where an
 //! earlier one changed the question, so the plan does not depend on the number of threads.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -14,7 +16,7 @@ use rayon::prelude::*;
 use crate::blocking_graph::{Blockage, Evaluation, blocked_from, initial_blockages};
 use crate::geometry::Pose;
 use crate::simulation::{Action, End, Motion, Surroundings};
-use crate::termination::Interrupt;
+use crate::termination::{Interrupt, Termination};
 
 use super::outcome::{Counters, Outcome, Removal};
 use super::problem::{Observer, Problem};
@@ -312,6 +314,8 @@ impl<'a, 'o> Search<'a, 'o> {
             })
     }
 
+    /// The motions of a window up to the first that leads out: that one changes the question to
+    /// which later ones were answers, so they are stopped.
     fn simulate_all(&mut self, phase: Phase, window: &[Job]) -> Result<Vec<Motion>, Stop> {
         let started = Instant::now();
         for job in window {
@@ -320,14 +324,23 @@ impl<'a, 'o> Search<'a, 'o> {
         }
         let (problem, nodes, around) = (&self.problem, &self.nodes, &self.around);
         let actions = self.actions(phase);
-        let run = |job: &Job| simulate(problem, &nodes[job.node], around, actions[job.action]);
-        let motions = if window.len() > 1 {
-            window.par_iter().map(run).collect::<Result<Vec<_>, Interrupt>>()
+        let winner = Arc::new(AtomicUsize::new(usize::MAX));
+        let run = |(rank, job): (usize, &Job)| {
+            let termination = problem.termination.unless_won(&winner, rank);
+            let motion = simulate(problem, &nodes[job.node], around, actions[job.action], &termination);
+            if matches!(&motion, Ok(Motion { end: End::Disassembled(_), .. })) {
+                winner.fetch_min(rank, Ordering::Relaxed);
+            }
+            motion
+        };
+        let motions: Vec<_> = if window.len() > 1 {
+            window.par_iter().enumerate().map(run).collect()
         } else {
-            window.iter().map(run).collect()
+            window.iter().enumerate().map(run).collect()
         };
         self.counters.simulation += started.elapsed();
-        Ok(motions?)
+        let wanted = winner.load(Ordering::Relaxed).saturating_add(1);
+        Ok(motions.into_iter().take(wanted).collect::<Result<_, Interrupt>>()?)
     }
 
     pub(super) fn charge(&mut self) -> Result<(), Stop> {
@@ -399,8 +412,9 @@ pub(super) fn simulate(
     node: &Node,
     around: &[Option<Surroundings>],
     action: Action,
+    termination: &Termination,
 ) -> Result<Motion, Interrupt> {
-    let Problem { scene, engine, termination, .. } = problem;
+    let Problem { scene, engine, .. } = problem;
     match &around[node.part] {
         Some(around) => engine.simulate(scene, around, node.part, node.pose(), action, termination),
         None => Ok(Motion { path: vec![*node.pose()], end: End::Collision { with: Vec::new() } }),

@@ -83,15 +83,21 @@ impl<'a> Mover<'a> {
         let allowance = self.scene.allowances.of(self.part, other);
         let standing_from_moving = standing.planning_from_shape.inverse() * self.pose;
         let moving_from_standing = standing_from_moving.inverse();
-        for (side, sampled, measured, to_measured) in [
-            (Side::Moving, self.body, standing, &standing_from_moving),
-            (Side::Standing, standing, self.body, &moving_from_standing),
-        ] {
+        let side = |side, sampled: &Body, measured: &Body, to_measured: &Pose| {
+            let mut found = Near { contacts: Vec::new(), clearance: near.clearance };
             for tree in [&sampled.shape.samples, &sampled.extra_samples] {
                 let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
-                gather(tree, measured, to_measured, allowance, reach, near, tag);
+                gather(tree, measured, to_measured, allowance, reach, &mut found, tag);
             }
-        }
+            found
+        };
+        let (mut mine, theirs) = rayon::join(
+            || side(Side::Moving, self.body, standing, &standing_from_moving),
+            || side(Side::Standing, standing, self.body, &moving_from_standing),
+        );
+        near.clearance = mine.clearance.min(theirs.clearance);
+        near.contacts.append(&mut mine.contacts);
+        near.contacts.extend(theirs.contacts);
     }
 
     /// The gap of a contact's sample with the mover at its pose, if still below `reach`.
