@@ -275,8 +275,12 @@ impl Drive {
             }
             let twist = result.w.component_div(&self.metric);
             let trial = Mover { pose: self.displaced(mover, &twist), ..*mover };
-            // Those behind the constraints first: most of what enters is among them.
-            let mut violated = self.violations(&trial, &working, &twist);
+            // From the second round on, those behind the constraints first: most of what enters is
+            // among them.
+            let mut violated = Vec::new();
+            if round > 0 {
+                violated = self.violations(&trial, &working, &twist);
+            }
             if violated.is_empty() {
                 let there = gather(&trial);
                 violated = there.contacts.iter().filter(|c| c.gap < -DEPTH_TOLERANCE).copied().collect();
