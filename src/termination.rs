@@ -40,6 +40,14 @@ impl Termination {
         Self { race: Some((Arc::clone(winner), rank)), ..self.clone() }
     }
 
+    /// The same with half of the time that is left.
+    #[must_use]
+    pub fn halfway(&self) -> Self {
+        let now = Instant::now();
+        let half = |d: Instant| now + d.saturating_duration_since(now) / 2;
+        Self { deadline: self.deadline.map(half), ..self.clone() }
+    }
+
     /// # Errors
     /// The reason to stop, if there is one.
     pub fn check(&self) -> Result<(), Interrupt> {

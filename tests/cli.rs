@@ -160,6 +160,37 @@ fn a_spent_budget_exits_3_and_a_passed_deadline_4() {
 }
 
 #[test]
+fn a_trace_is_explained_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("trace.jsonl");
+    let output = plan("pin-bolt-cover", &["--trace", file.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let told = run(&["explain", file.to_str().unwrap()]);
+    assert_eq!(told.status.code(), Some(0), "{}", stderr(&told));
+    let text = stdout(&told);
+    for words in [
+        "sbdp-star with sliding on 4 parts",
+        "static analysis of pin",
+        "=== bolt is out, freed after pin",
+        "complete",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    fs::write(&file, "{\"event\":\"pass\",\"phase\":\"rotation\",\"depth_limit\":null}\nnonsense\n").unwrap();
+    refused(&run(&["explain", file.to_str().unwrap()]), &["trace.jsonl", "line 2"]);
+}
+
+#[test]
+fn every_planner_plans_from_the_command_line() {
+    for planner in sbdp::search::Planner::ALL.map(sbdp::search::Planner::name) {
+        let output = plan("pin-bolt-cover", &["--planner", planner, "--json", "-"]);
+        assert_eq!(output.status.code(), Some(0), "{planner}: {}", stderr(&output));
+        let document: PlanDocument = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(document.planner, planner);
+    }
+}
+
+#[test]
 fn an_unwritable_file_exits_1() {
     let output = plan("peg-stl", &["--json", "/nonexistent/plan.json"]);
     assert_eq!(output.status.code(), Some(1));

@@ -8,12 +8,14 @@ use std::time::Instant;
 
 use sbdp::geometry::{SourceAssembly, Waypoint, load_assembly};
 use sbdp::plan::{MotionKind, Plan, PlanStatus, PlanStep};
-use sbdp::search::{Engine, PlanRequest, PlanSink, Planner, Progress};
+use sbdp::search::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress};
 use sbdp::service::Service;
 use sbdp::termination::Termination;
 
-/// All that exist; a new planner or engine is added here and held to the same.
-const KINDS: [(Planner, Engine); 1] = [(Planner::SbdpStar, Engine::Sliding)];
+/// All that exist: a new planner or engine is held to the same.
+fn kinds() -> impl Iterator<Item = (Planner, Engine)> {
+    Planner::ALL.into_iter().flat_map(|planner| Engine::ALL.map(|engine| (planner, engine)))
+}
 
 const IDENTITY: Waypoint = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
@@ -107,7 +109,12 @@ fn assert_path(step: &PlanStep, longest_side: f64) {
 }
 
 fn requests() -> impl Iterator<Item = PlanRequest> {
-    KINDS.into_iter().map(|(planner, engine)| PlanRequest { planner, engine, ..PlanRequest::default() })
+    kinds().map(|(planner, engine)| PlanRequest {
+        planner,
+        engine,
+        actions: planner.default_actions(),
+        ..PlanRequest::default()
+    })
 }
 
 fn order(plan: &Plan) -> Vec<&str> {
@@ -140,7 +147,7 @@ fn the_pin_leaves_before_the_bolt_before_the_cover() {
 #[test]
 fn a_thread_is_unscrewed() {
     let assembly = load("threaded-bolt-and-nut");
-    for request in requests() {
+    for request in requests().filter(|r| r.planner != Planner::PdpT) {
         let plan = plan(&assembly, &request);
         assert_eq!(plan.status, PlanStatus::Complete, "{:?}", plan.reason);
         assert_eq!(plan.steps.iter().map(|s| s.motion).collect::<Vec<_>>(), [MotionKind::Rotation]);
@@ -217,13 +224,29 @@ fn a_request_cancelled_before_it_began_is_cancelled() {
 #[test]
 fn a_request_cancelled_on_the_way_keeps_what_it_has() {
     let assembly = load("pin-bolt-cover");
-    for request in requests() {
+    // PDP* tells nothing before its first run has succeeded.
+    for request in requests().filter(|r| r.planner != Planner::PdpStar) {
         let termination = Termination::default();
         let listener = Listener { cancel: Some(termination.cancel_flag()), ..Listener::default() };
         let plan = plan_until(&assembly, &request, &termination, listener);
         assert_eq!(plan.status, PlanStatus::Cancelled);
         assert_eq!(order(&plan), ["pin"]);
     }
+}
+
+#[test]
+fn pdp_star_answers_with_the_run_that_succeeds() {
+    let with = |planner, name| {
+        let request = PlanRequest { planner, actions: ActionSet::Paper, ..PlanRequest::default() };
+        plan(&load(name), &request)
+    };
+    for (name, run) in [("pin-bolt-cover", Planner::PdpT), ("threaded-bolt-and-nut", Planner::PdpR)] {
+        let (both, alone) = (with(Planner::PdpStar, name), with(run, name));
+        assert_eq!((both.status, &both.steps), (alone.status, &alone.steps), "{name}");
+        assert_eq!(both.stats.simulations, alone.stats.simulations, "{name}: only the successful run counts");
+    }
+    let plan = with(Planner::PdpT, "threaded-bolt-and-nut");
+    assert_eq!((plan.status, plan.steps.len()), (PlanStatus::Infeasible, 0), "no translation unscrews");
 }
 
 #[test]

@@ -61,6 +61,12 @@ impl Blockage {
         self.jointly[action].is_empty()
     }
 
+    /// Whether an action can never succeed, whoever leaves.
+    #[must_use]
+    pub fn is_barred(&self, action: usize) -> bool {
+        self.jointly[action].iter().any(Vec::is_empty)
+    }
+
     /// Actions that are open, in order.
     pub fn open_actions(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.single.len()).filter(|&a| self.is_open(a))

@@ -25,6 +25,8 @@ pub(super) enum Command {
     Plan(PlanArguments),
     /// Say what is found in an assembly's files: healing, sizes, overlaps
     Check(CheckArguments),
+    /// Tell in words what a search did, from its trace
+    Explain(ExplainArguments),
     /// Say how the running daemon is
     Status,
 }
@@ -43,9 +45,9 @@ pub(super) struct PlanArguments {
     /// Which transition function
     #[arg(long, value_enum, default_value_t)]
     pub(super) engine: Engine,
-    /// Which actions: the paper's, or also pulling while turning
-    #[arg(long, value_enum, default_value_t)]
-    pub(super) actions: Actions,
+    /// Which actions [default: extended for sbdp-star, paper for all other planners]
+    #[arg(long, value_enum)]
+    pub(super) actions: Option<Actions>,
     /// Answer after so many seconds with what is there
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) timeout: Option<Duration>,
@@ -64,6 +66,10 @@ pub(super) struct PlanArguments {
     /// A part that must come out (repeatable) [default: all]
     #[arg(long, value_name = "PART")]
     pub(super) target: Vec<String>,
+    /// Write there what the search did, one JSON object per line (see `sbdp explain`); plans in
+    /// this process
+    #[arg(long, value_name = "FILE", conflicts_with = "daemon")]
+    pub(super) trace: Option<PathBuf>,
     /// Neither read nor write anything remembered
     #[arg(long)]
     pub(super) no_cache: bool,
@@ -82,18 +88,37 @@ pub(super) struct CheckArguments {
     pub(super) assembly: PathBuf,
 }
 
+/// Arguments of `sbdp explain`.
+#[derive(Debug, Args)]
+pub(super) struct ExplainArguments {
+    /// A file that `sbdp plan --trace` wrote
+    pub(super) trace: PathBuf,
+}
+
 /// Which search.
 #[derive(Debug, Clone, Copy, Default, ValueEnum)]
 pub(super) enum Planner {
     /// State-based planning guided by directional blocking graphs
     #[default]
     SbdpStar,
+    /// State-based planning without blocking graphs
+    Sbdp,
+    /// Breadth-first search per part with translations
+    PdpT,
+    /// Breadth-first search per part with rotational freedom
+    PdpR,
+    /// pdp-t, then pdp-r if that failed
+    PdpStar,
 }
 
 impl From<Planner> for search::Planner {
     fn from(planner: Planner) -> Self {
         match planner {
             Planner::SbdpStar => Self::SbdpStar,
+            Planner::Sbdp => Self::Sbdp,
+            Planner::PdpT => Self::PdpT,
+            Planner::PdpR => Self::PdpR,
+            Planner::PdpStar => Self::PdpStar,
         }
     }
 }
@@ -115,12 +140,11 @@ impl From<Engine> for search::Engine {
 }
 
 /// Which actions.
-#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+#[derive(Debug, Clone, Copy, ValueEnum)]
 pub(super) enum Actions {
     /// Six translations, six rotations
     Paper,
     /// The paper's and pulling while turning
-    #[default]
     Extended,
 }
 

@@ -108,6 +108,10 @@ fn options(question: &Question<'_>) -> PlanOptions {
     PlanOptions {
         planner: match request.planner {
             Planner::SbdpStar => client::Planner::SbdpStar,
+            Planner::Sbdp => client::Planner::Sbdp,
+            Planner::PdpT => client::Planner::PdpT,
+            Planner::PdpR => client::Planner::PdpR,
+            Planner::PdpStar => client::Planner::PdpStar,
         },
         engine: match request.engine {
             Engine::Sliding => client::Engine::Sliding,
@@ -217,12 +221,8 @@ fn unplanned(question: &Question<'_>, status: PlanStatus, error: &ClientError) -
     Plan {
         status,
         reason: Some(error.to_string()),
-        planner: match request.planner {
-            Planner::SbdpStar => "sbdp-star".to_owned(),
-        },
-        engine: match request.engine {
-            Engine::Sliding => "sliding".to_owned(),
-        },
+        planner: request.planner.name().to_owned(),
+        engine: request.engine.name().to_owned(),
         units: question.assembly.units.clone(),
         parts,
         removed: request.removed.clone(),

@@ -8,7 +8,9 @@ mod backend;
 mod check;
 mod daemon;
 mod error;
+mod explain;
 mod interrupt;
+mod listener;
 mod part_names;
 mod plan;
 mod progress;
@@ -30,6 +32,7 @@ pub fn run() -> ExitCode {
     let result = match Arguments::parse().command {
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Explain(arguments) => explain::run(&arguments),
         Command::Status => status::run(),
     };
     result.unwrap_or_else(|error| {

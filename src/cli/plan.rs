@@ -8,13 +8,13 @@ use super::args::PlanArguments;
 use super::backend::{Backend, Embedded, Question};
 use super::daemon::Daemon;
 use super::error::{CliError, exit_code};
+use super::listener::Listener;
 use super::part_names::resolve;
-use super::progress::ProgressDisplay;
 use super::{interrupt, print, report};
 use crate::geometry::{SourceAssembly, load_assembly};
 use crate::plan::Plan;
 use crate::plan::export::PlanDocument;
-use crate::search::{PlanRequest, Termination};
+use crate::search::{PlanRequest, Planner, Termination};
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     let deadline = arguments.timeout.and_then(|t| Instant::now().checked_add(t));
@@ -24,9 +24,9 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     let request = request(arguments, &assembly)?;
     let backend = choose_backend(arguments)?;
     let question = Question { assembly: &assembly, request, deadline, termination };
-    let mut display = ProgressDisplay::new();
-    let plan = backend.plan(&question, &mut display);
-    drop(display);
+    let mut listener = Listener::new(arguments.trace.as_deref())?;
+    let plan = backend.plan(&question, &mut listener);
+    listener.finish()?;
     let plan = plan?;
     write_results(arguments.json.as_deref(), &assembly, &plan)?;
     Ok(exit_code(plan.status))
@@ -35,10 +35,11 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
 fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanRequest, CliError> {
     let fixed = [&assembly.fixed[..], &arguments.fixed[..]].concat();
     let targets = resolve(assembly, "--target", &arguments.target)?;
+    let planner = Planner::from(arguments.planner);
     Ok(PlanRequest {
-        planner: arguments.planner.into(),
+        planner,
         engine: arguments.engine.into(),
-        actions: arguments.actions.into(),
+        actions: arguments.actions.map_or_else(|| planner.default_actions(), Into::into),
         max_simulations: arguments.max_simulations,
         threads: arguments.threads as usize,
         fixed: resolve(assembly, "--fixed", &fixed)?,
@@ -50,7 +51,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
 
 /// The daemon if one runs, else this process; or what the user insists on.
 fn choose_backend(arguments: &PlanArguments) -> Result<Box<dyn Backend>, CliError> {
-    if arguments.embedded {
+    if arguments.embedded || arguments.trace.is_some() {
         return Ok(Box::<Embedded>::default());
     }
     match Daemon::connect() {

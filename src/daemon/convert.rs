@@ -41,25 +41,19 @@ fn threads(asked: usize, most: usize) -> usize {
 }
 
 fn planner(index: u32) -> Result<Planner, WireError> {
-    match index {
-        0 => Ok(Planner::SbdpStar),
-        _ => Err(unsupported("planner", index, &wire::PLANNERS)),
-    }
+    chosen("planner", index, &Planner::ALL, &wire::PLANNERS)
 }
 
 fn engine(index: u32) -> Result<Engine, WireError> {
-    match index {
-        0 => Ok(Engine::Sliding),
-        _ => Err(unsupported("engine", index, &wire::ENGINES)),
-    }
+    chosen("engine", index, &Engine::ALL, &wire::ENGINES)
 }
 
 fn actions(index: u32) -> Result<ActionSet, WireError> {
-    match index {
-        0 => Ok(ActionSet::Paper),
-        1 => Ok(ActionSet::Extended),
-        _ => Err(unsupported("action set", index, &wire::ACTION_SETS)),
-    }
+    chosen("action set", index, &ActionSet::ALL, &wire::ACTION_SETS)
+}
+
+fn chosen<T: Copy>(what: &str, index: u32, all: &[T], names: &[&str]) -> Result<T, WireError> {
+    all.get(index as usize).copied().ok_or_else(|| unsupported(what, index, names))
 }
 
 fn unsupported(what: &str, index: u32, names: &[&str]) -> WireError {

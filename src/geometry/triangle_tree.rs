@@ -5,6 +5,8 @@
 //! remains is measured in double precision. In a leaf, the bound of a triangle is the distance to
 //! its plane joined with the distance beyond its sides in that plane: exact except beyond corners.
 
+#![allow(clippy::needless_range_loop, reason = "loops over all lanes alike become vector instructions")]
+
 use nalgebra::{Point3, Vector3};
 
 use super::triangle::area_normal;
@@ -83,8 +85,11 @@ impl TriangleTree {
             let (left, right) = split(items, group);
             groups.extend([left, right]);
         }
-        let mut node =
-            Node { min: [[f32::INFINITY; WIDTH]; 3], max: [[f32::NEG_INFINITY; WIDTH]; 3], child: [0; WIDTH] };
+        let mut node = Node {
+            min: [[f32::INFINITY; WIDTH]; 3],
+            max: [[f32::NEG_INFINITY; WIDTH]; 3],
+            child: [0; WIDTH],
+        };
         for (k, group) in groups.into_iter().enumerate() {
             let bounds = group.iter().fold(Bounds::EMPTY, |b, &i| b.union(&items[i as usize]));
             for a in 0..3 {
@@ -106,7 +111,8 @@ impl TriangleTree {
     ) -> Option<Closest> {
         let q = p - self.origin;
         let slack = ROUNDING * (q.amax() + self.radius);
-        let mut query = Query { q: q.map(|x| x as f32).into(), slack, best: None, limit: 0.0, reach, measure };
+        let mut query =
+            Query { q: q.map(|x| x as f32).into(), slack, best: None, limit: 0.0, reach, measure };
         query.tighten(reach);
         self.descend(self.root, &mut query);
         query.best
@@ -291,7 +297,8 @@ fn split<'a>(items: &[Bounds], order: &'a mut [u32]) -> (&'a mut [u32], &'a mut 
             order.partition_point(|&i| centre(i, axis) < at).clamp(least, order.len() - least)
         }
         None => {
-            let longest = order.iter().fold(Bounds::EMPTY, |b, &i| b.union(&items[i as usize])).extents().imax();
+            let longest =
+                order.iter().fold(Bounds::EMPTY, |b, &i| b.union(&items[i as usize])).extents().imax();
             order.sort_by(|&i, &j| centre(i, longest).total_cmp(&centre(j, longest)));
             order.len() / 2
         }

@@ -147,7 +147,10 @@ fn a_triangle_is_proposed_everywhere_near_the_surface() {
             if let Some(guess) = guess {
                 // Its node is less than a cell's diagonal away.
                 let distance = s.closest_on(guess, &p).distance;
-                assert!(distance <= exact + 2.0 * 3f64.sqrt() * f.cell, "{name}: {distance} for {exact} at {p}");
+                assert!(
+                    distance <= exact + 2.0 * 3f64.sqrt() * f.cell,
+                    "{name}: {distance} for {exact} at {p}"
+                );
             }
             // All corners of the cell are in the band then.
             if exact < (BAND - 3f64.sqrt()) * f.cell {

@@ -1,25 +1,35 @@
 //! Search: State-Based Disassembly Planning.
 //!
-//! Data flow: [`PlanRequest`] → [`Problem`] → a planner (`sbdp`) over states (`state`) → [`Outcome`].
+//! Data flow: [`PlanRequest`] → [`Problem`] → a planner (`sbdp`: states and blocking graphs; `pdp`:
+//! one part after the other), which works on the `disassembly` under way → [`Outcome`].
 //! Everything below the request is in the planning frame.
 
+mod disassembly;
 mod outcome;
+mod pdp;
 mod problem;
-mod removal;
 mod report;
 mod request;
 mod sbdp;
 mod state;
+#[cfg(test)]
+mod tests;
+mod trace;
 
 pub use crate::termination::{Interrupt, Termination};
 pub use outcome::{BlockedAction, Counters, Outcome, Removal};
 pub use problem::{Checked, Observer, Problem};
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage};
+pub use trace::{BlockedBy, TraceEvent, TracePhase};
 
 /// Runs the planner that a request names.
 #[must_use]
 pub fn search(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
     match planner {
-        Planner::SbdpStar => sbdp::sbdp_star(problem, observer),
+        Planner::SbdpStar => sbdp::sbdp(problem, observer, true),
+        Planner::Sbdp => sbdp::sbdp(problem, observer, false),
+        Planner::PdpT => pdp::pdp(problem, observer, pdp::Mode::Translation),
+        Planner::PdpR => pdp::pdp(problem, observer, pdp::Mode::Rotation),
+        Planner::PdpStar => pdp::pdp_star(problem, observer),
     }
 }

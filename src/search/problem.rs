@@ -11,6 +11,7 @@ use crate::termination::{Interrupt, Termination};
 
 use super::outcome::Removal;
 use super::request::ActionSet;
+use super::trace::TraceEvent;
 
 /// Is told what a search does.
 pub trait Observer {
@@ -18,12 +19,19 @@ pub trait Observer {
     fn progress(&mut self, removed: usize, simulations: u64);
     /// A part is out; in order.
     fn removal(&mut self, removal: &Removal);
+    /// Whether it wants to be told every event.
+    fn traces(&self) -> bool {
+        false
+    }
+    /// An event, if it wants to be told.
+    fn traced(&mut self, _event: TraceEvent) {}
 }
 
 /// A verified path with its depth, or the points that refute it.
 pub type Checked = Result<(Vec<Pose>, f64), Vec<Entry>>;
 
 /// What is to be searched.
+#[derive(Clone)]
 pub struct Problem<'a> {
     /// The bodies. Owned: a search adds samples where verification found some missing.
     pub scene: Scene,
@@ -41,6 +49,8 @@ pub struct Problem<'a> {
     pub actions: ActionSet,
     /// Simulations after which to give up.
     pub max_simulations: Option<u64>,
+    /// Simulations that an earlier search of the same question has used up.
+    pub spent: u64,
     /// Ends the search early.
     pub termination: Termination,
     /// Points added so far, per part.

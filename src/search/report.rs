@@ -1,41 +1,18 @@
-//! What a search answers when it ends.
+//! What a state-based search reports: why it found no more, who blocks what remains, its trace.
 
-use crate::plan::PlanStatus;
-use crate::termination::Interrupt;
+use crate::blocking_graph::Blockage;
 
-use super::outcome::{BlockedAction, Outcome};
-use super::sbdp::{Search, Stop};
+use super::disassembly::Run;
+use super::outcome::BlockedAction;
+use super::sbdp::{Job, Search};
 use super::state::{Phase, coarseness};
+use super::trace::{BlockedBy, TraceEvent};
 
 impl Search<'_, '_> {
-    pub(super) fn outcome(self, stop: Option<Stop>) -> Outcome {
-        let (status, reason) = match stop {
-            _ if self.is_done() => (PlanStatus::Complete, None),
-            None => (PlanStatus::Infeasible, Some(self.evidence())),
-            Some(Stop::Interrupted(Interrupt::Cancelled)) => {
-                (PlanStatus::Cancelled, Some("cancelled".to_owned()))
-            }
-            Some(Stop::Interrupted(Interrupt::DeadlinePassed)) => {
-                (PlanStatus::Timeout, Some("the deadline passed".to_owned()))
-            }
-            Some(Stop::Budget(n)) => {
-                (PlanStatus::Partial, Some(format!("the budget of {n} simulations is used up")))
-            }
-        };
-        let blocked = if status == PlanStatus::Complete { Vec::new() } else { self.blocked() };
-        Outcome {
-            status,
-            reason,
-            remaining: self.everything.standing.clone(),
-            blocked,
-            removals: self.removals,
-            counters: self.counters,
-        }
-    }
-
     /// What was tried before the search gave up.
-    fn evidence(&self) -> String {
-        let stuck = self.problem.wanted(&self.everything.standing);
+    pub(super) fn evidence(&self) -> String {
+        let (problem, standing) = (&self.disassembly.problem, &self.disassembly.everything.standing);
+        let stuck = problem.wanted(standing);
         let most = stuck.iter().map(|&p| self.states_of[p]).max().unwrap_or(0);
         let coarse = coarseness(most);
         format!(
@@ -43,29 +20,88 @@ impl Search<'_, '_> {
              and {} actions with rotational freedom ({} states in all, told apart at {:.3} of the longest side \
              and {:.1} rad), also where static analysis saw no way",
             stuck.len(),
-            self.problem.present.len(),
+            problem.present.len(),
             self.translations.len(),
             self.rotations.len(),
-            self.counters.states,
-            0.05 * coarse / self.problem.scene.longest_side,
+            self.disassembly.counters.states,
+            0.05 * coarse / problem.scene.longest_side,
             0.5 * coarse,
         )
     }
 
-    fn blocked(&self) -> Vec<BlockedAction> {
-        let wanted = self.problem.wanted(&self.everything.standing);
+    /// Who blocks the parts that remain, at the assembled pose.
+    pub(super) fn blocked(&self) -> Vec<BlockedAction> {
+        let wanted = self.disassembly.problem.wanted(&self.disassembly.everything.standing);
         let mut out = Vec::new();
         for node in self.nodes.iter().filter(|n| n.alive && n.is_root() && wanted.contains(&n.part)) {
             for phase in [Phase::Translation, Phase::Rotation] {
                 let Some(b) = node.blockage(phase) else { continue };
-                for (i, action) in self.actions(phase).iter().enumerate() {
-                    let by: Vec<_> = b.blockers(i).into_iter().collect();
-                    if !by.is_empty() {
-                        out.push(BlockedAction { part: node.part, action: action.to_string(), by });
-                    }
-                }
+                out.extend(self.edges(phase, b).map(|BlockedBy { action, parts }| BlockedAction {
+                    part: node.part,
+                    action,
+                    by: parts,
+                }));
             }
         }
         out
+    }
+
+    fn edges<'s>(&'s self, phase: Phase, b: &'s Blockage) -> impl Iterator<Item = BlockedBy> + 's {
+        self.actions(phase).iter().enumerate().filter_map(|(i, action)| {
+            let parts: Vec<_> = b.blockers(i).into_iter().collect();
+            (!parts.is_empty()).then(|| BlockedBy { action: action.to_string(), parts })
+        })
+    }
+
+    /// The number of a state in the trace: 0 is the assembled one.
+    fn state(&self, node: usize) -> usize {
+        if self.nodes[node].is_root() { 0 } else { node + 1 - self.roots }
+    }
+
+    pub(super) fn trace_analysis(&mut self, node: usize) {
+        if self.guided
+            && self.disassembly.observer.traces()
+            && let Some(b) = &self.nodes[node].translation
+        {
+            let blocked = self.edges(Phase::Translation, b).collect();
+            let (state, part) = (self.state(node), self.nodes[node].part);
+            self.disassembly.observer.traced(TraceEvent::Analysed { state, part, blocked });
+        }
+    }
+
+    pub(super) fn trace_expansion(&mut self, phase: Phase, node: usize) {
+        if !self.disassembly.observer.traces() {
+            return;
+        }
+        let (state, part) = (self.state(node), self.nodes[node].part);
+        let (mut evaluation, mut excluded) = (None, Vec::new());
+        if let (true, Some(b)) = (self.guided, self.nodes[node].blockage(phase)) {
+            let e = b.evaluation();
+            evaluation = Some([e.colliding_parts, e.open_actions]);
+            excluded = self.edges(phase, b).collect();
+        }
+        let phase = phase.into();
+        self.disassembly.observer.traced(TraceEvent::Expanded { phase, state, part, evaluation, excluded });
+    }
+
+    pub(super) fn trace_simulation(
+        &mut self,
+        job: Job,
+        run: &Run,
+        end: &str,
+        with: &[usize],
+        poses: usize,
+        leads_to: Option<usize>,
+    ) {
+        let state = self.state(job.node);
+        self.disassembly.trace(|| TraceEvent::Simulated {
+            state,
+            part: run.part,
+            action: run.action.to_string(),
+            end: end.to_owned(),
+            with: with.to_vec(),
+            poses,
+            leads_to,
+        });
     }
 }

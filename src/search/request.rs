@@ -6,6 +6,40 @@ pub enum Planner {
     /// State-based planning guided by directional blocking graphs (the paper's SBDP*).
     #[default]
     SbdpStar,
+    /// State-based planning without blocking graphs (the paper's SBDP).
+    Sbdp,
+    /// Breadth-first search per part with translations (PDP_t).
+    PdpT,
+    /// Breadth-first search per part with rotational freedom (PDP_r).
+    PdpR,
+    /// PDP_t, then PDP_r from the start if that failed (PDP*).
+    PdpStar,
+}
+
+impl Planner {
+    /// All planners, in the order of their numbers on the wire.
+    pub const ALL: [Self; 5] = [Self::SbdpStar, Self::Sbdp, Self::PdpT, Self::PdpR, Self::PdpStar];
+
+    /// The name in requests and plans.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SbdpStar => "sbdp-star",
+            Self::Sbdp => "sbdp",
+            Self::PdpT => "pdp-t",
+            Self::PdpR => "pdp-r",
+            Self::PdpStar => "pdp-star",
+        }
+    }
+
+    /// The actions it has unless others are asked for: the paper's, where it is the paper's.
+    #[must_use]
+    pub fn default_actions(self) -> ActionSet {
+        match self {
+            Self::SbdpStar => ActionSet::Extended,
+            _ => ActionSet::Paper,
+        }
+    }
 }
 
 /// Which transition function moves the parts.
@@ -16,6 +50,19 @@ pub enum Engine {
     Sliding,
 }
 
+impl Engine {
+    /// All engines, in the order of their numbers on the wire.
+    pub const ALL: [Self; 1] = [Self::Sliding];
+
+    /// The name in requests and plans.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sliding => "sliding",
+        }
+    }
+}
+
 /// Which actions the search may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ActionSet {
@@ -24,6 +71,20 @@ pub enum ActionSet {
     /// The paper's and pulling while turning about the same axis.
     #[default]
     Extended,
+}
+
+impl ActionSet {
+    /// All sets, in the order of their numbers on the wire.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::Extended];
+
+    /// The name in requests.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Extended => "extended",
+        }
+    }
 }
 
 /// A planning question about one assembly. Part numbers are indices into its parts.
@@ -77,4 +138,10 @@ pub trait PlanSink: Send {
     fn progress(&mut self, progress: Progress);
     /// A verified step, in order.
     fn step(&mut self, step: &crate::plan::PlanStep);
+    /// Whether it wants to be told every event of the search.
+    fn traces(&self) -> bool {
+        false
+    }
+    /// An event of the search, if it wants to be told.
+    fn traced(&mut self, _event: super::TraceEvent) {}
 }

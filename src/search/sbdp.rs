@@ -1,46 +1,38 @@
-//! SBDP*: State-Based Disassembly Planning guided by directional blocking graphs.
+//! SBDP and SBDP*: State-Based Disassembly Planning, without and with the guidance of
+//! directional blocking graphs.
 //!
-//! Source: the paper, Algorithm 1 with the evaluation functions (f_c, f_a) and the constraints of
-//! its section on blocking graphs. Departures, each for a reason given in DESIGN 6: a collision is
-//! about a set of parts; translational passes repeat while they find new states, since turning
-//! costs more; the search ends when nothing new can be found. Simulations run ahead in parallel,
-//! but their results are taken in the order of the serial algorithm and thrown away where an
-//! earlier one changed the question, so the plan does not depend on the number of threads.
+//! Source: the paper, Algorithm 1; for SBDP* with the evaluation functions (f_c, f_a) and the
+//! constraints of its section on blocking graphs. Departures, each for a reason given in DESIGN 6:
+//! a collision is about a set of parts; the search ends when nothing new can be found. Beyond the
+//! paper's action set, translational passes repeat while they find new states, since turning costs
+//! more, and both kinds of planning share their states, since a bayonet needs both. Simulations run ahead in parallel, but their results are taken in the order of the serial
+//! algorithm and thrown away where an earlier one changed the question, so the plan does not depend
+//! on the number of threads.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use crate::blocking_graph::{Blockage, Evaluation, blocked_from, initial_blockages};
 use crate::geometry::Pose;
-use crate::simulation::{Action, End, Motion, Surroundings};
-use crate::termination::{Interrupt, Termination};
+use crate::simulation::{Action, End, Motion};
+use crate::termination::Interrupt;
 
-use super::outcome::{Counters, Outcome, Removal};
+use super::disassembly::{Disassembly, Proof, Run, Stop, joined};
+use super::outcome::Outcome;
 use super::problem::{Observer, Problem};
+use super::request::ActionSet;
 use super::state::{Node, Phase, coarseness, least_travel, same_state};
+use super::trace::TraceEvent;
 
 /// Translational passes in a row before turning is tried, if they only find new states.
 const TRANSLATION_PASSES: usize = 6;
-/// Why a search stops before it is done.
-pub(super) enum Stop {
-    Interrupted(Interrupt),
-    Budget(u64),
-}
-
-impl From<Interrupt> for Stop {
-    fn from(i: Interrupt) -> Self {
-        Self::Interrupted(i)
-    }
-}
 
 /// What a pass brought.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Gain {
-    pub(super) removed: bool,
-    pub(super) new_states: bool,
+struct Gain {
+    removed: bool,
+    new_states: bool,
 }
 
 impl Gain {
@@ -57,48 +49,45 @@ pub(super) struct Job {
 }
 
 pub(super) struct Search<'a, 'o> {
-    pub(super) problem: Problem<'a>,
-    pub(super) observer: &'o mut dyn Observer,
-    /// All present parts that have not been taken out.
-    pub(super) everything: Surroundings,
-    pub(super) around: Vec<Option<Surroundings>>,
-    /// A part whose hull meets this part's, both assembled: proof that it is not free.
-    pub(super) entangled: Vec<Option<usize>>,
+    pub(super) disassembly: Disassembly<'a, 'o>,
+    /// Whether blocking graphs order and constrain the search (SBDP*).
+    pub(super) guided: bool,
     pub(super) nodes: Vec<Node>,
+    /// Nodes at the assembled pose: the first ones.
+    pub(super) roots: usize,
     pub(super) states_of: Vec<usize>,
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
+    /// As the paper has it: one open list for translational planning and one for rotational.
+    separate_lists: bool,
+    translation_passes: usize,
     /// The last resort: actions that static analysis excluded are simulated, too.
-    pub(super) distrust_static: bool,
-    pub(super) removals: Vec<Removal>,
-    pub(super) counters: Counters,
+    distrust_static: bool,
 }
 
 /// Searches until everything asked for is out, nothing more can be found, or a limit is met.
-pub(super) fn sbdp_star(problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
-    let mut search = Search::new(problem, observer);
+pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bool) -> Outcome {
+    let mut search = Search::new(problem, observer, guided);
     let stop = search.run().err();
-    search.outcome(stop)
+    let (evidence, blocked) = (search.evidence(), search.blocked());
+    search.disassembly.outcome(stop, evidence, blocked)
 }
 
 impl<'a, 'o> Search<'a, 'o> {
-    fn new(problem: Problem<'a>, observer: &'o mut dyn Observer) -> Self {
-        let count = problem.scene.bodies.len();
-        let everything = Surroundings::new(&problem.scene, problem.present.clone());
+    fn new(problem: Problem<'a>, observer: &'o mut dyn Observer, guided: bool) -> Self {
         let (translations, rotations) = problem.action_lists();
+        let as_paper = problem.actions == ActionSet::Paper;
         Self {
-            observer,
-            everything,
-            around: vec![None; count],
-            entangled: vec![None; count],
+            guided,
             nodes: Vec::new(),
-            states_of: vec![0; count],
+            roots: 0,
+            states_of: vec![0; problem.scene.bodies.len()],
             translations,
             rotations,
+            separate_lists: as_paper,
+            translation_passes: if as_paper { 1 } else { TRANSLATION_PASSES },
             distrust_static: false,
-            removals: Vec::new(),
-            counters: Counters::default(),
-            problem,
+            disassembly: Disassembly::new(problem, observer),
         }
     }
 
@@ -107,9 +96,9 @@ impl<'a, 'o> Search<'a, 'o> {
         self.take_free_parts()?;
         loop {
             let mut gain = Gain::default();
-            for _ in 0..TRANSLATION_PASSES {
+            for _ in 0..self.translation_passes {
                 let pass = self.pass(Phase::Translation)?;
-                if self.is_done() {
+                if self.disassembly.is_done() {
                     return Ok(());
                 }
                 gain.removed |= pass.removed;
@@ -119,45 +108,55 @@ impl<'a, 'o> Search<'a, 'o> {
                 }
             }
             let turned = self.pass(Phase::Rotation)?;
-            if self.is_done() {
+            if self.disassembly.is_done() {
                 return Ok(());
             }
             if gain.any() || turned.any() {
                 continue;
             }
+            if !self.guided {
+                return Ok(());
+            }
             self.distrust_static = true;
             let last = self.pass(Phase::Translation);
             self.distrust_static = false;
-            if self.is_done() || !last?.any() {
+            if self.disassembly.is_done() || !last?.any() {
                 return Ok(());
             }
         }
     }
 
     fn make_roots(&mut self) -> Result<(), Stop> {
-        let started = Instant::now();
-        let Problem { scene, present, termination, .. } = &self.problem;
-        let least = |part| least_travel(scene, part);
-        let blockages = initial_blockages(scene, present, &self.translations, &least, termination)?;
-        self.counters.static_analysis += started.elapsed();
+        let Problem { scene, present, termination, .. } = &self.disassembly.problem;
+        let blockages = if self.guided {
+            let started = Instant::now();
+            let least = |part| least_travel(scene, part);
+            let found = initial_blockages(scene, present, &self.translations, &least, termination)?;
+            self.disassembly.counters.static_analysis += started.elapsed();
+            found
+        } else {
+            vec![Blockage::open(self.translations.len()); scene.bodies.len()]
+        };
         for (part, blockage) in blockages.into_iter().enumerate() {
-            if self.problem.may_move(part) {
+            if self.disassembly.problem.may_move(part) {
                 self.add_node(Node {
                     part,
-                    path: vec![self.problem.scene.bodies[part].planning_from_shape],
+                    path: vec![self.disassembly.assembled(part)],
                     translation: Some(blockage),
                     rotation: Blockage::open(self.rotations.len()),
                     origin: None,
                     alive: true,
                 });
+                self.trace_analysis(self.nodes.len() - 1);
             }
         }
+        self.roots = self.nodes.len();
         Ok(())
     }
 
     fn add_node(&mut self, node: Node) {
         self.states_of[node.part] += 1;
-        self.counters.states += 1;
+        self.disassembly.counters.states += 1;
         self.nodes.push(node);
     }
 
@@ -170,9 +169,10 @@ impl<'a, 'o> Search<'a, 'o> {
 
     /// One run of Algorithm 1's `disassembly` over the open list.
     fn pass(&mut self, phase: Phase) -> Result<Gain, Stop> {
+        self.disassembly.trace(|| TraceEvent::Pass { phase: phase.into(), depth_limit: None });
         let mut gain = Gain::default();
         let mut open: Vec<usize> = self.expandable(phase);
-        while !open.is_empty() && !self.is_done() {
+        while !open.is_empty() && !self.disassembly.is_done() {
             self.analyse(phase, &open)?;
             let batch = self.extract(phase, &mut open);
             let result = self.expand(phase, &batch)?;
@@ -192,16 +192,23 @@ impl<'a, 'o> Search<'a, 'o> {
     /// The states to expand, the initial one included. Of two last parts it is the same which one
     /// moves against the other: beyond the first push, only the smaller one does.
     fn expandable(&self, phase: Phase) -> Vec<usize> {
-        let standing = &self.everything.standing;
+        let standing = &self.disassembly.everything.standing;
+        let problem = &self.disassembly.problem;
         let still = match standing[..] {
-            [a, b] if self.problem.may_move(a) && self.problem.may_move(b) => {
-                let reach = |p: usize| self.problem.scene.bodies[p].shape.reach;
+            [a, b] if !self.separate_lists && problem.may_move(a) && problem.may_move(b) => {
+                let reach = |p: usize| problem.scene.bodies[p].shape.reach;
                 Some(if reach(a) < reach(b) { b } else { a })
             }
             _ => None,
         };
         let skipped = |n: &Node| Some(n.part) == still && (phase == Phase::Rotation || !n.is_root());
-        (0..self.nodes.len()).filter(|&i| self.nodes[i].alive && !skipped(&self.nodes[i])).collect()
+        let wanted = |n: &Node| n.alive && self.lists(phase, n) && !skipped(n);
+        (0..self.nodes.len()).filter(|&i| wanted(&self.nodes[i])).collect()
+    }
+
+    /// Whether a state is in the list of a kind of planning.
+    fn lists(&self, phase: Phase, node: &Node) -> bool {
+        !self.separate_lists || node.origin.is_none_or(|(_, by, _)| by == phase)
     }
 
     /// Static analysis of displaced states that have none yet.
@@ -209,54 +216,81 @@ impl<'a, 'o> Search<'a, 'o> {
         if phase == Phase::Rotation {
             return Ok(());
         }
-        let started = Instant::now();
         let todo: Vec<_> = open.iter().copied().filter(|&i| self.nodes[i].translation.is_none()).collect();
-        for &i in &todo {
-            let part = self.nodes[i].part;
-            self.surroundings(part);
+        if !self.guided {
+            for i in todo {
+                self.nodes[i].translation = Some(Blockage::open(self.translations.len()));
+            }
+            return Ok(());
         }
-        let (scene, around, nodes) = (&self.problem.scene, &self.around, &self.nodes);
-        let translations = &self.translations;
-        let termination = &self.problem.termination;
+        let started = Instant::now();
+        let (scene, nodes) = (&self.disassembly.problem.scene, &self.nodes);
+        let standing: Vec<_> = todo.iter().map(|&i| self.disassembly.standing(nodes[i].part)).collect();
+        let (translations, termination) = (&self.translations, &self.disassembly.problem.termination);
         let found = todo
             .par_iter()
-            .map(|&i| {
+            .zip(standing)
+            .map(|(&i, standing)| {
                 termination.check()?;
                 let node = &nodes[i];
-                let standing = around[node.part].as_ref().map_or(&[][..], |s| &s.standing);
                 let least = least_travel(scene, node.part);
-                Ok(blocked_from(scene, standing, node.part, node.pose(), translations, least))
+                Ok(blocked_from(scene, &standing, node.part, node.pose(), translations, least))
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
-        for (i, blockage) in todo.into_iter().zip(found) {
+        for (&i, blockage) in todo.iter().zip(found) {
             self.nodes[i].translation = Some(blockage);
         }
-        self.counters.static_analysis += started.elapsed();
+        self.disassembly.counters.static_analysis += started.elapsed();
+        for i in todo {
+            self.trace_analysis(i);
+        }
         Ok(())
     }
 
     /// Takes the best displaced state off the open list, or else the initial state, which comes
     /// last (its f_c and f_a count as infinite) and stands for all its parts in their order.
-    fn extract(&self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
-        let evaluation = |i: usize| {
-            let zero = Evaluation { colliding_parts: 0, open_actions: 0 };
-            self.nodes[i].blockage(phase).map_or(zero, Blockage::evaluation)
-        };
+    /// Without guidance the first comes first: the initial state, then displaced ones by age.
+    fn extract(&mut self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
         let displaced = open.iter().copied().filter(|&i| !self.nodes[i].is_root());
-        if let Some(best) = displaced.min_by_key(|&i| (evaluation(i), i)) {
-            open.retain(|&i| i != best);
-            return vec![best];
+        let next = if self.guided {
+            displaced.min_by_key(|&i| (self.evaluation(phase, i), i))
+        } else {
+            open.first().copied().filter(|&i| !self.nodes[i].is_root())
+        };
+        let batch = match next {
+            Some(best) => {
+                open.retain(|&i| i != best);
+                vec![best]
+            }
+            None => self.ordered_roots(phase, open),
+        };
+        for &i in &batch {
+            self.trace_expansion(phase, i);
         }
-        let mut roots = std::mem::take(open);
+        batch
+    }
+
+    fn ordered_roots(&self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
+        let (mut roots, rest) = open.iter().partition::<Vec<usize>, _>(|&&i| self.nodes[i].is_root());
+        *open = rest;
+        if !self.guided {
+            return roots;
+        }
         // Before anything was turned, what stops pushes tells which part is least held; among
         // equals the smallest is the likeliest fastener and the cheapest to simulate.
         let other = |i: usize| self.nodes[i].blockage(Phase::Translation).map(Blockage::evaluation);
-        let reach = |i: usize| self.problem.scene.bodies[self.nodes[i].part].shape.reach.to_bits();
+        let reach =
+            |i: usize| self.disassembly.problem.scene.bodies[self.nodes[i].part].shape.reach.to_bits();
         roots.sort_by_key(|&i| match phase {
-            Phase::Translation => (evaluation(i), None, 0, i),
-            Phase::Rotation => (evaluation(i), other(i), reach(i), i),
+            Phase::Translation => (self.evaluation(phase, i), None, 0, i),
+            Phase::Rotation => (self.evaluation(phase, i), other(i), reach(i), i),
         });
         roots
+    }
+
+    fn evaluation(&self, phase: Phase, node: usize) -> Evaluation {
+        let none = Evaluation { colliding_parts: 0, open_actions: 0 };
+        self.nodes[node].blockage(phase).map_or(none, Blockage::evaluation)
     }
 
     /// Simulates the open actions of some states of one priority, in order.
@@ -269,9 +303,10 @@ impl<'a, 'o> Search<'a, 'o> {
         while next < jobs.len() {
             let (window, end) = self.window(phase, &jobs, next);
             next = end;
-            let motions = self.simulate_all(phase, &window)?;
+            let runs: Vec<Run> = window.iter().map(|job| self.run_of(phase, *job)).collect();
+            let motions = self.disassembly.simulate(&runs)?;
             for (job, motion) in window.into_iter().zip(motions) {
-                self.charge()?;
+                self.disassembly.charge()?;
                 if self.take(phase, job, motion, &mut gain)? {
                     // Later results of this window answer a question that has changed.
                     next = jobs
@@ -281,11 +316,16 @@ impl<'a, 'o> Search<'a, 'o> {
                     break;
                 }
             }
-            if self.is_done() {
+            if self.disassembly.is_done() {
                 break;
             }
         }
         Ok(gain)
+    }
+
+    fn run_of(&self, phase: Phase, job: Job) -> Run {
+        let node = &self.nodes[job.node];
+        Run { part: node.part, start: *node.pose(), action: self.actions(phase)[job.action] }
     }
 
     /// The next jobs worth running: as many as there are threads.
@@ -309,114 +349,116 @@ impl<'a, 'o> Search<'a, 'o> {
     fn is_open(&self, phase: Phase, job: Job) -> bool {
         let node = &self.nodes[job.node];
         node.alive
-            && node.blockage(phase).is_some_and(|b| {
-                if self.distrust_static { b.is_untried(job.action) } else { b.is_open(job.action) }
+            && node.blockage(phase).is_some_and(|b| match (self.guided, self.distrust_static) {
+                (true, false) => b.is_open(job.action),
+                (true, true) => b.is_untried(job.action),
+                (false, _) => !b.is_barred(job.action),
             })
     }
 
-    /// The motions of a window up to the first that leads out: that one changes the question to
-    /// which later ones were answers, so they are stopped.
-    fn simulate_all(&mut self, phase: Phase, window: &[Job]) -> Result<Vec<Motion>, Stop> {
-        let started = Instant::now();
-        for job in window {
-            let part = self.nodes[job.node].part;
-            self.surroundings(part);
-        }
-        let (problem, nodes, around) = (&self.problem, &self.nodes, &self.around);
-        let actions = self.actions(phase);
-        let winner = Arc::new(AtomicUsize::new(usize::MAX));
-        let run = |(rank, job): (usize, &Job)| {
-            let termination = problem.termination.unless_won(&winner, rank);
-            let motion = simulate(problem, &nodes[job.node], around, actions[job.action], &termination);
-            if matches!(&motion, Ok(Motion { end: End::Disassembled(_), .. })) {
-                winner.fetch_min(rank, Ordering::Relaxed);
-            }
-            motion
-        };
-        let motions: Vec<_> = if window.len() > 1 {
-            window.par_iter().enumerate().map(run).collect()
-        } else {
-            window.iter().enumerate().map(run).collect()
-        };
-        self.counters.simulation += started.elapsed();
-        let wanted = winner.load(Ordering::Relaxed).saturating_add(1);
-        Ok(motions.into_iter().take(wanted).collect::<Result<_, Interrupt>>()?)
-    }
-
-    pub(super) fn charge(&mut self) -> Result<(), Stop> {
-        if let Some(most) = self.problem.max_simulations
-            && self.counters.simulations >= most
-        {
-            return Err(Stop::Budget(most));
-        }
-        self.counters.simulations += 1;
-        self.observer.progress(self.removals.len(), self.counters.simulations);
-        Ok(())
-    }
-
     /// Takes in a motion; true if the scene changed by it.
-    pub(super) fn take(
-        &mut self,
-        phase: Phase,
-        job: Job,
-        motion: Motion,
-        gain: &mut Gain,
-    ) -> Result<bool, Stop> {
+    fn take(&mut self, phase: Phase, job: Job, motion: Motion, gain: &mut Gain) -> Result<bool, Stop> {
         let Motion { path, end } = motion;
-        let (part, action) = (self.nodes[job.node].part, self.actions(phase)[job.action]);
-        tracing::debug!(part, node = job.node, %action, steps = path.len(), ?end, "simulated");
-        let by = match end {
+        let run = self.run_of(phase, job);
+        tracing::debug!(part = run.part, node = job.node, action = %run.action, steps = path.len(), ?end, "simulated");
+        let (word, by) = match end {
             End::Disassembled(_) => {
-                let taken = self.take_out(phase, job, path)?;
-                gain.removed |= taken;
+                self.trace_simulation(job, &run, "disassembled", &[], path.len(), None);
+                self.take_out(phase, job, path, gain)?;
                 return Ok(true);
             }
-            End::Collision { with } => with,
-            End::Undecided { touched, .. } => touched,
+            End::Collision { with } => ("collision", with),
+            End::Undecided { touched, .. } => ("undecided", touched),
         };
+        let state = path.last().and_then(|end| self.new_state(phase, run.part, end)).is_some();
+        let leads_to = state.then_some(self.nodes.len() + 1 - self.roots);
+        self.trace_simulation(job, &run, word, &by, path.len(), leads_to);
         self.block(phase, job, by);
-        let node = &self.nodes[job.node];
-        let Some(end) = path.last() else { return Ok(false) };
-        let coarse = coarseness(self.states_of[part]);
-        let known = |n: &Node| {
-            n.alive && n.part == part && same_state(&self.problem.scene, part, n.pose(), end, coarse)
-        };
-        if !self.nodes.iter().any(known) {
+        if state {
             gain.new_states = true;
-            let path = joined(&node.path, &path);
+            let path = joined(&self.nodes[job.node].path, &path);
             let rotation = Blockage::open(self.rotations.len());
             let origin = Some((job.node, phase, job.action));
-            self.add_node(Node { part, path, translation: None, rotation, origin, alive: true });
+            self.add_node(Node { part: run.part, path, translation: None, rotation, origin, alive: true });
         }
         Ok(false)
     }
 
-    pub(super) fn block(&mut self, phase: Phase, job: Job, by: Vec<usize>) {
+    /// The pose, unless a state of this part is like it (the paper's rmd).
+    fn new_state<'p>(&self, phase: Phase, part: usize, pose: &'p Pose) -> Option<&'p Pose> {
+        let coarse = coarseness(self.states_of[part]);
+        let scene = &self.disassembly.problem.scene;
+        let listed = |n: &&Node| n.alive && n.part == part && self.lists(phase, n);
+        let known = |n: &Node| same_state(scene, part, n.pose(), pose, coarse);
+        (!self.nodes.iter().filter(listed).any(known)).then_some(pose)
+    }
+
+    fn block(&mut self, phase: Phase, job: Job, by: Vec<usize>) {
         if let Some(b) = self.nodes[job.node].blockage_mut(phase) {
             b.block_jointly(job.action, by);
         }
     }
 
-    pub(super) fn is_done(&self) -> bool {
-        self.problem.is_goal(&self.everything.standing)
+    /// Thins and verifies a path that leads out, and takes the part out if it holds.
+    fn take_out(&mut self, phase: Phase, job: Job, motion: Vec<Pose>, gain: &mut Gain) -> Result<(), Stop> {
+        let (run, prefix) = (self.run_of(phase, job), self.nodes[job.node].path.clone());
+        match self.disassembly.prove(run, &prefix, motion)? {
+            Proof::Path { path, depth } => {
+                self.remove(run.part, path, depth);
+                gain.removed = true;
+            }
+            Proof::PrefixRefuted => self.drop_state(job.node),
+            Proof::Refuted { by } => {
+                // Nothing that another part's leaving changes: never again from here.
+                let by = if self.guided { by } else { Vec::new() };
+                self.block(phase, job, by);
+            }
+            Proof::Otherwise(motion) => {
+                self.take(phase, job, motion, &mut Gain::default())?;
+            }
+        }
+        Ok(())
     }
-}
 
-/// A path continued by a motion that starts at its end.
-pub(super) fn joined(path: &[Pose], motion: &[Pose]) -> Vec<Pose> {
-    path.iter().chain(motion.iter().skip(1)).copied().collect()
-}
+    /// A state whose own path was refuted is dropped, and the action that led to it is open again.
+    fn drop_state(&mut self, node: usize) {
+        self.nodes[node].alive = false;
+        if let Some((parent, phase, action)) = self.nodes[node].origin
+            && let Some(b) = self.nodes[parent].blockage_mut(phase)
+        {
+            b.reopen(action);
+        }
+    }
 
-pub(super) fn simulate(
-    problem: &Problem<'_>,
-    node: &Node,
-    around: &[Option<Surroundings>],
-    action: Action,
-    termination: &Termination,
-) -> Result<Motion, Interrupt> {
-    let Problem { scene, engine, .. } = problem;
-    match &around[node.part] {
-        Some(around) => engine.simulate(scene, around, node.part, node.pose(), action, termination),
-        None => Ok(Motion { path: vec![*node.pose()], end: End::Collision { with: Vec::new() } }),
+    /// Parts whose hull is apart from all others' need no motion.
+    fn take_free_parts(&mut self) -> Result<(), Stop> {
+        while let Some(part) = self.disassembly.free_part()? {
+            self.remove(part, vec![self.disassembly.assembled(part)], 0.0);
+        }
+        Ok(())
+    }
+
+    fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) {
+        let mut waited_for = Vec::new();
+        for node in &mut self.nodes {
+            if node.part == part {
+                if node.is_root() {
+                    let blockages = [node.translation.as_ref(), Some(&node.rotation)];
+                    waited_for
+                        .extend(blockages.into_iter().flatten().flat_map(|b| b.outlived().iter().copied()));
+                }
+                node.alive = false;
+                // Its path and blockages are of no use any more.
+                node.path.truncate(1);
+                continue;
+            }
+            if let Some(b) = &mut node.translation {
+                b.remove(part);
+            }
+            node.rotation.remove(part);
+        }
+        waited_for.sort_unstable();
+        waited_for.dedup();
+        self.disassembly.remove(part, path, depth, waited_for);
     }
 }

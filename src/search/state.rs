@@ -4,6 +4,8 @@ use crate::blocking_graph::Blockage;
 use crate::geometry::Pose;
 use crate::simulation::Scene;
 
+use super::trace::TracePhase;
+
 /// Resolution at which two states of a part count as the same (the paper's rmd).
 const TRANSLATION: f64 = 0.05;
 const ROTATION: f64 = 0.5;
@@ -16,6 +18,15 @@ const STATES_PER_LEVEL: usize = 3;
 pub(super) enum Phase {
     Translation,
     Rotation,
+}
+
+impl From<Phase> for TracePhase {
+    fn from(phase: Phase) -> Self {
+        match phase {
+            Phase::Translation => Self::Translation,
+            Phase::Rotation => Self::Rotation,
+        }
+    }
 }
 
 /// A state to expand.

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::geometry::{Assembly, Pose, Waypoint, waypoint_from_pose};
 use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
-use crate::search::{BlockedAction, Engine, Outcome, PlanRequest, Planner, Removal};
+use crate::search::{BlockedAction, Outcome, PlanRequest, Removal};
 
 /// Turns below this are rounding.
 const NO_TURN: f64 = 1e-9;
@@ -90,8 +90,8 @@ impl Frame<'_> {
         Plan {
             status,
             reason,
-            planner: planner_name(self.request.planner).to_owned(),
-            engine: engine_name(self.request.engine).to_owned(),
+            planner: self.request.planner.name().to_owned(),
+            engine: self.request.engine.name().to_owned(),
             units: self.assembly.units.clone(),
             parts: self.assembly.parts.iter().map(|p| p.name.clone()).collect(),
             remaining: (0..count).filter(|p| !self.removed.contains(p)).collect(),
@@ -104,17 +104,5 @@ impl Frame<'_> {
             warnings: warnings(self.assembly),
             stats: PlanStats::default(),
         }
-    }
-}
-
-fn planner_name(planner: Planner) -> &'static str {
-    match planner {
-        Planner::SbdpStar => "sbdp-star",
-    }
-}
-
-fn engine_name(engine: Engine) -> &'static str {
-    match engine {
-        Engine::Sliding => "sliding",
     }
 }

@@ -15,7 +15,9 @@ use std::time::{Duration, Instant};
 
 use crate::geometry::{Assembly, GeometryError, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, PlanStatus, Warning};
-use crate::search::{Engine, Observer, PlanRequest, PlanSink, Problem, Progress, Removal, Stage, search};
+use crate::search::{
+    Engine, Observer, PlanRequest, PlanSink, Problem, Progress, Removal, Stage, TraceEvent, search,
+};
 use crate::simulation::{SlidingEngine, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
@@ -188,10 +190,18 @@ impl Entry {
             targets: request.targets.clone(),
             actions: request.actions,
             max_simulations: request.max_simulations,
+            spent: 0,
             termination: termination.clone(),
             extra_points: HashMap::new(),
         };
         let mut relay = Relay { assembly: &self.assembly, sink, total };
+        if relay.traces() {
+            relay.traced(TraceEvent::Start {
+                parts: self.assembly.parts.iter().map(|p| p.name.clone()).collect(),
+                planner: request.planner.name().to_owned(),
+                engine: request.engine.name().to_owned(),
+            });
+        }
         let outcome = search(request.planner, problem, &mut relay);
         let (sdf_time, hits) =
             if hit { (Duration::ZERO, self.assembly.shapes.len() as u64) } else { (prepared.sdf_time, 0) };
@@ -240,6 +250,14 @@ impl Observer for Relay<'_> {
 
     fn removal(&mut self, removal: &Removal) {
         self.sink.step(&answer::step(self.assembly, removal));
+    }
+
+    fn traces(&self) -> bool {
+        self.sink.traces()
+    }
+
+    fn traced(&mut self, event: TraceEvent) {
+        self.sink.traced(event);
     }
 }
 

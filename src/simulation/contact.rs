@@ -253,8 +253,7 @@ impl Sample {
             out.add(p);
         }
         let stopped = out.iter().all(|p| p.height + p.normal.dot(&self.motion) < 0.0);
-        if stopped
-            && let Some((ahead, _)) = measured.closest(&(self.point + self.motion), self.motion.norm())
+        if stopped && let Some((ahead, _)) = measured.closest(&(self.point + self.motion), self.motion.norm())
         {
             surface.feature_normals(&ahead, |n| {
                 if let Some(p) = above(n, &ahead.point) {

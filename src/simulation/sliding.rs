@@ -180,8 +180,15 @@ type Gather<'a> = &'a dyn Fn(&Mover<'_>) -> Near;
 
 enum Step {
     /// What is near the new pose comes along: it was gathered to check that pose.
-    Moved { pose: Pose, turned: f64, touching: Vec<usize>, near: Near },
-    Stuck { with: Vec<usize> },
+    Moved {
+        pose: Pose,
+        turned: f64,
+        touching: Vec<usize>,
+        near: Near,
+    },
+    Stuck {
+        with: Vec<usize>,
+    },
 }
 
 /// The wanted twist of an action for one part, and the metric.
@@ -344,12 +351,7 @@ impl Drive {
     /// One constraint per contact, reduced, and which contacts they come from. Where a contact
     /// leaves a choice of planes, the one is taken along which the motion gets furthest that the
     /// contacts without a choice allow: at the rim of a hole, that is the hole's wall.
-    fn chosen(
-        &self,
-        mover: &Mover<'_>,
-        near: &Near,
-        wanted: &Vector6<f64>,
-    ) -> (Vec<Row>, Vec<Contact>) {
+    fn chosen(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>) -> (Vec<Row>, Vec<Contact>) {
         let mut options = Vec::with_capacity(near.contacts.len() * 2);
         let mut ends = Vec::with_capacity(near.contacts.len());
         for contact in &near.contacts {

@@ -1,0 +1,72 @@
+//! What listens to a request: the display on the terminal, and the trace if one is asked for.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use super::error::CliError;
+use super::progress::ProgressDisplay;
+use crate::plan::PlanStep;
+use crate::search::{PlanSink, Progress, TraceEvent};
+
+/// Shows progress and writes the trace.
+pub(super) struct Listener {
+    display: ProgressDisplay,
+    trace: Option<TraceFile>,
+}
+
+struct TraceFile {
+    path: PathBuf,
+    file: BufWriter<File>,
+    /// The first failure; nothing is written after it.
+    failed: Option<std::io::Error>,
+}
+
+impl Listener {
+    pub(super) fn new(trace: Option<&Path>) -> Result<Self, CliError> {
+        let trace = match trace {
+            None => None,
+            Some(path) => {
+                let file = File::create(path).map_err(|e| unwritable(path, &e))?;
+                Some(TraceFile { path: path.to_owned(), file: BufWriter::new(file), failed: None })
+            }
+        };
+        Ok(Self { display: ProgressDisplay::new(), trace })
+    }
+
+    /// Ends the display and completes the trace.
+    pub(super) fn finish(self) -> Result<(), CliError> {
+        let Some(TraceFile { path, mut file, failed }) = self.trace else { return Ok(()) };
+        match failed.map_or_else(|| file.flush(), Err) {
+            Ok(()) => Ok(()),
+            Err(e) => Err(unwritable(&path, &e)),
+        }
+    }
+}
+
+impl PlanSink for Listener {
+    fn progress(&mut self, progress: Progress) {
+        self.display.progress(progress);
+    }
+
+    fn step(&mut self, step: &PlanStep) {
+        self.display.step(step);
+    }
+
+    fn traces(&self) -> bool {
+        self.trace.is_some()
+    }
+
+    fn traced(&mut self, event: TraceEvent) {
+        if let Some(TraceFile { file, failed, .. }) = &mut self.trace
+            && failed.is_none()
+        {
+            let written = serde_json::to_writer(&mut *file, &event).map_err(Into::into);
+            *failed = written.and_then(|()| file.write_all(b"\n")).err();
+        }
+    }
+}
+
+fn unwritable(path: &Path, error: &std::io::Error) -> CliError {
+    CliError::Failed(format!("{}: {error}", path.display()))
+}

@@ -1,0 +1,308 @@
+//! PDP: physics-based disassembly planning, the baseline (Y. Tian et al. 2022, as the paper's
+//! background describes it).
+//!
+//! Part by part, breadth-first search over motions up to a depth limit, rebuilt from scratch for
+//! every part and limit. The limit begins at one and grows when no part could leave. PDP_t has
+//! translations only, PDP_r only actions with rotational freedom; PDP* runs PDP_t, and PDP_r from
+//! the start if that failed.
+
+use crate::geometry::Pose;
+use crate::plan::PlanStatus;
+use crate::simulation::{Action, End, Motion};
+
+use super::disassembly::{Disassembly, Proof, Run, Stop, joined};
+use super::outcome::{BlockedAction, Outcome, Removal};
+use super::problem::{Observer, Problem};
+use super::state::{coarseness, same_state};
+use super::trace::{TraceEvent, TracePhase};
+
+/// Which actions PDP has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mode {
+    Translation,
+    Rotation,
+}
+
+/// PDP_t or PDP_r.
+pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: Mode) -> Outcome {
+    let (translations, rotations) = problem.action_lists();
+    let actions = match mode {
+        Mode::Translation => translations,
+        Mode::Rotation => rotations,
+    };
+    let count = problem.scene.bodies.len();
+    let disassembly = Disassembly::new(problem, observer);
+    let mut search = Search { disassembly, mode, actions, stopped_by: vec![Vec::new(); count], states: 0 };
+    let stop = search.run().err();
+    let (evidence, blocked) = (search.evidence(), search.blocked());
+    search.disassembly.counters.states = search.states;
+    search.disassembly.outcome(stop, evidence, blocked)
+}
+
+/// PDP*: the counters are those of the run that answers. Steps of the first run are not told
+/// before it has succeeded. With a deadline, the first run has half of the time.
+pub(super) fn pdp_star(problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
+    let first = Problem { termination: problem.termination.halfway(), ..problem.clone() };
+    let mut held = Held { observer, removals: Vec::new() };
+    let outcome = pdp(first, &mut held, Mode::Translation);
+    let Held { observer, removals } = held;
+    let spent = outcome.counters.simulations;
+    let nothing_left = problem.max_simulations.is_some_and(|most| spent >= most);
+    if matches!(outcome.status, PlanStatus::Complete | PlanStatus::Cancelled) || nothing_left {
+        removals.iter().for_each(|r| observer.removal(r));
+        return outcome;
+    }
+    pdp(Problem { spent, ..problem }, observer, Mode::Rotation)
+}
+
+/// Keeps removals until it is known whether they count.
+struct Held<'o> {
+    observer: &'o mut dyn Observer,
+    removals: Vec<Removal>,
+}
+
+impl Observer for Held<'_> {
+    fn progress(&mut self, removed: usize, simulations: u64) {
+        self.observer.progress(removed, simulations);
+    }
+
+    fn removal(&mut self, removal: &Removal) {
+        self.removals.push(removal.clone());
+    }
+
+    fn traces(&self) -> bool {
+        self.observer.traces()
+    }
+
+    fn traced(&mut self, event: TraceEvent) {
+        self.observer.traced(event);
+    }
+}
+
+/// A configuration in the search tree of one part.
+struct Node {
+    /// From the assembled pose on.
+    path: Vec<Pose>,
+    depth: usize,
+}
+
+/// How the search for one part ended.
+enum Found {
+    Out,
+    /// Nothing new within the limit; `cut` if there may be more beyond.
+    Nothing {
+        cut: bool,
+    },
+}
+
+struct Search<'a, 'o> {
+    disassembly: Disassembly<'a, 'o>,
+    mode: Mode,
+    actions: Vec<Action>,
+    /// Per part: who stopped each action at the assembled pose, when last tried.
+    stopped_by: Vec<Vec<(usize, Vec<usize>)>>,
+    /// Configurations made, over all trees.
+    states: u64,
+}
+
+impl Search<'_, '_> {
+    fn run(&mut self) -> Result<(), Stop> {
+        self.take_free_parts()?;
+        let mut limit = 1;
+        while !self.disassembly.is_done() {
+            let phase = self.phase();
+            self.disassembly.trace(|| TraceEvent::Pass { phase, depth_limit: Some(limit) });
+            let (mut removed, mut cut) = (false, false);
+            for part in self.disassembly.everything.standing.clone() {
+                let stands = self.disassembly.everything.standing.contains(&part);
+                if !stands || !self.disassembly.problem.may_move(part) {
+                    continue;
+                }
+                match self.search(part, limit)? {
+                    Found::Nothing { cut: c } => cut |= c,
+                    Found::Out => {
+                        removed = true;
+                        self.take_free_parts()?;
+                    }
+                }
+                if self.disassembly.is_done() {
+                    return Ok(());
+                }
+            }
+            match (removed, cut) {
+                (true, _) => {}
+                (false, true) => limit += 1,
+                (false, false) => return Ok(()),
+            }
+        }
+        Ok(())
+    }
+
+    fn take_free_parts(&mut self) -> Result<(), Stop> {
+        while let Some(part) = self.disassembly.free_part()? {
+            let pose = self.disassembly.assembled(part);
+            self.remove(part, vec![pose], 0.0);
+        }
+        Ok(())
+    }
+
+    fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) {
+        let standing = &self.disassembly.everything.standing;
+        let mut gone: Vec<usize> = self.stopped_by[part]
+            .iter()
+            .flat_map(|(_, by)| by)
+            .copied()
+            .filter(|p| !standing.contains(p))
+            .collect();
+        gone.sort_unstable();
+        gone.dedup();
+        self.disassembly.remove(part, path, depth, gone);
+    }
+
+    /// Breadth-first search for a way out of one part.
+    fn search(&mut self, part: usize, limit: usize) -> Result<Found, Stop> {
+        let phase = self.phase();
+        let mut tree = vec![Node { path: vec![self.disassembly.assembled(part)], depth: 0 }];
+        let (mut next, mut cut) = (0, false);
+        while next < tree.len() {
+            if tree[next].depth == limit {
+                cut = true;
+                break;
+            }
+            self.disassembly.trace(|| TraceEvent::Expanded {
+                phase,
+                state: next,
+                part,
+                evaluation: None,
+                excluded: Vec::new(),
+            });
+            if self.expand(part, &mut tree, next)? {
+                return Ok(Found::Out);
+            }
+            next += 1;
+        }
+        Ok(Found::Nothing { cut })
+    }
+
+    /// Tries all actions from a node; true if one of them led out.
+    fn expand(&mut self, part: usize, tree: &mut Vec<Node>, at: usize) -> Result<bool, Stop> {
+        let prefix = tree[at].path.clone();
+        let start = prefix[prefix.len() - 1];
+        let window = rayon::current_num_threads();
+        let mut action = 0;
+        while action < self.actions.len() {
+            let runs: Vec<Run> = self.actions[action..]
+                .iter()
+                .take(window)
+                .map(|&action| Run { part, start, action })
+                .collect();
+            let motions = self.disassembly.simulate(&runs)?;
+            for (run, motion) in runs.into_iter().zip(motions) {
+                self.disassembly.charge()?;
+                let motion = match motion {
+                    Motion { path, end: End::Disassembled(_) } => {
+                        self.trace(at, &run, "disassembled", &[], path.len(), None);
+                        match self.disassembly.prove(run, &prefix, path)? {
+                            Proof::Path { path, depth } => {
+                                self.remove(part, path, depth);
+                                return Ok(true);
+                            }
+                            Proof::Otherwise(motion) => Some(motion),
+                            // The tree is rebuilt with the refuting points as samples.
+                            Proof::PrefixRefuted | Proof::Refuted { .. } => None,
+                        }
+                    }
+                    motion => Some(motion),
+                };
+                if let Some(motion) = motion {
+                    self.grow(tree, at, &run, action, motion);
+                }
+                action += 1;
+            }
+        }
+        Ok(false)
+    }
+
+    /// Adds the end of a motion to the tree, unless it is there.
+    fn grow(&mut self, tree: &mut Vec<Node>, at: usize, run: &Run, action: usize, motion: Motion) {
+        let Motion { path, end } = motion;
+        let (word, with) = match end {
+            End::Collision { with } => ("collision", with),
+            End::Undecided { touched, .. } => ("undecided", touched),
+            End::Disassembled(_) => ("disassembled", Vec::new()),
+        };
+        let scene = &self.disassembly.problem.scene;
+        let coarse = coarseness(tree.len());
+        let reached = path[path.len() - 1];
+        let is_new =
+            !tree.iter().any(|n| same_state(scene, run.part, &n.path[n.path.len() - 1], &reached, coarse));
+        self.trace(at, run, word, &with, path.len(), is_new.then_some(tree.len()));
+        if tree[at].depth == 0 {
+            let list = &mut self.stopped_by[run.part];
+            list.retain(|(a, _)| *a != action);
+            list.push((action, with));
+        }
+        if is_new {
+            self.states += 1;
+            let (path, depth) = (joined(&tree[at].path, &path), tree[at].depth + 1);
+            tree.push(Node { path, depth });
+        }
+    }
+
+    fn trace(
+        &mut self,
+        at: usize,
+        run: &Run,
+        end: &str,
+        with: &[usize],
+        poses: usize,
+        leads_to: Option<usize>,
+    ) {
+        self.disassembly.trace(|| TraceEvent::Simulated {
+            state: at,
+            part: run.part,
+            action: run.action.to_string(),
+            end: end.to_owned(),
+            with: with.to_vec(),
+            poses,
+            leads_to,
+        });
+    }
+
+    fn phase(&self) -> TracePhase {
+        match self.mode {
+            Mode::Translation => TracePhase::Translation,
+            Mode::Rotation => TracePhase::Rotation,
+        }
+    }
+
+    fn evidence(&self) -> String {
+        let kind = match self.mode {
+            Mode::Translation => "translations",
+            Mode::Rotation => "actions with rotational freedom",
+        };
+        let stuck = self.disassembly.problem.wanted(&self.disassembly.everything.standing).len();
+        format!(
+            "{stuck} of {} parts cannot leave one at a time: breadth-first search with {} {kind} found no new \
+             configuration of any part",
+            self.disassembly.problem.present.len(),
+            self.actions.len(),
+        )
+    }
+
+    fn blocked(&self) -> Vec<BlockedAction> {
+        let standing = &self.disassembly.everything.standing;
+        let mut out = Vec::new();
+        for part in self.disassembly.problem.wanted(standing) {
+            let mut list: Vec<_> = self.stopped_by[part].iter().collect();
+            list.sort();
+            for (action, by) in list {
+                let by: Vec<_> = by.iter().copied().filter(|p| standing.contains(p)).collect();
+                if !by.is_empty() {
+                    out.push(BlockedAction { part, action: self.actions[*action].to_string(), by });
+                }
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,111 @@
+//! What a search did, event by event, for a trace: which state was expanded with which
+//! (f_c, f_a), which actions the graphs excluded, how each simulation ended, each update.
+
+use serde::{Deserialize, Serialize};
+
+/// Who blocks an action: the parts that outgoing edges of one vertex lead to, in the blocking
+/// graph of one direction.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BlockedBy {
+    /// The action's name.
+    pub action: String,
+    /// Parts, ascending.
+    pub parts: Vec<usize>,
+}
+
+/// Translation, or motion with freedom to turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TracePhase {
+    /// Translations.
+    Translation,
+    /// Actions with rotational freedom.
+    Rotation,
+}
+
+/// One event. Parts are indices into the list in the first one; state 0 is the assembled one,
+/// displaced states count from 1 in the order of their discovery.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub enum TraceEvent {
+    /// The question.
+    Start {
+        /// Names of all parts.
+        parts: Vec<String>,
+        /// The planner's name.
+        planner: String,
+        /// The engine's name.
+        engine: String,
+    },
+    /// Static analysis gave the outgoing edges of a part at a state.
+    Analysed {
+        /// The state.
+        state: usize,
+        /// The part.
+        part: usize,
+        /// Its edges; actions without any are left out.
+        blocked: Vec<BlockedBy>,
+    },
+    /// A run over the open list began.
+    Pass {
+        /// With which actions.
+        phase: TracePhase,
+        /// The depth limit of a breadth-first planner.
+        depth_limit: Option<usize>,
+    },
+    /// A state was taken off the open list.
+    Expanded {
+        /// With which actions.
+        phase: TracePhase,
+        /// The state.
+        state: usize,
+        /// The part that moves.
+        part: usize,
+        /// (f_c, f_a), where blocking graphs guide the search.
+        evaluation: Option<[usize; 2]>,
+        /// Actions that the graphs exclude.
+        excluded: Vec<BlockedBy>,
+    },
+    /// The transition function was used.
+    Simulated {
+        /// From this state.
+        state: usize,
+        /// The part that moved.
+        part: usize,
+        /// The action's name.
+        action: String,
+        /// `disassembled`, `collision` or `undecided`.
+        end: String,
+        /// The parts that it met: the edges that the graph of this action gets.
+        with: Vec<usize>,
+        /// Poses of the motion.
+        poses: usize,
+        /// The new state, unless there was one like it.
+        leads_to: Option<usize>,
+    },
+    /// The check on the triangles refuted a path.
+    Refuted {
+        /// The part.
+        part: usize,
+        /// The action's name.
+        action: String,
+        /// The parts that it entered.
+        by: Vec<usize>,
+    },
+    /// A part is out: its vertex and edges are deleted from all graphs.
+    Removed {
+        /// The part.
+        part: usize,
+        /// Parts that had blocked it and left before.
+        waited_for: Vec<usize>,
+    },
+    /// The search ended.
+    End {
+        /// The plan's status.
+        status: String,
+        /// Why it is not complete.
+        reason: Option<String>,
+        /// Simulations counted.
+        simulations: u64,
+    },
+}
