@@ -4,8 +4,10 @@
 //! Blocking Graphs") for their use over states. A state is one displaced part among the others at
 //! their assembled poses, so a state's graphs are that part's outgoing edges: its [`Blockage`].
 
+mod audit;
 mod blockage;
 mod static_analysis;
 
+pub use audit::{Audit, audit};
 pub use blockage::{Blockage, Evaluation};
 pub use static_analysis::{blocked_from, initial_blockages};

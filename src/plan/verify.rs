@@ -8,6 +8,8 @@
 //! turns) the poses take turns in checking a half or a quarter of the samples each, so that a
 //! sample is still checked every other or every fourth pose.
 
+use std::sync::Arc;
+
 use nalgebra::Point3;
 use rayon::prelude::*;
 
@@ -44,7 +46,7 @@ pub struct Verdict {
 #[derive(Debug, Clone)]
 pub struct Verifier {
     /// Per shape: its samples, dealt out evenly.
-    samples: Vec<[SampleTree; SHARES]>,
+    samples: Arc<Vec<[SampleTree; SHARES]>>,
     /// Per part: index of its shape.
     shape_of: Vec<usize>,
     /// Depth beyond the allowance that is still accepted, in the planning frame.
@@ -54,9 +56,15 @@ pub struct Verifier {
 impl Verifier {
     /// Prepares the check for shapes; `shape_of` gives each part's shape.
     #[must_use]
-    pub fn new(shapes: &[std::sync::Arc<Shape>], shape_of: Vec<usize>, limit: f64) -> Self {
+    pub fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>, limit: f64) -> Self {
         let samples = shapes.par_iter().map(|s| shares(&s.surface)).collect();
-        Self { samples, shape_of, limit }
+        Self { samples: Arc::new(samples), shape_of, limit }
+    }
+
+    /// The same check for an engine that declares another depth.
+    #[must_use]
+    pub fn with_limit(&self, limit: f64) -> Self {
+        Self { limit, ..self.clone() }
     }
 
     /// The depth at which a path is refused, in the planning frame.

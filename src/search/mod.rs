@@ -20,6 +20,7 @@ pub use crate::termination::{Interrupt, Termination};
 pub use outcome::{BlockedAction, Counters, Outcome, Removal};
 pub use problem::{Checked, Observer, Problem};
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage};
+pub use state::least_travel;
 pub use trace::{BlockedBy, TraceEvent, TracePhase};
 
 /// Runs the planner that a request names.

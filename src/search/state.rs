@@ -71,7 +71,8 @@ impl Node {
 }
 
 /// Least travel that makes a new state of a part: bounded by its own size.
-pub(super) fn least_travel(scene: &Scene, part: usize) -> f64 {
+#[must_use]
+pub fn least_travel(scene: &Scene, part: usize) -> f64 {
     TRANSLATION.min(scene.bodies[part].shape.bounds().extents().max() / 20.0)
 }
 

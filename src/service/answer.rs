@@ -50,6 +50,8 @@ pub(super) struct Frame<'a> {
     pub(super) fixed: Vec<usize>,
     pub(super) removed: Vec<usize>,
     pub(super) overlaps: Vec<Overlap>,
+    /// What else the reader of the plan should know.
+    pub(super) notes: Vec<String>,
 }
 
 impl Frame<'_> {
@@ -87,6 +89,8 @@ impl Frame<'_> {
     /// A plan without steps, for a request that ended before its search began.
     pub(super) fn empty(self, status: PlanStatus, reason: Option<String>) -> Plan {
         let count = self.assembly.parts.len();
+        let mut warnings = warnings(self.assembly);
+        warnings.extend(self.notes.into_iter().map(|message| Warning { part: None, message }));
         Plan {
             status,
             reason,
@@ -101,7 +105,7 @@ impl Frame<'_> {
             steps: Vec::new(),
             blocked: Vec::new(),
             overlaps: self.overlaps,
-            warnings: warnings(self.assembly),
+            warnings,
             stats: PlanStats::default(),
         }
     }

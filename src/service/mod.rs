@@ -13,10 +13,12 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
+use crate::blocking_graph::{Audit, audit};
 use crate::geometry::{Assembly, GeometryError, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, PlanStatus, Warning};
 use crate::search::{
-    Engine, Observer, PlanRequest, PlanSink, Problem, Progress, Removal, Stage, TraceEvent, search,
+    Engine, Observer, PlanRequest, PlanSink, Problem, Progress, Removal, Stage, TraceEvent, least_travel,
+    search,
 };
 use crate::simulation::{SlidingEngine, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
@@ -129,6 +131,24 @@ impl Service {
         Ok(pool.install(|| entry.plan(request, termination, sink)))
     }
 
+    /// Compares the initial blocking graphs of an assembly with simulation.
+    ///
+    /// # Errors
+    /// The assembly is unknown, or the termination condition became true (`Ok(None)`).
+    pub fn audit(
+        &self,
+        id: AssemblyId,
+        engine: Engine,
+        termination: &Termination,
+    ) -> Result<Option<Audit>, ServiceError> {
+        let entry = self.entry(id)?;
+        let Ok((prepared, _)) = entry.prepared(termination, &mut Silent) else { return Ok(None) };
+        let scene = &prepared.scene;
+        let present: Vec<usize> = (0..scene.bodies.len()).collect();
+        let least = |part| least_travel(scene, part);
+        Ok(audit(scene, &present, engine_of(engine), &least, termination).ok())
+    }
+
     fn entry(&self, id: AssemblyId) -> Result<Arc<Entry>, ServiceError> {
         self.entries().get(&id).cloned().ok_or(ServiceError::UnknownAssembly)
     }
@@ -150,7 +170,14 @@ impl Entry {
             list.dedup();
         }
         fixed.retain(|p| removed.binary_search(p).is_err());
-        let frame = Frame { assembly: &self.assembly, request, fixed, removed, overlaps: Vec::new() };
+        let frame = Frame {
+            assembly: &self.assembly,
+            request,
+            fixed,
+            removed,
+            overlaps: Vec::new(),
+            notes: Vec::new(),
+        };
         let prepared = if request.no_cache {
             Prepared::new(&self.assembly, termination, sink).map(|p| (Arc::new(p), false))
         } else {
@@ -175,15 +202,22 @@ impl Entry {
     ) -> Plan {
         let request = frame.request;
         frame.overlaps = answer::overlaps(&self.assembly, &prepared.overlaps);
-        let engine: &dyn TransitionFunction = match request.engine {
-            Engine::Sliding => &SlidingEngine,
-        };
+        let engine = engine_of(request.engine);
         let present: Vec<usize> =
             (0..self.assembly.parts.len()).filter(|p| frame.removed.binary_search(p).is_err()).collect();
         let total = present.len() as u32;
+        let limit = prepared.verifier.limit().max(engine.depth_tolerance() + BETWEEN_SAMPLES);
+        let verifier = prepared.verifier.with_limit(limit);
+        if limit > prepared.verifier.limit() {
+            frame.notes.push(format!(
+                "the engine `{}` lets parts overlap by {:.3e}; paths are verified to that depth",
+                engine.name(),
+                limit / self.assembly.scale
+            ));
+        }
         let problem = Problem {
             scene: prepared.scene.clone(),
-            verifier: &prepared.verifier,
+            verifier: &verifier,
             engine,
             present,
             fixed: frame.fixed.clone(),
@@ -234,6 +268,15 @@ impl Entry {
         }
     }
 }
+
+fn engine_of(engine: Engine) -> &'static dyn TransitionFunction {
+    match engine {
+        Engine::Sliding => &SlidingEngine,
+    }
+}
+
+/// What verification finds between the samples of an engine, in the planning frame.
+const BETWEEN_SAMPLES: f64 = 1e-3;
 
 /// Hands a search's events on, in the input's units.
 struct Relay<'a> {

@@ -1,0 +1,83 @@
+//! How good static analysis is: every action that it excludes at the assembled pose is simulated
+//! all the same.
+
+use rayon::prelude::*;
+
+use crate::simulation::{Action, End, Scene, Surroundings, TransitionFunction};
+use crate::termination::{Interrupt, Termination};
+
+use super::initial_blockages;
+
+/// What came of simulating excluded actions.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Audit {
+    /// Translations of parts at their assembled poses.
+    pub actions: usize,
+    /// Of these, excluded by static analysis.
+    pub excluded: usize,
+    /// Of these, wrongly: part and action, because the part moves that way by more than the
+    /// resolution of states.
+    pub wrong: Vec<(usize, String)>,
+    /// Not excluded, but the part does not move that way either: found by simulation only.
+    pub overlooked: usize,
+}
+
+/// Audits the initial blocking graphs of some parts.
+///
+/// # Errors
+/// The termination condition became true.
+pub fn audit(
+    scene: &Scene,
+    present: &[usize],
+    engine: &dyn TransitionFunction,
+    least: &(impl Fn(usize) -> f64 + Sync),
+    termination: &Termination,
+) -> Result<Audit, Interrupt> {
+    let translations = Action::translations();
+    let blockages = initial_blockages(scene, present, &translations, least, termination)?;
+    let everything = Surroundings::new(scene, present.to_vec());
+    let questions: Vec<_> =
+        present.iter().flat_map(|&p| (0..translations.len()).map(move |a| (p, a))).collect();
+    let moves = questions
+        .par_iter()
+        .map(|&(part, action)| {
+            let around = everything.without(scene, part);
+            let start = scene.bodies[part].planning_from_shape;
+            let motion = engine.simulate(scene, &around, part, &start, translations[action], termination)?;
+            let end = motion.path[motion.path.len() - 1];
+            let centre = scene.bodies[part].shape.mass.centre;
+            let travel = (end * centre - start * centre).norm();
+            Ok(matches!(motion.end, End::Disassembled(_)) || travel > least(part))
+        })
+        .collect::<Result<Vec<bool>, Interrupt>>()?;
+    let mut out = Audit { actions: questions.len(), ..Audit::default() };
+    for ((part, action), moves) in questions.into_iter().zip(moves) {
+        match (blockages[part].is_open(action), moves) {
+            (true, true) => {}
+            (true, false) => out.overlooked += 1,
+            (false, moves) => {
+                out.excluded += 1;
+                if moves {
+                    out.wrong.push((part, translations[action].to_string()));
+                }
+            }
+        }
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{block_on_plate, peg_in_hole, scene};
+    use crate::simulation::SlidingEngine;
+
+    #[test]
+    fn nothing_that_can_move_is_excluded() {
+        for (meshes, excluded) in [(block_on_plate(), 2), (peg_in_hole(0.0), 10), (peg_in_hole(0.02), 10)] {
+            let (scene, _) = scene(meshes);
+            let found = audit(&scene, &[0, 1], &SlidingEngine, &|_| 0.05, &Termination::default()).unwrap();
+            assert_eq!((found.actions, found.excluded, found.wrong.len()), (12, excluded, 0), "{found:?}");
+        }
+    }
+}
