@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Why work stopped early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,6 +38,14 @@ impl Termination {
     #[must_use]
     pub fn unless_won(&self, winner: &Arc<AtomicUsize>, rank: usize) -> Self {
         Self { race: Some((Arc::clone(winner), rank)), ..self.clone() }
+    }
+
+    /// The same with at most so much time from now on.
+    #[must_use]
+    pub fn within(&self, limit: Duration) -> Self {
+        let limit = Instant::now().checked_add(limit);
+        let earlier = [self.deadline, limit].into_iter().flatten().min();
+        Self { deadline: earlier, ..self.clone() }
     }
 
     /// The same with half of the time that is left.

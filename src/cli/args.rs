@@ -51,6 +51,10 @@ pub(super) struct PlanArguments {
     /// Answer after so many seconds with what is there
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) timeout: Option<Duration>,
+    /// Give one motion, or one part's search of a pdp planner, up after so many seconds; plans in
+    /// this process [default: no limit; the paper has 360]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "daemon")]
+    pub(super) path_timeout: Option<Duration>,
     /// Give up after so many simulations
     #[arg(long, value_name = "N")]
     pub(super) max_simulations: Option<u64>,

@@ -41,6 +41,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         engine: arguments.engine.into(),
         actions: arguments.actions.map_or_else(|| planner.default_actions(), Into::into),
         max_simulations: arguments.max_simulations,
+        path_timeout: arguments.path_timeout,
         threads: arguments.threads as usize,
         fixed: resolve(assembly, "--fixed", &fixed)?,
         removed: resolve(assembly, "--removed", &arguments.removed)?,
@@ -51,7 +52,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
 
 /// The daemon if one runs, else this process; or what the user insists on.
 fn choose_backend(arguments: &PlanArguments) -> Result<Box<dyn Backend>, CliError> {
-    if arguments.embedded || arguments.trace.is_some() {
+    if arguments.embedded || arguments.trace.is_some() || arguments.path_timeout.is_some() {
         return Ok(Box::<Embedded>::default());
     }
     match Daemon::connect() {

@@ -23,6 +23,7 @@ pub(crate) fn plan_request(
         engine: engine(request.engine)?,
         actions: actions(request.actions)?,
         max_simulations: request.max_simulations,
+        path_timeout: None,
         threads: threads(request.threads as usize, most_threads),
         fixed: indices(&request.fixed),
         removed: indices(&request.removed),

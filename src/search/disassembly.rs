@@ -19,6 +19,9 @@ use super::trace::TraceEvent;
 /// How often a motion is simulated again with the points at which verification refuted it.
 const REFINEMENTS: usize = 4;
 
+/// Why a motion is given up that took too long.
+const NO_TIME: &str = "the time for one path is used up";
+
 /// Why a search stops before it is done.
 pub(super) enum Stop {
     Interrupted(Interrupt),
@@ -62,6 +65,8 @@ pub(super) struct Disassembly<'a, 'o> {
     entangled: Vec<Option<usize>>,
     pub(super) removals: Vec<Removal>,
     pub(super) counters: Counters,
+    /// Whether some path was given up for want of time: nothing found is then no proof.
+    pub(super) path_time_ran_out: bool,
 }
 
 impl<'a, 'o> Disassembly<'a, 'o> {
@@ -74,6 +79,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             entangled: vec![None; count],
             removals: Vec::new(),
             counters: Counters::default(),
+            path_time_ran_out: false,
             problem,
         }
     }
@@ -129,9 +135,15 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             let Some(around) = &around[run.part] else {
                 return Ok(Motion { path: vec![run.start], end: End::Collision { with: Vec::new() } });
             };
-            let termination = problem.termination.unless_won(&winner, rank);
             let Run { part, start, action } = run;
-            let motion = problem.engine.simulate(&problem.scene, around, *part, start, *action, &termination);
+            let termination = problem.termination.unless_won(&winner, rank);
+            let limited = problem.path_timeout.map(|limit| termination.within(limit));
+            let poll = limited.as_ref().unwrap_or(&termination);
+            let mut motion = problem.engine.simulate(&problem.scene, around, *part, start, *action, poll);
+            if motion.is_err() && termination.check().is_ok() {
+                let touched = around.standing.clone();
+                motion = Ok(Motion { path: vec![*start], end: End::Undecided { reason: NO_TIME, touched } });
+            }
             if matches!(&motion, Ok(Motion { end: End::Disassembled(_), .. })) {
                 winner.fetch_min(rank, Ordering::Relaxed);
             }
@@ -143,6 +155,8 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             runs.iter().enumerate().map(simulated).collect()
         };
         self.counters.simulation += started.elapsed();
+        let no_time = |m: &Motion| matches!(m.end, End::Undecided { reason: NO_TIME, .. });
+        self.path_time_ran_out |= motions.iter().flatten().any(no_time);
         let wanted = winner.load(Ordering::Relaxed).saturating_add(1);
         Ok(motions.into_iter().take(wanted).collect::<Result<_, Interrupt>>()?)
     }
@@ -242,6 +256,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     ) -> Outcome {
         let (status, reason) = match stop {
             _ if self.is_done() => (PlanStatus::Complete, None),
+            None if self.path_time_ran_out => (PlanStatus::Timeout, Some(NO_TIME.to_owned())),
             None => (PlanStatus::Infeasible, Some(evidence)),
             Some(Stop::Interrupted(Interrupt::Cancelled)) => {
                 (PlanStatus::Cancelled, Some("cancelled".to_owned()))

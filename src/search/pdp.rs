@@ -6,6 +6,8 @@
 //! translations only, PDP_r only actions with rotational freedom; PDP* runs PDP_t, and PDP_r from
 //! the start if that failed.
 
+use std::time::{Duration, Instant};
+
 use crate::geometry::Pose;
 use crate::plan::PlanStatus;
 use crate::simulation::{Action, End, Motion};
@@ -164,7 +166,13 @@ impl Search<'_, '_> {
         let phase = self.phase();
         let mut tree = vec![Node { path: vec![self.disassembly.assembled(part)], depth: 0 }];
         let (mut next, mut cut) = (0, false);
+        let started = Instant::now();
+        let too_long = |limit: Duration| started.elapsed() >= limit;
         while next < tree.len() {
+            if self.disassembly.problem.path_timeout.is_some_and(too_long) {
+                self.disassembly.path_time_ran_out = true;
+                break;
+            }
             if tree[next].depth == limit {
                 cut = true;
                 break;

@@ -1,6 +1,7 @@
 //! A planning question in the planning frame, ready to be searched.
 
 use std::collections::{HashMap, HashSet};
+use std::time::Duration;
 
 use nalgebra::Point3;
 
@@ -51,6 +52,8 @@ pub struct Problem<'a> {
     pub max_simulations: Option<u64>,
     /// Simulations that an earlier search of the same question has used up.
     pub spent: u64,
+    /// Time after which one motion, or PDP's search for one part, is given up.
+    pub path_timeout: Option<Duration>,
     /// Ends the search early.
     pub termination: Termination,
     /// Points added so far, per part.

@@ -1,5 +1,7 @@
 //! What a planning request asks for, free of any transport.
 
+use std::time::Duration;
+
 /// Which search runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Planner {
@@ -98,6 +100,9 @@ pub struct PlanRequest {
     pub actions: ActionSet,
     /// Simulations after which the search gives up with `partial`.
     pub max_simulations: Option<u64>,
+    /// Time after which one motion, or the search for one part, is given up (the paper's path
+    /// planning timeout). Plans then depend on the clock.
+    pub path_timeout: Option<Duration>,
     /// Worker threads for this request; 0 stands for all. Never changes the plan.
     pub threads: usize,
     /// Parts that may not move.

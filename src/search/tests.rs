@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use super::*;
 use crate::fixtures::{cells, scene};
 use crate::geometry::SourceMesh;
-use crate::simulation::SlidingEngine;
+use crate::plan::{PlanStatus, Verifier};
+use crate::simulation::{Scene, SlidingEngine};
 
 const PIN: usize = 0;
 const BOLT: usize = 1;
@@ -54,23 +55,27 @@ impl Observer for Recorder {
     }
 }
 
-fn traced(planner: Planner) -> (Outcome, Vec<TraceEvent>) {
-    let (scene, verifier) = scene(pin_bolt_cover());
-    let problem = Problem {
+fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
+    Problem {
         present: vec![PIN, BOLT, COVER],
         scene,
-        verifier: &verifier,
+        verifier,
         engine: &SlidingEngine,
         fixed: Vec::new(),
         targets: None,
         actions: ActionSet::Paper,
         max_simulations: None,
         spent: 0,
+        path_timeout: None,
         termination: Termination::default(),
         extra_points: HashMap::new(),
-    };
+    }
+}
+
+fn traced(planner: Planner) -> (Outcome, Vec<TraceEvent>) {
+    let (scene, verifier) = scene(pin_bolt_cover());
     let mut recorder = Recorder::default();
-    (search(planner, problem, &mut recorder), recorder.0)
+    (search(planner, problem(scene, &verifier), &mut recorder), recorder.0)
 }
 
 /// Expansions and simulations as short texts, by pass.
@@ -103,7 +108,7 @@ fn account(events: &[TraceEvent]) -> Vec<Vec<String>> {
 #[test]
 fn the_worked_example_runs_as_in_the_paper() {
     let (outcome, events) = traced(Planner::SbdpStar);
-    assert_eq!(outcome.status, crate::plan::PlanStatus::Complete, "{:?}", outcome.reason);
+    assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
     let passes = account(&events);
     // Static analysis overlooks that the pin stops the cover; the bolt has no open action.
     assert_eq!(
@@ -156,5 +161,16 @@ fn without_graphs_it_takes_more_simulations() {
             }
             other => assert!(!matches!(other, TraceEvent::Analysed { .. })),
         }
+    }
+}
+
+#[test]
+fn a_motion_without_time_is_undecided_and_no_proof_of_anything() {
+    let (scene, verifier) = scene(pin_bolt_cover());
+    for planner in Planner::ALL {
+        let problem =
+            Problem { path_timeout: Some(std::time::Duration::ZERO), ..problem(scene.clone(), &verifier) };
+        let outcome = search(planner, problem, &mut Recorder::default());
+        assert_eq!((outcome.status, outcome.remaining.len()), (PlanStatus::Timeout, 3), "{planner:?}");
     }
 }

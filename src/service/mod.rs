@@ -225,6 +225,7 @@ impl Entry {
             actions: request.actions,
             max_simulations: request.max_simulations,
             spent: 0,
+            path_timeout: request.path_timeout,
             termination: termination.clone(),
             extra_points: HashMap::new(),
         };
