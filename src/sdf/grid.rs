@@ -1,6 +1,6 @@
 //! The sparse grid and its look-ups.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::geometry::Bounds;
 
@@ -41,6 +41,30 @@ pub struct Estimate {
     pub lower_bound: f64,
     /// Interpolated signed distance (in far bricks: the bound).
     pub value: f64,
+}
+
+/// The interpolated field at a point, with its derivatives inside the cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FieldSample {
+    /// Interpolated signed distance; where there are no nodes, the bound (see [`Estimate`]).
+    pub value: f64,
+    /// Its gradient; zero where there are no nodes.
+    pub gradient: Vector3<f64>,
+    /// Second derivatives ∂²/∂y∂z, ∂²/∂z∂x, ∂²/∂x∂y: all that trilinear interpolation has.
+    pub mixed: Vector3<f64>,
+}
+
+impl FieldSample {
+    /// The matrix of second derivatives.
+    #[must_use]
+    pub fn hessian(&self) -> Matrix3<f64> {
+        let [yz, zx, xy] = self.mixed.into();
+        Matrix3::new(0.0, xy, zx, xy, 0.0, yz, zx, yz, 0.0)
+    }
+
+    fn flat(value: f64) -> Self {
+        Self { value, gradient: Vector3::zeros(), mixed: Vector3::zeros() }
+    }
 }
 
 impl Field {
@@ -86,6 +110,39 @@ impl Field {
         let value = trilinear(&self.values[base..], &f);
         let boxed = self.bounds.distance(p);
         Estimate { lower_bound: (value - self.error_bound()).max(boxed), value }
+    }
+
+    /// The interpolated value at `p` and its exact derivatives. They jump at the faces of cells.
+    #[must_use]
+    pub fn sample(&self, p: &Point3<f64>) -> FieldSample {
+        let Some((brick, local)) = self.locate(p) else {
+            return FieldSample::flat(self.bounds.distance(p));
+        };
+        let slot = self.slots[brick];
+        if slot == EMPTY {
+            return FieldSample::flat(f64::from(self.far[brick]));
+        }
+        let (base, f) = corner(&local, slot);
+        let mut sample = trilinear_derivatives(&self.values[base..], &f);
+        sample.gradient /= self.cell;
+        sample.mixed /= self.cell * self.cell;
+        sample
+    }
+
+    /// `p` is no deeper inside than this; infinite where the field does not know. On open surfaces
+    /// only a guess: their sign may change where there is no triangle.
+    #[must_use]
+    pub fn deepest(&self, p: &Point3<f64>) -> f64 {
+        let Some((brick, local)) = self.locate(p) else { return 0.0 };
+        let slot = self.slots[brick];
+        if slot == EMPTY {
+            return if self.far[brick] < 0.0 { f64::INFINITY } else { 0.0 };
+        }
+        let (base, f) = corner(&local, slot);
+        // Values stand at the band's half-width beyond it; cut off so, distances are still
+        // 1-Lipschitz, and the error bound holds for them.
+        let depth = self.error_bound() - trilinear(&self.values[base..], &f);
+        if depth < BAND * self.cell { depth.max(0.0) } else { f64::INFINITY }
     }
 
     /// A triangle that is likely to be the nearest to `p`, or nearly: that of a node around it;
@@ -146,4 +203,92 @@ fn trilinear(v: &[f32], f: &Vector3<f64>) -> f64 {
     let x2 = lerp(c(4), c(5), f.x);
     let x3 = lerp(c(6), c(7), f.x);
     lerp(lerp(x0, x1, f.y), lerp(x2, x3, f.y), f.z)
+}
+
+/// Value and derivatives in units of the cell.
+fn trilinear_derivatives(v: &[f32], f: &Vector3<f64>) -> FieldSample {
+    let c = |k: usize| f64::from(v[CORNERS[k]]);
+    let lerp = |a: f64, b: f64, t: f64| a + (b - a) * t;
+    // Differences along x on the four edges, then values on them.
+    let d = [c(1) - c(0), c(3) - c(2), c(5) - c(4), c(7) - c(6)];
+    let x = [c(0) + d[0] * f.x, c(2) + d[1] * f.x, c(4) + d[2] * f.x, c(6) + d[3] * f.x];
+    let (below, above) = (lerp(x[0], x[1], f.y), lerp(x[2], x[3], f.y));
+    let (d_below, d_above) = (lerp(d[0], d[1], f.y), lerp(d[2], d[3], f.y));
+    let (y_below, y_above) = (x[1] - x[0], x[3] - x[2]);
+    FieldSample {
+        value: lerp(below, above, f.z),
+        gradient: Vector3::new(lerp(d_below, d_above, f.z), lerp(y_below, y_above, f.z), above - below),
+        mixed: Vector3::new(y_above - y_below, d_above - d_below, lerp(d[1] - d[0], d[3] - d[2], f.z)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{ball, l_shape, spread, surface};
+    use crate::geometry::Surface;
+    use crate::termination::Termination;
+
+    /// Solids with their fields and points in and around the band, none within 1e-6 of a face of a
+    /// cell, where derivatives jump.
+    fn cases() -> Vec<(Surface, Field, Vec<Point3<f64>>)> {
+        let case = |mesh| {
+            let s = surface(mesh);
+            let field = Field::build(&s, &Termination::default()).unwrap();
+            let b = s.bounds().grown(0.05);
+            let inside_a_cell = |p: &Point3<f64>| {
+                let at = (p - field.origin) / field.cell;
+                at.iter().all(|x| (0.01..0.99).contains(&x.fract()))
+            };
+            let points = spread(b.min.into(), b.max.into(), 40_000).filter(inside_a_cell);
+            let near = points.filter(|p| s.signed_distance(p).abs() < 2.0 * field.cell).collect();
+            (s, field, near)
+        };
+        vec![case(ball(3)), case(l_shape())]
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_interpolated_value() {
+        for (_, field, points) in cases() {
+            let e = 1e-3 * field.cell;
+            assert!(points.len() > 500);
+            for p in points {
+                let sample = field.sample(&p);
+                assert!((sample.value - field.estimate(&p).value).abs() < 1e-12);
+                let hessian = sample.hessian();
+                for a in 0..3 {
+                    let mut h = Vector3::zeros();
+                    h[a] = e;
+                    let (below, above) = (field.sample(&(p - h)), field.sample(&(p + h)));
+                    let slope = (above.value - below.value) / (2.0 * e);
+                    assert!((sample.gradient[a] - slope).abs() < 1e-8, "{sample:?} for {slope} at {p}");
+                    let bend = (above.gradient - below.gradient) / (2.0 * e);
+                    let off = (hessian.column(a) - bend).norm() * field.cell;
+                    assert!(off < 1e-8, "{hessian} for {bend} at {p}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn far_from_the_surface_a_sample_is_flat() {
+        let (_, field, _) = cases().swap_remove(0);
+        for p in [Point3::origin(), Point3::new(1e3, 0.0, 0.0)] {
+            assert_eq!(field.sample(&p), FieldSample::flat(field.estimate(&p).value));
+        }
+    }
+
+    #[test]
+    fn no_point_is_deeper_than_the_bound_on_its_depth() {
+        for (s, field, near) in cases() {
+            let b = s.bounds().grown(0.2);
+            let mut known = 0;
+            for p in spread(b.min.into(), b.max.into(), 4000).chain(near) {
+                let (bound, depth) = (field.deepest(&p), -s.signed_distance(&p));
+                assert!(depth <= bound + 1e-9, "{depth} deep for {bound} at {p}");
+                known += usize::from(bound.is_finite());
+            }
+            assert!(known > 1000, "{known} bounds");
+        }
+    }
 }

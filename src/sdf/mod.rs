@@ -12,4 +12,4 @@ mod grid;
 #[cfg(test)]
 mod tests;
 
-pub use grid::{Estimate, Field};
+pub use grid::{Estimate, Field, FieldSample};

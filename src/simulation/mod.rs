@@ -2,12 +2,14 @@
 //!
 //! Data flow: [`Scene`] (bodies and what each pair may overlap) → broad phase and `contact`
 //! (samples near the other surface, measured exactly) → `projection` (the nearest twist that
-//! contact allows) → `sliding` (steps until the part is out or stuck) → [`Motion`].
+//! contact allows) → `sliding` (steps until the part is out or stuck) → [`Motion`]. The paper's own
+//! simulation stands beside it: [`PenaltyEngine`], with forces and time steps, on the fields alone.
 //! Everything here is in the planning frame and knows nothing of search.
 
 mod action;
 mod contact;
 mod disassembled;
+mod penalty;
 mod projection;
 mod scene;
 mod sliding;
@@ -17,6 +19,7 @@ mod transition;
 
 pub use action::{Action, Axis};
 pub use disassembled::{HULL_MARGIN, Surroundings, exit_direction};
+pub use penalty::{PenaltyEngine, PenaltyParameters};
 pub use scene::{Allowances, Body, Scene};
 pub use sliding::{SlidingEngine, pair_blocks};
 pub use transition::{End, Motion, TransitionFunction};

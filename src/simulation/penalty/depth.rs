@@ -1,0 +1,95 @@
+//! The check that no pair gets deeper than the engine declares.
+//!
+//! Forces follow the interpolated field, which is off by up to 0.87 cells near edges, and contact
+//! points are far apart; so what a motion claims is checked by other means: the samples that
+//! `sliding` uses, against the triangles. The field only tells which samples need not be asked.
+
+use crate::geometry::{Pose, SampleTree, interpolate};
+use crate::simulation::Body;
+
+use super::contacts::Contacts;
+use super::parameters::PenaltyParameters;
+
+/// Share of the tolerance that samples may use up; the rest is for what lies between them.
+const SHARE: f64 = 0.9;
+/// No point travels further between two poses that are checked, in the planning frame.
+const DENSITY: f64 = 0.06;
+
+/// Whether all pairs keep to their depth between two poses, the first one excluded. Puts the
+/// indices of pairs that do not in `deep`.
+pub(super) fn holds_between(
+    contacts: &Contacts<'_>,
+    parameters: &PenaltyParameters,
+    from: &Pose,
+    to: &Pose,
+    deep: &mut Vec<usize>,
+) -> bool {
+    let body = contacts.body;
+    let centre = contacts.scene.centre_in_shape(contacts.part);
+    let turn = from.rotation.angle_to(&to.rotation);
+    let radius = body.shape.reach + (centre - body.shape.mass.centre).norm();
+    let travel = (to * centre - from * centre).norm() + turn * radius;
+    let count = (travel / DENSITY).ceil().max(1.0) as u32;
+    (1..=count).all(|k| {
+        let between = || interpolate(from, to, &centre, f64::from(k) / f64::from(count));
+        let pose = if k == count { *to } else { between() };
+        holds(contacts, parameters, &pose, deep)
+    })
+}
+
+fn holds(
+    contacts: &Contacts<'_>,
+    parameters: &PenaltyParameters,
+    pose: &Pose,
+    deep: &mut Vec<usize>,
+) -> bool {
+    let bounds = contacts.body.shape.bounds().transformed(pose);
+    let before = deep.len();
+    for (i, pair) in contacts.pairs.iter().enumerate().filter(|(_, p)| p.standing.bounds.meets(&bounds)) {
+        let allowance = contacts.scene.allowances.of(contacts.part, pair.other);
+        let limit = allowance + parameters.depth_tolerance() * pair.scale * SHARE;
+        let to_standing = pair.standing.planning_from_shape.inverse() * pose;
+        let is_deep = is_deeper(contacts.body, pair.standing, &to_standing, limit)
+            || is_deeper(pair.standing, contacts.body, &to_standing.inverse(), limit);
+        if is_deep {
+            deep.push(i);
+        }
+    }
+    deep.len() == before
+}
+
+/// Whether a sample of one body is deeper than `limit` in the other.
+fn is_deeper(sampled: &Body, measured: &Body, to_measured: &Pose, limit: f64) -> bool {
+    let trees: [&SampleTree; 2] = [&sampled.shape.samples, &sampled.extra_samples];
+    let found = std::cell::Cell::new(false);
+    for tree in trees {
+        tree.walk(
+            (),
+            |node, ()| {
+                let p = to_measured * node.centre;
+                let outside = || measured.field.estimate(&p).lower_bound > node.radius;
+                let shallow = || measured.field.deepest(&p) + node.radius <= limit;
+                (!found.get() && !outside() && !shallow()).then_some(())
+            },
+            |sample, ()| {
+                if !found.get() {
+                    found.set(is_point_deeper(measured, &(to_measured * sample), limit));
+                }
+            },
+        );
+    }
+    found.get()
+}
+
+fn is_point_deeper(measured: &Body, p: &nalgebra::Point3<f64>, limit: f64) -> bool {
+    if measured.field.deepest(p) <= limit {
+        return false;
+    }
+    let surface = &measured.shape.surface;
+    // No point is deeper than it is far from any one triangle.
+    let near = |t| surface.closest_on(t, p).distance <= limit;
+    if measured.field.likely_nearest(p).is_some_and(near) {
+        return false;
+    }
+    measured.closest(p, 0.0).is_some_and(|(_, distance)| -distance > limit)
+}

@@ -1,0 +1,100 @@
+//! The hyper-parameters of the paper's simulation, and what its table leaves open.
+
+/// Parameters of the engine `penalty`. Lengths are in the planning frame (longest side of the
+/// assembly in (5, 10]), angles in radians, times in seconds of the simulated motion.
+///
+/// "Table" means the table of hyper-parameters in the paper's appendix, "public code" what its
+/// public implementation was seen to do, "own" what neither fixes. The table's path planning
+/// timeout (360 s) is not here: deadlines reach an engine as a termination condition.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PenaltyParameters {
+    /// Time of one implicit step, in s. Table: simulation time step, 1e-3.
+    pub time_step: f64,
+    /// Time after which the velocity is zeroed and the state compared with earlier ones, in s.
+    /// Table: path planning time step, 1e-1.
+    pub planning_time_step: f64,
+    /// Force per depth at one contact point, for a density of 1. Table: contact stiffness, 1e6.
+    pub stiffness: f64,
+    /// Force per depth and speed of approach at one contact point. Table: contact damping
+    /// coefficient, 0.
+    pub damping: f64,
+    /// Depth beyond that at the assembled pose from which contact acts. Table: penetration
+    /// threshold for collision detection, 0.01.
+    pub penetration_threshold: f64,
+    /// Acceleration that an action's force gives, in length/s². Table: force/torque magnitude of
+    /// each action, 100; that it is scaled by the mass: public code.
+    pub force: f64,
+    /// Angular acceleration that an action's torque gives, as a multiple of `force`, in
+    /// 1/(length · rad). Public code, 3.
+    pub torque_factor: f64,
+    /// States closer than this in translation may be the same. Table: state similarity threshold
+    /// (translation), 0.05.
+    pub similar_translation: f64,
+    /// States closer than this in rotation may be the same, in rad. Table: state similarity
+    /// threshold (rotation), 0.5.
+    pub similar_rotation: f64,
+    /// Contact points are the vertices after edges were halved down to this length. Public code,
+    /// 0.5.
+    pub longest_edge: f64,
+    /// How much deeper than `penetration_threshold` stiffness, impact and the field's error may let
+    /// a pair get before a motion is stopped. Own, 0.02: about what paths with the table's values
+    /// were measured to need.
+    pub yielding: f64,
+    /// `penetration_threshold` and `yielding` shrink where the former would exceed this share of
+    /// the smallest extent of either part. Own, 1/8; infinite for the paper's fixed threshold, with
+    /// which parts thinner than twice the threshold never touch anything.
+    pub share_of_extent: f64,
+    /// Steps from one waypoint to the next, at most. Own, 5.
+    pub steps_per_waypoint: u32,
+    /// Zeroings of the velocity after which a motion is given up. Own, 1000 (505 units of free
+    /// travel); the paper has its timeout alone.
+    pub most_blocks: u32,
+    /// Newton iterations of one step, at most. Own, 30.
+    pub newton_iterations: u32,
+    /// A Newton step that moves no point of the part by more than this is the last, in lengths of
+    /// the planning frame. Own, 1e-9.
+    pub newton_tolerance: f64,
+}
+
+impl Default for PenaltyParameters {
+    fn default() -> Self {
+        Self {
+            time_step: 1e-3,
+            planning_time_step: 0.1,
+            stiffness: 1e6,
+            damping: 0.0,
+            penetration_threshold: 0.01,
+            force: 100.0,
+            torque_factor: 3.0,
+            similar_translation: 0.05,
+            similar_rotation: 0.5,
+            longest_edge: 0.5,
+            yielding: 0.02,
+            share_of_extent: 0.125,
+            steps_per_waypoint: 5,
+            most_blocks: 1000,
+            newton_iterations: 30,
+            newton_tolerance: 1e-9,
+        }
+    }
+}
+
+impl PenaltyParameters {
+    /// Steps between two zeroings of the velocity.
+    #[must_use]
+    pub fn block_steps(&self) -> u32 {
+        (self.planning_time_step / self.time_step).round().max(1.0) as u32
+    }
+
+    /// How much deeper than its allowance a pair may get, in the planning frame.
+    #[must_use]
+    pub fn depth_tolerance(&self) -> f64 {
+        self.penetration_threshold + self.yielding
+    }
+
+    /// What the tolerances of a pair are multiplied with whose smallest extent is `extent`.
+    #[must_use]
+    pub(super) fn scale_for(&self, extent: f64) -> f64 {
+        (extent * self.share_of_extent / self.penetration_threshold).min(1.0)
+    }
+}

@@ -1,0 +1,317 @@
+//! One implicit step of a rigid body: BDF1, solved as a minimum by Newton's method.
+//!
+//! With z = (Δx, θ), displacement of the centre of mass and rotation vector over one step of
+//! length h, the backward Euler equations are the stationary points of
+//! `m/(2h²)|Δx − x̂|² + 1/(2h²)(θ − θ̂)ᵀ I (θ − θ̂) + contact energy`, x̂ and θ̂ being where velocity
+//! and action alone would lead; I is the inertia tensor at the start of the step, and the
+//! gyroscopic moment is taken from there too. A minimum is looked for, not any stationary point:
+//! each Newton step goes down, so a field whose slope jumps between cells cannot make it diverge.
+
+use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
+
+use crate::geometry::{Pose, Shape};
+
+use super::contacts::{Contacts, Evaluation, Placement};
+use super::parameters::PenaltyParameters;
+
+/// Added to the squared lengths in inertia tensors: bodies without extent across an axis have none.
+const LEAST_INERTIA: f64 = 1e-8;
+const LEAST_MASS: f64 = 1e-9;
+/// Halvings of a Newton step before it is given up.
+const HALVINGS: u32 = 12;
+/// Share of the linear forecast by which the energy must fall (Armijo).
+const ENOUGH: f64 = 1e-4;
+
+/// A body at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct State {
+    /// Centre of mass in the planning frame.
+    pub(super) centre: Point3<f64>,
+    /// planning_from_shape.
+    pub(super) rotation: UnitQuaternion<f64>,
+    /// Velocity of the centre of mass.
+    pub(super) velocity: Vector3<f64>,
+    /// Angular velocity in planning axes.
+    pub(super) spin: Vector3<f64>,
+}
+
+impl State {
+    /// The same without velocity.
+    pub(super) fn at_rest(self) -> Self {
+        Self { velocity: Vector3::zeros(), spin: Vector3::zeros(), ..self }
+    }
+}
+
+/// What an action does to a body, as accelerations.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Drive {
+    pub(super) linear: Vector3<f64>,
+    pub(super) angular: Vector3<f64>,
+    /// Whether the body may turn: 6 unknowns instead of 3.
+    pub(super) turns: bool,
+}
+
+/// A rigid body of density 1.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rigid {
+    pub(super) mass: f64,
+    /// About the centre of mass, in the shape's axes.
+    inertia: Matrix3<f64>,
+    /// Centre of mass in the shape's frame.
+    mass_centre: Point3<f64>,
+    /// Largest distance of a point from it.
+    pub(super) reach: f64,
+}
+
+impl Rigid {
+    pub(super) fn new(shape: &Shape) -> Self {
+        let mass = shape.mass.volume.max(LEAST_MASS);
+        let unit = shape.mass.unit_inertia() + Matrix3::from_diagonal_element(LEAST_INERTIA);
+        Self { mass, inertia: unit * mass, mass_centre: shape.mass.centre, reach: shape.reach }
+    }
+
+    /// At rest at a pose.
+    pub(super) fn at_rest(&self, pose: &Pose) -> State {
+        let (velocity, spin) = (Vector3::zeros(), Vector3::zeros());
+        State { centre: pose * self.mass_centre, rotation: pose.rotation, velocity, spin }
+    }
+
+    pub(super) fn pose(&self, state: &State) -> Pose {
+        let origin = state.centre.coords - state.rotation * self.mass_centre.coords;
+        Pose::from_parts(Translation3::from(origin), state.rotation)
+    }
+
+    /// How far a point of the body can be displaced by this.
+    pub(super) fn travel(&self, displacement: &Vector6<f64>) -> f64 {
+        displacement.fixed_rows::<3>(0).norm() + self.reach * displacement.fixed_rows::<3>(3).norm()
+    }
+}
+
+/// How a step went.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step {
+    /// The body after it.
+    pub(super) state: State,
+    /// How far a point of the body can have been displaced.
+    pub(super) travel: f64,
+    /// Newton iterations; 0 if nothing was near.
+    #[cfg_attr(not(test), allow(dead_code))]
+    pub(super) iterations: u32,
+    /// Whether the last Newton step was within the tolerance; otherwise it ended where no step led
+    /// further down: the slope of the field jumps there.
+    #[cfg_attr(not(test), allow(dead_code))]
+    pub(super) converged: bool,
+}
+
+/// Makes steps; holds what they need, so that none is allocated for.
+pub(super) struct Stepper<'a> {
+    pub(super) rigid: Rigid,
+    drive: Drive,
+    parameters: &'a PenaltyParameters,
+    current: Evaluation,
+    trial: Evaluation,
+}
+
+impl<'a> Stepper<'a> {
+    pub(super) fn new(rigid: Rigid, drive: Drive, parameters: &'a PenaltyParameters, pairs: usize) -> Self {
+        let (current, trial) = (Evaluation::new(pairs), Evaluation::new(pairs));
+        Self { rigid, drive, parameters, current, trial }
+    }
+
+    /// Per pair, whether it was in contact at the end of the last step.
+    pub(super) fn touched(&self) -> &[bool] {
+        &self.current.touched
+    }
+
+    /// How far velocity and action alone would move a point of the body, at most.
+    pub(super) fn expected_travel(&self, state: &State) -> f64 {
+        self.rigid.travel(&self.goal(state).free)
+    }
+
+    /// The body after one time step. `contacts` must hold what comes near on the way.
+    pub(super) fn step(&mut self, state: &State, contacts: &Contacts<'_>) -> Step {
+        let goal = self.goal(state);
+        let mut z = goal.free;
+        let (mut iterations, mut converged) = (0, true);
+        if contacts.is_empty() {
+            self.current.clear();
+        } else {
+            (iterations, converged) = self.minimise(state, &goal, contacts, &mut z);
+        }
+        let h = self.parameters.time_step;
+        let (dx, turn) = (linear(&z), angular(&z));
+        let mut after =
+            State { centre: state.centre + dx, rotation: state.rotation, velocity: dx / h, spin: turn / h };
+        if self.drive.turns {
+            after.rotation = UnitQuaternion::from_scaled_axis(turn) * state.rotation;
+            after.rotation.renormalize();
+        }
+        Step { state: after, travel: self.rigid.travel(&z), iterations, converged }
+    }
+
+    fn goal(&self, state: &State) -> Goal {
+        let h = self.parameters.time_step;
+        let axes = state.rotation.to_rotation_matrix().into_inner();
+        let inertia = axes * self.rigid.inertia * axes.transpose();
+        let mut free = Vector6::zeros();
+        free.fixed_rows_mut::<3>(0).copy_from(&((state.velocity + self.drive.linear * h) * h));
+        if self.drive.turns {
+            let moment = -state.spin.cross(&(inertia * state.spin));
+            let gyroscopic = Cholesky::new(inertia).map_or_else(Vector3::zeros, |c| c.solve(&moment));
+            let spin = state.spin + (self.drive.angular + gyroscopic) * h;
+            free.fixed_rows_mut::<3>(3).copy_from(&(spin * h));
+        }
+        let mut weight = Matrix6::zeros();
+        let diagonal = Matrix3::from_diagonal_element(self.rigid.mass);
+        weight.fixed_view_mut::<3, 3>(0, 0).copy_from(&(diagonal / (h * h)));
+        weight.fixed_view_mut::<3, 3>(3, 3).copy_from(&(inertia / (h * h)));
+        Goal { free, weight }
+    }
+
+    /// Newton's method from `z`; returns the iterations and whether it converged.
+    fn minimise(
+        &mut self,
+        state: &State,
+        goal: &Goal,
+        contacts: &Contacts<'_>,
+        z: &mut Vector6<f64>,
+    ) -> (u32, bool) {
+        contacts.evaluate(&placement(state, z), self.drive.turns, &mut self.current);
+        for iteration in 1..=self.parameters.newton_iterations {
+            let local = goal.local(z, &self.current);
+            let mut next = None;
+            // Where the full second derivative leads nowhere, the part of it that is positive does.
+            for matrix in [&local.hessian, &local.gauss] {
+                let Some(direction) = descent(matrix, &local.gradient, self.drive.turns) else { continue };
+                if self.rigid.travel(&direction) <= self.parameters.newton_tolerance {
+                    *z += direction;
+                    return (iteration, true);
+                }
+                next = self.lower(state, goal, contacts, z, &local, &direction);
+                if next.is_some() {
+                    break;
+                }
+            }
+            let Some(next) = next else { return (iteration, false) };
+            *z = next;
+            std::mem::swap(&mut self.current, &mut self.trial);
+        }
+        (self.parameters.newton_iterations, false)
+    }
+
+    /// The first point of a backtracking line search that is low enough; `trial` belongs to it then.
+    fn lower(
+        &mut self,
+        state: &State,
+        goal: &Goal,
+        contacts: &Contacts<'_>,
+        z: &Vector6<f64>,
+        local: &Local,
+        direction: &Vector6<f64>,
+    ) -> Option<Vector6<f64>> {
+        let slope = local.gradient.dot(direction);
+        let mut share = 1.0;
+        for _ in 0..=HALVINGS {
+            let next = z + direction * share;
+            contacts.evaluate(&placement(state, &next), self.drive.turns, &mut self.trial);
+            if goal.energy(&next, &self.trial) <= local.energy + ENOUGH * share * slope {
+                return Some(next);
+            }
+            share *= 0.5;
+        }
+        None
+    }
+}
+
+/// Where the body would be without contact, and what it costs to be elsewhere.
+struct Goal {
+    free: Vector6<f64>,
+    weight: Matrix6<f64>,
+}
+
+/// The energy of a step at some z with its derivatives.
+struct Local {
+    energy: f64,
+    gradient: Vector6<f64>,
+    hessian: Matrix6<f64>,
+    gauss: Matrix6<f64>,
+}
+
+impl Goal {
+    fn energy(&self, z: &Vector6<f64>, contact: &Evaluation) -> f64 {
+        let off = z - self.free;
+        0.5 * off.dot(&(self.weight * off)) + contact.energy
+    }
+
+    fn local(&self, z: &Vector6<f64>, contact: &Evaluation) -> Local {
+        // exp(θ + dθ) = exp(J dθ) exp(θ): contact is differentiated by the turn J dθ. That J itself
+        // changes with θ adds a term that is smaller by |θ| (0.03 at most) and is left out.
+        let mut chain = Matrix6::identity();
+        chain.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn_jacobian(&angular(z)));
+        let back = chain.transpose();
+        let gauss = self.weight + back * contact.gauss * chain;
+        Local {
+            energy: self.energy(z, contact),
+            gradient: self.weight * (z - self.free) + back * contact.gradient,
+            hessian: gauss + back * contact.curvature * chain,
+            gauss,
+        }
+    }
+}
+
+/// −matrix⁻¹ gradient in the freedoms that there are; `None` unless the matrix is positive there.
+fn descent(matrix: &Matrix6<f64>, gradient: &Vector6<f64>, turns: bool) -> Option<Vector6<f64>> {
+    if turns {
+        return Some(-Cholesky::new(*matrix)?.solve(gradient));
+    }
+    let mut out = Vector6::zeros();
+    let part = Cholesky::new(matrix.fixed_view::<3, 3>(0, 0).into_owned())?.solve(&linear(gradient));
+    out.fixed_rows_mut::<3>(0).copy_from(&-part);
+    Some(out)
+}
+
+/// The left Jacobian of rotation vectors: exp(θ + dθ) ≈ exp(J dθ) exp(θ).
+fn turn_jacobian(turn: &Vector3<f64>) -> Matrix3<f64> {
+    let (angle, cross) = (turn.norm(), turn.cross_matrix());
+    // The series where the quotients lose their digits.
+    let (first, second) = if angle < 1e-2 {
+        let squared = angle * angle;
+        (0.5 - squared / 24.0, 1.0 / 6.0 - squared / 120.0)
+    } else {
+        ((1.0 - angle.cos()) / (angle * angle), (angle - angle.sin()) / (angle * angle * angle))
+    };
+    Matrix3::identity() + cross * first + cross * cross * second
+}
+
+/// Where a displacement takes a body.
+pub(super) fn placement(state: &State, z: &Vector6<f64>) -> Placement {
+    let rotation = UnitQuaternion::from_scaled_axis(angular(z)) * state.rotation;
+    Placement { centre: state.centre + linear(z), rotation: rotation.to_rotation_matrix().into_inner() }
+}
+
+fn linear(z: &Vector6<f64>) -> Vector3<f64> {
+    z.fixed_rows::<3>(0).into_owned()
+}
+
+fn angular(z: &Vector6<f64>) -> Vector3<f64> {
+    z.fixed_rows::<3>(3).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_jacobian_of_turns_is_that_of_finite_differences() {
+        for turn in [Vector3::zeros(), Vector3::new(3e-3, -2e-3, 5e-3), Vector3::new(0.3, -0.8, 0.4)] {
+            let jacobian = turn_jacobian(&turn);
+            for a in 0..3 {
+                let mut d = Vector3::zeros();
+                d[a] = 1e-6;
+                let [below, above] = [turn - d, turn + d].map(|t| UnitQuaternion::from_scaled_axis(t));
+                let between = (above * below.inverse()).scaled_axis() / 2e-6;
+                assert!((between - jacobian.column(a)).norm() < 1e-8, "{between} at {turn}");
+            }
+        }
+    }
+}
