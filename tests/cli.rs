@@ -54,6 +54,8 @@ fn wrong_usage_exits_2() {
     refused(&plan("l-slot", &["--planner", "a-star"]), &["a-star", "sbdp-star"]);
     refused(&plan("l-slot", &["--engine", "x"]), &["sliding"]);
     refused(&plan("l-slot", &["--timeout", "-1"]), &["--timeout", "seconds"]);
+    refused(&plan("l-slot", &["--penalty", "stifness=1"]), &["--penalty", "stifness", "stiffness"]);
+    refused(&plan("l-slot", &["--penalty", "time-step=0"]), &["--penalty", "time-step", "positive"]);
     refused(&plan("l-slot", &["--daemon"]), &["--embedded", "--daemon"]);
 }
 

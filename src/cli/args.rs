@@ -45,6 +45,9 @@ pub(super) struct PlanArguments {
     /// Which transition function
     #[arg(long, value_enum, default_value_t)]
     pub(super) engine: Engine,
+    /// A parameter of the engine `penalty`, as `stiffness=1e5` (repeatable); plans in this process
+    #[arg(long, value_name = "NAME=VALUE", conflicts_with = "daemon")]
+    pub(super) penalty: Vec<String>,
     /// Which actions [default: extended for sbdp-star, paper for all other planners]
     #[arg(long, value_enum)]
     pub(super) actions: Option<Actions>,
@@ -133,12 +136,15 @@ pub(super) enum Engine {
     /// Contact-constrained sliding without inertia
     #[default]
     Sliding,
+    /// The paper's simulation: rigid-body dynamics with penalty forces
+    Penalty,
 }
 
 impl From<Engine> for search::Engine {
     fn from(engine: Engine) -> Self {
         match engine {
             Engine::Sliding => Self::Sliding,
+            Engine::Penalty => Self::Penalty,
         }
     }
 }

@@ -115,6 +115,7 @@ fn options(question: &Question<'_>) -> PlanOptions {
         },
         engine: match request.engine {
             Engine::Sliding => client::Engine::Sliding,
+            Engine::Penalty => client::Engine::Penalty,
         },
         actions: match request.actions {
             ActionSet::Paper => client::ActionSet::Paper,

@@ -15,6 +15,7 @@ use crate::geometry::{SourceAssembly, load_assembly};
 use crate::plan::Plan;
 use crate::plan::export::PlanDocument;
 use crate::search::{PlanRequest, Planner, Termination};
+use crate::simulation::PenaltyParameters;
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     let deadline = arguments.timeout.and_then(|t| Instant::now().checked_add(t));
@@ -42,6 +43,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         actions: arguments.actions.map_or_else(|| planner.default_actions(), Into::into),
         max_simulations: arguments.max_simulations,
         path_timeout: arguments.path_timeout,
+        penalty: penalty(&arguments.penalty)?,
         threads: arguments.threads as usize,
         fixed: resolve(assembly, "--fixed", &fixed)?,
         removed: resolve(assembly, "--removed", &arguments.removed)?,
@@ -50,9 +52,20 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
     })
 }
 
+/// The paper's parameters, but for those given.
+fn penalty(given: &[String]) -> Result<PenaltyParameters, CliError> {
+    let refused = |e: String| CliError::Refused(format!("--penalty: {}", e.trim_end()));
+    let parameters: PenaltyParameters =
+        toml::from_str(&given.join("\n")).map_err(|e| refused(e.to_string()))?;
+    parameters.validate().map_err(refused)?;
+    Ok(parameters)
+}
+
 /// The daemon if one runs, else this process; or what the user insists on.
 fn choose_backend(arguments: &PlanArguments) -> Result<Box<dyn Backend>, CliError> {
-    if arguments.embedded || arguments.trace.is_some() || arguments.path_timeout.is_some() {
+    let only_here =
+        arguments.trace.is_some() || arguments.path_timeout.is_some() || !arguments.penalty.is_empty();
+    if arguments.embedded || only_here {
         return Ok(Box::<Embedded>::default());
     }
     match Daemon::connect() {

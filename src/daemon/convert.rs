@@ -11,6 +11,7 @@ use crate::geometry::{SourceAssembly, SourceMesh, SourcePart};
 use crate::plan::{MotionKind, Plan, PlanStats, PlanStatus, PlanStep};
 use crate::search::{ActionSet, Engine, PlanRequest, Planner, Progress, Stage};
 use crate::service::ServiceError;
+use crate::simulation::PenaltyParameters;
 
 /// What a wire request asks; the handle and the deadline are handled by the desk.
 pub(crate) fn plan_request(
@@ -24,6 +25,7 @@ pub(crate) fn plan_request(
         actions: actions(request.actions)?,
         max_simulations: request.max_simulations,
         path_timeout: None,
+        penalty: PenaltyParameters::default(),
         threads: threads(request.threads as usize, most_threads),
         fixed: indices(&request.fixed),
         removed: indices(&request.removed),

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use crate::simulation::PenaltyParameters;
+
 /// Which search runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Planner {
@@ -50,17 +52,20 @@ pub enum Engine {
     /// Contact-constrained sliding without inertia.
     #[default]
     Sliding,
+    /// The paper's penalty-based simulation.
+    Penalty,
 }
 
 impl Engine {
     /// All engines, in the order of their numbers on the wire.
-    pub const ALL: [Self; 1] = [Self::Sliding];
+    pub const ALL: [Self; 2] = [Self::Sliding, Self::Penalty];
 
     /// The name in requests and plans.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Sliding => "sliding",
+            Self::Penalty => "penalty",
         }
     }
 }
@@ -90,12 +95,14 @@ impl ActionSet {
 }
 
 /// A planning question about one assembly. Part numbers are indices into its parts.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct PlanRequest {
     /// Which search.
     pub planner: Planner,
     /// Which transition function.
     pub engine: Engine,
+    /// Parameters of the engine `penalty`.
+    pub penalty: PenaltyParameters,
     /// Which actions.
     pub actions: ActionSet,
     /// Simulations after which the search gives up with `partial`.

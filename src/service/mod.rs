@@ -20,7 +20,7 @@ use crate::search::{
     Engine, Observer, PlanRequest, PlanSink, Problem, Progress, Removal, Stage, TraceEvent, least_travel,
     search,
 };
-use crate::simulation::{SlidingEngine, TransitionFunction};
+use crate::simulation::{PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
 use answer::Frame;
@@ -146,7 +146,8 @@ impl Service {
         let scene = &prepared.scene;
         let present: Vec<usize> = (0..scene.bodies.len()).collect();
         let least = |part| least_travel(scene, part);
-        Ok(audit(scene, &present, engine_of(engine), &least, termination).ok())
+        let engine = engine_of(engine, PenaltyParameters::default());
+        Ok(audit(scene, &present, &*engine, &least, termination).ok())
     }
 
     fn entry(&self, id: AssemblyId) -> Result<Arc<Entry>, ServiceError> {
@@ -202,7 +203,7 @@ impl Entry {
     ) -> Plan {
         let request = frame.request;
         frame.overlaps = answer::overlaps(&self.assembly, &prepared.overlaps);
-        let engine = engine_of(request.engine);
+        let engine = engine_of(request.engine, request.penalty);
         let present: Vec<usize> =
             (0..self.assembly.parts.len()).filter(|p| frame.removed.binary_search(p).is_err()).collect();
         let total = present.len() as u32;
@@ -218,7 +219,7 @@ impl Entry {
         let problem = Problem {
             scene: prepared.scene.clone(),
             verifier: &verifier,
-            engine,
+            engine: &*engine,
             present,
             fixed: frame.fixed.clone(),
             targets: request.targets.clone(),
@@ -270,9 +271,10 @@ impl Entry {
     }
 }
 
-fn engine_of(engine: Engine) -> &'static dyn TransitionFunction {
+fn engine_of(engine: Engine, penalty: PenaltyParameters) -> Box<dyn TransitionFunction> {
     match engine {
-        Engine::Sliding => &SlidingEngine,
+        Engine::Sliding => Box::new(SlidingEngine),
+        Engine::Penalty => Box::new(PenaltyEngine::new(penalty)),
     }
 }
 

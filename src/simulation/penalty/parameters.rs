@@ -1,12 +1,15 @@
 //! The hyper-parameters of the paper's simulation, and what its table leaves open.
 
+use serde::{Deserialize, Serialize};
+
 /// Parameters of the engine `penalty`. Lengths are in the planning frame (longest side of the
 /// assembly in (5, 10]), angles in radians, times in seconds of the simulated motion.
 ///
 /// "Table" means the table of hyper-parameters in the paper's appendix, "public code" what its
 /// public implementation was seen to do, "own" what neither fixes. The table's path planning
 /// timeout (360 s) is not here: deadlines reach an engine as a termination condition.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
 pub struct PenaltyParameters {
     /// Time of one implicit step, in s. Table: simulation time step, 1e-3.
     pub time_step: f64,
@@ -80,6 +83,47 @@ impl Default for PenaltyParameters {
 }
 
 impl PenaltyParameters {
+    /// # Errors
+    /// The name and value of a parameter with which no motion could be simulated.
+    pub fn validate(&self) -> Result<(), String> {
+        let positive = [
+            ("time-step", self.time_step),
+            ("planning-time-step", self.planning_time_step),
+            ("stiffness", self.stiffness),
+            ("force", self.force),
+            ("torque-factor", self.torque_factor),
+            ("similar-translation", self.similar_translation),
+            ("similar-rotation", self.similar_rotation),
+            ("longest-edge", self.longest_edge),
+            ("newton-tolerance", self.newton_tolerance),
+            ("steps-per-waypoint", f64::from(self.steps_per_waypoint)),
+            ("most-blocks", f64::from(self.most_blocks)),
+            ("newton-iterations", f64::from(self.newton_iterations)),
+        ];
+        let not_negative = [
+            ("damping", self.damping),
+            ("penetration-threshold", self.penetration_threshold),
+            ("yielding", self.yielding),
+        ];
+        let bad = |x: f64, least: bool| !x.is_finite() || if least { x <= 0.0 } else { x < 0.0 };
+        if let Some((name, x)) = positive.into_iter().find(|(_, x)| bad(*x, true)) {
+            return Err(format!("`{name}` is {x}; it must be positive"));
+        }
+        if let Some((name, x)) = not_negative.into_iter().find(|(_, x)| bad(*x, false)) {
+            return Err(format!("`{name}` is {x}; it must not be negative"));
+        }
+        if self.share_of_extent.is_nan() || self.share_of_extent <= 0.0 {
+            return Err(format!(
+                "`share-of-extent` is {}; it must be positive, or `inf`",
+                self.share_of_extent
+            ));
+        }
+        if self.planning_time_step < self.time_step {
+            return Err("`planning-time-step` is shorter than `time-step`".to_owned());
+        }
+        Ok(())
+    }
+
     /// Steps between two zeroings of the velocity.
     #[must_use]
     pub fn block_steps(&self) -> u32 {
