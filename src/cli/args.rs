@@ -22,7 +22,7 @@ const EXIT_CODES: &str = "Exit codes: 0 complete, 2 wrong usage or refused input
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Plan in which order and along which paths the parts of an assembly come off
-    Plan(PlanArguments),
+    Plan(Box<PlanArguments>),
     /// Say what is found in an assembly's files: healing, sizes, overlaps
     Check(CheckArguments),
     /// Tell in words what a search did, from its trace
