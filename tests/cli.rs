@@ -116,6 +116,13 @@ fn check_tells_parts_findings_and_overlaps() {
 }
 
 #[test]
+fn check_compares_the_blocking_graphs_with_simulation() {
+    let path = assembly("pin-bolt-cover");
+    let text = stdout(&run(&["check", path.to_str().unwrap(), "--graphs"]));
+    assert!(text.contains("of 24 translations excluded, 0 of them wrongly"), "{text}");
+}
+
+#[test]
 fn the_pin_locks_the_bolt_and_the_bolt_the_cover() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("plan.json");

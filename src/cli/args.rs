@@ -93,6 +93,10 @@ pub(super) struct PlanArguments {
 pub(super) struct CheckArguments {
     /// A folder of OBJ and STL files in assembled pose, one such file, or a glTF or GLB scene
     pub(super) assembly: PathBuf,
+    /// Also simulate every translation from the assembled pose, and compare with what the blocking
+    /// graphs exclude
+    #[arg(long)]
+    pub(super) graphs: bool,
 }
 
 /// Arguments of `sbdp explain`.

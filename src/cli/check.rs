@@ -4,9 +4,11 @@ use std::process::ExitCode;
 
 use super::args::CheckArguments;
 use super::error::CliError;
-use super::print;
 use super::table::{Table, length};
+use super::{interrupt, print};
+use crate::blocking_graph::Audit;
 use crate::geometry::{Healed, Solidity, SourceAssembly, heal, load_assembly};
+use crate::search::{Engine, Termination};
 use crate::service::Service;
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
@@ -28,8 +30,31 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
     if overlaps.is_empty() {
         text.push_str("  none\n");
     }
+    if arguments.graphs {
+        let termination = Termination::default();
+        interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
+        match service.audit(admission.id, Engine::default(), &termination)? {
+            Some(audit) => text.push_str(&graphs(&audit, name)),
+            None => return Err(CliError::Failed("interrupted".to_owned())),
+        }
+    }
     print(&text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// What static analysis says of the translations, against simulation.
+fn graphs<'a>(audit: &Audit, name: impl Fn(usize) -> &'a str) -> String {
+    let mut text = format!(
+        "\nblocking graphs: {} of {} translations excluded, {} of them wrongly; {} more found blocked by simulation\n",
+        audit.excluded,
+        audit.actions,
+        audit.wrong.len(),
+        audit.overlooked,
+    );
+    for (part, action) in &audit.wrong {
+        text.push_str(&format!("  {} can move along {action}\n", name(*part)));
+    }
+    text
 }
 
 fn headline(assembly: &SourceAssembly, healed: &[Healed]) -> String {
