@@ -90,7 +90,8 @@ fn time_span(results: &EngineResults<'_>) -> (f64, f64) {
         return (0.1, 10.0);
     }
     let (from, to) = (decade(first, f64::floor), decade(last, f64::ceil));
-    (from, if to > from { to } else { 10.0 * from })
+    // A little more, for only what lies inside gets a label.
+    (0.99 * from, 1.01 * to.max(10.0 * from))
 }
 
 /// A logarithmic axis has no zero.
@@ -109,6 +110,8 @@ fn coverage<B: DrawingBackend>(
     let mut chart = ChartBuilder::on(panel)
         .caption(caption, (FAMILY, CAPTION))
         .margin(12)
+        // Half of the last label stands beyond the axis.
+        .margin_right(36)
         .x_label_area_size(48)
         .y_label_area_size(64)
         // Room above, so that a line at 100 % does not lie on the frame.
@@ -154,7 +157,7 @@ fn legend<B: DrawingBackend>(panel: &DrawingArea<B, Shift>, results: &EngineResu
         let y = 110 + 34 * row;
         let style = colour(planner).stroke_width(4);
         panel.draw(&PathElement::new([(80, y), (130, y)], style))?;
-        panel.draw(&Text::new(title(planner.planner), (145, y - 10), (FAMILY, CAPTION)))?;
+        panel.draw(&Text::new(title(planner.planner), (145, y - 8), (FAMILY, CAPTION)))?;
     }
     Ok(())
 }

@@ -31,7 +31,7 @@ impl Group {
     pub(super) fn title(self) -> &'static str {
         match self {
             Self::All => "All, 3+",
-            Self::Only(Category::Pair) => "Pairs, 2",
+            Self::Only(Category::Pair) => "Pairs, up to 2",
             Self::Only(Category::Small) => "Small, 3–9",
             Self::Only(Category::Medium) => "Medium, 10–49",
             Self::Only(Category::Large) => "Large, 50+",

@@ -1,11 +1,17 @@
 //! `tables.md`: the paper's three tables per engine, how runs ended, and engines against each
 //! other.
 
-use std::collections::BTreeSet;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::PDP_STAR;
 use super::record::Record;
 use super::statistics::{EngineResults, Group, Measure, PlannerResults, REFERENCE, geometric_mean};
+
+/// Statuses of runs that ended without a plan.
+const NO_PLAN: [&str; 3] = ["killed", "crashed", "failed"];
+/// So many different messages are shown.
+const ACCIDENTS: usize = 20;
 
 /// Everything but the coverage figure.
 pub(super) fn document(records: &[Record], engines: &[EngineResults<'_>]) -> String {
@@ -19,7 +25,7 @@ pub(super) fn document(records: &[Record], engines: &[EngineResults<'_>]) -> Str
         if !versus.is_empty() {
             text += &format!("\n### {} against the others\n\n{versus}", title(REFERENCE));
         }
-        text += &format!("\n### How runs ended\n\n{}", endings(results));
+        text += &format!("\n### How runs ended\n\n{}{}", endings(results), accidents(results));
         text += &format!("\nCoverage over time: `coverage-{0}.svg`, `coverage-{0}.png`.\n", results.engine);
     }
     if let [first, second] = engines {
@@ -79,7 +85,7 @@ fn conditions(records: &[Record]) -> String {
     text += "Solved: all that is wanted is out and every path verified on the triangles. Sim: simulations \
              executed. PT: seconds in simulation. DT: seconds for everything but thinning and verification. \
              PDP\\* is PDP_t where that solves the problem, else PDP_r; only the one that counts is measured. \
-             \"All\" leaves out problems of two parts, which the paper has none of.\n\n";
+             \"All\" leaves out problems of one or two parts, which the paper has none of.\n\n";
     builds.iter().for_each(|b| text += &format!("- {b}\n"));
     if crowded {
         text += "- Several runs went on at a time: their times disturb each other.\n";
@@ -192,6 +198,27 @@ fn endings(results: &EngineResults<'_>) -> String {
         table.row([title(planner.planner)].into_iter().chain(statuses.iter().map(count)));
     }
     table.render()
+}
+
+/// What runs said that ended without a plan, most frequent first.
+fn accidents(results: &EngineResults<'_>) -> String {
+    let mut counts: BTreeMap<(String, String, String), usize> = BTreeMap::new();
+    for planner in results.planners.iter().filter(|p| p.planner != PDP_STAR) {
+        for run in planner.runs.values().filter(|r| NO_PLAN.contains(&r.status.as_str())) {
+            let reason = cell(run.reason.as_deref().unwrap_or_default());
+            *counts.entry((title(planner.planner), run.status.clone(), reason)).or_default() += 1;
+        }
+    }
+    if counts.is_empty() {
+        return String::new();
+    }
+    let mut rows: Vec<_> = counts.into_iter().collect();
+    rows.sort_by_key(|(_, count)| Reverse(*count));
+    let mut table = Table::new(&["Runs", "", "", "What they said"]);
+    for ((planner, status, reason), count) in rows.into_iter().take(ACCIDENTS) {
+        table.row([count.to_string(), planner, status, reason]);
+    }
+    format!("\n{}", table.render())
 }
 
 fn status(record: &Record) -> &str {
