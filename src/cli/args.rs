@@ -1,10 +1,13 @@
 //! The command line as the user writes it.
 
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::bench::{ENGINES, PLANNERS, Shard};
 use crate::search;
 
 /// Plans how assemblies come apart.
@@ -29,6 +32,8 @@ pub(super) enum Command {
     Explain(ExplainArguments),
     /// Say how the running daemon is
     Status,
+    /// Run planners over folders of assemblies and evaluate what comes out
+    Bench(BenchArguments),
 }
 
 /// Arguments of `sbdp plan`.
@@ -104,6 +109,66 @@ pub(super) struct CheckArguments {
 pub(super) struct ExplainArguments {
     /// A file that `sbdp plan --trace` wrote
     pub(super) trace: PathBuf,
+}
+
+/// Arguments of `sbdp bench`.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(super) struct BenchArguments {
+    #[command(subcommand)]
+    pub(super) command: Option<BenchCommand>,
+    #[command(flatten)]
+    pub(super) run: Option<BenchRun>,
+}
+
+/// What else to do with a benchmark.
+#[derive(Debug, Subcommand)]
+pub(super) enum BenchCommand {
+    /// Put results together, as those of shards, and evaluate them without running anything
+    Report(BenchReport),
+}
+
+/// A benchmark to be run.
+#[derive(Debug, Args)]
+pub(super) struct BenchRun {
+    /// Folders of assemblies: every folder below with .obj or .stl files in it is one
+    #[arg(value_name = "DIR", required = true)]
+    pub(super) corpora: Vec<PathBuf>,
+    /// Which searches; `pdp-star` stands for `pdp-t` and `pdp-r`, which it is put together from
+    #[arg(long, value_name = "PLANNER,…", value_delimiter = ',', default_values = PLANNERS,
+        value_parser = PossibleValuesParser::new(PLANNERS))]
+    pub(super) planners: Vec<String>,
+    /// Which simulations
+    #[arg(long, value_name = "ENGINE,…", value_delimiter = ',', default_value = ENGINES[0],
+        value_parser = PossibleValuesParser::new(ENGINES))]
+    pub(super) engines: Vec<String>,
+    /// A run is to answer after so many seconds; one that does not is ended
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "7200",
+        allow_negative_numbers = true)]
+    pub(super) timeout: Duration,
+    /// Where results, tables and figures go; a benchmark that was interrupted goes on there
+    #[arg(long, value_name = "DIR", required = true)]
+    pub(super) out: PathBuf,
+    /// Run only the K-th of N parts of the corpus, as 2/8; `bench report` puts them together
+    #[arg(long, value_name = "K/N")]
+    pub(super) shard: Option<Shard>,
+    /// Runs at a time; more than one disturb each other's times
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub(super) jobs: NonZeroUsize,
+    /// Worker threads of each run [default: all processors]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    pub(super) threads: u32,
+}
+
+/// Arguments of `sbdp bench report`.
+#[derive(Debug, Args)]
+pub(super) struct BenchReport {
+    /// Output folders of `sbdp bench`
+    #[arg(value_name = "DIR", required = true)]
+    pub(super) results: Vec<PathBuf>,
+    /// Where the merged results, tables and figures go [default: the folder, if it is one]
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: Option<PathBuf>,
 }
 
 /// Which search.
@@ -184,6 +249,27 @@ mod tests {
     fn the_definition_is_consistent() {
         use clap::CommandFactory;
         Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn a_benchmark_runs_or_reports() {
+        let parse = |line: &str| Arguments::try_parse_from(line.split(' ')).map(|a| a.command);
+        let Ok(Command::Bench(run)) = parse("sbdp bench a b --out o --planners sbdp,pdp-star --shard 2/3")
+        else {
+            panic!("does not parse")
+        };
+        let run = run.run.unwrap();
+        assert_eq!(run.corpora, [PathBuf::from("a"), PathBuf::from("b")]);
+        assert_eq!(run.planners, ["sbdp", "pdp-star"]);
+        assert_eq!((run.engines, run.timeout), (vec!["sliding".to_owned()], crate::bench::TIMEOUT));
+        let Ok(Command::Bench(report)) = parse("sbdp bench report a b --out o") else {
+            panic!("does not parse")
+        };
+        let Some(BenchCommand::Report(report)) = report.command else { panic!("no report") };
+        assert_eq!(report.results.len(), 2);
+        for wrong in ["", " a", " --out o", " a --out o --planners x", " a --out o --jobs 0", " report"] {
+            assert!(parse(&format!("sbdp bench{wrong}")).is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use std::process::ExitCode;
 
+use crate::bench::BenchError;
 use crate::geometry::GeometryError;
 use crate::plan::PlanStatus;
 use crate::service::ServiceError;
@@ -38,6 +39,15 @@ impl From<ServiceError> for CliError {
             ServiceError::Geometry(_) | ServiceError::NoSuchPart { .. } => Self::Refused(error.to_string()),
             // The stages behind the service may come to name other failures.
             other => Self::Failed(other.to_string()),
+        }
+    }
+}
+
+impl From<BenchError> for CliError {
+    fn from(error: BenchError) -> Self {
+        match error {
+            BenchError::Refused(_) => Self::Refused(error.to_string()),
+            BenchError::Busy(_) | BenchError::Failed(_) => Self::Failed(error.to_string()),
         }
     }
 }

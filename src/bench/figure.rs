@@ -1,0 +1,179 @@
+//! The coverage figure: problems solved over time, per category and in total, as SVG and PNG.
+
+use std::path::Path;
+use std::sync::OnceLock;
+
+use plotters::coord::Shift;
+use plotters::prelude::*;
+use plotters::style::register_font;
+
+use super::statistics::{EngineResults, Group, PlannerResults};
+use super::{BenchError, PLANNERS, title};
+
+/// Carried along, for a new machine may have no font at all.
+const FONT: &[u8] = include_bytes!("font/DejaVuSans-ascii.ttf");
+const FAMILY: &str = "sans-serif";
+const SIZE: (u32, u32) = (1500, 900);
+const LABEL: i32 = 17;
+const CAPTION: i32 = 22;
+
+/// Colours that people with colour blindness tell apart (Okabe and Ito), in the order of the
+/// planners.
+const COLOURS: [RGBColor; 5] = [
+    RGBColor(213, 94, 0),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 114, 178),
+    RGBColor(0, 158, 115),
+    RGBColor(120, 120, 120),
+];
+
+/// Writes `coverage-ENGINE.svg` and `.png`.
+pub(super) fn write(folder: &Path, results: &EngineResults<'_>) -> Result<(), BenchError> {
+    let path = |extension: &str| folder.join(format!("coverage-{}.{extension}", results.engine));
+    let save =
+        |path: &Path, bytes: &[u8]| std::fs::write(path, bytes).map_err(|e| BenchError::file(path, &e));
+    let undrawn = |e: String| BenchError::Failed(format!("cannot draw the coverage figure: {e}"));
+    fonts_ready().map_err(undrawn)?;
+    save(&path("svg"), svg(results).map_err(undrawn)?.as_bytes())?;
+    save(&path("png"), &png(results).map_err(undrawn)?)
+}
+
+fn fonts_ready() -> Result<(), String> {
+    static READY: OnceLock<bool> = OnceLock::new();
+    let register = || register_font(FAMILY, FontStyle::Normal, FONT).is_ok();
+    READY.get_or_init(register).then_some(()).ok_or("its font is damaged".to_owned())
+}
+
+fn svg(results: &EngineResults<'_>) -> Result<String, String> {
+    let mut text = String::new();
+    draw(&SVGBackend::with_string(&mut text, SIZE).into_drawing_area(), results)
+        .map_err(|e| e.to_string())?;
+    Ok(text)
+}
+
+fn png(results: &EngineResults<'_>) -> Result<Vec<u8>, String> {
+    let mut pixels = vec![0; SIZE.0 as usize * SIZE.1 as usize * 3];
+    draw(&BitMapBackend::with_buffer(&mut pixels, SIZE).into_drawing_area(), results)
+        .map_err(|e| e.to_string())?;
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, SIZE.0, SIZE.1);
+    encoder.set_color(png::ColorType::Rgb);
+    let mut writer = encoder.write_header().map_err(|e| e.to_string())?;
+    writer.write_image_data(&pixels).map_err(|e| e.to_string())?;
+    writer.finish().map_err(|e| e.to_string())?;
+    Ok(bytes)
+}
+
+type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
+
+/// Five panels and, in the sixth, what the lines mean.
+fn draw<B: DrawingBackend>(area: &DrawingArea<B, Shift>, results: &EngineResults<'_>) -> Drawn<B> {
+    area.fill(&WHITE)?;
+    let panels = area.split_evenly((2, 3));
+    let span = time_span(results);
+    for (panel, group) in panels.iter().zip(Group::LIST) {
+        coverage(panel, results, group, span)?;
+    }
+    legend(&panels[5], results)?;
+    area.present()
+}
+
+/// Whole decades around all times, so that the panels share their axis.
+fn time_span(results: &EngineResults<'_>) -> (f64, f64) {
+    let times =
+        |p| results.solving_times(p, Group::All).into_iter().chain(results.solving_times(p, Group::LIST[4]));
+    let all: Vec<f64> = results.planners.iter().flat_map(times).map(at_least_a_millisecond).collect();
+    let decade = |x: f64, round: fn(f64) -> f64| 10f64.powf(round(x.log10()));
+    let first = all.iter().copied().fold(f64::INFINITY, f64::min);
+    let last = all.iter().copied().fold(0.0, f64::max);
+    if all.is_empty() {
+        return (0.1, 10.0);
+    }
+    let (from, to) = (decade(first, f64::floor), decade(last, f64::ceil));
+    // A little more, for only what lies inside gets a label.
+    (0.99 * from, 1.01 * to.max(10.0 * from))
+}
+
+/// A logarithmic axis has no zero.
+fn at_least_a_millisecond(seconds: f64) -> f64 {
+    seconds.max(1e-3)
+}
+
+fn coverage<B: DrawingBackend>(
+    panel: &DrawingArea<B, Shift>,
+    results: &EngineResults<'_>,
+    group: Group,
+    (from, to): (f64, f64),
+) -> Drawn<B> {
+    let problems = results.group(group).count();
+    let caption = format!("{} parts ({problems} problems)", group.title()).replace('–', "-");
+    let mut chart = ChartBuilder::on(panel)
+        .caption(caption, (FAMILY, CAPTION))
+        .margin(12)
+        // Half of the last label stands beyond the axis.
+        .margin_right(36)
+        .x_label_area_size(48)
+        .y_label_area_size(64)
+        // Room above, so that a line at 100 % does not lie on the frame.
+        .build_cartesian_2d((from..to).log_scale(), 0..problems + problems.div_ceil(25).max(1))?;
+    chart
+        .configure_mesh()
+        .label_style((FAMILY, LABEL))
+        .axis_desc_style((FAMILY, LABEL))
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(BLACK.mix(0.12))
+        .x_labels(8)
+        .y_labels(6)
+        .x_label_formatter(&|seconds| seconds_label(*seconds))
+        .x_desc("planning time (DT) in s")
+        .y_desc("problems solved")
+        .draw()?;
+    // The reference last: it lies on top.
+    for planner in results.planners.iter().rev() {
+        let line = steps(&results.solving_times(planner, group), from, to);
+        chart.draw_series(LineSeries::new(line, colour(planner).stroke_width(3)))?;
+    }
+    Ok(())
+}
+
+fn seconds_label(seconds: f64) -> String {
+    if seconds < 1.0 { format!("{seconds}") } else { format!("{seconds:.0}") }
+}
+
+/// The count after each solved problem, held until the next.
+fn steps(times: &[f64], from: f64, to: f64) -> Vec<(f64, usize)> {
+    let mut line = vec![(from, 0)];
+    for (count, time) in times.iter().copied().map(at_least_a_millisecond).enumerate() {
+        line.extend([(time, count), (time, count + 1)]);
+    }
+    line.push((to, times.len()));
+    line
+}
+
+fn legend<B: DrawingBackend>(panel: &DrawingArea<B, Shift>, results: &EngineResults<'_>) -> Drawn<B> {
+    let heading = format!("Engine {}", results.engine);
+    panel.draw(&Text::new(heading, (80, 60), (FAMILY, CAPTION)))?;
+    for (row, planner) in (0..).zip(&results.planners) {
+        let y = 110 + 34 * row;
+        let style = colour(planner).stroke_width(4);
+        panel.draw(&PathElement::new([(80, y), (130, y)], style))?;
+        panel.draw(&Text::new(title(planner.planner), (145, y - 8), (FAMILY, CAPTION)))?;
+    }
+    Ok(())
+}
+
+fn colour(planner: &PlannerResults<'_>) -> RGBColor {
+    let at = PLANNERS.iter().position(|p| *p == planner.planner);
+    at.and_then(|i| COLOURS.get(i)).copied().unwrap_or(BLACK)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_rises_when_a_problem_is_solved() {
+        let line = steps(&[0.0, 2.0], 1e-3, 10.0);
+        assert_eq!(line, [(1e-3, 0), (1e-3, 0), (1e-3, 1), (2.0, 1), (2.0, 2), (10.0, 2)]);
+    }
+}

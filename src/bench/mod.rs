@@ -1,0 +1,383 @@
+//! Benchmarks over whole corpora: `sbdp bench`.
+//!
+//! Data flow: folders of assemblies (`corpus`) → one process per run (`runner`) → one line per
+//! run (`record`) → the paper's measures (`statistics`) → `tables.md` and the coverage figure
+//! (`tables`, `figure`). Only `runner` starts anything; whatever comes after it works on the
+//! records alone, so that shards of several machines can be put together later.
+
+mod corpus;
+mod estimate;
+mod figure;
+mod record;
+mod runner;
+mod statistics;
+mod tables;
+#[cfg(test)]
+mod tests;
+
+use std::collections::HashSet;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc;
+use std::time::Duration;
+
+pub use corpus::{Category, Problem, Shard, find};
+pub use record::{Record, Settings, Store, read};
+
+use estimate::Estimate;
+use runner::{Job, Runner};
+use statistics::EngineResults;
+
+/// The planners of the paper, in the order of its tables. PDP* never runs by itself: it is what
+/// PDP_t solved and, of the rest, what PDP_r solved.
+pub const PLANNERS: [&str; 5] = ["sbdp-star", "sbdp", PDP_STAR, "pdp-r", PDP_T];
+/// The simulations.
+pub const ENGINES: [&str; 2] = ["sliding", "penalty"];
+
+const PDP_STAR: &str = "pdp-star";
+const PDP_T: &str = "pdp-t";
+/// What PDP* is put together from, the translational one first.
+const PDP_STAR_IS: [&str; 2] = [PDP_T, "pdp-r"];
+/// The paper's limit for a problem.
+pub const TIMEOUT: Duration = Duration::from_secs(2 * 3600);
+
+/// The records in an output folder.
+const RESULTS: &str = "results.jsonl";
+/// Files of processes that run.
+const SCRATCH: &str = "running";
+
+/// Why a benchmark ended without its results. What was recorded before stays.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// What was asked for makes no sense.
+    #[error("{0}")]
+    Refused(String),
+    /// Another benchmark writes there.
+    #[error("{0}: another benchmark is writing it")]
+    Busy(PathBuf),
+    /// Anything else.
+    #[error("{0}")]
+    Failed(String),
+}
+
+impl BenchError {
+    fn file(path: &Path, error: &io::Error) -> Self {
+        Self::Failed(format!("{}: {error}", path.display()))
+    }
+}
+
+/// What to run and how.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// Folders of assemblies.
+    pub corpora: Vec<PathBuf>,
+    /// Of [`PLANNERS`].
+    pub planners: Vec<String>,
+    /// Of [`ENGINES`].
+    pub engines: Vec<String>,
+    /// When a run is to answer.
+    pub timeout: Duration,
+    /// How long after that it is ended.
+    pub grace: Duration,
+    /// Threads of each run; 0 for all processors.
+    pub threads: u32,
+    /// Runs at a time. With more than one they take processor time from each other.
+    pub jobs: usize,
+    /// Which part of the corpus.
+    pub shard: Shard,
+    /// Where the results go.
+    pub out: PathBuf,
+    /// The program whose `plan` command is run.
+    pub program: PathBuf,
+}
+
+/// Is told how a benchmark gets on.
+pub trait Observer {
+    /// So many runs in all, of which so many had been done before.
+    fn begun(&mut self, total: usize, done: usize);
+    /// A run ended and is recorded; `left` is an estimate for all that is still to do.
+    fn ran(&mut self, record: &Record, done: usize, left: Option<Duration>);
+}
+
+/// What came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Summary {
+    /// Records that the tables are over.
+    pub records: usize,
+    /// Runs that are still to be done.
+    pub missing: usize,
+    /// Records left aside because another shard had the same run already.
+    pub repeated: usize,
+}
+
+/// The time after its timeout that a run is given to end: verification of a last step, writing.
+#[must_use]
+pub fn grace(timeout: Duration) -> Duration {
+    Duration::from_secs(30).saturating_add(timeout / 5)
+}
+
+/// Runs what the output folder has no record of, and writes tables and figures. Once `cancel` is
+/// set, what runs is ended unrecorded and the rest left for the next call.
+///
+/// # Errors
+/// The request makes no sense, the folder has results of other settings, or a file or process
+/// failed. What was recorded stays and is not run again.
+pub fn run(
+    request: &Request,
+    cancel: &AtomicBool,
+    observer: &mut dyn Observer,
+) -> Result<Summary, BenchError> {
+    let planners = planners_to_run(&request.planners)?;
+    let engines = known("engine", &ENGINES, &request.engines)?;
+    let problems = request.shard.select(find(&request.corpora)?);
+    let settings = settings(request)?;
+    std::fs::create_dir_all(&request.out).map_err(|e| BenchError::file(&request.out, &e))?;
+    let (store, mut records) = Store::open(&request.out)?;
+    check_resumable(&settings, &records, &request.out)?;
+    let jobs = jobs(&problems, &planners, &engines);
+    let missing = run_missing(request, &settings, &jobs, store, &mut records, cancel, observer)?;
+    write_evaluation(&request.out, &records)?;
+    Ok(Summary { records: records.len(), missing, repeated: 0 })
+}
+
+/// Puts the results of several folders together, writes the merged records, tables and figures.
+///
+/// # Errors
+/// A folder has no readable results, they were made with different settings, or the output folder
+/// has records that the given ones lack.
+pub fn report(folders: &[PathBuf], out: &Path) -> Result<Summary, BenchError> {
+    let mut records: Vec<Record> = Vec::new();
+    let (mut keys, mut repeated) = (HashSet::new(), 0);
+    for folder in folders {
+        for record in read(folder)? {
+            if records.first().is_some_and(|first| !first.settings.comparable(&record.settings)) {
+                return Err(different(&records[0].settings, &record.settings, folder));
+            }
+            let (assembly, planner, engine) = record.key();
+            if keys.insert((assembly.to_owned(), planner.to_owned(), engine.to_owned())) {
+                records.push(record);
+            } else {
+                repeated += 1;
+            }
+        }
+    }
+    std::fs::create_dir_all(out).map_err(|e| BenchError::file(out, &e))?;
+    if folders != [out] {
+        write_merged(out, &records)?;
+    }
+    write_evaluation(out, &records)?;
+    Ok(Summary { records: records.len(), missing: 0, repeated })
+}
+
+/// Never at the cost of a record that was there.
+fn write_merged(out: &Path, records: &[Record]) -> Result<(), BenchError> {
+    let (store, present) = Store::open(out)?;
+    let merged: HashSet<_> = records.iter().map(Record::key).collect();
+    if present.iter().any(|r| !merged.contains(&r.key())) {
+        let reason = "has results that would be lost; choose another folder or report it too";
+        return Err(BenchError::Refused(format!("{} {reason}", out.display())));
+    }
+    store.replace(records)
+}
+
+fn write_evaluation(out: &Path, records: &[Record]) -> Result<(), BenchError> {
+    let engines: Vec<EngineResults<'_>> = EngineResults::by_engine(records);
+    let write = |name: &str, text: String| {
+        let path = out.join(name);
+        std::fs::write(&path, text).map_err(|e| BenchError::file(&path, &e))
+    };
+    write("tables.md", tables::document(records, &engines))?;
+    if let [first, second] = &engines[..] {
+        write("engines.md", tables::engines_by_problem(first, second))?;
+    }
+    engines.iter().try_for_each(|results| figure::write(out, results))
+}
+
+/// A planner as the paper writes it.
+fn title(planner: &str) -> &str {
+    match planner {
+        "sbdp-star" => "SBDP*",
+        "sbdp" => "SBDP",
+        PDP_STAR => "PDP*",
+        "pdp-r" => "PDP_r",
+        PDP_T => "PDP_t",
+        other => other,
+    }
+}
+
+fn known(what: &str, list: &[&'static str], names: &[String]) -> Result<Vec<&'static str>, BenchError> {
+    let refused =
+        |n: &String| BenchError::Refused(format!("there is no {what} `{n}`, only {}", list.join(", ")));
+    let unknown = names.iter().find(|n| !list.contains(&n.as_str()));
+    match unknown {
+        Some(name) => Err(refused(name)),
+        None => Ok(list.iter().copied().filter(|l| names.iter().any(|n| n == l)).collect()),
+    }
+}
+
+/// PDP* stands for the two that it is put together from.
+fn planners_to_run(names: &[String]) -> Result<Vec<&'static str>, BenchError> {
+    let mut asked = known("planner", &PLANNERS, names)?;
+    if asked.contains(&PDP_STAR) {
+        asked.extend(PDP_STAR_IS);
+    }
+    Ok(PLANNERS.into_iter().filter(|p| *p != PDP_STAR && asked.contains(p)).collect())
+}
+
+fn settings(request: &Request) -> Result<Settings, BenchError> {
+    let program = std::fs::read(&request.program).map_err(|e| BenchError::file(&request.program, &e))?;
+    Ok(Settings {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        build: blake3::hash(&program).to_hex()[..12].to_owned(),
+        timeout_s: request.timeout.as_secs_f64(),
+        threads: request.threads,
+        jobs: request.jobs,
+        processors: std::thread::available_parallelism().map_or(0, usize::from),
+    })
+}
+
+fn check_resumable(settings: &Settings, records: &[Record], out: &Path) -> Result<(), BenchError> {
+    match records.iter().find(|r| !settings.resumes(&r.settings)) {
+        Some(record) => Err(different(settings, &record.settings, out)),
+        None => Ok(()),
+    }
+}
+
+fn different(here: &Settings, there: &Settings, folder: &Path) -> BenchError {
+    BenchError::Refused(format!(
+        "{} has results of other settings, which do not compare: {there}; here {here}",
+        folder.display()
+    ))
+}
+
+/// Problem by problem, so that an interrupted benchmark has problems that all planners ran on.
+fn jobs<'a>(problems: &'a [Problem], planners: &[&'static str], engines: &[&'static str]) -> Vec<Job<'a>> {
+    let mut jobs = Vec::new();
+    for problem in problems {
+        for engine in engines {
+            jobs.extend(planners.iter().map(|planner| Job { problem, planner, engine }));
+        }
+    }
+    jobs
+}
+
+/// Runs what has no record; how many runs are missing in the end.
+fn run_missing(
+    request: &Request,
+    settings: &Settings,
+    jobs: &[Job<'_>],
+    store: Store,
+    records: &mut Vec<Record>,
+    cancel: &AtomicBool,
+    observer: &mut dyn Observer,
+) -> Result<usize, BenchError> {
+    let present: HashSet<_> = records.iter().map(Record::key).collect();
+    let to_do: Vec<Job<'_>> = jobs.iter().copied().filter(|j| !present.contains(&j.key())).collect();
+    let mut estimate = Estimate::default();
+    for record in records.iter() {
+        estimate.took(record.group(), &record.planner, &record.engine, record.wall_time_s);
+    }
+    to_do.iter().for_each(|j| estimate.expect(j.category(), j.planner, j.engine));
+    observer.begun(jobs.len(), jobs.len() - to_do.len());
+    let mut ledger =
+        Ledger { store, records, observer, estimate, done: jobs.len() - to_do.len(), jobs: request.jobs };
+    let scratch = Scratch::new(&request.out)?;
+    run_side_by_side(request, settings, &scratch.own, &to_do, cancel, &mut ledger)?;
+    Ok(jobs.len() - ledger.done)
+}
+
+/// The folder that processes write to. Each benchmark has one of its own: a process that outlived
+/// a benchmark that was killed must not write into its successor's.
+struct Scratch {
+    all: PathBuf,
+    own: PathBuf,
+}
+
+impl Scratch {
+    fn new(out: &Path) -> Result<Self, BenchError> {
+        let all = out.join(SCRATCH);
+        let own = all.join(std::process::id().to_string());
+        let scratch = Self { all, own };
+        scratch.clear();
+        std::fs::create_dir_all(&scratch.own).map_err(|e| BenchError::file(&scratch.own, &e))?;
+        Ok(scratch)
+    }
+
+    /// What is left there is of no use to anybody, but no reason to fail either.
+    fn clear(&self) {
+        let _ = std::fs::remove_dir_all(&self.all);
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        self.clear();
+    }
+}
+
+/// What one thread alone does with ended runs.
+struct Ledger<'a> {
+    store: Store,
+    records: &'a mut Vec<Record>,
+    observer: &'a mut dyn Observer,
+    estimate: Estimate,
+    done: usize,
+    jobs: usize,
+}
+
+impl Ledger<'_> {
+    fn enter(&mut self, job: Job<'_>, record: Record) -> Result<(), BenchError> {
+        self.store.append(&record)?;
+        self.done += 1;
+        self.estimate.done(job.category(), job.planner, job.engine);
+        self.estimate.took(job.category(), job.planner, job.engine, record.wall_time_s);
+        let left = self.estimate.left().map(|t| t / self.jobs.max(1) as u32);
+        self.observer.ran(&record, self.done, left);
+        self.records.push(record);
+        Ok(())
+    }
+}
+
+/// Several runners take jobs in order; the first error stops them all.
+fn run_side_by_side(
+    request: &Request,
+    settings: &Settings,
+    scratch: &Path,
+    to_do: &[Job<'_>],
+    cancel: &AtomicBool,
+    ledger: &mut Ledger<'_>,
+) -> Result<(), BenchError> {
+    let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let (sender, ended) = mpsc::channel();
+    std::thread::scope(|scope| {
+        for number in 0..request.jobs.clamp(1, to_do.len().max(1)) {
+            let (sender, next, stop) = (sender.clone(), &next, &stop);
+            let runner = Runner {
+                program: &request.program,
+                settings,
+                timeout: request.timeout,
+                grace: request.grace,
+                ended_by: [cancel, stop],
+                scratch: scratch.to_owned(),
+                number,
+            };
+            scope.spawn(move || {
+                while let Some(&job) = to_do.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    // Nobody listens any more after an error.
+                    if runner.is_ended() || sender.send((job, runner.run(job))).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        let mut enter = |(job, result): (Job<'_>, Result<Option<Record>, BenchError>)| match result? {
+            Some(record) => ledger.enter(job, record),
+            None => Ok(()),
+        };
+        let result = ended.into_iter().try_for_each(&mut enter);
+        stop.store(true, Ordering::Relaxed);
+        result
+    })
+}

@@ -1,0 +1,252 @@
+//! One run: a process of its own, so that neither a crash nor a hang reaches the benchmark.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use super::BenchError;
+use super::corpus::{Category, Problem};
+use super::record::{Record, Settings};
+use crate::plan::export::PlanDocument;
+
+/// `sbdp plan` exits with these when it has written a plan.
+const PLAN_CODES: [i32; 3] = [0, 3, 4];
+/// It was told to stop.
+const CANCELLED: i32 = 5;
+/// It said why there is no plan: wrong usage or refused input, and anything else in good order.
+const REFUSALS: [i32; 2] = [1, 2];
+/// How much of what a process said is looked at.
+const LAST_WORDS: usize = 4096;
+
+/// What to run.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Job<'a> {
+    pub(super) problem: &'a Problem,
+    pub(super) planner: &'static str,
+    pub(super) engine: &'static str,
+}
+
+/// Runs jobs one after the other; several may work side by side, each with its own files.
+pub(super) struct Runner<'a> {
+    pub(super) program: &'a Path,
+    pub(super) settings: &'a Settings,
+    pub(super) timeout: Duration,
+    pub(super) grace: Duration,
+    /// Any of these ends what runs.
+    pub(super) ended_by: [&'a AtomicBool; 2],
+    /// Where a process writes its plan and what it says.
+    pub(super) scratch: PathBuf,
+    pub(super) number: usize,
+}
+
+/// How a process ended.
+enum End {
+    Exited(ExitStatus),
+    Overstayed,
+    Cancelled,
+}
+
+impl<'a> Job<'a> {
+    pub(super) fn category(&self) -> Category {
+        Category::of(self.problem.parts)
+    }
+
+    /// As [`Record::key`] of its record.
+    pub(super) fn key(&self) -> (&'a str, &'a str, &'a str) {
+        (&self.problem.name, self.planner, self.engine)
+    }
+}
+
+impl Runner<'_> {
+    pub(super) fn is_ended(&self) -> bool {
+        self.ended_by.iter().any(|flag| flag.load(Ordering::Relaxed))
+    }
+
+    /// Runs a job to its record, or `None` if it was cancelled.
+    pub(super) fn run(&self, job: Job<'_>) -> Result<Option<Record>, BenchError> {
+        let (plan, said) = (self.file("json"), self.file("stderr"));
+        // A plan of the run before must not pass for this one's.
+        remove(&plan)?;
+        let started = Instant::now();
+        let mut process = self.start(job, &plan, &said)?;
+        let end = self.wait(&mut process, started).map_err(|e| BenchError::file(self.program, &e))?;
+        let wall = started.elapsed();
+        let record = match end {
+            End::Cancelled => None,
+            End::Overstayed => {
+                Some(self.record(job, wall, "killed", format!("did not end within {} s", wall.as_secs())))
+            }
+            End::Exited(status) => self.ended(job, wall, status, &plan, &said),
+        };
+        remove(&plan)?;
+        remove(&said)?;
+        Ok(record)
+    }
+
+    fn file(&self, extension: &str) -> PathBuf {
+        self.scratch.join(format!("{}.{extension}", self.number))
+    }
+
+    fn start(&self, job: Job<'_>, plan: &Path, said: &Path) -> Result<Process, BenchError> {
+        let stderr = File::create(said).map_err(|e| BenchError::file(said, &e))?;
+        let mut command = Command::new(self.program);
+        command.arg("plan").arg(&job.problem.folder).args(["--embedded", "--no-cache"]);
+        command.args(["--planner", job.planner, "--engine", job.engine]);
+        command.args(["--timeout", &self.timeout.as_secs_f64().to_string()]);
+        if self.settings.threads > 0 {
+            command.args(["--threads", &self.settings.threads.to_string()]);
+        }
+        command.arg("--json").arg(plan);
+        // Into a file, for a full pipe would stop the process.
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
+        command.spawn().map(Process).map_err(|e| BenchError::file(self.program, &e))
+    }
+
+    fn wait(&self, process: &mut Process, started: Instant) -> io::Result<End> {
+        let most = self.timeout.saturating_add(self.grace);
+        loop {
+            if let Some(status) = process.0.try_wait()? {
+                return Ok(End::Exited(status));
+            }
+            if self.is_ended() {
+                return Ok(End::Cancelled);
+            }
+            let elapsed = started.elapsed();
+            if elapsed > most {
+                return Ok(End::Overstayed);
+            }
+            // Short runs are noticed at once, long ones are left in peace.
+            std::thread::sleep((elapsed / 50).clamp(Duration::from_millis(1), Duration::from_millis(50)));
+        }
+    }
+
+    fn ended(
+        &self,
+        job: Job<'_>,
+        wall: Duration,
+        status: ExitStatus,
+        plan: &Path,
+        said: &Path,
+    ) -> Option<Record> {
+        let problem = |name: &str, what: String| Some(self.record(job, wall, name, what));
+        match status.code() {
+            Some(CANCELLED) => None,
+            Some(code) if PLAN_CODES.contains(&code) => match read_plan(plan) {
+                Ok(document) => Some(self.planned(job, wall, &document)),
+                Err(reason) => problem("crashed", format!("{status}, but {reason}")),
+            },
+            Some(code) if REFUSALS.contains(&code) => problem("failed", last_words(said)),
+            _ => problem("crashed", format!("{status}: {}", last_words(said))),
+        }
+    }
+
+    fn planned(&self, job: Job<'_>, wall: Duration, plan: &PlanDocument) -> Record {
+        let s = &plan.stats;
+        Record {
+            parts: plan.parts.len(),
+            category: Category::of(plan.parts.len()).name().to_owned(),
+            reason: plan.reason.clone(),
+            simulations: s.simulations_run,
+            states: s.states,
+            path_time_s: s.path_time_s,
+            total_time_s: (s.total_time_s - s.verify_time_s).max(0.0),
+            sdf_time_s: s.sdf_time_s,
+            static_analysis_time_s: s.static_analysis_time_s,
+            verify_time_s: s.verify_time_s,
+            steps: plan.steps.len(),
+            verified: verified(plan),
+            ..self.record(job, wall, &plan.status, String::new())
+        }
+    }
+
+    fn record(&self, job: Job<'_>, wall: Duration, status: &str, reason: String) -> Record {
+        Record {
+            assembly: job.problem.name.clone(),
+            parts: job.problem.parts,
+            category: Category::of(job.problem.parts).name().to_owned(),
+            planner: job.planner.to_owned(),
+            engine: job.engine.to_owned(),
+            status: status.to_owned(),
+            reason: Some(reason),
+            simulations: 0,
+            states: 0,
+            path_time_s: 0.0,
+            total_time_s: 0.0,
+            sdf_time_s: 0.0,
+            static_analysis_time_s: 0.0,
+            verify_time_s: 0.0,
+            wall_time_s: wall.as_secs_f64(),
+            steps: 0,
+            verified: false,
+            settings: self.settings.clone(),
+        }
+    }
+}
+
+/// Ended by its handle when dropped, whatever happened meanwhile.
+struct Process(Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        // It may have ended by itself; then there is nothing to do.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn remove(file: &Path) -> Result<(), BenchError> {
+    match fs::remove_file(file) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(BenchError::file(file, &e)),
+        _ => Ok(()),
+    }
+}
+
+fn read_plan(file: &Path) -> Result<PlanDocument, String> {
+    let text = fs::read_to_string(file).map_err(|_| "wrote no plan".to_owned())?;
+    PlanDocument::from_json(&text).map_err(|e| format!("its plan cannot be read: {e}"))
+}
+
+/// The plan's own word on each step, and a count of its own that what should be out is out.
+fn verified(plan: &PlanDocument) -> bool {
+    let checked = plan.steps.iter().all(|s| s.verified_depth.is_finite() && !s.path.is_empty());
+    let movable = plan.remaining.iter().filter(|p| !plan.fixed.contains(p)).count();
+    // A last part has nothing to leave; fixed ones stay.
+    let all_out = movable == 0 || plan.remaining.len() <= 1;
+    let counted = plan.steps.len() + plan.remaining.len() == plan.parts.len();
+    checked && counted && if plan.status == "complete" { all_out } else { !plan.steps.is_empty() }
+}
+
+/// The line that says what went wrong: the first that is marked as an error, else the last.
+fn last_words(file: &Path) -> String {
+    let bytes = fs::read(file).unwrap_or_default();
+    let text = String::from_utf8_lossy(&bytes[bytes.len().saturating_sub(LAST_WORDS)..]).into_owned();
+    let hint = |l: &&str| !l.is_empty() && !l.starts_with("note: run with");
+    let mut lines = text.lines().map(str::trim).filter(hint);
+    let marked = lines.clone().find(|l| l.starts_with("error:"));
+    marked.or_else(|| lines.next_back()).unwrap_or("said nothing").to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(text: &str) -> String {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(file.path(), text).unwrap();
+        last_words(file.path())
+    }
+
+    #[test]
+    fn the_telling_line_is_kept() {
+        let refusal = "error: invalid value 'x' for '--planner'\n  [possible values: y]\n\ntry '--help'.\n";
+        assert_eq!(words(refusal), "error: invalid value 'x' for '--planner'");
+        let panic =
+            "thread 'main' panicked at a.rs:1:1:\nindex 3 out of bounds\nnote: run with `RUST_BACKTRACE=1`\n";
+        assert_eq!(words(panic), "index 3 out of bounds");
+        assert_eq!(words(&format!("{}\nlast", "x".repeat(100_000))), "last");
+        assert_eq!(words(" \n"), "said nothing");
+    }
+}

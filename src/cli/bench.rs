@@ -1,0 +1,133 @@
+//! `sbdp bench`.
+
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use super::args::{BenchArguments, BenchCommand, BenchReport, BenchRun};
+use super::error::CliError;
+use super::{interrupt, print};
+use crate::bench::{self, Observer, Record, Request, Shard};
+
+/// This very file, also after a newer build took its place: one benchmark is of one build.
+const THIS_PROGRAM: &str = "/proc/self/exe";
+/// As of a cancelled plan.
+const INTERRUPTED: u8 = 5;
+
+pub(super) fn run(arguments: &BenchArguments) -> Result<ExitCode, CliError> {
+    match (&arguments.command, &arguments.run) {
+        (Some(BenchCommand::Report(report)), _) => report_on(report),
+        (None, Some(run)) => measure(run),
+        (None, None) => Err(CliError::Refused("give folders of assemblies, or `report`".to_owned())),
+    }
+}
+
+fn measure(arguments: &BenchRun) -> Result<ExitCode, CliError> {
+    let cancel = Arc::new(AtomicBool::new(false));
+    interrupt::cancel_on_interrupt(&cancel)?;
+    let mut display = BenchDisplay::new();
+    let summary = bench::run(&request(arguments), &cancel, &mut display);
+    drop(display);
+    let summary = summary?;
+    print(&format!("{} records in {}\n", summary.records, files(&arguments.out)))?;
+    if summary.missing == 0 {
+        return Ok(ExitCode::SUCCESS);
+    }
+    print(&format!("{} runs are left: the same command goes on with them\n", summary.missing))?;
+    Ok(ExitCode::from(INTERRUPTED))
+}
+
+fn request(arguments: &BenchRun) -> Request {
+    Request {
+        corpora: arguments.corpora.clone(),
+        planners: arguments.planners.clone(),
+        engines: arguments.engines.clone(),
+        timeout: arguments.timeout,
+        grace: bench::grace(arguments.timeout),
+        threads: arguments.threads,
+        jobs: arguments.jobs.get(),
+        shard: arguments.shard.unwrap_or(Shard::WHOLE),
+        out: arguments.out.clone(),
+        program: PathBuf::from(THIS_PROGRAM),
+    }
+}
+
+fn report_on(arguments: &BenchReport) -> Result<ExitCode, CliError> {
+    let out = match (&arguments.out, &arguments.results[..]) {
+        (Some(out), _) => out,
+        (None, [only]) => only,
+        _ => return Err(CliError::Refused("several folders: say with --out where they go".to_owned())),
+    };
+    let summary = bench::report(&arguments.results, out)?;
+    print(&format!("{} records in {}\n", summary.records, files(out)))?;
+    if summary.repeated > 0 {
+        print(&format!("{} runs were there twice; the first one counts\n", summary.repeated))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn files(out: &Path) -> String {
+    format!("{0}/results.jsonl, evaluated in {0}/tables.md", out.display())
+}
+
+/// A bar on a terminal, else a line per run.
+struct BenchDisplay {
+    bar: Option<ProgressBar>,
+    total: usize,
+    solved: usize,
+}
+
+impl BenchDisplay {
+    fn new() -> Self {
+        let bar = std::io::stderr().is_terminal().then(|| {
+            let bar = ProgressBar::new(0);
+            bar.set_draw_target(ProgressDrawTarget::stderr());
+            // A template that does not parse would only cost the looks.
+            if let Ok(style) = ProgressStyle::with_template("{bar:30} {pos}/{len} [{elapsed}] {wide_msg}") {
+                bar.set_style(style);
+            }
+            bar.enable_steady_tick(Duration::from_secs(1));
+            bar
+        });
+        Self { bar, total: 0, solved: 0 }
+    }
+}
+
+impl Observer for BenchDisplay {
+    fn begun(&mut self, total: usize, done: usize) {
+        self.total = total;
+        if let Some(bar) = &self.bar {
+            bar.set_length(total as u64);
+            bar.set_position(done as u64);
+        } else if done > 0 {
+            eprintln!("{done} of {total} runs were done before");
+        }
+    }
+
+    fn ran(&mut self, record: &Record, done: usize, left: Option<Duration>) {
+        self.solved += usize::from(record.solved());
+        let left = left.map_or_else(|| "?".to_owned(), |t| HumanDuration(t).to_string());
+        let Record { assembly, planner, engine, status, wall_time_s, .. } = record;
+        let last = format!("{assembly} {planner} {engine}: {status} after {wall_time_s:.1} s");
+        match &self.bar {
+            Some(bar) => {
+                bar.set_position(done as u64);
+                bar.set_message(format!("about {left} left, {} solved, {last}", self.solved));
+            }
+            None => eprintln!("{done}/{}, about {left} left: {last}", self.total),
+        }
+    }
+}
+
+impl Drop for BenchDisplay {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
