@@ -33,6 +33,8 @@ fn request(folder: &Path, assemblies: &[&str]) -> Request {
         planners: vec!["sbdp-star".to_owned()],
         engines: vec!["sliding".to_owned()],
         timeout: Duration::from_secs(7200),
+        path_timeout: Duration::from_secs(360),
+        actions: "paper",
         grace: Duration::from_secs(7200),
         threads: 0,
         jobs: 1,

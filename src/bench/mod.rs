@@ -39,6 +39,8 @@ const PDP_STAR: &str = "pdp-star";
 const PDP_T: &str = "pdp-t";
 /// What PDP* is put together from, the translational one first.
 const PDP_STAR_IS: [&str; 2] = [PDP_T, "pdp-r"];
+/// The paper's limit for one path.
+pub const PATH_TIMEOUT: Duration = Duration::from_secs(360);
 /// The paper's limit for a problem.
 pub const TIMEOUT: Duration = Duration::from_secs(2 * 3600);
 
@@ -78,7 +80,11 @@ pub struct Request {
     pub engines: Vec<String>,
     /// When a run is to answer.
     pub timeout: Duration,
-    /// How long after that it is ended.
+    /// When one motion, or one part's search of a pdp planner, is given up.
+    pub path_timeout: Duration,
+    /// The action set of all planners: their search spaces compare only then.
+    pub actions: &'static str,
+    /// How long after `timeout` a run is ended.
     pub grace: Duration,
     /// Threads of each run; 0 for all processors.
     pub threads: u32,
@@ -231,6 +237,8 @@ fn settings(request: &Request) -> Result<Settings, BenchError> {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         build: blake3::hash(&program).to_hex()[..12].to_owned(),
         timeout_s: request.timeout.as_secs_f64(),
+        path_timeout_s: request.path_timeout.as_secs_f64(),
+        actions: request.actions.to_owned(),
         threads: request.threads,
         jobs: request.jobs,
         processors: std::thread::available_parallelism().map_or(0, usize::from),

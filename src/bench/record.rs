@@ -18,6 +18,10 @@ pub struct Settings {
     pub build: String,
     /// After so long a run was to answer.
     pub timeout_s: f64,
+    /// After so long one path was given up.
+    pub path_timeout_s: f64,
+    /// The action set of all planners.
+    pub actions: String,
     /// Threads of each run; 0 for all processors.
     pub threads: u32,
     /// How many runs went on at a time.
@@ -30,7 +34,15 @@ impl Settings {
     /// Whether runs belong into one table. Machines may differ, as those of shards do.
     #[must_use]
     pub fn comparable(&self, other: &Self) -> bool {
-        let key = |s: &Self| (s.version.clone(), s.timeout_s.to_bits(), s.threads);
+        let key = |s: &Self| {
+            (
+                s.version.clone(),
+                s.timeout_s.to_bits(),
+                s.path_timeout_s.to_bits(),
+                s.actions.clone(),
+                s.threads,
+            )
+        };
         key(self) == key(other)
     }
 
@@ -44,8 +56,11 @@ impl Settings {
 impl std::fmt::Display for Settings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let threads = if self.threads == 0 { "all".to_owned() } else { self.threads.to_string() };
-        let Self { version, build, timeout_s, .. } = self;
-        write!(f, "version {version}, build {build}, timeout {timeout_s} s, threads {threads}")
+        let Self { version, build, timeout_s, path_timeout_s, actions, .. } = self;
+        write!(
+            f,
+            "version {version}, build {build}, timeout {timeout_s} s ({path_timeout_s} s per path), actions {actions}, threads {threads}"
+        )
     }
 }
 

@@ -33,6 +33,8 @@ fn record(problem: (&str, usize), planner: &str, end: End) -> Record {
             version: "1".to_owned(),
             build: "b".to_owned(),
             timeout_s: 100.0,
+            path_timeout_s: 360.0,
+            actions: "paper".to_owned(),
             threads: 0,
             jobs: 1,
             processors: 2,

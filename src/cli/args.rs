@@ -146,6 +146,13 @@ pub(super) struct BenchRun {
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "7200",
         allow_negative_numbers = true)]
     pub(super) timeout: Duration,
+    /// One motion, or one part's search of a pdp planner, is given up after so many seconds
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "360",
+        allow_negative_numbers = true)]
+    pub(super) path_timeout: Duration,
+    /// Which actions all planners have
+    #[arg(long, value_enum, default_value = "paper")]
+    pub(super) actions: Actions,
     /// Where results, tables and figures go; a benchmark that was interrupted goes on there
     #[arg(long, value_name = "DIR", required = true)]
     pub(super) out: PathBuf,

@@ -13,6 +13,7 @@ use super::args::{BenchArguments, BenchCommand, BenchReport, BenchRun};
 use super::error::CliError;
 use super::{interrupt, print};
 use crate::bench::{self, Observer, Record, Request, Shard};
+use crate::search;
 
 /// This very file, also after a newer build took its place: one benchmark is of one build.
 const THIS_PROGRAM: &str = "/proc/self/exe";
@@ -48,6 +49,8 @@ fn request(arguments: &BenchRun) -> Request {
         planners: arguments.planners.clone(),
         engines: arguments.engines.clone(),
         timeout: arguments.timeout,
+        path_timeout: arguments.path_timeout,
+        actions: search::ActionSet::from(arguments.actions).name(),
         grace: bench::grace(arguments.timeout),
         threads: arguments.threads,
         jobs: arguments.jobs.get(),
