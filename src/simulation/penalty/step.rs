@@ -308,7 +308,7 @@ mod tests {
             for a in 0..3 {
                 let mut d = Vector3::zeros();
                 d[a] = 1e-6;
-                let [below, above] = [turn - d, turn + d].map(|t| UnitQuaternion::from_scaled_axis(t));
+                let [below, above] = [turn - d, turn + d].map(UnitQuaternion::from_scaled_axis);
                 let between = (above * below.inverse()).scaled_axis() / 2e-6;
                 assert!((between - jacobian.column(a)).norm() < 1e-8, "{between} at {turn}");
             }
