@@ -186,6 +186,13 @@ impl Run<'_> {
     }
 
     fn ended(self, end: End) -> Motion {
+        tracing::debug!(
+            part = self.contacts.part,
+            tally = ?self.stepper.tally,
+            waypoints = self.path.len(),
+            ?end,
+            "simulated"
+        );
         Motion { path: self.path, end }
     }
 

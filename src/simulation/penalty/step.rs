@@ -94,13 +94,19 @@ pub(super) struct Step {
     pub(super) state: State,
     /// How far a point of the body can have been displaced.
     pub(super) travel: f64,
-    /// Newton iterations; 0 if nothing was near.
-    #[cfg_attr(not(test), allow(dead_code))]
-    pub(super) iterations: u32,
-    /// Whether the last Newton step was within the tolerance; otherwise it ended where no step led
-    /// further down: the slope of the field jumps there.
-    #[cfg_attr(not(test), allow(dead_code))]
-    pub(super) converged: bool,
+}
+
+/// What steps have cost.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Tally {
+    pub(super) steps: u64,
+    /// Newton iterations; a step with nothing near takes none.
+    pub(super) iterations: u64,
+    /// Evaluations of all contact.
+    pub(super) evaluations: u64,
+    /// Steps whose last Newton step was not within the tolerance: no step led further down, for
+    /// the slope of the field jumps there.
+    pub(super) settled: u64,
 }
 
 /// Makes steps; holds what they need, so that none is allocated for.
@@ -110,12 +116,13 @@ pub(super) struct Stepper<'a> {
     parameters: &'a PenaltyParameters,
     current: Evaluation,
     trial: Evaluation,
+    pub(super) tally: Tally,
 }
 
 impl<'a> Stepper<'a> {
     pub(super) fn new(rigid: Rigid, drive: Drive, parameters: &'a PenaltyParameters, pairs: usize) -> Self {
         let (current, trial) = (Evaluation::new(pairs), Evaluation::new(pairs));
-        Self { rigid, drive, parameters, current, trial }
+        Self { rigid, drive, parameters, current, trial, tally: Tally::default() }
     }
 
     /// Per pair, whether it was in contact at the end of the last step.
@@ -132,11 +139,11 @@ impl<'a> Stepper<'a> {
     pub(super) fn step(&mut self, state: &State, contacts: &Contacts<'_>) -> Step {
         let goal = self.goal(state);
         let mut z = goal.free;
-        let (mut iterations, mut converged) = (0, true);
+        self.tally.steps += 1;
         if contacts.is_empty() {
             self.current.clear();
-        } else {
-            (iterations, converged) = self.minimise(state, &goal, contacts, &mut z);
+        } else if !self.minimise(state, &goal, contacts, &mut z) {
+            self.tally.settled += 1;
         }
         let h = self.parameters.time_step;
         let (dx, turn) = (linear(&z), angular(&z));
@@ -146,7 +153,7 @@ impl<'a> Stepper<'a> {
             after.rotation = UnitQuaternion::from_scaled_axis(turn) * state.rotation;
             after.rotation.renormalize();
         }
-        Step { state: after, travel: self.rigid.travel(&z), iterations, converged }
+        Step { state: after, travel: self.rigid.travel(&z) }
     }
 
     fn goal(&self, state: &State) -> Goal {
@@ -168,16 +175,18 @@ impl<'a> Stepper<'a> {
         Goal { free, weight }
     }
 
-    /// Newton's method from `z`; returns the iterations and whether it converged.
+    /// Newton's method from `z`; returns whether it converged.
     fn minimise(
         &mut self,
         state: &State,
         goal: &Goal,
         contacts: &Contacts<'_>,
         z: &mut Vector6<f64>,
-    ) -> (u32, bool) {
+    ) -> bool {
+        self.tally.evaluations += 1;
         contacts.evaluate(&placement(state, z), self.drive.turns, &mut self.current);
-        for iteration in 1..=self.parameters.newton_iterations {
+        for _ in 0..self.parameters.newton_iterations {
+            self.tally.iterations += 1;
             let local = goal.local(z, &self.current);
             let mut next = None;
             // Where the full second derivative leads nowhere, the part of it that is positive does.
@@ -185,18 +194,18 @@ impl<'a> Stepper<'a> {
                 let Some(direction) = descent(matrix, &local.gradient, self.drive.turns) else { continue };
                 if self.rigid.travel(&direction) <= self.parameters.newton_tolerance {
                     *z += direction;
-                    return (iteration, true);
+                    return true;
                 }
                 next = self.lower(state, goal, contacts, z, &local, &direction);
                 if next.is_some() {
                     break;
                 }
             }
-            let Some(next) = next else { return (iteration, false) };
+            let Some(next) = next else { return false };
             *z = next;
             std::mem::swap(&mut self.current, &mut self.trial);
         }
-        (self.parameters.newton_iterations, false)
+        false
     }
 
     /// The first point of a backtracking line search that is low enough; `trial` belongs to it then.
@@ -213,6 +222,7 @@ impl<'a> Stepper<'a> {
         let mut share = 1.0;
         for _ in 0..=HALVINGS {
             let next = z + direction * share;
+            self.tally.evaluations += 1;
             contacts.evaluate(&placement(state, &next), self.drive.turns, &mut self.trial);
             if goal.energy(&next, &self.trial) <= local.energy + ENOUGH * share * slope {
                 return Some(next);
