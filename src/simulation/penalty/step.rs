@@ -5,7 +5,8 @@
 //! `m/(2h²)|Δx − x̂|² + 1/(2h²)(θ − θ̂)ᵀ I (θ − θ̂) + contact energy`, x̂ and θ̂ being where velocity
 //! and action alone would lead; I is the inertia tensor at the start of the step, and the
 //! gyroscopic moment is taken from there too. A minimum is looked for, not any stationary point:
-//! each Newton step goes down, so a field whose slope jumps between cells cannot make it diverge.
+//! each Newton step goes down, so a field whose slope jumps between cells cannot make it diverge,
+//! and a minimum where it jumps is found as well.
 
 use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 
@@ -17,8 +18,11 @@ use super::parameters::PenaltyParameters;
 /// Added to the squared lengths in inertia tensors: bodies without extent across an axis have none.
 const LEAST_INERTIA: f64 = 1e-8;
 const LEAST_MASS: f64 = 1e-9;
-/// Halvings of a Newton step before it is given up.
-const HALVINGS: u32 = 12;
+/// A Newton step that does not lead down is shortened to this share, so many times at most.
+const BACK: f64 = 0.25;
+const BACKTRACKS: u32 = 6;
+/// Slopes that are combined where the field's slope jumps.
+const MOST_SLOPES: u32 = 6;
 /// Share of the linear forecast by which the energy must fall (Armijo).
 const ENOUGH: f64 = 1e-4;
 
@@ -183,54 +187,93 @@ impl<'a> Stepper<'a> {
         contacts: &Contacts<'_>,
         z: &mut Vector6<f64>,
     ) -> bool {
+        let at = Problem { state, goal, contacts };
         self.tally.evaluations += 1;
         contacts.evaluate(&placement(state, z), self.drive.turns, &mut self.current);
         for _ in 0..self.parameters.newton_iterations {
             self.tally.iterations += 1;
-            let local = goal.local(z, &self.current);
-            let mut next = None;
-            // Where the full second derivative leads nowhere, the part of it that is positive does.
-            for matrix in [&local.hessian, &local.gauss] {
-                let Some(direction) = descent(matrix, &local.gradient, self.drive.turns) else { continue };
-                if self.rigid.travel(&direction) <= self.parameters.newton_tolerance {
-                    *z += direction;
+            match self.descend(&at, z) {
+                Descent::Lower(next) => {
+                    let gained = self.rigid.travel(&(next - *z));
+                    *z = next;
+                    if gained < self.parameters.newton_tolerance {
+                        std::mem::swap(&mut self.current, &mut self.trial);
+                        return false;
+                    }
+                }
+                Descent::Lowest(last) => {
+                    *z = last;
                     return true;
                 }
-                next = self.lower(state, goal, contacts, z, &local, &direction);
-                if next.is_some() {
-                    break;
-                }
+                Descent::Nowhere => return false,
             }
-            let Some(next) = next else { return false };
-            *z = next;
             std::mem::swap(&mut self.current, &mut self.trial);
         }
         false
     }
 
-    /// The first point of a backtracking line search that is low enough; `trial` belongs to it then.
+    /// One Newton step. Where a face of cells bars the way, slopes on both sides of it are combined
+    /// to the least one (aggregated as in bundle methods, C. Lemaréchal 1975): its direction leads
+    /// along the face, and where it vanishes, the lowest point is on the face.
+    fn descend(&mut self, at: &Problem<'_>, z: &Vector6<f64>) -> Descent {
+        let turns = self.drive.turns;
+        let local = at.goal.local(z, &self.current);
+        let mut gradient = local.gradient;
+        for round in 0..=MOST_SLOPES {
+            let full = solved(&local.hessian, &gradient, turns);
+            let Some(up) = full.or_else(|| solved(&local.gauss, &gradient, turns)) else { break };
+            if self.rigid.travel(&up) <= self.parameters.newton_tolerance {
+                return Descent::Lowest(if round == 0 { z - up } else { *z });
+            }
+            let barred = match self.lower(at, z, local.energy, gradient.dot(&up), &up) {
+                Ok(next) => return Descent::Lower(next),
+                Err(last) => at.goal.local(&last, &self.trial).gradient,
+            };
+            let matrix = if full.is_some() { &local.hessian } else { &local.gauss };
+            gradient = least_between(matrix, &gradient, &barred, turns);
+        }
+        Descent::Nowhere
+    }
+
+    /// The first point of a backtracking line search down from `energy` that is low enough; else
+    /// the last one that was tried. `trial` belongs to it.
     fn lower(
         &mut self,
-        state: &State,
-        goal: &Goal,
-        contacts: &Contacts<'_>,
+        at: &Problem<'_>,
         z: &Vector6<f64>,
-        local: &Local,
-        direction: &Vector6<f64>,
-    ) -> Option<Vector6<f64>> {
-        let slope = local.gradient.dot(direction);
-        let mut share = 1.0;
-        for _ in 0..=HALVINGS {
-            let next = z + direction * share;
+        energy: f64,
+        slope: f64,
+        up: &Vector6<f64>,
+    ) -> Result<Vector6<f64>, Vector6<f64>> {
+        let (mut share, mut next) = (1.0, *z);
+        for _ in 0..=BACKTRACKS {
+            next = z - up * share;
             self.tally.evaluations += 1;
-            contacts.evaluate(&placement(state, &next), self.drive.turns, &mut self.trial);
-            if goal.energy(&next, &self.trial) <= local.energy + ENOUGH * share * slope {
-                return Some(next);
+            at.contacts.evaluate(&placement(at.state, &next), self.drive.turns, &mut self.trial);
+            if at.goal.energy(&next, &self.trial) <= energy - ENOUGH * share * slope {
+                return Ok(next);
             }
-            share *= 0.5;
+            share *= BACK;
         }
-        None
+        Err(next)
     }
+}
+
+/// What a step is to minimise.
+struct Problem<'a> {
+    state: &'a State,
+    goal: &'a Goal,
+    contacts: &'a Contacts<'a>,
+}
+
+/// What a Newton step found.
+enum Descent {
+    /// A lower point, which `trial` belongs to.
+    Lower(Vector6<f64>),
+    /// The lowest one, within the tolerance.
+    Lowest(Vector6<f64>),
+    /// No way down, nor that there is none.
+    Nowhere,
 }
 
 /// Where the body would be without contact, and what it costs to be elsewhere.
@@ -269,15 +312,26 @@ impl Goal {
     }
 }
 
-/// −matrix⁻¹ gradient in the freedoms that there are; `None` unless the matrix is positive there.
-fn descent(matrix: &Matrix6<f64>, gradient: &Vector6<f64>, turns: bool) -> Option<Vector6<f64>> {
+/// matrix⁻¹ v in the freedoms that there are; `None` unless the matrix is positive there.
+fn solved(matrix: &Matrix6<f64>, v: &Vector6<f64>, turns: bool) -> Option<Vector6<f64>> {
     if turns {
-        return Some(-Cholesky::new(*matrix)?.solve(gradient));
+        return Some(Cholesky::new(*matrix)?.solve(v));
     }
     let mut out = Vector6::zeros();
-    let part = Cholesky::new(matrix.fixed_view::<3, 3>(0, 0).into_owned())?.solve(&linear(gradient));
-    out.fixed_rows_mut::<3>(0).copy_from(&-part);
+    let part = Cholesky::new(matrix.fixed_view::<3, 3>(0, 0).into_owned())?.solve(&linear(v));
+    out.fixed_rows_mut::<3>(0).copy_from(&part);
     Some(out)
+}
+
+/// Of all between two slopes, the one that is least in the metric of matrix⁻¹.
+fn least_between(matrix: &Matrix6<f64>, a: &Vector6<f64>, b: &Vector6<f64>, turns: bool) -> Vector6<f64> {
+    let difference = a - b;
+    let Some(scaled) = solved(matrix, &difference, turns) else { return *a };
+    let squared = difference.dot(&scaled);
+    if squared <= 0.0 {
+        return *a;
+    }
+    b + difference * (-b.dot(&scaled) / squared).clamp(0.0, 1.0)
 }
 
 /// The left Jacobian of rotation vectors: exp(θ + dθ) ≈ exp(J dθ) exp(θ).
