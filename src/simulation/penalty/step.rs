@@ -21,6 +21,8 @@ const LEAST_MASS: f64 = 1e-9;
 /// A Newton step that does not lead down is shortened to this share, so many times at most.
 const BACK: f64 = 0.25;
 const BACKTRACKS: u32 = 6;
+/// A way shorter than this share is barred.
+const LEAST_SHARE: f64 = 0.01;
 /// Slopes that are combined where the field's slope jumps.
 const MOST_SLOPES: u32 = 6;
 /// Share of the linear forecast by which the energy must fall (Armijo).
@@ -193,14 +195,7 @@ impl<'a> Stepper<'a> {
         for _ in 0..self.parameters.newton_iterations {
             self.tally.iterations += 1;
             match self.descend(&at, z) {
-                Descent::Lower(next) => {
-                    let gained = self.rigid.travel(&(next - *z));
-                    *z = next;
-                    if gained < self.parameters.newton_tolerance {
-                        std::mem::swap(&mut self.current, &mut self.trial);
-                        return false;
-                    }
-                }
+                Descent::Lower(next) => *z = next,
                 Descent::Lowest(last) => {
                     *z = last;
                     return true;
@@ -218,45 +213,73 @@ impl<'a> Stepper<'a> {
     fn descend(&mut self, at: &Problem<'_>, z: &Vector6<f64>) -> Descent {
         let turns = self.drive.turns;
         let local = at.goal.local(z, &self.current);
-        let mut gradient = local.gradient;
+        let (mut gradient, mut short) = (local.gradient, None);
         for round in 0..=MOST_SLOPES {
             let full = solved(&local.hessian, &gradient, turns);
             let Some(up) = full.or_else(|| solved(&local.gauss, &gradient, turns)) else { break };
             if self.rigid.travel(&up) <= self.parameters.newton_tolerance {
-                return Descent::Lowest(if round == 0 { z - up } else { *z });
+                if round == 0 {
+                    return Descent::Lowest(z - up);
+                }
+                // With a way left towards the face, the lowest point is not here yet.
+                let Some(next) = short else { return Descent::Lowest(*z) };
+                return self.taken(at, next);
             }
-            let barred = match self.lower(at, z, local.energy, gradient.dot(&up), &up) {
-                Ok(next) => return Descent::Lower(next),
-                Err(last) => at.goal.local(&last, &self.trial).gradient,
-            };
+            let found = self.search(at, z, local.energy, gradient.dot(&up), &up);
+            if found.share >= LEAST_SHARE {
+                return Descent::Lower(z - up * found.share);
+            }
+            if found.share > 0.0 {
+                short = Some(z - up * found.share);
+            }
             let matrix = if full.is_some() { &local.hessian } else { &local.gauss };
-            gradient = least_between(matrix, &gradient, &barred, turns);
+            gradient = least_between(matrix, &gradient, &found.barred, turns);
         }
-        Descent::Nowhere
+        short.map_or(Descent::Nowhere, |next| self.taken(at, next))
     }
 
-    /// The first point of a backtracking line search down from `energy` that is low enough; else
-    /// the last one that was tried. `trial` belongs to it.
-    fn lower(
+    /// A step that was found lower before others were tried.
+    fn taken(&mut self, at: &Problem<'_>, next: Vector6<f64>) -> Descent {
+        self.evaluate(at, &next);
+        Descent::Lower(next)
+    }
+
+    /// Backtracks down from `energy` until it is low enough; `trial` belongs to the last try.
+    fn search(
         &mut self,
         at: &Problem<'_>,
         z: &Vector6<f64>,
         energy: f64,
         slope: f64,
         up: &Vector6<f64>,
-    ) -> Result<Vector6<f64>, Vector6<f64>> {
-        let (mut share, mut next) = (1.0, *z);
+    ) -> Found {
+        let mut found = Found { share: 0.0, barred: Vector6::zeros() };
+        let mut share = 1.0;
         for _ in 0..=BACKTRACKS {
-            next = z - up * share;
-            self.tally.evaluations += 1;
-            at.contacts.evaluate(&placement(at.state, &next), self.drive.turns, &mut self.trial);
+            let next = z - up * share;
+            self.evaluate(at, &next);
             if at.goal.energy(&next, &self.trial) <= energy - ENOUGH * share * slope {
-                return Ok(next);
+                found.share = share;
+                break;
             }
+            found.barred = at.goal.gradient(&next, &self.trial);
             share *= BACK;
         }
-        Err(next)
+        found
     }
+
+    fn evaluate(&mut self, at: &Problem<'_>, z: &Vector6<f64>) {
+        self.tally.evaluations += 1;
+        at.contacts.evaluate(&placement(at.state, z), self.drive.turns, &mut self.trial);
+    }
+}
+
+/// What a line search found.
+struct Found {
+    /// The share of the step that leads low enough; 0 if none does.
+    share: f64,
+    /// The slope at the shortest try that did not.
+    barred: Vector6<f64>,
 }
 
 /// What a step is to minimise.
@@ -296,20 +319,29 @@ impl Goal {
         0.5 * off.dot(&(self.weight * off)) + contact.energy
     }
 
+    fn gradient(&self, z: &Vector6<f64>, contact: &Evaluation) -> Vector6<f64> {
+        self.weight * (z - self.free) + chain(z).transpose() * contact.gradient
+    }
+
     fn local(&self, z: &Vector6<f64>, contact: &Evaluation) -> Local {
-        // exp(θ + dθ) = exp(J dθ) exp(θ): contact is differentiated by the turn J dθ. That J itself
-        // changes with θ adds a term that is smaller by |θ| (0.03 at most) and is left out.
-        let mut chain = Matrix6::identity();
-        chain.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn_jacobian(&angular(z)));
+        let chain = chain(z);
         let back = chain.transpose();
         let gauss = self.weight + back * contact.gauss * chain;
         Local {
             energy: self.energy(z, contact),
-            gradient: self.weight * (z - self.free) + back * contact.gradient,
+            gradient: self.gradient(z, contact),
             hessian: gauss + back * contact.curvature * chain,
             gauss,
         }
     }
+}
+
+/// exp(θ + dθ) = exp(J dθ) exp(θ): contact is differentiated by the turn J dθ. That J itself changes
+/// with θ adds a term that is smaller by |θ| (0.03 at most) and is left out of second derivatives.
+fn chain(z: &Vector6<f64>) -> Matrix6<f64> {
+    let mut chain = Matrix6::identity();
+    chain.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn_jacobian(&angular(z)));
+    chain
 }
 
 /// matrix⁻¹ v in the freedoms that there are; `None` unless the matrix is positive there.
