@@ -21,6 +21,10 @@ const LEAST_MASS: f64 = 1e-9;
 /// A Newton step that does not lead down is shortened to this share, so many times at most.
 const BACK: f64 = 0.25;
 const BACKTRACKS: u32 = 6;
+/// Evaluations of a step, per Newton iteration that it may take. Smooth contact needs one each; a
+/// part that is wedged between points whose slopes all jump could go on for hundreds, and gain
+/// millionths.
+const EVALUATIONS: u64 = 2;
 /// A way shorter than this share is barred.
 const LEAST_SHARE: f64 = 0.01;
 /// Slopes that are combined where the field's slope jumps.
@@ -192,7 +196,11 @@ impl<'a> Stepper<'a> {
         let at = Problem { state, goal, contacts };
         self.tally.evaluations += 1;
         contacts.evaluate(&placement(state, z), self.drive.turns, &mut self.current);
+        let most = self.tally.evaluations + EVALUATIONS * u64::from(self.parameters.newton_iterations);
         for _ in 0..self.parameters.newton_iterations {
+            if self.tally.evaluations >= most {
+                break;
+            }
             self.tally.iterations += 1;
             match self.descend(&at, z) {
                 Descent::Lower(next) => *z = next,
