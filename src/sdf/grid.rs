@@ -107,7 +107,7 @@ impl Field {
             return Estimate { lower_bound: d, value: d };
         }
         let (base, f) = corner(&local, slot);
-        let value = trilinear(&self.corners(base), &f);
+        let value = trilinear(&self.values[base..], &f);
         let boxed = self.bounds.distance(p);
         Estimate { lower_bound: (value - self.error_bound()).max(boxed), value }
     }
@@ -121,7 +121,7 @@ impl Field {
             return f64::from(self.far[brick]);
         }
         let (base, f) = corner(&local, slot);
-        trilinear(&self.corners(base), &f)
+        trilinear(&self.values[base..], &f)
     }
 
     /// The interpolated value at `p` and its exact derivatives. They jump at the faces of cells.
@@ -135,7 +135,7 @@ impl Field {
             return FieldSample::flat(f64::from(self.far[brick]));
         }
         let (base, f) = corner(&local, slot);
-        let mut sample = trilinear_derivatives(&self.corners(base), &f);
+        let mut sample = trilinear_derivatives(&self.values[base..], &f);
         sample.gradient /= self.cell;
         sample.mixed /= self.cell * self.cell;
         sample
@@ -153,7 +153,7 @@ impl Field {
         let (base, f) = corner(&local, slot);
         // Values stand at the band's half-width beyond it; cut off so, distances are still
         // 1-Lipschitz, and the error bound holds for them.
-        let depth = self.error_bound() - trilinear(&self.corners(base), &f);
+        let depth = self.error_bound() - trilinear(&self.values[base..], &f);
         if depth < BAND * self.cell { depth.max(0.0) } else { f64::INFINITY }
     }
 
@@ -171,14 +171,6 @@ impl Field {
         // All corners, the closest first: a cell at the band's edge has nodes beyond it.
         let known = |k: usize| Some(self.nearest[base + CORNERS[closest ^ k]]).filter(|t| *t != FAR_NODE);
         (0..8).find_map(known)
-    }
-
-    /// The values at the corners of the cell whose lowest one is at `base`.
-    #[inline]
-    fn corners(&self, base: usize) -> [f64; 8] {
-        // One check of bounds instead of eight.
-        let cell = &self.values[base..=base + CORNERS[7]];
-        CORNERS.map(|k| f64::from(cell[k]))
     }
 
     /// Brick index and position inside the brick in cells.
@@ -215,22 +207,23 @@ fn corner(local: &Vector3<f64>, slot: u32) -> (usize, Vector3<f64>) {
     (slot as usize * BRICK + (i.z * NODES + i.y) * NODES + i.x, f)
 }
 
-#[inline]
-fn trilinear(c: &[f64; 8], f: &Vector3<f64>) -> f64 {
+fn trilinear(v: &[f32], f: &Vector3<f64>) -> f64 {
+    let c = |k: usize| f64::from(v[CORNERS[k]]);
     let lerp = |a: f64, b: f64, t: f64| a + (b - a) * t;
-    let x0 = lerp(c[0], c[1], f.x);
-    let x1 = lerp(c[2], c[3], f.x);
-    let x2 = lerp(c[4], c[5], f.x);
-    let x3 = lerp(c[6], c[7], f.x);
+    let x0 = lerp(c(0), c(1), f.x);
+    let x1 = lerp(c(2), c(3), f.x);
+    let x2 = lerp(c(4), c(5), f.x);
+    let x3 = lerp(c(6), c(7), f.x);
     lerp(lerp(x0, x1, f.y), lerp(x2, x3, f.y), f.z)
 }
 
 /// Value and derivatives in units of the cell.
-fn trilinear_derivatives(c: &[f64; 8], f: &Vector3<f64>) -> FieldSample {
+fn trilinear_derivatives(v: &[f32], f: &Vector3<f64>) -> FieldSample {
+    let c = |k: usize| f64::from(v[CORNERS[k]]);
     let lerp = |a: f64, b: f64, t: f64| a + (b - a) * t;
     // Differences along x on the four edges, then values on them.
-    let d = [c[1] - c[0], c[3] - c[2], c[5] - c[4], c[7] - c[6]];
-    let x = [c[0] + d[0] * f.x, c[2] + d[1] * f.x, c[4] + d[2] * f.x, c[6] + d[3] * f.x];
+    let d = [c(1) - c(0), c(3) - c(2), c(5) - c(4), c(7) - c(6)];
+    let x = [c(0) + d[0] * f.x, c(2) + d[1] * f.x, c(4) + d[2] * f.x, c(6) + d[3] * f.x];
     let (below, above) = (lerp(x[0], x[1], f.y), lerp(x[2], x[3], f.y));
     let (d_below, d_above) = (lerp(d[0], d[1], f.y), lerp(d[2], d[3], f.y));
     let (y_below, y_above) = (x[1] - x[0], x[3] - x[2]);
