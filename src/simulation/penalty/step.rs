@@ -418,4 +418,20 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn the_least_slope_between_two_is_the_least_in_the_metric() {
+        let matrix = Matrix6::from_diagonal(&Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0));
+        let (a, b) =
+            (Vector6::new(1.0, -1.0, 0.5, 0.2, 0.0, 0.3), Vector6::new(-0.4, 0.9, 0.5, 0.1, 0.2, 0.3));
+        let size = |v: &Vector6<f64>| v.dot(&solved(&matrix, v, true).unwrap());
+        let least = size(&least_between(&matrix, &a, &b, true));
+        for k in 0..=100 {
+            let u = f64::from(k) / 100.0;
+            assert!(least <= size(&(a * u + b * (1.0 - u))) + 1e-12, "{u}");
+        }
+        assert!(least < 0.9 * size(&a).min(size(&b)));
+        // On one side of the other, the nearer end is the least.
+        assert!((least_between(&matrix, &a, &(a * 3.0), true) - a).norm() < 1e-12);
+    }
 }

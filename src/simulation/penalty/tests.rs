@@ -318,6 +318,17 @@ fn newton_converges_in_a_few_iterations() {
     }
 }
 
+/// A square peg that is turned about its axis rests on the rim of its hole, where the slope of the
+/// field jumps from cell to cell: with one slope at a time, most of these steps found no minimum.
+#[test]
+fn newton_finds_minima_where_the_slope_of_the_field_jumps() {
+    for (excess, way) in [(0.02, true), (0.02, false), (-0.05, true), (-0.05, false)] {
+        let (tally, _) = tally(&scene(peg_in_hole(excess)).0, Action::Turn(Axis::Z, way));
+        assert!(tally.steps > 40, "{excess}: {tally:?}");
+        assert!(tally.settled <= 2 && tally.iterations <= 8 * tally.steps, "{excess}: {tally:?}");
+    }
+}
+
 #[test]
 fn a_soft_contact_ends_the_motion_before_it_is_deeper_than_declared() {
     let (scene, verifier) = scene(block_on_plate());
