@@ -15,6 +15,7 @@ mod contacts;
 mod depth;
 mod parameters;
 mod points;
+mod slopes;
 mod step;
 #[cfg(test)]
 mod tests;

@@ -14,6 +14,7 @@ use crate::geometry::{Pose, Shape};
 
 use super::contacts::{Contacts, Evaluation, Placement};
 use super::parameters::PenaltyParameters;
+use super::slopes::{Metric, Slopes};
 
 /// Added to the squared lengths in inertia tensors: bodies without extent across an axis have none.
 const LEAST_INERTIA: f64 = 1e-8;
@@ -27,8 +28,6 @@ const BACKTRACKS: u32 = 6;
 const EVALUATIONS: u64 = 2;
 /// A way shorter than this share is barred.
 const LEAST_SHARE: f64 = 0.01;
-/// Slopes that are combined where the field's slope jumps.
-const MOST_SLOPES: u32 = 6;
 /// Share of the linear forecast by which the energy must fall (Armijo).
 const ENOUGH: f64 = 1e-4;
 
@@ -57,7 +56,7 @@ impl State {
 pub(super) struct Drive {
     pub(super) linear: Vector3<f64>,
     pub(super) angular: Vector3<f64>,
-    /// Whether the body may turn: 6 unknowns instead of 3.
+    /// Whether the body may turn: 6 unknowns instead of 3 (the other 3 are uncoupled then, and 0).
     pub(super) turns: bool,
 }
 
@@ -215,35 +214,38 @@ impl<'a> Stepper<'a> {
         false
     }
 
-    /// One Newton step. Where a face of cells bars the way, slopes on both sides of it are combined
-    /// to the least one (aggregated as in bundle methods, C. Lemaréchal 1975): its direction leads
-    /// along the face, and where it vanishes, the lowest point is on the face.
+    /// One Newton step. Where a face of cells bars the way, the slope behind it is kept too, and the
+    /// next direction leads down both: along the face, or nowhere if the lowest point is on it.
     fn descend(&mut self, at: &Problem<'_>, z: &Vector6<f64>) -> Descent {
-        let turns = self.drive.turns;
         let local = at.goal.local(z, &self.current);
-        let (mut gradient, mut short) = (local.gradient, None);
-        for round in 0..=MOST_SLOPES {
-            let full = solved(&local.hessian, &gradient, turns);
-            let Some(up) = full.or_else(|| solved(&local.gauss, &gradient, turns)) else { break };
+        let Some(metric) = Metric::new(local.hessian).or_else(|| Metric::new(local.gauss)) else {
+            return Descent::Nowhere;
+        };
+        let mut slopes = Slopes::new(metric.scaled(&local.gradient));
+        let (mut short, mut is_first) = (None, true);
+        loop {
+            let slope = slopes.least();
+            let up = metric.step(&slope);
             if self.rigid.travel(&up) <= self.parameters.newton_tolerance {
-                if round == 0 {
+                if is_first {
                     return Descent::Lowest(z - up);
                 }
                 // With a way left towards the face, the lowest point is not here yet.
                 let Some(next) = short else { return Descent::Lowest(*z) };
                 return self.taken(at, next);
             }
-            let found = self.search(at, z, local.energy, gradient.dot(&up), &up);
+            let found = self.search(at, z, local.energy, slope.norm_squared(), &up);
             if found.share >= LEAST_SHARE {
                 return Descent::Lower(z - up * found.share);
             }
             if found.share > 0.0 {
                 short = Some(z - up * found.share);
             }
-            let matrix = if full.is_some() { &local.hessian } else { &local.gauss };
-            gradient = least_between(matrix, &gradient, &found.barred, turns);
+            is_first = false;
+            if !slopes.add(metric.scaled(&found.barred)) {
+                return short.map_or(Descent::Nowhere, |next| self.taken(at, next));
+            }
         }
-        short.map_or(Descent::Nowhere, |next| self.taken(at, next))
     }
 
     /// A step that was found lower before others were tried.
@@ -352,28 +354,6 @@ fn chain(z: &Vector6<f64>) -> Matrix6<f64> {
     chain
 }
 
-/// matrix⁻¹ v in the freedoms that there are; `None` unless the matrix is positive there.
-fn solved(matrix: &Matrix6<f64>, v: &Vector6<f64>, turns: bool) -> Option<Vector6<f64>> {
-    if turns {
-        return Some(Cholesky::new(*matrix)?.solve(v));
-    }
-    let mut out = Vector6::zeros();
-    let part = Cholesky::new(matrix.fixed_view::<3, 3>(0, 0).into_owned())?.solve(&linear(v));
-    out.fixed_rows_mut::<3>(0).copy_from(&part);
-    Some(out)
-}
-
-/// Of all between two slopes, the one that is least in the metric of matrix⁻¹.
-fn least_between(matrix: &Matrix6<f64>, a: &Vector6<f64>, b: &Vector6<f64>, turns: bool) -> Vector6<f64> {
-    let difference = a - b;
-    let Some(scaled) = solved(matrix, &difference, turns) else { return *a };
-    let squared = difference.dot(&scaled);
-    if squared <= 0.0 {
-        return *a;
-    }
-    b + difference * (-b.dot(&scaled) / squared).clamp(0.0, 1.0)
-}
-
 /// The left Jacobian of rotation vectors: exp(θ + dθ) ≈ exp(J dθ) exp(θ).
 fn turn_jacobian(turn: &Vector3<f64>) -> Matrix3<f64> {
     let (angle, cross) = (turn.norm(), turn.cross_matrix());
@@ -417,21 +397,5 @@ mod tests {
                 assert!((between - jacobian.column(a)).norm() < 1e-8, "{between} at {turn}");
             }
         }
-    }
-
-    #[test]
-    fn the_least_slope_between_two_is_the_least_in_the_metric() {
-        let matrix = Matrix6::from_diagonal(&Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0));
-        let (a, b) =
-            (Vector6::new(1.0, -1.0, 0.5, 0.2, 0.0, 0.3), Vector6::new(-0.4, 0.9, 0.5, 0.1, 0.2, 0.3));
-        let size = |v: &Vector6<f64>| v.dot(&solved(&matrix, v, true).unwrap());
-        let least = size(&least_between(&matrix, &a, &b, true));
-        for k in 0..=100 {
-            let u = f64::from(k) / 100.0;
-            assert!(least <= size(&(a * u + b * (1.0 - u))) + 1e-12, "{u}");
-        }
-        assert!(least < 0.9 * size(&a).min(size(&b)));
-        // On one side of the other, the nearer end is the least.
-        assert!((least_between(&matrix, &a, &(a * 3.0), true) - a).norm() < 1e-12);
     }
 }

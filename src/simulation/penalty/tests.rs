@@ -293,6 +293,7 @@ fn tally(scene: &Scene, action: Action) -> (Tally, u64) {
         if stepper.touched()[0] {
             all.steps += 1;
             all.iterations += stepper.tally.iterations;
+            all.evaluations += stepper.tally.evaluations;
             all.settled += stepper.tally.settled;
             most = most.max(stepper.tally.iterations);
         }
@@ -325,7 +326,7 @@ fn newton_finds_minima_where_the_slope_of_the_field_jumps() {
     for (excess, way) in [(0.02, true), (0.02, false), (-0.05, true), (-0.05, false)] {
         let (tally, _) = tally(&scene(peg_in_hole(excess)).0, Action::Turn(Axis::Z, way));
         assert!(tally.steps > 40, "{excess}: {tally:?}");
-        assert!(tally.settled <= 2 && tally.iterations <= 8 * tally.steps, "{excess}: {tally:?}");
+        assert!(tally.settled <= 2 && tally.iterations <= 4 * tally.steps, "{excess}: {tally:?}");
     }
 }
 
