@@ -107,9 +107,21 @@ impl Field {
             return Estimate { lower_bound: d, value: d };
         }
         let (base, f) = corner(&local, slot);
-        let value = trilinear(&self.values[base..], &f);
+        let value = trilinear(self.around(base), &f);
         let boxed = self.bounds.distance(p);
         Estimate { lower_bound: (value - self.error_bound()).max(boxed), value }
+    }
+
+    /// The value of [`Field::sample`], to the bit.
+    #[must_use]
+    pub fn value(&self, p: &Point3<f64>) -> f64 {
+        let Some((brick, local)) = self.locate(p) else { return self.bounds.distance(p) };
+        let slot = self.slots[brick];
+        if slot == EMPTY {
+            return f64::from(self.far[brick]);
+        }
+        let (base, f) = corner(&local, slot);
+        trilinear(self.around(base), &f)
     }
 
     /// The interpolated value at `p` and its exact derivatives. They jump at the faces of cells.
@@ -123,7 +135,7 @@ impl Field {
             return FieldSample::flat(f64::from(self.far[brick]));
         }
         let (base, f) = corner(&local, slot);
-        let mut sample = trilinear_derivatives(&self.values[base..], &f);
+        let mut sample = trilinear_derivatives(self.around(base), &f);
         sample.gradient /= self.cell;
         sample.mixed /= self.cell * self.cell;
         sample
@@ -141,7 +153,7 @@ impl Field {
         let (base, f) = corner(&local, slot);
         // Values stand at the band's half-width beyond it; cut off so, distances are still
         // 1-Lipschitz, and the error bound holds for them.
-        let depth = self.error_bound() - trilinear(&self.values[base..], &f);
+        let depth = self.error_bound() - trilinear(self.around(base), &f);
         if depth < BAND * self.cell { depth.max(0.0) } else { f64::INFINITY }
     }
 
@@ -161,7 +173,15 @@ impl Field {
         (0..8).find_map(known)
     }
 
+    /// The values from the lowest to the highest corner of the cell whose lowest one is at `base`:
+    /// one check of bounds for all eight.
+    #[inline]
+    fn around(&self, base: usize) -> &[f32] {
+        &self.values[base..=base + CORNERS[7]]
+    }
+
     /// Brick index and position inside the brick in cells.
+    #[inline]
     fn locate(&self, p: &Point3<f64>) -> Option<(usize, Vector3<f64>)> {
         let g = (p - self.origin) / (self.cell * CELLS as f64);
         let mut at = [0usize; 3];
@@ -189,12 +209,14 @@ const CORNERS: [usize; 8] = [
 ];
 
 /// Index of the lowest corner of the cell, and the position inside it in 0..=1.
+#[inline]
 fn corner(local: &Vector3<f64>, slot: u32) -> (usize, Vector3<f64>) {
     let i = local.map(|x| (x as usize).min(CELLS - 1));
     let f = Vector3::new(local.x - i.x as f64, local.y - i.y as f64, local.z - i.z as f64);
     (slot as usize * BRICK + (i.z * NODES + i.y) * NODES + i.x, f)
 }
 
+#[inline]
 fn trilinear(v: &[f32], f: &Vector3<f64>) -> f64 {
     let c = |k: usize| f64::from(v[CORNERS[k]]);
     let lerp = |a: f64, b: f64, t: f64| a + (b - a) * t;
@@ -254,7 +276,7 @@ mod tests {
             assert!(points.len() > 500);
             for p in points {
                 let sample = field.sample(&p);
-                assert!((sample.value - field.estimate(&p).value).abs() < 1e-12);
+                assert_eq!((sample.value, sample.value), (field.value(&p), field.estimate(&p).value));
                 let hessian = sample.hessian();
                 for a in 0..3 {
                     let mut h = Vector3::zeros();

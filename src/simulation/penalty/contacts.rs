@@ -206,7 +206,7 @@ impl<'a> Contacts<'a> {
         ] {
             let field = &measured.field;
             points_near(&trees, field, &to_measured, 0.0, |p| {
-                depth = depth.max(-field.estimate(&(to_measured * p)).value);
+                depth = depth.max(-field.value(&(to_measured * p)));
             });
         }
         depth
@@ -226,7 +226,7 @@ impl<'a> Contacts<'a> {
         for group in &self.groups {
             let (view, threshold) = (self.view(group, at), self.threshold(&self.pairs[group.pair]));
             for n in &mut near[group.points.clone()] {
-                n.before = -view.field.sample(&view.measured(&n.point)).value - threshold;
+                n.before = -view.field.value(&view.measured(&n.point)) - threshold;
             }
         }
         self.near = near;
@@ -252,9 +252,10 @@ impl<'a> Contacts<'a> {
     fn add_group(&self, group: &Group, at: &Placement, turns: bool, out: &mut Evaluation) {
         let (view, threshold) = (self.view(group, at), self.threshold(&self.pairs[group.pair]));
         for near in &self.near[group.points.clone()] {
-            let sample = view.field.sample(&view.measured(&near.point));
-            let depth = -sample.value - threshold;
+            let at = view.measured(&near.point);
+            let depth = -view.field.value(&at) - threshold;
             if depth > 0.0 {
+                let sample = view.field.sample(&at);
                 out.touched[group.pair] = true;
                 let law = self.law(depth, near.before);
                 view.add(&near.point, &sample, &law, turns, out);

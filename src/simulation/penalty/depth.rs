@@ -67,9 +67,13 @@ fn is_deeper(sampled: &Body, measured: &Body, to_measured: &Pose, limit: f64) ->
             (),
             |node, ()| {
                 let p = to_measured * node.centre;
-                let outside = || measured.field.estimate(&p).lower_bound > node.radius;
-                let shallow = || measured.field.deepest(&p) + node.radius <= limit;
-                (!found.get() && !outside() && !shallow()).then_some(())
+                // Spheres no larger than the limit are left out by their depth: outside it is 0.
+                let is_left_out = if node.radius > limit {
+                    measured.field.estimate(&p).lower_bound > node.radius
+                } else {
+                    measured.field.deepest(&p) + node.radius <= limit
+                };
+                (!found.get() && !is_left_out).then_some(())
             },
             |sample, ()| {
                 if !found.get() {

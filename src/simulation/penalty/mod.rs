@@ -15,6 +15,7 @@ mod contacts;
 mod depth;
 mod parameters;
 mod points;
+mod slopes;
 mod step;
 #[cfg(test)]
 mod tests;
@@ -186,6 +187,13 @@ impl Run<'_> {
     }
 
     fn ended(self, end: End) -> Motion {
+        tracing::debug!(
+            part = self.contacts.part,
+            tally = ?self.stepper.tally,
+            waypoints = self.path.len(),
+            ?end,
+            "simulated"
+        );
         Motion { path: self.path, end }
     }
 

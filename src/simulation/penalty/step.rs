@@ -5,7 +5,8 @@
 //! `m/(2h²)|Δx − x̂|² + 1/(2h²)(θ − θ̂)ᵀ I (θ − θ̂) + contact energy`, x̂ and θ̂ being where velocity
 //! and action alone would lead; I is the inertia tensor at the start of the step, and the
 //! gyroscopic moment is taken from there too. A minimum is looked for, not any stationary point:
-//! each Newton step goes down, so a field whose slope jumps between cells cannot make it diverge.
+//! each Newton step goes down, so a field whose slope jumps between cells cannot make it diverge,
+//! and a minimum where it jumps is found as well.
 
 use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 
@@ -13,12 +14,20 @@ use crate::geometry::{Pose, Shape};
 
 use super::contacts::{Contacts, Evaluation, Placement};
 use super::parameters::PenaltyParameters;
+use super::slopes::{Metric, Slopes};
 
 /// Added to the squared lengths in inertia tensors: bodies without extent across an axis have none.
 const LEAST_INERTIA: f64 = 1e-8;
 const LEAST_MASS: f64 = 1e-9;
-/// Halvings of a Newton step before it is given up.
-const HALVINGS: u32 = 12;
+/// A Newton step that does not lead down is shortened to this share, so many times at most.
+const BACK: f64 = 0.25;
+const BACKTRACKS: u32 = 6;
+/// Evaluations of a step, per Newton iteration that it may take. Smooth contact needs one each; a
+/// part that is wedged between points whose slopes all jump could go on for hundreds, and gain
+/// millionths.
+const EVALUATIONS: u64 = 2;
+/// A way shorter than this share is barred.
+const LEAST_SHARE: f64 = 0.01;
 /// Share of the linear forecast by which the energy must fall (Armijo).
 const ENOUGH: f64 = 1e-4;
 
@@ -47,7 +56,7 @@ impl State {
 pub(super) struct Drive {
     pub(super) linear: Vector3<f64>,
     pub(super) angular: Vector3<f64>,
-    /// Whether the body may turn: 6 unknowns instead of 3.
+    /// Whether the body may turn: 6 unknowns instead of 3 (the other 3 are uncoupled then, and 0).
     pub(super) turns: bool,
 }
 
@@ -94,13 +103,19 @@ pub(super) struct Step {
     pub(super) state: State,
     /// How far a point of the body can have been displaced.
     pub(super) travel: f64,
-    /// Newton iterations; 0 if nothing was near.
-    #[cfg_attr(not(test), allow(dead_code))]
-    pub(super) iterations: u32,
-    /// Whether the last Newton step was within the tolerance; otherwise it ended where no step led
-    /// further down: the slope of the field jumps there.
-    #[cfg_attr(not(test), allow(dead_code))]
-    pub(super) converged: bool,
+}
+
+/// What steps have cost.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Tally {
+    pub(super) steps: u64,
+    /// Newton iterations; a step with nothing near takes none.
+    pub(super) iterations: u64,
+    /// Evaluations of all contact.
+    pub(super) evaluations: u64,
+    /// Steps whose last Newton step was not within the tolerance: no step led further down, for
+    /// the slope of the field jumps there.
+    pub(super) settled: u64,
 }
 
 /// Makes steps; holds what they need, so that none is allocated for.
@@ -110,12 +125,13 @@ pub(super) struct Stepper<'a> {
     parameters: &'a PenaltyParameters,
     current: Evaluation,
     trial: Evaluation,
+    pub(super) tally: Tally,
 }
 
 impl<'a> Stepper<'a> {
     pub(super) fn new(rigid: Rigid, drive: Drive, parameters: &'a PenaltyParameters, pairs: usize) -> Self {
         let (current, trial) = (Evaluation::new(pairs), Evaluation::new(pairs));
-        Self { rigid, drive, parameters, current, trial }
+        Self { rigid, drive, parameters, current, trial, tally: Tally::default() }
     }
 
     /// Per pair, whether it was in contact at the end of the last step.
@@ -132,11 +148,11 @@ impl<'a> Stepper<'a> {
     pub(super) fn step(&mut self, state: &State, contacts: &Contacts<'_>) -> Step {
         let goal = self.goal(state);
         let mut z = goal.free;
-        let (mut iterations, mut converged) = (0, true);
+        self.tally.steps += 1;
         if contacts.is_empty() {
             self.current.clear();
-        } else {
-            (iterations, converged) = self.minimise(state, &goal, contacts, &mut z);
+        } else if !self.minimise(state, &goal, contacts, &mut z) {
+            self.tally.settled += 1;
         }
         let h = self.parameters.time_step;
         let (dx, turn) = (linear(&z), angular(&z));
@@ -146,7 +162,7 @@ impl<'a> Stepper<'a> {
             after.rotation = UnitQuaternion::from_scaled_axis(turn) * state.rotation;
             after.rotation.renormalize();
         }
-        Step { state: after, travel: self.rigid.travel(&z), iterations, converged }
+        Step { state: after, travel: self.rigid.travel(&z) }
     }
 
     fn goal(&self, state: &State) -> Goal {
@@ -168,59 +184,129 @@ impl<'a> Stepper<'a> {
         Goal { free, weight }
     }
 
-    /// Newton's method from `z`; returns the iterations and whether it converged.
+    /// Newton's method from `z`; returns whether it converged.
     fn minimise(
         &mut self,
         state: &State,
         goal: &Goal,
         contacts: &Contacts<'_>,
         z: &mut Vector6<f64>,
-    ) -> (u32, bool) {
+    ) -> bool {
+        let at = Problem { state, goal, contacts };
+        self.tally.evaluations += 1;
         contacts.evaluate(&placement(state, z), self.drive.turns, &mut self.current);
-        for iteration in 1..=self.parameters.newton_iterations {
-            let local = goal.local(z, &self.current);
-            let mut next = None;
-            // Where the full second derivative leads nowhere, the part of it that is positive does.
-            for matrix in [&local.hessian, &local.gauss] {
-                let Some(direction) = descent(matrix, &local.gradient, self.drive.turns) else { continue };
-                if self.rigid.travel(&direction) <= self.parameters.newton_tolerance {
-                    *z += direction;
-                    return (iteration, true);
-                }
-                next = self.lower(state, goal, contacts, z, &local, &direction);
-                if next.is_some() {
-                    break;
-                }
+        let most = self.tally.evaluations + EVALUATIONS * u64::from(self.parameters.newton_iterations);
+        for _ in 0..self.parameters.newton_iterations {
+            if self.tally.evaluations >= most {
+                break;
             }
-            let Some(next) = next else { return (iteration, false) };
-            *z = next;
+            self.tally.iterations += 1;
+            match self.descend(&at, z) {
+                Descent::Lower(next) => *z = next,
+                Descent::Lowest(last) => {
+                    *z = last;
+                    return true;
+                }
+                Descent::Nowhere => return false,
+            }
             std::mem::swap(&mut self.current, &mut self.trial);
         }
-        (self.parameters.newton_iterations, false)
+        false
     }
 
-    /// The first point of a backtracking line search that is low enough; `trial` belongs to it then.
-    fn lower(
-        &mut self,
-        state: &State,
-        goal: &Goal,
-        contacts: &Contacts<'_>,
-        z: &Vector6<f64>,
-        local: &Local,
-        direction: &Vector6<f64>,
-    ) -> Option<Vector6<f64>> {
-        let slope = local.gradient.dot(direction);
-        let mut share = 1.0;
-        for _ in 0..=HALVINGS {
-            let next = z + direction * share;
-            contacts.evaluate(&placement(state, &next), self.drive.turns, &mut self.trial);
-            if goal.energy(&next, &self.trial) <= local.energy + ENOUGH * share * slope {
-                return Some(next);
+    /// One Newton step. Where a face of cells bars the way, the slope behind it is kept too, and the
+    /// next direction leads down both: along the face, or nowhere if the lowest point is on it.
+    fn descend(&mut self, at: &Problem<'_>, z: &Vector6<f64>) -> Descent {
+        let local = at.goal.local(z, &self.current);
+        let Some(metric) = Metric::new(local.hessian).or_else(|| Metric::new(local.gauss)) else {
+            return Descent::Nowhere;
+        };
+        let mut slopes = Slopes::new(metric.scaled(&local.gradient));
+        let (mut short, mut is_first) = (None, true);
+        loop {
+            let slope = slopes.least();
+            let up = metric.step(&slope);
+            if self.rigid.travel(&up) <= self.parameters.newton_tolerance {
+                if is_first {
+                    return Descent::Lowest(z - up);
+                }
+                // With a way left towards the face, the lowest point is not here yet.
+                let Some(next) = short else { return Descent::Lowest(*z) };
+                return self.taken(at, next);
             }
-            share *= 0.5;
+            let found = self.search(at, z, local.energy, slope.norm_squared(), &up);
+            if found.share >= LEAST_SHARE {
+                return Descent::Lower(z - up * found.share);
+            }
+            if found.share > 0.0 {
+                short = Some(z - up * found.share);
+            }
+            is_first = false;
+            if !slopes.add(metric.scaled(&found.barred)) {
+                return short.map_or(Descent::Nowhere, |next| self.taken(at, next));
+            }
         }
-        None
     }
+
+    /// A step that was found lower before others were tried.
+    fn taken(&mut self, at: &Problem<'_>, next: Vector6<f64>) -> Descent {
+        self.evaluate(at, &next);
+        Descent::Lower(next)
+    }
+
+    /// Backtracks down from `energy` until it is low enough; `trial` belongs to the last try.
+    fn search(
+        &mut self,
+        at: &Problem<'_>,
+        z: &Vector6<f64>,
+        energy: f64,
+        slope: f64,
+        up: &Vector6<f64>,
+    ) -> Found {
+        let mut found = Found { share: 0.0, barred: Vector6::zeros() };
+        let mut share = 1.0;
+        for _ in 0..=BACKTRACKS {
+            let next = z - up * share;
+            self.evaluate(at, &next);
+            if at.goal.energy(&next, &self.trial) <= energy - ENOUGH * share * slope {
+                found.share = share;
+                break;
+            }
+            found.barred = at.goal.gradient(&next, &self.trial);
+            share *= BACK;
+        }
+        found
+    }
+
+    fn evaluate(&mut self, at: &Problem<'_>, z: &Vector6<f64>) {
+        self.tally.evaluations += 1;
+        at.contacts.evaluate(&placement(at.state, z), self.drive.turns, &mut self.trial);
+    }
+}
+
+/// What a line search found.
+struct Found {
+    /// The share of the step that leads low enough; 0 if none does.
+    share: f64,
+    /// The slope at the shortest try that did not.
+    barred: Vector6<f64>,
+}
+
+/// What a step is to minimise.
+struct Problem<'a> {
+    state: &'a State,
+    goal: &'a Goal,
+    contacts: &'a Contacts<'a>,
+}
+
+/// What a Newton step found.
+enum Descent {
+    /// A lower point, which `trial` belongs to.
+    Lower(Vector6<f64>),
+    /// The lowest one, within the tolerance.
+    Lowest(Vector6<f64>),
+    /// No way down, nor that there is none.
+    Nowhere,
 }
 
 /// Where the body would be without contact, and what it costs to be elsewhere.
@@ -243,31 +329,29 @@ impl Goal {
         0.5 * off.dot(&(self.weight * off)) + contact.energy
     }
 
+    fn gradient(&self, z: &Vector6<f64>, contact: &Evaluation) -> Vector6<f64> {
+        self.weight * (z - self.free) + chain(z).transpose() * contact.gradient
+    }
+
     fn local(&self, z: &Vector6<f64>, contact: &Evaluation) -> Local {
-        // exp(θ + dθ) = exp(J dθ) exp(θ): contact is differentiated by the turn J dθ. That J itself
-        // changes with θ adds a term that is smaller by |θ| (0.03 at most) and is left out.
-        let mut chain = Matrix6::identity();
-        chain.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn_jacobian(&angular(z)));
+        let chain = chain(z);
         let back = chain.transpose();
         let gauss = self.weight + back * contact.gauss * chain;
         Local {
             energy: self.energy(z, contact),
-            gradient: self.weight * (z - self.free) + back * contact.gradient,
+            gradient: self.gradient(z, contact),
             hessian: gauss + back * contact.curvature * chain,
             gauss,
         }
     }
 }
 
-/// −matrix⁻¹ gradient in the freedoms that there are; `None` unless the matrix is positive there.
-fn descent(matrix: &Matrix6<f64>, gradient: &Vector6<f64>, turns: bool) -> Option<Vector6<f64>> {
-    if turns {
-        return Some(-Cholesky::new(*matrix)?.solve(gradient));
-    }
-    let mut out = Vector6::zeros();
-    let part = Cholesky::new(matrix.fixed_view::<3, 3>(0, 0).into_owned())?.solve(&linear(gradient));
-    out.fixed_rows_mut::<3>(0).copy_from(&-part);
-    Some(out)
+/// exp(θ + dθ) = exp(J dθ) exp(θ): contact is differentiated by the turn J dθ. That J itself changes
+/// with θ adds a term that is smaller by |θ| (0.03 at most) and is left out of second derivatives.
+fn chain(z: &Vector6<f64>) -> Matrix6<f64> {
+    let mut chain = Matrix6::identity();
+    chain.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn_jacobian(&angular(z)));
+    chain
 }
 
 /// The left Jacobian of rotation vectors: exp(θ + dθ) ≈ exp(J dθ) exp(θ).
