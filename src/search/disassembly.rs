@@ -110,6 +110,28 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         }
     }
 
+    /// Tells how a simulation ended, and the number of the new state that it led to.
+    pub(super) fn trace_simulation(
+        &mut self,
+        state: usize,
+        run: &Run,
+        end: &str,
+        with: &[usize],
+        poses: usize,
+        leads_to: Option<usize>,
+    ) {
+        let Run { part, action, .. } = *run;
+        self.trace(|| TraceEvent::Simulated {
+            state,
+            part,
+            action: action.to_string(),
+            end: end.to_owned(),
+            with: with.to_vec(),
+            poses,
+            leads_to,
+        });
+    }
+
     /// Counts one simulation against the budget.
     pub(super) fn charge(&mut self) -> Result<(), Stop> {
         if let Some(most) = self.problem.max_simulations

@@ -209,7 +209,7 @@ impl Search<'_, '_> {
                 self.disassembly.charge()?;
                 let motion = match motion {
                     Motion { path, end: End::Disassembled(_) } => {
-                        self.trace(at, &run, "disassembled", &[], path.len(), None);
+                        self.disassembly.trace_simulation(at, &run, "disassembled", &[], path.len(), None);
                         match self.disassembly.prove(run, &prefix, path)? {
                             Proof::Path { path, depth } => {
                                 self.remove(part, path, depth);
@@ -244,7 +244,7 @@ impl Search<'_, '_> {
         let reached = path[path.len() - 1];
         let is_new =
             !tree.iter().any(|n| same_state(scene, run.part, &n.path[n.path.len() - 1], &reached, coarse));
-        self.trace(at, run, word, &with, path.len(), is_new.then_some(tree.len()));
+        self.disassembly.trace_simulation(at, run, word, &with, path.len(), is_new.then_some(tree.len()));
         if tree[at].depth == 0 {
             let list = &mut self.stopped_by[run.part];
             list.retain(|(a, _)| *a != action);
@@ -255,26 +255,6 @@ impl Search<'_, '_> {
             let (path, depth) = (joined(&tree[at].path, &path), tree[at].depth + 1);
             tree.push(Node { path, depth });
         }
-    }
-
-    fn trace(
-        &mut self,
-        at: usize,
-        run: &Run,
-        end: &str,
-        with: &[usize],
-        poses: usize,
-        leads_to: Option<usize>,
-    ) {
-        self.disassembly.trace(|| TraceEvent::Simulated {
-            state: at,
-            part: run.part,
-            action: run.action.to_string(),
-            end: end.to_owned(),
-            with: with.to_vec(),
-            poses,
-            leads_to,
-        });
     }
 
     fn phase(&self) -> TracePhase {

@@ -2,9 +2,8 @@
 
 use crate::blocking_graph::Blockage;
 
-use super::disassembly::Run;
 use super::outcome::BlockedAction;
-use super::sbdp::{Job, Search};
+use super::sbdp::Search;
 use super::state::{Phase, coarseness};
 use super::trace::{BlockedBy, TraceEvent};
 
@@ -54,7 +53,7 @@ impl Search<'_, '_> {
     }
 
     /// The number of a state in the trace: 0 is the assembled one.
-    fn state(&self, node: usize) -> usize {
+    pub(super) fn state(&self, node: usize) -> usize {
         if self.nodes[node].is_root() { 0 } else { node + 1 - self.roots }
     }
 
@@ -82,26 +81,5 @@ impl Search<'_, '_> {
         }
         let phase = phase.into();
         self.disassembly.observer.traced(TraceEvent::Expanded { phase, state, part, evaluation, excluded });
-    }
-
-    pub(super) fn trace_simulation(
-        &mut self,
-        job: Job,
-        run: &Run,
-        end: &str,
-        with: &[usize],
-        poses: usize,
-        leads_to: Option<usize>,
-    ) {
-        let state = self.state(job.node);
-        self.disassembly.trace(|| TraceEvent::Simulated {
-            state,
-            part: run.part,
-            action: run.action.to_string(),
-            end: end.to_owned(),
-            with: with.to_vec(),
-            poses,
-            leads_to,
-        });
     }
 }

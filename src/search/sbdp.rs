@@ -43,9 +43,9 @@ impl Gain {
 
 /// One simulation to run.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Job {
-    pub(super) node: usize,
-    pub(super) action: usize,
+struct Job {
+    node: usize,
+    action: usize,
 }
 
 pub(super) struct Search<'a, 'o> {
@@ -363,7 +363,8 @@ impl<'a, 'o> Search<'a, 'o> {
         tracing::debug!(part = run.part, node = job.node, action = %run.action, steps = path.len(), ?end, "simulated");
         let (word, by) = match end {
             End::Disassembled(_) => {
-                self.trace_simulation(job, &run, "disassembled", &[], path.len(), None);
+                let state = self.state(job.node);
+                self.disassembly.trace_simulation(state, &run, "disassembled", &[], path.len(), None);
                 self.take_out(phase, job, path, gain)?;
                 return Ok(true);
             }
@@ -372,7 +373,8 @@ impl<'a, 'o> Search<'a, 'o> {
         };
         let state = path.last().and_then(|end| self.new_state(phase, run.part, end)).is_some();
         let leads_to = state.then_some(self.nodes.len() + 1 - self.roots);
-        self.trace_simulation(job, &run, word, &by, path.len(), leads_to);
+        let from = self.state(job.node);
+        self.disassembly.trace_simulation(from, &run, word, &by, path.len(), leads_to);
         self.block(phase, job, by);
         if state {
             gain.new_states = true;
