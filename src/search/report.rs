@@ -17,7 +17,7 @@ impl Search<'_, '_> {
         format!(
             "{} of {} parts cannot leave one at a time: every state reached was expanded with {} translations \
              and {} actions with rotational freedom ({} states in all, told apart at {:.3} of the longest side \
-             and {:.1} rad), also where static analysis saw no way",
+             and {:.1} rad){}",
             stuck.len(),
             problem.present.len(),
             self.translations.len(),
@@ -25,6 +25,7 @@ impl Search<'_, '_> {
             self.disassembly.counters.states,
             0.05 * coarse / problem.scene.longest_side,
             0.5 * coarse,
+            if self.guided { ", also where static analysis saw no way" } else { "" },
         )
     }
 

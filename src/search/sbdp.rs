@@ -371,12 +371,12 @@ impl<'a, 'o> Search<'a, 'o> {
             End::Collision { with } => ("collision", with),
             End::Undecided { touched, .. } => ("undecided", touched),
         };
-        let state = path.last().and_then(|end| self.new_state(phase, run.part, end)).is_some();
-        let leads_to = state.then_some(self.nodes.len() + 1 - self.roots);
+        let is_new = path.last().is_some_and(|end| self.is_new_state(phase, run.part, end));
+        let leads_to = is_new.then_some(self.nodes.len() + 1 - self.roots);
         let from = self.state(job.node);
         self.disassembly.trace_simulation(from, &run, word, &by, path.len(), leads_to);
         self.block(phase, job, by);
-        if state {
+        if is_new {
             gain.new_states = true;
             let path = joined(&self.nodes[job.node].path, &path);
             let rotation = Blockage::open(self.rotations.len());
@@ -386,13 +386,13 @@ impl<'a, 'o> Search<'a, 'o> {
         Ok(false)
     }
 
-    /// The pose, unless a state of this part is like it (the paper's rmd).
-    fn new_state<'p>(&self, phase: Phase, part: usize, pose: &'p Pose) -> Option<&'p Pose> {
+    /// Whether no state of this part is like a pose (the paper's rmd).
+    fn is_new_state(&self, phase: Phase, part: usize, pose: &Pose) -> bool {
         let coarse = coarseness(self.states_of[part]);
         let scene = &self.disassembly.problem.scene;
         let listed = |n: &&Node| n.alive && n.part == part && self.lists(phase, n);
         let known = |n: &Node| same_state(scene, part, n.pose(), pose, coarse);
-        (!self.nodes.iter().filter(listed).any(known)).then_some(pose)
+        !self.nodes.iter().filter(listed).any(known)
     }
 
     fn block(&mut self, phase: Phase, job: Job, by: Vec<usize>) {
