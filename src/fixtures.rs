@@ -10,7 +10,7 @@ use crate::geometry::{
 };
 use crate::plan::Verifier;
 use crate::sdf::Field;
-use crate::simulation::{Allowances, Body, Scene};
+use crate::simulation::Scene;
 use crate::termination::Termination;
 
 /// The solid made of the filled cells of a grid with the given planes; all its grid faces are there,
@@ -173,19 +173,8 @@ pub(crate) fn scene(meshes: impl IntoIterator<Item = SourceMesh>) -> (Scene, Ver
         .iter()
         .map(|s| Arc::new(Field::build(&s.surface, &Termination::default()).unwrap()))
         .collect();
-    let bodies = assembly.parts.iter().map(|part| Body {
-        shape: Arc::clone(&assembly.shapes[part.shape]),
-        field: Arc::clone(&fields[part.shape]),
-        planning_from_shape: part.planning_from_shape,
-        bounds: part.bounds,
-        extra_samples: Default::default(),
-    });
     let count = assembly.parts.len();
-    let mut scene = Scene {
-        bodies: bodies.collect(),
-        allowances: Allowances::none(count),
-        longest_side: assembly.longest_side(),
-    };
+    let mut scene = Scene::assembled(&assembly, &fields);
     let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
     let verifier = Verifier::new(&assembly.shapes, shape_of, LIMIT);
     for (a, b) in (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))) {

@@ -24,7 +24,8 @@ pub enum TracePhase {
 }
 
 /// One event. Parts are indices into the list in the first one; state 0 is the assembled one,
-/// displaced states count from 1 in the order of their discovery.
+/// displaced states count from 1 in the order of their discovery (in PDP, within the tree of one part,
+/// which begins anew with every depth limit).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum TraceEvent {

@@ -10,7 +10,7 @@ use crate::geometry::{Assembly, Shape};
 use crate::plan::Verifier;
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
-use crate::simulation::{Allowances, Body, Scene};
+use crate::simulation::Scene;
 use crate::termination::{Interrupt, Termination};
 
 /// Overlaps smaller than this share of the longest side are rounding, not modelling.
@@ -41,18 +41,9 @@ impl Prepared {
         let started = Instant::now();
         let fields = build_fields(&assembly.shapes, termination, sink)?;
         let sdf_time = started.elapsed();
-        let bodies = assembly.parts.iter().map(|part| Body {
-            shape: Arc::clone(&assembly.shapes[part.shape]),
-            field: Arc::clone(&fields[part.shape]),
-            planning_from_shape: part.planning_from_shape,
-            bounds: part.bounds,
-            extra_samples: Default::default(),
-        });
-        let longest_side = assembly.longest_side();
-        let allowances = Allowances::none(assembly.parts.len());
-        let mut scene = Scene { bodies: bodies.collect(), allowances, longest_side };
+        let mut scene = Scene::assembled(assembly, &fields);
         let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
-        let verifier = Verifier::new(&assembly.shapes, shape_of, DEPTH_LIMIT * longest_side);
+        let verifier = Verifier::new(&assembly.shapes, shape_of, DEPTH_LIMIT * scene.longest_side);
         let overlaps = measure_overlaps(&scene, &verifier, termination)?;
         for &(a, b, depth) in &overlaps {
             scene.allowances.grant(a, b, depth);

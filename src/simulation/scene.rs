@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use crate::geometry::{Bounds, Closest, Pose, SampleTree, Shape};
+use crate::geometry::{Assembly, Bounds, Closest, Part, Pose, SampleTree, Shape};
 use crate::sdf::Field;
 
 /// A part with its field, at its place.
@@ -81,6 +81,23 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// An assembly with the fields of its shapes, no overlap granted.
+    #[must_use]
+    pub fn assembled(assembly: &Assembly, fields: &[Arc<Field>]) -> Self {
+        let body = |part: &Part| Body {
+            shape: Arc::clone(&assembly.shapes[part.shape]),
+            field: Arc::clone(&fields[part.shape]),
+            planning_from_shape: part.planning_from_shape,
+            bounds: part.bounds,
+            extra_samples: SampleTree::default(),
+        };
+        Self {
+            bodies: assembly.parts.iter().map(body).collect(),
+            allowances: Allowances::none(assembly.parts.len()),
+            longest_side: assembly.longest_side(),
+        }
+    }
+
     /// The middle of a part's box at the assembled pose, in its shape's frame: the point that moves
     /// on a line between the waypoints of a plan.
     #[must_use]
