@@ -35,6 +35,7 @@ fn request(folder: &Path, assemblies: &[&str]) -> Request {
         timeout: Duration::from_secs(7200),
         path_timeout: Duration::from_secs(360),
         actions: "paper",
+        dbg: "sliding",
         grace: Duration::from_secs(7200),
         threads: 0,
         jobs: 1,

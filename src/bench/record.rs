@@ -22,12 +22,19 @@ pub struct Settings {
     pub path_timeout_s: f64,
     /// The action set of all planners.
     pub actions: String,
+    /// How blocking graphs were begun.
+    #[serde(default = "before_there_was_a_choice")]
+    pub dbg: String,
     /// Threads of each run; 0 for all processors.
     pub threads: u32,
     /// How many runs went on at a time.
     pub jobs: usize,
     /// How many processors the machine has.
     pub processors: usize,
+}
+
+fn before_there_was_a_choice() -> String {
+    "sliding".to_owned()
 }
 
 impl Settings {
@@ -40,6 +47,7 @@ impl Settings {
                 s.timeout_s.to_bits(),
                 s.path_timeout_s.to_bits(),
                 s.actions.clone(),
+                s.dbg.clone(),
                 s.threads,
             )
         };
@@ -56,10 +64,10 @@ impl Settings {
 impl std::fmt::Display for Settings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let threads = if self.threads == 0 { "all".to_owned() } else { self.threads.to_string() };
-        let Self { version, build, timeout_s, path_timeout_s, actions, .. } = self;
+        let Self { version, build, timeout_s, path_timeout_s, actions, dbg, .. } = self;
         write!(
             f,
-            "version {version}, build {build}, timeout {timeout_s} s ({path_timeout_s} s per path), actions {actions}, threads {threads}"
+            "version {version}, build {build}, timeout {timeout_s} s ({path_timeout_s} s per path), actions {actions}, dbg {dbg}, threads {threads}"
         )
     }
 }

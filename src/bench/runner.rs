@@ -97,7 +97,7 @@ impl Runner<'_> {
         command.args(["--planner", job.planner, "--engine", job.engine]);
         command.args(["--timeout", &self.timeout.as_secs_f64().to_string()]);
         command.args(["--path-timeout", &self.settings.path_timeout_s.to_string()]);
-        command.args(["--actions", &self.settings.actions]);
+        command.args(["--actions", &self.settings.actions, "--dbg", &self.settings.dbg]);
         if self.settings.threads > 0 {
             command.args(["--threads", &self.settings.threads.to_string()]);
         }

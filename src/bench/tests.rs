@@ -35,6 +35,7 @@ fn record(problem: (&str, usize), planner: &str, end: End) -> Record {
             timeout_s: 100.0,
             path_timeout_s: 360.0,
             actions: "paper".to_owned(),
+            dbg: "sliding".to_owned(),
             threads: 0,
             jobs: 1,
             processors: 2,

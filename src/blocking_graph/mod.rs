@@ -6,8 +6,9 @@
 
 mod audit;
 mod blockage;
+mod literal;
 mod static_analysis;
 
 pub use audit::{Audit, audit};
 pub use blockage::{Blockage, Evaluation};
-pub use static_analysis::{blocked_from, initial_blockages};
+pub use static_analysis::{StaticAnalysis, blocked_from, initial_blockages};

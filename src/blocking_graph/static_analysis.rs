@@ -1,10 +1,10 @@
 //! Static analysis: blocking relations of pairs, before anything is simulated.
 //!
 //! The paper tests whether vertices that are pushed a few steps along a direction come to lie
-//! inside another part. Taken literally that blocks tilted pegs and press fits in all six
-//! directions. Here an edge is added only if contact with the other part alone lets the wanted motion
-//! come to almost nothing, so nothing that could slide is excluded. The relation is symmetric:
-//! p is blocked by o along d exactly if o is blocked by p along −d.
+//! inside another part. Taken literally (see `literal`) that blocks tilted pegs and press fits in
+//! all six directions. By default an edge is added only if contact with the other part alone lets
+//! the wanted motion come to almost nothing, so nothing that could slide is excluded. The relation
+//! is symmetric: p is blocked by o along d exactly if o is blocked by p along −d.
 
 use rayon::prelude::*;
 
@@ -12,7 +12,48 @@ use crate::geometry::Pose;
 use crate::simulation::{Action, Scene, pair_blocks};
 use crate::termination::{Interrupt, Termination};
 
-use super::Blockage;
+use super::{Blockage, literal};
+
+/// When one part counts as blocked by another, before anything is simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum StaticAnalysis {
+    /// If contact with the other part alone brings the wanted motion to almost nothing.
+    #[default]
+    Sliding,
+    /// If a vertex, pushed a few steps, gets inside: the paper's rule, taken literally.
+    Paper,
+}
+
+impl StaticAnalysis {
+    /// All rules.
+    pub const ALL: [Self; 2] = [Self::Sliding, Self::Paper];
+
+    /// The name on the command line and in records.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sliding => "sliding",
+            Self::Paper => "paper",
+        }
+    }
+
+    /// For each translation, whether `other` blocks `part` at a pose. `least` is the travel that
+    /// counts as motion.
+    fn pair_blocks(
+        self,
+        scene: &Scene,
+        part: usize,
+        pose: &Pose,
+        other: usize,
+        translations: &[Action],
+        least: f64,
+    ) -> Vec<bool> {
+        match self {
+            Self::Sliding => pair_blocks(scene, part, pose, other, translations, least),
+            Self::Paper => literal::pair_blocks(scene, part, pose, other, translations),
+        }
+    }
+}
 
 /// Blockages of all present parts at their assembled poses, for the six translations (in opposite
 /// pairs: action `a ^ 1` is the reverse of `a`). One entry per part; absent parts stay open.
@@ -20,6 +61,7 @@ use super::Blockage;
 /// # Errors
 /// The termination condition became true.
 pub fn initial_blockages(
+    rule: StaticAnalysis,
     scene: &Scene,
     present: &[usize],
     translations: &[Action],
@@ -40,7 +82,7 @@ pub fn initial_blockages(
             let smaller = scene.bodies[p].bounds.extents().max() <= scene.bodies[o].bounds.extents().max();
             let (mover, other) = if smaller { (p, o) } else { (o, p) };
             let pose = scene.bodies[mover].planning_from_shape;
-            Ok((mover, other, pair_blocks(scene, mover, &pose, other, translations, least(mover))))
+            Ok((mover, other, rule.pair_blocks(scene, mover, &pose, other, translations, least(mover))))
         })
         .collect::<Result<Vec<_>, Interrupt>>()?;
     let mut out = vec![Blockage::open(translations.len()); scene.bodies.len()];
@@ -56,6 +98,7 @@ pub fn initial_blockages(
 /// The blockage of one displaced part among the parts that stand.
 #[must_use]
 pub fn blocked_from(
+    rule: StaticAnalysis,
     scene: &Scene,
     standing: &[usize],
     part: usize,
@@ -66,7 +109,7 @@ pub fn blocked_from(
     let mut out = Blockage::open(translations.len());
     let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(NEAR);
     for &other in standing.iter().filter(|&&o| scene.bodies[o].bounds.meets(&bounds)) {
-        let blocked = pair_blocks(scene, part, pose, other, translations, least);
+        let blocked = rule.pair_blocks(scene, part, pose, other, translations, least);
         for a in (0..translations.len()).filter(|&a| blocked[a]) {
             out.block_single(a, other);
         }
@@ -93,11 +136,12 @@ mod tests {
     const UP: usize = 4;
     const DOWN: usize = 5;
     const LEAST: f64 = 0.05;
+    const RULE: StaticAnalysis = StaticAnalysis::Sliding;
 
     fn initial(scene: &Scene) -> Vec<Blockage> {
         let all: Vec<_> = (0..scene.bodies.len()).collect();
         let translations = Action::translations();
-        initial_blockages(scene, &all, &translations, &|_| LEAST, &Termination::default()).unwrap()
+        initial_blockages(RULE, scene, &all, &translations, &|_| LEAST, &Termination::default()).unwrap()
     }
 
     fn open(b: &Blockage) -> Vec<usize> {
@@ -177,7 +221,8 @@ mod tests {
         let (scene, _) = scene([plate, block, cuboid([3.0, 3.0, 1.0], [4.0, 4.0, 2.0])]);
         assert_eq!(open(&initial(&scene)[2]).len(), 6);
         let t = Termination::default();
-        let without = initial_blockages(&scene, &[1, 2], &Action::translations(), &|_| LEAST, &t).unwrap();
+        let without =
+            initial_blockages(RULE, &scene, &[1, 2], &Action::translations(), &|_| LEAST, &t).unwrap();
         assert!(without.iter().all(|b| open(b).len() == 6));
     }
 
@@ -186,7 +231,7 @@ mod tests {
         let (scene, _) = scene(peg_in_hole(0.0));
         let blockage = |lift: f64| {
             let pose = Pose::translation(0.0, 0.0, lift) * scene.bodies[1].planning_from_shape;
-            blocked_from(&scene, &[0], 1, &pose, &Action::translations(), LEAST)
+            blocked_from(RULE, &scene, &[0], 1, &pose, &Action::translations(), LEAST)
         };
         assert_eq!(open(&blockage(0.0)), [UP]);
         assert_eq!(open(&blockage(1.0)), [UP, DOWN], "half-way out there is room below");
@@ -199,7 +244,7 @@ mod tests {
         let [plate, block] = block_on_plate();
         let (scene, _) = scene([plate, block, cuboid([1.0, -1.0, 0.0], [2.0, 1.0, 1.0])]);
         let pose = scene.bodies[1].planning_from_shape;
-        let there = blocked_from(&scene, &[0, 2], 1, &pose, &Action::translations(), LEAST);
+        let there = blocked_from(RULE, &scene, &[0, 2], 1, &pose, &Action::translations(), LEAST);
         let initially = &initial(&scene)[1];
         for a in 0..6 {
             assert_eq!(there.blockers(a), initially.blockers(a), "action {a}");
@@ -211,7 +256,8 @@ mod tests {
         let (scene, _) = scene(block_on_plate());
         let termination = Termination::default();
         termination.cancel_flag().store(true, Ordering::Relaxed);
-        let ended = initial_blockages(&scene, &[0, 1], &Action::translations(), &|_| LEAST, &termination);
+        let ended =
+            initial_blockages(RULE, &scene, &[0, 1], &Action::translations(), &|_| LEAST, &termination);
         assert_eq!(ended.err(), Some(Interrupt::Cancelled));
     }
 }

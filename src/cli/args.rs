@@ -8,6 +8,7 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::bench::{ENGINES, PLANNERS, Shard};
+use crate::blocking_graph::StaticAnalysis;
 use crate::search;
 
 /// Plans how assemblies come apart.
@@ -56,6 +57,10 @@ pub(super) struct PlanArguments {
     /// Which actions [default: extended for sbdp-star, paper for all other planners]
     #[arg(long, value_enum)]
     pub(super) actions: Option<Actions>,
+    /// How blocking graphs are begun, before anything is simulated; plans in this process
+    /// [default: sliding]
+    #[arg(long, value_enum, conflicts_with = "daemon")]
+    pub(super) dbg: Option<Dbg>,
     /// Answer after so many seconds with what is there
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) timeout: Option<Duration>,
@@ -102,6 +107,9 @@ pub(super) struct CheckArguments {
     /// graphs exclude
     #[arg(long)]
     pub(super) graphs: bool,
+    /// Of which blocking graphs
+    #[arg(long, value_enum, default_value_t, requires = "graphs")]
+    pub(super) dbg: Dbg,
 }
 
 /// Arguments of `sbdp explain`.
@@ -153,6 +161,9 @@ pub(super) struct BenchRun {
     /// Which actions all planners have
     #[arg(long, value_enum, default_value = "paper")]
     pub(super) actions: Actions,
+    /// How blocking graphs are begun, before anything is simulated
+    #[arg(long, value_enum, default_value_t)]
+    pub(super) dbg: Dbg,
     /// Where results, tables and figures go; a benchmark that was interrupted goes on there
     #[arg(long, value_name = "DIR", required = true)]
     pub(super) out: PathBuf,
@@ -239,6 +250,25 @@ impl From<Actions> for search::ActionSet {
         match actions {
             Actions::Paper => Self::Paper,
             Actions::Extended => Self::Extended,
+        }
+    }
+}
+
+/// How blocking graphs are begun.
+#[derive(Debug, Clone, Copy, Default, ValueEnum)]
+pub(super) enum Dbg {
+    /// An edge where contact with the other part alone lets a part hardly move
+    #[default]
+    Sliding,
+    /// The paper's rule, taken literally: an edge where a vertex, pushed a little, gets inside
+    Paper,
+}
+
+impl From<Dbg> for StaticAnalysis {
+    fn from(dbg: Dbg) -> Self {
+        match dbg {
+            Dbg::Sliding => Self::Sliding,
+            Dbg::Paper => Self::Paper,
         }
     }
 }

@@ -13,6 +13,7 @@ use super::args::{BenchArguments, BenchCommand, BenchReport, BenchRun};
 use super::error::CliError;
 use super::{interrupt, print};
 use crate::bench::{self, Observer, Record, Request, Shard};
+use crate::blocking_graph::StaticAnalysis;
 use crate::search;
 
 /// This very file, also after a newer build took its place: one benchmark is of one build.
@@ -51,6 +52,7 @@ fn request(arguments: &BenchRun) -> Request {
         timeout: arguments.timeout,
         path_timeout: arguments.path_timeout,
         actions: search::ActionSet::from(arguments.actions).name(),
+        dbg: StaticAnalysis::from(arguments.dbg).name(),
         grace: bench::grace(arguments.timeout),
         threads: arguments.threads,
         jobs: arguments.jobs.get(),

@@ -33,7 +33,7 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
     if arguments.graphs {
         let termination = Termination::default();
         interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
-        match service.audit(admission.id, Engine::default(), &termination)? {
+        match service.audit(admission.id, Engine::default(), arguments.dbg.into(), &termination)? {
             Some(audit) => text.push_str(&graphs(&audit, name)),
             None => return Err(CliError::Failed("interrupted".to_owned())),
         }

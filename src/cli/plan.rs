@@ -41,6 +41,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         planner,
         engine: arguments.engine.into(),
         actions: arguments.actions.map_or_else(|| planner.default_actions(), Into::into),
+        static_analysis: arguments.dbg.map(Into::into).unwrap_or_default(),
         max_simulations: arguments.max_simulations,
         path_timeout: arguments.path_timeout,
         penalty: penalty(&arguments.penalty)?,
@@ -63,8 +64,10 @@ fn penalty(given: &[String]) -> Result<PenaltyParameters, CliError> {
 
 /// The daemon if one runs, else this process; or what the user insists on.
 fn choose_backend(arguments: &PlanArguments) -> Result<Box<dyn Backend>, CliError> {
-    let only_here =
-        arguments.trace.is_some() || arguments.path_timeout.is_some() || !arguments.penalty.is_empty();
+    let only_here = arguments.trace.is_some()
+        || arguments.path_timeout.is_some()
+        || arguments.dbg.is_some()
+        || !arguments.penalty.is_empty();
     if arguments.embedded || only_here {
         return Ok(Box::<Embedded>::default());
     }

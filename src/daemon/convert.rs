@@ -7,6 +7,7 @@ use sbdp_ipc::plan as wire;
 use sbdp_ipc::progress::{ProgressSample, STAGE_SDF, STAGE_SEARCH};
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts};
 
+use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::{SourceAssembly, SourceMesh, SourcePart};
 use crate::plan::{MotionKind, Plan, PlanStats, PlanStatus, PlanStep};
 use crate::search::{ActionSet, Engine, PlanRequest, Planner, Progress, Stage};
@@ -25,6 +26,7 @@ pub(crate) fn plan_request(
         actions: actions(request.actions)?,
         max_simulations: request.max_simulations,
         path_timeout: None,
+        static_analysis: StaticAnalysis::default(),
         penalty: PenaltyParameters::default(),
         threads: threads(request.threads as usize, most_threads),
         fixed: indices(&request.fixed),

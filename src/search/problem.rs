@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use nalgebra::Point3;
 
+use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::{Pose, SampleTree};
 use crate::plan::{Entry, Verifier, thinned};
 use crate::simulation::{Action, Scene, TransitionFunction};
@@ -48,6 +49,8 @@ pub struct Problem<'a> {
     pub targets: Option<Vec<usize>>,
     /// Which actions are used.
     pub actions: ActionSet,
+    /// How blocking graphs are begun.
+    pub static_analysis: StaticAnalysis,
     /// Simulations after which to give up.
     pub max_simulations: Option<u64>,
     /// Simulations that an earlier search of the same question has used up.

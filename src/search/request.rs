@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::blocking_graph::StaticAnalysis;
 use crate::simulation::PenaltyParameters;
 
 /// Which search runs.
@@ -105,6 +106,8 @@ pub struct PlanRequest {
     pub penalty: PenaltyParameters,
     /// Which actions.
     pub actions: ActionSet,
+    /// How blocking graphs are begun, before anything is simulated.
+    pub static_analysis: StaticAnalysis,
     /// Simulations after which the search gives up with `partial`.
     pub max_simulations: Option<u64>,
     /// Time after which one motion, or the search for one part, is given up (the paper's path

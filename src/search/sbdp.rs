@@ -127,11 +127,12 @@ impl<'a, 'o> Search<'a, 'o> {
     }
 
     fn make_roots(&mut self) -> Result<(), Stop> {
-        let Problem { scene, present, termination, .. } = &self.disassembly.problem;
+        let Problem { scene, present, static_analysis, termination, .. } = &self.disassembly.problem;
         let blockages = if self.guided {
             let started = Instant::now();
             let least = |part| least_travel(scene, part);
-            let found = initial_blockages(scene, present, &self.translations, &least, termination)?;
+            let found =
+                initial_blockages(*static_analysis, scene, present, &self.translations, &least, termination)?;
             self.disassembly.counters.static_analysis += started.elapsed();
             found
         } else {
@@ -224,7 +225,8 @@ impl<'a, 'o> Search<'a, 'o> {
             return Ok(());
         }
         let started = Instant::now();
-        let (scene, nodes) = (&self.disassembly.problem.scene, &self.nodes);
+        let (problem, nodes) = (&self.disassembly.problem, &self.nodes);
+        let (scene, rule) = (&problem.scene, problem.static_analysis);
         let standing: Vec<_> = todo.iter().map(|&i| self.disassembly.standing(nodes[i].part)).collect();
         let (translations, termination) = (&self.translations, &self.disassembly.problem.termination);
         let found = todo
@@ -234,7 +236,7 @@ impl<'a, 'o> Search<'a, 'o> {
                 termination.check()?;
                 let node = &nodes[i];
                 let least = least_travel(scene, node.part);
-                Ok(blocked_from(scene, &standing, node.part, node.pose(), translations, least))
+                Ok(blocked_from(rule, scene, &standing, node.part, node.pose(), translations, least))
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
         for (&i, blockage) in todo.iter().zip(found) {

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use super::*;
+use crate::blocking_graph::StaticAnalysis;
 use crate::fixtures::{cells, scene};
 use crate::geometry::SourceMesh;
 use crate::plan::{PlanStatus, Verifier};
@@ -64,6 +65,7 @@ fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
         fixed: Vec::new(),
         targets: None,
         actions: ActionSet::Paper,
+        static_analysis: StaticAnalysis::default(),
         max_simulations: None,
         spent: 0,
         path_timeout: None,

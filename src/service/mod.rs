@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
-use crate::blocking_graph::{Audit, audit};
+use crate::blocking_graph::{Audit, StaticAnalysis, audit};
 use crate::geometry::{Assembly, GeometryError, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, PlanStatus, Warning};
 use crate::search::{
@@ -139,6 +139,7 @@ impl Service {
         &self,
         id: AssemblyId,
         engine: Engine,
+        rule: StaticAnalysis,
         termination: &Termination,
     ) -> Result<Option<Audit>, ServiceError> {
         let entry = self.entry(id)?;
@@ -147,7 +148,7 @@ impl Service {
         let present: Vec<usize> = (0..scene.bodies.len()).collect();
         let least = |part| least_travel(scene, part);
         let engine = engine_of(engine, PenaltyParameters::default());
-        Ok(audit(scene, &present, &*engine, &least, termination).ok())
+        Ok(audit(rule, scene, &present, &*engine, &least, termination).ok())
     }
 
     fn entry(&self, id: AssemblyId) -> Result<Arc<Entry>, ServiceError> {
@@ -224,6 +225,7 @@ impl Entry {
             fixed: frame.fixed.clone(),
             targets: request.targets.clone(),
             actions: request.actions,
+            static_analysis: request.static_analysis,
             max_simulations: request.max_simulations,
             spent: 0,
             path_timeout: request.path_timeout,
