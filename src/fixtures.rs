@@ -97,6 +97,45 @@ pub(crate) fn rod(radius: f64, z: [f64; 2], count: u32) -> SourceMesh {
     mesh
 }
 
+/// A bolt along z with a rounded thread over its whole length of 6, and a nut of height 1 that has
+/// so many turns to go before it is off: right-handed, with a play of 0.03 everywhere.
+pub(crate) fn thread(turns: f64, pitch: f64) -> [SourceMesh; 2] {
+    const LENGTH: f64 = 6.0;
+    const PLAY: f64 = 0.03;
+    let wave = |angle: f64, z: f64| 1.0 + 0.1 * (std::f64::consts::TAU * z / pitch - angle).sin();
+    let bolt = revolved([0.0, LENGTH], pitch / 8.0, &[&|_, _| 0.0, &wave]);
+    let low = LENGTH - turns * pitch;
+    let nut = revolved([low, low + 1.0], pitch / 8.0, &[&|a, z| wave(a, z) + PLAY, &|_, _| 1.8]);
+    [bolt, nut]
+}
+
+/// The solid about z between an inner and an outer radius that depend on angle and height, in
+/// rows of a given height; an inner radius of zero means none.
+fn revolved(z: [f64; 2], row: f64, radii: &[&dyn Fn(f64, f64) -> f64; 2]) -> SourceMesh {
+    const SIDES: u32 = 24;
+    let rows = ((z[1] - z[0]) / row).round() as u32;
+    let mut mesh = SourceMesh::default();
+    for j in 0..=rows {
+        let height = z[0] + (z[1] - z[0]) * f64::from(j) / f64::from(rows);
+        for i in 0..SIDES {
+            let angle = std::f64::consts::TAU * f64::from(i) / f64::from(SIDES);
+            let at = radii.map(|r| r(angle, height));
+            mesh.vertices.extend(at.map(|r| [r * angle.cos(), r * angle.sin(), height]));
+        }
+    }
+    let vertex = |i: u32, j: u32, side: u32| 2 * (j * SIDES + i % SIDES) + side;
+    for i in 0..SIDES {
+        let mut quad = |[a, b, c, d]: [u32; 4]| mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        for j in 0..rows {
+            quad([vertex(i, j, 1), vertex(i + 1, j, 1), vertex(i + 1, j + 1, 1), vertex(i, j + 1, 1)]);
+            quad([vertex(i, j, 0), vertex(i, j + 1, 0), vertex(i + 1, j + 1, 0), vertex(i + 1, j, 0)]);
+        }
+        quad([vertex(i, 0, 0), vertex(i + 1, 0, 0), vertex(i + 1, 0, 1), vertex(i, 0, 1)]);
+        quad([vertex(i, rows, 1), vertex(i + 1, rows, 1), vertex(i + 1, rows, 0), vertex(i, rows, 0)]);
+    }
+    mesh
+}
+
 /// A ball of radius 1, its octahedron's faces split `rounds` times.
 pub(crate) fn ball(rounds: u32) -> SourceMesh {
     let mut vertices: Vec<[f64; 3]> = vec![

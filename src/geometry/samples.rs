@@ -33,6 +33,8 @@ pub struct Node {
     end: u32,
     /// Index of the right child (the left one follows its parent); 0 for a leaf.
     right: u32,
+    /// Index of the node after this subtree.
+    after: u32,
 }
 
 /// Samples of one surface.
@@ -102,6 +104,26 @@ impl SampleTree {
                 stack.push((i + 1, known));
             }
         }
+    }
+}
+
+impl SampleTree {
+    /// Whether any sample passes a test, of the nodes that are entered.
+    #[must_use]
+    pub fn any(&self, enter: impl Fn(&Node) -> bool, test: impl Fn(&Point3<f64>) -> bool) -> bool {
+        let mut next = 0;
+        while next < self.nodes.len() {
+            let node = &self.nodes[next];
+            if !enter(node) {
+                next = node.after as usize;
+                continue;
+            }
+            if node.right == 0 && self.points[node.start as usize..node.end as usize].iter().any(&test) {
+                return true;
+            }
+            next += 1;
+        }
+        false
     }
 }
 
@@ -205,7 +227,14 @@ fn build(points: &mut [Point3<f64>], offset: usize, end: usize, nodes: &mut Vec<
     let bounds = super::Bounds::of(slice.iter());
     let centre = bounds.centre();
     let radius = slice.iter().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
-    nodes.push(Node { centre, radius, start: offset as u32, end: end as u32, right: 0 });
+    nodes.push(Node {
+        centre,
+        radius,
+        start: offset as u32,
+        end: end as u32,
+        right: 0,
+        after: me as u32 + 1,
+    });
     if slice.len() <= LEAF {
         return;
     }
@@ -221,6 +250,7 @@ fn build(points: &mut [Point3<f64>], offset: usize, end: usize, nodes: &mut Vec<
     build(points, offset, offset + mid, nodes);
     nodes[me].right = nodes.len() as u32;
     build(points, offset + mid, end, nodes);
+    nodes[me].after = nodes.len() as u32;
 }
 
 #[cfg(test)]

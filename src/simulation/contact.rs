@@ -100,6 +100,28 @@ impl<'a> Mover<'a> {
         near.contacts.extend(theirs.contacts);
     }
 
+    /// Whether the fields alone show that a sample of either surface is deeper than granted: deeper
+    /// than they can be wrong by. Measures nothing exactly, so it is quick.
+    pub(super) fn clearly_enters(&self, standing: &[usize]) -> bool {
+        let bounds = self.body.shape.bounds().transformed(&self.pose);
+        let inside = |sampled: &Body, measured: &Body, to_measured: &Pose, allowance: f64| {
+            let field = &measured.field;
+            let limit = -allowance - field.error_bound();
+            sampled.shape.samples.any(
+                |node| field.value(&(to_measured * node.centre)) - node.radius < limit,
+                |sample| field.value(&(to_measured * sample)) < limit,
+            )
+        };
+        standing.iter().any(|&other| {
+            let still = &self.scene.bodies[other];
+            let allowance = self.scene.allowances.of(self.part, other);
+            let to_still = still.planning_from_shape.inverse() * self.pose;
+            bounds.meets(&still.bounds)
+                && (inside(self.body, still, &to_still, allowance)
+                    || inside(still, self.body, &to_still.inverse(), allowance))
+        })
+    }
+
     /// The gap of a contact's sample with the mover at its pose, if still below `reach`.
     pub(super) fn remeasured(&self, contact: &Contact, reach: f64) -> Option<Contact> {
         let standing = &self.scene.bodies[contact.other];

@@ -245,6 +245,23 @@ fn a_tilted_block_slides_down_to_the_stop() {
 }
 
 #[test]
+fn a_part_falls_into_the_pit_that_it_slides_over() {
+    // A long slide on a ramp at 45 degrees, then a pit a fifth longer than the block.
+    let turn = Pose::rotation(Vector3::new(0.0, std::f64::consts::FRAC_PI_4, 0.0));
+    let ramp = cells([&[-3.0, 2.0, 3.2, 4.5], &[-2.0, 2.0], &[-1.5, -0.6, 0.0]], |c| c != [1, 0, 1]);
+    let block = cuboid([-2.0, -0.5, 0.0], [-1.0, 0.5, 0.8]);
+    let case = Case::new("pit", [ramp, block].map(|m| moved(m, &turn)));
+    for engine in *ENGINES {
+        let motion = case.motion(engine, DOWN);
+        assert_eq!(motion.end, End::Collision { with: vec![0] });
+        let last = motion.path[motion.path.len() - 1];
+        let travel = turn.inverse() * (last.translation.vector - case.assembled().translation.vector);
+        let expected = Vector3::new(4.2, 0.0, -0.6);
+        assert!((travel - expected).norm() < 2.0 * play(engine), "{}: {travel}", engine.name());
+    }
+}
+
+#[test]
 fn the_same_input_gives_the_same_motion_to_the_bit() {
     let actions: Vec<_> = [
         UP,

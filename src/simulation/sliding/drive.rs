@@ -1,23 +1,19 @@
-//! The engine `sliding`: motion in the limit of no inertia.
+//! One step of a motion: the wanted twist, projected until nothing enters.
 //!
-//! At each step the wanted twist is projected onto what contact allows, in the metric of the
-//! part's mass (rotation weighed by the squared radius of gyration), and the pose advances by the
-//! result. Linear constraints are exact only at the pose where they were made, so the result is
-//! checked at the trial pose against the triangles; what enters there adds constraints linearised
-//! at that pose, and the step is projected again (sequential quadratic programming); a step
-//! that still enters is halved. In free space the step is the certified clearance.
+//! Linear constraints are exact only at the pose where they were made, so the result of a
+//! projection is checked at the trial pose against the triangles; what enters there adds
+//! constraints linearised at that pose, and the step is projected again (sequential quadratic
+//! programming); a step that still enters is halved.
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::geometry::{Pose, interpolate};
-use crate::termination::{Interrupt, Termination};
 
-use super::contact::{Contact, Mover, Near, reduced};
-use super::projection::{Projected, Row, project};
-use super::{Action, End, Motion, Scene, Surroundings, TransitionFunction, exit_direction};
+use super::super::contact::{Contact, Mover, Near, reduced};
+use super::super::projection::{Projected, Row, project};
+use super::super::{Action, Scene};
+use super::DEPTH_TOLERANCE;
 
-/// A pair may get this much deeper than its allowance, in the planning frame.
-const DEPTH_TOLERANCE: f64 = 3e-4;
 /// A motion that follows less than this share of the action (cos² of the angle between them) is
 /// stuck.
 const LEAST_SHARE: f64 = 0.05;
@@ -32,167 +28,39 @@ const BULGE_TOLERANCE: f64 = 2.0 * DEPTH_TOLERANCE;
 const LONGEST_FREE_TURN: f64 = 4.0;
 const EAGER_ROUNDS: usize = 6;
 const LAZY_ROUNDS: usize = 12;
-/// Steps that the static analysis of a pair looks ahead (the paper's five extensions).
-const STATIC_STEPS: usize = 5;
 const HALVINGS: usize = 3;
-const MOST_STEPS: usize = 8000;
-/// Travel per turn below which a turning part is going nowhere.
-const LEAST_TRAVEL: f64 = 0.01;
+/// Pressed is what holds back more than this share of the wanted motion (in its square).
+const LEAST_PRESSURE: f64 = 1e-4;
 
-/// The engine.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct SlidingEngine;
-
-impl TransitionFunction for SlidingEngine {
-    fn name(&self) -> &'static str {
-        "sliding"
-    }
-
-    fn depth_tolerance(&self) -> f64 {
-        DEPTH_TOLERANCE
-    }
-
-    fn simulate(
-        &self,
-        scene: &Scene,
-        surroundings: &Surroundings,
-        part: usize,
-        start: &Pose,
-        action: Action,
-        termination: &Termination,
-    ) -> Result<Motion, Interrupt> {
-        let drive = Drive::new(scene, part, start, action);
-        let mut mover = Mover::new(scene, part, *start);
-        let mut path = vec![*start];
-        let mut exit = None;
-        let mut turning = Turning::new(&mover);
-        let gather = |mover: &Mover<'_>| mover.near(surroundings, drive.step);
-        let mut near = gather(&mover);
-        for _ in 0..MOST_STEPS {
-            termination.check()?;
-            match drive.advance(&mover, &near, &gather) {
-                Step::Stuck { with } => return Ok(Motion { path, end: End::Collision { with } }),
-                Step::Moved { pose, turned, touching, near: there } => {
-                    mover.pose = pose;
-                    near = there;
-                    path.push(pose);
-                    if let Some(d) = exit_direction(scene, surroundings, part, &pose, exit) {
-                        return Ok(Motion { path, end: End::Disassembled(d) });
-                    }
-                    exit = exit.or_else(|| Some(-action.force()).filter(|f| f.norm() > 0.5));
-                    if turning.is_idle(&mover, turned, &touching) {
-                        let touched = turning.all_touched;
-                        let reason = "a whole turn brought neither travel nor new contact";
-                        return Ok(Motion { path, end: End::Undecided { reason, touched } });
-                    }
-                }
-            }
-        }
-        let touched = turning.all_touched;
-        Ok(Motion { path, end: End::Undecided { reason: "the motion has too many steps", touched } })
-    }
-}
-
-/// For each action, whether `other` alone keeps `part` at `pose` from following it by more than
-/// `least`: the static analysis that suits this engine, which excludes nothing that could slide.
-#[must_use]
-pub fn pair_blocks(
-    scene: &Scene,
-    part: usize,
-    pose: &Pose,
-    other: usize,
-    actions: &[Action],
-    least: f64,
-) -> Vec<bool> {
-    let start = Mover::new(scene, part, *pose);
-    let Some(first) = actions.first() else { return Vec::new() };
-    let reach = Drive::new(scene, part, pose, *first).step;
-    let gather = |mover: &Mover<'_>| {
-        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
-        mover.near_pair(other, reach, &mut near);
-        near
-    };
-    let near = gather(&start);
-    if near.contacts.is_empty() {
-        return vec![false; actions.len()];
-    }
-    let blocked = |action: &Action| {
-        let drive = Drive::new(scene, part, pose, *action);
-        let mut step = drive.advance(&start, &near, &gather);
-        for _ in 0..STATIC_STEPS {
-            let Step::Moved { pose: there, near, .. } = step else { return true };
-            let mover = Mover::new(scene, part, there);
-            if (mover.centre() - start.centre()).norm() > least {
-                return false;
-            }
-            step = drive.advance(&mover, &near, &gather);
-        }
-        false
-    };
-    actions.iter().map(blocked).collect()
-}
-
-/// Sees when a part turns for ever: a whole turn that took it no further from where it started
-/// than it had been, and brought no new contact. A thread gets further with every turn.
-struct Turning {
-    angle: f64,
-    start: nalgebra::Point3<f64>,
-    farthest: f64,
-    farthest_before: f64,
-    new_contact: bool,
-    all_touched: Vec<usize>,
-}
-
-impl Turning {
-    fn new(mover: &Mover<'_>) -> Self {
-        Self {
-            angle: 0.0,
-            start: mover.centre(),
-            farthest: 0.0,
-            farthest_before: 0.0,
-            new_contact: false,
-            all_touched: Vec::new(),
-        }
-    }
-
-    fn is_idle(&mut self, mover: &Mover<'_>, turned: f64, touching: &[usize]) -> bool {
-        for &t in touching {
-            if let Err(at) = self.all_touched.binary_search(&t) {
-                self.all_touched.insert(at, t);
-                self.new_contact = true;
-            }
-        }
-        self.farthest = self.farthest.max((mover.centre() - self.start).norm());
-        self.angle += turned;
-        if self.angle < std::f64::consts::TAU {
-            return false;
-        }
-        let idle = self.farthest - self.farthest_before < LEAST_TRAVEL && !self.new_contact;
-        self.angle = 0.0;
-        self.farthest_before = self.farthest;
-        self.new_contact = false;
-        idle
-    }
-}
+/// The gap at which a part in the middle of its play is left alone, and the corrections that bring
+/// it there.
+const LIFT: f64 = 0.01;
+const LIFT_REACH: f64 = 0.04;
+const LIFT_ROUNDS: usize = 3;
 
 /// What is near a mover's pose.
-type Gather<'a> = &'a dyn Fn(&Mover<'_>) -> Near;
+pub(super) type Gather<'a> = &'a dyn Fn(&Mover<'_>) -> Near;
 
-enum Step {
+/// What a step came to.
+pub(super) enum Step {
+    Moved(Moved),
+    Stuck { with: Vec<usize> },
+}
+
+/// A step that was made.
+pub(super) struct Moved {
+    pub(super) pose: Pose,
+    /// By which angle, in radians.
+    pub(super) turned: f64,
+    pub(super) touching: Vec<usize>,
     /// What is near the new pose comes along: it was gathered to check that pose.
-    Moved {
-        pose: Pose,
-        turned: f64,
-        touching: Vec<usize>,
-        near: Near,
-    },
-    Stuck {
-        with: Vec<usize>,
-    },
+    pub(super) near: Near,
+    /// Twists against what holds the part back, of any length.
+    pub(super) pressing: Vec<Vector6<f64>>,
 }
 
 /// The wanted twist of an action for one part, and the metric.
-struct Drive {
+pub(super) struct Drive {
     /// Wanted twist (linear part first) of one contact step.
     wanted: Vector6<f64>,
     /// Square roots of the metric's diagonal: 1 for translation, the radius of gyration for rotation.
@@ -203,7 +71,7 @@ struct Drive {
 }
 
 impl Drive {
-    fn new(scene: &Scene, part: usize, start: &Pose, action: Action) -> Self {
+    pub(super) fn new(scene: &Scene, part: usize, start: &Pose, action: Action) -> Self {
         let shape = &scene.bodies[part].shape;
         let gyration = shape.mass.gyration_squared.sqrt();
         let smallest = shape.bounds().extents().min();
@@ -232,13 +100,18 @@ impl Drive {
         }
     }
 
+    /// How far contacts are looked for: no further can a step go in contact.
+    pub(super) fn reach(&self) -> f64 {
+        self.step
+    }
+
     /// One step from the mover's pose; `gather` finds what is near a pose.
-    fn advance(&self, mover: &Mover<'_>, near: &Near, gather: Gather<'_>) -> Step {
+    pub(super) fn advance(&self, mover: &Mover<'_>, near: &Near, gather: Gather<'_>) -> Step {
         if near.contacts.is_empty() {
             let factor = (near.clearance.min(FREE_STEP) / self.step).max(1.0);
             let twist = self.wanted * if self.turns { factor.min(LONGEST_FREE_TURN) } else { factor };
             let there = Mover { pose: self.displaced(mover, &twist), ..*mover };
-            return Self::moved(&there, gather(&there), &twist, Vec::new());
+            return Self::moved(&there, gather(&there), &twist, Vec::new(), Vec::new());
         }
         let mut with = Vec::new();
         for start in [Start::Certain, Start::Lazy] {
@@ -256,6 +129,38 @@ impl Drive {
             }
         }
         Step::Stuck { with }
+    }
+
+    /// The pose in the middle of the play around the mover's, and what is near there: the smallest
+    /// correction that gives all contacts as large a gap as they can have at once.
+    pub(super) fn lifted(&self, mover: &Mover<'_>, gather: Gather<'_>) -> Option<(Pose, Near)> {
+        let mut here = Mover { ..*mover };
+        let mut near = gather(&here);
+        for _ in 0..LIFT_ROUNDS {
+            let least = near.contacts.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
+            if least >= LIFT * 0.5 {
+                break;
+            }
+            let close = Near {
+                contacts: near.contacts.iter().filter(|c| c.gap < LIFT_REACH).copied().collect(),
+                clearance: near.clearance,
+            };
+            let (rows, _) = self.chosen(&here, &close, &Vector6::zeros());
+            let margins = (0..5).map(|halving| LIFT / f64::from(1 << halving)).chain([0.0]);
+            let correction = margins.filter(|m| *m > least).find_map(|margin| {
+                let scale = |r: &Row| Row { a: r.a.component_div(&self.metric), b: r.b - margin, ..*r };
+                let scaled: Vec<Row> = rows.iter().map(scale).collect();
+                project(&Vector6::zeros(), &scaled)
+            });
+            let Some(correction) = correction else { break };
+            let twist = correction.w.component_div(&self.metric);
+            if twist.norm() > LIFT_REACH {
+                break;
+            }
+            here.pose = self.displaced(&here, &twist);
+            near = gather(&here);
+        }
+        near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE).then_some((here.pose, near))
     }
 
     /// Projects the wanted twist until the trial pose is free of entry.
@@ -295,7 +200,8 @@ impl Drive {
                     if self.turns && !self.is_clear_between(mover, near, &trial, &there, &twist) {
                         return Attempt::Entered(touching);
                     }
-                    return Attempt::Moved(Self::moved(&trial, there, &twist, touching));
+                    let pressing = self.pressing(&target, &result, &rows);
+                    return Attempt::Moved(Self::moved(&trial, there, &twist, touching, pressing));
                 }
             }
             tracing::trace!(
@@ -409,8 +315,40 @@ impl Drive {
             .collect()
     }
 
-    fn moved(there: &Mover<'_>, near: Near, twist: &Vector6<f64>, touching: Vec<usize>) -> Step {
-        Step::Moved { pose: there.pose, turned: twist.fixed_rows::<3>(3).norm(), touching, near }
+    /// Against what a projected motion is pressed: each contact that holds a translation back by
+    /// itself; of a motion that may turn, the whole that contact takes away, for there the points
+    /// of contact change all the time.
+    fn pressing(&self, target: &Vector6<f64>, result: &Projected, rows: &[Row]) -> Vec<Vector6<f64>> {
+        let lost = target - result.w;
+        if lost.norm_squared() < LEAST_PRESSURE * target.norm_squared() {
+            return Vec::new();
+        }
+        if self.turns {
+            return vec![lost.component_div(&self.metric)];
+        }
+        let normals: Vec<Vector6<f64>> = result.active.iter().map(|(i, _)| rows[*i].a).collect();
+        let alone = |i: usize| {
+            // Without what pushes into the others.
+            let mut basis: Vec<Vector6<f64>> = Vec::new();
+            for (_, n) in normals.iter().enumerate().filter(|(j, _)| *j != i) {
+                let rest = basis.iter().fold(*n, |rest, b| rest - b * b.dot(n));
+                basis.extend(rest.try_normalize(0.1));
+            }
+            let n = normals[i];
+            basis.iter().fold(-n, |rest, b| rest + b * b.dot(&n)).try_normalize(0.1)
+        };
+        (0..normals.len()).filter_map(alone).collect()
+    }
+
+    fn moved(
+        there: &Mover<'_>,
+        near: Near,
+        twist: &Vector6<f64>,
+        touching: Vec<usize>,
+        pressing: Vec<Vector6<f64>>,
+    ) -> Step {
+        let turned = twist.fixed_rows::<3>(3).norm();
+        Step::Moved(Moved { pose: there.pose, turned, touching, near, pressing })
     }
 
     /// The pose after a twist about the centre of mass.

@@ -1,0 +1,232 @@
+//! Long steps along a motion that stays the same: along a wall, down a hole, off a thread.
+//!
+//! Steps of equal displacement show a screw (a line, if nothing turns). It is followed as far as
+//! the fields show that nothing is entered, and that what the part is pressed against is still
+//! there, so that it falls into a slot as it would in short steps. Where a leap lands, everything
+//! is measured exactly. Threads of triangles make a part that is pressed to them wobble; such a part
+//! is lifted into the middle of its play, and the mean screw of its steps is followed there.
+
+use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
+
+use crate::geometry::{Pose, Screw};
+
+use super::super::contact::{Mover, Near};
+use super::super::{Scene, Surroundings};
+use super::DEPTH_TOLERANCE;
+use super::drive::{Drive, Gather};
+
+/// Two steps are one motion if no point of the part differs by more than this share of a step …
+const SAME: f64 = 0.02;
+/// … and belong to one helix up to this share.
+const ALIKE: f64 = 0.15;
+/// A helix is seen once so much of it, in radians, was passed in steps that are alike.
+const LEAST_HELIX: f64 = 0.4;
+/// A leap is at most so many steps long …
+const LONGEST: usize = 32;
+/// … and turns by at most this angle: less than half a turn, so that it tells its screw.
+const WIDEST: f64 = 2.4;
+/// Shorter leaps along a helix gain nothing over steps.
+const SHORTEST_ON_HELIX: usize = 4;
+/// How far a part is moved against what it is pressed to, to see whether that is still there, in
+/// steps.
+const PROBE: f64 = 1.0;
+
+/// What a leap came to.
+pub(super) struct Leap {
+    /// The poses on the way, the last one where it lands.
+    pub(super) poses: Vec<Pose>,
+    /// What is near there.
+    pub(super) near: Near,
+    /// The angle, in radians.
+    pub(super) turned: f64,
+}
+
+/// A helix that is followed.
+#[derive(Clone)]
+struct Helix {
+    /// The displacement of one step.
+    screw: Screw,
+    /// How many steps the next leap is to have.
+    length: usize,
+    pressing: Vec<Vector6<f64>>,
+}
+
+/// Sees when a motion stays the same, and follows it.
+pub(super) struct Leaper<'a> {
+    surroundings: &'a Surroundings,
+    drive: &'a Drive,
+    /// How far points of the part are from its centre of mass at most.
+    radius: f64,
+    /// The last step, and how many steps the next leap along it is to have.
+    last: Option<Screw>,
+    length: usize,
+    /// Where the steps that are alike began, and how many there are.
+    alike: Option<(Pose, usize)>,
+    helix: Option<Helix>,
+    /// Where points were found missing, short steps are the safe ones.
+    disabled: bool,
+}
+
+impl<'a> Leaper<'a> {
+    pub(super) fn new(
+        scene: &'a Scene,
+        surroundings: &'a Surroundings,
+        part: usize,
+        drive: &'a Drive,
+    ) -> Self {
+        let refined = |i: usize| !scene.bodies[i].extra_samples.points().is_empty();
+        let disabled = refined(part) || surroundings.standing.iter().any(|&i| refined(i));
+        Self {
+            surroundings,
+            drive,
+            radius: scene.bodies[part].shape.reach,
+            last: None,
+            length: 2,
+            alike: None,
+            helix: None,
+            disabled,
+        }
+    }
+
+    /// After an ordinary contact step from `from` to where `mover` is: a leap, if the motion is the
+    /// same as before. `pressing` are the directions in which contact held the part back.
+    pub(super) fn leap(
+        &mut self,
+        from: &Pose,
+        mover: &Mover<'_>,
+        pressing: Vec<Vector6<f64>>,
+        gather: Gather<'_>,
+    ) -> Option<Leap> {
+        if self.disabled {
+            return None;
+        }
+        let now = Screw::between(from, &mover.pose, 1);
+        let apart = self.last.replace(now).map_or(f64::INFINITY, |before| self.apart(&before, &now, from));
+        let step = self.drive.reach();
+        self.alike = match self.alike {
+            Some((begin, count)) if apart < ALIKE * step => Some((begin, count + 1)),
+            _ => Some((*from, 1)),
+        };
+        if apart >= SAME * step {
+            self.length = 2;
+            self.begin_helix(mover, &now, pressing);
+            return self.follow(mover, gather);
+        }
+        let wanted = self.length.min(longest(&now));
+        let mut steps = self.free_steps(mover, &now, &pressing, wanted);
+        while steps > 1 {
+            let there = Mover { pose: now.times(steps as f64) * mover.pose, ..*mover };
+            let near = gather(&there);
+            if near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE) {
+                self.length = if steps == wanted { steps * 2 } else { steps };
+                return Some(leapt(mover, &now, steps, near));
+            }
+            steps /= 2;
+        }
+        self.length = 2;
+        None
+    }
+
+    /// Starts to follow a helix, if the steps so far show one.
+    fn begin_helix(&mut self, mover: &Mover<'_>, now: &Screw, pressing: Vec<Vector6<f64>>) {
+        let Some((begin, count)) = self.alike else { return };
+        if pressing.is_empty() || now.angle() * (count as f64) < LEAST_HELIX {
+            return;
+        }
+        let screw = Screw::between(&begin, &mover.pose, count);
+        self.helix = Some(Helix { screw, length: count, pressing });
+    }
+
+    /// The next leap along a helix that is followed.
+    pub(super) fn follow(&mut self, mover: &Mover<'_>, gather: Gather<'_>) -> Option<Leap> {
+        let Helix { screw, length, pressing } = self.helix.take()?;
+        let wanted = length.min(longest(&screw));
+        let mut steps = self.free_steps(mover, &screw, &pressing, wanted);
+        while steps >= SHORTEST_ON_HELIX {
+            let there = Mover { pose: screw.times(steps as f64) * mover.pose, ..*mover };
+            if let Some((pose, near)) = self.drive.lifted(&there, gather) {
+                let screw = Screw::between(&mover.pose, &pose, steps);
+                let length = if steps == wanted { steps * 2 } else { steps };
+                self.helix = Some(Helix { screw, length, pressing });
+                return Some(leapt(mover, &screw, steps, near));
+            }
+            steps /= 2;
+        }
+        self.alike = None;
+        None
+    }
+
+    /// How far apart two displacements take the part's points, at most.
+    fn apart(&self, a: &Screw, b: &Screw, from: &Pose) -> f64 {
+        let (a, b) = (a.times(1.0) * from, b.times(1.0) * from);
+        (a.translation.vector - b.translation.vector).norm() + a.rotation.angle_to(&b.rotation) * self.radius
+    }
+
+    /// How many steps, of those wanted, enter nothing and leave nothing that the part is pressed to.
+    fn free_steps(
+        &self,
+        mover: &Mover<'_>,
+        screw: &Screw,
+        pressing: &[Vector6<f64>],
+        wanted: usize,
+    ) -> usize {
+        let standing = &self.surroundings.standing;
+        let is_free = |k: &usize| {
+            let there = Mover { pose: screw.times(*k as f64) * mover.pose, ..*mover };
+            let holds = |push: &Vector6<f64>| {
+                Mover { pose: self.pushed(&there, push), ..there }.clearly_enters(standing)
+            };
+            !there.clearly_enters(standing) && pressing.iter().all(holds)
+        };
+        (1..=wanted).take_while(is_free).count()
+    }
+
+    /// The mover's pose, pushed until no point has moved by more than a probe's length.
+    fn pushed(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> Pose {
+        let (v, w): (Vector3<f64>, Vector3<f64>) =
+            (push.fixed_rows::<3>(0).into(), push.fixed_rows::<3>(3).into());
+        let scale = PROBE * self.drive.reach() / (v.norm() + w.norm() * self.radius);
+        let mut pose = mover.pose;
+        let turn = UnitQuaternion::from_scaled_axis(w * scale);
+        pose.append_rotation_wrt_point_mut(&turn, &mover.centre());
+        pose.append_translation_mut(&Translation3::from(v * scale));
+        pose
+    }
+}
+
+/// The most steps of a leap along a screw.
+fn longest(screw: &Screw) -> usize {
+    let most = if screw.angle() > 0.0 { (WIDEST / screw.angle()) as usize } else { LONGEST };
+    most.min(LONGEST)
+}
+
+fn leapt(mover: &Mover<'_>, screw: &Screw, steps: usize, near: Near) -> Leap {
+    let poses = (1..=steps).map(|k| screw.times(k as f64) * mover.pose).collect();
+    Leap { poses, near, turned: screw.angle() * steps as f64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::super::SlidingEngine;
+    use crate::fixtures::{scene, thread};
+    use crate::simulation::{Action, Axis, End, Surroundings, TransitionFunction};
+    use crate::termination::Termination;
+
+    #[test]
+    fn a_nut_is_followed_off_its_thread() {
+        let (turns, pitch) = (4.0, 0.5);
+        let (scene, verifier) = scene(thread(turns, pitch));
+        let start = scene.bodies[1].planning_from_shape;
+        let around = Surroundings::new(&scene, vec![0]);
+        let off = Action::Screw(Axis::Z, true, true);
+        let t = Termination::default();
+        let motion = SlidingEngine.simulate(&scene, &around, 1, &start, off, &t).unwrap();
+        assert!(matches!(motion.end, End::Disassembled(_)), "{:?}", motion.end);
+        let angle: f64 = motion.path.windows(2).map(|w| w[0].rotation.angle_to(&w[1].rotation)).sum();
+        assert!(angle > 0.6 * turns * TAU, "{angle}");
+        let verdict = verifier.check(&scene, &scene.allowances, &[0], 1, &motion.path, &t).unwrap();
+        assert!(verdict.depth < 2e-3, "{}", verdict.depth);
+    }
+}

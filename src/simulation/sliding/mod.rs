@@ -1,0 +1,93 @@
+//! The engine `sliding`: motion in the limit of no inertia.
+//!
+//! At each step the wanted twist is projected onto what contact allows, in the metric of the
+//! part's mass (rotation weighed by the squared radius of gyration), and the pose advances by the
+//! result (`drive`). In free space the step is the certified clearance; where the projected twist
+//! stays the same, along a wall or a thread, it is followed in long steps (`leap`).
+
+mod drive;
+mod leap;
+mod pair;
+mod turning;
+
+use crate::geometry::Pose;
+use crate::termination::{Interrupt, Termination};
+
+use super::contact::Mover;
+use super::{Action, End, Motion, Scene, Surroundings, TransitionFunction, exit_direction};
+use drive::{Drive, Step};
+use leap::Leaper;
+use turning::Turning;
+
+pub use pair::pair_blocks;
+
+/// A pair may get this much deeper than its allowance, in the planning frame.
+const DEPTH_TOLERANCE: f64 = 3e-4;
+const MOST_STEPS: usize = 8000;
+
+/// The engine.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SlidingEngine;
+
+impl TransitionFunction for SlidingEngine {
+    fn name(&self) -> &'static str {
+        "sliding"
+    }
+
+    fn depth_tolerance(&self) -> f64 {
+        DEPTH_TOLERANCE
+    }
+
+    fn simulate(
+        &self,
+        scene: &Scene,
+        surroundings: &Surroundings,
+        part: usize,
+        start: &Pose,
+        action: Action,
+        termination: &Termination,
+    ) -> Result<Motion, Interrupt> {
+        let drive = Drive::new(scene, part, start, action);
+        let mut mover = Mover::new(scene, part, *start);
+        let mut path = vec![*start];
+        let mut exit = None;
+        let mut turning = Turning::new(&mover);
+        let gather = |mover: &Mover<'_>| mover.near(surroundings, drive.reach());
+        let mut leaper = Leaper::new(scene, surroundings, part, &drive);
+        let mut near = gather(&mover);
+        for _ in 0..MOST_STEPS {
+            termination.check()?;
+            let (mut turned, mut touching) = (0.0, Vec::new());
+            let mut leap = leaper.follow(&mover, &gather);
+            if leap.is_none() {
+                let step = match drive.advance(&mover, &near, &gather) {
+                    Step::Stuck { with } => return Ok(Motion { path, end: End::Collision { with } }),
+                    Step::Moved(step) => step,
+                };
+                let from = std::mem::replace(&mut mover.pose, step.pose);
+                path.push(step.pose);
+                if !near.contacts.is_empty() {
+                    leap = leaper.leap(&from, &mover, step.pressing, &gather);
+                }
+                (turned, touching, near) = (step.turned, step.touching, step.near);
+            }
+            if let Some(leap) = leap {
+                path.extend(leap.poses);
+                mover.pose = path[path.len() - 1];
+                near = leap.near;
+                turned += leap.turned;
+            }
+            if let Some(d) = exit_direction(scene, surroundings, part, &mover.pose, exit) {
+                return Ok(Motion { path, end: End::Disassembled(d) });
+            }
+            exit = exit.or_else(|| Some(-action.force()).filter(|f| f.norm() > 0.5));
+            if turning.is_idle(&mover, turned, &touching) {
+                let touched = turning.all_touched;
+                let reason = "a whole turn brought neither travel nor new contact";
+                return Ok(Motion { path, end: End::Undecided { reason, touched } });
+            }
+        }
+        let touched = turning.all_touched;
+        Ok(Motion { path, end: End::Undecided { reason: "the motion has too many steps", touched } })
+    }
+}

@@ -1,0 +1,49 @@
+//! Static analysis by sliding: what contact with one part alone lets another do.
+
+use crate::geometry::Pose;
+
+use super::super::contact::{Mover, Near};
+use super::super::{Action, Scene};
+use super::drive::{Drive, Moved, Step};
+
+/// Steps that the static analysis of a pair looks ahead (the paper's five extensions).
+const STATIC_STEPS: usize = 5;
+
+/// For each action, whether `other` alone keeps `part` at `pose` from following it by more than
+/// `least`: the static analysis that suits this engine, which excludes nothing that could slide.
+#[must_use]
+pub fn pair_blocks(
+    scene: &Scene,
+    part: usize,
+    pose: &Pose,
+    other: usize,
+    actions: &[Action],
+    least: f64,
+) -> Vec<bool> {
+    let start = Mover::new(scene, part, *pose);
+    let Some(first) = actions.first() else { return Vec::new() };
+    let reach = Drive::new(scene, part, pose, *first).reach();
+    let gather = |mover: &Mover<'_>| {
+        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+        mover.near_pair(other, reach, &mut near);
+        near
+    };
+    let near = gather(&start);
+    if near.contacts.is_empty() {
+        return vec![false; actions.len()];
+    }
+    let blocked = |action: &Action| {
+        let drive = Drive::new(scene, part, pose, *action);
+        let mut step = drive.advance(&start, &near, &gather);
+        for _ in 0..STATIC_STEPS {
+            let Step::Moved(Moved { pose: there, near, .. }) = step else { return true };
+            let mover = Mover::new(scene, part, there);
+            if (mover.centre() - start.centre()).norm() > least {
+                return false;
+            }
+            step = drive.advance(&mover, &near, &gather);
+        }
+        false
+    };
+    actions.iter().map(blocked).collect()
+}

@@ -1,0 +1,50 @@
+//! The end of endless turning.
+
+use super::super::contact::Mover;
+
+/// Travel per turn below which a turning part is going nowhere.
+const LEAST_TRAVEL: f64 = 0.01;
+
+/// Sees when a part turns for ever: a whole turn that took it no further from where it started
+/// than it had been, and brought no new contact. A thread gets further with every turn.
+pub(super) struct Turning {
+    angle: f64,
+    start: nalgebra::Point3<f64>,
+    farthest: f64,
+    farthest_before: f64,
+    new_contact: bool,
+    /// Every part touched so far, ascending.
+    pub(super) all_touched: Vec<usize>,
+}
+
+impl Turning {
+    pub(super) fn new(mover: &Mover<'_>) -> Self {
+        Self {
+            angle: 0.0,
+            start: mover.centre(),
+            farthest: 0.0,
+            farthest_before: 0.0,
+            new_contact: false,
+            all_touched: Vec::new(),
+        }
+    }
+
+    pub(super) fn is_idle(&mut self, mover: &Mover<'_>, turned: f64, touching: &[usize]) -> bool {
+        for &t in touching {
+            if let Err(at) = self.all_touched.binary_search(&t) {
+                self.all_touched.insert(at, t);
+                self.new_contact = true;
+            }
+        }
+        self.farthest = self.farthest.max((mover.centre() - self.start).norm());
+        self.angle += turned;
+        if self.angle < std::f64::consts::TAU {
+            return false;
+        }
+        let idle = self.farthest - self.farthest_before < LEAST_TRAVEL && !self.new_contact;
+        self.angle = 0.0;
+        self.farthest_before = self.farthest;
+        self.new_contact = false;
+        idle
+    }
+}
