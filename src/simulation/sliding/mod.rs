@@ -23,7 +23,8 @@ pub use pair::pair_blocks;
 
 /// A pair may get this much deeper than its allowance, in the planning frame.
 const DEPTH_TOLERANCE: f64 = 3e-4;
-const MOST_STEPS: usize = 8000;
+/// A motion that is not done after so many poses turns without end.
+const MOST_POSES: usize = 8000;
 
 /// The engine.
 #[derive(Debug, Clone, Copy, Default)]
@@ -55,7 +56,7 @@ impl TransitionFunction for SlidingEngine {
         let gather = |mover: &Mover<'_>| mover.near(surroundings, drive.reach());
         let mut leaper = Leaper::new(scene, surroundings, part, &drive);
         let mut near = gather(&mover);
-        for _ in 0..MOST_STEPS {
+        while path.len() < MOST_POSES {
             termination.check()?;
             let (mut turned, mut touching) = (0.0, Vec::new());
             let mut leap = leaper.follow(&mover, &gather);
@@ -88,6 +89,6 @@ impl TransitionFunction for SlidingEngine {
             }
         }
         let touched = turning.all_touched;
-        Ok(Motion { path, end: End::Undecided { reason: "the motion has too many steps", touched } })
+        Ok(Motion { path, end: End::Undecided { reason: "the motion is too long", touched } })
     }
 }
