@@ -11,6 +11,7 @@ use crate::plan::{Entry, Verifier, thinned};
 use crate::simulation::{Action, Scene, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
+use super::directions::axes;
 use super::outcome::Removal;
 use super::request::ActionSet;
 use super::trace::TraceEvent;
@@ -64,15 +65,17 @@ pub struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// The translations, and the actions with rotational freedom in the order of trial.
+    /// The translations, and the actions with rotational freedom in the order of trial: the
+    /// paper's about the world's axes, or ours about the assembly's own.
     #[must_use]
     pub fn action_lists(&self) -> (Vec<Action>, Vec<Action>) {
-        let rotations = match self.actions {
-            ActionSet::Paper => Action::rotations(),
-            // Where turning helps, pulling while turning mostly leads out in one motion.
-            ActionSet::Extended => Action::screws().into_iter().chain(Action::rotations()).collect(),
-        };
-        (Action::translations(), rotations)
+        if self.actions == ActionSet::Paper {
+            return (Action::translations(), Action::rotations());
+        }
+        let axes = axes(&self.scene, &self.present);
+        // Where turning helps, pulling while turning mostly leads out in one motion.
+        let screws = Action::screws_along(&axes).into_iter();
+        (Action::translations_along(&axes), screws.chain(Action::rotations_about(&axes)).collect())
     }
 
     /// Whether a part is there and not fixed.

@@ -2,39 +2,50 @@
 
 use nalgebra::{Unit, Vector3};
 
-/// A world axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Axis {
-    /// The x axis.
-    X,
-    /// The y axis.
-    Y,
-    /// The z axis.
-    Z,
-}
+/// An axis through space, of the world or of the geometry.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axis(Unit<Vector3<f64>>);
 
 impl Axis {
-    const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
+    /// The x axis.
+    pub const X: Self = Self(Unit::new_unchecked(Vector3::new(1.0, 0.0, 0.0)));
+    /// The y axis.
+    pub const Y: Self = Self(Unit::new_unchecked(Vector3::new(0.0, 1.0, 0.0)));
+    /// The z axis.
+    pub const Z: Self = Self(Unit::new_unchecked(Vector3::new(0.0, 0.0, 1.0)));
+    /// The paper's axes.
+    pub const WORLD: [Self; 3] = [Self::X, Self::Y, Self::Z];
 
-    fn unit(self) -> Unit<Vector3<f64>> {
-        match self {
-            Self::X => Vector3::x_axis(),
-            Self::Y => Vector3::y_axis(),
-            Self::Z => Vector3::z_axis(),
-        }
+    /// The axis along a direction; exactly that of the world, and its sense, if it is as good as
+    /// that.
+    #[must_use]
+    pub fn along(direction: Unit<Vector3<f64>>) -> Self {
+        let alike = |a: &Self| a.0.dot(&direction).abs() > 1.0 - SNAP;
+        Self::WORLD.into_iter().find(alike).unwrap_or(Self(direction))
     }
 
-    fn letter(self) -> char {
-        match self {
-            Self::X => 'x',
-            Self::Y => 'y',
-            Self::Z => 'z',
+    /// Its positive direction.
+    #[must_use]
+    pub fn unit(self) -> Unit<Vector3<f64>> {
+        self.0
+    }
+}
+
+/// 1 − cos of the angle below which an axis is one of the world's (about 0.03 degrees).
+const SNAP: f64 = 1e-7;
+
+impl std::fmt::Display for Axis {
+    /// `x`, `y`, `z`, or the direction as `[0.31,0.00,0.95]`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match Self::WORLD.iter().position(|a| a == self) {
+            Some(i) => f.write_str(["x", "y", "z"][i]),
+            None => write!(f, "[{:.2},{:.2},{:.2}]", self.0.x, self.0.y, self.0.z),
         }
     }
 }
 
 /// What is done to a part. A positive sign means along (or counter-clockwise about) the axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Action {
     /// A force; the part does not turn.
     Push(Axis, bool),
@@ -50,22 +61,40 @@ impl Action {
     /// The paper's six translations.
     #[must_use]
     pub fn translations() -> Vec<Self> {
-        Axis::ALL.into_iter().flat_map(|a| [Self::Push(a, true), Self::Push(a, false)]).collect()
+        Self::translations_along(&Axis::WORLD)
+    }
+
+    /// The translations along some axes, both ways each.
+    #[must_use]
+    pub fn translations_along(axes: &[Axis]) -> Vec<Self> {
+        axes.iter().flat_map(|&a| [Self::Push(a, true), Self::Push(a, false)]).collect()
     }
 
     /// The paper's actions with rotational freedom: six torques, then six forces.
     #[must_use]
     pub fn rotations() -> Vec<Self> {
-        let turns = Axis::ALL.into_iter().flat_map(|a| [Self::Turn(a, true), Self::Turn(a, false)]);
-        let drags = Axis::ALL.into_iter().flat_map(|a| [Self::Drag(a, true), Self::Drag(a, false)]);
+        Self::rotations_about(&Axis::WORLD)
+    }
+
+    /// The torques about some axes, then the forces along them, both ways each.
+    #[must_use]
+    pub fn rotations_about(axes: &[Axis]) -> Vec<Self> {
+        let turns = axes.iter().flat_map(|&a| [Self::Turn(a, true), Self::Turn(a, false)]);
+        let drags = axes.iter().flat_map(|&a| [Self::Drag(a, true), Self::Drag(a, false)]);
         turns.chain(drags).collect()
     }
 
     /// The twelve wrenches that pull while turning.
     #[must_use]
     pub fn screws() -> Vec<Self> {
+        Self::screws_along(&Axis::WORLD)
+    }
+
+    /// The wrenches that pull along some axes while turning about them, all four ways each.
+    #[must_use]
+    pub fn screws_along(axes: &[Axis]) -> Vec<Self> {
         let signs = [(true, true), (true, false), (false, true), (false, false)];
-        Axis::ALL.into_iter().flat_map(|a| signs.map(|(f, t)| Self::Screw(a, f, t))).collect()
+        axes.iter().flat_map(|&a| signs.map(|(f, t)| Self::Screw(a, f, t))).collect()
     }
 
     /// Unit force (zero for a pure torque).
@@ -102,10 +131,10 @@ impl std::fmt::Display for Action {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let s = |p: bool| if p { '+' } else { '-' };
         match *self {
-            Self::Push(a, p) => write!(f, "{}{}", s(p), a.letter()),
-            Self::Drag(a, p) => write!(f, "{}{}~", s(p), a.letter()),
-            Self::Turn(a, p) => write!(f, "{}r{}", s(p), a.letter()),
-            Self::Screw(a, p, t) => write!(f, "{}{}{}r{}", s(p), a.letter(), s(t), a.letter()),
+            Self::Push(a, p) => write!(f, "{}{}", s(p), a),
+            Self::Drag(a, p) => write!(f, "{}{}~", s(p), a),
+            Self::Turn(a, p) => write!(f, "{}r{}", s(p), a),
+            Self::Screw(a, p, t) => write!(f, "{}{}{}r{}", s(p), a, s(t), a),
         }
     }
 }
@@ -113,6 +142,15 @@ impl std::fmt::Display for Action {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn axes_of_the_world_are_recognised() {
+        let nearly = Unit::new_normalize(Vector3::new(1e-5, -1.0, 0.0));
+        assert_eq!(Axis::along(nearly), Axis::Y);
+        let slanted = Axis::along(Unit::new_normalize(Vector3::new(0.6, 0.0, -0.8)));
+        assert_eq!(Action::Screw(slanted, true, false).to_string(), "+[0.60,0.00,-0.80]-r[0.60,0.00,-0.80]");
+        assert_eq!(Action::Drag(slanted, false).force(), Vector3::new(-0.6, 0.0, 0.8));
+    }
 
     #[test]
     fn actions_are_named_after_what_they_do() {

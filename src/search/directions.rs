@@ -1,0 +1,237 @@
+//! Directions from geometry: the axes along and about which an assembly's parts are made.
+//!
+//! Prismatic and turned parts leave along the axis that their surfaces are parallel or at right
+//! angles to. The axes on which most surface agrees make up the assembly's own frame; parts that
+//! stand askew in it add theirs. So the axes turn with the assembly, and a plan does not depend on
+//! how it lies in the world.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use nalgebra::{Unit, Vector3};
+
+use crate::geometry::Shape;
+use crate::simulation::{Axis, Scene};
+
+/// cos of the angle within which two directions are one (a quarter of a degree).
+const ALIKE: f64 = 0.999_99;
+/// |cos| below which two directions are at right angles.
+const SQUARE: f64 = 0.005;
+/// The directions of a part's surfaces that are looked at: those with the most area.
+const MOST_NORMALS: usize = 32;
+/// The share of a part's surface that must agree on an axis.
+const LEAST_SHARE: f64 = 0.5;
+/// How much more an axis of the world counts.
+const WORLD_PREFERENCE: f64 = 1.2;
+/// Axes of askew parts beyond the frame, at most.
+const MOST_EXTRA: usize = 3;
+
+/// The axes of the present parts: a right-angled frame, then those of parts that stand askew.
+/// The world's where surfaces do not agree on any.
+#[must_use]
+pub(super) fn axes(scene: &Scene, present: &[usize]) -> Vec<Axis> {
+    let mut of_shape: HashMap<*const Shape, Faces> = HashMap::new();
+    let mut votes = Axis::WORLD.map(|a| Candidate { direction: a.unit(), weight: 0.0 }).to_vec();
+    let mut own = Vec::new();
+    for &part in present {
+        let body = &scene.bodies[part];
+        let faces = of_shape.entry(Arc::as_ptr(&body.shape)).or_insert_with(|| Faces::of(&body.shape));
+        let rotation = body.planning_from_shape.rotation;
+        for v in &mut votes[..3] {
+            v.weight += faces.speaking_for(&rotation.inverse_transform_unit_vector(&v.direction));
+        }
+        let turned = |c: &Candidate| Candidate { direction: oriented(rotation * c.direction), ..*c };
+        for c in faces.candidates.iter().map(turned).filter(|c| !c.is_of_world()) {
+            match votes.iter_mut().find(|v| v.is_like(&c.direction)) {
+                Some(v) => v.weight += c.weight,
+                None => votes.push(c),
+            }
+        }
+        own.extend(faces.candidates.first().map(turned));
+    }
+    votes.sort_by(|a, b| b.rank().total_cmp(&a.rank()));
+    let mut axes = frame(&votes);
+    let askew =
+        |axes: &[Unit<Vector3<f64>>], d: &Unit<Vector3<f64>>| axes.iter().all(|a| a.dot(d).abs() < ALIKE);
+    let mut extra: Vec<Candidate> = Vec::new();
+    for c in own.into_iter().filter(|c| askew(&axes, &c.direction)) {
+        match extra.iter_mut().find(|e| e.is_like(&c.direction)) {
+            Some(e) => e.weight += c.weight,
+            None => extra.push(c),
+        }
+    }
+    extra.sort_by(|a, b| b.rank().total_cmp(&a.rank()));
+    axes.extend(extra.into_iter().take(MOST_EXTRA).map(|c| c.direction));
+    axes.into_iter().map(Axis::along).collect()
+}
+
+/// A direction and the surface that speaks for it.
+#[derive(Debug, Clone, Copy)]
+struct Candidate {
+    direction: Unit<Vector3<f64>>,
+    /// Area that is parallel or at right angles to it.
+    weight: f64,
+}
+
+impl Candidate {
+    fn is_like(&self, direction: &Unit<Vector3<f64>>) -> bool {
+        self.direction.dot(direction).abs() > ALIKE
+    }
+
+    fn is_of_world(&self) -> bool {
+        Axis::WORLD.iter().any(|a| self.is_like(&a.unit()))
+    }
+
+    /// Its weight; more for the world's axes, for of a round part's many sides none is better.
+    fn rank(&self) -> f64 {
+        self.weight * if self.is_of_world() { WORLD_PREFERENCE } else { 1.0 }
+    }
+}
+
+/// Where a shape's surface faces, in its frame.
+struct Faces {
+    /// The normals with the most area, opposite ones as one.
+    normals: Vec<Candidate>,
+    /// Directions that enough of the surface agrees on, best first.
+    candidates: Vec<Candidate>,
+}
+
+impl Faces {
+    fn of(shape: &Shape) -> Self {
+        let mut faces = Self { normals: normals(shape), candidates: Vec::new() };
+        faces.candidates = faces.agreed();
+        faces
+    }
+
+    /// The area that is parallel or at right angles to a direction.
+    fn speaking_for(&self, direction: &Unit<Vector3<f64>>) -> f64 {
+        let speaks = |n: &&Candidate| {
+            let cos = n.direction.dot(direction).abs();
+            !(SQUARE..=ALIKE).contains(&cos)
+        };
+        self.normals.iter().filter(speaks).map(|n| n.weight).sum()
+    }
+
+    fn agreed(&self) -> Vec<Candidate> {
+        let Some(largest) = self.normals.first() else { return Vec::new() };
+        let area: f64 = self.normals.iter().map(|n| n.weight).sum();
+        let mut out: Vec<Candidate> = Vec::new();
+        // A turned part without flat ends shows its axis as what two of its sides have in common.
+        let sides = self.normals[1..]
+            .iter()
+            .filter_map(|n| Unit::try_new(largest.direction.cross(&n.direction), 0.1).map(oriented))
+            .take(MOST_NORMALS);
+        for direction in self.normals.iter().take(MOST_NORMALS).map(|n| n.direction).chain(sides) {
+            if out.iter().any(|c| c.is_like(&direction)) {
+                continue;
+            }
+            let weight = self.speaking_for(&direction);
+            if weight > LEAST_SHARE * area {
+                out.push(Candidate { direction, weight });
+            }
+        }
+        out.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        out
+    }
+}
+
+/// The directions of a shape's surfaces with their areas, largest first; opposite ones are one.
+fn normals(shape: &Shape) -> Vec<Candidate> {
+    let surface = &shape.surface;
+    let mut out: Vec<Candidate> = Vec::new();
+    let mut at: HashMap<[i16; 3], usize> = HashMap::new();
+    for t in 0..surface.triangles().len() as u32 {
+        let [a, b, c] = surface.corners(t);
+        let twice = (b - a).cross(&(c - a));
+        let Some(direction) = Unit::try_new(twice, 1e-12).map(oriented) else { continue };
+        let weight = twice.norm() / 2.0;
+        // Most triangles share their normal with one before: found without a search.
+        let key = direction.map(|x| (x * 500.0).round() as i16).into();
+        let known = at.get(&key).copied().filter(|&i: &usize| out[i].is_like(&direction));
+        match known.or_else(|| out.iter().position(|c| c.is_like(&direction))) {
+            Some(i) => {
+                out[i].weight += weight;
+                at.insert(key, i);
+            }
+            None => {
+                at.insert(key, out.len());
+                out.push(Candidate { direction, weight });
+            }
+        }
+    }
+    out.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    out
+}
+
+/// Three axes at right angles: the best, the best at right angles to it, and the third.
+fn frame(votes: &[Candidate]) -> Vec<Unit<Vector3<f64>>> {
+    let world = Axis::WORLD.map(Axis::unit).to_vec();
+    let Some(first) = votes.first().map(|c| c.direction) else { return world };
+    let square = |c: &&Candidate| c.direction.dot(&first).abs() < SQUARE;
+    let across = |d: &Unit<Vector3<f64>>| Unit::try_new(d.into_inner() - *first * first.dot(d), 0.1);
+    let second = votes.iter().find(square).and_then(|c| across(&c.direction)).or_else(|| {
+        let flattest = world.iter().min_by(|a, b| a.dot(&first).abs().total_cmp(&b.dot(&first).abs()));
+        flattest.and_then(across)
+    });
+    let Some(second) = second else { return world };
+    let third = Unit::new_normalize(first.cross(&second));
+    // In the order of the world's axes that they are nearest to.
+    let mut axes = vec![oriented(first), oriented(second), oriented(third)];
+    axes.sort_by_key(|a| a.iamax());
+    axes
+}
+
+/// The same axis, its largest component positive.
+fn oriented(d: Unit<Vector3<f64>>) -> Unit<Vector3<f64>> {
+    if d[d.iamax()] < 0.0 { -d } else { d }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{block_on_plate, moved, peg_in_hole, rod, scene};
+    use crate::geometry::{Pose, SourceMesh};
+
+    fn axes_of(meshes: impl IntoIterator<Item = SourceMesh>) -> Vec<Axis> {
+        let (scene, _) = scene(meshes);
+        let present: Vec<_> = (0..scene.bodies.len()).collect();
+        axes(&scene, &present)
+    }
+
+    #[test]
+    fn parts_that_are_square_to_the_world_have_its_axes() {
+        assert_eq!(axes_of(block_on_plate()), Axis::WORLD);
+    }
+
+    #[test]
+    fn axes_turn_with_the_assembly() {
+        let turn = Pose::rotation(Vector3::new(0.3, -0.5, 0.2));
+        let found = axes_of(peg_in_hole(0.0).map(|m| moved(m, &turn)));
+        assert_eq!(found.len(), 3);
+        for axis in Axis::WORLD.map(|a| turn * a.unit().into_inner()) {
+            assert!(found.iter().any(|a| a.unit().dot(&axis).abs() > 1.0 - 1e-9), "{axis}");
+        }
+    }
+
+    #[test]
+    fn a_part_that_stands_askew_adds_its_axis() {
+        let [plate, _] = block_on_plate();
+        let lean = Pose::rotation(Vector3::new(0.0, 0.4, 0.0));
+        let pin = moved(rod(0.3, [1.0, 4.0], 24), &lean);
+        let found = axes_of([plate, pin]);
+        assert_eq!(found[..3], Axis::WORLD);
+        assert!(found.len() == 4 && found[3].unit().dot(&(lean * Vector3::z())).abs() > 1.0 - 1e-9);
+    }
+
+    #[test]
+    fn a_body_without_flat_faces_leaves_the_world_its_axes() {
+        assert_eq!(
+            axes_of([moved(crate::fixtures::ball(4), &Pose::translation(2.0, 0.0, 0.0)), cube()])[..3],
+            Axis::WORLD
+        );
+    }
+
+    fn cube() -> SourceMesh {
+        crate::fixtures::cuboid([-3.0, -1.0, -1.0], [-2.0, 1.0, 1.0])
+    }
+}
