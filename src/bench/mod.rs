@@ -84,6 +84,8 @@ pub struct Request {
     pub path_timeout: Duration,
     /// The action set of all planners: their search spaces compare only then.
     pub actions: &'static str,
+    /// Whether the state-based planners take parts that leave straight out without simulation.
+    pub sweeps: bool,
     /// How long after `timeout` a run is ended.
     pub grace: Duration,
     /// Threads of each run; 0 for all processors.
@@ -239,6 +241,7 @@ fn settings(request: &Request) -> Result<Settings, BenchError> {
         timeout_s: request.timeout.as_secs_f64(),
         path_timeout_s: request.path_timeout.as_secs_f64(),
         actions: request.actions.to_owned(),
+        sweeps: request.sweeps,
         threads: request.threads,
         jobs: request.jobs,
         processors: std::thread::available_parallelism().map_or(0, usize::from),

@@ -22,6 +22,9 @@ pub struct Settings {
     pub path_timeout_s: f64,
     /// The action set of all planners.
     pub actions: String,
+    /// Whether the state-based planners took parts that leave straight out without simulation.
+    #[serde(default)]
+    pub sweeps: bool,
     /// Threads of each run; 0 for all processors.
     pub threads: u32,
     /// How many runs went on at a time.
@@ -40,6 +43,7 @@ impl Settings {
                 s.timeout_s.to_bits(),
                 s.path_timeout_s.to_bits(),
                 s.actions.clone(),
+                s.sweeps,
                 s.threads,
             )
         };
@@ -57,9 +61,10 @@ impl std::fmt::Display for Settings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let threads = if self.threads == 0 { "all".to_owned() } else { self.threads.to_string() };
         let Self { version, build, timeout_s, path_timeout_s, actions, .. } = self;
+        let sweeps = if self.sweeps { ", sweeps" } else { "" };
         write!(
             f,
-            "version {version}, build {build}, timeout {timeout_s} s ({path_timeout_s} s per path), actions {actions}, threads {threads}"
+            "version {version}, build {build}, timeout {timeout_s} s ({path_timeout_s} s per path), actions {actions}{sweeps}, threads {threads}"
         )
     }
 }
@@ -84,6 +89,9 @@ pub struct Record {
     pub reason: Option<String>,
     /// Transition functions computed (the paper's Sim).
     pub simulations: u64,
+    /// Removals by a straight sweep, which are no simulations.
+    #[serde(default)]
+    pub swept: u64,
     /// States kept.
     pub states: u64,
     /// Simulation (the paper's PT).

@@ -98,6 +98,7 @@ impl Runner<'_> {
         command.args(["--timeout", &self.timeout.as_secs_f64().to_string()]);
         command.args(["--path-timeout", &self.settings.path_timeout_s.to_string()]);
         command.args(["--actions", &self.settings.actions]);
+        command.arg(if self.settings.sweeps { "--sweeps" } else { "--no-sweeps" });
         if self.settings.threads > 0 {
             command.args(["--threads", &self.settings.threads.to_string()]);
         }
@@ -152,6 +153,7 @@ impl Runner<'_> {
             category: Category::of(plan.parts.len()).name().to_owned(),
             reason: plan.reason.clone(),
             simulations: s.simulations_run,
+            swept: s.sweeps,
             states: s.states,
             path_time_s: s.path_time_s,
             total_time_s: (s.total_time_s - s.verify_time_s).max(0.0),
@@ -174,6 +176,7 @@ impl Runner<'_> {
             status: status.to_owned(),
             reason: Some(reason),
             simulations: 0,
+            swept: 0,
             states: 0,
             path_time_s: 0.0,
             total_time_s: 0.0,

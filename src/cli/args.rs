@@ -56,6 +56,8 @@ pub(super) struct PlanArguments {
     /// Which actions [default: extended for sbdp-star, paper for all other planners]
     #[arg(long, value_enum)]
     pub(super) actions: Option<Actions>,
+    #[command(flatten)]
+    pub(super) sweeps: Sweeps,
     /// Answer after so many seconds with what is there
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) timeout: Option<Duration>,
@@ -153,6 +155,8 @@ pub(super) struct BenchRun {
     /// Which actions all planners have
     #[arg(long, value_enum, default_value = "paper")]
     pub(super) actions: Actions,
+    #[command(flatten)]
+    pub(super) sweeps: Sweeps,
     /// Where results, tables and figures go; a benchmark that was interrupted goes on there
     #[arg(long, value_name = "DIR", required = true)]
     pub(super) out: PathBuf,
@@ -240,6 +244,25 @@ impl From<Actions> for search::ActionSet {
             Actions::Paper => Self::Paper,
             Actions::Extended => Self::Extended,
         }
+    }
+}
+
+/// Whether parts that leave straight are simulated.
+#[derive(Debug, Clone, Copy, Args)]
+pub(super) struct Sweeps {
+    /// Take parts that leave straight out without simulation, with sbdp-star and sbdp [default with
+    /// extended actions]
+    #[arg(long, overrides_with = "no_sweeps")]
+    sweeps: bool,
+    /// Simulate parts that leave straight, too [default with the paper's actions]
+    #[arg(long)]
+    no_sweeps: bool,
+}
+
+impl Sweeps {
+    /// What was asked for, if anything.
+    pub(super) fn asked(self) -> Option<bool> {
+        (self.sweeps || self.no_sweeps).then_some(self.sweeps)
     }
 }
 

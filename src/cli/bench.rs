@@ -44,13 +44,15 @@ fn measure(arguments: &BenchRun) -> Result<ExitCode, CliError> {
 }
 
 fn request(arguments: &BenchRun) -> Request {
+    let actions = search::ActionSet::from(arguments.actions);
     Request {
         corpora: arguments.corpora.clone(),
         planners: arguments.planners.clone(),
         engines: arguments.engines.clone(),
         timeout: arguments.timeout,
         path_timeout: arguments.path_timeout,
-        actions: search::ActionSet::from(arguments.actions).name(),
+        actions: actions.name(),
+        sweeps: arguments.sweeps.asked().unwrap_or_else(|| actions.default_sweeps()),
         grace: bench::grace(arguments.timeout),
         threads: arguments.threads,
         jobs: arguments.jobs.get(),

@@ -41,6 +41,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         planner,
         engine: arguments.engine.into(),
         actions: arguments.actions.map_or_else(|| planner.default_actions(), Into::into),
+        sweeps: arguments.sweeps.asked(),
         max_simulations: arguments.max_simulations,
         path_timeout: arguments.path_timeout,
         penalty: penalty(&arguments.penalty)?,

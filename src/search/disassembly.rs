@@ -8,8 +8,8 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::geometry::Pose;
-use crate::plan::PlanStatus;
-use crate::simulation::{Action, End, Motion, Surroundings, exit_direction};
+use crate::plan::{Entry, PlanStatus};
+use crate::simulation::{Action, End, Motion, Surroundings, Sweep, exit_direction, straight_sweep};
 use crate::termination::Interrupt;
 
 use super::outcome::{BlockedAction, Counters, Outcome, Removal};
@@ -52,6 +52,12 @@ pub(super) enum Proof {
     Refuted { by: Vec<usize> },
     /// With the refuting points as samples, the motion ends otherwise.
     Otherwise(Motion),
+}
+
+/// A sweep's claim that did not hold.
+pub(super) struct Refuted {
+    /// Already the way to the sweep's start does not hold.
+    pub(super) prefix: bool,
 }
 
 /// What every planner shares.
@@ -183,6 +189,58 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         Ok(motions.into_iter().take(wanted).collect::<Result<_, Interrupt>>()?)
     }
 
+    /// What straight sweeps along the forces of some runs tell, in order, up to the first that is
+    /// clear.
+    pub(super) fn sweep(&mut self, runs: &[Run]) -> Result<Vec<Option<Sweep>>, Stop> {
+        self.problem.termination.check()?;
+        let started = Instant::now();
+        for run in runs {
+            self.surroundings(run.part);
+        }
+        let (scene, around) = (&self.problem.scene, &self.around);
+        let swept = |run: &Run| {
+            let around = around[run.part].as_ref()?;
+            straight_sweep(scene, around, run.part, &run.start, &run.action.force())
+        };
+        let mut results: Vec<_> = runs.par_iter().map(swept).collect();
+        let clear = |s: &Option<Sweep>| matches!(s, Some(Sweep::Clear { .. }));
+        if let Some(first) = results.iter().position(clear) {
+            results.truncate(first + 1);
+        }
+        self.counters.simulation += started.elapsed();
+        Ok(results)
+    }
+
+    /// Verifies a path that a sweep claims to be clear, from the end of `prefix`. What refutes it
+    /// becomes samples, for the simulation that must answer instead.
+    pub(super) fn prove_sweep(
+        &mut self,
+        run: &Run,
+        prefix: &[Pose],
+        motion: &[Pose],
+    ) -> Result<Result<(Vec<Pose>, f64), Refuted>, Stop> {
+        let part = run.part;
+        let refuted = match self.checked(part, &joined(prefix, motion))? {
+            Ok(proof) => return Ok(Ok(proof)),
+            Err(entries) => entries,
+        };
+        tracing::debug!(part, action = %run.action, over = refuted.first().map(|e| e.over), "sweep refuted");
+        self.trace_refutation(run, &refuted);
+        self.problem.add_samples(part, &refuted);
+        let prefix = prefix.len() > 1 && self.checked(part, prefix)?.is_err();
+        Ok(Err(Refuted { prefix }))
+    }
+
+    /// Tells of a refuted path; the parts that it enters.
+    fn trace_refutation(&mut self, run: &Run, entries: &[Entry]) -> Vec<usize> {
+        let mut by: Vec<_> = entries.iter().map(|e| e.other).collect();
+        by.sort_unstable();
+        by.dedup();
+        let (part, action) = (run.part, run.action.to_string());
+        self.trace(|| TraceEvent::Refuted { part, action, by: by.clone() });
+        by
+    }
+
     /// Thins and verifies a motion that leads out from the end of `prefix`. A refuted one is
     /// simulated again with the refuting points as samples, and given up after some tries.
     pub(super) fn prove(&mut self, run: Run, prefix: &[Pose], motion: Vec<Pose>) -> Result<Proof, Stop> {
@@ -198,10 +256,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             if prefix.len() > 1 && self.checked(part, prefix)?.is_err() {
                 return Ok(Proof::PrefixRefuted);
             }
-            let mut by: Vec<_> = refuted.iter().map(|e| e.other).collect();
-            by.sort_unstable();
-            by.dedup();
-            self.trace(|| TraceEvent::Refuted { part, action: run.action.to_string(), by: by.clone() });
+            let by = self.trace_refutation(&run, &refuted);
             if refinement == REFINEMENTS {
                 return Ok(Proof::Refuted { by });
             }
@@ -290,11 +345,12 @@ impl<'a, 'o> Disassembly<'a, 'o> {
                 (PlanStatus::Partial, Some(format!("the budget of {n} simulations is used up")))
             }
         };
-        let simulations = self.counters.simulations;
+        let Counters { simulations, sweeps, .. } = self.counters;
         self.trace(|| TraceEvent::End {
             status: status.name().to_owned(),
             reason: reason.clone(),
             simulations,
+            sweeps,
         });
         Outcome {
             status,

@@ -12,6 +12,7 @@ mod report;
 mod request;
 mod sbdp;
 mod state;
+mod straight;
 #[cfg(test)]
 mod tests;
 mod trace;

@@ -48,6 +48,8 @@ pub struct Problem<'a> {
     pub targets: Option<Vec<usize>>,
     /// Which actions are used.
     pub actions: ActionSet,
+    /// Whether what leaves straight is taken out without simulation.
+    pub sweeps: bool,
     /// Simulations after which to give up.
     pub max_simulations: Option<u64>,
     /// Simulations that an earlier search of the same question has used up.

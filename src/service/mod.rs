@@ -224,6 +224,7 @@ impl Entry {
             fixed: frame.fixed.clone(),
             targets: request.targets.clone(),
             actions: request.actions,
+            sweeps: request.sweeps(),
             max_simulations: request.max_simulations,
             spent: 0,
             path_timeout: request.path_timeout,

@@ -13,6 +13,7 @@ mod penalty;
 mod projection;
 mod scene;
 mod sliding;
+mod sweep;
 #[cfg(test)]
 mod tests;
 mod transition;
@@ -22,4 +23,5 @@ pub use disassembled::{HULL_MARGIN, Surroundings, exit_direction};
 pub use penalty::{PenaltyEngine, PenaltyParameters};
 pub use scene::{Allowances, Body, Scene};
 pub use sliding::{SlidingEngine, pair_blocks};
+pub use sweep::{Sweep, straight_sweep};
 pub use transition::{End, Motion, TransitionFunction};
