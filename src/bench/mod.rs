@@ -7,9 +7,11 @@
 
 mod corpus;
 mod estimate;
+pub(crate) mod families;
 mod figure;
 mod record;
 mod runner;
+mod scale;
 mod statistics;
 mod tables;
 #[cfg(test)]
@@ -23,7 +25,9 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 pub use corpus::{Category, Problem, Shard, find};
+pub use families::Family;
 pub use record::{Record, Settings, Store, read};
+pub use scale::{Growth, PARTS, ScaleRequest, scale};
 
 use estimate::Estimate;
 use runner::{Job, Runner};

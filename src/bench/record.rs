@@ -107,6 +107,10 @@ pub struct Record {
     pub verify_time_s: f64,
     /// The process from start to end, reading and healing included.
     pub wall_time_s: f64,
+    /// The most memory that the process had (VmHWM), in KiB; looked up while it ran, so what it took
+    /// in the last fiftieth of its time may be missing.
+    #[serde(default)]
+    pub peak_memory_kib: u64,
     /// Removals.
     pub steps: usize,
     /// Every step passed verification, and all that is wanted is out if the status says so.
