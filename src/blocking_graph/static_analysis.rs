@@ -15,7 +15,8 @@ use crate::termination::{Interrupt, Termination};
 use super::Blockage;
 
 /// Blockages of all present parts at their assembled poses, for the six translations (in opposite
-/// pairs: action `a ^ 1` is the reverse of `a`). One entry per part; absent parts stay open.
+/// pairs: action `a ^ 1` is the reverse of `a`). One entry per part; absent parts stay open. `present`
+/// is ascending.
 ///
 /// # Errors
 /// The termination condition became true.
@@ -26,12 +27,9 @@ pub fn initial_blockages(
     least: &(impl Fn(usize) -> f64 + Sync),
     termination: &Termination,
 ) -> Result<Vec<Blockage>, Interrupt> {
-    let pairs: Vec<_> = present
-        .iter()
-        .enumerate()
-        .flat_map(|(k, &p)| present[k + 1..].iter().map(move |&o| (p, o)))
-        .filter(|&(p, o)| boxes_near(scene, p, o))
-        .collect();
+    let is_present = |part: usize| present.binary_search(&part).is_ok();
+    let mut pairs = scene.broad_phase.pairs(NEAR);
+    pairs.retain(|&(p, o)| is_present(p) && is_present(o));
     let relations = pairs
         .par_iter()
         .map(|&(p, o)| {
@@ -65,7 +63,7 @@ pub fn blocked_from(
 ) -> Blockage {
     let mut out = Blockage::open(translations.len());
     let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(NEAR);
-    for &other in standing.iter().filter(|&&o| scene.bodies[o].bounds.meets(&bounds)) {
+    for other in scene.broad_phase.meeting_of(standing, &bounds) {
         let blocked = pair_blocks(scene, part, pose, other, translations, least);
         for a in (0..translations.len()).filter(|&a| blocked[a]) {
             out.block_single(a, other);
@@ -76,10 +74,6 @@ pub fn blocked_from(
 
 /// Boxes further apart than this cannot touch within the look-ahead.
 const NEAR: f64 = 0.2;
-
-fn boxes_near(scene: &Scene, a: usize, b: usize) -> bool {
-    scene.bodies[a].bounds.grown(NEAR).meets(&scene.bodies[b].bounds)
-}
 
 #[cfg(test)]
 mod tests {

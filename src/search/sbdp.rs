@@ -201,7 +201,7 @@ impl<'a, 'o> Search<'a, 'o> {
     /// The states to expand, the initial one included. Of two last parts it is the same which one
     /// moves against the other: beyond the first push, only the smaller one does.
     fn expandable(&self, phase: Phase) -> Vec<usize> {
-        let standing = &self.disassembly.everything.standing;
+        let standing = self.disassembly.everything.standing();
         let problem = &self.disassembly.problem;
         let still = match standing[..] {
             [a, b] if !self.separate_lists && problem.may_move(a) && problem.may_move(b) => {

@@ -29,20 +29,27 @@ enum Blocked {
 }
 
 impl Search<'_, '_> {
-    /// Takes the first part out that a straight sweep from one of the open states shows free.
+    /// Takes out whatever straight sweeps from the open states show free, in one run over them;
+    /// true if anything left.
     pub(super) fn sweep_out(&mut self, phase: Phase, open: &[usize]) -> Result<bool, Stop> {
         if phase != Phase::Translation || !self.disassembly.problem.sweeps || self.distrust_static {
             return Ok(false);
         }
         let jobs = self.jobs_to_sweep(open);
-        for window in jobs.chunks(rayon::current_num_threads()) {
-            let runs: Vec<Run> = window.iter().map(|job| self.run_of(phase, *job)).collect();
+        let (mut next, mut removed) = (0, false);
+        while next < jobs.len() && !self.disassembly.is_done() {
+            let (window, end) = self.sweeps_from(&jobs, next);
+            next = end;
+            let runs: Vec<Run> = window.iter().map(|&at| self.run_of(phase, jobs[at])).collect();
             let results = self.disassembly.sweep(&runs)?;
-            for ((job, run), result) in window.iter().zip(&runs).zip(results) {
+            for ((&at, run), result) in window.iter().zip(&runs).zip(results) {
+                let job = jobs[at];
                 let blocked = match result {
                     Some(Sweep::Clear { path, .. }) => {
-                        if self.nodes[job.node].alive && self.prove_sweep(*job, run, &path)? {
-                            return Ok(true);
+                        if self.nodes[job.node].alive && self.prove_sweep(job, run, &path)? {
+                            // Later results answer a question that has changed.
+                            (next, removed) = (at + 1, true);
+                            break;
                         }
                         Blocked::ForGood
                     }
@@ -52,7 +59,18 @@ impl Search<'_, '_> {
                 self.swept.0.insert((job.node, job.action), blocked);
             }
         }
-        Ok(false)
+        Ok(removed)
+    }
+
+    /// The next sweeps worth doing, as many as there are threads, and where the ones after them begin.
+    fn sweeps_from(&self, jobs: &[Job], from: usize) -> (Vec<usize>, usize) {
+        let wanted =
+            |at: &usize| self.is_open(Phase::Translation, jobs[*at]) && !self.is_known_blocked(&jobs[*at]);
+        let window: Vec<usize> =
+            (from..jobs.len()).filter(wanted).take(rayon::current_num_threads()).collect();
+        let end = if window.len() < rayon::current_num_threads() { None } else { window.last() };
+        let end = end.map_or(jobs.len(), |at| at + 1);
+        (window, end)
     }
 
     /// In the order of expansion: displaced states first, then all parts as assembled.
@@ -64,14 +82,13 @@ impl Search<'_, '_> {
             rest.sort_by_cached_key(|&i| (self.evaluation(phase, i), i));
         }
         let actions = 0..self.translations.len();
-        let jobs = rest.into_iter().chain(roots);
-        let jobs = jobs.flat_map(|node| actions.clone().map(move |action| Job { node, action }));
-        jobs.filter(|job| self.is_open(phase, *job) && !self.is_known_blocked(job)).collect()
+        let nodes = rest.into_iter().chain(roots);
+        nodes.flat_map(|node| actions.clone().map(move |action| Job { node, action })).collect()
     }
 
     fn is_known_blocked(&self, job: &Job) -> bool {
         match self.swept.0.get(&(job.node, job.action)) {
-            Some(Blocked::By(part)) => self.disassembly.everything.standing.binary_search(part).is_ok(),
+            Some(Blocked::By(part)) => self.disassembly.everything.standing().binary_search(part).is_ok(),
             Some(Blocked::ForGood) => true,
             None => false,
         }
