@@ -33,7 +33,7 @@ pub(super) enum Command {
     /// Say how the running daemon is
     Status,
     /// Run planners over folders of assemblies and evaluate what comes out
-    Bench(BenchArguments),
+    Bench(Box<BenchArguments>),
 }
 
 /// Arguments of `sbdp plan`.

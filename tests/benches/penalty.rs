@@ -61,7 +61,7 @@ fn scene() -> Scene {
     let parts = meshes.into_iter().enumerate().map(part).collect();
     let source = SourceAssembly { name: "block on plate".into(), parts, ..SourceAssembly::default() };
     let assembly = Assembly::new(&source).expect("the meshes are sound");
-    let field = |shape: &Arc<Shape>| {
+    let field = |shape: &Arc<sbdp::geometry::Shape>| {
         Arc::new(Field::build(&shape.surface, &Termination::default()).expect("nobody cancels"))
     };
     Scene::assembled(&assembly, &assembly.shapes.iter().map(field).collect::<Vec<_>>())
