@@ -13,43 +13,7 @@ use crate::sdf::Field;
 use crate::simulation::Scene;
 use crate::termination::Termination;
 
-/// The solid made of the filled cells of a grid with the given planes; all its grid faces are there,
-/// so it is closed without T-junctions.
-pub(crate) fn cells(planes: [&[f64]; 3], filled: impl Fn([usize; 3]) -> bool) -> SourceMesh {
-    let mut mesh = SourceMesh::default();
-    let mut known: HashMap<[usize; 3], u32> = HashMap::new();
-    let count = planes.map(|p| p.len() - 1);
-    for i in 0..count.iter().product() {
-        let cell = [i % count[0], i / count[0] % count[1], i / (count[0] * count[1])];
-        if !filled(cell) {
-            continue;
-        }
-        for axis in 0..3 {
-            for up in [false, true] {
-                let mut beside = cell;
-                beside[axis] = cell[axis].wrapping_add(if up { 1 } else { usize::MAX });
-                if beside[axis] < count[axis] && filled(beside) {
-                    continue;
-                }
-                let mut quad = [[0, 0], [1, 0], [1, 1], [0, 1]].map(|[s, t]| {
-                    let mut node = cell;
-                    node[axis] += usize::from(up);
-                    node[(axis + 1) % 3] += s;
-                    node[(axis + 2) % 3] += t;
-                    *known.entry(node).or_insert_with(|| {
-                        mesh.vertices.push(std::array::from_fn(|a| planes[a][node[a]]));
-                        mesh.vertices.len() as u32 - 1
-                    })
-                });
-                if !up {
-                    quad.reverse();
-                }
-                mesh.triangles.extend([[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]);
-            }
-        }
-    }
-    mesh
-}
+pub(crate) use crate::bench::families::cells;
 
 /// A box.
 pub(crate) fn cuboid(lo: [f64; 3], hi: [f64; 3]) -> SourceMesh {

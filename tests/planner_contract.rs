@@ -201,7 +201,8 @@ fn targets_end_the_plan() {
 #[test]
 fn a_spent_budget_gives_a_partial_plan_with_its_reason() {
     for request in requests() {
-        let plan = plan(&load("pin-bolt-cover"), &PlanRequest { max_simulations: Some(1), ..request });
+        let request = PlanRequest { max_simulations: Some(1), sweeps: Some(false), ..request };
+        let plan = plan(&load("pin-bolt-cover"), &request);
         assert_eq!(plan.status, PlanStatus::Partial);
         assert!(plan.reason.as_ref().is_some_and(|r| r.contains("1 simulation")), "{:?}", plan.reason);
         assert!(plan.stats.simulations <= 1 && plan.steps.len() <= 1);

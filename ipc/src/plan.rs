@@ -14,6 +14,11 @@ pub const PLAN_NO_CACHE: u32 = 1;
 /// The list of targets is given (it may be empty); without it all parts are meant.
 pub const PLAN_HAS_TARGETS: u32 = 2;
 
+/// Parts that leave straight are taken out by a sweep, without simulation.
+pub const PLAN_SWEEPS: u32 = 4;
+/// They are simulated, too. Neither flag leaves it to the daemon; both are malformed.
+pub const PLAN_NO_SWEEPS: u32 = 8;
+
 /// Names of the planners; the wire carries the index.
 pub const PLANNERS: [&str; 5] = ["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star"];
 /// Names of the engines; the wire carries the index.
@@ -33,7 +38,7 @@ pub struct PlanRequestHeader {
     pub engine: u32,
     /// Index into [`ACTION_SETS`].
     pub actions: u32,
-    /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`].
+    /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`], [`PLAN_SWEEPS`], [`PLAN_NO_SWEEPS`].
     pub flags: u32,
     /// Threads for this request; 0 leaves it to the daemon.
     pub threads: u32,
@@ -104,6 +109,9 @@ pub struct PlanRequest {
     pub engine: u32,
     /// Index into [`ACTION_SETS`].
     pub actions: u32,
+    /// Whether parts that leave straight are taken out without simulation; `None` leaves it to the
+    /// daemon.
+    pub sweeps: Option<bool>,
     /// Neither read nor write anything remembered.
     pub no_cache: bool,
     /// Threads; 0 leaves it to the daemon.
@@ -132,7 +140,9 @@ impl PlanRequest {
             planner: self.planner,
             engine: self.engine,
             actions: self.actions,
-            flags: flag(self.no_cache, PLAN_NO_CACHE) | flag(self.targets.is_some(), PLAN_HAS_TARGETS),
+            flags: flag(self.no_cache, PLAN_NO_CACHE)
+                | flag(self.targets.is_some(), PLAN_HAS_TARGETS)
+                | self.sweeps.map_or(0, |s| if s { PLAN_SWEEPS } else { PLAN_NO_SWEEPS }),
             threads: self.threads,
             fixed: self.fixed.len() as u32,
             removed: self.removed.len() as u32,
@@ -154,7 +164,9 @@ impl PlanRequest {
         let fixed = reader.array::<u32>("fixed", u64::from(h.fixed))?.to_vec();
         let removed = reader.array::<u32>("removed", u64::from(h.removed))?.to_vec();
         let targets = reader.array::<u32>("targets", u64::from(h.targets))?.to_vec();
-        if h.flags & !(PLAN_NO_CACHE | PLAN_HAS_TARGETS) != 0 {
+        const KNOWN: u32 = PLAN_NO_CACHE | PLAN_HAS_TARGETS | PLAN_SWEEPS | PLAN_NO_SWEEPS;
+        let set = |bit: u32| h.flags & bit != 0;
+        if set(!KNOWN) || (set(PLAN_SWEEPS) && set(PLAN_NO_SWEEPS)) {
             return Err(Malformed::OutOfRange { field: "flags", value: u64::from(h.flags) });
         }
         Ok(Self {
@@ -162,13 +174,14 @@ impl PlanRequest {
             planner: h.planner,
             engine: h.engine,
             actions: h.actions,
-            no_cache: h.flags & PLAN_NO_CACHE != 0,
+            sweeps: (set(PLAN_SWEEPS) || set(PLAN_NO_SWEEPS)).then_some(set(PLAN_SWEEPS)),
+            no_cache: set(PLAN_NO_CACHE),
             threads: h.threads,
             deadline_ns: (h.deadline_ns != 0).then_some(h.deadline_ns),
             max_simulations: (h.max_simulations != u64::MAX).then_some(h.max_simulations),
             fixed,
             removed,
-            targets: (h.flags & PLAN_HAS_TARGETS != 0).then_some(targets),
+            targets: set(PLAN_HAS_TARGETS).then_some(targets),
         })
     }
 }

@@ -126,8 +126,11 @@ fn requests_errors_and_status_come_back() {
         targets: Some(vec![]),
         ..PlanRequest::default()
     };
-    let bytes = AlignedBytes::copy_of(&request.encode());
-    assert_eq!(PlanRequest::decode(bytes.as_slice()).unwrap(), request);
+    for sweeps in [None, Some(false), Some(true)] {
+        let request = PlanRequest { sweeps, ..request.clone() };
+        let bytes = AlignedBytes::copy_of(&request.encode());
+        assert_eq!(PlanRequest::decode(bytes.as_slice()).unwrap(), request);
+    }
 
     let error = WireError::new(ErrorCode::Busy, "ü".repeat(100_000));
     let bytes = AlignedBytes::copy_of(&error.encode());

@@ -7,9 +7,11 @@
 
 mod corpus;
 mod estimate;
+pub(crate) mod families;
 mod figure;
 mod record;
 mod runner;
+mod scale;
 mod statistics;
 mod tables;
 #[cfg(test)]
@@ -23,7 +25,9 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 pub use corpus::{Category, Problem, Shard, find};
+pub use families::Family;
 pub use record::{Record, Settings, Store, read};
+pub use scale::{Growth, PARTS, ScaleRequest, scale};
 
 use estimate::Estimate;
 use runner::{Job, Runner};
@@ -86,6 +90,8 @@ pub struct Request {
     pub actions: &'static str,
     /// How their blocking graphs are begun.
     pub dbg: &'static str,
+    /// Whether the state-based planners take parts that leave straight out without simulation.
+    pub sweeps: bool,
     /// How long after `timeout` a run is ended.
     pub grace: Duration,
     /// Threads of each run; 0 for all processors.
@@ -242,6 +248,7 @@ fn settings(request: &Request) -> Result<Settings, BenchError> {
         path_timeout_s: request.path_timeout.as_secs_f64(),
         actions: request.actions.to_owned(),
         dbg: request.dbg.to_owned(),
+        sweeps: request.sweeps,
         threads: request.threads,
         jobs: request.jobs,
         processors: std::thread::available_parallelism().map_or(0, usize::from),

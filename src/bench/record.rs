@@ -25,6 +25,9 @@ pub struct Settings {
     /// How blocking graphs were begun.
     #[serde(default = "before_there_was_a_choice")]
     pub dbg: String,
+    /// Whether the state-based planners took parts that leave straight out without simulation.
+    #[serde(default)]
+    pub sweeps: bool,
     /// Threads of each run; 0 for all processors.
     pub threads: u32,
     /// How many runs went on at a time.
@@ -48,6 +51,7 @@ impl Settings {
                 s.path_timeout_s.to_bits(),
                 s.actions.clone(),
                 s.dbg.clone(),
+                s.sweeps,
                 s.threads,
             )
         };
@@ -65,9 +69,10 @@ impl std::fmt::Display for Settings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let threads = if self.threads == 0 { "all".to_owned() } else { self.threads.to_string() };
         let Self { version, build, timeout_s, path_timeout_s, actions, dbg, .. } = self;
+        let sweeps = if self.sweeps { ", sweeps" } else { "" };
         write!(
             f,
-            "version {version}, build {build}, timeout {timeout_s} s ({path_timeout_s} s per path), actions {actions}, dbg {dbg}, threads {threads}"
+            "version {version}, build {build}, timeout {timeout_s} s ({path_timeout_s} s per path), actions {actions}{sweeps}, dbg {dbg}, threads {threads}"
         )
     }
 }
@@ -92,6 +97,9 @@ pub struct Record {
     pub reason: Option<String>,
     /// Transition functions computed (the paper's Sim).
     pub simulations: u64,
+    /// Removals by a straight sweep, which are no simulations.
+    #[serde(default)]
+    pub swept: u64,
     /// States kept.
     pub states: u64,
     /// Simulation (the paper's PT).
@@ -107,6 +115,10 @@ pub struct Record {
     pub verify_time_s: f64,
     /// The process from start to end, reading and healing included.
     pub wall_time_s: f64,
+    /// The most memory that the process had (VmHWM), in KiB; looked up while it ran, so what it took
+    /// in the last fiftieth of its time may be missing.
+    #[serde(default)]
+    pub peak_memory_kib: u64,
     /// Removals.
     pub steps: usize,
     /// Every step passed verification, and all that is wanted is out if the status says so.

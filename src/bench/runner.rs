@@ -72,7 +72,9 @@ impl Runner<'_> {
         remove(&plan)?;
         let started = Instant::now();
         let mut process = self.start(job, &plan, &said)?;
-        let end = self.wait(&mut process, started).map_err(|e| BenchError::file(self.program, &e))?;
+        let mut peak = 0;
+        let end = self.wait(&mut process, started, &mut peak);
+        let end = end.map_err(|e| BenchError::file(self.program, &e))?;
         let wall = started.elapsed();
         let record = match end {
             End::Cancelled => None,
@@ -83,7 +85,7 @@ impl Runner<'_> {
         };
         remove(&plan)?;
         remove(&said)?;
-        Ok(record)
+        Ok(record.map(|record| Record { peak_memory_kib: peak, ..record }))
     }
 
     fn file(&self, extension: &str) -> PathBuf {
@@ -98,6 +100,7 @@ impl Runner<'_> {
         command.args(["--timeout", &self.timeout.as_secs_f64().to_string()]);
         command.args(["--path-timeout", &self.settings.path_timeout_s.to_string()]);
         command.args(["--actions", &self.settings.actions, "--dbg", &self.settings.dbg]);
+        command.arg(if self.settings.sweeps { "--sweeps" } else { "--no-sweeps" });
         if self.settings.threads > 0 {
             command.args(["--threads", &self.settings.threads.to_string()]);
         }
@@ -107,7 +110,7 @@ impl Runner<'_> {
         command.spawn().map(Process).map_err(|e| BenchError::file(self.program, &e))
     }
 
-    fn wait(&self, process: &mut Process, started: Instant) -> io::Result<End> {
+    fn wait(&self, process: &mut Process, started: Instant, peak: &mut u64) -> io::Result<End> {
         let most = self.timeout.saturating_add(self.grace);
         loop {
             if let Some(status) = process.0.try_wait()? {
@@ -116,6 +119,7 @@ impl Runner<'_> {
             if self.is_ended() {
                 return Ok(End::Cancelled);
             }
+            *peak = peak_memory_kib(process.0.id()).unwrap_or(*peak);
             let elapsed = started.elapsed();
             if elapsed > most {
                 return Ok(End::Overstayed);
@@ -152,6 +156,7 @@ impl Runner<'_> {
             category: Category::of(plan.parts.len()).name().to_owned(),
             reason: plan.reason.clone(),
             simulations: s.simulations_run,
+            swept: s.sweeps,
             states: s.states,
             path_time_s: s.path_time_s,
             total_time_s: (s.total_time_s - s.verify_time_s).max(0.0),
@@ -174,6 +179,7 @@ impl Runner<'_> {
             status: status.to_owned(),
             reason: Some(reason),
             simulations: 0,
+            swept: 0,
             states: 0,
             path_time_s: 0.0,
             total_time_s: 0.0,
@@ -181,11 +187,19 @@ impl Runner<'_> {
             static_analysis_time_s: 0.0,
             verify_time_s: 0.0,
             wall_time_s: wall.as_secs_f64(),
+            peak_memory_kib: 0,
             steps: 0,
             verified: false,
             settings: self.settings.clone(),
         }
     }
+}
+
+/// What the system says of a process that runs; nothing once it has ended.
+fn peak_memory_kib(process: u32) -> Option<u64> {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse().ok()
 }
 
 /// Ended by its handle when dropped, whatever happened meanwhile.
@@ -239,6 +253,14 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         fs::write(file.path(), text).unwrap();
         last_words(file.path())
+    }
+
+    #[test]
+    fn this_process_has_had_some_memory() {
+        let before = peak_memory_kib(std::process::id()).unwrap();
+        let filled = std::hint::black_box(vec![1u8; 64 << 20]);
+        assert!(peak_memory_kib(std::process::id()).unwrap() >= before.max(filled.len() as u64 / 1024));
+        assert_eq!(peak_memory_kib(u32::MAX), None);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use super::{Category, Record, Settings, report};
 type End = Result<(u64, f64, f64), &'static str>;
 
 /// A record of a run that took so many simulations and seconds (PT and DT), or did not end well.
-fn record(problem: (&str, usize), planner: &str, end: End) -> Record {
+pub(super) fn record(problem: (&str, usize), planner: &str, end: End) -> Record {
     let (simulations, path_time_s, total_time_s) = end.unwrap_or((1, 1.0, 1.0));
     Record {
         assembly: problem.0.to_owned(),
@@ -20,6 +20,7 @@ fn record(problem: (&str, usize), planner: &str, end: End) -> Record {
         status: end.err().unwrap_or("complete").to_owned(),
         reason: None,
         simulations,
+        swept: 0,
         states: 1,
         path_time_s,
         total_time_s,
@@ -27,6 +28,7 @@ fn record(problem: (&str, usize), planner: &str, end: End) -> Record {
         static_analysis_time_s: 0.0,
         verify_time_s: 0.0,
         wall_time_s: 1.0,
+        peak_memory_kib: 0,
         steps: 1,
         verified: true,
         settings: Settings {
@@ -36,6 +38,7 @@ fn record(problem: (&str, usize), planner: &str, end: End) -> Record {
             path_timeout_s: 360.0,
             actions: "paper".to_owned(),
             dbg: "sliding".to_owned(),
+            sweeps: false,
             threads: 0,
             jobs: 1,
             processors: 2,

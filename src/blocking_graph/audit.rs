@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::simulation::{Action, End, Scene, Surroundings, TransitionFunction};
+use crate::simulation::{Action, End, HullTree, Scene, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
 use super::{StaticAnalysis, initial_blockages};
@@ -36,7 +36,7 @@ pub fn audit(
 ) -> Result<Audit, Interrupt> {
     let translations = Action::translations();
     let blockages = initial_blockages(rule, scene, present, &translations, least, termination)?;
-    let everything = Surroundings::new(scene, present.to_vec());
+    let everything = HullTree::new(scene, present.to_vec());
     let questions: Vec<_> =
         present.iter().flat_map(|&p| (0..translations.len()).map(move |a| (p, a))).collect();
     let moves = questions

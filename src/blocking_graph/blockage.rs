@@ -21,6 +21,10 @@ pub struct Blockage {
     jointly: Vec<Vec<Vec<usize>>>,
     /// Parts that blocked something once and are gone.
     outlived: BTreeSet<usize>,
+    /// All parts that block some action.
+    parts: BTreeSet<usize>,
+    /// Actions that nothing is known to block.
+    open: usize,
 }
 
 impl Blockage {
@@ -31,22 +35,40 @@ impl Blockage {
             single: vec![BTreeSet::new(); actions],
             jointly: vec![Vec::new(); actions],
             outlived: BTreeSet::new(),
+            parts: BTreeSet::new(),
+            open: actions,
         }
     }
 
     /// `by` alone blocks an action.
     pub fn block_single(&mut self, action: usize, by: usize) {
         self.single[action].insert(by);
+        self.parts.insert(by);
+        self.count_open();
     }
 
     /// A simulation of an action ended at these parts (none: it can never succeed from here).
     pub fn block_jointly(&mut self, action: usize, by: Vec<usize>) {
+        self.parts.extend(&by);
         self.jointly[action].push(by);
+        self.count_open();
+    }
+
+    /// Evaluated after every change, because states are looked at much more often than changed.
+    fn count_open(&mut self) {
+        self.open = (0..self.single.len()).filter(|&a| self.is_open(a)).count();
+    }
+
+    fn refresh(&mut self) {
+        let joint = self.jointly.iter().flatten().flatten();
+        self.parts = self.single.iter().flatten().chain(joint).copied().collect();
+        self.count_open();
     }
 
     /// Forgets what simulations said about an action.
     pub fn reopen(&mut self, action: usize) {
         self.jointly[action].clear();
+        self.refresh();
     }
 
     /// Whether nothing is known to block an action.
@@ -74,6 +96,9 @@ impl Blockage {
 
     /// A part is gone: deletes its vertex.
     pub fn remove(&mut self, part: usize) {
+        if !self.parts.contains(&part) {
+            return;
+        }
         for set in &mut self.single {
             if set.remove(&part) {
                 self.outlived.insert(part);
@@ -86,14 +111,13 @@ impl Blockage {
                 self.outlived.insert(part);
             }
         }
+        self.refresh();
     }
 
     /// The evaluation functions f_c and f_a.
     #[must_use]
     pub fn evaluation(&self) -> Evaluation {
-        let joint = self.jointly.iter().flatten().flatten();
-        let parts: BTreeSet<_> = self.single.iter().flatten().chain(joint).collect();
-        Evaluation { colliding_parts: parts.len(), open_actions: self.open_actions().count() }
+        Evaluation { colliding_parts: self.parts.len(), open_actions: self.open }
     }
 
     /// The parts known to block an action.

@@ -59,7 +59,8 @@ impl StaticAnalysis {
 }
 
 /// Blockages of all present parts at their assembled poses, for the six translations (in opposite
-/// pairs: action `a ^ 1` is the reverse of `a`). One entry per part; absent parts stay open.
+/// pairs: action `a ^ 1` is the reverse of `a`). One entry per part; absent parts stay open. `present`
+/// is ascending.
 ///
 /// # Errors
 /// The termination condition became true.
@@ -71,12 +72,9 @@ pub fn initial_blockages(
     least: &(impl Fn(usize) -> f64 + Sync),
     termination: &Termination,
 ) -> Result<Vec<Blockage>, Interrupt> {
-    let pairs: Vec<_> = present
-        .iter()
-        .enumerate()
-        .flat_map(|(k, &p)| present[k + 1..].iter().map(move |&o| (p, o)))
-        .filter(|&(p, o)| boxes_near(scene, p, o))
-        .collect();
+    let is_present = |part: usize| present.binary_search(&part).is_ok();
+    let mut pairs = scene.broad_phase.pairs(NEAR);
+    pairs.retain(|&(p, o)| is_present(p) && is_present(o));
     // The smaller part moves: its steps are adapted to its size.
     let extent = |i: usize| scene.bodies[i].bounds.extents().max();
     let pairs: Vec<_> =
@@ -154,7 +152,7 @@ pub fn blocked_from(
 ) -> Blockage {
     let mut out = Blockage::open(translations.len());
     let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(NEAR);
-    for &other in standing.iter().filter(|&&o| scene.bodies[o].bounds.meets(&bounds)) {
+    for other in scene.broad_phase.meeting_of(standing, &bounds) {
         let blocked = rule.pair_blocks(scene, part, pose, other, translations, least);
         for a in (0..translations.len()).filter(|&a| blocked[a]) {
             out.block_single(a, other);
@@ -165,10 +163,6 @@ pub fn blocked_from(
 
 /// Boxes further apart than this cannot touch within the look-ahead.
 const NEAR: f64 = 0.2;
-
-fn boxes_near(scene: &Scene, a: usize, b: usize) -> bool {
-    scene.bodies[a].bounds.grown(NEAR).meets(&scene.bodies[b].bounds)
-}
 
 #[cfg(test)]
 mod tests {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::bench::{ENGINES, PLANNERS, Shard};
+use crate::bench::{self, ENGINES, PARTS, PLANNERS, Shard};
 use crate::blocking_graph::StaticAnalysis;
 use crate::search;
 
@@ -34,7 +34,7 @@ pub(super) enum Command {
     /// Say how the running daemon is
     Status,
     /// Run planners over folders of assemblies and evaluate what comes out
-    Bench(BenchArguments),
+    Bench(Box<BenchArguments>),
 }
 
 /// Arguments of `sbdp plan`.
@@ -61,6 +61,8 @@ pub(super) struct PlanArguments {
     /// [default: sliding]
     #[arg(long, value_enum, conflicts_with = "daemon")]
     pub(super) dbg: Option<Dbg>,
+    #[command(flatten)]
+    pub(super) sweeps: Sweeps,
     /// Answer after so many seconds with what is there
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) timeout: Option<Duration>,
@@ -132,6 +134,8 @@ pub(super) struct BenchArguments {
 /// What else to do with a benchmark.
 #[derive(Debug, Subcommand)]
 pub(super) enum BenchCommand {
+    /// Plan families of assemblies with ever more parts, and see how time and memory grow
+    Scale(BenchScale),
     /// Put results together, as those of shards, and evaluate them without running anything
     Report(BenchReport),
 }
@@ -164,6 +168,14 @@ pub(super) struct BenchRun {
     /// How blocking graphs are begun, before anything is simulated
     #[arg(long, value_enum, default_value_t)]
     pub(super) dbg: Dbg,
+    // Not as one flattened group: within an optional group, clap then takes the whole for absent.
+    /// Take parts that leave straight out without simulation, with sbdp-star and sbdp [default with
+    /// extended actions]
+    #[arg(long, overrides_with = "no_sweeps")]
+    sweeps: bool,
+    /// Simulate parts that leave straight, too [default with the paper's actions]
+    #[arg(long, overrides_with = "sweeps")]
+    no_sweeps: bool,
     /// Where results, tables and figures go; a benchmark that was interrupted goes on there
     #[arg(long, value_name = "DIR", required = true)]
     pub(super) out: PathBuf,
@@ -176,6 +188,57 @@ pub(super) struct BenchRun {
     /// Worker threads of each run [default: all processors]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     pub(super) threads: u32,
+}
+
+impl BenchRun {
+    pub(super) fn sweeps(&self) -> Sweeps {
+        Sweeps { sweeps: self.sweeps, no_sweeps: self.no_sweeps }
+    }
+}
+
+/// Arguments of `sbdp bench scale`.
+#[derive(Debug, Args)]
+pub(super) struct BenchScale {
+    /// Which kinds of assemblies
+    #[arg(long, value_enum, value_name = "FAMILY,…", value_delimiter = ',',
+        default_values = ["bolted-frame", "rack", "gear-train"])]
+    pub(super) families: Vec<Family>,
+    /// With how many parts
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = PARTS)]
+    pub(super) parts: Vec<usize>,
+    /// A run is to answer after so many seconds; one that does not is ended
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "7200",
+        allow_negative_numbers = true)]
+    pub(super) timeout: Duration,
+    #[command(flatten)]
+    pub(super) sweeps: Sweeps,
+    /// Worker threads of each run [default: all processors]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    pub(super) threads: u32,
+    /// Where assemblies and results go; a benchmark that was interrupted goes on there
+    #[arg(long, value_name = "DIR")]
+    pub(super) out: PathBuf,
+}
+
+/// A kind of assembly.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(super) enum Family {
+    /// Two layers of beams, bolted where they cross
+    BoltedFrame,
+    /// Uprights, shelves, trays and what lies in them
+    Rack,
+    /// Meshing gears on shafts between two plates
+    GearTrain,
+}
+
+impl From<Family> for bench::Family {
+    fn from(family: Family) -> Self {
+        match family {
+            Family::BoltedFrame => Self::BoltedFrame,
+            Family::Rack => Self::Rack,
+            Family::GearTrain => Self::GearTrain,
+        }
+    }
 }
 
 /// Arguments of `sbdp bench report`.
@@ -273,6 +336,25 @@ impl From<Dbg> for StaticAnalysis {
     }
 }
 
+/// Whether parts that leave straight are simulated.
+#[derive(Debug, Clone, Copy, Args)]
+pub(super) struct Sweeps {
+    /// Take parts that leave straight out without simulation, with sbdp-star and sbdp [default with
+    /// extended actions]
+    #[arg(long, overrides_with = "no_sweeps")]
+    sweeps: bool,
+    /// Simulate parts that leave straight, too [default with the paper's actions]
+    #[arg(long, overrides_with = "sweeps")]
+    no_sweeps: bool,
+}
+
+impl Sweeps {
+    /// What was asked for, if anything.
+    pub(super) fn asked(self) -> Option<bool> {
+        (self.sweeps || self.no_sweeps).then_some(self.sweeps)
+    }
+}
+
 fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| "not a number of seconds".to_owned())?;
     Duration::try_from_secs_f64(seconds).map_err(|_| "not a number of seconds from 0 on".to_owned())
@@ -304,8 +386,32 @@ mod tests {
         };
         let Some(BenchCommand::Report(report)) = report.command else { panic!("no report") };
         assert_eq!(report.results.len(), 2);
+        let Ok(Command::Bench(scale)) = parse("sbdp bench scale --out o --families rack --parts 10,20")
+        else {
+            panic!("does not parse")
+        };
+        let Some(BenchCommand::Scale(scale)) = scale.command else { panic!("no scale") };
+        assert_eq!((scale.parts, scale.families.len()), (vec![10, 20], 1));
         for wrong in ["", " a", " --out o", " a --out o --planners x", " a --out o --jobs 0", " report"] {
             assert!(parse(&format!("sbdp bench{wrong}")).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn sweeps_are_asked_for_or_refused_or_left_open() {
+        for (flags, asked) in [
+            ("", None),
+            (" --sweeps", Some(true)),
+            (" --no-sweeps", Some(false)),
+            (" --sweeps --no-sweeps", Some(false)),
+            (" --no-sweeps --sweeps", Some(true)),
+        ] {
+            let plan = Arguments::try_parse_from(format!("sbdp plan a{flags}").split(' ')).unwrap();
+            let Command::Plan(plan) = plan.command else { panic!("no plan") };
+            assert_eq!(plan.sweeps.asked(), asked, "{flags}");
+            let bench = Arguments::try_parse_from(format!("sbdp bench a --out o{flags}").split(' ')).unwrap();
+            let Command::Bench(bench) = bench.command else { panic!("no benchmark") };
+            assert_eq!(bench.run.unwrap().sweeps().asked(), asked, "{flags}");
         }
     }
 

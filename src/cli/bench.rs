@@ -9,10 +9,10 @@ use std::time::Duration;
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::args::{BenchArguments, BenchCommand, BenchReport, BenchRun};
+use super::args::{BenchArguments, BenchCommand, BenchReport, BenchRun, BenchScale};
 use super::error::CliError;
 use super::{interrupt, print};
-use crate::bench::{self, Observer, Record, Request, Shard};
+use crate::bench::{self, BenchError, Observer, Record, Request, ScaleRequest, Shard, Summary};
 use crate::blocking_graph::StaticAnalysis;
 use crate::search;
 
@@ -24,19 +24,43 @@ const INTERRUPTED: u8 = 5;
 pub(super) fn run(arguments: &BenchArguments) -> Result<ExitCode, CliError> {
     match (&arguments.command, &arguments.run) {
         (Some(BenchCommand::Report(report)), _) => report_on(report),
+        (Some(BenchCommand::Scale(scale)), _) => measure_growth(scale),
         (None, Some(run)) => measure(run),
         (None, None) => Err(CliError::Refused("give folders of assemblies, or `report`".to_owned())),
     }
 }
 
 fn measure(arguments: &BenchRun) -> Result<ExitCode, CliError> {
+    let request = request(arguments);
+    watched(|cancel, display| bench::run(&request, cancel, display), &files(&arguments.out))
+}
+
+fn measure_growth(arguments: &BenchScale) -> Result<ExitCode, CliError> {
+    let request = ScaleRequest {
+        families: arguments.families.iter().copied().map(Into::into).collect(),
+        parts: arguments.parts.clone(),
+        timeout: arguments.timeout,
+        sweeps: arguments.sweeps.asked().unwrap_or(true),
+        threads: arguments.threads,
+        out: arguments.out.clone(),
+        program: PathBuf::from(THIS_PROGRAM),
+    };
+    let files = format!("{}, growth in {}/scale.md", files(&arguments.out), arguments.out.display());
+    watched(|cancel, display| bench::scale(&request, cancel, display), &files)
+}
+
+/// Runs a benchmark that Ctrl-C ends and a display follows.
+fn watched(
+    run: impl FnOnce(&AtomicBool, &mut BenchDisplay) -> Result<Summary, BenchError>,
+    files: &str,
+) -> Result<ExitCode, CliError> {
     let cancel = Arc::new(AtomicBool::new(false));
     interrupt::cancel_on_interrupt(&cancel)?;
     let mut display = BenchDisplay::new();
-    let summary = bench::run(&request(arguments), &cancel, &mut display);
+    let summary = run(&cancel, &mut display);
     drop(display);
     let summary = summary?;
-    print(&format!("{} records in {}\n", summary.records, files(&arguments.out)))?;
+    print(&format!("{} records in {files}\n", summary.records))?;
     if summary.missing == 0 {
         return Ok(ExitCode::SUCCESS);
     }
@@ -45,14 +69,16 @@ fn measure(arguments: &BenchRun) -> Result<ExitCode, CliError> {
 }
 
 fn request(arguments: &BenchRun) -> Request {
+    let actions = search::ActionSet::from(arguments.actions);
     Request {
         corpora: arguments.corpora.clone(),
         planners: arguments.planners.clone(),
         engines: arguments.engines.clone(),
         timeout: arguments.timeout,
         path_timeout: arguments.path_timeout,
-        actions: search::ActionSet::from(arguments.actions).name(),
+        actions: actions.name(),
         dbg: StaticAnalysis::from(arguments.dbg).name(),
+        sweeps: arguments.sweeps().asked().unwrap_or_else(|| actions.default_sweeps()),
         grace: bench::grace(arguments.timeout),
         threads: arguments.threads,
         jobs: arguments.jobs.get(),

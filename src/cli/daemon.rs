@@ -127,6 +127,7 @@ fn options(question: &Question<'_>) -> PlanOptions {
         fixed: numbers(&request.fixed),
         removed: numbers(&request.removed),
         targets: request.targets.as_deref().map(numbers),
+        sweeps: request.sweeps,
         no_cache: request.no_cache,
     }
 }

@@ -76,6 +76,10 @@ impl Account {
                 };
                 format!("    {place} {action}: {end}{met} after {poses} poses{to}")
             }
+            TraceEvent::Swept { state, part, action } => {
+                let place = self.place(*part, *state);
+                format!("    {place} {action}: leaves straight, by a sweep without simulation")
+            }
             TraceEvent::Refuted { part, action, by } => format!(
                 "    the path of {} by {action} enters {} on the triangles: refused",
                 self.name(*part),
@@ -88,10 +92,10 @@ impl Account {
                 };
                 format!("=== {} is out{after}; its edges are deleted from all graphs", self.name(*part))
             }
-            TraceEvent::End { status, reason, simulations } => {
+            TraceEvent::End { status, reason, simulations, sweeps } => {
                 let why = reason.as_ref().map(|r| format!(": {r}")).unwrap_or_default();
                 format!(
-                    "{status}{why}\n{simulations} simulations counted; where states were expanded, the graphs \
+                    "{status}{why}\n{simulations} simulations counted, {sweeps} parts out by straight sweeps; where states were expanded, the graphs \
                      excluded {} actions",
                     self.excluded
                 )

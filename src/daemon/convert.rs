@@ -24,6 +24,7 @@ pub(crate) fn plan_request(
         planner: planner(request.planner)?,
         engine: engine(request.engine)?,
         actions: actions(request.actions)?,
+        sweeps: request.sweeps,
         max_simulations: request.max_simulations,
         path_timeout: None,
         static_analysis: StaticAnalysis::default(),

@@ -37,6 +37,30 @@ pub struct Node {
     after: u32,
 }
 
+/// Where on its surface a sample lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Site {
+    /// At this vertex.
+    Vertex(u32),
+    /// On this edge of this triangle.
+    Edge(u32, u8),
+    /// Inside this triangle.
+    Face(u32),
+}
+
+/// A sample and where it lies.
+pub(super) type Sited = (Point3<f64>, Site);
+
+/// The samples of a surface, in the order of its triangles.
+pub(super) fn sited(surface: &Surface, spacing: &Spacing) -> Vec<Sited> {
+    let mut out = sample_vertices(surface, spacing);
+    for t in 0..surface.triangles().len() as u32 {
+        sample_edges(surface, t, spacing, &mut out);
+        sample_face(surface, t, spacing.face, &mut out);
+    }
+    out
+}
+
 /// Samples of one surface.
 #[derive(Debug, Clone, Default)]
 pub struct SampleTree {
@@ -54,12 +78,7 @@ impl SampleTree {
     /// Samples a surface.
     #[must_use]
     pub fn new(surface: &Surface, spacing: &Spacing) -> Self {
-        let mut points = sample_vertices(surface, spacing);
-        for t in 0..surface.triangles().len() as u32 {
-            sample_edges(surface, t, spacing, &mut points);
-            sample_face(surface, t, spacing.face, &mut points);
-        }
-        Self::over(points)
+        Self::over(sited(surface, spacing).into_iter().map(|(p, _)| p).collect())
     }
 
     /// A tree over given points.
@@ -160,7 +179,7 @@ fn bend(surface: &Surface, t: u32, e: u8) -> Bend {
 /// contact needs: blunt ones are thinned to the edge spacing, sharp ones only where they nearly
 /// coincide (the crest of a thread is narrow). All of
 /// them are still measured when the path is verified with a closer spacing.
-fn sample_vertices(surface: &Surface, spacing: &Spacing) -> Vec<Point3<f64>> {
+fn sample_vertices(surface: &Surface, spacing: &Spacing) -> Vec<Sited> {
     let mut bends = vec![Bend::Inward; surface.vertices().len()];
     for (i, t) in surface.triangles().iter().enumerate() {
         for e in 0..3u8 {
@@ -173,16 +192,18 @@ fn sample_vertices(surface: &Surface, spacing: &Spacing) -> Vec<Point3<f64>> {
     let mut taken = HashSet::new();
     let mut out = Vec::new();
     for (cell, wanted) in [(THINNEST, Bend::Sharp), (spacing.edge, Bend::Blunt)] {
-        for (p, _) in surface.vertices().iter().zip(&bends).filter(|(_, b)| **b == wanted) {
+        for (v, (p, _)) in
+            (0..).zip(surface.vertices().iter().zip(&bends)).filter(|(_, (_, b))| **b == wanted)
+        {
             if taken.insert((wanted == Bend::Sharp, p.coords.map(|x| (x / cell).floor() as i64))) {
-                out.push(*p);
+                out.push((*p, Site::Vertex(v)));
             }
         }
     }
     out
 }
 
-fn sample_edges(surface: &Surface, t: u32, spacing: &Spacing, out: &mut Vec<Point3<f64>>) {
+fn sample_edges(surface: &Surface, t: u32, spacing: &Spacing, out: &mut Vec<Sited>) {
     let corners = surface.corners(t);
     for e in 0..3u8 {
         let other = surface.neighbour(t, e);
@@ -197,12 +218,12 @@ fn sample_edges(surface: &Surface, t: u32, spacing: &Spacing, out: &mut Vec<Poin
             Bend::Sharp => spacing.edge,
         };
         let n = ((b - a).norm() / step).ceil().max(1.0) as usize;
-        out.extend((1..n).map(|k| a + (b - a) * (k as f64 / n as f64)));
+        out.extend((1..n).map(|k| (a + (b - a) * (k as f64 / n as f64), Site::Edge(t, e))));
     }
 }
 
 /// Points on rows parallel to the longest edge, all strictly inside.
-fn sample_face(surface: &Surface, t: u32, step: f64, out: &mut Vec<Point3<f64>>) {
+fn sample_face(surface: &Surface, t: u32, step: f64, out: &mut Vec<Sited>) {
     let corners = surface.corners(t);
     let side = |e: usize| (corners[(e + 1) % 3] - corners[e]).norm();
     let base = (0..3).max_by(|&e, &f| side(e).total_cmp(&side(f))).unwrap_or(0);
@@ -217,7 +238,8 @@ fn sample_face(surface: &Surface, t: u32, step: f64, out: &mut Vec<Point3<f64>>)
         let v = (row as f64 + 0.5) / rows as f64;
         let (from, to) = (a + (apex - a) * v, b + (apex - b) * v);
         let count = ((to - from).norm() / step).ceil().max(1.0) as usize;
-        out.extend((0..count).map(|k| from + (to - from) * ((k as f64 + 0.5) / count as f64)));
+        let point = |k: usize| from + (to - from) * ((k as f64 + 0.5) / count as f64);
+        out.extend((0..count).map(|k| (point(k), Site::Face(t))));
     }
 }
 

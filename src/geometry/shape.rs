@@ -3,7 +3,8 @@
 use nalgebra::{Point3, Vector3};
 
 use super::hull::hull_vertices;
-use super::{Bounds, MassProperties, Mesh, SampleTree, Spacing, Surface};
+use super::samples::sited;
+use super::{Bounds, MassProperties, Mesh, OrientedSamples, SampleTree, Spacing, Surface};
 
 /// A mesh in its own frame (origin at the middle of its box, lengths of the planning frame).
 #[derive(Debug, Clone)]
@@ -14,6 +15,8 @@ pub struct Shape {
     pub hull: Vec<Point3<f64>>,
     /// Where contact is looked for.
     pub samples: SampleTree,
+    /// The same points, with the faces that meet there.
+    pub oriented: OrientedSamples,
     /// Centre of mass and radius of gyration.
     pub mass: MassProperties,
     /// Largest distance of a vertex from the centre of mass.
@@ -28,8 +31,10 @@ impl Shape {
         let mass = surface.mass_properties();
         let reach =
             surface.vertices().iter().map(|v| (v - mass.centre).norm_squared()).fold(0.0, f64::max).sqrt();
-        let samples = SampleTree::new(&surface, &spacing(surface.bounds()));
-        Self { hull: hull_vertices(surface.vertices()), samples, mass, reach, surface }
+        let sited = sited(&surface, &spacing(surface.bounds()));
+        let oriented = OrientedSamples::new(&surface, &sited);
+        let samples = SampleTree::over(sited.into_iter().map(|(p, _)| p).collect());
+        Self { hull: hull_vertices(surface.vertices()), samples, oriented, mass, reach, surface }
     }
 
     /// Largest distance of a point of the shape from the line through `centre` along the unit

@@ -6,7 +6,7 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use super::triangle::{Feature, area_normal, closest_on_triangle};
+use super::triangle::{Feature, area_normal, closest_on_triangle, crossing};
 use super::triangle_tree::TriangleTree;
 use super::winding::WindingTree;
 use super::{Bounds, Mesh, Solidity};
@@ -148,6 +148,24 @@ impl Surface {
     pub fn closest_from(&self, p: &Point3<f64>, guess: u32) -> Closest {
         let near = self.closest_on(guess, p);
         self.closest(p, near.distance).unwrap_or(near)
+    }
+
+    /// Whether the segment from `p` along the unit vector `direction` crosses a triangle from its
+    /// outer side, at more than a grazing angle (`steepness`: sine of the angle). The border of a
+    /// triangle belongs to it.
+    #[must_use]
+    pub fn is_entered_along(
+        &self,
+        p: &Point3<f64>,
+        direction: &Vector3<f64>,
+        length: f64,
+        steepness: f64,
+    ) -> bool {
+        self.tree.any_along(p, direction, length, |t| {
+            let against = -self.face_normal(t).dot(direction);
+            against > steepness
+                && crossing(p, direction, &self.corners(t)).is_some_and(|at| (0.0..=length).contains(&at))
+        })
     }
 
     /// Signed distance given the closest point: negative inside.

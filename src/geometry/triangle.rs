@@ -13,6 +13,26 @@ pub enum Feature {
     Vertex(u8),
 }
 
+/// Where the line from `p` along `direction` meets a triangle, borders included (T. Möller and
+/// B. Trumbore 1997).
+#[must_use]
+pub(super) fn crossing(p: &Point3<f64>, direction: &Vector3<f64>, corners: &[Point3<f64>; 3]) -> Option<f64> {
+    /// Barycentric slack, so that no line passes between two triangles.
+    const BORDER: f64 = 1e-9;
+    let [a, b, c] = corners;
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let across = direction.cross(&ac);
+    let determinant = ab.dot(&across);
+    if determinant == 0.0 {
+        return None;
+    }
+    let u = ap.dot(&across) / determinant;
+    let q = ap.cross(&ab);
+    let v = direction.dot(&q) / determinant;
+    let inside = u >= -BORDER && v >= -BORDER && u + v <= 1.0 + BORDER;
+    inside.then(|| ac.dot(&q) / determinant)
+}
+
 /// The point of triangle `abc` closest to `p`, and its feature (C. Ericson, Real-Time Collision
 /// Detection, 5.1.5: Voronoi regions in barycentric terms).
 #[must_use]

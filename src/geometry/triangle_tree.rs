@@ -118,6 +118,37 @@ impl TriangleTree {
         query.best
     }
 
+    /// Whether any triangle whose box the segment from `p` along the unit vector `direction` meets
+    /// passes `test`. The order of the triangles is that of the tree.
+    pub(super) fn any_along(
+        &self,
+        p: &Point3<f64>,
+        direction: &Vector3<f64>,
+        length: f64,
+        test: impl Fn(u32) -> bool,
+    ) -> bool {
+        let q = p - self.origin;
+        let slack = (ROUNDING * (q.amax() + self.radius + length)) as f32;
+        // Nearly parallel to a slab counts as parallel, without infinities.
+        let steep = |x: f64| if x.abs() < 1e-12 { 1e12 } else { 1.0 / x };
+        let (inverse, q) = (direction.map(|x| steep(x) as f32), q.map(|x| x as f32));
+        let segment = Segment { q: q.into(), inverse: inverse.into(), length: length as f32 + slack, slack };
+        let mut stack = vec![self.root];
+        while let Some(at) = stack.pop() {
+            if at & LEAF != 0 {
+                let leaf = &self.leaves[(at & !LEAF) as usize];
+                if (0..WIDTH).any(|k| leaf.height[k].is_finite() && test(leaf.triangle[k])) {
+                    return true;
+                }
+                continue;
+            }
+            let node = &self.nodes[at as usize];
+            let meets = node.meets(&segment);
+            stack.extend((0..WIDTH).filter(|&k| meets[k]).map(|k| node.child[k]));
+        }
+        false
+    }
+
     fn descend<M: Fn(u32) -> Closest>(&self, at: u32, query: &mut Query<M>) {
         if at & LEAF != 0 {
             return query.visit(&self.leaves[(at & !LEAF) as usize]);
@@ -176,7 +207,34 @@ impl<M: Fn(u32) -> Closest> Query<M> {
     }
 }
 
+/// A segment in single precision, with a margin for its rounding.
+struct Segment {
+    q: [f32; 3],
+    /// One over the direction.
+    inverse: [f32; 3],
+    length: f32,
+    slack: f32,
+}
+
 impl Node {
+    /// Which boxes a segment meets.
+    #[inline]
+    fn meets(&self, segment: &Segment) -> [bool; WIDTH] {
+        let (mut from, mut to) = ([-segment.slack; WIDTH], [segment.length; WIDTH]);
+        for a in 0..3 {
+            let (q, inverse) = (segment.q[a], segment.inverse[a]);
+            // By the direction's sign: so an empty place, whose box is inside out, is never met.
+            let (near, far) =
+                if inverse > 0.0 { (&self.min[a], &self.max[a]) } else { (&self.max[a], &self.min[a]) };
+            let slack = segment.slack.copysign(inverse);
+            for k in 0..WIDTH {
+                from[k] = larger(from[k], (near[k] - slack - q) * inverse);
+                to[k] = -larger(-to[k], -((far[k] + slack - q) * inverse));
+            }
+        }
+        std::array::from_fn(|k| from[k] <= to[k])
+    }
+
     #[inline]
     fn squared_distances(&self, q: &[f32; 3]) -> Lanes {
         let mut sum = [0.0; WIDTH];

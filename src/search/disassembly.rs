@@ -1,15 +1,18 @@
 //! The disassembly under way: what stands, what is out, and what every planner does with it:
 //! simulate, prove a path, take parts out that nothing holds.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::geometry::Pose;
-use crate::plan::PlanStatus;
-use crate::simulation::{Action, End, Motion, Surroundings, exit_direction};
+use crate::geometry::{Pose, separating_direction, transformed};
+use crate::plan::{Entry, PlanStatus};
+use crate::simulation::{
+    Action, End, HULL_MARGIN, HullTree, Motion, Surroundings, Sweep, exit_direction, straight_sweep,
+};
 use crate::termination::Interrupt;
 
 use super::outcome::{BlockedAction, Counters, Outcome, Removal};
@@ -54,15 +57,25 @@ pub(super) enum Proof {
     Otherwise(Motion),
 }
 
+/// A sweep's claim that did not hold.
+pub(super) struct Refuted {
+    /// Already the way to the sweep's start does not hold.
+    pub(super) prefix: bool,
+}
+
 /// What every planner shares.
 pub(super) struct Disassembly<'a, 'o> {
     pub(super) problem: Problem<'a>,
     pub(super) observer: &'o mut dyn Observer,
     /// All present parts that have not been taken out.
-    pub(super) everything: Surroundings,
-    around: Vec<Option<Surroundings>>,
+    pub(super) everything: HullTree,
+    /// What stands around some parts, until the next removal.
+    around: HashMap<usize, Arc<Surroundings>>,
     /// A part whose hull meets this part's, both assembled: proof that it is not free.
     entangled: Vec<Option<usize>>,
+    /// At which change of the hull a part that does not shape it was found not to be free.
+    held_since: Vec<Option<usize>>,
+    hull_changes: usize,
     pub(super) removals: Vec<Removal>,
     pub(super) counters: Counters,
     /// Whether some path was given up for want of time: nothing found is then no proof.
@@ -74,9 +87,11 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         let count = problem.scene.bodies.len();
         Self {
             observer,
-            everything: Surroundings::new(&problem.scene, problem.present.clone()),
-            around: vec![None; count],
+            everything: HullTree::new(&problem.scene, problem.present.clone()),
+            around: HashMap::new(),
             entangled: vec![None; count],
+            held_since: vec![None; count],
+            hull_changes: 0,
             removals: Vec::new(),
             counters: Counters::default(),
             path_time_ran_out: false,
@@ -85,7 +100,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     }
 
     pub(super) fn is_done(&self) -> bool {
-        self.problem.is_goal(&self.everything.standing)
+        self.problem.is_goal(self.everything.standing())
     }
 
     /// Where a part stands assembled.
@@ -93,14 +108,18 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.problem.scene.bodies[part].planning_from_shape
     }
 
-    /// All that stands but one part.
-    pub(super) fn surroundings(&mut self, part: usize) -> &Surroundings {
+    /// All that stands but one part. A few are remembered: all would be the square of their number.
+    fn surroundings(&mut self, part: usize) -> Arc<Surroundings> {
+        const REMEMBERED: usize = 64;
+        if self.around.len() >= REMEMBERED && !self.around.contains_key(&part) {
+            self.around.clear();
+        }
         let (everything, scene) = (&self.everything, &self.problem.scene);
-        self.around[part].get_or_insert_with(|| everything.without(scene, part))
+        Arc::clone(self.around.entry(part).or_insert_with(|| Arc::new(everything.without(scene, part))))
     }
 
     pub(super) fn standing(&self, part: usize) -> Vec<usize> {
-        self.everything.standing.iter().copied().filter(|&i| i != part).collect()
+        self.everything.standing().iter().copied().filter(|&i| i != part).collect()
     }
 
     /// Tells the observer, if it listens.
@@ -148,15 +167,11 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     /// question to which later ones were answers, so they are stopped.
     pub(super) fn simulate(&mut self, runs: &[Run]) -> Result<Vec<Motion>, Stop> {
         let started = Instant::now();
-        for run in runs {
-            self.surroundings(run.part);
-        }
-        let (problem, around) = (&self.problem, &self.around);
+        let around: Vec<_> = runs.iter().map(|run| self.surroundings(run.part)).collect();
+        let problem = &self.problem;
         let winner = Arc::new(AtomicUsize::new(usize::MAX));
         let simulated = |(rank, run): (usize, &Run)| {
-            let Some(around) = &around[run.part] else {
-                return Ok(Motion { path: vec![run.start], end: End::Collision { with: Vec::new() } });
-            };
+            let around = &around[rank];
             let Run { part, start, action } = run;
             let termination = problem.termination.unless_won(&winner, rank);
             let limited = problem.path_timeout.map(|limit| termination.within(limit));
@@ -183,6 +198,55 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         Ok(motions.into_iter().take(wanted).collect::<Result<_, Interrupt>>()?)
     }
 
+    /// What straight sweeps along the forces of some runs tell, in order, up to the first that is
+    /// clear.
+    pub(super) fn sweep(&mut self, runs: &[Run]) -> Result<Vec<Option<Sweep>>, Stop> {
+        self.problem.termination.check()?;
+        let started = Instant::now();
+        let around: Vec<_> = runs.iter().map(|run| self.surroundings(run.part)).collect();
+        let scene = &self.problem.scene;
+        let swept = |(run, around): (&Run, &Arc<Surroundings>)| {
+            straight_sweep(scene, around, run.part, &run.start, &run.action.force())
+        };
+        let mut results: Vec<_> = runs.par_iter().zip(&around).map(swept).collect();
+        let clear = |s: &Option<Sweep>| matches!(s, Some(Sweep::Clear { .. }));
+        if let Some(first) = results.iter().position(clear) {
+            results.truncate(first + 1);
+        }
+        self.counters.simulation += started.elapsed();
+        Ok(results)
+    }
+
+    /// Verifies a path that a sweep claims to be clear, from the end of `prefix`. What refutes it
+    /// becomes samples, for the simulation that must answer instead.
+    pub(super) fn prove_sweep(
+        &mut self,
+        run: &Run,
+        prefix: &[Pose],
+        motion: &[Pose],
+    ) -> Result<Result<(Vec<Pose>, f64), Refuted>, Stop> {
+        let part = run.part;
+        let refuted = match self.checked(part, &joined(prefix, motion))? {
+            Ok(proof) => return Ok(Ok(proof)),
+            Err(entries) => entries,
+        };
+        tracing::debug!(part, action = %run.action, over = refuted.first().map(|e| e.over), "sweep refuted");
+        self.trace_refutation(run, &refuted);
+        self.problem.add_samples(part, &refuted);
+        let prefix = prefix.len() > 1 && self.checked(part, prefix)?.is_err();
+        Ok(Err(Refuted { prefix }))
+    }
+
+    /// Tells of a refuted path; the parts that it enters.
+    fn trace_refutation(&mut self, run: &Run, entries: &[Entry]) -> Vec<usize> {
+        let mut by: Vec<_> = entries.iter().map(|e| e.other).collect();
+        by.sort_unstable();
+        by.dedup();
+        let (part, action) = (run.part, run.action.to_string());
+        self.trace(|| TraceEvent::Refuted { part, action, by: by.clone() });
+        by
+    }
+
     /// Thins and verifies a motion that leads out from the end of `prefix`. A refuted one is
     /// simulated again with the refuting points as samples, and given up after some tries.
     pub(super) fn prove(&mut self, run: Run, prefix: &[Pose], motion: Vec<Pose>) -> Result<Proof, Stop> {
@@ -198,10 +262,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             if prefix.len() > 1 && self.checked(part, prefix)?.is_err() {
                 return Ok(Proof::PrefixRefuted);
             }
-            let mut by: Vec<_> = refuted.iter().map(|e| e.other).collect();
-            by.sort_unstable();
-            by.dedup();
-            self.trace(|| TraceEvent::Refuted { part, action: run.action.to_string(), by: by.clone() });
+            let by = self.trace_refutation(&run, &refuted);
             if refinement == REFINEMENTS {
                 return Ok(Proof::Refuted { by });
             }
@@ -224,8 +285,8 @@ impl<'a, 'o> Disassembly<'a, 'o> {
 
     /// Takes a part out; `waited_for` are those that had blocked it and left before.
     pub(super) fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64, waited_for: Vec<usize>) {
-        self.everything = self.everything.without(&self.problem.scene, part);
-        self.around.fill(None);
+        self.hull_changes += usize::from(self.everything.remove(&self.problem.scene, part));
+        self.around.clear();
         let removal = Removal { part, path, depth, waited_for };
         self.observer.removal(&removal);
         self.trace(|| TraceEvent::Removed { part, waited_for: removal.waited_for.clone() });
@@ -234,9 +295,12 @@ impl<'a, 'o> Disassembly<'a, 'o> {
 
     /// A part that may move and whose hull is apart from all others': it needs no motion.
     pub(super) fn free_part(&mut self) -> Result<Option<usize>, Stop> {
-        for part in self.everything.standing.clone() {
+        if self.is_done() {
+            return Ok(None);
+        }
+        for part in self.everything.standing().to_vec() {
             self.problem.termination.check()?;
-            if !self.is_done() && self.problem.may_move(part) && self.is_free(part) {
+            if self.problem.may_move(part) && self.is_free(part) {
                 return Ok(Some(part));
             }
         }
@@ -244,28 +308,32 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     }
 
     fn is_free(&mut self, part: usize) -> bool {
-        if self.everything.standing.len() < 2 {
-            return false;
-        }
-        if let Some(other) = self.entangled[part]
-            && self.everything.standing.binary_search(&other).is_ok()
-        {
+        let standing = self.everything.standing();
+        let stands = |other: usize| standing.binary_search(&other).is_ok();
+        // What was found the last time mostly still holds.
+        let held = self.held_since[part] == Some(self.hull_changes);
+        if standing.len() < 2 || held || self.entangled[part].is_some_and(stands) {
             return false;
         }
         let scene = &self.problem.scene;
         let pose = scene.bodies[part].planning_from_shape;
-        let meets = |&&other: &&usize| {
-            other != part
-                && scene.bodies[other].bounds.meets(&scene.bodies[part].bounds)
-                && exit_direction(scene, &Surroundings::new(scene, vec![other]), part, &pose, None).is_none()
+        let mine = transformed(&scene.bodies[part].shape.hull, &pose);
+        let meets = |&other: &usize| {
+            let body = &scene.bodies[other];
+            let theirs = transformed(&body.shape.hull, &body.planning_from_shape);
+            other != part && separating_direction(&mine, &theirs, HULL_MARGIN, None).is_none()
         };
-        self.entangled[part] = self.everything.standing.iter().find(meets).copied();
+        let near = scene.broad_phase.meeting_of(standing, &scene.bodies[part].bounds);
+        self.entangled[part] = near.into_iter().find(meets);
         if self.entangled[part].is_some() {
             return false;
         }
-        self.surroundings(part);
-        let around = self.around[part].as_ref();
-        around.is_some_and(|a| exit_direction(&self.problem.scene, a, part, &pose, None).is_some())
+        let around = self.surroundings(part);
+        let free = exit_direction(&self.problem.scene, &around, part, &pose, None).is_some();
+        if !free && !self.everything.shapes_hull(&self.problem.scene, part) {
+            self.held_since[part] = Some(self.hull_changes);
+        }
+        free
     }
 
     /// What the search answers. `evidence` says what was tried before nothing more was found;
@@ -290,16 +358,17 @@ impl<'a, 'o> Disassembly<'a, 'o> {
                 (PlanStatus::Partial, Some(format!("the budget of {n} simulations is used up")))
             }
         };
-        let simulations = self.counters.simulations;
+        let Counters { simulations, sweeps, .. } = self.counters;
         self.trace(|| TraceEvent::End {
             status: status.name().to_owned(),
             reason: reason.clone(),
             simulations,
+            sweeps,
         });
         Outcome {
             status,
             reason,
-            remaining: self.everything.standing,
+            remaining: self.everything.standing().to_vec(),
             blocked: if status == PlanStatus::Complete { Vec::new() } else { blocked },
             removals: self.removals,
             counters: self.counters,

@@ -13,6 +13,7 @@ mod report;
 mod request;
 mod sbdp;
 mod state;
+mod straight;
 #[cfg(test)]
 mod tests;
 mod trace;

@@ -34,11 +34,13 @@ pub struct BlockedAction {
 pub struct Counters {
     /// Transition functions used.
     pub simulations: u64,
+    /// Removals that a straight sweep showed, without simulation.
+    pub sweeps: u64,
     /// States kept.
     pub states: u64,
     /// Time in static analysis.
     pub static_analysis: Duration,
-    /// Time in simulation.
+    /// Time in simulation and sweeps.
     pub simulation: Duration,
     /// Time in thinning and verification.
     pub verification: Duration,

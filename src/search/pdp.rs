@@ -115,8 +115,8 @@ impl Search<'_, '_> {
             let phase = self.phase();
             self.disassembly.trace(|| TraceEvent::Pass { phase, depth_limit: Some(limit) });
             let (mut removed, mut cut) = (false, false);
-            for part in self.disassembly.everything.standing.clone() {
-                let stands = self.disassembly.everything.standing.contains(&part);
+            for part in self.disassembly.everything.standing().to_vec() {
+                let stands = self.disassembly.everything.standing().contains(&part);
                 if !stands || !self.disassembly.problem.may_move(part) {
                     continue;
                 }
@@ -149,7 +149,7 @@ impl Search<'_, '_> {
     }
 
     fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) {
-        let standing = &self.disassembly.everything.standing;
+        let standing = self.disassembly.everything.standing();
         let mut gone: Vec<usize> = self.stopped_by[part]
             .iter()
             .flat_map(|(_, by)| by)
@@ -269,7 +269,7 @@ impl Search<'_, '_> {
             Mode::Translation => "translations",
             Mode::Rotation => "actions with rotational freedom",
         };
-        let stuck = self.disassembly.problem.wanted(&self.disassembly.everything.standing).len();
+        let stuck = self.disassembly.problem.wanted(self.disassembly.everything.standing()).len();
         format!(
             "{stuck} of {} parts cannot leave one at a time: breadth-first search with {} {kind} found no new \
              configuration of any part",
@@ -279,7 +279,7 @@ impl Search<'_, '_> {
     }
 
     fn blocked(&self) -> Vec<BlockedAction> {
-        let standing = &self.disassembly.everything.standing;
+        let standing = self.disassembly.everything.standing();
         let mut out = Vec::new();
         for part in self.disassembly.problem.wanted(standing) {
             let mut list: Vec<_> = self.stopped_by[part].iter().collect();

@@ -6,7 +6,7 @@ use std::time::Duration;
 use nalgebra::Point3;
 
 use crate::blocking_graph::StaticAnalysis;
-use crate::geometry::{Pose, SampleTree};
+use crate::geometry::{Bounds, Pose, SampleTree};
 use crate::plan::{Entry, Verifier, thinned};
 use crate::simulation::{Action, Scene, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
@@ -52,6 +52,8 @@ pub struct Problem<'a> {
     pub actions: ActionSet,
     /// How blocking graphs are begun.
     pub static_analysis: StaticAnalysis,
+    /// Whether what leaves straight is taken out without simulation.
+    pub sweeps: bool,
     /// Simulations after which to give up.
     pub max_simulations: Option<u64>,
     /// Simulations that an earlier search of the same question has used up.
@@ -109,10 +111,23 @@ impl Problem<'_> {
     ) -> Result<Checked, Interrupt> {
         let bounds = self.scene.bodies[part].shape.bounds();
         let thin = thinned(path, bounds, &self.scene.centre_in_shape(part));
+        let standing = self.scene.broad_phase.meeting_of(&standing, &self.swept_bounds(part, &thin));
         let Scene { allowances, .. } = &self.scene;
         let verdict =
             self.verifier.check(&self.scene, allowances, &standing, part, &thin, &self.termination)?;
         if verdict.entries.is_empty() { Ok(Ok((thin, verdict.depth))) } else { Ok(Err(verdict.entries)) }
+    }
+
+    /// A box that holds a part all along a path: where it turns, a ball about the point that moves on
+    /// a line between waypoints.
+    fn swept_bounds(&self, part: usize, path: &[Pose]) -> Bounds {
+        let (shape, centre) = (&self.scene.bodies[part].shape, self.scene.centre_in_shape(part));
+        let radius = shape.hull.iter().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
+        let at = |pose: &Pose| shape.bounds().transformed(pose);
+        let ball = |pose: &Pose| Bounds::of([&(pose * centre)]).grown(radius);
+        let turns = path.iter().any(|p| p.rotation != path[0].rotation);
+        let held = path.iter().map(|p| if turns { ball(p) } else { at(p) });
+        held.fold(Bounds::EMPTY, |all, b| all.union(&b)).grown(self.verifier.limit())
     }
 
     /// Makes points that refuted a path samples of their bodies.

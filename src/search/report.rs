@@ -10,7 +10,7 @@ use super::trace::{BlockedBy, TraceEvent};
 impl Search<'_, '_> {
     /// What was tried before the search gave up.
     pub(super) fn evidence(&self) -> String {
-        let (problem, standing) = (&self.disassembly.problem, &self.disassembly.everything.standing);
+        let (problem, standing) = (&self.disassembly.problem, self.disassembly.everything.standing());
         let stuck = problem.wanted(standing);
         let most = stuck.iter().map(|&p| self.states_of[p]).max().unwrap_or(0);
         let coarse = coarseness(most);
@@ -31,7 +31,7 @@ impl Search<'_, '_> {
 
     /// Who blocks the parts that remain, at the assembled pose.
     pub(super) fn blocked(&self) -> Vec<BlockedAction> {
-        let wanted = self.disassembly.problem.wanted(&self.disassembly.everything.standing);
+        let wanted = self.disassembly.problem.wanted(self.disassembly.everything.standing());
         let mut out = Vec::new();
         for node in self.nodes.iter().filter(|n| n.alive && n.is_root() && wanted.contains(&n.part)) {
             for phase in [Phase::Translation, Phase::Rotation] {

@@ -85,6 +85,12 @@ impl ActionSet {
     /// All sets, in the order of their numbers on the wire.
     pub const ALL: [Self; 2] = [Self::Paper, Self::Extended];
 
+    /// Whether sweeps come with it unless asked otherwise.
+    #[must_use]
+    pub fn default_sweeps(self) -> bool {
+        self == Self::Extended
+    }
+
     /// The name in requests.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -108,6 +114,9 @@ pub struct PlanRequest {
     pub actions: ActionSet,
     /// How blocking graphs are begun, before anything is simulated.
     pub static_analysis: StaticAnalysis,
+    /// Whether parts that leave straight are taken out by a sweep, without simulation, by the planners
+    /// `sbdp-star` and `sbdp`; `None` for what goes with the actions: the paper's know no sweeps.
+    pub sweeps: Option<bool>,
     /// Simulations after which the search gives up with `partial`.
     pub max_simulations: Option<u64>,
     /// Time after which one motion, or the search for one part, is given up (the paper's path
@@ -123,6 +132,15 @@ pub struct PlanRequest {
     pub targets: Option<Vec<usize>>,
     /// Neither read nor write anything remembered.
     pub no_cache: bool,
+}
+
+impl PlanRequest {
+    /// Whether its search sweeps.
+    #[must_use]
+    pub fn sweeps(&self) -> bool {
+        let state_based = matches!(self.planner, Planner::SbdpStar | Planner::Sbdp);
+        state_based && self.sweeps.unwrap_or_else(|| self.actions.default_sweeps())
+    }
 }
 
 /// What a request is doing; lossy, for display only.

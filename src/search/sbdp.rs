@@ -23,6 +23,7 @@ use super::outcome::Outcome;
 use super::problem::{Observer, Problem};
 use super::request::ActionSet;
 use super::state::{Node, Phase, coarseness, least_travel, same_state};
+use super::straight::Swept;
 use super::trace::TraceEvent;
 
 /// Translational passes in a row before turning is tried, if they only find new states.
@@ -41,11 +42,11 @@ impl Gain {
     }
 }
 
-/// One simulation to run.
+/// One simulation or sweep to run.
 #[derive(Debug, Clone, Copy)]
-struct Job {
-    node: usize,
-    action: usize,
+pub(super) struct Job {
+    pub(super) node: usize,
+    pub(super) action: usize,
 }
 
 pub(super) struct Search<'a, 'o> {
@@ -58,11 +59,12 @@ pub(super) struct Search<'a, 'o> {
     pub(super) states_of: Vec<usize>,
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
+    pub(super) swept: Swept,
     /// As the paper has it: one open list for translational planning and one for rotational.
     separate_lists: bool,
     translation_passes: usize,
     /// The last resort: actions that static analysis excluded are simulated, too.
-    distrust_static: bool,
+    pub(super) distrust_static: bool,
 }
 
 /// Searches until everything asked for is out, nothing more can be found, or a limit is met.
@@ -84,6 +86,7 @@ impl<'a, 'o> Search<'a, 'o> {
             states_of: vec![0; problem.scene.bodies.len()],
             translations,
             rotations,
+            swept: Swept::default(),
             separate_lists: as_paper,
             translation_passes: if as_paper { 1 } else { TRANSLATION_PASSES },
             distrust_static: false,
@@ -175,6 +178,12 @@ impl<'a, 'o> Search<'a, 'o> {
         let mut open: Vec<usize> = self.expandable(phase);
         while !open.is_empty() && !self.disassembly.is_done() {
             self.analyse(phase, &open)?;
+            if self.sweep_out(phase, &open)? {
+                gain.removed = true;
+                self.take_free_parts()?;
+                open = self.expandable(phase);
+                continue;
+            }
             let batch = self.extract(phase, &mut open);
             let result = self.expand(phase, &batch)?;
             gain.new_states |= result.new_states;
@@ -193,7 +202,7 @@ impl<'a, 'o> Search<'a, 'o> {
     /// The states to expand, the initial one included. Of two last parts it is the same which one
     /// moves against the other: beyond the first push, only the smaller one does.
     fn expandable(&self, phase: Phase) -> Vec<usize> {
-        let standing = &self.disassembly.everything.standing;
+        let standing = self.disassembly.everything.standing();
         let problem = &self.disassembly.problem;
         let still = match standing[..] {
             [a, b] if !self.separate_lists && problem.may_move(a) && problem.may_move(b) => {
@@ -272,7 +281,7 @@ impl<'a, 'o> Search<'a, 'o> {
         batch
     }
 
-    fn ordered_roots(&self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
+    pub(super) fn ordered_roots(&self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
         let (mut roots, rest) = open.iter().partition::<Vec<usize>, _>(|&&i| self.nodes[i].is_root());
         *open = rest;
         if !self.guided {
@@ -290,7 +299,7 @@ impl<'a, 'o> Search<'a, 'o> {
         roots
     }
 
-    fn evaluation(&self, phase: Phase, node: usize) -> Evaluation {
+    pub(super) fn evaluation(&self, phase: Phase, node: usize) -> Evaluation {
         let none = Evaluation { colliding_parts: 0, open_actions: 0 };
         self.nodes[node].blockage(phase).map_or(none, Blockage::evaluation)
     }
@@ -325,7 +334,7 @@ impl<'a, 'o> Search<'a, 'o> {
         Ok(gain)
     }
 
-    fn run_of(&self, phase: Phase, job: Job) -> Run {
+    pub(super) fn run_of(&self, phase: Phase, job: Job) -> Run {
         let node = &self.nodes[job.node];
         Run { part: node.part, start: *node.pose(), action: self.actions(phase)[job.action] }
     }
@@ -348,7 +357,7 @@ impl<'a, 'o> Search<'a, 'o> {
         (window, at)
     }
 
-    fn is_open(&self, phase: Phase, job: Job) -> bool {
+    pub(super) fn is_open(&self, phase: Phase, job: Job) -> bool {
         let node = &self.nodes[job.node];
         node.alive
             && node.blockage(phase).is_some_and(|b| match (self.guided, self.distrust_static) {
@@ -425,7 +434,7 @@ impl<'a, 'o> Search<'a, 'o> {
     }
 
     /// A state whose own path was refuted is dropped, and the action that led to it is open again.
-    fn drop_state(&mut self, node: usize) {
+    pub(super) fn drop_state(&mut self, node: usize) {
         self.nodes[node].alive = false;
         if let Some((parent, phase, action)) = self.nodes[node].origin
             && let Some(b) = self.nodes[parent].blockage_mut(phase)
@@ -442,7 +451,7 @@ impl<'a, 'o> Search<'a, 'o> {
         Ok(())
     }
 
-    fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) {
+    pub(super) fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) {
         let mut waited_for = Vec::new();
         for node in &mut self.nodes {
             if node.part == part {

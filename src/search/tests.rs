@@ -66,6 +66,7 @@ fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
         targets: None,
         actions: ActionSet::Paper,
         static_analysis: StaticAnalysis::default(),
+        sweeps: false,
         max_simulations: None,
         spent: 0,
         path_timeout: None,
@@ -175,4 +176,60 @@ fn a_motion_without_time_is_undecided_and_no_proof_of_anything() {
         let outcome = search(planner, problem, &mut Recorder::default());
         assert_eq!((outcome.status, outcome.remaining.len()), (PlanStatus::Timeout, 3), "{planner:?}");
     }
+}
+
+/// A plate with two pegs and a block on it, and a second plate beside: all leave straight.
+fn straight() -> Vec<SourceMesh> {
+    let across: &[f64] = &[-4.0, -3.0, -2.0, 2.0, 3.0, 4.0];
+    let plate =
+        cells([across, across, &[-1.0, -0.5, 0.0]], |[x, y, z]| z == 0 || y != 2 || (x != 1 && x != 3));
+    let block = |x: [f64; 2], z: [f64; 2]| cells([&x, &[-2.0, 2.0], &z], |_| true);
+    vec![
+        plate,
+        block([-3.0, -2.0], [-0.5, 1.0]),
+        block([2.0, 3.0], [-0.5, 1.0]),
+        block([-1.0, 1.0], [0.0, 2.0]),
+    ]
+}
+
+fn with_sweeps(sweeps: bool) -> (Outcome, Vec<TraceEvent>) {
+    let (scene, verifier) = scene(straight());
+    let present = (0..scene.bodies.len()).collect();
+    let mut recorder = Recorder::default();
+    let problem = Problem { present, sweeps, actions: ActionSet::Extended, ..problem(scene, &verifier) };
+    (search(Planner::SbdpStar, problem, &mut recorder), recorder.0)
+}
+
+#[test]
+fn what_leaves_straight_is_not_simulated() {
+    let (swept, events) = with_sweeps(true);
+    let (simulated, _) = with_sweeps(false);
+    let order = |o: &Outcome| o.removals.iter().map(|r| r.part).collect::<Vec<_>>();
+    assert_eq!((swept.status, order(&swept)), (PlanStatus::Complete, order(&simulated)));
+    assert_eq!((swept.counters.simulations, swept.counters.sweeps), (0, 3));
+    assert_eq!((simulated.counters.simulations, simulated.counters.sweeps), (3, 0));
+    let told = events.iter().filter(|e| matches!(e, TraceEvent::Swept { .. })).count();
+    assert_eq!(told, 3);
+    assert!(events.iter().all(|e| !matches!(e, TraceEvent::Simulated { .. })));
+}
+
+#[test]
+fn a_sweep_that_the_triangles_refute_takes_nothing_out_and_leaves_its_points_for_simulation() {
+    use super::disassembly::{Disassembly, Run};
+    use crate::geometry::Pose;
+    use crate::simulation::Action;
+
+    let (scene, verifier) = scene(straight());
+    let start = scene.bodies[1].planning_from_shape;
+    let mut recorder = Recorder::default();
+    let present = (0..scene.bodies.len()).collect();
+    let mut disassembly = Disassembly::new(Problem { present, ..problem(scene, &verifier) }, &mut recorder);
+    let run = Run { part: 1, start, action: Action::translations()[0] };
+    let through = [start, Pose::translation(9.0, 0.0, 0.0) * start];
+    let Ok(Err(refuted)) = disassembly.prove_sweep(&run, &[start], &through) else { panic!("not refuted") };
+    assert!(!refuted.prefix);
+    assert!(!disassembly.problem.scene.bodies[1].extra_samples.points().is_empty());
+    assert!(disassembly.removals.is_empty());
+    let told = |e: &TraceEvent| matches!(e, TraceEvent::Refuted { part: 1, by, .. } if by.contains(&0));
+    assert!(recorder.0.iter().any(told));
 }

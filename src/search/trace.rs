@@ -84,6 +84,15 @@ pub enum TraceEvent {
         /// The new state, unless there was one like it.
         leads_to: Option<usize>,
     },
+    /// A straight sweep showed a way out, and the check on the triangles confirmed it.
+    Swept {
+        /// From this state.
+        state: usize,
+        /// The part that moved.
+        part: usize,
+        /// The action whose direction it followed.
+        action: String,
+    },
     /// The check on the triangles refuted a path.
     Refuted {
         /// The part.
@@ -108,5 +117,8 @@ pub enum TraceEvent {
         reason: Option<String>,
         /// Simulations counted.
         simulations: u64,
+        /// Removals by a straight sweep, without simulation.
+        #[serde(default)]
+        sweeps: u64,
     },
 }

@@ -61,6 +61,7 @@ impl Frame<'_> {
         let stats = PlanStats {
             simulations: c.simulations,
             simulations_run: c.simulations,
+            sweeps: c.sweeps,
             states: c.states,
             sdf_time_s: sdf_time.as_secs_f64(),
             static_analysis_time_s: c.static_analysis.as_secs_f64(),

@@ -226,6 +226,7 @@ impl Entry {
             targets: request.targets.clone(),
             actions: request.actions,
             static_analysis: request.static_analysis,
+            sweeps: request.sweeps(),
             max_simulations: request.max_simulations,
             spent: 0,
             path_timeout: request.path_timeout,

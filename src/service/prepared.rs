@@ -85,11 +85,7 @@ fn measure_overlaps(
     verifier: &Verifier,
     termination: &Termination,
 ) -> Result<Vec<(usize, usize, f64)>, Interrupt> {
-    let n = scene.bodies.len();
-    let pairs: Vec<_> = (0..n)
-        .flat_map(|a| (a + 1..n).map(move |b| (a, b)))
-        .filter(|&(a, b)| scene.bodies[a].bounds.meets(&scene.bodies[b].bounds))
-        .collect();
+    let pairs = scene.broad_phase.pairs(0.0);
     let depths = pairs
         .par_iter()
         .map(|&(a, b)| {
@@ -107,9 +103,8 @@ fn coincident_pairs(
     verifier: &Verifier,
     termination: &Termination,
 ) -> Result<Vec<(usize, usize, f64)>, Interrupt> {
-    let n = scene.bodies.len();
     let mut out = Vec::new();
-    for (a, b) in (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))) {
+    for (a, b) in scene.broad_phase.pairs(0.0) {
         termination.check()?;
         let alike = (scene.bodies[a].bounds.centre() - scene.bodies[b].bounds.centre()).norm()
             < COINCIDENT * scene.bodies[a].bounds.extents().norm();

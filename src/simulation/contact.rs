@@ -12,6 +12,7 @@ use nalgebra::{Point3, Vector3, Vector6};
 use crate::geometry::{Bounds, Closest, Pose, SampleTree};
 
 use super::projection::Row;
+use super::sliding::FREE_STEP;
 use super::{Body, Scene, Surroundings};
 
 /// Whose surface the sample lies on.
@@ -66,7 +67,10 @@ impl<'a> Mover<'a> {
     pub(super) fn near(&self, surroundings: &Surroundings, reach: f64) -> Near {
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
         let bounds = self.body.shape.bounds().transformed(&self.pose);
-        for &other in &surroundings.standing {
+        // What is further off than any step is long need not be known.
+        let horizon = reach.max(FREE_STEP);
+        near.clearance = horizon;
+        for other in self.scene.broad_phase.meeting_of(&surroundings.standing, &bounds.grown(horizon)) {
             let apart = box_distance(&bounds, &self.scene.bodies[other].bounds);
             if apart > reach {
                 near.clearance = near.clearance.min(apart);
@@ -112,13 +116,12 @@ impl<'a> Mover<'a> {
                 |sample| field.value(&(to_measured * sample)) < limit,
             )
         };
-        standing.iter().any(|&other| {
+        self.scene.broad_phase.meeting_of(standing, &bounds).into_iter().any(|other| {
             let still = &self.scene.bodies[other];
             let allowance = self.scene.allowances.of(self.part, other);
             let to_still = still.planning_from_shape.inverse() * self.pose;
-            bounds.meets(&still.bounds)
-                && (inside(self.body, still, &to_still, allowance)
-                    || inside(still, self.body, &to_still.inverse(), allowance))
+            inside(self.body, still, &to_still, allowance)
+                || inside(still, self.body, &to_still.inverse(), allowance)
         })
     }
 

@@ -30,17 +30,6 @@ impl Surroundings {
         let hull = if points.is_empty() { points } else { hull_vertices(&points) };
         Self { standing, hull }
     }
-
-    /// The same without one part; cheap if that part does not shape the hull.
-    #[must_use]
-    pub fn without(&self, scene: &Scene, part: usize) -> Self {
-        let standing: Vec<_> = self.standing.iter().copied().filter(|&i| i != part).collect();
-        let bounds = scene.bodies[part].bounds.grown(1e-9);
-        if self.hull.iter().any(|v| bounds.contains(v)) {
-            return Self::new(scene, standing);
-        }
-        Self { standing, hull: self.hull.clone() }
-    }
 }
 
 /// A direction along which the surroundings lie apart from the part at `pose`, if there is one.
@@ -56,12 +45,21 @@ pub fn exit_direction(
     let body = &scene.bodies[part];
     let mine = transformed(&body.shape.hull, pose);
     let direction = separating_direction(&mine, &surroundings.hull, HULL_MARGIN, hint)?;
-    let all = transformed(body.shape.surface.vertices(), pose);
+    let reach = |pose: &Pose, points: &[Point3<f64>]| {
+        points.iter().map(|p| (pose * p).coords.dot(&direction)).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let far = reach(pose, body.shape.surface.vertices());
     let apart = surroundings.standing.iter().all(|&i| {
         let other = &scene.bodies[i];
+        // The corner of its box that lies least far: mostly that is enough.
+        let corner = |a: usize| {
+            direction[a] * if direction[a] > 0.0 { other.bounds.min[a] } else { other.bounds.max[a] }
+        };
+        if corner(0) + corner(1) + corner(2) - far >= HULL_MARGIN {
+            return true;
+        }
         let local = other.planning_from_shape.rotation.inverse() * direction;
         let shift = other.planning_from_shape.translation.vector.dot(&direction);
-        let far = all.iter().map(|p| p.coords.dot(&direction)).fold(f64::NEG_INFINITY, f64::max);
         let near = gap_along(&local, &[Point3::origin()], other.shape.surface.vertices()) + shift;
         near - far >= HULL_MARGIN / 2.0
     });

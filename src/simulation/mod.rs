@@ -7,19 +7,25 @@
 //! Everything here is in the planning frame and knows nothing of search.
 
 mod action;
+mod broad_phase;
 mod contact;
 mod disassembled;
+mod hull_tree;
 mod penalty;
 mod projection;
 mod scene;
 mod sliding;
+mod sweep;
 #[cfg(test)]
 mod tests;
 mod transition;
 
 pub use action::{Action, Axis};
+pub use broad_phase::BroadPhase;
 pub use disassembled::{HULL_MARGIN, Surroundings, exit_direction};
+pub use hull_tree::HullTree;
 pub use penalty::{PenaltyEngine, PenaltyParameters};
 pub use scene::{Allowances, Body, Scene};
 pub use sliding::{SlidingEngine, pair_blocks};
+pub use sweep::{Sweep, straight_sweep};
 pub use transition::{End, Motion, TransitionFunction};

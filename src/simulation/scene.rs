@@ -1,11 +1,14 @@
 //! The bodies of a problem, and how deep each pair may overlap.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use nalgebra::Point3;
 
 use crate::geometry::{Assembly, Bounds, Closest, Part, Pose, SampleTree, Shape};
 use crate::sdf::Field;
+
+use super::BroadPhase;
 
 /// A part with its field, at its place.
 #[derive(Debug, Clone)]
@@ -45,27 +48,26 @@ impl Body {
 /// For each pair, how deep the two overlap at the assembled pose: that much is granted.
 #[derive(Debug, Clone, Default)]
 pub struct Allowances {
-    count: usize,
-    depth: Vec<f64>,
+    /// By the smaller part, then the larger; pairs without an entry may not overlap.
+    depth: HashMap<(usize, usize), f64>,
 }
 
 impl Allowances {
-    /// No overlap anywhere among `count` parts.
+    /// No overlap anywhere.
     #[must_use]
-    pub fn none(count: usize) -> Self {
-        Self { count, depth: vec![0.0; count * count] }
+    pub fn none() -> Self {
+        Self::default()
     }
 
     /// The depth granted to a pair.
     #[must_use]
     pub fn of(&self, a: usize, b: usize) -> f64 {
-        self.depth[a * self.count + b]
+        self.depth.get(&(a.min(b), a.max(b))).copied().unwrap_or(0.0)
     }
 
     /// Grants a pair some depth.
     pub fn grant(&mut self, a: usize, b: usize, depth: f64) {
-        self.depth[a * self.count + b] = depth;
-        self.depth[b * self.count + a] = depth;
+        self.depth.insert((a.min(b), a.max(b)), depth);
     }
 }
 
@@ -78,6 +80,8 @@ pub struct Scene {
     pub allowances: Allowances,
     /// Longest side of the whole, the unit of resolutions.
     pub longest_side: f64,
+    /// Their boxes, to be asked which are near.
+    pub broad_phase: Arc<BroadPhase>,
 }
 
 impl Scene {
@@ -91,10 +95,12 @@ impl Scene {
             bounds: part.bounds,
             extra_samples: SampleTree::default(),
         };
+        let boxes: Vec<Bounds> = assembly.parts.iter().map(|p| p.bounds).collect();
         Self {
             bodies: assembly.parts.iter().map(body).collect(),
-            allowances: Allowances::none(assembly.parts.len()),
+            allowances: Allowances::none(),
             longest_side: assembly.longest_side(),
+            broad_phase: Arc::new(BroadPhase::new(&boxes)),
         }
     }
 

@@ -11,7 +11,7 @@ use divan::counter::ItemsCount;
 use sbdp::geometry::{Assembly, SourceAssembly, SourceMesh, SourcePart};
 use sbdp::sdf::Field;
 use sbdp::simulation::{
-    Action, Allowances, Axis, Body, PenaltyEngine, PenaltyParameters, Scene, Surroundings, TransitionFunction,
+    Action, Axis, PenaltyEngine, PenaltyParameters, Scene, Surroundings, TransitionFunction,
 };
 use sbdp::termination::Termination;
 
@@ -61,22 +61,10 @@ fn scene() -> Scene {
     let parts = meshes.into_iter().enumerate().map(part).collect();
     let source = SourceAssembly { name: "block on plate".into(), parts, ..SourceAssembly::default() };
     let assembly = Assembly::new(&source).expect("the meshes are sound");
-    let body = |part: &sbdp::geometry::Part| {
-        let shape = Arc::clone(&assembly.shapes[part.shape]);
-        let field = Field::build(&shape.surface, &Termination::default()).expect("nobody cancels");
-        Body {
-            shape,
-            field: Arc::new(field),
-            planning_from_shape: part.planning_from_shape,
-            bounds: part.bounds,
-            extra_samples: Default::default(),
-        }
+    let field = |shape: &Arc<sbdp::geometry::Shape>| {
+        Arc::new(Field::build(&shape.surface, &Termination::default()).expect("nobody cancels"))
     };
-    Scene {
-        bodies: assembly.parts.iter().map(body).collect(),
-        allowances: Allowances::none(2),
-        longest_side: assembly.longest_side(),
-    }
+    Scene::assembled(&assembly, &assembly.shapes.iter().map(field).collect::<Vec<_>>())
 }
 
 fn pushed_down(bencher: divan::Bencher<'_, '_>, density: &Density, action: Action) {

@@ -80,6 +80,9 @@ pub struct PlanOptions {
     pub engine: Engine,
     /// Which actions.
     pub actions: ActionSet,
+    /// Whether parts that leave straight are taken out without simulation; `None` leaves it to the
+    /// daemon: with extended actions they are.
+    pub sweeps: Option<bool>,
     /// Time from now until the daemon must answer with what it has.
     pub timeout: Option<Duration>,
     /// Simulations after which to give up.
@@ -103,6 +106,7 @@ impl PlanOptions {
             planner: self.planner as u32,
             engine: self.engine as u32,
             actions: self.actions as u32,
+            sweeps: self.sweeps,
             no_cache: self.no_cache,
             threads: self.threads,
             deadline_ns: self.timeout.map(clock::deadline_in),

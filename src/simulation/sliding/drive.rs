@@ -19,7 +19,7 @@ use super::DEPTH_TOLERANCE;
 const LEAST_SHARE: f64 = 0.05;
 /// Longest contact step and longest step in free space, in the planning frame.
 const CONTACT_STEP: f64 = 0.12;
-const FREE_STEP: f64 = 0.5;
+pub(in crate::simulation) const FREE_STEP: f64 = 0.5;
 /// How far the arc of one turning step may bulge from its chord.
 const LARGEST_BULGE: f64 = 1e-3;
 /// A pair may get this much deeper than its allowance half-way through a turning step.

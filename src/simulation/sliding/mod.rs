@@ -19,6 +19,7 @@ use drive::{Drive, Step};
 use leap::Leaper;
 use turning::Turning;
 
+pub(super) use drive::FREE_STEP;
 pub use pair::pair_blocks;
 
 /// A pair may get this much deeper than its allowance, in the planning frame.

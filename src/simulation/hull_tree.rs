@@ -1,0 +1,155 @@
+//! The convex hull of all that stands, kept up while parts leave one by one.
+//!
+//! A binary tree over the parts, neighbours in space together, whose nodes hold the hull of their
+//! parts: without one part only the hulls above it differ, each made of two smaller ones. So leaving
+//! costs the logarithm of the number of parts, where a hull of all points would cost their number.
+
+use nalgebra::Point3;
+
+use crate::geometry::{hull_vertices, transformed};
+
+use super::{Scene, Surroundings};
+
+/// The parts that stand, with the hulls of groups of them.
+#[derive(Debug, Clone)]
+pub struct HullTree {
+    standing: Vec<usize>,
+    /// Node `i` has the children `2 i` and `2 i + 1`; the root is 1. Empty for nodes without parts.
+    hulls: Vec<Vec<Point3<f64>>>,
+    /// Per part of the scene: its leaf, or 0.
+    leaf: Vec<usize>,
+}
+
+impl HullTree {
+    /// Of some parts (ascending) at their assembled poses.
+    #[must_use]
+    pub fn new(scene: &Scene, standing: Vec<usize>) -> Self {
+        let leaves = standing.len().next_power_of_two();
+        let mut order = standing.clone();
+        group(scene, &mut order);
+        let mut tree =
+            Self { hulls: vec![Vec::new(); 2 * leaves], leaf: vec![0; scene.bodies.len()], standing };
+        for (k, &part) in order.iter().enumerate() {
+            let body = &scene.bodies[part];
+            tree.leaf[part] = leaves + k;
+            tree.hulls[leaves + k] = transformed(&body.shape.hull, &body.planning_from_shape);
+        }
+        for node in (1..leaves).rev() {
+            tree.hulls[node] = joined(&tree.hulls[2 * node], &tree.hulls[2 * node + 1]);
+        }
+        tree
+    }
+
+    /// The parts that stand, ascending.
+    #[must_use]
+    pub fn standing(&self) -> &[usize] {
+        &self.standing
+    }
+
+    /// Vertices of the hull of them all.
+    #[must_use]
+    pub fn hull(&self) -> &[Point3<f64>] {
+        self.hulls.get(1).map_or(&[], Vec::as_slice)
+    }
+
+    /// All that stands but one part.
+    #[must_use]
+    pub fn without(&self, scene: &Scene, part: usize) -> Surroundings {
+        let standing = self.standing.iter().copied().filter(|&i| i != part).collect();
+        if !self.shapes_hull(scene, part) {
+            return Surroundings { standing, hull: self.hull().to_vec() };
+        }
+        let mut node = self.leaf[part];
+        let mut hull = Vec::new();
+        while node > 1 {
+            hull = joined(&hull, &self.hulls[node ^ 1]);
+            node /= 2;
+        }
+        Surroundings { standing, hull }
+    }
+
+    /// Whether the hull may be another one without a part.
+    #[must_use]
+    pub fn shapes_hull(&self, scene: &Scene, part: usize) -> bool {
+        let bounds = scene.bodies[part].bounds.grown(1e-9);
+        self.hull().iter().any(|v| bounds.contains(v))
+    }
+
+    /// Takes a part out; whether the hull may have changed.
+    pub fn remove(&mut self, scene: &Scene, part: usize) -> bool {
+        let Ok(at) = self.standing.binary_search(&part) else { return false };
+        let shaped = self.shapes_hull(scene, part);
+        self.standing.remove(at);
+        let mut node = self.leaf[part];
+        self.leaf[part] = 0;
+        self.hulls[node].clear();
+        while node > 1 {
+            node /= 2;
+            self.hulls[node] = joined(&self.hulls[2 * node], &self.hulls[2 * node + 1]);
+        }
+        shaped
+    }
+}
+
+fn joined(a: &[Point3<f64>], b: &[Point3<f64>]) -> Vec<Point3<f64>> {
+    match (a, b) {
+        ([], hull) | (hull, []) => hull.to_vec(),
+        _ => hull_vertices(&[a, b].concat()),
+    }
+}
+
+/// Orders parts such that halves, quarters and so on lie together.
+fn group(scene: &Scene, parts: &mut [usize]) {
+    if parts.len() < 2 {
+        return;
+    }
+    let centre = |&i: &usize| scene.bodies[i].bounds.centre();
+    let centres: Vec<_> = parts.iter().map(centre).collect();
+    let axis = crate::geometry::Bounds::of(&centres).extents().imax();
+    parts.sort_by(|i, j| centre(i)[axis].total_cmp(&centre(j)[axis]).then(i.cmp(j)));
+    // As the tree is full from the left.
+    let (left, right) = parts.split_at_mut(parts.len().next_power_of_two() / 2);
+    group(scene, left);
+    group(scene, right);
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::fixtures::{cuboid, scene, spread};
+    use crate::geometry::gap_along;
+
+    #[test]
+    fn hulls_reach_as_far_as_those_of_all_points_while_parts_leave() {
+        let cubes = spread([-4.0; 3], [3.0; 3], 21)
+            .map(|p| cuboid([p.x, p.y, p.z], [p.x + 0.6, p.y + 0.5, p.z + 0.7]));
+        let (scene, _) = scene(cubes.chain([cuboid([-4.0; 3], [-3.9; 3]), cuboid([3.9; 3], [4.0; 3])]));
+        let mut left: Vec<usize> = (0..scene.bodies.len()).collect();
+        let mut tree = HullTree::new(&scene, left.clone());
+        let same = |hull: &[Point3<f64>], parts: Vec<usize>| {
+            let all = Surroundings::new(&scene, parts).hull;
+            for d in spread([-1.0; 3], [1.0; 3], 40) {
+                let d: Vector3<f64> = d.coords.normalize();
+                let reach = |points: &[Point3<f64>]| gap_along(&d, points, &[Point3::origin()]);
+                assert!((reach(hull) - reach(&all)).abs() < 1e-9);
+            }
+        };
+        while left.len() > 1 {
+            assert_eq!(tree.standing(), left);
+            same(tree.hull(), left.clone());
+            for &part in &left {
+                let rest: Vec<usize> = left.iter().copied().filter(|&i| i != part).collect();
+                let around = tree.without(&scene, part);
+                assert_eq!(around.standing, rest);
+                same(&around.hull, rest);
+            }
+            let gone = left.remove(left.len() * 2 / 3);
+            let before = tree.hull().to_vec();
+            assert!(tree.remove(&scene, gone) || tree.hull().len() == before.len());
+        }
+        assert!(tree.remove(&scene, left[0]) && tree.hull().is_empty());
+        assert!(!tree.remove(&scene, left[0]), "it is gone");
+    }
+}

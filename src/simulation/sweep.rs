@@ -1,0 +1,302 @@
+//! Straight sweeps: whether a part leaves along a straight direction without entering anything,
+//! told without simulating.
+//!
+//! A solid that is moved along `d` comes to overlap another exactly if on some line along `d` a
+//! point of its surface that faces `d` passes a point of the other's that faces against it. So only
+//! such points are asked: from every leading sample of the moving part a segment as long as the way
+//! out is cast against the triangles that face it, and from every sample of the standing part that
+//! faces the motion a segment backwards against the leading triangles. Walls along the direction
+//! face neither way: sliding along them, however flush, costs nothing.
+//!
+//! What a pair may overlap (its allowance, and the tolerance) is taken off the samples across the
+//! direction: a press fit's rim passes by its hole's. Known miss: edges that cross between two
+//! samples, as of all tests by samples; an overlap that is there at the start is taken for granted.
+//! Known refusals: contact that slides down a slope, overlaps that grow on the way. So "clear" is a
+//! claim to be verified like every path, and "blocked" leaves the question to simulation.
+
+use nalgebra::{Point3, Translation3, Vector3};
+
+use crate::geometry::{Bounds, OrientedSamples, Pose, Surface, separating_direction, transformed};
+
+use super::{HULL_MARGIN, Scene, Surroundings, exit_direction};
+
+/// How much deeper than its allowance a pair may get, in the planning frame.
+const DEPTH_TOLERANCE: f64 = 3e-4;
+/// Faces that look along the direction, or against it, by less than this count as walls.
+const STEEPNESS: f64 = 1e-3;
+/// The way out is found to this share of the way beyond everything.
+const HALVINGS: usize = 8;
+
+/// What a straight sweep told.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Sweep {
+    /// The part leaves along a line, to where its hull is apart from that of all others.
+    Clear {
+        /// From the start to there; the start alone if it is there.
+        path: Vec<Pose>,
+        /// Along this direction the hulls are apart in the end.
+        exit: Vector3<f64>,
+    },
+    /// It enters this part, or would have to be simulated to be told.
+    Blocked {
+        /// The part.
+        by: usize,
+    },
+}
+
+/// Sweeps a part from `start` along the unit vector `direction` out of its surroundings.
+/// `None` where no way out along it is found.
+#[must_use]
+pub fn straight_sweep(
+    scene: &Scene,
+    surroundings: &Surroundings,
+    part: usize,
+    start: &Pose,
+    direction: &Vector3<f64>,
+) -> Option<Sweep> {
+    if let Some(exit) = exit_direction(scene, surroundings, part, start, Some(-direction)) {
+        return Some(Sweep::Clear { path: vec![*start], exit });
+    }
+    let (travel, exit) = way_out(scene, surroundings, part, start, direction)?;
+    let end = moved(start, direction, travel);
+    let bounds = scene.bodies[part].shape.bounds();
+    let swept = bounds.transformed(start).union(&bounds.transformed(&end));
+    let blocks = |&other: &usize| enters(scene, part, start, direction, travel, other);
+    let met = scene.broad_phase.meeting_of(&surroundings.standing, &swept);
+    Some(match met.into_iter().find(blocks) {
+        Some(by) => Sweep::Blocked { by },
+        None => Sweep::Clear { path: vec![*start, end], exit },
+    })
+}
+
+fn moved(pose: &Pose, direction: &Vector3<f64>, travel: f64) -> Pose {
+    Translation3::from(direction * travel) * pose
+}
+
+/// How far the part has to go until its hull is apart, and the direction that shows it. Two convex
+/// bodies of which one moves along a line meet during one interval: bisection finds its end.
+fn way_out(
+    scene: &Scene,
+    surroundings: &Surroundings,
+    part: usize,
+    start: &Pose,
+    direction: &Vector3<f64>,
+) -> Option<(f64, Vector3<f64>)> {
+    let hull = transformed(&scene.bodies[part].shape.hull, start);
+    let along = |points: &[Point3<f64>], sign: f64| {
+        points.iter().map(|p| p.coords.dot(direction) * sign).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let beyond = along(&surroundings.hull, 1.0) + along(&hull, -1.0) + 1.5 * HULL_MARGIN;
+    let apart = |travel: f64| {
+        let there: Vec<_> = hull.iter().map(|p| p + direction * travel).collect();
+        separating_direction(&there, &surroundings.hull, HULL_MARGIN, None)
+    };
+    let (mut near, mut far, mut hint) = (0.0, beyond, Some(-direction));
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (near + far);
+        match apart(middle) {
+            Some(d) => (far, hint) = (middle, Some(d)),
+            None => near = middle,
+        }
+    }
+    let certified = |travel: f64, hint| {
+        let pose = moved(start, direction, travel);
+        exit_direction(scene, surroundings, part, &pose, hint).map(|d| (travel, d))
+    };
+    certified(far, hint).or_else(|| certified(beyond, Some(-direction)))
+}
+
+/// Whether the sweep enters a standing part.
+fn enters(
+    scene: &Scene,
+    part: usize,
+    start: &Pose,
+    direction: &Vector3<f64>,
+    travel: f64,
+    other: usize,
+) -> bool {
+    let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
+    let standing_from_moving = standing.planning_from_shape.inverse() * start;
+    let moving_from_standing = standing_from_moving.inverse();
+    let forward = standing.planning_from_shape.rotation.inverse() * direction;
+    let backward = start.rotation.inverse() * -direction;
+    let granted = scene.allowances.of(part, other) + DEPTH_TOLERANCE;
+    let casts = |samples, target, to_target, along: &Vector3<f64>| {
+        let cast = Cast { target, to_target, along: *along, travel, granted };
+        cast.enters(samples)
+    };
+    casts(&moving.shape.oriented, &standing.shape.surface, standing_from_moving, &forward)
+        || casts(&standing.shape.oriented, &moving.shape.surface, moving_from_standing, &backward)
+}
+
+/// Segments from the samples of one surface against another.
+struct Cast<'a> {
+    target: &'a Surface,
+    to_target: Pose,
+    /// How the samples move against the target, in its frame.
+    along: Vector3<f64>,
+    travel: f64,
+    granted: f64,
+}
+
+impl Cast<'_> {
+    fn enters(&self, samples: &OrientedSamples) -> bool {
+        // In the samples' frame.
+        let along = self.to_target.rotation.inverse() * self.along;
+        let corridor = self.corridor();
+        samples.iter().any(|(point, normals)| {
+            let leads = normals.iter().any(|n| n.dot(&along) > STEEPNESS);
+            if !leads {
+                return false;
+            }
+            let p = self.to_target * point;
+            if !corridor.contains(&p) {
+                return false;
+            }
+            let from =
+                self.to_target * (point + inward(normals, &along, self.granted)) - self.along * self.granted;
+            self.target.is_entered_along(&from, &self.along, self.travel + self.granted, STEEPNESS)
+        })
+    }
+
+    /// From where the target's box is reached.
+    fn corridor(&self) -> Bounds {
+        let bounds = *self.target.bounds();
+        let back = self.along * -(self.travel + self.granted);
+        let before = Bounds { min: bounds.min + back, max: bounds.max + back };
+        bounds.union(&before).grown(2.0 * self.granted)
+    }
+}
+
+/// The offset across `along` that takes a point below all faces that meet there, by `depth`; none
+/// where they leave no room for it.
+fn inward(normals: &[Vector3<f64>], along: &Vector3<f64>, depth: f64) -> Vector3<f64> {
+    let across = |n: &Vector3<f64>| (n - along * n.dot(along)).try_normalize(0.1);
+    let mut offset = Vector3::zeros();
+    for side in normals.iter().filter_map(across) {
+        offset -= side * (side.dot(&offset) + depth).max(0.0);
+    }
+    let below = |side: Vector3<f64>| side.dot(&offset) <= -0.5 * depth;
+    if normals.iter().filter_map(across).all(below) { offset } else { Vector3::zeros() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{block_on_plate, cells, cuboid, moved as placed, peg_in_hole, rod, scene, tube};
+
+    fn swept(scene: &Scene, part: usize, direction: Vector3<f64>) -> Option<Sweep> {
+        let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != part).collect();
+        let around = Surroundings::new(scene, standing);
+        straight_sweep(scene, &around, part, &scene.bodies[part].planning_from_shape, &direction)
+    }
+
+    fn is_clear(scene: &Scene, part: usize, direction: Vector3<f64>) -> bool {
+        matches!(swept(scene, part, direction), Some(Sweep::Clear { .. }))
+    }
+
+    #[test]
+    fn a_block_on_a_plate_slides_off_to_all_sides_but_down() {
+        let turn = Pose::rotation(Vector3::new(0.2, -0.15, 0.1));
+        for pose in [Pose::identity(), turn] {
+            let (scene, _) = scene(block_on_plate().map(|m| placed(m, &pose)));
+            for axis in [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), Vector3::z()] {
+                assert!(is_clear(&scene, 1, pose * axis), "{axis}");
+            }
+            assert_eq!(swept(&scene, 1, pose * -Vector3::z()), Some(Sweep::Blocked { by: 0 }));
+        }
+    }
+
+    #[test]
+    fn a_flush_peg_leaves_its_blind_hole_upwards_only() {
+        let (scene, _) = scene(peg_in_hole(0.0));
+        assert!(is_clear(&scene, 1, Vector3::z()));
+        for axis in [Vector3::x(), -Vector3::x(), Vector3::y(), -Vector3::y(), -Vector3::z()] {
+            assert_eq!(swept(&scene, 1, axis), Some(Sweep::Blocked { by: 0 }), "{axis}");
+        }
+    }
+
+    #[test]
+    fn what_is_too_wide_for_a_bore_passes_by_what_is_granted() {
+        let excess = 0.02;
+        for (lead, up) in [(-1.5, Vector3::z()), (1.5, -Vector3::z())] {
+            let z = if lead < 0.0 { [lead - 2.0, lead] } else { [lead, lead + 2.0] };
+            // So tall that the rod is not apart from the hull of both.
+            let wall = cuboid([-3.0, 3.5, -4.0], [3.0, 4.0, 4.0]);
+            let (mut scene, _) = scene([tube(1.0, 3.0, [-1.0, 1.0], 24), rod(1.0 + excess, z, 24), wall]);
+            assert_eq!(swept(&scene, 1, up), Some(Sweep::Blocked { by: 0 }));
+            scene.allowances.grant(0, 1, excess);
+            assert!(is_clear(&scene, 1, up));
+        }
+    }
+
+    #[test]
+    fn a_press_fit_leaves_its_hole_but_not_through_its_walls() {
+        let excess = 0.02;
+        let (mut scene, _) = scene(peg_in_hole(excess));
+        scene.allowances.grant(0, 1, excess);
+        assert!(is_clear(&scene, 1, Vector3::z()));
+        assert!(!is_clear(&scene, 1, -Vector3::z()) && !is_clear(&scene, 1, Vector3::x()));
+    }
+
+    #[test]
+    fn what_is_apart_already_stays_where_it_is() {
+        let (scene, _) = scene([cuboid([0.0; 3], [1.0; 3]), cuboid([5.0, 0.0, 0.0], [6.0, 1.0, 1.0])]);
+        let Some(Sweep::Clear { path, .. }) = swept(&scene, 1, -Vector3::x()) else { panic!("not clear") };
+        assert_eq!(path, [scene.bodies[1].planning_from_shape]);
+    }
+
+    #[test]
+    fn a_wall_on_the_way_is_found_however_thin_or_small() {
+        // The post, beside the way, makes the way out lead past the wall.
+        let post = cuboid([5.0, -4.0, -1.0], [5.5, -3.0, 2.0]);
+        for wall in [
+            cuboid([4.2, -3.0, 0.0], [4.21, 3.0, 3.0]),
+            cuboid([4.2, -0.005, 1.0], [4.21, 0.005, 1.01]),
+            cuboid([4.2, -3.0, 1.99], [4.5, 3.0, 9.0]),
+        ] {
+            let [plate, block] = block_on_plate();
+            let (scene, _) = scene([plate, block, wall, post.clone()]);
+            assert_eq!(swept(&scene, 1, Vector3::x()), Some(Sweep::Blocked { by: 2 }));
+            assert!(is_clear(&scene, 1, -Vector3::x()));
+        }
+    }
+
+    #[test]
+    fn a_pin_leaves_its_bore_and_the_bore_its_pin() {
+        let pin = rod(1.0, [-1.0, 1.5], 24);
+        for bore in [1.0, 1.01] {
+            let (scene, _) = scene([tube(bore, 3.0, [-1.0, 1.0], 24), pin.clone()]);
+            assert!(is_clear(&scene, 1, Vector3::z()) && is_clear(&scene, 1, -Vector3::z()));
+            assert!(!is_clear(&scene, 1, Vector3::x()));
+            assert!(is_clear(&scene, 0, Vector3::z()) && is_clear(&scene, 0, -Vector3::z()));
+        }
+    }
+
+    #[test]
+    fn the_path_ends_where_hulls_are_apart_and_not_much_later() {
+        let (scene, _) = scene(peg_in_hole(0.0));
+        let Some(Sweep::Clear { path, exit }) = swept(&scene, 1, Vector3::z()) else { panic!("not clear") };
+        let around = Surroundings::new(&scene, vec![0]);
+        assert_eq!(path[0], scene.bodies[1].planning_from_shape);
+        assert!(exit_direction(&scene, &around, 1, &path[1], Some(exit)).is_some());
+        let short = Pose::translation(0.0, 0.0, -0.1) * path[1];
+        assert!(exit_direction(&scene, &around, 1, &short, None).is_none());
+    }
+
+    #[test]
+    fn an_undercut_holds_what_stands_in_it() {
+        // A T-slot along x: the T leaves along x only.
+        let across: &[f64] = &[-3.0, -2.0, -1.0, 1.0, 2.0, 3.0];
+        let rail = cells([&[-3.0, 3.0], across, &[-2.0, -1.0, 0.0, 1.0]], |[_, y, z]| match z {
+            0 => true,
+            1 => y == 0 || y == 4,
+            _ => y != 2,
+        });
+        let tee =
+            cells([&[-3.0, 3.0], &[-2.0, -1.0, 1.0, 2.0], &[-1.0, 0.0, 2.0]], |[_, y, z]| z == 0 || y == 1);
+        let (scene, _) = scene([rail, tee]);
+        assert!(is_clear(&scene, 1, Vector3::x()) && is_clear(&scene, 1, -Vector3::x()));
+        assert_eq!(swept(&scene, 1, Vector3::z()), Some(Sweep::Blocked { by: 0 }));
+    }
+}
