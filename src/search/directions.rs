@@ -8,7 +8,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use nalgebra::{Unit, Vector3};
+use nalgebra::{Matrix3, Unit, Vector3};
 
 use crate::geometry::Shape;
 use crate::simulation::{Axis, Scene};
@@ -21,48 +21,80 @@ const SQUARE: f64 = 0.005;
 const MOST_NORMALS: usize = 32;
 /// The share of a part's surface that must agree on an axis.
 const LEAST_SHARE: f64 = 0.5;
+/// cos of the angle within which an axis stands for a part's own (3 degrees).
+const NEAR: f64 = 0.9986;
+/// Eigenvalues of a turned part, as shares of their sum: two differ by less than this …
+const TURNED_ALIKE: f64 = 0.03;
+/// … and the third by more than that.
+const TURNED_APART: f64 = 0.06;
 /// How much more an axis of the world counts.
 const WORLD_PREFERENCE: f64 = 1.2;
 /// Axes of askew parts beyond the frame, at most.
 const MOST_EXTRA: usize = 3;
 
-/// The axes of the present parts: a right-angled frame, then those of parts that stand askew.
-/// The world's where surfaces do not agree on any.
-#[must_use]
-pub(super) fn axes(scene: &Scene, present: &[usize]) -> Vec<Axis> {
-    let mut of_shape: HashMap<*const Shape, Faces> = HashMap::new();
-    let mut votes = Axis::WORLD.map(|a| Candidate { direction: a.unit(), weight: 0.0 }).to_vec();
-    let mut own = Vec::new();
-    for &part in present {
-        let body = &scene.bodies[part];
-        let faces = of_shape.entry(Arc::as_ptr(&body.shape)).or_insert_with(|| Faces::of(&body.shape));
-        let rotation = body.planning_from_shape.rotation;
-        for v in &mut votes[..3] {
-            v.weight += faces.speaking_for(&rotation.inverse_transform_unit_vector(&v.direction));
-        }
-        let turned = |c: &Candidate| Candidate { direction: oriented(rotation * c.direction), ..*c };
-        for c in faces.candidates.iter().map(turned).filter(|c| !c.is_of_world()) {
-            match votes.iter_mut().find(|v| v.is_like(&c.direction)) {
-                Some(v) => v.weight += c.weight,
-                None => votes.push(c),
+/// The directions that a search draws from the geometry.
+#[derive(Debug, Clone)]
+pub(super) struct Directions {
+    /// A right-angled frame, then the axes of parts that stand askew in it.
+    pub(super) axes: Vec<Axis>,
+    /// For each part, which of the axes it is made along, if any.
+    own: Vec<Option<usize>>,
+}
+
+impl Directions {
+    /// Those of the paper: the axes of the world, and no part's own.
+    pub(super) fn of_world(scene: &Scene) -> Self {
+        Self { axes: Axis::WORLD.to_vec(), own: vec![None; scene.bodies.len()] }
+    }
+
+    /// Those of the present parts; the world's axes where surfaces do not agree on any.
+    #[must_use]
+    pub(super) fn of(scene: &Scene, present: &[usize]) -> Self {
+        let mut of_shape: HashMap<*const Shape, Faces> = HashMap::new();
+        let mut votes = Axis::WORLD.map(|a| Candidate { direction: a.unit(), weight: 0.0 }).to_vec();
+        let mut own: Vec<Option<Candidate>> = vec![None; scene.bodies.len()];
+        for &part in present {
+            let body = &scene.bodies[part];
+            let faces = of_shape.entry(Arc::as_ptr(&body.shape)).or_insert_with(|| Faces::of(&body.shape));
+            let rotation = body.planning_from_shape.rotation;
+            for v in &mut votes[..3] {
+                v.weight += faces.speaking_for(&rotation.inverse_transform_unit_vector(&v.direction));
             }
+            let turned = |c: &Candidate| Candidate { direction: oriented(rotation * c.direction), ..*c };
+            for c in faces.candidates.iter().map(turned).filter(|c| !c.is_of_world()) {
+                count(&mut votes, c);
+            }
+            own[part] = faces.own.as_ref().map(turned);
         }
-        own.extend(faces.candidates.first().map(turned));
-    }
-    votes.sort_by(|a, b| b.rank().total_cmp(&a.rank()));
-    let mut axes = frame(&votes);
-    let askew =
-        |axes: &[Unit<Vector3<f64>>], d: &Unit<Vector3<f64>>| axes.iter().all(|a| a.dot(d).abs() < ALIKE);
-    let mut extra: Vec<Candidate> = Vec::new();
-    for c in own.into_iter().filter(|c| askew(&axes, &c.direction)) {
-        match extra.iter_mut().find(|e| e.is_like(&c.direction)) {
-            Some(e) => e.weight += c.weight,
-            None => extra.push(c),
+        votes.sort_by(|a, b| b.rank().total_cmp(&a.rank()));
+        let mut axes = frame(&votes);
+        let mut extra: Vec<Candidate> = Vec::new();
+        for c in own.iter().flatten().filter(|c| nearest(&axes, &c.direction).is_none()) {
+            count(&mut extra, *c);
         }
+        extra.sort_by(|a, b| b.rank().total_cmp(&a.rank()));
+        axes.extend(extra.into_iter().take(MOST_EXTRA).map(|c| c.direction));
+        let own = own.iter().map(|c| nearest(&axes, &c.as_ref()?.direction)).collect();
+        Self { axes: axes.into_iter().map(Axis::along).collect(), own }
     }
-    extra.sort_by(|a, b| b.rank().total_cmp(&a.rank()));
-    axes.extend(extra.into_iter().take(MOST_EXTRA).map(|c| c.direction));
-    axes.into_iter().map(Axis::along).collect()
+
+    /// Whether an action is along or about the axis that a part is made along.
+    pub(super) fn is_own(&self, part: usize, axis: Axis) -> bool {
+        self.own[part].is_some_and(|i| self.axes[i] == axis)
+    }
+}
+
+fn count(votes: &mut Vec<Candidate>, c: Candidate) {
+    match votes.iter_mut().find(|v| v.is_like(&c.direction)) {
+        Some(v) => v.weight += c.weight,
+        None => votes.push(c),
+    }
+}
+
+/// Which axis is the nearest to a direction, if it is near.
+fn nearest(axes: &[Unit<Vector3<f64>>], d: &Unit<Vector3<f64>>) -> Option<usize> {
+    let cos = |i: &usize| axes[*i].dot(d).abs();
+    (0..axes.len()).max_by(|i, j| cos(i).total_cmp(&cos(j))).filter(|i| cos(i) > NEAR)
 }
 
 /// A direction and the surface that speaks for it.
@@ -94,12 +126,20 @@ struct Faces {
     normals: Vec<Candidate>,
     /// Directions that enough of the surface agrees on, best first.
     candidates: Vec<Candidate>,
+    /// The axis that the shape is turned about, or else the best candidate.
+    own: Option<Candidate>,
 }
 
 impl Faces {
     fn of(shape: &Shape) -> Self {
-        let mut faces = Self { normals: normals(shape), candidates: Vec::new() };
+        let mut faces = Self { normals: normals(shape), candidates: Vec::new(), own: None };
         faces.candidates = faces.agreed();
+        let turned = turning_axis(shape).map(|axis| {
+            let mut known = faces.candidates.iter().chain(&faces.normals).map(|c| c.direction);
+            let direction = known.find(|d| d.dot(&axis).abs() > NEAR).unwrap_or(axis);
+            Candidate { direction, weight: faces.speaking_for(&direction) }
+        });
+        faces.own = turned.or_else(|| faces.candidates.first().copied());
         faces
     }
 
@@ -133,6 +173,29 @@ impl Faces {
         out.sort_by(|a, b| b.weight.total_cmp(&a.weight));
         out
     }
+}
+
+/// The axis of a shape whose normals are spread alike all around it, as those of a bolt or a nut are,
+/// threads included: an eigenvalue of ∫nnᵀdA stands apart from two others that are equal.
+fn turning_axis(shape: &Shape) -> Option<Unit<Vector3<f64>>> {
+    let surface = &shape.surface;
+    let mut spread = Matrix3::zeros();
+    for t in 0..surface.triangles().len() as u32 {
+        let [a, b, c] = surface.corners(t);
+        let twice = (b - a).cross(&(c - a));
+        let area = twice.norm();
+        if area > 0.0 {
+            spread += twice * twice.transpose() / area;
+        }
+    }
+    let eigen = spread.symmetric_eigen();
+    let (values, whole) = (eigen.eigenvalues, spread.trace());
+    let apart = |i: usize, j: usize| (values[i] - values[j]).abs() / whole;
+    let alone = (0..3).find(|&i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        apart(j, k) < TURNED_ALIKE && apart(i, j).min(apart(i, k)) > TURNED_APART
+    })?;
+    Unit::try_new(eigen.eigenvectors.column(alone).into_owned(), 0.5).map(oriented)
 }
 
 /// The directions of a shape's surfaces with their areas, largest first; opposite ones are one.
@@ -195,7 +258,7 @@ mod tests {
     fn axes_of(meshes: impl IntoIterator<Item = SourceMesh>) -> Vec<Axis> {
         let (scene, _) = scene(meshes);
         let present: Vec<_> = (0..scene.bodies.len()).collect();
-        axes(&scene, &present)
+        Directions::of(&scene, &present).axes
     }
 
     #[test]
@@ -229,6 +292,16 @@ mod tests {
             axes_of([moved(crate::fixtures::ball(4), &Pose::translation(2.0, 0.0, 0.0)), cube()])[..3],
             Axis::WORLD
         );
+    }
+
+    #[test]
+    fn a_nut_and_its_bolt_are_made_along_the_thread() {
+        let turn = Pose::rotation(Vector3::new(0.3, -0.5, 0.2));
+        let (scene, _) = scene(crate::fixtures::thread(3.0, 0.5).map(|m| moved(m, &turn)));
+        let directions = Directions::of(&scene, &[0, 1]);
+        let along =
+            directions.axes.iter().position(|a| a.unit().dot(&(turn * Vector3::z())).abs() > 0.999_999);
+        assert!(along.is_some() && directions.own == [along, along], "{directions:?}");
     }
 
     fn cube() -> SourceMesh {

@@ -27,7 +27,7 @@ pub(super) enum Mode {
 
 /// PDP_t or PDP_r.
 pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: Mode) -> Outcome {
-    let (translations, rotations) = problem.action_lists();
+    let (translations, rotations) = problem.action_lists(&problem.directions());
     let actions = match mode {
         Mode::Translation => translations,
         Mode::Rotation => rotations,

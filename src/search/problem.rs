@@ -11,7 +11,7 @@ use crate::plan::{Entry, Verifier, thinned};
 use crate::simulation::{Action, Scene, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
-use super::directions::axes;
+use super::directions::Directions;
 use super::outcome::Removal;
 use super::request::ActionSet;
 use super::trace::TraceEvent;
@@ -67,17 +67,25 @@ pub struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// The translations, and the actions with rotational freedom in the order of trial: the
-    /// paper's about the world's axes, or ours about the assembly's own.
-    #[must_use]
-    pub fn action_lists(&self) -> (Vec<Action>, Vec<Action>) {
-        if self.actions == ActionSet::Paper {
-            return (Action::translations(), Action::rotations());
+    /// The axes of the actions: the paper's are the world's, ours the assembly's own.
+    pub(super) fn directions(&self) -> Directions {
+        match self.actions {
+            ActionSet::Paper => Directions::of_world(&self.scene),
+            ActionSet::Extended => Directions::of(&self.scene, &self.present),
         }
-        let axes = axes(&self.scene, &self.present);
-        // Where turning helps, pulling while turning mostly leads out in one motion.
-        let screws = Action::screws_along(&axes).into_iter();
-        (Action::translations_along(&axes), screws.chain(Action::rotations_about(&axes)).collect())
+    }
+
+    /// The translations, and the actions with rotational freedom in the order of trial.
+    pub(super) fn action_lists(&self, directions: &Directions) -> (Vec<Action>, Vec<Action>) {
+        let axes = &directions.axes;
+        let rotations = match self.actions {
+            ActionSet::Paper => Action::rotations_about(axes),
+            // Where turning helps, pulling while turning mostly leads out in one motion.
+            ActionSet::Extended => {
+                Action::screws_along(axes).into_iter().chain(Action::rotations_about(axes)).collect()
+            }
+        };
+        (Action::translations_along(axes), rotations)
     }
 
     /// Whether a part is there and not fixed.

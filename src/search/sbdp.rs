@@ -18,6 +18,7 @@ use crate::geometry::Pose;
 use crate::simulation::{Action, End, Motion};
 use crate::termination::Interrupt;
 
+use super::directions::Directions;
 use super::disassembly::{Disassembly, Proof, Run, Stop, joined};
 use super::outcome::Outcome;
 use super::problem::{Observer, Problem};
@@ -57,6 +58,7 @@ pub(super) struct Search<'a, 'o> {
     /// Nodes at the assembled pose: the first ones.
     pub(super) roots: usize,
     pub(super) states_of: Vec<usize>,
+    directions: Directions,
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
     pub(super) swept: Swept,
@@ -77,13 +79,15 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
 
 impl<'a, 'o> Search<'a, 'o> {
     fn new(problem: Problem<'a>, observer: &'o mut dyn Observer, guided: bool) -> Self {
-        let (translations, rotations) = problem.action_lists();
+        let directions = problem.directions();
+        let (translations, rotations) = problem.action_lists(&directions);
         let as_paper = problem.actions == ActionSet::Paper;
         Self {
             guided,
             nodes: Vec::new(),
             roots: 0,
             states_of: vec![0; problem.scene.bodies.len()],
+            directions,
             translations,
             rotations,
             swept: Swept::default(),
@@ -307,8 +311,11 @@ impl<'a, 'o> Search<'a, 'o> {
     /// Simulates the open actions of some states of one priority, in order.
     fn expand(&mut self, phase: Phase, batch: &[usize]) -> Result<Gain, Stop> {
         let count = self.actions(phase).len();
-        let jobs: Vec<Job> =
+        let mut jobs: Vec<Job> =
             batch.iter().flat_map(|&node| (0..count).map(move |action| Job { node, action })).collect();
+        if phase == Phase::Rotation && self.guided && !self.separate_lists {
+            jobs.sort_by_cached_key(|job| self.promise(*job));
+        }
         let mut gain = Gain::default();
         let mut next = 0;
         while next < jobs.len() {
@@ -332,6 +339,21 @@ impl<'a, 'o> Search<'a, 'o> {
             }
         }
         Ok(gain)
+    }
+
+    /// Of actions that may turn a part, those first that pull it along the axis that it is made along
+    /// while turning it, over all parts; and of these, those first that fewer parts stand against, as
+    /// far as pushes tell. Smaller is better.
+    fn promise(&self, job: Job) -> (bool, usize) {
+        let node = &self.nodes[job.node];
+        let action = self.rotations[job.action];
+        let Action::Screw(axis, ..) = action else { return (true, 0) };
+        if !self.directions.is_own(node.part, axis) {
+            return (true, 0);
+        }
+        let push = self.translations.iter().position(|t| t.force() == action.force());
+        let against = |b: &Blockage| push.map_or(0, |push| b.blockers(push).len());
+        (false, node.translation.as_ref().map_or(0, against))
     }
 
     pub(super) fn run_of(&self, phase: Phase, job: Job) -> Run {
