@@ -52,6 +52,12 @@ impl Screw {
         Pose::from_parts(Translation3::from(t), rotation)
     }
 
+    /// The travel along the axis in one whole turn; infinite for a pure translation.
+    #[must_use]
+    pub fn lead(&self) -> f64 {
+        self.travel.norm() * std::f64::consts::TAU / self.angle()
+    }
+
     /// The angle in radians.
     #[must_use]
     pub fn angle(&self) -> f64 {
@@ -76,6 +82,7 @@ mod tests {
             Pose::translation(2.0, 0.0, 0.25) * Pose::rotation(quarter) * Pose::translation(-2.0, 0.0, 0.0);
         let screw = Screw::of(&there);
         assert!((screw.angle() - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+        assert!((screw.lead() - 1.0).abs() < 1e-12);
         assert!(distance(&screw.times(4.0), &Pose::translation(0.0, 0.0, 1.0)) < 1e-12);
         assert!(distance(&screw.times(0.0), &Pose::identity()) < 1e-12);
     }

@@ -5,9 +5,9 @@
 //! constraints of its section on blocking graphs. Departures, each for a reason given in DESIGN 6:
 //! a collision is about a set of parts; the search ends when nothing new can be found. Beyond the
 //! paper's action set, translational passes repeat while they find new states, since turning costs
-//! more, and both kinds of planning share their states, since a bayonet needs both. Simulations run ahead in parallel, but their results are taken in the order of the serial
-//! algorithm and thrown away where an earlier one changed the question, so the plan does not depend
-//! on the number of threads.
+//! more, and both kinds of planning share their states, since a bayonet needs both. Simulations run
+//! ahead in parallel, but their results are taken in the order of the serial algorithm and thrown
+//! away where an earlier one changed the question: plans do not depend on the number of threads.
 
 use std::time::Instant;
 
@@ -334,16 +334,17 @@ impl<'a, 'o> Search<'a, 'o> {
                     break;
                 }
             }
-            if self.disassembly.is_done() {
+            // What a part that was turned out leaves free mostly leaves straight: pushes first.
+            let pushes_first = phase == Phase::Rotation && gain.removed && !self.separate_lists;
+            if self.disassembly.is_done() || pushes_first {
                 break;
             }
         }
         Ok(gain)
     }
 
-    /// Of actions that may turn a part, those first that pull it along the axis that it is made along
-    /// while turning it, over all parts; and of these, those first that fewer parts stand against, as
-    /// far as pushes tell. Smaller is better.
+    /// Of actions that may turn a part, those first that pull it along its own axis, over all parts;
+    /// of these, those that fewer parts stand against, as far as pushes tell. Smaller is better.
     fn promise(&self, job: Job) -> (bool, usize) {
         let node = &self.nodes[job.node];
         let action = self.rotations[job.action];

@@ -107,21 +107,43 @@ impl<'a> Mover<'a> {
     /// Whether the fields alone show that a sample of either surface is deeper than granted: deeper
     /// than they can be wrong by. Measures nothing exactly, so it is quick.
     pub(super) fn clearly_enters(&self, standing: &[usize]) -> bool {
-        let bounds = self.body.shape.bounds().transformed(&self.pose);
-        let inside = |sampled: &Body, measured: &Body, to_measured: &Pose, allowance: f64| {
+        self.any_pair(standing, |sampled, measured, to_measured, allowance| {
             let field = &measured.field;
             let limit = -allowance - field.error_bound();
             sampled.shape.samples.any(
                 |node| field.value(&(to_measured * node.centre)) - node.radius < limit,
                 |sample| field.value(&(to_measured * sample)) < limit,
             )
-        };
+        })
+    }
+
+    /// Whether a sample of either surface is deeper by `depth` than granted: quick where many are.
+    pub(super) fn enters_by(&self, depth: f64, standing: &[usize]) -> bool {
+        self.any_pair(standing, |sampled, measured, to_measured, allowance| {
+            let (field, limit) = (&measured.field, -allowance - depth);
+            let least = |p: &Point3<f64>| field.value(p) - field.error_bound();
+            sampled.shape.samples.any(
+                |node| least(&(to_measured * node.centre)) - node.radius < limit,
+                |sample| {
+                    let p = to_measured * sample;
+                    least(&p) < limit
+                        && measured.closest(&p, 0.0).is_some_and(|(_, distance)| distance < limit)
+                },
+            )
+        })
+    }
+
+    /// Whether a test of one surface's samples against the other's body holds for any pair that may
+    /// meet, given the sampled and the measured body, the way from one's frame to the other's, and
+    /// the pair's allowance.
+    fn any_pair(&self, standing: &[usize], test: impl Fn(&Body, &Body, &Pose, f64) -> bool) -> bool {
+        let bounds = self.body.shape.bounds().transformed(&self.pose);
         self.scene.broad_phase.meeting_of(standing, &bounds).into_iter().any(|other| {
             let still = &self.scene.bodies[other];
             let allowance = self.scene.allowances.of(self.part, other);
             let to_still = still.planning_from_shape.inverse() * self.pose;
-            inside(self.body, still, &to_still, allowance)
-                || inside(still, self.body, &to_still.inverse(), allowance)
+            test(self.body, still, &to_still, allowance)
+                || test(still, self.body, &to_still.inverse(), allowance)
         })
     }
 

@@ -27,9 +27,14 @@ const LONGEST: usize = 32;
 const WIDEST: f64 = 2.4;
 /// Shorter leaps along a helix gain nothing over steps.
 const SHORTEST_ON_HELIX: usize = 4;
+/// A helix gets at least so much further with every turn, in the planning frame.
+const LEAST_LEAD: f64 = 0.02;
 /// How far a part is moved against what it is pressed to, to see whether that is still there, in
-/// steps.
+/// steps; and on a thread, where it is less than the pitch.
 const PROBE: f64 = 1.0;
+const PROBE_ON_HELIX: f64 = 0.25;
+/// How deep the probe must enter a thread, in the planning frame.
+const PRESSED: f64 = 2e-3;
 
 /// What a leap came to.
 pub(super) struct Leap {
@@ -113,7 +118,8 @@ impl<'a> Leaper<'a> {
             return self.follow(mover, gather);
         }
         let wanted = self.length.min(longest(&now));
-        let mut steps = self.free_steps(mover, &now, &pressing, wanted);
+        let holds = |there: &Mover<'_>| pressing.iter().all(|push| self.is_pressed(there, push));
+        let mut steps = self.free_steps(mover, &now, wanted, &holds);
         while steps > 1 {
             let there = Mover { pose: now.times(steps as f64) * mover.pose, ..*mover };
             let near = gather(&there);
@@ -134,6 +140,9 @@ impl<'a> Leaper<'a> {
             return;
         }
         let screw = Screw::between(&begin, &mover.pose, count);
+        if screw.lead() < LEAST_LEAD {
+            return;
+        }
         self.helix = Some(Helix { screw, length: count, pressing });
     }
 
@@ -141,7 +150,8 @@ impl<'a> Leaper<'a> {
     pub(super) fn follow(&mut self, mover: &Mover<'_>, gather: Gather<'_>) -> Option<Leap> {
         let Helix { screw, length, pressing } = self.helix.take()?;
         let wanted = length.min(longest(&screw));
-        let mut steps = self.free_steps(mover, &screw, &pressing, wanted);
+        let holds = |there: &Mover<'_>| pressing.iter().all(|push| self.is_on_thread(there, push));
+        let mut steps = self.free_steps(mover, &screw, wanted, &holds);
         while steps >= SHORTEST_ON_HELIX {
             let there = Mover { pose: screw.times(steps as f64) * mover.pose, ..*mover };
             if let Some((pose, near)) = self.drive.lifted(&there, gather) {
@@ -162,27 +172,24 @@ impl<'a> Leaper<'a> {
         (a.translation.vector - b.translation.vector).norm() + a.rotation.angle_to(&b.rotation) * self.radius
     }
 
-    /// How many steps, of those wanted, enter nothing and leave nothing that the part is pressed to.
+    /// How many steps, of those wanted, enter nothing and leave the part pressed to what it was.
     fn free_steps(
         &self,
         mover: &Mover<'_>,
         screw: &Screw,
-        pressing: &[Vector6<f64>],
         wanted: usize,
+        holds: &dyn Fn(&Mover<'_>) -> bool,
     ) -> usize {
-        let standing = &self.surroundings.standing;
         let is_free = |k: &usize| {
             let there = Mover { pose: screw.times(*k as f64) * mover.pose, ..*mover };
-            let holds = |push: &Vector6<f64>| {
-                Mover { pose: self.pushed(&there, push), ..there }.clearly_enters(standing)
-            };
-            !there.clearly_enters(standing) && pressing.iter().all(holds)
+            !there.clearly_enters(&self.surroundings.standing) && holds(&there)
         };
         (1..=wanted).take_while(is_free).count()
     }
 
-    /// The mover's pose, pushed until no point has moved by more than a probe's length.
-    fn pushed(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> Pose {
+    /// Whether the fields show that a push still meets what it met: not beside a slot's rim, where
+    /// short steps are needed.
+    fn is_pressed(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> bool {
         let (v, w): (Vector3<f64>, Vector3<f64>) =
             (push.fixed_rows::<3>(0).into(), push.fixed_rows::<3>(3).into());
         let scale = PROBE * self.drive.reach() / (v.norm() + w.norm() * self.radius);
@@ -190,7 +197,16 @@ impl<'a> Leaper<'a> {
         let turn = UnitQuaternion::from_scaled_axis(w * scale);
         pose.append_rotation_wrt_point_mut(&turn, &mover.centre());
         pose.append_translation_mut(&Translation3::from(v * scale));
-        pose
+        Mover { pose, ..*mover }.clearly_enters(&self.surroundings.standing)
+    }
+
+    /// Whether a short pull, as far as a push has one, still enters a thread: finer than fields show.
+    fn is_on_thread(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> bool {
+        let pull: Vector3<f64> = push.fixed_rows::<3>(0).into();
+        let Some(direction) = pull.try_normalize(0.0) else { return false };
+        let step = direction * (PROBE_ON_HELIX * self.drive.reach());
+        let pose = Translation3::from(step) * mover.pose;
+        Mover { pose, ..*mover }.enters_by(PRESSED, &self.surroundings.standing)
     }
 }
 
