@@ -54,8 +54,8 @@ impl<'a> Placed<'a> {
         let extent = |b: &Bounds| b.extents().dot(&direction.abs());
         let step = direction * LONGEST.min(extent(&self.bounds) * SHARE);
         // The potential collision area: where the mobile part lies behind the other one.
-        let rear = support(&still.bounds, &-direction);
-        let area = (extent(&self.bounds) > extent(&still.bounds)).then_some(-rear);
+        let rear = -still.bounds.support(&-direction);
+        let area = (extent(&self.bounds) > extent(&still.bounds)).then_some(rear);
         let to_still = still.pose.inverse();
         self.body.shape.surface.vertices().iter().any(|v| {
             let p = self.pose * v;
@@ -64,15 +64,6 @@ impl<'a> Placed<'a> {
                 && (1..=EXTENSIONS).any(|k| still.body.field.value(&(to_still * (p + step * k as f64))) < 0.0)
         })
     }
-}
-
-/// How far a box reaches along a direction.
-fn support(bounds: &Bounds, direction: &Vector3<f64>) -> f64 {
-    let corner = bounds
-        .min
-        .coords
-        .zip_zip_map(&bounds.max.coords, direction, |lo, hi, d| if d > 0.0 { hi * d } else { lo * d });
-    corner.sum()
 }
 
 #[cfg(test)]
@@ -122,12 +113,5 @@ mod tests {
         let (scene, _) = scene([washer, bolt]);
         let found = blocked(&scene, 1, 0);
         assert!(found.contains(&4) && !found.contains(&5), "{found:?}");
-    }
-
-    #[test]
-    fn boxes_reach_as_far_as_their_furthest_corner() {
-        let b = Bounds::of(&[nalgebra::Point3::new(-1.0, 2.0, 0.0), nalgebra::Point3::new(1.0, 3.0, 4.0)]);
-        assert_eq!(support(&b, &Vector3::y()), 3.0);
-        assert_eq!(support(&b, &-Vector3::y()), -2.0);
     }
 }

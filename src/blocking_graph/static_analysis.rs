@@ -28,9 +28,6 @@ pub enum StaticAnalysis {
 }
 
 impl StaticAnalysis {
-    /// All rules.
-    pub const ALL: [Self; 2] = [Self::Sliding, Self::Paper];
-
     /// The name on the command line and in records.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -58,8 +55,8 @@ impl StaticAnalysis {
     }
 }
 
-/// Blockages of all present parts at their assembled poses, for the six translations (in opposite
-/// pairs: action `a ^ 1` is the reverse of `a`). One entry per part; absent parts stay open. `present`
+/// Blockages of all present parts at their assembled poses, for translations in opposite
+/// pairs (action `a ^ 1` is the reverse of `a`). One entry per part; absent parts stay open. `present`
 /// is ascending.
 ///
 /// # Errors

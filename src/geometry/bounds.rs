@@ -75,6 +75,12 @@ impl Bounds {
         d.norm()
     }
 
+    /// How far the box reaches along a direction: the most that any of its points has of it.
+    #[must_use]
+    pub fn support(&self, direction: &Vector3<f64>) -> f64 {
+        (0..3).map(|a| (direction[a] * self.min[a]).max(direction[a] * self.max[a])).sum()
+    }
+
     /// A box that holds this one after `pose` (tight for the eight corners).
     #[must_use]
     pub fn transformed(&self, pose: &Pose) -> Self {
@@ -89,6 +95,13 @@ impl Bounds {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_box_reaches_as_far_as_its_furthest_corner() {
+        let b = Bounds { min: Point3::new(-1.0, 2.0, 0.0), max: Point3::new(1.0, 3.0, 4.0) };
+        assert_eq!((b.support(&Vector3::y()), b.support(&-Vector3::y())), (3.0, -2.0));
+        assert_eq!(b.support(&Vector3::new(1.0, -1.0, 0.5)), 1.0 - 2.0 + 2.0);
+    }
 
     #[test]
     fn a_turned_box_holds_its_corners() {

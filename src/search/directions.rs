@@ -19,6 +19,10 @@ const ALIKE: f64 = 0.999_99;
 const SQUARE: f64 = 0.005;
 /// The directions of a part's surfaces that are looked at: those with the most area.
 const MOST_NORMALS: usize = 32;
+/// Normals are first put into buckets of this many to the unit, and those with the most area looked
+/// at: a free form has as many normals as triangles.
+const BUCKETS: f64 = 500.0;
+const MOST_BUCKETS: usize = 512;
 /// The share of a part's surface that must agree on an axis.
 const LEAST_SHARE: f64 = 0.5;
 /// cos of the angle within which an axis stands for a part's own (3 degrees).
@@ -124,6 +128,8 @@ impl Candidate {
 struct Faces {
     /// The normals with the most area, opposite ones as one.
     normals: Vec<Candidate>,
+    /// The area of the whole surface.
+    area: f64,
     /// Directions that enough of the surface agrees on, best first.
     candidates: Vec<Candidate>,
     /// The axis that the shape is turned about, or else the best candidate.
@@ -132,7 +138,8 @@ struct Faces {
 
 impl Faces {
     fn of(shape: &Shape) -> Self {
-        let mut faces = Self { normals: normals(shape), candidates: Vec::new(), own: None };
+        let (normals, area) = normals(shape);
+        let mut faces = Self { normals, area, candidates: Vec::new(), own: None };
         faces.candidates = faces.agreed();
         let turned = turning_axis(shape).map(|axis| {
             let mut known = faces.candidates.iter().chain(&faces.normals).map(|c| c.direction);
@@ -154,7 +161,6 @@ impl Faces {
 
     fn agreed(&self) -> Vec<Candidate> {
         let Some(largest) = self.normals.first() else { return Vec::new() };
-        let area: f64 = self.normals.iter().map(|n| n.weight).sum();
         let mut out: Vec<Candidate> = Vec::new();
         // A turned part without flat ends shows its axis as what two of its sides have in common.
         let sides = self.normals[1..]
@@ -166,7 +172,7 @@ impl Faces {
                 continue;
             }
             let weight = self.speaking_for(&direction);
-            if weight > LEAST_SHARE * area {
+            if weight > LEAST_SHARE * self.area {
                 out.push(Candidate { direction, weight });
             }
         }
@@ -198,32 +204,30 @@ fn turning_axis(shape: &Shape) -> Option<Unit<Vector3<f64>>> {
     Unit::try_new(eigen.eigenvectors.column(alone).into_owned(), 0.5).map(oriented)
 }
 
-/// The directions of a shape's surfaces with their areas, largest first; opposite ones are one.
-fn normals(shape: &Shape) -> Vec<Candidate> {
+/// The directions in which most of a shape's surface faces, with their areas, largest first;
+/// opposite ones are one. Also the area of the whole surface.
+fn normals(shape: &Shape) -> (Vec<Candidate>, f64) {
     let surface = &shape.surface;
-    let mut out: Vec<Candidate> = Vec::new();
-    let mut at: HashMap<[i16; 3], usize> = HashMap::new();
+    let mut buckets: HashMap<[i16; 3], Candidate> = HashMap::new();
+    let mut area = 0.0;
     for t in 0..surface.triangles().len() as u32 {
         let [a, b, c] = surface.corners(t);
         let twice = (b - a).cross(&(c - a));
         let Some(direction) = Unit::try_new(twice, 1e-12).map(oriented) else { continue };
         let weight = twice.norm() / 2.0;
-        // Most triangles share their normal with one before: found without a search.
-        let key = direction.map(|x| (x * 500.0).round() as i16).into();
-        let known = at.get(&key).copied().filter(|&i: &usize| out[i].is_like(&direction));
-        match known.or_else(|| out.iter().position(|c| c.is_like(&direction))) {
-            Some(i) => {
-                out[i].weight += weight;
-                at.insert(key, i);
-            }
-            None => {
-                at.insert(key, out.len());
-                out.push(Candidate { direction, weight });
-            }
-        }
+        area += weight;
+        let key = direction.map(|x| (x * BUCKETS).round() as i16).into();
+        buckets.entry(key).or_insert(Candidate { direction, weight: 0.0 }).weight += weight;
+    }
+    let mut largest: Vec<([i16; 3], Candidate)> = buckets.into_iter().collect();
+    // The keys decide among equals, so that the order of the map does not.
+    largest.sort_by(|(k, a), (l, b)| b.weight.total_cmp(&a.weight).then(k.cmp(l)));
+    let mut out = Vec::new();
+    for (_, c) in largest.into_iter().take(MOST_BUCKETS) {
+        count(&mut out, c);
     }
     out.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-    out
+    (out, area)
 }
 
 /// Three axes at right angles: the best, the best at right angles to it, and the third.

@@ -70,24 +70,12 @@ impl Action {
         axes.iter().flat_map(|&a| [Self::Push(a, true), Self::Push(a, false)]).collect()
     }
 
-    /// The paper's actions with rotational freedom: six torques, then six forces.
-    #[must_use]
-    pub fn rotations() -> Vec<Self> {
-        Self::rotations_about(&Axis::WORLD)
-    }
-
     /// The torques about some axes, then the forces along them, both ways each.
     #[must_use]
     pub fn rotations_about(axes: &[Axis]) -> Vec<Self> {
         let turns = axes.iter().flat_map(|&a| [Self::Turn(a, true), Self::Turn(a, false)]);
         let drags = axes.iter().flat_map(|&a| [Self::Drag(a, true), Self::Drag(a, false)]);
         turns.chain(drags).collect()
-    }
-
-    /// The twelve wrenches that pull while turning.
-    #[must_use]
-    pub fn screws() -> Vec<Self> {
-        Self::screws_along(&Axis::WORLD)
     }
 
     /// The wrenches that pull along some axes while turning about them, all four ways each.
@@ -157,10 +145,10 @@ mod tests {
         let names = |a: Vec<Action>| a.iter().map(ToString::to_string).collect::<Vec<_>>();
         assert_eq!(names(Action::translations()), ["+x", "-x", "+y", "-y", "+z", "-z"]);
         assert_eq!(
-            names(Action::rotations()),
+            names(Action::rotations_about(&Axis::WORLD)),
             ["+rx", "-rx", "+ry", "-ry", "+rz", "-rz", "+x~", "-x~", "+y~", "-y~", "+z~", "-z~"]
         );
-        let screws = names(Action::screws());
+        let screws = names(Action::screws_along(&Axis::WORLD));
         assert_eq!((screws.len(), screws[9].as_str()), (12, "+z-rz"));
     }
 }

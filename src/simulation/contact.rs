@@ -46,6 +46,7 @@ pub(super) struct Near {
 }
 
 /// The moving body at a pose.
+#[derive(Clone, Copy)]
 pub(super) struct Mover<'a> {
     pub(super) scene: &'a Scene,
     pub(super) body: &'a Body,

@@ -52,10 +52,7 @@ pub fn exit_direction(
     let apart = surroundings.standing.iter().all(|&i| {
         let other = &scene.bodies[i];
         // The corner of its box that lies least far: mostly that is enough.
-        let corner = |a: usize| {
-            direction[a] * if direction[a] > 0.0 { other.bounds.min[a] } else { other.bounds.max[a] }
-        };
-        if corner(0) + corner(1) + corner(2) - far >= HULL_MARGIN {
+        if -other.bounds.support(&-direction) - far >= HULL_MARGIN {
             return true;
         }
         let local = other.planning_from_shape.rotation.inverse() * direction;

@@ -4,6 +4,7 @@
 //! (samples near the other surface, measured exactly) → `projection` (the nearest twist that
 //! contact allows) → `sliding` (steps until the part is out or stuck) → [`Motion`]. The paper's own
 //! simulation stands beside it: [`PenaltyEngine`], with forces and time steps, on the fields alone.
+//! So does [`straight_sweep`], which tells of a part that leaves along a line without simulating.
 //! Everything here is in the planning frame and knows nothing of search.
 
 mod action;

@@ -18,10 +18,9 @@ use nalgebra::{Point3, Translation3, Vector3};
 
 use crate::geometry::{Bounds, OrientedSamples, Pose, Surface, separating_direction, transformed};
 
+use super::sliding::DEPTH_TOLERANCE;
 use super::{HULL_MARGIN, Scene, Surroundings, exit_direction};
 
-/// How much deeper than its allowance a pair may get, in the planning frame.
-const DEPTH_TOLERANCE: f64 = 3e-4;
 /// Faces that look along the direction, or against it, by less than this count as walls.
 const STEEPNESS: f64 = 1e-3;
 /// The way out is found to this share of the way beyond everything.

@@ -285,7 +285,10 @@ fn the_same_input_gives_the_same_motion_to_the_bit() {
 #[test]
 fn no_path_is_deeper_than_the_engine_declares() {
     for case in cases() {
-        let actions = Action::translations().into_iter().chain(Action::rotations()).chain(Action::screws());
+        let actions = Action::translations()
+            .into_iter()
+            .chain(Action::rotations_about(&Axis::WORLD))
+            .chain(Action::screws_along(&Axis::WORLD));
         for (engine, action) in actions.flat_map(|a| ENGINES.map(|e| (e, a))) {
             let motion = case.motion(engine, action);
             assert_eq!(motion.path[0], case.assembled(), "{}: {action}", case.name);
@@ -302,7 +305,9 @@ fn no_path_is_deeper_than_the_engine_declares() {
 #[test]
 fn collisions_name_standing_parts_in_order() {
     for case in cases() {
-        for (engine, action) in Action::rotations().into_iter().flat_map(|a| ENGINES.map(|e| (e, a))) {
+        for (engine, action) in
+            Action::rotations_about(&Axis::WORLD).into_iter().flat_map(|a| ENGINES.map(|e| (e, a)))
+        {
             let motion = case.motion(engine, action);
             let (End::Collision { with: named } | End::Undecided { touched: named, .. }) = motion.end else {
                 continue;

@@ -134,7 +134,7 @@ impl Drive {
     /// The pose in the middle of the play around the mover's, and what is near there: the smallest
     /// correction that gives all contacts as large a gap as they can have at once.
     pub(super) fn lifted(&self, mover: &Mover<'_>, gather: Gather<'_>) -> Option<(Pose, Near)> {
-        let mut here = Mover { ..*mover };
+        let mut here = *mover;
         let mut near = gather(&here);
         for _ in 0..LIFT_ROUNDS {
             let least = near.contacts.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);

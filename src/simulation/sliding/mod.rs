@@ -23,7 +23,7 @@ pub(super) use drive::FREE_STEP;
 pub use pair::pair_blocks;
 
 /// A pair may get this much deeper than its allowance, in the planning frame.
-const DEPTH_TOLERANCE: f64 = 3e-4;
+pub(super) const DEPTH_TOLERANCE: f64 = 3e-4;
 /// A motion that is not done after so many poses turns without end.
 const MOST_POSES: usize = 8000;
 
