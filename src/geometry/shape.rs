@@ -1,5 +1,7 @@
 //! A distinct mesh with all that is derived from it alone. Equal parts share one.
 
+use std::sync::Arc;
+
 use nalgebra::{Point3, Vector3};
 
 use super::hull::hull_vertices;
@@ -10,7 +12,7 @@ use super::{Bounds, MassProperties, Mesh, OrientedSamples, SampleTree, Spacing, 
 #[derive(Debug, Clone)]
 pub struct Shape {
     /// The triangles.
-    pub surface: Surface,
+    pub surface: Arc<Surface>,
     /// Vertices of the convex hull.
     pub hull: Vec<Point3<f64>>,
     /// Where contact is looked for.
@@ -27,7 +29,7 @@ impl Shape {
     /// Derives everything from a mesh.
     #[must_use]
     pub fn new(mesh: &Mesh) -> Self {
-        let surface = Surface::new(mesh);
+        let surface = Arc::new(Surface::new(mesh));
         let mass = surface.mass_properties();
         let reach =
             surface.vertices().iter().map(|v| (v - mass.centre).norm_squared()).fold(0.0, f64::max).sqrt();

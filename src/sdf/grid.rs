@@ -1,8 +1,13 @@
 //! The sparse grid and its look-ups.
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use std::sync::{Arc, OnceLock};
 
-use crate::geometry::Bounds;
+use nalgebra::{Matrix3, Point3, Vector3};
+use rayon::prelude::*;
+
+use crate::geometry::{Bounds, Surface};
+
+use super::rim::Rim;
 
 /// Cells along a brick's side.
 pub(super) const CELLS: usize = 8;
@@ -25,13 +30,39 @@ pub struct Field {
     pub(super) dims: [usize; 3],
     /// Per brick: where its nodes are, or [`EMPTY`].
     pub(super) slots: Vec<u32>,
-    /// Per brick without nodes: signed bound, |bound| ≤ distance anywhere in the brick.
+    /// Per brick without nodes: bound, |bound| ≤ distance anywhere in the brick; signed, unless the
+    /// surface is open.
     pub(super) far: Vec<f32>,
-    /// Distances at nodes; outside the band they stand at ± the band's half-width.
-    pub(super) values: Vec<f32>,
-    /// Nearest triangle at nodes.
-    pub(super) nearest: Vec<u32>,
+    /// Per brick, if the surface is open: whether its middle is inside, asked when first looked at.
+    pub(super) far_inside: Vec<OnceLock<bool>>,
+    /// Bricks with nodes.
+    pub(super) near: Vec<NearBrick>,
+    /// The triangles of all of them.
+    pub(super) triangles: Vec<u32>,
+    pub(super) surface: Arc<Surface>,
+    /// Where the surface is open, if it is.
+    pub(super) rim: Option<Rim>,
     pub(super) bounds: Bounds,
+}
+
+/// A brick that the band touches.
+#[derive(Debug, Clone)]
+pub(super) struct NearBrick {
+    /// Its place in the grid.
+    pub(super) brick: u32,
+    /// Which of the field's triangles may be nearest in it, as a range.
+    pub(super) triangles: [u32; 2],
+    /// Measured when first looked at: what comes out does not depend on when or by whom.
+    pub(super) nodes: OnceLock<Box<Nodes>>,
+}
+
+/// What is known at the nodes of a brick.
+#[derive(Debug, Clone)]
+pub(super) struct Nodes {
+    /// Distances; outside the band they stand at ± the band's half-width.
+    pub(super) values: [f32; BRICK],
+    /// Nearest triangles.
+    pub(super) nearest: [u32; BRICK],
 }
 
 /// What a field knows about a point.
@@ -82,16 +113,28 @@ impl Field {
         self.cell * 0.87
     }
 
-    /// Bytes in memory.
+    /// Bytes in memory, of bricks looked at so far.
     #[must_use]
     pub fn memory(&self) -> usize {
-        self.slots.len() * 8 + self.values.len() * 8
+        let filled = self.near.iter().filter(|b| b.nodes.get().is_some()).count();
+        self.slots.len() * 8
+            + self.far_inside.len() * size_of::<OnceLock<bool>>()
+            + self.triangles.len() * 4
+            + self.near.len() * size_of::<NearBrick>()
+            + filled * size_of::<Nodes>()
     }
 
-    /// Bricks that hold nodes.
+    /// Bricks that the band touches.
     #[must_use]
     pub fn bricks(&self) -> usize {
-        self.values.len() / BRICK
+        self.near.len()
+    }
+
+    /// Fills all bricks, in parallel on the current rayon pool.
+    pub fn fill(&self) {
+        (0..self.near.len() as u32).into_par_iter().for_each(|slot| {
+            self.nodes(slot);
+        });
     }
 
     /// A bound and an estimate of the signed distance at `p`.
@@ -103,11 +146,11 @@ impl Field {
         };
         let slot = self.slots[brick];
         if slot == EMPTY {
-            let d = f64::from(self.far[brick]);
+            let d = self.far(brick);
             return Estimate { lower_bound: d, value: d };
         }
-        let (base, f) = corner(&local, slot);
-        let value = trilinear(self.around(base), &f);
+        let (base, f) = corner(&local);
+        let value = trilinear(around(self.nodes(slot), base), &f);
         let boxed = self.bounds.distance(p);
         Estimate { lower_bound: (value - self.error_bound()).max(boxed), value }
     }
@@ -118,10 +161,10 @@ impl Field {
         let Some((brick, local)) = self.locate(p) else { return self.bounds.distance(p) };
         let slot = self.slots[brick];
         if slot == EMPTY {
-            return f64::from(self.far[brick]);
+            return self.far(brick);
         }
-        let (base, f) = corner(&local, slot);
-        trilinear(self.around(base), &f)
+        let (base, f) = corner(&local);
+        trilinear(around(self.nodes(slot), base), &f)
     }
 
     /// The interpolated value at `p` and its exact derivatives. They jump at the faces of cells.
@@ -132,10 +175,10 @@ impl Field {
         };
         let slot = self.slots[brick];
         if slot == EMPTY {
-            return FieldSample::flat(f64::from(self.far[brick]));
+            return FieldSample::flat(self.far(brick));
         }
-        let (base, f) = corner(&local, slot);
-        let mut sample = trilinear_derivatives(self.around(base), &f);
+        let (base, f) = corner(&local);
+        let mut sample = trilinear_derivatives(around(self.nodes(slot), base), &f);
         sample.gradient /= self.cell;
         sample.mixed /= self.cell * self.cell;
         sample
@@ -148,12 +191,12 @@ impl Field {
         let Some((brick, local)) = self.locate(p) else { return 0.0 };
         let slot = self.slots[brick];
         if slot == EMPTY {
-            return if self.far[brick] < 0.0 { f64::INFINITY } else { 0.0 };
+            return if self.far(brick) < 0.0 { f64::INFINITY } else { 0.0 };
         }
-        let (base, f) = corner(&local, slot);
+        let (base, f) = corner(&local);
         // Values stand at the band's half-width beyond it; cut off so, distances are still
         // 1-Lipschitz, and the error bound holds for them.
-        let depth = self.error_bound() - trilinear(self.around(base), &f);
+        let depth = self.error_bound() - trilinear(around(self.nodes(slot), base), &f);
         if depth < BAND * self.cell { depth.max(0.0) } else { f64::INFINITY }
     }
 
@@ -166,18 +209,12 @@ impl Field {
         if slot == EMPTY {
             return None;
         }
-        let (base, f) = corner(&local, slot);
+        let (base, f) = corner(&local);
         let closest = usize::from(f.x > 0.5) | usize::from(f.y > 0.5) << 1 | usize::from(f.z > 0.5) << 2;
         // All corners, the closest first: a cell at the band's edge has nodes beyond it.
-        let known = |k: usize| Some(self.nearest[base + CORNERS[closest ^ k]]).filter(|t| *t != FAR_NODE);
+        let nodes = self.nodes(slot);
+        let known = |k: usize| Some(nodes.nearest[base + CORNERS[closest ^ k]]).filter(|t| *t != FAR_NODE);
         (0..8).find_map(known)
-    }
-
-    /// The values from the lowest to the highest corner of the cell whose lowest one is at `base`:
-    /// one check of bounds for all eight.
-    #[inline]
-    fn around(&self, base: usize) -> &[f32] {
-        &self.values[base..=base + CORNERS[7]]
     }
 
     /// Brick index and position inside the brick in cells.
@@ -208,12 +245,19 @@ const CORNERS: [usize; 8] = [
     NODES * NODES + NODES + 1,
 ];
 
+/// The values from the lowest to the highest corner of the cell whose lowest one is at `base`: one
+/// check of bounds for all eight.
+#[inline]
+fn around(nodes: &Nodes, base: usize) -> &[f32] {
+    &nodes.values[base..=base + CORNERS[7]]
+}
+
 /// Index of the lowest corner of the cell, and the position inside it in 0..=1.
 #[inline]
-fn corner(local: &Vector3<f64>, slot: u32) -> (usize, Vector3<f64>) {
+fn corner(local: &Vector3<f64>) -> (usize, Vector3<f64>) {
     let i = local.map(|x| (x as usize).min(CELLS - 1));
     let f = Vector3::new(local.x - i.x as f64, local.y - i.y as f64, local.z - i.z as f64);
-    (slot as usize * BRICK + (i.z * NODES + i.y) * NODES + i.x, f)
+    ((i.z * NODES + i.y) * NODES + i.x, f)
 }
 
 #[inline]
@@ -248,14 +292,13 @@ fn trilinear_derivatives(v: &[f32], f: &Vector3<f64>) -> FieldSample {
 mod tests {
     use super::*;
     use crate::fixtures::{ball, l_shape, spread, surface};
-    use crate::geometry::Surface;
     use crate::termination::Termination;
 
     /// Solids with their fields and points in and around the band, none within 1e-6 of a face of a
     /// cell, where derivatives jump.
-    fn cases() -> Vec<(Surface, Field, Vec<Point3<f64>>)> {
+    fn cases() -> Vec<(Arc<Surface>, Field, Vec<Point3<f64>>)> {
         let case = |mesh| {
-            let s = surface(mesh);
+            let s = Arc::new(surface(mesh));
             let field = Field::build(&s, &Termination::default()).unwrap();
             let b = s.bounds().grown(0.05);
             let inside_a_cell = |p: &Point3<f64>| {

@@ -6,9 +6,12 @@
 //! distance measures against a few triangles instead of interpolating. Everywhere else a field
 //! only gives bounds that never overstate the distance.
 
+mod brick;
 mod build;
+mod facet;
 mod far_field;
 mod grid;
+mod rim;
 #[cfg(test)]
 mod tests;
 

@@ -1,3 +1,4 @@
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use nalgebra::{Point3, Vector3};
@@ -8,7 +9,7 @@ use crate::geometry::{Pose, Surface};
 use crate::termination::{Interrupt, Termination};
 
 fn field(surface: &Surface) -> Field {
-    Field::build(surface, &Termination::default()).unwrap()
+    Field::build(&Arc::new(surface.clone()), &Termination::default()).unwrap()
 }
 
 /// Closed solids of the kinds that parts are made of, none on the grid's planes.
@@ -38,8 +39,8 @@ fn nodes(field: &Field) -> impl Iterator<Item = (Point3<f64>, f64, u32)> + '_ {
         (0..BRICK).map(move |i| {
             let at = [i % NODES, i / NODES % NODES, i / (NODES * NODES)];
             let steps = Vector3::from_fn(|a, _| (corner[a] + at[a]) as f64);
-            let stored = slot as usize * BRICK + i;
-            (field.origin + steps * field.cell, f64::from(field.values[stored]), field.nearest[stored])
+            let nodes = field.nodes(slot);
+            (field.origin + steps * field.cell, f64::from(nodes.values[i]), nodes.nearest[i])
         })
     })
 }
@@ -184,13 +185,14 @@ fn interpolation_in_the_band_is_within_the_error_bound() {
 fn a_cancelled_build_ends_with_the_reason() {
     let termination = Termination::default();
     termination.cancel_flag().store(true, Ordering::Relaxed);
-    let built = Field::build(&surface(cuboid([0.0; 3], [1.0; 3])), &termination);
+    let built = Field::build(&Arc::new(surface(cuboid([0.0; 3], [1.0; 3]))), &termination);
     assert_eq!(built.err(), Some(Interrupt::Cancelled));
 }
 
 #[test]
 fn the_size_of_a_field_is_bounded() {
     let long = field(&surface(cuboid([-5.0, -5.0, 0.0], [5.0, 5.0, 1e-3])));
+    long.fill();
     assert!(long.bricks() <= 8192 && long.memory() < 100 << 20, "{} bricks", long.bricks());
 }
 
@@ -234,4 +236,103 @@ fn empty_bricks_around_an_open_box_are_outside() {
     }
     let p = Point3::new(0.11, 0.07, 0.0);
     assert!(f.estimate(&p).value < 0.0, "{:?} in the middle", f.estimate(&p));
+}
+
+#[test]
+fn bricks_hold_the_same_in_whichever_order_they_are_filled() {
+    for (name, s) in solids().into_iter().chain([("open", surface(open_box([-1.0; 3], [1.0; 3])))]) {
+        let (all, looked_at) = (field(&s), field(&s));
+        all.fill();
+        let before = looked_at.memory();
+        let points: Vec<_> = around(&s, 0.05, 3000).collect();
+        let _: f64 = points.iter().rev().map(|p| looked_at.value(p)).sum();
+        assert!(looked_at.memory() > before, "{name}: nothing was filled");
+        for p in &points {
+            assert_eq!(all.sample(p), looked_at.sample(p), "{name}: at {p}");
+        }
+        for (a, b) in nodes(&all).zip(nodes(&looked_at)) {
+            assert_eq!(a, b, "{name}");
+        }
+        assert_eq!(all.memory(), looked_at.memory(), "{name}");
+    }
+}
+
+#[test]
+fn a_field_that_nobody_looked_at_holds_no_nodes() {
+    let f = field(&surface(ball(4)));
+    let nodes = f.bricks() * BRICK * 8;
+    assert!(f.memory() < nodes / 4, "{} bytes before", f.memory());
+    f.fill();
+    assert!(f.memory() > nodes, "{} bytes after", f.memory());
+}
+
+#[test]
+fn the_bound_of_an_empty_brick_holds_in_all_of_it() {
+    let open = [("open", surface(open_box([-1.0; 3], [1.0; 3])))];
+    for (name, s) in solids().into_iter().chain(open) {
+        let f = field(&s);
+        let side = f.cell * CELLS as f64;
+        let mut tight = 0.0f64;
+        for brick in (0..f.slots.len()).filter(|&b| f.slots[b] == EMPTY) {
+            let (low, bound) = (f.brick_min(brick), f.far(brick));
+            for corner in 0..8 {
+                let p = low + Vector3::from_fn(|a, _| f64::from(corner >> a & 1) * side);
+                let exact = s.signed_distance(&p);
+                assert!(bound.abs() <= exact.abs() + 1e-9, "{name}: {bound} for {exact} at {p}");
+                assert!(s.is_open() || (bound < 0.0) == (exact < 0.0), "{name}: {bound} for {exact} at {p}");
+                tight = tight.max(bound.abs() / exact.abs());
+            }
+        }
+        assert!(tight > 0.3, "{name}: no bound is nearer to the distance than {tight} of it");
+    }
+}
+
+/// A box with a second vertex next to one corner: triangles too thin for single precision.
+fn box_with_slivers() -> Surface {
+    let mut mesh = cuboid([-1.0, -1.5, -1.2], [1.0, 1.5, 1.2]);
+    let [a, b, _] = mesh.triangles[0];
+    let middle = mesh.vertices.len() as u32;
+    let [from, to] = [a, b].map(|i| Vector3::from(mesh.vertices[i as usize]));
+    mesh.vertices.push((from + (to - from) * 1e-7).into());
+    let split = |t: &[u32; 3]| {
+        let side = (0..3).find(|&e| [t[e], t[(e + 1) % 3]] == [a, b] || [t[e], t[(e + 1) % 3]] == [b, a]);
+        match side.map(|e| [t[e], t[(e + 1) % 3], t[(e + 2) % 3]]) {
+            Some([u, v, w]) => vec![[u, middle, w], [middle, v, w]],
+            None => vec![*t],
+        }
+    };
+    mesh.triangles = mesh.triangles.iter().flat_map(split).collect();
+    surface(mesh)
+}
+
+#[test]
+fn slivers_do_not_disturb_the_distance() {
+    let s = box_with_slivers();
+    assert!(!s.is_open() && s.triangles().len() == 14, "{s:?}");
+    for (p, value, t) in nodes(&field(&s)) {
+        let exact = s.signed_distance(&p);
+        if t != FAR_NODE {
+            assert!((value - exact).abs() <= exact.abs() * 1e-6 + 1e-12, "{value} for {exact} at {p}");
+        } else {
+            assert_eq!(value < 0.0, exact < 0.0, "at {p}");
+        }
+    }
+}
+
+#[test]
+fn a_ball_with_holes_is_signed_as_each_winding_number_says() {
+    let mut mesh = ball(4);
+    let count = mesh.triangles.len();
+    mesh.triangles = (0..count).filter(|i| i % 97 != 5).map(|i| mesh.triangles[i]).collect();
+    let s = surface(mesh);
+    assert!(s.is_open());
+    let mut inside = 0;
+    for (p, value, _) in nodes(&field(&s)).step_by(2) {
+        let w = s.winding(&p).unwrap();
+        if value != 0.0 && (w - 0.5).abs() > 0.02 {
+            assert_eq!(value < 0.0, w > 0.5, "winding {w} at {p}, {value} away");
+            inside += usize::from(value < 0.0);
+        }
+    }
+    assert!(inside > 1000, "{inside} nodes inside");
 }
