@@ -7,7 +7,7 @@
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::triangle::{Feature, area_normal, closest_on_triangle, crossing};
-use super::triangle_tree::TriangleTree;
+use super::triangle_tree::{TriangleTree, Visitor};
 use super::winding::WindingTree;
 use super::{Bounds, Mesh, Solidity};
 
@@ -148,6 +148,11 @@ impl Surface {
     pub fn closest_from(&self, p: &Point3<f64>, guess: u32) -> Closest {
         let near = self.closest_on(guess, p);
         self.closest(p, near.distance).unwrap_or(near)
+    }
+
+    /// Shows `visitor` the triangles within its reach of `p`, nearest first.
+    pub(super) fn nearest_first(&self, p: &Point3<f64>, visitor: &mut impl Visitor) {
+        self.tree.nearest_first(p, visitor);
     }
 
     /// Whether the segment from `p` along the unit vector `direction` crosses a triangle from its

@@ -7,6 +7,9 @@
 
 #![allow(clippy::needless_range_loop, reason = "loops over all lanes alike become vector instructions")]
 
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+
 use nalgebra::{Point3, Vector3};
 
 use super::triangle::area_normal;
@@ -149,6 +152,44 @@ impl TriangleTree {
         false
     }
 
+    /// Shows `visitor` the triangles within its reach of `p`, nearest first but for rounding.
+    pub(super) fn nearest_first(&self, p: &Point3<f64>, visitor: &mut impl Visitor) {
+        let q = p - self.origin;
+        let slack = ROUNDING * (q.amax() + self.radius);
+        let q: [f32; 3] = q.map(|x| x as f32).into();
+        let mut queue = BinaryHeap::from([Reverse(Near { squared: 0.0, at: Item::Place(self.root) })]);
+        while let Some(Reverse(Near { squared, at })) = queue.pop() {
+            let limit = ((visitor.reach() + slack).powi(2) * (1.0 + 1e-6)) as f32;
+            if squared > limit {
+                return;
+            }
+            match at {
+                Item::Triangle(t) => visitor.visit(t),
+                Item::Place(at) if at & LEAF != 0 => {
+                    let leaf = &self.leaves[(at & !LEAF) as usize];
+                    let bounds = leaf.squared_distances(&q);
+                    queue.extend(
+                        (0..WIDTH).filter(|&k| bounds[k] <= limit).map(|k| {
+                            Reverse(Near { squared: bounds[k], at: Item::Triangle(leaf.triangle[k]) })
+                        }),
+                    );
+                }
+                Item::Place(at) => {
+                    let node = &self.nodes[at as usize];
+                    let bounds = node.squared_distances(&q);
+                    for k in (0..WIDTH).filter(|&k| bounds[k] <= limit) {
+                        let corner =
+                            |of: &[Lanes; 3]| self.origin + Vector3::from_fn(|a, _| f64::from(of[a][k]));
+                        if visitor.wants(&Bounds { min: corner(&node.min), max: corner(&node.max) }) {
+                            let at = Item::Place(node.child[k]);
+                            queue.push(Reverse(Near { squared: bounds[k], at }));
+                        }
+                    }
+                }
+            }
+        }
+    }
+
     fn descend<M: Fn(u32) -> Closest>(&self, at: u32, query: &mut Query<M>) {
         if at & LEAF != 0 {
             return query.visit(&self.leaves[(at & !LEAF) as usize]);
@@ -176,6 +217,49 @@ impl TriangleTree {
         }
     }
 }
+
+/// Who is shown triangles in the order of their distance.
+pub(super) trait Visitor {
+    /// Triangles further than this are not asked for any more.
+    fn reach(&self) -> f64;
+    /// Whether it wants to see what is in a box (of single precision).
+    fn wants(&self, bounds: &Bounds) -> bool;
+    /// A triangle.
+    fn visit(&mut self, triangle: u32);
+}
+
+/// Something at a distance.
+struct Near {
+    squared: f32,
+    at: Item,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Item {
+    Triangle(u32),
+    /// A node or a leaf.
+    Place(u32),
+}
+
+impl Ord for Near {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.squared.total_cmp(&other.squared).then(self.at.cmp(&other.at))
+    }
+}
+
+impl PartialOrd for Near {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Near {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Near {}
 
 struct Query<M> {
     q: [f32; 3],

@@ -1,7 +1,10 @@
 //! Plans: what is returned, and the check that it is true.
 
+mod course;
+mod depth;
 pub mod export;
 mod model;
+mod sampling;
 mod shorten;
 mod verify;
 

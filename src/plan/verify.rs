@@ -1,24 +1,34 @@
 //! Verification of a path on the triangles, independent of distance fields and engines.
 //!
-//! At poses so dense that no vertex of the moving part travels further than [`DENSITY`] of the
-//! longest side between two of them, samples of both surfaces (denser ones than the engine's)
-//! are measured exactly against the other's triangles through a bounding-volume hierarchy. What
-//! counts is depth beyond the depth of the same samples at the assembled pose. Known miss:
-//! features that enter only between two samples or two poses. On long paths (screws of many
-//! turns) the poses take turns in checking a half or a quarter of the samples each, so that a
-//! sample is still checked every other or every fourth pose.
+//! For every standing part that the moving one comes near, both surfaces are bounded against each
+//! other all along the way ([`depth`](super::depth) says how, and what that guarantees): what counts
+//! is depth beyond that of the pair at the assembled pose, which is measured with the same search.
+//! Paths that turn far are checked at samples instead ([`sampling`](super::sampling)).
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry::{Occupied, Vacant};
 use std::sync::Arc;
 
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use crate::geometry::{Bounds, Pose, SampleTree, Shape, Spacing, Surface, area_normal, interpolate};
+use crate::geometry::{Bounds, PatchTree, Pose, Shape, Surface, area_normal};
 use crate::simulation::{Allowances, Scene};
 use crate::termination::{Interrupt, Termination};
 
-/// Largest travel of a vertex between two checked poses, as a share of the longest side.
-const DENSITY: f64 = 0.004;
+use super::course::{Course, View};
+use super::depth::{Found, Precision, Question};
+use super::sampling::{Samples, turns_far};
+
+/// Depth that is not looked into, as a share of the limit.
+const SPARE: f64 = 1.0 / 16.0;
+/// The smallest radius of a piece of surface, likewise.
+const FINEST: f64 = 1.0 / 4.0;
+/// Entries are no closer to each other than this, as a share of the longest side.
+const COARSE: f64 = 4e-3;
+/// The same for the overlap of assembled parts, that no more is granted than there is, and no less.
+const OVERLAP_SPARE: f64 = 2e-6;
+const OVERLAP_FINEST: f64 = 1e-4;
 
 /// A point that got too deep.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,19 +46,21 @@ pub struct Entry {
 /// What the check of a path found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// Largest depth beyond the allowances along the path; 0 if there is none.
+    /// Nothing gets deeper than this beyond the allowances along the path; 0 if nothing does.
     pub depth: f64,
-    /// The points that got deep along a path that exceeds the limit; empty if the path is good.
+    /// Points that got deep along a path that exceeds the limit; empty if the path is good.
     pub entries: Vec<Entry>,
 }
 
-/// The verification samples of all shapes.
+/// The check, prepared for all shapes.
 #[derive(Debug, Clone)]
 pub struct Verifier {
-    /// Per shape: its samples, dealt out evenly.
-    samples: Arc<Vec<[SampleTree; SHARES]>>,
+    /// Per shape: its triangles.
+    patches: Arc<Vec<PatchTree>>,
     /// Per part: index of its shape.
     shape_of: Vec<usize>,
+    /// For what turns far.
+    samples: Samples,
     /// Depth beyond the allowance that is still accepted, in the planning frame.
     limit: f64,
 }
@@ -57,14 +69,15 @@ impl Verifier {
     /// Prepares the check for shapes; `shape_of` gives each part's shape.
     #[must_use]
     pub fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>, limit: f64) -> Self {
-        let samples = shapes.par_iter().map(|s| shares(&s.surface)).collect();
-        Self { samples: Arc::new(samples), shape_of, limit }
+        let patches = shapes.par_iter().map(|s| PatchTree::new(&s.surface)).collect();
+        let samples = Samples::new(shapes, shape_of.clone(), limit);
+        Self { patches: Arc::new(patches), shape_of, samples, limit }
     }
 
     /// The same check for an engine that declares another depth.
     #[must_use]
     pub fn with_limit(&self, limit: f64) -> Self {
-        Self { limit, ..self.clone() }
+        Self { limit, samples: self.samples.with_limit(limit), ..self.clone() }
     }
 
     /// The depth at which a path is refused, in the planning frame.
@@ -74,13 +87,29 @@ impl Verifier {
     }
 
     /// How deep two parts overlap at the assembled pose.
-    #[must_use]
-    pub fn assembled_depth(&self, scene: &Scene, a: usize, b: usize) -> f64 {
-        let pose = scene.bodies[a].planning_from_shape;
-        let mut entries = Vec::new();
-        let pair = Pair { part: a, pose: &pose, other: b, granted: 0.0 };
-        self.entries(scene, &pair, Turn::ALL, &mut entries);
-        entries.iter().map(|e| e.over).fold(0.0, f64::max)
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn assembled_depth(
+        &self,
+        scene: &Scene,
+        a: usize,
+        b: usize,
+        termination: &Termination,
+    ) -> Result<f64, Interrupt> {
+        let precision = Precision {
+            spare: OVERLAP_SPARE * scene.longest_side,
+            deep: f64::INFINITY,
+            finest: OVERLAP_FINEST * scene.longest_side,
+            coarse: COARSE * scene.longest_side,
+        };
+        let pose = [scene.bodies[a].planning_from_shape];
+        let course = Course::new(&pose, scene.centre_in_shape(a), 0.0);
+        let way = Way { part: a, course: &course, precision };
+        [true, false].into_iter().try_fold(0.0f64, |deepest, on_moving| {
+            let found = self.found(scene, &way, b, on_moving, 0.0, termination)?;
+            Ok(deepest.max(found.depth))
+        })
     }
 
     /// How deep a point in the middle of one part lies in both, where surfaces show no overlap: two
@@ -108,17 +137,52 @@ impl Verifier {
         path: &[Pose],
         termination: &Termination,
     ) -> Result<Verdict, Interrupt> {
-        let poses = dense(scene, part, path);
-        let found = poses
+        if turns_far(path) {
+            return self.sampled(scene, allowances, standing, part, path, termination);
+        }
+        let shape = &scene.bodies[part].shape;
+        let centre = scene.centre_in_shape(part);
+        let reach = shape.hull.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
+        let course = Course::new(path, centre, reach);
+        let precision = Precision {
+            spare: self.limit * SPARE,
+            deep: self.limit,
+            finest: self.limit * FINEST,
+            coarse: COARSE * scene.longest_side,
+        };
+        let way = Way { part, course: &course, precision };
+        let swept = path.iter().fold(Bounds::EMPTY, |b, pose| {
+            let c = pose * centre;
+            b.union(&Bounds { min: c, max: c })
+        });
+        let swept = swept.grown(reach);
+        let tasks: Vec<(usize, bool)> = standing
+            .iter()
+            .filter(|&&o| scene.bodies[o].bounds.meets(&swept))
+            .flat_map(|&o| [(o, true), (o, false)])
+            .collect();
+        let found = tasks
             .par_iter()
-            .enumerate()
-            .map(|(i, pose)| {
-                termination.check()?;
-                let turn = Turn::of(i, poses.len());
-                Ok(self.entries_at(scene, allowances, standing, part, pose, turn))
+            .map(|&(other, on_moving)| {
+                let granted = allowances.of(part, other);
+                self.found(scene, &way, other, on_moving, granted, termination)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
-        let mut entries: Vec<Entry> = found.into_iter().flatten().collect();
+        let depth = found.iter().map(|f| f.bound).fold(0.0, f64::max);
+        let entries = if depth > self.limit { self.entries(scene, &tasks, &found) } else { Vec::new() };
+        Ok(Verdict { depth, entries })
+    }
+
+    fn sampled(
+        &self,
+        scene: &Scene,
+        allowances: &Allowances,
+        standing: &[usize],
+        part: usize,
+        path: &[Pose],
+        termination: &Termination,
+    ) -> Result<Verdict, Interrupt> {
+        let mut entries = self.samples.entries_along(scene, allowances, standing, part, path, termination)?;
         let depth = entries.iter().map(|e| e.over).fold(0.0, f64::max);
         if depth <= self.limit {
             entries.clear();
@@ -126,51 +190,57 @@ impl Verifier {
         Ok(Verdict { depth, entries })
     }
 
-    fn entries_at(
+    /// How deep the moving part gets into a standing one, or the other way round.
+    fn found(
         &self,
         scene: &Scene,
-        allowances: &Allowances,
-        standing: &[usize],
-        part: usize,
-        pose: &Pose,
-        turn: Turn,
-    ) -> Vec<Entry> {
-        let bounds = scene.bodies[part].shape.bounds().transformed(pose);
-        let mut out = Vec::new();
-        for &other in standing.iter().filter(|&&o| scene.bodies[o].bounds.meets(&bounds)) {
-            let pair = Pair { part, pose, other, granted: allowances.of(part, other) };
-            self.entries(scene, &pair, turn, &mut out);
-        }
-        out
+        way: &Way<'_>,
+        other: usize,
+        on_moving: bool,
+        granted: f64,
+        termination: &Termination,
+    ) -> Result<Found, Interrupt> {
+        let (asked, measured) = if on_moving { (way.part, other) } else { (other, way.part) };
+        let stand = scene.bodies[other].planning_from_shape;
+        let view = View::new(way.course, stand, on_moving, way.precision.finest / 16.0);
+        let question = Question {
+            surface: &scene.bodies[asked].shape.surface,
+            tree: &self.patches[self.shape_of[asked]],
+            measured: &scene.bodies[measured].shape.surface,
+            granted,
+            precision: way.precision,
+        };
+        question.answer(view, termination)
     }
 
-    /// The samples of a pair deeper than `granted`, on either side: the deepest of each side, and
-    /// all that are deep enough to help in refining a motion.
-    fn entries(&self, scene: &Scene, pair: &Pair<'_>, turn: Turn, out: &mut Vec<Entry>) {
-        let Pair { part, pose, other, granted } = *pair;
-        let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
-        let to_standing = standing.planning_from_shape.inverse() * pose;
-        let samples = |i: usize| &self.samples[self.shape_of[i]];
-        let deep = self.limit / 2.0;
-        for (on_moving, trees, to_measured, surface) in [
-            (true, samples(part), &to_standing, &standing.shape.surface),
-            (false, samples(other), &to_standing.inverse(), &moving.shape.surface),
-        ] {
-            let mut worst: Option<Entry> = None;
-            for tree in trees.iter().enumerate().filter(|(i, _)| turn.takes(*i)).map(|(_, t)| t) {
-                entered(tree, to_measured, surface, granted, |point, over| {
-                    let entry = Entry { other, on_moving, point, over };
-                    if over > deep {
-                        out.push(entry.clone());
+    /// The points that help in refining a motion: of those that are near each other, the deepest.
+    fn entries(&self, scene: &Scene, tasks: &[(usize, bool)], found: &[Found]) -> Vec<Entry> {
+        let cell = COARSE * scene.longest_side;
+        let mut taken: BTreeMap<(usize, bool, [i64; 3]), Entry> = BTreeMap::new();
+        for (&(other, on_moving), side) in tasks.iter().zip(found) {
+            for &(point, over) in &side.deep {
+                let key = (other, on_moving, point.coords.map(|x| (x / cell).floor() as i64).into());
+                let entry = Entry { other, on_moving, point, over };
+                match taken.entry(key) {
+                    Occupied(mut known) if known.get().over < over => {
+                        known.insert(entry);
                     }
-                    if worst.as_ref().is_none_or(|w| over > w.over) {
-                        worst = Some(entry);
+                    Occupied(_) => {}
+                    Vacant(free) => {
+                        free.insert(entry);
                     }
-                });
+                }
             }
-            out.extend(worst.filter(|w| w.over <= deep));
         }
+        taken.into_values().collect()
     }
+}
+
+/// The way of a part, and how finely it is checked.
+struct Way<'a> {
+    part: usize,
+    course: &'a Course,
+    precision: Precision,
 }
 
 /// A few points below the largest faces, by a tenth of the smallest extent.
@@ -189,119 +259,14 @@ fn interior_points(surface: &Surface) -> impl Iterator<Item = Point3<f64>> + '_ 
     })
 }
 
-/// A moving part at a pose, a standing one, and the depth that is granted to the two.
-struct Pair<'a> {
-    part: usize,
-    pose: &'a Pose,
-    other: usize,
-    granted: f64,
-}
-
-/// Into so many shares the samples of a shape are dealt.
-const SHARES: usize = 4;
-/// Paths of more poses than this are long.
-const LONG: usize = 400;
-
-/// Which shares a pose checks.
-#[derive(Debug, Clone, Copy)]
-struct Turn {
-    index: usize,
-    of: usize,
-}
-
-impl Turn {
-    const ALL: Self = Self { index: 0, of: 1 };
-
-    /// The turn of pose `index` of `poses`; both ends of a path check all.
-    fn of(index: usize, poses: usize) -> Self {
-        match poses {
-            _ if index == 0 || index + 1 == poses => Self::ALL,
-            0..=LONG => Self::ALL,
-            _ if poses <= 2 * LONG => Self { index, of: 2 },
-            _ => Self { index, of: SHARES },
-        }
-    }
-
-    fn takes(self, share: usize) -> bool {
-        share % self.of == self.index % self.of
-    }
-}
-
-/// The samples of a surface, dealt out in the order of a tree, so that each share covers all of it.
-fn shares(surface: &Surface) -> [SampleTree; SHARES] {
-    let all = SampleTree::new(surface, &spacing(surface.bounds()));
-    std::array::from_fn(|i| SampleTree::over(all.points().iter().skip(i).step_by(SHARES).copied().collect()))
-}
-
-/// Denser than the engine's samples, and not a multiple of their spacing.
-fn spacing(bounds: &Bounds) -> Spacing {
-    let size = bounds.extents().max();
-    let edge = (size / 63.0).clamp(0.015, 0.07);
-    Spacing { edge, blunt_edge: edge * 3.0, face: edge * 4.0 }
-}
-
-/// Visits the samples inside `surface` by more than `granted`: the sample in its own shape's frame,
-/// and its depth beyond.
-fn entered(
-    samples: &SampleTree,
-    to_measured: &Pose,
-    surface: &Surface,
-    granted: f64,
-    mut visit: impl FnMut(Point3<f64>, f64),
-) {
-    let inner = surface.bounds().grown(-granted);
-    // What is known about a sphere: a triangle near it, its centre, how far outside that lies.
-    let root = (0, Point3::origin(), f64::NEG_INFINITY);
-    samples.walk(
-        root,
-        |node, (guess, _, _)| {
-            let c = to_measured * node.centre;
-            if surface.bounds().distance(&c) > node.radius {
-                return None;
-            }
-            let closest = surface.closest_from(&c, guess);
-            let distance = surface.signed(&c, &closest);
-            let outside = distance > 0.0 && distance > node.radius - granted;
-            (!outside).then_some((closest.triangle, c, distance))
-        },
-        |sample, (guess, centre, distance)| {
-            let p = to_measured * sample;
-            let outside = distance > 0.0 && distance > (p - centre).norm() - granted;
-            if outside || !inner.contains(&p) {
-                return;
-            }
-            let over = -surface.signed(&p, &surface.closest_from(&p, guess)) - granted;
-            if over > 0.0 {
-                visit(*sample, over);
-            }
-        },
-    );
-}
-
-/// The path's poses and as many between them as the density asks for.
-fn dense(scene: &Scene, part: usize, path: &[Pose]) -> Vec<Pose> {
-    let shape = &scene.bodies[part].shape;
-    // The point that moves on a line: fixed to the shape, the middle of the assembled part's box.
-    let centre = scene.centre_in_shape(part);
-    let step = DENSITY * scene.longest_side;
-    let mut out = Vec::new();
-    for (a, b) in path.iter().zip(path.iter().skip(1)) {
-        let turn = (a.rotation.inverse() * b.rotation).scaled_axis();
-        let radius = turn.try_normalize(1e-12).map_or(0.0, |axis| shape.radius_about(&centre, &axis));
-        let travel = (b * centre - a * centre).norm() + radius * turn.norm();
-        let n = (travel / step).ceil().max(1.0) as usize;
-        out.extend((0..n).map(|k| interpolate(a, b, &centre, k as f64 / n as f64)));
-    }
-    out.extend(path.last());
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
+    use proptest::prelude::*;
 
     use super::*;
-    use crate::fixtures::{LIMIT, block_on_plate, cells, cuboid, moved, peg_in_hole, scene};
+    use crate::fixtures::{LIMIT, block_on_plate, cells, cuboid, l_shape, moved, peg_in_hole, scene};
+    use crate::geometry::{SourceMesh, interpolate};
 
     /// The path of part 1 by steps from its assembled pose, checked against all others.
     fn checked(scene: &Scene, verifier: &Verifier, steps: &[Vector3<f64>]) -> Verdict {
@@ -315,6 +280,10 @@ mod tests {
     fn checked_path(scene: &Scene, verifier: &Verifier, path: &[Pose]) -> Verdict {
         let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != 1).collect();
         verifier.check(scene, &scene.allowances, &standing, 1, path, &Termination::default()).unwrap()
+    }
+
+    fn overlap(scene: &Scene, verifier: &Verifier, a: usize, b: usize) -> f64 {
+        verifier.assembled_depth(scene, a, b, &Termination::default()).unwrap()
     }
 
     #[test]
@@ -396,9 +365,9 @@ mod tests {
     fn an_overlap_is_measured_and_granted() {
         let low = cuboid([-3.0, -3.0, -2.0], [3.0, 3.0, 0.0]);
         let (scene, verifier) = scene([low, cuboid([-1.0, -1.0, -0.3], [1.0, 1.0, 3.0])]);
-        let depth = verifier.assembled_depth(&scene, 0, 1);
+        let depth = overlap(&scene, &verifier, 0, 1);
         assert!((depth - 0.3).abs() < 1e-9, "{depth}");
-        assert!((verifier.assembled_depth(&scene, 1, 0) - depth).abs() < 1e-9);
+        assert!((overlap(&scene, &verifier, 1, 0) - depth).abs() < 1e-9);
         assert!(checked(&scene, &verifier, &[Vector3::z() * 0.1, Vector3::x()]).depth < 1e-9);
         let deeper = checked(&scene, &verifier, &[Vector3::z() * -0.1]);
         assert!((deeper.depth - 0.1).abs() < 1e-9, "{}", deeper.depth);
@@ -407,7 +376,7 @@ mod tests {
     #[test]
     fn parts_that_touch_or_are_apart_do_not_overlap() {
         let (scene, verifier) = scene(block_on_plate());
-        assert!(verifier.assembled_depth(&scene, 0, 1) < 1e-12);
+        assert!(overlap(&scene, &verifier, 0, 1) < 1e-12);
         assert_eq!(verifier.coincident_depth(&scene, 0, 1), 0.0);
         assert_eq!(verifier.coincident_depth(&scene, 1, 0), 0.0);
     }
@@ -416,7 +385,7 @@ mod tests {
     fn coincident_parts_share_their_inside() {
         let block = || cuboid([-3.0, -2.0, -1.0], [3.0, 2.0, 1.0]);
         let (scene, verifier) = scene([block(), block()]);
-        assert!(verifier.assembled_depth(&scene, 0, 1) < 1e-9, "no surface is inside the other");
+        assert!(overlap(&scene, &verifier, 0, 1) < 1e-9, "no surface is inside the other");
         let depth = verifier.coincident_depth(&scene, 0, 1);
         assert!(depth > 0.1 && depth <= 1.0, "{depth}");
     }
@@ -440,21 +409,67 @@ mod tests {
         assert_eq!(ended, Err(Interrupt::Cancelled));
     }
 
-    #[test]
-    fn checked_poses_are_dense_and_keep_the_waypoints() {
-        let (scene, _) = scene(block_on_plate());
-        let from = scene.bodies[1].planning_from_shape;
-        let turn = Pose::rotation(Vector3::new(0.0, 0.0, 1.0));
-        let path =
-            [from, Pose::translation(1.0, 0.0, 0.0) * from, Pose::translation(1.0, 0.0, 0.0) * turn * from];
-        let poses = dense(&scene, 1, &path);
-        assert_eq!((poses[0], poses[poses.len() - 1]), (path[0], path[2]));
-        assert!(poses.iter().any(|p| (p.to_matrix() - path[1].to_matrix()).norm() < 1e-12));
-        for w in poses.windows(2) {
-            for v in scene.bodies[1].shape.surface.vertices() {
-                let travel = (w[1] * v - w[0] * v).norm();
-                assert!(travel <= DENSITY * scene.longest_side + 1e-9, "{travel}");
+    fn poses(size: f64) -> impl Strategy<Value = Vec<Pose>> {
+        let step = prop::array::uniform6(-1.0..1.0f64);
+        let step = step.prop_map(move |[x, y, z, a, b, c]| {
+            Pose::new(Vector3::new(x, y, z) * size, Vector3::new(a, b, c) * size)
+        });
+        prop::collection::vec(step, 1..4)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn nothing_is_deeper_than_the_bound(steps in poses(0.08), x in -0.3..0.6f64, turn in 0.0..6.0f64) {
+            // Two solids with a reentrant corner each, about to mesh, and something far away.
+            let large = |mesh: SourceMesh| SourceMesh {
+                vertices: mesh.vertices.iter().map(|v| v.map(|x| x * 1.5)).collect(),
+                ..mesh
+            };
+            let place = Pose::new(Vector3::new(3.0 + x, 0.4, 1.5), Vector3::y() * 0.3 + Vector3::z() * turn);
+            let far = cuboid([7.0, -1.0, -1.0], [7.5, 0.0, 0.0]);
+            let (scene, verifier) = scene([large(l_shape()), moved(large(l_shape()), &place), far]);
+            let granted = scene.allowances.of(0, 1);
+            let from = scene.bodies[1].planning_from_shape;
+            let mut path = vec![from];
+            path.extend(steps.iter().map(|s| s * from));
+            let verdict = checked_path(&scene, &verifier, &path);
+            let centre = scene.centre_in_shape(1);
+            let dense: Vec<Pose> = path
+                .windows(2)
+                .flat_map(|w| (0..=40).map(|k| interpolate(&w[0], &w[1], &centre, f64::from(k) / 40.0)))
+                .collect();
+            let depth = |pose: &Pose, on_moving: bool, p: &Point3<f64>| {
+                let relative = scene.bodies[0].planning_from_shape.inverse() * pose;
+                let at = if on_moving { relative * p } else { relative.inverse() * p };
+                let into = &scene.bodies[usize::from(!on_moving)].shape.surface;
+                -into.signed_distance(&at) - granted
+            };
+            // What a dense look finds, at points all over both.
+            let deepest = dense.iter().step_by(4).flat_map(|pose| {
+                let sides = [(true, 1), (false, 0)];
+                sides.map(|(on_moving, body)| {
+                    let points = on_surface(&scene.bodies[body].shape.surface);
+                    points.iter().map(|p| depth(pose, on_moving, p)).fold(0.0, f64::max)
+                })
+            });
+            let deepest = deepest.fold(0.0, f64::max);
+            prop_assert!(verdict.depth >= deepest.min(LIMIT) - 1e-5, "{} for {deepest}", verdict.depth);
+            prop_assert_eq!(verdict.depth > LIMIT, !verdict.entries.is_empty());
+            // No alarm without a cause.
+            for e in verdict.entries.iter().take(20) {
+                let there = dense.iter().map(|pose| depth(pose, e.on_moving, &e.point)).fold(0.0, f64::max);
+                prop_assert!(there > 0.25 * LIMIT && e.over <= there + 0.01, "{there} at {e:?}");
             }
         }
+    }
+
+    fn on_surface(surface: &Surface) -> Vec<Point3<f64>> {
+        let weights = (0..=6u32).flat_map(|i| (0..=6 - i).map(move |j| [i, j, 6 - i - j]));
+        let at = |t: u32, w: [u32; 3]| {
+            let corners = surface.corners(t);
+            Point3::from((0..3).map(|k| corners[k].coords * f64::from(w[k]) / 6.0).sum::<Vector3<f64>>())
+        };
+        (0..surface.triangles().len() as u32).flat_map(|t| weights.clone().map(move |w| at(t, w))).collect()
     }
 }

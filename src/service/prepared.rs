@@ -88,10 +88,7 @@ fn measure_overlaps(
     let pairs = scene.broad_phase.pairs(0.0);
     let depths = pairs
         .par_iter()
-        .map(|&(a, b)| {
-            termination.check()?;
-            Ok((a, b, verifier.assembled_depth(scene, a, b)))
-        })
+        .map(|&(a, b)| Ok((a, b, verifier.assembled_depth(scene, a, b, termination)?)))
         .collect::<Result<Vec<_>, Interrupt>>()?;
     Ok(depths.into_iter().filter(|(_, _, d)| *d > LEAST_OVERLAP * scene.longest_side).collect())
 }

@@ -1,0 +1,274 @@
+//! Convex regions that a surface does not enter.
+//!
+//! Grown from a seed as in IRIS (R. Deits and R. Tedrake 2014, the step that separates obstacles):
+//! the nearest triangle gets a plane between it and the seed, which rules out all triangles behind
+//! it, then the nearest of the rest, until none is left in the ball that was asked for. What is
+//! convex has all of a hull in it that has the hull's corners: a few points decide about a whole
+//! piece of surface, and about all of its straight motion.
+
+use nalgebra::{Point3, Vector3};
+
+use super::surface::NO_TRIANGLE;
+use super::triangle_tree::Visitor;
+use super::{Bounds, Surface, separating_direction};
+
+/// A surface may reach so far into a region, in the planning frame: rounding of flush faces.
+const TOUCH: f64 = 2e-6;
+/// A point so deep in a region is well inside.
+const INNER: f64 = 2.0 * TOUCH;
+/// With more planes than this, a region is not worth its tests.
+const MOST_PLANES: usize = 48;
+/// So far towards the seed, as a share of the way, hulls are taken to be apart from what they touch.
+const INSET: f64 = 0.02;
+/// Steps of alternating projection before a point counts as too far.
+const PROJECTIONS: usize = 8;
+
+/// A half-space: points with normal · x ≥ height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct HalfSpace {
+    normal: Vector3<f64>,
+    height: f64,
+}
+
+impl HalfSpace {
+    /// How far a point is inside.
+    fn above(&self, p: &Point3<f64>) -> f64 {
+        self.normal.dot(&p.coords) - self.height
+    }
+}
+
+/// A ball cut by half-spaces into which a surface nowhere reaches further than rounding.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeRegion {
+    centre: Point3<f64>,
+    radius: f64,
+    sides: Vec<HalfSpace>,
+}
+
+impl FreeRegion {
+    /// An upper bound of the distance of a point from the region (0 inside), unless that is more
+    /// than `most`.
+    #[must_use]
+    pub fn distance_within(&self, p: &Point3<f64>, most: f64) -> Option<f64> {
+        self.nearest_within(p, most, 0.0).map(|q| (q - p).norm())
+    }
+
+    /// A point `inset` inside all sides and no further than `most` from `p`, by alternating
+    /// projection.
+    fn nearest_within(&self, p: &Point3<f64>, most: f64, inset: f64) -> Option<Point3<f64>> {
+        let mut q = *p;
+        for _ in 0..PROJECTIONS {
+            let mut deepest = (1e-12, None);
+            for side in &self.sides {
+                let below = inset - side.above(&q);
+                if below > deepest.0 {
+                    deepest = (below, Some(side.normal));
+                }
+            }
+            let Some(normal) = deepest.1 else {
+                return ((q - self.centre).norm() <= self.radius).then_some(q);
+            };
+            q += normal * deepest.0;
+            if (q - p).norm_squared() > most * most {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// Whether a ball lies inside.
+    #[must_use]
+    pub fn holds_ball(&self, centre: &Point3<f64>, radius: f64) -> bool {
+        (centre - self.centre).norm() + radius <= self.radius
+            && self.sides.iter().all(|side| side.above(centre) >= radius)
+    }
+}
+
+impl Surface {
+    /// A convex region around `seed`, within `radius`, that the surface does not enter: `None` if
+    /// there is none worth having. If the surface is closed, all of the region is outside. No point of `wanted`, nor the
+    /// seed, is further than `most` from any of its sides.
+    #[must_use]
+    pub fn free_region(
+        &self,
+        seed: &Point3<f64>,
+        radius: f64,
+        wanted: &[Point3<f64>],
+        most: f64,
+    ) -> Option<FreeRegion> {
+        let sides = Vec::with_capacity(8);
+        let region = FreeRegion { centre: *seed, radius, sides };
+        let inset = |p: &Point3<f64>| p + (seed - p) * (most / (seed - p).norm().max(most)).max(INSET);
+        let inset = wanted.iter().map(inset).collect();
+        let mut growth = Growth { surface: self, wanted, inset, most, region };
+        self.nearest_first(seed, &mut growth);
+        let region = growth.region;
+        if region.radius <= radius * 0.5 {
+            return None;
+        }
+        // No surface passes through: all of the region is where one point well inside is. (A region
+        // too thin to have one may follow the plane of a face into the solid.)
+        let inner = region.nearest_within(seed, most + 4.0 * INNER, INNER)?;
+        (self.signed_distance(&inner) > 0.0).then_some(region)
+    }
+}
+
+/// A region as its planes are found.
+struct Growth<'a> {
+    surface: &'a Surface,
+    wanted: &'a [Point3<f64>],
+    /// The wanted points, a little towards the seed: so hulls that touch are apart.
+    inset: Vec<Point3<f64>>,
+    most: f64,
+    region: FreeRegion,
+}
+
+impl Growth<'_> {
+    /// The better of two half-spaces: that in front of some corners with this normal, and the best
+    /// so far. Each with how deep the worst of the wanted points is inside.
+    fn better(
+        &self,
+        triangle: u32,
+        corners: &[Point3<f64>; 3],
+        normal: Vector3<f64>,
+        best: Option<(f64, HalfSpace)>,
+    ) -> Option<(f64, HalfSpace)> {
+        let side = Self::before(corners, normal);
+        let seed = &self.region.centre;
+        let worth = self.wanted.iter().map(|p| side.above(p)).fold(side.above(seed), f64::min);
+        // Seen from behind, a surface is entered already.
+        let from_behind = normal.dot(&self.surface.face_normal(triangle)) < -0.6;
+        if normal != Vector3::zeros() && !from_behind && best.is_none_or(|(most, _)| worth > most) {
+            Some((worth, side))
+        } else {
+            best
+        }
+    }
+
+    /// The half-space behind which a triangle just disappears, with this normal.
+    fn before(corners: &[Point3<f64>; 3], normal: Vector3<f64>) -> HalfSpace {
+        let height = corners.iter().map(|v| normal.dot(&v.coords)).fold(f64::NEG_INFINITY, f64::max);
+        HalfSpace { normal, height }
+    }
+}
+
+impl Visitor for Growth<'_> {
+    fn reach(&self) -> f64 {
+        self.region.radius
+    }
+
+    fn wants(&self, bounds: &Bounds) -> bool {
+        let behind = |side: &HalfSpace| bounds.support(&side.normal) <= side.height + 1e-6;
+        !self.region.sides.iter().any(behind)
+    }
+
+    fn visit(&mut self, triangle: u32) {
+        let corners = self.surface.corners(triangle);
+        let behind = |side: &HalfSpace| corners.iter().all(|v| side.above(v) <= TOUCH);
+        if self.region.sides.iter().any(behind) {
+            return;
+        }
+        let seed = self.region.centre;
+        let closest = self.surface.closest_on(triangle, &seed);
+        // The faces that meet where the triangle is nearest, and the way there.
+        let mut best = None;
+        self.surface.feature_normals(&closest, |n| best = self.better(triangle, &corners, n, best));
+        if closest.distance > TOUCH {
+            best = self.better(triangle, &corners, (seed - closest.point) / closest.distance, best);
+        }
+        if best.is_none_or(|(worth, _)| worth < 0.0)
+            && let Some(apart) = separating_direction(&corners, &self.inset, f64::NEG_INFINITY, None)
+        {
+            best = self.better(triangle, &corners, apart, best);
+        }
+        if best.is_none_or(|(worth, _)| worth < 0.0) {
+            // Beside the triangle: along the faces across its sides, and in its own plane.
+            for edge in 0..3 {
+                let across = self.surface.neighbour(triangle, edge as u8);
+                if across != NO_TRIANGLE {
+                    best = self.better(triangle, &corners, self.surface.face_normal(across), best);
+                }
+                let along = corners[(edge + 1) % 3] - corners[edge];
+                let outward = along.cross(&self.surface.face_normal(triangle));
+                if let Some(outward) = outward.try_normalize(0.0) {
+                    best = self.better(triangle, &corners, outward, best);
+                }
+            }
+        }
+        match best {
+            // What cannot be held for this triangle cannot be held at all.
+            Some((worth, side)) if worth >= -self.most && self.region.sides.len() < MOST_PLANES => {
+                self.region.sides.push(side);
+            }
+            Some((worth, _)) if worth < -self.most => self.region.radius = 0.0,
+            _ => self.region.radius = closest.distance.min(self.region.radius),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::fixtures::{ball, cuboid, l_shape, spread, surface, tube};
+
+    #[test]
+    fn above_a_plate_all_is_free() {
+        let plate = surface(cuboid([-4.0, -4.0, -1.0], [4.0, 4.0, 0.0]));
+        for seed in [Point3::new(0.3, 0.2, 0.0), Point3::new(-1.0, 2.0, 0.7)] {
+            let region = plate.free_region(&seed, 3.0, &[seed], 0.1).unwrap();
+            assert_eq!(region.sides.len(), 1, "{region:?}");
+            assert_eq!(region.distance_within(&Point3::new(1.0, 1.0, 0.0), 0.0), Some(0.0));
+            assert_eq!(region.distance_within(&Point3::new(1.0, 1.0, -0.2), 0.1), None);
+            let deep = region.distance_within(&Point3::new(1.0, 1.0, -0.2), 1.0).unwrap();
+            assert!((deep - 0.2).abs() < 1e-12, "{deep}");
+            assert_eq!(region.distance_within(&(seed + Vector3::z() * 3.1), 1.0), None);
+            assert!(region.holds_ball(&(seed + Vector3::z()), 0.9));
+            assert!(!region.holds_ball(&seed, 0.9) || seed.z >= 0.9);
+        }
+    }
+
+    #[test]
+    fn the_inside_of_a_tube_is_one_region() {
+        let tube = surface(tube(1.0, 2.0, [-3.0, 3.0], 24));
+        let region = tube.free_region(&Point3::origin(), 2.5, &[Point3::origin()], 0.1).unwrap();
+        assert_eq!(region.sides.len(), 24);
+        for k in 0..24 {
+            let angle = f64::from(k) * std::f64::consts::TAU / 24.0;
+            let on_wall = Point3::new(angle.cos(), angle.sin(), 1.5);
+            assert!(region.distance_within(&on_wall, 1e-9).is_some());
+        }
+    }
+
+    #[test]
+    fn a_reentrant_corner_has_two_sides() {
+        let l = surface(l_shape());
+        let region = l.free_region(&Point3::new(1.0, 1.0, 0.5), 0.4, &[], 0.1).unwrap();
+        assert_eq!(region.sides.len(), 2, "{region:?}");
+        // Beside the corner, both walls count.
+        let d = region.distance_within(&Point3::new(0.97, 0.96, 0.5), 1.0).unwrap();
+        assert!((d - 0.05).abs() < 1e-12, "{d}");
+    }
+
+    proptest! {
+        #[test]
+        fn no_surface_is_inside(seed in prop::array::uniform3(-2.5..2.5f64), radius in 0.05..3.0f64) {
+            let seed = Point3::from(seed);
+            for s in [surface(ball(2)), surface(l_shape()), surface(tube(1.0, 2.0, [-1.0, 1.0], 12))] {
+                prop_assume!(s.signed_distance(&seed) >= 0.0);
+                let Some(region) = s.free_region(&seed, radius, &[seed], 0.1) else { continue };
+                prop_assert!(region.distance_within(&seed, 1e-9).is_some());
+                for p in spread([-2.5; 3], [2.5; 3], 400) {
+                    if region.distance_within(&p, 0.0).is_some() {
+                        prop_assert!(s.signed_distance(&p) >= -TOUCH);
+                    }
+                    // As deep as the point is, so far it is to the region at least.
+                    if let Some(d) = region.distance_within(&p, 0.5) {
+                        prop_assert!(-s.signed_distance(&p) <= d + TOUCH);
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! A surface's triangles in a tree of bounding spheres: what a branch-and-bound over a surface
+//! walks.
+
+use nalgebra::{Point3, Vector3};
+
+use super::{Bounds, Surface};
+
+/// A node: a sphere that holds the triangles of its subtree.
+#[derive(Debug, Clone)]
+pub struct Patch {
+    /// Centre of the sphere.
+    pub centre: Point3<f64>,
+    /// Its radius.
+    pub radius: f64,
+    /// Its triangles, as a range of those of the tree.
+    start: u32,
+    end: u32,
+    /// Its vertices, likewise.
+    first_vertex: u32,
+    last_vertex: u32,
+    /// Of the vertices, those that reach furthest in some directions, likewise.
+    first_extreme: u32,
+    last_extreme: u32,
+    /// Index of the right child (the left one follows its parent); 0 for a leaf.
+    right: u32,
+}
+
+/// What a patch is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Parts<'a> {
+    /// Two smaller patches, as indices of their nodes.
+    Patches([u32; 2]),
+    /// Triangles.
+    Triangles(&'a [u32]),
+}
+
+/// The triangles of one surface.
+#[derive(Debug, Clone, Default)]
+pub struct PatchTree {
+    nodes: Vec<Patch>,
+    triangles: Vec<u32>,
+    /// The vertices of each leaf, leaf by leaf.
+    vertices: Vec<Point3<f64>>,
+    extremes: Vec<Point3<f64>>,
+}
+
+const LEAF: usize = 8;
+
+impl PatchTree {
+    /// The tree of all triangles of a surface.
+    #[must_use]
+    pub fn new(surface: &Surface) -> Self {
+        let mut triangles: Vec<u32> = (0..surface.triangles().len() as u32).collect();
+        let mut tree = Self::default();
+        let n = triangles.len();
+        if n > 0 {
+            tree.build(surface, &mut triangles, 0, n);
+        }
+        Self { triangles, ..tree }
+    }
+
+    /// The whole surface, unless it has no triangles.
+    #[must_use]
+    pub fn root(&self) -> Option<u32> {
+        (!self.nodes.is_empty()).then_some(0)
+    }
+
+    /// A node.
+    #[must_use]
+    pub fn patch(&self, index: u32) -> &Patch {
+        &self.nodes[index as usize]
+    }
+
+    /// The vertices of a node's triangles; those of several leaves come several times.
+    #[must_use]
+    pub fn vertices(&self, index: u32) -> &[Point3<f64>] {
+        let patch = self.patch(index);
+        &self.vertices[patch.first_vertex as usize..patch.last_vertex as usize]
+    }
+
+    /// Those of a node's vertices that say most about where it reaches.
+    pub fn extremes(&self, index: u32) -> impl Iterator<Item = &Point3<f64>> {
+        let patch = self.patch(index);
+        self.extremes[patch.first_extreme as usize..patch.last_extreme as usize].iter()
+    }
+
+    /// What a node holds.
+    #[must_use]
+    pub fn parts(&self, index: u32) -> Parts<'_> {
+        match self.patch(index) {
+            Patch { right: 0, start, end, .. } => {
+                Parts::Triangles(&self.triangles[*start as usize..*end as usize])
+            }
+            Patch { right, .. } => Parts::Patches([index + 1, *right]),
+        }
+    }
+
+    fn build(&mut self, surface: &Surface, triangles: &mut [u32], start: usize, end: usize) {
+        let slice = &mut triangles[start..end];
+        let corners = || slice.iter().flat_map(|&t| surface.corners(t));
+        let bounds = corners().fold(Bounds::EMPTY, |b, p| b.with_point(&p));
+        let centre = bounds.centre();
+        let radius = corners().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
+        let me = self.nodes.len();
+        self.nodes.push(Patch {
+            centre,
+            radius,
+            start: start as u32,
+            end: end as u32,
+            first_vertex: self.vertices.len() as u32,
+            last_vertex: 0,
+            first_extreme: 0,
+            last_extreme: 0,
+            right: 0,
+        });
+        if slice.len() <= LEAF {
+            let mut ids: Vec<u32> = slice.iter().flat_map(|&t| surface.triangles()[t as usize]).collect();
+            ids.sort_unstable();
+            ids.dedup();
+            self.vertices.extend(ids.iter().map(|&v| surface.vertices()[v as usize]));
+        } else {
+            let axis = bounds.extents().imax();
+            let middle = |t: u32| surface.corners(t).iter().map(|p| p[axis]).sum::<f64>();
+            let half = slice.len() / 2;
+            slice.select_nth_unstable_by(half, |&s, &t| middle(s).total_cmp(&middle(t)).then(s.cmp(&t)));
+            self.build(surface, triangles, start, start + half);
+            self.nodes[me].right = self.nodes.len() as u32;
+            self.build(surface, triangles, start + half, end);
+        }
+        let node = &mut self.nodes[me];
+        node.last_vertex = self.vertices.len() as u32;
+        node.first_extreme = self.extremes.len() as u32;
+        self.extremes.extend(furthest(&self.vertices[node.first_vertex as usize..]));
+        node.last_extreme = self.extremes.len() as u32;
+    }
+}
+
+/// Points that reach furthest, in each of 26 directions: few points are kept as they are.
+fn furthest(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
+    const FEW: usize = 26;
+    if points.len() <= FEW {
+        return points.to_vec();
+    }
+    let steps = || -1..=1i32;
+    let directions = steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| [x, y, z])));
+    let mut found: Vec<usize> = directions
+        .filter(|d| *d != [0; 3])
+        .filter_map(|d| {
+            let along = Vector3::from(d.map(f64::from));
+            let reach = |i: &usize| points[*i].coords.dot(&along);
+            (0..points.len()).max_by(|i, j| reach(i).total_cmp(&reach(j)))
+        })
+        .collect();
+    found.sort_unstable();
+    found.dedup();
+    found.into_iter().map(|i| points[i]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{ball, l_shape, open_box, surface};
+
+    /// The triangles below a node; checks that its sphere holds them.
+    fn held(tree: &PatchTree, surface: &Surface, index: u32) -> Vec<u32> {
+        let found = match tree.parts(index) {
+            Parts::Patches(children) => children.map(|c| held(tree, surface, c)).concat(),
+            Parts::Triangles(list) => list.to_vec(),
+        };
+        let patch = tree.patch(index);
+        for p in found.iter().flat_map(|&t| surface.corners(t)) {
+            assert!(tree.vertices(index).contains(&p));
+            assert!((p - patch.centre).norm() <= patch.radius * (1.0 + 1e-12));
+        }
+        found
+    }
+
+    #[test]
+    fn every_triangle_is_in_one_leaf_and_in_all_spheres_above() {
+        for mesh in [ball(3), l_shape(), open_box([0.0; 3], [1.0; 3])] {
+            let s = surface(mesh);
+            let tree = PatchTree::new(&s);
+            let mut all = held(&tree, &s, tree.root().unwrap());
+            all.sort_unstable();
+            assert_eq!(all, (0..s.triangles().len() as u32).collect::<Vec<_>>());
+        }
+        assert_eq!(PatchTree::default().root(), None);
+    }
+}

@@ -1,0 +1,308 @@
+//! How points move along a path, as hulls: for any stretch of the way, a few affine maps such that
+//! where a point passes lies in the convex hull of its images.
+//!
+//! Between two poses of a path the part's middle moves on a line and its rotation slerps. Of a
+//! rotation alone, a point's arc lies in the triangle of its ends and the point where the tangents
+//! there meet, and each of these three is a linear map of the point. With the shift, that is true
+//! but for a remainder, which is bounded by [`Leg::slack`].
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::geometry::{Pose, interpolate};
+
+/// Legs that turn further than this have no hull: they must be split.
+const MOST_TURN: f64 = 0.8;
+/// Legs of more bends than this likewise.
+const MOST_BENDS: usize = 12;
+
+/// The path of a part.
+#[derive(Debug)]
+pub(super) struct Course {
+    segments: Vec<Segment>,
+    /// The point of the shape that moves on lines.
+    centre: Point3<f64>,
+    length: f64,
+}
+
+#[derive(Debug)]
+struct Segment {
+    from: Pose,
+    to: Pose,
+    /// Way from the path's start to this segment's.
+    before: f64,
+    /// No point moves further on it.
+    length: f64,
+}
+
+impl Course {
+    /// The path through some poses of a shape whose point `centre` moves on lines; no point of the
+    /// shape is further than `reach` from it.
+    pub(super) fn new(path: &[Pose], centre: Point3<f64>, reach: f64) -> Self {
+        let mut course = Self { segments: Vec::new(), centre, length: 0.0 };
+        for (from, to) in path.iter().zip(path.iter().skip(1).chain(path.last())) {
+            let shift = (to * centre - from * centre).norm();
+            let length = shift + reach * from.rotation.angle_to(&to.rotation);
+            if length > 0.0 || path.len() == 1 {
+                course.segments.push(Segment { from: *from, to: *to, before: course.length, length });
+                course.length += length;
+            }
+        }
+        if let (true, Some(only)) = (course.segments.is_empty(), path.first()) {
+            course.segments.push(Segment { from: *only, to: *only, before: 0.0, length: 0.0 });
+        }
+        course
+    }
+
+    /// The bends of a stretch of the way: segments with the shares at which they begin and end.
+    fn bends(&self, from: f64, to: f64) -> Vec<(&Segment, f64, f64)> {
+        let first = self.segments.partition_point(|s| s.before + s.length < from);
+        let share = |s: &Segment, at: f64| {
+            if s.length > 0.0 { ((at - s.before) / s.length).clamp(0.0, 1.0) } else { 0.0 }
+        };
+        let mut bends: Vec<_> = self.segments[first.min(self.segments.len().saturating_sub(1))..]
+            .iter()
+            .take_while(|s| s.before <= to)
+            .map(|s| (s, share(s, from), share(s, to)))
+            .collect();
+        // Segments that are only touched at an end say nothing new.
+        if bends.iter().any(|(_, a, b)| b > a) {
+            bends.retain(|(_, a, b)| b > a);
+        } else {
+            bends.truncate(1);
+        }
+        bends
+    }
+
+    fn pose(&self, at: f64) -> Option<Pose> {
+        let (segment, share, _) = *self.bends(at, at).first()?;
+        Some(interpolate(&segment.from, &segment.to, &self.centre, share))
+    }
+}
+
+/// A piece `index` of `2^level` of the way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct Interval {
+    level: u32,
+    index: u64,
+}
+
+impl Interval {
+    pub(super) const WHOLE: Self = Self { level: 0, index: 0 };
+
+    pub(super) fn halves(self) -> [Self; 2] {
+        [0, 1].map(|k| Self { level: self.level + 1, index: 2 * self.index + k })
+    }
+
+    /// Its part of the whole.
+    pub(super) fn share(self) -> f64 {
+        0.5f64.powi(self.level as i32)
+    }
+}
+
+/// x ↦ linear · x + shift.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Affine {
+    linear: Matrix3<f64>,
+    shift: Vector3<f64>,
+}
+
+impl Affine {
+    pub(super) fn apply(&self, p: &Point3<f64>) -> Point3<f64> {
+        Point3::from(self.linear * p.coords + self.shift)
+    }
+}
+
+/// A stretch of the way.
+#[derive(Debug)]
+pub(super) struct Leg {
+    /// Where a point passes is in the hull of its images; empty if the stretch is too bent.
+    pub(super) maps: Vec<Affine>,
+    /// But for so much.
+    pub(super) slack: f64,
+    /// The largest factor by which a map stretches.
+    pub(super) stretch: f64,
+    /// At its end.
+    pub(super) end: Pose,
+    /// No point moves further.
+    pub(super) length: f64,
+}
+
+/// A course seen from one of the two parts: of points of the moving part in the frame of the
+/// standing one, or the other way round.
+pub(super) struct View<'a> {
+    course: &'a Course,
+    planning_from_standing: Pose,
+    /// Whether points of the moving part are looked at.
+    on_moving: bool,
+    /// Shorter stretches are taken as a point, however bent.
+    shortest: f64,
+    legs: HashMap<Interval, Rc<Leg>>,
+}
+
+impl<'a> View<'a> {
+    pub(super) fn new(
+        course: &'a Course,
+        planning_from_standing: Pose,
+        on_moving: bool,
+        shortest: f64,
+    ) -> Self {
+        Self { course, planning_from_standing, on_moving, shortest, legs: HashMap::new() }
+    }
+
+    pub(super) fn leg(&mut self, interval: Interval) -> Rc<Leg> {
+        if let Some(leg) = self.legs.get(&interval) {
+            return Rc::clone(leg);
+        }
+        let leg = Rc::new(self.measured(interval));
+        self.legs.insert(interval, Rc::clone(&leg));
+        leg
+    }
+
+    fn measured(&self, interval: Interval) -> Leg {
+        let length = self.course.length * interval.share();
+        let from = length * interval.index as f64;
+        let end = self.course.pose(from + length).unwrap_or_else(Pose::identity);
+        let to_standing = self.planning_from_standing.inverse() * end;
+        let mut leg = Leg {
+            maps: Vec::new(),
+            slack: 0.0,
+            stretch: 1.0,
+            end: if self.on_moving { to_standing } else { to_standing.inverse() },
+            length,
+        };
+        let bends = self.course.bends(from, from + length);
+        let turns = |(segment, a, b): &(&Segment, f64, f64)| {
+            segment.from.rotation.angle_to(&segment.to.rotation) * (b - a)
+        };
+        if bends.len() > MOST_BENDS || bends.iter().any(|bend| turns(bend) > MOST_TURN) {
+            if length <= self.shortest {
+                let linear = *leg.end.rotation.to_rotation_matrix().matrix();
+                leg.maps.push(Affine { linear, shift: leg.end.translation.vector });
+                leg.slack = length;
+            }
+            return leg;
+        }
+        for (segment, a, b) in bends {
+            let [a, b] = [a, b].map(|u| interpolate(&segment.from, &segment.to, &self.course.centre, u));
+            self.bend(&a, &b, &mut leg);
+        }
+        leg
+    }
+
+    /// Adds the maps of the way between two poses.
+    fn bend(&self, a: &Pose, b: &Pose, leg: &mut Leg) {
+        let centre = self.course.centre;
+        let start = a * centre;
+        let shift = b * centre - start;
+        let turn = (b.rotation * a.rotation.inverse()).scaled_axis();
+        let [first, last] = [a, b].map(|p| *p.rotation.to_rotation_matrix().matrix());
+        if leg.maps.is_empty() {
+            leg.maps.push(self.map(first, start.coords));
+        }
+        if let Some(axis) = turn.try_normalize(1e-9) {
+            let angle = turn.norm();
+            let along = axis * axis.transpose();
+            let widened = 1.0 / (angle / 2.0).cos().powi(2);
+            let tangents = along * first + (Matrix3::identity() - along) * (first + last) * (widened / 2.0);
+            leg.maps.push(self.map(tangents, start.coords + shift / 2.0));
+            leg.stretch = leg.stretch.max(widened);
+            // How far t strays from where the three maps put it: measured, 0.008 of the square.
+            let mut slack = 0.01 * angle * angle * shift.norm();
+            if !self.on_moving {
+                slack += angle * (1.0 + angle) / 8.0 * axis.cross(&shift).norm();
+            }
+            leg.slack = leg.slack.max(slack);
+        }
+        leg.maps.push(self.map(last, (start + shift).coords));
+    }
+
+    /// The map for a part turned by `rotation` (or what stands for it) with its centre at `at`.
+    fn map(&self, rotation: Matrix3<f64>, at: Vector3<f64>) -> Affine {
+        let centre = self.course.centre.coords;
+        let stand = &self.planning_from_standing;
+        let standing = stand.rotation.to_rotation_matrix();
+        if self.on_moving {
+            let linear = standing.matrix().transpose() * rotation;
+            let shift = standing.matrix().transpose() * (at - rotation * centre - stand.translation.vector);
+            Affine { linear, shift }
+        } else {
+            let linear = rotation.transpose() * standing.matrix();
+            let shift = rotation.transpose() * (stand.translation.vector - at) + centre;
+            Affine { linear, shift }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
+        prop::array::uniform3(-size..size).prop_map(Vector3::from)
+    }
+
+    proptest! {
+        #[test]
+        fn where_a_point_passes_is_in_the_hull_of_its_images(
+            turns in prop::collection::vec(vector(1.0), 2..5),
+            shifts in prop::collection::vec(vector(2.0), 5),
+            stand in (vector(2.0), vector(3.0)),
+            point in vector(3.0),
+            directions in prop::collection::vec(vector(1.0), 20),
+            share in 0.0..1.0f64,
+        ) {
+            let path: Vec<Pose> = turns.iter().zip(&shifts).map(|(t, s)| Pose::new(*s, *t)).collect();
+            let centre = Point3::new(0.3, -0.2, 0.5);
+            let course = Course::new(&path, centre, 4.0);
+            let stand = Pose::new(stand.0, stand.1);
+            let point = Point3::from(point);
+            for on_moving in [true, false] {
+                let mut view = View::new(&course, stand, on_moving, 1e-3);
+                let mut interval = Interval::WHOLE;
+                for _ in 0..7 {
+                    let leg = view.leg(interval);
+                    let at = course.length * (interval.index as f64 + share) * interval.share();
+                    let pose = stand.inverse() * course.pose(at).unwrap();
+                    let pose = if on_moving { pose } else { pose.inverse() };
+                    let p = pose * point;
+                    for n in directions.iter().filter_map(|d| d.try_normalize(1e-3)) {
+                        let images = leg.maps.iter().map(|m| n.dot(&m.apply(&point).coords));
+                        let least = images.fold(f64::INFINITY, f64::min);
+                        prop_assert!(leg.maps.is_empty() || n.dot(&p.coords) >= least - leg.slack - 1e-9);
+                    }
+                    interval = interval.halves()[usize::from(share > 0.5)];
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_straight_way_has_two_maps_and_a_turn_three() {
+        let to = Pose::translation(2.0, 0.0, 0.0);
+        let turned = to * Pose::rotation(Vector3::z() * 0.5);
+        let course = Course::new(&[Pose::identity(), to, turned], Point3::origin(), 1.0);
+        assert!((course.length - 2.5).abs() < 1e-12);
+        let mut view = View::new(&course, Pose::identity(), true, 1e-3);
+        let whole = view.leg(Interval::WHOLE);
+        assert_eq!((whole.maps.len(), whole.slack), (4, 0.0));
+        let [first, second] = Interval::WHOLE.halves();
+        assert_eq!(view.leg(first).maps.len(), 2);
+        assert!((view.leg(first).end.translation.vector.x - 1.25).abs() < 1e-12);
+        assert_eq!(view.leg(second).maps.len(), 4);
+    }
+
+    #[test]
+    fn a_path_of_one_pose_is_a_point() {
+        let course = Course::new(&[Pose::translation(1.0, 2.0, 3.0)], Point3::origin(), 1.0);
+        let leg = View::new(&course, Pose::identity(), true, 1e-3).leg(Interval::WHOLE);
+        assert!(course.length == 0.0 && leg.length == 0.0);
+        for m in &leg.maps {
+            assert_eq!(m.apply(&Point3::origin()), Point3::new(1.0, 2.0, 3.0));
+        }
+    }
+}

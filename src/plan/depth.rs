@@ -1,0 +1,387 @@
+//! How deep one surface gets into another on the way of a part: an upper bound, by branch and bound
+//! over surface and way.
+//!
+//! A piece of surface on a stretch of the way lies in the hull of a few points ([`super::course`]).
+//! If all of these are within some distance of one convex region that the other surface does not
+//! enter ([`FreeRegion`]), so is the whole piece all the way, and it gets no deeper than that: what
+//! slides along a face, in a hole or in a groove is settled at once. Pieces that no region holds
+//! are split, in space or in time, whichever is longer, and regions are remembered by their place,
+//! for what comes by later. Pieces of the smallest size are measured; their size is added.
+//!
+//! So for closed surfaces the answer is a bound for all points and all times, not for samples (but
+//! for [`FreeRegion`]'s rounding). Surfaces with holes have no outside that a region could be in:
+//! there, only small pieces are settled, by their corners.
+
+use std::collections::HashMap;
+
+use nalgebra::{Point3, Vector3};
+
+use crate::geometry::{Closest, FreeRegion, Parts, PatchTree, Surface};
+use crate::termination::{Interrupt, Termination};
+
+use super::course::{Interval, Leg, View};
+
+/// How finely depth is told, in the planning frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Precision {
+    /// Depth beyond what is granted that is not looked into.
+    pub(super) spare: f64,
+    /// Depth beyond what is granted from which on points are recorded, but not looked for any
+    /// closer.
+    pub(super) deep: f64,
+    /// Pieces of a smaller radius are not split.
+    pub(super) finest: f64,
+    /// The same once something deep was found.
+    pub(super) coarse: f64,
+}
+
+/// One surface that is measured against another.
+pub(super) struct Question<'a> {
+    /// The surface whose points are asked for, and its triangles' tree.
+    pub(super) surface: &'a Surface,
+    pub(super) tree: &'a PatchTree,
+    /// The surface into which they may get.
+    pub(super) measured: &'a Surface,
+    /// The depth that counts as none.
+    pub(super) granted: f64,
+    pub(super) precision: Precision,
+}
+
+/// What was found.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Found {
+    /// No point gets deeper than this beyond what is granted.
+    pub(super) bound: f64,
+    /// The largest depth that was measured beyond what is granted.
+    pub(super) depth: f64,
+    /// Points (frame of the surface asked about) that were measured deeper than
+    /// [`Precision::deep`]: all of a path that is good, the first found of one that is bad.
+    pub(super) deep: Vec<(Point3<f64>, f64)>,
+}
+
+impl Question<'_> {
+    /// Looks for the deepest points all the way.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn answer(&self, view: View<'_>, termination: &Termination) -> Result<Found, Interrupt> {
+        let mut search = Search {
+            asked: self,
+            view,
+            termination,
+            regions: Vec::new(),
+            places: HashMap::new(),
+            wanted: Vec::new(),
+            found: Found::default(),
+        };
+        if let Some(root) = self.tree.root() {
+            search.patch(root, Interval::WHOLE, Hint { triangle: 0, region: None })?;
+        }
+        Ok(search.found)
+    }
+}
+
+/// What is likely to be of use for a piece: a triangle near it, a region around it.
+#[derive(Debug, Clone, Copy)]
+struct Hint {
+    triangle: u32,
+    region: Option<u32>,
+}
+
+/// Where a piece passes: a ball that holds the hull.
+#[derive(Debug, Clone, Copy)]
+struct Swept {
+    centre: Point3<f64>,
+    radius: f64,
+    /// The longest way of any of its points.
+    moved: f64,
+}
+
+/// Size and cell of a place.
+type Place = (i32, [i64; 3]);
+
+/// How far a piece is from a region: the distance of its worst corner, and that.
+type Fit = Option<(f64, Point3<f64>)>;
+
+/// So many regions of a place are tried.
+const TRIED: usize = 3;
+
+struct Search<'a> {
+    asked: &'a Question<'a>,
+    view: View<'a>,
+    termination: &'a Termination,
+    regions: Vec<FreeRegion>,
+    /// Regions by the places of pieces that they held.
+    places: HashMap<Place, Vec<u32>>,
+    /// The corners of the hull in question.
+    wanted: Vec<Point3<f64>>,
+    found: Found,
+}
+
+impl Search<'_> {
+    /// Looks into a node of the tree on a stretch of the way.
+    fn patch(&mut self, index: u32, interval: Interval, hint: Hint) -> Result<(), Interrupt> {
+        self.termination.check()?;
+        if self.found.deep.len() >= ENOUGH {
+            return Ok(());
+        }
+        let tree = self.asked.tree;
+        let patch = tree.patch(index);
+        let leg = self.view.leg(interval);
+        let mut hint = hint;
+        let mut in_time = leg.maps.is_empty();
+        if !in_time {
+            let centres: Vec<_> = leg.maps.iter().map(|m| m.apply(&patch.centre)).collect();
+            let ball = patch.radius * leg.stretch;
+            if self.is_apart(&centres, ball + leg.slack) {
+                return Ok(());
+            }
+            let swept = swept(&centres, ball + leg.slack);
+            in_time = swept.moved > 4.0 * patch.radius;
+            self.wanted.clear();
+            self.wanted.extend(tree.extremes(index).flat_map(|p| leg.maps.iter().map(move |m| m.apply(p))));
+            let points = tree.vertices(index);
+            let fits = |region: &FreeRegion, most: f64| {
+                if centres.iter().all(|c| region.holds_ball(c, ball + leg.slack)) {
+                    return Some((0.0, swept.centre));
+                }
+                furthest(points.iter().flat_map(|p| leg.maps.iter().map(|m| m.apply(p))), region, most)
+            };
+            if self.is_settled(&swept, leg.slack, &mut hint, fits) {
+                return Ok(());
+            }
+        }
+        if in_time && leg.length > self.finest() / (2.0 * DOUBT) {
+            return interval.halves().into_iter().try_for_each(|half| self.patch(index, half, hint));
+        }
+        match tree.parts(index) {
+            Parts::Patches(children) => {
+                children.into_iter().try_for_each(|child| self.patch(child, interval, hint))
+            }
+            Parts::Triangles(list) => {
+                list.iter().try_for_each(|&t| self.triangle(self.asked.surface.corners(t), interval, hint))
+            }
+        }
+    }
+
+    /// Looks at a triangle, or a piece of one, on a stretch of the way.
+    fn triangle(
+        &mut self,
+        corners: [Point3<f64>; 3],
+        interval: Interval,
+        hint: Hint,
+    ) -> Result<(), Interrupt> {
+        let mut stack = vec![(corners, interval, hint)];
+        while let Some((corners, interval, mut hint)) = stack.pop() {
+            self.termination.check()?;
+            let leg = self.view.leg(interval);
+            let (side, longest) = longest_side(&corners);
+            let mut in_time = leg.maps.is_empty();
+            if !in_time {
+                let points: Vec<_> = leg.maps.iter().flat_map(|m| corners.map(|p| m.apply(&p))).collect();
+                if self.is_apart(&points, leg.slack) {
+                    continue;
+                }
+                let swept = swept(&points, leg.slack);
+                self.wanted.clone_from(&points);
+                let fits = |region: &FreeRegion, most: f64| furthest(points.iter().copied(), region, most);
+                if self.is_settled(&swept, leg.slack, &mut hint, fits)
+                    || self.is_measured(&corners, &leg, &swept, hint.triangle)
+                {
+                    continue;
+                }
+                in_time = points[..points.len() - 3]
+                    .iter()
+                    .zip(&points[3..])
+                    .any(|(a, b)| (b - a).norm() > longest);
+            }
+            if in_time && leg.length > self.finest() / (2.0 * DOUBT) {
+                stack.extend(interval.halves().map(|half| (corners, half, hint)));
+            } else {
+                let [a, b, c] = [0, 1, 2].map(|k| corners[(side + k) % 3]);
+                let cut = nalgebra::center(&a, &b);
+                stack.extend([[a, cut, c], [cut, b, c]].map(|half| (half, interval, hint)));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the box of the measured surface lies beside a hull, given by balls.
+    fn is_apart(&self, centres: &[Point3<f64>], radius: f64) -> bool {
+        let bounds = self.asked.measured.bounds();
+        (0..3).any(|a| {
+            centres.iter().all(|c| c[a] - radius >= bounds.max[a])
+                || centres.iter().all(|c| c[a] + radius <= bounds.min[a])
+        })
+    }
+
+    /// Whether some region tells well how deep a piece gets; the bound is raised by that.
+    fn is_settled(
+        &mut self,
+        swept: &Swept,
+        slack: f64,
+        hint: &mut Hint,
+        fits: impl Fn(&FreeRegion, f64) -> Fit,
+    ) -> bool {
+        let asked = self.asked;
+        let spared = self.spared() - slack;
+        if spared < 0.0 || (asked.measured.is_open() && swept.radius > asked.precision.coarse) {
+            return false;
+        }
+        let place = place(swept);
+        let known = self.places.get(&place).map_or(&[][..], Vec::as_slice);
+        for region in known.iter().rev().take(TRIED).copied().chain(hint.region) {
+            if let Some((depth, _)) = fits(&self.regions[region as usize], spared) {
+                hint.region = Some(region);
+                return self.is_outside(spared, hint.triangle) && self.settled(depth + slack);
+            }
+        }
+        let closest = asked.measured.closest_from(&swept.centre, hint.triangle);
+        hint.triangle = closest.triangle;
+        let signed = asked.measured.signed(&swept.centre, &closest);
+        // Depth changes by no more than the distance.
+        if swept.radius - signed <= spared {
+            return self.settled(swept.radius - signed + slack);
+        }
+        // Wider regions than large pieces need are vain; small ones tell how deep they really are.
+        let wide = (swept.radius / 8.0).max(swept.radius.min(asked.precision.coarse / 8.0));
+        let most = (asked.granted + asked.precision.deep - slack).min(wide).max(spared);
+        if -signed > most {
+            return false;
+        }
+        let Some(region) = self.region(swept, &closest, signed, most) else { return false };
+        let fit = fits(&region, most);
+        let id = self.regions.len() as u32;
+        self.regions.push(region);
+        hint.region = Some(id);
+        let Some((depth, worst)) = fit else { return false };
+        self.places.entry(place).or_default().push(id);
+        if depth > spared && !self.is_told(swept, depth, &worst, hint.triangle) {
+            return false;
+        }
+        self.is_outside(most, hint.triangle) && self.settled(depth + slack)
+    }
+
+    /// A region for a piece, around its middle or what is outside nearest to that.
+    fn region(&self, swept: &Swept, closest: &Closest, signed: f64, most: f64) -> Option<FreeRegion> {
+        let measured = self.asked.measured;
+        let seed = if signed > SKIN {
+            swept.centre
+        } else {
+            let outward = measured.pseudo_normal(closest).try_normalize(0.0)?;
+            closest.point + outward * (closest.distance + SKIN)
+        };
+        let radius = swept.radius * ROOM + most + (seed - swept.centre).norm();
+        measured.free_region(&seed, radius, &self.wanted, most)
+    }
+
+    /// Whether a depth is what it is, as measured at the worst corner, or small enough not to matter:
+    /// not only that of a region which is too narrow.
+    fn is_told(&mut self, swept: &Swept, depth: f64, worst: &Point3<f64>, guess: u32) -> bool {
+        let Question { measured, granted, precision, .. } = self.asked;
+        let real = -measured.signed(worst, &measured.closest_from(worst, guess));
+        let beyond = depth - granted;
+        let small = swept.radius <= precision.coarse && beyond <= precision.deep / 2.0;
+        // Where overlap is granted, facets are in each other's way by as much.
+        let rough = *granted > 0.0 && beyond <= precision.deep / 4.0;
+        if real < depth - precision.spare && !(precision.deep.is_finite() && (small || rough)) {
+            return false;
+        }
+        self.found.depth = self.found.depth.max(real - granted);
+        true
+    }
+
+    fn settled(&mut self, depth: f64) -> bool {
+        self.found.bound = self.found.bound.max(depth - self.asked.granted);
+        true
+    }
+
+    /// Whether the corners in question are no deeper than `most`: a region beside a surface with
+    /// holes may be inside.
+    fn is_outside(&self, most: f64, guess: u32) -> bool {
+        let measured = self.asked.measured;
+        let depth = |p: &Point3<f64>| -measured.signed(p, &measured.closest_from(p, guess));
+        !measured.is_open() || self.wanted.iter().all(|p| depth(p) <= most)
+    }
+
+    /// Measures the corners of a piece at its end; whether that is all that can be said about it.
+    fn is_measured(&mut self, corners: &[Point3<f64>; 3], leg: &Leg, swept: &Swept, guess: u32) -> bool {
+        let asked = self.asked;
+        let over = |at: &Point3<f64>| {
+            -asked.measured.signed(at, &asked.measured.closest_from(at, guess)) - asked.granted
+        };
+        for p in corners {
+            let over = over(&(leg.end * p));
+            self.found.depth = self.found.depth.max(over);
+            if over > asked.precision.deep {
+                self.found.deep.push((*p, over));
+            }
+        }
+        self.found.bound = self.found.bound.max(self.found.depth);
+        if swept.radius > self.finest() {
+            return self.found.deep.len() >= ENOUGH;
+        }
+        if !self.found.deep.is_empty() {
+            return true;
+        }
+        // Depth changes by no more than the distance.
+        let bound = over(&swept.centre) + swept.radius;
+        if bound > asked.precision.deep {
+            if swept.radius > self.finest() / DOUBT {
+                return false;
+            }
+            self.found.deep.push((corners[0], bound));
+        }
+        self.settled(asked.granted + bound)
+    }
+
+    /// The depth up to which nothing is looked into: it is granted, spared, or found already.
+    fn spared(&self) -> f64 {
+        let Precision { spare, deep, .. } = self.asked.precision;
+        self.asked.granted + self.found.depth.min(deep).max(spare)
+    }
+
+    /// The smallest size of pieces, for now.
+    fn finest(&self) -> f64 {
+        let Precision { deep, finest, coarse, .. } = self.asked.precision;
+        if self.found.depth > deep { coarse } else { finest }
+    }
+}
+
+/// After so many deep points, a path is bad enough.
+const ENOUGH: usize = 400;
+/// Pieces that might be too deep are split until they are so much smaller than others.
+const DOUBT: f64 = 4.0;
+/// Points nearer to the surface than this, in the planning frame, count as on it.
+const SKIN: f64 = 1e-6;
+/// Regions are asked for so much larger than the piece, that others find room.
+const ROOM: f64 = 1.25;
+
+/// The ball that holds balls around the corners of a hull.
+fn swept(points: &[Point3<f64>], ball: f64) -> Swept {
+    let sum: Vector3<f64> = points.iter().map(|p| p.coords).sum();
+    let centre = Point3::from(sum / points.len().max(1) as f64);
+    let reach = points.iter().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
+    Swept { centre, radius: reach + ball, moved: 2.0 * reach }
+}
+
+/// How far the furthest of some points is from a region, and which, unless it is beyond `most`.
+fn furthest(points: impl IntoIterator<Item = Point3<f64>>, region: &FreeRegion, most: f64) -> Fit {
+    points.into_iter().try_fold((0.0, Point3::origin()), |far, p| {
+        let d = region.distance_within(&p, most)?;
+        Some(if d > far.0 { (d, p) } else { far })
+    })
+}
+
+fn place(swept: &Swept) -> Place {
+    let level = swept.radius.max(1e-9).log2().ceil();
+    let cell = level.exp2();
+    (level as i32, (swept.centre.coords / cell).map(|x| x.floor() as i64).into())
+}
+
+/// The longest side of a triangle (side `i` joins corners `i` and `i + 1`), and its length.
+fn longest_side(corners: &[Point3<f64>; 3]) -> (usize, f64) {
+    let length = |i: usize| (corners[(i + 1) % 3] - corners[i]).norm();
+    let side = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
+    (side, length(side))
+}
