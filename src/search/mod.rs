@@ -6,6 +6,8 @@
 
 mod directions;
 mod disassembly;
+mod known_states;
+mod order;
 mod outcome;
 mod pdp;
 mod problem;

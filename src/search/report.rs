@@ -12,7 +12,7 @@ impl Search<'_, '_> {
     pub(super) fn evidence(&self) -> String {
         let (problem, standing) = (&self.disassembly.problem, self.disassembly.everything.standing());
         let stuck = problem.wanted(standing);
-        let most = stuck.iter().map(|&p| self.states_of[p]).max().unwrap_or(0);
+        let most = stuck.iter().map(|&p| self.known[p].len()).max().unwrap_or(0);
         let coarse = coarseness(most);
         format!(
             "{} of {} parts cannot leave one at a time: every state reached was expanded with {} translations \

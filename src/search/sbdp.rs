@@ -13,17 +13,18 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::blocking_graph::{Blockage, Evaluation, blocked_from, initial_blockages};
+use crate::blocking_graph::{Blockage, blocked_from, initial_blockages};
 use crate::geometry::Pose;
 use crate::simulation::{Action, End, Motion};
 use crate::termination::Interrupt;
 
 use super::directions::Directions;
 use super::disassembly::{Disassembly, Proof, Run, Stop, joined};
+use super::known_states::KnownStates;
 use super::outcome::Outcome;
 use super::problem::{Observer, Problem};
 use super::request::ActionSet;
-use super::state::{Node, Phase, coarseness, least_travel, same_state};
+use super::state::{Node, Phase, least_travel};
 use super::straight::Swept;
 use super::trace::TraceEvent;
 
@@ -57,13 +58,14 @@ pub(super) struct Search<'a, 'o> {
     pub(super) nodes: Vec<Node>,
     /// Nodes at the assembled pose: the first ones.
     pub(super) roots: usize,
-    pub(super) states_of: Vec<usize>,
-    directions: Directions,
+    /// Of each part.
+    pub(super) known: Vec<KnownStates>,
+    pub(super) directions: Directions,
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
     pub(super) swept: Swept,
     /// As the paper has it: one open list for translational planning and one for rotational.
-    separate_lists: bool,
+    pub(super) separate_lists: bool,
     translation_passes: usize,
     /// The last resort: actions that static analysis excluded are simulated, too.
     pub(super) distrust_static: bool,
@@ -86,7 +88,7 @@ impl<'a, 'o> Search<'a, 'o> {
             guided,
             nodes: Vec::new(),
             roots: 0,
-            states_of: vec![0; problem.scene.bodies.len()],
+            known: (0..problem.scene.bodies.len()).map(|p| KnownStates::new(&problem.scene, p)).collect(),
             directions,
             translations,
             rotations,
@@ -163,7 +165,7 @@ impl<'a, 'o> Search<'a, 'o> {
     }
 
     fn add_node(&mut self, node: Node) {
-        self.states_of[node.part] += 1;
+        self.known[node.part].add(self.nodes.len(), *node.pose());
         self.disassembly.counters.states += 1;
         self.nodes.push(node);
     }
@@ -203,28 +205,6 @@ impl<'a, 'o> Search<'a, 'o> {
         Ok(gain)
     }
 
-    /// The states to expand, the initial one included. Of two last parts it is the same which one
-    /// moves against the other: beyond the first push, only the smaller one does.
-    fn expandable(&self, phase: Phase) -> Vec<usize> {
-        let standing = self.disassembly.everything.standing();
-        let problem = &self.disassembly.problem;
-        let still = match standing[..] {
-            [a, b] if !self.separate_lists && problem.may_move(a) && problem.may_move(b) => {
-                let reach = |p: usize| problem.scene.bodies[p].shape.reach;
-                Some(if reach(a) < reach(b) { b } else { a })
-            }
-            _ => None,
-        };
-        let skipped = |n: &Node| Some(n.part) == still && (phase == Phase::Rotation || !n.is_root());
-        let wanted = |n: &Node| n.alive && self.lists(phase, n) && !skipped(n);
-        (0..self.nodes.len()).filter(|&i| wanted(&self.nodes[i])).collect()
-    }
-
-    /// Whether a state is in the list of a kind of planning.
-    fn lists(&self, phase: Phase, node: &Node) -> bool {
-        !self.separate_lists || node.origin.is_none_or(|(_, by, _)| by == phase)
-    }
-
     /// Static analysis of displaced states that have none yet.
     fn analyse(&mut self, phase: Phase, open: &[usize]) -> Result<(), Stop> {
         if phase == Phase::Rotation {
@@ -262,52 +242,6 @@ impl<'a, 'o> Search<'a, 'o> {
         Ok(())
     }
 
-    /// Takes the best displaced state off the open list, or else the initial state, which comes
-    /// last (its f_c and f_a count as infinite) and stands for all its parts in their order.
-    /// Without guidance the first comes first: the initial state, then displaced ones by age.
-    fn extract(&mut self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
-        let displaced = open.iter().copied().filter(|&i| !self.nodes[i].is_root());
-        let next = if self.guided {
-            displaced.min_by_key(|&i| (self.evaluation(phase, i), i))
-        } else {
-            open.first().copied().filter(|&i| !self.nodes[i].is_root())
-        };
-        let batch = match next {
-            Some(best) => {
-                open.retain(|&i| i != best);
-                vec![best]
-            }
-            None => self.ordered_roots(phase, open),
-        };
-        for &i in &batch {
-            self.trace_expansion(phase, i);
-        }
-        batch
-    }
-
-    pub(super) fn ordered_roots(&self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
-        let (mut roots, rest) = open.iter().partition::<Vec<usize>, _>(|&&i| self.nodes[i].is_root());
-        *open = rest;
-        if !self.guided {
-            return roots;
-        }
-        // Before anything was turned, what stops pushes tells which part is least held; among
-        // equals the smallest is the likeliest fastener and the cheapest to simulate.
-        let other = |i: usize| self.nodes[i].blockage(Phase::Translation).map(Blockage::evaluation);
-        let reach =
-            |i: usize| self.disassembly.problem.scene.bodies[self.nodes[i].part].shape.reach.to_bits();
-        roots.sort_by_key(|&i| match phase {
-            Phase::Translation => (self.evaluation(phase, i), None, 0, i),
-            Phase::Rotation => (self.evaluation(phase, i), other(i), reach(i), i),
-        });
-        roots
-    }
-
-    pub(super) fn evaluation(&self, phase: Phase, node: usize) -> Evaluation {
-        let none = Evaluation { colliding_parts: 0, open_actions: 0 };
-        self.nodes[node].blockage(phase).map_or(none, Blockage::evaluation)
-    }
-
     /// Simulates the open actions of some states of one priority, in order.
     fn expand(&mut self, phase: Phase, batch: &[usize]) -> Result<Gain, Stop> {
         let count = self.actions(phase).len();
@@ -341,20 +275,6 @@ impl<'a, 'o> Search<'a, 'o> {
             }
         }
         Ok(gain)
-    }
-
-    /// Of actions that may turn a part, those first that pull it along its own axis, over all parts;
-    /// of these, those that fewer parts stand against, as far as pushes tell. Smaller is better.
-    fn promise(&self, job: Job) -> (bool, usize) {
-        let node = &self.nodes[job.node];
-        let action = self.rotations[job.action];
-        let Action::Screw(axis, ..) = action else { return (true, 0) };
-        if !self.directions.is_own(node.part, axis) {
-            return (true, 0);
-        }
-        let push = self.translations.iter().position(|t| t.force() == action.force());
-        let against = |b: &Blockage| push.map_or(0, |push| b.blockers(push).len());
-        (false, node.translation.as_ref().map_or(0, against))
     }
 
     pub(super) fn run_of(&self, phase: Phase, job: Job) -> Run {
@@ -422,11 +342,8 @@ impl<'a, 'o> Search<'a, 'o> {
 
     /// Whether no state of this part is like a pose (the paper's rmd).
     fn is_new_state(&self, phase: Phase, part: usize, pose: &Pose) -> bool {
-        let coarse = coarseness(self.states_of[part]);
-        let scene = &self.disassembly.problem.scene;
-        let listed = |n: &&Node| n.alive && n.part == part && self.lists(phase, n);
-        let known = |n: &Node| same_state(scene, part, n.pose(), pose, coarse);
-        !self.nodes.iter().filter(listed).any(known)
+        let listed = |node: usize| self.nodes[node].alive && self.lists(phase, &self.nodes[node]);
+        !self.known[part].has_like(pose, listed)
     }
 
     fn block(&mut self, phase: Phase, job: Job, by: Vec<usize>) {
