@@ -66,6 +66,15 @@ impl KnownStates {
         states.any(|(number, known)| self.alike(known, pose) && counts(*number))
     }
 
+    /// How far a pose is from the nearest state, in units of the resolution: infinite if there is none.
+    pub(super) fn novelty(&self, pose: &Pose) -> f64 {
+        let distance = |known: &Pose| {
+            let travel = (known * self.centre - pose * self.centre).norm() / self.least_travel;
+            travel + known.rotation.angle_to(&pose.rotation) / ROTATION
+        };
+        self.states.iter().map(|(_, known)| distance(known)).fold(f64::INFINITY, f64::min)
+    }
+
     fn alike(&self, a: &Pose, b: &Pose) -> bool {
         (a * self.centre - b * self.centre).norm() < self.width()
             && a.rotation.angle_to(&b.rotation) < ROTATION * self.coarseness

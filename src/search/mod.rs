@@ -4,6 +4,7 @@
 //! one part after the other), which works on the `disassembly` under way → [`Outcome`].
 //! Everything below the request is in the planning frame.
 
+mod ahead;
 mod directions;
 mod disassembly;
 mod known_states;

@@ -1,5 +1,7 @@
 //! In which order a state-based search expands states and tries actions.
 
+use std::cmp::Reverse;
+
 use crate::blocking_graph::{Blockage, Evaluation};
 use crate::simulation::Action;
 
@@ -29,13 +31,20 @@ impl Search<'_, '_> {
         !self.separate_lists || node.origin.is_none_or(|(_, by, _)| by == phase)
     }
 
-    /// Takes the best displaced state off the open list, or else the initial state, which comes
+    /// Takes the best displaced state off the open list (smaller f_c, then smaller f_a; beyond the
+    /// paper, then what is farther from the states known before), or else the initial state, which comes
     /// last (its f_c and f_a count as infinite) and stands for all its parts in their order.
     /// Without guidance the first comes first: the initial state, then displaced ones by age.
+    ///
+    /// Beyond the paper, turning takes all states at once: which action is tried next matters more
+    /// than in which state.
     pub(super) fn extract(&mut self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
+        if self.turns_by_action(phase) {
+            return self.ranked(phase, std::mem::take(open));
+        }
         let displaced = open.iter().copied().filter(|&i| !self.nodes[i].is_root());
         let next = if self.guided {
-            displaced.min_by_key(|&i| (self.evaluation(phase, i), i))
+            displaced.min_by_key(|&i| self.rank(phase, i))
         } else {
             open.first().copied().filter(|&i| !self.nodes[i].is_root())
         };
@@ -52,7 +61,29 @@ impl Search<'_, '_> {
         batch
     }
 
-    pub(super) fn ordered_roots(&self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
+    /// Whether actions are tried in an order of their own, over all states.
+    pub(super) fn turns_by_action(&self, phase: Phase) -> bool {
+        phase == Phase::Rotation && self.guided && !self.separate_lists
+    }
+
+    /// Where a displaced state stands among the others.
+    fn rank(&self, phase: Phase, node: usize) -> (Evaluation, Reverse<u64>, usize) {
+        // Not negative, so its bits are in its order.
+        let novelty = if self.separate_lists { 0.0 } else { self.nodes[node].novelty };
+        (self.evaluation(phase, node), Reverse(novelty.to_bits()), node)
+    }
+
+    /// Open states in the order of expansion.
+    pub(super) fn ranked(&self, phase: Phase, mut open: Vec<usize>) -> Vec<usize> {
+        let roots = self.ordered_roots(phase, &mut open);
+        if self.guided {
+            open.sort_by_cached_key(|&i| self.rank(phase, i));
+        }
+        open.extend(roots);
+        open
+    }
+
+    fn ordered_roots(&self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
         let (mut roots, rest) = open.iter().partition::<Vec<usize>, _>(|&&i| self.nodes[i].is_root());
         *open = rest;
         if !self.guided {

@@ -9,6 +9,7 @@
 //! ahead in parallel, but their results are taken in the order of the serial algorithm and thrown
 //! away where an earlier one changed the question: plans do not depend on the number of threads.
 
+use std::collections::HashSet;
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -18,6 +19,7 @@ use crate::geometry::Pose;
 use crate::simulation::{Action, End, Motion};
 use crate::termination::Interrupt;
 
+use super::ahead::Ahead;
 use super::directions::Directions;
 use super::disassembly::{Disassembly, Proof, Run, Stop, joined};
 use super::known_states::KnownStates;
@@ -64,6 +66,7 @@ pub(super) struct Search<'a, 'o> {
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
     pub(super) swept: Swept,
+    ahead: Ahead,
     /// As the paper has it: one open list for translational planning and one for rotational.
     pub(super) separate_lists: bool,
     translation_passes: usize,
@@ -93,6 +96,7 @@ impl<'a, 'o> Search<'a, 'o> {
             translations,
             rotations,
             swept: Swept::default(),
+            ahead: Ahead::default(),
             separate_lists: as_paper,
             translation_passes: if as_paper { 1 } else { TRANSLATION_PASSES },
             distrust_static: false,
@@ -155,6 +159,7 @@ impl<'a, 'o> Search<'a, 'o> {
                     translation: Some(blockage),
                     rotation: Blockage::open(self.rotations.len()),
                     origin: None,
+                    novelty: 0.0,
                     alive: true,
                 });
                 self.trace_analysis(self.nodes.len() - 1);
@@ -193,6 +198,9 @@ impl<'a, 'o> Search<'a, 'o> {
             let batch = self.extract(phase, &mut open);
             let result = self.expand(phase, &batch)?;
             gain.new_states |= result.new_states;
+            if result.new_states && self.turns_by_action(phase) {
+                return Ok(gain);
+            }
             if result.removed {
                 gain.removed = true;
                 self.take_free_parts()?;
@@ -247,19 +255,29 @@ impl<'a, 'o> Search<'a, 'o> {
         let count = self.actions(phase).len();
         let mut jobs: Vec<Job> =
             batch.iter().flat_map(|&node| (0..count).map(move |action| Job { node, action })).collect();
-        if phase == Phase::Rotation && self.guided && !self.separate_lists {
+        let by_action = self.turns_by_action(phase);
+        if by_action {
             jobs.sort_by_cached_key(|job| self.promise(*job));
         }
         let mut gain = Gain::default();
         let mut next = 0;
+        let mut expanded = HashSet::new();
         while next < jobs.len() {
             let (window, end) = self.window(phase, &jobs, next);
             next = end;
-            let runs: Vec<Run> = window.iter().map(|job| self.run_of(phase, *job)).collect();
-            let motions = self.disassembly.simulate(&runs)?;
-            for (job, motion) in window.into_iter().zip(motions) {
+            let mut motions = self.simulated(phase, &window)?.into_iter();
+            while let Some((job, motion)) = motions.next() {
+                if by_action && expanded.insert(job.node) {
+                    self.trace_expansion(phase, job.node);
+                }
                 self.disassembly.charge()?;
-                if self.take(phase, job, motion, &mut gain)? {
+                let changed = self.take(phase, job, motion, &mut gain)?;
+                // Where turning led a part is looked at before it is turned on, or another part is.
+                let look_there = by_action && gain.new_states;
+                if look_there && !changed {
+                    motions.by_ref().for_each(|(job, motion)| self.ahead.keep(phase, job, motion));
+                }
+                if look_there || changed {
                     // Later results of this window answer a question that has changed.
                     next = jobs
                         .iter()
@@ -270,11 +288,21 @@ impl<'a, 'o> Search<'a, 'o> {
             }
             // What a part that was turned out leaves free mostly leaves straight: pushes first.
             let pushes_first = phase == Phase::Rotation && gain.removed && !self.separate_lists;
-            if self.disassembly.is_done() || pushes_first {
+            if self.disassembly.is_done() || pushes_first || (by_action && gain.new_states) {
                 break;
             }
         }
         Ok(gain)
+    }
+
+    /// The motions of some jobs, in order, up to the first that leads out.
+    fn simulated(&mut self, phase: Phase, window: &[Job]) -> Result<Vec<(Job, Motion)>, Stop> {
+        let ahead = self.ahead.valid_at(self.disassembly.version());
+        let todo: Vec<Job> = window.iter().copied().filter(|job| !ahead.has(phase, *job)).collect();
+        let runs: Vec<Run> = todo.iter().map(|job| self.run_of(phase, *job)).collect();
+        let mut fresh = self.disassembly.simulate(&runs)?.into_iter();
+        let mut known = |job: &Job| Some((*job, self.ahead.take(phase, *job).or_else(|| fresh.next())?));
+        Ok(window.iter().map_while(&mut known).collect())
     }
 
     pub(super) fn run_of(&self, phase: Phase, job: Job) -> Run {
@@ -335,7 +363,9 @@ impl<'a, 'o> Search<'a, 'o> {
             let path = joined(&self.nodes[job.node].path, &path);
             let rotation = Blockage::open(self.rotations.len());
             let origin = Some((job.node, phase, job.action));
-            self.add_node(Node { part: run.part, path, translation: None, rotation, origin, alive: true });
+            let novelty = self.known[run.part].novelty(&path[path.len() - 1]);
+            let (part, translation) = (run.part, None);
+            self.add_node(Node { part, path, translation, rotation, origin, novelty, alive: true });
         }
         Ok(false)
     }

@@ -13,7 +13,7 @@ const TRANSLATION: f64 = 0.05;
 const STATES_PER_LEVEL: usize = 3;
 
 /// Translation without, or rotation with, freedom to turn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Phase {
     Translation,
     Rotation,
@@ -40,6 +40,8 @@ pub(super) struct Node {
     pub(super) rotation: Blockage,
     /// Parent node and action, unless assembled.
     pub(super) origin: Option<(usize, Phase, usize)>,
+    /// How far it is from the part's states known before, in units of the resolution; 0 assembled.
+    pub(super) novelty: f64,
     /// False once its part is gone or its path was refuted.
     pub(super) alive: bool,
 }
