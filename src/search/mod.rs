@@ -8,6 +8,7 @@ mod ahead;
 mod directions;
 mod disassembly;
 mod known_states;
+mod linked;
 mod order;
 mod outcome;
 mod pdp;

@@ -10,7 +10,7 @@ use super::state::{Node, Phase};
 
 impl Search<'_, '_> {
     /// The states to expand, the initial one included. Of two last parts it is the same which one
-    /// moves against the other: beyond the first push, only the smaller one does.
+    /// moves against the other: beyond the first push, only the smaller one does. A linked part is not moved: it cannot leave.
     pub(super) fn expandable(&self, phase: Phase) -> Vec<usize> {
         let standing = self.disassembly.everything.standing();
         let problem = &self.disassembly.problem;
@@ -22,7 +22,8 @@ impl Search<'_, '_> {
             _ => None,
         };
         let skipped = |n: &Node| Some(n.part) == still && (phase == Phase::Rotation || !n.is_root());
-        let wanted = |n: &Node| n.alive && self.lists(phase, n) && !skipped(n);
+        let wanted =
+            |n: &Node| n.alive && self.lists(phase, n) && !skipped(n) && self.linked_with(n.part).is_none();
         (0..self.nodes.len()).filter(|&i| wanted(&self.nodes[i])).collect()
     }
 

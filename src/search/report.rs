@@ -7,6 +7,9 @@ use super::sbdp::Search;
 use super::state::{Phase, coarseness};
 use super::trace::{BlockedBy, TraceEvent};
 
+/// What stands for every action where parts are linked.
+const LINKED: &str = "any";
+
 impl Search<'_, '_> {
     /// What was tried before the search gave up.
     pub(super) fn evidence(&self) -> String {
@@ -14,8 +17,17 @@ impl Search<'_, '_> {
         let stuck = problem.wanted(standing);
         let most = stuck.iter().map(|&p| self.known[p].len()).max().unwrap_or(0);
         let coarse = coarseness(most);
+        let linked = stuck.iter().filter(|p| self.linked_with(**p).is_some()).count();
+        let proof = if linked == 0 {
+            String::new()
+        } else {
+            format!(
+                "{linked} of them are linked with others, as links of a chain, which no motion undoes (linking \
+                 numbers of curves on their surfaces); of all others, "
+            )
+        };
         format!(
-            "{} of {} parts cannot leave one at a time: every state reached was expanded with {} translations \
+            "{} of {} parts cannot leave one at a time: {proof}every state reached was expanded with {} translations \
              and {} actions with rotational freedom ({} states in all, told apart at {:.3} of the longest side \
              and {:.1} rad){}",
             stuck.len(),
@@ -34,6 +46,11 @@ impl Search<'_, '_> {
         let wanted = self.disassembly.problem.wanted(self.disassembly.everything.standing());
         let mut out = Vec::new();
         for node in self.nodes.iter().filter(|n| n.alive && n.is_root() && wanted.contains(&n.part)) {
+            out.extend(self.linked_with(node.part).map(|by| BlockedAction {
+                part: node.part,
+                action: LINKED.to_owned(),
+                by: vec![by],
+            }));
             for phase in [Phase::Translation, Phase::Rotation] {
                 let Some(b) = node.blockage(phase) else { continue };
                 out.extend(self.edges(phase, b).map(|BlockedBy { action, parts }| BlockedAction {

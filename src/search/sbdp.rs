@@ -23,6 +23,7 @@ use super::ahead::Ahead;
 use super::directions::Directions;
 use super::disassembly::{Disassembly, Proof, Run, Stop, joined};
 use super::known_states::KnownStates;
+use super::linked::Links;
 use super::outcome::Outcome;
 use super::problem::{Observer, Problem};
 use super::request::ActionSet;
@@ -67,6 +68,8 @@ pub(super) struct Search<'a, 'o> {
     pub(super) rotations: Vec<Action>,
     pub(super) swept: Swept,
     ahead: Ahead,
+    /// Once it was looked which parts are linked.
+    pub(super) links: Option<Links>,
     /// As the paper has it: one open list for translational planning and one for rotational.
     pub(super) separate_lists: bool,
     translation_passes: usize,
@@ -97,6 +100,7 @@ impl<'a, 'o> Search<'a, 'o> {
             rotations,
             swept: Swept::default(),
             ahead: Ahead::default(),
+            links: None,
             separate_lists: as_paper,
             translation_passes: if as_paper { 1 } else { TRANSLATION_PASSES },
             distrust_static: false,
@@ -192,6 +196,11 @@ impl<'a, 'o> Search<'a, 'o> {
             if self.sweep_out(phase, &open)? {
                 gain.removed = true;
                 self.take_free_parts()?;
+                open = self.expandable(phase);
+                continue;
+            }
+            // Before the first simulation: what leaves straight is out.
+            if self.find_links() {
                 open = self.expandable(phase);
                 continue;
             }
