@@ -63,7 +63,7 @@ impl KnownStates {
         let cells = around(x).flat_map(|x| around(y).flat_map(move |y| around(z).map(move |z| [x, y, z])));
         let listed = cells.filter_map(|cell| self.cells.get(&cell)).flatten();
         let mut states = listed.map(|&i| &self.states[i]);
-        states.any(|(number, known)| self.alike(known, pose) && counts(*number))
+        states.any(|(number, known)| self.alike(known, pose, self.coarseness) && counts(*number))
     }
 
     /// How far a pose is from the nearest state, in units of the resolution: infinite if there is none.
@@ -75,9 +75,15 @@ impl KnownStates {
         self.states.iter().map(|(_, known)| distance(known)).fold(f64::INFINITY, f64::min)
     }
 
-    fn alike(&self, a: &Pose, b: &Pose) -> bool {
-        (a * self.centre - b * self.centre).norm() < self.width()
-            && a.rotation.angle_to(&b.rotation) < ROTATION * self.coarseness
+    /// The states whose number `counts`.
+    pub(super) fn poses(&self, counts: impl Fn(usize) -> bool) -> impl Iterator<Item = Pose> {
+        self.states.iter().filter(move |(number, _)| counts(*number)).map(|(_, pose)| *pose)
+    }
+
+    /// Whether two poses are the same state at a multiple of the resolution.
+    pub(super) fn alike(&self, a: &Pose, b: &Pose, coarseness: f64) -> bool {
+        (a * self.centre - b * self.centre).norm() < self.least_travel * coarseness
+            && a.rotation.angle_to(&b.rotation) < ROTATION * coarseness
     }
 
     fn width(&self) -> f64 {

@@ -15,6 +15,8 @@ mod pdp;
 mod problem;
 mod report;
 mod request;
+mod rooms;
+mod round;
 mod sbdp;
 mod state;
 mod straight;

@@ -10,7 +10,8 @@ use super::state::{Node, Phase};
 
 impl Search<'_, '_> {
     /// The states to expand, the initial one included. Of two last parts it is the same which one
-    /// moves against the other: beyond the first push, only the smaller one does. A linked part is not moved: it cannot leave.
+    /// moves against the other: beyond the first push, only the smaller one does. A linked part is not moved, for it
+    /// cannot leave, and a ball not turned.
     pub(super) fn expandable(&self, phase: Phase) -> Vec<usize> {
         let standing = self.disassembly.everything.standing();
         let problem = &self.disassembly.problem;
@@ -22,8 +23,9 @@ impl Search<'_, '_> {
             _ => None,
         };
         let skipped = |n: &Node| Some(n.part) == still && (phase == Phase::Rotation || !n.is_root());
-        let wanted =
-            |n: &Node| n.alive && self.lists(phase, n) && !skipped(n) && self.linked_with(n.part).is_none();
+        let in_vain =
+            |n: &Node| (phase == Phase::Rotation && self.balls[n.part]) || self.linked_with(n.part).is_some();
+        let wanted = |n: &Node| n.alive && self.lists(phase, n) && !skipped(n) && !in_vain(n);
         (0..self.nodes.len()).filter(|&i| wanted(&self.nodes[i])).collect()
     }
 

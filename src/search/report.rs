@@ -4,7 +4,7 @@ use crate::blocking_graph::Blockage;
 
 use super::outcome::BlockedAction;
 use super::sbdp::Search;
-use super::state::{Phase, coarseness};
+use super::state::Phase;
 use super::trace::{BlockedBy, TraceEvent};
 
 /// What stands for every action where parts are linked.
@@ -16,7 +16,7 @@ impl Search<'_, '_> {
         let (problem, standing) = (&self.disassembly.problem, self.disassembly.everything.standing());
         let stuck = problem.wanted(standing);
         let most = stuck.iter().map(|&p| self.known[p].len()).max().unwrap_or(0);
-        let coarse = coarseness(most);
+        let coarse = self.coarsest(most);
         let linked = stuck.iter().filter(|p| self.linked_with(**p).is_some()).count();
         let proof = if linked == 0 {
             String::new()

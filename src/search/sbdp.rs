@@ -27,6 +27,7 @@ use super::linked::Links;
 use super::outcome::Outcome;
 use super::problem::{Observer, Problem};
 use super::request::ActionSet;
+use super::round::is_ball;
 use super::state::{Node, Phase, least_travel};
 use super::straight::Swept;
 use super::trace::TraceEvent;
@@ -68,6 +69,10 @@ pub(super) struct Search<'a, 'o> {
     pub(super) rotations: Vec<Action>,
     pub(super) swept: Swept,
     ahead: Ahead,
+    /// How coarsely two states were taken for one, at most.
+    pub(super) coarsest: f64,
+    /// Which parts are balls, which no action has to turn.
+    pub(super) balls: Vec<bool>,
     /// Once it was looked which parts are linked.
     pub(super) links: Option<Links>,
     /// As the paper has it: one open list for translational planning and one for rotational.
@@ -90,6 +95,10 @@ impl<'a, 'o> Search<'a, 'o> {
         let directions = problem.directions();
         let (translations, rotations) = problem.action_lists(&directions);
         let as_paper = problem.actions == ActionSet::Paper;
+        let scene = &problem.scene;
+        let bodies = scene.bodies.iter().enumerate();
+        let balls =
+            bodies.map(|(p, b)| guided && !as_paper && is_ball(&b.shape, least_travel(scene, p))).collect();
         Self {
             guided,
             nodes: Vec::new(),
@@ -100,6 +109,8 @@ impl<'a, 'o> Search<'a, 'o> {
             rotations,
             swept: Swept::default(),
             ahead: Ahead::default(),
+            coarsest: 1.0,
+            balls,
             links: None,
             separate_lists: as_paper,
             translation_passes: if as_paper { 1 } else { TRANSLATION_PASSES },
@@ -362,7 +373,7 @@ impl<'a, 'o> Search<'a, 'o> {
             End::Collision { with } => ("collision", with),
             End::Undecided { touched, .. } => ("undecided", touched),
         };
-        let is_new = path.last().is_some_and(|end| self.is_new_state(phase, run.part, end));
+        let is_new = path.last().copied().is_some_and(|end| self.is_new_state(phase, run.part, &end));
         let leads_to = is_new.then_some(self.nodes.len() + 1 - self.roots);
         let from = self.state(job.node);
         self.disassembly.trace_simulation(from, &run, word, &by, path.len(), leads_to);
@@ -377,12 +388,6 @@ impl<'a, 'o> Search<'a, 'o> {
             self.add_node(Node { part, path, translation, rotation, origin, novelty, alive: true });
         }
         Ok(false)
-    }
-
-    /// Whether no state of this part is like a pose (the paper's rmd).
-    fn is_new_state(&self, phase: Phase, part: usize, pose: &Pose) -> bool {
-        let listed = |node: usize| self.nodes[node].alive && self.lists(phase, &self.nodes[node]);
-        !self.known[part].has_like(pose, listed)
     }
 
     fn block(&mut self, phase: Phase, job: Job, by: Vec<usize>) {
