@@ -15,27 +15,31 @@ impl Search<'_, '_> {
     pub(super) fn evidence(&self) -> String {
         let (problem, standing) = (&self.disassembly.problem, self.disassembly.everything.standing());
         let stuck = problem.wanted(standing);
+        let linked = stuck.iter().filter(|p| self.linked_with(**p).is_some()).count();
+        let mut found = Vec::new();
+        if linked > 0 {
+            found.push(format!(
+                "{linked} of them are linked with others, as links of a chain, which no motion undoes (linking \
+                 numbers of curves on their surfaces)"
+            ));
+        }
+        if linked < stuck.len() {
+            found.push(self.exhausted(&stuck));
+        }
+        let (stuck, all) = (stuck.len(), problem.present.len());
+        format!("{stuck} of {all} parts cannot leave one at a time: {}", found.join("; of the others, "))
+    }
+
+    fn exhausted(&self, stuck: &[usize]) -> String {
         let most = stuck.iter().map(|&p| self.known[p].len()).max().unwrap_or(0);
         let coarse = self.coarsest(most);
-        let linked = stuck.iter().filter(|p| self.linked_with(**p).is_some()).count();
-        let proof = if linked == 0 {
-            String::new()
-        } else {
-            format!(
-                "{linked} of them are linked with others, as links of a chain, which no motion undoes (linking \
-                 numbers of curves on their surfaces); of all others, "
-            )
-        };
         format!(
-            "{} of {} parts cannot leave one at a time: {proof}every state reached was expanded with {} translations \
-             and {} actions with rotational freedom ({} states in all, told apart at {:.3} of the longest side \
-             and {:.1} rad){}",
-            stuck.len(),
-            problem.present.len(),
+            "every state reached was expanded with {} translations and {} actions with rotational freedom ({} \
+             states in all, told apart at {:.3} of the longest side and {:.1} rad){}",
             self.translations.len(),
             self.rotations.len(),
             self.disassembly.counters.states,
-            0.05 * coarse / problem.scene.longest_side,
+            0.05 * coarse / self.disassembly.problem.scene.longest_side,
             0.5 * coarse,
             if self.guided { ", also where static analysis saw no way" } else { "" },
         )

@@ -24,3 +24,24 @@ pub fn passes_straight(scene: &Scene, standing: &[usize], part: usize, from: &Po
         !Mover::new(scene, part, pose).clearly_enters(standing)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Translation3, Vector3};
+
+    use super::*;
+    use crate::fixtures::{peg_in_hole, scene};
+
+    #[test]
+    fn a_peg_passes_through_its_hole_but_not_through_the_wall() {
+        let (scene, _) = scene(peg_in_hole(-0.05));
+        let at = |x: f64, z: f64| {
+            Translation3::from(Vector3::new(x, 0.0, z)) * scene.bodies[1].planning_from_shape
+        };
+        let passes = |from: Pose, to: Pose| passes_straight(&scene, &[0], 1, &from, &to);
+        assert!(passes(at(0.0, 0.0), at(0.0, 4.0)) && passes(at(0.0, 4.0), at(0.0, 0.0)));
+        assert!(passes(at(0.0, 4.0), at(6.0, 4.0)) && passes(at(6.0, 4.0), at(6.0, 0.0)));
+        assert!(!passes(at(0.0, 0.0), at(6.0, 0.0)), "both ends are free, the way is not");
+        assert!(passes(at(0.0, 0.0), at(0.0, 0.0)));
+    }
+}
