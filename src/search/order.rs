@@ -10,8 +10,8 @@ use super::state::{Node, Phase};
 
 impl Search<'_, '_> {
     /// The states to expand, the initial one included. Of two last parts it is the same which one
-    /// moves against the other: beyond the first push, only the smaller one does. A linked part is not moved, for it
-    /// cannot leave, and a ball not turned.
+    /// moves against the other: beyond the first push, only the smaller one does. A linked part is
+    /// not moved, for it cannot leave, and a ball not turned.
     pub(super) fn expandable(&self, phase: Phase) -> Vec<usize> {
         let standing = self.disassembly.everything.standing();
         let problem = &self.disassembly.problem;
