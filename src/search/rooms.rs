@@ -44,11 +44,11 @@ impl Search<'_, '_> {
             states.par_iter().partition(|s| if turned { is_turned(s) } else { is_near(s) });
         let coarse = coarseness(near.len() + far.len() / ELSEWHERE);
         let hides = |state: &&Pose| known.alike(state, pose, coarse);
-        let is_new = !near.iter().any(hides) && !(turned && far.iter().any(hides));
-        if !is_new {
+        let hidden = near.iter().any(hides) || (turned && far.iter().any(hides));
+        if hidden {
             self.coarsest = self.coarsest.max(coarse);
         }
-        is_new
+        !hidden
     }
 
     /// How coarsely states were told apart at most, as a multiple of the paper's resolution.
