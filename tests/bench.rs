@@ -40,6 +40,9 @@ fn request(folder: &Path, assemblies: &[&str]) -> Request {
         grace: Duration::from_secs(7200),
         threads: 0,
         jobs: 1,
+        parts_up_to: None,
+        rotations: 0,
+        seed: 0,
         shard: Shard::WHOLE,
         out: folder.join("out"),
         program: root().join("bench/fake-sbdp"),
@@ -204,6 +207,65 @@ fn pdp_star_runs_what_it_is_put_together_from() {
     assert_eq!(ran, ["sbdp", "pdp-r", "pdp-t"]);
     request.planners.push("magic".to_owned());
     assert!(run(&request).unwrap_err().to_string().contains("`magic`"));
+}
+
+#[test]
+fn rotated_runs_are_runs_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let once = Request { rotations: 1, seed: 7, ..request(folder.path(), &["one", "stuck"]) };
+    assert_eq!(run(&once).unwrap().records, 4);
+    let turned = |log: &[String]| log.iter().filter(|l| l.contains(" --rotate=")).count();
+    assert_eq!(turned(&log(&once.out)), 2);
+    // More of them: only the new ones run; less of them: none.
+    let more = Request { rotations: 3, ..once.clone() };
+    assert_eq!(run(&more).unwrap().records, 8);
+    assert_eq!((log(&more.out).len(), turned(&log(&more.out))), (8, 6));
+    assert_eq!(run(&once).unwrap().missing, 0);
+    let rotations: Vec<String> = log(&more.out)
+        .iter()
+        .filter_map(|l| Some(l.split_once("--rotate=")?.1.split(' ').next()?.to_owned()))
+        .collect();
+    assert_eq!(rotations.iter().collect::<BTreeSet<_>>().len(), 6, "{rotations:?}");
+    let tables = fs::read_to_string(more.out.join("tables.md")).unwrap();
+    assert!(tables.contains("| 2 | 1 (50%) | 6 | 3 (50%) | 1 |"), "{tables}");
+    assert!(tables.contains("All, 3+ (2)"), "rotated problems are no further problems: {tables}");
+    let other_seed = run(&Request { seed: 8, ..more }).unwrap_err().to_string();
+    assert!(other_seed.contains("seed 7") && other_seed.contains("seed 8"), "{other_seed}");
+}
+
+#[test]
+fn shards_of_rotated_runs_are_put_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = Request { rotations: 2, ..request(folder.path(), &["a", "b", "c"]) };
+    let shards = ["1/2", "2/2"].map(|shard| Request {
+        shard: shard.parse().unwrap(),
+        out: folder.path().join(shard.replace('/', "-")),
+        ..whole.clone()
+    });
+    let ran: usize = shards.iter().map(|s| run(s).unwrap().records).sum();
+    let folders = shards.each_ref().map(|s| s.out.clone());
+    let summary = bench::report(&folders, &folder.path().join("all")).unwrap();
+    assert_eq!((ran, summary), (9, Summary { records: 9, missing: 0, repeated: 0 }));
+    // A shard turns an assembly as the whole does.
+    run(&whole).unwrap();
+    let lines = |outs: &[PathBuf]| -> BTreeSet<String> {
+        let logs = outs.iter().flat_map(|out| log(out));
+        let turned =
+            |l: String| Some((l.split(' ').next()?.to_owned(), l.split_once("--rotate=")?.1.to_owned()));
+        logs.filter_map(turned).map(|(name, rest)| name + rest.split(' ').next().unwrap_or("")).collect()
+    };
+    assert_eq!(lines(&folders), lines(&[whole.out]));
+}
+
+#[test]
+fn assemblies_of_more_parts_are_left_out_if_asked() {
+    let folder = tempfile::tempdir().unwrap();
+    let request = request(folder.path(), &["three", "four"]);
+    fs::write(folder.path().join("corpus/four/3.obj"), "").unwrap();
+    let few = Request { parts_up_to: Some(3), ..request };
+    run(&few).unwrap();
+    let names: Vec<String> = bench::read(&few.out).unwrap().into_iter().map(|r| r.assembly).collect();
+    assert_eq!(names, ["corpus/three"]);
 }
 
 #[test]

@@ -60,6 +60,23 @@ fn wrong_usage_exits_2() {
 }
 
 #[test]
+fn a_turned_assembly_comes_apart_in_turned_directions() {
+    let first_displacement = |options: &[&str]| {
+        let output = plan("bolt-washer-plate", &[options, &["--json", "-"]].concat());
+        let plan = PlanDocument::from_json(&stdout(&output)).unwrap();
+        assert_eq!((plan.status.as_str(), plan.steps[0].part.as_str()), ("complete", "bolt"));
+        let end = plan.steps[0].path.last().unwrap();
+        nalgebra::Vector3::new(end[0], end[1], end[2]).normalize()
+    };
+    // A quarter turn about y maps z to x.
+    let given = first_displacement(&[]);
+    let turned = first_displacement(&["--rotate", "1,0,1,0"]);
+    let expected = nalgebra::Vector3::new(given.z, given.y, -given.x);
+    assert!((turned - expected).norm() < 1e-6, "{given} {turned}");
+    refused(&plan("l-slot", &["--rotate", "1,0,0"]), &["--rotate", "four numbers"]);
+}
+
+#[test]
 fn help_and_version_exit_0() {
     for argument in ["--help", "--version"] {
         assert_eq!(run(&[argument]).status.code(), Some(0));

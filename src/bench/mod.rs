@@ -10,6 +10,8 @@ mod estimate;
 pub(crate) mod families;
 mod figure;
 mod record;
+mod rotated;
+mod rotation;
 mod runner;
 mod scale;
 mod statistics;
@@ -26,7 +28,7 @@ use std::time::Duration;
 
 pub use corpus::{Category, Problem, Shard, find};
 pub use families::Family;
-pub use record::{Record, Settings, Store, read};
+pub use record::{Key, Record, Settings, Store, read};
 pub use scale::{Growth, PARTS, ScaleRequest, scale};
 
 use estimate::Estimate;
@@ -98,7 +100,13 @@ pub struct Request {
     pub threads: u32,
     /// Runs at a time. With more than one they take processor time from each other.
     pub jobs: usize,
-    /// Which part of the corpus.
+    /// Only assemblies of so many parts at most.
+    pub parts_up_to: Option<usize>,
+    /// Beside as it is, under how many random rotations every assembly is planned.
+    pub rotations: u32,
+    /// Which rotations.
+    pub seed: u64,
+    /// Which part of the corpus, after what else limits it.
     pub shard: Shard,
     /// Where the results go.
     pub out: PathBuf,
@@ -144,12 +152,14 @@ pub fn run(
 ) -> Result<Summary, BenchError> {
     let planners = planners_to_run(&request.planners)?;
     let engines = known("engine", &ENGINES, &request.engines)?;
-    let problems = request.shard.select(find(&request.corpora)?);
+    let mut problems = find(&request.corpora)?;
+    problems.retain(|p| request.parts_up_to.is_none_or(|most| p.parts <= most));
+    let problems = request.shard.select(problems);
     let settings = settings(request)?;
     std::fs::create_dir_all(&request.out).map_err(|e| BenchError::file(&request.out, &e))?;
     let (store, mut records) = Store::open(&request.out)?;
     check_resumable(&settings, &records, &request.out)?;
-    let jobs = jobs(&problems, &planners, &engines);
+    let jobs = jobs(&problems, request.rotations, &planners, &engines);
     let missing = run_missing(request, &settings, &jobs, store, &mut records, cancel, observer)?;
     write_evaluation(&request.out, &records)?;
     Ok(Summary { records: records.len(), missing, repeated: 0 })
@@ -168,8 +178,8 @@ pub fn report(folders: &[PathBuf], out: &Path) -> Result<Summary, BenchError> {
             if records.first().is_some_and(|first| !first.settings.comparable(&record.settings)) {
                 return Err(different(&records[0].settings, &record.settings, folder));
             }
-            let (assembly, planner, engine) = record.key();
-            if keys.insert((assembly.to_owned(), planner.to_owned(), engine.to_owned())) {
+            let (assembly, rotation, planner, engine) = record.key();
+            if keys.insert((assembly.to_owned(), rotation, planner.to_owned(), engine.to_owned())) {
                 records.push(record);
             } else {
                 repeated += 1;
@@ -249,6 +259,7 @@ fn settings(request: &Request) -> Result<Settings, BenchError> {
         actions: request.actions.to_owned(),
         dbg: request.dbg.to_owned(),
         sweeps: request.sweeps,
+        seed: request.seed,
         threads: request.threads,
         jobs: request.jobs,
         processors: std::thread::available_parallelism().map_or(0, usize::from),
@@ -270,11 +281,18 @@ fn different(here: &Settings, there: &Settings, folder: &Path) -> BenchError {
 }
 
 /// Problem by problem, so that an interrupted benchmark has problems that all planners ran on.
-fn jobs<'a>(problems: &'a [Problem], planners: &[&'static str], engines: &[&'static str]) -> Vec<Job<'a>> {
+fn jobs<'a>(
+    problems: &'a [Problem],
+    rotations: u32,
+    planners: &[&'static str],
+    engines: &[&'static str],
+) -> Vec<Job<'a>> {
     let mut jobs = Vec::new();
     for problem in problems {
-        for engine in engines {
-            jobs.extend(planners.iter().map(|planner| Job { problem, planner, engine }));
+        for rotation in 0..=rotations {
+            for engine in engines {
+                jobs.extend(planners.iter().map(|planner| Job { problem, rotation, planner, engine }));
+            }
         }
     }
     jobs

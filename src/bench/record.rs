@@ -28,6 +28,9 @@ pub struct Settings {
     /// Whether the state-based planners took parts that leave straight out without simulation.
     #[serde(default)]
     pub sweeps: bool,
+    /// Which rotations those of rotated runs were.
+    #[serde(default)]
+    pub seed: u64,
     /// Threads of each run; 0 for all processors.
     pub threads: u32,
     /// How many runs went on at a time.
@@ -52,6 +55,7 @@ impl Settings {
                 s.actions.clone(),
                 s.dbg.clone(),
                 s.sweeps,
+                s.seed,
                 s.threads,
             )
         };
@@ -69,19 +73,23 @@ impl std::fmt::Display for Settings {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let threads = if self.threads == 0 { "all".to_owned() } else { self.threads.to_string() };
         let Self { version, build, timeout_s, path_timeout_s, actions, dbg, .. } = self;
+        let seed = if self.seed == 0 { String::new() } else { format!(", seed {}", self.seed) };
         let sweeps = if self.sweeps { ", sweeps" } else { "" };
         write!(
             f,
-            "version {version}, build {build}, timeout {timeout_s} s ({path_timeout_s} s per path), actions {actions}{sweeps}, dbg {dbg}, threads {threads}"
+            "version {version}, build {build}, timeout {timeout_s} s ({path_timeout_s} s per path), actions {actions}{sweeps}, dbg {dbg}{seed}, threads {threads}"
         )
     }
 }
 
-/// One run: one assembly, one planner, one engine.
+/// One run: one assembly, as given or rotated, one planner, one engine.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// The assembly's name in the corpus.
     pub assembly: String,
+    /// 0: as given; else the number of the random rotation it was planned under.
+    #[serde(default)]
+    pub rotation: u32,
     /// How many parts it has.
     pub parts: usize,
     /// `pair`, `small`, `medium` or `large`.
@@ -128,6 +136,9 @@ pub struct Record {
     pub settings: Settings,
 }
 
+/// Assembly, rotation, planner and engine.
+pub type Key<'a> = (&'a str, u32, &'a str, &'a str);
+
 impl Record {
     /// Whether the problem counts as solved.
     #[must_use]
@@ -137,8 +148,8 @@ impl Record {
 
     /// What the run was: no two records of a results file share it.
     #[must_use]
-    pub fn key(&self) -> (&str, &str, &str) {
-        (&self.assembly, &self.planner, &self.engine)
+    pub fn key(&self) -> Key<'_> {
+        (&self.assembly, self.rotation, &self.planner, &self.engine)
     }
 
     /// The group of problems it belongs to.

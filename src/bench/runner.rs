@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 
 use super::BenchError;
 use super::corpus::{Category, Problem};
-use super::record::{Record, Settings};
+use super::record::{Key, Record, Settings};
+use super::rotation::random_rotation;
 use crate::plan::export::PlanDocument;
 
 /// `sbdp plan` exits with these when it has written a plan.
@@ -25,6 +26,8 @@ const LAST_WORDS: usize = 4096;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Job<'a> {
     pub(super) problem: &'a Problem,
+    /// As [`Record::rotation`].
+    pub(super) rotation: u32,
     pub(super) planner: &'static str,
     pub(super) engine: &'static str,
 }
@@ -55,8 +58,8 @@ impl<'a> Job<'a> {
     }
 
     /// As [`Record::key`] of its record.
-    pub(super) fn key(&self) -> (&'a str, &'a str, &'a str) {
-        (&self.problem.name, self.planner, self.engine)
+    pub(super) fn key(&self) -> Key<'a> {
+        (&self.problem.name, self.rotation, self.planner, self.engine)
     }
 }
 
@@ -101,6 +104,11 @@ impl Runner<'_> {
         command.args(["--path-timeout", &self.settings.path_timeout_s.to_string()]);
         command.args(["--actions", &self.settings.actions, "--dbg", &self.settings.dbg]);
         command.arg(if self.settings.sweeps { "--sweeps" } else { "--no-sweeps" });
+        if job.rotation > 0 {
+            let q = random_rotation(self.settings.seed, &job.problem.name, job.rotation);
+            // As one word: it may begin with a minus.
+            command.arg(format!("--rotate={},{},{},{}", q.w, q.i, q.j, q.k));
+        }
         if self.settings.threads > 0 {
             command.args(["--threads", &self.settings.threads.to_string()]);
         }
@@ -172,6 +180,7 @@ impl Runner<'_> {
     fn record(&self, job: Job<'_>, wall: Duration, status: &str, reason: String) -> Record {
         Record {
             assembly: job.problem.name.clone(),
+            rotation: job.rotation,
             parts: job.problem.parts,
             category: Category::of(job.problem.parts).name().to_owned(),
             planner: job.planner.to_owned(),

@@ -146,7 +146,7 @@ impl<'a> PlannerResults<'a> {
     }
 }
 
-/// What ran with one engine.
+/// What ran with one engine on assemblies as given, or on all under the rotation of one number.
 #[derive(Debug)]
 pub(super) struct EngineResults<'a> {
     pub(super) engine: &'static str,
@@ -158,12 +158,14 @@ pub(super) struct EngineResults<'a> {
 
 impl<'a> EngineResults<'a> {
     pub(super) fn by_engine(records: &'a [Record]) -> Vec<Self> {
-        let of = |engine: &'static str| Self::of(engine, records);
+        let of = |engine: &'static str| Self::of(engine, 0, records);
         ENGINES.into_iter().map(of).filter(|r| !r.problems.is_empty()).collect()
     }
 
-    fn of(engine: &'static str, records: &'a [Record]) -> Self {
-        let records: Vec<&Record> = records.iter().filter(|r| r.engine == engine).collect();
+    /// As given if `rotation` is 0.
+    pub(super) fn of(engine: &'static str, rotation: u32, records: &'a [Record]) -> Self {
+        let wanted = |r: &&Record| r.engine == engine && r.rotation == rotation;
+        let records: Vec<&Record> = records.iter().filter(wanted).collect();
         let categories: HashMap<&str, Category> =
             records.iter().map(|r| (r.assembly.as_str(), r.group())).collect();
         let mut problems: Vec<_> = categories.into_iter().collect();

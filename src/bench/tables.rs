@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::PDP_STAR;
 use super::record::Record;
+use super::rotated;
 use super::statistics::{EngineResults, Group, Measure, PlannerResults, REFERENCE, geometric_mean};
 
 /// Statuses of runs that ended without a plan.
@@ -25,6 +26,7 @@ pub(super) fn document(records: &[Record], engines: &[EngineResults<'_>]) -> Str
         if !versus.is_empty() {
             text += &format!("\n### {} against the others\n\n{versus}", title(REFERENCE));
         }
+        text += &rotated::section(records, results);
         text += &format!("\n### How runs ended\n\n{}{}", endings(results), accidents(results));
         text += &format!("\nCoverage over time: `coverage-{0}.svg`, `coverage-{0}.png`.\n", results.engine);
     }
@@ -87,6 +89,9 @@ fn conditions(records: &[Record]) -> String {
              PDP\\* is PDP_t where that solves the problem, else PDP_r; only the one that counts is measured. \
              \"All\" leaves out problems of one or two parts, which the paper has none of.\n\n";
     builds.iter().for_each(|b| text += &format!("- {b}\n"));
+    if records.iter().any(|r| r.rotation > 0) {
+        text += "- Runs of rotated assemblies count only where rotation is spoken of.\n";
+    }
     if crowded {
         text += "- Several runs went on at a time: their times disturb each other.\n";
     }
@@ -153,7 +158,7 @@ fn spreads(results: &EngineResults<'_>) -> String {
             table.row(cells);
         }
     }
-    if table.rows.is_empty() {
+    if table.is_empty() {
         return "No problem was solved by all planners.\n".to_owned();
     }
     let note = "Over the problems that all planners but PDP_t solved; standard deviation over all of them.";
@@ -180,7 +185,7 @@ fn versus(results: &EngineResults<'_>) -> String {
             table.row(row);
         }
     }
-    if table.rows.is_empty() {
+    if table.is_empty() {
         return String::new();
     }
     let note = "LR: share of problems on which SBDP\\* takes less time, in path planning (PP) and in disassembly \
@@ -280,12 +285,12 @@ fn ratio(first: &Record, second: &Record) -> Option<f64> {
 }
 
 /// A planner as the paper writes it.
-fn title(planner: &str) -> String {
+pub(super) fn title(planner: &str) -> String {
     super::title(planner).replace('*', "\\*")
 }
 
 /// Three digits or so, thousands as in the paper.
-fn number(x: f64) -> String {
+pub(super) fn number(x: f64) -> String {
     match x {
         0.0 => "0".to_owned(),
         x if x < 1.0 => format!("{x:.3}"),
@@ -296,7 +301,7 @@ fn number(x: f64) -> String {
     }
 }
 
-fn optional<T>(value: Option<T>, text: impl Fn(T) -> String) -> String {
+pub(super) fn optional<T>(value: Option<T>, text: impl Fn(T) -> String) -> String {
     value.map_or_else(|| "–".to_owned(), text)
 }
 
@@ -305,26 +310,30 @@ fn bold(text: String, yes: bool) -> String {
 }
 
 /// Names come from folders: no sign of theirs may end a cell.
-fn cell(name: &str) -> String {
+pub(super) fn cell(name: &str) -> String {
     name.replace('|', "\\|").replace('\n', " ")
 }
 
 /// A table in Markdown.
-struct Table {
+pub(super) struct Table {
     header: Vec<String>,
     rows: Vec<Vec<String>>,
 }
 
 impl Table {
-    fn new<S: ToString>(header: &[S]) -> Self {
+    pub(super) fn new<S: ToString>(header: &[S]) -> Self {
         Self { header: header.iter().map(S::to_string).collect(), rows: Vec::new() }
     }
 
-    fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.rows.push(cells.into_iter().collect());
     }
 
-    fn render(&self) -> String {
+    pub(super) fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    pub(super) fn render(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         let rule = format!("|{}\n", "---|".repeat(self.header.len()));
         let rows: String = self.rows.iter().map(|r| line(r)).collect();

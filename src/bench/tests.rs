@@ -13,6 +13,7 @@ pub(super) fn record(problem: (&str, usize), planner: &str, end: End) -> Record 
     let (simulations, path_time_s, total_time_s) = end.unwrap_or((1, 1.0, 1.0));
     Record {
         assembly: problem.0.to_owned(),
+        rotation: 0,
         parts: problem.1,
         category: Category::of(problem.1).name().to_owned(),
         planner: planner.to_owned(),
@@ -39,6 +40,7 @@ pub(super) fn record(problem: (&str, usize), planner: &str, end: End) -> Record 
             actions: "paper".to_owned(),
             dbg: "sliding".to_owned(),
             sweeps: false,
+            seed: 0,
             threads: 0,
             jobs: 1,
             processors: 2,

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use nalgebra::{Quaternion, UnitQuaternion};
 
 use crate::bench::{self, ENGINES, PARTS, PLANNERS, Shard};
 use crate::blocking_graph::StaticAnalysis;
@@ -42,6 +43,10 @@ pub(super) enum Command {
 pub(super) struct PlanArguments {
     /// A folder of OBJ and STL files in assembled pose, one such file, or a glTF or GLB scene
     pub(super) assembly: PathBuf,
+    /// Turn the assembly by the quaternion W,X,Y,Z about the origin before anything else; the plan
+    /// is that of the turned assembly, in its frame
+    #[arg(long, value_name = "W,X,Y,Z", value_parser = rotation, allow_hyphen_values = true)]
+    pub(super) rotate: Option<UnitQuaternion<f64>>,
     /// Write the plan there as JSON (contract sbdp-plan/1); `-` writes it to stdout in place of the table
     #[arg(long, value_name = "FILE")]
     pub(super) json: Option<PathBuf>,
@@ -182,6 +187,15 @@ pub(super) struct BenchRun {
     /// Run only the K-th of N parts of the corpus, as 2/8; `bench report` puts them together
     #[arg(long, value_name = "K/N")]
     pub(super) shard: Option<Shard>,
+    /// Leave out assemblies of more parts
+    #[arg(long, value_name = "N")]
+    pub(super) parts_up_to: Option<usize>,
+    /// Run every assembly as it is, and then under so many random rotations of its own
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    pub(super) rotations: u32,
+    /// Which rotations: the same seed gives the same ones
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    pub(super) seed: u64,
     /// Runs at a time; more than one disturb each other's times
     #[arg(long, value_name = "N", default_value = "1")]
     pub(super) jobs: NonZeroUsize,
@@ -360,6 +374,15 @@ fn seconds(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(seconds).map_err(|_| "not a number of seconds from 0 on".to_owned())
 }
 
+fn rotation(text: &str) -> Result<UnitQuaternion<f64>, String> {
+    let wrong = || "not four numbers W,X,Y,Z of which one is not 0".to_owned();
+    let numbers: Vec<f64> = text.split(',').map(str::parse).collect::<Result<_, _>>().map_err(|_| wrong())?;
+    let [w, x, y, z] = numbers[..] else { return Err(wrong()) };
+    UnitQuaternion::try_new(Quaternion::new(w, x, y, z), f64::MIN_POSITIVE)
+        .filter(|q| q.coords.iter().all(|c| c.is_finite()))
+        .ok_or_else(wrong)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -413,6 +436,16 @@ mod tests {
             let Command::Bench(bench) = bench.command else { panic!("no benchmark") };
             assert_eq!(bench.run.unwrap().sweeps().asked(), asked, "{flags}");
         }
+    }
+
+    #[test]
+    fn a_rotation_is_a_quaternion_of_any_length() {
+        let half_turn = rotation("0,-2,0,0").unwrap();
+        assert!((half_turn.angle() - std::f64::consts::PI).abs() < 1e-12);
+        for wrong in ["", "1,0,0", "0,0,0,0", "1,0,0,x", "nan,0,0,0", "inf,0,0,1", "1,0,0,0,0"] {
+            assert!(rotation(wrong).is_err(), "{wrong}");
+        }
+        assert!(Arguments::try_parse_from("sbdp plan a --rotate -1,0,0,1".split(' ')).is_ok());
     }
 
     #[test]

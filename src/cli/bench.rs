@@ -82,6 +82,9 @@ fn request(arguments: &BenchRun) -> Request {
         grace: bench::grace(arguments.timeout),
         threads: arguments.threads,
         jobs: arguments.jobs.get(),
+        parts_up_to: arguments.parts_up_to,
+        rotations: arguments.rotations,
+        seed: arguments.seed,
         shard: arguments.shard.unwrap_or(Shard::WHOLE),
         out: arguments.out.clone(),
         program: PathBuf::from(THIS_PROGRAM),
@@ -143,8 +146,9 @@ impl Observer for BenchDisplay {
     fn ran(&mut self, record: &Record, done: usize, left: Option<Duration>) {
         self.solved += usize::from(record.solved());
         let left = left.map_or_else(|| "?".to_owned(), |t| HumanDuration(t).to_string());
-        let Record { assembly, planner, engine, status, wall_time_s, .. } = record;
-        let last = format!("{assembly} {planner} {engine}: {status} after {wall_time_s:.1} s");
+        let Record { assembly, rotation, planner, engine, status, wall_time_s, .. } = record;
+        let turned = if *rotation == 0 { String::new() } else { format!(" rotation {rotation}") };
+        let last = format!("{assembly}{turned} {planner} {engine}: {status} after {wall_time_s:.1} s");
         match &self.bar {
             Some(bar) => {
                 bar.set_position(done as u64);

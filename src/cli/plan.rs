@@ -21,7 +21,10 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     let deadline = arguments.timeout.and_then(|t| Instant::now().checked_add(t));
     let termination = Termination::new(deadline);
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
-    let assembly = load_assembly(&arguments.assembly)?;
+    let mut assembly = load_assembly(&arguments.assembly)?;
+    if let Some(rotation) = &arguments.rotate {
+        assembly.rotate(rotation);
+    }
     let request = request(arguments, &assembly)?;
     let backend = choose_backend(arguments)?;
     let question = Question { assembly: &assembly, request, deadline, termination };

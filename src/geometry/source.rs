@@ -1,5 +1,7 @@
 //! An assembly as it came in, before anything was healed or scaled.
 
+use nalgebra::{Point3, UnitQuaternion};
+
 /// A triangle mesh as given: nothing is known to be valid yet.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SourceMesh {
@@ -31,4 +33,14 @@ pub struct SourceAssembly {
     pub parts: Vec<SourcePart>,
     /// Names of parts that the assembly's own description declares fixed.
     pub fixed: Vec<String>,
+}
+
+impl SourceAssembly {
+    /// Turns all parts together about the origin of the input's frame.
+    pub fn rotate(&mut self, rotation: &UnitQuaternion<f64>) {
+        let matrix = rotation.to_rotation_matrix();
+        for vertex in self.parts.iter_mut().flat_map(|p| &mut p.mesh.vertices) {
+            *vertex = (matrix * Point3::from(*vertex)).coords.into();
+        }
+    }
 }

@@ -151,6 +151,12 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         });
     }
 
+    /// What motions depend on besides their own question: which parts stand and where contact is
+    /// looked for. Changes with both.
+    pub(super) fn version(&self) -> (usize, usize) {
+        (self.removals.len(), self.problem.extra_points.values().map(Vec::len).sum())
+    }
+
     /// Counts one simulation against the budget.
     pub(super) fn charge(&mut self) -> Result<(), Stop> {
         if let Some(most) = self.problem.max_simulations

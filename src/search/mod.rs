@@ -4,13 +4,19 @@
 //! one part after the other), which works on the `disassembly` under way → [`Outcome`].
 //! Everything below the request is in the planning frame.
 
+mod ahead;
 mod directions;
 mod disassembly;
+mod known_states;
+mod linked;
+mod order;
 mod outcome;
 mod pdp;
 mod problem;
 mod report;
 mod request;
+mod rooms;
+mod round;
 mod sbdp;
 mod state;
 mod straight;

@@ -13,9 +13,9 @@ use crate::plan::PlanStatus;
 use crate::simulation::{Action, End, Motion};
 
 use super::disassembly::{Disassembly, Proof, Run, Stop, joined};
+use super::known_states::KnownStates;
 use super::outcome::{BlockedAction, Outcome, Removal};
 use super::problem::{Observer, Problem};
-use super::state::{coarseness, same_state};
 use super::trace::{TraceEvent, TracePhase};
 
 /// Which actions PDP has.
@@ -86,6 +86,19 @@ struct Node {
     /// From the assembled pose on.
     path: Vec<Pose>,
     depth: usize,
+}
+
+/// The search tree of one part.
+struct Tree {
+    nodes: Vec<Node>,
+    known: KnownStates,
+}
+
+impl Tree {
+    fn add(&mut self, node: Node) {
+        self.known.add(self.nodes.len(), node.path[node.path.len() - 1]);
+        self.nodes.push(node);
+    }
 }
 
 /// How the search for one part ended.
@@ -164,16 +177,18 @@ impl Search<'_, '_> {
     /// Breadth-first search for a way out of one part.
     fn search(&mut self, part: usize, limit: usize) -> Result<Found, Stop> {
         let phase = self.phase();
-        let mut tree = vec![Node { path: vec![self.disassembly.assembled(part)], depth: 0 }];
+        let known = KnownStates::new(&self.disassembly.problem.scene, part);
+        let mut tree = Tree { nodes: Vec::new(), known };
+        tree.add(Node { path: vec![self.disassembly.assembled(part)], depth: 0 });
         let (mut next, mut cut) = (0, false);
         let started = Instant::now();
         let too_long = |limit: Duration| started.elapsed() >= limit;
-        while next < tree.len() {
+        while next < tree.nodes.len() {
             if self.disassembly.problem.path_timeout.is_some_and(too_long) {
                 self.disassembly.path_time_ran_out = true;
                 break;
             }
-            if tree[next].depth == limit {
+            if tree.nodes[next].depth == limit {
                 cut = true;
                 break;
             }
@@ -193,8 +208,8 @@ impl Search<'_, '_> {
     }
 
     /// Tries all actions from a node; true if one of them led out.
-    fn expand(&mut self, part: usize, tree: &mut Vec<Node>, at: usize) -> Result<bool, Stop> {
-        let prefix = tree[at].path.clone();
+    fn expand(&mut self, part: usize, tree: &mut Tree, at: usize) -> Result<bool, Stop> {
+        let prefix = tree.nodes[at].path.clone();
         let start = prefix[prefix.len() - 1];
         let window = rayon::current_num_threads();
         let mut action = 0;
@@ -232,28 +247,26 @@ impl Search<'_, '_> {
     }
 
     /// Adds the end of a motion to the tree, unless it is there.
-    fn grow(&mut self, tree: &mut Vec<Node>, at: usize, run: &Run, action: usize, motion: Motion) {
+    fn grow(&mut self, tree: &mut Tree, at: usize, run: &Run, action: usize, motion: Motion) {
         let Motion { path, end } = motion;
         let (word, with) = match end {
             End::Collision { with } => ("collision", with),
             End::Undecided { touched, .. } => ("undecided", touched),
             End::Disassembled(_) => ("disassembled", Vec::new()),
         };
-        let scene = &self.disassembly.problem.scene;
-        let coarse = coarseness(tree.len());
-        let reached = path[path.len() - 1];
-        let is_new =
-            !tree.iter().any(|n| same_state(scene, run.part, &n.path[n.path.len() - 1], &reached, coarse));
-        self.disassembly.trace_simulation(at, run, word, &with, path.len(), is_new.then_some(tree.len()));
-        if tree[at].depth == 0 {
+        let is_new = !tree.known.has_like(&path[path.len() - 1], |_| true);
+        let leads_to = is_new.then_some(tree.nodes.len());
+        self.disassembly.trace_simulation(at, run, word, &with, path.len(), leads_to);
+        if tree.nodes[at].depth == 0 {
             let list = &mut self.stopped_by[run.part];
             list.retain(|(a, _)| *a != action);
             list.push((action, with));
         }
         if is_new {
             self.states += 1;
-            let (path, depth) = (joined(&tree[at].path, &path), tree[at].depth + 1);
-            tree.push(Node { path, depth });
+            let from = &tree.nodes[at];
+            let (path, depth) = (joined(&from.path, &path), from.depth + 1);
+            tree.add(Node { path, depth });
         }
     }
 

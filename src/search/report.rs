@@ -4,26 +4,42 @@ use crate::blocking_graph::Blockage;
 
 use super::outcome::BlockedAction;
 use super::sbdp::Search;
-use super::state::{Phase, coarseness};
+use super::state::Phase;
 use super::trace::{BlockedBy, TraceEvent};
+
+/// What stands for every action where parts are linked.
+const LINKED: &str = "any";
 
 impl Search<'_, '_> {
     /// What was tried before the search gave up.
     pub(super) fn evidence(&self) -> String {
         let (problem, standing) = (&self.disassembly.problem, self.disassembly.everything.standing());
         let stuck = problem.wanted(standing);
-        let most = stuck.iter().map(|&p| self.states_of[p]).max().unwrap_or(0);
-        let coarse = coarseness(most);
+        let linked = stuck.iter().filter(|p| self.linked_with(**p).is_some()).count();
+        let mut found = Vec::new();
+        if linked > 0 {
+            found.push(format!(
+                "{linked} of them are linked with others, as links of a chain, which no motion undoes (linking \
+                 numbers of curves on their surfaces)"
+            ));
+        }
+        if linked < stuck.len() {
+            found.push(self.exhausted(&stuck));
+        }
+        let (stuck, all) = (stuck.len(), problem.present.len());
+        format!("{stuck} of {all} parts cannot leave one at a time: {}", found.join("; of the others, "))
+    }
+
+    fn exhausted(&self, stuck: &[usize]) -> String {
+        let most = stuck.iter().map(|&p| self.known[p].len()).max().unwrap_or(0);
+        let coarse = self.coarsest(most);
         format!(
-            "{} of {} parts cannot leave one at a time: every state reached was expanded with {} translations \
-             and {} actions with rotational freedom ({} states in all, told apart at {:.3} of the longest side \
-             and {:.1} rad){}",
-            stuck.len(),
-            problem.present.len(),
+            "every state reached was expanded with {} translations and {} actions with rotational freedom ({} \
+             states in all, told apart at {:.3} of the longest side and {:.1} rad){}",
             self.translations.len(),
             self.rotations.len(),
             self.disassembly.counters.states,
-            0.05 * coarse / problem.scene.longest_side,
+            0.05 * coarse / self.disassembly.problem.scene.longest_side,
             0.5 * coarse,
             if self.guided { ", also where static analysis saw no way" } else { "" },
         )
@@ -34,6 +50,11 @@ impl Search<'_, '_> {
         let wanted = self.disassembly.problem.wanted(self.disassembly.everything.standing());
         let mut out = Vec::new();
         for node in self.nodes.iter().filter(|n| n.alive && n.is_root() && wanted.contains(&n.part)) {
+            out.extend(self.linked_with(node.part).map(|by| BlockedAction {
+                part: node.part,
+                action: LINKED.to_owned(),
+                by: vec![by],
+            }));
             for phase in [Phase::Translation, Phase::Rotation] {
                 let Some(b) = node.blockage(phase) else { continue };
                 out.extend(self.edges(phase, b).map(|BlockedBy { action, parts }| BlockedAction {

@@ -9,21 +9,26 @@
 //! ahead in parallel, but their results are taken in the order of the serial algorithm and thrown
 //! away where an earlier one changed the question: plans do not depend on the number of threads.
 
+use std::collections::HashSet;
 use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::blocking_graph::{Blockage, Evaluation, blocked_from, initial_blockages};
+use crate::blocking_graph::{Blockage, blocked_from, initial_blockages};
 use crate::geometry::Pose;
 use crate::simulation::{Action, End, Motion};
 use crate::termination::Interrupt;
 
+use super::ahead::Ahead;
 use super::directions::Directions;
 use super::disassembly::{Disassembly, Proof, Run, Stop, joined};
+use super::known_states::KnownStates;
+use super::linked::Links;
 use super::outcome::Outcome;
 use super::problem::{Observer, Problem};
 use super::request::ActionSet;
-use super::state::{Node, Phase, coarseness, least_travel, same_state};
+use super::round::is_ball;
+use super::state::{Node, Phase, least_travel};
 use super::straight::Swept;
 use super::trace::TraceEvent;
 
@@ -57,13 +62,21 @@ pub(super) struct Search<'a, 'o> {
     pub(super) nodes: Vec<Node>,
     /// Nodes at the assembled pose: the first ones.
     pub(super) roots: usize,
-    pub(super) states_of: Vec<usize>,
-    directions: Directions,
+    /// Of each part.
+    pub(super) known: Vec<KnownStates>,
+    pub(super) directions: Directions,
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
     pub(super) swept: Swept,
+    ahead: Ahead,
+    /// How coarsely two states were taken for one, at most.
+    pub(super) coarsest: f64,
+    /// Which parts are balls, which no action has to turn.
+    pub(super) balls: Vec<bool>,
+    /// Once it was looked which parts are linked.
+    pub(super) links: Option<Links>,
     /// As the paper has it: one open list for translational planning and one for rotational.
-    separate_lists: bool,
+    pub(super) separate_lists: bool,
     translation_passes: usize,
     /// The last resort: actions that static analysis excluded are simulated, too.
     pub(super) distrust_static: bool,
@@ -82,15 +95,23 @@ impl<'a, 'o> Search<'a, 'o> {
         let directions = problem.directions();
         let (translations, rotations) = problem.action_lists(&directions);
         let as_paper = problem.actions == ActionSet::Paper;
+        let scene = &problem.scene;
+        let bodies = scene.bodies.iter().enumerate();
+        let balls =
+            bodies.map(|(p, b)| guided && !as_paper && is_ball(&b.shape, least_travel(scene, p))).collect();
         Self {
             guided,
             nodes: Vec::new(),
             roots: 0,
-            states_of: vec![0; problem.scene.bodies.len()],
+            known: (0..problem.scene.bodies.len()).map(|p| KnownStates::new(&problem.scene, p)).collect(),
             directions,
             translations,
             rotations,
             swept: Swept::default(),
+            ahead: Ahead::default(),
+            coarsest: 1.0,
+            balls,
+            links: None,
             separate_lists: as_paper,
             translation_passes: if as_paper { 1 } else { TRANSLATION_PASSES },
             distrust_static: false,
@@ -153,6 +174,7 @@ impl<'a, 'o> Search<'a, 'o> {
                     translation: Some(blockage),
                     rotation: Blockage::open(self.rotations.len()),
                     origin: None,
+                    novelty: 0.0,
                     alive: true,
                 });
                 self.trace_analysis(self.nodes.len() - 1);
@@ -163,7 +185,7 @@ impl<'a, 'o> Search<'a, 'o> {
     }
 
     fn add_node(&mut self, node: Node) {
-        self.states_of[node.part] += 1;
+        self.known[node.part].add(self.nodes.len(), *node.pose());
         self.disassembly.counters.states += 1;
         self.nodes.push(node);
     }
@@ -188,9 +210,17 @@ impl<'a, 'o> Search<'a, 'o> {
                 open = self.expandable(phase);
                 continue;
             }
+            // Before the first simulation: what leaves straight is out.
+            if self.find_links() {
+                open = self.expandable(phase);
+                continue;
+            }
             let batch = self.extract(phase, &mut open);
             let result = self.expand(phase, &batch)?;
             gain.new_states |= result.new_states;
+            if result.new_states && self.turns_by_action(phase) {
+                return Ok(gain);
+            }
             if result.removed {
                 gain.removed = true;
                 self.take_free_parts()?;
@@ -201,28 +231,6 @@ impl<'a, 'o> Search<'a, 'o> {
             }
         }
         Ok(gain)
-    }
-
-    /// The states to expand, the initial one included. Of two last parts it is the same which one
-    /// moves against the other: beyond the first push, only the smaller one does.
-    fn expandable(&self, phase: Phase) -> Vec<usize> {
-        let standing = self.disassembly.everything.standing();
-        let problem = &self.disassembly.problem;
-        let still = match standing[..] {
-            [a, b] if !self.separate_lists && problem.may_move(a) && problem.may_move(b) => {
-                let reach = |p: usize| problem.scene.bodies[p].shape.reach;
-                Some(if reach(a) < reach(b) { b } else { a })
-            }
-            _ => None,
-        };
-        let skipped = |n: &Node| Some(n.part) == still && (phase == Phase::Rotation || !n.is_root());
-        let wanted = |n: &Node| n.alive && self.lists(phase, n) && !skipped(n);
-        (0..self.nodes.len()).filter(|&i| wanted(&self.nodes[i])).collect()
-    }
-
-    /// Whether a state is in the list of a kind of planning.
-    fn lists(&self, phase: Phase, node: &Node) -> bool {
-        !self.separate_lists || node.origin.is_none_or(|(_, by, _)| by == phase)
     }
 
     /// Static analysis of displaced states that have none yet.
@@ -262,70 +270,34 @@ impl<'a, 'o> Search<'a, 'o> {
         Ok(())
     }
 
-    /// Takes the best displaced state off the open list, or else the initial state, which comes
-    /// last (its f_c and f_a count as infinite) and stands for all its parts in their order.
-    /// Without guidance the first comes first: the initial state, then displaced ones by age.
-    fn extract(&mut self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
-        let displaced = open.iter().copied().filter(|&i| !self.nodes[i].is_root());
-        let next = if self.guided {
-            displaced.min_by_key(|&i| (self.evaluation(phase, i), i))
-        } else {
-            open.first().copied().filter(|&i| !self.nodes[i].is_root())
-        };
-        let batch = match next {
-            Some(best) => {
-                open.retain(|&i| i != best);
-                vec![best]
-            }
-            None => self.ordered_roots(phase, open),
-        };
-        for &i in &batch {
-            self.trace_expansion(phase, i);
-        }
-        batch
-    }
-
-    pub(super) fn ordered_roots(&self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
-        let (mut roots, rest) = open.iter().partition::<Vec<usize>, _>(|&&i| self.nodes[i].is_root());
-        *open = rest;
-        if !self.guided {
-            return roots;
-        }
-        // Before anything was turned, what stops pushes tells which part is least held; among
-        // equals the smallest is the likeliest fastener and the cheapest to simulate.
-        let other = |i: usize| self.nodes[i].blockage(Phase::Translation).map(Blockage::evaluation);
-        let reach =
-            |i: usize| self.disassembly.problem.scene.bodies[self.nodes[i].part].shape.reach.to_bits();
-        roots.sort_by_key(|&i| match phase {
-            Phase::Translation => (self.evaluation(phase, i), None, 0, i),
-            Phase::Rotation => (self.evaluation(phase, i), other(i), reach(i), i),
-        });
-        roots
-    }
-
-    pub(super) fn evaluation(&self, phase: Phase, node: usize) -> Evaluation {
-        let none = Evaluation { colliding_parts: 0, open_actions: 0 };
-        self.nodes[node].blockage(phase).map_or(none, Blockage::evaluation)
-    }
-
     /// Simulates the open actions of some states of one priority, in order.
     fn expand(&mut self, phase: Phase, batch: &[usize]) -> Result<Gain, Stop> {
         let count = self.actions(phase).len();
         let mut jobs: Vec<Job> =
             batch.iter().flat_map(|&node| (0..count).map(move |action| Job { node, action })).collect();
-        if phase == Phase::Rotation && self.guided && !self.separate_lists {
+        let by_action = self.turns_by_action(phase);
+        if by_action {
             jobs.sort_by_cached_key(|job| self.promise(*job));
         }
         let mut gain = Gain::default();
         let mut next = 0;
+        let mut expanded = HashSet::new();
         while next < jobs.len() {
             let (window, end) = self.window(phase, &jobs, next);
             next = end;
-            let runs: Vec<Run> = window.iter().map(|job| self.run_of(phase, *job)).collect();
-            let motions = self.disassembly.simulate(&runs)?;
-            for (job, motion) in window.into_iter().zip(motions) {
+            let mut motions = self.simulated(phase, &window)?.into_iter();
+            while let Some((job, motion)) = motions.next() {
+                if by_action && expanded.insert(job.node) {
+                    self.trace_expansion(phase, job.node);
+                }
                 self.disassembly.charge()?;
-                if self.take(phase, job, motion, &mut gain)? {
+                let changed = self.take(phase, job, motion, &mut gain)?;
+                // Where turning led a part is looked at before it is turned on, or another part is.
+                let look_there = by_action && gain.new_states;
+                if look_there && !changed {
+                    motions.by_ref().for_each(|(job, motion)| self.ahead.keep(phase, job, motion));
+                }
+                if look_there || changed {
                     // Later results of this window answer a question that has changed.
                     next = jobs
                         .iter()
@@ -336,25 +308,21 @@ impl<'a, 'o> Search<'a, 'o> {
             }
             // What a part that was turned out leaves free mostly leaves straight: pushes first.
             let pushes_first = phase == Phase::Rotation && gain.removed && !self.separate_lists;
-            if self.disassembly.is_done() || pushes_first {
+            if self.disassembly.is_done() || pushes_first || (by_action && gain.new_states) {
                 break;
             }
         }
         Ok(gain)
     }
 
-    /// Of actions that may turn a part, those first that pull it along its own axis, over all parts;
-    /// of these, those that fewer parts stand against, as far as pushes tell. Smaller is better.
-    fn promise(&self, job: Job) -> (bool, usize) {
-        let node = &self.nodes[job.node];
-        let action = self.rotations[job.action];
-        let Action::Screw(axis, ..) = action else { return (true, 0) };
-        if !self.directions.is_own(node.part, axis) {
-            return (true, 0);
-        }
-        let push = self.translations.iter().position(|t| t.force() == action.force());
-        let against = |b: &Blockage| push.map_or(0, |push| b.blockers(push).len());
-        (false, node.translation.as_ref().map_or(0, against))
+    /// The motions of some jobs, in order, up to the first that leads out.
+    fn simulated(&mut self, phase: Phase, window: &[Job]) -> Result<Vec<(Job, Motion)>, Stop> {
+        let ahead = self.ahead.valid_at(self.disassembly.version());
+        let todo: Vec<Job> = window.iter().copied().filter(|job| !ahead.has(phase, *job)).collect();
+        let runs: Vec<Run> = todo.iter().map(|job| self.run_of(phase, *job)).collect();
+        let mut fresh = self.disassembly.simulate(&runs)?.into_iter();
+        let mut known = |job: &Job| Some((*job, self.ahead.take(phase, *job).or_else(|| fresh.next())?));
+        Ok(window.iter().map_while(&mut known).collect())
     }
 
     pub(super) fn run_of(&self, phase: Phase, job: Job) -> Run {
@@ -405,7 +373,7 @@ impl<'a, 'o> Search<'a, 'o> {
             End::Collision { with } => ("collision", with),
             End::Undecided { touched, .. } => ("undecided", touched),
         };
-        let is_new = path.last().is_some_and(|end| self.is_new_state(phase, run.part, end));
+        let is_new = path.last().copied().is_some_and(|end| self.is_new_state(phase, run.part, &end));
         let leads_to = is_new.then_some(self.nodes.len() + 1 - self.roots);
         let from = self.state(job.node);
         self.disassembly.trace_simulation(from, &run, word, &by, path.len(), leads_to);
@@ -415,18 +383,11 @@ impl<'a, 'o> Search<'a, 'o> {
             let path = joined(&self.nodes[job.node].path, &path);
             let rotation = Blockage::open(self.rotations.len());
             let origin = Some((job.node, phase, job.action));
-            self.add_node(Node { part: run.part, path, translation: None, rotation, origin, alive: true });
+            let novelty = self.known[run.part].novelty(&path[path.len() - 1]);
+            let (part, translation) = (run.part, None);
+            self.add_node(Node { part, path, translation, rotation, origin, novelty, alive: true });
         }
         Ok(false)
-    }
-
-    /// Whether no state of this part is like a pose (the paper's rmd).
-    fn is_new_state(&self, phase: Phase, part: usize, pose: &Pose) -> bool {
-        let coarse = coarseness(self.states_of[part]);
-        let scene = &self.disassembly.problem.scene;
-        let listed = |n: &&Node| n.alive && n.part == part && self.lists(phase, n);
-        let known = |n: &Node| same_state(scene, part, n.pose(), pose, coarse);
-        !self.nodes.iter().filter(listed).any(known)
     }
 
     fn block(&mut self, phase: Phase, job: Job, by: Vec<usize>) {

@@ -6,15 +6,14 @@ use crate::simulation::Scene;
 
 use super::trace::TracePhase;
 
-/// Resolution at which two states of a part count as the same (the paper's rmd).
+/// The travel at which two states of a part count as the same (the paper's rmd).
 const TRANSLATION: f64 = 0.05;
-const ROTATION: f64 = 0.5;
 /// States of one part after which the resolution is halved, and again after as many more: where
 /// there is much free play, states multiply without end.
 const STATES_PER_LEVEL: usize = 3;
 
 /// Translation without, or rotation with, freedom to turn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Phase {
     Translation,
     Rotation,
@@ -41,6 +40,8 @@ pub(super) struct Node {
     pub(super) rotation: Blockage,
     /// Parent node and action, unless assembled.
     pub(super) origin: Option<(usize, Phase, usize)>,
+    /// How far it is from the part's states known before, in units of the resolution; 0 assembled.
+    pub(super) novelty: f64,
     /// False once its part is gone or its path was refuted.
     pub(super) alive: bool,
 }
@@ -79,11 +80,4 @@ pub fn least_travel(scene: &Scene, part: usize) -> f64 {
 /// How coarse a part's states are told apart once it has `states` of them: a factor.
 pub(super) fn coarseness(states: usize) -> f64 {
     2f64.powi((states / STATES_PER_LEVEL).min(10) as i32)
-}
-
-/// Whether two poses of a part are the same state.
-pub(super) fn same_state(scene: &Scene, part: usize, a: &Pose, b: &Pose, coarseness: f64) -> bool {
-    let centre = scene.bodies[part].shape.mass.centre;
-    (a * centre - b * centre).norm() < least_travel(scene, part) * coarseness
-        && a.rotation.angle_to(&b.rotation) < ROTATION * coarseness
 }

@@ -76,14 +76,9 @@ impl Search<'_, '_> {
     /// In the order of expansion: displaced states first, then all parts as assembled.
     fn jobs_to_sweep(&self, open: &[usize]) -> Vec<Job> {
         let phase = Phase::Translation;
-        let mut rest = open.to_vec();
-        let roots = self.ordered_roots(phase, &mut rest);
-        if self.guided {
-            rest.sort_by_cached_key(|&i| (self.evaluation(phase, i), i));
-        }
         let actions = 0..self.translations.len();
-        let nodes = rest.into_iter().chain(roots);
-        nodes.flat_map(|node| actions.clone().map(move |action| Job { node, action })).collect()
+        let nodes = self.ranked(phase, open.to_vec());
+        nodes.into_iter().flat_map(|node| actions.clone().map(move |action| Job { node, action })).collect()
     }
 
     fn is_known_blocked(&self, job: &Job) -> bool {

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::*;
 use crate::blocking_graph::StaticAnalysis;
-use crate::fixtures::{cells, scene};
+use crate::fixtures::{cells, cuboid, moved, rod, scene, tube};
 use crate::geometry::SourceMesh;
 use crate::plan::{PlanStatus, Verifier};
 use crate::simulation::{Scene, SlidingEngine};
@@ -148,6 +148,74 @@ fn the_worked_example_runs_as_in_the_paper() {
     );
     assert_eq!(outcome.remaining, [BOLT]);
     assert_eq!(outcome.removals[1].waited_for, [PIN]);
+}
+
+/// Plans two parts with the extended actions.
+fn pair(parts: [SourceMesh; 2]) -> Outcome {
+    let (scene, verifier) = scene(parts);
+    let problem = Problem {
+        present: vec![0, 1],
+        actions: ActionSet::Extended,
+        sweeps: true,
+        // Far more than any of them needs.
+        max_simulations: Some(1000),
+        ..problem(scene, &verifier)
+    };
+    search(Planner::SbdpStar, problem, &mut Recorder::default())
+}
+
+/// A covered channel that runs to and fro in `rows` rows, each nine cells long and one apart from
+/// the next, and in its first cell a cube that leaves at the end of the last one.
+fn serpentine(rows: usize) -> [SourceMesh; 2] {
+    const LENGTH: usize = 9;
+    let cell = 9.45 / (LENGTH + 2).max(2 * rows + 1) as f64;
+    let lines = |count: usize| (0..=count).map(|i| i as f64 * cell).collect::<Vec<_>>();
+    let (x, y, z) = (lines(LENGTH + 2), lines(2 * rows + 1), lines(3));
+    let is_right_end = |row: usize| row.is_multiple_of(2);
+    let is_channel = |x: usize, y: usize| {
+        let within = (1..=LENGTH).contains(&x);
+        if y % 2 == 1 {
+            let exit = if is_right_end(rows - 1) { LENGTH + 1 } else { 0 };
+            within || (y == 2 * rows - 1 && x == exit)
+        } else {
+            (2..2 * rows).contains(&y) && x == if is_right_end(y / 2 - 1) { LENGTH } else { 1 }
+        }
+    };
+    let maze = cells([&x, &y, &z], |[x, y, z]| z != 1 || !is_channel(x, y));
+    let (lo, hi) = (cell + 0.02, 2.0 * cell - 0.02);
+    [maze, cuboid([lo; 3], [hi; 3])]
+}
+
+#[test]
+fn no_maze_has_too_many_moves() {
+    for rows in [3, 10] {
+        let outcome = pair(serpentine(rows));
+        assert_eq!(outcome.status, PlanStatus::Complete, "{rows} rows: {:?}", outcome.reason);
+    }
+}
+
+/// Two rings in one another, or beside each other.
+fn rings(apart: f64) -> [SourceMesh; 2] {
+    let ring = || tube(1.5, 2.0, [-0.25, 0.25], 24);
+    let turn = nalgebra::UnitQuaternion::from_euler_angles(std::f64::consts::FRAC_PI_2, 0.0, 0.0);
+    let pose = crate::geometry::Pose::from_parts(nalgebra::Translation3::new(apart, 0.1, 0.0), turn);
+    [ring(), moved(ring(), &pose)]
+}
+
+#[test]
+fn linked_rings_are_proved_never_to_come_apart() {
+    let outcome = pair(rings(1.75));
+    assert_eq!((outcome.status, outcome.counters.simulations), (PlanStatus::Infeasible, 0));
+    assert!(outcome.reason.unwrap().contains("linked"));
+    let blocked: Vec<_> = outcome.blocked.iter().map(|b| (b.part, b.by.as_slice())).collect();
+    assert!(blocked.contains(&(0, &[1])) && blocked.contains(&(1, &[0])), "{blocked:?}");
+}
+
+#[test]
+fn what_only_looks_linked_comes_apart() {
+    assert_eq!(pair(rings(4.2)).status, PlanStatus::Complete, "beside each other");
+    let through = [tube(1.5, 2.0, [-3.0, 3.0], 24), rod(1.0, [-3.5, 3.5], 24)];
+    assert_eq!(pair(through).status, PlanStatus::Complete, "a rod has no hole");
 }
 
 #[test]

@@ -197,7 +197,8 @@ impl Boxes {
     }
 }
 
-/// A link of a chain along x as an OBJ file: a torus, flat or upright by turns.
+/// A link of a chain along x as an OBJ file: a torus, flat or upright by turns. It is cut open, by less
+/// than it is thick: then nothing but a long search shows that the chain does not come apart.
 pub fn ring(link: u32) -> String {
     const AROUND: u32 = 24;
     const ACROSS: u32 = 12;
@@ -210,12 +211,14 @@ pub fn ring(link: u32) -> String {
         let (y, z) = if link.is_multiple_of(2) { (across, off) } else { (-off, across) };
         text += &format!("v {x} {y} {z}\n");
     }
-    for (i, j) in (0..AROUND).flat_map(|i| (0..ACROSS).map(move |j| (i, j))) {
+    for (i, j) in (0..AROUND - 1).flat_map(|i| (0..ACROSS).map(move |j| (i, j))) {
         let vertex = |i: u32, j: u32| 1 + (i % AROUND) * ACROSS + j % ACROSS;
         let (a, b, c, d) = (vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1));
         text += &format!("f {a} {b} {c} {d}\n");
     }
-    text
+    let end = |i: u32| (1..=ACROSS).map(move |j| (i * ACROSS + j).to_string());
+    let (first, last) = (end(0).rev().collect::<Vec<_>>(), end(AROUND - 1).collect::<Vec<_>>());
+    text + &format!("f {}\nf {}\n", first.join(" "), last.join(" "))
 }
 
 /// Plans to the end; the steps' parts and the summary.

@@ -1,0 +1,131 @@
+//! The states of a part, to be asked whether a pose is among them (the paper's rmd).
+//!
+//! A hash grid over where the centre of mass stands, as wide as the resolution: what is alike lies
+//! in the same cell or in one of the 26 around it. Cells are as coarse as the states are told
+//! apart; when that changes the grid is made anew, which happens ten times at most.
+
+use std::collections::HashMap;
+
+use nalgebra::Point3;
+
+use crate::geometry::Pose;
+use crate::simulation::Scene;
+
+use super::state::{coarseness, least_travel};
+
+/// The rotation at which two states of a part count as the same (the paper's rmd).
+const ROTATION: f64 = 0.5;
+
+/// States of one part, by numbers that their owner gives.
+#[derive(Debug)]
+pub(super) struct KnownStates {
+    centre: Point3<f64>,
+    least_travel: f64,
+    /// Width of a cell, as a multiple of the least travel.
+    coarseness: f64,
+    states: Vec<(usize, Pose)>,
+    /// Indices into `states`.
+    cells: HashMap<[i64; 3], Vec<usize>>,
+}
+
+impl KnownStates {
+    pub(super) fn new(scene: &Scene, part: usize) -> Self {
+        Self {
+            centre: scene.bodies[part].shape.mass.centre,
+            least_travel: least_travel(scene, part),
+            coarseness: coarseness(0),
+            states: Vec::new(),
+            cells: HashMap::new(),
+        }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.states.len()
+    }
+
+    pub(super) fn add(&mut self, number: usize, pose: Pose) {
+        self.cells.entry(self.cell(&pose)).or_default().push(self.states.len());
+        self.states.push((number, pose));
+        if coarseness(self.len()) != self.coarseness {
+            self.coarseness = coarseness(self.len());
+            self.cells.clear();
+            for (i, (_, pose)) in self.states.iter().enumerate() {
+                self.cells.entry(self.cell(pose)).or_default().push(i);
+            }
+        }
+    }
+
+    /// Whether one of the states is like a pose, as coarsely as so many states are told apart; only
+    /// those count whose number `counts`.
+    pub(super) fn has_like(&self, pose: &Pose, counts: impl Fn(usize) -> bool) -> bool {
+        let [x, y, z] = self.cell(pose);
+        let around = |c: i64| c.saturating_sub(1)..=c.saturating_add(1);
+        let cells = around(x).flat_map(|x| around(y).flat_map(move |y| around(z).map(move |z| [x, y, z])));
+        let listed = cells.filter_map(|cell| self.cells.get(&cell)).flatten();
+        let mut states = listed.map(|&i| &self.states[i]);
+        states.any(|(number, known)| self.alike(known, pose, self.coarseness) && counts(*number))
+    }
+
+    /// How far a pose is from the nearest state, in units of the resolution: infinite if there is none.
+    pub(super) fn novelty(&self, pose: &Pose) -> f64 {
+        let distance = |known: &Pose| {
+            let travel = (known * self.centre - pose * self.centre).norm() / self.least_travel;
+            travel + known.rotation.angle_to(&pose.rotation) / ROTATION
+        };
+        self.states.iter().map(|(_, known)| distance(known)).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The states whose number `counts`.
+    pub(super) fn poses(&self, counts: impl Fn(usize) -> bool) -> impl Iterator<Item = Pose> {
+        self.states.iter().filter(move |(number, _)| counts(*number)).map(|(_, pose)| *pose)
+    }
+
+    /// Whether two poses are the same state at a multiple of the resolution.
+    pub(super) fn alike(&self, a: &Pose, b: &Pose, coarseness: f64) -> bool {
+        (a * self.centre - b * self.centre).norm() < self.least_travel * coarseness
+            && a.rotation.angle_to(&b.rotation) < ROTATION * coarseness
+    }
+
+    fn width(&self) -> f64 {
+        self.least_travel * self.coarseness
+    }
+
+    fn cell(&self, pose: &Pose) -> [i64; 3] {
+        (pose * self.centre).coords.map(|x| (x / self.width()).floor() as i64).into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Vector3};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::fixtures::{block_on_plate, scene};
+
+    /// The answer is that of going through all states one by one.
+    #[test]
+    fn the_grid_answers_as_a_scan_does() {
+        let (scene, _) = scene(block_on_plate());
+        let centre = scene.bodies[0].shape.mass.centre;
+        let pose = |p: &[f64; 6]| {
+            Isometry3::new(Vector3::new(p[0], p[1], p[2]), Vector3::new(p[3], p[4], p[5]) * 3.0)
+        };
+        let poses = |most| prop::collection::vec(prop::array::uniform6(-0.4..0.4f64), 1..most);
+        proptest!(|(states in poses(40), asked in poses(20), left_out in 0..3usize)| {
+            let mut known = KnownStates::new(&scene, 0);
+            for (number, p) in states.iter().enumerate() {
+                known.add(number, pose(p));
+            }
+            let coarse = coarseness(states.len());
+            for p in asked.iter().map(pose) {
+                let like = |q: &Pose| {
+                    (q * centre - p * centre).norm() < least_travel(&scene, 0) * coarse
+                        && q.rotation.angle_to(&p.rotation) < ROTATION * coarse
+                };
+                let scanned = states.iter().enumerate().any(|(i, q)| i % 3 != left_out && like(&pose(q)));
+                prop_assert_eq!(known.has_like(&p, |i| i % 3 != left_out), scanned);
+            }
+        });
+    }
+}

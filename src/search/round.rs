@@ -1,0 +1,27 @@
+//! Balls: parts that turning does not change.
+
+use crate::geometry::Shape;
+
+/// Whether a shape is a ball but for `tolerance`: its whole surface is that far from a sphere about
+/// the centre of mass at most. Turning it is then no motion, at this resolution.
+pub(super) fn is_ball(shape: &Shape, tolerance: f64) -> bool {
+    let (surface, centre) = (&shape.surface, shape.mass.centre);
+    let least = surface.closest(&centre, f64::INFINITY).map_or(0.0, |c| c.distance);
+    // No point is farther than the farthest vertex, none nearer than the nearest of the surface.
+    least > 0.0 && shape.reach - least <= tolerance
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{ball, cuboid, healed, rod};
+
+    #[test]
+    fn balls_are_round_and_dice_are_not() {
+        let shape = |mesh| Shape::new(&healed(mesh));
+        assert!(is_ball(&shape(ball(3)), 0.05));
+        assert!(!is_ball(&shape(ball(0)), 0.05), "an octahedron");
+        assert!(!is_ball(&shape(cuboid([-1.0; 3], [1.0; 3])), 0.05));
+        assert!(!is_ball(&shape(rod(1.0, [-1.0, 1.0], 32)), 0.05));
+    }
+}
