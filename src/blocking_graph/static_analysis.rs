@@ -6,13 +6,10 @@
 //! the wanted motion come to almost nothing, so nothing that could slide is excluded. The relation
 //! is symmetric: p is blocked by o along d exactly if o is blocked by p along −d.
 
-use std::collections::HashMap;
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
-use crate::geometry::{Pose, Shape};
-use crate::simulation::{Action, Scene, pair_blocks};
+use crate::geometry::Pose;
+use crate::simulation::{Action, Scene, alike, pair_blocks};
 use crate::termination::{Interrupt, Termination};
 
 use super::{Blockage, literal};
@@ -77,17 +74,7 @@ pub fn initial_blockages(
     let pairs: Vec<_> =
         pairs.into_iter().map(|(p, o)| if extent(p) <= extent(o) { (p, o) } else { (o, p) }).collect();
     // What holds for one bolt in its nut holds for all that stand alike.
-    let mut groups: HashMap<PairKey, usize> = HashMap::new();
-    let mut first = Vec::new();
-    let group_of: Vec<usize> = pairs
-        .iter()
-        .map(|&(mover, other)| {
-            *groups.entry(PairKey::of(scene, mover, other)).or_insert_with(|| {
-                first.push((mover, other));
-                first.len() - 1
-            })
-        })
-        .collect();
+    let (first, group_of) = alike(scene, &pairs);
     let relations = first
         .par_iter()
         .map(|&(mover, other)| {
@@ -104,36 +91,6 @@ pub fn initial_blockages(
         }
     }
     Ok(out)
-}
-
-/// Pairs with equal keys stand alike: the same shapes at the same relative place, turned alike
-/// against the axes of the actions.
-#[derive(PartialEq, Eq, Hash)]
-struct PairKey {
-    shapes: [*const Shape; 2],
-    rotations: [[i64; 4]; 2],
-    between: [i64; 3],
-    allowance: i64,
-}
-
-impl PairKey {
-    fn of(scene: &Scene, mover: usize, other: usize) -> Self {
-        let bodies = [&scene.bodies[mover], &scene.bodies[other]];
-        // Far finer than contact is measured, far coarser than poses are rounded.
-        let snapped = |x: f64| (x * 1e8).round() as i64;
-        let [a, b] = bodies.map(|body| body.planning_from_shape);
-        Self {
-            shapes: bodies.map(|body| Arc::as_ptr(&body.shape)),
-            rotations: [a, b].map(|pose| {
-                let q = pose.rotation.coords;
-                // A rotation has two quaternions.
-                let sign = q.iter().find(|c| c.abs() > 1e-7).map_or(1.0, |c| c.signum());
-                (q * sign).map(snapped).into()
-            }),
-            between: (b.translation.vector - a.translation.vector).map(snapped).into(),
-            allowance: snapped(scene.allowances.of(mover, other)),
-        }
-    }
 }
 
 /// The blockage of one displaced part among the parts that stand.

@@ -284,7 +284,8 @@ impl Search<'_> {
         let small = swept.radius <= precision.coarse && beyond <= precision.deep / 2.0;
         // Where overlap is granted, facets are in each other's way by as much.
         let rough = *granted > 0.0 && beyond <= precision.deep / 4.0;
-        if real < depth - precision.spare && !(precision.deep.is_finite() && (small || rough)) {
+        let exact = real >= depth - precision.spare.max(NEARLY * depth);
+        if !exact && !(precision.deep.is_finite() && (small || rough)) {
             return false;
         }
         self.found.depth = self.found.depth.max(real - granted);
@@ -352,6 +353,8 @@ impl Search<'_> {
 const ENOUGH: usize = 400;
 /// Pieces that might be too deep are split until they are so much smaller than others.
 const DOUBT: f64 = 4.0;
+/// Depths are told to this share.
+const NEARLY: f64 = 0.03;
 /// Points nearer to the surface than this, in the planning frame, count as on it.
 const SKIN: f64 = 1e-6;
 /// Regions are asked for so much larger than the piece, that others find room.

@@ -10,13 +10,13 @@ use crate::geometry::{Assembly, Shape};
 use crate::plan::Verifier;
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
-use crate::simulation::Scene;
+use crate::simulation::{Scene, alike};
 use crate::termination::{Interrupt, Termination};
 
 /// Overlaps smaller than this share of the longest side are rounding, not modelling.
 const LEAST_OVERLAP: f64 = 1e-6;
-/// Verification refuses paths deeper than this share of the longest side (0.004 where it is 10).
-const DEPTH_LIMIT: f64 = 4e-4;
+/// Verification refuses paths deeper than this share of the longest side (0.002 where it is 10).
+const DEPTH_LIMIT: f64 = 2e-4;
 
 /// An assembly with everything derived from it.
 #[derive(Debug)]
@@ -86,11 +86,13 @@ fn measure_overlaps(
     termination: &Termination,
 ) -> Result<Vec<(usize, usize, f64)>, Interrupt> {
     let pairs = scene.broad_phase.pairs(0.0);
-    let depths = pairs
+    let (first, group_of) = alike(scene, &pairs);
+    let depths = first
         .par_iter()
-        .map(|&(a, b)| Ok((a, b, verifier.assembled_depth(scene, a, b, termination)?)))
+        .map(|&(a, b)| verifier.assembled_depth(scene, a, b, termination))
         .collect::<Result<Vec<_>, Interrupt>>()?;
-    Ok(depths.into_iter().filter(|(_, _, d)| *d > LEAST_OVERLAP * scene.longest_side).collect())
+    let overlaps = pairs.into_iter().zip(group_of).map(|((a, b), group)| (a, b, depths[group]));
+    Ok(overlaps.filter(|(_, _, d)| *d > LEAST_OVERLAP * scene.longest_side).collect())
 }
 
 /// Pairs without a granted overlap that share their inside all the same. It is reported, but not

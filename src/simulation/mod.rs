@@ -8,6 +8,7 @@
 //! Everything here is in the planning frame and knows nothing of search.
 
 mod action;
+mod alike;
 mod broad_phase;
 mod contact;
 mod disassembled;
@@ -23,6 +24,7 @@ mod tests;
 mod transition;
 
 pub use action::{Action, Axis};
+pub use alike::alike;
 pub use broad_phase::BroadPhase;
 pub use disassembled::{HULL_MARGIN, Surroundings, exit_direction};
 pub use hull_tree::HullTree;

@@ -27,7 +27,7 @@ const SIDEWAYS: [Action; 4] = [
 ];
 
 /// Between two samples or two poses of the engine a feature may be a little deeper than there.
-const BETWEEN_SAMPLES: f64 = 1e-4;
+const BETWEEN_SAMPLES: f64 = 2e-4;
 
 /// How far from its course contact may let a part stray: its walls give way by the tolerance.
 fn play(engine: &dyn TransitionFunction) -> f64 {

@@ -12,7 +12,7 @@ use crate::geometry::{Pose, interpolate};
 use super::super::contact::{Contact, Mover, Near, reduced};
 use super::super::projection::{Projected, Row, project};
 use super::super::{Action, Scene};
-use super::DEPTH_TOLERANCE;
+use super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
 
 /// A motion that follows less than this share of the action (cos² of the angle between them) is
 /// stuck.
@@ -22,8 +22,6 @@ const CONTACT_STEP: f64 = 0.12;
 pub(in crate::simulation) const FREE_STEP: f64 = 0.5;
 /// How far the arc of one turning step may bulge from its chord.
 const LARGEST_BULGE: f64 = 1e-3;
-/// A pair may get this much deeper than its allowance half-way through a turning step.
-const BULGE_TOLERANCE: f64 = 2.0 * DEPTH_TOLERANCE;
 /// A free turn is at most so many contact steps long: exits show only at the ends of steps.
 const LONGEST_FREE_TURN: f64 = 4.0;
 const EAGER_ROUNDS: usize = 6;

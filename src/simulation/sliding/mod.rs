@@ -24,6 +24,8 @@ pub use pair::pair_blocks;
 
 /// A pair may get this much deeper than its allowance, in the planning frame.
 pub(super) const DEPTH_TOLERANCE: f64 = 3e-4;
+/// The same half-way between two poses of a motion that turns.
+const BULGE_TOLERANCE: f64 = 2.0 * DEPTH_TOLERANCE;
 /// A motion that is not done after so many poses turns without end.
 const MOST_POSES: usize = 8000;
 
@@ -37,7 +39,7 @@ impl TransitionFunction for SlidingEngine {
     }
 
     fn depth_tolerance(&self) -> f64 {
-        DEPTH_TOLERANCE
+        BULGE_TOLERANCE
     }
 
     fn simulate(
