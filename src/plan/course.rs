@@ -15,6 +15,8 @@ use crate::geometry::{Pose, interpolate};
 
 /// Legs that turn further than this have no hull: they must be split.
 const MOST_TURN: f64 = 0.8;
+/// Legs up to this level are remembered: some thousands.
+const REMEMBERED: u32 = 12;
 /// Legs of more bends than this likewise.
 const MOST_BENDS: usize = 12;
 
@@ -157,7 +159,9 @@ impl<'a> View<'a> {
             return Rc::clone(leg);
         }
         let leg = Rc::new(self.measured(interval));
-        self.legs.insert(interval, Rc::clone(&leg));
+        if interval.level <= REMEMBERED {
+            self.legs.insert(interval, Rc::clone(&leg));
+        }
         leg
     }
 

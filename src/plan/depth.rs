@@ -8,6 +8,9 @@
 //! are split, in space or in time, whichever is longer, and regions are remembered by their place,
 //! for what comes by later. Pieces of the smallest size are measured; their size is added.
 //!
+//! Where facets of two curved surfaces with granted overlap lie across each other, or a sheet in the
+//! middle of another, this takes too long: a count ends it ([`Found::gave_up`]).
+//!
 //! So for closed surfaces the answer is a bound for all points and all times, not for samples (but
 //! for [`FreeRegion`]'s rounding). Surfaces with holes have no outside that a region could be in:
 //! there, only small pieces are settled, by their corners.
@@ -57,6 +60,25 @@ pub(super) struct Found {
     /// Points (frame of the surface asked about) that were measured deeper than
     /// [`Precision::deep`]: all of a path that is good, the first found of one that is bad.
     pub(super) deep: Vec<(Point3<f64>, f64)>,
+    /// How much was looked at: pieces, and regions that were looked for.
+    effort: usize,
+}
+
+/// So much is looked at before a question is given up.
+const MOST_EFFORT: usize = 200_000;
+/// What a region costs, in pieces.
+const REGION_EFFORT: usize = 40;
+
+impl Found {
+    /// Whether the search was given up: then the bound is none.
+    pub(super) fn gave_up(&self) -> bool {
+        self.effort > MOST_EFFORT
+    }
+
+    /// Whether more would not change the answer.
+    fn is_enough(&self) -> bool {
+        self.gave_up() || self.deep.len() >= ENOUGH
+    }
 }
 
 impl Question<'_> {
@@ -122,7 +144,8 @@ impl Search<'_> {
     /// Looks into a node of the tree on a stretch of the way.
     fn patch(&mut self, index: u32, interval: Interval, hint: Hint) -> Result<(), Interrupt> {
         self.termination.check()?;
-        if self.found.deep.len() >= ENOUGH {
+        self.found.effort += 1;
+        if self.found.is_enough() {
             return Ok(());
         }
         let tree = self.asked.tree;
@@ -174,6 +197,10 @@ impl Search<'_> {
         let mut stack = vec![(corners, interval, hint)];
         while let Some((corners, interval, mut hint)) = stack.pop() {
             self.termination.check()?;
+            self.found.effort += 1;
+            if self.found.is_enough() {
+                break;
+            }
             let leg = self.view.leg(interval);
             let (side, longest) = longest_side(&corners);
             let mut in_time = leg.maps.is_empty();
@@ -249,6 +276,7 @@ impl Search<'_> {
         if -signed > most {
             return false;
         }
+        self.found.effort += REGION_EFFORT;
         let Some(region) = self.region(swept, &closest, signed, most) else { return false };
         let fit = fits(&region, most);
         let id = self.regions.len() as u32;
@@ -320,7 +348,7 @@ impl Search<'_> {
         }
         self.found.bound = self.found.bound.max(self.found.depth);
         if swept.radius > self.finest() {
-            return self.found.deep.len() >= ENOUGH;
+            return self.found.is_enough();
         }
         if !self.found.deep.is_empty() {
             return true;
@@ -354,7 +382,7 @@ const ENOUGH: usize = 400;
 /// Pieces that might be too deep are split until they are so much smaller than others.
 const DOUBT: f64 = 4.0;
 /// Depths are told to this share.
-const NEARLY: f64 = 0.03;
+const NEARLY: f64 = 0.1;
 /// Points nearer to the surface than this, in the planning frame, count as on it.
 const SKIN: f64 = 1e-6;
 /// Regions are asked for so much larger than the piece, that others find room.
