@@ -310,16 +310,15 @@ impl Search<'_> {
         let real = -measured.signed(worst, &measured.closest_from(worst, guess));
         let beyond = depth - granted;
         let small = swept.radius <= precision.coarse && beyond <= precision.deep / 2.0;
-        // Where overlap is granted, facets are in each other's way by as much.
-        let rough = *granted > 0.0 && beyond <= precision.deep / 4.0;
         let exact = real >= depth - precision.spare.max(NEARLY * depth);
-        if !exact && !(precision.deep.is_finite() && (small || rough)) {
+        if !exact && !(precision.deep.is_finite() && small) {
             return false;
         }
         self.found.depth = self.found.depth.max(real - granted);
         true
     }
 
+    /// Raises the bound.
     fn settled(&mut self, depth: f64) -> bool {
         self.found.bound = self.found.bound.max(depth - self.asked.granted);
         true
@@ -364,10 +363,10 @@ impl Search<'_> {
         self.settled(asked.granted + bound)
     }
 
-    /// The depth up to which nothing is looked into: it is granted, spared, or found already.
+    /// The depth up to which nothing is looked into: it is granted, spared, or as good as found.
     fn spared(&self) -> f64 {
         let Precision { spare, deep, .. } = self.asked.precision;
-        self.asked.granted + self.found.depth.min(deep).max(spare)
+        self.asked.granted + (self.found.depth * (1.0 + NEARLY)).min(deep).max(spare)
     }
 
     /// The smallest size of pieces, for now.

@@ -22,6 +22,8 @@ use super::sampling::{Samples, turns_far};
 
 /// Depth that is not looked into, as a share of the limit.
 const SPARE: f64 = 1.0 / 16.0;
+/// The same where overlap is granted: facets that lie across each other are deep here and there.
+const SPARE_IN_OVERLAP: f64 = 1.0 / 4.0;
 /// The smallest radius of a piece of surface, likewise.
 const FINEST: f64 = 1.0 / 4.0;
 /// Entries are no closer to each other than this, as a share of the longest side.
@@ -159,7 +161,6 @@ impl Verifier {
             finest: self.limit * FINEST,
             coarse: COARSE * scene.longest_side,
         };
-        let way = Way { part, course: &course, precision };
         let swept = path.iter().fold(Bounds::EMPTY, |b, pose| {
             let c = pose * centre;
             b.union(&Bounds { min: c, max: c })
@@ -174,6 +175,9 @@ impl Verifier {
             .par_iter()
             .map(|&(other, on_moving)| {
                 let granted = allowances.of(part, other);
+                let share = if granted > 0.0 { SPARE_IN_OVERLAP } else { SPARE };
+                let precision = Precision { spare: self.limit * share, ..precision };
+                let way = Way { part, course: &course, precision };
                 self.found(scene, &way, other, on_moving, granted, termination)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
