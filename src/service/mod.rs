@@ -208,9 +208,11 @@ impl Entry {
         let present: Vec<usize> =
             (0..self.assembly.parts.len()).filter(|p| frame.removed.binary_search(p).is_err()).collect();
         let total = present.len() as u32;
-        let limit = prepared.verifier.limit().max(engine.depth_tolerance() + BETWEEN_SAMPLES);
+        // An engine that lets parts overlap by more than is accepted is held to its own word.
+        let soft = engine.depth_tolerance() > prepared.verifier.limit();
+        let limit = if soft { engine.depth_tolerance() + BETWEEN_SAMPLES } else { prepared.verifier.limit() };
         let verifier = prepared.verifier.with_limit(limit);
-        if limit > prepared.verifier.limit() {
+        if soft {
             frame.notes.push(format!(
                 "the engine `{}` lets parts overlap by {:.3e}; paths are verified to that depth",
                 engine.name(),
