@@ -311,7 +311,8 @@ impl Search<'_> {
         let beyond = depth - granted;
         let small = swept.radius <= precision.coarse && beyond <= precision.deep / 2.0;
         let exact = real >= depth - precision.spare.max(NEARLY * depth);
-        if !exact && !(precision.deep.is_finite() && small) {
+        let told = exact || (small && precision.deep.is_finite());
+        if !told {
             return false;
         }
         self.found.depth = self.found.depth.max(real - granted);
