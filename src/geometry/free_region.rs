@@ -10,12 +10,14 @@ use nalgebra::{Point3, Vector3};
 
 use super::surface::NO_TRIANGLE;
 use super::triangle_tree::Visitor;
-use super::{Bounds, Surface, separating_direction};
+use super::{Bounds, Closest, Surface, separating_direction};
 
 /// A surface may reach so far into a region, in the planning frame: rounding of flush faces.
 const TOUCH: f64 = 2e-6;
 /// A point so deep in a region is well inside.
 const INNER: f64 = 2.0 * TOUCH;
+/// Points nearer to the surface than this, in the planning frame, count as on it.
+const SKIN: f64 = 1e-6;
 /// With more planes than this, a region is not worth its tests.
 const MOST_PLANES: usize = 48;
 /// So far towards the seed, as a share of the way, hulls are taken to be apart from what they touch.
@@ -76,6 +78,23 @@ impl FreeRegion {
         None
     }
 
+    /// The planes that bound it: unit normals, which point inside, and heights along them.
+    pub fn planes(&self) -> impl Iterator<Item = (Vector3<f64>, f64)> {
+        self.sides.iter().map(|side| (side.normal, side.height))
+    }
+
+    /// The middle of the ball that it was asked for in.
+    #[must_use]
+    pub fn centre(&self) -> Point3<f64> {
+        self.centre
+    }
+
+    /// The radius of that ball, or as much of it as is free.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
     /// Whether a ball lies inside.
     #[must_use]
     pub fn holds_ball(&self, centre: &Point3<f64>, radius: f64) -> bool {
@@ -85,6 +104,27 @@ impl FreeRegion {
 }
 
 impl Surface {
+    /// A convex region that holds the middle of a ball, or what is outside nearest to that: as
+    /// [`Surface::free_region`]. `closest` is the surface's point nearest to the centre, `signed` its
+    /// signed distance.
+    #[must_use]
+    pub fn free_region_around(
+        &self,
+        centre: &Point3<f64>,
+        radius: f64,
+        (closest, signed): (&Closest, f64),
+        wanted: &[Point3<f64>],
+        most: f64,
+    ) -> Option<FreeRegion> {
+        let seed = if signed > SKIN {
+            *centre
+        } else {
+            let outward = self.pseudo_normal(closest).try_normalize(0.0)?;
+            closest.point + outward * (closest.distance + SKIN)
+        };
+        self.free_region(&seed, radius + most + (seed - centre).norm(), wanted, most)
+    }
+
     /// A convex region around `seed`, within `radius`, that the surface does not enter: `None` if
     /// there is none worth having. If the surface is closed, all of the region is outside. No point of `wanted`, nor the
     /// seed, is further than `most` from any of its sides.

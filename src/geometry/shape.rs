@@ -1,12 +1,12 @@
 //! A distinct mesh with all that is derived from it alone. Equal parts share one.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Point3, Vector3};
 
 use super::hull::hull_vertices;
 use super::samples::sited;
-use super::{Bounds, MassProperties, Mesh, OrientedSamples, SampleTree, Spacing, Surface};
+use super::{Bounds, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Spacing, Surface};
 
 /// A mesh in its own frame (origin at the middle of its box, lengths of the planning frame).
 #[derive(Debug, Clone)]
@@ -23,6 +23,8 @@ pub struct Shape {
     pub mass: MassProperties,
     /// Largest distance of a vertex from the centre of mass.
     pub reach: f64,
+    /// Built when it is asked for.
+    patches: OnceLock<PatchTree>,
 }
 
 impl Shape {
@@ -36,7 +38,13 @@ impl Shape {
         let sited = sited(&surface, &spacing(surface.bounds()));
         let oriented = OrientedSamples::new(&surface, &sited);
         let samples = SampleTree::over(sited.into_iter().map(|(p, _)| p).collect());
-        Self { hull: hull_vertices(surface.vertices()), samples, oriented, mass, reach, surface }
+        let hull = hull_vertices(surface.vertices());
+        Self { hull, samples, oriented, mass, reach, surface, patches: OnceLock::new() }
+    }
+
+    /// The triangles in a tree of patches.
+    pub fn patches(&self) -> &PatchTree {
+        self.patches.get_or_init(|| PatchTree::new(&self.surface))
     }
 
     /// Largest distance of a point of the shape from the line through `centre` along the unit

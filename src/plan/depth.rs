@@ -292,15 +292,9 @@ impl Search<'_> {
 
     /// A region for a piece, around its middle or what is outside nearest to that.
     fn region(&self, swept: &Swept, closest: &Closest, signed: f64, most: f64) -> Option<FreeRegion> {
-        let measured = self.asked.measured;
-        let seed = if signed > SKIN {
-            swept.centre
-        } else {
-            let outward = measured.pseudo_normal(closest).try_normalize(0.0)?;
-            closest.point + outward * (closest.distance + SKIN)
-        };
-        let radius = swept.radius * ROOM + most + (seed - swept.centre).norm();
-        measured.free_region(&seed, radius, &self.wanted, most)
+        let Swept { centre, radius, .. } = swept;
+        let seen = (closest, signed);
+        self.asked.measured.free_region_around(centre, radius * ROOM, seen, &self.wanted, most)
     }
 
     /// Whether a depth is what it is, as measured at the worst corner, or small enough not to matter:
@@ -383,8 +377,6 @@ const ENOUGH: usize = 400;
 const DOUBT: f64 = 4.0;
 /// Depths are told to this share.
 const NEARLY: f64 = 0.1;
-/// Points nearer to the surface than this, in the planning frame, count as on it.
-const SKIN: f64 = 1e-6;
 /// Regions are asked for so much larger than the piece, that others find room.
 const ROOM: f64 = 1.25;
 

@@ -7,7 +7,7 @@
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 
-use crate::geometry::{Pose, interpolate};
+use crate::geometry::{Pose, Shape, interpolate};
 
 use super::super::contact::{Contact, Mover, Near, reduced};
 use super::super::projection::{Projected, Row, project};
@@ -16,7 +16,7 @@ use super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
 
 /// A motion that follows less than this share of the action (cos² of the angle between them) is
 /// stuck.
-const LEAST_SHARE: f64 = 0.05;
+pub(super) const LEAST_SHARE: f64 = 0.05;
 /// Longest contact step and longest step in free space, in the planning frame.
 const CONTACT_STEP: f64 = 0.12;
 pub(in crate::simulation) const FREE_STEP: f64 = 0.5;
@@ -72,12 +72,11 @@ impl Drive {
     pub(super) fn new(scene: &Scene, part: usize, start: &Pose, action: Action) -> Self {
         let shape = &scene.bodies[part].shape;
         let gyration = shape.mass.gyration_squared.sqrt();
-        let smallest = shape.bounds().extents().min();
         let (force, torque) = (action.force(), action.torque());
         // Turning about the torque's axis keeps it the same in the shape.
         let axis = start.rotation.inverse() * torque;
         let radius = shape.radius_about(&shape.mass.centre, &axis);
-        let mut step = (smallest * 0.5).clamp(0.03, CONTACT_STEP);
+        let mut step = contact_step(shape);
         if action.turns() && radius > 0.0 {
             // An arc of this length bulges by s²/8r.
             step = step.min((8.0 * radius * LARGEST_BULGE).sqrt());
@@ -366,6 +365,11 @@ impl Drive {
     }
 }
 
+/// The longest step of a shape in contact.
+pub(super) fn contact_step(shape: &Shape) -> f64 {
+    (shape.bounds().extents().min() * 0.5).clamp(0.03, CONTACT_STEP)
+}
+
 /// What the first projection of a step knows of the contacts; tried in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Start {
@@ -386,7 +390,7 @@ enum Attempt {
 }
 
 /// The parts behind active rows, ascending; rows that hardly push are left out.
-fn others(active: &[(usize, f64)], rows: &[Row]) -> Vec<usize> {
+pub(super) fn others(active: &[(usize, f64)], rows: &[Row]) -> Vec<usize> {
     let strongest = active.iter().map(|(_, m)| *m).fold(0.0, f64::max);
     let mut out: Vec<_> =
         active.iter().filter(|(_, m)| *m > 1e-6 * strongest).map(|(i, _)| rows[*i].other).collect();

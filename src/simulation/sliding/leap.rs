@@ -79,8 +79,7 @@ impl<'a> Leaper<'a> {
         part: usize,
         drive: &'a Drive,
     ) -> Self {
-        let refined = |i: usize| !scene.bodies[i].extra_samples.points().is_empty();
-        let disabled = refined(part) || surroundings.standing.iter().any(|&i| refined(i));
+        let disabled = super::is_refined(scene, surroundings, part);
         Self {
             surroundings,
             drive,

@@ -5,9 +5,11 @@
 //! result (`drive`). In free space the step is the certified clearance; where the projected twist
 //! stays the same, along a wall or a thread, it is followed in long steps (`leap`).
 
+mod cells;
 mod drive;
 mod leap;
 mod pair;
+mod push;
 mod turning;
 
 use crate::geometry::Pose;
@@ -15,8 +17,10 @@ use crate::termination::{Interrupt, Termination};
 
 use super::contact::Mover;
 use super::{Action, End, Motion, Scene, Surroundings, TransitionFunction, exit_direction};
+use cells::Halt;
 use drive::{Drive, Step};
 use leap::Leaper;
+use push::Push;
 use turning::Turning;
 
 pub(super) use drive::FREE_STEP;
@@ -51,6 +55,13 @@ impl TransitionFunction for SlidingEngine {
         action: Action,
         termination: &Termination,
     ) -> Result<Motion, Interrupt> {
+        if let (Action::Push(..), false) = (action, is_refined(scene, surroundings, part)) {
+            match pushed(scene, surroundings, (part, start), action, termination) {
+                Err(Halt::Lost) => {}
+                Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
+                Ok(motion) => return Ok(motion),
+            }
+        }
         let drive = Drive::new(scene, part, start, action);
         let mut mover = Mover::new(scene, part, *start);
         let mut path = vec![*start];
@@ -94,4 +105,35 @@ impl TransitionFunction for SlidingEngine {
         let touched = turning.all_touched;
         Ok(Motion { path, end: End::Undecided { reason: "the motion is too long", touched } })
     }
+}
+
+/// Whether points were found missing around a part: then short steps are the safe ones.
+fn is_refined(scene: &Scene, surroundings: &Surroundings, part: usize) -> bool {
+    let refined = |i: usize| !scene.bodies[i].extra_samples.points().is_empty();
+    refined(part) || surroundings.standing.iter().any(|&i| refined(i))
+}
+
+/// A translation, by regions.
+fn pushed(
+    scene: &Scene,
+    surroundings: &Surroundings,
+    (part, start): (usize, &Pose),
+    action: Action,
+    termination: &Termination,
+) -> Result<Motion, Halt> {
+    let mut push = Push::new(scene, &surroundings.standing, (part, start), action.force(), termination);
+    let mut path = vec![*start];
+    let mut exit = None;
+    while path.len() < MOST_POSES {
+        match push.step()? {
+            push::Step::Stuck { with } => return Ok(Motion { path, end: End::Collision { with } }),
+            push::Step::Moved(pose) => path.push(pose),
+        }
+        if let Some(d) = exit_direction(scene, surroundings, part, &path[path.len() - 1], exit) {
+            return Ok(Motion { path, end: End::Disassembled(d) });
+        }
+        exit = exit.or_else(|| Some(-action.force()));
+    }
+    let reason = "the motion is too long";
+    Ok(Motion { path, end: End::Undecided { reason, touched: Vec::new() } })
 }

@@ -1,0 +1,142 @@
+//! Translations: a shift that follows a force as far as contact lets it, in steps as long as the
+//! regions around the part's surface allow ([`cells`](super::cells)).
+//!
+//! At each shift the force is projected onto the cone that the obstacles leave. Along an obstacle
+//! steps are short, and each begins with the force as it is: where the obstacle ends, the part
+//! follows it again.
+
+use nalgebra::{Vector3, Vector6};
+
+use crate::geometry::{Bounds, Pose};
+use crate::termination::Termination;
+
+use super::super::Scene;
+use super::super::projection::{Row, project};
+use super::cells::{Cells, Halt, Obstacle};
+use super::drive::{FREE_STEP, LEAST_SHARE, contact_step};
+
+/// So many times the direction is bent at one place.
+const MOST_BENDS: usize = 24;
+/// So many steps in succession may be vanishingly short.
+const MOST_STALLS: usize = 16;
+const STALL: f64 = 1e-7;
+/// What leads into an obstacle by less than this is rounding.
+const AGAINST: f64 = 1e-7;
+
+/// A part that is pushed.
+pub(super) struct Push<'a> {
+    scene: &'a Scene,
+    part: usize,
+    start: Pose,
+    standing: &'a [usize],
+    /// The part's box without a shift.
+    bounds: Bounds,
+    force: Vector3<f64>,
+    /// How far it got.
+    shift: Vector3<f64>,
+    cells: Cells<'a>,
+    /// Where the surroundings were asked last.
+    asked_at: Option<Vector3<f64>>,
+    stalls: usize,
+    contact_step: f64,
+}
+
+/// What a step came to.
+pub(super) enum Step {
+    Moved(Pose),
+    Stuck { with: Vec<usize> },
+}
+
+impl<'a> Push<'a> {
+    pub(super) fn new(
+        scene: &'a Scene,
+        standing: &'a [usize],
+        (part, start): (usize, &Pose),
+        force: Vector3<f64>,
+        termination: &'a Termination,
+    ) -> Self {
+        let shape = &scene.bodies[part].shape;
+        Self {
+            scene,
+            part,
+            start: *start,
+            standing,
+            bounds: shape.bounds().transformed(start),
+            force,
+            shift: Vector3::zeros(),
+            cells: Cells::new(termination),
+            asked_at: None,
+            stalls: 0,
+            contact_step: contact_step(shape),
+        }
+    }
+
+    /// One step; `Halt::Lost` where regions cannot tell.
+    pub(super) fn step(&mut self) -> Result<Step, Halt> {
+        let mut obstacles = Vec::new();
+        let mut u = self.force;
+        let mut with = Vec::new();
+        let mut bends = 0;
+        loop {
+            self.look_around(&u, &mut obstacles)?;
+            self.cells.make_way(&self.shift, &u, &mut obstacles)?;
+            if !obstacles.iter().any(|o| o.normal.dot(&u) < -AGAINST) {
+                break;
+            }
+            let Some((along, by)) = projected(&self.force, &obstacles) else {
+                return Ok(Step::Stuck { with: all(&obstacles) });
+            };
+            with = by;
+            bends += 1;
+            if along.norm_squared() < LEAST_SHARE || bends > MOST_BENDS {
+                return Ok(Step::Stuck { with });
+            }
+            u = along.normalize();
+        }
+        let longest = if obstacles.is_empty() { FREE_STEP } else { self.contact_step };
+        let seen = self.asked_at.map_or(0.0, |at| FREE_STEP - (self.shift - at).norm());
+        let length = self.cells.length(&self.shift, &u).min(longest).min(seen);
+        self.stalls = if length < STALL { self.stalls + 1 } else { 0 };
+        if self.stalls > MOST_STALLS {
+            return Ok(Step::Stuck { with });
+        }
+        self.shift += u * length;
+        let mut pose = self.start;
+        pose.translation.vector += self.shift;
+        Ok(Step::Moved(pose))
+    }
+
+    /// Takes in parts that come near.
+    fn look_around(&mut self, u: &Vector3<f64>, obstacles: &mut Vec<Obstacle>) -> Result<(), Halt> {
+        if self.asked_at.is_some_and(|at| (self.shift - at).norm() < FREE_STEP * 0.9) {
+            return Ok(());
+        }
+        self.asked_at = Some(self.shift);
+        let here = Bounds { min: self.bounds.min + self.shift, max: self.bounds.max + self.shift };
+        for other in self.scene.broad_phase.meeting_of(self.standing, &here.grown(FREE_STEP)) {
+            if !self.cells.knows(other) {
+                let who = (self.part, &self.start);
+                self.cells.add(self.scene, who, other, &self.shift, u, obstacles)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The direction nearest to a force that no obstacle stops, and the parts that bend it, ascending.
+fn projected(force: &Vector3<f64>, obstacles: &[Obstacle]) -> Option<(Vector3<f64>, Vec<usize>)> {
+    let row = |o: &Obstacle| {
+        let n = o.normal;
+        Row { a: Vector6::new(n.x, n.y, n.z, 0.0, 0.0, 0.0), b: 0.0, other: o.other }
+    };
+    let rows: Vec<Row> = obstacles.iter().map(row).collect();
+    let result = project(&Vector6::new(force.x, force.y, force.z, 0.0, 0.0, 0.0), &rows)?;
+    Some((result.w.fixed_rows::<3>(0).into(), super::drive::others(&result.active, &rows)))
+}
+
+fn all(obstacles: &[Obstacle]) -> Vec<usize> {
+    let mut with: Vec<usize> = obstacles.iter().map(|o| o.other).collect();
+    with.sort_unstable();
+    with.dedup();
+    with
+}
