@@ -19,7 +19,7 @@ const INNER: f64 = 2.0 * TOUCH;
 /// Points nearer to the surface than this, in the planning frame, count as on it.
 const SKIN: f64 = 1e-6;
 /// With more planes than this, a region is not worth its tests.
-const MOST_PLANES: usize = 48;
+const MOST_PLANES: usize = 160;
 /// So far towards the seed, as a share of the way, hulls are taken to be apart from what they touch.
 const INSET: f64 = 0.02;
 /// Steps of alternating projection before a point counts as too far.
@@ -45,6 +45,15 @@ pub struct FreeRegion {
     centre: Point3<f64>,
     radius: f64,
     sides: Vec<HalfSpace>,
+}
+
+/// Why there is no region worth having.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoRegion {
+    /// This triangle is amid the points that were wanted: no plane was found between them.
+    Amid(u32),
+    /// There is too little room around the seed, or it is too complicated.
+    Cramped,
 }
 
 impl FreeRegion {
@@ -107,7 +116,9 @@ impl Surface {
     /// A convex region that holds the middle of a ball, or what is outside nearest to that: as
     /// [`Surface::free_region`]. `closest` is the surface's point nearest to the centre, `signed` its
     /// signed distance.
-    #[must_use]
+    ///
+    /// # Errors
+    /// There is none worth having.
     pub fn free_region_around(
         &self,
         centre: &Point3<f64>,
@@ -115,41 +126,46 @@ impl Surface {
         (closest, signed): (&Closest, f64),
         wanted: &[Point3<f64>],
         most: f64,
-    ) -> Option<FreeRegion> {
+    ) -> Result<FreeRegion, NoRegion> {
         let seed = if signed > SKIN {
             *centre
         } else {
-            let outward = self.pseudo_normal(closest).try_normalize(0.0)?;
-            closest.point + outward * (closest.distance + SKIN)
+            let outward = self.pseudo_normal(closest).try_normalize(0.0);
+            closest.point + outward.ok_or(NoRegion::Cramped)? * (closest.distance + SKIN)
         };
         self.free_region(&seed, radius + most + (seed - centre).norm(), wanted, most)
     }
 
-    /// A convex region around `seed`, within `radius`, that the surface does not enter: `None` if
-    /// there is none worth having. If the surface is closed, all of the region is outside. No point of `wanted`, nor the
-    /// seed, is further than `most` from any of its sides.
-    #[must_use]
+    /// A convex region around `seed`, within `radius`, that the surface does not enter. If
+    /// the surface is closed, all of the region is outside. No point of `wanted`, nor the seed, is
+    /// further than `most` from any of its sides.
+    ///
+    /// # Errors
+    /// There is none worth having.
     pub fn free_region(
         &self,
         seed: &Point3<f64>,
         radius: f64,
         wanted: &[Point3<f64>],
         most: f64,
-    ) -> Option<FreeRegion> {
+    ) -> Result<FreeRegion, NoRegion> {
         let sides = Vec::with_capacity(8);
         let region = FreeRegion { centre: *seed, radius, sides };
         let inset = |p: &Point3<f64>| p + (seed - p) * (most / (seed - p).norm().max(most)).max(INSET);
         let inset = wanted.iter().map(inset).collect();
-        let mut growth = Growth { surface: self, wanted, inset, most, region };
+        let mut growth = Growth { surface: self, wanted, inset, most, region, amid: None };
         self.nearest_first(seed, &mut growth);
+        if let Some(triangle) = growth.amid {
+            return Err(NoRegion::Amid(triangle));
+        }
         let region = growth.region;
         if region.radius <= radius * 0.5 {
-            return None;
+            return Err(NoRegion::Cramped);
         }
         // No surface passes through: all of the region is where one point well inside is. (A region
         // too thin to have one may follow the plane of a face into the solid.)
-        let inner = region.nearest_within(seed, most + 4.0 * INNER, INNER)?;
-        (self.signed_distance(&inner) > 0.0).then_some(region)
+        let inner = region.nearest_within(seed, most + 4.0 * INNER, INNER).ok_or(NoRegion::Cramped)?;
+        if self.signed_distance(&inner) > 0.0 { Ok(region) } else { Err(NoRegion::Cramped) }
     }
 }
 
@@ -161,6 +177,8 @@ struct Growth<'a> {
     inset: Vec<Point3<f64>>,
     most: f64,
     region: FreeRegion,
+    /// The triangle that ended it.
+    amid: Option<u32>,
 }
 
 impl Growth<'_> {
@@ -173,16 +191,23 @@ impl Growth<'_> {
         normal: Vector3<f64>,
         best: Option<(f64, HalfSpace)>,
     ) -> Option<(f64, HalfSpace)> {
+        // Seen from behind, a surface is entered already, mostly.
+        let from_behind = normal.dot(&self.surface.face_normal(triangle)) < -0.6;
+        if from_behind { best } else { self.any_better(corners, normal, best) }
+    }
+
+    /// The same, also from behind: the back of a wall of which another side is nearer.
+    fn any_better(
+        &self,
+        corners: &[Point3<f64>; 3],
+        normal: Vector3<f64>,
+        best: Option<(f64, HalfSpace)>,
+    ) -> Option<(f64, HalfSpace)> {
         let side = Self::before(corners, normal);
         let seed = &self.region.centre;
         let worth = self.wanted.iter().map(|p| side.above(p)).fold(side.above(seed), f64::min);
-        // Seen from behind, a surface is entered already.
-        let from_behind = normal.dot(&self.surface.face_normal(triangle)) < -0.6;
-        if normal != Vector3::zeros() && !from_behind && best.is_none_or(|(most, _)| worth > most) {
-            Some((worth, side))
-        } else {
-            best
-        }
+        let better = normal != Vector3::zeros() && best.is_none_or(|(most, _)| worth > most);
+        if better { Some((worth, side)) } else { best }
     }
 
     /// The half-space behind which a triangle just disappears, with this normal.
@@ -219,7 +244,7 @@ impl Visitor for Growth<'_> {
         if best.is_none_or(|(worth, _)| worth < 0.0)
             && let Some(apart) = separating_direction(&corners, &self.inset, f64::NEG_INFINITY, None)
         {
-            best = self.better(triangle, &corners, apart, best);
+            best = self.any_better(&corners, apart, best);
         }
         if best.is_none_or(|(worth, _)| worth < 0.0) {
             // Beside the triangle: along the faces across its sides, and in its own plane.
@@ -240,7 +265,10 @@ impl Visitor for Growth<'_> {
             Some((worth, side)) if worth >= -self.most && self.region.sides.len() < MOST_PLANES => {
                 self.region.sides.push(side);
             }
-            Some((worth, _)) if worth < -self.most => self.region.radius = 0.0,
+            Some((worth, _)) if worth < -self.most => {
+                self.amid = Some(triangle);
+                self.region.radius = 0.0;
+            }
             _ => self.region.radius = closest.distance.min(self.region.radius),
         }
     }
@@ -297,7 +325,7 @@ mod tests {
             let seed = Point3::from(seed);
             for s in [surface(ball(2)), surface(l_shape()), surface(tube(1.0, 2.0, [-1.0, 1.0], 12))] {
                 prop_assume!(s.signed_distance(&seed) >= 0.0);
-                let Some(region) = s.free_region(&seed, radius, &[seed], 0.1) else { continue };
+                let Ok(region) = s.free_region(&seed, radius, &[seed], 0.1) else { continue };
                 prop_assert!(region.distance_within(&seed, 1e-9).is_some());
                 for p in spread([-2.5; 3], [2.5; 3], 400) {
                     if region.distance_within(&p, 0.0).is_some() {

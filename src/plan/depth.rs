@@ -294,7 +294,7 @@ impl Search<'_> {
     fn region(&self, swept: &Swept, closest: &Closest, signed: f64, most: f64) -> Option<FreeRegion> {
         let Swept { centre, radius, .. } = swept;
         let seen = (closest, signed);
-        self.asked.measured.free_region_around(centre, radius * ROOM, seen, &self.wanted, most)
+        self.asked.measured.free_region_around(centre, radius * ROOM, seen, &self.wanted, most).ok()
     }
 
     /// Whether a depth is what it is, as measured at the worst corner, or small enough not to matter:

@@ -11,7 +11,9 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::geometry::{Closest, FreeRegion, Parts, PatchTree, Pose, Surface};
+use crate::geometry::{
+    Closest, FreeRegion, NoRegion, Parts, PatchTree, Pose, Surface, separating_direction,
+};
 use crate::termination::{Interrupt, Termination};
 
 use super::super::Scene;
@@ -19,8 +21,9 @@ use super::DEPTH_TOLERANCE;
 
 /// Pieces this far off need no region, in the planning frame.
 const FAR: f64 = 0.12;
-/// Shifts that a region is asked to allow: the first that works.
-const AHEAD: [f64; 2] = [1.0, 0.06];
+/// Shifts that a region is asked to allow: the longest that works.
+const AHEAD: [f64; 3] = [4.0, 0.5, 0.06];
+const SHORTEST: usize = AHEAD.len() - 1;
 /// Regions without a wanted shift are asked for so much around a piece.
 const AROUND: f64 = 0.12;
 /// A plane nearer than this is touched.
@@ -31,13 +34,22 @@ const TILT: f64 = 1e-5;
 /// What such shifts may come to.
 const SUNK: f64 = 0.3 * DEPTH_TOLERANCE;
 /// So much deeper than granted a piece may be and still be held.
-const HELD: f64 = 0.6 * DEPTH_TOLERANCE;
+const HELD: f64 = 1e-3;
 /// Vertices are moved so far to see whether they get inside …
 const PROBE: f64 = 2e-3;
 /// … by more than this share of it.
 const INSIDE: f64 = 0.125;
 /// So many vertices of a piece are probed.
 const PROBED: usize = 16;
+/// A bit of a triangle that is smaller than this and has no region ahead is in the way …
+const SMALL: f64 = 0.3;
+/// … and is lost if it has none at all and is smaller than this.
+const SMALLEST: f64 = 0.02;
+/// So many regions are looked for on one side of a pair before the other is tried; then twice as
+/// many, and so on.
+const FIRST_BUDGET: usize = 16;
+/// So many cells of a pair are too many to renew one by one.
+const MANY: usize = 8;
 /// So many regions are looked for before a motion is given up.
 const MOST_REGIONS: usize = 20_000;
 
@@ -64,6 +76,7 @@ pub(super) struct Obstacle {
 }
 
 /// A moving and a standing part: the surface that is asked, and that into which it may not get.
+#[derive(Clone)]
 struct Pair<'a> {
     other: usize,
     asked: &'a Surface,
@@ -77,33 +90,32 @@ struct Pair<'a> {
 }
 
 impl<'a> Pair<'a> {
-    /// `None` if neither surface is closed.
-    fn new(scene: &'a Scene, part: usize, start: &Pose, other: usize) -> Option<Self> {
+    /// The pair with the moving part's surface asked, or with the standing one's: those that can be,
+    /// the smaller surface first. None if neither surface is closed.
+    fn both(scene: &'a Scene, part: usize, start: &Pose, other: usize) -> Vec<Self> {
         let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
-        let [mine, theirs] = [moving, standing].map(|body| &body.shape);
-        let size = |s: &Surface| s.bounds().extents().product();
-        let smaller = size(&mine.surface) <= size(&theirs.surface);
-        let ask_mine = match (mine.surface.is_open(), theirs.surface.is_open()) {
-            (true, true) => return None,
-            (false, false) => smaller,
-            (open, _) => open,
-        };
         let stand = standing.planning_from_shape;
-        let (asked, measured, measured_from_asked, turn) = if ask_mine {
-            (mine, theirs, stand.inverse() * start, stand.rotation.inverse())
-        } else {
-            (theirs, mine, start.inverse() * stand, start.rotation.inverse())
+        let of = |ask_mine: bool| {
+            let [mine, theirs] = [moving, standing].map(|body| &body.shape);
+            let (asked, measured, measured_from_asked, turn) = if ask_mine {
+                (mine, theirs, stand.inverse() * start, stand.rotation.inverse())
+            } else {
+                (theirs, mine, start.inverse() * stand, start.rotation.inverse())
+            };
+            let sense = if ask_mine { 1.0 } else { -1.0 };
+            (!measured.surface.is_open()).then(|| Self {
+                other,
+                asked: &asked.surface,
+                tree: asked.patches(),
+                measured: &measured.surface,
+                measured_from_asked,
+                shifted: *turn.to_rotation_matrix().matrix() * sense,
+                allowance: scene.allowances.of(part, other),
+            })
         };
-        let sense = if ask_mine { 1.0 } else { -1.0 };
-        Some(Self {
-            other,
-            asked: &asked.surface,
-            tree: asked.patches(),
-            measured: &measured.surface,
-            measured_from_asked,
-            shifted: *turn.to_rotation_matrix().matrix() * sense,
-            allowance: scene.allowances.of(part, other),
-        })
+        let size = |s: &Surface| s.bounds().extents().product();
+        let mine_first = size(&moving.shape.surface) <= size(&standing.shape.surface);
+        [mine_first, !mine_first].into_iter().filter_map(of).collect()
     }
 
     fn held(&self) -> f64 {
@@ -115,16 +127,31 @@ impl<'a> Pair<'a> {
 #[derive(Debug, Clone, Copy)]
 enum Piece {
     Patch(u32),
-    Triangle(u32),
+    /// A triangle, or a bit of one, by its corners.
+    Bit([Point3<f64>; 3]),
+}
+
+/// What a cell is asked for.
+#[derive(Debug, Clone, Copy)]
+struct Spot {
+    pair: usize,
+    piece: Piece,
+    /// A triangle of the measured surface near it.
+    guess: u32,
+    /// Which of [`AHEAD`] it was let go by last.
+    level: usize,
+}
+
+impl Spot {
+    fn root(pair: usize, tree: &PatchTree) -> Option<Self> {
+        tree.root().map(|root| Self { pair, piece: Piece::Patch(root), guess: 0, level: 0 })
+    }
 }
 
 /// A piece that is free while the shift stays within limits.
 #[derive(Debug, Clone)]
 struct Cell {
-    pair: usize,
-    piece: Piece,
-    /// A triangle of the measured surface near it.
-    guess: u32,
+    spot: Spot,
     limits: Vec<Limit>,
     /// The shift must stay in this ball, too.
     middle: Vector3<f64>,
@@ -173,21 +200,32 @@ impl Limit {
     }
 }
 
+/// A ball around a piece, what of the measured surface is nearest to its centre, and how near.
+struct Ball {
+    centre: Point3<f64>,
+    radius: f64,
+    closest: Closest,
+    signed: f64,
+}
+
 /// A question about a piece: from which shift on, and which way it is to go on.
 struct Wish<'a> {
     at: Vector3<f64>,
-    /// A unit vector.
+    /// A unit vector, or nothing.
     along: Vector3<f64>,
     /// What is certainly in the way.
     obstacles: &'a mut Vec<Obstacle>,
 }
 
 /// All pieces of all pairs.
+#[derive(Clone)]
 pub(super) struct Cells<'a> {
     termination: &'a Termination,
     pairs: Vec<Pair<'a>>,
     cells: Vec<Cell>,
     regions: usize,
+    /// No more of them than this.
+    budget: usize,
     /// A piece's points against the measured surface: all, and those that say most.
     points: Vec<Point3<f64>>,
     wanted: Vec<Point3<f64>>,
@@ -200,6 +238,7 @@ impl<'a> Cells<'a> {
             pairs: Vec::new(),
             cells: Vec::new(),
             regions: 0,
+            budget: MOST_REGIONS,
             points: Vec::new(),
             wanted: Vec::new(),
         }
@@ -220,11 +259,32 @@ impl<'a> Cells<'a> {
         along: &Vector3<f64>,
         obstacles: &mut Vec<Obstacle>,
     ) -> Result<(), Halt> {
-        let pair = Pair::new(scene, part, start, other).ok_or(Halt::Lost)?;
-        let Some(root) = pair.tree.root() else { return Ok(()) };
-        self.pairs.push(pair);
+        let mut sides = Pair::both(scene, part, start, other);
+        if sides.is_empty() {
+            return Err(Halt::Lost);
+        }
         let mut wish = Wish { at: *at, along: *along, obstacles };
-        self.renew(self.pairs.len() - 1, Piece::Patch(root), 0, &mut wish)
+        let (cells, known) = (self.cells.len(), wish.obstacles.len());
+        let mut budget = FIRST_BUDGET;
+        // The one inside the other, or the plainer one, needs fewer pieces: which, shows in trying.
+        loop {
+            sides.rotate_left(1);
+            let Some(side) = sides.pop() else { return Err(Halt::Lost) };
+            let Some(root) = Spot::root(self.pairs.len(), side.tree) else { return Ok(()) };
+            self.pairs.push(side);
+            self.budget = if sides.is_empty() { MOST_REGIONS } else { self.regions + budget };
+            match self.renew(root, &mut wish) {
+                Err(Halt::Lost) if self.regions >= self.budget && self.budget < MOST_REGIONS => {}
+                done => {
+                    self.budget = MOST_REGIONS;
+                    return done;
+                }
+            }
+            self.cells.truncate(cells);
+            wish.obstacles.truncate(known);
+            sides.extend(self.pairs.pop());
+            budget *= 2;
+        }
     }
 
     /// How far the part may be shifted from `at` along the unit vector `u`.
@@ -241,14 +301,15 @@ impl<'a> Cells<'a> {
         obstacles: &mut Vec<Obstacle>,
     ) -> Result<(), Halt> {
         let mut wish = Wish { at: *at, along: *u, obstacles };
+        self.restart_exhausted(&mut wish)?;
         let known = self.cells.len();
         let mut renewed = Vec::new();
         for i in 0..known {
             let cell = &self.cells[i];
             if cell.blocks(at, u) || cell.is_exhausted(at, u) {
-                let Cell { pair, piece, guess, .. } = *cell;
+                let spot = cell.spot;
                 renewed.push(i);
-                self.renew(pair, piece, guess, &mut wish)?;
+                self.renew(spot, &mut wish)?;
             }
         }
         for i in renewed.into_iter().rev() {
@@ -257,73 +318,132 @@ impl<'a> Cells<'a> {
         Ok(())
     }
 
+    /// Begins anew with pairs of which most cells are exhausted: larger pieces may do.
+    fn restart_exhausted(&mut self, wish: &mut Wish<'_>) -> Result<(), Halt> {
+        let mut counts = vec![(0usize, 0usize); self.pairs.len()];
+        for cell in &self.cells {
+            let (all, exhausted) = &mut counts[cell.spot.pair];
+            *all += 1;
+            *exhausted +=
+                usize::from(cell.spot.level == 0 && cell.is_exhausted(&wish.at, &wish.along));
+        }
+        for (pair, (all, exhausted)) in counts.into_iter().enumerate() {
+            if all > MANY && 2 * exhausted > all {
+                self.cells.retain(|cell| cell.spot.pair != pair);
+                if let Some(root) = Spot::root(pair, self.pairs[pair].tree) {
+                    self.renew(root, wish)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Finds cells for a piece, as free along the wish as can be.
-    fn renew(&mut self, pair: usize, piece: Piece, guess: u32, wish: &mut Wish<'_>) -> Result<(), Halt> {
+    fn renew(&mut self, mut spot: Spot, wish: &mut Wish<'_>) -> Result<(), Halt> {
         self.termination.check()?;
-        let (centre, radius) = self.place(pair, piece, &wish.at);
-        let measured = self.pairs[pair].measured;
-        let closest = measured.closest_from(&centre, guess);
+        let (centre, radius) = self.place(&spot, &wish.at);
+        let measured = self.pairs[spot.pair].measured;
+        let closest = measured.closest_from(&centre, spot.guess);
         let signed = measured.signed(&centre, &closest);
-        let guess = closest.triangle;
+        spot.guess = closest.triangle;
         if signed - radius >= FAR {
-            let (limits, middle) = (Vec::new(), wish.at);
-            self.cells.push(Cell { pair, piece, guess, limits, middle, room: signed - radius });
+            let limits = Vec::new();
+            self.cells.push(Cell { spot, limits, middle: wish.at, room: signed - radius });
             return Ok(());
         }
-        for ahead in AHEAD {
-            let shift = wish.along * ahead;
-            if let Some(cell) = self.held(pair, piece, (centre, radius), (closest, signed), wish, &shift) {
+        let ball = Ball { centre, radius, closest, signed };
+        if self.regions >= self.budget {
+            return Err(Halt::Lost);
+        }
+        let small = matches!(spot.piece, Piece::Bit(_)) && radius < SMALL;
+        if wish.along == Vector3::zeros() {
+            return match self.held(&spot, &ball, wish, &Vector3::zeros()) {
+                Ok(cell) => {
+                    self.cells.push(cell);
+                    Ok(())
+                }
+                Err(_) => self.split(&spot, radius, wish),
+            };
+        }
+        match self.held(&Spot { level: SHORTEST, ..spot }, &ball, wish, &(wish.along * AHEAD[SHORTEST])) {
+            Ok(short) => {
+                let further = (0..SHORTEST).find_map(|level| {
+                    let shift = wish.along * AHEAD[level];
+                    self.held(&Spot { level, ..spot }, &ball, wish, &shift).ok()
+                });
+                let cell = further.unwrap_or(short);
+                // What gets no further the second time may do so in pieces.
+                let again = cell.spot.level > 0 && cell.spot.level == spot.level;
+                if again && !small {
+                    return self.split(&spot, radius, wish);
+                }
                 self.cells.push(cell);
                 return Ok(());
             }
+            Err(NoRegion::Amid(triangle)) if !small && !self.is_beside(&spot, &centre, triangle) => {
+                return self.split(&spot, radius, wish);
+            }
+            Err(_) => {}
         }
-        if self.regions > MOST_REGIONS {
-            return Err(Halt::Lost);
-        }
-        let still = self.held(pair, piece, (centre, radius), (closest, signed), wish, &Vector3::zeros());
-        if let Some(cell) = still {
+        let still = self.held(&Spot { level: 0, ..spot }, &ball, wish, &Vector3::zeros());
+        if let Ok(cell) = still {
             if !cell.blocks(&wish.at, &wish.along) || self.is_certain(&cell, wish) {
                 self.cells.push(cell);
                 return Ok(());
             }
-            if let Piece::Triangle(_) = piece {
-                let other = self.pairs[pair].other;
+            if small {
+                let other = self.pairs[spot.pair].other;
                 let blocking = cell.limits.iter().filter(|l| l.blocks(&wish.at, &wish.along));
                 wish.obstacles.extend(blocking.map(|l| Obstacle { normal: l.normal, other }));
                 self.cells.push(cell);
                 return Ok(());
             }
         }
-        let tree = self.pairs[pair].tree;
-        match piece {
-            Piece::Triangle(_) => Err(Halt::Lost),
+        self.split(&spot, radius, wish)
+    }
+
+    /// Whether a triangle of the measured surface may lie beside the piece at hand where it is.
+    fn is_beside(&self, spot: &Spot, centre: &Point3<f64>, triangle: u32) -> bool {
+        let pair = &self.pairs[spot.pair];
+        let corners = pair.measured.corners(triangle);
+        // What touches is beside, too.
+        let inset = |p: &Point3<f64>| p + (centre - p) * (pair.held() / (centre - p).norm()).clamp(INSET, 1.0);
+        let within: Vec<_> = self.wanted.iter().map(inset).collect();
+        separating_direction(&corners, &within, 0.0, None).is_some()
+    }
+
+    /// Finds cells for the parts of a piece.
+    fn split(&mut self, spot: &Spot, radius: f64, wish: &mut Wish<'_>) -> Result<(), Halt> {
+        let Pair { tree, asked, .. } = self.pairs[spot.pair];
+        let mut renew = |piece: Piece| self.renew(Spot { piece, level: 0, ..*spot }, wish);
+        match spot.piece {
+            Piece::Bit(_) if radius < SMALLEST => Err(Halt::Lost),
+            Piece::Bit(corners) => halves(&corners).into_iter().try_for_each(|b| renew(Piece::Bit(b))),
             Piece::Patch(index) => match tree.parts(index) {
-                Parts::Patches(children) => {
-                    children.into_iter().try_for_each(|c| self.renew(pair, Piece::Patch(c), guess, wish))
-                }
+                Parts::Patches(children) => children.into_iter().try_for_each(|c| renew(Piece::Patch(c))),
                 Parts::Triangles(list) => {
-                    list.iter().try_for_each(|&t| self.renew(pair, Piece::Triangle(t), guess, wish))
+                    list.iter().try_for_each(|&t| renew(Piece::Bit(asked.corners(t))))
                 }
             },
         }
     }
 
     /// Takes a piece's points as they are against the measured surface; the ball that holds them.
-    fn place(&mut self, pair: usize, piece: Piece, at: &Vector3<f64>) -> (Point3<f64>, f64) {
-        let Pair { asked, tree, measured_from_asked, shifted, .. } = &self.pairs[pair];
+    fn place(&mut self, spot: &Spot, at: &Vector3<f64>) -> (Point3<f64>, f64) {
+        let Pair { tree, measured_from_asked, shifted, .. } = &self.pairs[spot.pair];
         let shift = shifted * at;
         let place = |p: &Point3<f64>| measured_from_asked * p + shift;
         self.points.clear();
         self.wanted.clear();
-        match piece {
+        match spot.piece {
             Piece::Patch(index) => {
                 let patch = tree.patch(index);
                 self.points.extend(tree.vertices(index).iter().map(place));
                 self.wanted.extend(tree.extremes(index).map(place));
                 (place(&patch.centre), patch.radius)
             }
-            Piece::Triangle(t) => {
-                let corners = asked.corners(t).map(|p| place(&p));
+            Piece::Bit(corners) => {
+                let corners = corners.map(|p| place(&p));
                 self.points.extend(corners);
                 self.wanted.extend(corners);
                 let centre = Point3::from(corners.iter().map(|p| p.coords).sum::<Vector3<f64>>() / 3.0);
@@ -333,46 +453,38 @@ impl<'a> Cells<'a> {
     }
 
     /// The piece at hand in a region that also lets it go by a shift.
-    fn held(
-        &mut self,
-        pair: usize,
-        piece: Piece,
-        (centre, radius): (Point3<f64>, f64),
-        seen: (Closest, f64),
-        wish: &Wish<'_>,
-        shift: &Vector3<f64>,
-    ) -> Option<Cell> {
+    fn held(&mut self, spot: &Spot, ball: &Ball, wish: &Wish<'_>, shift: &Vector3<f64>) -> Result<Cell, NoRegion> {
         self.regions += 1;
-        let at = &self.pairs[pair];
-        let most = at.held();
-        let ahead = at.shifted * shift;
+        let pair = &self.pairs[spot.pair];
+        let most = pair.held();
+        let ahead = pair.shifted * shift;
         let few = self.wanted.len();
-        let (middle, reach, seen) = if ahead == Vector3::zeros() {
-            (centre, radius + AROUND, seen)
-        } else {
+        let mut around = Ball { radius: ball.radius + AROUND, ..*ball };
+        if ahead != Vector3::zeros() {
             self.wanted.extend_from_within(..);
             self.wanted[few..].iter_mut().for_each(|p| *p += ahead);
-            let middle = centre + ahead / 2.0;
-            let closest = at.measured.closest_from(&middle, seen.0.triangle);
-            let signed = at.measured.signed(&middle, &closest);
-            (middle, radius + ahead.norm() / 2.0, (closest, signed))
-        };
-        let region = (-seen.1 <= most.max(reach))
-            .then(|| at.measured.free_region_around(&middle, reach * ROOM, (&seen.0, seen.1), &self.wanted, most))
-            .flatten();
+            let centre = ball.centre + ahead / 2.0;
+            let closest = pair.measured.closest_from(&centre, spot.guess);
+            let signed = pair.measured.signed(&centre, &closest);
+            around = Ball { centre, radius: ball.radius + ahead.norm() / 2.0, closest, signed };
+        }
+        let Ball { centre, radius, closest, signed } = &around;
+        let seen = (closest, *signed);
+        let region = pair.measured.free_region_around(centre, radius * ROOM, seen, &self.wanted, most);
         self.wanted.truncate(few);
         let region = region?;
-        let depth = self.depth_below(&region, &ahead, most)?;
-        let slack = if at.allowance > 0.0 { ((most - depth) / 3f64.sqrt()).max(0.0) } else { 0.0 };
+        let depth = self.depth_below(&region, &ahead, most).ok_or(NoRegion::Cramped)?;
+        let slack = if pair.allowance > 0.0 { ((most - depth) / 3f64.sqrt()).max(0.0) } else { 0.0 };
         let limits = region.planes().map(|(inward, height)| {
-            let gap = self.points.iter().map(|p| inward.dot(&p.coords) - height).fold(f64::INFINITY, f64::min);
-            let normal = at.shifted.transpose() * inward;
+            let above = |p: &Point3<f64>| inward.dot(&p.coords) - height;
+            let gap = self.points.iter().map(above).fold(f64::INFINITY, f64::min);
+            let normal = pair.shifted.transpose() * inward;
             Limit { normal, height: normal.dot(&wish.at) - gap.max(0.0) - slack }
         });
-        let (limits, guess) = (limits.collect(), seen.0.triangle);
-        let offset = at.shifted.transpose() * (centre - region.centre());
-        let room = region.radius() - radius;
-        Some(Cell { pair, piece, guess, limits, middle: wish.at - offset, room })
+        let spot = Spot { guess: closest.triangle, ..*spot };
+        let offset = pair.shifted.transpose() * (ball.centre - region.centre());
+        let room = region.radius() - ball.radius;
+        Ok(Cell { spot, limits: limits.collect(), middle: wish.at - offset, room })
     }
 
     /// How deep the points at hand are below a region, here and shifted, if no more than `most`.
@@ -388,7 +500,7 @@ impl<'a> Cells<'a> {
     /// Whether a vertex of the piece at hand gets inside on the way: then that is certain, and the
     /// faces there are obstacles.
     fn is_certain(&self, cell: &Cell, wish: &mut Wish<'_>) -> bool {
-        let pair = &self.pairs[cell.pair];
+        let pair = &self.pairs[cell.spot.pair];
         let ahead = pair.shifted * wish.along;
         let depth = |p: &Point3<f64>, guess: u32| {
             let closest = pair.measured.closest_from(p, guess);
@@ -400,7 +512,7 @@ impl<'a> Cells<'a> {
             self.points.iter().map(|p| (ahead.dot(&p.coords), p)).collect();
         front.sort_by(|a, b| b.0.total_cmp(&a.0));
         for (_, p) in front.into_iter().take(PROBED) {
-            let (now, closest) = depth(p, cell.guess);
+            let (now, closest) = depth(p, cell.spot.guess);
             let (then, _) = depth(&(p + ahead * PROBE), closest.triangle);
             if then <= now.max(pair.allowance) + INSIDE * PROBE {
                 continue;
@@ -430,6 +542,17 @@ impl<'a> Cells<'a> {
     }
 }
 
+/// A triangle cut in two across its longest side.
+fn halves(corners: &[Point3<f64>; 3]) -> [[Point3<f64>; 3]; 2] {
+    let length = |i: usize| (corners[(i + 1) % 3] - corners[i]).norm_squared();
+    let side = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
+    let [a, b, c] = [0, 1, 2].map(|k| corners[(side + k) % 3]);
+    let cut = nalgebra::center(&a, &b);
+    [[a, cut, c], [cut, b, c]]
+}
+
+/// Pieces are drawn together by this share to see whether they only touch.
+const INSET: f64 = 0.02;
 /// Regions are asked for so much larger than the piece.
 const ROOM: f64 = 1.25;
 /// Cosine of the angle below which two planes are one.

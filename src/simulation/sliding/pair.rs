@@ -1,13 +1,20 @@
 //! Static analysis by sliding: what contact with one part alone lets another do.
 
+use nalgebra::Vector3;
+
 use crate::geometry::Pose;
+use crate::termination::Termination;
 
 use super::super::contact::{Mover, Near};
 use super::super::{Action, Scene};
+use super::cells::{Cells, Halt};
 use super::drive::{Drive, Moved, Step};
+use super::push::{self, Push};
 
 /// Steps that the static analysis of a pair looks ahead (the paper's five extensions).
 const STATIC_STEPS: usize = 5;
+/// The same in steps that end where the next obstacle begins.
+const PUSHES: usize = 32;
 
 /// For each action, whether `other` alone keeps `part` at `pose` from following it by more than
 /// `least`: the static analysis that suits this engine, which excludes nothing that could slide.
@@ -20,6 +27,11 @@ pub fn pair_blocks(
     actions: &[Action],
     least: f64,
 ) -> Vec<bool> {
+    if actions.iter().all(|a| !a.turns())
+        && let Ok(blocked) = translations_blocked(scene, part, pose, other, actions, least)
+    {
+        return blocked;
+    }
     let start = Mover::new(scene, part, *pose);
     let Some(first) = actions.first() else { return Vec::new() };
     let reach = Drive::new(scene, part, pose, *first).reach();
@@ -44,6 +56,34 @@ pub fn pair_blocks(
             step = drive.advance(&mover, &near, &gather);
         }
         false
+    };
+    actions.iter().map(blocked).collect()
+}
+
+/// The same by regions, for translations.
+fn translations_blocked(
+    scene: &Scene,
+    part: usize,
+    pose: &Pose,
+    other: usize,
+    actions: &[Action],
+    least: f64,
+) -> Result<Vec<bool>, Halt> {
+    let termination = Termination::default();
+    let (standing, nowhere) = ([other], Vector3::zeros());
+    let mut cells = Cells::new(&termination);
+    cells.add(scene, (part, pose), other, &nowhere, &nowhere, &mut Vec::new())?;
+    let blocked = |action: &Action| {
+        let mut push = Push::with(cells.clone(), scene, &standing, (part, pose), action.force());
+        for _ in 0..PUSHES {
+            if let push::Step::Stuck { .. } = push.step()? {
+                return Ok(true);
+            }
+            if push.travel() > least {
+                return Ok(false);
+            }
+        }
+        Err(Halt::Lost)
     };
     actions.iter().map(blocked).collect()
 }

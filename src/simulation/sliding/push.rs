@@ -55,6 +55,17 @@ impl<'a> Push<'a> {
         force: Vector3<f64>,
         termination: &'a Termination,
     ) -> Self {
+        Self::with(Cells::new(termination), scene, standing, (part, start), force)
+    }
+
+    /// The same with some pairs that are known already.
+    pub(super) fn with(
+        cells: Cells<'a>,
+        scene: &'a Scene,
+        standing: &'a [usize],
+        (part, start): (usize, &Pose),
+        force: Vector3<f64>,
+    ) -> Self {
         let shape = &scene.bodies[part].shape;
         Self {
             scene,
@@ -64,11 +75,16 @@ impl<'a> Push<'a> {
             bounds: shape.bounds().transformed(start),
             force,
             shift: Vector3::zeros(),
-            cells: Cells::new(termination),
+            cells,
             asked_at: None,
             stalls: 0,
             contact_step: contact_step(shape),
         }
+    }
+
+    /// How far it got.
+    pub(super) fn travel(&self) -> f64 {
+        self.shift.norm()
     }
 
     /// One step; `Halt::Lost` where regions cannot tell.
