@@ -84,6 +84,13 @@ impl PatchTree {
         self.extremes[patch.first_extreme as usize..patch.last_extreme as usize].iter()
     }
 
+    /// All triangles of a node.
+    #[must_use]
+    pub fn triangles(&self, index: u32) -> &[u32] {
+        let patch = self.patch(index);
+        &self.triangles[patch.start as usize..patch.end as usize]
+    }
+
     /// What a node holds.
     #[must_use]
     pub fn parts(&self, index: u32) -> Parts<'_> {

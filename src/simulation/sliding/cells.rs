@@ -35,11 +35,11 @@ const TILT: f64 = 1e-5;
 const SUNK: f64 = 0.3 * DEPTH_TOLERANCE;
 /// So much deeper than granted a piece may be and still be held.
 const HELD: f64 = 1e-3;
-/// Vertices are moved so far to see whether they get inside …
+/// Points are moved so far to see whether they get inside …
 const PROBE: f64 = 2e-3;
 /// … by more than this share of it.
 const INSIDE: f64 = 0.125;
-/// So many vertices of a piece are probed.
+/// So many corners of a piece, and so many faces, are probed.
 const PROBED: usize = 16;
 /// A bit of a triangle that is smaller than this and has no region ahead is in the way …
 const SMALL: f64 = 0.3;
@@ -48,8 +48,6 @@ const SMALLEST: f64 = 0.02;
 /// So many regions are looked for on one side of a pair before the other is tried; then twice as
 /// many, and so on.
 const FIRST_BUDGET: usize = 16;
-/// So many cells of a pair are too many to renew one by one.
-const MANY: usize = 8;
 /// So many regions are looked for before a motion is given up.
 const MOST_REGIONS: usize = 20_000;
 
@@ -60,6 +58,8 @@ pub(super) enum Halt {
     Interrupted(Interrupt),
     /// A piece is in no region, deeper than granted, or the surfaces are too complicated.
     Lost,
+    /// Something is in the way of what was wished.
+    Blocked,
 }
 
 impl From<Interrupt> for Halt {
@@ -249,22 +249,20 @@ impl<'a> Cells<'a> {
         self.pairs.iter().any(|p| p.other == other)
     }
 
-    /// Takes a pair in, at a shift of the part from `start`, to be moved along a unit vector.
+    /// Takes a pair in, at a shift of the part from `start`.
     pub(super) fn add(
         &mut self,
         scene: &'a Scene,
         (part, start): (usize, &Pose),
         other: usize,
         at: &Vector3<f64>,
-        along: &Vector3<f64>,
-        obstacles: &mut Vec<Obstacle>,
     ) -> Result<(), Halt> {
         let mut sides = Pair::both(scene, part, start, other);
         if sides.is_empty() {
             return Err(Halt::Lost);
         }
-        let mut wish = Wish { at: *at, along: *along, obstacles };
-        let (cells, known) = (self.cells.len(), wish.obstacles.len());
+        let mut wish = Wish { at: *at, along: Vector3::zeros(), obstacles: &mut Vec::new() };
+        let cells = self.cells.len();
         let mut budget = FIRST_BUDGET;
         // The one inside the other, or the plainer one, needs fewer pieces: which, shows in trying.
         loop {
@@ -281,7 +279,6 @@ impl<'a> Cells<'a> {
                 }
             }
             self.cells.truncate(cells);
-            wish.obstacles.truncate(known);
             sides.extend(self.pairs.pop());
             budget *= 2;
         }
@@ -293,7 +290,8 @@ impl<'a> Cells<'a> {
     }
 
     /// Makes way for a shift from `at` along the unit vector `u`: pieces whose region does not let
-    /// them go there get others, and what is certainly in the way is added to `obstacles`.
+    /// them go there get others. Ends at the first that cannot: what is in its way is added to
+    /// `obstacles`.
     pub(super) fn make_way(
         &mut self,
         at: &Vector3<f64>,
@@ -301,41 +299,25 @@ impl<'a> Cells<'a> {
         obstacles: &mut Vec<Obstacle>,
     ) -> Result<(), Halt> {
         let mut wish = Wish { at: *at, along: *u, obstacles };
-        self.restart_exhausted(&mut wish)?;
-        let known = self.cells.len();
-        let mut renewed = Vec::new();
-        for i in 0..known {
+        let mut replaced = Vec::new();
+        let mut ended = Ok(());
+        for i in 0..self.cells.len() {
             let cell = &self.cells[i];
-            if cell.blocks(at, u) || cell.is_exhausted(at, u) {
-                let spot = cell.spot;
-                renewed.push(i);
-                self.renew(spot, &mut wish)?;
+            if !cell.blocks(at, u) && !cell.is_exhausted(at, u) {
+                continue;
             }
+            let (spot, known) = (cell.spot, self.cells.len());
+            ended = self.renew(spot, &mut wish);
+            if ended.is_err() {
+                self.cells.truncate(known);
+                break;
+            }
+            replaced.push(i);
         }
-        for i in renewed.into_iter().rev() {
+        for i in replaced.into_iter().rev() {
             self.cells.swap_remove(i);
         }
-        Ok(())
-    }
-
-    /// Begins anew with pairs of which most cells are exhausted: larger pieces may do.
-    fn restart_exhausted(&mut self, wish: &mut Wish<'_>) -> Result<(), Halt> {
-        let mut counts = vec![(0usize, 0usize); self.pairs.len()];
-        for cell in &self.cells {
-            let (all, exhausted) = &mut counts[cell.spot.pair];
-            *all += 1;
-            *exhausted +=
-                usize::from(cell.spot.level == 0 && cell.is_exhausted(&wish.at, &wish.along));
-        }
-        for (pair, (all, exhausted)) in counts.into_iter().enumerate() {
-            if all > MANY && 2 * exhausted > all {
-                self.cells.retain(|cell| cell.spot.pair != pair);
-                if let Some(root) = Spot::root(pair, self.pairs[pair].tree) {
-                    self.renew(root, wish)?;
-                }
-            }
-        }
-        Ok(())
+        if ended == Err(Halt::Blocked) { Ok(()) } else { ended }
     }
 
     /// Finds cells for a piece, as free along the wish as can be.
@@ -346,15 +328,15 @@ impl<'a> Cells<'a> {
         let closest = measured.closest_from(&centre, spot.guess);
         let signed = measured.signed(&centre, &closest);
         spot.guess = closest.triangle;
+        if self.regions >= self.budget {
+            return Err(Halt::Lost);
+        }
         if signed - radius >= FAR {
             let limits = Vec::new();
             self.cells.push(Cell { spot, limits, middle: wish.at, room: signed - radius });
             return Ok(());
         }
         let ball = Ball { centre, radius, closest, signed };
-        if self.regions >= self.budget {
-            return Err(Halt::Lost);
-        }
         let small = matches!(spot.piece, Piece::Bit(_)) && radius < SMALL;
         if wish.along == Vector3::zeros() {
             return match self.held(&spot, &ball, wish, &Vector3::zeros()) {
@@ -365,6 +347,7 @@ impl<'a> Cells<'a> {
                 Err(_) => self.split(&spot, radius, wish),
             };
         }
+        let small = matches!(spot.piece, Piece::Bit(_)) && radius < SMALL;
         match self.held(&Spot { level: SHORTEST, ..spot }, &ball, wish, &(wish.along * AHEAD[SHORTEST])) {
             Ok(short) => {
                 let further = (0..SHORTEST).find_map(|level| {
@@ -385,9 +368,11 @@ impl<'a> Cells<'a> {
             }
             Err(_) => {}
         }
-        let still = self.held(&Spot { level: 0, ..spot }, &ball, wish, &Vector3::zeros());
-        if let Ok(cell) = still {
-            if !cell.blocks(&wish.at, &wish.along) || self.is_certain(&cell, wish) {
+        if self.is_certain(&spot, wish) {
+            return Err(Halt::Blocked);
+        }
+        if let Ok(cell) = self.held(&Spot { level: 0, ..spot }, &ball, wish, &Vector3::zeros()) {
+            if !cell.blocks(&wish.at, &wish.along) {
                 self.cells.push(cell);
                 return Ok(());
             }
@@ -395,8 +380,7 @@ impl<'a> Cells<'a> {
                 let other = self.pairs[spot.pair].other;
                 let blocking = cell.limits.iter().filter(|l| l.blocks(&wish.at, &wish.along));
                 wish.obstacles.extend(blocking.map(|l| Obstacle { normal: l.normal, other }));
-                self.cells.push(cell);
-                return Ok(());
+                return Err(Halt::Blocked);
             }
         }
         self.split(&spot, radius, wish)
@@ -497,22 +481,18 @@ impl<'a> Cells<'a> {
         })
     }
 
-    /// Whether a vertex of the piece at hand gets inside on the way: then that is certain, and the
+    /// Whether a point of the piece at hand gets inside on the way: then that is certain, and the
     /// faces there are obstacles.
-    fn is_certain(&self, cell: &Cell, wish: &mut Wish<'_>) -> bool {
-        let pair = &self.pairs[cell.spot.pair];
+    fn is_certain(&self, spot: &Spot, wish: &mut Wish<'_>) -> bool {
+        let pair = &self.pairs[spot.pair];
         let ahead = pair.shifted * wish.along;
         let depth = |p: &Point3<f64>, guess: u32| {
             let closest = pair.measured.closest_from(p, guess);
             (-pair.measured.signed(p, &closest), closest)
         };
         let before = wish.obstacles.len();
-        // Those in front touch first.
-        let mut front: Vec<(f64, &Point3<f64>)> =
-            self.points.iter().map(|p| (ahead.dot(&p.coords), p)).collect();
-        front.sort_by(|a, b| b.0.total_cmp(&a.0));
-        for (_, p) in front.into_iter().take(PROBED) {
-            let (now, closest) = depth(p, cell.spot.guess);
+        for p in self.probes(spot, &wish.at, &ahead) {
+            let (now, closest) = depth(&p, spot.guess);
             let (then, _) = depth(&(p + ahead * PROBE), closest.triangle);
             if then <= now.max(pair.allowance) + INSIDE * PROBE {
                 continue;
@@ -539,6 +519,35 @@ impl<'a> Cells<'a> {
             }
         }
         wish.obstacles.len() > before
+    }
+
+    /// Points of the piece at hand that are likely to get inside first: corners in front, and the
+    /// middles of the largest faces that look ahead (corners may be at the rims of holes).
+    fn probes(&self, spot: &Spot, at: &Vector3<f64>, ahead: &Vector3<f64>) -> Vec<Point3<f64>> {
+        let Pair { asked, tree, measured_from_asked, shifted, .. } = &self.pairs[spot.pair];
+        let mut probes = self.points.clone();
+        if probes.len() > PROBED {
+            let front = |p: &Point3<f64>, q: &Point3<f64>| {
+                ahead.dot(&q.coords).total_cmp(&ahead.dot(&p.coords))
+            };
+            probes.select_nth_unstable_by(PROBED, front);
+            probes.truncate(PROBED);
+        }
+        let shift = shifted * at;
+        let mut middles = Vec::new();
+        let mut middle = |[a, b, c]: [Point3<f64>; 3]| {
+            let area = (b - a).cross(&(c - a)).dot(&measured_from_asked.inverse_transform_vector(ahead));
+            if area > 0.0 {
+                middles.push((area, Point3::from((a.coords + b.coords + c.coords) / 3.0)));
+            }
+        };
+        match spot.piece {
+            Piece::Patch(index) => tree.triangles(index).iter().for_each(|&t| middle(asked.corners(t))),
+            Piece::Bit(corners) => middle(corners),
+        }
+        middles.sort_by(|a, b| b.0.total_cmp(&a.0));
+        probes.extend(middles.into_iter().take(PROBED).map(|(_, p)| measured_from_asked * p + shift));
+        probes
     }
 }
 

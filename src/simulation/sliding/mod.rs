@@ -57,7 +57,7 @@ impl TransitionFunction for SlidingEngine {
     ) -> Result<Motion, Interrupt> {
         if let (Action::Push(..), false) = (action, is_refined(scene, surroundings, part)) {
             match pushed(scene, surroundings, (part, start), action, termination) {
-                Err(Halt::Lost) => {}
+                Err(Halt::Lost | Halt::Blocked) => {}
                 Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
                 Ok(motion) => return Ok(motion),
             }

@@ -70,9 +70,9 @@ fn translations_blocked(
     least: f64,
 ) -> Result<Vec<bool>, Halt> {
     let termination = Termination::default();
-    let (standing, nowhere) = ([other], Vector3::zeros());
+    let standing = [other];
     let mut cells = Cells::new(&termination);
-    cells.add(scene, (part, pose), other, &nowhere, &nowhere, &mut Vec::new())?;
+    cells.add(scene, (part, pose), other, &Vector3::zeros())?;
     let blocked = |action: &Action| {
         let mut push = Push::with(cells.clone(), scene, &standing, (part, pose), action.force());
         for _ in 0..PUSHES {

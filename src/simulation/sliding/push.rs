@@ -16,12 +16,10 @@ use super::cells::{Cells, Halt, Obstacle};
 use super::drive::{FREE_STEP, LEAST_SHARE, contact_step};
 
 /// So many times the direction is bent at one place.
-const MOST_BENDS: usize = 24;
+const MOST_BENDS: usize = 64;
 /// So many steps in succession may be vanishingly short.
 const MOST_STALLS: usize = 16;
 const STALL: f64 = 1e-7;
-/// What leads into an obstacle by less than this is rounding.
-const AGAINST: f64 = 1e-7;
 
 /// A part that is pushed.
 pub(super) struct Push<'a> {
@@ -92,18 +90,17 @@ impl<'a> Push<'a> {
         let mut obstacles = Vec::new();
         let mut u = self.force;
         let mut with = Vec::new();
-        let mut bends = 0;
-        loop {
-            self.look_around(&u, &mut obstacles)?;
+        self.look_around()?;
+        for bends in 0.. {
+            let known = obstacles.len();
             self.cells.make_way(&self.shift, &u, &mut obstacles)?;
-            if !obstacles.iter().any(|o| o.normal.dot(&u) < -AGAINST) {
+            if obstacles.len() == known {
                 break;
             }
             let Some((along, by)) = projected(&self.force, &obstacles) else {
                 return Ok(Step::Stuck { with: all(&obstacles) });
             };
             with = by;
-            bends += 1;
             if along.norm_squared() < LEAST_SHARE || bends > MOST_BENDS {
                 return Ok(Step::Stuck { with });
             }
@@ -123,7 +120,7 @@ impl<'a> Push<'a> {
     }
 
     /// Takes in parts that come near.
-    fn look_around(&mut self, u: &Vector3<f64>, obstacles: &mut Vec<Obstacle>) -> Result<(), Halt> {
+    fn look_around(&mut self) -> Result<(), Halt> {
         if self.asked_at.is_some_and(|at| (self.shift - at).norm() < FREE_STEP * 0.9) {
             return Ok(());
         }
@@ -132,7 +129,7 @@ impl<'a> Push<'a> {
         for other in self.scene.broad_phase.meeting_of(self.standing, &here.grown(FREE_STEP)) {
             if !self.cells.knows(other) {
                 let who = (self.part, &self.start);
-                self.cells.add(self.scene, who, other, &self.shift, u, obstacles)?;
+                self.cells.add(self.scene, who, other, &self.shift)?;
             }
         }
         Ok(())
