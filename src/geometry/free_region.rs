@@ -244,7 +244,10 @@ impl Visitor for Growth<'_> {
         if best.is_none_or(|(worth, _)| worth < 0.0)
             && let Some(apart) = separating_direction(&corners, &self.inset, f64::NEG_INFINITY, None)
         {
-            best = self.any_better(&corners, apart, best);
+            best = self.better(triangle, &corners, apart, best);
+            if best.is_none_or(|(worth, _)| worth < -self.most) {
+                best = self.any_better(&corners, apart, best);
+            }
         }
         if best.is_none_or(|(worth, _)| worth < 0.0) {
             // Beside the triangle: along the faces across its sides, and in its own plane.

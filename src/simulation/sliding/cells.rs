@@ -337,7 +337,6 @@ impl<'a> Cells<'a> {
             return Ok(());
         }
         let ball = Ball { centre, radius, closest, signed };
-        let small = matches!(spot.piece, Piece::Bit(_)) && radius < SMALL;
         if wish.along == Vector3::zeros() {
             return match self.held(&spot, &ball, wish, &Vector3::zeros()) {
                 Ok(cell) => {
@@ -401,7 +400,12 @@ impl<'a> Cells<'a> {
         let Pair { tree, asked, .. } = self.pairs[spot.pair];
         let mut renew = |piece: Piece| self.renew(Spot { piece, level: 0, ..*spot }, wish);
         match spot.piece {
-            Piece::Bit(_) if radius < SMALLEST => Err(Halt::Lost),
+            Piece::Bit(_) if radius < SMALLEST => {
+                let Pair { other, allowance, .. } = self.pairs[spot.pair];
+                let depth = -self.pairs[spot.pair].measured.signed_distance(&self.points[0]);
+                tracing::debug!(other, radius, allowance, depth, "a bit of surface is in no region");
+                Err(Halt::Lost)
+            }
             Piece::Bit(corners) => halves(&corners).into_iter().try_for_each(|b| renew(Piece::Bit(b))),
             Piece::Patch(index) => match tree.parts(index) {
                 Parts::Patches(children) => children.into_iter().try_for_each(|c| renew(Piece::Patch(c))),

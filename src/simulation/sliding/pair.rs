@@ -83,6 +83,7 @@ fn translations_blocked(
                 return Ok(false);
             }
         }
+        tracing::debug!(part, other, %action, travel = push.travel(), "no end of a short push");
         Err(Halt::Lost)
     };
     actions.iter().map(blocked).collect()
