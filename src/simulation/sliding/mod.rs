@@ -7,6 +7,7 @@
 
 mod cells;
 mod drive;
+mod facing;
 mod leap;
 mod pair;
 mod push;

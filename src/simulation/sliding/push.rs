@@ -12,8 +12,9 @@ use crate::termination::Termination;
 
 use super::super::Scene;
 use super::super::projection::{Row, project};
-use super::cells::{Cells, Halt, Obstacle};
-use super::drive::{FREE_STEP, LEAST_SHARE, contact_step};
+use super::cells::{Cells, Halt};
+use super::drive::{FREE_STEP, LEAST_SHARE, contact_step, others};
+use super::facing::Obstacle;
 
 /// So many times the direction is bent at one place.
 const MOST_BENDS: usize = 64;
@@ -89,7 +90,6 @@ impl<'a> Push<'a> {
     pub(super) fn step(&mut self) -> Result<Step, Halt> {
         let mut obstacles = Vec::new();
         let mut u = self.force;
-        let mut with = Vec::new();
         self.look_around()?;
         for bends in 0.. {
             let known = obstacles.len();
@@ -97,12 +97,11 @@ impl<'a> Push<'a> {
             if obstacles.len() == known {
                 break;
             }
-            let Some((along, by)) = projected(&self.force, &obstacles) else {
-                return Ok(Step::Stuck { with: all(&obstacles) });
+            let Some((along, by)) = projected(&self.force, &obstacles).filter(|_| bends < MOST_BENDS) else {
+                return Err(Halt::Lost);
             };
-            with = by;
-            if along.norm_squared() < LEAST_SHARE || bends > MOST_BENDS {
-                return Ok(Step::Stuck { with });
+            if along.norm_squared() < LEAST_SHARE {
+                return Ok(Step::Stuck { with: by });
             }
             u = along.normalize();
         }
@@ -111,7 +110,7 @@ impl<'a> Push<'a> {
         let length = self.cells.length(&self.shift, &u).min(longest).min(seen);
         self.stalls = if length < STALL { self.stalls + 1 } else { 0 };
         if self.stalls > MOST_STALLS {
-            return Ok(Step::Stuck { with });
+            return Err(Halt::Lost);
         }
         self.shift += u * length;
         let mut pose = self.start;
@@ -144,12 +143,5 @@ fn projected(force: &Vector3<f64>, obstacles: &[Obstacle]) -> Option<(Vector3<f6
     };
     let rows: Vec<Row> = obstacles.iter().map(row).collect();
     let result = project(&Vector6::new(force.x, force.y, force.z, 0.0, 0.0, 0.0), &rows)?;
-    Some((result.w.fixed_rows::<3>(0).into(), super::drive::others(&result.active, &rows)))
-}
-
-fn all(obstacles: &[Obstacle]) -> Vec<usize> {
-    let mut with: Vec<usize> = obstacles.iter().map(|o| o.other).collect();
-    with.sort_unstable();
-    with.dedup();
-    with
+    Some((result.w.fixed_rows::<3>(0).into(), others(&result.active, &rows)))
 }

@@ -1,0 +1,243 @@
+//! Two surfaces that face each other: of one, pieces are asked for; into the other they may not get.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use crate::geometry::{Parts, PatchTree, Pose, Surface, separating_direction};
+
+use super::super::Scene;
+use super::DEPTH_TOLERANCE;
+
+/// So much deeper than granted a piece may be and still be held, in the planning frame: how deep
+/// facets of round parts may lie across each other without being granted anything.
+const HELD: f64 = 1e-3;
+/// Pieces are drawn together by this share to see whether they only touch.
+const INSET: f64 = 0.02;
+/// Shifts that lead into a plane by less than this share go along it: coordinates in files are
+/// rounded, and so are planes.
+pub(super) const TILT: f64 = 1e-5;
+/// What such shifts may come to.
+pub(super) const SUNK: f64 = 0.3 * DEPTH_TOLERANCE;
+/// Points are moved so far to see whether they get inside …
+const PROBE: f64 = 2e-3;
+/// … by more than this share of it.
+const INSIDE: f64 = 0.125;
+/// So many corners of a piece, and so many faces, are probed.
+const PROBED: usize = 16;
+/// Cosine of the angle below which two planes are one.
+const PARALLEL: f64 = 0.9999;
+
+/// A plane that a part is kept from passing, by its normal in the planning frame, and whose it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Obstacle {
+    pub(super) normal: Vector3<f64>,
+    pub(super) other: usize,
+}
+
+/// A moving and a standing part: the surface that is asked, and that into which it may not get.
+#[derive(Clone)]
+pub(super) struct Facing<'a> {
+    pub(super) other: usize,
+    asked: &'a Surface,
+    tree: &'a PatchTree,
+    pub(super) measured: &'a Surface,
+    /// Without a shift.
+    measured_from_asked: Pose,
+    /// From shifts of the part to shifts of the asked surface against the measured one: orthogonal.
+    pub(super) shifted: Matrix3<f64>,
+    pub(super) allowance: f64,
+}
+
+impl<'a> Facing<'a> {
+    /// With the moving part's surface asked, and with the standing one's: what is closed can be
+    /// measured. The smaller surface is asked first.
+    pub(super) fn both(scene: &'a Scene, part: usize, start: &Pose, other: usize) -> Vec<Self> {
+        let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
+        let stand = standing.planning_from_shape;
+        let of = |ask_mine: bool| {
+            let [mine, theirs] = [moving, standing].map(|body| &body.shape);
+            let (asked, measured, measured_from_asked, turn) = if ask_mine {
+                (mine, theirs, stand.inverse() * start, stand.rotation.inverse())
+            } else {
+                (theirs, mine, start.inverse() * stand, start.rotation.inverse())
+            };
+            let sense = if ask_mine { 1.0 } else { -1.0 };
+            (!measured.surface.is_open()).then(|| Self {
+                other,
+                asked: &asked.surface,
+                tree: asked.patches(),
+                measured: &measured.surface,
+                measured_from_asked,
+                shifted: *turn.to_rotation_matrix().matrix() * sense,
+                allowance: scene.allowances.of(part, other),
+            })
+        };
+        let size = |s: &Surface| s.bounds().extents().product();
+        let mine_first = size(&moving.shape.surface) <= size(&standing.shape.surface);
+        [mine_first, !mine_first].into_iter().filter_map(of).collect()
+    }
+
+    /// How deep a piece may be and still be held.
+    pub(super) fn held(&self) -> f64 {
+        self.allowance + HELD
+    }
+
+    /// The whole asked surface, unless it has no triangles.
+    pub(super) fn root(&self) -> Option<Piece> {
+        self.tree.root().map(Piece::Patch)
+    }
+
+    /// The parts of a piece.
+    pub(super) fn parts(&self, piece: &Piece) -> Vec<Piece> {
+        match piece {
+            Piece::Bit(corners) => halves(corners).map(Piece::Bit).to_vec(),
+            Piece::Patch(index) => match self.tree.parts(*index) {
+                Parts::Patches(children) => children.map(Piece::Patch).to_vec(),
+                Parts::Triangles(list) => list.iter().map(|&t| Piece::Bit(self.asked.corners(t))).collect(),
+            },
+        }
+    }
+
+    /// Where a piece is against the measured surface when the part is shifted.
+    pub(super) fn place(&self, piece: &Piece, at: &Vector3<f64>, placed: &mut Placed) {
+        let shift = self.shifted * at;
+        let place = |p: &Point3<f64>| self.measured_from_asked * p + shift;
+        placed.points.clear();
+        placed.extremes.clear();
+        match piece {
+            Piece::Patch(index) => {
+                let patch = self.tree.patch(*index);
+                placed.points.extend(self.tree.vertices(*index).iter().map(place));
+                placed.extremes.extend(self.tree.extremes(*index).map(place));
+                (placed.centre, placed.radius) = (place(&patch.centre), patch.radius);
+            }
+            Piece::Bit(corners) => {
+                let corners = corners.map(|p| place(&p));
+                placed.points.extend(corners);
+                placed.extremes.extend(corners);
+                let centre = Point3::from(corners.iter().map(|p| p.coords).sum::<Vector3<f64>>() / 3.0);
+                placed.centre = centre;
+                placed.radius = corners.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
+            }
+        }
+    }
+
+    /// Whether a triangle of the measured surface may lie beside a piece where it is.
+    pub(super) fn is_beside(&self, piece: &Placed, triangle: u32) -> bool {
+        let corners = self.measured.corners(triangle);
+        // What touches is beside, too.
+        let centre = piece.centre;
+        let inset =
+            |p: &Point3<f64>| p + (centre - p) * (self.held() / (centre - p).norm()).clamp(INSET, 1.0);
+        let within: Vec<_> = piece.extremes.iter().map(inset).collect();
+        separating_direction(&corners, &within, 0.0, None).is_some()
+    }
+
+    /// The faces that points of a piece get into when the part moves from a shift along a unit
+    /// vector: what is certainly in the way.
+    pub(super) fn obstacles(
+        &self,
+        piece: &Piece,
+        placed: &Placed,
+        (at, along): (&Vector3<f64>, &Vector3<f64>),
+        guess: u32,
+    ) -> Vec<Obstacle> {
+        let mut obstacles: Vec<Obstacle> = Vec::new();
+        let ahead = self.shifted * along;
+        let depth = |p: &Point3<f64>, guess: u32| {
+            let closest = self.measured.closest_from(p, guess);
+            (-self.measured.signed(p, &closest), closest)
+        };
+        for p in self.probes(piece, placed, at, &ahead) {
+            let (now, closest) = depth(&p, guess);
+            let (then, _) = depth(&(p + ahead * PROBE), closest.triangle);
+            if then <= now.max(self.allowance) + INSIDE * PROBE {
+                continue;
+            }
+            let (mut least, mut most): (Option<Vector3<f64>>, Option<Vector3<f64>>) = (None, None);
+            self.measured.feature_normals(&closest, |n| {
+                let speed = n.dot(&ahead);
+                if least.is_none_or(|m| speed > m.dot(&ahead)) {
+                    least = Some(n);
+                }
+                if most.is_none_or(|m| speed < m.dot(&ahead)) {
+                    most = Some(n);
+                }
+            });
+            // Before a convex edge either face is enough to stay above; if that does not help, it is
+            // a reentrant one.
+            let blocking = |n: &Vector3<f64>| n.dot(&ahead) < -TILT;
+            if let Some(n) = least.filter(blocking).or(most.filter(blocking)) {
+                let normal = self.shifted.transpose() * n;
+                let known = |o: &Obstacle| o.other == self.other && o.normal.dot(&normal) > PARALLEL;
+                if !obstacles.iter().any(known) {
+                    obstacles.push(Obstacle { normal, other: self.other });
+                }
+            }
+        }
+        obstacles
+    }
+
+    /// Points of a piece that are likely to get inside first: corners in front, and the
+    /// middles of the largest faces that look ahead (corners may be at the rims of holes).
+    fn probes(
+        &self,
+        piece: &Piece,
+        placed: &Placed,
+        at: &Vector3<f64>,
+        ahead: &Vector3<f64>,
+    ) -> Vec<Point3<f64>> {
+        let Self { asked, tree, measured_from_asked, shifted, .. } = self;
+        let mut probes = placed.points.clone();
+        if probes.len() > PROBED {
+            let front =
+                |p: &Point3<f64>, q: &Point3<f64>| ahead.dot(&q.coords).total_cmp(&ahead.dot(&p.coords));
+            probes.select_nth_unstable_by(PROBED, front);
+            probes.truncate(PROBED);
+        }
+        let shift = shifted * at;
+        let mut middles = Vec::new();
+        let mut middle = |[a, b, c]: [Point3<f64>; 3]| {
+            let area = (b - a).cross(&(c - a)).dot(&measured_from_asked.inverse_transform_vector(ahead));
+            if area > 0.0 {
+                middles.push((area, Point3::from((a.coords + b.coords + c.coords) / 3.0)));
+            }
+        };
+        match *piece {
+            Piece::Patch(index) => tree.triangles(index).iter().for_each(|&t| middle(asked.corners(t))),
+            Piece::Bit(corners) => middle(corners),
+        }
+        middles.sort_by(|a, b| b.0.total_cmp(&a.0));
+        probes.extend(middles.into_iter().take(PROBED).map(|(_, p)| measured_from_asked * p + shift));
+        probes
+    }
+}
+
+/// A piece of the asked surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Piece {
+    /// A node of the tree.
+    Patch(u32),
+    /// A triangle, or a bit of one, by its corners.
+    Bit([Point3<f64>; 3]),
+}
+
+/// A piece against the measured surface.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Placed {
+    /// Its corners.
+    pub(super) points: Vec<Point3<f64>>,
+    /// Those that reach furthest.
+    pub(super) extremes: Vec<Point3<f64>>,
+    /// A ball that holds it.
+    pub(super) centre: Point3<f64>,
+    pub(super) radius: f64,
+}
+
+/// A triangle cut in two across its longest side.
+fn halves(corners: &[Point3<f64>; 3]) -> [[Point3<f64>; 3]; 2] {
+    let length = |i: usize| (corners[(i + 1) % 3] - corners[i]).norm_squared();
+    let side = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
+    let [a, b, c] = [0, 1, 2].map(|k| corners[(side + k) % 3]);
+    let cut = nalgebra::center(&a, &b);
+    [[a, cut, c], [cut, b, c]]
+}
