@@ -12,6 +12,7 @@ mod congruence;
 mod content_hash;
 mod error;
 mod free_region;
+mod half_space;
 mod heal;
 mod hull;
 mod linking_number;

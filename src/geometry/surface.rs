@@ -100,18 +100,21 @@ impl Surface {
 
     /// The corners of a triangle.
     #[must_use]
+    #[inline]
     pub fn corners(&self, triangle: u32) -> [Point3<f64>; 3] {
         self.triangles[triangle as usize].map(|i| self.vertices[i as usize])
     }
 
     /// The unit normal of a triangle (zero if degenerate).
     #[must_use]
+    #[inline]
     pub fn face_normal(&self, triangle: u32) -> Vector3<f64> {
         self.face_normals[triangle as usize]
     }
 
     /// The triangle across edge `edge` of `triangle`, or `u32::MAX` where there is none.
     #[must_use]
+    #[inline]
     pub fn neighbour(&self, triangle: u32, edge: u8) -> u32 {
         self.neighbours[triangle as usize][edge as usize]
     }
@@ -130,6 +133,7 @@ impl Surface {
 
     /// The closest point on one triangle.
     #[must_use]
+    #[inline]
     pub fn closest_on(&self, triangle: u32, p: &Point3<f64>) -> Closest {
         let [a, b, c] = self.corners(triangle);
         let (point, feature) = closest_on_triangle(p, &a, &b, &c);
