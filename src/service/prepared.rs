@@ -10,7 +10,7 @@ use crate::geometry::{Assembly, Shape};
 use crate::plan::Verifier;
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
-use crate::simulation::{Scene, alike};
+use crate::simulation::{Scene, placed_alike};
 use crate::termination::{Interrupt, Termination};
 
 /// Overlaps smaller than this share of the longest side are rounding, not modelling.
@@ -86,7 +86,7 @@ fn measure_overlaps(
     termination: &Termination,
 ) -> Result<Vec<(usize, usize, f64)>, Interrupt> {
     let pairs = scene.broad_phase.pairs(0.0);
-    let (first, group_of) = alike(scene, &pairs);
+    let (first, group_of) = placed_alike(scene, &pairs);
     let depths = first
         .par_iter()
         .map(|&(a, b)| verifier.assembled_depth(scene, a, b, termination))
