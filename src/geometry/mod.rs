@@ -11,6 +11,7 @@ mod bounds;
 mod congruence;
 mod content_hash;
 mod error;
+mod folds;
 mod free_region;
 mod half_space;
 mod heal;

@@ -122,8 +122,10 @@ impl Brick<'_> {
             for i in chosen(squared, &limits) {
                 let at = (corner + place(i, ACROSS)).map(|x| x as f64 - (CELLS / 2) as f64);
                 match facet.height_over(&at) {
-                    Some(height) => best[i].consider(t, height.abs() * self.cell, Foot::Face(height)),
-                    None => self.consider(t, node(&corner, i), &mut best[i]),
+                    Some(height) if !self.surface.is_folded(t) => {
+                        best[i].consider(t, height.abs() * self.cell, Foot::Face(height));
+                    }
+                    _ => self.consider(t, node(&corner, i), &mut best[i]),
                 }
             }
         }
