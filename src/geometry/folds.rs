@@ -148,7 +148,7 @@ mod tests {
             corner(a) * 0.45 + corner(b) * 0.345 + corner(c) * 0.205,
         );
         let n = mesh.vertices.len() as u32;
-        mesh.vertices.extend([x.into(), y.into()]);
+        mesh.vertices.extend([x, y].map(<[f64; 3]>::from));
         mesh.triangles.extend([[a, b, n], [b, c, n], [c, n + 1, n], [n, n + 1, a], [n + 1, c, a]]);
         mesh
     }

@@ -104,7 +104,7 @@ mod tests {
         let quarter = Pose::rotation(Vector3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2));
         let foot = || cuboid([-1.0, -1.5, 0.0], [2.0, 2.0, 1.0]);
         let post = || cuboid([0.0, 0.0, 1.0], [1.0, 1.25, 3.0]);
-        let turned = |mesh| moved(moved(mesh, &quarter), &Pose::translation(9.0, 0.0, 0.0));
+        let turned = |mesh| moved(moved(mesh, &quarter), &Pose::translation(6.0, 0.0, 0.0));
         let (scene, _) = scene([foot(), post(), turned(post()), turned(foot())]);
         let pairs = [(0, 1), (2, 3), (0, 2)];
         assert_eq!(alike(&scene, &pairs).0.len(), 3);
