@@ -1,7 +1,7 @@
 //! Where plans are made: in this process or in the daemon. Both speak the planning modules'
 //! own types.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::error::CliError;
 use crate::geometry::SourceAssembly;
@@ -13,6 +13,8 @@ use crate::service::Service;
 pub(super) struct Question<'a> {
     /// The assembly.
     pub(super) assembly: &'a SourceAssembly,
+    /// How long it took to read.
+    pub(super) read: Duration,
     /// What to plan.
     pub(super) request: PlanRequest,
     /// When the answer is due.
@@ -35,7 +37,11 @@ pub(super) struct Embedded {
 
 impl Backend for Embedded {
     fn plan(&self, question: &Question<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError> {
+        let started = Instant::now();
         let admission = self.service.admit(question.assembly)?;
-        Ok(self.service.plan(admission.id, &question.request, &question.termination, sink)?)
+        let admitted = started.elapsed();
+        let mut plan = self.service.plan(admission.id, &question.request, &question.termination, sink)?;
+        plan.stats.load_time_s = Some((question.read + admitted).as_secs_f64());
+        Ok(plan)
     }
 }

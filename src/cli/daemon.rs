@@ -198,6 +198,9 @@ fn stats(s: &client::Stats) -> PlanStats {
         simulations_run: s.simulations_run,
         sweeps: s.sweeps,
         states: s.states,
+        // The wire has no room for these.
+        load_time_s: None,
+        overlap_time_s: None,
         sdf_time_s: s.sdf_time_s,
         static_analysis_time_s: s.static_analysis_time_s,
         path_time_s: s.path_time_s,

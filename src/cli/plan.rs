@@ -21,13 +21,15 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     let deadline = arguments.timeout.and_then(|t| Instant::now().checked_add(t));
     let termination = Termination::new(deadline);
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
+    let started = Instant::now();
     let mut assembly = load_assembly(&arguments.assembly)?;
+    let read = started.elapsed();
     if let Some(rotation) = &arguments.rotate {
         assembly.rotate(rotation);
     }
     let request = request(arguments, &assembly)?;
     let backend = choose_backend(arguments)?;
-    let question = Question { assembly: &assembly, request, deadline, termination };
+    let question = Question { assembly: &assembly, read, request, deadline, termination };
     let mut listener = Listener::new(arguments.trace.as_deref())?;
     let plan = backend.plan(&question, &mut listener);
     listener.finish()?;

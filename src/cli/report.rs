@@ -126,14 +126,18 @@ fn stats(plan: &Plan) -> String {
     let s = &plan.stats;
     let depth = plan.steps.iter().map(|step| step.verified_depth).fold(0.0, f64::max);
     let hit = if s.plan_hit { ", plan remembered" } else { "" };
+    let told =
+        |name: &str, time: Option<f64>| time.map_or_else(String::new, |t| format!("{name} {t:.3} s, "));
     format!(
-        "{} simulations ({} run), {} sweeps, {} states{hit}; fields {:.3} s, static analysis {:.3} s, \
+        "{} simulations ({} run), {} sweeps, {} states{hit}; {}fields {:.3} s, {}static analysis {:.3} s, \
          paths {:.3} s, verification {:.3} s, total {:.3} s; verified to {}\n",
         s.simulations,
         s.simulations_run,
         s.sweeps,
         s.states,
+        told("loading", s.load_time_s),
         s.sdf_time_s,
+        told("overlaps", s.overlap_time_s),
         s.static_analysis_time_s,
         s.path_time_s,
         s.verify_time_s,

@@ -8,12 +8,15 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::half_space::{Cloud, HalfSpace};
 use super::surface::NO_TRIANGLE;
-use super::triangle_tree::Visitor;
-use super::{Bounds, Closest, Surface, separating_direction};
+use super::triangle_tree::{Corners, Visitor, WIDTH};
+use super::{Closest, Surface, separating_direction};
 
 /// A surface may reach so far into a region, in the planning frame: rounding of flush faces.
 const TOUCH: f64 = 2e-6;
+/// A box so far inside may hold nothing that reaches further than that.
+const BOX_TOUCH: f64 = 1e-6;
 /// A point so deep in a region is well inside.
 const INNER: f64 = 2.0 * TOUCH;
 /// Points nearer to the surface than this, in the planning frame, count as on it.
@@ -24,20 +27,6 @@ const MOST_PLANES: usize = 160;
 const INSET: f64 = 0.02;
 /// Steps of alternating projection before a point counts as too far.
 const PROJECTIONS: usize = 8;
-
-/// A half-space: points with normal · x ≥ height.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct HalfSpace {
-    normal: Vector3<f64>,
-    height: f64,
-}
-
-impl HalfSpace {
-    /// How far a point is inside.
-    fn above(&self, p: &Point3<f64>) -> f64 {
-        self.normal.dot(&p.coords) - self.height
-    }
-}
 
 /// A ball cut by half-spaces into which a surface nowhere reaches further than rounding.
 #[derive(Debug, Clone, PartialEq)]
@@ -151,21 +140,31 @@ impl Surface {
     ) -> Result<FreeRegion, NoRegion> {
         let sides = Vec::with_capacity(8);
         let region = FreeRegion { centre: *seed, radius, sides };
-        let inset = |p: &Point3<f64>| p + (seed - p) * (most / (seed - p).norm().max(most)).max(INSET);
-        let inset = wanted.iter().map(inset).collect();
-        let mut growth = Growth { surface: self, wanted, inset, most, region, amid: None };
+        let reach = wanted.iter().map(|p| (p - seed).norm()).fold(0.0, f64::max);
+        let mut growth = Growth {
+            surface: self,
+            wanted,
+            cloud: Cloud::new(wanted, seed),
+            inset: Vec::new(),
+            most,
+            least: (radius * 0.5).max(reach - most),
+            nearest: None,
+            region,
+            amid: None,
+        };
         self.nearest_first(seed, &mut growth);
-        if let Some(triangle) = growth.amid {
+        let Growth { region, nearest, least, amid, .. } = growth;
+        if let Some(triangle) = amid {
             return Err(NoRegion::Amid(triangle));
         }
-        let region = growth.region;
-        if region.radius <= radius * 0.5 {
+        if region.radius < least {
             return Err(NoRegion::Cramped);
         }
         // No surface passes through: all of the region is where one point well inside is. (A region
         // too thin to have one may follow the plane of a face into the solid.)
         let inner = region.nearest_within(seed, most + 4.0 * INNER, INNER).ok_or(NoRegion::Cramped)?;
-        if self.signed_distance(&inner) > 0.0 { Ok(region) } else { Err(NoRegion::Cramped) }
+        let closest = self.closest_from(&inner, nearest.unwrap_or(0));
+        if self.signed(&inner, &closest) > 0.0 { Ok(region) } else { Err(NoRegion::Cramped) }
     }
 }
 
@@ -173,47 +172,91 @@ impl Surface {
 struct Growth<'a> {
     surface: &'a Surface,
     wanted: &'a [Point3<f64>],
-    /// The wanted points, a little towards the seed: so hulls that touch are apart.
+    /// The wanted points and the seed.
+    cloud: Cloud,
+    /// The wanted points, a little towards the seed, so that hulls which touch are apart: made when
+    /// first needed.
     inset: Vec<Point3<f64>>,
     most: f64,
+    /// A smaller region is not worth having: some wanted point is further than `most` from it.
+    least: f64,
+    /// The triangle of the first side.
+    nearest: Option<u32>,
     region: FreeRegion,
     /// The triangle that ended it.
     amid: Option<u32>,
 }
 
+/// A half-space, and how far the worst of the wanted points is inside.
+type Candidate = Option<(f64, HalfSpace)>;
+
 impl Growth<'_> {
     /// The better of two half-spaces: that in front of some corners with this normal, and the best
-    /// so far. Each with how deep the worst of the wanted points is inside.
+    /// so far.
     fn better(
         &self,
         triangle: u32,
         corners: &[Point3<f64>; 3],
         normal: Vector3<f64>,
-        best: Option<(f64, HalfSpace)>,
-    ) -> Option<(f64, HalfSpace)> {
+        best: Candidate,
+    ) -> Candidate {
         // Seen from behind, a surface is entered already, mostly.
         let from_behind = normal.dot(&self.surface.face_normal(triangle)) < -0.6;
         if from_behind { best } else { self.any_better(corners, normal, best) }
     }
 
     /// The same, also from behind: the back of a wall of which another side is nearer.
-    fn any_better(
-        &self,
-        corners: &[Point3<f64>; 3],
-        normal: Vector3<f64>,
-        best: Option<(f64, HalfSpace)>,
-    ) -> Option<(f64, HalfSpace)> {
-        let side = Self::before(corners, normal);
-        let seed = &self.region.centre;
-        let worth = self.wanted.iter().map(|p| side.above(p)).fold(side.above(seed), f64::min);
-        let better = normal != Vector3::zeros() && best.is_none_or(|(most, _)| worth > most);
-        if better { Some((worth, side)) } else { best }
+    fn any_better(&self, corners: &[Point3<f64>; 3], normal: Vector3<f64>, best: Candidate) -> Candidate {
+        if normal == Vector3::zeros() {
+            return best;
+        }
+        let side = HalfSpace::before(corners, normal);
+        let worth = self.cloud.least_above(&side);
+        if best.is_none_or(|(most, _)| worth > most) { Some((worth, side)) } else { best }
     }
 
-    /// The half-space behind which a triangle just disappears, with this normal.
-    fn before(corners: &[Point3<f64>; 3], normal: Vector3<f64>) -> HalfSpace {
-        let height = corners.iter().map(|v| normal.dot(&v.coords)).fold(f64::NEG_INFINITY, f64::max);
-        HalfSpace { normal, height }
+    /// The best half-space in front of a triangle, of those that are worth trying.
+    fn best(&mut self, triangle: u32, corners: &[Point3<f64>; 3], closest: &Closest) -> Candidate {
+        let seed = self.region.centre;
+        // The faces that meet where the triangle is nearest, and the way there.
+        let mut best = None;
+        self.surface.feature_normals(closest, |n| best = self.better(triangle, corners, n, best));
+        if closest.distance > TOUCH {
+            best = self.better(triangle, corners, (seed - closest.point) / closest.distance, best);
+        }
+        let enough = |best: Candidate| best.is_some_and(|(worth, _)| worth >= 0.0);
+        if !enough(best) {
+            // Beside the triangle: along the faces across its sides, and in its own plane.
+            for edge in 0..3 {
+                let across = self.surface.neighbour(triangle, edge as u8);
+                if across != NO_TRIANGLE {
+                    best = self.better(triangle, corners, self.surface.face_normal(across), best);
+                }
+                let along = corners[(edge + 1) % 3] - corners[edge];
+                let outward = along.cross(&self.surface.face_normal(triangle));
+                if let Some(outward) = outward.try_normalize(0.0) {
+                    best = self.better(triangle, corners, outward, best);
+                }
+            }
+        }
+        if !enough(best)
+            && let Some(apart) = separating_direction(corners, self.inset(), f64::NEG_INFINITY, None)
+        {
+            best = self.better(triangle, corners, apart, best);
+            if best.is_none_or(|(worth, _)| worth < -self.most) {
+                best = self.any_better(corners, apart, best);
+            }
+        }
+        best
+    }
+
+    fn inset(&mut self) -> &[Point3<f64>] {
+        if self.inset.is_empty() {
+            let (seed, most) = (self.region.centre, self.most);
+            let inset = |p: &Point3<f64>| p + (seed - p) * (most / (seed - p).norm().max(most)).max(INSET);
+            self.inset = self.wanted.iter().map(inset).collect();
+        }
+        &self.inset
     }
 }
 
@@ -222,9 +265,17 @@ impl Visitor for Growth<'_> {
         self.region.radius
     }
 
-    fn wants(&self, bounds: &Bounds) -> bool {
-        let behind = |side: &HalfSpace| bounds.support(&side.normal) <= side.height + 1e-6;
-        !self.region.sides.iter().any(behind)
+    fn hides_boxes(
+        &self,
+        origin: &Point3<f64>,
+        min: &[[f32; WIDTH]; 3],
+        max: &[[f32; WIDTH]; 3],
+    ) -> [bool; WIDTH] {
+        any_of(&self.region.sides, |side| side.boxes_above(origin, min, max).map(|above| above <= BOX_TOUCH))
+    }
+
+    fn hides_triangles(&self, corners: &Corners) -> [bool; WIDTH] {
+        any_of(&self.region.sides, |side| side.triangles_above(corners).map(|above| above <= TOUCH))
     }
 
     fn visit(&mut self, triangle: u32) {
@@ -233,48 +284,39 @@ impl Visitor for Growth<'_> {
         if self.region.sides.iter().any(behind) {
             return;
         }
-        let seed = self.region.centre;
-        let closest = self.surface.closest_on(triangle, &seed);
-        // The faces that meet where the triangle is nearest, and the way there.
-        let mut best = None;
-        self.surface.feature_normals(&closest, |n| best = self.better(triangle, &corners, n, best));
-        if closest.distance > TOUCH {
-            best = self.better(triangle, &corners, (seed - closest.point) / closest.distance, best);
-        }
-        if best.is_none_or(|(worth, _)| worth < 0.0)
-            && let Some(apart) = separating_direction(&corners, &self.inset, f64::NEG_INFINITY, None)
-        {
-            best = self.better(triangle, &corners, apart, best);
-            if best.is_none_or(|(worth, _)| worth < -self.most) {
-                best = self.any_better(&corners, apart, best);
-            }
-        }
-        if best.is_none_or(|(worth, _)| worth < 0.0) {
-            // Beside the triangle: along the faces across its sides, and in its own plane.
-            for edge in 0..3 {
-                let across = self.surface.neighbour(triangle, edge as u8);
-                if across != NO_TRIANGLE {
-                    best = self.better(triangle, &corners, self.surface.face_normal(across), best);
-                }
-                let along = corners[(edge + 1) % 3] - corners[edge];
-                let outward = along.cross(&self.surface.face_normal(triangle));
-                if let Some(outward) = outward.try_normalize(0.0) {
-                    best = self.better(triangle, &corners, outward, best);
-                }
-            }
-        }
-        match best {
+        let closest = self.surface.closest_on(triangle, &self.region.centre);
+        match self.best(triangle, &corners, &closest) {
             // What cannot be held for this triangle cannot be held at all.
             Some((worth, side)) if worth >= -self.most && self.region.sides.len() < MOST_PLANES => {
+                self.nearest.get_or_insert(triangle);
                 self.region.sides.push(side);
             }
             Some((worth, _)) if worth < -self.most => {
                 self.amid = Some(triangle);
                 self.region.radius = 0.0;
             }
-            _ => self.region.radius = closest.distance.min(self.region.radius),
+            _ => {
+                self.region.radius = closest.distance.min(self.region.radius);
+                if self.region.radius < self.least {
+                    self.region.radius = 0.0;
+                }
+            }
         }
     }
+}
+
+/// Which of eight some side hides.
+#[inline]
+fn any_of(sides: &[HalfSpace], hides: impl Fn(&HalfSpace) -> [bool; WIDTH]) -> [bool; WIDTH] {
+    let mut hidden = [false; WIDTH];
+    for side in sides {
+        let by = hides(side);
+        (0..WIDTH).for_each(|k| hidden[k] |= by[k]);
+        if hidden == [true; WIDTH] {
+            break;
+        }
+    }
+    hidden
 }
 
 #[cfg(test)]

@@ -2,10 +2,12 @@
 //!
 //! Sign: for closed meshes by the angle-weighted pseudo-normal of the closest feature
 //! (J. A. Bærentzen and H. Aanæs 2005), which is exact for closed, outward oriented meshes that do
-//! not cross themselves; for all others by winding number > 0.5.
+//! not cross or touch themselves; for all others by winding number > 0.5, and so where a closed one
+//! is folded (`folds`).
 
 use nalgebra::{Point3, Unit, Vector3};
 
+use super::folds::Folds;
 use super::triangle::{Feature, area_normal, closest_on_triangle, crossing};
 use super::triangle_tree::{TriangleTree, Visitor};
 use super::winding::WindingTree;
@@ -41,6 +43,7 @@ pub struct Surface {
     fan: Vec<u32>,
     tree: TriangleTree,
     winding: Option<WindingTree>,
+    folds: Option<Folds>,
     bounds: Bounds,
 }
 
@@ -66,8 +69,11 @@ impl Surface {
         let (fan_start, fan) = fans(mesh);
         let winding =
             (mesh.solidity == Solidity::Winding).then(|| WindingTree::new(&mesh.vertices, &mesh.triangles));
+        let neighbours = neighbours(mesh);
+        let folds = if winding.is_some() { None } else { Folds::of(mesh, &face_normals, &neighbours) };
         Self {
-            neighbours: neighbours(mesh),
+            folds,
+            neighbours,
             vertex_normals: vertex_normals(mesh, &face_normals),
             face_normals,
             fan_start,
@@ -100,18 +106,21 @@ impl Surface {
 
     /// The corners of a triangle.
     #[must_use]
+    #[inline]
     pub fn corners(&self, triangle: u32) -> [Point3<f64>; 3] {
         self.triangles[triangle as usize].map(|i| self.vertices[i as usize])
     }
 
     /// The unit normal of a triangle (zero if degenerate).
     #[must_use]
+    #[inline]
     pub fn face_normal(&self, triangle: u32) -> Vector3<f64> {
         self.face_normals[triangle as usize]
     }
 
     /// The triangle across edge `edge` of `triangle`, or `u32::MAX` where there is none.
     #[must_use]
+    #[inline]
     pub fn neighbour(&self, triangle: u32, edge: u8) -> u32 {
         self.neighbours[triangle as usize][edge as usize]
     }
@@ -122,6 +131,18 @@ impl Surface {
         self.winding.is_some()
     }
 
+    /// Whether a triangle is folded on another: then being above its face does not mean outside.
+    #[must_use]
+    #[inline]
+    pub fn is_folded(&self, triangle: u32) -> bool {
+        self.folds.as_ref().is_some_and(|folds| folds.has_face(triangle))
+    }
+
+    #[cfg(test)]
+    pub(super) fn is_folded_anywhere(&self) -> bool {
+        self.folds.is_some()
+    }
+
     /// The winding number at `p`, where signs come from it.
     #[must_use]
     pub fn winding(&self, p: &Point3<f64>) -> Option<f64> {
@@ -130,6 +151,7 @@ impl Surface {
 
     /// The closest point on one triangle.
     #[must_use]
+    #[inline]
     pub fn closest_on(&self, triangle: u32, p: &Point3<f64>) -> Closest {
         let [a, b, c] = self.corners(triangle);
         let (point, feature) = closest_on_triangle(p, &a, &b, &c);
@@ -176,9 +198,11 @@ impl Surface {
     /// Signed distance given the closest point: negative inside.
     #[must_use]
     pub fn signed(&self, p: &Point3<f64>, closest: &Closest) -> f64 {
-        let inside = match &self.winding {
-            Some(w) => w.winding(p) > 0.5,
-            None => self.pseudo_normal(closest).dot(&(p - closest.point)) < 0.0,
+        let corners = &self.triangles[closest.triangle as usize];
+        let inside = match (&self.winding, &self.folds) {
+            (Some(w), _) => w.winding(p) > 0.5,
+            (None, Some(folds)) if folds.doubts(closest, corners) => folds.is_inside(p),
+            _ => self.pseudo_normal(closest).dot(&(p - closest.point)) < 0.0,
         };
         if inside { -closest.distance } else { closest.distance }
     }

@@ -36,6 +36,7 @@ pub(super) fn crossing(p: &Point3<f64>, direction: &Vector3<f64>, corners: &[Poi
 /// The point of triangle `abc` closest to `p`, and its feature (C. Ericson, Real-Time Collision
 /// Detection, 5.1.5: Voronoi regions in barycentric terms).
 #[must_use]
+#[inline]
 pub fn closest_on_triangle(
     p: &Point3<f64>,
     a: &Point3<f64>,
@@ -76,6 +77,7 @@ pub fn closest_on_triangle(
 
 /// Twice the area times the unit normal; zero for a degenerate triangle.
 #[must_use]
+#[inline]
 pub fn area_normal(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>) -> Vector3<f64> {
     (b - a).cross(&(c - a))
 }

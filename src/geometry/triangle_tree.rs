@@ -7,15 +7,17 @@
 
 #![allow(clippy::needless_range_loop, reason = "loops over all lanes alike become vector instructions")]
 
-use std::cmp::{Ordering, Reverse};
-use std::collections::BinaryHeap;
+mod nearest_first;
 
 use nalgebra::{Point3, Vector3};
 
 use super::triangle::area_normal;
 use super::{Bounds, Closest};
 
-const WIDTH: usize = 8;
+pub(super) use nearest_first::Visitor;
+
+/// Boxes in a node, and triangles in a leaf.
+pub(super) const WIDTH: usize = 8;
 /// Bits of a child that is a leaf.
 const LEAF: u32 = 1 << 31;
 /// Rounding of coordinates and products, as a share of the coordinates' size.
@@ -26,6 +28,8 @@ const BINS: usize = 16;
 const LEAST_SHARE: usize = 16;
 
 type Lanes = [f32; WIDTH];
+/// The corners of eight triangles, in double precision: by corner, axis and triangle.
+pub(super) type Corners = [[[f64; WIDTH]; 3]; 3];
 
 /// Eight boxes and what they hold.
 #[derive(Clone)]
@@ -45,6 +49,7 @@ struct Leaf {
     height: Lanes,
     sides: [[Lanes; 3]; 3],
     limits: [Lanes; 3],
+    corners: Corners,
     triangle: [u32; WIDTH],
 }
 
@@ -152,44 +157,6 @@ impl TriangleTree {
         false
     }
 
-    /// Shows `visitor` the triangles within its reach of `p`, nearest first but for rounding.
-    pub(super) fn nearest_first(&self, p: &Point3<f64>, visitor: &mut impl Visitor) {
-        let q = p - self.origin;
-        let slack = ROUNDING * (q.amax() + self.radius);
-        let q: [f32; 3] = q.map(|x| x as f32).into();
-        let mut queue = BinaryHeap::from([Reverse(Near { squared: 0.0, at: Item::Place(self.root) })]);
-        while let Some(Reverse(Near { squared, at })) = queue.pop() {
-            let limit = ((visitor.reach() + slack).powi(2) * (1.0 + 1e-6)) as f32;
-            if squared > limit {
-                return;
-            }
-            match at {
-                Item::Triangle(t) => visitor.visit(t),
-                Item::Place(at) if at & LEAF != 0 => {
-                    let leaf = &self.leaves[(at & !LEAF) as usize];
-                    let bounds = leaf.squared_distances(&q);
-                    queue.extend(
-                        (0..WIDTH).filter(|&k| bounds[k] <= limit).map(|k| {
-                            Reverse(Near { squared: bounds[k], at: Item::Triangle(leaf.triangle[k]) })
-                        }),
-                    );
-                }
-                Item::Place(at) => {
-                    let node = &self.nodes[at as usize];
-                    let bounds = node.squared_distances(&q);
-                    for k in (0..WIDTH).filter(|&k| bounds[k] <= limit) {
-                        let corner =
-                            |of: &[Lanes; 3]| self.origin + Vector3::from_fn(|a, _| f64::from(of[a][k]));
-                        if visitor.wants(&Bounds { min: corner(&node.min), max: corner(&node.max) }) {
-                            let at = Item::Place(node.child[k]);
-                            queue.push(Reverse(Near { squared: bounds[k], at }));
-                        }
-                    }
-                }
-            }
-        }
-    }
-
     fn descend<M: Fn(u32) -> Closest>(&self, at: u32, query: &mut Query<M>) {
         if at & LEAF != 0 {
             return query.visit(&self.leaves[(at & !LEAF) as usize]);
@@ -217,49 +184,6 @@ impl TriangleTree {
         }
     }
 }
-
-/// Who is shown triangles in the order of their distance.
-pub(super) trait Visitor {
-    /// Triangles further than this are not asked for any more.
-    fn reach(&self) -> f64;
-    /// Whether it wants to see what is in a box (of single precision).
-    fn wants(&self, bounds: &Bounds) -> bool;
-    /// A triangle.
-    fn visit(&mut self, triangle: u32);
-}
-
-/// Something at a distance.
-struct Near {
-    squared: f32,
-    at: Item,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Item {
-    Triangle(u32),
-    /// A node or a leaf.
-    Place(u32),
-}
-
-impl Ord for Near {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.squared.total_cmp(&other.squared).then(self.at.cmp(&other.at))
-    }
-}
-
-impl PartialOrd for Near {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl PartialEq for Near {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-
-impl Eq for Near {}
 
 struct Query<M> {
     q: [f32; 3],
@@ -340,6 +264,7 @@ impl Leaf {
             height: [f32::INFINITY; WIDTH],
             sides: [[[0.0; WIDTH]; 3]; 3],
             limits: [[0.0; WIDTH]; 3],
+            corners: [[[0.0; WIDTH]; 3]; 3],
             triangle: [0; WIDTH],
         };
         for (k, &t) in members.iter().enumerate() {
@@ -361,6 +286,9 @@ impl Leaf {
                 let along = corners[(e + 1) % 3] - corners[e];
                 let outward = along.cross(&normal).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
                 put(outward, &mut leaf.sides[e], &mut leaf.limits[e], &corners[e]);
+            }
+            for (lanes, p) in leaf.corners.iter_mut().zip(&triangles[t as usize]) {
+                (0..3).for_each(|axis| lanes[axis][k] = p[axis]);
             }
             leaf.triangle[k] = t;
         }

@@ -271,7 +271,8 @@ impl Search<'_> {
             return self.settled(swept.radius - signed + slack);
         }
         // Wider regions than large pieces need are vain; small ones tell how deep they really are.
-        let wide = (swept.radius / 8.0).max(swept.radius.min(asked.precision.coarse / 8.0));
+        let coarse = asked.precision.coarse;
+        let wide = if swept.radius > coarse { 0.0 } else { swept.radius.min(coarse / 8.0) };
         let most = (asked.granted + asked.precision.deep - slack).min(wide).max(spared);
         if -signed > most {
             return false;

@@ -112,8 +112,14 @@ pub struct StatsDocument {
     pub sweeps: u64,
     /// States kept.
     pub states: u64,
+    /// Reading and healing, before the total begins; null where the daemon planned.
+    #[serde(default)]
+    pub load_time_s: Option<f64>,
     /// Distance fields.
     pub sdf_time_s: f64,
+    /// Overlaps at the assembled pose; null where the daemon planned.
+    #[serde(default)]
+    pub overlap_time_s: Option<f64>,
     /// Blocking graphs.
     pub static_analysis_time_s: f64,
     /// Simulation.
@@ -251,7 +257,9 @@ fn stats(stats: &PlanStats) -> StatsDocument {
         simulations_run: stats.simulations_run,
         sweeps: stats.sweeps,
         states: stats.states,
+        load_time_s: stats.load_time_s,
         sdf_time_s: stats.sdf_time_s,
+        overlap_time_s: stats.overlap_time_s,
         static_analysis_time_s: stats.static_analysis_time_s,
         path_time_s: stats.path_time_s,
         verify_time_s: stats.verify_time_s,
@@ -294,7 +302,12 @@ mod tests {
                 Warning { part: Some(2), message: "open".into() },
                 Warning { part: None, message: "small".into() },
             ],
-            stats: PlanStats { simulations: 7, plan_hit: true, ..Default::default() },
+            stats: PlanStats {
+                simulations: 7,
+                overlap_time_s: Some(0.5),
+                plan_hit: true,
+                ..Default::default()
+            },
         }
     }
 
@@ -309,7 +322,8 @@ mod tests {
             r#""remaining":["0","1"],"blocked":[{"part":"1","by":["0"],"action":"+x"}],"#,
             r#""overlaps":[{"parts":["0","1"],"depth":0.25}],"#,
             r#""warnings":[{"part":"2","message":"open"},{"part":null,"message":"small"}],"#,
-            r#""stats":{"simulations":7,"simulations_run":0,"sweeps":0,"states":0,"sdf_time_s":0.0,"#,
+            r#""stats":{"simulations":7,"simulations_run":0,"sweeps":0,"states":0,"load_time_s":null,"#,
+            r#""sdf_time_s":0.0,"overlap_time_s":0.5,"#,
             r#""static_analysis_time_s":0.0,"path_time_s":0.0,"verify_time_s":0.0,"total_time_s":0.0,"#,
             r#""cache":{"sdf_hits":0,"blocking_hits":0,"motion_hits":0,"plan_hit":true}}}"#,
         );

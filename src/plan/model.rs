@@ -81,8 +81,13 @@ pub struct PlanStats {
     pub sweeps: u64,
     /// States kept.
     pub states: u64,
+    /// Reading, healing and preparing the meshes, before `total_time_s` begins; `None` where that is
+    /// not told, as by the daemon.
+    pub load_time_s: Option<f64>,
     /// Building or loading distance fields.
     pub sdf_time_s: f64,
+    /// Preparing verification and measuring overlaps; `None` as above.
+    pub overlap_time_s: Option<f64>,
     /// Building blocking graphs.
     pub static_analysis_time_s: f64,
     /// Simulation (the paper's path-planning time).

@@ -108,14 +108,11 @@ impl Verifier {
         let pose = [scene.bodies[a].planning_from_shape];
         let course = Course::new(&pose, scene.centre_in_shape(a), 0.0);
         let way = Way { part: a, course: &course, precision };
-        let mut deepest = 0.0f64;
-        let mut gave_up = false;
-        for on_moving in [true, false] {
-            let found = self.found(scene, &way, b, on_moving, 0.0, termination)?;
-            deepest = deepest.max(found.depth);
-            gave_up |= found.gave_up();
-        }
-        if gave_up {
+        let side = |on_moving| self.found(scene, &way, b, on_moving, 0.0, termination);
+        let (one, other) = rayon::join(|| side(true), || side(false));
+        let (one, other) = (one?, other?);
+        let mut deepest = one.depth.max(other.depth);
+        if one.gave_up() || other.gave_up() {
             let none = Allowances::none();
             let entries = self.samples.entries_along(scene, &none, &[b], a, &pose, termination)?;
             deepest = entries.iter().map(|e| e.over).fold(deepest, f64::max);

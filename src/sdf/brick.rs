@@ -119,11 +119,13 @@ impl Brick<'_> {
         let mut best = [Nearest::NONE; POINTS];
         for (&k, squared) in left.iter().zip(squared.iter()) {
             let (facet, t) = (&facets.facets[k as usize], facets.of[k as usize]);
-            for i in (0..POINTS).filter(|&i| squared[i] <= limits[i]) {
+            for i in chosen(squared, &limits) {
                 let at = (corner + place(i, ACROSS)).map(|x| x as f64 - (CELLS / 2) as f64);
                 match facet.height_over(&at) {
-                    Some(height) => best[i].consider(t, height.abs() * self.cell, Foot::Face(height)),
-                    None => self.consider(t, node(&corner, i), &mut best[i]),
+                    Some(height) if !self.surface.is_folded(t) => {
+                        best[i].consider(t, height.abs() * self.cell, Foot::Face(height));
+                    }
+                    _ => self.consider(t, node(&corner, i), &mut best[i]),
                 }
             }
         }
@@ -178,6 +180,17 @@ impl Facets {
     }
 }
 
+/// The points of a lattice at which a distance does not exceed its limit, in order.
+fn chosen(squared: &Lanes, limits: &Lanes) -> impl Iterator<Item = usize> {
+    let within = |i: usize| u32::from(squared[i] <= limits[i]) << i;
+    let mut left = (0..POINTS).fold(0, |all, i| all | within(i));
+    std::iter::from_fn(move || {
+        let next = left.trailing_zeros() as usize;
+        left &= left.wrapping_sub(1);
+        (next < POINTS).then_some(next)
+    })
+}
+
 /// Up to where a triangle may be the nearest to each node, squared; nowhere beyond the band.
 fn limits(squared: &[Lanes], rounding: f32) -> Lanes {
     let mut out = [f32::INFINITY; size_of::<Lanes>() / size_of::<f32>()];
@@ -206,17 +219,28 @@ fn node(corner: &Vector3<usize>, i: usize) -> usize {
 }
 
 /// The nodes beside a node of a brick; the node itself where there is none.
+#[inline]
 pub(super) fn beside(i: usize) -> [usize; 6] {
+    BESIDE[i].map(usize::from)
+}
+
+static BESIDE: [[u16; 6]; BRICK] = beside_all();
+
+const fn beside_all() -> [[u16; 6]; BRICK] {
     const STRIDES: [usize; 3] = [1, NODES, NODES * NODES];
-    let at = place(i, NODES);
-    std::array::from_fn(|k| {
-        let (axis, stride) = (k / 2, STRIDES[k / 2]);
-        match k % 2 {
-            0 if at[axis] > 0 => i - stride,
-            1 if at[axis] + 1 < NODES => i + stride,
-            _ => i,
+    let mut out = [[0; 6]; BRICK];
+    let mut i = 0;
+    while i < BRICK {
+        let mut axis = 0;
+        while axis < 3 {
+            let (at, stride) = (i / STRIDES[axis] % NODES, STRIDES[axis]);
+            out[i][2 * axis] = (if at > 0 { i - stride } else { i }) as u16;
+            out[i][2 * axis + 1] = (if at + 1 < NODES { i + stride } else { i }) as u16;
+            axis += 1;
         }
-    })
+        i += 1;
+    }
+    out
 }
 
 /// Gives nodes outside the band the band's half-width with the sign of the nodes beside them: no

@@ -54,20 +54,29 @@ pub(super) struct Frame<'a> {
     pub(super) notes: Vec<String>,
 }
 
+/// What a request spent its time on, beside its search.
+pub(super) struct Times {
+    pub(super) fields: Duration,
+    pub(super) overlaps: Duration,
+    /// Its search included.
+    pub(super) total: Duration,
+}
+
 impl Frame<'_> {
     /// The plan of a finished search.
-    pub(super) fn plan(self, outcome: Outcome, sdf_time: Duration, sdf_hits: u64, total: Duration) -> Plan {
+    pub(super) fn plan(self, outcome: Outcome, times: &Times, sdf_hits: u64) -> Plan {
         let c = outcome.counters;
         let stats = PlanStats {
             simulations: c.simulations,
             simulations_run: c.simulations,
             sweeps: c.sweeps,
             states: c.states,
-            sdf_time_s: sdf_time.as_secs_f64(),
+            sdf_time_s: times.fields.as_secs_f64(),
+            overlap_time_s: Some(times.overlaps.as_secs_f64()),
             static_analysis_time_s: c.static_analysis.as_secs_f64(),
             path_time_s: c.simulation.as_secs_f64(),
             verify_time_s: c.verification.as_secs_f64(),
-            total_time_s: total.as_secs_f64(),
+            total_time_s: times.total.as_secs_f64(),
             sdf_hits,
             ..PlanStats::default()
         };

@@ -23,7 +23,7 @@ use crate::search::{
 use crate::simulation::{PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
-use answer::Frame;
+use answer::{Frame, Times};
 use prepared::Prepared;
 
 /// The name of an assembly: the hash of its content.
@@ -244,9 +244,14 @@ impl Entry {
             });
         }
         let outcome = search(request.planner, problem, &mut relay);
-        let (sdf_time, hits) =
-            if hit { (Duration::ZERO, self.assembly.shapes.len() as u64) } else { (prepared.sdf_time, 0) };
-        frame.plan(outcome, sdf_time, hits, started.elapsed())
+        let hits = if hit { self.assembly.shapes.len() as u64 } else { 0 };
+        let spent = |time: Duration| if hit { Duration::ZERO } else { time };
+        let times = Times {
+            fields: spent(prepared.sdf_time),
+            overlaps: spent(prepared.overlap_time),
+            total: started.elapsed(),
+        };
+        frame.plan(outcome, &times, hits)
     }
 
     /// Fields and overlaps, and whether they were there already. Whoever comes while they are

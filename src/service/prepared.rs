@@ -10,7 +10,7 @@ use crate::geometry::{Assembly, Shape};
 use crate::plan::Verifier;
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
-use crate::simulation::{Scene, alike};
+use crate::simulation::{Scene, placed_alike};
 use crate::termination::{Interrupt, Termination};
 
 /// Overlaps smaller than this share of the longest side are rounding, not modelling.
@@ -29,6 +29,8 @@ pub(super) struct Prepared {
     pub(super) overlaps: Vec<(usize, usize, f64)>,
     /// How long the fields took.
     pub(super) sdf_time: Duration,
+    /// How long it took to prepare verification and measure overlaps.
+    pub(super) overlap_time: Duration,
 }
 
 impl Prepared {
@@ -41,6 +43,7 @@ impl Prepared {
         let started = Instant::now();
         let fields = build_fields(&assembly.shapes, termination, sink)?;
         let sdf_time = started.elapsed();
+        let started = Instant::now();
         let mut scene = Scene::assembled(assembly, &fields);
         let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
         let verifier = Verifier::new(&assembly.shapes, shape_of, DEPTH_LIMIT * scene.longest_side);
@@ -51,7 +54,7 @@ impl Prepared {
         let mut overlaps = overlaps;
         overlaps.extend(coincident_pairs(&scene, &verifier, termination)?);
         overlaps.sort_by_key(|&(a, b, _)| (a, b));
-        Ok(Self { scene, verifier, overlaps, sdf_time })
+        Ok(Self { scene, verifier, overlaps, sdf_time, overlap_time: started.elapsed() })
     }
 }
 
@@ -86,7 +89,7 @@ fn measure_overlaps(
     termination: &Termination,
 ) -> Result<Vec<(usize, usize, f64)>, Interrupt> {
     let pairs = scene.broad_phase.pairs(0.0);
-    let (first, group_of) = alike(scene, &pairs);
+    let (first, group_of) = placed_alike(scene, &pairs);
     let depths = first
         .par_iter()
         .map(|&(a, b)| verifier.assembled_depth(scene, a, b, termination))

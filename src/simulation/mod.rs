@@ -24,7 +24,7 @@ mod tests;
 mod transition;
 
 pub use action::{Action, Axis};
-pub use alike::alike;
+pub use alike::{alike, placed_alike};
 pub use broad_phase::BroadPhase;
 pub use disassembled::{HULL_MARGIN, Surroundings, exit_direction};
 pub use hull_tree::HullTree;

@@ -35,27 +35,30 @@ pub fn pair_blocks(
     let start = Mover::new(scene, part, *pose);
     let Some(first) = actions.first() else { return Vec::new() };
     let reach = Drive::new(scene, part, pose, *first).reach();
-    let gather = |mover: &Mover<'_>| {
+    let within = |reach: f64, mover: &Mover<'_>| {
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
         mover.near_pair(other, reach, &mut near);
         near
     };
-    let near = gather(&start);
+    let near = within(reach, &start);
     if near.contacts.is_empty() {
         return vec![false; actions.len()];
     }
+    // Whether a step can be made is told by what enters at its end alone; what is merely near there
+    // matters only if another step follows.
+    let entering = |mover: &Mover<'_>| within(0.0, mover);
     let blocked = |action: &Action| {
         let drive = Drive::new(scene, part, pose, *action);
-        let mut step = drive.advance(&start, &near, &gather);
-        for _ in 0..STATIC_STEPS {
-            let Step::Moved(Moved { pose: there, near, .. }) = step else { return true };
+        let mut step = drive.advance(&start, &near, &entering);
+        for _ in 1..STATIC_STEPS {
+            let Step::Moved(Moved { pose: there, .. }) = step else { return true };
             let mover = Mover::new(scene, part, there);
             if (mover.centre() - start.centre()).norm() > least {
                 return false;
             }
-            step = drive.advance(&mover, &near, &gather);
+            step = drive.advance(&mover, &within(reach, &mover), &entering);
         }
-        false
+        matches!(step, Step::Stuck { .. })
     };
     actions.iter().map(blocked).collect()
 }
