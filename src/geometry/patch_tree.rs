@@ -136,8 +136,17 @@ impl PatchTree {
         }
         let node = &mut self.nodes[me];
         node.last_vertex = self.vertices.len() as u32;
+        let node = &self.nodes[me];
+        let extremes = match node.right {
+            0 => furthest(&self.vertices[node.first_vertex as usize..]),
+            // Who reaches furthest of all does so of one half.
+            right => furthest(
+                &[me as u32 + 1, right].map(|c| self.extremes(c).copied().collect::<Vec<_>>()).concat(),
+            ),
+        };
+        let node = &mut self.nodes[me];
         node.first_extreme = self.extremes.len() as u32;
-        self.extremes.extend(furthest(&self.vertices[node.first_vertex as usize..]));
+        self.extremes.extend(extremes);
         node.last_extreme = self.extremes.len() as u32;
     }
 }
