@@ -39,6 +39,8 @@ const SMALLEST: f64 = 0.02;
 /// So many regions are looked for on one side of a pair before the other is tried; then twice as
 /// many, and so on.
 const FIRST_BUDGET: usize = 16;
+/// Where more overlap than this is granted, facets lie across each other, and regions tell little.
+const MOST_GRANTED: f64 = 1e-3;
 /// So many regions are looked for before a motion is given up.
 const MOST_REGIONS: usize = 20_000;
 
@@ -105,7 +107,13 @@ impl Cell {
         self.limits.iter().any(|limit| limit.blocks(at, u))
     }
 
-    /// Whether there is something to go on `u`.
+    /// What of it is in the way.
+    fn obstacles(&self, pair: &Facing<'_>, wish: &Wish<'_>) -> Vec<Obstacle> {
+        let blocking = self.limits.iter().filter(|l| l.blocks(&wish.at, &wish.along));
+        blocking.map(|l| Obstacle { normal: l.normal, other: pair.other }).collect()
+    }
+
+    /// Whether there is nothing left to go on `u`.
     fn is_exhausted(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> bool {
         let from = at - self.middle;
         (from + u * TOUCHED).norm() >= self.room
@@ -176,7 +184,7 @@ impl<'a> Cells<'a> {
         at: &Vector3<f64>,
     ) -> Result<(), Halt> {
         let mut sides = Facing::both(scene, part, start, other);
-        if sides.is_empty() {
+        if sides.is_empty() || scene.allowances.of(part, other) > MOST_GRANTED {
             return Err(Halt::Lost);
         }
         let mut wish = Wish { at: *at, along: Vector3::zeros(), obstacles: &mut Vec::new() };
@@ -291,15 +299,14 @@ impl<'a> Cells<'a> {
             wish.obstacles.extend(certain);
             return Err(Halt::Blocked);
         }
-        let other = pair.other;
         if let Ok(cell) = self.held(&Spot { level: 0, ..spot }, &seen, wish, &still) {
             if cell.length(&wish.at, &wish.along) > LEAST_STEP {
                 self.cells.push(cell);
                 return Ok(());
             }
-            if small && cell.blocks(&wish.at, &wish.along) {
-                let blocking = cell.limits.iter().filter(|l| l.blocks(&wish.at, &wish.along));
-                wish.obstacles.extend(blocking.map(|l| Obstacle { normal: l.normal, other }));
+            let blocking = cell.obstacles(&self.pairs[spot.pair], wish);
+            if small && !blocking.is_empty() {
+                wish.obstacles.extend(blocking);
                 return Err(Halt::Blocked);
             }
         }
@@ -309,10 +316,48 @@ impl<'a> Cells<'a> {
     /// Finds cells for the parts of a piece.
     fn split(&mut self, spot: &Spot, radius: f64, wish: &mut Wish<'_>) -> Result<(), Halt> {
         if matches!(spot.piece, Piece::Bit(_)) && radius < SMALLEST {
-            return Err(Halt::Lost);
+            let cell = self.before_face(spot, wish).ok_or(Halt::Lost)?;
+            let blocked = cell.obstacles(&self.pairs[spot.pair], wish);
+            if wish.along != Vector3::zeros() && !blocked.is_empty() {
+                wish.obstacles.extend(blocked);
+                return Err(Halt::Blocked);
+            }
+            self.cells.push(cell);
+            return Ok(());
         }
         let parts = self.pairs[spot.pair].parts(&spot.piece);
         parts.into_iter().try_for_each(|piece| self.renew(Spot { piece, level: 0, ..*spot }, wish))
+    }
+
+    /// The piece at hand, a small bit no deeper than it may be, before the face that it is nearest
+    /// to: where facets with granted overlap lie across each other there are no regions. That is not
+    /// certain, as regions are; paths are verified.
+    fn before_face(&self, spot: &Spot, wish: &Wish<'_>) -> Option<Cell> {
+        let (pair, Placed { points, centre, .. }) = (&self.pairs[spot.pair], &self.placed);
+        let held = pair.held();
+        let depth = points.iter().map(|p| -look(pair, p, spot.guess).signed).fold(0.0, f64::max);
+        if depth > held {
+            return None;
+        }
+        let closest = look(pair, centre, spot.guess).closest;
+        let ahead = pair.shifted * wish.along * AHEAD[SHORTEST];
+        let mut best: Option<(f64, Vector3<f64>)> = None;
+        pair.measured.feature_normals(&closest, |n| {
+            let ends = n.dot(&(centre + ahead - closest.point));
+            if best.is_none_or(|(most, _)| ends > most) {
+                best = Some((ends, n));
+            }
+        });
+        let (_, inward) = best?;
+        let gap = points.iter().map(|p| inward.dot(&(p - closest.point))).fold(f64::INFINITY, f64::min);
+        let normal = pair.shifted.transpose() * inward;
+        let height = normal.dot(&wish.at) - gap.max(0.0) - (held - depth) / 3f64.sqrt();
+        Some(Cell {
+            spot: *spot,
+            limits: vec![Limit { normal, height }],
+            middle: wish.at,
+            room: AHEAD[SHORTEST],
+        })
     }
 
     /// The piece at hand in a region that also lets it go by a shift.
