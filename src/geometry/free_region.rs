@@ -36,6 +36,19 @@ pub struct FreeRegion {
     sides: Vec<HalfSpace>,
 }
 
+/// What a region is to hold.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted<'a> {
+    /// Points …
+    pub points: &'a [Point3<f64>],
+    /// … none of which may be further than this from any of its sides.
+    pub most: f64,
+    /// Whether triangles may lie behind a side that sees their back, as that of a wall of which
+    /// another side is nearer. Not worth its time where points may be inside: what is seen from
+    /// behind is entered there, mostly.
+    pub from_behind: bool,
+}
+
 /// Why there is no region worth having.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoRegion {
@@ -113,8 +126,7 @@ impl Surface {
         centre: &Point3<f64>,
         radius: f64,
         (closest, signed): (&Closest, f64),
-        wanted: &[Point3<f64>],
-        most: f64,
+        wanted: Wanted<'_>,
     ) -> Result<FreeRegion, NoRegion> {
         let seed = if signed > SKIN {
             *centre
@@ -122,12 +134,12 @@ impl Surface {
             let outward = self.pseudo_normal(closest).try_normalize(0.0);
             closest.point + outward.ok_or(NoRegion::Cramped)? * (closest.distance + SKIN)
         };
-        self.free_region(&seed, radius + most + (seed - centre).norm(), wanted, most)
+        self.free_region(&seed, radius + wanted.most + (seed - centre).norm(), wanted)
     }
 
     /// A convex region around `seed`, within `radius`, that the surface does not enter. If
-    /// the surface is closed, all of the region is outside. No point of `wanted`, nor the seed, is
-    /// further than `most` from any of its sides.
+    /// the surface is closed, all of the region is outside. No wanted point, nor the seed, is
+    /// further than [`Wanted::most`] from any of its sides.
     ///
     /// # Errors
     /// There is none worth having.
@@ -135,18 +147,17 @@ impl Surface {
         &self,
         seed: &Point3<f64>,
         radius: f64,
-        wanted: &[Point3<f64>],
-        most: f64,
+        wanted: Wanted<'_>,
     ) -> Result<FreeRegion, NoRegion> {
+        let Wanted { points, most, .. } = wanted;
         let sides = Vec::with_capacity(8);
         let region = FreeRegion { centre: *seed, radius, sides };
-        let reach = wanted.iter().map(|p| (p - seed).norm()).fold(0.0, f64::max);
+        let reach = points.iter().map(|p| (p - seed).norm()).fold(0.0, f64::max);
         let mut growth = Growth {
             surface: self,
             wanted,
-            cloud: Cloud::new(wanted, seed),
+            cloud: Cloud::new(points, seed),
             inset: Vec::new(),
-            most,
             least: (radius * 0.5).max(reach - most),
             nearest: None,
             region,
@@ -171,14 +182,13 @@ impl Surface {
 /// A region as its planes are found.
 struct Growth<'a> {
     surface: &'a Surface,
-    wanted: &'a [Point3<f64>],
+    wanted: Wanted<'a>,
     /// The wanted points and the seed.
     cloud: Cloud,
     /// The wanted points, a little towards the seed, so that hulls which touch are apart: made when
     /// first needed.
     inset: Vec<Point3<f64>>,
-    most: f64,
-    /// A smaller region is not worth having: some wanted point is further than `most` from it.
+    /// A smaller region is not worth having: some wanted point is further than [`Wanted::most`] from it.
     least: f64,
     /// The triangle of the first side.
     nearest: Option<u32>,
@@ -243,7 +253,7 @@ impl Growth<'_> {
             && let Some(apart) = separating_direction(corners, self.inset(), f64::NEG_INFINITY, None)
         {
             best = self.better(triangle, corners, apart, best);
-            if best.is_none_or(|(worth, _)| worth < -self.most) {
+            if self.wanted.from_behind && best.is_none_or(|(worth, _)| worth < -self.wanted.most) {
                 best = self.any_better(corners, apart, best);
             }
         }
@@ -252,9 +262,9 @@ impl Growth<'_> {
 
     fn inset(&mut self) -> &[Point3<f64>] {
         if self.inset.is_empty() {
-            let (seed, most) = (self.region.centre, self.most);
+            let (seed, most) = (self.region.centre, self.wanted.most);
             let inset = |p: &Point3<f64>| p + (seed - p) * (most / (seed - p).norm().max(most)).max(INSET);
-            self.inset = self.wanted.iter().map(inset).collect();
+            self.inset = self.wanted.points.iter().map(inset).collect();
         }
         &self.inset
     }
@@ -287,11 +297,11 @@ impl Visitor for Growth<'_> {
         let closest = self.surface.closest_on(triangle, &self.region.centre);
         match self.best(triangle, &corners, &closest) {
             // What cannot be held for this triangle cannot be held at all.
-            Some((worth, side)) if worth >= -self.most && self.region.sides.len() < MOST_PLANES => {
+            Some((worth, side)) if worth >= -self.wanted.most && self.region.sides.len() < MOST_PLANES => {
                 self.nearest.get_or_insert(triangle);
                 self.region.sides.push(side);
             }
-            Some((worth, _)) if worth < -self.most => {
+            Some((worth, _)) if worth < -self.wanted.most => {
                 self.amid = Some(triangle);
                 self.region.radius = 0.0;
             }
@@ -326,11 +336,15 @@ mod tests {
     use super::*;
     use crate::fixtures::{ball, cuboid, l_shape, spread, surface, tube};
 
+    fn near(points: &[Point3<f64>]) -> Wanted<'_> {
+        Wanted { points, most: 0.1, from_behind: true }
+    }
+
     #[test]
     fn above_a_plate_all_is_free() {
         let plate = surface(cuboid([-4.0, -4.0, -1.0], [4.0, 4.0, 0.0]));
         for seed in [Point3::new(0.3, 0.2, 0.0), Point3::new(-1.0, 2.0, 0.7)] {
-            let region = plate.free_region(&seed, 3.0, &[seed], 0.1).unwrap();
+            let region = plate.free_region(&seed, 3.0, near(&[seed])).unwrap();
             assert_eq!(region.sides.len(), 1, "{region:?}");
             assert_eq!(region.distance_within(&Point3::new(1.0, 1.0, 0.0), 0.0), Some(0.0));
             assert_eq!(region.distance_within(&Point3::new(1.0, 1.0, -0.2), 0.1), None);
@@ -345,7 +359,7 @@ mod tests {
     #[test]
     fn the_inside_of_a_tube_is_one_region() {
         let tube = surface(tube(1.0, 2.0, [-3.0, 3.0], 24));
-        let region = tube.free_region(&Point3::origin(), 2.5, &[Point3::origin()], 0.1).unwrap();
+        let region = tube.free_region(&Point3::origin(), 2.5, near(&[Point3::origin()])).unwrap();
         assert_eq!(region.sides.len(), 24);
         for k in 0..24 {
             let angle = f64::from(k) * std::f64::consts::TAU / 24.0;
@@ -357,7 +371,7 @@ mod tests {
     #[test]
     fn a_reentrant_corner_has_two_sides() {
         let l = surface(l_shape());
-        let region = l.free_region(&Point3::new(1.0, 1.0, 0.5), 0.4, &[], 0.1).unwrap();
+        let region = l.free_region(&Point3::new(1.0, 1.0, 0.5), 0.4, near(&[])).unwrap();
         assert_eq!(region.sides.len(), 2, "{region:?}");
         // Beside the corner, both walls count.
         let d = region.distance_within(&Point3::new(0.97, 0.96, 0.5), 1.0).unwrap();
@@ -370,7 +384,7 @@ mod tests {
             let seed = Point3::from(seed);
             for s in [surface(ball(2)), surface(l_shape()), surface(tube(1.0, 2.0, [-1.0, 1.0], 12))] {
                 prop_assume!(s.signed_distance(&seed) >= 0.0);
-                let Ok(region) = s.free_region(&seed, radius, &[seed], 0.1) else { continue };
+                let Ok(region) = s.free_region(&seed, radius, near(&[seed])) else { continue };
                 prop_assert!(region.distance_within(&seed, 1e-9).is_some());
                 for p in spread([-2.5; 3], [2.5; 3], 400) {
                     if region.distance_within(&p, 0.0).is_some() {

@@ -37,7 +37,7 @@ pub use assembly::{Assembly, Part};
 pub use bounds::Bounds;
 pub use content_hash::content_hash;
 pub use error::GeometryError;
-pub use free_region::{FreeRegion, NoRegion};
+pub use free_region::{FreeRegion, NoRegion, Wanted};
 pub use heal::{Healed, heal};
 pub use hull::{gap_along, hull_vertices, separating_direction, transformed};
 pub use linking_number::linking_number;

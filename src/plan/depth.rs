@@ -19,7 +19,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::geometry::{Closest, FreeRegion, Parts, PatchTree, Surface};
+use crate::geometry::{Closest, FreeRegion, Parts, PatchTree, Surface, Wanted};
 use crate::termination::{Interrupt, Termination};
 
 use super::course::{Interval, Leg, View};
@@ -295,7 +295,8 @@ impl Search<'_> {
     fn region(&self, swept: &Swept, closest: &Closest, signed: f64, most: f64) -> Option<FreeRegion> {
         let Swept { centre, radius, .. } = swept;
         let seen = (closest, signed);
-        self.asked.measured.free_region_around(centre, radius * ROOM, seen, &self.wanted, most).ok()
+        let wanted = Wanted { points: &self.wanted, most, from_behind: false };
+        self.asked.measured.free_region_around(centre, radius * ROOM, seen, wanted).ok()
     }
 
     /// Whether a depth is what it is, as measured at the worst corner, or small enough not to matter:

@@ -11,7 +11,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::geometry::{Closest, FreeRegion, NoRegion, Pose};
+use crate::geometry::{Closest, FreeRegion, NoRegion, Pose, Wanted};
 use crate::termination::{Interrupt, Termination};
 
 use super::super::Scene;
@@ -373,15 +373,16 @@ impl<'a> Cells<'a> {
         let most = pair.held();
         let ahead = pair.shifted * shift;
         let Placed { points, extremes, centre, radius } = &self.placed;
+        let of = |points| Wanted { points, most, from_behind: true };
         let region = if ahead == Vector3::zeros() {
             let around = (radius + AROUND) * ROOM;
-            pair.measured.free_region_around(centre, around, (&seen.closest, seen.signed), extremes, most)
+            pair.measured.free_region_around(centre, around, (&seen.closest, seen.signed), of(extremes))
         } else {
             let wanted: Vec<_> = extremes.iter().copied().chain(extremes.iter().map(|p| p + ahead)).collect();
             let middle = centre + ahead / 2.0;
             let around = (radius + ahead.norm() / 2.0) * ROOM;
             let seen = look(pair, &middle, spot.guess);
-            pair.measured.free_region_around(&middle, around, (&seen.closest, seen.signed), &wanted, most)
+            pair.measured.free_region_around(&middle, around, (&seen.closest, seen.signed), of(&wanted))
         }?;
         let depth = depth_below(points, &region, &ahead, most).ok_or(NoRegion::Cramped)?;
         let slack = if pair.allowance > 0.0 { ((most - depth) / 3f64.sqrt()).max(0.0) } else { 0.0 };
