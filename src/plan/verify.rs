@@ -12,7 +12,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use crate::geometry::{Bounds, PatchTree, Pose, Shape, Surface, area_normal};
+use crate::geometry::{Bounds, Pose, Shape, Surface, area_normal};
 use crate::simulation::{Allowances, Scene};
 use crate::termination::{Interrupt, Termination};
 
@@ -54,13 +54,34 @@ pub struct Verdict {
     pub entries: Vec<Entry>,
 }
 
+impl Verdict {
+    /// On a path where nothing but these points gets deeper than `bound`; entries up to `limit` make
+    /// a good path and are dropped.
+    fn new(bound: f64, entries: Vec<Entry>, limit: f64) -> Self {
+        let depth = deepest(bound, &entries);
+        Self { depth, entries: if depth <= limit { Vec::new() } else { entries } }
+    }
+}
+
+/// The largest of a depth and those of some points.
+fn deepest(depth: f64, entries: &[Entry]) -> f64 {
+    entries.iter().map(|e| e.over).fold(depth, f64::max)
+}
+
+/// What is asked: how deep a part gets into those that stand, along a path of poses of its shape.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Asked<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) allowances: &'a Allowances,
+    pub(super) standing: &'a [usize],
+    pub(super) part: usize,
+    pub(super) path: &'a [Pose],
+    pub(super) termination: &'a Termination,
+}
+
 /// The check, prepared for all shapes.
 #[derive(Debug, Clone)]
 pub struct Verifier {
-    /// Per shape: its triangles.
-    patches: Arc<Vec<PatchTree>>,
-    /// Per part: index of its shape.
-    shape_of: Vec<usize>,
     /// For what turns far.
     samples: Samples,
     /// Depth beyond the allowance that is still accepted, in the planning frame.
@@ -71,15 +92,13 @@ impl Verifier {
     /// Prepares the check for shapes; `shape_of` gives each part's shape.
     #[must_use]
     pub fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>, limit: f64) -> Self {
-        let patches = shapes.par_iter().map(|s| PatchTree::new(&s.surface)).collect();
-        let samples = Samples::new(shapes, shape_of.clone(), limit);
-        Self { patches: Arc::new(patches), shape_of, samples, limit }
+        Self { samples: Samples::new(shapes, shape_of), limit }
     }
 
     /// The same check for an engine that declares another depth.
     #[must_use]
     pub fn with_limit(&self, limit: f64) -> Self {
-        Self { limit, samples: self.samples.with_limit(limit), ..self.clone() }
+        Self { limit, samples: self.samples.clone() }
     }
 
     /// The depth at which a path is refused, in the planning frame.
@@ -105,19 +124,19 @@ impl Verifier {
             finest: OVERLAP_FINEST * scene.longest_side,
             coarse: COARSE * scene.longest_side,
         };
-        let pose = [scene.bodies[a].planning_from_shape];
-        let course = Course::new(&pose, scene.centre_in_shape(a), 0.0);
-        let way = Way { part: a, course: &course, precision };
-        let side = |on_moving| self.found(scene, &way, b, on_moving, 0.0, termination);
+        let path = [scene.bodies[a].planning_from_shape];
+        let course = Course::new(&path, scene.centre_in_shape(a), 0.0);
+        let allowances = Allowances::none();
+        let asked =
+            Asked { scene, allowances: &allowances, standing: &[b], part: a, path: &path, termination };
+        let side = |on_moving| depth_of_side(&asked, &course, precision, b, on_moving);
         let (one, other) = rayon::join(|| side(true), || side(false));
         let (one, other) = (one?, other?);
-        let mut deepest = one.depth.max(other.depth);
+        let depth = one.depth.max(other.depth);
         if one.gave_up() || other.gave_up() {
-            let none = Allowances::none();
-            let entries = self.samples.entries_along(scene, &none, &[b], a, &pose, termination)?;
-            deepest = entries.iter().map(|e| e.over).fold(deepest, f64::max);
+            return Ok(deepest(depth, &self.samples.entries_along(&asked, self.limit)?));
         }
-        Ok(deepest)
+        Ok(depth)
     }
 
     /// How deep a point in the middle of one part lies in both, where surfaces show no overlap: two
@@ -145,8 +164,9 @@ impl Verifier {
         path: &[Pose],
         termination: &Termination,
     ) -> Result<Verdict, Interrupt> {
+        let asked = Asked { scene, allowances, standing, part, path, termination };
         if turns_far(path) {
-            return self.sampled(scene, allowances, standing, part, path, termination);
+            return Ok(Verdict::new(0.0, self.samples.entries_along(&asked, self.limit)?, self.limit));
         }
         let shape = &scene.bodies[part].shape;
         let centre = scene.centre_in_shape(part);
@@ -171,98 +191,65 @@ impl Verifier {
         let found = tasks
             .par_iter()
             .map(|&(other, on_moving)| {
-                let granted = allowances.of(part, other);
-                let share = if granted > 0.0 { SPARE_IN_OVERLAP } else { SPARE };
+                let share = if allowances.of(part, other) > 0.0 { SPARE_IN_OVERLAP } else { SPARE };
                 let precision = Precision { spare: self.limit * share, ..precision };
-                let way = Way { part, course: &course, precision };
-                self.found(scene, &way, other, on_moving, granted, termination)
+                depth_of_side(&asked, &course, precision, other, on_moving)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
-        let mut depth = found.iter().map(|f| f.bound).fold(0.0, f64::max);
-        let mut entries = self.entries(scene, &tasks, &found);
+        let bound = found.iter().map(|f| f.bound).fold(0.0, f64::max);
+        let mut entries = deepest_entries(scene, &tasks, &found);
         let mut open: Vec<usize> =
             tasks.iter().zip(&found).filter(|(_, f)| f.gave_up()).map(|((other, _), _)| *other).collect();
         open.dedup();
-        if depth <= self.limit && !open.is_empty() {
-            let sampled = self.sampled(scene, allowances, &open, part, path, termination)?;
-            depth = depth.max(sampled.depth);
-            entries.extend(sampled.entries);
+        if bound <= self.limit && !open.is_empty() {
+            let asked = Asked { standing: &open, ..asked };
+            entries.extend(self.samples.entries_along(&asked, self.limit)?);
         }
-        if depth <= self.limit {
-            entries.clear();
-        }
-        Ok(Verdict { depth, entries })
-    }
-
-    /// The check by samples.
-    fn sampled(
-        &self,
-        scene: &Scene,
-        allowances: &Allowances,
-        standing: &[usize],
-        part: usize,
-        path: &[Pose],
-        termination: &Termination,
-    ) -> Result<Verdict, Interrupt> {
-        let mut entries = self.samples.entries_along(scene, allowances, standing, part, path, termination)?;
-        let depth = entries.iter().map(|e| e.over).fold(0.0, f64::max);
-        if depth <= self.limit {
-            entries.clear();
-        }
-        Ok(Verdict { depth, entries })
-    }
-
-    /// How deep the moving part gets into a standing one, or the other way round.
-    fn found(
-        &self,
-        scene: &Scene,
-        way: &Way<'_>,
-        other: usize,
-        on_moving: bool,
-        granted: f64,
-        termination: &Termination,
-    ) -> Result<Found, Interrupt> {
-        let (asked, measured) = if on_moving { (way.part, other) } else { (other, way.part) };
-        let stand = scene.bodies[other].planning_from_shape;
-        let view = View::new(way.course, stand, on_moving, way.precision.finest / 16.0);
-        let question = Question {
-            surface: &scene.bodies[asked].shape.surface,
-            tree: &self.patches[self.shape_of[asked]],
-            measured: &scene.bodies[measured].shape.surface,
-            granted,
-            precision: way.precision,
-        };
-        question.answer(view, termination)
-    }
-
-    /// The points that help in refining a motion: of those that are near each other, the deepest.
-    fn entries(&self, scene: &Scene, tasks: &[(usize, bool)], found: &[Found]) -> Vec<Entry> {
-        let cell = COARSE * scene.longest_side;
-        let mut taken: BTreeMap<(usize, bool, [i64; 3]), Entry> = BTreeMap::new();
-        for (&(other, on_moving), side) in tasks.iter().zip(found) {
-            for &(point, over) in &side.deep {
-                let key = (other, on_moving, point.coords.map(|x| (x / cell).floor() as i64).into());
-                let entry = Entry { other, on_moving, point, over };
-                match taken.entry(key) {
-                    Occupied(mut known) if known.get().over < over => {
-                        known.insert(entry);
-                    }
-                    Occupied(_) => {}
-                    Vacant(free) => {
-                        free.insert(entry);
-                    }
-                }
-            }
-        }
-        taken.into_values().collect()
+        Ok(Verdict::new(bound, entries, self.limit))
     }
 }
 
-/// The way of a part, and how finely it is checked.
-struct Way<'a> {
-    part: usize,
-    course: &'a Course,
+/// How deep the moving part gets into a standing one, or the other way round.
+fn depth_of_side(
+    asked: &Asked<'_>,
+    course: &Course,
     precision: Precision,
+    other: usize,
+    on_moving: bool,
+) -> Result<Found, Interrupt> {
+    let (moving, standing) = (&asked.scene.bodies[asked.part], &asked.scene.bodies[other]);
+    let (looked_at, measured) = if on_moving { (moving, standing) } else { (standing, moving) };
+    let view = View::new(course, standing.planning_from_shape, on_moving, precision.finest / 16.0);
+    let question = Question {
+        surface: &looked_at.shape.surface,
+        tree: looked_at.shape.patches(),
+        measured: &measured.shape.surface,
+        granted: asked.allowances.of(asked.part, other),
+        precision,
+    };
+    question.answer(view, asked.termination)
+}
+
+/// The points that help in refining a motion: of those that are near each other, the deepest.
+fn deepest_entries(scene: &Scene, tasks: &[(usize, bool)], found: &[Found]) -> Vec<Entry> {
+    let cell = COARSE * scene.longest_side;
+    let mut taken: BTreeMap<(usize, bool, [i64; 3]), Entry> = BTreeMap::new();
+    for (&(other, on_moving), side) in tasks.iter().zip(found) {
+        for &(point, over) in &side.deep {
+            let key = (other, on_moving, point.coords.map(|x| (x / cell).floor() as i64).into());
+            let entry = Entry { other, on_moving, point, over };
+            match taken.entry(key) {
+                Occupied(mut known) if known.get().over < over => {
+                    known.insert(entry);
+                }
+                Occupied(_) => {}
+                Vacant(free) => {
+                    free.insert(entry);
+                }
+            }
+        }
+    }
+    taken.into_values().collect()
 }
 
 /// A few points below the largest faces, by a tenth of the smallest extent.
