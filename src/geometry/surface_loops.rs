@@ -20,10 +20,13 @@ const NONE: u32 = u32::MAX;
 /// surface is not closed, or of more loops than `most`.
 #[must_use]
 pub fn surface_loops(surface: &Surface, most: usize) -> Option<Vec<Vec<Point3<f64>>>> {
-    if surface.is_open() || !is_closed(surface) || loop_count(surface)? > most {
+    if surface.is_open() || !is_closed(surface) {
         return None;
     }
     let tree = VertexTree::of(surface);
+    if loop_count(surface, &tree)? > most {
+        return None;
+    }
     let crossed = crossed_by_cotree(surface, &tree);
     let mut loops = Vec::new();
     for (triangle, corners) in (0u32..).zip(surface.triangles()) {
@@ -44,10 +47,9 @@ fn is_closed(surface: &Surface) -> bool {
 }
 
 /// Twice the genus, summed over shells: by Euler's formula, shells · 2 − (V − E + F).
-fn loop_count(surface: &Surface) -> Option<usize> {
+fn loop_count(surface: &Surface, tree: &VertexTree) -> Option<usize> {
     let (v, f) = (surface.vertices().len(), surface.triangles().len());
-    let shells = VertexTree::of(surface).parent.iter().zip(0..).filter(|(p, v)| **p == *v).count();
-    (shells * 2 + f * 3 / 2).checked_sub(v + f)
+    (tree.shells() * 2 + f * 3 / 2).checked_sub(v + f)
 }
 
 /// A spanning tree of each shell's vertices, breadth first so that loops are short.
@@ -81,6 +83,11 @@ impl VertexTree {
             }
         }
         tree
+    }
+
+    /// How many roots there are.
+    fn shells(&self) -> usize {
+        self.parent.iter().zip(0..).filter(|(p, v)| **p == *v).count()
     }
 
     fn has_edge(&self, a: u32, b: u32) -> bool {

@@ -58,7 +58,8 @@ pub(super) struct Found {
     /// The largest depth that was measured beyond what is granted.
     pub(super) depth: f64,
     /// Points (frame of the surface asked about) that were measured deeper than
-    /// [`Precision::deep`]: all of a path that is good, the first found of one that is bad.
+    /// [`Precision::deep`], or of which no less can be told: a good path has none, of a bad one these
+    /// are the first found.
     pub(super) deep: Vec<(Point3<f64>, f64)>,
     /// How much was looked at: pieces, and regions that were looked for.
     effort: usize,
@@ -115,8 +116,6 @@ struct Hint {
 struct Swept {
     centre: Point3<f64>,
     radius: f64,
-    /// The longest way of any of its points.
-    moved: f64,
 }
 
 /// Size and cell of a place.
@@ -155,17 +154,18 @@ impl Search<'_> {
         let mut in_time = leg.maps.is_empty();
         if !in_time {
             let centres: Vec<_> = leg.maps.iter().map(|m| m.apply(&patch.centre)).collect();
-            let ball = patch.radius * leg.stretch;
-            if self.is_apart(&centres, ball + leg.slack) {
+            let ball = patch.radius * leg.stretch + leg.slack;
+            if self.is_apart(&centres, ball) {
                 return Ok(());
             }
-            let swept = swept(&centres, ball + leg.slack);
-            in_time = swept.moved > 4.0 * patch.radius;
+            let swept = swept(&centres, ball);
+            // What is beyond the ball is half of the way.
+            in_time = swept.radius - ball > 2.0 * patch.radius;
             self.wanted.clear();
             self.wanted.extend(tree.extremes(index).flat_map(|p| leg.maps.iter().map(move |m| m.apply(p))));
             let points = tree.vertices(index);
             let fits = |region: &FreeRegion, most: f64| {
-                if centres.iter().all(|c| region.holds_ball(c, ball + leg.slack)) {
+                if centres.iter().all(|c| region.holds_ball(c, ball)) {
                     return Some((0.0, swept.centre));
                 }
                 furthest(points.iter().flat_map(|p| leg.maps.iter().map(|m| m.apply(p))), region, most)
@@ -266,9 +266,11 @@ impl Search<'_> {
         let closest = asked.measured.closest_from(&swept.centre, hint.triangle);
         hint.triangle = closest.triangle;
         let signed = asked.measured.signed(&swept.centre, &closest);
-        // Depth changes by no more than the distance.
+        // Depth changes by no more than the distance, if the surface is closed. That of one with holes
+        // changes its sign in mid-air, where the winding number passes a half: a point next to one
+        // far outside may be as far inside.
         if swept.radius - signed <= spared {
-            return self.settled(swept.radius - signed + slack);
+            return self.is_outside(spared, hint.triangle) && self.settled(swept.radius - signed + slack);
         }
         // Wider regions than large pieces need are vain; small ones tell how deep they really are.
         let coarse = asked.precision.coarse;
@@ -349,8 +351,11 @@ impl Search<'_> {
         if !self.found.deep.is_empty() {
             return true;
         }
-        // Depth changes by no more than the distance.
-        let bound = over(&swept.centre) + swept.radius;
+        // As in `is_settled`: depth changes by no more than the distance, but for surfaces with holes.
+        let mut bound = over(&swept.centre) + swept.radius;
+        if asked.measured.is_open() {
+            bound = self.wanted.iter().map(over).fold(bound, f64::max);
+        }
         if bound > asked.precision.deep {
             if swept.radius > self.finest() / DOUBT {
                 return false;
@@ -387,7 +392,7 @@ fn swept(points: &[Point3<f64>], ball: f64) -> Swept {
     let sum: Vector3<f64> = points.iter().map(|p| p.coords).sum();
     let centre = Point3::from(sum / points.len().max(1) as f64);
     let reach = points.iter().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
-    Swept { centre, radius: reach + ball, moved: 2.0 * reach }
+    Swept { centre, radius: reach + ball }
 }
 
 /// How far the furthest of some points is from a region, and which, unless it is beyond `most`.

@@ -16,10 +16,10 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
-use crate::simulation::{Allowances, Scene};
-use crate::termination::{Interrupt, Termination};
+use crate::simulation::Scene;
+use crate::termination::Interrupt;
 
-use super::verify::Entry;
+use super::verify::{Asked, Entry};
 
 /// Largest travel of a vertex between two checked poses, as a share of the longest side.
 const DENSITY: f64 = 0.004;
@@ -32,13 +32,11 @@ pub(super) fn turns_far(path: &[Pose]) -> bool {
     turns.sum::<f64>() > FAR
 }
 
-/// The samples of all shapes, taken when they are needed.
+/// The samples of all parts, taken when they are needed.
 #[derive(Debug, Clone)]
 pub(super) struct Samples {
-    shapes: Arc<Vec<Sampled>>,
-    /// Per part: index of its shape.
-    shape_of: Vec<usize>,
-    limit: f64,
+    /// Per part: those of its shape, which equal parts share.
+    parts: Arc<Vec<Arc<Sampled>>>,
 }
 
 #[derive(Debug)]
@@ -47,81 +45,70 @@ struct Sampled {
     shares: OnceLock<[SampleTree; SHARES]>,
 }
 
-impl Samples {
-    pub(super) fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>, limit: f64) -> Self {
-        let shapes =
-            shapes.iter().map(|s| Sampled { shape: Arc::clone(s), shares: OnceLock::new() }).collect();
-        Self { shapes: Arc::new(shapes), shape_of, limit }
-    }
+/// A moment of a path: which samples are looked at there, and of these which count.
+struct Moment<'a> {
+    pose: &'a Pose,
+    turn: Turn,
+    /// Deeper than this beyond what is granted, a sample helps in refining a motion.
+    deep: f64,
+}
 
-    pub(super) fn with_limit(&self, limit: f64) -> Self {
-        Self { limit, ..self.clone() }
+impl Samples {
+    /// For parts of which `shape_of` gives each one's shape.
+    pub(super) fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>) -> Self {
+        let sampled = |s: &Arc<Shape>| Arc::new(Sampled { shape: Arc::clone(s), shares: OnceLock::new() });
+        let shapes: Vec<_> = shapes.iter().map(sampled).collect();
+        Self { parts: Arc::new(shape_of.into_iter().map(|s| Arc::clone(&shapes[s])).collect()) }
     }
 
     fn of(&self, part: usize) -> &[SampleTree; SHARES] {
-        let Sampled { shape, shares } = &self.shapes[self.shape_of[part]];
+        let Sampled { shape, shares } = &*self.parts[part];
         shares.get_or_init(|| dealt(&shape.surface))
     }
 
     /// The samples that get deeper than granted along a path: of every pose and pair the deepest,
-    /// and all that are deep enough to help in refining a motion.
-    pub(super) fn entries_along(
-        &self,
-        scene: &Scene,
-        allowances: &Allowances,
-        standing: &[usize],
-        part: usize,
-        path: &[Pose],
-        termination: &Termination,
-    ) -> Result<Vec<Entry>, Interrupt> {
-        let poses = dense(scene, part, path);
+    /// and all that are deep enough, for a path that is refused beyond `limit`, to help in refining
+    /// a motion.
+    pub(super) fn entries_along(&self, asked: &Asked<'_>, limit: f64) -> Result<Vec<Entry>, Interrupt> {
+        let poses = dense(asked.scene, asked.part, asked.path);
         let found = poses
             .par_iter()
             .enumerate()
             .map(|(i, pose)| {
-                termination.check()?;
-                let turn = Turn::of(i, poses.len());
-                Ok(self.entries_at(scene, allowances, standing, part, pose, turn))
+                asked.termination.check()?;
+                let moment = Moment { pose, turn: Turn::of(i, poses.len()), deep: limit / 2.0 };
+                Ok(self.entries_at(asked, &moment))
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
         Ok(found.into_iter().flatten().collect())
     }
 
-    fn entries_at(
-        &self,
-        scene: &Scene,
-        allowances: &Allowances,
-        standing: &[usize],
-        part: usize,
-        pose: &Pose,
-        turn: Turn,
-    ) -> Vec<Entry> {
-        let bounds = scene.bodies[part].shape.bounds().transformed(pose);
+    fn entries_at(&self, asked: &Asked<'_>, moment: &Moment<'_>) -> Vec<Entry> {
+        let bodies = &asked.scene.bodies;
+        let bounds = bodies[asked.part].shape.bounds().transformed(moment.pose);
         let mut out = Vec::new();
-        for &other in standing.iter().filter(|&&o| scene.bodies[o].bounds.meets(&bounds)) {
-            let pair = Pair { part, pose, other, granted: allowances.of(part, other) };
-            self.entries(scene, &pair, turn, &mut out);
+        for &other in asked.standing.iter().filter(|&&o| bodies[o].bounds.meets(&bounds)) {
+            self.entries(asked, moment, other, &mut out);
         }
         out
     }
 
-    /// The samples of a pair deeper than `granted`, on either side: the deepest of each side, and
-    /// all that are deep enough to help in refining a motion.
-    fn entries(&self, scene: &Scene, pair: &Pair<'_>, turn: Turn, out: &mut Vec<Entry>) {
-        let Pair { part, pose, other, granted } = *pair;
-        let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
-        let to_standing = standing.planning_from_shape.inverse() * pose;
-        let samples = |i: usize| self.of(i);
-        let deep = self.limit / 2.0;
-        for (on_moving, trees, to_measured, surface) in [
-            (true, samples(part), &to_standing, &standing.shape.surface),
-            (false, samples(other), &to_standing.inverse(), &moving.shape.surface),
+    /// The samples of a pair deeper than granted, on either side: the deepest of each side, and all
+    /// that are deep enough to help in refining a motion.
+    fn entries(&self, asked: &Asked<'_>, moment: &Moment<'_>, other: usize, out: &mut Vec<Entry>) {
+        let (moving, standing) = (&asked.scene.bodies[asked.part], &asked.scene.bodies[other]);
+        let granted = asked.allowances.of(asked.part, other);
+        let to_standing = standing.planning_from_shape.inverse() * moment.pose;
+        for (on_moving, part, to_measured, surface) in [
+            (true, asked.part, &to_standing, &standing.shape.surface),
+            (false, other, &to_standing.inverse(), &moving.shape.surface),
         ] {
             let mut worst: Option<Entry> = None;
-            for tree in trees.iter().enumerate().filter(|(i, _)| turn.takes(*i)).map(|(_, t)| t) {
+            let trees = self.of(part).iter().enumerate();
+            for tree in trees.filter(|(i, _)| moment.turn.takes(*i)).map(|(_, t)| t) {
                 entered(tree, to_measured, surface, granted, |point, over| {
                     let entry = Entry { other, on_moving, point, over };
-                    if over > deep {
+                    if over > moment.deep {
                         out.push(entry.clone());
                     }
                     if worst.as_ref().is_none_or(|w| over > w.over) {
@@ -129,17 +116,9 @@ impl Samples {
                     }
                 });
             }
-            out.extend(worst.filter(|w| w.over <= deep));
+            out.extend(worst.filter(|w| w.over <= moment.deep));
         }
     }
-}
-
-/// A moving part at a pose, a standing one, and the depth that is granted to the two.
-struct Pair<'a> {
-    part: usize,
-    pose: &'a Pose,
-    other: usize,
-    granted: f64,
 }
 
 /// Into so many shares the samples of a shape are dealt.

@@ -6,10 +6,13 @@
 //! of more holes than are looked at, of curves that come too close to each other, and whatever is
 //! held without being linked, as a ball in a cage.
 
+use std::cell::OnceCell;
+
 use nalgebra::Point3;
 
 use crate::geometry::{linking_number, surface_loops};
 use crate::simulation::Scene;
+use crate::termination::{Interrupt, Termination};
 
 use super::sbdp::Search;
 
@@ -20,25 +23,34 @@ const MOST_SEGMENT_PAIRS: usize = 4_000_000;
 /// Curves that come closer than this, in the planning frame, might meet by what engines tolerate.
 const CLEARANCE: f64 = 2e-3;
 
+/// A closed polygon in the planning frame.
+type Loop = Vec<Point3<f64>>;
+
 /// Per part: those that it is linked with.
 #[derive(Debug, Default)]
 pub(super) struct Links(Vec<Vec<usize>>);
 
 impl Links {
-    /// Among some parts (ascending).
-    pub(super) fn among(scene: &Scene, parts: &[usize]) -> Self {
-        let loops: Vec<Vec<Vec<Point3<f64>>>> = parts.iter().map(|&p| loops(scene, p)).collect();
+    /// Among some parts (ascending), at their assembled poses.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    fn among(scene: &Scene, parts: &[usize], termination: &Termination) -> Result<Self, Interrupt> {
+        // Many parts have nobody near whom they could be linked with: theirs are never looked for.
+        let known = vec![OnceCell::new(); scene.bodies.len()];
+        let loops = |part: usize| known[part].get_or_init(|| loops(scene, part));
         let mut links = vec![Vec::new(); scene.bodies.len()];
-        for (i, &a) in parts.iter().enumerate() {
-            for (j, &b) in parts.iter().enumerate().skip(i + 1) {
-                let near = scene.bodies[a].bounds.meets(&scene.bodies[b].bounds);
-                if near && scene.allowances.of(a, b) == 0.0 && are_linked(&loops[i], &loops[j]) {
+        for &a in parts {
+            let near = scene.broad_phase.meeting_of(parts, &scene.bodies[a].bounds);
+            for b in near.into_iter().filter(|&b| b > a && scene.allowances.of(a, b) == 0.0) {
+                termination.check()?;
+                if are_linked(loops(a), loops(b)) {
                     links[a].push(b);
                     links[b].push(a);
                 }
             }
         }
-        Self(links)
+        Ok(Self(links))
     }
 
     /// One of some parts (ascending) that a part is linked with.
@@ -49,15 +61,18 @@ impl Links {
 
 impl Search<'_, '_> {
     /// Looks, once, which of the parts that stand are linked; true if any is. Beyond the paper.
-    pub(super) fn find_links(&mut self) -> bool {
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn find_links(&mut self) -> Result<bool, Interrupt> {
         if self.links.is_some() || self.separate_lists || !self.guided {
-            return false;
+            return Ok(false);
         }
-        let (scene, standing) = (&self.disassembly.problem.scene, self.disassembly.everything.standing());
-        let links = Links::among(scene, standing);
+        let (problem, standing) = (&self.disassembly.problem, self.disassembly.everything.standing());
+        let links = Links::among(&problem.scene, standing, &problem.termination)?;
         let any = standing.iter().any(|&p| links.holder(p, standing).is_some());
         self.links = Some(links);
-        any
+        Ok(any)
     }
 
     /// A part that stands and is linked with this one.
@@ -67,7 +82,7 @@ impl Search<'_, '_> {
 }
 
 /// Curves that generate all on a part's surface, as it stands.
-fn loops(scene: &Scene, part: usize) -> Vec<Vec<Point3<f64>>> {
+fn loops(scene: &Scene, part: usize) -> Vec<Loop> {
     let body = &scene.bodies[part];
     let mut loops = surface_loops(&body.shape.surface, MOST_LOOPS).unwrap_or_default();
     for p in loops.iter_mut().flatten() {
@@ -76,9 +91,58 @@ fn loops(scene: &Scene, part: usize) -> Vec<Vec<Point3<f64>>> {
     loops
 }
 
-fn are_linked(a: &[Vec<Point3<f64>>], b: &[Vec<Point3<f64>>]) -> bool {
-    let segments = |loops: &[Vec<Point3<f64>>]| loops.iter().map(Vec::len).sum::<usize>();
-    let linked = |(a, b): (&Vec<_>, &Vec<_>)| linking_number(a, b, CLEARANCE).is_some_and(|n| n != 0);
+fn are_linked(a: &[Loop], b: &[Loop]) -> bool {
+    let segments = |loops: &[Loop]| loops.iter().map(Vec::len).sum::<usize>();
+    let linked = |(a, b): (&Loop, &Loop)| linking_number(a, b, CLEARANCE).is_some_and(|n| n != 0);
     segments(a) * segments(b) <= MOST_SEGMENT_PAIRS
         && a.iter().flat_map(|a| b.iter().map(move |b| (a, b))).any(linked)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use super::*;
+    use crate::fixtures::{cuboid, moved, scene, tube};
+    use crate::geometry::{Pose, SourceMesh};
+
+    /// Links of a chain along x, every other one turned by a right angle, and a block in the first.
+    fn chain(count: usize) -> Vec<SourceMesh> {
+        let link = |i: usize| {
+            let turn = if i % 2 == 1 { std::f64::consts::FRAC_PI_2 } else { 0.0 };
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), turn);
+            let at = nalgebra::Translation3::new(0.7 * i as f64 - 3.0, 0.0, 0.0);
+            moved(tube(0.6, 0.8, [-0.1, 0.1], 20), &Pose::from_parts(at, turn))
+        };
+        let mut meshes: Vec<_> = (0..count).map(link).collect();
+        meshes.push(cuboid([-3.6, -0.2, -0.2], [-3.4, 0.2, 0.2]));
+        meshes
+    }
+
+    #[test]
+    fn each_link_of_a_chain_is_linked_with_its_neighbours_alone() {
+        let (scene, _) = scene(chain(8));
+        let all: Vec<usize> = (0..9).collect();
+        let links = Links::among(&scene, &all, &Termination::default()).unwrap();
+        let expected: Vec<Vec<usize>> = (0..8)
+            .map(|i: usize| [i.wrapping_sub(1), i + 1].into_iter().filter(|&j| j < 8).collect())
+            .collect();
+        assert_eq!(links.0[..8], expected);
+        assert!(links.0[8].is_empty(), "a block has no hole");
+        assert_eq!(
+            (links.holder(3, &all), links.holder(3, &[4, 5]), links.holder(3, &[5])),
+            (Some(2), Some(4), None)
+        );
+        let few = Links::among(&scene, &[0, 2, 3], &Termination::default()).unwrap();
+        assert_eq!((few.holder(0, &all), few.holder(2, &all)), (None, Some(3)));
+    }
+
+    #[test]
+    fn a_cancelled_look_ends_with_the_reason() {
+        let (scene, _) = scene(chain(8));
+        let termination = Termination::default();
+        termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+        let ended = Links::among(&scene, &[0, 1], &termination);
+        assert_eq!(ended.err(), Some(Interrupt::Cancelled));
+    }
 }

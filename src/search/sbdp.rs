@@ -211,7 +211,7 @@ impl<'a, 'o> Search<'a, 'o> {
                 continue;
             }
             // Before the first simulation: what leaves straight is out.
-            if self.find_links() {
+            if self.find_links()? {
                 open = self.expandable(phase);
                 continue;
             }

@@ -1,0 +1,235 @@
+use nalgebra::Vector3;
+use proptest::prelude::*;
+
+use super::*;
+use crate::fixtures::{LIMIT, block_on_plate, cells, cuboid, l_shape, moved, open_box, peg_in_hole, scene};
+use crate::geometry::{SourceMesh, interpolate};
+
+/// The path of part 1 by steps from its assembled pose, checked against all others.
+fn checked(scene: &Scene, verifier: &Verifier, steps: &[Vector3<f64>]) -> Verdict {
+    let mut path = vec![scene.bodies[1].planning_from_shape];
+    for s in steps {
+        path.push(nalgebra::Translation3::from(*s) * path[path.len() - 1]);
+    }
+    checked_path(scene, verifier, &path)
+}
+
+fn checked_path(scene: &Scene, verifier: &Verifier, path: &[Pose]) -> Verdict {
+    let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != 1).collect();
+    verifier.check(scene, &scene.allowances, &standing, 1, path, &Termination::default()).unwrap()
+}
+
+fn overlap(scene: &Scene, verifier: &Verifier, a: usize, b: usize) -> f64 {
+    verifier.assembled_depth(scene, a, b, &Termination::default()).unwrap()
+}
+
+#[test]
+fn a_path_through_a_wall_is_refused_and_the_wall_named() {
+    let [plate, block] = block_on_plate();
+    let wall = cuboid([2.5, -4.0, 0.0], [3.0, 4.0, 3.0]);
+    let (scene, verifier) = scene([plate, block, wall]);
+    let verdict = checked(&scene, &verifier, &[Vector3::x() * 6.0]);
+    let moving = scene.bodies[1].planning_from_shape;
+    assert!(verdict.entries.iter().any(|e| e.on_moving) && verdict.entries.iter().any(|e| !e.on_moving));
+    assert!(verdict.entries.len() > 10);
+    for e in &verdict.entries {
+        assert!(e.other == 2 && e.over > LIMIT, "{e:?}");
+        let (own, into) = if e.on_moving { (1, 2) } else { (2, 1) };
+        let surface = |part: usize| &scene.bodies[part].shape.surface;
+        assert!(surface(own).signed_distance(&e.point).abs() < 1e-9, "{e:?}");
+        // Somewhere on the way it is as deep as told: how deep it gets at most is not looked into.
+        let depth = |k: u32| {
+            let moved = Pose::translation(f64::from(k) * 1e-3, 0.0, 0.0) * moving;
+            let to_wall = scene.bodies[2].planning_from_shape.inverse() * moved;
+            let at = if e.on_moving { to_wall * e.point } else { to_wall.inverse() * e.point };
+            -surface(into).signed_distance(&at)
+        };
+        let there = (0..=6000).map(depth).fold(0.0, f64::max);
+        assert!(e.over <= there + 1e-3, "{there} at {e:?}");
+    }
+    // The verdict is the deepest of them, and no block is deeper in a wall than half its width.
+    let by_side = |on: bool| {
+        let side = verdict.entries.iter().filter(|e| e.on_moving == on);
+        side.map(|e| e.over).fold(0.0, f64::max)
+    };
+    assert_eq!(by_side(true).max(by_side(false)), verdict.depth);
+    assert!(by_side(true) <= 0.25 + 1e-9 && by_side(false) <= 1.0 + 1e-9);
+}
+
+#[test]
+fn entries_are_points_of_the_surface_that_they_name() {
+    let (scene, verifier) = scene(block_on_plate());
+    let verdict = checked(&scene, &verifier, &[Vector3::new(0.3, 0.2, -0.1)]);
+    assert!((verdict.depth - 0.1).abs() < 1e-9, "{}", verdict.depth);
+    for e in &verdict.entries {
+        let shape = &scene.bodies[if e.on_moving { 1 } else { e.other }].shape;
+        assert!(shape.surface.signed_distance(&e.point).abs() < 1e-9, "{e:?}");
+    }
+}
+
+#[test]
+fn a_thin_wall_between_two_waypoints_is_found() {
+    let wall = cuboid([1.5, -3.0, -3.0], [1.6, 3.0, 3.0]);
+    let (scene, verifier) = scene([wall, cuboid([0.0; 3], [1.0; 3])]);
+    let verdict = checked(&scene, &verifier, &[Vector3::x() * 4.0]);
+    assert!(verdict.depth > 0.05 && verdict.depth <= 0.5, "{}", verdict.depth);
+}
+
+#[test]
+fn what_pokes_into_the_mouth_of_an_open_box_is_found() {
+    // Half-way into the mouth, the middle of a crumb is far outside and its foot far inside.
+    let crumb = cuboid([-0.01, -0.01, 3.001], [0.01, 0.01, 3.021]);
+    let (scene, verifier) = scene([open_box([-3.0; 3], [3.0; 3]), crumb]);
+    assert!(scene.bodies[0].shape.surface.is_open());
+    assert!(checked(&scene, &verifier, &[Vector3::z()]).depth < 1e-9);
+    let verdict = checked(&scene, &verifier, &[Vector3::z() * -0.006]);
+    assert!(verdict.depth > 2.9 && verdict.depth < 3.01, "{}", verdict.depth);
+}
+
+#[test]
+fn flush_sliding_is_not_deep() {
+    let turn = Pose::rotation(Vector3::new(0.2, -0.15, 0.1));
+    for pose in [Pose::identity(), turn] {
+        let (scene, verifier) = scene(block_on_plate().map(|m| moved(m, &pose)));
+        let steps = [Vector3::new(2.0, 1.0, 0.0), Vector3::new(-4.0, 0.5, 0.0), Vector3::new(8.0, 0.0, 0.0)];
+        let verdict = checked(&scene, &verifier, &steps.map(|s| pose * s));
+        assert!(verdict.depth < 1e-9 && verdict.entries.is_empty(), "{}", verdict.depth);
+    }
+}
+
+#[test]
+fn a_flush_peg_leaves_its_hole_unhindered() {
+    let (scene, verifier) = scene(peg_in_hole(0.0));
+    assert!(checked(&scene, &verifier, &[Vector3::z() * 4.0]).depth < 1e-9);
+    let askew = checked(&scene, &verifier, &[Vector3::z(), Vector3::x() * 0.05]);
+    assert!((askew.depth - 0.05).abs() < 1e-3, "{}", askew.depth);
+}
+
+#[test]
+fn what_a_turn_sweeps_over_is_found() {
+    // A bar that points up turns half-way about y, through a ridge it is clear of at both ends.
+    let base = cells([&[-4.0, 1.5, 1.8, 4.0], &[-1.0, 1.0], &[-1.0, 0.0, 2.0]], |c| c[2] == 0 || c[0] == 1);
+    let (scene, verifier) = scene([base, cuboid([-0.2, -0.2, 0.5], [0.2, 0.2, 4.5])]);
+    let from = scene.bodies[1].planning_from_shape;
+    let about = |angle: f64| {
+        let foot = Pose::translation(0.0, 0.0, 2.5);
+        foot * Pose::rotation(Vector3::y() * angle) * foot.inverse() * from
+    };
+    assert!(checked_path(&scene, &verifier, &[from, about(-0.5)]).depth < 1e-9);
+    let path = [0.0, 1.0, 2.0, 3.0, 4.0].map(|k| about(k * std::f64::consts::FRAC_PI_4));
+    assert!(checked_path(&scene, &verifier, &[path[0]]).depth < 1e-9);
+    assert!(checked_path(&scene, &verifier, &[path[4]]).depth < 1e-9);
+    assert!(checked_path(&scene, &verifier, &path).depth > 0.05);
+}
+
+#[test]
+fn an_overlap_is_measured_and_granted() {
+    let low = cuboid([-3.0, -3.0, -2.0], [3.0, 3.0, 0.0]);
+    let (scene, verifier) = scene([low, cuboid([-1.0, -1.0, -0.3], [1.0, 1.0, 3.0])]);
+    let depth = overlap(&scene, &verifier, 0, 1);
+    assert!((depth - 0.3).abs() < 1e-9, "{depth}");
+    assert!((overlap(&scene, &verifier, 1, 0) - depth).abs() < 1e-9);
+    assert!(checked(&scene, &verifier, &[Vector3::z() * 0.1, Vector3::x()]).depth < 1e-9);
+    let deeper = checked(&scene, &verifier, &[Vector3::z() * -0.1]);
+    assert!((deeper.depth - 0.1).abs() < 1e-9, "{}", deeper.depth);
+}
+
+#[test]
+fn parts_that_touch_or_are_apart_do_not_overlap() {
+    let (scene, verifier) = scene(block_on_plate());
+    assert!(overlap(&scene, &verifier, 0, 1) < 1e-12);
+    assert_eq!(verifier.coincident_depth(&scene, 0, 1), 0.0);
+    assert_eq!(verifier.coincident_depth(&scene, 1, 0), 0.0);
+}
+
+#[test]
+fn coincident_parts_share_their_inside() {
+    let block = || cuboid([-3.0, -2.0, -1.0], [3.0, 2.0, 1.0]);
+    let (scene, verifier) = scene([block(), block()]);
+    assert!(overlap(&scene, &verifier, 0, 1) < 1e-9, "no surface is inside the other");
+    let depth = verifier.coincident_depth(&scene, 0, 1);
+    assert!(depth > 0.1 && depth <= 1.0, "{depth}");
+}
+
+#[test]
+fn a_depth_up_to_the_limit_is_told_but_not_refused() {
+    let (scene, verifier) = scene(block_on_plate());
+    let slight = checked(&scene, &verifier, &[Vector3::z() * (-0.9 * LIMIT)]);
+    assert!((slight.depth - 0.9 * LIMIT).abs() < 1e-9 && slight.entries.is_empty());
+    assert!(!checked(&scene, &verifier, &[Vector3::z() * (-1.1 * LIMIT)]).entries.is_empty());
+    assert_eq!(verifier.limit(), LIMIT);
+}
+
+#[test]
+fn a_cancelled_check_ends_with_the_reason() {
+    let (scene, verifier) = scene(block_on_plate());
+    let termination = Termination::default();
+    termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+    let path = [scene.bodies[1].planning_from_shape];
+    let ended = verifier.check(&scene, &scene.allowances, &[0], 1, &path, &termination);
+    assert_eq!(ended, Err(Interrupt::Cancelled));
+}
+
+fn poses(size: f64) -> impl Strategy<Value = Vec<Pose>> {
+    let step = prop::array::uniform6(-1.0..1.0f64);
+    let step = step.prop_map(move |[x, y, z, a, b, c]| {
+        Pose::new(Vector3::new(x, y, z) * size, Vector3::new(a, b, c) * size)
+    });
+    prop::collection::vec(step, 1..4)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn nothing_is_deeper_than_the_bound(steps in poses(0.08), x in -0.3..0.6f64, turn in 0.0..6.0f64) {
+        // Two solids with a reentrant corner each, about to mesh, and something far away.
+        let large = |mesh: SourceMesh| SourceMesh {
+            vertices: mesh.vertices.iter().map(|v| v.map(|x| x * 1.5)).collect(),
+            ..mesh
+        };
+        let place = Pose::new(Vector3::new(3.0 + x, 0.4, 1.5), Vector3::y() * 0.3 + Vector3::z() * turn);
+        let far = cuboid([7.0, -1.0, -1.0], [7.5, 0.0, 0.0]);
+        let (scene, verifier) = scene([large(l_shape()), moved(large(l_shape()), &place), far]);
+        let granted = scene.allowances.of(0, 1);
+        let from = scene.bodies[1].planning_from_shape;
+        let mut path = vec![from];
+        path.extend(steps.iter().map(|s| s * from));
+        let verdict = checked_path(&scene, &verifier, &path);
+        let centre = scene.centre_in_shape(1);
+        let dense: Vec<Pose> = path
+            .windows(2)
+            .flat_map(|w| (0..=40).map(|k| interpolate(&w[0], &w[1], &centre, f64::from(k) / 40.0)))
+            .collect();
+        let depth = |pose: &Pose, on_moving: bool, p: &Point3<f64>| {
+            let relative = scene.bodies[0].planning_from_shape.inverse() * pose;
+            let at = if on_moving { relative * p } else { relative.inverse() * p };
+            let into = &scene.bodies[usize::from(!on_moving)].shape.surface;
+            -into.signed_distance(&at) - granted
+        };
+        // What a dense look finds, at points all over both.
+        let deepest = dense.iter().step_by(4).flat_map(|pose| {
+            let sides = [(true, 1), (false, 0)];
+            sides.map(|(on_moving, body)| {
+                let points = on_surface(&scene.bodies[body].shape.surface);
+                points.iter().map(|p| depth(pose, on_moving, p)).fold(0.0, f64::max)
+            })
+        });
+        let deepest = deepest.fold(0.0, f64::max);
+        prop_assert!(verdict.depth >= deepest.min(LIMIT) - 1e-5, "{} for {deepest}", verdict.depth);
+        prop_assert_eq!(verdict.depth > LIMIT, !verdict.entries.is_empty());
+        // No alarm without a cause.
+        for e in verdict.entries.iter().take(20) {
+            let there = dense.iter().map(|pose| depth(pose, e.on_moving, &e.point)).fold(0.0, f64::max);
+            prop_assert!(there > 0.25 * LIMIT && e.over <= there + 0.01, "{there} at {e:?}");
+        }
+    }
+}
+
+fn on_surface(surface: &Surface) -> Vec<Point3<f64>> {
+    let weights = (0..=6u32).flat_map(|i| (0..=6 - i).map(move |j| [i, j, 6 - i - j]));
+    let at = |t: u32, w: [u32; 3]| {
+        let corners = surface.corners(t);
+        Point3::from((0..3).map(|k| corners[k].coords * f64::from(w[k]) / 6.0).sum::<Vector3<f64>>())
+    };
+    (0..surface.triangles().len() as u32).flat_map(|t| weights.clone().map(move |w| at(t, w))).collect()
+}
