@@ -145,3 +145,113 @@ fn projected(force: &Vector3<f64>, obstacles: &[Obstacle]) -> Option<(Vector3<f6
     let result = project(&Vector6::new(force.x, force.y, force.z, 0.0, 0.0, 0.0), &rows)?;
     Some((result.w.fixed_rows::<3>(0).into(), others(&result.active, &rows)))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use nalgebra::{Translation3, Unit};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::fixtures::{LIMIT, block_on_plate, cuboid, l_shape, moved, peg_in_hole, scene};
+    use crate::plan::Verifier;
+
+    /// Pushes part 1 with all others standing: its shifts, and what stopped it within some steps.
+    fn pushed(scene: &Scene, force: Vector3<f64>, steps: usize) -> (Vec<Vector3<f64>>, Option<Vec<usize>>) {
+        let termination = Termination::default();
+        let standing: Vec<usize> = (0..scene.bodies.len()).filter(|&i| i != 1).collect();
+        let start = scene.bodies[1].planning_from_shape;
+        let mut push = Push::new(scene, &standing, (1, &start), force, &termination);
+        let mut shifts = vec![Vector3::zeros()];
+        for _ in 0..steps {
+            match push.step().unwrap() {
+                Step::Stuck { with } => return (shifts, Some(with)),
+                Step::Moved(pose) => shifts.push(pose.translation.vector - start.translation.vector),
+            }
+        }
+        (shifts, None)
+    }
+
+    fn depth(scene: &Scene, verifier: &Verifier, shifts: &[Vector3<f64>]) -> f64 {
+        let start = scene.bodies[1].planning_from_shape;
+        let path: Vec<Pose> = shifts.iter().map(|s| Translation3::from(*s) * start).collect();
+        let standing: Vec<usize> = (0..scene.bodies.len()).filter(|&i| i != 1).collect();
+        let t = Termination::default();
+        verifier.check(scene, &scene.allowances, &standing, 1, &path, &t).unwrap().depth
+    }
+
+    #[test]
+    fn a_flush_peg_leaves_its_hole_in_free_steps() {
+        for excess in [0.0, 5e-4] {
+            let (scene, verifier) = scene(peg_in_hole(excess));
+            let (shifts, stopped) = pushed(&scene, Vector3::z(), 8);
+            assert_eq!(stopped, None);
+            let far = shifts[shifts.len() - 1];
+            assert!(far.z >= 6.0 * FREE_STEP && far.xy().norm() < 1e-9, "{far}");
+            assert!(depth(&scene, &verifier, &shifts) < LIMIT);
+        }
+    }
+
+    #[test]
+    fn what_stands_in_the_way_is_named() {
+        let (scene, _) = scene(peg_in_hole(0.0));
+        for force in [-Vector3::z(), Vector3::x(), -Vector3::y()] {
+            assert_eq!(pushed(&scene, force, 3), (vec![Vector3::zeros()], Some(vec![0])));
+        }
+    }
+
+    #[test]
+    fn a_block_stops_flush_with_a_wall() {
+        let [plate, block] = block_on_plate();
+        let wall = cuboid([2.7, -4.0, 0.0], [3.0, 4.0, 3.0]);
+        let (scene, verifier) = scene([plate, block, wall]);
+        let (shifts, stopped) = pushed(&scene, Vector3::x(), 100);
+        assert_eq!(stopped, Some(vec![2]));
+        let last = shifts[shifts.len() - 1];
+        assert!((last - Vector3::x() * 1.7).norm() < 1e-6, "{last}");
+        assert!(depth(&scene, &verifier, &shifts) < 1e-6);
+    }
+
+    #[test]
+    fn a_pressed_block_slides_and_follows_the_force_where_the_plate_ends() {
+        // The block is 2 wide, the plate ends at x = 4: its last corner leaves it at a shift of 5.
+        let (scene, verifier) = scene(block_on_plate());
+        let force = Vector3::new(0.8, 0.0, -0.6);
+        let (shifts, stopped) = pushed(&scene, force, 60);
+        assert_eq!(stopped, None);
+        let on_plate: Vec<_> = shifts.iter().filter(|s| s.x < 5.0 - 1e-6).collect();
+        assert!(on_plate.len() > 10 && on_plate.iter().all(|s| s.z.abs() < 1e-6 && s.y.abs() < 1e-9));
+        let last = shifts[shifts.len() - 1];
+        assert!(last.z < -0.5, "{last}");
+        assert!(depth(&scene, &verifier, &shifts) < 1e-6);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(40))]
+        #[test]
+        fn nothing_is_entered_and_what_stops_is_in_the_way(
+            place in prop::array::uniform3(-2.5..2.5f64),
+            turn in prop::array::uniform3(0.0..TAU),
+            force in prop::array::uniform3(-1.0..1.0f64),
+        ) {
+            // Two solids with a reentrant corner each, and a third that stands about.
+            let force = Unit::try_new(Vector3::from(force), 0.1);
+            prop_assume!(force.is_some());
+            let force = force.unwrap().into_inner();
+            let pose = Pose::new(Vector3::from(place), Vector3::from(turn));
+            let post = cuboid([2.0, -3.0, -3.0], [2.5, -2.0, 3.0]);
+            let (scene, verifier) = scene([l_shape(), moved(l_shape(), &pose), post]);
+            prop_assume!(depth(&scene, &verifier, &[Vector3::zeros()]) < 1e-9);
+            prop_assume!(scene.allowances.of(0, 1) == 0.0 && scene.allowances.of(1, 2) == 0.0);
+            let (shifts, stopped) = pushed(&scene, force, 40);
+            let got = depth(&scene, &verifier, &shifts);
+            prop_assert!(got < LIMIT, "{got}");
+            if let Some(with) = stopped {
+                prop_assert!(!with.is_empty());
+                let last = shifts[shifts.len() - 1];
+                prop_assert!(depth(&scene, &verifier, &[last, last + force * 0.02]) > 1e-3);
+            }
+        }
+    }
+}
