@@ -90,6 +90,7 @@ impl Question<'_> {
     pub(super) fn answer(&self, view: View<'_>, termination: &Termination) -> Result<Found, Interrupt> {
         let mut search = Search {
             asked: self,
+            has_rim: self.measured.is_open() && self.measured.has_rim(),
             view,
             termination,
             regions: Vec::new(),
@@ -129,6 +130,8 @@ const TRIED: usize = 3;
 
 struct Search<'a> {
     asked: &'a Question<'a>,
+    /// Whether the measured surface has holes, so that depth changes its sign off it, too.
+    has_rim: bool,
     view: View<'a>,
     termination: &'a Termination,
     regions: Vec<FreeRegion>,
@@ -266,11 +269,12 @@ impl Search<'_> {
         let closest = asked.measured.closest_from(&swept.centre, hint.triangle);
         hint.triangle = closest.triangle;
         let signed = asked.measured.signed(&swept.centre, &closest);
-        // Depth changes by no more than the distance, if the surface is closed. That of one with holes
-        // changes its sign in mid-air, where the winding number passes a half: a point next to one
-        // far outside may be as far inside.
+        // Depth changes by no more than the distance, unless the surface has holes. Then it changes its
+        // sign in mid-air, too, where the winding number passes a half: next to a point far outside
+        // may be one as far inside.
         if swept.radius - signed <= spared {
-            return self.is_outside(spared, hint.triangle) && self.settled(swept.radius - signed + slack);
+            return (!self.has_rim || self.is_outside(spared, hint.triangle))
+                && self.settled(swept.radius - signed + slack);
         }
         // Wider regions than large pieces need are vain; small ones tell how deep they really are.
         let coarse = asked.precision.coarse;
@@ -353,7 +357,7 @@ impl Search<'_> {
         }
         // As in `is_settled`: depth changes by no more than the distance, but for surfaces with holes.
         let mut bound = over(&swept.centre) + swept.radius;
-        if asked.measured.is_open() {
+        if self.has_rim {
             bound = self.wanted.iter().map(over).fold(bound, f64::max);
         }
         if bound > asked.precision.deep {
