@@ -26,8 +26,6 @@ use super::request::ActionSet;
 use super::sbdp::Search;
 use super::state::{Phase, least_travel};
 
-/// Planes that are looked at, at most: round fits have many, and threads more.
-const MOST_PLANES: usize = 64;
 /// A cone with more rays is not narrow.
 const MOST_RAYS: usize = 4;
 /// Rays of all parts together, at most.
@@ -71,7 +69,7 @@ impl Search<'_, '_> {
         let before = self.rays.offered.len();
         for (part, Touching { normals, parts: touched }) in parts.into_iter().zip(found) {
             self.rays.touched.insert(part, touched);
-            let rays = if normals.len() > MOST_PLANES { Vec::new() } else { extreme_rays(&normals) };
+            let rays = extreme_rays(&normals.unwrap_or_default());
             if rays.len() <= MOST_RAYS {
                 rays.iter().for_each(|ray| self.offer(part, ray));
             }
