@@ -125,3 +125,87 @@ impl Search<'_, '_> {
         late
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::super::outcome::Outcome;
+    use super::super::problem::Problem;
+    use super::super::request::{ActionSet, Planner};
+    use super::super::tests::{Recorder, problem};
+    use super::super::{TraceEvent, search};
+    use crate::fixtures::{cells, moved, peg_in_hole, scene};
+    use crate::geometry::{Pose, SourceMesh};
+    use crate::plan::PlanStatus;
+
+    const WAY: Vector3<f64> = Vector3::new(0.45, 0.3, 1.0);
+
+    /// A plate (part 0) with a blind square hole along [`WAY`], and at its bottom a key (part 1) that
+    /// fits tightly. On the way out the hole has a pocket that is higher than the key, into which it goes
+    /// when it is pushed along anything else. Most of the plate looks along z, so no axis is slanted.
+    fn key_in_slanted_hole() -> [SourceMesh; 2] {
+        let slanted = |mut mesh: SourceMesh| {
+            for v in &mut mesh.vertices {
+                (v[0], v[1]) = (v[0] + WAY.x * v[2], v[1] + WAY.y * v[2]);
+            }
+            mesh
+        };
+        let across: &[f64] = &[-4.0, -1.5, -0.5, 0.5, 1.5, 4.0];
+        let plate = cells([across, across, &[-3.0, -2.5, -1.7, -0.9, 0.0]], |[x, y, z]| {
+            let is_hole = x == 2 && y == 2 && z > 0;
+            let is_pocket = (1..4).contains(&x) && (1..4).contains(&y) && z == 2;
+            !(is_hole || is_pocket)
+        });
+        let key = cells([&[-0.5, 0.5], &[-0.5, 0.5], &[-2.5, -1.9]], |_| true);
+        [slanted(plate), slanted(key)]
+    }
+
+    fn planned(parts: [SourceMesh; 2], actions: ActionSet) -> (Outcome, Vec<TraceEvent>) {
+        let (scene, verifier) = scene(parts);
+        let mut recorder = Recorder::default();
+        let present = vec![0, 1];
+        let problem = Problem {
+            present,
+            actions,
+            sweeps: true,
+            max_simulations: Some(20),
+            ..problem(scene, &verifier)
+        };
+        (search(Planner::SbdpStar, problem, &mut recorder), recorder.0)
+    }
+
+    #[test]
+    fn a_key_leaves_along_the_ray_that_its_contacts_leave() {
+        for turn in [Vector3::zeros(), Vector3::new(0.3, -0.5, 0.2), Vector3::new(-0.7, 0.4, 1.1)] {
+            let turn = Pose::rotation(turn);
+            let (outcome, _) = planned(key_in_slanted_hole().map(|m| moved(m, &turn)), ActionSet::Extended);
+            let counters = &outcome.counters;
+            assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
+            assert_eq!((counters.simulations, counters.sweeps), (0, 1));
+            let [removal] = &outcome.removals[..] else { panic!("{:?}", outcome.removals) };
+            let travel =
+                removal.path[removal.path.len() - 1].translation.vector - removal.path[0].translation.vector;
+            // Either part may be the one that leaves.
+            let along = travel.normalize().dot(&(turn * WAY.normalize()));
+            assert!(along * (if removal.part == 1 { 1.0 } else { -1.0 }) > 1.0 - 1e-6, "{travel}");
+        }
+    }
+
+    #[test]
+    fn the_papers_actions_are_along_the_axes_of_the_world_alone() {
+        let (outcome, events) = planned(key_in_slanted_hole(), ActionSet::Paper);
+        assert_eq!((outcome.status, outcome.counters.sweeps), (PlanStatus::Partial, 0));
+        let slanted =
+            |e: &TraceEvent| matches!(e, TraceEvent::Simulated { action, .. } if action.contains('['));
+        assert!(!events.iter().any(slanted));
+    }
+
+    #[test]
+    fn what_leaves_along_an_axis_does_so_as_without_rays() {
+        let (outcome, events) = planned(peg_in_hole(0.0), ActionSet::Extended);
+        assert_eq!((outcome.status, outcome.counters.sweeps), (PlanStatus::Complete, 1));
+        let out = |e: &TraceEvent| matches!(e, TraceEvent::Swept { action, .. } if action.ends_with('z'));
+        assert!(events.iter().any(out));
+    }
+}
