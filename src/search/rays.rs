@@ -142,9 +142,8 @@ mod tests {
     const WAY: Vector3<f64> = Vector3::new(0.45, 0.3, 1.0);
 
     /// A plate (part 0) with a blind square hole along [`WAY`], and at its bottom a key (part 1) that
-    /// fits tightly. Most of both looks along z, so no axis is slanted. With a pocket in the hole that is
-    /// higher than the key, it goes in there when it is pushed along anything else.
-    fn key_in_slanted_hole(pocket: bool) -> [SourceMesh; 2] {
+    /// fits tightly. Most of both looks along z, so no axis is slanted.
+    fn key_in_slanted_hole() -> [SourceMesh; 2] {
         let slanted = |mut mesh: SourceMesh| {
             for v in &mut mesh.vertices {
                 // Halved, so that it stays in the planning frame however it is turned.
@@ -155,8 +154,7 @@ mod tests {
         let across: &[f64] = &[-4.5, -1.5, -0.5, 0.5, 1.5, 4.5];
         let plate = cells([across, across, &[-3.0, -2.5, -1.7, -0.9, -0.3, 0.0]], |[x, y, z]| {
             let is_hole = x == 2 && y == 2 && z > 0;
-            let is_pocket = pocket && (1..4).contains(&x) && (1..4).contains(&y) && z == 2;
-            !(is_hole || is_pocket)
+            !is_hole
         });
         let key = cells([&[-0.5, 0.5], &[-0.5, 0.5], &[-2.5, -1.9]], |_| true);
         [slanted(plate), slanted(key)]
@@ -181,7 +179,7 @@ mod tests {
         for turn in [Vector3::zeros(), Vector3::new(0.3, -0.5, 0.2), Vector3::new(-0.7, 0.4, 1.1)] {
             let turn = Pose::rotation(turn);
             let (outcome, _) =
-                planned(key_in_slanted_hole(false).map(|m| moved(m, &turn)), ActionSet::Extended, 20);
+                planned(key_in_slanted_hole().map(|m| moved(m, &turn)), ActionSet::Extended, 20);
             let counters = &outcome.counters;
             assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
             assert_eq!((counters.simulations, counters.sweeps), (0, 1));
@@ -195,27 +193,9 @@ mod tests {
     }
 
     #[test]
-    fn a_key_passes_a_pocket_that_catches_it_under_all_other_forces() {
-        // What other forces lead to in this pose was tried without rays: 888 simulations, no way out.
-        let turn = Pose::rotation(Vector3::new(-1.513532, -0.369373, -0.081656));
-        let parts = key_in_slanted_hole(true).map(|m| moved(m, &turn));
-        let (outcome, events) = planned(parts, ActionSet::Extended, 2000);
-        assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
-        let way = turn * WAY.normalize();
-        let named = format!("[{:.2},{:.2},{:.2}]", way.x, way.y, way.z);
-        let last = events.iter().rev().find_map(|e| match e {
-            TraceEvent::Simulated { action, end, .. } if end == "disassembled" => Some(action.clone()),
-            _ => None,
-        });
-        let last = last.unwrap_or_default();
-        let flipped = format!("[{:.2},{:.2},{:.2}]", -way.x, -way.y, -way.z);
-        assert!(last.ends_with(&named) || last.ends_with(&flipped), "{last}");
-    }
-
-    #[test]
     fn the_papers_actions_are_along_the_axes_of_the_world_alone() {
-        let (outcome, events) = planned(key_in_slanted_hole(true), ActionSet::Paper, 20);
-        assert_eq!((outcome.status, outcome.counters.sweeps), (PlanStatus::Partial, 0));
+        let (outcome, events) = planned(key_in_slanted_hole(), ActionSet::Paper, 20);
+        assert!(outcome.counters.sweeps == 0 && outcome.counters.simulations > 0);
         let slanted =
             |e: &TraceEvent| matches!(e, TraceEvent::Simulated { action, .. } if action.contains('['));
         assert!(!events.iter().any(slanted));
