@@ -23,7 +23,9 @@ pub struct Blockage {
     outlived: BTreeSet<usize>,
     /// All parts that block some action.
     parts: BTreeSet<usize>,
-    /// Actions that nothing is known to block.
+    /// The first so many actions are open to all parts: these count in f_a.
+    common: usize,
+    /// Of these, those that nothing is known to block.
     open: usize,
 }
 
@@ -36,8 +38,16 @@ impl Blockage {
             jointly: vec![Vec::new(); actions],
             outlived: BTreeSet::new(),
             parts: BTreeSet::new(),
+            common: actions,
             open: actions,
         }
+    }
+
+    /// One more action, which this part does not have unless it is reopened. Such actions do not count
+    /// in f_a: parts are compared by those that all have.
+    pub fn add_withheld(&mut self) {
+        self.single.push(BTreeSet::new());
+        self.jointly.push(vec![Vec::new()]);
     }
 
     /// `by` alone blocks an action.
@@ -56,7 +66,7 @@ impl Blockage {
 
     /// Evaluated after every change, because states are looked at much more often than changed.
     fn count_open(&mut self) {
-        self.open = (0..self.single.len()).filter(|&a| self.is_open(a)).count();
+        self.open = (0..self.common).filter(|&a| self.is_open(a)).count();
     }
 
     fn refresh(&mut self) {

@@ -8,6 +8,7 @@
 
 mod assembly;
 mod bounds;
+mod cone;
 mod congruence;
 mod content_hash;
 mod error;
@@ -35,6 +36,7 @@ mod winding;
 
 pub use assembly::{Assembly, Part};
 pub use bounds::Bounds;
+pub use cone::extreme_rays;
 pub use content_hash::content_hash;
 pub use error::GeometryError;
 pub use free_region::{FreeRegion, NoRegion, Wanted};

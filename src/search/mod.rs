@@ -13,6 +13,7 @@ mod order;
 mod outcome;
 mod pdp;
 mod problem;
+mod rays;
 mod report;
 mod request;
 mod rooms;

@@ -26,6 +26,7 @@ use super::known_states::KnownStates;
 use super::linked::Links;
 use super::outcome::Outcome;
 use super::problem::{Observer, Problem};
+use super::rays::Rays;
 use super::request::ActionSet;
 use super::round::is_ball;
 use super::state::{Node, Phase, least_travel};
@@ -68,6 +69,7 @@ pub(super) struct Search<'a, 'o> {
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
     pub(super) swept: Swept,
+    pub(super) rays: Rays,
     ahead: Ahead,
     /// How coarsely two states were taken for one, at most.
     pub(super) coarsest: f64,
@@ -108,6 +110,7 @@ impl<'a, 'o> Search<'a, 'o> {
             translations,
             rotations,
             swept: Swept::default(),
+            rays: Rays::default(),
             ahead: Ahead::default(),
             coarsest: 1.0,
             balls,
@@ -139,7 +142,7 @@ impl<'a, 'o> Search<'a, 'o> {
             if self.disassembly.is_done() {
                 return Ok(());
             }
-            if gain.any() || turned.any() {
+            if gain.any() || turned.any() || self.simulate_rays() {
                 continue;
             }
             if !self.guided {
@@ -210,6 +213,9 @@ impl<'a, 'o> Search<'a, 'o> {
                 open = self.expandable(phase);
                 continue;
             }
+            if self.offer_rays(phase, &open)? {
+                continue;
+            }
             // Before the first simulation: what leaves straight is out.
             if self.find_links()? {
                 open = self.expandable(phase);
@@ -241,7 +247,8 @@ impl<'a, 'o> Search<'a, 'o> {
         let todo: Vec<_> = open.iter().copied().filter(|&i| self.nodes[i].translation.is_none()).collect();
         if !self.guided {
             for i in todo {
-                self.nodes[i].translation = Some(Blockage::open(self.translations.len()));
+                self.nodes[i].translation = Some(Blockage::open(self.along_axes()));
+                self.add_rays(i);
             }
             return Ok(());
         }
@@ -249,7 +256,8 @@ impl<'a, 'o> Search<'a, 'o> {
         let (problem, nodes) = (&self.disassembly.problem, &self.nodes);
         let (scene, rule) = (&problem.scene, problem.static_analysis);
         let standing: Vec<_> = todo.iter().map(|&i| self.disassembly.standing(nodes[i].part)).collect();
-        let (translations, termination) = (&self.translations, &self.disassembly.problem.termination);
+        let translations = &self.translations[..self.along_axes()];
+        let termination = &self.disassembly.problem.termination;
         let found = todo
             .par_iter()
             .zip(standing)
@@ -262,6 +270,7 @@ impl<'a, 'o> Search<'a, 'o> {
             .collect::<Result<Vec<_>, Interrupt>>()?;
         for (&i, blockage) in todo.iter().zip(found) {
             self.nodes[i].translation = Some(blockage);
+            self.add_rays(i);
         }
         self.disassembly.counters.static_analysis += started.elapsed();
         for i in todo {
@@ -272,7 +281,10 @@ impl<'a, 'o> Search<'a, 'o> {
 
     /// Simulates the open actions of some states of one priority, in order.
     fn expand(&mut self, phase: Phase, batch: &[usize]) -> Result<Gain, Stop> {
-        let count = self.actions(phase).len();
+        let count = match phase {
+            Phase::Translation if !self.rays.simulated => self.along_axes(),
+            _ => self.actions(phase).len(),
+        };
         let mut jobs: Vec<Job> =
             batch.iter().flat_map(|&node| (0..count).map(move |action| Job { node, action })).collect();
         let by_action = self.turns_by_action(phase);

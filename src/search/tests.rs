@@ -43,7 +43,7 @@ fn pin_bolt_cover() -> [SourceMesh; 3] {
 }
 
 #[derive(Default)]
-struct Recorder(Vec<TraceEvent>);
+pub(super) struct Recorder(pub(super) Vec<TraceEvent>);
 
 impl Observer for Recorder {
     fn progress(&mut self, _: usize, _: u64) {}
@@ -56,7 +56,7 @@ impl Observer for Recorder {
     }
 }
 
-fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
+pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
     Problem {
         present: vec![PIN, BOLT, COVER],
         scene,

@@ -23,6 +23,7 @@ mod sliding;
 mod sweep;
 #[cfg(test)]
 mod tests;
+mod touching;
 mod transition;
 
 pub use action::{Action, Axis};
@@ -35,4 +36,5 @@ pub use penalty::{PenaltyEngine, PenaltyParameters};
 pub use scene::{Allowances, Body, Scene};
 pub use sliding::{SlidingEngine, pair_blocks};
 pub use sweep::{Sweep, straight_sweep};
+pub use touching::Touching;
 pub use transition::{End, Motion, TransitionFunction};

@@ -1,0 +1,178 @@
+//! The planes that a part lies against.
+//!
+//! Contact between faces is looked for from inside faces: what is nearest to a corner that stands in a
+//! corner leaves a choice of planes, what is nearest to the middle of a face does not. Both
+//! surfaces are cut into bits as fine as their boxes' common part is small. Missed are planes that hold
+//! the part by less than one bit, or only by an edge or a corner of it.
+
+use nalgebra::{Point3, Unit, Vector3};
+
+use crate::geometry::{Bounds, Pose, Surface};
+
+use super::{Body, Scene};
+
+/// cos of the angle within which two planes are one (a quarter of a degree).
+const ALIKE: f64 = 0.999_99;
+/// Bits are no longer than this share of the longest side of what two boxes have in common.
+const FINENESS: f64 = 0.125;
+/// cos of the angle within which faces in contact look against each other (8 degrees).
+const OPPOSED: f64 = 0.99;
+/// Planes after which the search for more is given up: round fits have many, and threads more.
+const MOST_PLANES: usize = 64;
+
+/// What a part touches.
+#[derive(Debug, Clone, Default)]
+pub struct Touching {
+    /// The normals of the planes, in the planning frame, towards the part; `None` if they are too
+    /// many to be told one by one.
+    pub normals: Option<Vec<Unit<Vector3<f64>>>>,
+    /// The parts whose surfaces were looked at, ascending.
+    pub parts: Vec<usize>,
+}
+
+impl Touching {
+    /// The planes of faces within `reach` (a gap in the planning frame) of a part at a pose; `standing`
+    /// is ascending.
+    #[must_use]
+    pub fn of(scene: &Scene, part: usize, pose: &Pose, standing: &[usize], reach: f64) -> Self {
+        let body = &scene.bodies[part];
+        let bounds = body.shape.bounds().transformed(pose).grown(reach);
+        let parts = scene.broad_phase.meeting_of(standing, &bounds);
+        let mut normals = Vec::new();
+        for &other in &parts {
+            let still = &scene.bodies[other];
+            let within = common(&bounds, &still.bounds.grown(reach));
+            let deepest = reach + scene.allowances.of(part, other);
+            for (asked, at, measured, stands, sense) in [
+                (body, pose, still, &still.planning_from_shape, 1.0),
+                (still, &still.planning_from_shape, body, pose, -1.0),
+            ] {
+                let mut facing =
+                    Facing { asked, at, measured, stands, within, reach, deepest, bits: Vec::new() };
+                if !facing.planes(sense, &mut normals) {
+                    return Self { normals: None, parts };
+                }
+            }
+        }
+        Self { normals: Some(normals), parts }
+    }
+}
+
+/// The common part of two boxes that meet.
+fn common(a: &Bounds, b: &Bounds) -> Bounds {
+    Bounds { min: a.min.sup(&b.min), max: a.max.inf(&b.max) }
+}
+
+/// A body whose faces are cut into bits, and one that is measured from there.
+struct Facing<'a> {
+    asked: &'a Body,
+    at: &'a Pose,
+    measured: &'a Body,
+    stands: &'a Pose,
+    /// Where the bits are looked at, in the planning frame.
+    within: Bounds,
+    reach: f64,
+    deepest: f64,
+    /// Bits still to be looked at, by their corners in the planning frame.
+    bits: Vec<[Point3<f64>; 3]>,
+}
+
+impl Facing<'_> {
+    /// Adds the planes of the measured body, or of the asked one if `sense` is negative: faces that
+    /// are in contact look against each other. False if they are too many.
+    fn planes(&mut self, sense: f64, normals: &mut Vec<Unit<Vector3<f64>>>) -> bool {
+        let surface: &Surface = &self.asked.shape.surface;
+        let finest = self.within.extents().max() * FINENESS;
+        for t in 0..surface.triangles().len() as u32 {
+            let looks = self.at.rotation * surface.face_normal(t);
+            self.bits.push(surface.corners(t).map(|p| self.at * p));
+            while let Some(bit) = self.bits.pop() {
+                if !Bounds::of(&bit).meets(&self.within) {
+                    continue;
+                }
+                if let Some(halves) = halves(&bit, finest) {
+                    self.bits.extend(halves);
+                    continue;
+                }
+                // A wall that leans over the part's top ends near it, and does not hold it there.
+                let is_faced = |n: &Vector3<f64>| n.dot(&looks) < -OPPOSED;
+                let Some(normal) = self.plane_at(&middle(&bit)).filter(is_faced) else { continue };
+                let normal = Unit::new_normalize(normal * sense);
+                if !normals.iter().any(|n| n.dot(&normal) > ALIKE) {
+                    normals.push(normal);
+                    if normals.len() > MOST_PLANES {
+                        return false;
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// The normal of the measured body's face at a point near it, if one face alone is nearest.
+    fn plane_at(&self, p: &Point3<f64>) -> Option<Vector3<f64>> {
+        let (closest, distance) =
+            self.measured.closest(&self.stands.inverse_transform_point(p), self.reach)?;
+        if !(-self.deepest..self.reach).contains(&distance) {
+            return None;
+        }
+        let (mut found, mut alone) = (None, true);
+        self.measured.shape.surface.feature_normals(&closest, |n| match found {
+            None => found = Some(n),
+            Some(m) => alone &= n.dot(&m) > ALIKE,
+        });
+        found.filter(|_| alone).map(|n| self.stands.rotation * n)
+    }
+}
+
+fn middle([a, b, c]: &[Point3<f64>; 3]) -> Point3<f64> {
+    Point3::from((a.coords + b.coords + c.coords) / 3.0)
+}
+
+/// A triangle cut in two across its longest side, if that is longer than `finest`.
+fn halves(corners: &[Point3<f64>; 3], finest: f64) -> Option<[[Point3<f64>; 3]; 2]> {
+    let length = |i: usize| (corners[(i + 1) % 3] - corners[i]).norm();
+    let side = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
+    let [a, b, c] = [0, 1, 2].map(|k| corners[(side + k) % 3]);
+    let cut = nalgebra::center(&a, &b);
+    (length(side) > finest).then_some([[a, cut, c], [cut, b, c]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{block_on_plate, peg_in_hole, scene, thread};
+    use crate::geometry::SourceMesh;
+
+    fn normals(meshes: [SourceMesh; 2], reach: f64) -> Option<Vec<Unit<Vector3<f64>>>> {
+        let (scene, _) = scene(meshes);
+        let found = Touching::of(&scene, 1, &scene.bodies[1].planning_from_shape, &[0], reach);
+        assert_eq!(found.parts, [0]);
+        found.normals
+    }
+
+    #[test]
+    fn a_block_on_a_plate_touches_one_plane() {
+        let found = normals(block_on_plate(), 0.01).unwrap();
+        assert!(found.len() == 1 && found[0].z > 1.0 - 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn a_peg_in_its_hole_touches_five_also_with_play_or_pressed_in() {
+        for excess in [-0.02, 0.0, 0.02] {
+            let found = normals(peg_in_hole(excess), 0.05).unwrap();
+            let sum: Vector3<f64> = found.iter().map(|n| n.into_inner()).sum();
+            assert!(found.len() == 5 && (sum - Vector3::z()).norm() < 1e-9, "{excess}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn walls_that_are_apart_are_not_touched() {
+        assert_eq!(normals(peg_in_hole(-0.2), 0.05).unwrap(), [Vector3::z_axis()], "the bottom alone");
+    }
+
+    #[test]
+    fn a_thread_touches_too_many_planes() {
+        assert!(normals(thread(3.0, 0.5), 0.05).is_none());
+    }
+}
