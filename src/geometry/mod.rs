@@ -55,4 +55,4 @@ pub use shape::Shape;
 pub use source::{SourceAssembly, SourceMesh, SourcePart};
 pub use surface::{Closest, Surface};
 pub use surface_loops::surface_loops;
-pub use triangle::{Feature, area_normal, closest_on_triangle};
+pub use triangle::{Feature, area_normal, bisected, closest_on_triangle};

@@ -82,6 +82,16 @@ pub fn area_normal(a: &Point3<f64>, b: &Point3<f64>, c: &Point3<f64>) -> Vector3
     (b - a).cross(&(c - a))
 }
 
+/// The length of a triangle's longest side, and its two halves when it is cut across that.
+#[must_use]
+pub fn bisected(corners: &[Point3<f64>; 3]) -> (f64, [[Point3<f64>; 3]; 2]) {
+    let length = |i: usize| (corners[(i + 1) % 3] - corners[i]).norm();
+    let side = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
+    let [a, b, c] = [0, 1, 2].map(|k| corners[(side + k) % 3]);
+    let cut = nalgebra::center(&a, &b);
+    (length(side), [[a, cut, c], [cut, b, c]])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -104,5 +114,14 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_triangle_is_cut_across_its_longest_side() {
+        let [a, b, c] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]].map(Point3::from);
+        let (length, halves) = bisected(&[a, b, c]);
+        assert!((length - 5f64.sqrt()).abs() < 1e-12);
+        let area = |[p, q, r]: [Point3<f64>; 3]| area_normal(&p, &q, &r).z;
+        assert!(halves.iter().all(|h| (area(*h) - area([a, b, c]) / 2.0).abs() < 1e-12));
     }
 }

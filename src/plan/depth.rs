@@ -19,7 +19,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::geometry::{Closest, FreeRegion, Parts, PatchTree, Surface, Wanted};
+use crate::geometry::{Closest, FreeRegion, Parts, PatchTree, Surface, Wanted, bisected};
 use crate::termination::{Interrupt, Termination};
 
 use super::course::{Interval, Leg, View};
@@ -205,7 +205,7 @@ impl Search<'_> {
                 break;
             }
             let leg = self.view.leg(interval);
-            let (side, longest) = longest_side(&corners);
+            let (longest, halves) = bisected(&corners);
             let mut in_time = leg.maps.is_empty();
             if !in_time {
                 let points: Vec<_> = leg.maps.iter().flat_map(|m| corners.map(|p| m.apply(&p))).collect();
@@ -228,9 +228,7 @@ impl Search<'_> {
             if in_time && leg.length > self.finest() / (2.0 * DOUBT) {
                 stack.extend(interval.halves().map(|half| (corners, half, hint)));
             } else {
-                let [a, b, c] = [0, 1, 2].map(|k| corners[(side + k) % 3]);
-                let cut = nalgebra::center(&a, &b);
-                stack.extend([[a, cut, c], [cut, b, c]].map(|half| (half, interval, hint)));
+                stack.extend(halves.map(|half| (half, interval, hint)));
             }
         }
         Ok(())
@@ -411,11 +409,4 @@ fn place(swept: &Swept) -> Place {
     let level = swept.radius.max(1e-9).log2().ceil();
     let cell = level.exp2();
     (level as i32, (swept.centre.coords / cell).map(|x| x.floor() as i64).into())
-}
-
-/// The longest side of a triangle (side `i` joins corners `i` and `i + 1`), and its length.
-fn longest_side(corners: &[Point3<f64>; 3]) -> (usize, f64) {
-    let length = |i: usize| (corners[(i + 1) % 3] - corners[i]).norm();
-    let side = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
-    (side, length(side))
 }

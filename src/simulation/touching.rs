@@ -7,7 +7,7 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use crate::geometry::{Bounds, Pose, Surface};
+use crate::geometry::{Bounds, Pose, Surface, bisected};
 
 use super::{Body, Scene};
 
@@ -47,9 +47,9 @@ impl Touching {
                 (body, pose, still, &still.planning_from_shape, 1.0),
                 (still, &still.planning_from_shape, body, pose, -1.0),
             ] {
-                let mut facing =
-                    Facing { asked, at, measured, stands, within, reach, deepest, bits: Vec::new() };
-                if !facing.planes(sense, &mut normals) {
+                let mut faces =
+                    Faces { asked, at, measured, stands, within, reach, deepest, bits: Vec::new() };
+                if !faces.planes(sense, &mut normals) {
                     return Self { normals: None, parts };
                 }
             }
@@ -64,7 +64,7 @@ fn common(a: &Bounds, b: &Bounds) -> Bounds {
 }
 
 /// A body whose faces are cut into bits, and one that is measured from there.
-struct Facing<'a> {
+struct Faces<'a> {
     asked: &'a Body,
     at: &'a Pose,
     measured: &'a Body,
@@ -77,7 +77,7 @@ struct Facing<'a> {
     bits: Vec<[Point3<f64>; 3]>,
 }
 
-impl Facing<'_> {
+impl Faces<'_> {
     /// Adds the planes of the measured body, or of the asked one if `sense` is negative: faces that
     /// are in contact look against each other. False if they are too many.
     fn planes(&mut self, sense: f64, normals: &mut Vec<Unit<Vector3<f64>>>) -> bool {
@@ -90,7 +90,8 @@ impl Facing<'_> {
                 if !Bounds::of(&bit).meets(&self.within) {
                     continue;
                 }
-                if let Some(halves) = halves(&bit, finest) {
+                let (longest, halves) = bisected(&bit);
+                if longest > finest {
                     self.bits.extend(halves);
                     continue;
                 }
@@ -127,15 +128,6 @@ impl Facing<'_> {
 
 fn middle([a, b, c]: &[Point3<f64>; 3]) -> Point3<f64> {
     Point3::from((a.coords + b.coords + c.coords) / 3.0)
-}
-
-/// A triangle cut in two across its longest side, if that is longer than `finest`.
-fn halves(corners: &[Point3<f64>; 3], finest: f64) -> Option<[[Point3<f64>; 3]; 2]> {
-    let length = |i: usize| (corners[(i + 1) % 3] - corners[i]).norm();
-    let side = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
-    let [a, b, c] = [0, 1, 2].map(|k| corners[(side + k) % 3]);
-    let cut = nalgebra::center(&a, &b);
-    (length(side) > finest).then_some([[a, cut, c], [cut, b, c]])
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::geometry::{Parts, PatchTree, Pose, Surface, separating_direction};
+use crate::geometry::{Parts, PatchTree, Pose, Surface, bisected, separating_direction};
 
 use super::super::Scene;
 use super::DEPTH_TOLERANCE;
@@ -89,7 +89,7 @@ impl<'a> Facing<'a> {
     /// The parts of a piece.
     pub(super) fn parts(&self, piece: &Piece) -> Vec<Piece> {
         match piece {
-            Piece::Bit(corners) => halves(corners).map(Piece::Bit).to_vec(),
+            Piece::Bit(corners) => bisected(corners).1.map(Piece::Bit).to_vec(),
             Piece::Patch(index) => match self.tree.parts(*index) {
                 Parts::Patches(children) => children.map(Piece::Patch).to_vec(),
                 Parts::Triangles(list) => list.iter().map(|&t| Piece::Bit(self.asked.corners(t))).collect(),
@@ -231,13 +231,4 @@ pub(super) struct Placed {
     /// A ball that holds it.
     pub(super) centre: Point3<f64>,
     pub(super) radius: f64,
-}
-
-/// A triangle cut in two across its longest side.
-fn halves(corners: &[Point3<f64>; 3]) -> [[Point3<f64>; 3]; 2] {
-    let length = |i: usize| (corners[(i + 1) % 3] - corners[i]).norm_squared();
-    let side = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
-    let [a, b, c] = [0, 1, 2].map(|k| corners[(side + k) % 3]);
-    let cut = nalgebra::center(&a, &b);
-    [[a, cut, c], [cut, b, c]]
 }
