@@ -15,13 +15,15 @@ use crate::geometry::{Closest, FreeRegion, NoRegion, Pose, Wanted};
 use crate::termination::{Interrupt, Termination};
 
 use super::super::Scene;
+use super::DEPTH_TOLERANCE;
 use super::facing::{Facing, Obstacle, Piece, Placed, SUNK, TILT};
 
 /// Pieces this far off need no region, in the planning frame.
 const FAR: f64 = 0.12;
 /// Shifts that a region is asked to allow: the longest that works.
-const AHEAD: [f64; 3] = [4.0, 0.5, 0.06];
-const SHORTEST: usize = AHEAD.len() - 1;
+const AHEAD: [f64; 5] = [4.0, 0.5, 0.06, 0.012, 2e-3];
+/// Which of these is asked for first; the shorter ones only where something is near ahead.
+const SHORT: usize = 2;
 /// Regions without a wanted shift are asked for so much around a piece.
 const AROUND: f64 = 0.12;
 /// A plane nearer than this is touched.
@@ -32,6 +34,12 @@ const LEAST_SHARE: f64 = 0.25;
 const LEAST_STEP: f64 = 1e-5;
 /// Regions are asked for so much larger than the piece.
 const ROOM: f64 = 1.25;
+/// So much deeper than granted a piece may be where it begins: facets of round parts lie across each
+/// other without being granted anything.
+const HELD_AT_FIRST: f64 = 1e-3;
+/// The same for what was not as deep before. A corner of the measured surface gets deeper into a face
+/// than that gets into the corner, a few times: still within what the engine declares.
+const HELD: f64 = DEPTH_TOLERANCE / 2.0;
 /// A bit of a triangle that is smaller than this and has no region ahead is in the way …
 const SMALL: f64 = 0.3;
 /// … and is lost if it has none at all and is smaller than this.
@@ -70,6 +78,8 @@ struct Spot {
     guess: u32,
     /// Which of [`AHEAD`] it was let go by last.
     level: usize,
+    /// How much deeper than granted it may be.
+    held: f64,
 }
 
 /// A piece that is free while the shift stays within limits.
@@ -195,7 +205,7 @@ impl<'a> Cells<'a> {
             sides.rotate_left(1);
             let Some(side) = sides.pop() else { return Err(Halt::Lost) };
             let Some(piece) = side.root() else { return Ok(()) };
-            let root = Spot { pair: self.pairs.len(), piece, guess: 0, level: 0 };
+            let root = Spot { pair: self.pairs.len(), piece, guess: 0, level: 0, held: HELD_AT_FIRST };
             self.pairs.push(side);
             self.budget = if sides.is_empty() { MOST_REGIONS } else { self.regions + budget };
             match self.renew(root, &mut wish) {
@@ -260,6 +270,7 @@ impl<'a> Cells<'a> {
         spot.guess = seen.closest.triangle;
         if seen.signed - radius >= FAR {
             let limits = Vec::new();
+            spot.held = if pair.allowance > 0.0 { spot.held } else { HELD };
             self.cells.push(Cell { spot, limits, middle: wish.at, room: seen.signed - radius });
             return Ok(());
         }
@@ -277,9 +288,9 @@ impl<'a> Cells<'a> {
         let let_go = |cells: &mut Self, level: usize| {
             cells.held(&Spot { level, ..spot }, &seen, wish, &(wish.along * AHEAD[level]))
         };
-        match let_go(self, SHORTEST) {
+        match let_go(self, SHORT) {
             Ok(short) => {
-                let further = (0..SHORTEST).find_map(|level| let_go(self, level).ok());
+                let further = (0..SHORT).find_map(|level| let_go(self, level).ok());
                 let cell = further.unwrap_or(short);
                 // What gets no further the second time may do so in pieces.
                 if !small && cell.spot.level > 0 && cell.spot.level == spot.level {
@@ -288,7 +299,7 @@ impl<'a> Cells<'a> {
                 self.cells.push(cell);
                 return Ok(());
             }
-            Err(NoRegion::Amid(t)) if !small && !self.pairs[spot.pair].is_beside(&self.placed, t) => {
+            Err(NoRegion::Amid(t)) if !small && !self.is_beside(&spot, t) => {
                 return self.split(&spot, radius, wish);
             }
             Err(_) => {}
@@ -298,6 +309,14 @@ impl<'a> Cells<'a> {
         if !certain.is_empty() {
             wish.obstacles.extend(certain);
             return Err(Halt::Blocked);
+        }
+        let nearer = (SHORT + 1..AHEAD.len()).find_map(|level| let_go(self, level).ok());
+        if let Some(cell) = nearer {
+            if !small && cell.spot.level == spot.level {
+                return self.split(&spot, radius, wish);
+            }
+            self.cells.push(cell);
+            return Ok(());
         }
         if let Ok(cell) = self.held(&Spot { level: 0, ..spot }, &seen, wish, &still) {
             if cell.length(&wish.at, &wish.along) > LEAST_STEP {
@@ -311,6 +330,12 @@ impl<'a> Cells<'a> {
             }
         }
         self.split(&spot, radius, wish)
+    }
+
+    /// Whether a triangle may lie beside the piece at hand.
+    fn is_beside(&self, spot: &Spot, triangle: u32) -> bool {
+        let pair = &self.pairs[spot.pair];
+        pair.is_beside(&self.placed, triangle, pair.allowance + spot.held)
     }
 
     /// Finds cells for the parts of a piece.
@@ -334,13 +359,16 @@ impl<'a> Cells<'a> {
     /// certain, as regions are; paths are verified.
     fn before_face(&self, spot: &Spot, wish: &Wish<'_>) -> Option<Cell> {
         let (pair, Placed { points, centre, .. }) = (&self.pairs[spot.pair], &self.placed);
-        let held = pair.held();
+        if pair.allowance == 0.0 {
+            return None;
+        }
+        let held = pair.allowance + spot.held;
         let depth = points.iter().map(|p| -look(pair, p, spot.guess).signed).fold(0.0, f64::max);
         if depth > held {
             return None;
         }
         let closest = look(pair, centre, spot.guess).closest;
-        let ahead = pair.shifted * wish.along * AHEAD[SHORTEST];
+        let ahead = pair.shifted * wish.along * AHEAD[SHORT];
         let mut best: Option<(f64, Vector3<f64>)> = None;
         pair.measured.feature_normals(&closest, |n| {
             let ends = n.dot(&(centre + ahead - closest.point));
@@ -356,7 +384,7 @@ impl<'a> Cells<'a> {
             spot: *spot,
             limits: vec![Limit { normal, height }],
             middle: wish.at,
-            room: AHEAD[SHORTEST],
+            room: AHEAD[SHORT],
         })
     }
 
@@ -370,7 +398,7 @@ impl<'a> Cells<'a> {
     ) -> Result<Cell, NoRegion> {
         self.regions += 1;
         let pair = &self.pairs[spot.pair];
-        let most = pair.held();
+        let most = pair.allowance + spot.held;
         let ahead = pair.shifted * shift;
         let Placed { points, extremes, centre, radius } = &self.placed;
         let of = |points| Wanted { points, most, from_behind: true };
@@ -403,7 +431,9 @@ impl<'a> Cells<'a> {
             let far = points.iter().map(|p| (p - region.centre()).norm()).fold(0.0, f64::max);
             (wish.at, region.radius() - far)
         };
-        let cell = Cell { spot: *spot, limits, middle, room };
+        let held = if pair.allowance > 0.0 { HELD_AT_FIRST } else { HELD.max(depth + HELD / 10.0) };
+        let held = held.min(spot.held);
+        let cell = Cell { spot: Spot { held, ..*spot }, limits, middle, room };
         let too_small =
             ahead != Vector3::zeros() && cell.length(&wish.at, &wish.along) < LEAST_SHARE * shift.norm();
         if too_small { Err(NoRegion::Cramped) } else { Ok(cell) }

@@ -7,9 +7,6 @@ use crate::geometry::{Parts, PatchTree, Pose, Surface, bisected, separating_dire
 use super::super::Scene;
 use super::DEPTH_TOLERANCE;
 
-/// So much deeper than granted a piece may be and still be held, in the planning frame: how deep
-/// facets of round parts may lie across each other without being granted anything.
-const HELD: f64 = 1e-3;
 /// Pieces are drawn together by this share to see whether they only touch.
 const INSET: f64 = 0.02;
 /// Shifts that lead into a plane by less than this share go along it: coordinates in files are
@@ -76,11 +73,6 @@ impl<'a> Facing<'a> {
         [mine_first, !mine_first].into_iter().filter_map(of).collect()
     }
 
-    /// How deep a piece may be and still be held.
-    pub(super) fn held(&self) -> f64 {
-        self.allowance + HELD
-    }
-
     /// The whole asked surface, unless it has no triangles.
     pub(super) fn root(&self) -> Option<Piece> {
         self.tree.root().map(Piece::Patch)
@@ -122,12 +114,11 @@ impl<'a> Facing<'a> {
     }
 
     /// Whether a triangle of the measured surface may lie beside a piece where it is.
-    pub(super) fn is_beside(&self, piece: &Placed, triangle: u32) -> bool {
+    pub(super) fn is_beside(&self, piece: &Placed, triangle: u32, most: f64) -> bool {
         let corners = self.measured.corners(triangle);
         // What touches is beside, too.
         let centre = piece.centre;
-        let inset =
-            |p: &Point3<f64>| p + (centre - p) * (self.held() / (centre - p).norm()).clamp(INSET, 1.0);
+        let inset = |p: &Point3<f64>| p + (centre - p) * (most / (centre - p).norm()).clamp(INSET, 1.0);
         let within: Vec<_> = piece.extremes.iter().map(inset).collect();
         separating_direction(&corners, &within, 0.0, None).is_some()
     }
