@@ -10,7 +10,8 @@
 //! differ from those of the exact distance (`of exact`: the latter are wrong); `over` are lower bounds
 //! above the distance.
 
-use std::path::{Path, PathBuf};
+mod folders;
+
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -32,9 +33,7 @@ const MOST_DENSE: usize = 1 << 26;
 const RUNS: usize = 3;
 
 fn main() {
-    let given = std::env::args().skip(1).filter(|a| !a.starts_with('-')).map(PathBuf::from);
-    let listed = std::env::var_os("SBDP_MESHES");
-    let folders: Vec<PathBuf> = given.chain(listed.iter().flat_map(std::env::split_paths)).collect();
+    let folders = folders::given();
     println!(
         "| assembly | triangles | bricks | built, ms | filled, ms | Mcells/s | dense Mcells/s | MB built | MB filled | MB dense | error max | mean | wrong signs | of exact | over |"
     );
@@ -43,9 +42,9 @@ fn main() {
         measure(&fixtures()).print("torus and bar");
     }
     let mut all = Figures::default();
-    for folder in folders.iter().flat_map(|f| assemblies(f)) {
-        let name = folder.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        match load_assembly(&folder) {
+    for folder in &folders {
+        let name = folders::name(folder);
+        match load_assembly(folder) {
             Ok(source) => {
                 let figures = measure(&source);
                 figures.print(&name);
@@ -57,14 +56,6 @@ fn main() {
     if !folders.is_empty() {
         all.print("all");
     }
-}
-
-/// The folder, or those in it, if it has any.
-fn assemblies(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path());
-    let mut inner: Vec<_> = entries.filter(|p| p.is_dir()).collect();
-    inner.sort();
-    if inner.is_empty() { vec![folder.to_owned()] } else { inner }
 }
 
 /// A torus, finely tessellated, and a flat bar.
