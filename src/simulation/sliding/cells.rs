@@ -29,15 +29,15 @@ const AROUND: f64 = 0.12;
 /// A plane nearer than this is touched.
 const TOUCHED: f64 = 1e-6;
 /// A region that lets a piece go by less than this share of what was asked is too small.
-const LEAST_SHARE: f64 = 0.25;
+const LEAST_LET_GO: f64 = 0.25;
 /// Steps that are shorter lead nowhere.
 const LEAST_STEP: f64 = 1e-5;
 /// Regions are asked for so much larger than the piece.
 const ROOM: f64 = 1.25;
-/// So much deeper than granted a piece may be where it begins: facets of round parts lie across each
-/// other without being granted anything.
+/// So far outside its region, beyond what is granted, a piece may be where it begins: flat sides leave
+/// out a little of what is free, and where parts stand assembled nothing is entered.
 const HELD_AT_FIRST: f64 = 1e-3;
-/// The same for what was not as deep before. A corner of the measured surface gets deeper into a face
+/// The same for what was not as far outside before. A corner of the measured surface gets deeper into a face
 /// than that gets into the corner, a few times: still within what the engine declares.
 const HELD: f64 = DEPTH_TOLERANCE / 2.0;
 /// A bit of a triangle that is smaller than this and has no region ahead is in the way …
@@ -78,7 +78,7 @@ struct Spot {
     guess: u32,
     /// Which of [`AHEAD`] it was let go by last.
     level: usize,
-    /// How much deeper than granted it may be.
+    /// How far outside its region it may be, beyond what is granted.
     held: f64,
 }
 
@@ -435,7 +435,7 @@ impl<'a> Cells<'a> {
         let held = held.min(spot.held);
         let cell = Cell { spot: Spot { held, ..*spot }, limits, middle, room };
         let too_small =
-            ahead != Vector3::zeros() && cell.length(&wish.at, &wish.along) < LEAST_SHARE * shift.norm();
+            ahead != Vector3::zeros() && cell.length(&wish.at, &wish.along) < LEAST_LET_GO * shift.norm();
         if too_small { Err(NoRegion::Cramped) } else { Ok(cell) }
     }
 }
