@@ -59,10 +59,12 @@ impl HullTree {
         if !self.shapes_hull(scene, part) {
             return Surroundings { standing, hull: self.hull().to_vec() };
         }
+        // The hulls beside its way to the root hold all others. To join them would cost more than
+        // the few inner points that they have too many.
         let mut node = self.leaf[part];
         let mut hull = Vec::new();
         while node > 1 {
-            hull = joined(&hull, &self.hulls[node ^ 1]);
+            hull.extend_from_slice(&self.hulls[node ^ 1]);
             node /= 2;
         }
         Surroundings { standing, hull }

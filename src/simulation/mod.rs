@@ -34,7 +34,7 @@ pub use hull_tree::HullTree;
 pub use passage::passes_straight;
 pub use penalty::{PenaltyEngine, PenaltyParameters};
 pub use scene::{Allowances, Body, Scene};
-pub use sliding::{SlidingEngine, pair_blocks};
+pub use sliding::{KeptCells, SlidingEngine, pair_blocks};
 pub use sweep::{Sweep, straight_sweep};
 pub use touching::Touching;
 pub use transition::{End, Motion, TransitionFunction};

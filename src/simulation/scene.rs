@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use crate::geometry::{Assembly, Bounds, Closest, Part, Pose, SampleTree, Shape};
 use crate::sdf::Field;
 
-use super::BroadPhase;
+use super::{BroadPhase, KeptCells};
 
 /// A part with its field, at its place.
 #[derive(Debug, Clone)]
@@ -82,6 +82,8 @@ pub struct Scene {
     pub longest_side: f64,
     /// Their boxes, to be asked which are near.
     pub broad_phase: Arc<BroadPhase>,
+    /// What the engine keeps of pairs where motions begin.
+    pub kept: Arc<KeptCells>,
 }
 
 impl Scene {
@@ -101,6 +103,7 @@ impl Scene {
             allowances: Allowances::none(),
             longest_side: assembly.longest_side(),
             broad_phase: Arc::new(BroadPhase::new(&boxes)),
+            kept: Arc::default(),
         }
     }
 

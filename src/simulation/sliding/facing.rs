@@ -45,32 +45,42 @@ pub(super) struct Facing<'a> {
 }
 
 impl<'a> Facing<'a> {
-    /// With the moving part's surface asked, and with the standing one's: what is closed can be
-    /// measured. The smaller surface is asked first.
-    pub(super) fn both(scene: &'a Scene, part: usize, start: &Pose, other: usize) -> Vec<Self> {
+    /// With the moving part's surface asked, or the standing one's.
+    pub(super) fn new(
+        scene: &'a Scene,
+        (part, start): (usize, &Pose),
+        other: usize,
+        asks_part: bool,
+    ) -> Self {
         let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
         let stand = standing.planning_from_shape;
-        let of = |ask_mine: bool| {
-            let [mine, theirs] = [moving, standing].map(|body| &body.shape);
-            let (asked, measured, measured_from_asked, turn) = if ask_mine {
-                (mine, theirs, stand.inverse() * start, stand.rotation.inverse())
-            } else {
-                (theirs, mine, start.inverse() * stand, start.rotation.inverse())
-            };
-            let sense = if ask_mine { 1.0 } else { -1.0 };
-            (!measured.surface.is_open()).then(|| Self {
-                other,
-                asked: &asked.surface,
-                tree: asked.patches(),
-                measured: &measured.surface,
-                measured_from_asked,
-                shifted: *turn.to_rotation_matrix().matrix() * sense,
-                allowance: scene.allowances.of(part, other),
-            })
+        let [mine, theirs] = [moving, standing].map(|body| &body.shape);
+        let (asked, measured, measured_from_asked, turn) = if asks_part {
+            (mine, theirs, stand.inverse() * start, stand.rotation.inverse())
+        } else {
+            (theirs, mine, start.inverse() * stand, start.rotation.inverse())
         };
-        let size = |s: &Surface| s.bounds().extents().product();
-        let mine_first = size(&moving.shape.surface) <= size(&standing.shape.surface);
-        [mine_first, !mine_first].into_iter().filter_map(of).collect()
+        let sense = if asks_part { 1.0 } else { -1.0 };
+        Self {
+            other,
+            asked: &asked.surface,
+            tree: asked.patches(),
+            measured: &measured.surface,
+            measured_from_asked,
+            shifted: *turn.to_rotation_matrix().matrix() * sense,
+            allowance: scene.allowances.of(part, other),
+        }
+    }
+
+    /// Which sides of a pair can be asked, as what is closed can be measured: whether it is the
+    /// part's. The smaller surface is the last of the list, to be asked first.
+    pub(super) fn asked_first(scene: &Scene, part: usize, other: usize) -> Vec<bool> {
+        let surface = |i: usize| &scene.bodies[i].shape.surface;
+        let size = |i: usize| surface(i).bounds().extents().product();
+        let mine_first = size(part) <= size(other);
+        let mut sides = vec![!mine_first, mine_first];
+        sides.retain(|&asks_part| !surface(if asks_part { other } else { part }).is_open());
+        sides
     }
 
     /// The whole asked surface, unless it has no triangles.
@@ -123,13 +133,12 @@ impl<'a> Facing<'a> {
         separating_direction(&corners, &within, 0.0, None).is_some()
     }
 
-    /// The faces that points of a piece get into when the part moves from a shift along a unit
-    /// vector: what is certainly in the way.
+    /// The faces that some points of the asked surface (measured surface's frame) get into when the part
+    /// moves along a unit vector: what is certainly in the way.
     pub(super) fn obstacles(
         &self,
-        piece: &Piece,
-        placed: &Placed,
-        (at, along): (&Vector3<f64>, &Vector3<f64>),
+        probes: &[Point3<f64>],
+        along: &Vector3<f64>,
         guess: u32,
     ) -> Vec<Obstacle> {
         let mut obstacles: Vec<Obstacle> = Vec::new();
@@ -138,8 +147,8 @@ impl<'a> Facing<'a> {
             let closest = self.measured.closest_from(p, guess);
             (-self.measured.signed(p, &closest), closest)
         };
-        for p in self.probes(piece, placed, at, &ahead) {
-            let (now, closest) = depth(&p, guess);
+        for p in probes {
+            let (now, closest) = depth(p, guess);
             let (then, _) = depth(&(p + ahead * PROBE), closest.triangle);
             if then <= now.max(self.allowance) + INSIDE * PROBE {
                 continue;
@@ -170,14 +179,14 @@ impl<'a> Facing<'a> {
 
     /// Points of a piece that are likely to get inside first: corners in front, and the
     /// middles of the largest faces that look ahead (corners may be at the rims of holes).
-    fn probes(
+    pub(super) fn probes_ahead(
         &self,
         piece: &Piece,
         placed: &Placed,
-        at: &Vector3<f64>,
-        ahead: &Vector3<f64>,
+        (at, along): (&Vector3<f64>, &Vector3<f64>),
     ) -> Vec<Point3<f64>> {
         let Self { asked, tree, measured_from_asked, shifted, .. } = self;
+        let ahead = &(shifted * along);
         let mut probes = placed.points.clone();
         if probes.len() > PROBED {
             let front =

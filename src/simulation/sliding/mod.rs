@@ -1,7 +1,9 @@
 //! The engine `sliding`: motion in the limit of no inertia.
 //!
 //! A translation (`push`) is a shift: pieces of surface, each in a convex region that the other
-//! surface does not enter (`cells`, `facing`), tell how far it may go, and what is in the way. Where
+//! surface does not enter (`cells` of pairs that face each other: `facing`), tell how far it may go,
+//! and what is in the way. A `finder` finds the cells of a pair; those where motions begin are `kept`
+//! for all motions from there. Where
 //! regions cannot tell (open surfaces facing each other, deep granted overlap, points that
 //! verification found missing) and for all that turns, the wanted twist is projected at each step
 //! onto what contact of samples allows, in the metric of the part's mass (rotation weighed by the
@@ -9,9 +11,12 @@
 //! step is the certified clearance; where the projected twist stays the same, along a wall or a
 //! thread, it is followed in long steps (`leap`).
 
+mod cell;
 mod cells;
 mod drive;
 mod facing;
+mod finder;
+mod kept;
 mod leap;
 mod pair;
 mod push;
@@ -29,6 +34,7 @@ use push::Push;
 use turning::Turning;
 
 pub(super) use drive::FREE_STEP;
+pub use kept::KeptCells;
 pub use pair::pair_blocks;
 
 /// A pair may get this much deeper than its allowance, in the planning frame.

@@ -1,13 +1,11 @@
 //! Static analysis by sliding: what contact with one part alone lets another do.
 
-use nalgebra::Vector3;
-
 use crate::geometry::Pose;
 use crate::termination::Termination;
 
 use super::super::contact::{Mover, Near};
 use super::super::{Action, Scene};
-use super::cells::{Cells, Halt};
+use super::cells::Halt;
 use super::drive::{Drive, Moved, Step};
 use super::push::{self, Push};
 
@@ -74,10 +72,8 @@ fn translations_blocked(
 ) -> Result<Vec<bool>, Halt> {
     let termination = Termination::default();
     let standing = [other];
-    let mut cells = Cells::new(&termination);
-    cells.add(scene, (part, pose), other, &Vector3::zeros())?;
     let blocked = |action: &Action| {
-        let mut push = Push::with(cells.clone(), scene, &standing, (part, pose), action.force());
+        let mut push = Push::new(scene, &standing, (part, pose), action.force(), &termination).short();
         for _ in 0..PUSHES {
             if let push::Step::Stuck { .. } = push.step()? {
                 return Ok(true);

@@ -25,7 +25,6 @@ const STALL: f64 = 1e-7;
 /// A part that is pushed.
 pub(super) struct Push<'a> {
     scene: &'a Scene,
-    part: usize,
     start: Pose,
     standing: &'a [usize],
     /// The part's box without a shift.
@@ -38,6 +37,8 @@ pub(super) struct Push<'a> {
     asked_at: Option<Vector3<f64>>,
     stalls: usize,
     contact_step: f64,
+    /// Whether it is to get far: the way is then made so from the start.
+    is_long: bool,
 }
 
 /// What a step came to.
@@ -54,31 +55,25 @@ impl<'a> Push<'a> {
         force: Vector3<f64>,
         termination: &'a Termination,
     ) -> Self {
-        Self::with(Cells::new(termination), scene, standing, (part, start), force)
-    }
-
-    /// The same with some pairs that are known already.
-    pub(super) fn with(
-        cells: Cells<'a>,
-        scene: &'a Scene,
-        standing: &'a [usize],
-        (part, start): (usize, &Pose),
-        force: Vector3<f64>,
-    ) -> Self {
         let shape = &scene.bodies[part].shape;
         Self {
             scene,
-            part,
             start: *start,
             standing,
             bounds: shape.bounds().transformed(start),
             force,
             shift: Vector3::zeros(),
-            cells,
+            cells: Cells::new(scene, (part, start), termination),
             asked_at: None,
             stalls: 0,
             contact_step: contact_step(shape),
+            is_long: true,
         }
+    }
+
+    /// The same for a short way.
+    pub(super) fn short(self) -> Self {
+        Self { is_long: false, ..self }
     }
 
     /// How far it got.
@@ -105,6 +100,9 @@ impl<'a> Push<'a> {
             }
             u = along.normalize();
         }
+        if self.is_long && self.shift == Vector3::zeros() {
+            self.cells.lengthen(&u)?;
+        }
         let longest = if obstacles.is_empty() { FREE_STEP } else { self.contact_step };
         let seen = self.asked_at.map_or(0.0, |at| FREE_STEP - (self.shift - at).norm());
         let length = self.cells.length(&self.shift, &u).min(longest).min(seen);
@@ -127,8 +125,7 @@ impl<'a> Push<'a> {
         let here = Bounds { min: self.bounds.min + self.shift, max: self.bounds.max + self.shift };
         for other in self.scene.broad_phase.meeting_of(self.standing, &here.grown(FREE_STEP)) {
             if !self.cells.knows(other) {
-                let who = (self.part, &self.start);
-                self.cells.add(self.scene, who, other, &self.shift)?;
+                self.cells.add(other, &self.shift)?;
             }
         }
         Ok(())

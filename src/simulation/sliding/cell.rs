@@ -1,0 +1,84 @@
+//! A piece of surface with the shifts at which it is certainly free.
+
+use nalgebra::Vector3;
+
+use super::facing::{Facing, Obstacle, Piece, SUNK, TILT};
+
+/// A plane nearer than this is touched.
+const TOUCHED: f64 = 1e-6;
+
+/// What a cell is asked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spot {
+    pub(super) piece: Piece,
+    /// A triangle of the measured surface near it.
+    pub(super) guess: u32,
+    /// Which of [`AHEAD`] it was let go by last.
+    pub(super) level: usize,
+    /// How far outside its region it may be, beyond what is granted.
+    pub(super) held: f64,
+}
+
+/// A piece that is free while the shift stays within limits.
+#[derive(Debug, Clone)]
+pub(super) struct Cell {
+    pub(super) spot: Spot,
+    pub(super) limits: Vec<Limit>,
+    /// The shift must stay in this ball, too.
+    pub(super) middle: Vector3<f64>,
+    pub(super) room: f64,
+}
+
+/// normal · shift ≥ height.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limit {
+    pub(super) normal: Vector3<f64>,
+    pub(super) height: f64,
+}
+
+impl Cell {
+    /// The same with the other part of the pair moving instead.
+    pub(super) fn mirrored(&self) -> Self {
+        let limits = self.limits.iter().map(|l| Limit { normal: -l.normal, ..*l }).collect();
+        Self { limits, middle: -self.middle, ..*self }
+    }
+
+    /// How far the shift may go from `at` along the unit vector `u`.
+    pub(super) fn length(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> f64 {
+        let from = at - self.middle;
+        let along = from.dot(u);
+        let chord = along * along - from.norm_squared() + self.room * self.room;
+        let ball = if chord > 0.0 { (chord.sqrt() - along).max(0.0) } else { 0.0 };
+        self.limits.iter().fold(ball, |length, limit| {
+            let speed = -limit.normal.dot(u);
+            let gap = limit.gap(at) + if speed <= TILT { SUNK } else { 0.0 };
+            if speed > 0.0 { length.min(gap.max(0.0) / speed) } else { length }
+        })
+    }
+
+    pub(super) fn blocks(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> bool {
+        self.limits.iter().any(|limit| limit.blocks(at, u))
+    }
+
+    /// What of it is in the way of a shift from `at` along `u`.
+    pub(super) fn obstacles(&self, pair: &Facing<'_>, at: &Vector3<f64>, u: &Vector3<f64>) -> Vec<Obstacle> {
+        let blocking = self.limits.iter().filter(|l| l.blocks(at, u));
+        blocking.map(|l| Obstacle { normal: l.normal, other: pair.other }).collect()
+    }
+
+    /// Whether there is nothing left to go on `u`.
+    pub(super) fn is_exhausted(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> bool {
+        let from = at - self.middle;
+        (from + u * TOUCHED).norm() >= self.room
+    }
+}
+
+impl Limit {
+    fn gap(&self, at: &Vector3<f64>) -> f64 {
+        self.normal.dot(at) - self.height
+    }
+
+    fn blocks(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> bool {
+        self.normal.dot(u) < -TILT && self.gap(at) <= TOUCHED
+    }
+}

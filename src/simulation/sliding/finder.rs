@@ -1,0 +1,297 @@
+//! Finds regions for the pieces of one surface that another may not be entered by.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::geometry::{Closest, FreeRegion, NoRegion, Wanted};
+use crate::termination::Termination;
+
+use super::DEPTH_TOLERANCE;
+use super::cell::{Cell, Limit, Spot};
+use super::cells::Halt;
+use super::facing::{Facing, Obstacle, Piece, Placed};
+
+/// Pieces this far off need no region, in the planning frame.
+const FAR: f64 = 0.12;
+/// Shifts that a region is asked to allow: the longest that works.
+const AHEAD: [f64; 5] = [4.0, 0.5, 0.06, 0.012, 2e-3];
+/// Which of these is asked for first; the shorter ones only where something is near ahead.
+const SHORT: usize = 2;
+/// Regions without a wanted shift are asked for so much around a piece.
+const AROUND: f64 = 0.12;
+/// A region that lets a piece go by less than this share of what was asked is too small.
+const LEAST_LET_GO: f64 = 0.25;
+/// Steps that are shorter lead nowhere.
+const LEAST_STEP: f64 = 1e-5;
+/// Regions are asked for so much larger than the piece.
+const ROOM: f64 = 1.25;
+/// So far outside its region, beyond what is granted, a piece may be where it begins: flat sides leave
+/// out a little of what is free, and where parts stand assembled nothing is entered.
+pub(super) const HELD_AT_FIRST: f64 = 1e-3;
+/// The same for what was not as far outside before. A corner of the measured surface gets deeper into a face
+/// than that gets into the corner, a few times: still within what the engine declares.
+const HELD: f64 = DEPTH_TOLERANCE / 2.0;
+/// A bit of a triangle that is smaller than this and has no region ahead is in the way …
+const SMALL: f64 = 0.3;
+/// … and is lost if it has none at all and is smaller than this.
+const SMALLEST: f64 = 0.02;
+/// What of the measured surface is nearest to a point, and how near.
+struct Seen {
+    closest: Closest,
+    signed: f64,
+}
+
+/// A question about a piece: from which shift on, and which way it is to go on.
+#[derive(Clone, Copy)]
+struct Wish {
+    at: Vector3<f64>,
+    /// A unit vector, or nothing.
+    along: Vector3<f64>,
+}
+
+/// A search for cells of one pair.
+pub(super) struct Finder<'a> {
+    termination: &'a Termination,
+    pair: &'a Facing<'a>,
+    /// How many regions were looked for.
+    pub(super) regions: usize,
+    /// No more than this.
+    pub(super) budget: usize,
+    /// What was found.
+    pub(super) cells: Vec<Cell>,
+    /// Normals of what is certainly in the way.
+    pub(super) obstacles: Vec<Vector3<f64>>,
+    /// The piece at hand.
+    placed: Placed,
+}
+
+impl<'a> Finder<'a> {
+    pub(super) fn new(pair: &'a Facing<'a>, budget: usize, termination: &'a Termination) -> Self {
+        Self {
+            termination,
+            pair,
+            regions: 0,
+            budget,
+            cells: Vec::new(),
+            obstacles: Vec::new(),
+            placed: Placed::default(),
+        }
+    }
+
+    /// Finds cells for a piece at a shift, as free along the unit vector `u`, or around it, as can be.
+    pub(super) fn find(&mut self, spot: Spot, at: &Vector3<f64>, u: &Vector3<f64>) -> Result<(), Halt> {
+        self.renew(spot, &Wish { at: *at, along: *u })
+    }
+
+    /// A cell for all of a piece that lets it go far along the unit vector `u`, if there is one.
+    pub(super) fn far(&mut self, mut spot: Spot, u: &Vector3<f64>) -> Option<Cell> {
+        let wish = Wish { at: Vector3::zeros(), along: *u };
+        self.pair.place(&spot.piece, &wish.at, &mut self.placed);
+        let seen = look(self.pair, &self.placed.centre, spot.guess);
+        spot.guess = seen.closest.triangle;
+        let let_go =
+            |level: usize| self.held(&Spot { level, ..spot }, &seen, &wish, &(u * AHEAD[level])).ok();
+        (0..=SHORT).find_map(let_go)
+    }
+
+    fn block(&mut self, by: &[Obstacle]) {
+        self.obstacles.extend(by.iter().map(|o| o.normal));
+    }
+
+    /// Finds cells for a piece, as free along the wish as can be.
+    fn renew(&mut self, mut spot: Spot, wish: &Wish) -> Result<(), Halt> {
+        self.termination.check()?;
+        if self.regions >= self.budget {
+            return Err(Halt::Lost);
+        }
+        let pair = self.pair;
+        pair.place(&spot.piece, &wish.at, &mut self.placed);
+        let radius = self.placed.radius;
+        let seen = look(pair, &self.placed.centre, spot.guess);
+        spot.guess = seen.closest.triangle;
+        if seen.signed - radius >= FAR {
+            let limits = Vec::new();
+            spot.held = if pair.allowance > 0.0 { spot.held } else { HELD };
+            self.cells.push(Cell { spot, limits, middle: wish.at, room: seen.signed - radius });
+            return Ok(());
+        }
+        let still = Vector3::zeros();
+        if wish.along == still {
+            return match self.held(&spot, &seen, wish, &still) {
+                Ok(cell) => {
+                    self.cells.push(cell);
+                    Ok(())
+                }
+                Err(_) => self.split(&spot, radius, wish),
+            };
+        }
+        let small = matches!(spot.piece, Piece::Bit(_)) && radius < SMALL;
+        let let_go = |cells: &mut Self, level: usize| {
+            cells.held(&Spot { level, ..spot }, &seen, wish, &(wish.along * AHEAD[level]))
+        };
+        match let_go(self, SHORT) {
+            Ok(short) => {
+                let further = (0..SHORT).find_map(|level| let_go(self, level).ok());
+                let cell = further.unwrap_or(short);
+                // What gets no further the second time may do so in pieces.
+                if !small && cell.spot.level > 0 && cell.spot.level == spot.level {
+                    return self.split(&spot, radius, wish);
+                }
+                self.cells.push(cell);
+                return Ok(());
+            }
+            Err(NoRegion::Amid(t)) if !small && !self.is_beside(&spot, t) => {
+                return self.split(&spot, radius, wish);
+            }
+            Err(_) => {}
+        }
+        let pair = self.pair;
+        let probes = pair.probes_ahead(&spot.piece, &self.placed, (&wish.at, &wish.along));
+        let certain = pair.obstacles(&probes, &wish.along, spot.guess);
+        if !certain.is_empty() {
+            self.block(&certain);
+            return Err(Halt::Blocked);
+        }
+        let nearer = (SHORT + 1..AHEAD.len()).find_map(|level| let_go(self, level).ok());
+        if let Some(cell) = nearer {
+            if !small && cell.spot.level == spot.level {
+                return self.split(&spot, radius, wish);
+            }
+            self.cells.push(cell);
+            return Ok(());
+        }
+        if let Ok(cell) = self.held(&Spot { level: 0, ..spot }, &seen, wish, &still) {
+            if cell.length(&wish.at, &wish.along) > LEAST_STEP {
+                self.cells.push(cell);
+                return Ok(());
+            }
+            let blocking = cell.obstacles(self.pair, &wish.at, &wish.along);
+            if small && !blocking.is_empty() {
+                self.block(&blocking);
+                return Err(Halt::Blocked);
+            }
+        }
+        self.split(&spot, radius, wish)
+    }
+
+    /// Whether a triangle may lie beside the piece at hand.
+    fn is_beside(&self, spot: &Spot, triangle: u32) -> bool {
+        let pair = self.pair;
+        pair.is_beside(&self.placed, triangle, pair.allowance + spot.held)
+    }
+
+    /// Finds cells for the parts of a piece.
+    fn split(&mut self, spot: &Spot, radius: f64, wish: &Wish) -> Result<(), Halt> {
+        if matches!(spot.piece, Piece::Bit(_)) && radius < SMALLEST {
+            let cell = self.before_face(spot, wish).ok_or(Halt::Lost)?;
+            let blocked = cell.obstacles(self.pair, &wish.at, &wish.along);
+            if wish.along != Vector3::zeros() && !blocked.is_empty() {
+                self.block(&blocked);
+                return Err(Halt::Blocked);
+            }
+            self.cells.push(cell);
+            return Ok(());
+        }
+        let parts = self.pair.parts(&spot.piece);
+        parts.into_iter().try_for_each(|piece| self.renew(Spot { piece, level: 0, ..*spot }, wish))
+    }
+
+    /// The piece at hand, a small bit no deeper than it may be, before the face that it is nearest
+    /// to: where facets with granted overlap lie across each other there are no regions. That is not
+    /// certain, as regions are; paths are verified.
+    fn before_face(&self, spot: &Spot, wish: &Wish) -> Option<Cell> {
+        let (pair, Placed { points, centre, .. }) = (self.pair, &self.placed);
+        if pair.allowance == 0.0 {
+            return None;
+        }
+        let held = pair.allowance + spot.held;
+        let depth = points.iter().map(|p| -look(pair, p, spot.guess).signed).fold(0.0, f64::max);
+        if depth > held {
+            return None;
+        }
+        let closest = look(pair, centre, spot.guess).closest;
+        let ahead = pair.shifted * wish.along * AHEAD[SHORT];
+        let mut best: Option<(f64, Vector3<f64>)> = None;
+        pair.measured.feature_normals(&closest, |n| {
+            let ends = n.dot(&(centre + ahead - closest.point));
+            if best.is_none_or(|(most, _)| ends > most) {
+                best = Some((ends, n));
+            }
+        });
+        let (_, inward) = best?;
+        let gap = points.iter().map(|p| inward.dot(&(p - closest.point))).fold(f64::INFINITY, f64::min);
+        let normal = pair.shifted.transpose() * inward;
+        let height = normal.dot(&wish.at) - gap.max(0.0) - (held - depth) / 3f64.sqrt();
+        Some(Cell {
+            spot: *spot,
+            limits: vec![Limit { normal, height }],
+            middle: wish.at,
+            room: AHEAD[SHORT],
+        })
+    }
+
+    /// The piece at hand in a region that also lets it go by a shift.
+    fn held(
+        &mut self,
+        spot: &Spot,
+        seen: &Seen,
+        wish: &Wish,
+        shift: &Vector3<f64>,
+    ) -> Result<Cell, NoRegion> {
+        self.regions += 1;
+        let pair = self.pair;
+        let most = pair.allowance + spot.held;
+        let ahead = pair.shifted * shift;
+        let Placed { points, extremes, centre, radius } = &self.placed;
+        let of = |points| Wanted { points, most, from_behind: true };
+        let region = if ahead == Vector3::zeros() {
+            let around = (radius + AROUND) * ROOM;
+            pair.measured.free_region_around(centre, around, (&seen.closest, seen.signed), of(extremes))
+        } else {
+            let wanted: Vec<_> = extremes.iter().copied().chain(extremes.iter().map(|p| p + ahead)).collect();
+            let middle = centre + ahead / 2.0;
+            let around = (radius + ahead.norm() / 2.0) * ROOM;
+            let seen = look(pair, &middle, spot.guess);
+            pair.measured.free_region_around(&middle, around, (&seen.closest, seen.signed), of(&wanted))
+        }?;
+        let depth = depth_below(points, &region, &ahead, most).ok_or(NoRegion::Cramped)?;
+        let slack = if pair.allowance > 0.0 { ((most - depth) / 3f64.sqrt()).max(0.0) } else { 0.0 };
+        let back = pair.shifted.transpose();
+        let limits = region.planes().map(|(inward, height)| {
+            let above = |p: &Point3<f64>| inward.dot(&p.coords) - height;
+            let gap = points.iter().map(above).fold(f64::INFINITY, f64::min);
+            let normal = back * inward;
+            Limit { normal, height: normal.dot(&wish.at) - gap.max(0.0) - slack }
+        });
+        let limits = limits.collect();
+        // The ball around the piece stays in that of the region, or all its points are far enough
+        // from the edge.
+        let offset = centre - region.centre();
+        let (middle, room) = if offset.norm() + radius < region.radius() {
+            (wish.at - back * offset, region.radius() - radius)
+        } else {
+            let far = points.iter().map(|p| (p - region.centre()).norm()).fold(0.0, f64::max);
+            (wish.at, region.radius() - far)
+        };
+        let held = if pair.allowance > 0.0 { HELD_AT_FIRST } else { HELD.max(depth + HELD / 10.0) };
+        let held = held.min(spot.held);
+        let cell = Cell { spot: Spot { held, ..*spot }, limits, middle, room };
+        let too_small =
+            ahead != Vector3::zeros() && cell.length(&wish.at, &wish.along) < LEAST_LET_GO * shift.norm();
+        if too_small { Err(NoRegion::Cramped) } else { Ok(cell) }
+    }
+}
+
+fn look(pair: &Facing<'_>, p: &Point3<f64>, guess: u32) -> Seen {
+    let closest = pair.measured.closest_from(p, guess);
+    Seen { signed: pair.measured.signed(p, &closest), closest }
+}
+
+/// How deep some points are below a region, here and shifted, if no more than `most`.
+fn depth_below(points: &[Point3<f64>], region: &FreeRegion, shift: &Vector3<f64>, most: f64) -> Option<f64> {
+    let still = shift == &Vector3::zeros();
+    points.iter().try_fold(0.0, |depth: f64, p| {
+        let here = region.distance_within(p, most)?;
+        let there = if still { 0.0 } else { region.distance_within(&(p + shift), most)? };
+        Some(depth.max(here).max(there))
+    })
+}

@@ -1,0 +1,262 @@
+//! Cells of pairs where motions begin, kept for all motions that begin there.
+//!
+//! Six pushes from a state, its static analysis, and the same part tried again after another left
+//! ask the same at first: regions around a pair's surface, at one place. They are found once. What is
+//! kept is a function of its key alone, so motions do not depend on which of them came first.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+use nalgebra::Vector3;
+
+use crate::geometry::Pose;
+use crate::termination::Interrupt;
+
+use super::super::{Scene, alike};
+use super::cell::Cell;
+
+/// So many cells are kept besides those of assembled pairs without a wish; then they are forgotten.
+const MOST_CELLS: usize = 40_000;
+/// Boxes further apart than this are not looked at for pairs that stand alike.
+const NEAR: f64 = 0.2;
+
+/// A pair of a part that begins to move and one that stands.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place<'a> {
+    pub(super) part: usize,
+    pub(super) start: &'a Pose,
+    pub(super) other: usize,
+}
+
+/// All of one side of a pair in cells without a shift.
+#[derive(Debug, Clone)]
+pub(super) struct Gathered {
+    /// Whether the moving part's surface is the one that is in cells.
+    pub(super) asks_part: bool,
+    /// None where regions cannot tell.
+    pub(super) cells: Option<Arc<Vec<Cell>>>,
+    /// How many regions it took.
+    pub(super) regions: usize,
+}
+
+impl Gathered {
+    /// The same with the other part moving instead.
+    fn mirrored(&self) -> Self {
+        let cells = self.cells.as_deref().map(|cells| mirrored(cells));
+        Self { asks_part: !self.asks_part, cells, regions: self.regions }
+    }
+}
+
+/// What becomes of a pair's cells when the part is to go somewhere from where it begins.
+#[derive(Debug, Clone)]
+pub(super) struct Way {
+    /// Normals (planning frame) of what stops it; free where there are none.
+    pub(super) blocked: Vec<Vector3<f64>>,
+    /// The cells that let it go; those that it had where it is stopped; none where regions cannot
+    /// tell.
+    pub(super) cells: Option<Arc<Vec<Cell>>>,
+    /// How many regions it took.
+    pub(super) regions: usize,
+}
+
+impl Way {
+    fn mirrored(&self) -> Self {
+        let blocked = self.blocked.iter().map(|n| -n).collect();
+        let cells = self.cells.as_deref().map(|cells| mirrored(cells));
+        Self { blocked, cells, regions: self.regions }
+    }
+}
+
+fn size(cells: Option<&Arc<Vec<Cell>>>) -> usize {
+    1 + cells.map_or(0, |cells| cells.len())
+}
+
+fn mirrored(cells: &[Cell]) -> Arc<Vec<Cell>> {
+    Arc::new(cells.iter().map(Cell::mirrored).collect())
+}
+
+/// What is kept.
+#[derive(Debug, Default)]
+pub struct KeptCells {
+    kept: Mutex<Kept>,
+    /// Of the pairs that stand alike, assembled, the first.
+    firsts: OnceLock<HashMap<(usize, usize), (usize, usize)>>,
+}
+
+#[derive(Debug, Default)]
+struct Kept {
+    gathered: HashMap<Key, Arc<Gathered>>,
+    ways: HashMap<(Key, [u64; 3], bool), Arc<Way>>,
+    /// How many cells are kept of what may be forgotten.
+    count: usize,
+}
+
+impl Kept {
+    /// Makes room for so many cells: displaced pairs and ways may be forgotten.
+    fn make_room(&mut self, cells: usize) {
+        self.count += cells;
+        if self.count > MOST_CELLS {
+            self.gathered.retain(|key, _| key.start.is_none());
+            self.ways.clear();
+            self.count = cells;
+        }
+    }
+}
+
+/// Where a pair is; assembled without the bits of a start pose.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct Key {
+    part: usize,
+    other: usize,
+    start: Option<[u64; 7]>,
+}
+
+/// A place as it is kept: the same for pairs that stand alike, and for both parts of a pair.
+struct Canonical<'a> {
+    key: Key,
+    place: Place<'a>,
+    /// Whether the other part moves in it.
+    is_mirrored: bool,
+}
+
+impl KeptCells {
+    /// The cells of a pair; `find` finds them.
+    pub(super) fn gathered(
+        &self,
+        scene: &Scene,
+        place: &Place<'_>,
+        find: impl Fn(&Place<'_>) -> Result<Gathered, Interrupt>,
+    ) -> Result<Arc<Gathered>, Interrupt> {
+        let Canonical { key, place, is_mirrored } = self.canonical(scene, place);
+        let known = self.lock().gathered.get(&key).cloned();
+        let found = if let Some(known) = known {
+            known
+        } else {
+            let found = Arc::new(find(&place)?);
+            let mut kept = self.lock();
+            kept.make_room(if key.start.is_some() { size(found.cells.as_ref()) } else { 0 });
+            kept.gathered.insert(key, Arc::clone(&found));
+            found
+        };
+        Ok(if is_mirrored { Arc::new(found.mirrored()) } else { found })
+    }
+
+    /// The way of a pair along a unit vector, the next step or far; `find` finds it.
+    pub(super) fn way(
+        &self,
+        scene: &Scene,
+        place: &Place<'_>,
+        (u, far): (&Vector3<f64>, bool),
+        find: impl Fn(&Place<'_>, &Vector3<f64>) -> Result<Way, Interrupt>,
+    ) -> Result<Arc<Way>, Interrupt> {
+        let Canonical { key, place, is_mirrored } = self.canonical(scene, place);
+        // The sum makes −0 to 0.
+        let u = if is_mirrored { -u } else { *u } + Vector3::zeros();
+        let key = (key, <[f64; 3]>::from(u).map(f64::to_bits), far);
+        let known = self.lock().ways.get(&key).cloned();
+        let found = if let Some(known) = known {
+            known
+        } else {
+            let found = Arc::new(find(&place, &u)?);
+            let mut kept = self.lock();
+            kept.make_room(size(found.cells.as_ref()));
+            kept.ways.insert(key, Arc::clone(&found));
+            found
+        };
+        Ok(if is_mirrored { Arc::new(found.mirrored()) } else { found })
+    }
+
+    fn canonical<'a>(&self, scene: &'a Scene, place: &Place<'a>) -> Canonical<'a> {
+        let Place { part, start, other } = *place;
+        if start != &scene.bodies[part].planning_from_shape {
+            let key = Key { part, other, start: Some(bits(start)) };
+            return Canonical { key, place: *place, is_mirrored: false };
+        }
+        let in_order = ordered(scene, part, other);
+        let (part, other) = self.first_alike(scene, in_order);
+        let start = &scene.bodies[part].planning_from_shape;
+        let is_mirrored = in_order != (place.part, place.other);
+        Canonical { key: Key { part, other, start: None }, place: Place { part, start, other }, is_mirrored }
+    }
+
+    fn first_alike(&self, scene: &Scene, pair: (usize, usize)) -> (usize, usize) {
+        let firsts = self.firsts.get_or_init(|| {
+            let pairs = scene.broad_phase.pairs(NEAR);
+            let pairs: Vec<_> = pairs.into_iter().map(|(a, b)| ordered(scene, a, b)).collect();
+            let (first, group_of) = alike(scene, &pairs);
+            pairs.into_iter().zip(group_of.into_iter().map(|group| first[group])).collect()
+        });
+        firsts.get(&pair).copied().unwrap_or(pair)
+    }
+
+    /// It holds plain data: it is whole even if a holder panicked.
+    fn lock(&self) -> MutexGuard<'_, Kept> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The smaller of two parts first.
+fn ordered(scene: &Scene, a: usize, b: usize) -> (usize, usize) {
+    let size = |i: usize| scene.bodies[i].bounds.extents().max();
+    if (size(a), a) <= (size(b), b) { (a, b) } else { (b, a) }
+}
+
+fn bits(pose: &Pose) -> [u64; 7] {
+    let (t, q) = (pose.translation.vector, pose.rotation.coords);
+    [t.x, t.y, t.z, q.x, q.y, q.z, q.w].map(f64::to_bits)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{cuboid, moved, scene};
+    use crate::geometry::SourceMesh;
+    use crate::simulation::{Action, Axis, End, Motion, SlidingEngine, Surroundings, TransitionFunction};
+    use crate::termination::Termination;
+
+    /// Three posts, each on its foot, alike but for rounding, and a wall beside.
+    fn meshes() -> Vec<SourceMesh> {
+        let pairs = [-4.9, -2.3, 0.3].map(|x: f64| {
+            let foot = cuboid([-0.7, -0.8, 0.0], [0.9, 1.0, 0.5]);
+            let post = cuboid([-0.3, -0.4, 0.5], [0.5, 0.6, 2.0]);
+            [foot, post].map(|mesh| moved(mesh, &Pose::translation(x, 0.1, 0.0)))
+        });
+        pairs.into_iter().flatten().chain([cuboid([2.3, -4.0, 0.0], [2.6, 4.0, 3.0])]).collect()
+    }
+
+    fn motion(scene: &Scene, part: usize, lift: f64, action: Action) -> Motion {
+        let standing = (0..scene.bodies.len()).filter(|&i| i != part).collect();
+        let around = Surroundings::new(scene, standing);
+        let start = Pose::translation(0.0, 0.0, lift) * scene.bodies[part].planning_from_shape;
+        SlidingEngine.simulate(scene, &around, part, &start, action, &Termination::default()).unwrap()
+    }
+
+    #[test]
+    fn motions_do_not_depend_on_what_was_asked_before() {
+        let meshes = meshes();
+        let questions: Vec<_> = (0..meshes.len())
+            .flat_map(|part| [0.0, 0.25].map(|lift| (part, lift)))
+            .flat_map(|(part, lift)| Action::translations().into_iter().map(move |a| (part, lift, a)))
+            .collect();
+        let (remembering, _) = scene(meshes.clone());
+        for &(part, lift, action) in questions.iter().rev() {
+            let warm = motion(&remembering, part, lift, action);
+            assert_eq!(warm, motion(&remembering, part, lift, action), "asked again");
+            let (fresh, _) = scene(meshes.clone());
+            assert_eq!(warm, motion(&fresh, part, lift, action), "part {part} up by {lift}, {action}");
+        }
+    }
+
+    #[test]
+    fn pairs_that_stand_alike_are_kept_once_for_either_part() {
+        let (scene, _) = scene(meshes());
+        let [up, down] = [true, false].map(|positive| Action::Push(Axis::Z, positive));
+        for (part, action) in [(1, down), (3, down), (5, down), (0, up), (4, up)] {
+            let Motion { path, end } = motion(&scene, part, 0.0, action);
+            let with = vec![part ^ 1];
+            assert_eq!((path.len(), end), (1, End::Collision { with }), "{part} {action}");
+        }
+        let kept = scene.kept.lock();
+        assert_eq!(kept.gathered.iter().filter(|(key, _)| key.part ^ 1 == key.other).count(), 1);
+    }
+}
