@@ -86,6 +86,8 @@ pub struct RequestsConfig {
     pub max_upload_mb: u64,
     /// Megabytes of a plan that may wait for a client to read.
     pub outbox_mb: u64,
+    /// Megabytes of answers that are remembered as they were sent.
+    pub answers_mb: u64,
     /// Seconds that a client may leave a waiting plan unread.
     pub slow_reader_s: f64,
 }
@@ -139,7 +141,7 @@ impl Default for WorkersConfig {
 
 impl Default for RequestsConfig {
     fn default() -> Self {
-        Self { queue: 16, max_upload_mb: 1024, outbox_mb: 64, slow_reader_s: 60.0 }
+        Self { queue: 16, max_upload_mb: 1024, outbox_mb: 64, answers_mb: 64, slow_reader_s: 60.0 }
     }
 }
 
@@ -179,6 +181,7 @@ impl Config {
         within("requests.queue", self.requests.queue, 1..=4096, "1 to 4096")?;
         within("requests.max_upload_mb", self.requests.max_upload_mb, 1..=65_536, "1 to 65536")?;
         within("requests.outbox_mb", self.requests.outbox_mb, 1..=65_536, "1 to 65536")?;
+        within("requests.answers_mb", self.requests.answers_mb, 0..=65_536, "0 to 65536")?;
         within("requests.slow_reader_s", self.requests.slow_reader_s, 0.1..=86_400.0, "0.1 to 86400")?;
         within("times.tick_s", self.times.tick_s, 0.05..=60.0, "0.05 to 60")?;
         within("times.grace_s", self.times.grace_s, 0.0..=3600.0, "0 to 3600")?;

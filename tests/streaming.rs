@@ -30,6 +30,10 @@ impl Planning for Scripted {
         Ok(Admission { id, known: false, warnings: vec![] })
     }
 
+    fn revise(&self, base: AssemblyId, _: &sbdp::geometry::Revision) -> Result<Admission, ServiceError> {
+        Ok(Admission { id: base, known: true, warnings: vec![] })
+    }
+
     fn knows(&self, _: AssemblyId) -> bool {
         true
     }

@@ -42,8 +42,9 @@ pub struct PartRecord {
     pub name: Text,
     /// [`VERTICES_F64`] or [`VERTICES_F32`].
     pub vertex_kind: u32,
-    /// Reserved, 0.
-    pub reserved: u32,
+    /// In revisions the place of the part that it replaces, or [`ADDED`](crate::revision::ADDED); in
+    /// uploads 0.
+    pub place: u32,
     /// Vertices.
     pub vertices: u64,
     /// Triangles.
@@ -105,6 +106,57 @@ pub struct Part<'a> {
     pub triangles: &'a [[u32; 3]],
 }
 
+impl<'a> Part<'a> {
+    /// Its header, with its name among the texts.
+    pub(crate) fn record(&self, place: u32, texts: &mut TextWriter) -> PartRecord {
+        PartRecord {
+            name: texts.add(self.name),
+            vertex_kind: if matches!(self.vertices, Vertices::F64(_)) { VERTICES_F64 } else { VERTICES_F32 },
+            place,
+            vertices: self.vertices.len() as u64,
+            triangles: self.triangles.len() as u64,
+        }
+    }
+
+    /// Its mesh as it travels, in two pieces.
+    pub(crate) fn pieces(&self) -> [&'a [u8]; 2] {
+        [self.vertices.bytes(), bytemuck::cast_slice(self.triangles)]
+    }
+
+    /// Reads a part; the reader stands at its mesh.
+    pub(crate) fn read(
+        record: &PartRecord,
+        texts: &Texts<'a>,
+        reader: &mut Reader<'a>,
+    ) -> Result<Self, Malformed> {
+        Ok(Self {
+            name: texts.get(record.name, "part name")?,
+            vertices: read_vertices(reader, record)?,
+            triangles: reader.array("triangles", record.triangles)?,
+        })
+    }
+}
+
+/// Bytes of a message with a front and further pieces, each padded to 8 bytes.
+pub(crate) fn length_of<'p>(front: &[u8], pieces: impl Iterator<Item = &'p [u8]>) -> usize {
+    front.len() + pieces.map(|p| padded(p.len() as u64) as usize).sum::<usize>()
+}
+
+/// Writes such a message to the front of `out`; false if it does not fit.
+pub(crate) fn write_pieces<'p>(
+    front: &'p [u8],
+    pieces: impl Iterator<Item = &'p [u8]>,
+    out: &mut [u8],
+) -> bool {
+    let mut position = 0;
+    for piece in std::iter::once(front).chain(pieces) {
+        let Some(target) = out.get_mut(position..position + piece.len()) else { return false };
+        target.copy_from_slice(piece);
+        position = padded((position + piece.len()) as u64) as usize;
+    }
+    position <= out.len()
+}
+
 /// An assembly to upload, or as received.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Assembly<'a> {
@@ -122,17 +174,7 @@ impl<'a> Assembly<'a> {
     /// Everything before the meshes.
     fn front(&self) -> Vec<u8> {
         let mut texts = TextWriter::default();
-        let records: Vec<PartRecord> = self
-            .parts
-            .iter()
-            .map(|p| PartRecord {
-                name: texts.add(p.name),
-                vertex_kind: if matches!(p.vertices, Vertices::F64(_)) { VERTICES_F64 } else { VERTICES_F32 },
-                reserved: 0,
-                vertices: p.vertices.len() as u64,
-                triangles: p.triangles.len() as u64,
-            })
-            .collect();
+        let records: Vec<PartRecord> = self.parts.iter().map(|part| part.record(0, &mut texts)).collect();
         let fixed: Vec<Text> = self.fixed.iter().map(|n| texts.add(n)).collect();
         let header = UploadHeader {
             parts: records.len() as u32,
@@ -149,25 +191,18 @@ impl<'a> Assembly<'a> {
 
     /// The pieces of the message in order; each is padded to 8 bytes when written.
     fn pieces(&self) -> impl Iterator<Item = &'a [u8]> + '_ {
-        self.parts.iter().flat_map(|p| [p.vertices.bytes(), bytemuck::cast_slice(p.triangles)])
+        self.parts.iter().flat_map(Part::pieces)
     }
 
     /// Bytes of the message.
     #[must_use]
     pub fn encoded_len(&self) -> usize {
-        self.front().len() + self.pieces().map(|p| padded(p.len() as u64) as usize).sum::<usize>()
+        length_of(&self.front(), self.pieces())
     }
 
     /// Writes the message to the front of `out`; false if it does not fit.
     pub fn encode_into(&self, out: &mut [u8]) -> bool {
-        let front = self.front();
-        let mut position = 0;
-        for piece in std::iter::once(front.as_slice()).chain(self.pieces()) {
-            let Some(target) = out.get_mut(position..position + piece.len()) else { return false };
-            target.copy_from_slice(piece);
-            position = padded((position + piece.len()) as u64) as usize;
-        }
-        position <= out.len()
+        write_pieces(&self.front(), self.pieces(), out)
     }
 
     /// Reads an upload. The meshes are borrowed from `bytes`: pass a private copy if the sender
@@ -186,11 +221,7 @@ impl<'a> Assembly<'a> {
         let texts = Texts(reader.array("texts", u64::from(header.text_bytes))?);
         let mut parts = Vec::with_capacity(records.len());
         for record in records {
-            parts.push(Part {
-                name: texts.get(record.name, "part name")?,
-                vertices: read_vertices(&mut reader, record)?,
-                triangles: reader.array("triangles", record.triangles)?,
-            });
+            parts.push(Part::read(record, &texts, &mut reader)?);
         }
         let units = texts.get(header.units, "units")?;
         Ok(Self {
@@ -210,7 +241,7 @@ fn read_vertices<'a>(reader: &mut Reader<'a>, record: &PartRecord) -> Result<Ver
     }
 }
 
-/// The answer to `Have` and `Upload`.
+/// The answer to `Have`, `Upload` and `Revise`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct HandleResponse {

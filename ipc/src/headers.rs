@@ -22,13 +22,15 @@ pub enum RequestKind {
     Have = 4,
     /// `geometry`: an upload.
     Upload = 5,
+    /// `geometry`: what differs from a known assembly.
+    Revise = 6,
 }
 
 impl RequestKind {
     /// The kind of a number on the wire.
     #[must_use]
     pub fn from_wire(kind: u32) -> Option<Self> {
-        [Self::Plan, Self::Control, Self::Status, Self::Have, Self::Upload]
+        [Self::Plan, Self::Control, Self::Status, Self::Have, Self::Upload, Self::Revise]
             .into_iter()
             .find(|k| *k as u32 == kind)
     }
@@ -46,7 +48,7 @@ pub enum ResponseKind {
     Error = 3,
     /// The daemon's status.
     Status = 4,
-    /// The answer to `Have` and `Upload`.
+    /// The answer to `Have`, `Upload` and `Revise`.
     Handle = 5,
 }
 

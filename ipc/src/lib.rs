@@ -13,6 +13,7 @@ pub mod headers;
 pub mod layout;
 pub mod plan;
 pub mod progress;
+pub mod revision;
 pub mod services;
 pub mod status;
 pub mod summary;

@@ -26,7 +26,8 @@ pub const ENGINES: [&str; 2] = ["sliding", "penalty"];
 /// Names of the action sets; the wire carries the index.
 pub const ACTION_SETS: [&str; 2] = ["paper", "extended"];
 
-/// Header of a plan request; three lists of u32 part numbers follow: fixed, removed, targets.
+/// Header of a plan request; three lists of u32 part numbers follow: fixed, removed, targets; then
+/// [`MovedPart`]s.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct PlanRequestHeader {
@@ -48,10 +49,26 @@ pub struct PlanRequestHeader {
     pub removed: u32,
     /// Parts that must come out.
     pub targets: u32,
+    /// Parts that stand elsewhere than in the assembly.
+    pub moved: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
     /// CLOCK_MONOTONIC nanoseconds; 0 for none.
     pub deadline_ns: u64,
     /// Simulations after which to give up; `u64::MAX` for no limit.
     pub max_simulations: u64,
+}
+
+/// A part that stands elsewhere.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+pub struct MovedPart {
+    /// The part.
+    pub part: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// The rigid motion of its mesh from where the assembly has it.
+    pub motion: Waypoint,
 }
 
 /// One step's entry in the table.
@@ -89,9 +106,11 @@ pub struct StepsHeader {
 }
 
 const _: () = {
-    assert!(size_of::<PlanRequestHeader>() == 80 && align_of::<PlanRequestHeader>() == 8);
+    assert!(size_of::<PlanRequestHeader>() == 88 && align_of::<PlanRequestHeader>() == 8);
     assert!(offset_of!(PlanRequestHeader, planner) == 32);
-    assert!(offset_of!(PlanRequestHeader, deadline_ns) == 64);
+    assert!(offset_of!(PlanRequestHeader, moved) == 64);
+    assert!(offset_of!(PlanRequestHeader, deadline_ns) == 72);
+    assert!(size_of::<MovedPart>() == 64 && offset_of!(MovedPart, motion) == 8);
     assert!(size_of::<StepRecord>() == 32 && align_of::<StepRecord>() == 8);
     assert!(offset_of!(StepRecord, first_blocker) == 16);
     assert!(offset_of!(StepRecord, verified_depth) == 24);
@@ -99,7 +118,7 @@ const _: () = {
 };
 
 /// A plan request, owned.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlanRequest {
     /// Which assembly.
     pub handle: [u8; 32],
@@ -126,6 +145,8 @@ pub struct PlanRequest {
     pub removed: Vec<u32>,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<u32>>,
+    /// Parts that stand elsewhere than in the assembly.
+    pub moved: Vec<MovedPart>,
 }
 
 impl PlanRequest {
@@ -147,10 +168,12 @@ impl PlanRequest {
             fixed: self.fixed.len() as u32,
             removed: self.removed.len() as u32,
             targets: targets.len() as u32,
+            moved: self.moved.len() as u32,
+            reserved: 0,
             deadline_ns: self.deadline_ns.unwrap_or(0),
             max_simulations: self.max_simulations.unwrap_or(u64::MAX),
         });
-        writer.array(&self.fixed).array(&self.removed).array(targets);
+        writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.moved);
         writer.finish()
     }
 
@@ -164,6 +187,7 @@ impl PlanRequest {
         let fixed = reader.array::<u32>("fixed", u64::from(h.fixed))?.to_vec();
         let removed = reader.array::<u32>("removed", u64::from(h.removed))?.to_vec();
         let targets = reader.array::<u32>("targets", u64::from(h.targets))?.to_vec();
+        let moved = reader.array::<MovedPart>("moved", u64::from(h.moved))?.to_vec();
         const KNOWN: u32 = PLAN_NO_CACHE | PLAN_HAS_TARGETS | PLAN_SWEEPS | PLAN_NO_SWEEPS;
         let set = |bit: u32| h.flags & bit != 0;
         if set(!KNOWN) || (set(PLAN_SWEEPS) && set(PLAN_NO_SWEEPS)) {
@@ -182,6 +206,7 @@ impl PlanRequest {
             fixed,
             removed,
             targets: set(PLAN_HAS_TARGETS).then_some(targets),
+            moved,
         })
     }
 }

@@ -26,6 +26,8 @@ pub struct StatusHeader {
     pub requests: u64,
     /// Answered with a plan.
     pub done: u64,
+    /// Answered at once with what was answered before (they count as done, too).
+    pub remembered: u64,
     /// Cancelled by the client.
     pub cancelled: u64,
     /// Expired before planning began.
@@ -54,7 +56,7 @@ pub struct PreloadRecord {
     pub name: Text,
 }
 
-const _: () = assert!(size_of::<StatusHeader>() == 104 && size_of::<PreloadRecord>() == 40);
+const _: () = assert!(size_of::<StatusHeader>() == 112 && size_of::<PreloadRecord>() == 40);
 
 /// A status, owned.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -4,7 +4,8 @@ use proptest::prelude::*;
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, Part, Vertices};
-use sbdp_ipc::plan::{PlanRequest, Step, StepsView, encode_steps};
+use sbdp_ipc::plan::{MovedPart, PlanRequest, Step, StepsView, encode_steps};
+use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts, SummaryView};
 
@@ -23,6 +24,9 @@ fn read_everything(bytes: &[u8]) {
     if let Ok(view) = SummaryView::new(bytes) {
         let _ = (view.part_names().count(), view.blocked().count(), view.warnings().count());
         let _ = (view.reason(), view.units(), view.planner(), view.engine(), view.status());
+    }
+    if let Ok(revision) = Revision::decode(bytes) {
+        let _ = revision.added.iter().map(|p| p.vertices.iter().count()).sum::<usize>();
     }
     if let Ok(assembly) = Assembly::decode(bytes) {
         let _ = assembly.parts.iter().map(|p| p.vertices.iter().count()).sum::<usize>();
@@ -81,6 +85,27 @@ fn assembly_bytes() -> Vec<u8> {
     bytes
 }
 
+fn moved_part() -> MovedPart {
+    MovedPart { part: 2, reserved: 0, motion: [0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0] }
+}
+
+fn revision_bytes() -> Vec<u8> {
+    let wide = [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0], [6.0, 7.0, 8.0]];
+    let part = |name| Part { name, vertices: Vertices::F64(&wide), triangles: &[[0, 1, 2], [0, 2, 1]] };
+    let narrow = [[0.5_f32, 1.0, 2.0]];
+    let revision = Revision {
+        base: [3; 32],
+        replaced: vec![(4, part("")), (1, part(""))],
+        added: vec![Part { name: "größer", vertices: Vertices::F32(&narrow), triangles: &[] }],
+        moved: vec![moved_part()],
+    };
+    let mut bytes = vec![0; revision.encoded_len()];
+    assert!(revision.encode_into(&mut bytes));
+    let aligned = AlignedBytes::copy_of(&bytes);
+    assert_eq!(Revision::decode(aligned.as_slice()).unwrap(), revision);
+    bytes
+}
+
 #[test]
 fn steps_come_back_in_place() {
     let bytes = AlignedBytes::copy_of(&encode_steps(4, &two_steps()));
@@ -124,6 +149,7 @@ fn requests_errors_and_status_come_back() {
         max_simulations: Some(0),
         fixed: vec![1, 2, 3],
         targets: Some(vec![]),
+        moved: vec![moved_part()],
         ..PlanRequest::default()
     };
     for sweeps in [None, Some(false), Some(true)] {
@@ -150,7 +176,12 @@ fn requests_errors_and_status_come_back() {
 
 /// A valid message of each kind, to be damaged.
 fn messages() -> Vec<Vec<u8>> {
-    let request = PlanRequest { fixed: vec![1, 2], targets: Some(vec![3]), ..PlanRequest::default() };
+    let request = PlanRequest {
+        fixed: vec![1, 2],
+        targets: Some(vec![3]),
+        moved: vec![moved_part()],
+        ..PlanRequest::default()
+    };
     let status = Status {
         numbers: StatusHeader::default(),
         version: "1".into(),
@@ -160,6 +191,7 @@ fn messages() -> Vec<Vec<u8>> {
         encode_steps(0, &two_steps()),
         summary(),
         assembly_bytes(),
+        revision_bytes(),
         request.encode(),
         status.encode(),
         WireError::new(ErrorCode::Failed, "text").encode(),
@@ -183,7 +215,7 @@ proptest! {
 
     #[test]
     fn no_damage_makes_a_view_panic(
-        which in 0_usize..6,
+        which in 0_usize..7,
         damage in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
     ) {
         let mut message = messages().swap_remove(which);

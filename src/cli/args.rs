@@ -6,10 +6,11 @@ use std::time::Duration;
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use nalgebra::{Quaternion, UnitQuaternion};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
 use crate::bench::{self, ENGINES, PARTS, PLANNERS, Shard};
 use crate::blocking_graph::StaticAnalysis;
+use crate::geometry::{Pose, Waypoint, waypoint_from_pose};
 use crate::search;
 
 /// Plans how assemblies come apart.
@@ -90,6 +91,16 @@ pub(super) struct PlanArguments {
     /// A part that must come out (repeatable) [default: all]
     #[arg(long, value_name = "PART")]
     pub(super) target: Vec<String>,
+    /// A part that stands elsewhere: the motion of its mesh, a shift and (if it turns) a quaternion
+    /// (repeatable)
+    #[arg(long, value_name = "PART=X,Y,Z[,W,X,Y,Z]", value_parser = moved, allow_hyphen_values = true)]
+    pub(super) moved: Vec<(String, Waypoint)>,
+    /// A part with another mesh, from a file that has just one (repeatable)
+    #[arg(long, value_name = "PART=FILE", value_parser = replaced)]
+    pub(super) replaced: Vec<(String, PathBuf)>,
+    /// Further parts from a file or folder (repeatable)
+    #[arg(long, value_name = "PATH")]
+    pub(super) added: Vec<PathBuf>,
     /// Write there what the search did, one JSON object per line (see `sbdp explain`); plans in
     /// this process
     #[arg(long, value_name = "FILE", conflicts_with = "daemon")]
@@ -374,13 +385,36 @@ fn seconds(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(seconds).map_err(|_| "not a number of seconds from 0 on".to_owned())
 }
 
+fn replaced(text: &str) -> Result<(String, PathBuf), String> {
+    let (part, file) = text.rsplit_once('=').ok_or_else(|| "not PART=FILE".to_owned())?;
+    Ok((part.to_owned(), file.into()))
+}
+
+fn moved(text: &str) -> Result<(String, Waypoint), String> {
+    let wrong = || "not PART=X,Y,Z or PART=X,Y,Z,W,X,Y,Z with a quaternion that is not 0".to_owned();
+    let (part, motion) = text.rsplit_once('=').ok_or_else(wrong)?;
+    let numbers: Vec<f64> =
+        motion.split(',').map(str::parse).collect::<Result<_, _>>().map_err(|_| wrong())?;
+    let shift = numbers.get(..3).filter(|shift| shift.iter().all(|x| x.is_finite())).ok_or_else(wrong)?;
+    let turn = match &numbers[3..] {
+        [] => UnitQuaternion::identity(),
+        &[w, x, y, z] => quaternion([w, x, y, z]).ok_or_else(wrong)?,
+        _ => return Err(wrong()),
+    };
+    let shift = Translation3::new(shift[0], shift[1], shift[2]);
+    Ok((part.to_owned(), waypoint_from_pose(&Pose::from_parts(shift, turn))))
+}
+
+fn quaternion([w, x, y, z]: [f64; 4]) -> Option<UnitQuaternion<f64>> {
+    UnitQuaternion::try_new(Quaternion::new(w, x, y, z), f64::MIN_POSITIVE)
+        .filter(|q| q.coords.iter().all(|c| c.is_finite()))
+}
+
 fn rotation(text: &str) -> Result<UnitQuaternion<f64>, String> {
     let wrong = || "not four numbers W,X,Y,Z of which one is not 0".to_owned();
     let numbers: Vec<f64> = text.split(',').map(str::parse).collect::<Result<_, _>>().map_err(|_| wrong())?;
-    let [w, x, y, z] = numbers[..] else { return Err(wrong()) };
-    UnitQuaternion::try_new(Quaternion::new(w, x, y, z), f64::MIN_POSITIVE)
-        .filter(|q| q.coords.iter().all(|c| c.is_finite()))
-        .ok_or_else(wrong)
+    let numbers: [f64; 4] = numbers.try_into().map_err(|_| wrong())?;
+    quaternion(numbers).ok_or_else(wrong)
 }
 
 #[cfg(test)]
@@ -446,6 +480,16 @@ mod tests {
             assert!(rotation(wrong).is_err(), "{wrong}");
         }
         assert!(Arguments::try_parse_from("sbdp plan a --rotate -1,0,0,1".split(' ')).is_ok());
+    }
+
+    #[test]
+    fn parts_move_by_a_shift_and_a_turn() {
+        let identity = [1.0, 0.0, 0.0, 0.0];
+        assert_eq!(moved("a=b=1,-2,3"), Ok(("a=b".into(), [1.0, -2.0, 3.0, 1.0, 0.0, 0.0, 0.0])));
+        assert_eq!(moved("a=0,0,0,-2,0,0,0").unwrap().1[3..], identity);
+        for wrong in ["a", "a=1,2", "a=1,2,nan", "a=1,2,3,4", "a=1,2,3,0,0,0,0", "a=1,2,3,1,0,0,0,0"] {
+            assert!(moved(wrong).is_err(), "{wrong}");
+        }
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use std::time::{Duration, Instant};
 
 use super::error::CliError;
-use crate::geometry::SourceAssembly;
+use crate::geometry::{Revision, SourceAssembly};
 use crate::plan::Plan;
 use crate::search::{PlanRequest, PlanSink, Termination};
 use crate::service::Service;
@@ -13,6 +13,10 @@ use crate::service::Service;
 pub(super) struct Question<'a> {
     /// The assembly.
     pub(super) assembly: &'a SourceAssembly,
+    /// What differs from it.
+    pub(super) revision: Revision,
+    /// The assembly with what differs: what the plan is about.
+    pub(super) revised: &'a SourceAssembly,
     /// How long it took to read.
     pub(super) read: Duration,
     /// What to plan.
@@ -40,7 +44,8 @@ impl Backend for Embedded {
         let started = Instant::now();
         let admission = self.service.admit(question.assembly)?;
         let admitted = started.elapsed();
-        let mut plan = self.service.plan(admission.id, &question.request, &question.termination, sink)?;
+        let revised = self.service.revise(admission.id, &question.revision)?;
+        let mut plan = self.service.plan(revised.id, &question.request, &question.termination, sink)?;
         plan.stats.load_time_s = Some((question.read + admitted).as_secs_f64());
         Ok(plan)
     }

@@ -9,7 +9,7 @@ use sbdp_client::{Client, ClientError, ErrorCode, Event, PlanOptions, PlanStream
 
 use super::backend::{Backend, Question};
 use super::error::CliError;
-use crate::geometry::{SourceAssembly, SourcePart, heal};
+use crate::geometry::{Revision, SourceAssembly, SourceMesh, SourcePart, heal, waypoint_from_pose};
 use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
 use crate::search::{ActionSet, Engine, PlanSink, Planner, Progress, Stage};
 
@@ -31,7 +31,10 @@ impl Daemon {
     }
 
     fn ask(&self, question: &Question<'_>, sink: &mut dyn PlanSink) -> Result<Plan, ClientError> {
-        let handle = self.client.upload(&wire_assembly(question.assembly))?;
+        let mut handle = self.client.upload(&wire_assembly(question.assembly))?;
+        if !question.revision.is_empty() {
+            handle = self.client.revise(handle, &change(&question.revision))?;
+        }
         let mut stream = self.client.plan(handle, &options(question))?;
         receive(&mut stream, question, sink)
     }
@@ -47,7 +50,7 @@ impl Backend for Daemon {
         answer.or_else(|error| match error.code() {
             Some(ErrorCode::Expired) => Ok(unplanned(question, PlanStatus::Timeout, &error)),
             Some(ErrorCode::Cancelled) => Ok(unplanned(question, PlanStatus::Cancelled, &error)),
-            Some(ErrorCode::Geometry) => Err(refusal(question.assembly, &error)),
+            Some(ErrorCode::Geometry) => Err(refusal(question.revised, &error)),
             Some(ErrorCode::NoSuchPart | ErrorCode::Unsupported) => Err(CliError::Refused(error.to_string())),
             _ => Err(CliError::Failed(error.to_string())),
         })
@@ -94,12 +97,24 @@ fn wire_assembly(assembly: &SourceAssembly) -> client::Assembly<'_> {
     }
 }
 
-fn wire_part(part: &SourcePart) -> client::Part<'_> {
-    client::Part {
-        name: &part.name,
-        vertices: client::Vertices::F64(&part.mesh.vertices),
-        triangles: &part.mesh.triangles,
+fn change(revision: &Revision) -> client::Change<'_> {
+    client::Change {
+        replaced: revision
+            .replaced
+            .iter()
+            .map(|(place, mesh)| (*place as u32, wire_mesh("", mesh)))
+            .collect(),
+        added: revision.added.iter().map(wire_part).collect(),
+        moved: revision.moved.iter().map(|(p, pose)| (*p as u32, waypoint_from_pose(pose))).collect(),
     }
+}
+
+fn wire_part(part: &SourcePart) -> client::Part<'_> {
+    wire_mesh(&part.name, &part.mesh)
+}
+
+fn wire_mesh<'a>(name: &'a str, mesh: &'a SourceMesh) -> client::Part<'a> {
+    client::Part { name, vertices: client::Vertices::F64(&mesh.vertices), triangles: &mesh.triangles }
 }
 
 fn options(question: &Question<'_>) -> PlanOptions {
@@ -129,6 +144,7 @@ fn options(question: &Question<'_>) -> PlanOptions {
         targets: request.targets.as_deref().map(numbers),
         sweeps: request.sweeps,
         no_cache: request.no_cache,
+        moved: Vec::new(),
     }
 }
 
@@ -221,7 +237,7 @@ fn indices(parts: &[u32]) -> Vec<usize> {
 /// where it stood.
 fn unplanned(question: &Question<'_>, status: PlanStatus, error: &ClientError) -> Plan {
     let request = &question.request;
-    let parts: Vec<String> = question.assembly.parts.iter().map(|p| p.name.clone()).collect();
+    let parts: Vec<String> = question.revised.parts.iter().map(|p| p.name.clone()).collect();
     let remaining = (0..parts.len()).filter(|p| !request.removed.contains(p)).collect();
     Plan {
         status,

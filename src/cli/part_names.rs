@@ -15,14 +15,20 @@ pub(super) fn resolve(
     option: &str,
     names: &[String],
 ) -> Result<Vec<usize>, CliError> {
-    let find = |name: &String| {
-        let found = assembly.parts.iter().position(|p| p.name == *name);
-        found.ok_or_else(|| CliError::Refused(unknown(assembly, option, name)))
-    };
+    let find = |name: &String| part_named(assembly, option, name);
     let mut parts = names.iter().map(find).collect::<Result<Vec<_>, _>>()?;
     parts.sort_unstable();
     parts.dedup();
     Ok(parts)
+}
+
+/// The number of a named part.
+///
+/// # Errors
+/// There is no such part; the message names those that are spelled most alike.
+pub(super) fn part_named(assembly: &SourceAssembly, option: &str, name: &str) -> Result<usize, CliError> {
+    let found = assembly.parts.iter().position(|p| p.name == name);
+    found.ok_or_else(|| CliError::Refused(unknown(assembly, option, name)))
 }
 
 fn unknown(assembly: &SourceAssembly, option: &str, name: &str) -> String {

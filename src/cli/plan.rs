@@ -9,9 +9,9 @@ use super::backend::{Backend, Embedded, Question};
 use super::daemon::Daemon;
 use super::error::{CliError, exit_code};
 use super::listener::Listener;
-use super::part_names::resolve;
+use super::part_names::{part_named, resolve};
 use super::{interrupt, print, report};
-use crate::geometry::{SourceAssembly, load_assembly};
+use crate::geometry::{Revision, SourceAssembly, load_assembly, pose_from_waypoint};
 use crate::plan::Plan;
 use crate::plan::export::PlanDocument;
 use crate::search::{PlanRequest, Planner, Termination};
@@ -27,14 +27,17 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     if let Some(rotation) = &arguments.rotate {
         assembly.rotate(rotation);
     }
-    let request = request(arguments, &assembly)?;
+    let revision = revision(arguments, &assembly)?;
+    let revised = assembly.revised(&revision);
+    let request = request(arguments, &revised)?;
     let backend = choose_backend(arguments)?;
-    let question = Question { assembly: &assembly, read, request, deadline, termination };
+    let question =
+        Question { assembly: &assembly, revision, revised: &revised, read, request, deadline, termination };
     let mut listener = Listener::new(arguments.trace.as_deref())?;
     let plan = backend.plan(&question, &mut listener);
     listener.finish()?;
     let plan = plan?;
-    write_results(arguments.json.as_deref(), &assembly, &plan)?;
+    write_results(arguments.json.as_deref(), &revised, &plan)?;
     Ok(exit_code(plan.status))
 }
 
@@ -56,6 +59,32 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         removed: resolve(assembly, "--removed", &arguments.removed)?,
         targets: (!arguments.target.is_empty()).then_some(targets),
         no_cache: arguments.no_cache,
+    })
+}
+
+/// What differs from the files.
+fn revision(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<Revision, CliError> {
+    let moved = arguments
+        .moved
+        .iter()
+        .map(|(name, motion)| Ok((part_named(assembly, "--moved", name)?, pose_from_waypoint(motion))));
+    let replaced = arguments.replaced.iter().map(|(name, file)| {
+        let place = part_named(assembly, "--replaced", name)?;
+        let mut parts = load_assembly(file)?.parts;
+        match (parts.pop(), parts.len()) {
+            (Some(part), 0) => Ok((place, part.mesh)),
+            (_, rest) => Err(CliError::Refused(format!(
+                "--replaced: `{}` has {} parts where one is wanted",
+                file.display(),
+                rest + 1
+            ))),
+        }
+    });
+    let added = arguments.added.iter().map(|path| Ok(load_assembly(path)?.parts));
+    Ok(Revision {
+        moved: moved.collect::<Result<_, CliError>>()?,
+        replaced: replaced.collect::<Result<_, CliError>>()?,
+        added: added.collect::<Result<Vec<_>, CliError>>()?.concat(),
     })
 }
 

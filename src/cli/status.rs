@@ -22,7 +22,7 @@ fn describe(status: &Status) -> String {
     let mut text = format!(
         "sbdpd {} (protocol {}), pid {}, up {uptime} s\n\
          workers   {}, {} busy; {} of {} requests wait\n\
-         requests  {}: {} answered, {} cancelled, {} expired, {} refused, {} failed\n\
+         requests  {}: {} answered ({} of them from memory), {} cancelled, {} expired, {} refused, {} failed\n\
          uploads   {}\n",
         status.version,
         n.protocol,
@@ -33,6 +33,7 @@ fn describe(status: &Status) -> String {
         n.queue_limit,
         n.requests,
         n.done,
+        n.remembered,
         n.cancelled,
         n.expired,
         n.refused,

@@ -2,16 +2,17 @@
 
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
-use sbdp_ipc::geometry::Assembly;
+use sbdp_ipc::geometry::{Assembly, Part};
 use sbdp_ipc::plan as wire;
 use sbdp_ipc::progress::{ProgressSample, STAGE_SDF, STAGE_SEARCH};
+use sbdp_ipc::revision as wire_revision;
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts};
 
 use crate::blocking_graph::StaticAnalysis;
-use crate::geometry::{SourceAssembly, SourceMesh, SourcePart};
+use crate::geometry::{Pose, Revision, SourceAssembly, SourceMesh, SourcePart, pose_from_waypoint};
 use crate::plan::{MotionKind, Plan, PlanStats, PlanStatus, PlanStep};
 use crate::search::{ActionSet, Engine, PlanRequest, Planner, Progress, Stage};
-use crate::service::ServiceError;
+use crate::service::{AssemblyId, ServiceError};
 use crate::simulation::PenaltyParameters;
 
 /// What a wire request asks; the handle and the deadline are handled by the desk.
@@ -35,6 +36,24 @@ pub(crate) fn plan_request(
         targets: request.targets.as_deref().map(indices),
         no_cache: request.no_cache,
     })
+}
+
+/// What a plan request moves, and a revision on the wire, as the geometry stage takes it.
+pub(crate) fn moved(parts: &[wire::MovedPart]) -> Vec<(usize, Pose)> {
+    parts.iter().map(|m| (m.part as usize, pose_from_waypoint(&m.motion))).collect()
+}
+
+/// A revision and the assembly that it revises. The bytes are a private copy.
+pub(crate) fn revision(bytes: &AlignedBytes) -> Result<(AssemblyId, Revision), WireError> {
+    let wire = wire_revision::Revision::decode(bytes.as_slice())
+        .map_err(|e| WireError::new(ErrorCode::Malformed, format!("revision: {e}")))?;
+    let replaced = wire.replaced.iter().map(|(place, part)| (*place as usize, source_mesh(part)));
+    let revision = Revision {
+        replaced: replaced.collect(),
+        moved: moved(&wire.moved),
+        added: wire.added.iter().map(source_part).collect(),
+    };
+    Ok((AssemblyId(wire.base), revision))
 }
 
 /// 0 stands for all on both sides; the configuration is the upper bound.
@@ -164,16 +183,16 @@ pub(crate) fn source_assembly(bytes: &AlignedBytes) -> Result<SourceAssembly, Wi
         name: upload.name.to_owned(),
         units: upload.units.map(str::to_owned),
         fixed: upload.fixed.iter().map(|n| (*n).to_owned()).collect(),
-        parts: upload
-            .parts
-            .iter()
-            .map(|p| SourcePart {
-                name: p.name.to_owned(),
-                origin: "upload".to_owned(),
-                mesh: SourceMesh { vertices: p.vertices.iter().collect(), triangles: p.triangles.to_vec() },
-            })
-            .collect(),
+        parts: upload.parts.iter().map(source_part).collect(),
     })
+}
+
+fn source_part(part: &Part<'_>) -> SourcePart {
+    SourcePart { name: part.name.to_owned(), origin: "upload".to_owned(), mesh: source_mesh(part) }
+}
+
+fn source_mesh(part: &Part<'_>) -> SourceMesh {
+    SourceMesh { vertices: part.vertices.iter().collect(), triangles: part.triangles.to_vec() }
 }
 
 /// Why nothing was planned, with its stable code.

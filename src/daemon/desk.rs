@@ -13,6 +13,7 @@ use sbdp_ipc::plan::PlanRequest;
 use sbdp_ipc::progress::ProgressSample;
 use sbdp_ipc::status::{Status, StatusHeader};
 
+use super::answers::{Answers, question};
 use super::convert;
 use super::request_queue::Rejected;
 use super::session::{End, Input, Link, Session, State};
@@ -43,6 +44,8 @@ pub(crate) enum Event<L> {
     Have(Incoming<L>),
     /// Meshes.
     Upload(Incoming<L>),
+    /// What differs from a known assembly.
+    Revise(Incoming<L>),
     /// Something that cannot be taken, and why.
     Unusable(Incoming<L>, WireError),
     /// A worker reports.
@@ -81,6 +84,7 @@ pub(crate) struct Desk<L, P> {
     sessions: HashMap<SessionKey, Session<L>>,
     uploads: HashMap<u64, (L, u128)>,
     running: BTreeSet<(u128, u64)>,
+    answers: Answers,
     next_upload: u64,
     closing: Closing,
     counters: StatusHeader,
@@ -115,6 +119,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
             sessions: HashMap::new(),
             uploads: HashMap::new(),
             running: BTreeSet::new(),
+            answers: Answers::new(megabytes(config.requests.answers_mb)),
             next_upload: 0,
             closing: Closing::Open,
             counters,
@@ -134,7 +139,12 @@ impl<L: Link, P: Planning> Desk<L, P> {
                 self.answer(&incoming.link, &incoming.header, ResponseKind::Status, &status);
             }
             Event::Have(incoming) => self.have(&incoming),
-            Event::Upload(incoming) => self.upload(incoming),
+            Event::Upload(incoming) => {
+                self.take_in(incoming, |number, bytes| AdmitJob::Upload { number, bytes });
+            }
+            Event::Revise(incoming) => {
+                self.take_in(incoming, |number, bytes| AdmitJob::Revise { number, bytes });
+            }
             Event::Unusable(incoming, error) => {
                 self.counters.refused += 1;
                 self.answer_error(&incoming.link, &incoming.header, &error);
@@ -163,7 +173,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
 
     /// Reads a plan request and puts it into the queue.
     fn admit(
-        &self,
+        &mut self,
         session: &mut Session<L>,
         key: SessionKey,
         payload: &AlignedBytes,
@@ -177,7 +187,9 @@ impl<L: Link, P: Planning> Desk<L, P> {
         let request =
             convert::plan_request(&wire, self.limits.threads).map_err(|error| (Input::Refuse, error))?;
         let assembly = AssemblyId(wire.handle);
-        if !self.service.knows(assembly) {
+        let question = question(&wire);
+        let answer = question.as_deref().and_then(|question| self.answers.get(question));
+        if answer.is_none() && !self.service.knows(assembly) {
             return Err(refuse(ErrorCode::UnknownHandle, "no assembly has this handle".to_owned()));
         }
         let deadline = wire.deadline_ns.and_then(clock::instant_of);
@@ -186,7 +198,19 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
         let termination = Termination::new(deadline);
         session.admit(termination.cancel_flag(), deadline);
-        match self.queues.plans.push(PlanJob { key, assembly, request, termination }) {
+        if let Some(answer) = answer {
+            session.answer(&answer);
+            self.counters.remembered += 1;
+            return Ok(());
+        }
+        match self.queues.plans.push(PlanJob {
+            key,
+            assembly,
+            question,
+            moved: convert::moved(&wire.moved),
+            request,
+            termination,
+        }) {
             Ok(()) => {
                 session.input(Input::Enqueue);
                 Ok(())
@@ -228,14 +252,13 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
     }
 
-    fn upload(&mut self, incoming: Incoming<L>) {
+    /// Lets meshes be taken in.
+    fn take_in(&mut self, incoming: Incoming<L>, job: impl FnOnce(u64, AlignedBytes) -> AdmitJob) {
         self.counters.uploads += 1;
         let Incoming { link, header, payload, .. } = incoming;
         let number = self.next_upload;
         self.next_upload += 1;
-        if self.closing == Closing::Open
-            && self.queues.admissions.push(AdmitJob::Upload { number, bytes: payload }).is_ok()
-        {
+        if self.closing == Closing::Open && self.queues.admissions.push(job(number, payload)).is_ok() {
             self.uploads.insert(number, (link, id_of_words(header.listener)));
             return;
         }
@@ -261,8 +284,11 @@ impl<L: Link, P: Planning> Desk<L, P> {
                     self.wakes.push(session.listener);
                 }
             }
-            WorkerEvent::Planned(key, summary) => {
+            WorkerEvent::Planned(key, summary, again) => {
                 self.running.remove(&(key.client, key.request));
+                if let Some((question, answer)) = again {
+                    self.answers.insert(&question, answer);
+                }
                 self.with_session(key, |s| s.finish(summary));
             }
             WorkerEvent::Unplanned(key, error) => {

@@ -55,6 +55,10 @@ impl Planning for Scripted {
         Ok(Admission { id: AssemblyId([7; 32]), known: false, warnings: vec![] })
     }
 
+    fn revise(&self, base: AssemblyId, _: &crate::geometry::Revision) -> Result<Admission, ServiceError> {
+        Ok(Admission { id: base, known: true, warnings: vec![] })
+    }
+
     fn knows(&self, id: AssemblyId) -> bool {
         id.0 == [7; 32]
     }
@@ -167,12 +171,7 @@ impl Bench {
     }
 
     fn script(&mut self, script: u64) -> Wire {
-        self.ask(&PlanRequest {
-            handle: [7; 32],
-            actions: 1,
-            max_simulations: Some(script),
-            ..PlanRequest::default()
-        })
+        self.ask(&request(script))
     }
 
     fn handle(&mut self, event: Event<Wire>) {
@@ -198,6 +197,10 @@ impl Bench {
     }
 }
 
+fn request(script: u64) -> PlanRequest {
+    PlanRequest { handle: [7; 32], actions: 1, max_simulations: Some(script), ..PlanRequest::default() }
+}
+
 #[test]
 fn a_plan_is_streamed_and_summed_up() {
     let mut bench = Bench::new(4);
@@ -205,6 +208,22 @@ fn a_plan_is_streamed_and_summed_up() {
     bench.until(|desk| desk.counters.done == 1);
     assert_eq!(wire.kinds(), [ResponseKind::Steps as u32, ResponseKind::Summary as u32]);
     assert_eq!(wire.summary_status(), Some("complete"));
+}
+
+#[test]
+fn what_was_answered_before_is_answered_at_once_while_no_worker_is_free() {
+    let mut bench = Bench::new(1);
+    let first = bench.script(QUICK);
+    bench.until(|desk| desk.counters.done == 1);
+    bench.script(HOLD);
+    bench.until_running();
+    let again = bench.script(QUICK);
+    assert_eq!((again.kinds(), again.summary_status()), (first.kinds(), Some("complete")));
+    assert_eq!((bench.desk.counters.remembered, bench.desk.counters.done), (1, 2));
+    let unremembered = PlanRequest { no_cache: true, ..request(QUICK) };
+    assert!(bench.ask(&unremembered).kinds().is_empty(), "it waits for a worker");
+    let error = bench.script(HOLD).error();
+    assert_eq!(error, Some(ErrorCode::Busy), "what was not answered is not remembered");
 }
 
 #[test]

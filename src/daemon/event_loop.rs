@@ -215,6 +215,7 @@ fn read(active: Active, geometry: bool, limits: ReceiveLimits) -> Event<ActiveLi
         (false, Some(RequestKind::Status)) => Event::Status(incoming),
         (true, Some(RequestKind::Have)) => Event::Have(incoming),
         (true, Some(RequestKind::Upload)) => Event::Upload(incoming),
+        (true, Some(RequestKind::Revise)) => Event::Revise(incoming),
         _ => {
             let message = format!("no request of kind {} is known here", header.kind);
             Event::Unusable(incoming, WireError::new(ErrorCode::Malformed, message))

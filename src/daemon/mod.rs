@@ -2,10 +2,12 @@
 //!
 //! One thread owns the ports (`event_loop`): it receives, copies and checks, admits or refuses,
 //! and sends. It never plans, heals or blocks. `workers` do, and report back as events.
+//! What was answered before is answered from `answers` at once.
 //! `desk` decides, by the state machine of `session` and the bounded `outbox`; none of these
 //! three knows iceoryx2, so they are tested without it. Only `convert` sees both wire and
 //! working types.
 
+mod answers;
 mod convert;
 mod desk;
 mod event_loop;

@@ -4,6 +4,7 @@
 //! than the client's buffer holds: the error that ends a stream always finds room.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use sbdp_ipc::error::WireError;
 use sbdp_ipc::headers::ResponseKind;
@@ -18,7 +19,7 @@ pub(crate) struct Overflow;
 #[derive(Debug)]
 enum Message {
     Step(Step),
-    Whole { kind: ResponseKind, bytes: Vec<u8> },
+    Whole { kind: ResponseKind, bytes: Arc<Vec<u8>> },
 }
 
 impl Message {
@@ -30,11 +31,45 @@ impl Message {
     }
 }
 
+/// Steps that fit one chunk.
+struct Group {
+    bytes: usize,
+}
+
+impl Group {
+    fn of(first: &Step) -> Self {
+        Self { bytes: size_of::<StepsHeader>() + first.wire_bytes() }
+    }
+
+    /// Adds a step if it fits.
+    fn takes(&mut self, next: &Step) -> bool {
+        let bytes = self.bytes + next.wire_bytes();
+        let fits = bytes <= PLAN_CHUNK;
+        if fits {
+            self.bytes = bytes;
+        }
+        fits
+    }
+}
+
+/// The messages of all steps of a plan, in order, as they travel when all wait.
+pub(crate) fn steps_messages(steps: &[Step]) -> Vec<Vec<u8>> {
+    let mut messages = Vec::new();
+    let mut first = 0;
+    while let Some(step) = steps.get(first) {
+        let mut group = Group::of(step);
+        let count = 1 + steps[first + 1..].iter().take_while(|next| group.takes(next)).count();
+        messages.push(encode_steps(first as u32, &steps[first..first + count]));
+        first += count;
+    }
+    messages
+}
+
 /// A message that is being sent, from `offset` on.
 #[derive(Debug)]
 struct Sending {
     kind: ResponseKind,
-    bytes: Vec<u8>,
+    bytes: Arc<Vec<u8>>,
     offset: usize,
 }
 
@@ -79,7 +114,8 @@ impl Outbox {
         self.push(Message::Step(step))
     }
 
-    pub(crate) fn push_whole(&mut self, kind: ResponseKind, bytes: Vec<u8>) -> Result<(), Overflow> {
+    /// A message whose bytes others may hold, too.
+    pub(crate) fn push_whole(&mut self, kind: ResponseKind, bytes: Arc<Vec<u8>>) -> Result<(), Overflow> {
         self.push(Message::Whole { kind, bytes })
     }
 
@@ -99,7 +135,8 @@ impl Outbox {
         self.waiting.clear();
         self.waiting_bytes = 0;
         self.window = RESPONSE_BUFFER as u64;
-        self.sending = Some(Sending { kind: ResponseKind::Error, bytes: error.encode(), offset: 0 });
+        self.sending =
+            Some(Sending { kind: ResponseKind::Error, bytes: Arc::new(error.encode()), offset: 0 });
     }
 
     /// The client has received this many chunks in all. Nonsense changes nothing.
@@ -154,20 +191,18 @@ impl Outbox {
 
     /// As many steps as fit one chunk travel together; one that does not fit goes alone.
     fn encode_steps(&mut self, first: Step) -> Sending {
-        let mut bytes = size_of::<StepsHeader>() + first.wire_bytes();
+        let mut group = Group::of(&first);
         let mut steps = vec![first];
-        while let Some(Message::Step(next)) = self.waiting.front() {
-            bytes += next.wire_bytes();
-            if bytes > PLAN_CHUNK {
-                break;
-            }
+        while let Some(Message::Step(next)) = self.waiting.front()
+            && group.takes(next)
+        {
             if let Some(Message::Step(step)) = self.pop() {
                 steps.push(step);
             }
         }
         let encoded = encode_steps(self.steps, &steps);
         self.steps += steps.len() as u32;
-        Sending { kind: ResponseKind::Steps, bytes: encoded, offset: 0 }
+        Sending { kind: ResponseKind::Steps, bytes: Arc::new(encoded), offset: 0 }
     }
 
     fn pop(&mut self) -> Option<Message> {
@@ -215,7 +250,7 @@ mod tests {
         for part in 0..5 {
             outbox.push_step(step(part, 2)).unwrap();
         }
-        outbox.push_whole(ResponseKind::Summary, vec![1; 8]).unwrap();
+        outbox.push_whole(ResponseKind::Summary, Arc::new(vec![1; 8])).unwrap();
         let messages = read_all(&mut outbox);
         assert_eq!(messages.len(), 2);
         let bytes = AlignedBytes::copy_of(&messages[0].1);
@@ -275,6 +310,11 @@ mod tests {
                 }
             }
             prop_assert_eq!(next as usize, sizes.len());
+            let steps: Vec<Step> = (0_u32..).zip(&sizes).map(|(part, size)| step(part, *size)).collect();
+            let mut waiting = Outbox::new(usize::MAX);
+            steps.iter().for_each(|step| waiting.push_step(step.clone()).unwrap());
+            let travelled: Vec<_> = read_all(&mut waiting).into_iter().map(|(_, bytes)| bytes).collect();
+            prop_assert_eq!(steps_messages(&steps), travelled);
         }
 
         #[test]

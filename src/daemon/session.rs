@@ -9,6 +9,7 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::{ResponseHeader, ResponseKind};
 use sbdp_ipc::plan::Step;
 
+use super::answers::Answer;
 use super::outbox::Outbox;
 
 /// Where a request stands.
@@ -181,7 +182,21 @@ impl<L: Link> Session<L> {
         }
     }
 
-    pub(crate) fn finish(&mut self, summary: Vec<u8>) {
+    /// Answers at once with what was answered before.
+    pub(crate) fn answer(&mut self, answer: &Answer) {
+        let started = [Input::Enqueue, Input::Start].into_iter().all(|input| self.input(input));
+        if !started {
+            return;
+        }
+        for message in &answer.steps {
+            if self.outbox.push_whole(ResponseKind::Steps, Arc::clone(message)).is_err() {
+                return self.lose("its outbox is full");
+            }
+        }
+        self.finish(Arc::clone(&answer.summary));
+    }
+
+    pub(crate) fn finish(&mut self, summary: Arc<Vec<u8>>) {
         if self.input(Input::Finish) && self.outbox.push_whole(ResponseKind::Summary, summary).is_err() {
             self.lose("its outbox is full");
         }
@@ -320,7 +335,7 @@ mod tests {
     fn a_plan_is_done_when_its_last_chunk_is_delivered() {
         let link = Scripted::default();
         let mut session = running(&link);
-        session.finish(vec![0; 8]);
+        session.finish(Arc::new(vec![0; 8]));
         assert!(!session.pump(Instant::now(), Duration::from_secs(9)));
         assert_eq!(session.state(), State::Streaming);
         link.room.set(1);

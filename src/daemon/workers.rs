@@ -10,9 +10,10 @@ use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::plan::Step;
 
+use super::answers::Answer;
 use super::convert;
 use super::request_queue::{Rejected, RequestQueue};
-use crate::geometry::{SourceAssembly, load_assembly};
+use crate::geometry::{Pose, Revision, SourceAssembly, load_assembly};
 use crate::plan::{Plan, PlanStep};
 use crate::search::{PlanRequest, PlanSink, Progress, Termination};
 use crate::service::{Admission, AssemblyId, Service, ServiceError};
@@ -24,6 +25,11 @@ pub trait Planning: Send + Sync + 'static {
     /// # Errors
     /// The geometry was refused.
     fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError>;
+    /// See [`Service::revise`].
+    ///
+    /// # Errors
+    /// The base is unknown, or the change is refused.
+    fn revise(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError>;
     /// See [`Service::knows`]. Called on the port thread: it must not block.
     fn knows(&self, id: AssemblyId) -> bool;
     /// See [`Service::plan`].
@@ -42,6 +48,10 @@ pub trait Planning: Send + Sync + 'static {
 impl Planning for Service {
     fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError> {
         Self::admit(self, source)
+    }
+
+    fn revise(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError> {
+        Self::revise(self, base, revision)
     }
 
     fn knows(&self, id: AssemblyId) -> bool {
@@ -71,6 +81,10 @@ pub(crate) struct SessionKey {
 pub(crate) struct PlanJob {
     pub(crate) key: SessionKey,
     pub(crate) assembly: AssemblyId,
+    /// What is remembered with its answer, if anything is to be.
+    pub(crate) question: Option<Vec<u8>>,
+    /// Parts that stand elsewhere than in it.
+    pub(crate) moved: Vec<(usize, Pose)>,
     pub(crate) request: PlanRequest,
     pub(crate) termination: Termination,
 }
@@ -80,6 +94,8 @@ pub(crate) struct PlanJob {
 pub(crate) enum AdmitJob {
     /// Received bytes, a private copy.
     Upload { number: u64, bytes: AlignedBytes },
+    /// The same of what differs from a known assembly.
+    Revise { number: u64, bytes: AlignedBytes },
     /// A file or folder of the configuration.
     Preload(PathBuf),
 }
@@ -90,10 +106,17 @@ pub(crate) enum WorkerEvent {
     Started(SessionKey),
     Step(SessionKey, Step),
     Progress(SessionKey, Progress),
-    Planned(SessionKey, Vec<u8>),
+    /// A plan's summary, and what to answer when the same is asked again.
+    Planned(SessionKey, Arc<Vec<u8>>, Option<(Vec<u8>, Answer)>),
     Unplanned(SessionKey, WireError),
-    Admitted { number: u64, result: Result<AssemblyId, WireError> },
-    Preloaded { name: String, id: AssemblyId },
+    Admitted {
+        number: u64,
+        result: Result<AssemblyId, WireError>,
+    },
+    Preloaded {
+        name: String,
+        id: AssemblyId,
+    },
 }
 
 /// Takes reports to the port thread and wakes it.
@@ -225,9 +248,19 @@ impl PlanSink for Sink<'_> {
 fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
     report(WorkerEvent::Started(job.key));
     let mut sink = Sink { key: job.key, report, last_progress: None };
-    let planned = contained(|| service.plan(job.assembly, &job.request, &job.termination, &mut sink));
+    let planned = contained(|| {
+        let mut assembly = job.assembly;
+        if !job.moved.is_empty() {
+            let revision = Revision { moved: job.moved.clone(), ..Revision::default() };
+            assembly = service.revise(assembly, &revision)?.id;
+        }
+        service.plan(assembly, &job.request, &job.termination, &mut sink)
+    });
     report(match planned {
-        Ok(Ok(plan)) => WorkerEvent::Planned(job.key, convert::summary(&plan)),
+        Ok(Ok(plan)) => {
+            let again = job.question.clone().zip(Answer::of(&plan));
+            WorkerEvent::Planned(job.key, Arc::new(convert::summary(&plan)), again)
+        }
         Ok(Err(error)) => WorkerEvent::Unplanned(job.key, convert::service_error(&error)),
         Err(panic) => WorkerEvent::Unplanned(job.key, panic),
     });
@@ -237,6 +270,10 @@ fn admit<P: Planning>(service: &P, job: AdmitJob, report: &Report) {
     match job {
         AdmitJob::Upload { number, bytes } => {
             let result = contained(|| admit_upload(service, bytes)).unwrap_or_else(Err);
+            report(WorkerEvent::Admitted { number, result });
+        }
+        AdmitJob::Revise { number, bytes } => {
+            let result = contained(|| admit_revision(service, bytes)).unwrap_or_else(Err);
             report(WorkerEvent::Admitted { number, result });
         }
         AdmitJob::Preload(path) => {
@@ -261,6 +298,13 @@ fn admit_upload<P: Planning>(service: &P, bytes: AlignedBytes) -> Result<Assembl
     // Healing takes memory of its own: an upload need not be there three times.
     drop(bytes);
     let admission = service.admit(&source).map_err(|e| convert::service_error(&e))?;
+    Ok(admission.id)
+}
+
+fn admit_revision<P: Planning>(service: &P, bytes: AlignedBytes) -> Result<AssemblyId, WireError> {
+    let (base, revision) = convert::revision(&bytes)?;
+    drop(bytes);
+    let admission = service.revise(base, &revision).map_err(|e| convert::service_error(&e))?;
     Ok(admission.id)
 }
 

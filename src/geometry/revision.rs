@@ -3,10 +3,12 @@
 
 use std::sync::Arc;
 
+use nalgebra::Point3;
+
 use super::congruence::congruence;
 use super::{
-    Assembly, Bounds, GeometryError, Mesh, Part, Pose, Shape, Solidity, SourceMesh, SourcePart, heal,
-    transformed, waypoint_from_pose,
+    Assembly, Bounds, GeometryError, Mesh, Part, Pose, Shape, Solidity, SourceAssembly, SourceMesh,
+    SourcePart, heal, transformed, waypoint_from_pose,
 };
 
 /// Names the byte stream that is hashed; a changed stream gets a new tag.
@@ -64,6 +66,27 @@ impl Revision {
             mesh(&mut hasher, &part.mesh);
         }
         hasher.finalize().into()
+    }
+}
+
+impl SourceAssembly {
+    /// The assembly as it would have been given with what differs. Parts that do not exist are left out
+    /// of account.
+    #[must_use]
+    pub fn revised(&self, revision: &Revision) -> Self {
+        let mut revised = self.clone();
+        for (part, mesh) in &revision.replaced {
+            if let Some(part) = revised.parts.get_mut(*part) {
+                part.mesh = mesh.clone();
+            }
+        }
+        for (part, motion) in &revision.moved {
+            for vertex in revised.parts.get_mut(*part).iter_mut().flat_map(|p| &mut p.mesh.vertices) {
+                *vertex = (motion * Point3::from(*vertex)).into();
+            }
+        }
+        revised.parts.extend(revision.added.iter().cloned());
+        revised
     }
 }
 
@@ -192,18 +215,17 @@ mod tests {
     #[test]
     fn a_revised_assembly_is_as_if_it_had_been_given_so() {
         let [plate, block] = block_on_plate();
+        let source = source([plate, block.clone(), moved(block, &Pose::translation(0.0, 0.0, 2.0))]);
         let motion = Pose::new(Vector3::new(0.5, -0.25, 1.0), Vector3::z() * std::f64::consts::FRAC_PI_2);
         let post = cuboid([-3.0, -3.0, 0.0], [-2.0, -2.0, 1.0]);
         let revision = Revision {
             replaced: vec![(1, l_shape())],
             moved: vec![(2, motion)],
-            added: vec![added("3", post.clone()), added("4", moved(post.clone(), &motion))],
+            added: vec![added("3", post.clone()), added("4", moved(post, &motion))],
         };
-        let base = assembly();
+        let base = Assembly::new(&source).unwrap();
         let revised = base.revised(&revision).unwrap();
-        let third = moved(moved(block, &Pose::translation(0.0, 0.0, 2.0)), &motion);
-        let whole =
-            Assembly::new(&source([plate, l_shape(), third, post.clone(), moved(post, &motion)])).unwrap();
+        let whole = Assembly::new(&source.revised(&revision)).unwrap();
         for (a, b) in places(&revised).iter().zip(places(&whole)) {
             let off = (a.1.min - b.1.min).norm().max((a.1.max - b.1.max).norm());
             assert!(a.0 == b.0 && off < 1e-9, "{a:?} {b:?}");

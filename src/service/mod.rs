@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
 use crate::blocking_graph::{Audit, StaticAnalysis, audit};
-use crate::geometry::{Assembly, GeometryError, SourceAssembly, content_hash};
+use crate::geometry::{Assembly, GeometryError, Revision, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, PlanStatus, Warning};
 use crate::search::{
     Engine, Observer, PlanRequest, PlanSink, Problem, Progress, Removal, Stage, TraceEvent, least_travel,
@@ -89,6 +89,23 @@ impl Service {
             return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly) });
         }
         let assembly = Assembly::new(source)?;
+        let warnings = answer::warnings(&assembly);
+        let entry = Arc::new(Entry { assembly, prepared: Mutex::default() });
+        self.entries().entry(id).or_insert(entry);
+        Ok(Admission { id, known: false, warnings })
+    }
+
+    /// Registers what becomes of a known assembly with some change. Of no change it is the same.
+    ///
+    /// # Errors
+    /// The base is unknown, or the change is refused; the error names the part and the reason.
+    pub fn revise(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError> {
+        let entry = self.entry(base)?;
+        let id = if revision.is_empty() { base } else { AssemblyId(revision.content_hash(&base.0)) };
+        if let Ok(entry) = self.entry(id) {
+            return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly) });
+        }
+        let assembly = entry.assembly.revised(revision)?;
         let warnings = answer::warnings(&assembly);
         let entry = Arc::new(Entry { assembly, prepared: Mutex::default() });
         self.entries().entry(id).or_insert(entry);

@@ -40,3 +40,4 @@ pub use sbdp_ipc::status::Status;
 pub use sbdp_ipc::summary::Stats;
 pub use stream::{Event, PlanStream, Progress, Stage};
 pub use summary::{Blocked, Overlap, PlanStatus, Summary, Warning};
+pub use upload::Change;

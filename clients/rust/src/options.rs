@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use sbdp_ipc::clock;
-use sbdp_ipc::plan::PlanRequest;
+use sbdp_ipc::plan::{MovedPart, PlanRequest, Waypoint};
 
 /// The name of an assembly: the hash of its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -72,7 +72,7 @@ pub enum ActionSet {
 }
 
 /// What to plan. Part numbers are places in the uploaded assembly's list of parts.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlanOptions {
     /// Which search.
     pub planner: Planner,
@@ -95,6 +95,9 @@ pub struct PlanOptions {
     pub removed: Vec<u32>,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<u32>>,
+    /// Parts that stand elsewhere than in the assembly, with the rigid motion of their mesh from there
+    /// (input units and frame).
+    pub moved: Vec<(u32, Waypoint)>,
     /// Neither read nor write anything remembered.
     pub no_cache: bool,
 }
@@ -114,8 +117,13 @@ impl PlanOptions {
             fixed: self.fixed.clone(),
             removed: self.removed.clone(),
             targets: self.targets.clone(),
+            moved: self.moved.iter().map(moved_part).collect(),
         }
     }
+}
+
+pub(crate) fn moved_part(&(part, motion): &(u32, Waypoint)) -> MovedPart {
+    MovedPart { part, reserved: 0, motion }
 }
 
 #[cfg(test)]

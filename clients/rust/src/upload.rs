@@ -1,13 +1,27 @@
 //! Handing an assembly over.
 
 use sbdp_ipc::bytes::Reader;
-use sbdp_ipc::geometry::{Assembly, HandleResponse};
+use sbdp_ipc::geometry::{Assembly, HandleResponse, Part};
 use sbdp_ipc::headers::RequestKind;
+use sbdp_ipc::plan::Waypoint;
+use sbdp_ipc::revision::Revision;
 
 use crate::client::{Client, client_port};
 use crate::content_hash;
 use crate::error::ClientError;
-use crate::options::Handle;
+use crate::options::{Handle, moved_part};
+
+/// What differs from an assembly that the daemon knows. Parts are named by their places in it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Change<'a> {
+    /// Parts with another mesh, given where it stands assembled; the part's name stays.
+    pub replaced: Vec<(u32, Part<'a>)>,
+    /// Further parts; they get the places after all others.
+    pub added: Vec<Part<'a>>,
+    /// Parts that stand elsewhere: the rigid motion of the (new) mesh from where it was (input units and
+    /// frame).
+    pub moved: Vec<(u32, Waypoint)>,
+}
 
 impl Client {
     /// Hands an assembly over and returns its handle. The daemon is asked first whether it
@@ -42,19 +56,45 @@ impl Client {
         Ok(response.known != 0)
     }
 
-    /// The meshes travel through a port of their own, just as large as needed: its memory goes
-    /// back to the system when the daemon has answered.
+    /// Hands over what differs from an assembly that the daemon knows, and returns the handle of what
+    /// becomes of it. The daemon keeps all that it knows of what did not change.
+    ///
+    /// # Errors
+    /// The base is not known (any more), the geometry is refused, or the daemon is gone.
+    pub fn revise(&self, base: Handle, change: &Change<'_>) -> Result<Handle, ClientError> {
+        let revision = Revision {
+            base: base.0,
+            replaced: change.replaced.clone(),
+            added: change.added.clone(),
+            moved: change.moved.iter().map(moved_part).collect(),
+        };
+        let fill = |out: &mut [u8]| revision.encode_into(out);
+        self.hand_over("revise", RequestKind::Revise, revision.encoded_len(), fill)
+    }
+
     fn send_meshes(&self, assembly: &Assembly<'_>) -> Result<Handle, ClientError> {
-        let length = assembly.encoded_len();
+        let fill = |out: &mut [u8]| assembly.encode_into(out);
+        self.hand_over("upload", RequestKind::Upload, assembly.encoded_len(), fill)
+    }
+
+    /// Meshes travel through a port of their own, just as large as needed: its memory goes back to the
+    /// system when the daemon has answered.
+    fn hand_over(
+        &self,
+        what: &'static str,
+        kind: RequestKind,
+        length: usize,
+        encode: impl Fn(&mut [u8]) -> bool,
+    ) -> Result<Handle, ClientError> {
         check_shared_memory(length as u64)?;
         let port = client_port(&self.geometry, length)?;
-        let header = self.header(RequestKind::Upload, 0);
+        let header = self.header(kind, 0);
         let fill = |out: &mut [u8]| {
-            let fits = assembly.encode_into(out);
+            let fits = encode(out);
             debug_assert!(fits, "the port was made as long as the message");
         };
-        let pending = self.send("upload", &port, header, length, fill)?;
-        let answer = self.answer("upload", &pending, self.options.upload_timeout)?;
+        let pending = self.send(what, &port, header, length, fill)?;
+        let answer = self.answer(what, &pending, self.options.upload_timeout)?;
         let response: HandleResponse = Reader::new(answer.as_slice())?.value("handle")?;
         Ok(Handle(response.handle))
     }

@@ -1,0 +1,154 @@
+//! Answers that were given before, as the bytes that were sent: the port thread gives them again
+//! without waking a worker.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+
+use sbdp_ipc::plan::PlanRequest;
+
+use super::convert;
+use super::outbox::steps_messages;
+use crate::plan::{Plan, PlanStats, PlanStatus};
+
+/// A whole answer, ready to be sent.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Answer {
+    /// Messages with steps, in order.
+    pub(crate) steps: Vec<Arc<Vec<u8>>>,
+    /// The message that ends the plan.
+    pub(crate) summary: Arc<Vec<u8>>,
+}
+
+impl Answer {
+    /// What is answered when the question that led to a plan is asked again. None if the plan ended by
+    /// the clock: then another one may come.
+    pub(crate) fn of(plan: &Plan) -> Option<Self> {
+        if !matches!(plan.status, PlanStatus::Complete | PlanStatus::Infeasible | PlanStatus::Partial) {
+            return None;
+        }
+        let steps: Vec<_> = plan.steps.iter().map(convert::step).collect();
+        let PlanStats { simulations, sweeps, states, .. } = plan.stats;
+        let stats = PlanStats { simulations, sweeps, states, plan_hit: true, ..PlanStats::default() };
+        let summary = convert::summary(&Plan { stats, ..plan.clone() });
+        Some(Self {
+            steps: steps_messages(&steps).into_iter().map(Arc::new).collect(),
+            summary: Arc::new(summary),
+        })
+    }
+
+    fn bytes(&self) -> usize {
+        self.summary.len() + self.steps.iter().map(|message| message.len()).sum::<usize>()
+    }
+}
+
+/// What makes two requests the same question: all but who asks, how many work, and until when. None if
+/// nothing is to be remembered.
+pub(crate) fn question(request: &PlanRequest) -> Option<Vec<u8>> {
+    let PlanRequest { no_cache, .. } = *request;
+    (!no_cache).then(|| PlanRequest { threads: 0, deadline_ns: None, ..request.clone() }.encode())
+}
+
+/// The answers that are remembered: those that were asked for last, within a number of bytes.
+#[derive(Debug, Default)]
+pub(crate) struct Answers {
+    by_question: HashMap<Arc<[u8]>, Remembered>,
+    /// By the time they were asked for last.
+    by_age: BTreeMap<u64, Arc<[u8]>>,
+    time: u64,
+    bytes: usize,
+    limit: usize,
+}
+
+#[derive(Debug)]
+struct Remembered {
+    answer: Arc<Answer>,
+    time: u64,
+    bytes: usize,
+}
+
+impl Answers {
+    pub(crate) fn new(limit: usize) -> Self {
+        Self { limit, ..Self::default() }
+    }
+
+    /// The answer to a question.
+    pub(crate) fn get(&mut self, question: &[u8]) -> Option<Arc<Answer>> {
+        let known = self.by_question.get_mut(question)?;
+        self.time += 1;
+        if let Some(key) = self.by_age.remove(&known.time) {
+            self.by_age.insert(self.time, key);
+        }
+        known.time = self.time;
+        Some(Arc::clone(&known.answer))
+    }
+
+    /// Remembers an answer in place of those that were not asked for the longest.
+    pub(crate) fn insert(&mut self, question: &[u8], answer: Answer) {
+        let bytes = answer.bytes() + question.len();
+        if bytes > self.limit {
+            return;
+        }
+        self.forget(question);
+        while self.bytes + bytes > self.limit
+            && let Some((_, oldest)) = self.by_age.first_key_value()
+        {
+            let oldest = Arc::clone(oldest);
+            self.forget(&oldest);
+        }
+        self.time += 1;
+        let key: Arc<[u8]> = question.into();
+        self.by_age.insert(self.time, Arc::clone(&key));
+        self.by_question.insert(key, Remembered { answer: Arc::new(answer), time: self.time, bytes });
+        self.bytes += bytes;
+    }
+
+    fn forget(&mut self, question: &[u8]) {
+        if let Some(known) = self.by_question.remove(question) {
+            self.by_age.remove(&known.time);
+            self.bytes -= known.bytes;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn answer(bytes: usize) -> Answer {
+        Answer { steps: vec![Arc::new(vec![1; bytes - 8])], summary: Arc::new(vec![0; 8]) }
+    }
+
+    #[test]
+    fn those_not_asked_for_the_longest_are_forgotten_first() {
+        let mut answers = Answers::new(3 * 101);
+        for question in [b"a", b"b", b"c"] {
+            answers.insert(question, answer(100));
+        }
+        assert_eq!(*answers.get(b"a").unwrap(), answer(100));
+        answers.insert(b"d", answer(100));
+        let known: Vec<bool> = [b"a", b"b", b"c", b"d"].map(|q| answers.get(q).is_some()).into();
+        assert_eq!(known, [true, false, true, true]);
+        answers.insert(b"e", answer(250));
+        assert!(answers.get(b"e").is_some() && answers.bytes == 251 && answers.by_age.len() == 1);
+        answers.insert(b"f", answer(400));
+        assert!(answers.get(b"f").is_none() && answers.get(b"e").is_some(), "what never fits takes no room");
+    }
+
+    #[test]
+    fn an_answer_given_anew_takes_the_place_of_the_old_one() {
+        let mut answers = Answers::new(1000);
+        answers.insert(b"a", answer(100));
+        answers.insert(b"a", answer(200));
+        assert_eq!((answers.bytes, answers.by_age.len()), (201, 1));
+        assert_eq!(*answers.get(b"a").unwrap(), answer(200));
+    }
+
+    #[test]
+    fn threads_and_deadlines_make_no_other_question() {
+        let request = PlanRequest { fixed: vec![1], ..PlanRequest::default() };
+        let same = PlanRequest { threads: 4, deadline_ns: Some(9), ..request.clone() };
+        assert_eq!(question(&request), question(&same));
+        assert_ne!(question(&request), question(&PlanRequest { fixed: vec![2], ..request.clone() }));
+        assert_eq!(question(&PlanRequest { no_cache: true, ..request }), None);
+    }
+}
