@@ -4,12 +4,18 @@
 //! run (`record`) → the paper's measures (`statistics`) → `tables.md` and the coverage figure
 //! (`tables`, `figure`). Only `runner` starts anything; whatever comes after it works on the
 //! records alone, so that shards of several machines can be put together later.
+//!
+//! `latency` and `replan` ask a `daemon` of their own; the first beside a `raw_peer`.
 
 mod corpus;
+mod daemon;
 mod estimate;
 pub(crate) mod families;
 mod figure;
+mod latency;
+mod raw_peer;
 mod record;
+mod replan;
 mod rotated;
 mod rotation;
 mod runner;
@@ -28,7 +34,10 @@ use std::time::Duration;
 
 pub use corpus::{Category, Problem, Shard, find};
 pub use families::Family;
+pub use latency::{Latency, LatencyRequest, Percentiles, latency};
+pub use raw_peer::serve as serve_raw;
 pub use record::{Key, Record, Settings, Store, read};
+pub use replan::{Cost, ReplanRecord, replan};
 pub use scale::{Growth, PARTS, ScaleRequest, scale};
 
 use estimate::Estimate;

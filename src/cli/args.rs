@@ -154,6 +154,51 @@ pub(super) enum BenchCommand {
     Scale(BenchScale),
     /// Put results together, as those of shards, and evaluate them without running anything
     Report(BenchReport),
+    /// Ask a daemon for the same plan again and again, beside a peer that only copies its bytes
+    Latency(BenchLatency),
+    /// Plan again through a daemon when one part changed, beside a daemon that planned nothing before
+    Replan(BenchReplan),
+    /// The peer of `latency`
+    #[command(hide = true)]
+    RawPeer(BenchRawPeer),
+}
+
+/// A benchmark of answers from memory.
+#[derive(Debug, Args)]
+pub(super) struct BenchLatency {
+    /// What is planned [default: a bolted frame of 20 parts]
+    pub(super) assembly: Option<PathBuf>,
+    /// How many clients ask at the same time
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub(super) clients: NonZeroUsize,
+    /// How often each asks
+    #[arg(long, value_name = "N", default_value = "2000")]
+    pub(super) rounds: NonZeroUsize,
+    /// Write the figures there as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(super) json: Option<PathBuf>,
+}
+
+/// A benchmark of changed questions.
+#[derive(Debug, Args)]
+pub(super) struct BenchReplan {
+    /// Folders or files of assemblies; of each, a bolt is removed, moved, replaced and locked
+    #[arg(value_name = "ASSEMBLY", required = true)]
+    pub(super) assemblies: Vec<PathBuf>,
+    /// Write the figures there as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(super) json: Option<PathBuf>,
+}
+
+/// The raw peer.
+#[derive(Debug, Args)]
+pub(super) struct BenchRawPeer {
+    #[arg(long)]
+    pub(super) runtime_dir: PathBuf,
+    #[arg(long)]
+    pub(super) root: PathBuf,
+    #[arg(long, value_delimiter = ',')]
+    pub(super) chunks: Vec<usize>,
 }
 
 /// A benchmark to be run.

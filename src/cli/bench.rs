@@ -1,5 +1,7 @@
 //! `sbdp bench`.
 
+mod through_daemon;
+
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -17,7 +19,7 @@ use crate::blocking_graph::StaticAnalysis;
 use crate::search;
 
 /// This very file, also after a newer build took its place: one benchmark is of one build.
-const THIS_PROGRAM: &str = "/proc/self/exe";
+pub(super) const THIS_PROGRAM: &str = "/proc/self/exe";
 /// As of a cancelled plan.
 const INTERRUPTED: u8 = 5;
 
@@ -25,6 +27,9 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<ExitCode, CliError> {
     match (&arguments.command, &arguments.run) {
         (Some(BenchCommand::Report(report)), _) => report_on(report),
         (Some(BenchCommand::Scale(scale)), _) => measure_growth(scale),
+        (Some(BenchCommand::Latency(latency)), _) => through_daemon::latency(latency),
+        (Some(BenchCommand::Replan(replan)), _) => through_daemon::replan(replan),
+        (Some(BenchCommand::RawPeer(peer)), _) => through_daemon::raw_peer(peer),
         (None, Some(run)) => measure(run),
         (None, None) => Err(CliError::Refused("give folders of assemblies, or `report`".to_owned())),
     }

@@ -23,6 +23,12 @@ pub use lifecycle::LifecycleError;
 pub use lifecycle::check_place;
 pub use workers::Planning;
 
+/// The ports, for measuring them without a daemon behind.
+pub(crate) mod transport {
+    pub(crate) use super::ports::{ActiveLink, Ports};
+    pub(crate) use super::session::Link;
+}
+
 use sbdp_ipc::services::SetupError;
 
 /// Why the daemon could not run.

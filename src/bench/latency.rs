@@ -1,0 +1,212 @@
+//! `sbdp bench latency`: the same plan asked again and again through the daemon, beside the same
+//! number of bytes through a peer that only copies them.
+
+use std::path::Path;
+use std::process::Command;
+use std::sync::Barrier;
+use std::time::{Duration, Instant};
+
+use sbdp_client::{Assembly, Client, Event, Handle, Part, PlanOptions, Summary, Vertices};
+use sbdp_ipc::plan::PlanRequest;
+use serde::Serialize;
+
+use super::BenchError;
+use super::daemon::{Place, Server};
+use super::raw_peer::RawClient;
+use crate::geometry::SourceAssembly;
+
+/// What to measure.
+#[derive(Debug, Clone)]
+pub struct LatencyRequest {
+    /// The assembly that is planned.
+    pub assembly: SourceAssembly,
+    /// How many clients ask at the same time.
+    pub clients: usize,
+    /// How often each asks.
+    pub rounds: usize,
+    /// This very program, for the raw peer.
+    pub program: std::path::PathBuf,
+}
+
+/// Median and 99th percentile of some times, in microseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Percentiles {
+    /// Median.
+    pub p50: f64,
+    /// 99th percentile.
+    pub p99: f64,
+}
+
+/// What was measured.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Latency {
+    /// Clients at the same time.
+    pub clients: usize,
+    /// Rounds of each.
+    pub rounds: usize,
+    /// Bytes of an answer.
+    pub payload_bytes: usize,
+    /// The first answer, which was planned.
+    pub first_plan_us: f64,
+    /// A request to the raw peer and its answer.
+    pub raw_event_rtt_us: Percentiles,
+    /// A plan that was made before.
+    pub repeat_plan_us: Percentiles,
+}
+
+/// Rounds before the measurement.
+const WARM_UP: usize = 50;
+
+/// Measures, with raw and planned rounds in turn.
+///
+/// # Errors
+/// A process cannot be started, or does not answer.
+pub fn latency(request: &LatencyRequest) -> Result<Latency, BenchError> {
+    let daemon = Server::daemon(Place::new("daemon")?)?;
+    let client = daemon.connect()?;
+    let assembly = wire(&request.assembly);
+    let handle = client.upload(&assembly).map_err(failed)?;
+    let started = Instant::now();
+    ask(&client, handle)?;
+    let first_plan_us = micros(started.elapsed());
+    if ask(&client, handle)?.stats.plan_hit == 0 {
+        return Err(BenchError::Failed("the plan is not remembered: it ended by the clock".to_owned()));
+    }
+    let question = question(handle);
+    let chunks = RawClient::connect(&daemon.runtime_dir())?.chunks(&question)?;
+    let peer = raw_peer(&request.program, &chunks)?;
+    let (raw, repeated) = rounds(request, &daemon, &peer, handle, &chunks)?;
+    Ok(Latency {
+        clients: request.clients,
+        rounds: request.rounds,
+        payload_bytes: chunks.iter().sum(),
+        first_plan_us,
+        raw_event_rtt_us: percentiles(raw),
+        repeat_plan_us: percentiles(repeated),
+    })
+}
+
+fn raw_peer(program: &Path, chunks: &[usize]) -> Result<Server, BenchError> {
+    let place = Place::new("raw")?;
+    let mut command = Command::new(program);
+    command.args(["bench", "raw-peer", "--runtime-dir"]).arg(place.runtime_dir());
+    command.arg("--root").arg(place.root()).arg("--chunks");
+    command.arg(chunks.iter().map(ToString::to_string).collect::<Vec<_>>().join(","));
+    Server::start(place, command)
+}
+
+/// All clients at the same time; the times of all rounds.
+fn rounds(
+    request: &LatencyRequest,
+    daemon: &Server,
+    peer: &Server,
+    handle: Handle,
+    chunks: &[usize],
+) -> Result<(Vec<Duration>, Vec<Duration>), BenchError> {
+    let barrier = Barrier::new(request.clients);
+    let length = chunks.iter().sum::<usize>();
+    let work = || -> Result<(Vec<Duration>, Vec<Duration>), BenchError> {
+        let connected =
+            daemon.connect().and_then(|client| Ok((client, RawClient::connect(&peer.runtime_dir())?)));
+        // Whoever cannot connect must not keep the others waiting.
+        barrier.wait();
+        let (client, raw) = connected?;
+        let question = question(handle);
+        let (mut raw_times, mut plan_times) = (Vec::new(), Vec::new());
+        for round in 0..WARM_UP + request.rounds {
+            let (took, came) = raw.round(&question, chunks.len())?;
+            let started = Instant::now();
+            let summary = ask(&client, handle)?;
+            let planned = started.elapsed();
+            if came != length || summary.stats.plan_hit == 0 {
+                return Err(BenchError::Failed(format!("{came} bytes came, not {length}")));
+            }
+            if round >= WARM_UP {
+                raw_times.push(took);
+                plan_times.push(planned);
+            }
+        }
+        Ok((raw_times, plan_times))
+    };
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..request.clients).map(|_| scope.spawn(work)).collect();
+        let mut all = (Vec::new(), Vec::new());
+        for thread in threads {
+            let times = thread.join().map_err(|_| BenchError::Failed("a client panicked".to_owned()))??;
+            all.0.extend(times.0);
+            all.1.extend(times.1);
+        }
+        Ok(all)
+    })
+}
+
+/// The request of a plan with all options as they are by default.
+fn question(handle: Handle) -> Vec<u8> {
+    let PlanOptions { planner, engine, actions, .. } = PlanOptions::default();
+    PlanRequest {
+        handle: handle.0,
+        planner: planner as u32,
+        engine: engine as u32,
+        actions: actions as u32,
+        ..PlanRequest::default()
+    }
+    .encode()
+}
+
+/// Plans to the end.
+fn ask(client: &Client, handle: Handle) -> Result<Summary, BenchError> {
+    let mut stream = client.plan(handle, &PlanOptions::default()).map_err(failed)?;
+    while let Some(event) = stream.next_event().map_err(failed)? {
+        if let Event::Done(summary) = event {
+            return Ok(summary);
+        }
+    }
+    Err(BenchError::Failed("a plan ended without its summary".to_owned()))
+}
+
+/// An assembly as it is uploaded.
+pub(super) fn wire(assembly: &SourceAssembly) -> Assembly<'_> {
+    Assembly {
+        name: &assembly.name,
+        units: assembly.units.as_deref(),
+        parts: assembly
+            .parts
+            .iter()
+            .map(|part| Part {
+                name: &part.name,
+                vertices: Vertices::F64(&part.mesh.vertices),
+                triangles: &part.mesh.triangles,
+            })
+            .collect(),
+        fixed: assembly.fixed.iter().map(String::as_str).collect(),
+    }
+}
+
+fn failed(error: impl std::fmt::Display) -> BenchError {
+    BenchError::Failed(error.to_string())
+}
+
+fn micros(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e6
+}
+
+fn percentiles(mut times: Vec<Duration>) -> Percentiles {
+    times.sort_unstable();
+    let at = |share: f64| {
+        let place = (times.len() as f64 * share) as usize;
+        times.get(place.min(times.len().saturating_sub(1))).map_or(f64::NAN, |t| micros(*t))
+    };
+    Percentiles { p50: at(0.5), p99: at(0.99) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_are_those_of_the_sorted_times() {
+        let times = (1..=200).rev().map(Duration::from_micros).collect();
+        assert_eq!(percentiles(times), Percentiles { p50: 101.0, p99: 199.0 });
+        assert!(percentiles(Vec::new()).p50.is_nan());
+    }
+}

@@ -1,0 +1,195 @@
+//! `sbdp bench replan`: what it costs to plan again when one part of an assembly changed, through the
+//! daemon, beside the same question asked of a daemon that knows nothing.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use sbdp_client::{Change, Client, Event, Handle, PlanOptions, PlanStatus, Summary};
+use serde::Serialize;
+
+use super::BenchError;
+use super::daemon::{Place, Server};
+use super::latency::wire;
+use crate::geometry::{SourceAssembly, SourceMesh, load_assembly};
+
+/// One question, cold or after the change.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Cost {
+    /// From the change to the whole plan, seconds.
+    pub time_s: f64,
+    /// Simulations that were really run.
+    pub simulations: u64,
+}
+
+/// One kind of change.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReplanRecord {
+    /// The assembly.
+    pub assembly: String,
+    /// The part that changed.
+    pub part: String,
+    /// What became of it.
+    pub change: &'static str,
+    /// Asked of a daemon that knows the assembly but planned nothing.
+    pub cold: Cost,
+    /// Asked of a daemon that planned the assembly as it was.
+    pub changed: Cost,
+    /// Whether both gave the same plan to the bit, which the cold daemon verified path by path.
+    pub verified: bool,
+}
+
+/// A change of one part.
+struct Changed {
+    name: &'static str,
+    options: PlanOptions,
+    replaced: Option<SourceMesh>,
+}
+
+/// The moved part goes so far, in the assembly's unit if that is not known to be metres.
+const MILLIMETRE: f64 = 1.0;
+/// The mesh that replaces another is so much smaller.
+const SMALLER: f64 = 0.98;
+
+/// Measures all kinds of changes of one part of each assembly.
+///
+/// # Errors
+/// An assembly cannot be read, or a daemon does not answer.
+pub fn replan(
+    assemblies: &[PathBuf],
+    mut told: impl FnMut(&ReplanRecord),
+) -> Result<Vec<ReplanRecord>, BenchError> {
+    let mut records = Vec::new();
+    for path in assemblies {
+        let source = load_assembly(path).map_err(failed)?;
+        let base = Asked::of(&source, "base")?;
+        let (plan, _) = base.plan(base.handle, &PlanOptions::default())?;
+        let part = fastener(&source, &plan)
+            .ok_or_else(|| BenchError::Failed(format!("{}: nothing comes off", source.name)))?;
+        let outward = plan.outward(part);
+        drop(base);
+        for change in changes(&source, part, outward) {
+            let record = compared(&source, part, &change)?;
+            told(&record);
+            records.push(record);
+        }
+    }
+    Ok(records)
+}
+
+fn compared(source: &SourceAssembly, part: usize, change: &Changed) -> Result<ReplanRecord, BenchError> {
+    let (cold_plan, cold) = Asked::of(source, "cold")?.changed(source, part, change)?;
+    let warm = Asked::of(source, "warm")?;
+    warm.plan(warm.handle, &PlanOptions::default())?;
+    let (plan, changed) = warm.changed(source, part, change)?;
+    Ok(ReplanRecord {
+        assembly: source.name.clone(),
+        part: source.parts[part].name.clone(),
+        change: change.name,
+        cold,
+        changed,
+        verified: plan == cold_plan,
+    })
+}
+
+/// A daemon of its own that knows an assembly.
+struct Asked {
+    client: Client,
+    handle: Handle,
+    _daemon: Server,
+}
+
+impl Asked {
+    fn of(source: &SourceAssembly, name: &str) -> Result<Self, BenchError> {
+        let daemon = Server::daemon(Place::new(name)?)?;
+        let client = daemon.connect()?;
+        let handle = client.upload(&wire(source)).map_err(failed)?;
+        Ok(Self { client, handle, _daemon: daemon })
+    }
+
+    fn plan(&self, handle: Handle, options: &PlanOptions) -> Result<(Answered, Summary), BenchError> {
+        let mut stream = self.client.plan(handle, options).map_err(failed)?;
+        let mut steps = Vec::new();
+        while let Some(event) = stream.next_event().map_err(failed)? {
+            match event {
+                Event::Progress(_) => {}
+                Event::Step(step) => steps.push((step.part as usize, step.path.to_vec())),
+                Event::Done(summary) => return Ok((Answered { status: summary.status, steps }, summary)),
+            }
+        }
+        Err(BenchError::Failed("a plan ended without its summary".to_owned()))
+    }
+
+    fn changed(
+        &self,
+        source: &SourceAssembly,
+        part: usize,
+        change: &Changed,
+    ) -> Result<(Answered, Cost), BenchError> {
+        let started = Instant::now();
+        let mut handle = self.handle;
+        if let Some(mesh) = &change.replaced {
+            let mut with = wire(source).parts[part];
+            with.vertices = sbdp_client::Vertices::F64(&mesh.vertices);
+            let change = Change { replaced: vec![(part as u32, with)], ..Change::default() };
+            handle = self.client.revise(handle, &change).map_err(failed)?;
+        }
+        let (answered, summary) = self.plan(handle, &change.options)?;
+        let cost =
+            Cost { time_s: started.elapsed().as_secs_f64(), simulations: summary.stats.simulations_run };
+        Ok((answered, cost))
+    }
+}
+
+/// What was answered, to the bit.
+#[derive(Debug, PartialEq)]
+struct Answered {
+    status: PlanStatus,
+    steps: Vec<(usize, Vec<[f64; 7]>)>,
+}
+
+impl Answered {
+    /// The unit vector along which a part begins to leave.
+    fn outward(&self, part: usize) -> [f64; 3] {
+        let path = self.steps.iter().find(|(p, _)| *p == part).map(|(_, path)| path.as_slice());
+        let way = path.and_then(|path| path.iter().find(|w| w[..3].iter().any(|x| x.abs() > 1e-9)));
+        let [x, y, z] = way.map_or([0.0, 0.0, 1.0], |w| [w[0], w[1], w[2]]);
+        let length = (x * x + y * y + z * z).sqrt();
+        [x, y, z].map(|x| x / length)
+    }
+}
+
+/// A part that comes off and is called a bolt or screw, else the first that comes off.
+fn fastener(source: &SourceAssembly, plan: &Answered) -> Option<usize> {
+    let leaves = || plan.steps.iter().map(|(part, _)| *part);
+    let is_fastener = |&part: &usize| {
+        let name = source.parts[part].name.to_lowercase();
+        ["bolt", "screw"].iter().any(|kind| name.contains(kind))
+    };
+    leaves().find(is_fastener).or_else(|| leaves().next())
+}
+
+fn changes(source: &SourceAssembly, part: usize, outward: [f64; 3]) -> Vec<Changed> {
+    let number = part as u32;
+    let by = if source.units.as_deref() == Some("m") { MILLIMETRE / 1000.0 } else { MILLIMETRE };
+    let [x, y, z] = outward.map(|x| x * by);
+    let with = |name, options| Changed { name, options, replaced: None };
+    let mesh = &source.parts[part].mesh;
+    let count = mesh.vertices.len() as f64;
+    let middle: [f64; 3] = [0, 1, 2].map(|a| mesh.vertices.iter().map(|v| v[a]).sum::<f64>() / count);
+    let smaller = |v: &[f64; 3]| [0, 1, 2].map(|a| middle[a] + (v[a] - middle[a]) * SMALLER);
+    let smaller = SourceMesh {
+        vertices: mesh.vertices.iter().map(smaller).collect(),
+        triangles: mesh.triangles.clone(),
+    };
+    let options = PlanOptions::default;
+    vec![
+        with("removed", PlanOptions { removed: vec![number], ..options() }),
+        with("moved", PlanOptions { moved: vec![(number, [x, y, z, 1.0, 0.0, 0.0, 0.0])], ..options() }),
+        Changed { name: "replaced", options: options(), replaced: Some(smaller) },
+        with("locked", PlanOptions { fixed: vec![number], ..options() }),
+    ]
+}
+
+fn failed(error: impl std::fmt::Display) -> BenchError {
+    BenchError::Failed(error.to_string())
+}

@@ -1,0 +1,102 @@
+//! Benchmarks that ask a daemon of their own.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use serde::Serialize;
+
+use super::super::args::{BenchLatency, BenchRawPeer, BenchReplan};
+use super::super::error::CliError;
+use super::super::print;
+use super::THIS_PROGRAM;
+use crate::bench::{self, Family, LatencyRequest, Percentiles, ReplanRecord};
+use crate::geometry::{SourceAssembly, SourcePart, load_assembly};
+
+/// Parts of the assembly that is planned by default.
+const PARTS: usize = 20;
+
+pub(super) fn latency(arguments: &BenchLatency) -> Result<ExitCode, CliError> {
+    let assembly = match &arguments.assembly {
+        Some(path) => load_assembly(path)?,
+        None => frame(),
+    };
+    let request = LatencyRequest {
+        assembly,
+        clients: arguments.clients.get(),
+        rounds: arguments.rounds.get(),
+        program: PathBuf::from(THIS_PROGRAM),
+    };
+    let latency = bench::latency(&request)?;
+    let row = |what: &str, p: Percentiles| format!("{what:<22}{:>10.1}{:>10.1}\n", p.p50, p.p99);
+    let (raw, repeated) = (latency.raw_event_rtt_us, latency.repeat_plan_us);
+    print(&format!(
+        "{} clients, {} rounds each, {} bytes an answer; planned first in {:.1} ms\n\
+         {:<22}{:>10}{:>10}\n{}{}{:<22}{:>10.2}{:>10.2}\n",
+        latency.clients,
+        latency.rounds,
+        latency.payload_bytes,
+        latency.first_plan_us / 1e3,
+        "microseconds",
+        "p50",
+        "p99",
+        row("raw round trip", raw),
+        row("the same plan again", repeated),
+        "ratio",
+        repeated.p50 / raw.p50,
+        repeated.p99 / raw.p99,
+    ))?;
+    written(arguments.json.as_deref(), &latency)
+}
+
+pub(super) fn replan(arguments: &BenchReplan) -> Result<ExitCode, CliError> {
+    eprintln!("assembly, part, change: cold s (simulations), changed s (simulations), shares, same plan");
+    let records = bench::replan(&arguments.assemblies, |r| eprintln!("{}", line(r)))?;
+    written(arguments.json.as_deref(), &records)
+}
+
+fn line(r: &ReplanRecord) -> String {
+    format!(
+        "{}, {}, {}: {:.4} ({}), {:.4} ({}), {:.1} % of the time, {:.1} % of the simulations, {}",
+        r.assembly,
+        r.part,
+        r.change,
+        r.cold.time_s,
+        r.cold.simulations,
+        r.changed.time_s,
+        r.changed.simulations,
+        100.0 * r.changed.time_s / r.cold.time_s,
+        100.0 * r.changed.simulations as f64 / r.cold.simulations.max(1) as f64,
+        if r.verified { "the same plan" } else { "NOT the same plan" }
+    )
+}
+
+pub(super) fn raw_peer(arguments: &BenchRawPeer) -> Result<ExitCode, CliError> {
+    let end = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGTERM, signal_hook::consts::SIGINT] {
+        signal_hook::flag::register(signal, Arc::clone(&end)).map_err(|e| CliError::Failed(e.to_string()))?;
+    }
+    bench::serve_raw(&arguments.runtime_dir, &arguments.root, &arguments.chunks, &end)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn frame() -> SourceAssembly {
+    let part = |(name, mesh)| SourcePart { name, origin: "benchmark".to_owned(), mesh };
+    let parts = Family::BoltedFrame.member(PARTS).into_iter().map(part).collect();
+    SourceAssembly {
+        name: "bolted-frame".to_owned(),
+        units: Some("mm".to_owned()),
+        parts,
+        ..SourceAssembly::default()
+    }
+}
+
+fn written(file: Option<&Path>, figures: &impl Serialize) -> Result<ExitCode, CliError> {
+    let Some(file) = file else { return Ok(ExitCode::SUCCESS) };
+    let failed = |e: String| CliError::Failed(format!("{}: {e}", file.display()));
+    let mut text = serde_json::to_string_pretty(figures).map_err(|e| failed(e.to_string()))?;
+    text.push('\n');
+    std::fs::write(file, text).map_err(|e| failed(e.to_string()))?;
+    Ok(ExitCode::SUCCESS)
+}
