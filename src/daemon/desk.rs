@@ -168,7 +168,15 @@ impl<L: Link, P: Planning> Desk<L, P> {
         if let Err((input, error)) = self.admit(&mut session, key, &payload) {
             session.end_with(input, &error);
         }
+        // What is there goes out at once, not behind other requests.
+        if session.pump(Instant::now(), self.limits.patience) {
+            self.wakes.push(session.listener);
+        }
+        let is_finished = session.is_finished();
         self.sessions.insert(key, session);
+        if is_finished {
+            self.remove(key);
+        }
     }
 
     /// Reads a plan request and puts it into the queue.

@@ -165,12 +165,15 @@ impl<P: Planning> EventLoop<P> {
     fn receive_all(&mut self) -> bool {
         let mut more = false;
         for geometry in [false, true] {
-            for taken in 0..RECEIVE_AT_ONCE {
-                let port = if geometry { &self.ports.geometry } else { &self.ports.plan };
-                let Some(active) = receive(port) else { break };
+            let port = if geometry { &self.ports.geometry } else { &self.ports.plan };
+            // Those that are here now come before what those ask next who are answered first.
+            let taken: Vec<Active> = std::iter::from_fn(|| receive(port)).take(RECEIVE_AT_ONCE).collect();
+            more |= taken.len() == RECEIVE_AT_ONCE;
+            for active in taken {
                 let event = read(active, geometry, self.limits);
                 self.desk.handle(event, Instant::now());
-                more |= taken + 1 == RECEIVE_AT_ONCE;
+                // Whoever is answered already is not to wait for those behind.
+                self.deliver();
             }
         }
         more

@@ -1,6 +1,7 @@
 //! A connection to the daemon.
 
 use std::cell::{Cell, RefCell};
+use std::os::fd::OwnedFd;
 use std::path::PathBuf;
 
 use iceoryx2::node::Node;
@@ -9,6 +10,8 @@ use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::subscriber::{Subscriber, SubscriberCreateError};
 use iceoryx2::port::{BackpressureAction, BackpressureInfo};
 use iceoryx2::service::port_factory::client::ClientCreateError;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::process::{Pid, PidfdFlags, pidfd_open};
 use sbdp_ipc::endpoint::{Endpoint, default_runtime_dir};
 use sbdp_ipc::headers::RequestKind;
 use sbdp_ipc::layout::{self, WAKE_CLIENT_SERVICE, WAKE_SERVER_SERVICE};
@@ -20,12 +23,36 @@ use sbdp_ipc::{Transport, bytes};
 use crate::error::ClientError;
 use crate::options::ConnectOptions;
 
+/// A daemon process whose end is seen at the cost of one call to the system.
+#[derive(Debug)]
+struct Watched {
+    endpoint: Endpoint,
+    /// Readable once the process has ended; none where the system has no such thing.
+    process: Option<OwnedFd>,
+}
+
+impl Watched {
+    fn new(endpoint: Endpoint) -> Self {
+        let pid = i32::try_from(endpoint.pid).ok().and_then(Pid::from_raw);
+        let process = pid.and_then(|pid| pidfd_open(pid, PidfdFlags::empty()).ok());
+        Self { endpoint, process }
+    }
+
+    fn is_alive(&self) -> bool {
+        let Some(process) = &self.process else { return self.endpoint.is_alive() };
+        match poll(&mut [PollFd::new(process, PollFlags::IN)], Some(&Timespec::default())) {
+            Ok(ended) => ended == 0,
+            Err(_) => self.endpoint.is_alive(),
+        }
+    }
+}
+
 /// A connection to the daemon. It may move between threads but is used by one at a time.
 #[derive(Debug)]
 pub struct Client {
     pub(crate) options: ConnectOptions,
     pub(crate) runtime_dir: PathBuf,
-    endpoint: RefCell<Endpoint>,
+    daemon: RefCell<Watched>,
     pub(crate) planning: Cell<bool>,
     next_request: Cell<u64>,
     pub(crate) plan_port: ClientPort,
@@ -82,7 +109,7 @@ impl Client {
                 .map_err(SetupError::at("creating the notifier"))?,
             options,
             runtime_dir,
-            endpoint: RefCell::new(endpoint),
+            daemon: RefCell::new(Watched::new(endpoint)),
             planning: Cell::new(false),
             next_request: Cell::new(1),
             node,
@@ -103,7 +130,7 @@ impl Client {
     /// The daemon's process id.
     #[must_use]
     pub fn pid(&self) -> u32 {
-        self.endpoint.borrow().pid
+        self.daemon.borrow().endpoint.pid
     }
 
     pub(crate) fn new_request(&self) -> u64 {
@@ -112,7 +139,7 @@ impl Client {
 
     /// Fails if the daemon that holds our request is gone.
     pub(crate) fn check_alive(&self) -> Result<(), ClientError> {
-        if self.endpoint.borrow().is_alive() {
+        if self.daemon.borrow().is_alive() {
             return Ok(());
         }
         // Let iceoryx2 see the death as well, so that a new daemon finds a clean house.
@@ -122,15 +149,16 @@ impl Client {
 
     /// Before a new request: follows a daemon that was restarted at the same place.
     pub(crate) fn refresh_endpoint(&self) -> Result<(), ClientError> {
-        if self.endpoint.borrow().is_alive() {
+        if self.daemon.borrow().is_alive() {
             return Ok(());
         }
         let found = Endpoint::find(&self.runtime_dir)?;
-        let mut known = self.endpoint.borrow_mut();
-        if (&found.prefix, &found.root) != (&known.prefix, &known.root) {
-            return Err(ClientError::DaemonDied { pid: known.pid });
+        let mut known = self.daemon.borrow_mut();
+        let Endpoint { pid, prefix, root, .. } = &known.endpoint;
+        if (&found.prefix, &found.root) != (prefix, root) {
+            return Err(ClientError::DaemonDied { pid: *pid });
         }
-        *known = found;
+        *known = Watched::new(found);
         Ok(())
     }
 }
