@@ -9,9 +9,9 @@ use std::io::ErrorKind;
 use std::os::unix::fs::DirBuilderExt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
 
-use redb::{Database, ReadableDatabase, ReadableTable, StorageError, TableDefinition};
+use redb::{Database, ReadableDatabase, ReadableTable, ReadableTableMetadata, StorageError, TableDefinition};
 
 use super::kind::{Key, Kind};
 use super::tally::Tally;
@@ -20,8 +20,9 @@ use super::tally::Tally;
 const RECORDS: TableDefinition<'_, &[u8], &[u8]> = TableDefinition::new("records");
 /// When a record was used last, and how long it is.
 const USED: TableDefinition<'_, &[u8], (u64, u64)> = TableDefinition::new("used");
-/// The count of transactions and of bytes.
+/// The count of transactions and of bytes, and how many bytes there were when the file last grew.
 const META: TableDefinition<'_, &str, u64> = TableDefinition::new("meta");
+const GROWN_AT: &str = "grown_at";
 const CLOCK: &str = "clock";
 const BYTES: &str = "bytes";
 
@@ -31,9 +32,15 @@ const DAMAGED: &str = "records.redb.damaged";
 const PAGE_CACHE: usize = 16 << 20;
 /// What a record takes in the file beside its bytes, about: keys, stamps, and pages that are not full.
 const OVERHEAD: u64 = 160;
-/// Of the budget, what records may take: pages are not full, and a transaction writes new ones before
-/// old ones are free.
+/// Of the budget, what records may take at most: pages are not full, and a transaction writes new ones
+/// before old ones are free.
 const SHARE: f64 = 0.5;
+/// The file grows by this factor, about, …
+const GROWTH: f64 = 2.2;
+/// … and has room then for so many times as much as when it grew, surely.
+const ROOM: f64 = 1.4;
+/// Of a file that has become too large all the same, so much of what records may take is left.
+const AFTER_OVERGROWTH: f64 = 0.5;
 /// Evicting goes on down to this share of what records may take, so that it is not done all the time.
 const AFTER_EVICTION: f64 = 0.9;
 /// So many records are remembered as used until the next transaction notes it.
@@ -96,7 +103,7 @@ impl<E: Into<redb::Error>> From<E> for Failure {
 #[derive(Debug)]
 pub(super) struct Disk {
     folder: PathBuf,
-    /// Bytes that records may take.
+    /// Bytes that the file may take.
     budget: u64,
     database: RwLock<Option<Database>>,
     touched: Mutex<HashSet<Key>>,
@@ -111,7 +118,7 @@ impl Disk {
         builder.recursive(true).mode(0o700).create(folder).map_err(|e| unusable(e.to_string()))?;
         let disk = Self {
             folder: folder.to_owned(),
-            budget: (budget as f64 * SHARE) as u64,
+            budget,
             database: RwLock::new(None),
             touched: Mutex::default(),
             tally,
@@ -149,7 +156,7 @@ impl Disk {
 
     /// The envelope of a key, as it was written.
     pub(super) fn get(&self, key: &Key) -> Option<Vec<u8>> {
-        let found = self.with(|database| {
+        let found = self.with_free(|database| {
             let transaction = database.begin_read()?;
             let records = transaction.open_table(RECORDS)?;
             Ok(records.get(&key.to_bytes()[..])?.map(|bytes| bytes.value().to_vec()))
@@ -168,9 +175,10 @@ impl Disk {
     /// Writes envelopes in one transaction, with what was used since the last one.
     pub(super) fn write(&self, records: &[(Key, Vec<u8>)]) {
         let touched = std::mem::take(&mut *self.touched.lock().unwrap_or_else(PoisonError::into_inner));
-        let evicted = self.with(|database| {
+        let before = self.file_bytes();
+        let written = self.with(|database| {
             let transaction = write(database)?;
-            let evicted = {
+            let (evicted, bytes) = {
                 let mut tables = Tables::of(&transaction)?;
                 for (key, bytes) in records {
                     tables.insert(key, bytes)?;
@@ -178,16 +186,32 @@ impl Disk {
                 for key in touched.iter() {
                     tables.touch(key)?;
                 }
-                let evicted = tables.evict(self.budget)?;
+                let limit = tables.limit(self.budget, before)?;
+                let evicted = tables.evict_above(limit, (limit as f64 * AFTER_EVICTION) as u64)?;
                 tables.finish()?;
-                evicted
+                (evicted, tables.bytes)
             };
             transaction.commit()?;
-            Ok(evicted)
+            Ok((evicted, bytes))
         });
-        for key in evicted.unwrap_or_default() {
-            self.tally.of(key.kind()).disk_evictions.one_more();
+        let Some((evicted, bytes)) = written else { return };
+        self.count(&evicted);
+        let after = self.file_bytes();
+        if after > before {
+            self.note_growth(bytes);
         }
+        if after > self.budget {
+            self.evict((bytes as f64 * AFTER_OVERGROWTH) as u64);
+            self.check(true);
+        }
+    }
+
+    fn note_growth(&self, bytes: u64) {
+        self.with(|database| {
+            let transaction = write(database)?;
+            transaction.open_table(META)?.insert(GROWN_AT, bytes)?;
+            Ok(transaction.commit()?)
+        });
     }
 
     /// Takes records out; whether that was done.
@@ -207,15 +231,23 @@ impl Disk {
 
     /// Evicts down to so many bytes of records; how many left.
     pub(super) fn evict(&self, budget: u64) -> Option<usize> {
-        self.with(|database| {
+        let evicted = self.with(|database| {
             let transaction = write(database)?;
             let mut tables = Tables::of(&transaction)?;
             let evicted = tables.evict_above(budget, budget)?;
             tables.finish()?;
             drop(tables);
             transaction.commit()?;
-            Ok(evicted.len())
-        })
+            Ok(evicted)
+        })?;
+        self.count(&evicted);
+        Some(evicted.len())
+    }
+
+    fn count(&self, evicted: &[Key]) {
+        for key in evicted {
+            self.tally.of(key.kind()).disk_evictions.one_more();
+        }
     }
 
     /// All records, in the order of their keys.
@@ -256,6 +288,35 @@ impl Disk {
         checked.ok()
     }
 
+    /// Whether the tables agree with each other, and have every key once.
+    pub(super) fn agrees(&self) -> bool {
+        let agrees = self.with(|database| {
+            let transaction = database.begin_read()?;
+            let (records, used) = (transaction.open_table(RECORDS)?, transaction.open_table(USED)?);
+            let (mut sum, mut last) = (0, Vec::new());
+            for (record, use_of) in records.iter()?.zip(used.iter()?) {
+                let ((key, bytes), (same_key, value)) = (record?, use_of?);
+                let same = key.value() == same_key.value() && bytes.value().len() as u64 == value.value().1;
+                if !same || key.value() <= &last[..] {
+                    return Ok(false);
+                }
+                sum += value.value().1 + OVERHEAD;
+                last = key.value().to_vec();
+            }
+            let noted = transaction.open_table(META)?.get(BYTES)?.map_or(0, |bytes| bytes.value());
+            Ok(records.len()? == used.len()? && noted == sum)
+        });
+        agrees == Some(true)
+    }
+
+    /// As [`Disk::with`], unless the file is being looked after: nobody waits for that.
+    fn with_free<T>(&self, work: impl FnOnce(&Database) -> Result<T, Failure>) -> Option<T> {
+        if matches!(self.database.try_read(), Err(TryLockError::WouldBlock)) {
+            return None;
+        }
+        self.with(work)
+    }
+
     /// Something with the open file, if it is open; what fails closes the file or sets it aside.
     fn with<T>(&self, work: impl FnOnce(&Database) -> Result<T, Failure>) -> Option<T> {
         let failure = {
@@ -289,7 +350,7 @@ impl Disk {
     }
 
     /// Keeps a damaged file for whoever wants to look at it, and begins anew.
-    fn set_aside(&self, reason: &str) {
+    pub(super) fn set_aside(&self, reason: &str) {
         self.close();
         self.rename(reason);
         let database = self.database_at().ok();
@@ -363,8 +424,12 @@ impl<'t> Tables<'t> {
         Ok(())
     }
 
-    fn evict(&mut self, budget: u64) -> Result<Vec<Key>, Failure> {
-        self.evict_above(budget, (budget as f64 * AFTER_EVICTION) as u64)
+    /// What records may take in a file of some length, so that it keeps a budget.
+    fn limit(&self, budget: u64, length: u64) -> Result<u64, Failure> {
+        let most = budget as f64 * SHARE;
+        let grown_at = self.meta.get(GROWN_AT)?.map(|bytes| bytes.value() as f64);
+        let may_grow = length as f64 * GROWTH <= budget as f64;
+        Ok(grown_at.filter(|_| !may_grow).map_or(most, |bytes| most.min(bytes * ROOM)) as u64)
     }
 
     /// Above a limit: takes out the least recently used until no more than `goal` bytes are left.

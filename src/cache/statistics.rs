@@ -103,7 +103,11 @@ impl Cache {
     pub fn verify(&self) -> Verified {
         self.flush();
         let Some(disk) = &self.disk else { return Verified { records: 0, damaged: 0, clean: true } };
-        let clean = disk.check(false).unwrap_or(false);
+        let mut clean = disk.check(false).unwrap_or(false);
+        if !disk.agrees() {
+            clean = false;
+            disk.set_aside("its tables contradict each other");
+        }
         let list = self.list();
         let intact = |l: &&Listed| disk.get(&l.key).is_some_and(|bytes| format::opened(&l.key, &bytes).is_some());
         let damaged: Vec<_> = list.iter().filter(|l| !intact(l)).map(|l| l.key).collect();
