@@ -47,7 +47,11 @@ fn main() -> ExitCode {
         println!("the configuration is fine");
         return ExitCode::SUCCESS;
     }
-    match daemon::run(&config, Arc::new(Service::new(Arc::new(cache(&config))))) {
+    let cache = Arc::new(cache(&config));
+    let ended = daemon::run(&config, Arc::new(Service::new(Arc::clone(&cache))));
+    // A worker that does not end in time still holds the service.
+    cache.flush();
+    match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("sbdpd: {error}");

@@ -8,8 +8,8 @@
 
 use rayon::prelude::*;
 
-use crate::geometry::Pose;
 use crate::cache::{Key, Recall, blocking_key};
+use crate::geometry::Pose;
 use crate::simulation::{Action, Pair, Scene, grouped, pair_blocks};
 use crate::termination::{Interrupt, Termination};
 

@@ -153,7 +153,6 @@ impl Disk {
         self.database.read().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 
-
     /// The envelope of a key, as it was written.
     pub(super) fn get(&self, key: &Key) -> Option<Vec<u8>> {
         let found = self.with_free(|database| {
@@ -393,7 +392,8 @@ impl<'t> Tables<'t> {
         let records = transaction.open_table(RECORDS)?;
         let used = transaction.open_table(USED)?;
         let meta = transaction.open_table(META)?;
-        let number = |name: &str| -> Result<u64, StorageError> { Ok(meta.get(name)?.map_or(0, |n| n.value())) };
+        let number =
+            |name: &str| -> Result<u64, StorageError> { Ok(meta.get(name)?.map_or(0, |n| n.value())) };
         let (clock, bytes) = (number(CLOCK)? + 1, number(BYTES)?);
         Ok(Self { records, used, meta, clock, bytes })
     }

@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+/// What the build script hashed (`src/build.rs`).
+const SOURCES: &str = env!("SBDP_SOURCES");
+
 /// A kind of record. Its number is part of the format on disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[repr(u8)]
@@ -43,12 +46,7 @@ impl Kind {
     #[must_use]
     pub fn algorithm(self) -> u32 {
         match self {
-            Self::Overlap
-            | Self::Blocking
-            | Self::Witness
-            | Self::Motion
-            | Self::Verdict
-            | Self::Plan => 1,
+            Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Verdict | Self::Plan => 1,
         }
     }
 
@@ -161,11 +159,12 @@ impl Digest {
         self.0.finalize().into()
     }
 
-    /// The key of a record of a kind that depends on what was added, and on the version of its algorithm.
+    /// The key of a record of a kind that depends on what was added, on the version of its algorithm, and on
+    /// the sources that this was built from.
     #[must_use]
     pub fn key(&self, kind: Kind) -> Key {
         let mut all = self.clone();
-        all.text(kind.name()).integer(u64::from(kind.algorithm()));
+        all.text(SOURCES).text(kind.name()).integer(u64::from(kind.algorithm()));
         Key { kind, hash: all.finish() }
     }
 }

@@ -89,7 +89,11 @@ impl Cache {
             }
             record
         });
-        if found.is_some() { tally.hits.one_more() } else { tally.misses.one_more() };
+        if found.is_some() {
+            tally.hits.one_more()
+        } else {
+            tally.misses.one_more()
+        };
         found
     }
 

@@ -85,7 +85,12 @@ impl Recall {
     }
 
     /// A motion that is known, if it holds among what stands today.
-    fn found(&self, question: &MotionQuestion<'_>, digest: &Digest, variant: &WitnessVariant) -> Option<Motion> {
+    fn found(
+        &self,
+        question: &MotionQuestion<'_>,
+        digest: &Digest,
+        variant: &WitnessVariant,
+    ) -> Option<Motion> {
         let (parts, witnesses) = question.witnesses(&variant.looked_at);
         if witnesses != variant.witnesses {
             return None;

@@ -5,8 +5,8 @@
 //! on what is in the question; so a pair analysed once serves every state, request and assembly in
 //! which it recurs.
 
-use super::records::{BlockingRecord, OverlapRecord};
 use super::recall::About;
+use super::records::{BlockingRecord, OverlapRecord};
 use super::{Digest, Key, Kind, Recall};
 use crate::geometry::Pose;
 use crate::simulation::{Action, Body, Pair, Scene};

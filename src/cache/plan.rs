@@ -105,8 +105,11 @@ fn record(status: StatusRecord, outcome: &Outcome, overlaps: &[(usize, usize, f6
         depth: r.depth,
         waited_for: numbers(&r.waited_for),
     };
-    let blocked =
-        |b: &BlockedAction| BlockedRecord { part: b.part as u32, action: b.action.clone(), by: numbers(&b.by) };
+    let blocked = |b: &BlockedAction| BlockedRecord {
+        part: b.part as u32,
+        action: b.action.clone(),
+        by: numbers(&b.by),
+    };
     PlanRecord {
         status,
         reason: outcome.reason.clone(),

@@ -64,8 +64,13 @@ pub(super) struct MotionRecord {
 pub(super) enum MotionEnd {
     /// It was out: how it would have gone on is not known.
     Out,
-    Collision { with: Vec<u32> },
-    Undecided { reason: String, touched: Vec<u32> },
+    Collision {
+        with: Vec<u32>,
+    },
+    Undecided {
+        reason: String,
+        touched: Vec<u32>,
+    },
 }
 
 /// What verification found; parts are given by their place among its witnesses.

@@ -109,7 +109,8 @@ impl Cache {
             disk.set_aside("its tables contradict each other");
         }
         let list = self.list();
-        let intact = |l: &&Listed| disk.get(&l.key).is_some_and(|bytes| format::opened(&l.key, &bytes).is_some());
+        let intact =
+            |l: &&Listed| disk.get(&l.key).is_some_and(|bytes| format::opened(&l.key, &bytes).is_some());
         let damaged: Vec<_> = list.iter().filter(|l| !intact(l)).map(|l| l.key).collect();
         for key in &damaged {
             self.tally.of(key.kind()).damaged.one_more();

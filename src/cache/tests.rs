@@ -27,7 +27,9 @@ fn key(n: u64) -> Key {
 
 /// Some record that only `n` has.
 fn record(n: u64, length: usize) -> BlockingRecord {
-    BlockingRecord { blocked: (0..length as u64 + n % 7).map(|i| (n.wrapping_mul(i + 11) >> 3) % 2 == 0).collect() }
+    BlockingRecord {
+        blocked: (0..length as u64 + n % 7).map(|i| (n.wrapping_mul(i + 11) >> 3) % 2 == 0).collect(),
+    }
 }
 
 fn has(cache: &Cache, n: u64, length: usize) -> bool {
@@ -49,7 +51,10 @@ fn what_was_remembered_is_there_after_a_restart() {
     let cache = open(folder.path());
     assert!((0..100).all(|n| has(&cache, n, 20)) && !has(&cache, 100, 20));
     let s = cache.statistics();
-    assert_eq!(s.kinds.iter().map(|k| (k.hits, k.disk_entries)).fold((0, 0), |(a, b), (c, d)| (a + c, b + d)), (100, 100));
+    assert_eq!(
+        s.kinds.iter().map(|k| (k.hits, k.disk_entries)).fold((0, 0), |(a, b), (c, d)| (a + c, b + d)),
+        (100, 100)
+    );
     assert_eq!(s.kinds.iter().map(|k| k.misses).sum::<u64>(), 1);
     assert!(cache.verify().clean);
 }

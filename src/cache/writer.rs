@@ -103,10 +103,7 @@ fn run(disk: &Disk, receiver: &Receiver<Message>, waiting: &AtomicUsize) {
 }
 
 /// What comes within a short while of a first message.
-fn gathered(
-    receiver: &Receiver<Message>,
-    first: Message,
-) -> (Vec<(Key, Vec<u8>)>, Option<SyncSender<()>>) {
+fn gathered(receiver: &Receiver<Message>, first: Message) -> (Vec<(Key, Vec<u8>)>, Option<SyncSender<()>>) {
     let until = Instant::now() + GATHER;
     let (mut records, mut bytes) = (Vec::new(), 0);
     let mut next = Some(first);

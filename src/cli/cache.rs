@@ -36,7 +36,9 @@ fn settings(folder: Option<&Path>) -> CacheSettings {
 pub(super) fn run(arguments: &CacheArguments) -> Result<ExitCode, CliError> {
     let settings = settings(arguments.cache_dir.as_deref());
     let Some(folder) = &settings.folder else {
-        return Err(CliError::Refused("there is no folder for a cache: give one with --cache-dir".to_owned()));
+        return Err(CliError::Refused(
+            "there is no folder for a cache: give one with --cache-dir".to_owned(),
+        ));
     };
     // Looking must not make one.
     if !folder.is_dir() {
@@ -85,7 +87,11 @@ fn described(statistics: &CacheStatistics) -> String {
 
 fn verify(cache: &Cache) -> Result<ExitCode, CliError> {
     let verified = cache.verify();
-    let file = if verified.clean { "the file is as it was left" } else { "the file was damaged and was mended or set aside" };
+    let file = if verified.clean {
+        "the file is as it was left"
+    } else {
+        "the file was damaged and was mended or set aside"
+    };
     print(&format!(
         "{} records, {} damaged or of another version and taken out; {file}\n",
         verified.records, verified.damaged

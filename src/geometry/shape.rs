@@ -7,7 +7,9 @@ use nalgebra::{Point3, Vector3};
 use super::content_hash::mesh_hash;
 use super::hull::hull_vertices;
 use super::samples::sited;
-use super::{Bounds, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Solidity, Spacing, Surface};
+use super::{
+    Bounds, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Solidity, Spacing, Surface,
+};
 
 /// A mesh in its own frame (origin at the middle of its box, lengths of the planning frame).
 #[derive(Debug, Clone)]

@@ -125,10 +125,8 @@ impl Problem<'_> {
         let thin = thinned(path, bounds, &self.scene.centre_in_shape(part));
         let standing = self.scene.broad_phase.meeting_of(&standing, &self.swept_bounds(part, &thin));
         let Self { scene, verifier, .. } = self;
-        let question =
-            VerdictQuestion { scene, near: &standing, part, path: &thin, limit: verifier.limit() };
-        let check =
-            || verifier.check(scene, &scene.allowances, &standing, part, &thin, &self.termination);
+        let question = VerdictQuestion { scene, near: &standing, part, path: &thin, limit: verifier.limit() };
+        let check = || verifier.check(scene, &scene.allowances, &standing, part, &thin, &self.termination);
         let verdict = self.recall.verdict(&question, check)?;
         if verdict.entries.is_empty() { Ok(Ok((thin, verdict.depth))) } else { Ok(Err(verdict.entries)) }
     }

@@ -162,7 +162,8 @@ impl<'a, 'o> Search<'a, 'o> {
         let blockages = if self.guided {
             let started = Instant::now();
             let least = |part| least_travel(scene, part);
-            let analysis = Analysis { rule: *static_analysis, scene, translations: &self.translations, recall };
+            let analysis =
+                Analysis { rule: *static_analysis, scene, translations: &self.translations, recall };
             let found = analysis.initial_blockages(present, &least, termination)?;
             self.disassembly.counters.static_analysis += started.elapsed();
             found

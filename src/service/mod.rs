@@ -8,6 +8,8 @@
 
 mod answer;
 mod prepared;
+#[cfg(test)]
+mod tests;
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
@@ -170,8 +172,7 @@ impl Service {
             .num_threads(request.threads)
             .build()
             .map_err(|e| ServiceError::Threads(e.to_string()))?;
-        let recall =
-            if request.no_cache { Recall::default() } else { Recall::of(Arc::clone(&self.cache)) };
+        let recall = if request.no_cache { Recall::default() } else { Recall::of(Arc::clone(&self.cache)) };
         Ok(pool.install(|| entry.plan(request, termination, sink, &recall)))
     }
 
@@ -376,7 +377,8 @@ fn accepted(engine: &dyn TransitionFunction, limit: f64, assembly: &Assembly) ->
     }
     let limit = engine.depth_tolerance() + BETWEEN_SAMPLES;
     let (name, depth) = (engine.name(), limit / assembly.scale);
-    let note = format!("the engine `{name}` lets parts overlap by {depth:.3e}; paths are verified to that depth");
+    let note =
+        format!("the engine `{name}` lets parts overlap by {depth:.3e}; paths are verified to that depth");
     (limit, Some(note))
 }
 

@@ -6,11 +6,11 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
+use crate::cache::{Recall, overlap_key};
 use crate::geometry::{Assembly, Shape};
 use crate::plan::Verifier;
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
-use crate::cache::{Recall, overlap_key};
 use crate::simulation::{Pair, Scene, grouped, resolution};
 use crate::termination::{Interrupt, Termination};
 

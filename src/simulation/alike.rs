@@ -32,7 +32,8 @@ impl Pair {
         let there = scene.bodies[other].planning_from_shape;
         let way = (there.translation.vector - pose.translation.vector).map(rounded);
         let turned = [pose, &there].map(|p| rounded_turn(&p.rotation));
-        let poses = [Pose::from_parts(Vector3::zeros().into(), turned[0]), Pose::from_parts(way.into(), turned[1])];
+        let poses =
+            [Pose::from_parts(Vector3::zeros().into(), turned[0]), Pose::from_parts(way.into(), turned[1])];
         Self { parts: [part, other], poses }
     }
 
@@ -50,7 +51,10 @@ impl Pair {
         let hash = |part: usize| scene.bodies[part].shape.content();
         let bits = |pair: &Self| -> ([u64; 3], [u64; 4]) {
             let there = pair.poses[1];
-            (there.translation.vector.map(f64::to_bits).into(), there.rotation.coords.map(f64::to_bits).into())
+            (
+                there.translation.vector.map(f64::to_bits).into(),
+                there.rotation.coords.map(f64::to_bits).into(),
+            )
         };
         let (one, other) = (of([a, b]), of([b, a]));
         let first = (hash(a), bits(&one)) <= (hash(b), bits(&other));
@@ -67,7 +71,8 @@ impl Pair {
             (body.planning_from_shape, body.bounds) = (*pose, Bounds::of(&hull));
         }
         let broad_phase = Arc::new(BroadPhase::new(&[bodies[0].bounds, bodies[1].bounds]));
-        let mut pair = Scene { bodies: Arc::new(bodies.into()), broad_phase, ..Scene::empty(scene.longest_side) };
+        let mut pair =
+            Scene { bodies: Arc::new(bodies.into()), broad_phase, ..Scene::empty(scene.longest_side) };
         let granted = scene.allowances.of(a, b);
         if granted > 0.0 {
             pair.allowances.grant(0, 1, granted);
@@ -119,7 +124,8 @@ mod tests {
         let post = |x: f64| cuboid([x, 0.0, 1.0], [x + 1.0, 1.0, 3.0]);
         let foot = |x: f64| cuboid([x - 1.0, -1.0, 0.0], [x + 2.0, 2.0, 1.0]);
         let (scene, _) = scene([foot(0.0), post(0.0), foot(5.1), post(5.1)]);
-        let pair = |a: usize, b: usize| Pair::shifted(&scene, a, &scene.bodies[a].planning_from_shape, b).poses;
+        let pair =
+            |a: usize, b: usize| Pair::shifted(&scene, a, &scene.bodies[a].planning_from_shape, b).poses;
         assert_eq!(pair(0, 1), pair(2, 3));
         assert_ne!(pair(0, 1), pair(0, 3));
         assert_ne!(pair(0, 1), pair(1, 0));
@@ -139,15 +145,19 @@ mod tests {
         assert_eq!(pair(0, 1), pair(2, 3));
         assert_eq!(pair(0, 1), pair(1, 0));
         assert_ne!(pair(0, 1), pair(0, 2));
-        let shifted = |a: usize, b: usize| Pair::shifted(&scene, a, &scene.bodies[a].planning_from_shape, b).poses;
+        let shifted =
+            |a: usize, b: usize| Pair::shifted(&scene, a, &scene.bodies[a].planning_from_shape, b).poses;
         assert_ne!(shifted(0, 1), shifted(3, 2));
     }
 
     #[test]
     fn a_pair_stands_as_its_parts_do_in_the_assembly() {
         let turn = Pose::new(Vector3::new(3.0, -1.0, 0.5), Vector3::new(0.2, -0.4, 1.0));
-        let (scene, _) = scene([cuboid([-4.0; 3], [0.0; 3]), moved(cuboid([0.0; 3], [1.0, 2.0, 3.0]), &turn)]);
-        for pair in [Pair::turned(&scene, 0, 1), Pair::shifted(&scene, 1, &scene.bodies[1].planning_from_shape, 0)] {
+        let (scene, _) =
+            scene([cuboid([-4.0; 3], [0.0; 3]), moved(cuboid([0.0; 3], [1.0, 2.0, 3.0]), &turn)]);
+        for pair in
+            [Pair::turned(&scene, 0, 1), Pair::shifted(&scene, 1, &scene.bodies[1].planning_from_shape, 0)]
+        {
             let alone = pair.scene(&scene);
             let between = |s: &Scene, a: usize, b: usize| {
                 s.bodies[a].planning_from_shape.inverse() * s.bodies[b].planning_from_shape

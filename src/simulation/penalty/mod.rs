@@ -172,8 +172,10 @@ impl Run<'_> {
             }
             earlier.push(state);
         }
-        let end =
-            End::Undecided { reason: "the motion has too many steps".into(), touched: self.parts(&ever_touched) };
+        let end = End::Undecided {
+            reason: "the motion has too many steps".into(),
+            touched: self.parts(&ever_touched),
+        };
         Ok(self.ended(end))
     }
 
