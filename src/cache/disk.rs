@@ -5,40 +5,21 @@
 //! is closed, and the process goes on in memory. Only the writer's thread ([`super::writer`]) writes.
 
 use std::collections::HashSet;
-use std::io::ErrorKind;
 use std::os::unix::fs::DirBuilderExt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
 
-use redb::{Database, ReadableDatabase, ReadableTable, ReadableTableMetadata, StorageError, TableDefinition};
+use redb::Database;
 
 use super::kind::{Key, Kind};
+use super::tables::{Failure, Listed, Tables, agree, grew, listed, make_tables, read, write};
 use super::tally::Tally;
-
-/// Envelopes by key.
-const RECORDS: TableDefinition<'_, &[u8], &[u8]> = TableDefinition::new("records");
-/// When a record was used last, and how long it is.
-const USED: TableDefinition<'_, &[u8], (u64, u64)> = TableDefinition::new("used");
-/// The count of transactions and of bytes, and how many bytes there were when the file last grew.
-const META: TableDefinition<'_, &str, u64> = TableDefinition::new("meta");
-const GROWN_AT: &str = "grown_at";
-const CLOCK: &str = "clock";
-const BYTES: &str = "bytes";
 
 const FILE: &str = "records.redb";
 const DAMAGED: &str = "records.redb.damaged";
 /// redb's own cache of pages.
 const PAGE_CACHE: usize = 16 << 20;
-/// What a record takes in the file beside its bytes, about: keys, stamps, and pages that are not full.
-const OVERHEAD: u64 = 160;
-/// Of the budget, what records may take at most: pages are not full, and a transaction writes new ones
-/// before old ones are free.
-const SHARE: f64 = 0.5;
-/// The file grows by this factor, about, …
-const GROWTH: f64 = 2.2;
-/// … and has room then for so many times as much as when it grew, surely.
-const ROOM: f64 = 1.4;
 /// Of a file that has become too large all the same, so much of what records may take is left.
 const AFTER_OVERGROWTH: f64 = 0.5;
 /// Evicting goes on down to this share of what records may take, so that it is not done all the time.
@@ -60,43 +41,6 @@ pub enum DiskError {
         /// What the system or the database said.
         reason: String,
     },
-}
-
-/// A record as [`Disk::list`] tells it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Listed {
-    /// Its key.
-    pub key: Key,
-    /// Its length with the envelope, in bytes.
-    pub bytes: u64,
-    /// The transaction in or before which it was used last.
-    pub used: u64,
-}
-
-/// What a transaction failed with.
-#[derive(Debug)]
-enum Failure {
-    /// Another process has the file.
-    InUse,
-    /// The system refused to read or write.
-    Io(String),
-    /// The file is not what was written to it.
-    Damaged(String),
-}
-
-const DAMAGE: [ErrorKind; 3] = [ErrorKind::UnexpectedEof, ErrorKind::InvalidData, ErrorKind::InvalidInput];
-
-impl<E: Into<redb::Error>> From<E> for Failure {
-    fn from(error: E) -> Self {
-        let error = error.into();
-        match &error {
-            redb::Error::DatabaseAlreadyOpen | redb::Error::LockProtocolMismatch => Self::InUse,
-            // Where the file says that something is which is not there.
-            redb::Error::Io(e) if DAMAGE.contains(&e.kind()) => Self::Damaged(error.to_string()),
-            redb::Error::Io(_) | redb::Error::PreviousIo => Self::Io(error.to_string()),
-            _ => Self::Damaged(error.to_string()),
-        }
-    }
 }
 
 /// The file, open until it fails.
@@ -139,11 +83,7 @@ impl Disk {
     fn database_at(&self) -> Result<Database, Failure> {
         contained(|| {
             let database = Database::builder().set_cache_size(PAGE_CACHE).create(self.folder.join(FILE))?;
-            let transaction = write(&database)?;
-            transaction.open_table(RECORDS)?;
-            transaction.open_table(USED)?;
-            transaction.open_table(META)?;
-            transaction.commit()?;
+            make_tables(&database)?;
             Ok(database)
         })
     }
@@ -155,12 +95,7 @@ impl Disk {
 
     /// The envelope of a key, as it was written.
     pub(super) fn get(&self, key: &Key) -> Option<Vec<u8>> {
-        let found = self.with_free(|database| {
-            let transaction = database.begin_read()?;
-            let records = transaction.open_table(RECORDS)?;
-            Ok(records.get(&key.to_bytes()[..])?.map(|bytes| bytes.value().to_vec()))
-        });
-        found.flatten()
+        self.with_free(|database| read(database, key)).flatten()
     }
 
     /// Notes that a record was used; the next transaction writes it down.
@@ -206,11 +141,7 @@ impl Disk {
     }
 
     fn note_growth(&self, bytes: u64) {
-        self.with(|database| {
-            let transaction = write(database)?;
-            transaction.open_table(META)?.insert(GROWN_AT, bytes)?;
-            Ok(transaction.commit()?)
-        });
+        self.with(|database| grew(database, bytes));
     }
 
     /// Takes records out; whether that was done.
@@ -251,16 +182,7 @@ impl Disk {
 
     /// All records, in the order of their keys.
     pub(super) fn list(&self) -> Option<Vec<Listed>> {
-        self.with(|database| {
-            let used = database.begin_read()?.open_table(USED)?;
-            let mut out = Vec::new();
-            for entry in used.iter()? {
-                let (key, value) = entry?;
-                let (stamp, bytes) = value.value();
-                out.extend(Key::from_bytes(key.value()).map(|key| Listed { key, bytes, used: stamp }));
-            }
-            Ok(out)
-        })
+        self.with(listed)
     }
 
     /// Bytes of the file.
@@ -289,23 +211,7 @@ impl Disk {
 
     /// Whether the tables agree with each other, and have every key once.
     pub(super) fn agrees(&self) -> bool {
-        let agrees = self.with(|database| {
-            let transaction = database.begin_read()?;
-            let (records, used) = (transaction.open_table(RECORDS)?, transaction.open_table(USED)?);
-            let (mut sum, mut last) = (0, Vec::new());
-            for (record, use_of) in records.iter()?.zip(used.iter()?) {
-                let ((key, bytes), (same_key, value)) = (record?, use_of?);
-                let same = key.value() == same_key.value() && bytes.value().len() as u64 == value.value().1;
-                if !same || key.value() <= &last[..] {
-                    return Ok(false);
-                }
-                sum += value.value().1 + OVERHEAD;
-                last = key.value().to_vec();
-            }
-            let noted = transaction.open_table(META)?.get(BYTES)?.map_or(0, |bytes| bytes.value());
-            Ok(records.len()? == used.len()? && noted == sum)
-        });
-        agrees == Some(true)
+        self.with(agree) == Some(true)
     }
 
     /// As [`Disk::with`], unless the file is being looked after: nobody waits for that.
@@ -343,7 +249,11 @@ impl Disk {
     pub(super) fn close(&self) {
         let database = self.database.write().unwrap_or_else(PoisonError::into_inner).take();
         // redb writes when it is dropped.
-        if contained(|| Ok(drop(database))).is_err() {
+        let closed = contained(|| {
+            drop(database);
+            Ok(())
+        });
+        if closed.is_err() {
             tracing::warn!(folder = %self.folder.display(), "the store on disk was not closed cleanly");
         }
     }
@@ -369,97 +279,6 @@ impl Disk {
 /// A panic of the database is a damaged file.
 fn contained<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(Failure::Damaged("redb panicked".into())))
-}
-
-/// A transaction after which a crash costs no long repair.
-fn write(database: &Database) -> Result<redb::WriteTransaction, Failure> {
-    let mut transaction = database.begin_write()?;
-    transaction.set_quick_repair(true);
-    Ok(transaction)
-}
-
-/// The tables in one transaction.
-struct Tables<'t> {
-    records: redb::Table<'t, &'static [u8], &'static [u8]>,
-    used: redb::Table<'t, &'static [u8], (u64, u64)>,
-    meta: redb::Table<'t, &'static str, u64>,
-    clock: u64,
-    bytes: u64,
-}
-
-impl<'t> Tables<'t> {
-    fn of(transaction: &'t redb::WriteTransaction) -> Result<Self, Failure> {
-        let records = transaction.open_table(RECORDS)?;
-        let used = transaction.open_table(USED)?;
-        let meta = transaction.open_table(META)?;
-        let number =
-            |name: &str| -> Result<u64, StorageError> { Ok(meta.get(name)?.map_or(0, |n| n.value())) };
-        let (clock, bytes) = (number(CLOCK)? + 1, number(BYTES)?);
-        Ok(Self { records, used, meta, clock, bytes })
-    }
-
-    fn insert(&mut self, key: &Key, bytes: &[u8]) -> Result<(), Failure> {
-        let key = key.to_bytes();
-        self.remove(&key)?;
-        self.records.insert(&key[..], bytes)?;
-        self.used.insert(&key[..], (self.clock, bytes.len() as u64))?;
-        self.bytes += bytes.len() as u64 + OVERHEAD;
-        Ok(())
-    }
-
-    fn remove(&mut self, key: &[u8]) -> Result<(), Failure> {
-        self.records.remove(key)?;
-        if let Some(old) = self.used.remove(key)? {
-            self.bytes = self.bytes.saturating_sub(old.value().1 + OVERHEAD);
-        }
-        Ok(())
-    }
-
-    fn touch(&mut self, key: &Key) -> Result<(), Failure> {
-        let key = key.to_bytes();
-        let length = self.used.get(&key[..])?.map(|used| used.value().1);
-        if let Some(length) = length {
-            self.used.insert(&key[..], (self.clock, length))?;
-        }
-        Ok(())
-    }
-
-    /// What records may take in a file of some length, so that it keeps a budget.
-    fn limit(&self, budget: u64, length: u64) -> Result<u64, Failure> {
-        let most = budget as f64 * SHARE;
-        let grown_at = self.meta.get(GROWN_AT)?.map(|bytes| bytes.value() as f64);
-        let may_grow = length as f64 * GROWTH <= budget as f64;
-        Ok(grown_at.filter(|_| !may_grow).map_or(most, |bytes| most.min(bytes * ROOM)) as u64)
-    }
-
-    /// Above a limit: takes out the least recently used until no more than `goal` bytes are left.
-    fn evict_above(&mut self, limit: u64, goal: u64) -> Result<Vec<Key>, Failure> {
-        if self.bytes <= limit {
-            return Ok(Vec::new());
-        }
-        let mut all = Vec::new();
-        for entry in self.used.iter()? {
-            let (key, value) = entry?;
-            let (stamp, bytes) = value.value();
-            all.push((stamp, bytes, key.value().to_vec()));
-        }
-        all.sort_unstable();
-        let mut evicted = Vec::new();
-        for (_, _, key) in all {
-            if self.bytes <= goal {
-                break;
-            }
-            self.remove(&key)?;
-            evicted.extend(Key::from_bytes(&key));
-        }
-        Ok(evicted)
-    }
-
-    fn finish(&mut self) -> Result<(), Failure> {
-        self.meta.insert(CLOCK, self.clock)?;
-        self.meta.insert(BYTES, self.bytes)?;
-        Ok(())
-    }
 }
 
 /// How many bytes of records there are of each kind, in the order of [`Kind::ALL`].

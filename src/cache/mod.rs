@@ -2,7 +2,7 @@
 //!
 //! Data flow: a kind of record and everything that it depends on make a [`Key`] (`kind`) → the tier in
 //! memory (`memory`, a budget in bytes, the least recently used leave) → the tier on disk (`disk`, a redb
-//! file that one process holds; `writer`, the one thread that writes to it) → bytes (`format`, drawn in
+//! file that one process holds, with its `tables`; `writer`, the one thread that writes to it) → bytes (`format`, drawn in
 //! `FORMAT.md`; `records`, what is in them). What is asked, under which key, and when an old answer still
 //! holds, is said once for each kind: `pair`, `motion`, `verdict`, `plan`. A request sees
 //! it all through its [`Recall`], which counts what was reused; with none of it, it remembers nothing.
@@ -22,6 +22,7 @@ mod recall;
 mod records;
 mod settings;
 mod statistics;
+mod tables;
 mod tally;
 #[cfg(test)]
 mod tests;
@@ -30,7 +31,7 @@ mod writer;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-pub use disk::{DiskError, Listed};
+pub use disk::DiskError;
 pub use format::Record;
 pub use kind::{Digest, Key, Kind};
 pub use motion::MotionQuestion;
@@ -39,6 +40,7 @@ pub use plan::{Answered, PlanQuestion};
 pub use recall::{Recall, Reused};
 pub use settings::CacheSettings;
 pub use statistics::{CacheStatistics, KindStatistics, Verified};
+pub use tables::Listed;
 pub use verdict::VerdictQuestion;
 
 use disk::Disk;

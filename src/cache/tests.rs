@@ -28,7 +28,9 @@ fn key(n: u64) -> Key {
 /// Some record that only `n` has.
 fn record(n: u64, length: usize) -> BlockingRecord {
     BlockingRecord {
-        blocked: (0..length as u64 + n % 7).map(|i| (n.wrapping_mul(i + 11) >> 3) % 2 == 0).collect(),
+        blocked: (0..length as u64 + n % 7)
+            .map(|i| (n.wrapping_mul(i + 11) >> 3).is_multiple_of(2))
+            .collect(),
     }
 }
 

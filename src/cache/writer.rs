@@ -20,6 +20,9 @@ const BATCH: usize = 4 << 20;
 /// So long is waited for more, because each transaction waits for the disk.
 const GATHER: Duration = Duration::from_millis(20);
 
+/// A record in its envelope.
+type Waiting = (Key, Vec<u8>);
+
 enum Message {
     Record(Key, Vec<u8>),
     Flush(SyncSender<()>),
@@ -103,7 +106,7 @@ fn run(disk: &Disk, receiver: &Receiver<Message>, waiting: &AtomicUsize) {
 }
 
 /// What comes within a short while of a first message.
-fn gathered(receiver: &Receiver<Message>, first: Message) -> (Vec<(Key, Vec<u8>)>, Option<SyncSender<()>>) {
+fn gathered(receiver: &Receiver<Message>, first: Message) -> (Vec<Waiting>, Option<SyncSender<()>>) {
     let until = Instant::now() + GATHER;
     let (mut records, mut bytes) = (Vec::new(), 0);
     let mut next = Some(first);

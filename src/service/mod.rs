@@ -8,6 +8,7 @@
 
 mod answer;
 mod prepared;
+mod relay;
 #[cfg(test)]
 mod tests;
 
@@ -19,15 +20,13 @@ use crate::blocking_graph::{Audit, StaticAnalysis, audit};
 use crate::cache::{Answered, Cache, PlanQuestion, Recall};
 use crate::geometry::{Assembly, GeometryError, Revision, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, PlanStatus, Warning};
-use crate::search::{
-    Engine, Observer, PlanRequest, PlanSink, Problem, Progress, Removal, Stage, TraceEvent, least_travel,
-    search,
-};
+use crate::search::{Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, least_travel, search};
 use crate::simulation::{PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
 use answer::{Found, Frame, Times};
 use prepared::Prepared;
+use relay::{Relay, Silent};
 
 /// The name of an assembly: the hash of its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -391,40 +390,6 @@ fn engine_of(engine: Engine, penalty: PenaltyParameters) -> Box<dyn TransitionFu
 
 /// What verification finds between the samples of an engine, in the planning frame.
 const BETWEEN_SAMPLES: f64 = 1e-3;
-
-/// Hands a search's events on, in the input's units.
-struct Relay<'a> {
-    assembly: &'a Assembly,
-    sink: &'a mut dyn PlanSink,
-    total: u32,
-}
-
-impl Observer for Relay<'_> {
-    fn progress(&mut self, removed: usize, simulations: u64) {
-        let (done, total) = (removed as u32, self.total);
-        self.sink.progress(Progress { stage: Stage::Search, done, total, simulations });
-    }
-
-    fn removal(&mut self, removal: &Removal) {
-        self.sink.step(&answer::step(self.assembly, removal));
-    }
-
-    fn traces(&self) -> bool {
-        self.sink.traces()
-    }
-
-    fn traced(&mut self, event: TraceEvent) {
-        self.sink.traced(event);
-    }
-}
-
-/// Nobody listens.
-struct Silent;
-
-impl PlanSink for Silent {
-    fn progress(&mut self, _: Progress) {}
-    fn step(&mut self, _: &crate::plan::PlanStep) {}
-}
 
 fn check_parts(request: &PlanRequest, count: usize) -> Result<(), ServiceError> {
     let none = Vec::new();

@@ -7,7 +7,7 @@ use super::*;
 use crate::fixtures::{cuboid, l_shape, moved, peg_in_hole, source};
 use crate::geometry::{Pose, SourceMesh};
 use crate::plan::PlanStep;
-use crate::search::{ActionSet, Planner};
+use crate::search::{ActionSet, Planner, Progress};
 
 /// Wants to be told everything, so that no plan is remembered as a whole.
 struct Told {
