@@ -124,6 +124,8 @@ impl MotionQuestion<'_> {
         let mut digest = Digest::new();
         for &part in &parts {
             add_standing(&mut digest, self.scene, self.part, part);
+            // Of parts of one size, the engine takes the one that is named first.
+            digest.integer(u64::from(part < self.part));
             add_samples(&mut digest, &self.scene.bodies[part]);
         }
         (parts, digest.finish())

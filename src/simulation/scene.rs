@@ -116,6 +116,7 @@ impl Scene {
             allowances: Allowances::none(),
             longest_side,
             broad_phase: Arc::new(BroadPhase::new(&[])),
+            kept: Arc::default(),
         }
     }
 
@@ -128,8 +129,10 @@ impl Scene {
     }
 }
 
-/// The longest side of an assembly, which is above 5, rounded down by at most a twentieth.
+/// The longest side of an assembly, rounded down by less than a sixteenth.
 #[must_use]
 pub fn resolution(assembly: &Assembly) -> f64 {
-    (assembly.longest_side() * 4.0).floor() / 4.0
+    let longest = assembly.longest_side();
+    let step = longest.log2().floor().exp2() / 16.0;
+    (longest / step).floor() * step
 }
