@@ -21,12 +21,21 @@ pub enum Kind {
     Verdict = 5,
     /// What a search answered.
     Plan = 6,
+    /// The planes that a part lies against.
+    Touching = 7,
 }
 
 impl Kind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 6] =
-        [Self::Overlap, Self::Blocking, Self::Witness, Self::Motion, Self::Verdict, Self::Plan];
+    pub const ALL: [Self; 7] = [
+        Self::Overlap,
+        Self::Blocking,
+        Self::Witness,
+        Self::Motion,
+        Self::Verdict,
+        Self::Plan,
+        Self::Touching,
+    ];
 
     /// The name in statistics.
     #[must_use]
@@ -38,6 +47,7 @@ impl Kind {
             Self::Motion => "motion",
             Self::Verdict => "verdict",
             Self::Plan => "plan",
+            Self::Touching => "touching",
         }
     }
 
@@ -46,7 +56,13 @@ impl Kind {
     #[must_use]
     pub fn algorithm(self) -> u32 {
         match self {
-            Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Verdict | Self::Plan => 1,
+            Self::Overlap
+            | Self::Blocking
+            | Self::Witness
+            | Self::Motion
+            | Self::Verdict
+            | Self::Plan
+            | Self::Touching => 1,
         }
     }
 

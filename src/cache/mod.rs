@@ -4,7 +4,8 @@
 //! memory (`memory`, a budget in bytes, the least recently used leave) → the tier on disk (`disk`, a redb
 //! file that one process holds, with its `tables`; `writer`, the one thread that writes to it) → bytes (`format`, drawn in
 //! `FORMAT.md`; `records`, what is in them). What is asked, under which key, and when an old answer still
-//! holds, is said once for each kind: `pair`, `motion`, `verdict`, `plan`. A request sees
+//! holds, is said once for each kind: `pair`, `touching`, `motion`, `verdict`,
+//! `plan`. A request sees
 //! it all through its [`Recall`], which counts what was reused; with none of it, it remembers nothing.
 //!
 //! Invariants: an answer that is found is, to the bit, the one that would be computed; so whatever an
@@ -26,6 +27,7 @@ mod tables;
 mod tally;
 #[cfg(test)]
 mod tests;
+mod touching;
 mod verdict;
 mod writer;
 

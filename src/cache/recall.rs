@@ -25,7 +25,7 @@ struct Counts {
 pub struct Reused {
     /// Overlaps of pairs.
     pub overlaps: u64,
-    /// Blocking relations of pairs.
+    /// Blocking relations of pairs, and planes that parts touch.
     pub blocking: u64,
     /// Motions.
     pub motions: u64,

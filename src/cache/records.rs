@@ -127,9 +127,16 @@ pub(super) struct BlockedRecord {
     pub(super) by: Vec<u32>,
 }
 
+/// Normals of planes, in the planning frame; none if they were too many.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct TouchingRecord {
+    pub(super) normals: Option<Vec<[f64; 3]>>,
+}
+
 impl Record for OverlapRecord {}
 impl Record for BlockingRecord {}
 impl Record for WitnessRecord {}
 impl Record for MotionRecord {}
 impl Record for VerdictRecord {}
 impl Record for PlanRecord {}
+impl Record for TouchingRecord {}

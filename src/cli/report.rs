@@ -149,7 +149,7 @@ fn stats(plan: &Plan) -> String {
 /// How much was there already.
 fn reused(s: &PlanStats) -> String {
     let counts = [
-        (s.blocking_hits, "pair answers"),
+        (s.blocking_hits, "relations"),
         (s.motion_hits, "motions"),
         (s.verdict_hits.unwrap_or(0), "verified paths"),
     ];

@@ -137,7 +137,7 @@ pub struct StatsDocument {
 pub struct CacheDocument {
     /// Distance fields.
     pub sdf_hits: u64,
-    /// Overlaps and blocking relations of pairs.
+    /// Overlaps and blocking relations of pairs, and planes that parts touch.
     pub blocking_hits: u64,
     /// Motions.
     pub motion_hits: u64,

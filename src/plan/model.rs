@@ -98,7 +98,7 @@ pub struct PlanStats {
     pub total_time_s: f64,
     /// Distance fields that were there already.
     pub sdf_hits: u64,
-    /// Overlaps and blocking relations of pairs that were there already.
+    /// Overlaps and blocking relations of pairs, and planes that parts touch, that were there already.
     pub blocking_hits: u64,
     /// Motions that were there already.
     pub motion_hits: u64,
