@@ -8,6 +8,7 @@ use std::collections::HashSet;
 use std::os::unix::fs::DirBuilderExt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
 
 use redb::Database;
@@ -50,6 +51,8 @@ pub(super) struct Disk {
     /// Bytes that the file may take.
     budget: u64,
     database: RwLock<Option<Database>>,
+    /// Counts the files that were opened: who failed on one must not set the next one aside.
+    generation: AtomicU64,
     touched: Mutex<HashSet<Key>>,
     tally: Arc<Tally>,
 }
@@ -64,6 +67,7 @@ impl Disk {
             folder: folder.to_owned(),
             budget,
             database: RwLock::new(None),
+            generation: AtomicU64::new(0),
             touched: Mutex::default(),
             tally,
         };
@@ -201,17 +205,21 @@ impl Disk {
             }
             Ok(clean)
         });
-        if checked.is_err() {
-            drop(slot);
-            self.set_aside("its check failed");
-            return Some(false);
-        }
-        checked.ok()
+        let generation = self.generation.load(Ordering::Relaxed);
+        drop(slot);
+        Some(checked.unwrap_or_else(|failure| {
+            self.failed(failure, generation);
+            false
+        }))
     }
 
-    /// Whether the tables agree with each other, and have every key once.
-    pub(super) fn agrees(&self) -> bool {
-        self.with(agree) == Some(true)
+    /// Whether the tables agree with each other; a file where they do not is set aside.
+    pub(super) fn holds_together(&self) -> bool {
+        let agrees = self.with(|database| {
+            let reason = "its tables contradict each other";
+            if agree(database)? { Ok(()) } else { Err(Failure::Damaged(reason.to_owned())) }
+        });
+        agrees.is_some()
     }
 
     /// As [`Disk::with`], unless the file is being looked after: nobody waits for that.
@@ -224,30 +232,23 @@ impl Disk {
 
     /// Something with the open file, if it is open; what fails closes the file or sets it aside.
     fn with<T>(&self, work: impl FnOnce(&Database) -> Result<T, Failure>) -> Option<T> {
-        let failure = {
-            let slot = self.database.read().unwrap_or_else(PoisonError::into_inner);
-            let database = slot.as_ref()?;
-            match contained(|| work(database)) {
-                Ok(done) => return Some(done),
-                Err(failure) => failure,
-            }
-        };
-        match failure {
-            Failure::Damaged(reason) => self.set_aside(&reason),
-            // Not of an open file.
-            Failure::InUse => {}
-            Failure::Io(reason) => {
-                self.tally.write_failures.one_more();
-                tracing::warn!(folder = %self.folder.display(), reason, "the store on disk fails: on in memory");
-                self.close();
-            }
-        }
-        None
+        let slot = self.database.read().unwrap_or_else(PoisonError::into_inner);
+        let database = slot.as_ref()?;
+        let done = contained(|| work(database));
+        let generation = self.generation.load(Ordering::Relaxed);
+        drop(slot);
+        done.map_err(|failure| self.failed(failure, generation)).ok()
     }
 
-    /// Closes the file for good.
-    pub(super) fn close(&self) {
-        let database = self.database.write().unwrap_or_else(PoisonError::into_inner).take();
+    /// Closes the file that failed, unless somebody did; a damaged one is kept for whoever wants to look at
+    /// it, and another begun.
+    fn failed(&self, failure: Failure, generation: u64) {
+        let mut slot = self.database.write().unwrap_or_else(PoisonError::into_inner);
+        if self.generation.load(Ordering::Relaxed) != generation {
+            return;
+        }
+        self.generation.store(generation + 1, Ordering::Relaxed);
+        let database = slot.take();
         // redb writes when it is dropped.
         let closed = contained(|| {
             drop(database);
@@ -256,14 +257,18 @@ impl Disk {
         if closed.is_err() {
             tracing::warn!(folder = %self.folder.display(), "the store on disk was not closed cleanly");
         }
-    }
-
-    /// Keeps a damaged file for whoever wants to look at it, and begins anew.
-    pub(super) fn set_aside(&self, reason: &str) {
-        self.close();
-        self.rename(reason);
-        let database = self.database_at().ok();
-        *self.database.write().unwrap_or_else(PoisonError::into_inner) = database;
+        match failure {
+            Failure::Damaged(reason) => {
+                self.rename(&reason);
+                *slot = self.database_at().ok();
+            }
+            Failure::Io(reason) => {
+                self.tally.write_failures.one_more();
+                tracing::warn!(folder = %self.folder.display(), reason, "the store on disk fails: on in memory");
+            }
+            // Not of an open file.
+            Failure::InUse => {}
+        }
     }
 
     fn rename(&self, reason: &str) {

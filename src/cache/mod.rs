@@ -2,11 +2,11 @@
 //!
 //! Data flow: a kind of record and everything that it depends on make a [`Key`] (`kind`) → the tier in
 //! memory (`memory`, a budget in bytes, the least recently used leave) → the tier on disk (`disk`, a redb
-//! file that one process holds, with its `tables`; `writer`, the one thread that writes to it) → bytes (`format`, drawn in
-//! `FORMAT.md`; `records`, what is in them). What is asked, under which key, and when an old answer still
-//! holds, is said once for each kind: `pair`, `touching`, `motion`, `verdict`,
-//! `plan`. A request sees
-//! it all through its [`Recall`], which counts what was reused; with none of it, it remembers nothing.
+//! file that one process holds, with its `tables`; `writer`, the one thread that writes to it) → bytes
+//! (`format`, drawn in `FORMAT.md`; `records`, what is in them). What is asked, under which key, and when
+//! an old answer still holds, is said once for each kind: `pair`, `touching`, `motion`, `verdict`, `plan`.
+//! A request sees it all through its [`Recall`], which counts what was reused; with none of it, it
+//! remembers nothing.
 //!
 //! Invariants: an answer that is found is, to the bit, the one that would be computed; so whatever an
 //! answer depends on is in its key, or in what is compared when it is found. A record that is damaged, of

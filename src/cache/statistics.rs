@@ -103,11 +103,8 @@ impl Cache {
     pub fn verify(&self) -> Verified {
         self.flush();
         let Some(disk) = &self.disk else { return Verified { records: 0, damaged: 0, clean: true } };
-        let mut clean = disk.check(false).unwrap_or(false);
-        if !disk.agrees() {
-            clean = false;
-            disk.set_aside("its tables contradict each other");
-        }
+        let checked = disk.check(false).unwrap_or(false);
+        let clean = disk.holds_together() && checked;
         let list = self.list();
         let intact =
             |l: &&Listed| disk.get(&l.key).is_some_and(|bytes| format::opened(&l.key, &bytes).is_some());
