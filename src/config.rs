@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use serde::Deserialize;
 
+use crate::cache::CacheSettings;
+
 /// Why a configuration is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
@@ -48,6 +50,8 @@ pub struct Config {
     pub requests: RequestsConfig,
     /// Housekeeping and shutting down.
     pub times: TimesConfig,
+    /// What is remembered.
+    pub cache: CacheConfig,
     /// Assemblies to load at start.
     pub preload: PreloadConfig,
     /// What is logged.
@@ -104,6 +108,20 @@ pub struct TimesConfig {
     pub drain_s: f64,
 }
 
+/// What is remembered.
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CacheConfig {
+    /// Whether there is a store on disk.
+    pub disk: bool,
+    /// Its folder.
+    pub dir: Option<PathBuf>,
+    /// Megabytes that its file may have.
+    pub disk_mb: u64,
+    /// Megabytes that records in memory may have.
+    pub memory_mb: u64,
+}
+
 /// Assemblies to load at start.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -151,6 +169,25 @@ impl Default for TimesConfig {
     }
 }
 
+impl Default for CacheConfig {
+    fn default() -> Self {
+        Self { disk: true, dir: None, disk_mb: 1024, memory_mb: 256 }
+    }
+}
+
+impl CacheConfig {
+    /// The same for the cache.
+    #[must_use]
+    pub fn settings(&self) -> CacheSettings {
+        let folder = self.dir.clone().or_else(CacheSettings::default_folder).filter(|_| self.disk);
+        CacheSettings {
+            folder,
+            memory_bytes: (self.memory_mb as usize).saturating_mul(1 << 20),
+            disk_bytes: self.disk_mb.saturating_mul(1 << 20),
+        }
+    }
+}
+
 impl Default for LogConfig {
     fn default() -> Self {
         Self { format: LogFormat::Text, filter: "info".to_owned() }
@@ -183,6 +220,8 @@ impl Config {
         within("requests.outbox_mb", self.requests.outbox_mb, 1..=65_536, "1 to 65536")?;
         within("requests.answers_mb", self.requests.answers_mb, 0..=65_536, "0 to 65536")?;
         within("requests.slow_reader_s", self.requests.slow_reader_s, 0.1..=86_400.0, "0.1 to 86400")?;
+        within("cache.disk_mb", self.cache.disk_mb, 16..=1_048_576, "16 to 1048576")?;
+        within("cache.memory_mb", self.cache.memory_mb, 0..=1_048_576, "0 to 1048576")?;
         within("times.tick_s", self.times.tick_s, 0.05..=60.0, "0.05 to 60")?;
         within("times.grace_s", self.times.grace_s, 0.0..=3600.0, "0 to 3600")?;
         within("times.drain_s", self.times.drain_s, 0.1..=3600.0, "0.1 to 3600")

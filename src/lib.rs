@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod blocking_graph;
+pub mod cache;
 pub mod cli;
 pub mod config;
 pub mod daemon;

@@ -56,6 +56,12 @@ impl Termination {
         Self { deadline: self.deadline.map(half), ..self.clone() }
     }
 
+    /// Whether the clock can end the work.
+    #[must_use]
+    pub fn has_deadline(&self) -> bool {
+        self.deadline.is_some()
+    }
+
     /// # Errors
     /// The reason to stop, if there is one.
     pub fn check(&self) -> Result<(), Interrupt> {

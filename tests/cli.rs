@@ -15,10 +15,16 @@ fn assembly(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/assemblies").join(name)
 }
 
-/// The command, kept away from any daemon that runs for this user.
+thread_local! {
+    /// What the commands of a test remember; gone with its thread.
+    static CACHE: tempfile::TempDir = tempfile::tempdir().unwrap();
+}
+
+/// The command, kept away from any daemon that runs for this user, and from what they remember.
 fn sbdp() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sbdp"));
     command.env("SBDP_RUNTIME_DIR", "/nonexistent/sbdp-tests").stdin(Stdio::null());
+    CACHE.with(|folder| command.env("SBDP_CACHE_DIR", folder.path()));
     command
 }
 

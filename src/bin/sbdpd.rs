@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::Parser;
+use sbdp::cache::Cache;
 use sbdp::config::Config;
 use sbdp::service::Service;
 use sbdp::{daemon, telemetry};
@@ -46,13 +47,26 @@ fn main() -> ExitCode {
         println!("the configuration is fine");
         return ExitCode::SUCCESS;
     }
-    match daemon::run(&config, Arc::new(Service::default())) {
+    let cache = Arc::new(cache(&config));
+    let ended = daemon::run(&config, Arc::new(Service::new(Arc::clone(&cache))));
+    // A worker that does not end in time still holds the service.
+    cache.flush();
+    match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("sbdpd: {error}");
             ExitCode::FAILURE
         }
     }
+}
+
+/// The store on disk, or memory if that cannot be had: a daemon without is better than none.
+fn cache(config: &Config) -> Cache {
+    let settings = config.cache.settings();
+    Cache::open(&settings).unwrap_or_else(|error| {
+        tracing::warn!(%error, "no cache on disk: nothing is remembered beyond this process");
+        Cache::in_memory(settings.memory_bytes)
+    })
 }
 
 /// The file's values, then what the command line says; logging runs afterwards.

@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use crate::simulation::{Action, End, HullTree, Scene, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
-use super::{StaticAnalysis, initial_blockages};
+use super::{Analysis, StaticAnalysis};
+use crate::cache::Recall;
 
 /// What came of simulating excluded actions.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -35,7 +36,10 @@ pub fn audit(
     termination: &Termination,
 ) -> Result<Audit, Interrupt> {
     let translations = Action::translations();
-    let blockages = initial_blockages(rule, scene, present, &translations, least, termination)?;
+    // Asked about what is computed, not about what is remembered.
+    let recall = Recall::default();
+    let analysis = Analysis { rule, scene, translations: &translations, recall: &recall };
+    let blockages = analysis.initial_blockages(present, least, termination)?;
     let everything = HullTree::new(scene, present.to_vec());
     let questions: Vec<_> =
         present.iter().flat_map(|&p| (0..translations.len()).map(move |a| (p, a))).collect();

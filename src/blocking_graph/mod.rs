@@ -11,4 +11,4 @@ mod static_analysis;
 
 pub use audit::{Audit, audit};
 pub use blockage::{Blockage, Evaluation};
-pub use static_analysis::{StaticAnalysis, blocked_from, initial_blockages};
+pub use static_analysis::{Analysis, StaticAnalysis};

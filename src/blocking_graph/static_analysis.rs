@@ -8,8 +8,9 @@
 
 use rayon::prelude::*;
 
+use crate::cache::{Key, Recall, blocking_key};
 use crate::geometry::Pose;
-use crate::simulation::{Action, Scene, alike, pair_blocks};
+use crate::simulation::{Action, Pair, Scene, grouped, pair_blocks};
 use crate::termination::{Interrupt, Termination};
 
 use super::{Blockage, literal};
@@ -33,86 +34,96 @@ impl StaticAnalysis {
             Self::Paper => "paper",
         }
     }
-
-    /// For each translation, whether `other` blocks `part` at a pose. `least` is the travel that
-    /// counts as motion.
-    fn pair_blocks(
-        self,
-        scene: &Scene,
-        part: usize,
-        pose: &Pose,
-        other: usize,
-        translations: &[Action],
-        least: f64,
-    ) -> Vec<bool> {
-        match self {
-            Self::Sliding => pair_blocks(scene, part, pose, other, translations, least),
-            Self::Paper => literal::pair_blocks(scene, part, pose, other, translations),
-        }
-    }
 }
 
-/// Blockages of all present parts at their assembled poses, for translations in opposite
-/// pairs (action `a ^ 1` is the reverse of `a`). One entry per part; absent parts stay open. `present`
-/// is ascending.
-///
-/// # Errors
-/// The termination condition became true.
-pub fn initial_blockages(
-    rule: StaticAnalysis,
-    scene: &Scene,
-    present: &[usize],
-    translations: &[Action],
-    least: &(impl Fn(usize) -> f64 + Sync),
-    termination: &Termination,
-) -> Result<Vec<Blockage>, Interrupt> {
-    let is_present = |part: usize| present.binary_search(&part).is_ok();
-    let mut pairs = scene.broad_phase.pairs(NEAR);
-    pairs.retain(|&(p, o)| is_present(p) && is_present(o));
-    // The smaller part moves: its steps are adapted to its size.
-    let extent = |i: usize| scene.bodies[i].bounds.extents().max();
-    let pairs: Vec<_> =
-        pairs.into_iter().map(|(p, o)| if extent(p) <= extent(o) { (p, o) } else { (o, p) }).collect();
-    // What holds for one bolt in its nut holds for all that stand alike.
-    let (first, group_of) = alike(scene, &pairs);
-    let relations = first
-        .par_iter()
-        .map(|&(mover, other)| {
-            termination.check()?;
-            let pose = scene.bodies[mover].planning_from_shape;
-            Ok(rule.pair_blocks(scene, mover, &pose, other, translations, least(mover)))
+/// What static analysis is asked with: a rule about translations in opposite pairs (action `a ^ 1` is the
+/// reverse of `a`), and what is remembered of its answers.
+#[derive(Debug, Clone, Copy)]
+pub struct Analysis<'a> {
+    /// The rule.
+    pub rule: StaticAnalysis,
+    /// The bodies.
+    pub scene: &'a Scene,
+    /// The actions.
+    pub translations: &'a [Action],
+    /// What is remembered.
+    pub recall: &'a Recall,
+}
+
+impl Analysis<'_> {
+    /// Blockages of all present parts (ascending) at their assembled poses. `least` is the travel of a part
+    /// that counts as motion. One entry per part; absent parts stay open.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn initial_blockages(
+        &self,
+        present: &[usize],
+        least: &(impl Fn(usize) -> f64 + Sync),
+        termination: &Termination,
+    ) -> Result<Vec<Blockage>, Interrupt> {
+        let Self { scene, translations, .. } = *self;
+        let is_present = |part: usize| present.binary_search(&part).is_ok();
+        let mut pairs = scene.broad_phase.pairs(NEAR);
+        pairs.retain(|&(p, o)| is_present(p) && is_present(o));
+        // The smaller part moves: its steps are adapted to its size.
+        let extent = |i: usize| scene.bodies[i].bounds.extents().max();
+        let placed = |&(p, o): &(usize, usize)| {
+            let (mover, other) = if extent(p) <= extent(o) { (p, o) } else { (o, p) };
+            self.keyed(mover, &scene.bodies[mover].planning_from_shape, other, least(mover))
+        };
+        let pairs: Vec<(Key, Pair)> = pairs.par_iter().map(placed).collect();
+        // What holds for one bolt in its nut holds for all that stand alike.
+        let (first, group_of) = grouped(pairs.iter().map(|(key, _)| *key));
+        let relations = first
+            .par_iter()
+            .map(|&i| {
+                termination.check()?;
+                let (key, pair) = &pairs[i];
+                Ok(self.pair_blocks(*key, pair, least(pair.parts[0])))
+            })
+            .collect::<Result<Vec<_>, Interrupt>>()?;
+        let mut out = vec![Blockage::open(translations.len()); scene.bodies.len()];
+        for ((_, Pair { parts: [mover, other], .. }), group) in pairs.into_iter().zip(group_of) {
+            for a in (0..translations.len()).filter(|&a| relations[group][a]) {
+                out[mover].block_single(a, other);
+                out[other].block_single(a ^ 1, mover);
+            }
+        }
+        Ok(out)
+    }
+
+    /// The blockage of one displaced part among the parts that stand.
+    #[must_use]
+    pub fn blocked_from(&self, standing: &[usize], part: usize, pose: &Pose, least: f64) -> Blockage {
+        let Self { scene, translations, .. } = *self;
+        let mut out = Blockage::open(translations.len());
+        let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(NEAR);
+        for other in scene.broad_phase.meeting_of(standing, &bounds) {
+            let (key, pair) = self.keyed(part, pose, other, least);
+            let blocked = self.pair_blocks(key, &pair, least);
+            for a in (0..translations.len()).filter(|&a| blocked[a]) {
+                out.block_single(a, other);
+            }
+        }
+        out
+    }
+
+    fn keyed(&self, part: usize, pose: &Pose, other: usize, least: f64) -> (Key, Pair) {
+        let pair = Pair::shifted(self.scene, part, pose, other);
+        (blocking_key(self.scene, &pair, self.rule.name(), self.translations, least), pair)
+    }
+
+    /// For each translation, whether the second part of a pair blocks the first.
+    fn pair_blocks(&self, key: Key, pair: &Pair, least: f64) -> Vec<bool> {
+        self.recall.blocking(key, self.translations.len(), || {
+            let (alone, pose) = (pair.scene(self.scene), &pair.poses[0]);
+            match self.rule {
+                StaticAnalysis::Sliding => pair_blocks(&alone, 0, pose, 1, self.translations, least),
+                StaticAnalysis::Paper => literal::pair_blocks(&alone, 0, pose, 1, self.translations),
+            }
         })
-        .collect::<Result<Vec<_>, Interrupt>>()?;
-    let mut out = vec![Blockage::open(translations.len()); scene.bodies.len()];
-    for (&(mover, other), group) in pairs.iter().zip(group_of) {
-        for a in (0..translations.len()).filter(|&a| relations[group][a]) {
-            out[mover].block_single(a, other);
-            out[other].block_single(a ^ 1, mover);
-        }
     }
-    Ok(out)
-}
-
-/// The blockage of one displaced part among the parts that stand.
-#[must_use]
-pub fn blocked_from(
-    rule: StaticAnalysis,
-    scene: &Scene,
-    standing: &[usize],
-    part: usize,
-    pose: &Pose,
-    translations: &[Action],
-    least: f64,
-) -> Blockage {
-    let mut out = Blockage::open(translations.len());
-    let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(NEAR);
-    for other in scene.broad_phase.meeting_of(standing, &bounds) {
-        let blocked = rule.pair_blocks(scene, part, pose, other, translations, least);
-        for a in (0..translations.len()).filter(|&a| blocked[a]) {
-            out.block_single(a, other);
-        }
-    }
-    out
 }
 
 /// Boxes further apart than this cannot touch within the look-ahead.
@@ -132,10 +143,25 @@ mod tests {
     const LEAST: f64 = 0.05;
     const RULE: StaticAnalysis = StaticAnalysis::Sliding;
 
+    fn among(
+        scene: &Scene,
+        present: &[usize],
+        termination: &Termination,
+    ) -> Result<Vec<Blockage>, Interrupt> {
+        let (translations, recall) = (Action::translations(), Recall::default());
+        let analysis = Analysis { rule: RULE, scene, translations: &translations, recall: &recall };
+        analysis.initial_blockages(present, &|_| LEAST, termination)
+    }
+
     fn initial(scene: &Scene) -> Vec<Blockage> {
         let all: Vec<_> = (0..scene.bodies.len()).collect();
-        let translations = Action::translations();
-        initial_blockages(RULE, scene, &all, &translations, &|_| LEAST, &Termination::default()).unwrap()
+        among(scene, &all, &Termination::default()).unwrap()
+    }
+
+    fn from(scene: &Scene, standing: &[usize], part: usize, pose: &Pose) -> Blockage {
+        let (translations, recall) = (Action::translations(), Recall::default());
+        let analysis = Analysis { rule: RULE, scene, translations: &translations, recall: &recall };
+        analysis.blocked_from(standing, part, pose, LEAST)
     }
 
     fn open(b: &Blockage) -> Vec<usize> {
@@ -214,9 +240,7 @@ mod tests {
         let [plate, block] = block_on_plate();
         let (scene, _) = scene([plate, block, cuboid([3.0, 3.0, 1.0], [4.0, 4.0, 2.0])]);
         assert_eq!(open(&initial(&scene)[2]).len(), 6);
-        let t = Termination::default();
-        let without =
-            initial_blockages(RULE, &scene, &[1, 2], &Action::translations(), &|_| LEAST, &t).unwrap();
+        let without = among(&scene, &[1, 2], &Termination::default()).unwrap();
         assert!(without.iter().all(|b| open(b).len() == 6));
     }
 
@@ -225,7 +249,7 @@ mod tests {
         let (scene, _) = scene(peg_in_hole(0.0));
         let blockage = |lift: f64| {
             let pose = Pose::translation(0.0, 0.0, lift) * scene.bodies[1].planning_from_shape;
-            blocked_from(RULE, &scene, &[0], 1, &pose, &Action::translations(), LEAST)
+            from(&scene, &[0], 1, &pose)
         };
         assert_eq!(open(&blockage(0.0)), [UP]);
         assert_eq!(open(&blockage(1.0)), [UP, DOWN], "half-way out there is room below");
@@ -238,7 +262,7 @@ mod tests {
         let [plate, block] = block_on_plate();
         let (scene, _) = scene([plate, block, cuboid([1.0, -1.0, 0.0], [2.0, 1.0, 1.0])]);
         let pose = scene.bodies[1].planning_from_shape;
-        let there = blocked_from(RULE, &scene, &[0, 2], 1, &pose, &Action::translations(), LEAST);
+        let there = from(&scene, &[0, 2], 1, &pose);
         let initially = &initial(&scene)[1];
         for a in 0..6 {
             assert_eq!(there.blockers(a), initially.blockers(a), "action {a}");
@@ -250,8 +274,6 @@ mod tests {
         let (scene, _) = scene(block_on_plate());
         let termination = Termination::default();
         termination.cancel_flag().store(true, Ordering::Relaxed);
-        let ended =
-            initial_blockages(RULE, &scene, &[0, 1], &Action::translations(), &|_| LEAST, &termination);
-        assert_eq!(ended.err(), Some(Interrupt::Cancelled));
+        assert_eq!(among(&scene, &[0, 1], &termination).err(), Some(Interrupt::Cancelled));
     }
 }

@@ -35,6 +35,8 @@ pub(super) enum Command {
     Explain(ExplainArguments),
     /// Say how the running daemon is
     Status,
+    /// Look after what is remembered on disk (stop the daemon first: it holds the store alone)
+    Cache(CacheArguments),
     /// Run planners over folders of assemblies and evaluate what comes out
     Bench(Box<BenchArguments>),
 }
@@ -108,6 +110,10 @@ pub(super) struct PlanArguments {
     /// Neither read nor write anything remembered
     #[arg(long)]
     pub(super) no_cache: bool,
+    /// The folder of what is remembered on disk [default: $SBDP_CACHE_DIR, else
+    /// $XDG_CACHE_HOME/sbdp, else ~/.cache/sbdp]; plans in this process
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["no_cache", "daemon"])]
+    pub(super) cache_dir: Option<PathBuf>,
     /// Plan in this process, even if a daemon runs
     #[arg(long, conflicts_with = "daemon")]
     pub(super) embedded: bool,
@@ -128,6 +134,39 @@ pub(super) struct CheckArguments {
     /// Of which blocking graphs
     #[arg(long, value_enum, default_value_t, requires = "graphs")]
     pub(super) dbg: Dbg,
+}
+
+/// Arguments of `sbdp cache`.
+#[derive(Debug, Args)]
+pub(super) struct CacheArguments {
+    /// The folder [default: $SBDP_CACHE_DIR, else $XDG_CACHE_HOME/sbdp, else ~/.cache/sbdp]
+    #[arg(long, value_name = "DIR", global = true)]
+    pub(super) cache_dir: Option<PathBuf>,
+    #[command(subcommand)]
+    pub(super) command: CacheCommand,
+}
+
+/// What to do with the store.
+#[derive(Debug, Subcommand)]
+pub(super) enum CacheCommand {
+    /// List all records: kind, key, bytes, and the transaction in which it was used last
+    Ls,
+    /// Count records and bytes by kind
+    Stats {
+        /// Write all statistics there as JSON; `-` for stdout
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+    },
+    /// Check the file and every record, and take out what is damaged; exits with 1 if anything was
+    Verify,
+    /// Take out the records used least recently
+    Evict {
+        /// Until so many megabytes of records are left
+        #[arg(long, value_name = "MB")]
+        to_mb: u64,
+    },
+    /// Take out all records
+    Clear,
 }
 
 /// Arguments of `sbdp explain`.

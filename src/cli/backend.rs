@@ -1,9 +1,11 @@
 //! Where plans are made: in this process or in the daemon. Both speak the planning modules'
 //! own types.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::error::CliError;
+use crate::cache::Cache;
 use crate::geometry::{Revision, SourceAssembly};
 use crate::plan::Plan;
 use crate::search::{PlanRequest, PlanSink, Termination};
@@ -34,9 +36,15 @@ pub(super) trait Backend {
 }
 
 /// The service in this process.
-#[derive(Default)]
 pub(super) struct Embedded {
     service: Service,
+}
+
+impl Embedded {
+    /// A service that remembers in a cache, or not at all.
+    pub(super) fn new(cache: Option<Arc<Cache>>) -> Self {
+        Self { service: cache.map_or_else(Service::default, Service::new) }
+    }
 }
 
 impl Backend for Embedded {

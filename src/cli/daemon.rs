@@ -217,6 +217,7 @@ fn stats(s: &client::Stats) -> PlanStats {
         // The wire has no room for these.
         load_time_s: None,
         overlap_time_s: None,
+        verdict_hits: None,
         sdf_time_s: s.sdf_time_s,
         static_analysis_time_s: s.static_analysis_time_s,
         path_time_s: s.path_time_s,

@@ -1,11 +1,12 @@
 //! The command line `sbdp`.
 //!
 //! `plan` asks the daemon if one runs, else a service in this process; `check` always works
-//! here; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
+//! here; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
 
 mod args;
 mod backend;
 mod bench;
+mod cache;
 mod check;
 mod daemon;
 mod error;
@@ -35,6 +36,7 @@ pub fn run() -> ExitCode {
         Command::Check(arguments) => check::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Status => status::run(),
+        Command::Cache(arguments) => cache::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
     };
     result.unwrap_or_else(|error| {

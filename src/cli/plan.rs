@@ -10,7 +10,7 @@ use super::daemon::Daemon;
 use super::error::{CliError, exit_code};
 use super::listener::Listener;
 use super::part_names::{part_named, resolve};
-use super::{interrupt, print, report};
+use super::{cache, interrupt, print, report};
 use crate::geometry::{Revision, SourceAssembly, load_assembly, pose_from_waypoint};
 use crate::plan::Plan;
 use crate::plan::export::PlanDocument;
@@ -100,11 +100,16 @@ fn penalty(given: &[String]) -> Result<PenaltyParameters, CliError> {
 /// The daemon if one runs, else this process; or what the user insists on.
 fn choose_backend(arguments: &PlanArguments) -> Result<Box<dyn Backend>, CliError> {
     let only_here = arguments.trace.is_some()
+        || arguments.cache_dir.is_some()
         || arguments.path_timeout.is_some()
         || arguments.dbg.is_some()
         || !arguments.penalty.is_empty();
+    let embedded = || {
+        let cache = (!arguments.no_cache).then(|| cache::embedded(arguments.cache_dir.as_deref()));
+        Box::new(Embedded::new(cache))
+    };
     if arguments.embedded || only_here {
-        return Ok(Box::<Embedded>::default());
+        return Ok(embedded());
     }
     match Daemon::connect() {
         Ok(daemon) => Ok(Box::new(daemon)),
@@ -114,7 +119,7 @@ fn choose_backend(arguments: &PlanArguments) -> Result<Box<dyn Backend>, CliErro
             if !error.is_no_daemon() {
                 eprintln!("warning: {error}; planning in this process");
             }
-            Ok(Box::<Embedded>::default())
+            Ok(embedded())
         }
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::table::{Table, length};
 use crate::geometry::{SourceAssembly, SourceMesh, pose_from_waypoint};
-use crate::plan::{MotionKind, Plan, PlanStep};
+use crate::plan::{MotionKind, Plan, PlanStats, PlanStep};
 
 /// The table of steps and everything there is to know about the rest.
 pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan) -> String {
@@ -125,7 +125,7 @@ fn warnings(plan: &Plan) -> Vec<String> {
 fn stats(plan: &Plan) -> String {
     let s = &plan.stats;
     let depth = plan.steps.iter().map(|step| step.verified_depth).fold(0.0, f64::max);
-    let hit = if s.plan_hit { ", plan remembered" } else { "" };
+    let hit = if s.plan_hit { ", plan remembered".to_owned() } else { reused(s) };
     let told =
         |name: &str, time: Option<f64>| time.map_or_else(String::new, |t| format!("{name} {t:.3} s, "));
     format!(
@@ -146,6 +146,18 @@ fn stats(plan: &Plan) -> String {
     )
 }
 
+/// How much was there already.
+fn reused(s: &PlanStats) -> String {
+    let counts = [
+        (s.blocking_hits, "relations"),
+        (s.motion_hits, "motions"),
+        (s.verdict_hits.unwrap_or(0), "verified paths"),
+    ];
+    let told = counts.iter().filter(|(count, _)| *count > 0).map(|(count, what)| format!("{count} {what}"));
+    let told: Vec<String> = told.collect();
+    if told.is_empty() { String::new() } else { format!(", remembered: {}", told.join(", ")) }
+}
+
 fn names(plan: &Plan, parts: &[usize]) -> String {
     let names: Vec<&str> = parts.iter().map(|&p| plan.part_name(p)).collect();
     names.join(", ")
@@ -155,7 +167,7 @@ fn names(plan: &Plan, parts: &[usize]) -> String {
 mod tests {
     use super::*;
     use crate::geometry::SourcePart;
-    use crate::plan::{Blocked, Overlap, PlanStats, PlanStatus, Warning};
+    use crate::plan::{Blocked, Overlap, PlanStatus, Warning};
 
     #[test]
     fn everything_is_told() {
@@ -194,7 +206,7 @@ mod tests {
             ],
             overlaps: vec![Overlap { parts: [0, 1], depth: 0.5 }],
             warnings: vec![Warning { part: Some(2), message: "open".into() }],
-            stats: PlanStats::default(),
+            stats: PlanStats { motion_hits: 3, verdict_hits: Some(2), ..PlanStats::default() },
         };
         let text = super::plan(&assembly, &plan);
         for line in [
@@ -204,6 +216,7 @@ mod tests {
             "  b: +x by a, c; -z by a",
             "  a and b: 0.5000 mm deep",
             "  c: open",
+            "0 states, remembered: 3 motions, 2 verified paths; fields",
             "verified to 0.0100 mm",
         ] {
             assert!(text.contains(line), "{line}\n{text}");

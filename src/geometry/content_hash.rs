@@ -3,10 +3,12 @@
 //! The hashed byte stream is part of the wire contract (`ipc/PROTOCOL.md`), because clients
 //! compute the same handle over what they are about to upload. A test pins that both agree.
 
-use crate::geometry::SourceAssembly;
+use crate::geometry::{Solidity, SourceAssembly, Surface};
 
 /// Names the byte stream; a changed stream gets a new tag.
 const TAG: &str = "sbdp-content/1";
+/// The same for meshes in caches.
+const MESH_TAG: &str = "sbdp-mesh/1";
 
 /// The handle of an assembly as given, before anything is healed. The assembly's own name and
 /// where its parts came from do not count.
@@ -28,6 +30,23 @@ pub fn content_hash(assembly: &SourceAssembly) -> [u8; 32] {
         number(&mut hasher, part.mesh.triangles.len());
         hasher.update(bytemuck::cast_slice(&part.mesh.triangles));
     }
+    hasher.finalize().into()
+}
+
+/// The hash of a healed mesh as it is used: in its own frame, in lengths of the planning frame.
+pub(super) fn mesh_hash(surface: &Surface, solidity: Solidity) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    text(&mut hasher, MESH_TAG);
+    hasher.update(&[match solidity {
+        Solidity::Closed => 0,
+        Solidity::Winding => 1,
+    }]);
+    number(&mut hasher, surface.vertices().len());
+    for vertex in surface.vertices() {
+        hasher.update(bytemuck::cast_slice(vertex.coords.as_slice()));
+    }
+    number(&mut hasher, surface.triangles().len());
+    hasher.update(bytemuck::cast_slice(surface.triangles()));
     hasher.finalize().into()
 }
 

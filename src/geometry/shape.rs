@@ -4,9 +4,12 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Point3, Vector3};
 
+use super::content_hash::mesh_hash;
 use super::hull::hull_vertices;
 use super::samples::sited;
-use super::{Bounds, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Spacing, Surface};
+use super::{
+    Bounds, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Solidity, Spacing, Surface,
+};
 
 /// A mesh in its own frame (origin at the middle of its box, lengths of the planning frame).
 #[derive(Debug, Clone)]
@@ -25,6 +28,8 @@ pub struct Shape {
     pub reach: f64,
     /// Built when it is asked for.
     patches: OnceLock<PatchTree>,
+    solidity: Solidity,
+    content: OnceLock<[u8; 32]>,
 }
 
 impl Shape {
@@ -39,12 +44,19 @@ impl Shape {
         let oriented = OrientedSamples::new(&surface, &sited);
         let samples = SampleTree::over(sited.into_iter().map(|(p, _)| p).collect());
         let hull = hull_vertices(surface.vertices());
-        Self { hull, samples, oriented, mass, reach, surface, patches: OnceLock::new() }
+        let solidity = mesh.solidity;
+        let (patches, content) = (OnceLock::new(), OnceLock::new());
+        Self { hull, samples, oriented, mass, reach, surface, patches, solidity, content }
     }
 
     /// The triangles in a tree of patches.
     pub fn patches(&self) -> &PatchTree {
         self.patches.get_or_init(|| PatchTree::new(&self.surface))
+    }
+
+    /// The hash of the mesh, on which alone everything here depends.
+    pub fn content(&self) -> &[u8; 32] {
+        self.content.get_or_init(|| mesh_hash(&self.surface, self.solidity))
     }
 
     /// Largest distance of a point of the shape from the line through `centre` along the unit

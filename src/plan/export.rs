@@ -137,10 +137,13 @@ pub struct StatsDocument {
 pub struct CacheDocument {
     /// Distance fields.
     pub sdf_hits: u64,
-    /// Blocking relations.
+    /// Overlaps and blocking relations of pairs, and planes that parts touch.
     pub blocking_hits: u64,
     /// Motions.
     pub motion_hits: u64,
+    /// Verified paths; null where the daemon planned.
+    #[serde(default)]
+    pub verdict_hits: Option<u64>,
     /// The whole plan.
     pub plan_hit: bool,
 }
@@ -268,6 +271,7 @@ fn stats(stats: &PlanStats) -> StatsDocument {
             sdf_hits: stats.sdf_hits,
             blocking_hits: stats.blocking_hits,
             motion_hits: stats.motion_hits,
+            verdict_hits: stats.verdict_hits,
             plan_hit: stats.plan_hit,
         },
     }
@@ -325,7 +329,7 @@ mod tests {
             r#""stats":{"simulations":7,"simulations_run":0,"sweeps":0,"states":0,"load_time_s":null,"#,
             r#""sdf_time_s":0.0,"overlap_time_s":0.5,"#,
             r#""static_analysis_time_s":0.0,"path_time_s":0.0,"verify_time_s":0.0,"total_time_s":0.0,"#,
-            r#""cache":{"sdf_hits":0,"blocking_hits":0,"motion_hits":0,"plan_hit":true}}}"#,
+            r#""cache":{"sdf_hits":0,"blocking_hits":0,"motion_hits":0,"verdict_hits":null,"plan_hit":true}}}"#,
         );
         assert_eq!(PlanDocument::new(&plan()).to_json().unwrap(), expected);
     }

@@ -98,10 +98,12 @@ pub struct PlanStats {
     pub total_time_s: f64,
     /// Distance fields that were there already.
     pub sdf_hits: u64,
-    /// Blocking relations that were there already.
+    /// Overlaps and blocking relations of pairs, and planes that parts touch, that were there already.
     pub blocking_hits: u64,
     /// Motions that were there already.
     pub motion_hits: u64,
+    /// Verified paths that were there already; `None` where that is not told, as by the daemon.
+    pub verdict_hits: Option<u64>,
     /// The whole plan was there already.
     pub plan_hit: bool,
 }

@@ -61,6 +61,11 @@ impl Samples {
         Self { parts: Arc::new(shape_of.into_iter().map(|s| Arc::clone(&shapes[s])).collect()) }
     }
 
+    /// Those of two parts, as parts 0 and 1.
+    pub(super) fn of_pair(&self, parts: [usize; 2]) -> Self {
+        Self { parts: Arc::new(parts.map(|part| Arc::clone(&self.parts[part])).into()) }
+    }
+
     fn of(&self, part: usize) -> &[SampleTree; SHARES] {
         let Sampled { shape, shares } = &*self.parts[part];
         shares.get_or_init(|| dealt(&shape.surface))

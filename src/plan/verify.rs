@@ -104,6 +104,12 @@ impl Verifier {
         Self { limit, samples: self.samples.clone() }
     }
 
+    /// The same check for a scene of two of the parts alone, as parts 0 and 1.
+    #[must_use]
+    pub fn of_pair(&self, parts: [usize; 2]) -> Self {
+        Self { limit: self.limit, samples: self.samples.of_pair(parts) }
+    }
+
     /// The depth at which a path is refused, in the planning frame.
     #[must_use]
     pub fn limit(&self) -> f64 {

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use crate::cache::MotionQuestion;
 use crate::geometry::{Pose, separating_direction, transformed};
 use crate::plan::{Entry, PlanStatus};
 use crate::simulation::{
@@ -157,7 +158,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         (self.removals.len(), self.problem.extra_points.values().map(Vec::len).sum())
     }
 
-    /// Counts one simulation against the budget.
+    /// Counts one simulation against the budget; a motion that was known costs what it would have cost.
     pub(super) fn charge(&mut self) -> Result<(), Stop> {
         if let Some(most) = self.problem.max_simulations
             && self.problem.spent + self.counters.simulations >= most
@@ -167,6 +168,11 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.counters.simulations += 1;
         self.observer.progress(self.removals.len(), self.counters.simulations);
         Ok(())
+    }
+
+    /// Notes that a motion was used for which a simulation was counted.
+    pub(super) fn used(&mut self, motion: &Motion) {
+        self.counters.recalled += u64::from(motion.recalled);
     }
 
     /// The motions of some runs, in order, up to the first that leads out: that one changes the
@@ -182,10 +188,19 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             let termination = problem.termination.unless_won(&winner, rank);
             let limited = problem.path_timeout.map(|limit| termination.within(limit));
             let poll = limited.as_ref().unwrap_or(&termination);
-            let mut motion = problem.engine.simulate(&problem.scene, around, *part, start, *action, poll);
+            let question = MotionQuestion {
+                engine: problem.engine,
+                scene: &problem.scene,
+                surroundings: around,
+                part: *part,
+                start: *start,
+                action: *action,
+            };
+            let mut motion = problem.recall.motion(&question, poll);
             if motion.is_err() && termination.check().is_ok() {
                 let touched = around.standing.clone();
-                motion = Ok(Motion { path: vec![*start], end: End::Undecided { reason: NO_TIME, touched } });
+                let end = End::Undecided { reason: NO_TIME.into(), touched };
+                motion = Ok(Motion::simulated(vec![*start], Vec::new(), end));
             }
             if matches!(&motion, Ok(Motion { end: End::Disassembled(_), .. })) {
                 winner.fetch_min(rank, Ordering::Relaxed);
@@ -198,7 +213,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             runs.iter().enumerate().map(simulated).collect()
         };
         self.counters.simulation += started.elapsed();
-        let no_time = |m: &Motion| matches!(m.end, End::Undecided { reason: NO_TIME, .. });
+        let no_time = |m: &Motion| matches!(&m.end, End::Undecided { reason, .. } if reason == NO_TIME);
         self.path_time_ran_out |= motions.iter().flatten().any(no_time);
         let wanted = winner.load(Ordering::Relaxed).saturating_add(1);
         Ok(motions.into_iter().take(wanted).collect::<Result<_, Interrupt>>()?)
@@ -274,6 +289,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             }
             self.charge()?;
             let Some(again) = self.simulate(&[run])?.pop() else { break };
+            self.used(&again);
             if !matches!(again.end, End::Disassembled(_)) {
                 return Ok(Proof::Otherwise(again));
             }

@@ -34,6 +34,8 @@ pub struct BlockedAction {
 pub struct Counters {
     /// Transition functions used.
     pub simulations: u64,
+    /// Of them, those whose motion was known.
+    pub recalled: u64,
     /// Removals that a straight sweep showed, without simulation.
     pub sweeps: u64,
     /// States kept.

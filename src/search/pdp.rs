@@ -222,8 +222,9 @@ impl Search<'_, '_> {
             let motions = self.disassembly.simulate(&runs)?;
             for (run, motion) in runs.into_iter().zip(motions) {
                 self.disassembly.charge()?;
+                self.disassembly.used(&motion);
                 let motion = match motion {
-                    Motion { path, end: End::Disassembled(_) } => {
+                    Motion { path, end: End::Disassembled(_), .. } => {
                         self.disassembly.trace_simulation(at, &run, "disassembled", &[], path.len(), None);
                         match self.disassembly.prove(run, &prefix, path)? {
                             Proof::Path { path, depth } => {
@@ -248,7 +249,7 @@ impl Search<'_, '_> {
 
     /// Adds the end of a motion to the tree, unless it is there.
     fn grow(&mut self, tree: &mut Tree, at: usize, run: &Run, action: usize, motion: Motion) {
-        let Motion { path, end } = motion;
+        let Motion { path, end, .. } = motion;
         let (word, with) = match end {
             End::Collision { with } => ("collision", with),
             End::Undecided { touched, .. } => ("undecided", touched),

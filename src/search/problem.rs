@@ -1,11 +1,13 @@
 //! A planning question in the planning frame, ready to be searched.
 
 use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 use std::time::Duration;
 
 use nalgebra::Point3;
 
 use crate::blocking_graph::StaticAnalysis;
+use crate::cache::{Recall, VerdictQuestion};
 use crate::geometry::{Bounds, Pose, SampleTree};
 use crate::plan::{Entry, Verifier, thinned};
 use crate::simulation::{Action, Scene, TransitionFunction};
@@ -62,6 +64,8 @@ pub struct Problem<'a> {
     pub path_timeout: Option<Duration>,
     /// Ends the search early.
     pub termination: Termination,
+    /// What is remembered.
+    pub recall: Recall,
     /// Points added so far, per part.
     pub extra_points: HashMap<usize, Vec<Point3<f64>>>,
 }
@@ -120,9 +124,10 @@ impl Problem<'_> {
         let bounds = self.scene.bodies[part].shape.bounds();
         let thin = thinned(path, bounds, &self.scene.centre_in_shape(part));
         let standing = self.scene.broad_phase.meeting_of(&standing, &self.swept_bounds(part, &thin));
-        let Scene { allowances, .. } = &self.scene;
-        let verdict =
-            self.verifier.check(&self.scene, allowances, &standing, part, &thin, &self.termination)?;
+        let Self { scene, verifier, .. } = self;
+        let question = VerdictQuestion { scene, near: &standing, part, path: &thin, limit: verifier.limit() };
+        let check = || verifier.check(scene, &scene.allowances, &standing, part, &thin, &self.termination);
+        let verdict = self.recall.verdict(&question, check)?;
         if verdict.entries.is_empty() { Ok(Ok((thin, verdict.depth))) } else { Ok(Err(verdict.entries)) }
     }
 
@@ -153,7 +158,7 @@ impl Problem<'_> {
             }
         }
         for (body, points) in &self.extra_points {
-            self.scene.bodies[*body].extra_samples = SampleTree::over(points.clone());
+            Arc::make_mut(&mut self.scene.bodies)[*body].extra_samples = SampleTree::over(points.clone());
         }
     }
 }

@@ -63,7 +63,7 @@ impl Search<'_, '_> {
             termination.check()?;
             let others: Vec<usize> = standing.iter().copied().filter(|&p| p != part).collect();
             let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
-            Ok(Touching::of(scene, part, &pose, &others, reach))
+            Ok(problem.recall.touching(scene, part, &pose, &others, reach))
         };
         let found = parts.par_iter().map(touching).collect::<Result<Vec<_>, Interrupt>>()?;
         let before = self.rays.offered.len();

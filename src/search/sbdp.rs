@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::blocking_graph::{Blockage, blocked_from, initial_blockages};
+use crate::blocking_graph::{Analysis, Blockage};
 use crate::geometry::Pose;
 use crate::simulation::{Action, End, Motion};
 use crate::termination::Interrupt;
@@ -158,12 +158,13 @@ impl<'a, 'o> Search<'a, 'o> {
     }
 
     fn make_roots(&mut self) -> Result<(), Stop> {
-        let Problem { scene, present, static_analysis, termination, .. } = &self.disassembly.problem;
+        let Problem { scene, present, static_analysis, termination, recall, .. } = &self.disassembly.problem;
         let blockages = if self.guided {
             let started = Instant::now();
             let least = |part| least_travel(scene, part);
-            let found =
-                initial_blockages(*static_analysis, scene, present, &self.translations, &least, termination)?;
+            let analysis =
+                Analysis { rule: *static_analysis, scene, translations: &self.translations, recall };
+            let found = analysis.initial_blockages(present, &least, termination)?;
             self.disassembly.counters.static_analysis += started.elapsed();
             found
         } else {
@@ -254,10 +255,10 @@ impl<'a, 'o> Search<'a, 'o> {
         }
         let started = Instant::now();
         let (problem, nodes) = (&self.disassembly.problem, &self.nodes);
-        let (scene, rule) = (&problem.scene, problem.static_analysis);
+        let Problem { scene, static_analysis, termination, recall, .. } = problem;
         let standing: Vec<_> = todo.iter().map(|&i| self.disassembly.standing(nodes[i].part)).collect();
         let translations = &self.translations[..self.along_axes()];
-        let termination = &self.disassembly.problem.termination;
+        let analysis = Analysis { rule: *static_analysis, scene, translations, recall };
         let found = todo
             .par_iter()
             .zip(standing)
@@ -265,7 +266,7 @@ impl<'a, 'o> Search<'a, 'o> {
                 termination.check()?;
                 let node = &nodes[i];
                 let least = least_travel(scene, node.part);
-                Ok(blocked_from(rule, scene, &standing, node.part, node.pose(), translations, least))
+                Ok(analysis.blocked_from(&standing, node.part, node.pose(), least))
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
         for (&i, blockage) in todo.iter().zip(found) {
@@ -303,6 +304,7 @@ impl<'a, 'o> Search<'a, 'o> {
                     self.trace_expansion(phase, job.node);
                 }
                 self.disassembly.charge()?;
+                self.disassembly.used(&motion);
                 let changed = self.take(phase, job, motion, &mut gain)?;
                 // Where turning led a part is looked at before it is turned on, or another part is.
                 let look_there = by_action && gain.new_states;
@@ -372,7 +374,7 @@ impl<'a, 'o> Search<'a, 'o> {
 
     /// Takes in a motion; true if the scene changed by it.
     fn take(&mut self, phase: Phase, job: Job, motion: Motion, gain: &mut Gain) -> Result<bool, Stop> {
-        let Motion { path, end } = motion;
+        let Motion { path, end, .. } = motion;
         let run = self.run_of(phase, job);
         tracing::debug!(part = run.part, node = job.node, action = %run.action, steps = path.len(), ?end, "simulated");
         let (word, by) = match end {

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use super::*;
 use crate::blocking_graph::StaticAnalysis;
+use crate::cache::Recall;
 use crate::fixtures::{cells, cuboid, moved, rod, scene, tube};
 use crate::geometry::SourceMesh;
 use crate::plan::{PlanStatus, Verifier};
@@ -71,6 +72,7 @@ pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
         spent: 0,
         path_timeout: None,
         termination: Termination::default(),
+        recall: Recall::default(),
         extra_points: HashMap::new(),
     }
 }

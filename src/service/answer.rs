@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::cache::Reused;
 use crate::geometry::{Assembly, Pose, Waypoint, waypoint_from_pose};
 use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
 use crate::search::{BlockedAction, Outcome, PlanRequest, Removal};
@@ -54,7 +55,18 @@ pub(super) struct Frame<'a> {
     pub(super) notes: Vec<String>,
 }
 
+/// What of an answer was there already.
+#[derive(Default)]
+pub(super) struct Found {
+    /// Distance fields.
+    pub(super) fields: u64,
+    pub(super) pieces: Reused,
+    /// The whole.
+    pub(super) plan: bool,
+}
+
 /// What a request spent its time on, beside its search.
+#[derive(Default)]
 pub(super) struct Times {
     pub(super) fields: Duration,
     pub(super) overlaps: Duration,
@@ -64,11 +76,11 @@ pub(super) struct Times {
 
 impl Frame<'_> {
     /// The plan of a finished search.
-    pub(super) fn plan(self, outcome: Outcome, times: &Times, sdf_hits: u64) -> Plan {
+    pub(super) fn plan(self, outcome: Outcome, times: &Times, found: &Found) -> Plan {
         let c = outcome.counters;
         let stats = PlanStats {
             simulations: c.simulations,
-            simulations_run: c.simulations,
+            simulations_run: c.simulations - c.recalled,
             sweeps: c.sweeps,
             states: c.states,
             sdf_time_s: times.fields.as_secs_f64(),
@@ -77,7 +89,11 @@ impl Frame<'_> {
             path_time_s: c.simulation.as_secs_f64(),
             verify_time_s: c.verification.as_secs_f64(),
             total_time_s: times.total.as_secs_f64(),
-            sdf_hits,
+            sdf_hits: found.fields,
+            blocking_hits: found.pieces.overlaps + found.pieces.blocking,
+            motion_hits: found.pieces.motions,
+            verdict_hits: Some(found.pieces.verdicts),
+            plan_hit: found.plan,
             ..PlanStats::default()
         };
         let steps = outcome.removals.iter().map(|r| step(self.assembly, r)).collect();

@@ -4,27 +4,29 @@
 //! tested is what is used. It knows nothing of shared memory.
 //!
 //! Data flow of a request: assembly (`geometry`) → fields (`sdf`) and overlaps → `search` → plan in
-//! the input's units (`plan`).
+//! the input's units (`plan`). What was answered before, in whole or in part, the `cache` knows.
 
 mod answer;
 mod prepared;
+mod relay;
+#[cfg(test)]
+mod tests;
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::{Duration, Instant};
 
 use crate::blocking_graph::{Audit, StaticAnalysis, audit};
+use crate::cache::{Answered, Cache, PlanQuestion, Recall};
 use crate::geometry::{Assembly, GeometryError, Revision, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, PlanStatus, Warning};
-use crate::search::{
-    Engine, Observer, PlanRequest, PlanSink, Problem, Progress, Removal, Stage, TraceEvent, least_travel,
-    search,
-};
+use crate::search::{Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, least_travel, search};
 use crate::simulation::{PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
-use answer::{Frame, Times};
+use answer::{Found, Frame, Times};
 use prepared::Prepared;
+use relay::{Relay, Silent};
 
 /// The name of an assembly: the hash of its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -73,12 +75,35 @@ struct Entry {
 }
 
 /// The service. Shared by all threads.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Service {
     entries: Mutex<HashMap<AssemblyId, Arc<Entry>>>,
+    cache: Arc<Cache>,
+}
+
+/// Bytes that a service remembers which was given no cache.
+const MEMORY: usize = 64 << 20;
+
+impl Default for Service {
+    /// Remembers in memory, for as long as it lives.
+    fn default() -> Self {
+        Self::new(Arc::new(Cache::in_memory(MEMORY)))
+    }
 }
 
 impl Service {
+    /// A service that remembers in a cache.
+    #[must_use]
+    pub fn new(cache: Arc<Cache>) -> Self {
+        Self { entries: Mutex::default(), cache }
+    }
+
+    /// What it remembers in.
+    #[must_use]
+    pub fn cache(&self) -> &Arc<Cache> {
+        &self.cache
+    }
+
     /// Validates, heals and registers an assembly. The same content gives the same id, at once.
     ///
     /// # Errors
@@ -124,7 +149,8 @@ impl Service {
     /// The id is unknown.
     pub fn overlaps(&self, id: AssemblyId) -> Result<Vec<Overlap>, ServiceError> {
         let entry = self.entry(id)?;
-        let found = entry.prepared(&Termination::default(), &mut Silent);
+        let recall = Recall::of(Arc::clone(&self.cache));
+        let found = entry.prepared(&Termination::default(), &mut Silent, &recall);
         Ok(found.map_or_else(|_| Vec::new(), |(p, _)| answer::overlaps(&entry.assembly, &p.overlaps)))
     }
 
@@ -145,7 +171,8 @@ impl Service {
             .num_threads(request.threads)
             .build()
             .map_err(|e| ServiceError::Threads(e.to_string()))?;
-        Ok(pool.install(|| entry.plan(request, termination, sink)))
+        let recall = if request.no_cache { Recall::default() } else { Recall::of(Arc::clone(&self.cache)) };
+        Ok(pool.install(|| entry.plan(request, termination, sink, &recall)))
     }
 
     /// Compares the initial blocking graphs of an assembly with simulation.
@@ -160,7 +187,8 @@ impl Service {
         termination: &Termination,
     ) -> Result<Option<Audit>, ServiceError> {
         let entry = self.entry(id)?;
-        let Ok((prepared, _)) = entry.prepared(termination, &mut Silent) else { return Ok(None) };
+        let recall = Recall::of(Arc::clone(&self.cache));
+        let Ok((prepared, _)) = entry.prepared(termination, &mut Silent, &recall) else { return Ok(None) };
         let scene = &prepared.scene;
         let present: Vec<usize> = (0..scene.bodies.len()).collect();
         let least = |part| least_travel(scene, part);
@@ -179,7 +207,13 @@ impl Service {
 }
 
 impl Entry {
-    fn plan(&self, request: &PlanRequest, termination: &Termination, sink: &mut dyn PlanSink) -> Plan {
+    fn plan(
+        &self,
+        request: &PlanRequest,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+        recall: &Recall,
+    ) -> Plan {
         let started = Instant::now();
         let mut fixed = request.fixed.clone();
         fixed.extend(&self.assembly.fixed);
@@ -197,45 +231,67 @@ impl Entry {
             overlaps: Vec::new(),
             notes: Vec::new(),
         };
+        let (fixed, removed) = (frame.fixed.clone(), frame.removed.clone());
+        let question = PlanQuestion { assembly: &self.assembly, request, fixed: &fixed, removed: &removed };
+        // Whoever wants to be told what the search does wants it done.
+        if !sink.traces()
+            && let Some(answered) = recall.plan(&question)
+        {
+            return self.answered(frame, answered, sink, started);
+        }
         let prepared = if request.no_cache {
-            Prepared::new(&self.assembly, termination, sink).map(|p| (Arc::new(p), false))
+            Prepared::new(&self.assembly, termination, sink, recall).map(|p| (Arc::new(p), false))
         } else {
-            self.prepared(termination, sink)
+            self.prepared(termination, sink, recall)
         };
         match prepared {
-            Ok((prepared, hit)) => self.searched(frame, &prepared, hit, termination, sink, started),
+            Ok((prepared, hit)) => {
+                let prepared = Ready { prepared: &prepared, hit, recall, question: &question };
+                self.searched(frame, &prepared, termination, sink, started)
+            }
             Err(Interrupt::Cancelled) => frame.empty(PlanStatus::Cancelled, Some("cancelled".to_owned())),
             Err(Interrupt::DeadlinePassed) => frame
                 .empty(PlanStatus::Timeout, Some("the deadline passed while fields were built".to_owned())),
         }
     }
 
+    /// A plan that was made before, told as if it were made now.
+    fn answered(
+        &self,
+        mut frame: Frame<'_>,
+        answered: Answered,
+        sink: &mut dyn PlanSink,
+        started: Instant,
+    ) -> Plan {
+        let Answered { outcome, overlaps } = answered;
+        frame.overlaps = answer::overlaps(&self.assembly, &overlaps);
+        let engine = engine_of(frame.request.engine, frame.request.penalty);
+        frame.notes.extend(accepted(&*engine, prepared::depth_limit(&self.assembly), &self.assembly).1);
+        for removal in &outcome.removals {
+            sink.step(&answer::step(&self.assembly, removal));
+        }
+        let times = Times { total: started.elapsed(), ..Times::default() };
+        frame.plan(outcome, &times, &Found { plan: true, ..Found::default() })
+    }
+
     fn searched(
         &self,
         mut frame: Frame<'_>,
-        prepared: &Prepared,
-        hit: bool,
+        ready: &Ready<'_>,
         termination: &Termination,
         sink: &mut dyn PlanSink,
         started: Instant,
     ) -> Plan {
         let request = frame.request;
+        let Ready { prepared, hit, recall, question } = *ready;
         frame.overlaps = answer::overlaps(&self.assembly, &prepared.overlaps);
         let engine = engine_of(request.engine, request.penalty);
         let present: Vec<usize> =
             (0..self.assembly.parts.len()).filter(|p| frame.removed.binary_search(p).is_err()).collect();
         let total = present.len() as u32;
-        // An engine that lets parts overlap by more than is accepted is held to its own word.
-        let soft = engine.depth_tolerance() > prepared.verifier.limit();
-        let limit = if soft { engine.depth_tolerance() + BETWEEN_SAMPLES } else { prepared.verifier.limit() };
+        let (limit, note) = accepted(&*engine, prepared.verifier.limit(), &self.assembly);
         let verifier = prepared.verifier.with_limit(limit);
-        if soft {
-            frame.notes.push(format!(
-                "the engine `{}` lets parts overlap by {:.3e}; paths are verified to that depth",
-                engine.name(),
-                limit / self.assembly.scale
-            ));
-        }
+        frame.notes.extend(note);
         let problem = Problem {
             scene: prepared.scene.clone(),
             verifier: &verifier,
@@ -250,6 +306,7 @@ impl Entry {
             spent: 0,
             path_timeout: request.path_timeout,
             termination: termination.clone(),
+            recall: recall.clone(),
             extra_points: HashMap::new(),
         };
         let mut relay = Relay { assembly: &self.assembly, sink, total };
@@ -261,14 +318,16 @@ impl Entry {
             });
         }
         let outcome = search(request.planner, problem, &mut relay);
-        let hits = if hit { self.assembly.shapes.len() as u64 } else { 0 };
+        recall.remember_plan(question, termination, &outcome, &prepared.overlaps);
+        let fields = if hit { self.assembly.shapes.len() as u64 } else { 0 };
+        let found = Found { fields, pieces: recall.reused(), plan: false };
         let spent = |time: Duration| if hit { Duration::ZERO } else { time };
         let times = Times {
             fields: spent(prepared.sdf_time),
             overlaps: spent(prepared.overlap_time),
             total: started.elapsed(),
         };
-        frame.plan(outcome, &times, hits)
+        frame.plan(outcome, &times, &found)
     }
 
     /// Fields and overlaps, and whether they were there already. Whoever comes while they are
@@ -277,6 +336,7 @@ impl Entry {
         &self,
         termination: &Termination,
         sink: &mut dyn PlanSink,
+        recall: &Recall,
     ) -> Result<(Arc<Prepared>, bool), Interrupt> {
         loop {
             let mut slot = match self.prepared.try_lock() {
@@ -291,11 +351,34 @@ impl Entry {
             if let Some(prepared) = &*slot {
                 return Ok((Arc::clone(prepared), true));
             }
-            let prepared = Arc::new(Prepared::new(&self.assembly, termination, sink)?);
+            let prepared = Arc::new(Prepared::new(&self.assembly, termination, sink, recall)?);
             *slot = Some(Arc::clone(&prepared));
             return Ok((prepared, false));
         }
     }
+}
+
+/// What a search works with.
+#[derive(Clone, Copy)]
+struct Ready<'a> {
+    prepared: &'a Prepared,
+    /// It was there already.
+    hit: bool,
+    recall: &'a Recall,
+    question: &'a PlanQuestion<'a>,
+}
+
+/// The depth to which paths are verified, and what the reader of a plan should know of it: an engine that
+/// lets parts overlap by more than is accepted is held to its own word.
+fn accepted(engine: &dyn TransitionFunction, limit: f64, assembly: &Assembly) -> (f64, Option<String>) {
+    if engine.depth_tolerance() <= limit {
+        return (limit, None);
+    }
+    let limit = engine.depth_tolerance() + BETWEEN_SAMPLES;
+    let (name, depth) = (engine.name(), limit / assembly.scale);
+    let note =
+        format!("the engine `{name}` lets parts overlap by {depth:.3e}; paths are verified to that depth");
+    (limit, Some(note))
 }
 
 fn engine_of(engine: Engine, penalty: PenaltyParameters) -> Box<dyn TransitionFunction> {
@@ -307,40 +390,6 @@ fn engine_of(engine: Engine, penalty: PenaltyParameters) -> Box<dyn TransitionFu
 
 /// What verification finds between the samples of an engine, in the planning frame.
 const BETWEEN_SAMPLES: f64 = 1e-3;
-
-/// Hands a search's events on, in the input's units.
-struct Relay<'a> {
-    assembly: &'a Assembly,
-    sink: &'a mut dyn PlanSink,
-    total: u32,
-}
-
-impl Observer for Relay<'_> {
-    fn progress(&mut self, removed: usize, simulations: u64) {
-        let (done, total) = (removed as u32, self.total);
-        self.sink.progress(Progress { stage: Stage::Search, done, total, simulations });
-    }
-
-    fn removal(&mut self, removal: &Removal) {
-        self.sink.step(&answer::step(self.assembly, removal));
-    }
-
-    fn traces(&self) -> bool {
-        self.sink.traces()
-    }
-
-    fn traced(&mut self, event: TraceEvent) {
-        self.sink.traced(event);
-    }
-}
-
-/// Nobody listens.
-struct Silent;
-
-impl PlanSink for Silent {
-    fn progress(&mut self, _: Progress) {}
-    fn step(&mut self, _: &crate::plan::PlanStep) {}
-}
 
 fn check_parts(request: &PlanRequest, count: usize) -> Result<(), ServiceError> {
     let none = Vec::new();

@@ -6,11 +6,12 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
+use crate::cache::{Recall, overlap_key};
 use crate::geometry::{Assembly, Shape};
 use crate::plan::Verifier;
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
-use crate::simulation::{Scene, placed_alike};
+use crate::simulation::{Pair, Scene, grouped, resolution};
 use crate::termination::{Interrupt, Termination};
 
 /// Overlaps smaller than this share of the longest side are rounding, not modelling.
@@ -39,6 +40,7 @@ impl Prepared {
         assembly: &Assembly,
         termination: &Termination,
         sink: &mut dyn PlanSink,
+        recall: &Recall,
     ) -> Result<Self, Interrupt> {
         let started = Instant::now();
         let fields = build_fields(&assembly.shapes, termination, sink)?;
@@ -46,8 +48,8 @@ impl Prepared {
         let started = Instant::now();
         let mut scene = Scene::assembled(assembly, &fields);
         let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
-        let verifier = Verifier::new(&assembly.shapes, shape_of, DEPTH_LIMIT * scene.longest_side);
-        let overlaps = measure_overlaps(&scene, &verifier, termination)?;
+        let verifier = Verifier::new(&assembly.shapes, shape_of, depth_limit(assembly));
+        let overlaps = measure_overlaps(&scene, &verifier, termination, recall)?;
         for &(a, b, depth) in &overlaps {
             scene.allowances.grant(a, b, depth);
         }
@@ -56,6 +58,11 @@ impl Prepared {
         overlaps.sort_by_key(|&(a, b, _)| (a, b));
         Ok(Self { scene, verifier, overlaps, sdf_time, overlap_time: started.elapsed() })
     }
+}
+
+/// The depth beyond what is granted at which paths are refused, in the planning frame.
+pub(super) fn depth_limit(assembly: &Assembly) -> f64 {
+    DEPTH_LIMIT * resolution(assembly)
 }
 
 fn build_fields(
@@ -87,12 +94,24 @@ fn measure_overlaps(
     scene: &Scene,
     verifier: &Verifier,
     termination: &Termination,
+    recall: &Recall,
 ) -> Result<Vec<(usize, usize, f64)>, Interrupt> {
     let pairs = scene.broad_phase.pairs(0.0);
-    let (first, group_of) = placed_alike(scene, &pairs);
+    let placed = |&(a, b): &(usize, usize)| {
+        let pair = Pair::turned(scene, a, b);
+        (overlap_key(scene, &pair), pair)
+    };
+    let keyed: Vec<_> = pairs.par_iter().map(placed).collect();
+    let (first, group_of) = grouped(keyed.iter().map(|(key, _)| *key));
     let depths = first
         .par_iter()
-        .map(|&(a, b)| verifier.assembled_depth(scene, a, b, termination))
+        .map(|&i| {
+            let (key, pair) = &keyed[i];
+            recall.overlap(*key, || {
+                let alone = pair.scene(scene);
+                verifier.of_pair(pair.parts).assembled_depth(&alone, 0, 1, termination)
+            })
+        })
         .collect::<Result<Vec<_>, Interrupt>>()?;
     let overlaps = pairs.into_iter().zip(group_of).map(|((a, b), group)| (a, b, depths[group]));
     Ok(overlaps.filter(|(_, _, d)| *d > LEAST_OVERLAP * scene.longest_side).collect())

@@ -1,113 +1,173 @@
-//! Pairs of parts that stand alike: what holds for one bolt in its nut holds for all.
+//! Pairs of parts as they stand to each other, wherever that is: what holds for one bolt in its nut
+//! holds for all that stand alike, in this assembly and in others.
+//!
+//! Poses are rounded, far finer than contact is measured, and what is asked about a pair is answered for
+//! the rounded poses in a scene of the two alone. So the answer is the same, to the bit, for all pairs
+//! that stand alike, whichever is asked first.
 
 use std::collections::HashMap;
 use std::hash::Hash;
 use std::sync::Arc;
 
-use crate::geometry::{Pose, Shape};
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 
-use super::Scene;
+use crate::geometry::{Bounds, Pose};
 
-/// The first of each group of pairs that stand alike, and for every pair the group that it is in.
-#[must_use]
-pub fn alike(scene: &Scene, pairs: &[(usize, usize)]) -> (Vec<(usize, usize)>, Vec<usize>) {
-    grouped(pairs, |mover, other| PairKey::of(scene, mover, other))
+use super::{BroadPhase, Scene};
+
+/// Two parts with rounded poses of their shapes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pair {
+    /// The parts' numbers.
+    pub parts: [usize; 2],
+    /// Where they stand, up to a motion of both together.
+    pub poses: [Pose; 2],
 }
 
-/// The same for pairs that may be turned together: what is asked about them depends on their relative
-/// pose only, and not on which of the two is named first.
-#[must_use]
-pub fn placed_alike(scene: &Scene, pairs: &[(usize, usize)]) -> (Vec<(usize, usize)>, Vec<usize>) {
-    let mut shapes: HashMap<*const Shape, usize> = HashMap::new();
-    let of_body = scene.bodies.iter().map(|body| Arc::as_ptr(&body.shape));
-    let kinds: Vec<usize> = of_body.enumerate().map(|(i, s)| *shapes.entry(s).or_insert(i)).collect();
-    grouped(pairs, |a, b| {
-        let [a, b] = if kinds[a] <= kinds[b] { [a, b] } else { [b, a] };
-        let [from, to] = [a, b].map(|part| scene.bodies[part].planning_from_shape);
-        let between = from.inverse() * to;
-        let way: [i64; 3] = between.translation.vector.map(snapped).into();
-        ([kinds[a], kinds[b]], turned(&between), way)
-    })
+impl Pair {
+    /// A part at a pose and another as assembled, shifted together: for questions that depend on how
+    /// they are turned against the axes of the world.
+    #[must_use]
+    pub fn shifted(scene: &Scene, part: usize, pose: &Pose, other: usize) -> Self {
+        let there = scene.bodies[other].planning_from_shape;
+        let way = (there.translation.vector - pose.translation.vector).map(rounded);
+        let turned = [pose, &there].map(|p| rounded_turn(&p.rotation));
+        let poses =
+            [Pose::from_parts(Vector3::zeros().into(), turned[0]), Pose::from_parts(way.into(), turned[1])];
+        Self { parts: [part, other], poses }
+    }
+
+    /// Two parts as assembled, turned together such that the first is not turned at all: for questions
+    /// that depend on their relative pose only, and not on which of them is named first.
+    #[must_use]
+    pub fn turned(scene: &Scene, a: usize, b: usize) -> Self {
+        let of = |parts: [usize; 2]| {
+            let [from, to] = parts.map(|part| scene.bodies[part].planning_from_shape);
+            let between = from.inverse() * to;
+            let way = between.translation.vector.map(rounded);
+            let there = Pose::from_parts(way.into(), rounded_turn(&between.rotation));
+            Self { parts, poses: [Pose::identity(), there] }
+        };
+        let hash = |part: usize| scene.bodies[part].shape.content();
+        let bits = |pair: &Self| -> ([u64; 3], [u64; 4]) {
+            let there = pair.poses[1];
+            (
+                there.translation.vector.map(f64::to_bits).into(),
+                there.rotation.coords.map(f64::to_bits).into(),
+            )
+        };
+        let (one, other) = (of([a, b]), of([b, a]));
+        let first = (hash(a), bits(&one)) <= (hash(b), bits(&other));
+        if first { one } else { other }
+    }
+
+    /// The two alone, as parts 0 and 1, with what they are granted and the resolution of the whole.
+    #[must_use]
+    pub fn scene(&self, scene: &Scene) -> Scene {
+        let [a, b] = self.parts;
+        let mut bodies = self.parts.map(|part| scene.bodies[part].clone());
+        for (body, pose) in bodies.iter_mut().zip(&self.poses) {
+            let hull: Vec<Point3<f64>> = body.shape.hull.iter().map(|p| pose * p).collect();
+            (body.planning_from_shape, body.bounds) = (*pose, Bounds::of(&hull));
+        }
+        let broad_phase = Arc::new(BroadPhase::new(&[bodies[0].bounds, bodies[1].bounds]));
+        let mut pair =
+            Scene { bodies: Arc::new(bodies.into()), broad_phase, ..Scene::empty(scene.longest_side) };
+        let granted = scene.allowances.of(a, b);
+        if granted > 0.0 {
+            pair.allowances.grant(0, 1, granted);
+        }
+        pair
+    }
 }
 
-fn grouped<K: Eq + Hash>(
-    pairs: &[(usize, usize)],
-    key: impl Fn(usize, usize) -> K,
-) -> (Vec<(usize, usize)>, Vec<usize>) {
-    let mut groups: HashMap<K, usize> = HashMap::new();
-    let mut first = Vec::new();
-    let group_of = pairs
-        .iter()
-        .map(|&(a, b)| {
-            *groups.entry(key(a, b)).or_insert_with(|| {
-                first.push((a, b));
-                first.len() - 1
-            })
+/// Of things with equal keys the first one's place, in order, and for each thing the place of its key among these.
+pub fn grouped<K: Eq + Hash>(keys: impl IntoIterator<Item = K>) -> (Vec<usize>, Vec<usize>) {
+    let (mut groups, mut first) = (HashMap::new(), Vec::new());
+    let group = |(i, key)| {
+        *groups.entry(key).or_insert_with(|| {
+            first.push(i);
+            first.len() - 1
         })
-        .collect();
+    };
+    let group_of = keys.into_iter().enumerate().map(group).collect();
     (first, group_of)
 }
 
-/// Far finer than contact is measured, far coarser than poses are rounded.
-fn snapped(x: f64) -> i64 {
-    (x * 1e8).round() as i64
+/// To about a billionth of the planning frame's unit.
+fn rounded(x: f64) -> f64 {
+    const STEP: f64 = 1.0 / (1u64 << 30) as f64;
+    // Without the sign of zero.
+    (x / STEP).round() * STEP + 0.0
 }
 
 /// A rotation, of whose two quaternions one is taken.
-fn turned(pose: &Pose) -> [i64; 4] {
-    let q = pose.rotation.coords;
-    let sign = q.iter().find(|c| c.abs() > 1e-7).map_or(1.0, |c| c.signum());
-    (q * sign).map(snapped).into()
-}
-
-/// Pairs with equal keys stand alike: the same shapes at the same relative place, turned alike
-/// against the axes of the actions.
-#[derive(PartialEq, Eq, Hash)]
-struct PairKey {
-    shapes: [*const Shape; 2],
-    rotations: [[i64; 4]; 2],
-    between: [i64; 3],
-    allowance: i64,
-}
-
-impl PairKey {
-    fn of(scene: &Scene, mover: usize, other: usize) -> Self {
-        let bodies = [&scene.bodies[mover], &scene.bodies[other]];
-        let [a, b] = bodies.map(|body| body.planning_from_shape);
-        Self {
-            shapes: bodies.map(|body| Arc::as_ptr(&body.shape)),
-            rotations: [a, b].map(|pose| turned(&pose)),
-            between: (b.translation.vector - a.translation.vector).map(snapped).into(),
-            allowance: snapped(scene.allowances.of(mover, other)),
-        }
-    }
+fn rounded_turn(q: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    let coords = q.coords.map(rounded);
+    let sign = coords.iter().find(|c| **c != 0.0).map_or(1.0, |c| c.signum());
+    UnitQuaternion::new_normalize(nalgebra::Quaternion::from(coords.map(|c| c * sign + 0.0)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
 
     use crate::fixtures::{cuboid, moved, scene};
 
     #[test]
-    fn equal_pairs_are_one_group() {
-        let post = |x: f64| cuboid([x, 0.0, 1.0], [x + 1.0, 1.0, 3.0]);
-        let foot = |x: f64| cuboid([x - 1.0, -1.0, 0.0], [x + 2.0, 2.0, 1.0]);
-        let (scene, _) = scene([foot(0.0), post(0.0), foot(5.0), post(5.0)]);
-        let (first, group_of) = alike(&scene, &[(0, 1), (2, 3), (0, 3)]);
-        assert_eq!((first, group_of), (vec![(0, 1), (0, 3)], vec![0, 0, 1]));
+    fn equal_keys_are_one_group() {
+        assert_eq!(grouped(["a", "b", "a", "c", "b"]), (vec![0, 1, 3], vec![0, 1, 0, 2, 1]));
     }
 
     #[test]
-    fn pairs_that_are_turned_together_are_placed_alike() {
+    fn shifted_pairs_stand_alike() {
+        let post = |x: f64| cuboid([x, 0.0, 1.0], [x + 1.0, 1.0, 3.0]);
+        let foot = |x: f64| cuboid([x - 1.0, -1.0, 0.0], [x + 2.0, 2.0, 1.0]);
+        let (scene, _) = scene([foot(0.0), post(0.0), foot(5.1), post(5.1)]);
+        let pair =
+            |a: usize, b: usize| Pair::shifted(&scene, a, &scene.bodies[a].planning_from_shape, b).poses;
+        assert_eq!(pair(0, 1), pair(2, 3));
+        assert_ne!(pair(0, 1), pair(0, 3));
+        assert_ne!(pair(0, 1), pair(1, 0));
+    }
+
+    #[test]
+    fn pairs_that_are_turned_together_stand_alike_whichever_is_first() {
         let quarter = Pose::rotation(Vector3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2));
         let foot = || cuboid([-1.0, -1.5, 0.0], [2.0, 2.0, 1.0]);
         let post = || cuboid([0.0, 0.0, 1.0], [1.0, 1.25, 3.0]);
         let turned = |mesh| moved(moved(mesh, &quarter), &Pose::translation(6.0, 0.0, 0.0));
         let (scene, _) = scene([foot(), post(), turned(post()), turned(foot())]);
-        let pairs = [(0, 1), (2, 3), (0, 2)];
-        assert_eq!(alike(&scene, &pairs).0.len(), 3);
-        assert_eq!(placed_alike(&scene, &pairs), (vec![(0, 1), (0, 2)], vec![0, 0, 1]));
+        let pair = |a: usize, b: usize| {
+            let pair = Pair::turned(&scene, a, b);
+            (pair.parts.map(|p| scene.bodies[p].shape.content()), pair.poses)
+        };
+        assert_eq!(pair(0, 1), pair(2, 3));
+        assert_eq!(pair(0, 1), pair(1, 0));
+        assert_ne!(pair(0, 1), pair(0, 2));
+        let shifted =
+            |a: usize, b: usize| Pair::shifted(&scene, a, &scene.bodies[a].planning_from_shape, b).poses;
+        assert_ne!(shifted(0, 1), shifted(3, 2));
+    }
+
+    #[test]
+    fn a_pair_stands_as_its_parts_do_in_the_assembly() {
+        let turn = Pose::new(Vector3::new(3.0, -1.0, 0.5), Vector3::new(0.2, -0.4, 1.0));
+        let (scene, _) =
+            scene([cuboid([-4.0; 3], [0.0; 3]), moved(cuboid([0.0; 3], [1.0, 2.0, 3.0]), &turn)]);
+        for pair in
+            [Pair::turned(&scene, 0, 1), Pair::shifted(&scene, 1, &scene.bodies[1].planning_from_shape, 0)]
+        {
+            let alone = pair.scene(&scene);
+            let between = |s: &Scene, a: usize, b: usize| {
+                s.bodies[a].planning_from_shape.inverse() * s.bodies[b].planning_from_shape
+            };
+            let (here, there) = (between(&alone, 0, 1), between(&scene, pair.parts[0], pair.parts[1]));
+            assert!((here.to_matrix() - there.to_matrix()).norm() < 1e-8);
+            for body in alone.bodies.iter() {
+                let inside = |v| body.bounds.grown(1e-12).contains(&(body.planning_from_shape * v));
+                assert!(body.shape.surface.vertices().iter().all(inside));
+            }
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! Which parts' boxes meet a box, at the assembled poses: parry's tree of boxes.
 
+use std::sync::{Arc, Mutex, PoisonError};
+
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector as ParryVector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
@@ -9,8 +11,15 @@ use crate::geometry::Bounds;
 /// The boxes of all parts, in a tree.
 #[derive(Debug, Clone)]
 pub struct BroadPhase {
+    boxes: Arc<Boxes>,
+    /// Takes in every box that is asked about.
+    watched: Option<Arc<Mutex<Bounds>>>,
+}
+
+#[derive(Debug)]
+struct Boxes {
     tree: Bvh,
-    boxes: Vec<Bounds>,
+    list: Vec<Bounds>,
 }
 
 /// Single precision may decide in the tree: what it lets through is compared again, what it must not
@@ -22,16 +31,31 @@ impl BroadPhase {
     #[must_use]
     pub fn new(boxes: &[Bounds]) -> Self {
         let leaves: Vec<Aabb> = boxes.iter().map(|b| aabb(b, 0.0)).collect();
-        Self { tree: Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves), boxes: boxes.to_vec() }
+        let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves);
+        Self { boxes: Arc::new(Boxes { tree, list: boxes.to_vec() }), watched: None }
+    }
+
+    /// The same boxes; `looked_at` grows to hold every box that is asked about.
+    #[must_use]
+    pub fn watched(&self, looked_at: Arc<Mutex<Bounds>>) -> Self {
+        Self { boxes: Arc::clone(&self.boxes), watched: Some(looked_at) }
+    }
+
+    fn asked_about(&self, bounds: &Bounds) {
+        if let Some(looked_at) = &self.watched {
+            let mut all = looked_at.lock().unwrap_or_else(PoisonError::into_inner);
+            *all = all.union(bounds);
+        }
     }
 
     /// All parts whose boxes meet a box, ascending.
     #[must_use]
     pub fn meeting(&self, bounds: &Bounds) -> Vec<usize> {
+        self.asked_about(bounds);
         let size = bounds.min.coords.amax().max(bounds.max.coords.amax());
         let query = aabb(bounds, size * ROUNDING);
-        let mut out: Vec<usize> = self.tree.intersect_aabb(&query).map(|i| i as usize).collect();
-        out.retain(|&i| self.boxes[i].meets(bounds));
+        let mut out: Vec<usize> = self.boxes.tree.intersect_aabb(&query).map(|i| i as usize).collect();
+        out.retain(|&i| self.boxes.list[i].meets(bounds));
         out.sort_unstable();
         out
     }
@@ -41,7 +65,8 @@ impl BroadPhase {
     pub fn meeting_of(&self, parts: &[usize], bounds: &Bounds) -> Vec<usize> {
         // Asking each is as quick for a few.
         if parts.len() < 16 {
-            return parts.iter().copied().filter(|&i| self.boxes[i].meets(bounds)).collect();
+            self.asked_about(bounds);
+            return parts.iter().copied().filter(|&i| self.boxes.list[i].meets(bounds)).collect();
         }
         let mut out = self.meeting(bounds);
         out.retain(|i| parts.binary_search(i).is_ok());
@@ -53,7 +78,7 @@ impl BroadPhase {
     #[must_use]
     pub fn pairs(&self, margin: f64) -> Vec<(usize, usize)> {
         let mut out = Vec::new();
-        for (a, bounds) in self.boxes.iter().enumerate() {
+        for (a, bounds) in self.boxes.list.iter().enumerate() {
             let near = self.meeting(&bounds.grown(margin));
             out.extend(near.into_iter().filter(|&b| b > a).map(|b| (a, b)));
         }

@@ -27,14 +27,14 @@ mod touching;
 mod transition;
 
 pub use action::{Action, Axis};
-pub use alike::{alike, placed_alike};
+pub use alike::{Pair, grouped};
 pub use broad_phase::BroadPhase;
 pub use disassembled::{HULL_MARGIN, Surroundings, exit_direction};
 pub use hull_tree::HullTree;
 pub use passage::passes_straight;
 pub use penalty::{PenaltyEngine, PenaltyParameters};
-pub use scene::{Allowances, Body, Scene};
+pub use scene::{Allowances, Body, Scene, resolution};
 pub use sliding::{KeptCells, SlidingEngine, pair_blocks};
 pub use sweep::{Sweep, straight_sweep};
 pub use touching::Touching;
-pub use transition::{End, Motion, TransitionFunction};
+pub use transition::{End, Motion, TransitionFunction, asked_again};

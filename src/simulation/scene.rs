@@ -49,7 +49,7 @@ impl Body {
 #[derive(Debug, Clone, Default)]
 pub struct Allowances {
     /// By the smaller part, then the larger; pairs without an entry may not overlap.
-    depth: HashMap<(usize, usize), f64>,
+    depth: Arc<HashMap<(usize, usize), f64>>,
 }
 
 impl Allowances {
@@ -67,18 +67,19 @@ impl Allowances {
 
     /// Grants a pair some depth.
     pub fn grant(&mut self, a: usize, b: usize, depth: f64) {
-        self.depth.insert((a.min(b), a.max(b)), depth);
+        Arc::make_mut(&mut self.depth).insert((a.min(b), a.max(b)), depth);
     }
 }
 
-/// All bodies at their assembled poses.
+/// All bodies at their assembled poses. Quickly copied: what is in it is shared until it is changed.
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// One per part, in the assembly's order.
-    pub bodies: Vec<Body>,
+    pub bodies: Arc<Vec<Body>>,
     /// Overlaps granted.
     pub allowances: Allowances,
-    /// Longest side of the whole, the unit of resolutions.
+    /// Longest side of the whole, the unit of resolutions: rounded down, so that most edits leave it and
+    /// all that was found out with it.
     pub longest_side: f64,
     /// Their boxes, to be asked which are near.
     pub broad_phase: Arc<BroadPhase>,
@@ -99,10 +100,22 @@ impl Scene {
         };
         let boxes: Vec<Bounds> = assembly.parts.iter().map(|p| p.bounds).collect();
         Self {
-            bodies: assembly.parts.iter().map(body).collect(),
+            bodies: Arc::new(assembly.parts.iter().map(body).collect()),
             allowances: Allowances::none(),
-            longest_side: assembly.longest_side(),
+            longest_side: resolution(assembly),
             broad_phase: Arc::new(BroadPhase::new(&boxes)),
+            kept: Arc::default(),
+        }
+    }
+
+    /// No bodies, and the resolution of a scene with a longest side.
+    #[must_use]
+    pub(super) fn empty(longest_side: f64) -> Self {
+        Self {
+            bodies: Arc::default(),
+            allowances: Allowances::none(),
+            longest_side,
+            broad_phase: Arc::new(BroadPhase::new(&[])),
             kept: Arc::default(),
         }
     }
@@ -114,4 +127,12 @@ impl Scene {
         let body = &self.bodies[part];
         body.planning_from_shape.inverse_transform_point(&body.bounds.centre())
     }
+}
+
+/// The longest side of an assembly, rounded down by less than a sixteenth.
+#[must_use]
+pub fn resolution(assembly: &Assembly) -> f64 {
+    let longest = assembly.longest_side();
+    let step = longest.log2().floor().exp2() / 16.0;
+    (longest / step).floor() * step
 }

@@ -31,13 +31,20 @@ pub struct Touching {
 }
 
 impl Touching {
+    /// The parts that may be touched within `reach`: of no others anything is looked at.
+    #[must_use]
+    pub fn near(scene: &Scene, part: usize, pose: &Pose, standing: &[usize], reach: f64) -> Vec<usize> {
+        let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(reach);
+        scene.broad_phase.meeting_of(standing, &bounds)
+    }
+
     /// The planes of faces within `reach` (a gap in the planning frame) of a part at a pose; `standing`
     /// is ascending.
     #[must_use]
     pub fn of(scene: &Scene, part: usize, pose: &Pose, standing: &[usize], reach: f64) -> Self {
         let body = &scene.bodies[part];
         let bounds = body.shape.bounds().transformed(pose).grown(reach);
-        let parts = scene.broad_phase.meeting_of(standing, &bounds);
+        let parts = Self::near(scene, part, pose, standing, reach);
         let mut normals = Vec::new();
         for &other in &parts {
             let still = &scene.bodies[other];

@@ -1,5 +1,7 @@
 //! The contract between search and the engines.
 
+use std::borrow::Cow;
+
 use nalgebra::Vector3;
 
 use crate::geometry::Pose;
@@ -20,7 +22,7 @@ pub enum End {
     /// It neither came out nor got stuck.
     Undecided {
         /// Why the motion was given up.
-        reason: &'static str,
+        reason: Cow<'static, str>,
         /// Parts it touched on the way, ascending.
         touched: Vec<usize>,
     },
@@ -32,8 +34,27 @@ pub struct Motion {
     /// Poses of the part's shape in the planning frame, the start first. In contact they are a
     /// contact step apart at most, in free space as far as the clearance allows.
     pub path: Vec<Pose>,
+    /// Indices in the path, ascending, at which it was asked whether the part is out.
+    pub asked: Vec<u32>,
     /// How it ended.
     pub end: End,
+    /// It was not simulated, but known.
+    pub recalled: bool,
+}
+
+impl Motion {
+    /// A motion that was simulated.
+    #[must_use]
+    pub fn simulated(path: Vec<Pose>, asked: Vec<u32>, end: End) -> Self {
+        Self { path, asked, end, recalled: false }
+    }
+}
+
+/// The direction that is tried first when an engine asks, for the `number`-th time (from 0), whether a
+/// part is out: at first none, then against the force.
+#[must_use]
+pub fn asked_again(action: &Action, number: usize) -> Option<Vector3<f64>> {
+    Some(-action.force()).filter(|f| number > 0 && f.norm() > 0.5)
 }
 
 /// A simulation engine: f(s, a, p).
@@ -47,6 +68,13 @@ pub trait TransitionFunction: Sync {
 
     /// How much deeper than the allowance a pair may get, in the planning frame.
     fn depth_tolerance(&self) -> f64;
+
+    /// Its name in the keys of remembered motions; none if they are not to be remembered. Who has one looks
+    /// at standing parts only as the broad phase finds them, in ascending order, and asks whether a part
+    /// is out with [`asked_again`].
+    fn remembered_as(&self) -> Option<&str> {
+        None
+    }
 
     /// Moves `part` from `start` under `action` among the parts that stand.
     ///

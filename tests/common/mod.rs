@@ -118,6 +118,7 @@ fn sbdpd(folder: &Path) -> Command {
     command.arg("--config").arg(folder.join("config.toml"));
     command.arg("--runtime-dir").arg(runtime_dir(folder));
     command.arg("--root").arg(folder.join("iox"));
+    command.env("SBDP_CACHE_DIR", folder.join("cache"));
     command
 }
 

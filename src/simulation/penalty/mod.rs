@@ -172,8 +172,10 @@ impl Run<'_> {
             }
             earlier.push(state);
         }
-        let end =
-            End::Undecided { reason: "the motion has too many steps", touched: self.parts(&ever_touched) };
+        let end = End::Undecided {
+            reason: "the motion has too many steps".into(),
+            touched: self.parts(&ever_touched),
+        };
         Ok(self.ended(end))
     }
 
@@ -183,7 +185,7 @@ impl Run<'_> {
             return End::Collision { with: self.parts(&self.touched) };
         }
         let reason = "the part came back to an earlier pose without contact";
-        End::Undecided { reason, touched: self.parts(ever_touched) }
+        End::Undecided { reason: reason.into(), touched: self.parts(ever_touched) }
     }
 
     fn ended(self, end: End) -> Motion {
@@ -194,7 +196,8 @@ impl Run<'_> {
             ?end,
             "simulated"
         );
-        Motion { path: self.path, end }
+        // Not remembered, so nobody asks again.
+        Motion::simulated(self.path, Vec::new(), end)
     }
 
     /// The parts of marked pairs, ascending.

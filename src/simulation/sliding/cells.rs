@@ -81,7 +81,7 @@ impl<'a> Cells<'a> {
         if scene.allowances.of(self.part, other) > MOST_GRANTED {
             return Err(Halt::Lost);
         }
-        let place = Place { part: self.part, start: &self.start, other };
+        let place = Place::new(self.part, &self.start, other);
         let gathered = if at == &Vector3::zeros() {
             kept(scene, &place, termination)?
         } else {
@@ -125,8 +125,8 @@ impl<'a> Cells<'a> {
     fn known_way(&mut self, i: usize, u: &Vector3<f64>) -> Result<(Vec<Vector3<f64>>, usize), Halt> {
         let (scene, termination) = (self.scene, self.termination);
         let pair = &mut self.pairs[i];
-        let place = Place { part: self.part, start: &self.start, other: pair.facing.other };
-        let find = |place: &Place<'_>, u: &Vector3<f64>| way(scene, place, u, termination);
+        let place = Place::new(self.part, &self.start, pair.facing.other);
+        let find = |scene: &Scene, place: &Place<'_>, u: &Vector3<f64>| way(scene, place, u, termination);
         let way = scene.kept.way(scene, &place, (u, false), find)?;
         pair.cells = Arc::clone(way.cells.as_ref().ok_or(Halt::Lost)?);
         Ok((way.blocked.clone(), way.regions))
@@ -136,9 +136,10 @@ impl<'a> Cells<'a> {
     /// nothing is in it.
     pub(super) fn lengthen(&mut self, u: &Vector3<f64>) -> Result<(), Halt> {
         let (scene, termination) = (self.scene, self.termination);
-        let find = |place: &Place<'_>, u: &Vector3<f64>| long_way(scene, place, u, termination);
+        let find =
+            |scene: &Scene, place: &Place<'_>, u: &Vector3<f64>| long_way(scene, place, u, termination);
         for i in 0..self.pairs.len() {
-            let place = Place { part: self.part, start: &self.start, other: self.pairs[i].facing.other };
+            let place = Place::new(self.part, &self.start, self.pairs[i].facing.other);
             let way = scene.kept.way(scene, &place, (u, true), find)?;
             self.pairs[i].cells = Arc::clone(way.cells.as_ref().ok_or(Halt::Lost)?);
             self.count(way.regions)?;
@@ -166,7 +167,7 @@ impl<'a> Cells<'a> {
 
 /// Cells for all of a pair's surface where a motion begins.
 fn kept(scene: &Scene, place: &Place<'_>, termination: &Termination) -> Result<Arc<Gathered>, Interrupt> {
-    scene.kept.gathered(scene, place, |place| gathered(scene, place, &Vector3::zeros(), termination))
+    scene.kept.gathered(scene, place, |scene, place| gathered(scene, place, &Vector3::zeros(), termination))
 }
 
 /// The way of a pair from where a motion begins.
@@ -199,7 +200,8 @@ fn long_way(
     u: &Vector3<f64>,
     termination: &Termination,
 ) -> Result<Way, Interrupt> {
-    let short = scene.kept.way(scene, place, (u, false), |place, u| way(scene, place, u, termination))?;
+    let short =
+        scene.kept.way(scene, place, (u, false), |scene, place, u| way(scene, place, u, termination))?;
     let base = kept(scene, place, termination)?;
     let facing = Facing::new(scene, (place.part, place.start), place.other, base.asks_part);
     let mut finder = Finder::new(&facing, MOST_REGIONS, termination);
@@ -221,7 +223,7 @@ fn gathered(
     at: &Vector3<f64>,
     termination: &Termination,
 ) -> Result<Gathered, Interrupt> {
-    let &Place { part, start, other } = place;
+    let &Place { part, start, other, .. } = place;
     let mut sides = Facing::asked_first(scene, part, other);
     let mut budget = FIRST_BUDGET;
     let mut regions = 0;

@@ -2,17 +2,19 @@
 //!
 //! Six pushes from a state, its static analysis, and the same part tried again after another left
 //! ask the same at first: regions around a pair's surface, at one place. They are found once. What is
-//! kept is a function of its key alone, so motions do not depend on which of them came first.
+//! kept is a function of its key alone, so motions do not depend on which of them came first; and of
+//! assembled pairs it is found in a scene of the two alone, at rounded poses, so that it does not depend
+//! on which other pairs stand alike either.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use nalgebra::Vector3;
 
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Shape};
 use crate::termination::Interrupt;
 
-use super::super::{Scene, alike};
+use super::super::{Pair, Scene, grouped};
 use super::cell::Cell;
 
 /// So many cells are kept besides those of assembled pairs without a wish; then they are forgotten.
@@ -26,6 +28,14 @@ pub(super) struct Place<'a> {
     pub(super) part: usize,
     pub(super) start: &'a Pose,
     pub(super) other: usize,
+    /// Under which key it is kept, if it is one that is.
+    kept_as: Option<Key>,
+}
+
+impl<'a> Place<'a> {
+    pub(super) fn new(part: usize, start: &'a Pose, other: usize) -> Self {
+        Self { part, start, other, kept_as: None }
+    }
 }
 
 /// All of one side of a pair in cells without a shift.
@@ -112,9 +122,10 @@ struct Key {
 }
 
 /// A place as it is kept: the same for pairs that stand alike, and for both parts of a pair.
-struct Canonical<'a> {
+struct Canonical {
     key: Key,
-    place: Place<'a>,
+    /// Where it is found, if not at the place itself.
+    alone: Option<Pair>,
     /// Whether the other part moves in it.
     is_mirrored: bool,
 }
@@ -125,14 +136,14 @@ impl KeptCells {
         &self,
         scene: &Scene,
         place: &Place<'_>,
-        find: impl Fn(&Place<'_>) -> Result<Gathered, Interrupt>,
+        find: impl Fn(&Scene, &Place<'_>) -> Result<Gathered, Interrupt>,
     ) -> Result<Arc<Gathered>, Interrupt> {
-        let Canonical { key, place, is_mirrored } = self.canonical(scene, place);
+        let Canonical { key, alone, is_mirrored } = self.canonical(scene, place);
         let known = self.lock().gathered.get(&key).cloned();
         let found = if let Some(known) = known {
             known
         } else {
-            let found = Arc::new(find(&place)?);
+            let found = Arc::new(at_place(scene, place, alone, key, &find)?);
             let mut kept = self.lock();
             kept.make_room(if key.start.is_some() { size(found.cells.as_ref()) } else { 0 });
             kept.gathered.insert(key, Arc::clone(&found));
@@ -147,17 +158,18 @@ impl KeptCells {
         scene: &Scene,
         place: &Place<'_>,
         (u, far): (&Vector3<f64>, bool),
-        find: impl Fn(&Place<'_>, &Vector3<f64>) -> Result<Way, Interrupt>,
+        find: impl Fn(&Scene, &Place<'_>, &Vector3<f64>) -> Result<Way, Interrupt>,
     ) -> Result<Arc<Way>, Interrupt> {
-        let Canonical { key, place, is_mirrored } = self.canonical(scene, place);
+        let Canonical { key: pair_key, alone, is_mirrored } = self.canonical(scene, place);
         // The sum makes −0 to 0.
         let u = if is_mirrored { -u } else { *u } + Vector3::zeros();
-        let key = (key, <[f64; 3]>::from(u).map(f64::to_bits), far);
+        let key = (pair_key, <[f64; 3]>::from(u).map(f64::to_bits), far);
         let known = self.lock().ways.get(&key).cloned();
         let found = if let Some(known) = known {
             known
         } else {
-            let found = Arc::new(find(&place, &u)?);
+            let find = |scene: &Scene, place: &Place<'_>| find(scene, place, &u);
+            let found = Arc::new(at_place(scene, place, alone, pair_key, &find)?);
             let mut kept = self.lock();
             kept.make_room(size(found.cells.as_ref()));
             kept.ways.insert(key, Arc::clone(&found));
@@ -166,25 +178,29 @@ impl KeptCells {
         Ok(if is_mirrored { Arc::new(found.mirrored()) } else { found })
     }
 
-    fn canonical<'a>(&self, scene: &'a Scene, place: &Place<'a>) -> Canonical<'a> {
-        let Place { part, start, other } = *place;
+    fn canonical(&self, scene: &Scene, place: &Place<'_>) -> Canonical {
+        let Place { part, start, other, kept_as } = *place;
+        if let Some(key) = kept_as {
+            return Canonical { key, alone: None, is_mirrored: false };
+        }
         if start != &scene.bodies[part].planning_from_shape {
             let key = Key { part, other, start: Some(bits(start)) };
-            return Canonical { key, place: *place, is_mirrored: false };
+            return Canonical { key, alone: None, is_mirrored: false };
         }
         let in_order = ordered(scene, part, other);
         let (part, other) = self.first_alike(scene, in_order);
-        let start = &scene.bodies[part].planning_from_shape;
+        let alone = Some(Pair::shifted(scene, part, &scene.bodies[part].planning_from_shape, other));
         let is_mirrored = in_order != (place.part, place.other);
-        Canonical { key: Key { part, other, start: None }, place: Place { part, start, other }, is_mirrored }
+        Canonical { key: Key { part, other, start: None }, alone, is_mirrored }
     }
 
     fn first_alike(&self, scene: &Scene, pair: (usize, usize)) -> (usize, usize) {
         let firsts = self.firsts.get_or_init(|| {
             let pairs = scene.broad_phase.pairs(NEAR);
             let pairs: Vec<_> = pairs.into_iter().map(|(a, b)| ordered(scene, a, b)).collect();
-            let (first, group_of) = alike(scene, &pairs);
-            pairs.into_iter().zip(group_of.into_iter().map(|group| first[group])).collect()
+            let (first, group_of) = grouped(pairs.iter().map(|&(a, b)| alike(scene, a, b)));
+            let first_of: Vec<_> = group_of.into_iter().map(|group| pairs[first[group]]).collect();
+            pairs.into_iter().zip(first_of).collect()
         });
         firsts.get(&pair).copied().unwrap_or(pair)
     }
@@ -193,6 +209,27 @@ impl KeptCells {
     fn lock(&self) -> MutexGuard<'_, Kept> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Finds something about a place, or about the pair that is kept for it.
+fn at_place<T>(
+    scene: &Scene,
+    place: &Place<'_>,
+    alone: Option<Pair>,
+    key: Key,
+    find: &dyn Fn(&Scene, &Place<'_>) -> Result<T, Interrupt>,
+) -> Result<T, Interrupt> {
+    let Some(pair) = alone else { return find(scene, place) };
+    // What is found on the way is kept here, too.
+    let alone = Scene { kept: Arc::clone(&scene.kept), ..pair.scene(scene) };
+    find(&alone, &Place { part: 0, start: &pair.poses[0], other: 1, kept_as: Some(key) })
+}
+
+/// What pairs have in common that stand alike: the same shapes, poses and allowance.
+fn alike(scene: &Scene, a: usize, b: usize) -> ([*const Shape; 2], [[u64; 7]; 2], u64) {
+    let pair = Pair::shifted(scene, a, &scene.bodies[a].planning_from_shape, b);
+    let shapes = pair.parts.map(|part| Arc::as_ptr(&scene.bodies[part].shape));
+    (shapes, pair.poses.map(|pose| bits(&pose)), scene.allowances.of(a, b).to_bits())
 }
 
 /// The smaller of two parts first.
@@ -252,7 +289,7 @@ mod tests {
         let (scene, _) = scene(meshes());
         let [up, down] = [true, false].map(|positive| Action::Push(Axis::Z, positive));
         for (part, action) in [(1, down), (3, down), (5, down), (0, up), (4, up)] {
-            let Motion { path, end } = motion(&scene, part, 0.0, action);
+            let Motion { path, end, .. } = motion(&scene, part, 0.0, action);
             let with = vec![part ^ 1];
             assert_eq!((path.len(), end), (1, End::Collision { with }), "{part} {action}");
         }

@@ -25,7 +25,7 @@ use crate::geometry::Pose;
 use crate::termination::{Interrupt, Termination};
 
 use super::contact::Mover;
-use super::{Action, End, Motion, Scene, Surroundings, TransitionFunction, exit_direction};
+use super::{Action, End, Motion, Scene, Surroundings, TransitionFunction, asked_again, exit_direction};
 use cells::Halt;
 use drive::{Drive, Step};
 use leap::Leaper;
@@ -56,6 +56,10 @@ impl TransitionFunction for SlidingEngine {
         BULGE_TOLERANCE
     }
 
+    fn remembered_as(&self) -> Option<&str> {
+        Some("sliding")
+    }
+
     fn simulate(
         &self,
         scene: &Scene,
@@ -74,8 +78,7 @@ impl TransitionFunction for SlidingEngine {
         }
         let drive = Drive::new(scene, part, start, action);
         let mut mover = Mover::new(scene, part, *start);
-        let mut path = vec![*start];
-        let mut exit = None;
+        let (mut path, mut asked) = (vec![*start], Vec::new());
         let mut turning = Turning::new(&mover);
         let gather = |mover: &Mover<'_>| mover.near(surroundings, drive.reach());
         let mut leaper = Leaper::new(scene, surroundings, part, &drive);
@@ -86,7 +89,9 @@ impl TransitionFunction for SlidingEngine {
             let mut leap = leaper.follow(&mover, &gather);
             if leap.is_none() {
                 let step = match drive.advance(&mover, &near, &gather) {
-                    Step::Stuck { with } => return Ok(Motion { path, end: End::Collision { with } }),
+                    Step::Stuck { with } => {
+                        return Ok(Motion::simulated(path, asked, End::Collision { with }));
+                    }
                     Step::Moved(step) => step,
                 };
                 let from = std::mem::replace(&mut mover.pose, step.pose);
@@ -102,18 +107,20 @@ impl TransitionFunction for SlidingEngine {
                 near = leap.near;
                 turned += leap.turned;
             }
-            if let Some(d) = exit_direction(scene, surroundings, part, &mover.pose, exit) {
-                return Ok(Motion { path, end: End::Disassembled(d) });
+            let hint = asked_again(&action, asked.len());
+            asked.push(path.len() as u32 - 1);
+            if let Some(d) = exit_direction(scene, surroundings, part, &mover.pose, hint) {
+                return Ok(Motion::simulated(path, asked, End::Disassembled(d)));
             }
-            exit = exit.or_else(|| Some(-action.force()).filter(|f| f.norm() > 0.5));
             if turning.is_idle(&mover, turned, &touching) {
                 let touched = turning.all_touched;
-                let reason = "a whole turn brought neither travel nor new contact";
-                return Ok(Motion { path, end: End::Undecided { reason, touched } });
+                let reason = "a whole turn brought neither travel nor new contact".into();
+                return Ok(Motion::simulated(path, asked, End::Undecided { reason, touched }));
             }
         }
         let touched = turning.all_touched;
-        Ok(Motion { path, end: End::Undecided { reason: "the motion is too long", touched } })
+        let reason = "the motion is too long".into();
+        Ok(Motion::simulated(path, asked, End::Undecided { reason, touched }))
     }
 }
 
@@ -132,18 +139,20 @@ fn pushed(
     termination: &Termination,
 ) -> Result<Motion, Halt> {
     let mut push = Push::new(scene, &surroundings.standing, (part, start), action.force(), termination);
-    let mut path = vec![*start];
-    let mut exit = None;
+    let (mut path, mut asked) = (vec![*start], Vec::new());
     while path.len() < MOST_POSES {
         match push.step()? {
-            push::Step::Stuck { with } => return Ok(Motion { path, end: End::Collision { with } }),
+            push::Step::Stuck { with } => {
+                return Ok(Motion::simulated(path, asked, End::Collision { with }));
+            }
             push::Step::Moved(pose) => path.push(pose),
         }
-        if let Some(d) = exit_direction(scene, surroundings, part, &path[path.len() - 1], exit) {
-            return Ok(Motion { path, end: End::Disassembled(d) });
+        let hint = asked_again(&action, asked.len());
+        asked.push(path.len() as u32 - 1);
+        if let Some(d) = exit_direction(scene, surroundings, part, &path[path.len() - 1], hint) {
+            return Ok(Motion::simulated(path, asked, End::Disassembled(d)));
         }
-        exit = exit.or_else(|| Some(-action.force()));
     }
-    let reason = "the motion is too long";
-    Ok(Motion { path, end: End::Undecided { reason, touched: Vec::new() } })
+    let reason = "the motion is too long".into();
+    Ok(Motion::simulated(path, asked, End::Undecided { reason, touched: Vec::new() }))
 }

@@ -1,0 +1,296 @@
+//! The tier on disk: one redb file, which one process holds.
+//!
+//! redb may panic or fail on a file that was damaged from outside, so everything that touches it is
+//! contained: such a file is set aside and another begun. A file that cannot be written (a full disk)
+//! is closed, and the process goes on in memory. Only the writer's thread ([`super::writer`]) writes.
+
+use std::collections::HashSet;
+use std::os::unix::fs::DirBuilderExt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
+
+use redb::Database;
+
+use super::kind::{Key, Kind};
+use super::tables::{Failure, Listed, Tables, agree, grew, listed, make_tables, read, write};
+use super::tally::Tally;
+
+const FILE: &str = "records.redb";
+const DAMAGED: &str = "records.redb.damaged";
+/// redb's own cache of pages.
+const PAGE_CACHE: usize = 16 << 20;
+/// Of a file that has become too large all the same, so much of what records may take is left.
+const AFTER_OVERGROWTH: f64 = 0.5;
+/// Evicting goes on down to this share of what records may take, so that it is not done all the time.
+const AFTER_EVICTION: f64 = 0.9;
+/// So many records are remembered as used until the next transaction notes it.
+const MOST_TOUCHED: usize = 1 << 16;
+
+/// Why a store cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub enum DiskError {
+    /// Another process holds it.
+    #[error("{0}: in use by another process")]
+    InUse(PathBuf),
+    /// The folder or the file cannot be made, read or written.
+    #[error("{path}: {reason}")]
+    Unusable {
+        /// The folder.
+        path: PathBuf,
+        /// What the system or the database said.
+        reason: String,
+    },
+}
+
+/// The file, open until it fails.
+#[derive(Debug)]
+pub(super) struct Disk {
+    folder: PathBuf,
+    /// Bytes that the file may take.
+    budget: u64,
+    database: RwLock<Option<Database>>,
+    /// Counts the files that were opened: who failed on one must not set the next one aside.
+    generation: AtomicU64,
+    touched: Mutex<HashSet<Key>>,
+    tally: Arc<Tally>,
+}
+
+impl Disk {
+    /// Opens the store of a folder, or makes one; `budget` is for the whole file, in bytes.
+    pub(super) fn open(folder: &Path, budget: u64, tally: Arc<Tally>) -> Result<Self, DiskError> {
+        let unusable = |reason: String| DiskError::Unusable { path: folder.to_owned(), reason };
+        let mut builder = std::fs::DirBuilder::new();
+        builder.recursive(true).mode(0o700).create(folder).map_err(|e| unusable(e.to_string()))?;
+        let disk = Self {
+            folder: folder.to_owned(),
+            budget,
+            database: RwLock::new(None),
+            generation: AtomicU64::new(0),
+            touched: Mutex::default(),
+            tally,
+        };
+        let database = match disk.database_at() {
+            Ok(database) => database,
+            Err(Failure::InUse) => return Err(DiskError::InUse(folder.join(FILE))),
+            Err(Failure::Io(reason)) => return Err(unusable(reason)),
+            Err(Failure::Damaged(reason)) => {
+                disk.rename(&reason);
+                disk.database_at().map_err(|_| unusable(format!("cannot begin anew after: {reason}")))?
+            }
+        };
+        *disk.database.write().unwrap_or_else(PoisonError::into_inner) = Some(database);
+        Ok(disk)
+    }
+
+    fn database_at(&self) -> Result<Database, Failure> {
+        contained(|| {
+            let database = Database::builder().set_cache_size(PAGE_CACHE).create(self.folder.join(FILE))?;
+            make_tables(&database)?;
+            Ok(database)
+        })
+    }
+
+    /// Whether there is a file to work with.
+    pub(super) fn is_open(&self) -> bool {
+        self.database.read().unwrap_or_else(PoisonError::into_inner).is_some()
+    }
+
+    /// The envelope of a key, as it was written.
+    pub(super) fn get(&self, key: &Key) -> Option<Vec<u8>> {
+        self.with_free(|database| read(database, key)).flatten()
+    }
+
+    /// Notes that a record was used; the next transaction writes it down.
+    pub(super) fn touch(&self, key: Key) {
+        let mut touched = self.touched.lock().unwrap_or_else(PoisonError::into_inner);
+        if touched.len() < MOST_TOUCHED {
+            touched.insert(key);
+        }
+    }
+
+    /// Writes envelopes in one transaction, with what was used since the last one.
+    pub(super) fn write(&self, records: &[(Key, Vec<u8>)]) {
+        let touched = std::mem::take(&mut *self.touched.lock().unwrap_or_else(PoisonError::into_inner));
+        let before = self.file_bytes();
+        let written = self.with(|database| {
+            let transaction = write(database)?;
+            let (evicted, bytes) = {
+                let mut tables = Tables::of(&transaction)?;
+                for (key, bytes) in records {
+                    tables.insert(key, bytes)?;
+                }
+                for key in touched.iter() {
+                    tables.touch(key)?;
+                }
+                let limit = tables.limit(self.budget, before)?;
+                let evicted = tables.evict_above(limit, (limit as f64 * AFTER_EVICTION) as u64)?;
+                tables.finish()?;
+                (evicted, tables.bytes)
+            };
+            transaction.commit()?;
+            Ok((evicted, bytes))
+        });
+        let Some((evicted, bytes)) = written else { return };
+        self.count(&evicted);
+        let after = self.file_bytes();
+        if after > before {
+            self.note_growth(bytes);
+        }
+        if after > self.budget {
+            self.evict((bytes as f64 * AFTER_OVERGROWTH) as u64);
+            self.check(true);
+        }
+    }
+
+    fn note_growth(&self, bytes: u64) {
+        self.with(|database| grew(database, bytes));
+    }
+
+    /// Takes records out; whether that was done.
+    pub(super) fn remove(&self, keys: &[Key]) -> bool {
+        let done = self.with(|database| {
+            let transaction = write(database)?;
+            let mut tables = Tables::of(&transaction)?;
+            for key in keys {
+                tables.remove(&key.to_bytes())?;
+            }
+            tables.finish()?;
+            drop(tables);
+            Ok(transaction.commit()?)
+        });
+        done.is_some()
+    }
+
+    /// Evicts down to so many bytes of records; how many left.
+    pub(super) fn evict(&self, budget: u64) -> Option<usize> {
+        let evicted = self.with(|database| {
+            let transaction = write(database)?;
+            let mut tables = Tables::of(&transaction)?;
+            let evicted = tables.evict_above(budget, budget)?;
+            tables.finish()?;
+            drop(tables);
+            transaction.commit()?;
+            Ok(evicted)
+        })?;
+        self.count(&evicted);
+        Some(evicted.len())
+    }
+
+    fn count(&self, evicted: &[Key]) {
+        for key in evicted {
+            self.tally.of(key.kind()).disk_evictions.one_more();
+        }
+    }
+
+    /// All records, in the order of their keys.
+    pub(super) fn list(&self) -> Option<Vec<Listed>> {
+        self.with(listed)
+    }
+
+    /// Bytes of the file.
+    pub(super) fn file_bytes(&self) -> u64 {
+        std::fs::metadata(self.folder.join(FILE)).map_or(0, |m| m.len())
+    }
+
+    /// redb's own check of the whole file; `None` if there is no file any more. Gives back unused space.
+    pub(super) fn check(&self, compact: bool) -> Option<bool> {
+        let mut slot = self.database.write().unwrap_or_else(PoisonError::into_inner);
+        let database = slot.as_mut()?;
+        let checked = contained(|| {
+            let clean = database.check_integrity()?;
+            if compact {
+                database.compact()?;
+            }
+            Ok(clean)
+        });
+        let generation = self.generation.load(Ordering::Relaxed);
+        drop(slot);
+        Some(checked.unwrap_or_else(|failure| {
+            self.failed(failure, generation);
+            false
+        }))
+    }
+
+    /// Whether the tables agree with each other; a file where they do not is set aside.
+    pub(super) fn holds_together(&self) -> bool {
+        let agrees = self.with(|database| {
+            let reason = "its tables contradict each other";
+            if agree(database)? { Ok(()) } else { Err(Failure::Damaged(reason.to_owned())) }
+        });
+        agrees.is_some()
+    }
+
+    /// As [`Disk::with`], unless the file is being looked after: nobody waits for that.
+    fn with_free<T>(&self, work: impl FnOnce(&Database) -> Result<T, Failure>) -> Option<T> {
+        if matches!(self.database.try_read(), Err(TryLockError::WouldBlock)) {
+            return None;
+        }
+        self.with(work)
+    }
+
+    /// Something with the open file, if it is open; what fails closes the file or sets it aside.
+    fn with<T>(&self, work: impl FnOnce(&Database) -> Result<T, Failure>) -> Option<T> {
+        let slot = self.database.read().unwrap_or_else(PoisonError::into_inner);
+        let database = slot.as_ref()?;
+        let done = contained(|| work(database));
+        let generation = self.generation.load(Ordering::Relaxed);
+        drop(slot);
+        done.map_err(|failure| self.failed(failure, generation)).ok()
+    }
+
+    /// Closes the file that failed, unless somebody did; a damaged one is kept for whoever wants to look at
+    /// it, and another begun.
+    fn failed(&self, failure: Failure, generation: u64) {
+        let mut slot = self.database.write().unwrap_or_else(PoisonError::into_inner);
+        if self.generation.load(Ordering::Relaxed) != generation {
+            return;
+        }
+        self.generation.store(generation + 1, Ordering::Relaxed);
+        let database = slot.take();
+        // redb writes when it is dropped.
+        let closed = contained(|| {
+            drop(database);
+            Ok(())
+        });
+        if closed.is_err() {
+            tracing::warn!(folder = %self.folder.display(), "the store on disk was not closed cleanly");
+        }
+        match failure {
+            Failure::Damaged(reason) => {
+                self.rename(&reason);
+                *slot = self.database_at().ok();
+            }
+            Failure::Io(reason) => {
+                self.tally.write_failures.one_more();
+                tracing::warn!(folder = %self.folder.display(), reason, "the store on disk fails: on in memory");
+            }
+            // Not of an open file.
+            Failure::InUse => {}
+        }
+    }
+
+    fn rename(&self, reason: &str) {
+        self.tally.set_aside.one_more();
+        tracing::warn!(folder = %self.folder.display(), reason, "the store on disk is damaged: set aside, begun anew");
+        let (from, to) = (self.folder.join(FILE), self.folder.join(DAMAGED));
+        if let Err(error) = std::fs::rename(&from, to) {
+            tracing::warn!(file = %from.display(), %error, "cannot be set aside");
+        }
+    }
+}
+
+/// A panic of the database is a damaged file.
+fn contained<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(Failure::Damaged("redb panicked".into())))
+}
+
+/// How many bytes of records there are of each kind, in the order of [`Kind::ALL`].
+pub(super) fn by_kind(list: &[Listed]) -> Vec<(u64, u64)> {
+    let of = |kind: Kind| {
+        let listed = list.iter().filter(|l| l.key.kind() == kind);
+        listed.fold((0, 0), |(entries, bytes), l| (entries + 1, bytes + l.bytes))
+    };
+    Kind::ALL.into_iter().map(of).collect()
+}

@@ -1,0 +1,187 @@
+//! The tier in memory: payloads up to a budget in bytes, the least recently used leave first.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+
+use super::kind::{Key, Kind};
+
+/// What an entry takes beside its payload, about.
+const OVERHEAD: usize = 192;
+
+/// Payloads by key. What somebody still holds is never evicted.
+#[derive(Debug)]
+pub(super) struct Memory {
+    budget: usize,
+    bytes: usize,
+    /// Counts uses.
+    clock: u64,
+    entries: HashMap<Key, Entry>,
+    /// By the use that was the last.
+    order: BTreeMap<u64, Key>,
+}
+
+#[derive(Debug)]
+struct Entry {
+    payload: Arc<[u8]>,
+    used: u64,
+}
+
+/// How much of a kind is held.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Held {
+    pub(super) entries: u64,
+    pub(super) bytes: u64,
+}
+
+impl Memory {
+    pub(super) fn new(budget: usize) -> Self {
+        Self { budget, bytes: 0, clock: 0, entries: HashMap::new(), order: BTreeMap::new() }
+    }
+
+    pub(super) fn get(&mut self, key: &Key) -> Option<Arc<[u8]>> {
+        let entry = self.entries.get_mut(key)?;
+        self.clock += 1;
+        self.order.remove(&entry.used);
+        entry.used = self.clock;
+        self.order.insert(entry.used, *key);
+        Some(Arc::clone(&entry.payload))
+    }
+
+    /// Keeps a payload, in place of one with the same key; what had to leave for it, by kind.
+    pub(super) fn put(&mut self, key: Key, payload: Arc<[u8]>) -> Vec<Kind> {
+        self.remove(&key);
+        let cost = cost(&payload);
+        if cost > self.budget {
+            return Vec::new();
+        }
+        let evicted = self.make_room(cost);
+        self.clock += 1;
+        self.bytes += cost;
+        self.order.insert(self.clock, key);
+        self.entries.insert(key, Entry { payload, used: self.clock });
+        evicted
+    }
+
+    pub(super) fn remove(&mut self, key: &Key) -> bool {
+        let Some(entry) = self.entries.remove(key) else { return false };
+        self.bytes -= cost(&entry.payload);
+        self.order.remove(&entry.used);
+        true
+    }
+
+    fn make_room(&mut self, needed: usize) -> Vec<Kind> {
+        let mut evicted = Vec::new();
+        let mut from = 0;
+        while self.bytes + needed > self.budget {
+            let Some((&used, &key)) = self.order.range(from..).next() else { break };
+            from = used + 1;
+            let in_use = self.entries.get(&key).is_some_and(|e| Arc::strong_count(&e.payload) > 1);
+            if !in_use {
+                self.remove(&key);
+                evicted.push(key.kind());
+            }
+        }
+        evicted
+    }
+
+    pub(super) fn held(&self, kind: Kind) -> Held {
+        let of_kind = self.entries.iter().filter(|(key, _)| key.kind() == kind);
+        of_kind.fold(Held::default(), |held, (_, entry)| Held {
+            entries: held.entries + 1,
+            bytes: held.bytes + entry.payload.len() as u64,
+        })
+    }
+
+    /// Of payloads and of what is kept beside them.
+    pub(super) fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.entries.clear();
+        self.order.clear();
+        self.bytes = 0;
+    }
+}
+
+fn cost(payload: &[u8]) -> usize {
+    payload.len() + OVERHEAD
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn key(n: u8) -> Key {
+        Key::new(Kind::ALL[usize::from(n) % 2], [n; 32])
+    }
+
+    fn payload(length: usize) -> Arc<[u8]> {
+        vec![0; length].into()
+    }
+
+    #[test]
+    fn the_least_recently_used_leave() {
+        let mut memory = Memory::new(3 * (100 + OVERHEAD));
+        for n in 0..3 {
+            assert!(memory.put(key(n), payload(100)).is_empty());
+        }
+        drop(memory.get(&key(0)));
+        assert_eq!(memory.put(key(3), payload(100)), [key(1).kind()]);
+        let there: Vec<bool> = (0..4).map(|n| memory.get(&key(n)).is_some()).collect();
+        assert_eq!(there, [true, false, true, true]);
+    }
+
+    #[test]
+    fn what_is_in_use_stays() {
+        let mut memory = Memory::new(2 * (100 + OVERHEAD));
+        memory.put(key(0), payload(100));
+        let held = memory.get(&key(0));
+        memory.put(key(1), payload(100));
+        memory.put(key(2), payload(100));
+        assert!(held.is_some() && memory.get(&key(0)).is_some() && memory.get(&key(1)).is_none());
+    }
+
+    #[test]
+    fn what_is_larger_than_the_budget_is_not_kept() {
+        let mut memory = Memory::new(100 + OVERHEAD);
+        memory.put(key(0), payload(10));
+        assert!(memory.put(key(1), payload(101)).is_empty());
+        assert!(memory.get(&key(1)).is_none() && memory.get(&key(0)).is_some());
+    }
+
+    proptest! {
+        /// Against a list in order of use.
+        #[test]
+        fn it_holds_what_a_plain_list_would(steps in prop::collection::vec((0u8..12, 0usize..400, any::<bool>()), 1..200)) {
+            let budget = 5 * (200 + OVERHEAD);
+            let mut memory = Memory::new(budget);
+            let mut model: Vec<(Key, usize)> = Vec::new();
+            for (n, length, put) in steps {
+                let known = model.iter().position(|(k, _)| *k == key(n));
+                if put {
+                    known.map(|at| model.remove(at));
+                    let used = |m: &[(Key, usize)]| m.iter().map(|(_, l)| l + OVERHEAD).sum::<usize>();
+                    if length + OVERHEAD <= budget {
+                        while used(&model) + length + OVERHEAD > budget {
+                            model.remove(0);
+                        }
+                        model.push((key(n), length));
+                    }
+                    memory.put(key(n), payload(length));
+                    prop_assert_eq!(memory.bytes(), used(&model));
+                } else {
+                    let found = memory.get(&key(n)).map(|p| p.len());
+                    prop_assert_eq!(found, known.map(|at| model[at].1));
+                    if let Some(at) = known {
+                        let entry = model.remove(at);
+                        model.push(entry);
+                    }
+                }
+                prop_assert!(memory.bytes() <= budget);
+            }
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! What the store holds and how it did; looking after it from outside (`sbdp cache`).
+
+use serde::Serialize;
+
+use super::disk::by_kind;
+use super::{Cache, Kind, Listed, format};
+
+/// How the store does.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct CacheStatistics {
+    /// Whether there is a file that works.
+    pub on_disk: bool,
+    /// Bytes of the file.
+    pub file_bytes: u64,
+    /// Bytes in memory: payloads and what is kept beside them.
+    pub memory_bytes: u64,
+    /// Records that were not written because too many waited, since the start.
+    pub overflows: u64,
+    /// Times that the file could not be written, since the start.
+    pub write_failures: u64,
+    /// Files that were set aside as damaged, since the start.
+    pub set_aside: u64,
+    /// By kind.
+    pub kinds: Vec<KindStatistics>,
+}
+
+/// How one kind does; counts since the start.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct KindStatistics {
+    /// Its name.
+    pub kind: &'static str,
+    /// Records found.
+    pub hits: u64,
+    /// Records asked for and not found.
+    pub misses: u64,
+    /// Records in memory.
+    pub entries: u64,
+    /// Bytes of their payloads.
+    pub bytes: u64,
+    /// Records that left memory for others.
+    pub evictions: u64,
+    /// Records on disk.
+    pub disk_entries: u64,
+    /// Their bytes.
+    pub disk_bytes: u64,
+    /// Records that left the disk for others.
+    pub disk_evictions: u64,
+    /// Records found damaged, or of another version.
+    pub damaged: u64,
+}
+
+/// What a check of the file found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Verified {
+    /// Records that were looked at.
+    pub records: usize,
+    /// Of them, damaged or of another version, and taken out.
+    pub damaged: usize,
+    /// Whether the file itself was as its transactions left it.
+    pub clean: bool,
+}
+
+impl Cache {
+    /// Counts what there is; looks at every record's entry on disk.
+    #[must_use]
+    pub fn statistics(&self) -> CacheStatistics {
+        let on_disk = by_kind(&self.list());
+        let memory = self.memory();
+        let kind = |(kind, (disk_entries, disk_bytes)): (Kind, (u64, u64))| {
+            let (tally, held) = (self.tally.of(kind), memory.held(kind));
+            KindStatistics {
+                kind: kind.name(),
+                hits: tally.hits.count(),
+                misses: tally.misses.count(),
+                entries: held.entries,
+                bytes: held.bytes,
+                evictions: tally.evictions.count(),
+                disk_entries,
+                disk_bytes,
+                disk_evictions: tally.disk_evictions.count(),
+                damaged: tally.damaged.count(),
+            }
+        };
+        CacheStatistics {
+            on_disk: self.is_on_disk(),
+            file_bytes: self.disk.as_ref().map_or(0, |d| d.file_bytes()),
+            memory_bytes: memory.bytes() as u64,
+            overflows: self.tally.overflows.count(),
+            write_failures: self.tally.write_failures.count(),
+            set_aside: self.tally.set_aside.count(),
+            kinds: Kind::ALL.into_iter().zip(on_disk).map(kind).collect(),
+        }
+    }
+
+    /// All records on disk.
+    #[must_use]
+    pub fn list(&self) -> Vec<Listed> {
+        self.disk.as_ref().and_then(|d| d.list()).unwrap_or_default()
+    }
+
+    /// Checks the file and every record in it, and takes damaged ones out.
+    #[must_use]
+    pub fn verify(&self) -> Verified {
+        self.flush();
+        let Some(disk) = &self.disk else { return Verified { records: 0, damaged: 0, clean: true } };
+        let checked = disk.check(false).unwrap_or(false);
+        let clean = disk.holds_together() && checked;
+        let list = self.list();
+        let intact =
+            |l: &&Listed| disk.get(&l.key).is_some_and(|bytes| format::opened(&l.key, &bytes).is_some());
+        let damaged: Vec<_> = list.iter().filter(|l| !intact(l)).map(|l| l.key).collect();
+        for key in &damaged {
+            self.tally.of(key.kind()).damaged.one_more();
+        }
+        if !damaged.is_empty() {
+            disk.remove(&damaged);
+        }
+        Verified { records: list.len(), damaged: damaged.len(), clean }
+    }
+
+    /// Takes the least recently used records out of the file until so many bytes are left, and gives
+    /// unused space back; how many records left.
+    #[must_use]
+    pub fn evict(&self, bytes: u64) -> usize {
+        self.flush();
+        self.memory().clear();
+        let Some(disk) = &self.disk else { return 0 };
+        let evicted = disk.evict(bytes).unwrap_or(0);
+        disk.check(true);
+        evicted
+    }
+}

@@ -1,0 +1,106 @@
+//! `sbdp cache`: looks after the store on disk.
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use super::args::{CacheArguments, CacheCommand};
+use super::error::CliError;
+use super::print;
+use super::table::Table;
+use crate::cache::{Cache, CacheSettings, CacheStatistics, DiskError};
+
+/// Megabytes as the command line and the configuration have them.
+const MEGABYTE: u64 = 1 << 20;
+
+/// The cache for planning in this process. Where the store on disk cannot be had, that is told, and
+/// memory has to do.
+pub(super) fn embedded(folder: Option<&Path>) -> Arc<Cache> {
+    let settings = settings(folder);
+    let cache = Cache::open(&settings).unwrap_or_else(|error| {
+        let why = match error {
+            DiskError::InUse(_) => "note",
+            DiskError::Unusable { .. } => "warning",
+        };
+        eprintln!("{why}: cache {error}; nothing is remembered beyond this process");
+        Cache::in_memory(settings.memory_bytes)
+    });
+    Arc::new(cache)
+}
+
+fn settings(folder: Option<&Path>) -> CacheSettings {
+    let settings = CacheSettings::default();
+    CacheSettings { folder: folder.map(Path::to_owned).or_else(|| settings.folder.clone()), ..settings }
+}
+
+pub(super) fn run(arguments: &CacheArguments) -> Result<ExitCode, CliError> {
+    let settings = settings(arguments.cache_dir.as_deref());
+    let Some(folder) = &settings.folder else {
+        return Err(CliError::Refused(
+            "there is no folder for a cache: give one with --cache-dir".to_owned(),
+        ));
+    };
+    // Looking must not make one.
+    if !folder.is_dir() {
+        return Err(CliError::Refused(format!("{}: there is no cache", folder.display())));
+    }
+    let cache = Cache::open(&settings).map_err(|e| CliError::Failed(e.to_string()))?;
+    match &arguments.command {
+        CacheCommand::Ls => print(&listed(&cache))?,
+        CacheCommand::Stats { json } => stats(&cache, json.as_deref())?,
+        CacheCommand::Verify => return verify(&cache),
+        CacheCommand::Evict { to_mb } => evict(&cache, to_mb.saturating_mul(MEGABYTE))?,
+        CacheCommand::Clear => evict(&cache, 0)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn listed(cache: &Cache) -> String {
+    let mut table = Table::new(&["kind", "key", "bytes", "used"]);
+    for record in cache.list() {
+        let hash: String = record.key.hash().iter().map(|b| format!("{b:02x}")).collect();
+        let kind = record.key.kind().name().to_owned();
+        table.row([kind, hash, record.bytes.to_string(), record.used.to_string()]);
+    }
+    table.render()
+}
+
+fn stats(cache: &Cache, json: Option<&Path>) -> Result<(), CliError> {
+    let statistics = cache.statistics();
+    let Some(file) = json else { return print(&described(&statistics)) };
+    let mut text = serde_json::to_string_pretty(&statistics)
+        .map_err(|e| CliError::Failed(format!("cannot write the statistics as JSON: {e}")))?;
+    text.push('\n');
+    if file == Path::new("-") {
+        return print(&text);
+    }
+    std::fs::write(file, text).map_err(|e| CliError::Failed(format!("{}: {e}", file.display())))
+}
+
+fn described(statistics: &CacheStatistics) -> String {
+    let mut table = Table::new(&["kind", "records", "bytes"]);
+    for kind in &statistics.kinds {
+        table.row([kind.kind.to_owned(), kind.disk_entries.to_string(), kind.disk_bytes.to_string()]);
+    }
+    format!("{}file     {} bytes\n", table.render(), statistics.file_bytes)
+}
+
+fn verify(cache: &Cache) -> Result<ExitCode, CliError> {
+    let verified = cache.verify();
+    let file = if verified.clean {
+        "the file is as it was left"
+    } else {
+        "the file was damaged and was mended or set aside"
+    };
+    print(&format!(
+        "{} records, {} damaged or of another version and taken out; {file}\n",
+        verified.records, verified.damaged
+    ))?;
+    let fine = verified.clean && verified.damaged == 0 && cache.statistics().set_aside == 0;
+    Ok(if fine { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn evict(cache: &Cache, bytes: u64) -> Result<(), CliError> {
+    let evicted = cache.evict(bytes);
+    print(&format!("{evicted} records taken out; the file has {} bytes\n", cache.statistics().file_bytes))
+}
