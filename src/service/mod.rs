@@ -13,7 +13,7 @@ mod relay;
 mod tests;
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError, Weak};
 use std::time::{Duration, Instant};
 
 use crate::blocking_graph::{Audit, StaticAnalysis, audit};
@@ -72,6 +72,8 @@ pub enum ServiceError {
 struct Entry {
     assembly: Assembly,
     prepared: Mutex<Option<Arc<Prepared>>>,
+    /// The entry that it is a revision of, while that is known.
+    base: Weak<Entry>,
 }
 
 /// The service. Shared by all threads.
@@ -115,7 +117,7 @@ impl Service {
         }
         let assembly = Assembly::new(source)?;
         let warnings = answer::warnings(&assembly);
-        let entry = Arc::new(Entry { assembly, prepared: Mutex::default() });
+        let entry = Arc::new(Entry { assembly, prepared: Mutex::default(), base: Weak::new() });
         self.entries().entry(id).or_insert(entry);
         Ok(Admission { id, known: false, warnings })
     }
@@ -132,7 +134,7 @@ impl Service {
         }
         let assembly = entry.assembly.revised(revision)?;
         let warnings = answer::warnings(&assembly);
-        let entry = Arc::new(Entry { assembly, prepared: Mutex::default() });
+        let entry = Arc::new(Entry { assembly, prepared: Mutex::default(), base: Arc::downgrade(&entry) });
         self.entries().entry(id).or_insert(entry);
         Ok(Admission { id, known: false, warnings })
     }
@@ -240,7 +242,7 @@ impl Entry {
             return self.answered(frame, answered, sink, started);
         }
         let prepared = if request.no_cache {
-            Prepared::new(&self.assembly, termination, sink, recall).map(|p| (Arc::new(p), false))
+            Prepared::new(&self.assembly, None, termination, sink, recall).map(|p| (Arc::new(p), false))
         } else {
             self.prepared(termination, sink, recall)
         };
@@ -330,6 +332,15 @@ impl Entry {
         frame.plan(outcome, &times, &found)
     }
 
+    /// Fields and overlaps, if they are there.
+    fn at_hand(&self) -> Option<Arc<Prepared>> {
+        match self.prepared.try_lock() {
+            Ok(slot) => slot.clone(),
+            Err(TryLockError::Poisoned(slot)) => slot.into_inner().clone(),
+            Err(TryLockError::WouldBlock) => None,
+        }
+    }
+
     /// Fields and overlaps, and whether they were there already. Whoever comes while they are
     /// being made waits for them, but not beyond its own termination.
     fn prepared(
@@ -351,7 +362,9 @@ impl Entry {
             if let Some(prepared) = &*slot {
                 return Ok((Arc::clone(prepared), true));
             }
-            let prepared = Arc::new(Prepared::new(&self.assembly, termination, sink, recall)?);
+            let before = self.base.upgrade().and_then(|base| base.at_hand());
+            let prepared =
+                Arc::new(Prepared::new(&self.assembly, before.as_deref(), termination, sink, recall)?);
             *slot = Some(Arc::clone(&prepared));
             return Ok((prepared, false));
         }

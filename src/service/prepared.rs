@@ -1,5 +1,6 @@
 //! What must be there before an assembly can be searched: fields, overlaps, verification samples.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -35,15 +36,17 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// Builds fields in parallel on the current rayon pool and measures all overlaps.
+    /// Builds fields in parallel on the current rayon pool and measures all overlaps. Fields of shapes
+    /// that `before` has, too, are taken from there.
     pub(super) fn new(
         assembly: &Assembly,
+        before: Option<&Self>,
         termination: &Termination,
         sink: &mut dyn PlanSink,
         recall: &Recall,
     ) -> Result<Self, Interrupt> {
         let started = Instant::now();
-        let fields = build_fields(&assembly.shapes, termination, sink)?;
+        let fields = build_fields(&assembly.shapes, before, termination, sink)?;
         let sdf_time = started.elapsed();
         let started = Instant::now();
         let mut scene = Scene::assembled(assembly, &fields);
@@ -67,6 +70,7 @@ pub(super) fn depth_limit(assembly: &Assembly) -> f64 {
 
 fn build_fields(
     shapes: &[Arc<Shape>],
+    before: Option<&Prepared>,
     termination: &Termination,
     sink: &mut dyn PlanSink,
 ) -> Result<Vec<Arc<Field>>, Interrupt> {
@@ -77,9 +81,16 @@ fn build_fields(
     };
     report(sink, 0);
     let sink = std::sync::Mutex::new(sink);
+    let bodies = before.iter().flat_map(|before| before.scene.bodies.iter());
+    // By place in memory: what both have is one.
+    let place = |shape: &Arc<Shape>| Arc::as_ptr(shape).addr();
+    let known: HashMap<usize, &Arc<Field>> = bodies.map(|body| (place(&body.shape), &body.field)).collect();
     shapes
         .par_iter()
         .map(|shape| {
+            if let Some(field) = known.get(&place(shape)) {
+                return Ok(Arc::clone(field));
+            }
             let field = Field::build(&shape.surface, termination)?;
             let n = done.fetch_add(1, Ordering::Relaxed) + 1;
             if let Ok(mut sink) = sink.lock() {
