@@ -1,14 +1,48 @@
 //! `sbdp cache`: looks after the store on disk.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use super::args::{CacheArguments, CacheCommand};
+use clap::{Args, Subcommand};
+
 use super::error::CliError;
 use super::print;
 use super::table::Table;
 use crate::cache::{Cache, CacheSettings, CacheStatistics, DiskError};
+
+/// Arguments of `sbdp cache`.
+#[derive(Debug, Args)]
+pub(super) struct CacheArguments {
+    /// The folder [default: $SBDP_CACHE_DIR, else $XDG_CACHE_HOME/sbdp, else ~/.cache/sbdp]
+    #[arg(long, value_name = "DIR", global = true)]
+    pub(super) cache_dir: Option<PathBuf>,
+    #[command(subcommand)]
+    pub(super) command: CacheCommand,
+}
+
+/// What to do with the store.
+#[derive(Debug, Subcommand)]
+pub(super) enum CacheCommand {
+    /// List all records: kind, key, bytes, and the transaction in which it was used last
+    Ls,
+    /// Count records and bytes by kind
+    Stats {
+        /// Write all statistics there as JSON; `-` for stdout
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+    },
+    /// Check the file and every record, and take out what is damaged; exits with 1 if anything was
+    Verify,
+    /// Take out the records used least recently
+    Evict {
+        /// Until so many megabytes of records are left
+        #[arg(long, value_name = "MB")]
+        to_mb: u64,
+    },
+    /// Take out all records
+    Clear,
+}
 
 /// Megabytes as the command line and the configuration have them.
 const MEGABYTE: u64 = 1 << 20;
