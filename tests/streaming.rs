@@ -74,6 +74,7 @@ impl Planning for Scripted {
             units: None,
             parts: (0..count).map(|i| format!("part {i}")).collect(),
             removed: vec![],
+            poses: vec![],
             targets: None,
             fixed: vec![],
             steps,

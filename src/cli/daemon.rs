@@ -9,7 +9,7 @@ use sbdp_client::{Client, ClientError, ErrorCode, Event, PlanOptions, PlanStream
 
 use super::backend::{Backend, Question};
 use super::error::CliError;
-use crate::geometry::{Revision, SourceAssembly, SourceMesh, SourcePart, heal, waypoint_from_pose};
+use crate::geometry::{Revision, SourceAssembly, SourceMesh, SourcePart, Waypoint, heal, waypoint_from_pose};
 use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
 use crate::search::{ActionSet, Engine, PlanSink, Planner, Progress, Stage};
 
@@ -80,7 +80,9 @@ fn receive(
                 steps.push(plan_step(&step));
                 steps.last().into_iter().for_each(|s| sink.step(s));
             }
-            Ok(Some(Event::Done(summary))) => return Ok(plan(summary, steps)),
+            Ok(Some(Event::Done(summary))) => {
+                return Ok(Plan { poses: poses(&question.revision), ..plan(summary, steps) });
+            }
             Ok(None) => return Err(ClientError::Protocol("the plan ended without its summary".into())),
             Err(ClientError::Timeout { .. }) => {}
             Err(error) => return Err(error),
@@ -166,6 +168,13 @@ fn plan_step(step: &client::Step<'_>) -> PlanStep {
     }
 }
 
+/// Where moved parts stand: what was asked, which the wire does not tell again.
+fn poses(revision: &Revision) -> Vec<(usize, Waypoint)> {
+    let mut poses: Vec<_> = revision.moved.iter().map(|(p, pose)| (*p, waypoint_from_pose(pose))).collect();
+    poses.sort_by_key(|(part, _)| *part);
+    poses
+}
+
 fn plan(s: Summary, steps: Vec<PlanStep>) -> Plan {
     Plan {
         status: status(s.status),
@@ -175,6 +184,7 @@ fn plan(s: Summary, steps: Vec<PlanStep>) -> Plan {
         units: s.units,
         parts: s.parts,
         removed: indices(&s.removed),
+        poses: Vec::new(),
         targets: s.targets.as_deref().map(indices),
         fixed: indices(&s.fixed),
         steps,
@@ -248,6 +258,7 @@ fn unplanned(question: &Question<'_>, status: PlanStatus, error: &ClientError) -
         units: question.assembly.units.clone(),
         parts,
         removed: request.removed.clone(),
+        poses: Vec::new(),
         targets: request.targets.clone(),
         fixed: request.fixed.clone(),
         steps: Vec::new(),

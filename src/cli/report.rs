@@ -193,6 +193,7 @@ mod tests {
             units: Some("mm".into()),
             parts: ["a", "b", "c"].map(String::from).into(),
             removed: vec![],
+            poses: vec![],
             targets: None,
             fixed: vec![],
             steps: vec![

@@ -38,6 +38,7 @@ fn plan_with(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
         units: None,
         parts: vec!["0".into()],
         removed: vec![],
+        poses: vec![],
         targets: None,
         fixed: vec![],
         steps,

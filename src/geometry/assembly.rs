@@ -20,6 +20,8 @@ pub struct Part {
     pub planning_from_shape: Pose,
     /// Box of the assembled part in the planning frame.
     pub bounds: Bounds,
+    /// Where its mesh stands against where it was given (input units and frame).
+    pub moved: Pose,
 }
 
 /// Parts in the planning frame.
@@ -150,7 +152,7 @@ fn share_shapes(meshes: Vec<Mesh>, names: Vec<String>) -> (Vec<Arc<Shape>>, Vec<
                 (originals.len() - 1, Pose::translation(c.x, c.y, c.z))
             }
         };
-        parts.push(Part { name, shape, planning_from_shape, bounds });
+        parts.push(Part { name, shape, planning_from_shape, bounds, moved: Pose::identity() });
     }
     let shapes = originals
         .par_iter()

@@ -124,6 +124,7 @@ impl Assembly {
             let mut motion = *pose;
             motion.translation.vector *= self.scale;
             let moved = &mut revised.parts[*part];
+            moved.moved = pose * moved.moved;
             moved.planning_from_shape = motion * moved.planning_from_shape;
             moved.bounds =
                 Bounds::of(&transformed(&revised.shapes[moved.shape].hull, &moved.planning_from_shape));
@@ -157,7 +158,8 @@ impl Assembly {
             self.shapes.push(Arc::new(Shape::new(&Mesh { vertices, ..mesh })));
             (self.shapes.len() - 1, Pose::from(nalgebra::Translation3::from(c)))
         });
-        Ok(Part { name: source.name.clone(), shape, planning_from_shape, bounds })
+        let moved = Pose::identity();
+        Ok(Part { name: source.name.clone(), shape, planning_from_shape, bounds, moved })
     }
 
     fn drop_unused_shapes(&mut self) {

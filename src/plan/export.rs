@@ -197,7 +197,7 @@ impl PlanDocument {
             engine: plan.engine.clone(),
             units: plan.units.clone(),
             parts: plan.parts.clone(),
-            initial: InitialDocument { removed: plan.names(&plan.removed), poses: BTreeMap::new() },
+            initial: InitialDocument { removed: plan.names(&plan.removed), poses: poses(plan) },
             targets: plan.targets.as_ref().map(|t| plan.names(t)),
             fixed: plan.names(&plan.fixed),
             steps: plan.steps.iter().map(|s| step(plan, s)).collect(),
@@ -224,6 +224,10 @@ impl PlanDocument {
     pub fn from_json(text: &str) -> serde_json::Result<Self> {
         serde_json::from_str(text)
     }
+}
+
+fn poses(plan: &Plan) -> BTreeMap<String, Waypoint> {
+    plan.poses.iter().map(|(part, pose)| (plan.part_name(*part).to_owned(), *pose)).collect()
 }
 
 fn step(plan: &Plan, step: &PlanStep) -> StepDocument {
@@ -290,6 +294,7 @@ mod tests {
             units: Some("mm".into()),
             parts: vec!["0".into(), "1".into(), "2".into(), "10".into()],
             removed: vec![3],
+            poses: vec![(1, [0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0])],
             targets: Some(vec![1]),
             fixed: vec![0],
             steps: vec![PlanStep {
@@ -320,7 +325,7 @@ mod tests {
         let expected = concat!(
             r#"{"schema":"sbdp-plan/1","status":"infeasible","reason":"nothing moves","planner":"sbdp-star","#,
             r#""engine":"sliding","units":"mm","parts":["0","1","2","10"],"#,
-            r#""initial":{"removed":["10"],"poses":{}},"targets":["1"],"fixed":["0"],"#,
+            r#""initial":{"removed":["10"],"poses":{"1":[0.0,0.5,0.0,1.0,0.0,0.0,0.0]}},"targets":["1"],"fixed":["0"],"#,
             r#""steps":[{"part":"2","motion":"rotation","#,
             r#""path":[[0.0,0.0,0.0,1.0,0.0,0.0,0.0],[0.0,0.5,0.0,0.0,1.0,0.0,0.0]],"verified_depth":0.001}],"#,
             r#""remaining":["0","1"],"blocked":[{"part":"1","by":["0"],"action":"+x"}],"#,

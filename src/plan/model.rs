@@ -33,7 +33,8 @@ pub struct PlanStep {
     pub part: usize,
     /// Whether the path turns the part.
     pub motion: MotionKind,
-    /// Transforms of the assembled mesh; the first is the part's pose at the start.
+    /// Transforms of the mesh from where it was given; the first is the part's pose at the start, the
+    /// identity but for parts that stand elsewhere.
     pub path: Vec<Waypoint>,
     /// Deepest penetration found by verification beyond the pair's assembled depth.
     pub verified_depth: f64,
@@ -125,6 +126,8 @@ pub struct Plan {
     pub parts: Vec<String>,
     /// Parts that had been removed before.
     pub removed: Vec<usize>,
+    /// Parts that stood elsewhere at the start than where their mesh was given, and where.
+    pub poses: Vec<(usize, Waypoint)>,
     /// Parts that must come out, or all.
     pub targets: Option<Vec<usize>>,
     /// Parts that may not move.

@@ -13,8 +13,12 @@ const NO_TURN: f64 = 1e-9;
 /// A removal as a step of a plan.
 pub(super) fn step(assembly: &Assembly, removal: &Removal) -> PlanStep {
     let start = removal.path.first().copied().unwrap_or_default();
-    let path: Vec<Waypoint> = removal.path.iter().map(|p| waypoint(assembly, &start, p)).collect();
-    let turns = path.iter().any(|w| w[3] < 1.0);
+    let motions: Vec<Pose> = removal.path.iter().map(|p| motion(assembly, &start, p)).collect();
+    let turns = motions.iter().any(|m| waypoint_from_pose(m)[3] < 1.0);
+    let moved = assembly.parts[removal.part].moved;
+    // What was given where it stands keeps its numbers.
+    let of_mesh = |m: &Pose| if moved == Pose::identity() { *m } else { m * moved };
+    let path = motions.iter().map(|m| waypoint_from_pose(&of_mesh(m))).collect();
     PlanStep {
         part: removal.part,
         motion: if turns { MotionKind::Rotation } else { MotionKind::Translation },
@@ -25,14 +29,20 @@ pub(super) fn step(assembly: &Assembly, removal: &Removal) -> PlanStep {
 }
 
 /// The transform of the assembled mesh that brings it from `start` to `pose`, in input units.
-fn waypoint(assembly: &Assembly, start: &Pose, pose: &Pose) -> Waypoint {
+fn motion(assembly: &Assembly, start: &Pose, pose: &Pose) -> Pose {
     let mut moved = pose * start.inverse();
     if start.rotation.angle_to(&pose.rotation) < NO_TURN {
         moved = Pose::from(pose.translation.vector - start.translation.vector);
     }
     moved.translation.vector /= assembly.scale;
     moved.rotation.renormalize();
-    waypoint_from_pose(&moved)
+    moved
+}
+
+/// The parts that stand elsewhere than where they were given.
+fn poses(assembly: &Assembly) -> Vec<(usize, Waypoint)> {
+    let moved = assembly.parts.iter().enumerate().filter(|(_, part)| part.moved != Pose::identity());
+    moved.map(|(i, part)| (i, waypoint_from_pose(&part.moved))).collect()
 }
 
 pub(super) fn overlaps(assembly: &Assembly, found: &[(usize, usize, f64)]) -> Vec<Overlap> {
@@ -125,6 +135,7 @@ impl Frame<'_> {
             units: self.assembly.units.clone(),
             parts: self.assembly.parts.iter().map(|p| p.name.clone()).collect(),
             remaining: (0..count).filter(|p| !self.removed.contains(p)).collect(),
+            poses: poses(self.assembly),
             removed: self.removed,
             targets: self.request.targets.clone(),
             fixed: self.fixed,
