@@ -5,6 +5,11 @@ mod depth;
 pub mod export;
 mod model;
 mod sampling;
+mod screw_envelope;
+mod screw_path;
+#[cfg(test)]
+mod screw_tests;
+mod screws;
 mod shorten;
 mod verify;
 
