@@ -101,6 +101,18 @@ fn beside(angle: f64, near: f64) -> f64 {
     angle + TAU * ((near - angle) / TAU).round()
 }
 
+/// From how far to how far a triangle (axis frame) is from the axis.
+#[must_use]
+pub fn radii(corners: &[Point3<f64>; 3]) -> [f64; 2] {
+    let flat = corners.map(|p| p.xy().coords);
+    let far = flat.iter().map(|p| p.norm()).fold(0.0, f64::max);
+    let sides = [0, 1, 2].map(|i| flat[i].perp(&flat[(i + 1) % 3]));
+    if sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0) {
+        return [0.0, far];
+    }
+    [(0..3).map(|i| from_origin(&flat[i], &flat[(i + 1) % 3])).fold(f64::INFINITY, f64::min), far]
+}
+
 /// How far a line from one point to another is from the origin.
 fn from_origin(a: &Vector2<f64>, b: &Vector2<f64>) -> f64 {
     let along = b - a;

@@ -42,7 +42,7 @@ pub use content_hash::content_hash;
 pub use error::GeometryError;
 pub use free_region::{FreeRegion, NoRegion, Wanted};
 pub use heal::{Healed, heal};
-pub use helix::{Footprint, Helix};
+pub use helix::{Footprint, Helix, radii};
 pub use hull::{gap_along, hull_vertices, separating_direction, transformed};
 pub use linking_number::linking_number;
 pub use load::{load_assembly, natural_order};

@@ -1,5 +1,6 @@
 //! Plans: what is returned, and the check that it is true.
 
+mod centred;
 mod course;
 mod depth;
 pub mod export;
@@ -11,6 +12,7 @@ mod screw_path;
 mod screw_tests;
 mod screws;
 mod shorten;
+mod slip;
 mod verify;
 
 pub use model::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};

@@ -125,6 +125,12 @@ impl ScrewPath {
         mean
     }
 
+    /// Where it is last as near to the helix as `near`: the angle, and the way there.
+    pub(super) fn leaves(&self, near: f64) -> Option<(f64, f64)> {
+        let off = |k: &&Knot| (k.unscrewed * self.centre - self.reference * self.centre).norm() <= near;
+        self.knots.iter().rev().find(off).map(|k| (k.angles[1], k.way[1]))
+    }
+
     /// What is known of a stretch: `None` if the two parts are nowhere near each other.
     pub(super) fn stretch(&self, interval: Interval, pair: &Pair<'_>) -> Option<Stretch> {
         let (moving, standing) = (pair.moving.bounds(), pair.standing.bounds());

@@ -6,21 +6,23 @@
 //! [`depth`](super::depth), as far as that gets, and to samples. So but for these the answer is the
 //! same kind of bound.
 
+use nalgebra::Point3;
+
 use crate::geometry::{Pose, Surface};
 use crate::termination::{Interrupt, Termination};
 
 use super::course::{Course, Interval};
 use super::depth::{Found, MOST_EFFORT};
-use super::screw_envelope::Envelope;
+use super::screw_envelope::{Envelope, Zone};
 use super::screw_path::{Pair, ScrewPath};
 use super::verify::{Asked, Way};
 
 /// Stretches that turn by less than this (radians) are not compared any more.
 const LEAST_TURN: f64 = 0.25;
 /// So many helices are tried.
-const ROUNDS: usize = 3;
-/// Errors of profiles, as a share of the limit.
-const FINEST: f64 = 1.0 / 4.0;
+const ROUNDS: usize = 2;
+/// How far a part may stray on a piece of the way that is looked at as one, as a share of the limit.
+const FINEST: f64 = 1.0 / 2.0;
 /// So much effort is spent on a side before profiles are asked.
 const FIRST_EFFORT: usize = 8_000;
 /// Stretches that turn further (radians) are bounded in pieces.
@@ -43,7 +45,7 @@ pub(super) fn unsettled(
         if open.is_empty() || screw.helix.rise == 0.0 {
             break;
         }
-        open = left_open(&screw, course, pair, open, limit, termination)?;
+        open = left_open(&screw, course, pair, open, termination)?;
     }
     Ok(open)
 }
@@ -53,19 +55,21 @@ fn left_open(
     course: &Course,
     pair: &Pair<'_>,
     stretches: Vec<Interval>,
-    limit: f64,
     termination: &Termination,
 ) -> Result<Vec<Interval>, Interrupt> {
     let axis_from_standing = screw.helix.axis_from_planning * pair.planning_from_standing;
-    let envelope = |surface: &Surface, axis_from_shape: &Pose| {
+    let triangles = |surface: &Surface, axis_from_shape: &Pose| -> Vec<[Point3<f64>; 3]> {
         let corners = |t: u32| surface.corners(t).map(|p| axis_from_shape * p);
-        let triangles = (0..surface.triangles().len() as u32).map(corners);
-        Envelope::new(triangles, &screw.helix, limit * FINEST)
+        (0..surface.triangles().len() as u32).map(corners).collect()
     };
-    let (moving, standing) = rayon::join(
-        || envelope(pair.moving, &screw.reference),
-        || envelope(pair.standing, &axis_from_standing),
-    );
+    let moving = triangles(pair.moving, &screw.reference);
+    let standing = triangles(pair.standing, &axis_from_standing);
+    let [one, other] = [&moving, &standing].map(|t| Zone::of(t).everywhere());
+    let zone = one.common(&other);
+    let envelope = |triangles: Vec<[Point3<f64>; 3]>| {
+        Envelope::new(triangles.into_iter(), &screw.helix, &zone)
+    };
+    let (moving, standing) = rayon::join(|| envelope(moving), || envelope(standing));
     let mut open = Vec::new();
     let mut stack = stretches;
     while let Some(interval) = stack.pop() {
@@ -100,7 +104,9 @@ pub(super) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], In
         return Ok([unknown(), unknown()]);
     }
     // A part that shares no thread with the moving one is soon told to be apart.
+    let t0 = std::time::Instant::now();
     let mut found = bounded(way, vec![Interval::WHOLE], FIRST_EFFORT)?;
+    let t1 = std::time::Instant::now();
     // Where the one surface does not touch the other, the parts are apart, unless one lay in the
     // other from the start: that is a granted overlap.
     let mut open = taken_open(&mut found);
@@ -109,8 +115,14 @@ pub(super) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], In
             Pair { moving: one, standing: other, planning_from_standing: standing.planning_from_shape };
         open = unsettled(way.course, &pair, open, limit, termination)?;
     }
+    let t2 = std::time::Instant::now();
     let [mut one, mut other] = found;
+    let turn = |v: &[Interval]| v.iter().map(|i| way.course.turn(*i)).sum::<f64>();
+    let left = turn(&open);
+    let list = format!("{:?}", open.iter().map(|i| i.of(1.0).map(|x| (x * 1000.0).round())).collect::<Vec<_>>());
     let [more, others] = bounded(way, open, MOST_EFFORT)?;
+    eprintln!("pair {} {} turn {:.1} segs {} first {:.4} (effort {} {}), profiles {:.4} leave {left:.2} {list}, bound {:.4} (effort {} {}) leaves {:.2} {:.2}; deep {} {} granted {:.5}", part, way.other, way.course.turn(Interval::WHOLE), way.course.segments.len(),
+      (t1-t0).as_secs_f64(), one.effort, other.effort, (t2-t1).as_secs_f64(), t2.elapsed().as_secs_f64(), more.effort, others.effort, turn(&more.open), turn(&others.open), one.deep.len()+more.deep.len(), other.deep.len()+others.deep.len(), allowances.of(part, way.other));
     one.add(more);
     other.add(others);
     Ok([one, other])

@@ -17,6 +17,7 @@ use crate::geometry::{Bounds, Pose, Shape, Surface, area_normal};
 use crate::simulation::{Allowances, Scene};
 use crate::termination::{Interrupt, Termination};
 
+use super::centred::centred;
 use super::course::{Course, Interval, View};
 use super::depth::{Found, MOST_EFFORT, Precision, Question};
 use super::sampling::{Samples, turns_far};
@@ -155,6 +156,19 @@ impl Verifier {
         interior_points(&one.shape.surface)
             .map(|p| depth(&one.shape.surface, &p).min(depth(&other.shape.surface, &(to_other * p))))
             .fold(0.0, f64::max)
+    }
+
+    /// A path from where a given one begins to where it ends that turns in the middle of the play of a
+    /// thread, if the given one follows a thread. It is no better verified than any.
+    #[must_use]
+    pub fn centred_on_thread(
+        &self,
+        scene: &Scene,
+        standing: &[usize],
+        part: usize,
+        path: &[Pose],
+    ) -> Option<Vec<Pose>> {
+        centred(scene, standing, part, path, self.limit / 2.0)
     }
 
     /// Checks a path of a part (poses of its shape) among the parts that stand.

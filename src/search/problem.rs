@@ -121,8 +121,18 @@ impl Problem<'_> {
         let thin = thinned(path, bounds, &self.scene.centre_in_shape(part));
         let standing = self.scene.broad_phase.meeting_of(&standing, &self.swept_bounds(part, &thin));
         let Scene { allowances, .. } = &self.scene;
-        let verdict =
-            self.verifier.check(&self.scene, allowances, &standing, part, &thin, &self.termination)?;
+        let checked = |path: &[Pose]| {
+            self.verifier.check(&self.scene, allowances, &standing, part, path, &self.termination)
+        };
+        if let Some(centred) = self.verifier.centred_on_thread(&self.scene, &standing, part, &thin) {
+            let thin = thinned(&centred, bounds, &self.scene.centre_in_shape(part));
+            let verdict = checked(&thin)?;
+            eprintln!("centred verdict {} ({} entries)", verdict.depth, verdict.entries.len());
+            if verdict.entries.is_empty() {
+                return Ok(Ok((thin, verdict.depth)));
+            }
+        }
+        let verdict = checked(&thin)?;
         if verdict.entries.is_empty() { Ok(Ok((thin, verdict.depth))) } else { Ok(Err(verdict.entries)) }
     }
 
