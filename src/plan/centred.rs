@@ -1,43 +1,51 @@
 //! Paths off a thread, in the middle of its play.
 //!
 //! An engine that pushes a part off a thread presses it against the flanks: such a path has no room,
-//! and its wobble makes many waypoints. The two threads themselves tell a better one ([`slip`](super::slip)): both
-//! axes as one, the profiles as far apart as they can be, and nothing but turning along the helix. It is
-//! a proposal, to be verified like any path.
+//! and its wobble makes many waypoints. The two threads themselves tell a
+//! better one ([`slip`](super::slip)): both axes as one, the profiles as far apart as they can be, and
+//! nothing but turning along the helix. It is a proposal, to be verified like any path.
 
 use std::f64::consts::TAU;
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 
-use crate::geometry::{Helix, Pose};
+use crate::geometry::{Helix, Pose, Surface, interpolate};
 use crate::simulation::Scene;
 
 use super::course::{Course, Interval};
 use super::sampling::turns_far;
 use super::screw_envelope::{Envelope, Zone};
 use super::screw_path::ScrewPath;
+use super::screws::FINEST;
 use super::slip::{Facet, slipping};
 
-/// Two threads fit if their rises differ by no more than this share.
-const SAME_RISE: f64 = 0.05;
 /// So far from the helix, as a share of the pitch, a path has left it.
 const LEFT: f64 = 0.25;
+/// What is no further from the end of the thread, in pitches, does not count: seats and the bottoms of holes
+/// are there.
+const ENDS: f64 = 0.3;
 /// The angle between two poses, before thinning, in radians.
 const STEP: f64 = 0.1;
+/// Pieces of the way from there to where the given path ends.
+const PIECES: u32 = 4;
+/// A part that is off the thread after so much more (radians) is turned off it, where the given path only
+/// draws it off: chamfers end threads early.
+const MOST_FURTHER: f64 = 2.0 * TAU;
 
 /// A path with the same start and end as a given one that turns along the thread which a part shares
-/// with one of those standing; `None` if there is no such thread, or no play in it. `finest` is the
-/// error of profiles.
+/// with one of those standing; `None` if there is no such thread, or no play in it. `limit` is the depth
+/// at which paths are refused.
 pub(super) fn centred(
     scene: &Scene,
     standing: &[usize],
     part: usize,
     path: &[Pose],
-    finest: f64,
+    limit: f64,
 ) -> Option<Vec<Pose>> {
     if !turns_far(path) {
         return None;
     }
+    let finest = limit * FINEST;
     let course = Course::new(path, scene.centre_in_shape(part), scene.bodies[part].shape.reach);
     let followed = ScrewPath::new(&course, &[Interval::WHOLE], finest)?;
     let (left, way) = followed.leaves(followed.helix.pitch().abs() * LEFT)?;
@@ -50,7 +58,7 @@ pub(super) fn centred(
             _ => Some((play, thread)),
         })?;
     // What is nearly off the thread is turned off it.
-    let is_near = (thread.off - left).abs() < TAU;
+    let is_near = (thread.off - left).abs() < MOST_FURTHER;
     let angle = if is_near { thread.off.abs().max(left.abs()).copysign(left) } else { left };
     let count = (angle / STEP).abs().ceil().max(1.0);
     let on_thread = (0..=count as usize).map(|k| thread.pose(angle * k as f64 / count));
@@ -58,8 +66,13 @@ pub(super) fn centred(
     // From there on as the given path, at the same distance from it, and at its end on it.
     let aside = rest.first()?.inverse() * thread.pose(angle);
     let rest: Vec<Pose> = if is_near { Vec::new() } else { rest.iter().map(|p| p * aside).collect() };
-    let ends = [path.first().copied(), path.last().copied()];
-    Some(ends[0].into_iter().chain(on_thread).chain(rest).chain(ends[1]).collect())
+    let mut poses: Vec<Pose> = path.first().copied().into_iter().chain(on_thread).chain(rest).collect();
+    // In small pieces, so that it is clear which way round it turns.
+    let (from, to) = (*poses.last()?, *path.last()?);
+    let between =
+        (1..=PIECES).map(|k| interpolate(&from, &to, &course.centre, f64::from(k) / f64::from(PIECES)));
+    poses.extend(between);
+    Some(poses)
 }
 
 /// A thread that two parts share.
@@ -88,14 +101,12 @@ impl Thread {
         let ScrewPath { helix: guess, reference, .. } = followed;
         let (moving, standing) = (&scene.bodies[part].shape.surface, &scene.bodies[other].shape.surface);
         let guess_from_standing = guess.axis_from_planning * scene.bodies[other].planning_from_shape;
-        let triangles = |surface: &crate::geometry::Surface, frame: Pose| -> Vec<[Point3<f64>; 3]> {
-            (0..surface.triangles().len() as u32)
-                .map(|t| surface.corners(t).map(|p| frame * p))
-                .collect()
+        let triangles = |surface: &Surface, frame: Pose| -> Vec<[Point3<f64>; 3]> {
+            (0..surface.triangles().len() as u32).map(|t| surface.corners(t).map(|p| frame * p)).collect()
         };
         let (moving, standing) = (triangles(moving, *reference), triangles(standing, guess_from_standing));
         let zones = [Zone::of(&moving), Zone::of(&standing)];
-        let zone = zones[0].common(&zones[1]);
+        let zone = zones[0].common(&zones[1]).trimmed(ENDS * guess.pitch().abs());
         if zone.is_empty() {
             return None;
         }
@@ -103,13 +114,8 @@ impl Thread {
             let facets: Vec<Facet> = t.iter().filter(|c| zone.meets(c)).filter_map(Facet::of).collect();
             slipping(&facets, guess.rise)
         });
-        eprintln!("shared {part} {other}: guess rise {} own {:?} others {:?}", guess.rise, own.map(|h| h.rise), others.map(|h| h.rise));
         let (own, others) = (own?, others?);
-        let rise = guess.rise;
-        if (own.rise - others.rise).abs() > SAME_RISE * rise.abs() {
-            return None;
-        }
-        let helix = Helix { rise, ..others };
+        let helix = Helix { rise: guess.rise, ..others };
         // The moving part's axis onto the standing one's.
         let to_other = onto(&own, &others, f64::midpoint(zone.along()[0], zone.along()[1]));
         let frame = helix.axis_from_planning;
@@ -118,7 +124,6 @@ impl Thread {
             Envelope::new(moved, &helix, &zone)
         };
         let (one, two) = (envelope(&moving, frame * to_other), envelope(&standing, frame));
-        eprintln!("gap {:?} pitch {}", two.widest_gap(&one, LEFT * helix.pitch().abs()), helix.pitch());
         let (play, shift) = two.widest_gap(&one, LEFT * helix.pitch().abs())?;
         let reference = Translation3::from(Vector3::z() * shift) * frame * to_other * reference;
         let helix = Helix { axis_from_planning: frame * guess.axis_from_planning, ..helix };

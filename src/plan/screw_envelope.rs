@@ -58,6 +58,11 @@ impl Zone {
         self.along[0] >= self.along[1] || self.across[0] >= self.across[1]
     }
 
+    /// The same without so much at both ends, along the axis.
+    pub(super) fn trimmed(self, by: f64) -> Self {
+        Self { along: [self.along[0] + by, self.along[1] - by], ..self }
+    }
+
     /// The same at all heights.
     pub(super) fn everywhere(self) -> Self {
         Self { along: [f64::NEG_INFINITY, f64::INFINITY], ..self }
@@ -107,11 +112,7 @@ pub(super) struct Envelope {
 impl Envelope {
     /// The profile of triangles (axis frame) along a helix that rises, where another part can be
     /// near: in `zone`.
-    pub(super) fn new(
-        triangles: impl Iterator<Item = [Point3<f64>; 3]>,
-        helix: &Helix,
-        zone: &Zone,
-    ) -> Self {
+    pub(super) fn new(triangles: impl Iterator<Item = [Point3<f64>; 3]>, helix: &Helix, zone: &Zone) -> Self {
         let pitch = helix.pitch().abs();
         let [near, far] = zone.across;
         let zone = Zone { across: [near - BESIDE * pitch, far + BESIDE * pitch], ..*zone };
@@ -139,10 +140,12 @@ impl Envelope {
             }
             match Footprint::of(&corners, rise) {
                 Some(print) if print.error <= self.finest || cuts >= MOST_CUTS => {
-                    self.enter(&print, [low, high]);
+                    let heights = print.points.iter().zip(&corners);
+                    self.enter(&print, [low, high], min_max(heights.map(|(p, c)| p.y - c.z)));
                 }
                 None if far <= 4.0 * self.finest || cuts >= MOST_CUTS => {
-                    self.enter(&Footprint::at_all_angles(&corners, rise), [low, high]);
+                    let whole = [f64::NEG_INFINITY, f64::INFINITY];
+                    self.enter(&Footprint::at_all_angles(&corners, rise), [low, high], whole);
                 }
                 _ => stack.extend(halves(&corners).map(|half| (half, cuts + 1))),
             }
@@ -170,17 +173,20 @@ impl Envelope {
         &mut self.slabs[(low - self.first) as usize..needed]
     }
 
-    /// Notes where a footprint reaches.
-    fn enter(&mut self, print: &Footprint, along: [f64; 2]) {
-        let size = self.finest;
+    /// Notes where a footprint reaches. Its heights on the helix are beside those along the axis, from
+    /// `along[0]` to `along[1]`, by something in `beside`.
+    fn enter(&mut self, print: &Footprint, along: [f64; 2], beside: [f64; 2]) {
+        let (size, pitch) = (self.finest, self.pitch);
         let [from, to] = min_max(print.points.iter().map(|p| p.y));
-        let from = ((from - print.error) / size).floor() as i64;
-        // What reaches over more than a pitch comes by everywhere.
-        let to = ((to + print.error) / size).floor() as i64;
+        let mut low = self.slab(along[0]);
         for slab in self.slabs_between(along) {
             if slab.reaches.is_empty() {
                 slab.reaches.resize(BINS, NOTHING);
             }
+            let ends = [low as f64, (low + 1) as f64].map(|z| z / SLABS * pitch);
+            low += 1;
+            let from = ((from.max(ends[0] + beside[0]) - print.error) / size).floor() as i64;
+            let to = ((to.min(ends[1] + beside[1]) + print.error) / size).floor() as i64;
             for bin in from..=to {
                 let [near, far] = reach(print, [bin as f64 * size, (bin + 1) as f64 * size]);
                 let own = &mut slab.reaches[bin.rem_euclid(BINS as i64) as usize];

@@ -97,6 +97,33 @@ fn a_stop_at_the_end_is_met() {
     assert!(checked(&scene, &verifier, &path) > LIMIT);
 }
 
+#[test]
+fn a_path_pressed_to_its_thread_is_brought_into_the_middle_of_the_play() {
+    let (scene, verifier) = scene(nut_on_bolt());
+    // To one side, as far as it goes, and wobbling.
+    let straight = screwed(&scene, TURNS + 1.0, PITCH, &Pose::translation(0.0, 0.0, 0.02));
+    let wobble = |k: usize| Pose::translation(0.004 * (k as f64 * 1.7).sin(), 0.004 * (k as f64).cos(), 0.0);
+    let path: Vec<Pose> = straight.iter().enumerate().map(|(k, p)| wobble(k) * p).collect();
+    let centred = verifier.centred_on_thread(&scene, &[0], 1, &path).unwrap();
+    assert_eq!(centred[0], path[0]);
+    let last = centred[centred.len() - 1].inverse() * path[path.len() - 1];
+    assert!((last.to_matrix() - Pose::identity().to_matrix()).norm() < 1e-12);
+    assert!(checked(&scene, &verifier, &centred) <= LIMIT);
+    // Away from its ends, it is where both axes are one.
+    let on_axis =
+        |pose: &Pose| (pose * scene.bodies[1].planning_from_shape.inverse()).translation.vector.xy();
+    assert!(centred[5..centred.len() - 8].iter().all(|p| on_axis(p).norm() < 3e-3));
+    assert!(path[5..].iter().any(|p| on_axis(p).norm() > 3e-3));
+}
+
+#[test]
+fn what_turns_beside_no_thread_is_left_as_it_is() {
+    let peg = cuboid([-0.5, -0.5, 0.0], [0.5, 0.5, 4.0]);
+    let (scene, verifier) = scene([cuboid([-3.0, -3.0, -1.0], [3.0, 3.0, 0.0]), peg]);
+    let path = screwed(&scene, 2.0, PITCH, &Pose::identity());
+    assert_eq!(verifier.centred_on_thread(&scene, &[0], 1, &path), None);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
     #[test]

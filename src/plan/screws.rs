@@ -19,44 +19,28 @@ use super::verify::{Asked, Way};
 
 /// Stretches that turn by less than this (radians) are not compared any more.
 const LEAST_TURN: f64 = 0.25;
-/// So many helices are tried.
-const ROUNDS: usize = 2;
 /// How far a part may stray on a piece of the way that is looked at as one, as a share of the limit.
-const FINEST: f64 = 1.0 / 2.0;
+pub(super) const FINEST: f64 = 1.0 / 2.0;
 /// So much effort is spent on a side before profiles are asked.
 const FIRST_EFFORT: usize = 8_000;
 /// Stretches that turn further (radians) are bounded in pieces.
 const LONGEST: f64 = 4.0;
 
-/// The stretches of the way on which the profiles of two surfaces do not show that they are apart. What
-/// one helix leaves open is tried again with the helix that is closest to that.
+/// The stretches of the way on which the profiles of two surfaces do not show that they are apart.
 ///
 /// # Errors
 /// The termination condition became true.
 pub(super) fn unsettled(
     course: &Course,
     pair: &Pair<'_>,
-    mut open: Vec<Interval>,
+    stretches: Vec<Interval>,
     limit: f64,
     termination: &Termination,
 ) -> Result<Vec<Interval>, Interrupt> {
-    for _ in 0..ROUNDS {
-        let Some(screw) = ScrewPath::new(course, &open, limit * FINEST) else { break };
-        if open.is_empty() || screw.helix.rise == 0.0 {
-            break;
-        }
-        open = left_open(&screw, course, pair, open, termination)?;
+    let Some(screw) = ScrewPath::new(course, &stretches, limit * FINEST) else { return Ok(stretches) };
+    if screw.helix.rise == 0.0 {
+        return Ok(stretches);
     }
-    Ok(open)
-}
-
-fn left_open(
-    screw: &ScrewPath,
-    course: &Course,
-    pair: &Pair<'_>,
-    stretches: Vec<Interval>,
-    termination: &Termination,
-) -> Result<Vec<Interval>, Interrupt> {
     let axis_from_standing = screw.helix.axis_from_planning * pair.planning_from_standing;
     let triangles = |surface: &Surface, axis_from_shape: &Pose| -> Vec<[Point3<f64>; 3]> {
         let corners = |t: u32| surface.corners(t).map(|p| axis_from_shape * p);
@@ -66,9 +50,8 @@ fn left_open(
     let standing = triangles(pair.standing, &axis_from_standing);
     let [one, other] = [&moving, &standing].map(|t| Zone::of(t).everywhere());
     let zone = one.common(&other);
-    let envelope = |triangles: Vec<[Point3<f64>; 3]>| {
-        Envelope::new(triangles.into_iter(), &screw.helix, &zone)
-    };
+    let envelope =
+        |triangles: Vec<[Point3<f64>; 3]>| Envelope::new(triangles.into_iter(), &screw.helix, &zone);
     let (moving, standing) = rayon::join(|| envelope(moving), || envelope(standing));
     let mut open = Vec::new();
     let mut stack = stretches;
@@ -104,25 +87,20 @@ pub(super) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], In
         return Ok([unknown(), unknown()]);
     }
     // A part that shares no thread with the moving one is soon told to be apart.
-    let t0 = std::time::Instant::now();
     let mut found = bounded(way, vec![Interval::WHOLE], FIRST_EFFORT)?;
-    let t1 = std::time::Instant::now();
-    // Where the one surface does not touch the other, the parts are apart, unless one lay in the
-    // other from the start: that is a granted overlap.
-    let mut open = taken_open(&mut found);
-    if !open.is_empty() && allowances.of(part, way.other) == 0.0 {
-        let pair =
-            Pair { moving: one, standing: other, planning_from_standing: standing.planning_from_shape };
-        open = unsettled(way.course, &pair, open, limit, termination)?;
+    if allowances.of(part, way.other) > 0.0 {
+        // One part lies in the other: surfaces cross, and no more effort would tell how deep.
+        return Ok(found);
     }
-    let t2 = std::time::Instant::now();
-    let [mut one, mut other] = found;
-    let turn = |v: &[Interval]| v.iter().map(|i| way.course.turn(*i)).sum::<f64>();
-    let left = turn(&open);
-    let list = format!("{:?}", open.iter().map(|i| i.of(1.0).map(|x| (x * 1000.0).round())).collect::<Vec<_>>());
+    let open = taken_open(&mut found);
+    if open.is_empty() {
+        return Ok(found);
+    }
+    // They do not overlap at the start: where neither surface meets the other, they stay apart.
+    let pair = Pair { moving: one, standing: other, planning_from_standing: standing.planning_from_shape };
+    let open = unsettled(way.course, &pair, open, limit, termination)?;
     let [more, others] = bounded(way, open, MOST_EFFORT)?;
-    eprintln!("pair {} {} turn {:.1} segs {} first {:.4} (effort {} {}), profiles {:.4} leave {left:.2} {list}, bound {:.4} (effort {} {}) leaves {:.2} {:.2}; deep {} {} granted {:.5}", part, way.other, way.course.turn(Interval::WHOLE), way.course.segments.len(),
-      (t1-t0).as_secs_f64(), one.effort, other.effort, (t2-t1).as_secs_f64(), t2.elapsed().as_secs_f64(), more.effort, others.effort, turn(&more.open), turn(&others.open), one.deep.len()+more.deep.len(), other.deep.len()+others.deep.len(), allowances.of(part, way.other));
+    let [mut one, mut other] = found;
     one.add(more);
     other.add(others);
     Ok([one, other])

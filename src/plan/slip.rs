@@ -39,8 +39,10 @@ impl Facet {
     }
 }
 
-/// The helix along which the flanks among some facets slip best; that along z with some rise is close
-/// to it, in whose frame they are given. `None` if they are too few or tell no helix.
+/// The helix of some rise along which the flanks among some facets slip best; that along z is close to
+/// it, in whose frame they are given. `None` if they are too few or tell no axis. (Facets on a grid lean
+/// all the same way against the flank that they stand for, and would tell a false rise; about the axis,
+/// that evens out.)
 pub(super) fn slipping(facets: &[Facet], rise: f64) -> Option<Helix> {
     // The speed along the normal is linear in the twist: ω = (a, b, 1), v = (c, d, rise).
     let row = |f: &Facet| {
@@ -77,4 +79,36 @@ pub(super) fn slipping(facets: &[Facet], rise: f64) -> Option<Helix> {
     let squared = omega.norm_squared();
     let through = Point3::from(omega.cross(&v) / squared);
     Some(Helix::about(&omega.normalize(), &through, omega.dot(&v) / squared))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{ball, surface, thread};
+    use crate::geometry::{Pose, Surface};
+
+    fn facets(surface: &Surface, place: &Pose) -> Vec<Facet> {
+        let corners = |t: u32| surface.corners(t).map(|p| place * p);
+        (0..surface.triangles().len() as u32).filter_map(|t| Facet::of(&corners(t))).collect()
+    }
+
+    #[test]
+    fn the_axis_of_a_displaced_thread_is_found() {
+        let (pitch, [bolt, nut]) = (0.5, thread(3.0, 0.5));
+        let place = Pose::new(Vector3::new(0.03, -0.02, 0.01), Vector3::new(0.004, -0.006, 0.4));
+        for mesh in [bolt, nut] {
+            let found = slipping(&facets(&surface(mesh), &place), pitch / std::f64::consts::TAU).unwrap();
+            let axis_from_thread = found.axis_from_planning * place;
+            for z in [0.0, 6.0] {
+                let at = axis_from_thread * Point3::new(0.0, 0.0, z);
+                assert!(at.xy().coords.norm() < 2e-3, "{at}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_flanks_tells_no_axis() {
+        let small = facets(&surface(ball(0)), &Pose::identity());
+        assert_eq!(slipping(&small, 0.1), None);
+    }
 }

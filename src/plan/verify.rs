@@ -168,7 +168,7 @@ impl Verifier {
         part: usize,
         path: &[Pose],
     ) -> Option<Vec<Pose>> {
-        centred(scene, standing, part, path, self.limit / 2.0)
+        centred(scene, standing, part, path, self.limit)
     }
 
     /// Checks a path of a part (poses of its shape) among the parts that stand.
@@ -282,7 +282,10 @@ fn joined<'i>(course: &Course, intervals: impl Iterator<Item = &'i Interval>) ->
 fn deepest_entries(scene: &Scene, others: &[usize], found: &[[Found; 2]]) -> Vec<Entry> {
     let cell = COARSE * scene.longest_side;
     let mut taken: BTreeMap<(usize, bool, [i64; 3]), Entry> = BTreeMap::new();
-    let sides = others.iter().zip(found).flat_map(|(o, [moving, standing])| [(*o, true, moving), (*o, false, standing)]);
+    let sides = others
+        .iter()
+        .zip(found)
+        .flat_map(|(o, [moving, standing])| [(*o, true, moving), (*o, false, standing)]);
     for (other, on_moving, side) in sides {
         for &(point, over) in &side.deep {
             let key = (other, on_moving, point.coords.map(|x| (x / cell).floor() as i64).into());

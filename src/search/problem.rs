@@ -107,7 +107,8 @@ impl Problem<'_> {
         remaining.len() <= 1 || self.wanted(remaining).is_empty()
     }
 
-    /// Thins a path and verifies it on the triangles.
+    /// Thins a path and verifies it on the triangles. A path off a thread is tried in the middle of the
+    /// thread's play first: it has room there.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -127,7 +128,6 @@ impl Problem<'_> {
         if let Some(centred) = self.verifier.centred_on_thread(&self.scene, &standing, part, &thin) {
             let thin = thinned(&centred, bounds, &self.scene.centre_in_shape(part));
             let verdict = checked(&thin)?;
-            eprintln!("centred verdict {} ({} entries)", verdict.depth, verdict.entries.len());
             if verdict.entries.is_empty() {
                 return Ok(Ok((thin, verdict.depth)));
             }
