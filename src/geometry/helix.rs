@@ -47,7 +47,8 @@ impl Helix {
     }
 }
 
-/// Where a triangle is in the half plane (r, u): every one of its points is within `error` of the hull of three points.
+/// Where a triangle is in the half plane (r, u): every one of its points is within `error` of the
+/// hull of three points.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Footprint {
     /// The images of the corners, moved to where the error is least.

@@ -21,15 +21,15 @@ use super::slip::{Facet, slipping};
 
 /// So far from the helix, as a share of the pitch, a path has left it.
 const LEFT: f64 = 0.25;
-/// What is no further from the end of the thread, in pitches, does not count: seats and the bottoms of holes
-/// are there.
+/// What is no further from the end of the thread, in pitches, does not count: seats and the bottoms
+/// of holes are there.
 const ENDS: f64 = 0.3;
 /// The angle between two poses, before thinning, in radians.
 const STEP: f64 = 0.1;
 /// Pieces of the way from there to where the given path ends.
 const PIECES: u32 = 4;
-/// A part that is off the thread after so much more (radians) is turned off it, where the given path only
-/// draws it off: chamfers end threads early.
+/// A part that is off the thread after so much more (radians) is turned off it, where the given path
+/// only draws it off: chamfers end threads early.
 const MOST_FURTHER: f64 = 2.0 * TAU;
 
 /// A path with the same start and end as a given one that turns along the thread which a part shares
@@ -48,6 +48,9 @@ pub(super) fn centred(
     let finest = limit * FINEST;
     let course = Course::new(path, scene.centre_in_shape(part), scene.bodies[part].shape.reach);
     let followed = ScrewPath::new(&course, &[Interval::WHOLE], finest)?;
+    if followed.helix.rise == 0.0 {
+        return None;
+    }
     let (left, way) = followed.leaves(followed.helix.pitch().abs() * LEFT)?;
     let (_, thread) = standing
         .iter()
@@ -69,9 +72,9 @@ pub(super) fn centred(
     let mut poses: Vec<Pose> = path.first().copied().into_iter().chain(on_thread).chain(rest).collect();
     // In small pieces, so that it is clear which way round it turns.
     let (from, to) = (*poses.last()?, *path.last()?);
-    let between =
-        (1..=PIECES).map(|k| interpolate(&from, &to, &course.centre, f64::from(k) / f64::from(PIECES)));
-    poses.extend(between);
+    let share = |k: u32| f64::from(k) / f64::from(PIECES);
+    poses.extend((1..PIECES).map(|k| interpolate(&from, &to, &course.centre, share(k))));
+    poses.push(to);
     Some(poses)
 }
 

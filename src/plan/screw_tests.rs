@@ -74,7 +74,7 @@ fn a_thread_that_fits_is_settled_whole() {
     let (scene, verifier) = scene(nut_on_bolt());
     let path = screwed(&scene, TURNS, PITCH, &Pose::identity());
     assert_eq!(open(&scene, &path), []);
-    assert!(checked(&scene, &verifier, &path) < 1e-12);
+    assert!(checked(&scene, &verifier, &path) < LIMIT / 8.0);
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn a_stop_at_the_end_is_met() {
     let stop = cuboid([1.3, -1.0, 6.2], [1.6, 1.0, 7.0]);
     let (scene, verifier) = scene([bolt, nut, stop]);
     let path = screwed(&scene, 2.0, PITCH, &Pose::identity());
-    assert!(checked(&scene, &verifier, &path[..=8]) < 1e-9);
+    assert!(checked(&scene, &verifier, &path[..=8]) < LIMIT / 8.0);
     assert!(checked(&scene, &verifier, &path) > LIMIT);
 }
 
@@ -106,8 +106,7 @@ fn a_path_pressed_to_its_thread_is_brought_into_the_middle_of_the_play() {
     let path: Vec<Pose> = straight.iter().enumerate().map(|(k, p)| wobble(k) * p).collect();
     let centred = verifier.centred_on_thread(&scene, &[0], 1, &path).unwrap();
     assert_eq!(centred[0], path[0]);
-    let last = centred[centred.len() - 1].inverse() * path[path.len() - 1];
-    assert!((last.to_matrix() - Pose::identity().to_matrix()).norm() < 1e-12);
+    assert_eq!(centred[centred.len() - 1], path[path.len() - 1]);
     assert!(checked(&scene, &verifier, &centred) <= LIMIT);
     // Away from its ends, it is where both axes are one.
     let on_axis =
@@ -125,7 +124,7 @@ fn what_turns_beside_no_thread_is_left_as_it_is() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
+    #![proptest_config(ProptestConfig::with_cases(option_env!("SCREW_CASES").and_then(|n| n.parse().ok()).unwrap_or(12)))]
     #[test]
     fn no_screw_is_deeper_than_its_bound(
         x in -0.04..0.04f64, z in -0.1..0.1f64, tilt in -0.03..0.03f64, pitch in 0.48..0.52f64, turns in 1.0..2.5f64,

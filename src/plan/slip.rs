@@ -101,7 +101,7 @@ mod tests {
             let axis_from_thread = found.axis_from_planning * place;
             for z in [0.0, 6.0] {
                 let at = axis_from_thread * Point3::new(0.0, 0.0, z);
-                assert!(at.xy().coords.norm() < 2e-3, "{at}");
+                assert!(at.xy().coords.norm() < 4e-3, "{at}");
             }
         }
     }
