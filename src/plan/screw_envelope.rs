@@ -178,13 +178,12 @@ impl Envelope {
     fn enter(&mut self, print: &Footprint, along: [f64; 2], beside: [f64; 2]) {
         let (size, pitch) = (self.finest, self.pitch);
         let [from, to] = min_max(print.points.iter().map(|p| p.y));
-        let mut low = self.slab(along[0]);
-        for slab in self.slabs_between(along) {
+        let lowest = self.slab(along[0]);
+        for (low, slab) in (lowest..).zip(self.slabs_between(along)) {
             if slab.reaches.is_empty() {
                 slab.reaches.resize(BINS, NOTHING);
             }
             let ends = [low as f64, (low + 1) as f64].map(|z| z / SLABS * pitch);
-            low += 1;
             let from = ((from.max(ends[0] + beside[0]) - print.error) / size).floor() as i64;
             let to = ((to.min(ends[1] + beside[1]) + print.error) / size).floor() as i64;
             for bin in from..=to {

@@ -101,7 +101,8 @@ mod tests {
             let axis_from_thread = found.axis_from_planning * place;
             for z in [0.0, 6.0] {
                 let at = axis_from_thread * Point3::new(0.0, 0.0, z);
-                assert!(at.xy().coords.norm() < 4e-3, "{at}");
+                // A fifth of the play between the two.
+                assert!(at.xy().coords.norm() < 6e-3, "{at}");
             }
         }
     }
