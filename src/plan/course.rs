@@ -23,27 +23,29 @@ const MOST_BENDS: usize = 12;
 /// The path of a part.
 #[derive(Debug)]
 pub(super) struct Course {
-    segments: Vec<Segment>,
+    pub(super) segments: Vec<Segment>,
     /// The point of the shape that moves on lines.
-    centre: Point3<f64>,
-    length: f64,
+    pub(super) centre: Point3<f64>,
+    /// No point of the shape is further from it.
+    pub(super) reach: f64,
+    pub(super) length: f64,
 }
 
 #[derive(Debug)]
-struct Segment {
-    from: Pose,
-    to: Pose,
+pub(super) struct Segment {
+    pub(super) from: Pose,
+    pub(super) to: Pose,
     /// Way from the path's start to this segment's.
-    before: f64,
+    pub(super) before: f64,
     /// No point moves further on it.
-    length: f64,
+    pub(super) length: f64,
 }
 
 impl Course {
     /// The path through some poses of a shape whose point `centre` moves on lines; no point of the
     /// shape is further than `reach` from it.
     pub(super) fn new(path: &[Pose], centre: Point3<f64>, reach: f64) -> Self {
-        let mut course = Self { segments: Vec::new(), centre, length: 0.0 };
+        let mut course = Self { segments: Vec::new(), centre, reach, length: 0.0 };
         for (from, to) in path.iter().zip(path.iter().skip(1).chain(path.last())) {
             let shift = (to * centre - from * centre).norm();
             let length = shift + reach * from.rotation.angle_to(&to.rotation);
@@ -78,6 +80,21 @@ impl Course {
         bends
     }
 
+    /// By how many radians the part turns on a stretch.
+    pub(super) fn turn(&self, interval: Interval) -> f64 {
+        let [from, to] = interval.of(self.length);
+        let turn = |(s, a, b): &(&Segment, f64, f64)| s.from.rotation.angle_to(&s.to.rotation) * (b - a);
+        self.bends(from, to).iter().map(turn).sum()
+    }
+
+    /// The path from one place on the way to another.
+    pub(super) fn path_between(&self, [from, to]: [f64; 2]) -> Vec<Pose> {
+        let bends = self.bends(from, to);
+        let at = |(s, a, _): &(&Segment, f64, f64)| interpolate(&s.from, &s.to, &self.centre, *a);
+        let last = bends.last().map(|(s, _, b)| interpolate(&s.from, &s.to, &self.centre, *b));
+        bends.iter().map(at).chain(last).collect()
+    }
+
     fn pose(&self, at: f64) -> Option<Pose> {
         let (segment, share, _) = *self.bends(at, at).first()?;
         Some(interpolate(&segment.from, &segment.to, &self.centre, share))
@@ -85,7 +102,7 @@ impl Course {
 }
 
 /// A piece `index` of `2^level` of the way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct Interval {
     level: u32,
     index: u64,
@@ -96,6 +113,17 @@ impl Interval {
 
     pub(super) fn halves(self) -> [Self; 2] {
         [0, 1].map(|k| Self { level: self.level + 1, index: 2 * self.index + k })
+    }
+
+    /// Whether another is a piece of it.
+    pub(super) fn holds(self, other: Self) -> bool {
+        other.level >= self.level && other.index >> (other.level - self.level) == self.index
+    }
+
+    /// From where to where it reaches on a way of some length.
+    pub(super) fn of(self, length: f64) -> [f64; 2] {
+        let own = length * self.share();
+        [own * self.index as f64, own * (self.index + 1) as f64]
     }
 
     /// Its part of the whole.

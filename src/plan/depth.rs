@@ -61,36 +61,49 @@ pub(super) struct Found {
     /// [`Precision::deep`], or of which no less can be told: a good path has none, of a bad one these
     /// are the first found.
     pub(super) deep: Vec<(Point3<f64>, f64)>,
+    /// Stretches of the way on which the search was given up: the bound is none there.
+    pub(super) open: Vec<Interval>,
     /// How much was looked at: pieces, and regions that were looked for.
-    effort: usize,
+    pub(super) effort: usize,
 }
 
 /// So much is looked at before a question is given up.
-const MOST_EFFORT: usize = 200_000;
+pub(super) const MOST_EFFORT: usize = 200_000;
 /// What a region costs, in pieces.
 const REGION_EFFORT: usize = 40;
 
 impl Found {
-    /// Whether the search was given up: then the bound is none.
-    pub(super) fn gave_up(&self) -> bool {
-        self.effort > MOST_EFFORT
+    /// Adds what was found elsewhere.
+    pub(super) fn add(&mut self, other: Self) {
+        self.bound = self.bound.max(other.bound);
+        self.depth = self.depth.max(other.depth);
+        self.deep.extend(other.deep);
+        self.open.extend(other.open);
+        self.effort += other.effort;
     }
 
-    /// Whether more would not change the answer.
-    fn is_enough(&self) -> bool {
-        self.gave_up() || self.deep.len() >= ENOUGH
+    /// Whether so much is deep that more would not change the answer.
+    pub(super) fn is_enough(&self) -> bool {
+        self.deep.len() >= ENOUGH
     }
 }
 
 impl Question<'_> {
-    /// Looks for the deepest points all the way.
+    /// Looks for the deepest points on a stretch of the way, with no more than some effort.
     ///
     /// # Errors
     /// The termination condition became true.
-    pub(super) fn answer(&self, view: View<'_>, termination: &Termination) -> Result<Found, Interrupt> {
+    pub(super) fn answer(
+        &self,
+        view: View<'_>,
+        interval: Interval,
+        most_effort: usize,
+        termination: &Termination,
+    ) -> Result<Found, Interrupt> {
         let mut search = Search {
             asked: self,
             has_rim: self.measured.is_open() && self.measured.has_rim(),
+            most_effort,
             view,
             termination,
             regions: Vec::new(),
@@ -99,7 +112,10 @@ impl Question<'_> {
             found: Found::default(),
         };
         if let Some(root) = self.tree.root() {
-            search.patch(root, Interval::WHOLE, Hint { triangle: 0, region: None })?;
+            search.patch(root, interval, Hint { triangle: 0, region: None })?;
+        }
+        if search.gave_up() {
+            search.found.open.push(interval);
         }
         Ok(search.found)
     }
@@ -132,6 +148,7 @@ struct Search<'a> {
     asked: &'a Question<'a>,
     /// Whether the measured surface has holes, so that depth changes its sign off it, too.
     has_rim: bool,
+    most_effort: usize,
     view: View<'a>,
     termination: &'a Termination,
     regions: Vec<FreeRegion>,
@@ -143,11 +160,19 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
+    fn gave_up(&self) -> bool {
+        self.found.effort > self.most_effort
+    }
+
+    fn is_enough(&self) -> bool {
+        self.gave_up() || self.found.is_enough()
+    }
+
     /// Looks into a node of the tree on a stretch of the way.
     fn patch(&mut self, index: u32, interval: Interval, hint: Hint) -> Result<(), Interrupt> {
         self.termination.check()?;
         self.found.effort += 1;
-        if self.found.is_enough() {
+        if self.is_enough() {
             return Ok(());
         }
         let tree = self.asked.tree;
@@ -201,7 +226,7 @@ impl Search<'_> {
         while let Some((corners, interval, mut hint)) = stack.pop() {
             self.termination.check()?;
             self.found.effort += 1;
-            if self.found.is_enough() {
+            if self.is_enough() {
                 break;
             }
             let leg = self.view.leg(interval);
@@ -348,7 +373,7 @@ impl Search<'_> {
         }
         self.found.bound = self.found.bound.max(self.found.depth);
         if swept.radius > self.finest() {
-            return self.found.is_enough();
+            return self.is_enough();
         }
         if !self.found.deep.is_empty() {
             return true;

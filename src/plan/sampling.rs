@@ -1,4 +1,4 @@
-//! Verification by samples, for paths that turn far: screws of many turns.
+//! Verification by samples, for what bounds do not settle.
 //!
 //! At poses so dense that no vertex of the moving part travels further than [`DENSITY`] of the
 //! longest side between two of them, samples of both surfaces (denser ones than the engine's)
@@ -23,10 +23,10 @@ use super::verify::{Asked, Entry};
 
 /// Largest travel of a vertex between two checked poses, as a share of the longest side.
 const DENSITY: f64 = 0.004;
-/// A path that turns further than this (radians) is sampled.
+/// A path that turns further than this (radians) is a screw.
 const FAR: f64 = 4.0;
 
-/// Whether a path turns so far that it is sampled.
+/// Whether a path turns so far that it may be a screw of many turns.
 pub(super) fn turns_far(path: &[Pose]) -> bool {
     let turns = path.iter().zip(path.iter().skip(1)).map(|(a, b)| a.rotation.angle_to(&b.rotation));
     turns.sum::<f64>() > FAR

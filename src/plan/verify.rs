@@ -3,7 +3,8 @@
 //! For every standing part that the moving one comes near, both surfaces are bounded against each
 //! other all along the way ([`depth`](super::depth) says how, and what that guarantees): what counts
 //! is depth beyond that of the pair at the assembled pose, which is measured with the same search.
-//! Paths that turn far are checked at samples instead ([`sampling`](super::sampling)).
+//! Screws of many turns are bounded by their profiles, too ([`screws`](super::screws)), and what
+//! neither settles is checked at samples ([`sampling`](super::sampling)).
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry::{Occupied, Vacant};
@@ -16,9 +17,11 @@ use crate::geometry::{Bounds, Pose, Shape, Surface, area_normal};
 use crate::simulation::{Allowances, Scene};
 use crate::termination::{Interrupt, Termination};
 
-use super::course::{Course, View};
-use super::depth::{Found, Precision, Question};
+use super::centred::centred;
+use super::course::{Course, Interval, View};
+use super::depth::{Found, MOST_EFFORT, Precision, Question};
 use super::sampling::{Samples, turns_far};
+use super::screws::depth_on_screw;
 
 /// Depth that is not looked into, as a share of the limit.
 const SPARE: f64 = 1.0 / 16.0;
@@ -138,11 +141,12 @@ impl Verifier {
         let allowances = Allowances::none();
         let asked =
             Asked { scene, allowances: &allowances, standing: &[b], part: a, path: &path, termination };
-        let side = |on_moving| depth_of_side(&asked, &course, precision, b, on_moving);
+        let way = Way { asked: &asked, course: &course, precision, other: b };
+        let side = |on_moving| way.depth_of_side(on_moving, Interval::WHOLE, MOST_EFFORT);
         let (one, other) = rayon::join(|| side(true), || side(false));
         let (one, other) = (one?, other?);
         let depth = one.depth.max(other.depth);
-        if one.gave_up() || other.gave_up() {
+        if !one.open.is_empty() || !other.open.is_empty() {
             return Ok(deepest(depth, &self.samples.entries_along(&asked, self.limit)?));
         }
         Ok(depth)
@@ -160,6 +164,19 @@ impl Verifier {
             .fold(0.0, f64::max)
     }
 
+    /// A path from where a given one begins to where it ends that turns in the middle of the play of a
+    /// thread, if the given one follows a thread. It is no better verified than any.
+    #[must_use]
+    pub fn centred_on_thread(
+        &self,
+        scene: &Scene,
+        standing: &[usize],
+        part: usize,
+        path: &[Pose],
+    ) -> Option<Vec<Pose>> {
+        centred(scene, standing, part, path, self.limit)
+    }
+
     /// Checks a path of a part (poses of its shape) among the parts that stand.
     ///
     /// # Errors
@@ -174,9 +191,6 @@ impl Verifier {
         termination: &Termination,
     ) -> Result<Verdict, Interrupt> {
         let asked = Asked { scene, allowances, standing, part, path, termination };
-        if turns_far(path) {
-            return Ok(Verdict::new(0.0, self.samples.entries_along(&asked, self.limit)?, self.limit));
-        }
         let shape = &scene.bodies[part].shape;
         let centre = scene.centre_in_shape(part);
         let reach = shape.hull.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
@@ -192,58 +206,93 @@ impl Verifier {
             b.union(&Bounds { min: c, max: c })
         });
         let swept = swept.grown(reach);
-        let tasks: Vec<(usize, bool)> = standing
-            .iter()
-            .filter(|&&o| scene.bodies[o].bounds.meets(&swept))
-            .flat_map(|&o| [(o, true), (o, false)])
-            .collect();
-        let found = tasks
+        let others: Vec<usize> =
+            standing.iter().filter(|&&o| scene.bodies[o].bounds.meets(&swept)).copied().collect();
+        let far = turns_far(path);
+        let found = others
             .par_iter()
-            .map(|&(other, on_moving)| {
+            .map(|&other| {
                 let share = if allowances.of(part, other) > 0.0 { SPARE_IN_OVERLAP } else { SPARE };
                 let precision = Precision { spare: self.limit * share, ..precision };
-                depth_of_side(&asked, &course, precision, other, on_moving)
+                let way = Way { asked: &asked, course: &course, precision, other };
+                if far { depth_on_screw(&way, self.limit) } else { way.depth() }
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
-        let bound = found.iter().map(|f| f.bound).fold(0.0, f64::max);
-        let mut entries = deepest_entries(scene, &tasks, &found);
-        let mut open: Vec<usize> =
-            tasks.iter().zip(&found).filter(|(_, f)| f.gave_up()).map(|((other, _), _)| *other).collect();
-        open.dedup();
-        if bound <= self.limit && !open.is_empty() {
-            let asked = Asked { standing: &open, ..asked };
-            entries.extend(self.samples.entries_along(&asked, self.limit)?);
+        let bound = found.iter().flatten().map(|f| f.bound).fold(0.0, f64::max);
+        let mut entries = deepest_entries(scene, &others, &found);
+        if bound <= self.limit {
+            for (other, [one, two]) in others.iter().zip(&found) {
+                for stretch in joined(&course, one.open.iter().chain(&two.open)) {
+                    let (standing, path) = ([*other], course.path_between(stretch));
+                    let asked = Asked { standing: &standing, path: &path, ..asked };
+                    entries.extend(self.samples.entries_along(&asked, self.limit)?);
+                }
+            }
         }
         Ok(Verdict::new(bound, entries, self.limit))
     }
 }
 
-/// How deep the moving part gets into a standing one, or the other way round.
-fn depth_of_side(
-    asked: &Asked<'_>,
-    course: &Course,
+/// The way of a part past one that stands.
+pub(super) struct Way<'a> {
+    pub(super) asked: &'a Asked<'a>,
+    pub(super) course: &'a Course,
     precision: Precision,
-    other: usize,
-    on_moving: bool,
-) -> Result<Found, Interrupt> {
-    let (moving, standing) = (&asked.scene.bodies[asked.part], &asked.scene.bodies[other]);
-    let (looked_at, measured) = if on_moving { (moving, standing) } else { (standing, moving) };
-    let view = View::new(course, standing.planning_from_shape, on_moving, precision.finest / 16.0);
-    let question = Question {
-        surface: &looked_at.shape.surface,
-        tree: looked_at.shape.patches(),
-        measured: &measured.shape.surface,
-        granted: asked.allowances.of(asked.part, other),
-        precision,
-    };
-    question.answer(view, asked.termination)
+    pub(super) other: usize,
+}
+
+impl Way<'_> {
+    /// How deep the moving part gets into the standing one, and the other way round.
+    fn depth(&self) -> Result<[Found; 2], Interrupt> {
+        let side = |on_moving| self.depth_of_side(on_moving, Interval::WHOLE, MOST_EFFORT);
+        let (one, other) = rayon::join(|| side(true), || side(false));
+        Ok([one?, other?])
+    }
+
+    /// How deep the moving part gets into the standing one on a stretch of the way, or the other way
+    /// round, looked at with no more than some effort.
+    pub(super) fn depth_of_side(
+        &self,
+        on_moving: bool,
+        interval: Interval,
+        most_effort: usize,
+    ) -> Result<Found, Interrupt> {
+        let Self { asked, course, precision, other } = *self;
+        let (moving, standing) = (&asked.scene.bodies[asked.part], &asked.scene.bodies[other]);
+        let (looked_at, measured) = if on_moving { (moving, standing) } else { (standing, moving) };
+        let view = View::new(course, standing.planning_from_shape, on_moving, precision.finest / 16.0);
+        let question = Question {
+            surface: &looked_at.shape.surface,
+            tree: looked_at.shape.patches(),
+            measured: &measured.shape.surface,
+            granted: asked.allowances.of(asked.part, other),
+            precision,
+        };
+        question.answer(view, interval, most_effort, asked.termination)
+    }
+}
+
+/// Stretches of the way, those that touch each other as one.
+fn joined<'i>(course: &Course, intervals: impl Iterator<Item = &'i Interval>) -> Vec<[f64; 2]> {
+    let mut stretches: Vec<[f64; 2]> = intervals.map(|i| i.of(course.length)).collect();
+    stretches.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    stretches.dedup_by(|next, last| {
+        let touch = next[0] <= last[1];
+        last[1] = if touch { last[1].max(next[1]) } else { last[1] };
+        touch
+    });
+    stretches
 }
 
 /// The points that help in refining a motion: of those that are near each other, the deepest.
-fn deepest_entries(scene: &Scene, tasks: &[(usize, bool)], found: &[Found]) -> Vec<Entry> {
+fn deepest_entries(scene: &Scene, others: &[usize], found: &[[Found; 2]]) -> Vec<Entry> {
     let cell = COARSE * scene.longest_side;
     let mut taken: BTreeMap<(usize, bool, [i64; 3]), Entry> = BTreeMap::new();
-    for (&(other, on_moving), side) in tasks.iter().zip(found) {
+    let sides = others
+        .iter()
+        .zip(found)
+        .flat_map(|(o, [moving, standing])| [(*o, true, moving), (*o, false, standing)]);
+    for (other, on_moving, side) in sides {
         for &(point, over) in &side.deep {
             let key = (other, on_moving, point.coords.map(|x| (x / cell).floor() as i64).into());
             let entry = Entry { other, on_moving, point, over };

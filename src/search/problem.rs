@@ -9,7 +9,7 @@ use nalgebra::Point3;
 use crate::blocking_graph::StaticAnalysis;
 use crate::cache::{Recall, VerdictQuestion};
 use crate::geometry::{Bounds, Pose, SampleTree};
-use crate::plan::{Entry, Verifier, thinned};
+use crate::plan::{Entry, Verdict, Verifier, thinned};
 use crate::simulation::{Action, Scene, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
@@ -111,7 +111,8 @@ impl Problem<'_> {
         remaining.len() <= 1 || self.wanted(remaining).is_empty()
     }
 
-    /// Thins a path and verifies it on the triangles.
+    /// Thins a path and verifies it on the triangles. A path off a thread is tried in the middle of the
+    /// thread's play first: it has room there.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -121,14 +122,34 @@ impl Problem<'_> {
         part: usize,
         path: &[Pose],
     ) -> Result<Checked, Interrupt> {
-        let bounds = self.scene.bodies[part].shape.bounds();
-        let thin = thinned(path, bounds, &self.scene.centre_in_shape(part));
-        let standing = self.scene.broad_phase.meeting_of(&standing, &self.swept_bounds(part, &thin));
-        let Self { scene, verifier, .. } = self;
-        let question = VerdictQuestion { scene, near: &standing, part, path: &thin, limit: verifier.limit() };
-        let check = || verifier.check(scene, &scene.allowances, &standing, part, &thin, &self.termination);
-        let verdict = self.recall.verdict(&question, check)?;
+        let thin = self.thinned(part, path);
+        let near = self.near(&standing, part, &thin);
+        if let Some(centred) = self.verifier.centred_on_thread(&self.scene, &near, part, &thin) {
+            let thin = self.thinned(part, &centred);
+            let verdict = self.verdict(&standing, part, &thin)?;
+            if verdict.entries.is_empty() {
+                return Ok(Ok((thin, verdict.depth)));
+            }
+        }
+        let verdict = self.verdict(&standing, part, &thin)?;
         if verdict.entries.is_empty() { Ok(Ok((thin, verdict.depth))) } else { Ok(Err(verdict.entries)) }
+    }
+
+    fn thinned(&self, part: usize, path: &[Pose]) -> Vec<Pose> {
+        thinned(path, self.scene.bodies[part].shape.bounds(), &self.scene.centre_in_shape(part))
+    }
+
+    /// Of the parts that stand, those that a path may meet.
+    fn near(&self, standing: &[usize], part: usize, path: &[Pose]) -> Vec<usize> {
+        self.scene.broad_phase.meeting_of(standing, &self.swept_bounds(part, path))
+    }
+
+    fn verdict(&self, standing: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
+        let Self { scene, verifier, .. } = self;
+        let near = self.near(standing, part, path);
+        let question = VerdictQuestion { scene, near: &near, part, path, limit: verifier.limit() };
+        let check = || verifier.check(scene, &scene.allowances, &near, part, path, &self.termination);
+        self.recall.verdict(&question, check)
     }
 
     /// A box that holds a part all along a path: where it turns, a ball about the point that moves on

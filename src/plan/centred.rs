@@ -1,0 +1,150 @@
+//! Paths off a thread, in the middle of its play.
+//!
+//! An engine that pushes a part off a thread presses it against the flanks: such a path has no room,
+//! and its wobble makes many waypoints. The two threads themselves tell a
+//! better one ([`slip`](super::slip)): both axes as one, the profiles as far apart as they can be, and
+//! nothing but turning along the helix. It is a proposal, to be verified like any path.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
+
+use crate::geometry::{Helix, Pose, Surface, interpolate};
+use crate::simulation::Scene;
+
+use super::course::{Course, Interval};
+use super::sampling::turns_far;
+use super::screw_envelope::{Envelope, Zone};
+use super::screw_path::ScrewPath;
+use super::screws::FINEST;
+use super::slip::{Facet, slipping};
+
+/// So far from the helix, as a share of the pitch, a path has left it.
+const LEFT: f64 = 0.25;
+/// What is no further from the end of the thread, in pitches, does not count: seats and the bottoms
+/// of holes are there.
+const ENDS: f64 = 0.3;
+/// The angle between two poses, before thinning, in radians.
+const STEP: f64 = 0.1;
+/// Pieces of the way from there to where the given path ends.
+const PIECES: u32 = 4;
+/// A part that is off the thread after so much more (radians) is turned off it, where the given path
+/// only draws it off: chamfers end threads early.
+const MOST_FURTHER: f64 = 2.0 * TAU;
+
+/// A path with the same start and end as a given one that turns along the thread which a part shares
+/// with one of those standing; `None` if there is no such thread, or no play in it. `limit` is the depth
+/// at which paths are refused.
+pub(super) fn centred(
+    scene: &Scene,
+    standing: &[usize],
+    part: usize,
+    path: &[Pose],
+    limit: f64,
+) -> Option<Vec<Pose>> {
+    if !turns_far(path) {
+        return None;
+    }
+    let finest = limit * FINEST;
+    let course = Course::new(path, scene.centre_in_shape(part), scene.bodies[part].shape.reach);
+    let followed = ScrewPath::new(&course, &[Interval::WHOLE], finest)?;
+    if followed.helix.rise == 0.0 {
+        return None;
+    }
+    let (left, way) = followed.leaves(followed.helix.pitch().abs() * LEFT)?;
+    let (_, thread) = standing
+        .iter()
+        .filter(|&&other| scene.allowances.of(part, other) == 0.0)
+        .filter_map(|&other| Thread::shared(scene, part, other, &followed, left))
+        .fold(None, |best: Option<(f64, Thread)>, (play, thread)| match best {
+            Some(best) if best.0 >= play => Some(best),
+            _ => Some((play, thread)),
+        })?;
+    // What is nearly off the thread is turned off it.
+    let is_near = (thread.off - left).abs() < MOST_FURTHER;
+    let angle = if is_near { thread.off.abs().max(left.abs()).copysign(left) } else { left };
+    let count = (angle / STEP).abs().ceil().max(1.0);
+    let on_thread = (0..=count as usize).map(|k| thread.pose(angle * k as f64 / count));
+    let rest = course.path_between([way, course.length]);
+    // From there on as the given path, at the same distance from it, and at its end on it.
+    let aside = rest.first()?.inverse() * thread.pose(angle);
+    let rest: Vec<Pose> = if is_near { Vec::new() } else { rest.iter().map(|p| p * aside).collect() };
+    let mut poses: Vec<Pose> = path.first().copied().into_iter().chain(on_thread).chain(rest).collect();
+    // In small pieces, so that it is clear which way round it turns.
+    let (from, to) = (*poses.last()?, *path.last()?);
+    let share = |k: u32| f64::from(k) / f64::from(PIECES);
+    poses.extend((1..PIECES).map(|k| interpolate(&from, &to, &course.centre, share(k))));
+    poses.push(to);
+    Some(poses)
+}
+
+/// A thread that two parts share.
+struct Thread {
+    helix: Helix,
+    /// The moving part in the middle of its play, in the axis frame, at the start.
+    reference: Pose,
+    /// The angle by which it is off the other one.
+    off: f64,
+}
+
+impl Thread {
+    /// The pose of the moving part after turning by an angle.
+    fn pose(&self, angle: f64) -> Pose {
+        self.helix.axis_from_planning.inverse() * self.helix.screwed(angle) * self.reference
+    }
+
+    /// The thread that a part on its way shares with one that stands, and the play in it.
+    fn shared(
+        scene: &Scene,
+        part: usize,
+        other: usize,
+        followed: &ScrewPath,
+        left: f64,
+    ) -> Option<(f64, Self)> {
+        let ScrewPath { helix: guess, reference, .. } = followed;
+        let (moving, standing) = (&scene.bodies[part].shape.surface, &scene.bodies[other].shape.surface);
+        let guess_from_standing = guess.axis_from_planning * scene.bodies[other].planning_from_shape;
+        let triangles = |surface: &Surface, frame: Pose| -> Vec<[Point3<f64>; 3]> {
+            (0..surface.triangles().len() as u32).map(|t| surface.corners(t).map(|p| frame * p)).collect()
+        };
+        let (moving, standing) = (triangles(moving, *reference), triangles(standing, guess_from_standing));
+        let zones = [Zone::of(&moving), Zone::of(&standing)];
+        let zone = zones[0].common(&zones[1]).trimmed(ENDS * guess.pitch().abs());
+        if zone.is_empty() {
+            return None;
+        }
+        let [own, others] = [&moving, &standing].map(|t| {
+            let facets: Vec<Facet> = t.iter().filter(|c| zone.meets(c)).filter_map(Facet::of).collect();
+            slipping(&facets, guess.rise)
+        });
+        let (own, others) = (own?, others?);
+        let helix = Helix { rise: guess.rise, ..others };
+        // The moving part's axis onto the standing one's.
+        let to_other = onto(&own, &others, f64::midpoint(zone.along()[0], zone.along()[1]));
+        let frame = helix.axis_from_planning;
+        let envelope = |t: &[[Point3<f64>; 3]], frame: Pose| {
+            let moved = t.iter().map(|c| c.map(|p| frame * p));
+            Envelope::new(moved, &helix, &zone)
+        };
+        let (one, two) = (envelope(&moving, frame * to_other), envelope(&standing, frame));
+        let (play, shift) = two.widest_gap(&one, LEFT * helix.pitch().abs())?;
+        let reference = Translation3::from(Vector3::z() * shift) * frame * to_other * reference;
+        let helix = Helix { axis_from_planning: frame * guess.axis_from_planning, ..helix };
+        let [own, others] = zones.map(|zone| zone.along());
+        let travel = if helix.rise * left > 0.0 { others[1] - own[0] } else { others[0] - own[1] };
+        let off = travel / helix.rise;
+        Some((play, Self { helix, reference, off }))
+    }
+}
+
+/// The smallest displacement that takes one axis onto another, at some height.
+fn onto(axis: &Helix, other: &Helix, height: f64) -> Pose {
+    let [(from, along), (to, wanted)] = [axis, other].map(|h| {
+        let frame = h.axis_from_planning.inverse();
+        let along = frame * Vector3::z();
+        let origin = frame * Point3::origin();
+        (origin + along * ((height - origin.z) / along.z), along)
+    });
+    let turn = UnitQuaternion::rotation_between(&along, &wanted).unwrap_or_default();
+    Pose::from_parts(Translation3::from(to - turn * from), turn)
+}

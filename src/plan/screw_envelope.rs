@@ -1,0 +1,309 @@
+//! How far a surface reaches from the axis of a helix, and how near it comes to it, by the height on
+//! the helix: the profiles of a bolt and of a nut.
+//!
+//! All turns of a thread lie on each other there (see [`Helix`](crate::geometry::Helix)). If the
+//! profile of one part is beyond that of the other at every height, and nowhere nearer than the part
+//! strays from the helix, then the helical sheet between the two parts them at every angle: nothing
+//! is met. Only what is about as far from the axis as the other part needs to be known exactly.
+
+use std::f64::consts::TAU;
+
+use nalgebra::Point3;
+
+use crate::geometry::{Footprint, Helix, radii};
+
+/// Slabs along the axis per pitch: what is elsewhere does not count.
+const SLABS: f64 = 4.0;
+/// Heights that are told apart within a pitch; errors of footprints below one are not worth cuts.
+const BINS: usize = 300;
+/// Halvings of a triangle until it is taken as it is.
+const MOST_CUTS: u32 = 24;
+/// What is so much further out or in than the other part, in pitches, is not told exactly: more than
+/// any part that is told to be apart strays.
+const BESIDE: f64 = 0.5;
+/// Of the shifts with the widest gap, those within this share of it count as equal.
+const AS_WIDE: f64 = 0.02;
+
+/// Where a surface is along an axis and how far from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Zone {
+    /// From where to where along the axis.
+    along: [f64; 2],
+    /// From the least to the largest distance from it.
+    across: [f64; 2],
+}
+
+impl Zone {
+    /// The zone of triangles (axis frame).
+    pub(super) fn of(triangles: &[[Point3<f64>; 3]]) -> Self {
+        let empty = [f64::INFINITY, f64::NEG_INFINITY];
+        triangles.iter().fold(Self { along: empty, across: empty }, |zone, corners| {
+            let [near, far] = radii(corners);
+            let [low, high] = min_max(corners.iter().map(|p| p.z));
+            Self {
+                along: [zone.along[0].min(low), zone.along[1].max(high)],
+                across: [zone.across[0].min(near), zone.across[1].max(far)],
+            }
+        })
+    }
+
+    /// Where both are, and what is between if they are apart.
+    pub(super) fn common(&self, other: &Self) -> Self {
+        let both = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].min(b[1])];
+        Self { along: both(self.along, other.along), across: both(self.across, other.across) }
+    }
+
+    /// Whether nothing can be in it.
+    pub(super) fn is_empty(&self) -> bool {
+        self.along[0] >= self.along[1] || self.across[0] >= self.across[1]
+    }
+
+    /// The same without so much at both ends, along the axis.
+    pub(super) fn trimmed(self, by: f64) -> Self {
+        Self { along: [self.along[0] + by, self.along[1] - by], ..self }
+    }
+
+    /// The same at all heights.
+    pub(super) fn everywhere(self) -> Self {
+        Self { along: [f64::NEG_INFINITY, f64::INFINITY], ..self }
+    }
+
+    /// Whether some of a triangle may be in it.
+    pub(super) fn meets(&self, corners: &[Point3<f64>; 3]) -> bool {
+        let [near, far] = radii(corners);
+        let [low, high] = min_max(corners.iter().map(|p| p.z));
+        let meets = |[low, high]: [f64; 2], own: [f64; 2]| low <= own[1] && high >= own[0];
+        meets([low, high], self.along) && meets([near, far], self.across)
+    }
+
+    /// From where to where it reaches along the axis.
+    pub(super) fn along(&self) -> [f64; 2] {
+        self.along
+    }
+}
+
+/// From the least to the largest distance from the axis, by height on the helix.
+type Reaches = Vec<[f64; 2]>;
+
+/// Nowhere anything.
+const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+/// A piece of the profile along the axis.
+#[derive(Debug, Clone)]
+struct Slab {
+    /// Empty as long as there is nothing.
+    reaches: Reaches,
+    /// Whether something is further in than is told exactly, or further out.
+    further: [bool; 2],
+}
+
+/// The profile of a surface.
+pub(super) struct Envelope {
+    pitch: f64,
+    /// The size of a bin, the error that footprints may have.
+    finest: f64,
+    /// What is told exactly.
+    zone: Zone,
+    /// Index of the first slab.
+    first: i64,
+    slabs: Vec<Slab>,
+}
+
+impl Envelope {
+    /// The profile of triangles (axis frame) along a helix that rises, where another part can be
+    /// near: in `zone`.
+    pub(super) fn new(triangles: impl Iterator<Item = [Point3<f64>; 3]>, helix: &Helix, zone: &Zone) -> Self {
+        let pitch = helix.pitch().abs();
+        let [near, far] = zone.across;
+        let zone = Zone { across: [near - BESIDE * pitch, far + BESIDE * pitch], ..*zone };
+        let mut envelope = Self { pitch, finest: pitch / BINS as f64, zone, first: 0, slabs: Vec::new() };
+        for corners in triangles {
+            envelope.add(&corners, helix.rise);
+        }
+        envelope
+    }
+
+    fn add(&mut self, corners: &[Point3<f64>; 3], rise: f64) {
+        let mut stack = vec![(*corners, 0)];
+        while let Some((corners, cuts)) = stack.pop() {
+            let [low, high] = min_max(corners.iter().map(|p| p.z));
+            if low > self.zone.along[1] || high < self.zone.along[0] {
+                continue;
+            }
+            let [near, far] = radii(&corners);
+            let further = [far < self.zone.across[0], near > self.zone.across[1]];
+            if further.contains(&true) {
+                for slab in self.slabs_between([low, high]) {
+                    (0..2).for_each(|side| slab.further[side] |= further[side]);
+                }
+                continue;
+            }
+            match Footprint::of(&corners, rise) {
+                Some(print) if print.error <= self.finest || cuts >= MOST_CUTS => {
+                    let heights = print.points.iter().zip(&corners);
+                    self.enter(&print, [low, high], min_max(heights.map(|(p, c)| p.y - c.z)));
+                }
+                None if far <= 4.0 * self.finest || cuts >= MOST_CUTS => {
+                    let whole = [f64::NEG_INFINITY, f64::INFINITY];
+                    self.enter(&Footprint::at_all_angles(&corners, rise), [low, high], whole);
+                }
+                _ => stack.extend(halves(&corners).map(|half| (half, cuts + 1))),
+            }
+        }
+    }
+
+    fn slab(&self, z: f64) -> i64 {
+        (z / self.pitch * SLABS).floor() as i64
+    }
+
+    /// The slabs between two places, made when there are none.
+    fn slabs_between(&mut self, [low, high]: [f64; 2]) -> &mut [Slab] {
+        let (low, high) = (self.slab(low), self.slab(high));
+        let empty = || Slab { reaches: Vec::new(), further: [false; 2] };
+        if self.slabs.is_empty() {
+            self.first = low;
+        }
+        let before = (self.first - low).max(0) as usize;
+        self.slabs.splice(0..0, std::iter::repeat_with(empty).take(before));
+        self.first -= before as i64;
+        let needed = (high - self.first + 1) as usize;
+        if needed > self.slabs.len() {
+            self.slabs.resize_with(needed, empty);
+        }
+        &mut self.slabs[(low - self.first) as usize..needed]
+    }
+
+    /// Notes where a footprint reaches. Its heights on the helix are beside those along the axis, from
+    /// `along[0]` to `along[1]`, by something in `beside`.
+    fn enter(&mut self, print: &Footprint, along: [f64; 2], beside: [f64; 2]) {
+        let (size, pitch) = (self.finest, self.pitch);
+        let [from, to] = min_max(print.points.iter().map(|p| p.y));
+        let lowest = self.slab(along[0]);
+        for (low, slab) in (lowest..).zip(self.slabs_between(along)) {
+            if slab.reaches.is_empty() {
+                slab.reaches.resize(BINS, NOTHING);
+            }
+            let ends = [low as f64, (low + 1) as f64].map(|z| z / SLABS * pitch);
+            let from = ((from.max(ends[0] + beside[0]) - print.error) / size).floor() as i64;
+            let to = ((to.min(ends[1] + beside[1]) + print.error) / size).floor() as i64;
+            for bin in from..=to {
+                let [near, far] = reach(print, [bin as f64 * size, (bin + 1) as f64 * size]);
+                let own = &mut slab.reaches[bin.rem_euclid(BINS as i64) as usize];
+                *own = [own[0].min(near), own[1].max(far)];
+            }
+        }
+    }
+
+    /// The profile between two places along the axis.
+    fn between(&self, [from, to]: [f64; 2]) -> Reaches {
+        let within = |z: f64| self.slab(z).saturating_sub(self.first).clamp(-1, self.slabs.len() as i64);
+        let range = within(from).max(0)..=within(to).min(self.slabs.len() as i64 - 1);
+        let mut all = vec![NOTHING; BINS];
+        let mut further = [false; 2];
+        for slab in range {
+            let slab = &self.slabs[slab as usize];
+            (0..2).for_each(|side| further[side] |= slab.further[side]);
+            for (own, [near, far]) in all.iter_mut().zip(&slab.reaches) {
+                *own = [own[0].min(*near), own[1].max(*far)];
+            }
+        }
+        for own in &mut all {
+            *own = [if further[0] { 0.0 } else { own[0] }, if further[1] { f64::INFINITY } else { own[1] }];
+        }
+        all
+    }
+
+    /// Whether this surface, between two places along the axis, stays apart from another between two
+    /// places, which is shifted along the axis and strays from there, the more the further its points
+    /// are from the axis.
+    pub(super) fn is_apart(
+        &self,
+        places: [f64; 2],
+        other: &Self,
+        other_places: [f64; 2],
+        shift: f64,
+        stray: impl Fn(f64) -> f64,
+    ) -> bool {
+        let (one, other) = (self.between(places), other.between(other_places));
+        let widest = |r: &Reaches| r.iter().map(|[_, far]| *far).fold(0.0, f64::max);
+        let stray = stray(widest(&one).min(widest(&other)));
+        let narrowest = |r: &Reaches| r.iter().map(|[near, _]| *near).fold(f64::INFINITY, f64::min);
+        // Where one is around the other, that is no nearer to the axis than …
+        let inner = narrowest(&one).max(narrowest(&other));
+        if !stray.is_finite() || inner <= 2.0 * stray {
+            return false;
+        }
+        // A way in space is a little longer in the half plane.
+        let margin = stray * 1.0f64.hypot(2.0 * self.pitch / TAU / inner);
+        let (size, bins) = (self.finest, BINS as i64);
+        let moved = (shift / size).floor() as i64;
+        if margin >= BESIDE * self.pitch {
+            return false;
+        }
+        let wide = (margin / size).ceil() as i64 + 2;
+        let is_inside = |inner: &Reaches, outer: &Reaches, moved: i64| {
+            (0..bins).all(|i| {
+                let far = inner[i as usize][1];
+                far == f64::NEG_INFINITY
+                    || (-wide..=wide).all(|k| {
+                        let beside = (k.abs() - 2).max(0) as f64 * size;
+                        let across = (margin * margin - beside * beside).max(0.0).sqrt();
+                        outer[(i + k - moved).rem_euclid(bins) as usize][0] > far + across
+                    })
+            })
+        };
+        is_inside(&one, &other, moved) || is_inside(&other, &one, -moved)
+    }
+
+    /// By how much another profile is to be shifted along the axis, no further than `most`, so that the
+    /// gap across the axis between the two is as wide as can be, and that gap, if there is one.
+    pub(super) fn widest_gap(&self, other: &Self, most: f64) -> Option<(f64, f64)> {
+        let everywhere = [f64::NEG_INFINITY, f64::INFINITY];
+        let (one, other) = (self.between(everywhere), other.between(everywhere));
+        let (bins, size) = (BINS as i64, self.finest);
+        let gap = |inner: &Reaches, outer: &Reaches, shift: i64| {
+            let at = |i: i64| outer[(i + shift).rem_euclid(bins) as usize][0] - inner[i as usize][1];
+            (0..bins).map(at).fold(f64::INFINITY, f64::min)
+        };
+        let most = (most / size) as i64;
+        let gaps: Vec<(f64, i64)> = (-most..=most)
+            .map(|shift| (gap(&one, &other, -shift).max(gap(&other, &one, shift)), shift))
+            .collect();
+        let widest = gaps.iter().map(|(gap, _)| *gap).fold(f64::NEG_INFINITY, f64::max);
+        let as_wide = || gaps.iter().filter(|(gap, _)| *gap >= widest * (1.0 - AS_WIDE));
+        let middle = as_wide().map(|(_, shift)| *shift as f64).sum::<f64>() / as_wide().count() as f64;
+        (widest > 0.0 && widest.is_finite()).then_some((widest, middle * size))
+    }
+}
+
+/// From where to where a footprint reaches across, between two heights.
+fn reach(print: &Footprint, [low, high]: [f64; 2]) -> [f64; 2] {
+    let (low, high) = (low - print.error, high + print.error);
+    let mut found = NOTHING;
+    for i in 0..3 {
+        let (a, b) = (print.points[i], print.points[(i + 1) % 3]);
+        if a.y.min(b.y) > high || a.y.max(b.y) < low {
+            continue;
+        }
+        let at = |y: f64| {
+            let share = if a.y == b.y { 0.0 } else { ((y - a.y) / (b.y - a.y)).clamp(0.0, 1.0) };
+            a.x + (b.x - a.x) * share
+        };
+        let ends = if a.y == b.y { [a.x, b.x] } else { [at(low), at(high)] };
+        found = [found[0].min(ends[0]).min(ends[1]), found[1].max(ends[0]).max(ends[1])];
+    }
+    [found[0] - print.error, found[1] + print.error]
+}
+
+fn min_max(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+}
+
+/// The two halves of a triangle, cut across the side that is longest beside the axis.
+fn halves(corners: &[Point3<f64>; 3]) -> [[Point3<f64>; 3]; 2] {
+    let length = |i: usize| (corners[(i + 1) % 3] - corners[i]).xy().norm_squared();
+    let side = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });
+    let [a, b, c] = [0, 1, 2].map(|k| corners[(side + k) % 3]);
+    let cut = nalgebra::center(&a, &b);
+    [[a, cut, c], [cut, b, c]]
+}

@@ -1,0 +1,315 @@
+//! The helix that a path follows, and how far it strays from it.
+//!
+//! At every time, the part is where a fixed reference pose was screwed to, but for a small
+//! displacement: a nut in its play rattles. The axis is that on which directions in the part and in
+//! space keep together (the largest singular value of the sum of all rotations) and points keep their
+//! distance (least squares); what lies far off, such as the last pull, is left out.
+
+use nalgebra::{Matrix3, Point3, Quaternion, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
+
+use crate::geometry::{Bounds, Helix, Pose, Surface, interpolate};
+
+use super::course::{Course, Interval, Segment};
+
+/// A helix gets at least so much further with every turn, in the planning frame; others do not rise.
+const LEAST_PITCH: f64 = 0.02;
+/// Rounds of leaving out what lies off.
+const ROUNDS: usize = 4;
+/// What is so many times further off than most is left out.
+const OFF: f64 = 3.0;
+/// Knots on a segment at most.
+const MOST_KNOTS: f64 = 64.0;
+
+/// A short piece of the way.
+#[derive(Debug, Clone)]
+struct Knot {
+    /// From where to where on the way.
+    way: [f64; 2],
+    /// The angles there, counted from the start.
+    angles: [f64; 2],
+    /// The pose of the shape in the middle.
+    pose: Pose,
+    /// The same in the axis frame, screwed back by the angle there.
+    unscrewed: Pose,
+    /// From there, the part's middle moves no further, when screwed back.
+    strays: f64,
+    /// Nor does the part turn further.
+    turns: f64,
+}
+
+/// A path as motion along a helix.
+#[derive(Debug, Clone)]
+pub(super) struct ScrewPath {
+    pub(super) helix: Helix,
+    /// The pose (axis frame) that is screwed along.
+    pub(super) reference: Pose,
+    length: f64,
+    centre: Point3<f64>,
+    knots: Vec<Knot>,
+}
+
+/// Two surfaces of which one is screwed past the other.
+#[derive(Clone, Copy)]
+pub(super) struct Pair<'a> {
+    pub(super) moving: &'a Surface,
+    pub(super) standing: &'a Surface,
+    pub(super) planning_from_standing: Pose,
+}
+
+/// A stretch of the way, as far as the two parts can meet there.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stretch {
+    /// How much further along the axis it is than the reference says.
+    pub(super) shift: f64,
+    /// The middle of where it can meet the other part is no further from where this says.
+    pub(super) strays: f64,
+    /// The part is turned no further against what this says.
+    pub(super) tilt: f64,
+    /// How far along the axis the parts can meet on either side of that middle.
+    pub(super) height: f64,
+    /// Between which places along the axis what can meet the other part is: of the moving part at the
+    /// reference pose, and of the standing one.
+    pub(super) places_of_moving: [f64; 2],
+    pub(super) places_of_standing: [f64; 2],
+}
+
+impl Stretch {
+    /// How far points so far from the axis may be from where this says, if they can meet the other
+    /// part at all.
+    pub(super) fn stray(&self, radius: f64) -> f64 {
+        (self.strays + self.tilt * radius.hypot(self.height)) / (1.0 - self.tilt)
+    }
+}
+
+impl ScrewPath {
+    /// The helix that most of some stretches of the way are close to, told by pieces on which no point
+    /// strays much further than `finest`.
+    pub(super) fn new(course: &Course, stretches: &[Interval], finest: f64) -> Option<Self> {
+        let stretches: Vec<[f64; 2]> = stretches.iter().map(|i| i.of(course.length)).collect();
+        let is_in = |s: &&Segment| {
+            let way = [s.before, s.before + s.length];
+            stretches.iter().any(|[from, to]| way[0] < *to && *from < way[1])
+        };
+        let samples: Vec<Sample> =
+            course.segments.iter().filter(is_in).map(|s| Sample::of(s, course)).collect();
+        let helix = fit(&samples, &course.centre)?;
+        let (length, centre) = (course.length, course.centre);
+        let knots = knots(course, &helix, finest);
+        let mut path = Self { helix, reference: Pose::identity(), length, centre, knots };
+        path.reference = path.mean(&stretches)?;
+        Some(path)
+    }
+
+    /// A pose close to most of the unscrewed ones.
+    fn mean(&self, stretches: &[[f64; 2]]) -> Option<Pose> {
+        let is_in = |k: &Knot| stretches.iter().any(|[from, to]| k.way[0] < *to && *from < k.way[1]);
+        let weight = |k: &Knot| if is_in(k) { (k.angles[1] - k.angles[0]).abs() } else { 0.0 };
+        let mut weights: Vec<f64> = self.knots.iter().map(weight).collect();
+        let mut mean = None;
+        for _ in 0..ROUNDS {
+            let first = self.knots.iter().zip(&weights).find(|(_, w)| **w > 0.0)?.0.unscrewed.rotation;
+            let (mut rotation, mut middle) = (Quaternion::from_imag(Vector3::zeros()), Vector3::zeros());
+            for (k, &w) in self.knots.iter().zip(&weights) {
+                let q = k.unscrewed.rotation.quaternion();
+                rotation += q * w.copysign(q.dot(first.quaternion()));
+                middle += (k.unscrewed * self.centre).coords * w;
+            }
+            let rotation = UnitQuaternion::from_quaternion(rotation);
+            let sum: f64 = weights.iter().sum();
+            let translation = Translation3::from(middle / sum - rotation * self.centre.coords);
+            let pose = Pose::from_parts(translation, rotation);
+            let off = self.knots.iter().map(|k| (k.unscrewed * self.centre - pose * self.centre).norm());
+            leave_out(&mut weights, &off.collect::<Vec<_>>());
+            mean = Some(pose);
+        }
+        mean
+    }
+
+    /// Where it is last as near to the helix as `near`: the angle, and the way there.
+    pub(super) fn leaves(&self, near: f64) -> Option<(f64, f64)> {
+        let off = |k: &&Knot| (k.unscrewed * self.centre - self.reference * self.centre).norm() <= near;
+        self.knots.iter().rev().find(off).map(|k| (k.angles[1], k.way[1]))
+    }
+
+    /// What is known of a stretch: `None` if the two parts are nowhere near each other.
+    pub(super) fn stretch(&self, interval: Interval, pair: &Pair<'_>) -> Option<Stretch> {
+        let (moving, standing) = (pair.moving.bounds(), pair.standing.bounds());
+        let [from, to] = interval.of(self.length);
+        let first = self.knots.partition_point(|k| k.way[1] < from);
+        let knots = || self.knots[first..].iter().take_while(|k| k.way[0] <= to);
+        // Where the moving part can meet the other, and how far it is from the reference there.
+        let zones = knots().map(|k| {
+            let near = standing
+                .grown((k.way[1] - k.way[0]) / 2.0)
+                .transformed(&(k.pose.inverse() * pair.planning_from_standing));
+            Bounds { min: near.min.sup(&moving.min), max: near.max.inf(&moving.max) }
+        });
+        let zone = zones
+            .filter(|z| (0..3).all(|a| z.min[a] <= z.max[a]))
+            .fold(Bounds::EMPTY, |all, z| all.union(&z));
+        if !zone.meets(moving) {
+            return None;
+        }
+        let zone = zone.transformed(&self.reference);
+        let middle = Point3::new(0.0, 0.0, zone.centre().z);
+        let own = self.reference.inverse() * middle;
+        let off = |k: &Knot| k.unscrewed * own - middle;
+        let [low, high] = range(knots().map(|k| off(k).z));
+        let shift = f64::midpoint(low, high);
+        let (mut strays, mut tilt) = (0.0f64, 0.0f64);
+        for k in knots() {
+            let off = off(k) - Vector3::z() * shift;
+            strays = strays.max(off.norm() + k.strays + k.turns * (own - self.centre).norm());
+            tilt = tilt.max(k.unscrewed.rotation.angle_to(&self.reference.rotation) + k.turns);
+        }
+        let angles = range(knots().flat_map(|k| k.angles));
+        let mut stretch = Stretch {
+            shift,
+            strays,
+            tilt: tilt.min(0.5),
+            height: zone.extents().z / 2.0,
+            places_of_moving: [zone.min.z, zone.max.z],
+            places_of_standing: [0.0; 2],
+        };
+        let [low, high] = range(angles.map(|angle| angle * self.helix.rise).into_iter());
+        let stray = stretch.stray(zone.extents().norm());
+        stretch.places_of_standing = [zone.min.z + low + shift - stray, zone.max.z + high + shift + stray];
+        Some(stretch)
+    }
+}
+
+/// A segment in its middle, with how far it turns, and how far all before it turned.
+struct Sample {
+    pose: Pose,
+    turn: Vector3<f64>,
+    before: Vector3<f64>,
+}
+
+impl Sample {
+    fn of(segment: &Segment, course: &Course) -> Self {
+        let pose = interpolate(&segment.from, &segment.to, &course.centre, 0.5);
+        let before = course.segments.iter().take_while(|s| s.before < segment.before).map(turn).sum();
+        Self { pose, turn: turn(segment), before }
+    }
+}
+
+/// How a segment turns.
+fn turn(segment: &Segment) -> Vector3<f64> {
+    (segment.to.rotation * segment.from.rotation.inverse()).scaled_axis()
+}
+
+/// The helix that most of some poses are screwed along.
+fn fit(samples: &[Sample], centre: &Point3<f64>) -> Option<Helix> {
+    let mut weights: Vec<f64> = samples.iter().map(|s| s.turn.norm()).collect();
+    let mut found = None;
+    for _ in 0..ROUNDS {
+        let weighted = || samples.iter().zip(weights.iter().copied());
+        let rotations: Matrix3<f64> =
+            weighted().map(|(s, w)| *s.pose.rotation.to_rotation_matrix().matrix() * w).sum();
+        let svd = rotations.svd(true, true);
+        let largest = svd.singular_values.imax();
+        let (u, v) = (svd.u?, svd.v_t?);
+        let (axis, own) = (u.column(largest).into_owned(), v.row(largest).transpose());
+        let along: f64 = weighted().map(|(s, w)| s.turn.dot(&axis) * w).sum();
+        let (axis, own) = if along < 0.0 { (-axis, -own) } else { (axis, own) };
+        // A point of space and one of the part that stay together beside the axis.
+        let across = Matrix3::identity() - axis * axis.transpose();
+        let mut normal = SMatrix::<f64, 6, 6>::identity() * 1e-9;
+        let mut right = SVector::<f64, 6>::zeros();
+        for (s, w) in weighted() {
+            let mut row = SMatrix::<f64, 3, 6>::zeros();
+            row.fixed_columns_mut::<3>(0)
+                .copy_from(&(across * s.pose.rotation.to_rotation_matrix().matrix()));
+            row.fixed_columns_mut::<3>(3).copy_from(&-across);
+            let target = -(across * (s.pose * centre).coords);
+            normal += row.transpose() * row * w;
+            right += row.transpose() * target * w;
+        }
+        let solved = normal.cholesky()?.solve(&right);
+        let point = centre + solved.fixed_rows::<3>(0);
+        let through = Point3::from(solved.fixed_rows::<3>(3).into_owned());
+        let angle = |s: &Sample| (s.before + s.turn / 2.0).dot(&axis);
+        let angles: Vec<f64> = samples.iter().map(angle).collect();
+        let heights: Vec<f64> = samples.iter().map(|s| axis.dot(&(s.pose * point).coords)).collect();
+        let (rise, level) = line(&angles, &heights, &weights)?;
+        let rise = if (rise * std::f64::consts::TAU).abs() < LEAST_PITCH { 0.0 } else { rise };
+        found = Some(Helix::about(&axis, &through, rise));
+        let off: Vec<f64> = samples
+            .iter()
+            .enumerate()
+            .map(|(i, s)| {
+                let beside = (across * (s.pose * point - through)).norm();
+                let tilt = (s.pose.rotation * own - axis).norm();
+                beside + tilt + (heights[i] - level - rise * angles[i]).abs()
+            })
+            .collect();
+        leave_out(&mut weights, &off);
+    }
+    found
+}
+
+/// Slope and level of the line through weighted points.
+fn line(x: &[f64], y: &[f64], weights: &[f64]) -> Option<(f64, f64)> {
+    let sum: f64 = weights.iter().sum();
+    let mean = |v: &[f64]| v.iter().zip(weights).map(|(v, w)| v * w).sum::<f64>() / sum;
+    let (mx, my) = (mean(x), mean(y));
+    let mut of_x = 0.0;
+    let mut of_both = 0.0;
+    for ((x, y), w) in x.iter().zip(y).zip(weights) {
+        of_x += (x - mx).powi(2) * w;
+        of_both += (x - mx) * (y - my) * w;
+    }
+    (sum > 0.0 && of_x > 0.0).then(|| (of_both / of_x, my - mx * of_both / of_x))
+}
+
+/// Takes the weight from what is much further off than most.
+fn leave_out(weights: &mut [f64], off: &[f64]) {
+    let mut order: Vec<usize> = (0..off.len()).collect();
+    order.sort_by(|&i, &j| off[i].total_cmp(&off[j]));
+    let half: f64 = weights.iter().sum::<f64>() / 2.0;
+    let mut passed = 0.0;
+    let median = order.iter().find(|&&i| {
+        passed += weights[i];
+        passed >= half
+    });
+    let Some(&median) = median else { return };
+    let most = off[median] * OFF + 1e-9;
+    weights.iter_mut().zip(off).filter(|(_, off)| **off > most).for_each(|(w, _)| *w = 0.0);
+}
+
+/// The way in pieces on which nothing moves much when it is screwed back.
+fn knots(course: &Course, helix: &Helix, finest: f64) -> Vec<Knot> {
+    let frame = helix.axis_from_planning;
+    let mut angle = 0.0;
+    let mut knots = Vec::new();
+    for s in &course.segments {
+        let turn = frame.rotation * turn(s);
+        let by = turn.z;
+        let [a, b] = [s.from, s.to].map(|pose| frame * (pose * course.centre));
+        // Speeds per segment: of the middle against a point screwed along (linear in the place, so at
+        // its largest at an end), and of the rotation.
+        let along = |p: &Point3<f64>| (b - a) - Vector3::new(-p.y, p.x, helix.rise) * by;
+        let speed = along(&a).norm().max(along(&b).norm());
+        let turning = (turn - Vector3::z() * by).norm();
+        let count = ((speed + turning * course.reach) / (2.0 * finest)).ceil().clamp(1.0, MOST_KNOTS);
+        for i in 0..count as usize {
+            let share = |k: f64| (i as f64 + k) / count;
+            let pose = interpolate(&s.from, &s.to, &course.centre, share(0.5));
+            let unscrewed = helix.screwed(-(angle + by * share(0.5))) * frame * pose;
+            knots.push(Knot {
+                way: [0.0, 1.0].map(|k| s.before + s.length * share(k)),
+                angles: [0.0, 1.0].map(|k| angle + by * share(k)),
+                pose,
+                unscrewed,
+                strays: speed / (2.0 * count),
+                turns: turning / (2.0 * count),
+            });
+        }
+        angle += by;
+    }
+    knots
+}
+
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+}

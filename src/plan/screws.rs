@@ -1,0 +1,139 @@
+//! Depth along screws: what the profiles of two parts along their helix settle, and the rest.
+//!
+//! Along a helix, surfaces keep their profile (see [`Envelope`]): one comparison settles ten turns.
+//! Where it does not, because the part strays too far, or a head meets its seat, it is made on each
+//! half of the way, where the part strays less; and what short stretches leave open is left to
+//! [`depth`](super::depth), as far as that gets, and to samples. So but for these the answer is the
+//! same kind of bound.
+
+use nalgebra::Point3;
+
+use crate::geometry::{Pose, Surface};
+use crate::termination::{Interrupt, Termination};
+
+use super::course::{Course, Interval};
+use super::depth::{Found, MOST_EFFORT};
+use super::screw_envelope::{Envelope, Zone};
+use super::screw_path::{Pair, ScrewPath};
+use super::verify::{Asked, Way};
+
+/// Stretches that turn by less than this (radians) are not compared any more.
+const LEAST_TURN: f64 = 0.25;
+/// How far a part may stray on a piece of the way that is looked at as one, as a share of the limit.
+pub(super) const FINEST: f64 = 1.0 / 2.0;
+/// So much effort is spent on a side before profiles are asked.
+const FIRST_EFFORT: usize = 8_000;
+/// Stretches that turn further (radians) are bounded in pieces.
+const LONGEST: f64 = 4.0;
+
+/// The stretches of the way on which the profiles of two surfaces do not show that they are apart.
+///
+/// # Errors
+/// The termination condition became true.
+pub(super) fn unsettled(
+    course: &Course,
+    pair: &Pair<'_>,
+    stretches: Vec<Interval>,
+    limit: f64,
+    termination: &Termination,
+) -> Result<Vec<Interval>, Interrupt> {
+    let Some(screw) = ScrewPath::new(course, &stretches, limit * FINEST) else { return Ok(stretches) };
+    if screw.helix.rise == 0.0 {
+        return Ok(stretches);
+    }
+    let axis_from_standing = screw.helix.axis_from_planning * pair.planning_from_standing;
+    let triangles = |surface: &Surface, axis_from_shape: &Pose| -> Vec<[Point3<f64>; 3]> {
+        let corners = |t: u32| surface.corners(t).map(|p| axis_from_shape * p);
+        (0..surface.triangles().len() as u32).map(corners).collect()
+    };
+    let moving = triangles(pair.moving, &screw.reference);
+    let standing = triangles(pair.standing, &axis_from_standing);
+    let [one, other] = [&moving, &standing].map(|t| Zone::of(t).everywhere());
+    let zone = one.common(&other);
+    let envelope =
+        |triangles: Vec<[Point3<f64>; 3]>| Envelope::new(triangles.into_iter(), &screw.helix, &zone);
+    let (moving, standing) = rayon::join(|| envelope(moving), || envelope(standing));
+    let mut open = Vec::new();
+    let mut stack = stretches;
+    while let Some(interval) = stack.pop() {
+        termination.check()?;
+        let Some(stretch) = screw.stretch(interval, pair) else { continue };
+        let stray = |radius: f64| stretch.stray(radius);
+        let places = [stretch.places_of_standing, stretch.places_of_moving];
+        if standing.is_apart(places[0], &moving, places[1], stretch.shift, stray) {
+            continue;
+        }
+        if course.turn(interval) < LEAST_TURN {
+            open.push(interval);
+        } else {
+            let [first, second] = interval.halves();
+            stack.extend([second, first]);
+        }
+    }
+    Ok(open)
+}
+
+/// How deep two parts get into each other along a screw: the moving one into the standing one, and the
+/// other way round. Stretches that could not be bounded are told as open.
+///
+/// # Errors
+/// The termination condition became true.
+pub(super) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], Interrupt> {
+    let Asked { scene, allowances, part, termination, .. } = *way.asked;
+    let (moving, standing) = (&scene.bodies[part], &scene.bodies[way.other]);
+    let [one, other] = [moving, standing].map(|body| &body.shape.surface);
+    if one.is_open() || other.is_open() {
+        let unknown = || Found { open: vec![Interval::WHOLE], ..Found::default() };
+        return Ok([unknown(), unknown()]);
+    }
+    // A part that shares no thread with the moving one is soon told to be apart.
+    let mut found = bounded(way, vec![Interval::WHOLE], FIRST_EFFORT)?;
+    if allowances.of(part, way.other) > 0.0 {
+        // One part lies in the other: surfaces cross, and no more effort would tell how deep.
+        return Ok(found);
+    }
+    let open = taken_open(&mut found);
+    if open.is_empty() {
+        return Ok(found);
+    }
+    // They do not overlap at the start: where neither surface meets the other, they stay apart.
+    let pair = Pair { moving: one, standing: other, planning_from_standing: standing.planning_from_shape };
+    let open = unsettled(way.course, &pair, open, limit, termination)?;
+    let [more, others] = bounded(way, open, MOST_EFFORT)?;
+    let [mut one, mut other] = found;
+    one.add(more);
+    other.add(others);
+    Ok([one, other])
+}
+
+/// Looks for the deepest points of both surfaces on some stretches of the way, with no more than some
+/// effort on each side. Long ones are halved first.
+fn bounded(way: &Way<'_>, stretches: Vec<Interval>, most_effort: usize) -> Result<[Found; 2], Interrupt> {
+    let side = |on_moving| {
+        let mut all = Found::default();
+        let mut stack = stretches.clone();
+        while let Some(interval) = stack.pop() {
+            let left = most_effort.saturating_sub(all.effort);
+            if left == 0 || all.is_enough() {
+                all.open.push(interval);
+            } else if way.course.turn(interval) > LONGEST {
+                stack.extend(interval.halves());
+            } else {
+                all.add(way.depth_of_side(on_moving, interval, left)?);
+            }
+        }
+        Ok(all)
+    };
+    let (one, other) = rayon::join(|| side(true), || side(false));
+    Ok([one?, other?])
+}
+
+/// The stretches that are open on either side, which are none then.
+fn taken_open(found: &mut [Found; 2]) -> Vec<Interval> {
+    let open: Vec<Interval> = found.iter_mut().flat_map(|f| std::mem::take(&mut f.open)).collect();
+    let mut apart: Vec<Interval> =
+        open.iter().filter(|i| !open.iter().any(|o| o != *i && o.holds(**i))).copied().collect();
+    apart.sort_unstable();
+    apart.dedup();
+    apart
+}

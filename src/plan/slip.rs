@@ -1,0 +1,115 @@
+//! Threads of surfaces, found by how they slip.
+//!
+//! A surface slips along a screw motion that keeps every point's velocity in its tangent plane
+//! (N. Gelfand and L. Guibas 2004, Shape segmentation using local slippage analysis): the flanks of a
+//! thread do so along their own helix. Of the screws near a given one, that along which the flanks of a
+//! surface slip best is a linear least-squares problem; facets that belong to something else (chamfers,
+//! run-outs) are weighed down by how badly they slip (A. Beaton and J. Tukey 1974, iterative
+//! reweighting, here with Cauchy's weights).
+
+use nalgebra::{Point3, SMatrix, SVector, Vector3};
+
+use crate::geometry::Helix;
+
+/// Flanks lean towards the axis and along it: their normals have at least and at most so much along it.
+const LEAN: [f64; 2] = [0.15, 0.97];
+/// Facets that slip worse than this, as a share of the turning speed, are none of a thread.
+const WORST: f64 = 0.15;
+/// Rounds of weighing.
+const ROUNDS: usize = 6;
+/// Fewer facets make no thread.
+const FEWEST: usize = 24;
+
+/// A facet of a surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Facet {
+    pub(super) middle: Point3<f64>,
+    pub(super) normal: Vector3<f64>,
+    pub(super) area: f64,
+}
+
+impl Facet {
+    pub(super) fn of(corners: &[Point3<f64>; 3]) -> Option<Self> {
+        let double = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+        // Right triangles on a curved surface have the normal that it has there.
+        let side = |i: usize| (corners[(i + 1) % 3] - corners[i]).norm_squared();
+        let longest = (1..3).fold(0, |best, i| if side(i) > side(best) { i } else { best });
+        let middle = nalgebra::center(&corners[longest], &corners[(longest + 1) % 3]);
+        Some(Self { middle, normal: double.try_normalize(0.0)?, area: double.norm() / 2.0 })
+    }
+}
+
+/// The helix of some rise along which the flanks among some facets slip best; that along z is close to
+/// it, in whose frame they are given. `None` if they are too few or tell no axis. (Facets on a grid lean
+/// all the same way against the flank that they stand for, and would tell a false rise; about the axis,
+/// that evens out.)
+pub(super) fn slipping(facets: &[Facet], rise: f64) -> Option<Helix> {
+    // The speed along the normal is linear in the twist: ω = (a, b, 1), v = (c, d, rise).
+    let row = |f: &Facet| {
+        let lever = f.middle.coords.cross(&f.normal);
+        SVector::<f64, 4>::new(lever.x, lever.y, f.normal.x, f.normal.y)
+    };
+    let turning = |f: &Facet| f.middle.coords.cross(&f.normal).z + rise * f.normal.z;
+    let mut twist = SVector::<f64, 4>::zeros();
+    let share = |f: &Facet, twist: &SVector<f64, 4>| {
+        (row(f).dot(twist) + turning(f)) / f.middle.xy().coords.norm().max(1e-12)
+    };
+    let flanks: Vec<&Facet> = facets
+        .iter()
+        .filter(|f| (LEAN[0]..LEAN[1]).contains(&f.normal.z.abs()) && share(f, &twist).abs() < WORST)
+        .collect();
+    if flanks.len() < FEWEST {
+        return None;
+    }
+    for _ in 0..ROUNDS {
+        let shares: Vec<f64> = flanks.iter().map(|f| share(f, &twist).abs()).collect();
+        let mut sorted = shares.clone();
+        sorted.sort_by(f64::total_cmp);
+        let scale = sorted[sorted.len() / 2].max(1e-9);
+        let mut normal = SMatrix::<f64, 4, 4>::zeros();
+        let mut right = SVector::<f64, 4>::zeros();
+        for (f, own) in flanks.iter().zip(&shares) {
+            let weight = f.area / (1.0 + (own / scale).powi(2)) / f.middle.xy().coords.norm_squared();
+            normal += row(f) * row(f).transpose() * weight;
+            right -= row(f) * (turning(f) * weight);
+        }
+        twist = normal.cholesky()?.solve(&right);
+    }
+    let (omega, v) = (Vector3::new(twist[0], twist[1], 1.0), Vector3::new(twist[2], twist[3], rise));
+    let squared = omega.norm_squared();
+    let through = Point3::from(omega.cross(&v) / squared);
+    Some(Helix::about(&omega.normalize(), &through, omega.dot(&v) / squared))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{ball, surface, thread};
+    use crate::geometry::{Pose, Surface};
+
+    fn facets(surface: &Surface, place: &Pose) -> Vec<Facet> {
+        let corners = |t: u32| surface.corners(t).map(|p| place * p);
+        (0..surface.triangles().len() as u32).filter_map(|t| Facet::of(&corners(t))).collect()
+    }
+
+    #[test]
+    fn the_axis_of_a_displaced_thread_is_found() {
+        let (pitch, [bolt, nut]) = (0.5, thread(3.0, 0.5));
+        let place = Pose::new(Vector3::new(0.03, -0.02, 0.01), Vector3::new(0.004, -0.006, 0.4));
+        for mesh in [bolt, nut] {
+            let found = slipping(&facets(&surface(mesh), &place), pitch / std::f64::consts::TAU).unwrap();
+            let axis_from_thread = found.axis_from_planning * place;
+            for z in [0.0, 6.0] {
+                let at = axis_from_thread * Point3::new(0.0, 0.0, z);
+                // A fifth of the play between the two.
+                assert!(at.xy().coords.norm() < 6e-3, "{at}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_flanks_tells_no_axis() {
+        let small = facets(&surface(ball(0)), &Pose::identity());
+        assert_eq!(slipping(&small, 0.1), None);
+    }
+}
