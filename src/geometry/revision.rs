@@ -95,7 +95,7 @@ impl Assembly {
     /// change holds.
     ///
     /// # Errors
-    /// A part that is named does not exist, a name is given twice, a mesh cannot be used, a pose is not
+    /// A part that is named does not exist, a name is given or a part moved twice, a mesh cannot be used, a pose is not
     /// finite, or the whole would be so much larger or smaller that another scale were due.
     pub fn revised(&self, revision: &Revision) -> Result<Self, GeometryError> {
         let refuse = |reason: String| GeometryError::Assembly { origin: self.name.clone(), reason };
@@ -116,8 +116,11 @@ impl Assembly {
             let part = revised.taken_in(revised.parts.len(), source)?;
             revised.parts.push(part);
         }
-        for (part, pose) in &revision.moved {
+        for (i, (part, pose)) in revision.moved.iter().enumerate() {
             let name = part_at(*part)?;
+            if revision.moved[..i].iter().any(|(before, _)| before == part) {
+                return Err(refuse(format!("part `{name}` is moved twice; give one motion")));
+            }
             if !waypoint_from_pose(pose).iter().all(|x| x.is_finite()) {
                 return Err(refuse(format!("the pose of part `{name}` is not finite")));
             }
@@ -255,6 +258,8 @@ mod tests {
         assert!(none.contains("no part 7"), "{none}");
         let infinite = refusal(Revision { moved: vec![(1, to(f64::INFINITY))], ..Revision::default() });
         assert!(infinite.contains("`1`") && infinite.contains("not finite"), "{infinite}");
+        let both = refusal(Revision { moved: vec![(1, to(1.0)), (1, to(2.0))], ..Revision::default() });
+        assert!(both.contains("`1` is moved twice"), "{both}");
         let far = refusal(Revision { moved: vec![(1, to(1e4))], ..Revision::default() });
         assert!(far.contains("longest side") && far.contains("new assembly"), "{far}");
         let twice = refusal(Revision { added: vec![added("1", l_shape())], ..Revision::default() });
