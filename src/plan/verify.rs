@@ -3,7 +3,7 @@
 //! For every standing part that the moving one comes near, both surfaces are bounded against each
 //! other all along the way ([`depth`](super::depth) says how, and what that guarantees): what counts
 //! is depth beyond that of the pair at the assembled pose, which is measured with the same search.
-//! Screws of many turns are bounded by their profiles, too ([`screws`](super::screws)), and what
+//! Screws of many turns are bounded by their profiles, too ([`screw`](super::screw)), and what
 //! neither settles is checked at samples ([`sampling`](super::sampling)).
 
 use std::collections::BTreeMap;
@@ -17,11 +17,10 @@ use crate::geometry::{Bounds, Pose, Shape, Surface, area_normal};
 use crate::simulation::{Allowances, Scene};
 use crate::termination::{Interrupt, Termination};
 
-use super::centred::centred;
 use super::course::{Course, Interval, View};
 use super::depth::{Found, MOST_EFFORT, Precision, Question};
 use super::sampling::{Samples, turns_far};
-use super::screws::depth_on_screw;
+use super::screw::{centred, depth_on_screw};
 
 /// Depth that is not looked into, as a share of the limit.
 const SPARE: f64 = 1.0 / 16.0;

@@ -10,10 +10,10 @@ use crate::geometry::{Bounds, Pose, SourceMesh, interpolate};
 use crate::simulation::Scene;
 use crate::termination::Termination;
 
-use super::Verifier;
-use super::course::{Course, Interval};
-use super::screw_path::Pair;
-use super::screws::unsettled;
+use super::super::Verifier;
+use super::super::course::{Course, Interval};
+use super::path::Pair;
+use super::unsettled;
 
 const TURNS: f64 = 3.0;
 const PITCH: f64 = 0.5;

@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Point3, Quaternion, SMatrix, SVector, Translation3, Unit
 
 use crate::geometry::{Bounds, Helix, Pose, Surface, interpolate};
 
-use super::course::{Course, Interval, Segment};
+use super::super::course::{Course, Interval, Segment};
 
 /// A helix gets at least so much further with every turn, in the planning frame; others do not rise.
 const LEAST_PITCH: f64 = 0.02;

@@ -1,26 +1,36 @@
 //! Depth along screws: what the profiles of two parts along their helix settle, and the rest.
 //!
-//! Along a helix, surfaces keep their profile (see [`Envelope`]): one comparison settles ten turns.
+//! Along a helix, surfaces keep their profile (`envelope`; the helix that a path follows, and how far it
+//! strays from it: `path`): one comparison settles ten turns.
 //! Where it does not, because the part strays too far, or a head meets its seat, it is made on each
 //! half of the way, where the part strays less; and what short stretches leave open is left to
 //! [`depth`](super::depth), as far as that gets, and to samples. So but for these the answer is the
 //! same kind of bound.
+
+mod centred;
+mod envelope;
+mod path;
+mod slip;
+#[cfg(test)]
+mod tests;
 
 use nalgebra::Point3;
 
 use crate::geometry::{Pose, Surface};
 use crate::termination::{Interrupt, Termination};
 
+pub(super) use centred::centred;
+
 use super::course::{Course, Interval};
 use super::depth::{Found, MOST_EFFORT};
-use super::screw_envelope::{Envelope, Zone};
-use super::screw_path::{Pair, ScrewPath};
 use super::verify::{Asked, Way};
+use envelope::{Envelope, Zone};
+use path::{Pair, ScrewPath};
 
 /// Stretches that turn by less than this (radians) are not compared any more.
 const LEAST_TURN: f64 = 0.25;
 /// How far a part may stray on a piece of the way that is looked at as one, as a share of the limit.
-pub(super) const FINEST: f64 = 1.0 / 2.0;
+const FINEST: f64 = 1.0 / 2.0;
 /// So much effort is spent on a side before profiles are asked.
 const FIRST_EFFORT: usize = 8_000;
 /// Stretches that turn further (radians) are bounded in pieces.
@@ -30,7 +40,7 @@ const LONGEST: f64 = 4.0;
 ///
 /// # Errors
 /// The termination condition became true.
-pub(super) fn unsettled(
+fn unsettled(
     course: &Course,
     pair: &Pair<'_>,
     stretches: Vec<Interval>,

@@ -12,11 +12,11 @@ use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use crate::geometry::{Helix, Pose, Surface, interpolate};
 use crate::simulation::Scene;
 
-use super::course::{Course, Interval};
-use super::sampling::turns_far;
-use super::screw_envelope::{Envelope, Zone};
-use super::screw_path::ScrewPath;
-use super::screws::FINEST;
+use super::super::course::{Course, Interval};
+use super::super::sampling::turns_far;
+use super::FINEST;
+use super::envelope::{Envelope, Zone};
+use super::path::ScrewPath;
 use super::slip::{Facet, slipping};
 
 /// So far from the helix, as a share of the pitch, a path has left it.
@@ -35,7 +35,7 @@ const MOST_FURTHER: f64 = 2.0 * TAU;
 /// A path with the same start and end as a given one that turns along the thread which a part shares
 /// with one of those standing; `None` if there is no such thread, or no play in it. `limit` is the depth
 /// at which paths are refused.
-pub(super) fn centred(
+pub(in crate::plan) fn centred(
     scene: &Scene,
     standing: &[usize],
     part: usize,
