@@ -16,3 +16,4 @@ pub mod service;
 pub mod simulation;
 pub mod telemetry;
 pub mod termination;
+mod upload;

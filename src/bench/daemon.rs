@@ -60,7 +60,7 @@ pub(super) struct Server {
 impl Server {
     /// Starts `sbdpd`, which lies beside this program.
     pub(super) fn daemon(place: Place) -> Result<Self, BenchError> {
-        let program = std::env::current_exe().map_err(|e| BenchError::Failed(e.to_string()))?;
+        let program = std::env::current_exe().map_err(BenchError::failed)?;
         let mut command = Command::new(program.with_file_name("sbdpd"));
         command.arg("--runtime-dir").arg(place.runtime_dir()).arg("--root").arg(place.root());
         command.env("SBDP_CACHE_DIR", place.folder().join("cache")).env("SBDP_LOG", "warn");
@@ -87,7 +87,7 @@ impl Server {
     pub(super) fn connect(&self) -> Result<Client, BenchError> {
         let options =
             ConnectOptions { runtime_dir: Some(self.place.runtime_dir()), ..ConnectOptions::default() };
-        Client::connect_with(options).map_err(|e| BenchError::Failed(e.to_string()))
+        Client::connect_with(options).map_err(BenchError::failed)
     }
 
     pub(super) fn runtime_dir(&self) -> PathBuf {

@@ -6,7 +6,7 @@ use std::process::Command;
 use std::sync::Barrier;
 use std::time::{Duration, Instant};
 
-use sbdp_client::{Assembly, Client, Event, Handle, Part, PlanOptions, Summary, Vertices};
+use sbdp_client::{Client, Event, Handle, PlanOptions, Summary};
 use sbdp_ipc::plan::PlanRequest;
 use serde::Serialize;
 
@@ -14,6 +14,7 @@ use super::BenchError;
 use super::daemon::{Place, Server};
 use super::raw_peer::RawClient;
 use crate::geometry::SourceAssembly;
+use crate::upload::wire_assembly;
 
 /// What to measure.
 #[derive(Debug, Clone)]
@@ -64,8 +65,8 @@ const WARM_UP: usize = 50;
 pub fn latency(request: &LatencyRequest) -> Result<Latency, BenchError> {
     let daemon = Server::daemon(Place::new("daemon")?)?;
     let client = daemon.connect()?;
-    let assembly = wire(&request.assembly);
-    let handle = client.upload(&assembly).map_err(failed)?;
+    let assembly = wire_assembly(&request.assembly);
+    let handle = client.upload(&assembly).map_err(BenchError::failed)?;
     let started = Instant::now();
     ask(&client, handle)?;
     let first_plan_us = micros(started.elapsed());
@@ -155,35 +156,13 @@ fn question(handle: Handle) -> Vec<u8> {
 
 /// Plans to the end.
 fn ask(client: &Client, handle: Handle) -> Result<Summary, BenchError> {
-    let mut stream = client.plan(handle, &PlanOptions::default()).map_err(failed)?;
-    while let Some(event) = stream.next_event().map_err(failed)? {
+    let mut stream = client.plan(handle, &PlanOptions::default()).map_err(BenchError::failed)?;
+    while let Some(event) = stream.next_event().map_err(BenchError::failed)? {
         if let Event::Done(summary) = event {
             return Ok(summary);
         }
     }
     Err(BenchError::Failed("a plan ended without its summary".to_owned()))
-}
-
-/// An assembly as it is uploaded.
-pub(super) fn wire(assembly: &SourceAssembly) -> Assembly<'_> {
-    Assembly {
-        name: &assembly.name,
-        units: assembly.units.as_deref(),
-        parts: assembly
-            .parts
-            .iter()
-            .map(|part| Part {
-                name: &part.name,
-                vertices: Vertices::F64(&part.mesh.vertices),
-                triangles: &part.mesh.triangles,
-            })
-            .collect(),
-        fixed: assembly.fixed.iter().map(String::as_str).collect(),
-    }
-}
-
-fn failed(error: impl std::fmt::Display) -> BenchError {
-    BenchError::Failed(error.to_string())
 }
 
 fn micros(time: Duration) -> f64 {

@@ -27,19 +27,15 @@ impl From<SetupError> for BenchError {
     }
 }
 
-fn failed(error: impl std::fmt::Display) -> BenchError {
-    BenchError::Failed(error.to_string())
-}
-
 /// Answers every request with chunks of these sizes, until `end` becomes true.
 ///
 /// # Errors
 /// The place cannot be used.
 pub fn serve(runtime_dir: &Path, root: &Path, chunks: &[usize], end: &AtomicBool) -> Result<(), BenchError> {
-    create_runtime_dir(runtime_dir).map_err(failed)?;
+    create_runtime_dir(runtime_dir).map_err(BenchError::failed)?;
     let prefix = default_prefix(runtime_dir);
-    let ports = Ports::open(&layout::iceoryx2_config(&prefix, root).map_err(failed)?)?;
-    Endpoint::of_this_process(&prefix, root).publish(runtime_dir).map_err(failed)?;
+    let ports = Ports::open(&layout::iceoryx2_config(&prefix, root).map_err(BenchError::failed)?)?;
+    Endpoint::of_this_process(&prefix, root).publish(runtime_dir).map_err(BenchError::failed)?;
     let chunks: Vec<Vec<u8>> = chunks.iter().map(|&bytes| vec![7; bytes]).collect();
     let mut wakes = Vec::new();
     while !end.load(Ordering::Relaxed) {
@@ -69,30 +65,35 @@ pub(super) struct RawClient {
 
 impl RawClient {
     pub(super) fn connect(runtime_dir: &Path) -> Result<Self, BenchError> {
-        let endpoint = Endpoint::find(runtime_dir).map_err(failed)?;
-        let node =
-            services::node(&layout::iceoryx2_config(&endpoint.prefix, &endpoint.root).map_err(failed)?)?;
-        let plan = services::plan(&node)?.open().map_err(failed)?;
-        let wake_client = services::wake(&node, WAKE_CLIENT_SERVICE)?.open().map_err(failed)?;
-        let wake_server = services::wake(&node, WAKE_SERVER_SERVICE)?.open().map_err(failed)?;
+        let endpoint = Endpoint::find(runtime_dir).map_err(BenchError::failed)?;
+        let node = services::node(
+            &layout::iceoryx2_config(&endpoint.prefix, &endpoint.root).map_err(BenchError::failed)?,
+        )?;
+        let plan = services::plan(&node)?.open().map_err(BenchError::failed)?;
+        let wake_client = services::wake(&node, WAKE_CLIENT_SERVICE)?.open().map_err(BenchError::failed)?;
+        let wake_server = services::wake(&node, WAKE_SERVER_SERVICE)?.open().map_err(BenchError::failed)?;
         Ok(Self {
-            port: plan.client_builder().initial_max_slice_len(PLAN_REQUEST).create().map_err(failed)?,
-            listener: wake_client.listener_builder().create().map_err(failed)?,
-            notifier: wake_server.notifier_builder().create().map_err(failed)?,
+            port: plan
+                .client_builder()
+                .initial_max_slice_len(PLAN_REQUEST)
+                .create()
+                .map_err(BenchError::failed)?,
+            listener: wake_client.listener_builder().create().map_err(BenchError::failed)?,
+            notifier: wake_server.notifier_builder().create().map_err(BenchError::failed)?,
             _node: node,
         })
     }
 
     fn send(&self, payload: &[u8]) -> Result<Pending, BenchError> {
-        let mut request = self.port.loan_slice(payload.len()).map_err(failed)?;
+        let mut request = self.port.loan_slice(payload.len()).map_err(BenchError::failed)?;
         *request.user_header_mut() = RequestHeader {
             kind: RequestKind::Plan as u32,
             listener: id_words(self.listener.id().value()),
             ..RequestHeader::default()
         };
         request.payload_mut().copy_from_slice(payload);
-        let pending = request.send().map_err(failed)?;
-        self.notifier.notify().map_err(failed)?;
+        let pending = request.send().map_err(BenchError::failed)?;
+        self.notifier.notify().map_err(BenchError::failed)?;
         Ok(pending)
     }
 
@@ -103,7 +104,7 @@ impl RawClient {
         loop {
             // Asked before looking: what was sent before the request was let go is then seen.
             let connected = pending.is_connected();
-            match pending.receive().map_err(failed)? {
+            match pending.receive().map_err(BenchError::failed)? {
                 Some(answer) => sizes.push(answer.payload().len()),
                 None if connected => {
                     let _ = self.listener.timed_wait(|_| {}, TICK);
@@ -119,7 +120,7 @@ impl RawClient {
         let pending = self.send(payload)?;
         let (mut received, mut length) = (0, 0);
         while received < chunks {
-            match pending.receive().map_err(failed)? {
+            match pending.receive().map_err(BenchError::failed)? {
                 Some(answer) => {
                     received += 1;
                     length += answer.payload().len();

@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use super::BenchError;
 use super::daemon::{Place, Server};
-use super::latency::wire;
 use crate::geometry::{SourceAssembly, SourceMesh, load_assembly};
+use crate::upload::{wire_assembly, wire_part};
 
 /// One question, cold or after the change.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -60,7 +60,7 @@ pub fn replan(
 ) -> Result<Vec<ReplanRecord>, BenchError> {
     let mut records = Vec::new();
     for path in assemblies {
-        let source = load_assembly(path).map_err(failed)?;
+        let source = load_assembly(path).map_err(BenchError::failed)?;
         let base = Asked::of(&source, "base")?;
         let (plan, _) = base.plan(base.handle, &PlanOptions::default())?;
         let part = fastener(&source, &plan)
@@ -102,14 +102,14 @@ impl Asked {
     fn of(source: &SourceAssembly, name: &str) -> Result<Self, BenchError> {
         let daemon = Server::daemon(Place::new(name)?)?;
         let client = daemon.connect()?;
-        let handle = client.upload(&wire(source)).map_err(failed)?;
+        let handle = client.upload(&wire_assembly(source)).map_err(BenchError::failed)?;
         Ok(Self { client, handle, _daemon: daemon })
     }
 
     fn plan(&self, handle: Handle, options: &PlanOptions) -> Result<(Answered, Summary), BenchError> {
-        let mut stream = self.client.plan(handle, options).map_err(failed)?;
+        let mut stream = self.client.plan(handle, options).map_err(BenchError::failed)?;
         let mut steps = Vec::new();
-        while let Some(event) = stream.next_event().map_err(failed)? {
+        while let Some(event) = stream.next_event().map_err(BenchError::failed)? {
             match event {
                 Event::Progress(_) => {}
                 Event::Step(step) => steps.push((step.part as usize, step.path.to_vec())),
@@ -128,10 +128,10 @@ impl Asked {
         let started = Instant::now();
         let mut handle = self.handle;
         if let Some(mesh) = &change.replaced {
-            let mut with = wire(source).parts[part];
+            let mut with = wire_part(&source.parts[part]);
             with.vertices = sbdp_client::Vertices::F64(&mesh.vertices);
             let change = Change { replaced: vec![(part as u32, with)], ..Change::default() };
-            handle = self.client.revise(handle, &change).map_err(failed)?;
+            handle = self.client.revise(handle, &change).map_err(BenchError::failed)?;
         }
         let (answered, summary) = self.plan(handle, &change.options)?;
         let cost =
@@ -188,8 +188,4 @@ fn changes(source: &SourceAssembly, part: usize, outward: [f64; 3]) -> Vec<Chang
         Changed { name: "replaced", options: options(), replaced: Some(smaller) },
         with("locked", PlanOptions { fixed: vec![number], ..options() }),
     ]
-}
-
-fn failed(error: impl std::fmt::Display) -> BenchError {
-    BenchError::Failed(error.to_string())
 }

@@ -9,9 +9,10 @@ use sbdp_client::{Client, ClientError, ErrorCode, Event, PlanOptions, PlanStream
 
 use super::backend::{Backend, Question};
 use super::error::CliError;
-use crate::geometry::{Revision, SourceAssembly, SourceMesh, SourcePart, Waypoint, heal, waypoint_from_pose};
+use crate::geometry::{Revision, SourceAssembly, Waypoint, heal, waypoint_from_pose};
 use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
 use crate::search::{ActionSet, Engine, PlanSink, Planner, Progress, Stage};
+use crate::upload::{wire_assembly, wire_mesh, wire_part};
 
 /// How long Ctrl-C may go unnoticed while the daemon has nothing to say.
 const CANCEL_POLL: Duration = Duration::from_millis(100);
@@ -90,15 +91,6 @@ fn receive(
     }
 }
 
-fn wire_assembly(assembly: &SourceAssembly) -> client::Assembly<'_> {
-    client::Assembly {
-        name: &assembly.name,
-        units: assembly.units.as_deref(),
-        parts: assembly.parts.iter().map(wire_part).collect(),
-        fixed: assembly.fixed.iter().map(String::as_str).collect(),
-    }
-}
-
 fn change(revision: &Revision) -> client::Change<'_> {
     client::Change {
         replaced: revision
@@ -109,14 +101,6 @@ fn change(revision: &Revision) -> client::Change<'_> {
         added: revision.added.iter().map(wire_part).collect(),
         moved: revision.moved.iter().map(|(p, pose)| (*p as u32, waypoint_from_pose(pose))).collect(),
     }
-}
-
-fn wire_part(part: &SourcePart) -> client::Part<'_> {
-    wire_mesh(&part.name, &part.mesh)
-}
-
-fn wire_mesh<'a>(name: &'a str, mesh: &'a SourceMesh) -> client::Part<'a> {
-    client::Part { name, vertices: client::Vertices::F64(&mesh.vertices), triangles: &mesh.triangles }
 }
 
 fn options(question: &Question<'_>) -> PlanOptions {

@@ -29,7 +29,7 @@ impl Answer {
         let steps: Vec<_> = plan.steps.iter().map(convert::step).collect();
         let PlanStats { simulations, sweeps, states, .. } = plan.stats;
         let stats = PlanStats { simulations, sweeps, states, plan_hit: true, ..PlanStats::default() };
-        let summary = convert::summary(&Plan { stats, ..plan.clone() });
+        let summary = convert::summary(plan, &stats);
         Some(Self {
             steps: steps_messages(&steps).into_iter().map(Arc::new).collect(),
             summary: Arc::new(summary),

@@ -101,8 +101,8 @@ fn numbers(list: &[usize]) -> Vec<u32> {
     list.iter().map(|i| *i as u32).collect()
 }
 
-/// Everything of a plan but its steps, as it travels.
-pub(crate) fn summary(plan: &Plan) -> Vec<u8> {
+/// Everything of a plan but its steps, as it travels, with what its making took this time.
+pub(crate) fn summary(plan: &Plan, spent: &PlanStats) -> Vec<u8> {
     SummaryParts {
         status: status(plan.status),
         steps: plan.steps.len() as u32,
@@ -126,7 +126,7 @@ pub(crate) fn summary(plan: &Plan) -> Vec<u8> {
         targets: plan.targets.as_deref().map(numbers),
         fixed: numbers(&plan.fixed),
         remaining: numbers(&plan.remaining),
-        stats: stats(&plan.stats),
+        stats: stats(spent),
     }
     .encode()
 }

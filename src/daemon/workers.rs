@@ -259,7 +259,7 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
     report(match planned {
         Ok(Ok(plan)) => {
             let again = job.question.clone().zip(Answer::of(&plan));
-            WorkerEvent::Planned(job.key, Arc::new(convert::summary(&plan)), again)
+            WorkerEvent::Planned(job.key, Arc::new(convert::summary(&plan, &plan.stats)), again)
         }
         Ok(Err(error)) => WorkerEvent::Unplanned(job.key, convert::service_error(&error)),
         Err(panic) => WorkerEvent::Unplanned(job.key, panic),

@@ -126,12 +126,12 @@ impl Problem<'_> {
         let near = self.near(&standing, part, &thin);
         if let Some(centred) = self.verifier.centred_on_thread(&self.scene, &near, part, &thin) {
             let thin = self.thinned(part, &centred);
-            let verdict = self.verdict(&standing, part, &thin)?;
+            let verdict = self.verdict(&self.near(&standing, part, &thin), part, &thin)?;
             if verdict.entries.is_empty() {
                 return Ok(Ok((thin, verdict.depth)));
             }
         }
-        let verdict = self.verdict(&standing, part, &thin)?;
+        let verdict = self.verdict(&near, part, &thin)?;
         if verdict.entries.is_empty() { Ok(Ok((thin, verdict.depth))) } else { Ok(Err(verdict.entries)) }
     }
 
@@ -144,11 +144,11 @@ impl Problem<'_> {
         self.scene.broad_phase.meeting_of(standing, &self.swept_bounds(part, path))
     }
 
-    fn verdict(&self, standing: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
+    /// Verifies a path past all that it may meet.
+    fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
         let Self { scene, verifier, .. } = self;
-        let near = self.near(standing, part, path);
-        let question = VerdictQuestion { scene, near: &near, part, path, limit: verifier.limit() };
-        let check = || verifier.check(scene, &scene.allowances, &near, part, path, &self.termination);
+        let question = VerdictQuestion { scene, near, part, path, limit: verifier.limit() };
+        let check = || verifier.check(scene, &scene.allowances, near, part, path, &self.termination);
         self.recall.verdict(&question, check)
     }
 

@@ -128,6 +128,7 @@ impl Service {
     /// The base is unknown, or the change is refused; the error names the part and the reason.
     pub fn revise(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError> {
         let entry = self.entry(base)?;
+        check_parts(&revised_parts(revision), entry.assembly.parts.len())?;
         let id = if revision.is_empty() { base } else { AssemblyId(revision.content_hash(&base.0)) };
         if let Ok(entry) = self.entry(id) {
             return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly) });
@@ -168,7 +169,7 @@ impl Service {
         sink: &mut dyn PlanSink,
     ) -> Result<Plan, ServiceError> {
         let entry = self.entry(id)?;
-        check_parts(request, entry.assembly.parts.len())?;
+        check_parts(&named_parts(request), entry.assembly.parts.len())?;
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(request.threads)
             .build()
@@ -404,10 +405,22 @@ fn engine_of(engine: Engine, penalty: PenaltyParameters) -> Box<dyn TransitionFu
 /// What verification finds between the samples of an engine, in the planning frame.
 const BETWEEN_SAMPLES: f64 = 1e-3;
 
-fn check_parts(request: &PlanRequest, count: usize) -> Result<(), ServiceError> {
-    let none = Vec::new();
-    let targets = request.targets.as_ref().unwrap_or(&none);
-    for (field, list) in [("fixed", &request.fixed), ("removed", &request.removed), ("targets", targets)] {
+/// Parts that a request or a change names, by field.
+type Named = [(&'static str, Vec<usize>)];
+
+fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 3] {
+    let PlanRequest { fixed, removed, targets, .. } = request;
+    [("fixed", fixed.clone()), ("removed", removed.clone()), ("targets", targets.clone().unwrap_or_default())]
+}
+
+fn revised_parts(revision: &Revision) -> [(&'static str, Vec<usize>); 2] {
+    let replaced = revision.replaced.iter().map(|(part, _)| *part).collect();
+    let moved = revision.moved.iter().map(|(part, _)| *part).collect();
+    [("replaced", replaced), ("moved", moved)]
+}
+
+fn check_parts(named: &Named, count: usize) -> Result<(), ServiceError> {
+    for (field, list) in named {
         if let Some(&index) = list.iter().find(|&&i| i >= count) {
             return Err(ServiceError::NoSuchPart { field, index, count });
         }
