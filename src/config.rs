@@ -90,8 +90,6 @@ pub struct RequestsConfig {
     pub max_upload_mb: u64,
     /// Megabytes of a plan that may wait for a client to read.
     pub outbox_mb: u64,
-    /// Megabytes of answers that are remembered as they were sent.
-    pub answers_mb: u64,
     /// Seconds that a client may leave a waiting plan unread.
     pub slow_reader_s: f64,
 }
@@ -118,8 +116,19 @@ pub struct CacheConfig {
     pub dir: Option<PathBuf>,
     /// Megabytes that its file may have.
     pub disk_mb: u64,
-    /// Megabytes that records in memory may have.
+    /// Megabytes of memory for all that is remembered; see [`CacheConfig::memory`].
     pub memory_mb: u64,
+}
+
+/// What of the memory is for what, in bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MemoryBudget {
+    /// Assemblies, with their distance fields and what else is derived from them.
+    pub assemblies: usize,
+    /// Records: pairs, motions, verified paths, plans.
+    pub records: usize,
+    /// Answers, as they were sent.
+    pub answers: usize,
 }
 
 /// Assemblies to load at start.
@@ -159,7 +168,7 @@ impl Default for WorkersConfig {
 
 impl Default for RequestsConfig {
     fn default() -> Self {
-        Self { queue: 16, max_upload_mb: 1024, outbox_mb: 64, answers_mb: 64, slow_reader_s: 60.0 }
+        Self { queue: 16, max_upload_mb: 1024, outbox_mb: 64, slow_reader_s: 60.0 }
     }
 }
 
@@ -176,13 +185,21 @@ impl Default for CacheConfig {
 }
 
 impl CacheConfig {
+    /// Half of the memory is for assemblies, three eighths for records, the rest for answers.
+    #[must_use]
+    pub fn memory(&self) -> MemoryBudget {
+        let all = usize::try_from(self.memory_mb.saturating_mul(1 << 20)).unwrap_or(usize::MAX);
+        let (assemblies, records) = (all / 2, all / 8 * 3);
+        MemoryBudget { assemblies, records, answers: all - assemblies - records }
+    }
+
     /// The same for the cache.
     #[must_use]
     pub fn settings(&self) -> CacheSettings {
         let folder = self.dir.clone().or_else(CacheSettings::default_folder).filter(|_| self.disk);
         CacheSettings {
             folder,
-            memory_bytes: (self.memory_mb as usize).saturating_mul(1 << 20),
+            memory_bytes: self.memory().records,
             disk_bytes: self.disk_mb.saturating_mul(1 << 20),
         }
     }
@@ -218,7 +235,6 @@ impl Config {
         within("requests.queue", self.requests.queue, 1..=4096, "1 to 4096")?;
         within("requests.max_upload_mb", self.requests.max_upload_mb, 1..=65_536, "1 to 65536")?;
         within("requests.outbox_mb", self.requests.outbox_mb, 1..=65_536, "1 to 65536")?;
-        within("requests.answers_mb", self.requests.answers_mb, 0..=65_536, "0 to 65536")?;
         within("requests.slow_reader_s", self.requests.slow_reader_s, 0.1..=86_400.0, "0.1 to 86400")?;
         within("cache.disk_mb", self.cache.disk_mb, 16..=1_048_576, "16 to 1048576")?;
         within("cache.memory_mb", self.cache.memory_mb, 0..=1_048_576, "0 to 1048576")?;

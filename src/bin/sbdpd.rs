@@ -48,7 +48,8 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let cache = Arc::new(cache(&config));
-    let ended = daemon::run(&config, Arc::new(Service::new(Arc::clone(&cache))));
+    let service = Service::new(Arc::clone(&cache), config.cache.memory().assemblies);
+    let ended = daemon::run(&config, Arc::new(service));
     // A worker that does not end in time still holds the service.
     cache.flush();
     match ended {

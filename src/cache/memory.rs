@@ -1,9 +1,9 @@
-//! The tier in memory: payloads up to a budget in bytes, the least recently used leave first.
+//! The tier in memory: payloads up to a budget in bytes, the least recently used leave.
 
-use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use super::kind::{Key, Kind};
+use crate::lru::Lru;
 
 /// What an entry takes beside its payload, about.
 const OVERHEAD: usize = 192;
@@ -13,17 +13,7 @@ const OVERHEAD: usize = 192;
 pub(super) struct Memory {
     budget: usize,
     bytes: usize,
-    /// Counts uses.
-    clock: u64,
-    entries: HashMap<Key, Entry>,
-    /// By the use that was the last.
-    order: BTreeMap<u64, Key>,
-}
-
-#[derive(Debug)]
-struct Entry {
-    payload: Arc<[u8]>,
-    used: u64,
+    payloads: Lru<Key, [u8]>,
 }
 
 /// How much of a kind is held.
@@ -35,16 +25,11 @@ pub(super) struct Held {
 
 impl Memory {
     pub(super) fn new(budget: usize) -> Self {
-        Self { budget, bytes: 0, clock: 0, entries: HashMap::new(), order: BTreeMap::new() }
+        Self { budget, bytes: 0, payloads: Lru::default() }
     }
 
     pub(super) fn get(&mut self, key: &Key) -> Option<Arc<[u8]>> {
-        let entry = self.entries.get_mut(key)?;
-        self.clock += 1;
-        self.order.remove(&entry.used);
-        entry.used = self.clock;
-        self.order.insert(entry.used, *key);
-        Some(Arc::clone(&entry.payload))
+        self.payloads.get(key)
     }
 
     /// Keeps a payload, in place of one with the same key; what had to leave for it, by kind.
@@ -55,40 +40,35 @@ impl Memory {
             return Vec::new();
         }
         let evicted = self.make_room(cost);
-        self.clock += 1;
         self.bytes += cost;
-        self.order.insert(self.clock, key);
-        self.entries.insert(key, Entry { payload, used: self.clock });
+        self.payloads.insert(key, payload);
         evicted
     }
 
-    pub(super) fn remove(&mut self, key: &Key) -> bool {
-        let Some(entry) = self.entries.remove(key) else { return false };
-        self.bytes -= cost(&entry.payload);
-        self.order.remove(&entry.used);
-        true
+    pub(super) fn remove(&mut self, key: &Key) {
+        if let Some(payload) = self.payloads.remove(key) {
+            self.bytes -= cost(&payload);
+        }
     }
 
     fn make_room(&mut self, needed: usize) -> Vec<Kind> {
+        let Self { budget, bytes, payloads } = self;
         let mut evicted = Vec::new();
-        let mut from = 0;
-        while self.bytes + needed > self.budget {
-            let Some((&used, &key)) = self.order.range(from..).next() else { break };
-            from = used + 1;
-            let in_use = self.entries.get(&key).is_some_and(|e| Arc::strong_count(&e.payload) > 1);
-            if !in_use {
-                self.remove(&key);
+        if *bytes + needed > *budget {
+            payloads.evict(|key, payload| {
+                *bytes -= cost(&payload);
                 evicted.push(key.kind());
-            }
+                *bytes + needed > *budget
+            });
         }
         evicted
     }
 
     pub(super) fn held(&self, kind: Kind) -> Held {
-        let of_kind = self.entries.iter().filter(|(key, _)| key.kind() == kind);
-        of_kind.fold(Held::default(), |held, (_, entry)| Held {
+        let of_kind = self.payloads.iter().filter(|(key, _)| key.kind() == kind);
+        of_kind.fold(Held::default(), |held, (_, payload)| Held {
             entries: held.entries + 1,
-            bytes: held.bytes + entry.payload.len() as u64,
+            bytes: held.bytes + payload.len() as u64,
         })
     }
 
@@ -98,9 +78,7 @@ impl Memory {
     }
 
     pub(super) fn clear(&mut self) {
-        self.entries.clear();
-        self.order.clear();
-        self.bytes = 0;
+        *self = Self::new(self.budget);
     }
 }
 

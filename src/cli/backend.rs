@@ -43,7 +43,7 @@ pub(super) struct Embedded {
 impl Embedded {
     /// A service that remembers in a cache, or not at all.
     pub(super) fn new(cache: Option<Arc<Cache>>) -> Self {
-        Self { service: cache.map_or_else(Service::default, Service::new) }
+        Self { service: cache.map_or_else(Service::default, Service::remembering) }
     }
 }
 

@@ -1,13 +1,13 @@
 //! Answers that were given before, as the bytes that were sent: the port thread gives them again
 //! without waking a worker.
 
-use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use sbdp_ipc::plan::PlanRequest;
 
 use super::convert;
 use super::outbox::steps_messages;
+use crate::lru::Lru;
 use crate::plan::{Plan, PlanStats, PlanStatus};
 
 /// A whole answer, ready to be sent.
@@ -51,19 +51,9 @@ pub(crate) fn question(request: &PlanRequest) -> Option<Vec<u8>> {
 /// The answers that are remembered: those that were asked for last, within a number of bytes.
 #[derive(Debug, Default)]
 pub(crate) struct Answers {
-    by_question: HashMap<Arc<[u8]>, Remembered>,
-    /// By the time they were asked for last.
-    by_age: BTreeMap<u64, Arc<[u8]>>,
-    time: u64,
+    by_question: Lru<Arc<[u8]>, Answer>,
     bytes: usize,
     limit: usize,
-}
-
-#[derive(Debug)]
-struct Remembered {
-    answer: Arc<Answer>,
-    time: u64,
-    bytes: usize,
 }
 
 impl Answers {
@@ -73,41 +63,32 @@ impl Answers {
 
     /// The answer to a question.
     pub(crate) fn get(&mut self, question: &[u8]) -> Option<Arc<Answer>> {
-        let known = self.by_question.get_mut(question)?;
-        self.time += 1;
-        if let Some(key) = self.by_age.remove(&known.time) {
-            self.by_age.insert(self.time, key);
-        }
-        known.time = self.time;
-        Some(Arc::clone(&known.answer))
+        self.by_question.get(question)
     }
 
     /// Remembers an answer in place of those that were not asked for the longest.
     pub(crate) fn insert(&mut self, question: &[u8], answer: Answer) {
-        let bytes = answer.bytes() + question.len();
-        if bytes > self.limit {
+        let needed = cost(question, &answer);
+        if needed > self.limit {
             return;
         }
-        self.forget(question);
-        while self.bytes + bytes > self.limit
-            && let Some((_, oldest)) = self.by_age.first_key_value()
-        {
-            let oldest = Arc::clone(oldest);
-            self.forget(&oldest);
+        let Self { by_question, bytes, limit } = self;
+        if let Some(before) = by_question.remove(question) {
+            *bytes -= cost(question, &before);
         }
-        self.time += 1;
-        let key: Arc<[u8]> = question.into();
-        self.by_age.insert(self.time, Arc::clone(&key));
-        self.by_question.insert(key, Remembered { answer: Arc::new(answer), time: self.time, bytes });
-        self.bytes += bytes;
+        if *bytes + needed > *limit {
+            by_question.evict(|question, answer| {
+                *bytes -= cost(&question, &answer);
+                *bytes + needed > *limit
+            });
+        }
+        by_question.insert(question.into(), Arc::new(answer));
+        *bytes += needed;
     }
+}
 
-    fn forget(&mut self, question: &[u8]) {
-        if let Some(known) = self.by_question.remove(question) {
-            self.by_age.remove(&known.time);
-            self.bytes -= known.bytes;
-        }
-    }
+fn cost(question: &[u8], answer: &Answer) -> usize {
+    answer.bytes() + question.len()
 }
 
 #[cfg(test)]
@@ -129,7 +110,7 @@ mod tests {
         let known: Vec<bool> = [b"a", b"b", b"c", b"d"].map(|q| answers.get(q).is_some()).into();
         assert_eq!(known, [true, false, true, true]);
         answers.insert(b"e", answer(250));
-        assert!(answers.get(b"e").is_some() && answers.bytes == 251 && answers.by_age.len() == 1);
+        assert!(answers.get(b"e").is_some() && answers.bytes == 251 && answers.by_question.len() == 1);
         answers.insert(b"f", answer(400));
         assert!(answers.get(b"f").is_none() && answers.get(b"e").is_some(), "what never fits takes no room");
     }
@@ -139,7 +120,7 @@ mod tests {
         let mut answers = Answers::new(1000);
         answers.insert(b"a", answer(100));
         answers.insert(b"a", answer(200));
-        assert_eq!((answers.bytes, answers.by_age.len()), (201, 1));
+        assert_eq!((answers.bytes, answers.by_question.len()), (201, 1));
         assert_eq!(*answers.get(b"a").unwrap(), answer(200));
     }
 

@@ -119,7 +119,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
             sessions: HashMap::new(),
             uploads: HashMap::new(),
             running: BTreeSet::new(),
-            answers: Answers::new(megabytes(config.requests.answers_mb)),
+            answers: Answers::new(config.cache.memory().answers),
             next_upload: 0,
             closing: Closing::Open,
             counters,

@@ -154,14 +154,8 @@ fn share_shapes(meshes: Vec<Mesh>, names: Vec<String>) -> (Vec<Arc<Shape>>, Vec<
         };
         parts.push(Part { name, shape, planning_from_shape, bounds, moved: Pose::identity() });
     }
-    let shapes = originals
-        .par_iter()
-        .map(|(i, centre)| {
-            let mesh = &meshes[*i];
-            let vertices = mesh.vertices.iter().map(|v| v - centre.coords).collect();
-            Arc::new(Shape::new(&Mesh { vertices, ..mesh.clone() }))
-        })
-        .collect();
+    let shapes =
+        originals.par_iter().map(|(i, centre)| Arc::new(Shape::about(&meshes[*i], centre))).collect();
     (shapes, parts)
 }
 

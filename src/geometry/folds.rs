@@ -30,6 +30,11 @@ pub(super) struct Folds {
 }
 
 impl Folds {
+    /// Bytes in memory.
+    pub(super) fn memory(&self) -> usize {
+        self.bits.len() + self.vertices.len() + self.winding.memory()
+    }
+
     /// What is folded of a mesh, if anything is; `across` are the neighbours of its triangles.
     pub(super) fn of(mesh: &Mesh, normals: &[Vector3<f64>], across: &[[u32; 3]]) -> Option<Self> {
         let faces: Vec<bool> = (0..normals.len()).map(|t| is_folded(mesh, normals, across, t)).collect();

@@ -19,6 +19,11 @@ pub struct OrientedSamples {
 }
 
 impl OrientedSamples {
+    /// Bytes in memory.
+    pub(super) fn memory(&self) -> usize {
+        size_of_val(&*self.points) + size_of_val(&*self.starts) + size_of_val(&*self.normals)
+    }
+
     pub(super) fn new(surface: &Surface, sited: &[Sited]) -> Self {
         let mut out = Self { starts: vec![0], ..Self::default() };
         for (point, site) in sited {
@@ -32,6 +37,9 @@ impl OrientedSamples {
             out.points.push(*point);
             out.starts.push(out.normals.len() as u32);
         }
+        out.points.shrink_to_fit();
+        out.starts.shrink_to_fit();
+        out.normals.shrink_to_fit();
         out
     }
 

@@ -47,6 +47,15 @@ pub struct PatchTree {
 const LEAF: usize = 8;
 
 impl PatchTree {
+    /// Bytes in memory.
+    pub(super) fn memory(&self) -> usize {
+        let Self { nodes, triangles, vertices, extremes } = self;
+        size_of_val(&**nodes)
+            + size_of_val(&**triangles)
+            + size_of_val(&**vertices)
+            + size_of_val(&**extremes)
+    }
+
     /// The tree of all triangles of a surface.
     #[must_use]
     pub fn new(surface: &Surface) -> Self {
@@ -56,6 +65,9 @@ impl PatchTree {
         if n > 0 {
             tree.build(surface, &mut triangles, 0, n);
         }
+        tree.nodes.shrink_to_fit();
+        tree.vertices.shrink_to_fit();
+        tree.extremes.shrink_to_fit();
         Self { triangles, ..tree }
     }
 

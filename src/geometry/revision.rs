@@ -156,10 +156,9 @@ impl Assembly {
         let copied = |(k, shape): (usize, &Arc<Shape>)| Some((k, congruence(&mesh_of(shape), &mesh)?));
         let copy = self.shapes.iter().enumerate().filter(|(_, s)| is_like(s, &mesh)).find_map(copied);
         let (shape, planning_from_shape) = copy.unwrap_or_else(|| {
-            let c = bounds.centre().coords;
-            let vertices = mesh.vertices.iter().map(|v| v - c).collect();
-            self.shapes.push(Arc::new(Shape::new(&Mesh { vertices, ..mesh })));
-            (self.shapes.len() - 1, Pose::from(nalgebra::Translation3::from(c)))
+            let c = bounds.centre();
+            self.shapes.push(Arc::new(Shape::about(&mesh, &c)));
+            (self.shapes.len() - 1, Pose::translation(c.x, c.y, c.z))
         });
         let moved = Pose::identity();
         Ok(Part { name: source.name.clone(), shape, planning_from_shape, bounds, moved })

@@ -75,6 +75,12 @@ const THINNEST: f64 = 0.005;
 const BLUNT_COS: f64 = 0.94;
 
 impl SampleTree {
+    /// Bytes in memory.
+    #[must_use]
+    pub fn memory(&self) -> usize {
+        size_of_val(&*self.points) + size_of_val(&*self.nodes)
+    }
+
     /// Samples a surface.
     #[must_use]
     pub fn new(surface: &Surface, spacing: &Spacing) -> Self {
@@ -89,6 +95,8 @@ impl SampleTree {
         if n > 0 {
             build(&mut points, 0, n, &mut nodes);
         }
+        points.shrink_to_fit();
+        nodes.shrink_to_fit();
         Self { points, nodes }
     }
 

@@ -32,7 +32,20 @@ pub struct Shape {
     content: OnceLock<[u8; 32]>,
 }
 
+/// Vertices of shapes stand on this grid, in units of the planning frame: a part that stands elsewhere in
+/// another assembly has the same shape to the bit, whatever was rounded on the way there, but for one
+/// coordinate in some ten thousand. Far below every tolerance of contact.
+const GRID: f64 = 1.0 / (1u64 << 33) as f64;
+
 impl Shape {
+    /// The shape of a part's mesh with its origin at a point, in the planning frame.
+    #[must_use]
+    pub fn about(mesh: &Mesh, origin: &Point3<f64>) -> Self {
+        // Adding zero makes zeros positive.
+        let onto_grid = |v: &Point3<f64>| (v - origin.coords).map(|x| (x / GRID).round() * GRID + 0.0);
+        Self::new(&Mesh { vertices: mesh.vertices.iter().map(onto_grid).collect(), ..mesh.clone() })
+    }
+
     /// Derives everything from a mesh.
     #[must_use]
     pub fn new(mesh: &Mesh) -> Self {
@@ -52,6 +65,17 @@ impl Shape {
     /// The triangles in a tree of patches.
     pub fn patches(&self) -> &PatchTree {
         self.patches.get_or_init(|| PatchTree::new(&self.surface))
+    }
+
+    /// Bytes in memory, of what was derived so far.
+    #[must_use]
+    pub fn memory(&self) -> usize {
+        size_of::<Self>()
+            + self.surface.memory()
+            + size_of_val(&*self.hull)
+            + self.samples.memory()
+            + self.oriented.memory()
+            + self.patches.get().map_or(0, PatchTree::memory)
     }
 
     /// The hash of the mesh, on which alone everything here depends.
@@ -100,6 +124,18 @@ mod tests {
         assert!((about([0.0; 3], Vector3::z()) - 5f64.sqrt()).abs() < 1e-12);
         assert!((about([0.0; 3], Vector3::y()) - 1.25f64.sqrt()).abs() < 1e-12);
         assert!((about([1.0, 2.0, 9.0], Vector3::z()) - 20f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_part_has_the_same_shape_wherever_it_stands() {
+        let ball = healed(ball(3));
+        let content = |by: f64| {
+            let vertices = ball.vertices.iter().map(|v| v + Vector3::new(by, -by / 3.0, by * by)).collect();
+            let moved = Mesh { vertices, ..ball.clone() };
+            *Shape::about(&moved, &Bounds::of(&moved.vertices).centre()).content()
+        };
+        let there = [0.1, 1.0 / 3.0, -2.7].map(content);
+        assert_eq!(there, [content(0.0); 3]);
     }
 
     #[test]

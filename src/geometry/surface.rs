@@ -86,6 +86,21 @@ impl Surface {
         }
     }
 
+    /// Bytes in memory.
+    #[must_use]
+    pub fn memory(&self) -> usize {
+        size_of_val(&*self.vertices)
+            + size_of_val(&*self.triangles)
+            + size_of_val(&*self.face_normals)
+            + size_of_val(&*self.neighbours)
+            + size_of_val(&*self.vertex_normals)
+            + size_of_val(&*self.fan_start)
+            + size_of_val(&*self.fan)
+            + self.tree.memory()
+            + self.winding.as_ref().map_or(0, WindingTree::memory)
+            + self.folds.as_ref().map_or(0, Folds::memory)
+    }
+
     /// The vertices.
     #[must_use]
     pub fn vertices(&self) -> &[Point3<f64>] {

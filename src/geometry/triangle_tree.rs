@@ -65,6 +65,11 @@ pub(super) struct TriangleTree {
 }
 
 impl TriangleTree {
+    /// Bytes in memory.
+    pub(super) fn memory(&self) -> usize {
+        size_of_val(&*self.nodes) + size_of_val(&*self.leaves)
+    }
+
     /// The tree of some triangles, given by their corners.
     pub(super) fn new(triangles: &[[Point3<f64>; 3]]) -> Self {
         let items: Vec<Bounds> = triangles.iter().map(Bounds::of).collect();
@@ -75,6 +80,8 @@ impl TriangleTree {
         let mut tree = Self { origin, radius, root: 0, nodes: Vec::new(), leaves: Vec::new() };
         let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
         tree.root = tree.build(triangles, &items, &mut order);
+        tree.nodes.shrink_to_fit();
+        tree.leaves.shrink_to_fit();
         tree
     }
 

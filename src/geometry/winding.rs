@@ -32,6 +32,11 @@ pub(super) struct WindingTree {
 }
 
 impl WindingTree {
+    /// Bytes in memory.
+    pub(super) fn memory(&self) -> usize {
+        size_of_val(&*self.nodes) + size_of_val(&*self.corners)
+    }
+
     /// Builds the tree over triangles.
     #[must_use]
     pub(super) fn new(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {

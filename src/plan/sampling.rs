@@ -61,6 +61,15 @@ impl Samples {
         Self { parts: Arc::new(shape_of.into_iter().map(|s| Arc::clone(&shapes[s])).collect()) }
     }
 
+    /// Bytes in memory, of what was sampled so far; equal parts count once.
+    pub(super) fn memory(&self) -> usize {
+        let mut shapes: Vec<&Arc<Sampled>> = self.parts.iter().collect();
+        shapes.sort_unstable_by_key(|s| Arc::as_ptr(s));
+        shapes.dedup_by_key(|s| Arc::as_ptr(s));
+        let taken = shapes.iter().filter_map(|s| s.shares.get()).flatten();
+        taken.map(SampleTree::memory).sum()
+    }
+
     /// Those of two parts, as parts 0 and 1.
     pub(super) fn of_pair(&self, parts: [usize; 2]) -> Self {
         Self { parts: Arc::new(parts.map(|part| Arc::clone(&self.parts[part])).into()) }

@@ -94,6 +94,12 @@ pub struct Verifier {
 }
 
 impl Verifier {
+    /// Bytes in memory, of what was prepared so far.
+    #[must_use]
+    pub fn memory(&self) -> usize {
+        self.samples.memory()
+    }
+
     /// Prepares the check for shapes; `shape_of` gives each part's shape.
     #[must_use]
     pub fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>, limit: f64) -> Self {

@@ -50,6 +50,9 @@ impl Field {
             start = end;
         }
         field.triangles = pairs.into_iter().map(|(_, t)| t).collect();
+        // They stay for long.
+        field.triangles.shrink_to_fit();
+        field.near.shrink_to_fit();
         field.rim = surface.is_open().then(|| Rim::of(surface));
         field.fill_far();
         Ok(field)

@@ -9,11 +9,12 @@
 mod answer;
 mod prepared;
 mod relay;
+mod store;
 #[cfg(test)]
 mod tests;
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError, Weak};
+use std::sync::{Arc, Mutex, TryLockError};
 use std::time::{Duration, Instant};
 
 use crate::blocking_graph::{Audit, StaticAnalysis, audit};
@@ -27,6 +28,8 @@ use crate::termination::{Interrupt, Termination};
 use answer::{Found, Frame, Times};
 use prepared::Prepared;
 use relay::{Relay, Silent};
+pub use store::StoreStatistics;
+use store::{SharedShape, Store};
 
 /// The name of an assembly: the hash of its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -71,33 +74,47 @@ pub enum ServiceError {
 #[derive(Debug)]
 struct Entry {
     assembly: Assembly,
+    /// Those of the assembly, with their fields.
+    shapes: Vec<Arc<SharedShape>>,
     prepared: Mutex<Option<Arc<Prepared>>>,
-    /// The entry that it is a revision of, while that is known.
-    base: Weak<Entry>,
 }
 
 /// The service. Shared by all threads.
 #[derive(Debug)]
 pub struct Service {
-    entries: Mutex<HashMap<AssemblyId, Arc<Entry>>>,
+    store: Store,
     cache: Arc<Cache>,
 }
 
-/// Bytes that a service remembers which was given no cache.
-const MEMORY: usize = 64 << 20;
+/// Bytes of records that a service remembers which was given no cache.
+const RECORDS: usize = 64 << 20;
+/// Bytes of assemblies that a service knows which was given no budget.
+const ASSEMBLIES: usize = 1 << 30;
 
 impl Default for Service {
     /// Remembers in memory, for as long as it lives.
     fn default() -> Self {
-        Self::new(Arc::new(Cache::in_memory(MEMORY)))
+        Self::new(Arc::new(Cache::in_memory(RECORDS)), ASSEMBLIES)
     }
 }
 
 impl Service {
-    /// A service that remembers in a cache.
+    /// A service for one process's own questions, which remembers in a cache.
     #[must_use]
-    pub fn new(cache: Arc<Cache>) -> Self {
-        Self { entries: Mutex::default(), cache }
+    pub fn remembering(cache: Arc<Cache>) -> Self {
+        Self::new(cache, ASSEMBLIES)
+    }
+
+    /// A service that remembers in a cache, and knows assemblies up to so many bytes of memory.
+    #[must_use]
+    pub fn new(cache: Arc<Cache>, budget: usize) -> Self {
+        Self { store: Store::new(budget), cache }
+    }
+
+    /// How many assemblies it knows, and what they take.
+    #[must_use]
+    pub fn store_statistics(&self) -> StoreStatistics {
+        self.store.statistics()
     }
 
     /// What it remembers in.
@@ -115,11 +132,7 @@ impl Service {
         if let Ok(entry) = self.entry(id) {
             return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly) });
         }
-        let assembly = Assembly::new(source)?;
-        let warnings = answer::warnings(&assembly);
-        let entry = Arc::new(Entry { assembly, prepared: Mutex::default(), base: Weak::new() });
-        self.entries().entry(id).or_insert(entry);
-        Ok(Admission { id, known: false, warnings })
+        Ok(self.taken_in(id, Assembly::new(source)?))
     }
 
     /// Registers what becomes of a known assembly with some change. Of no change it is the same.
@@ -133,17 +146,18 @@ impl Service {
         if let Ok(entry) = self.entry(id) {
             return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly) });
         }
-        let assembly = entry.assembly.revised(revision)?;
-        let warnings = answer::warnings(&assembly);
-        let entry = Arc::new(Entry { assembly, prepared: Mutex::default(), base: Arc::downgrade(&entry) });
-        self.entries().entry(id).or_insert(entry);
-        Ok(Admission { id, known: false, warnings })
+        Ok(self.taken_in(id, entry.assembly.revised(revision)?))
     }
 
-    /// Whether an assembly is known.
+    fn taken_in(&self, id: AssemblyId, assembly: Assembly) -> Admission {
+        let entry = self.store.insert(id, assembly);
+        Admission { id, known: false, warnings: answer::warnings(&entry.assembly) }
+    }
+
+    /// Whether an assembly is known. If it is, it counts as used: whoever asks is about to.
     #[must_use]
     pub fn knows(&self, id: AssemblyId) -> bool {
-        self.entries().contains_key(&id)
+        self.store.get(id).is_some()
     }
 
     /// The overlaps at the assembled pose, in the input's units.
@@ -175,7 +189,9 @@ impl Service {
             .build()
             .map_err(|e| ServiceError::Threads(e.to_string()))?;
         let recall = if request.no_cache { Recall::default() } else { Recall::of(Arc::clone(&self.cache)) };
-        Ok(pool.install(|| entry.plan(request, termination, sink, &recall)))
+        let plan = pool.install(|| entry.plan(request, termination, sink, &recall));
+        self.store.settle(id, &entry);
+        Ok(plan)
     }
 
     /// Compares the initial blocking graphs of an assembly with simulation.
@@ -200,16 +216,21 @@ impl Service {
     }
 
     fn entry(&self, id: AssemblyId) -> Result<Arc<Entry>, ServiceError> {
-        self.entries().get(&id).cloned().ok_or(ServiceError::UnknownAssembly)
-    }
-
-    /// A thread that panicked while it held the map cannot have left it half-changed.
-    fn entries(&self) -> MutexGuard<'_, HashMap<AssemblyId, Arc<Entry>>> {
-        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
+        self.store.get(id).ok_or(ServiceError::UnknownAssembly)
     }
 }
 
 impl Entry {
+    fn new(assembly: Assembly, shapes: Vec<Arc<SharedShape>>) -> Self {
+        Self { assembly, shapes, prepared: Mutex::default() }
+    }
+
+    /// Bytes in memory beside its shapes, about.
+    fn memory(&self) -> usize {
+        let parts = self.assembly.parts.iter().map(|part| size_of_val(part) + part.name.len());
+        size_of::<Self>() + parts.sum::<usize>() + self.at_hand().map_or(0, |prepared| prepared.memory())
+    }
+
     fn plan(
         &self,
         request: &PlanRequest,
@@ -243,7 +264,9 @@ impl Entry {
             return self.answered(frame, answered, sink, started);
         }
         let prepared = if request.no_cache {
-            Prepared::new(&self.assembly, None, termination, sink, recall).map(|p| (Arc::new(p), false))
+            let fresh: Vec<_> =
+                self.assembly.shapes.iter().map(|s| Arc::new(SharedShape::new(Arc::clone(s)))).collect();
+            Prepared::new(&self.assembly, &fresh, termination, sink, recall).map(|p| (Arc::new(p), false))
         } else {
             self.prepared(termination, sink, recall)
         };
@@ -322,7 +345,7 @@ impl Entry {
         }
         let outcome = search(request.planner, problem, &mut relay);
         recall.remember_plan(question, termination, &outcome, &prepared.overlaps);
-        let fields = if hit { self.assembly.shapes.len() as u64 } else { 0 };
+        let fields = if hit { self.assembly.shapes.len() as u64 } else { prepared.fields_known };
         let found = Found { fields, pieces: recall.reused(), plan: false };
         let spent = |time: Duration| if hit { Duration::ZERO } else { time };
         let times = Times {
@@ -363,9 +386,7 @@ impl Entry {
             if let Some(prepared) = &*slot {
                 return Ok((Arc::clone(prepared), true));
             }
-            let before = self.base.upgrade().and_then(|base| base.at_hand());
-            let prepared =
-                Arc::new(Prepared::new(&self.assembly, before.as_deref(), termination, sink, recall)?);
+            let prepared = Arc::new(Prepared::new(&self.assembly, &self.shapes, termination, sink, recall)?);
             *slot = Some(Arc::clone(&prepared));
             return Ok((prepared, false));
         }

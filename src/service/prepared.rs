@@ -1,6 +1,5 @@
 //! What must be there before an assembly can be searched: fields, overlaps, verification samples.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -8,12 +7,14 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use crate::cache::{Recall, overlap_key};
-use crate::geometry::{Assembly, Shape};
+use crate::geometry::Assembly;
 use crate::plan::Verifier;
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
 use crate::simulation::{Pair, Scene, grouped, resolution};
 use crate::termination::{Interrupt, Termination};
+
+use super::store::SharedShape;
 
 /// Overlaps smaller than this share of the longest side are rounding, not modelling.
 const LEAST_OVERLAP: f64 = 1e-6;
@@ -29,6 +30,8 @@ pub(super) struct Prepared {
     pub(super) verifier: Verifier,
     /// Overlapping pairs and their depths in the planning frame.
     pub(super) overlaps: Vec<(usize, usize, f64)>,
+    /// Shapes whose field was there already.
+    pub(super) fields_known: u64,
     /// How long the fields took.
     pub(super) sdf_time: Duration,
     /// How long it took to prepare verification and measure overlaps.
@@ -36,17 +39,18 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// Builds fields in parallel on the current rayon pool and measures all overlaps. Fields of shapes
-    /// that `before` has, too, are taken from there.
+    /// Builds the fields that are not there yet in parallel on the current rayon pool, and measures all
+    /// overlaps.
     pub(super) fn new(
         assembly: &Assembly,
-        before: Option<&Self>,
+        shapes: &[Arc<SharedShape>],
         termination: &Termination,
         sink: &mut dyn PlanSink,
         recall: &Recall,
     ) -> Result<Self, Interrupt> {
         let started = Instant::now();
-        let fields = build_fields(&assembly.shapes, before, termination, sink)?;
+        let fields_known = shapes.iter().filter(|shape| shape.known_field().is_some()).count() as u64;
+        let fields = build_fields(shapes, termination, sink)?;
         let sdf_time = started.elapsed();
         let started = Instant::now();
         let mut scene = Scene::assembled(assembly, &fields);
@@ -59,7 +63,13 @@ impl Prepared {
         let mut overlaps = overlaps;
         overlaps.extend(coincident_pairs(&scene, &verifier, termination)?);
         overlaps.sort_by_key(|&(a, b, _)| (a, b));
-        Ok(Self { scene, verifier, overlaps, sdf_time, overlap_time: started.elapsed() })
+        Ok(Self { scene, verifier, overlaps, fields_known, sdf_time, overlap_time: started.elapsed() })
+    }
+
+    /// Bytes in memory beside the shapes and their fields, about.
+    pub(super) fn memory(&self) -> usize {
+        let Self { scene, verifier, overlaps, .. } = self;
+        size_of_val(&**scene.bodies) + scene.kept.memory() + verifier.memory() + size_of_val(&**overlaps)
     }
 }
 
@@ -69,8 +79,7 @@ pub(super) fn depth_limit(assembly: &Assembly) -> f64 {
 }
 
 fn build_fields(
-    shapes: &[Arc<Shape>],
-    before: Option<&Prepared>,
+    shapes: &[Arc<SharedShape>],
     termination: &Termination,
     sink: &mut dyn PlanSink,
 ) -> Result<Vec<Arc<Field>>, Interrupt> {
@@ -81,24 +90,15 @@ fn build_fields(
     };
     report(sink, 0);
     let sink = std::sync::Mutex::new(sink);
-    let bodies = before.iter().flat_map(|before| before.scene.bodies.iter());
-    // By place in memory: what both have is one.
-    let place = |shape: &Arc<Shape>| Arc::as_ptr(shape).addr();
-    let known: HashMap<usize, &Arc<Field>> = bodies.map(|body| (place(&body.shape), &body.field)).collect();
-    shapes
-        .par_iter()
-        .map(|shape| {
-            if let Some(field) = known.get(&place(shape)) {
-                return Ok(Arc::clone(field));
-            }
-            let field = Field::build(&shape.surface, termination)?;
-            let n = done.fetch_add(1, Ordering::Relaxed) + 1;
-            if let Ok(mut sink) = sink.lock() {
-                report(&mut **sink, n);
-            }
-            Ok(Arc::new(field))
-        })
-        .collect()
+    let field = |shape: &Arc<SharedShape>| {
+        let field = shape.field(termination)?;
+        let n = done.fetch_add(1, Ordering::Relaxed) + 1;
+        if let Ok(mut sink) = sink.lock() {
+            report(&mut **sink, n);
+        }
+        Ok(field)
+    };
+    shapes.par_iter().map(field).collect()
 }
 
 fn measure_overlaps(

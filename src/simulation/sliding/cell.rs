@@ -37,6 +37,11 @@ pub(super) struct Limit {
 }
 
 impl Cell {
+    /// Bytes in memory.
+    pub(super) fn memory(&self) -> usize {
+        size_of::<Self>() + size_of_val(&*self.limits)
+    }
+
     /// The same with the other part of the pair moving instead.
     pub(super) fn mirrored(&self) -> Self {
         let limits = self.limits.iter().map(|l| Limit { normal: -l.normal, ..*l }).collect();

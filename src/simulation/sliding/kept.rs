@@ -81,6 +81,10 @@ fn size(cells: Option<&Arc<Vec<Cell>>>) -> usize {
     1 + cells.map_or(0, |cells| cells.len())
 }
 
+fn memory(cells: Option<&Vec<Cell>>) -> usize {
+    cells.map_or(0, |cells| cells.iter().map(Cell::memory).sum())
+}
+
 fn mirrored(cells: &[Cell]) -> Arc<Vec<Cell>> {
     Arc::new(cells.iter().map(Cell::mirrored).collect())
 }
@@ -131,6 +135,15 @@ struct Canonical {
 }
 
 impl KeptCells {
+    /// Bytes in memory.
+    #[must_use]
+    pub fn memory(&self) -> usize {
+        let kept = self.lock();
+        let gathered = kept.gathered.values().map(|g| memory(g.cells.as_deref()));
+        let ways = kept.ways.values().map(|w| memory(w.cells.as_deref()));
+        gathered.sum::<usize>() + ways.sum::<usize>()
+    }
+
     /// The cells of a pair; `find` finds them.
     pub(super) fn gathered(
         &self,

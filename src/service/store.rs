@@ -1,0 +1,194 @@
+//! The assemblies that the service knows, in memory, up to a budget in bytes: those not asked about for
+//! longest leave. What does not depend on the assembly is shared: equal shapes with their fields.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+use super::{AssemblyId, Entry};
+use crate::geometry::{Assembly, Shape};
+use crate::lru::Lru;
+use crate::sdf::Field;
+use crate::termination::{Interrupt, Termination};
+
+/// A shape and its field, for all assemblies that have it.
+#[derive(Debug)]
+pub(super) struct SharedShape {
+    pub(super) shape: Arc<Shape>,
+    field: OnceLock<Arc<Field>>,
+}
+
+impl SharedShape {
+    pub(super) fn new(shape: Arc<Shape>) -> Self {
+        Self { shape, field: OnceLock::new() }
+    }
+
+    /// The field, if it is there.
+    pub(super) fn known_field(&self) -> Option<&Arc<Field>> {
+        self.field.get()
+    }
+
+    /// The field. Two that ask at the same time may both build it: neither waits for the other.
+    pub(super) fn field(&self, termination: &Termination) -> Result<Arc<Field>, Interrupt> {
+        if let Some(field) = self.field.get() {
+            return Ok(Arc::clone(field));
+        }
+        let built = Arc::new(Field::build(&self.shape.surface, termination)?);
+        Ok(Arc::clone(self.field.get_or_init(|| built)))
+    }
+
+    fn memory(&self) -> usize {
+        self.shape.memory() + self.field.get().map_or(0, |field| field.memory())
+    }
+}
+
+/// How much there is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct StoreStatistics {
+    /// Assemblies.
+    pub assemblies: u64,
+    /// Distinct shapes.
+    pub shapes: u64,
+    /// Bytes that they take.
+    pub bytes: u64,
+    /// Assemblies that left for others, since the start.
+    pub evictions: u64,
+    /// Shapes that an assembly found there when it came, since the start.
+    pub shared: u64,
+}
+
+/// The assemblies.
+#[derive(Debug)]
+pub(super) struct Store {
+    budget: usize,
+    held: Mutex<Held>,
+}
+
+#[derive(Debug, Default)]
+struct Held {
+    entries: Lru<AssemblyId, Entry>,
+    shapes: HashMap<[u8; 32], Counted>,
+    /// What each entry takes beside its shapes, as last measured.
+    own: HashMap<AssemblyId, usize>,
+    bytes: usize,
+    evictions: u64,
+    shared: u64,
+}
+
+/// A shape that entries have.
+#[derive(Debug)]
+struct Counted {
+    shared: Arc<SharedShape>,
+    entries: usize,
+    /// As last measured.
+    bytes: usize,
+}
+
+impl Store {
+    /// Nothing yet; `budget` in bytes.
+    pub(super) fn new(budget: usize) -> Self {
+        Self { budget, held: Mutex::default() }
+    }
+
+    /// An assembly, which is used by this.
+    pub(super) fn get(&self, id: AssemblyId) -> Option<Arc<Entry>> {
+        self.held().entries.get(&id)
+    }
+
+    /// Takes an assembly in, with the shapes that are there in place of equal ones. Of two that came at
+    /// the same time, the first stays.
+    pub(super) fn insert(&self, id: AssemblyId, mut assembly: Assembly) -> Arc<Entry> {
+        // Hashing is not for the lock.
+        let contents: Vec<[u8; 32]> = assembly.shapes.iter().map(|shape| *shape.content()).collect();
+        let mut held = self.held();
+        if let Some(entry) = held.entries.get(&id) {
+            return entry;
+        }
+        let shapes: Vec<_> = contents
+            .iter()
+            .zip(&assembly.shapes)
+            .map(|(content, shape)| held.share(content, shape))
+            .collect();
+        assembly.shapes = shapes.iter().map(|shared| Arc::clone(&shared.shape)).collect();
+        let entry = Arc::new(Entry::new(assembly, shapes));
+        held.entries.insert(id, Arc::clone(&entry));
+        held.measure(id, &entry);
+        held.make_room(self.budget);
+        entry
+    }
+
+    /// Measures again what an assembly takes, after it was asked about, and lets others go for it.
+    pub(super) fn settle(&self, id: AssemblyId, entry: &Entry) {
+        let mut held = self.held();
+        held.measure(id, entry);
+        held.make_room(self.budget);
+    }
+
+    pub(super) fn statistics(&self) -> StoreStatistics {
+        let held = self.held();
+        StoreStatistics {
+            assemblies: held.entries.len() as u64,
+            shapes: held.shapes.len() as u64,
+            bytes: held.bytes as u64,
+            evictions: held.evictions,
+            shared: held.shared,
+        }
+    }
+
+    /// A thread that panicked while it held the maps cannot have left more than the sums wrong.
+    fn held(&self) -> MutexGuard<'_, Held> {
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Held {
+    fn share(&mut self, content: &[u8; 32], shape: &Arc<Shape>) -> Arc<SharedShape> {
+        let known = self.shapes.len();
+        let counted = self.shapes.entry(*content).or_insert_with(|| Counted {
+            shared: Arc::new(SharedShape::new(Arc::clone(shape))),
+            entries: 0,
+            bytes: 0,
+        });
+        counted.entries += 1;
+        let shared = Arc::clone(&counted.shared);
+        self.shared += u64::from(self.shapes.len() == known);
+        shared
+    }
+
+    fn measure(&mut self, id: AssemblyId, entry: &Entry) {
+        let Some(known) = self.entries.peek(&id) else { return };
+        if !std::ptr::eq(Arc::as_ptr(known), entry) {
+            return;
+        }
+        let own = entry.memory();
+        self.bytes += own;
+        self.bytes -= self.own.insert(id, own).unwrap_or(0);
+        for shape in &entry.shapes {
+            if let Some(counted) = self.shapes.get_mut(shape.shape.content()) {
+                let now = shape.memory();
+                self.bytes += now;
+                self.bytes -= std::mem::replace(&mut counted.bytes, now);
+            }
+        }
+    }
+
+    fn make_room(&mut self, budget: usize) {
+        if self.bytes <= budget {
+            return;
+        }
+        let Self { entries, shapes, own, bytes, evictions, .. } = self;
+        entries.evict(|id, entry| {
+            *evictions += 1;
+            *bytes -= own.remove(&id).unwrap_or(0);
+            for shape in &entry.shapes {
+                let content = shape.shape.content();
+                let Some(counted) = shapes.get_mut(content) else { continue };
+                counted.entries -= 1;
+                if counted.entries == 0 {
+                    *bytes -= counted.bytes;
+                    shapes.remove(content);
+                }
+            }
+            *bytes > budget
+        });
+    }
+}
