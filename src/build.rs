@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
-const SOURCES: [&str; 9] = [
+const SOURCES: [&str; 11] = [
     "Cargo.lock",
     "src/geometry",
     "src/sdf",
@@ -16,6 +16,8 @@ const SOURCES: [&str; 9] = [
     "src/plan",
     "src/service",
     "src/cache",
+    "src/daemon",
+    "ipc/src",
 ];
 
 fn main() -> io::Result<()> {

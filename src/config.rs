@@ -118,6 +118,8 @@ pub struct CacheConfig {
     pub disk_mb: u64,
     /// Megabytes of memory for all that is remembered; see [`CacheConfig::memory`].
     pub memory_mb: u64,
+    /// Whether assemblies are made ready while nothing is asked.
+    pub prefetch: bool,
 }
 
 /// What of the memory is for what, in bytes.
@@ -180,7 +182,7 @@ impl Default for TimesConfig {
 
 impl Default for CacheConfig {
     fn default() -> Self {
-        Self { disk: true, dir: None, disk_mb: 1024, memory_mb: 256 }
+        Self { disk: true, dir: None, disk_mb: 1024, memory_mb: 256, prefetch: true }
     }
 }
 

@@ -10,7 +10,7 @@ use common::{Boxes, Daemon};
 use rustix::process::Signal;
 use sbdp::cache::{Cache, CacheSettings};
 use sbdp::plan::export::{PlanDocument, StatsDocument};
-use sbdp_client::PlanOptions;
+use sbdp_client::{Change, Handle, PlanOptions, PlanStatus};
 
 fn assembly() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/assemblies/pin-bolt-cover")
@@ -162,6 +162,13 @@ fn a_damaged_file_is_set_aside_and_told_by_verify() {
     assert!(plan(folder.path(), &[]).stats.cache.plan_hit);
 }
 
+/// Stops the daemon and starts another in its place.
+fn restart(daemon: &mut Daemon) {
+    daemon.signal(Signal::TERM);
+    assert!(daemon.wait().success());
+    daemon.kill_and_restart();
+}
+
 #[test]
 fn a_daemon_started_again_remembers() {
     let mut daemon = Daemon::start();
@@ -174,9 +181,33 @@ fn a_daemon_started_again_remembers() {
     let (parts, first) = ask(&daemon);
     assert_eq!(first.stats.plan_hit, 0);
     assert_eq!(ask(&daemon).1.stats.plan_hit, 1);
-    daemon.signal(Signal::TERM);
-    assert!(daemon.wait().success());
-    daemon.kill_and_restart();
+    restart(&mut daemon);
     let (again, second) = ask(&daemon);
     assert_eq!((again, second.stats.plan_hit, second.stats.simulations_run), (parts, 1, 0));
+}
+
+#[test]
+fn handles_and_revisions_hold_across_restarts() {
+    let mut daemon = Daemon::start_with("[cache]\nprefetch = false\n");
+    let boxes = Boxes::lattice(2);
+    let client = daemon.connect();
+    let handle = client.upload(&boxes.assembly()).unwrap();
+    let shift = |x: f64| [x, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+    let change = Change { moved: vec![(7, shift(0.25))], ..Change::default() };
+    let revised = client.revise(handle, &change).unwrap();
+    let again =
+        client.revise(revised, &Change { moved: vec![(6, shift(-0.25))], ..Change::default() }).unwrap();
+    let known = common::plan(&client, again, &PlanOptions::default());
+    drop(client);
+    restart(&mut daemon);
+    let client = daemon.connect();
+    assert!([handle, revised, again].into_iter().all(|handle| client.knows(handle).unwrap()));
+    assert!(!client.knows(Handle([7; 32])).unwrap());
+    // What was asked before is answered without the assembly, another question with it.
+    let (parts, summary) = common::plan(&client, again, &PlanOptions::default());
+    assert_eq!((parts, summary.stats.plan_hit), (known.0, 1));
+    assert_eq!(client.status().unwrap().numbers.remembered, 1);
+    let other = PlanOptions { removed: vec![0], ..PlanOptions::default() };
+    let (_, other) = common::plan(&client, again, &other);
+    assert_eq!((other.stats.plan_hit, other.status), (0, PlanStatus::Complete));
 }

@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
 use redb::Database;
 
 use super::kind::{Key, Kind};
-use super::tables::{Failure, Listed, Tables, agree, grew, listed, make_tables, read, write};
+use super::tables::{Failure, Listed, Tables, agree, grew, holds, listed, make_tables, read, write};
 use super::tally::Tally;
 
 const FILE: &str = "records.redb";
@@ -100,6 +100,11 @@ impl Disk {
     /// The envelope of a key, as it was written.
     pub(super) fn get(&self, key: &Key) -> Option<Vec<u8>> {
         self.with_free(|database| read(database, key)).flatten()
+    }
+
+    /// Whether there is an envelope of a key.
+    pub(super) fn contains(&self, key: &Key) -> bool {
+        self.with_free(|database| holds(database, key)).unwrap_or(false)
     }
 
     /// Notes that a record was used; the next transaction writes it down.

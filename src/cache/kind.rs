@@ -23,11 +23,15 @@ pub enum Kind {
     Plan = 6,
     /// The planes that a part lies against.
     Touching = 7,
+    /// An assembly as it was given, or how it was revised.
+    Source = 8,
+    /// A plan as it was sent.
+    Answer = 9,
 }
 
 impl Kind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Overlap,
         Self::Blocking,
         Self::Witness,
@@ -35,6 +39,8 @@ impl Kind {
         Self::Verdict,
         Self::Plan,
         Self::Touching,
+        Self::Source,
+        Self::Answer,
     ];
 
     /// The name in statistics.
@@ -48,7 +54,15 @@ impl Kind {
             Self::Verdict => "verdict",
             Self::Plan => "plan",
             Self::Touching => "touching",
+            Self::Source => "source",
+            Self::Answer => "answer",
         }
+    }
+
+    /// Whether records are kept in memory, too. Assemblies and answers are there already, as what was made
+    /// of them and as they are sent.
+    pub(super) fn stays_in_memory(self) -> bool {
+        !matches!(self, Self::Source | Self::Answer)
     }
 
     /// The version of what computes such records: to be raised with every change that may give another
@@ -62,7 +76,9 @@ impl Kind {
             | Self::Motion
             | Self::Verdict
             | Self::Plan
-            | Self::Touching => 1,
+            | Self::Touching
+            | Self::Source
+            | Self::Answer => 1,
         }
     }
 

@@ -4,7 +4,8 @@
 //! memory (`memory`, a budget in bytes, the least recently used leave) → the tier on disk (`disk`, a redb
 //! file that one process holds, with its `tables`; `writer`, the one thread that writes to it) → bytes
 //! (`format`, drawn in `FORMAT.md`; `records`, what is in them). What is asked, under which key, and when
-//! an old answer still holds, is said once for each kind: `pair`, `touching`, `motion`, `verdict`, `plan`.
+//! an old answer still holds, is said once for each kind: `pair`, `touching`, `motion`, `verdict`, `plan`,
+//! `source`, `answer`.
 //! A request sees it all through its [`Recall`], which counts what was reused; with none of it, it
 //! remembers nothing.
 //!
@@ -12,6 +13,7 @@
 //! answer depends on is in its key, or in what is compared when it is found. A record that is damaged, of
 //! another version, or gone is a miss and never an error. No request waits for the disk to be written.
 
+mod answer;
 mod disk;
 mod format;
 mod kind;
@@ -22,6 +24,7 @@ mod plan;
 mod recall;
 mod records;
 mod settings;
+mod source;
 mod statistics;
 mod tables;
 mod tally;
@@ -41,6 +44,7 @@ pub use pair::{blocking_key, overlap_key};
 pub use plan::{Answered, PlanQuestion};
 pub use recall::{Recall, Reused};
 pub use settings::CacheSettings;
+pub use source::Source;
 pub use statistics::{CacheStatistics, KindStatistics, Verified};
 pub use tables::Listed;
 pub use verdict::VerdictQuestion;
@@ -119,6 +123,11 @@ impl Cache {
         Some(payload)
     }
 
+    /// Whether there is a record of a key, on disk if such records are only there. It may be damaged.
+    fn contains(&self, key: &Key) -> bool {
+        self.memory().get(key).is_some() || self.disk.as_ref().is_some_and(|d| d.contains(key))
+    }
+
     /// Remembers a record, in place of one with the same key.
     pub fn put(&self, key: Key, record: &impl Record) {
         let Some(payload) = format::encode(record) else { return };
@@ -132,6 +141,9 @@ impl Cache {
     }
 
     fn keep(&self, key: Key, payload: Arc<[u8]>) {
+        if !key.kind().stays_in_memory() {
+            return;
+        }
         for kind in self.memory().put(key, payload) {
             self.tally.of(kind).evictions.one_more();
         }

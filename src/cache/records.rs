@@ -133,6 +133,53 @@ pub(super) struct TouchingRecord {
     pub(super) normals: Option<Vec<[f64; 3]>>,
 }
 
+/// An assembly by its handle: all that it was made of.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) enum SourceRecord {
+    Given(AssemblyRecord),
+    Revised(RevisionRecord),
+}
+
+/// As it was given.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct AssemblyRecord {
+    pub(super) name: String,
+    pub(super) units: Option<String>,
+    pub(super) parts: Vec<PartRecord>,
+    pub(super) fixed: Vec<String>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct PartRecord {
+    pub(super) name: String,
+    pub(super) origin: String,
+    pub(super) mesh: MeshRecord,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct MeshRecord {
+    pub(super) vertices: Vec<[f64; 3]>,
+    pub(super) triangles: Vec<[u32; 3]>,
+}
+
+/// What differs from another assembly.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct RevisionRecord {
+    /// The handle of the other one.
+    pub(super) base: [u8; 32],
+    pub(super) replaced: Vec<(u32, MeshRecord)>,
+    pub(super) moved: Vec<(u32, PoseRecord)>,
+    pub(super) added: Vec<PartRecord>,
+}
+
+/// A plan in the messages that it was sent in; the last one ends it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct AnswerRecord {
+    pub(super) messages: Vec<Vec<u8>>,
+}
+
+impl Record for SourceRecord {}
+impl Record for AnswerRecord {}
 impl Record for OverlapRecord {}
 impl Record for BlockingRecord {}
 impl Record for WitnessRecord {}

@@ -190,6 +190,11 @@ pub(super) fn read(database: &Database, key: &Key) -> Result<Option<Vec<u8>>, Fa
     Ok(records.get(&key.to_bytes()[..])?.map(|bytes| bytes.value().to_vec()))
 }
 
+pub(super) fn holds(database: &Database, key: &Key) -> Result<bool, Failure> {
+    let records = database.begin_read()?.open_table(RECORDS)?;
+    Ok(records.get(&key.to_bytes()[..])?.is_some())
+}
+
 /// All records, in the order of their keys.
 pub(super) fn listed(database: &Database) -> Result<Vec<Listed>, Failure> {
     let used = database.begin_read()?.open_table(USED)?;

@@ -36,6 +36,17 @@ impl Answer {
         })
     }
 
+    /// From its messages in order; the last one ends the plan.
+    pub(crate) fn from_messages(mut messages: Vec<Vec<u8>>) -> Option<Self> {
+        let summary = Arc::new(messages.pop()?);
+        Some(Self { steps: messages.into_iter().map(Arc::new).collect(), summary })
+    }
+
+    /// The inverse.
+    pub(crate) fn messages(&self) -> Vec<Vec<u8>> {
+        self.steps.iter().chain([&self.summary]).map(|message| (**message).clone()).collect()
+    }
+
     fn bytes(&self) -> usize {
         self.summary.len() + self.steps.iter().map(|message| message.len()).sum::<usize>()
     }

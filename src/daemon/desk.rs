@@ -299,6 +299,12 @@ impl<L: Link, P: Planning> Desk<L, P> {
                 }
                 self.with_session(key, |s| s.finish(summary));
             }
+            WorkerEvent::Answered(key, question, answer) => {
+                self.running.remove(&(key.client, key.request));
+                self.counters.remembered += 1;
+                self.with_session(key, |s| s.answer_running(&answer));
+                self.answers.insert(&question, answer);
+            }
             WorkerEvent::Unplanned(key, error) => {
                 self.running.remove(&(key.client, key.request));
                 let input = if error.code == ErrorCode::Failed { Input::Fail } else { Input::Refuse };

@@ -18,7 +18,7 @@ use super::DaemonError;
 use super::desk::{Desk, Event, Incoming};
 use super::lifecycle::{Lease, Place, raise_file_limit, warn_of_small_shared_memory};
 use super::ports::{ActiveLink, Ports};
-use super::workers::{AdmitJob, Planning, Queues, Report, WorkerEvent, start};
+use super::workers::{AdmitJob, Planning, Queues, Report, WorkerEvent, start, start_prefetch};
 use crate::config::{Config, seconds};
 
 /// Requests taken from one port before workers' reports are looked at again.
@@ -40,6 +40,10 @@ pub fn run<P: Planning>(config: &Config, service: Arc<P>) -> Result<(), DaemonEr
     let queues = Queues::new(config.requests.queue);
     start(config.workers.count, &queues, &service, &reporter(&ports, sender))
         .map_err(|source| DaemonError::System { what: "starting workers", source })?;
+    if config.cache.prefetch {
+        start_prefetch(&queues, &service)
+            .map_err(|source| DaemonError::System { what: "starting workers", source })?;
+    }
     for path in &config.preload.assemblies {
         if queues.admissions.push(AdmitJob::Preload(path.clone())).is_err() {
             tracing::warn!(path = %path.display(), "not preloaded: the list is too long");

@@ -2,7 +2,8 @@
 //!
 //! One thread owns the ports (`event_loop`): it receives, copies and checks, admits or refuses,
 //! and sends. It never plans, heals or blocks. `workers` do, and report back as events.
-//! What was answered before is answered from `answers` at once.
+//! What was answered before is answered from `answers` at once; while nothing is asked, assemblies are made
+//! ready for what may be (`prefetch`).
 //! `desk` decides, by the state machine of `session` and the bounded `outbox`; none of these
 //! three knows iceoryx2, so they are tested without it. Only `convert` sees both wire and
 //! working types.
@@ -14,6 +15,7 @@ mod event_loop;
 mod lifecycle;
 mod outbox;
 mod ports;
+mod prefetch;
 mod request_queue;
 mod session;
 mod workers;

@@ -184,10 +184,13 @@ impl<L: Link> Session<L> {
 
     /// Answers at once with what was answered before.
     pub(crate) fn answer(&mut self, answer: &Answer) {
-        let started = [Input::Enqueue, Input::Start].into_iter().all(|input| self.input(input));
-        if !started {
-            return;
+        if [Input::Enqueue, Input::Start].into_iter().all(|input| self.input(input)) {
+            self.answer_running(answer);
         }
+    }
+
+    /// Answers what runs with what was answered before.
+    pub(crate) fn answer_running(&mut self, answer: &Answer) {
         for message in &answer.steps {
             if self.outbox.push_whole(ResponseKind::Steps, Arc::clone(message)).is_err() {
                 return self.lose("its outbox is full");

@@ -1,7 +1,7 @@
 //! The threads that plan and heal. A panic is contained to its request.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -12,6 +12,7 @@ use sbdp_ipc::plan::Step;
 
 use super::answers::Answer;
 use super::convert;
+use super::prefetch::Prefetch;
 use super::request_queue::{Rejected, RequestQueue};
 use crate::geometry::{Pose, Revision, SourceAssembly, load_assembly};
 use crate::plan::{Plan, PlanStep};
@@ -20,18 +21,42 @@ use crate::service::{Admission, AssemblyId, Service, ServiceError};
 
 /// What the workers ask of the planning service; tests script it.
 pub trait Planning: Send + Sync + 'static {
-    /// See [`Service::admit`].
+    /// See [`Service::admit`]. What was given is remembered.
     ///
     /// # Errors
     /// The geometry was refused.
     fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError>;
-    /// See [`Service::revise`].
+    /// See [`Service::revise`]. The change is remembered.
     ///
     /// # Errors
     /// The base is unknown, or the change is refused.
     fn revise(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError>;
+    /// The same for a question that brings its change along: nobody will ask for its handle.
+    ///
+    /// # Errors
+    /// The base is unknown, or the change is refused.
+    fn revise_for_now(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError> {
+        self.revise(base, revision)
+    }
     /// See [`Service::knows`]. Called on the port thread: it must not block.
     fn knows(&self, id: AssemblyId) -> bool;
+    /// See [`Service::prepare`].
+    ///
+    /// # Errors
+    /// The id is unknown.
+    fn prepare(&self, _: AssemblyId, _: &Termination) -> Result<(), ServiceError> {
+        Ok(())
+    }
+    /// See [`Service::recent`].
+    fn recent(&self, _: usize) -> Vec<AssemblyId> {
+        Vec::new()
+    }
+    /// The messages that answered a question before, also before a restart.
+    fn answered(&self, _question: &[u8]) -> Option<Vec<Vec<u8>>> {
+        None
+    }
+    /// Remembers the messages that answered a question.
+    fn remember(&self, _question: &[u8], _messages: Vec<Vec<u8>>) {}
     /// See [`Service::plan`].
     ///
     /// # Errors
@@ -47,15 +72,41 @@ pub trait Planning: Send + Sync + 'static {
 
 impl Planning for Service {
     fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError> {
-        Self::admit(self, source)
+        let admission = Self::admit(self, source)?;
+        self.cache().remember_given(&admission.id.0, source);
+        Ok(admission)
     }
 
     fn revise(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError> {
+        let admission = Self::revise(self, base, revision)?;
+        if admission.id != base {
+            self.cache().remember_revised(&admission.id.0, &base.0, revision);
+        }
+        Ok(admission)
+    }
+
+    fn revise_for_now(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError> {
         Self::revise(self, base, revision)
     }
 
     fn knows(&self, id: AssemblyId) -> bool {
         Self::knows(self, id)
+    }
+
+    fn prepare(&self, id: AssemblyId, termination: &Termination) -> Result<(), ServiceError> {
+        Self::prepare(self, id, termination)
+    }
+
+    fn recent(&self, most: usize) -> Vec<AssemblyId> {
+        Self::recent(self, most)
+    }
+
+    fn answered(&self, question: &[u8]) -> Option<Vec<Vec<u8>>> {
+        self.cache().answer(question)
+    }
+
+    fn remember(&self, question: &[u8], messages: Vec<Vec<u8>>) {
+        self.cache().remember_answer(question, messages);
     }
 
     fn plan(
@@ -108,6 +159,8 @@ pub(crate) enum WorkerEvent {
     Progress(SessionKey, Progress),
     /// A plan's summary, and what to answer when the same is asked again.
     Planned(SessionKey, Arc<Vec<u8>>, Option<(Vec<u8>, Answer)>),
+    /// The question was answered before, and is so again.
+    Answered(SessionKey, Vec<u8>, Answer),
     Unplanned(SessionKey, WireError),
     Admitted {
         number: u64,
@@ -181,6 +234,8 @@ const ADMISSION_QUEUE: usize = 128;
 pub(crate) struct Queues {
     pub(crate) plans: Arc<SharedQueue<PlanJob>>,
     pub(crate) admissions: Arc<SharedQueue<AdmitJob>>,
+    /// What is made ready while nothing is asked, if anything is.
+    prefetch: Arc<Prefetch>,
 }
 
 impl Queues {
@@ -188,12 +243,14 @@ impl Queues {
         Self {
             plans: Arc::new(SharedQueue::new(plan_limit)),
             admissions: Arc::new(SharedQueue::new(ADMISSION_QUEUE)),
+            prefetch: Arc::default(),
         }
     }
 
     pub(crate) fn close(&self) {
         self.plans.close();
         self.admissions.close();
+        self.prefetch.close();
     }
 }
 
@@ -206,20 +263,57 @@ pub(crate) fn start<P: Planning>(
     report: &Report,
 ) -> std::io::Result<()> {
     for number in 0..count {
-        let (queue, service, report) = (Arc::clone(&queues.plans), Arc::clone(service), Arc::clone(report));
+        let (queues, service, report) = (queues.clone(), Arc::clone(service), Arc::clone(report));
         thread::Builder::new().name(format!("sbdp-plan-{number}")).spawn(move || {
-            while let Some(job) = queue.pop() {
+            while let Some(job) = queues.plans.pop() {
+                let _busy = queues.prefetch.busy();
                 plan(&*service, &job, &report);
             }
         })?;
     }
-    let (queue, service, report) = (Arc::clone(&queues.admissions), Arc::clone(service), Arc::clone(report));
+    let (its_queues, its_service, report) = (queues.clone(), Arc::clone(service), Arc::clone(report));
     thread::Builder::new().name("sbdp-admit".to_owned()).spawn(move || {
-        while let Some(job) = queue.pop() {
-            admit(&*service, job, &report);
+        while let Some(job) = its_queues.admissions.pop() {
+            let _busy = its_queues.prefetch.busy();
+            if let Some(id) = admit(&*its_service, job, &report) {
+                its_queues.prefetch.want(id);
+            }
         }
     })?;
     Ok(())
+}
+
+/// Assemblies that were asked about before a restart are made ready, up to so many.
+const MOST_RECENT: usize = 8;
+/// How much less the processor is for what is not asked (Unix niceness).
+const NICENESS: i32 = 10;
+
+/// Starts the thread that makes assemblies ready while nothing is asked.
+pub(crate) fn start_prefetch<P: Planning>(queues: &Queues, service: &Arc<P>) -> std::io::Result<()> {
+    let (queues, service) = (queues.clone(), Arc::clone(service));
+    let prepare = move || {
+        let pool = rayon::ThreadPoolBuilder::new().start_handler(|_| yield_to_requests()).build();
+        let Ok(pool) = pool.inspect_err(|error| tracing::warn!(%error, "nothing is made ready ahead")) else {
+            return;
+        };
+        for id in service.recent(MOST_RECENT) {
+            queues.prefetch.want(id);
+        }
+        queues.prefetch.run(|id, termination| {
+            // Whoever asks will be told what is wrong.
+            let _ = contained(|| pool.install(|| service.prepare(id, termination)));
+        });
+    };
+    thread::Builder::new().name("sbdp-prefetch".to_owned()).spawn(prepare)?;
+    Ok(())
+}
+
+/// Makes this thread wait for all others of the machine. On Linux niceness is a thread's own.
+fn yield_to_requests() {
+    let this = rustix::thread::gettid();
+    if let Err(error) = rustix::process::setpriority_process(Some(this), NICENESS) {
+        tracing::debug!(%error, "no lower priority for what is not asked");
+    }
 }
 
 /// Streams what a plan yields to the port thread.
@@ -247,18 +341,25 @@ impl PlanSink for Sink<'_> {
 
 fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
     report(WorkerEvent::Started(job.key));
+    let before = job.question.as_ref().and_then(|q| Some((q, Answer::from_messages(service.answered(q)?)?)));
+    if let Some((question, answer)) = before {
+        return report(WorkerEvent::Answered(job.key, question.clone(), answer));
+    }
     let mut sink = Sink { key: job.key, report, last_progress: None };
     let planned = contained(|| {
         let mut assembly = job.assembly;
         if !job.moved.is_empty() {
             let revision = Revision { moved: job.moved.clone(), ..Revision::default() };
-            assembly = service.revise(assembly, &revision)?.id;
+            assembly = service.revise_for_now(assembly, &revision)?.id;
         }
         service.plan(assembly, &job.request, &job.termination, &mut sink)
     });
     report(match planned {
         Ok(Ok(plan)) => {
             let again = job.question.clone().zip(Answer::of(&plan));
+            if let Some((question, answer)) = &again {
+                service.remember(question, answer.messages());
+            }
             WorkerEvent::Planned(job.key, Arc::new(convert::summary(&plan, &plan.stats)), again)
         }
         Ok(Err(error)) => WorkerEvent::Unplanned(job.key, convert::service_error(&error)),
@@ -266,31 +367,38 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
     });
 }
 
-fn admit<P: Planning>(service: &P, job: AdmitJob, report: &Report) {
+/// Which assembly was taken in, if it was.
+fn admit<P: Planning>(service: &P, job: AdmitJob, report: &Report) -> Option<AssemblyId> {
     match job {
         AdmitJob::Upload { number, bytes } => {
             let result = contained(|| admit_upload(service, bytes)).unwrap_or_else(Err);
+            let id = result.as_ref().ok().copied();
             report(WorkerEvent::Admitted { number, result });
+            id
         }
         AdmitJob::Revise { number, bytes } => {
             let result = contained(|| admit_revision(service, bytes)).unwrap_or_else(Err);
+            let id = result.as_ref().ok().copied();
             report(WorkerEvent::Admitted { number, result });
+            id
         }
-        AdmitJob::Preload(path) => {
-            let loaded = contained(|| {
-                load_assembly(&path).map_err(ServiceError::from).and_then(|source| {
-                    let admission = service.admit(&source)?;
-                    Ok((source.name, admission.id))
-                })
-            });
-            match loaded.map(|r| r.map_err(|e| convert::service_error(&e))).unwrap_or_else(Err) {
-                Ok((name, id)) => report(WorkerEvent::Preloaded { name, id }),
-                Err(error) => {
-                    tracing::warn!(path = %path.display(), "not preloaded: {}", error.message);
-                }
+        AdmitJob::Preload(path) => match contained(|| preload(service, &path)).unwrap_or_else(Err) {
+            Ok((name, id)) => {
+                report(WorkerEvent::Preloaded { name, id });
+                Some(id)
             }
-        }
+            Err(error) => {
+                tracing::warn!(path = %path.display(), "not preloaded: {}", error.message);
+                None
+            }
+        },
     }
+}
+
+fn preload<P: Planning>(service: &P, path: &Path) -> Result<(String, AssemblyId), WireError> {
+    let source = load_assembly(path).map_err(|e| convert::service_error(&e.into()))?;
+    let admission = service.admit(&source).map_err(|e| convert::service_error(&e))?;
+    Ok((source.name, admission.id))
 }
 
 fn admit_upload<P: Planning>(service: &P, bytes: AlignedBytes) -> Result<AssemblyId, WireError> {

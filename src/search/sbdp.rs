@@ -49,6 +49,22 @@ impl Gain {
     }
 }
 
+/// The blocking graphs of the assembled state along the directions that a search would begin with.
+///
+/// # Errors
+/// The termination condition became true.
+pub fn initial_blockages(problem: &Problem<'_>) -> Result<Vec<Blockage>, Interrupt> {
+    let (translations, _) = problem.action_lists(&problem.directions());
+    assembled_blockages(problem, &translations)
+}
+
+fn assembled_blockages(problem: &Problem<'_>, translations: &[Action]) -> Result<Vec<Blockage>, Interrupt> {
+    let Problem { scene, present, static_analysis, termination, recall, .. } = problem;
+    let least = |part| least_travel(scene, part);
+    let analysis = Analysis { rule: *static_analysis, scene, translations, recall };
+    analysis.initial_blockages(present, &least, termination)
+}
+
 /// One simulation or sweep to run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Job {
@@ -158,17 +174,14 @@ impl<'a, 'o> Search<'a, 'o> {
     }
 
     fn make_roots(&mut self) -> Result<(), Stop> {
-        let Problem { scene, present, static_analysis, termination, recall, .. } = &self.disassembly.problem;
+        let problem = &self.disassembly.problem;
         let blockages = if self.guided {
             let started = Instant::now();
-            let least = |part| least_travel(scene, part);
-            let analysis =
-                Analysis { rule: *static_analysis, scene, translations: &self.translations, recall };
-            let found = analysis.initial_blockages(present, &least, termination)?;
+            let found = assembled_blockages(problem, &self.translations)?;
             self.disassembly.counters.static_analysis += started.elapsed();
             found
         } else {
-            vec![Blockage::open(self.translations.len()); scene.bodies.len()]
+            vec![Blockage::open(self.translations.len()); problem.scene.bodies.len()]
         };
         for (part, blockage) in blockages.into_iter().enumerate() {
             if self.disassembly.problem.may_move(part) {

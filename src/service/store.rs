@@ -4,7 +4,8 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use super::{AssemblyId, Entry};
+use super::AssemblyId;
+use super::entry::Entry;
 use crate::geometry::{Assembly, Shape};
 use crate::lru::Lru;
 use crate::sdf::Field;

@@ -1,6 +1,8 @@
 //! What is remembered changes nothing but the time: plans of a service that remembers are those of one that
 //! does not, to the bit, whatever was asked before.
 
+use std::time::Duration;
+
 use proptest::prelude::*;
 
 use super::*;

@@ -1,0 +1,264 @@
+//! An admitted assembly: from a request to its plan.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, TryLockError};
+use std::time::{Duration, Instant};
+
+use crate::cache::{Answered, PlanQuestion, Recall};
+use crate::geometry::Assembly;
+use crate::plan::{Plan, PlanStatus, Verifier};
+use crate::search::{
+    Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_blockages, search,
+};
+use crate::simulation::{PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
+use crate::termination::{Interrupt, Termination};
+
+use super::answer::{self, Found, Frame, Times};
+use super::prepared::{self, Prepared};
+use super::relay::{Relay, Silent};
+use super::store::SharedShape;
+
+/// One admitted assembly; fields and overlaps are made when first needed.
+#[derive(Debug)]
+pub(super) struct Entry {
+    pub(super) assembly: Assembly,
+    /// Those of the assembly, with their fields.
+    pub(super) shapes: Vec<Arc<SharedShape>>,
+    prepared: Mutex<Option<Arc<Prepared>>>,
+}
+
+impl Entry {
+    pub(super) fn new(assembly: Assembly, shapes: Vec<Arc<SharedShape>>) -> Self {
+        Self { assembly, shapes, prepared: Mutex::default() }
+    }
+
+    /// Bytes in memory beside its shapes, about.
+    pub(super) fn memory(&self) -> usize {
+        let parts = self.assembly.parts.iter().map(|part| size_of_val(part) + part.name.len());
+        size_of::<Self>() + parts.sum::<usize>() + self.at_hand().map_or(0, |prepared| prepared.memory())
+    }
+
+    pub(super) fn plan(
+        &self,
+        request: &PlanRequest,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+        recall: &Recall,
+    ) -> Plan {
+        let started = Instant::now();
+        let mut fixed = request.fixed.clone();
+        fixed.extend(&self.assembly.fixed);
+        let mut removed = request.removed.clone();
+        for list in [&mut fixed, &mut removed] {
+            list.sort_unstable();
+            list.dedup();
+        }
+        fixed.retain(|p| removed.binary_search(p).is_err());
+        let frame = Frame {
+            assembly: &self.assembly,
+            request,
+            fixed,
+            removed,
+            overlaps: Vec::new(),
+            notes: Vec::new(),
+        };
+        let (fixed, removed) = (frame.fixed.clone(), frame.removed.clone());
+        let question = PlanQuestion { assembly: &self.assembly, request, fixed: &fixed, removed: &removed };
+        // Whoever wants to be told what the search does wants it done.
+        if !sink.traces()
+            && let Some(answered) = recall.plan(&question)
+        {
+            return self.answered(frame, answered, sink, started);
+        }
+        let prepared = if request.no_cache {
+            let fresh: Vec<_> =
+                self.assembly.shapes.iter().map(|s| Arc::new(SharedShape::new(Arc::clone(s)))).collect();
+            Prepared::new(&self.assembly, &fresh, termination, sink, recall).map(|p| (Arc::new(p), false))
+        } else {
+            self.prepared(termination, sink, recall)
+        };
+        match prepared {
+            Ok((prepared, hit)) => {
+                let prepared = Ready { prepared: &prepared, hit, recall, question: &question };
+                self.searched(frame, &prepared, termination, sink, started)
+            }
+            Err(Interrupt::Cancelled) => frame.empty(PlanStatus::Cancelled, Some("cancelled".to_owned())),
+            Err(Interrupt::DeadlinePassed) => frame
+                .empty(PlanStatus::Timeout, Some("the deadline passed while fields were built".to_owned())),
+        }
+    }
+
+    /// A plan that was made before, told as if it were made now.
+    fn answered(
+        &self,
+        mut frame: Frame<'_>,
+        answered: Answered,
+        sink: &mut dyn PlanSink,
+        started: Instant,
+    ) -> Plan {
+        let Answered { outcome, overlaps } = answered;
+        frame.overlaps = answer::overlaps(&self.assembly, &overlaps);
+        let engine = engine_of(frame.request.engine, frame.request.penalty);
+        frame.notes.extend(accepted(&*engine, prepared::depth_limit(&self.assembly), &self.assembly).1);
+        for removal in &outcome.removals {
+            sink.step(&answer::step(&self.assembly, removal));
+        }
+        let times = Times { total: started.elapsed(), ..Times::default() };
+        frame.plan(outcome, &times, &Found { plan: true, ..Found::default() })
+    }
+
+    fn searched(
+        &self,
+        mut frame: Frame<'_>,
+        ready: &Ready<'_>,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+        started: Instant,
+    ) -> Plan {
+        let request = frame.request;
+        let Ready { prepared, hit, recall, question } = *ready;
+        frame.overlaps = answer::overlaps(&self.assembly, &prepared.overlaps);
+        let engine = engine_of(request.engine, request.penalty);
+        let (limit, note) = accepted(&*engine, prepared.verifier.limit(), &self.assembly);
+        let verifier = prepared.verifier.with_limit(limit);
+        frame.notes.extend(note);
+        let asked = Asked { question, engine: &*engine, verifier: &verifier };
+        let problem = self.problem(prepared, &asked, termination, recall);
+        let total = problem.present.len() as u32;
+        let mut relay = Relay { assembly: &self.assembly, sink, total };
+        if relay.traces() {
+            relay.traced(TraceEvent::Start {
+                parts: self.assembly.parts.iter().map(|p| p.name.clone()).collect(),
+                planner: request.planner.name().to_owned(),
+                engine: request.engine.name().to_owned(),
+            });
+        }
+        let outcome = search(request.planner, problem, &mut relay);
+        recall.remember_plan(question, termination, &outcome, &prepared.overlaps);
+        let fields = if hit { self.assembly.shapes.len() as u64 } else { prepared.fields_known };
+        let found = Found { fields, pieces: recall.reused(), plan: false };
+        let spent = |time: Duration| if hit { Duration::ZERO } else { time };
+        let times = Times {
+            fields: spent(prepared.sdf_time),
+            overlaps: spent(prepared.overlap_time),
+            total: started.elapsed(),
+        };
+        frame.plan(outcome, &times, &found)
+    }
+
+    /// The question in the planning frame.
+    fn problem<'a>(
+        &self,
+        prepared: &Prepared,
+        asked: &Asked<'a>,
+        termination: &Termination,
+        recall: &Recall,
+    ) -> Problem<'a> {
+        let PlanQuestion { request, fixed, removed, .. } = *asked.question;
+        let is_there = |part: &usize| removed.binary_search(part).is_err();
+        Problem {
+            scene: prepared.scene.clone(),
+            verifier: asked.verifier,
+            engine: asked.engine,
+            present: (0..self.assembly.parts.len()).filter(is_there).collect(),
+            fixed: fixed.to_vec(),
+            targets: request.targets.clone(),
+            actions: request.actions,
+            static_analysis: request.static_analysis,
+            sweeps: request.sweeps(),
+            max_simulations: request.max_simulations,
+            spent: 0,
+            path_timeout: request.path_timeout,
+            termination: termination.clone(),
+            recall: recall.clone(),
+            extra_points: HashMap::new(),
+        }
+    }
+
+    /// Makes ready what any plan needs, as far as `termination` lets it.
+    pub(super) fn prepare(&self, termination: &Termination, recall: &Recall) {
+        let Ok((prepared, _)) = self.prepared(termination, &mut Silent, recall) else { return };
+        let request = PlanRequest::default();
+        let question = PlanQuestion { assembly: &self.assembly, request: &request, fixed: &[], removed: &[] };
+        let engine = engine_of(request.engine, request.penalty);
+        let asked = Asked { question: &question, engine: &*engine, verifier: &prepared.verifier };
+        // Interrupted, it has remembered what it found.
+        let _ = initial_blockages(&self.problem(&prepared, &asked, termination, recall));
+    }
+
+    /// Fields and overlaps, if they are there.
+    fn at_hand(&self) -> Option<Arc<Prepared>> {
+        match self.prepared.try_lock() {
+            Ok(slot) => slot.clone(),
+            Err(TryLockError::Poisoned(slot)) => slot.into_inner().clone(),
+            Err(TryLockError::WouldBlock) => None,
+        }
+    }
+
+    /// Fields and overlaps, and whether they were there already. Whoever comes while they are
+    /// being made waits for them, but not beyond its own termination.
+    pub(super) fn prepared(
+        &self,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+        recall: &Recall,
+    ) -> Result<(Arc<Prepared>, bool), Interrupt> {
+        loop {
+            let mut slot = match self.prepared.try_lock() {
+                Ok(slot) => slot,
+                Err(TryLockError::Poisoned(slot)) => slot.into_inner(),
+                Err(TryLockError::WouldBlock) => {
+                    termination.check()?;
+                    std::thread::sleep(Duration::from_millis(2));
+                    continue;
+                }
+            };
+            if let Some(prepared) = &*slot {
+                return Ok((Arc::clone(prepared), true));
+            }
+            let prepared = Arc::new(Prepared::new(&self.assembly, &self.shapes, termination, sink, recall)?);
+            *slot = Some(Arc::clone(&prepared));
+            return Ok((prepared, false));
+        }
+    }
+}
+
+/// A question, with what answers it.
+struct Asked<'a> {
+    question: &'a PlanQuestion<'a>,
+    engine: &'a dyn TransitionFunction,
+    verifier: &'a Verifier,
+}
+
+/// What a search works with.
+#[derive(Clone, Copy)]
+struct Ready<'a> {
+    prepared: &'a Prepared,
+    /// It was there already.
+    hit: bool,
+    recall: &'a Recall,
+    question: &'a PlanQuestion<'a>,
+}
+
+/// The depth to which paths are verified, and what the reader of a plan should know of it: an engine that
+/// lets parts overlap by more than is accepted is held to its own word.
+fn accepted(engine: &dyn TransitionFunction, limit: f64, assembly: &Assembly) -> (f64, Option<String>) {
+    if engine.depth_tolerance() <= limit {
+        return (limit, None);
+    }
+    let limit = engine.depth_tolerance() + BETWEEN_SAMPLES;
+    let (name, depth) = (engine.name(), limit / assembly.scale);
+    let note =
+        format!("the engine `{name}` lets parts overlap by {depth:.3e}; paths are verified to that depth");
+    (limit, Some(note))
+}
+
+pub(super) fn engine_of(engine: Engine, penalty: PenaltyParameters) -> Box<dyn TransitionFunction> {
+    match engine {
+        Engine::Sliding => Box::new(SlidingEngine),
+        Engine::Penalty => Box::new(PenaltyEngine::new(penalty)),
+    }
+}
+
+/// What verification finds between the samples of an engine, in the planning frame.
+const BETWEEN_SAMPLES: f64 = 1e-3;
