@@ -156,6 +156,8 @@ pub struct Phase {
     pub lost_because: Vec<String>,
     /// Plans that differed from another answer to the same question: there may be none.
     pub differing: u64,
+    /// Plan requests that the daemon counted meanwhile, those of disturbers included.
+    pub plans_received: u64,
     /// From the first request to the last answer.
     pub wall_s: f64,
     /// By kind.
@@ -165,7 +167,12 @@ pub struct Phase {
 }
 
 impl Phase {
-    pub(super) fn of(figures: ClientFigures, wall_s: f64, daemon: DaemonFigures) -> Self {
+    pub(super) fn of(
+        figures: ClientFigures,
+        plans_received: u64,
+        wall_s: f64,
+        daemon: DaemonFigures,
+    ) -> Self {
         let kinds: BTreeMap<Kind, KindFigures> =
             figures.kinds.into_iter().map(|(kind, times)| (kind, kind_figures(times))).collect();
         let sum = |of: fn(&KindFigures) -> u64| kinds.values().map(of).sum();
@@ -177,6 +184,7 @@ impl Phase {
             lost: sum(|k| k.lost),
             lost_because: figures.lost,
             differing: figures.differing,
+            plans_received,
             wall_s,
             daemon,
             kinds,
@@ -217,7 +225,7 @@ mod tests {
             one.plan("question".into(), hash.into());
             all.merge(one);
         }
-        let phase = Phase::of(all, 1.0, DaemonFigures::default());
+        let phase = Phase::of(all, 5, 1.0, DaemonFigures::default());
         assert_eq!((phase.sent, phase.answered, phase.refused), (12, 3, 3));
         assert_eq!((phase.dropped, phase.lost, phase.differing), (3, 3, 1));
         assert_eq!(phase.kinds[&Kind::Repeat].p99_us, 20.0);

@@ -7,17 +7,18 @@ mod figures;
 mod footprint;
 mod mix;
 
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{self, Sender};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use sbdp_ipc::endpoint::Endpoint;
+use sbdp_client::{Client, ConnectOptions};
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 pub use client::{LoadClient, Role, load_client};
 pub use figures::{DaemonFigures, Footprint, KindFigures, Phase};
@@ -27,7 +28,6 @@ use super::BenchError;
 use super::daemon::{Place, Server};
 use figures::ClientFigures;
 use footprint::Watch;
-use std::sync::Arc;
 
 /// What to do.
 #[derive(Debug, Clone)]
@@ -87,8 +87,9 @@ pub fn load(request: &LoadRequest) -> Result<Load, BenchError> {
         (None, Some(folder)) => folder.clone(),
         (None, None) => sbdp_ipc::endpoint::default_runtime_dir(),
     };
-    let pid = Endpoint::find(&runtime_dir).map_err(failed)?.pid;
-    let start = Start { request, runtime_dir: &runtime_dir, pid };
+    let options = ConnectOptions { runtime_dir: Some(runtime_dir.clone()), ..ConnectOptions::default() };
+    let observer = Client::connect_with(options).map_err(failed)?;
+    let start = Start { request, runtime_dir: &runtime_dir, pid: observer.pid(), observer };
     let calm = start.phase(&[])?;
     let disturbed = request.disturb.then(|| start.phase(&[Role::Stopped, Role::Flooding, Role::Deaf]));
     let disturbed = disturbed.transpose()?;
@@ -146,6 +147,7 @@ struct Start<'r> {
     request: &'r LoadRequest,
     runtime_dir: &'r std::path::Path,
     pid: u32,
+    observer: Client,
 }
 
 impl Start<'_> {
@@ -158,6 +160,7 @@ impl Start<'_> {
             around.push((role, self.process(role, 0, 0, &disturbing, &ended)?));
             expect_ready(disturber_said.recv().ok(), "a disturber")?;
         }
+        let plans = || Ok::<_, BenchError>(self.observer.status().map_err(failed)?.numbers.requests);
         let (sender, said) = mpsc::channel();
         let mut clients = Vec::new();
         for number in 0..self.request.clients {
@@ -174,7 +177,7 @@ impl Start<'_> {
                 rustix::process::kill_process(pid, rustix::process::Signal::STOP).map_err(failed)?;
             }
         }
-        let started = Instant::now();
+        let (started, before) = (Instant::now(), plans()?);
         clients.iter_mut().for_each(|c| c.say("go"));
         let mut watch = Watch::new(self.pid);
         let mut figures = ClientFigures::default();
@@ -193,9 +196,10 @@ impl Start<'_> {
             watch.look(ended.load(Ordering::Relaxed));
         }
         let wall_s = started.elapsed().as_secs_f64();
+        let received = plans()?.saturating_sub(before);
         watch.look(ended.load(Ordering::Relaxed));
         clients.iter_mut().for_each(|c| c.say("leave"));
-        Ok(Phase::of(figures, wall_s, watch.figures()))
+        Ok(Phase::of(figures, received, wall_s, watch.figures()))
     }
 
     fn process(

@@ -60,7 +60,7 @@ fn text(load: &Load) -> String {
 fn phase(title: &str, phase: &Phase) -> String {
     let (early, late) = (phase.daemon.at_2000, phase.daemon.at_end);
     let mut text = format!(
-        "\n{title}, {:.1} s: {} sent, {} answered, {} refused, {} dropped by the client, {} lost, {} differing\n\
+        "\n{title}, {:.1} s: {} sent, {} answered, {} refused, {} dropped by the client, {} lost, {} differing; the daemon counted {} plan requests\n\
          daemon at request {}: {} KiB resident ({} private), {} descriptors; at {}: {} ({}), {}\n\
          {:<12}{:>8}{:>10}{:>9}{:>12}{:>12}\n",
         phase.wall_s,
@@ -70,6 +70,7 @@ fn phase(title: &str, phase: &Phase) -> String {
         phase.dropped,
         phase.lost,
         phase.differing,
+        phase.plans_received,
         early.requests,
         early.resident_kib,
         early.private_kib,
