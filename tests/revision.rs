@@ -70,7 +70,10 @@ fn what_cannot_be_changed_is_refused_with_the_reason() {
     let nothing = refusal(Handle([9; 32]), &Change::default());
     assert_eq!(nothing.code(), Some(ErrorCode::UnknownHandle), "{nothing}");
     let none = refusal(handle, &Change { moved: vec![(7, shift(1.0, 0.0, 0.0))], ..Change::default() });
-    assert!(none.code() == Some(ErrorCode::NoSuchPart) && none.to_string().contains("part 7 in `moved`"), "{none}");
+    assert!(
+        none.code() == Some(ErrorCode::NoSuchPart) && none.to_string().contains("part 7 in `moved`"),
+        "{none}"
+    );
     let empty = Part { name: "", vertices: Vertices::F64(&[]), triangles: &[] };
     let empty = refusal(handle, &Change { replaced: vec![(1, empty)], ..Change::default() });
     assert!(empty.code() == Some(ErrorCode::Geometry) && empty.to_string().contains("`1`"), "{empty}");

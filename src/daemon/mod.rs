@@ -11,17 +11,20 @@ mod answers;
 mod convert;
 mod desk;
 mod event_loop;
+mod intake;
 mod lifecycle;
 mod outbox;
 mod ports;
 mod request_queue;
 mod session;
+mod shared_queue;
 mod workers;
 
 pub use event_loop::run;
 pub use lifecycle::LifecycleError;
 pub use lifecycle::check_place;
 pub use workers::Planning;
+pub(crate) use convert::source_assembly as uploaded_assembly;
 
 /// The ports, for measuring them without a daemon behind.
 pub(crate) mod transport {

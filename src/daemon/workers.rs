@@ -2,7 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,7 @@ use sbdp_ipc::plan::Step;
 
 use super::answers::Answer;
 use super::convert;
-use super::request_queue::{Rejected, RequestQueue};
+use super::shared_queue::Queues;
 use crate::geometry::{Pose, Revision, SourceAssembly, load_assembly};
 use crate::plan::{Plan, PlanStep};
 use crate::search::{PlanRequest, PlanSink, Progress, Termination};
@@ -122,81 +122,6 @@ pub(crate) enum WorkerEvent {
 /// Takes reports to the port thread and wakes it.
 pub(crate) type Report = Arc<dyn Fn(WorkerEvent) + Send + Sync>;
 
-/// A queue that threads share.
-#[derive(Debug)]
-pub(crate) struct SharedQueue<J> {
-    queue: Mutex<RequestQueue<J>>,
-    ready: Condvar,
-}
-
-impl<J> SharedQueue<J> {
-    fn new(limit: usize) -> Self {
-        Self { queue: Mutex::new(RequestQueue::new(limit)), ready: Condvar::new() }
-    }
-
-    /// The queue holds plain data: it is whole even if a holder panicked.
-    fn lock(&self) -> MutexGuard<'_, RequestQueue<J>> {
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(crate) fn push(&self, job: J) -> Result<(), Rejected> {
-        self.lock().push(job)?;
-        self.ready.notify_one();
-        Ok(())
-    }
-
-    /// Waits for a job; `None` when the queue is closed and empty.
-    fn pop(&self) -> Option<J> {
-        let mut queue = self.lock();
-        loop {
-            if let Some(job) = queue.pop() {
-                return Some(job);
-            }
-            if queue.is_closed() {
-                return None;
-            }
-            queue = self.ready.wait(queue).unwrap_or_else(PoisonError::into_inner);
-        }
-    }
-
-    pub(crate) fn withdraw(&self, fits: impl Fn(&J) -> bool) -> bool {
-        self.lock().withdraw(fits)
-    }
-
-    pub(crate) fn close(&self) {
-        self.lock().close();
-        self.ready.notify_all();
-    }
-
-    pub(crate) fn len(&self) -> usize {
-        self.lock().len()
-    }
-}
-
-/// Uploads that may wait to be healed; each client port has at most one.
-const ADMISSION_QUEUE: usize = 128;
-
-/// The queues that feed the threads.
-#[derive(Debug, Clone)]
-pub(crate) struct Queues {
-    pub(crate) plans: Arc<SharedQueue<PlanJob>>,
-    pub(crate) admissions: Arc<SharedQueue<AdmitJob>>,
-}
-
-impl Queues {
-    pub(crate) fn new(plan_limit: usize) -> Self {
-        Self {
-            plans: Arc::new(SharedQueue::new(plan_limit)),
-            admissions: Arc::new(SharedQueue::new(ADMISSION_QUEUE)),
-        }
-    }
-
-    pub(crate) fn close(&self) {
-        self.plans.close();
-        self.admissions.close();
-    }
-}
-
 /// Starts `count` planning threads, and one that takes assemblies in, so that an upload never
 /// waits behind a long plan.
 pub(crate) fn start<P: Planning>(
@@ -208,14 +133,14 @@ pub(crate) fn start<P: Planning>(
     for number in 0..count {
         let (queue, service, report) = (Arc::clone(&queues.plans), Arc::clone(service), Arc::clone(report));
         thread::Builder::new().name(format!("sbdp-plan-{number}")).spawn(move || {
-            while let Some(job) = queue.pop() {
+            while let Some((job, _working)) = queue.pop() {
                 plan(&*service, &job, &report);
             }
         })?;
     }
     let (queue, service, report) = (Arc::clone(&queues.admissions), Arc::clone(service), Arc::clone(report));
     thread::Builder::new().name("sbdp-admit".to_owned()).spawn(move || {
-        while let Some(job) = queue.pop() {
+        while let Some((job, _working)) = queue.pop() {
             admit(&*service, job, &report);
         }
     })?;

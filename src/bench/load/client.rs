@@ -10,10 +10,10 @@ use sbdp_client::{
 };
 
 use super::super::BenchError;
-use super::super::latency::wire;
 use super::figures::{ClientFigures, Ending};
 use super::mix::{Kind, Mix, Question};
 use crate::geometry::{SourceAssembly, SourceMesh};
+use crate::upload::wire_assembly;
 
 /// What such a process is to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,20 +60,20 @@ pub fn load_client(load: &LoadClient) -> Result<(), BenchError> {
         timeout: PATIENCE,
         ..ConnectOptions::default()
     };
-    let client = Client::connect_with(options).map_err(failed)?;
-    let base = client.upload(&wire(&load.assembly)).map_err(failed)?;
+    let client = Client::connect_with(options).map_err(BenchError::failed)?;
+    let base = client.upload(&wire_assembly(&load.assembly)).map_err(BenchError::failed)?;
     let me = Asking { client, base, load };
     match load.role {
         Role::Asking => {
             say("ready")?;
             wait_for_line();
             let figures = me.ask_all()?;
-            say(&serde_json::to_string(&figures).map_err(failed)?)?;
+            say(&serde_json::to_string(&figures).map_err(BenchError::failed)?)?;
             // The connection stays until all have ended, so that the daemon's figures compare.
             wait_for_line();
         }
         Role::Stopped | Role::Deaf => {
-            let unread = me.client.plan(base, &unremembered()).map_err(failed)?;
+            let unread = me.client.plan(base, &unremembered()).map_err(BenchError::failed)?;
             say("ready")?;
             wait_for_line();
             drop(unread);
@@ -91,7 +91,7 @@ pub fn load_client(load: &LoadClient) -> Result<(), BenchError> {
 
 fn say(line: &str) -> Result<(), BenchError> {
     let mut out = std::io::stdout().lock();
-    writeln!(out, "{line}").and_then(|()| out.flush()).map_err(failed)
+    writeln!(out, "{line}").and_then(|()| out.flush()).map_err(BenchError::failed)
 }
 
 fn wait_for_line() {
@@ -168,6 +168,9 @@ impl Asking<'_> {
         while let Some(event) = stream.next_event_within(PATIENCE.saturating_sub(started.elapsed()))? {
             match event {
                 Event::Progress(_) => {}
+                Event::Restarted => {
+                    hasher.reset();
+                }
                 Event::Step(step) => {
                     hasher.update(&step.part.to_le_bytes());
                     for x in step.path.iter().flatten() {
@@ -195,7 +198,7 @@ impl Asking<'_> {
         let scale = 1.0 + 1e-3 * (variant + 1) as f64;
         let vertices = source.parts.iter_mut().flat_map(|part| &mut part.mesh.vertices);
         vertices.for_each(|v| *v = v.map(|x| x * scale));
-        self.client.upload(&wire(&source)).map(|_| Ending::Answered)
+        self.client.upload(&wire_assembly(&source)).map(|_| Ending::Answered)
     }
 
     /// A part, a little smaller.
@@ -207,7 +210,7 @@ impl Asking<'_> {
             vertices: mesh.vertices.iter().map(|v| v.map(|x| x * scale)).collect(),
             triangles: mesh.triangles.clone(),
         };
-        let mut with = wire(&self.load.assembly).parts[part];
+        let mut with = wire_assembly(&self.load.assembly).parts[part];
         with.vertices = Vertices::F64(&smaller.vertices);
         with.triangles = &smaller.triangles;
         let change = Change { replaced: vec![(part as u32, with)], ..Change::default() };
@@ -223,8 +226,4 @@ impl Asking<'_> {
         let assembly = Assembly { parts: vec![part], ..Assembly::default() };
         self.client.upload(&assembly).map(|_| Ending::Lost("a mesh of NaN was taken".to_owned()))
     }
-}
-
-fn failed(error: impl std::fmt::Display) -> BenchError {
-    BenchError::Failed(error.to_string())
 }

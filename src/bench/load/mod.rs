@@ -88,7 +88,7 @@ pub fn load(request: &LoadRequest) -> Result<Load, BenchError> {
         (None, None) => sbdp_ipc::endpoint::default_runtime_dir(),
     };
     let options = ConnectOptions { runtime_dir: Some(runtime_dir.clone()), ..ConnectOptions::default() };
-    let observer = Client::connect_with(options).map_err(failed)?;
+    let observer = Client::connect_with(options).map_err(BenchError::failed)?;
     let start = Start { request, runtime_dir: &runtime_dir, pid: observer.pid(), observer };
     let calm = start.phase(&[])?;
     let disturbed = request.disturb.then(|| start.phase(&[Role::Stopped, Role::Flooding, Role::Deaf]));
@@ -160,7 +160,8 @@ impl Start<'_> {
             around.push((role, self.process(role, 0, 0, &disturbing, &ended)?));
             expect_ready(disturber_said.recv().ok(), "a disturber")?;
         }
-        let plans = || Ok::<_, BenchError>(self.observer.status().map_err(failed)?.numbers.requests);
+        let plans =
+            || Ok::<_, BenchError>(self.observer.status().map_err(BenchError::failed)?.numbers.requests);
         let (sender, said) = mpsc::channel();
         let mut clients = Vec::new();
         for number in 0..self.request.clients {
@@ -174,7 +175,8 @@ impl Start<'_> {
         for (role, process) in &around {
             if *role == Role::Stopped {
                 let pid = rustix::process::Pid::from_child(&process.child);
-                rustix::process::kill_process(pid, rustix::process::Signal::STOP).map_err(failed)?;
+                rustix::process::kill_process(pid, rustix::process::Signal::STOP)
+                    .map_err(BenchError::failed)?;
             }
         }
         let (started, before) = (Instant::now(), plans()?);
@@ -264,10 +266,6 @@ impl Role {
             Self::Deaf => "deaf",
         }
     }
-}
-
-fn failed(error: impl std::fmt::Display) -> BenchError {
-    BenchError::Failed(error.to_string())
 }
 
 #[cfg(test)]
