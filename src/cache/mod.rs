@@ -14,6 +14,7 @@
 
 mod disk;
 mod format;
+mod hostile;
 mod kind;
 mod memory;
 mod motion;
@@ -35,6 +36,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 pub use disk::DiskError;
 pub use format::Record;
+pub(crate) use hostile::read_as_records;
 pub use kind::{Digest, Key, Kind};
 pub use motion::MotionQuestion;
 pub use pair::{blocking_key, overlap_key};

@@ -20,11 +20,11 @@ mod session;
 mod shared_queue;
 mod workers;
 
+pub(crate) use convert::source_assembly as uploaded_assembly;
 pub use event_loop::run;
 pub use lifecycle::LifecycleError;
 pub use lifecycle::check_place;
 pub use workers::Planning;
-pub(crate) use convert::source_assembly as uploaded_assembly;
 
 /// The ports, for measuring them without a daemon behind.
 pub(crate) mod transport {
