@@ -45,6 +45,8 @@ const SLOW: Duration = Duration::from_millis(500);
 const HEAVY_TURN: u64 = 20;
 /// New seeds of one reader; more would only dilute the others.
 const MOST_SEEDS: usize = 4000;
+/// Ways that are told apart per reader: they are held in memory.
+const MOST_WAYS: usize = 20_000;
 
 /// One reader and its seeds.
 struct Target {
@@ -125,7 +127,8 @@ fn one(target: &mut Target, random: &mut Random, current: &File, out: &Path) {
     target.slowest = target.slowest.max(took);
     match read {
         Ok(words) => {
-            if target.ways.insert(way(&words)) && target.seeds.len() < MOST_SEEDS {
+            let room = target.ways.len() < MOST_WAYS && target.seeds.len() < MOST_SEEDS;
+            if room && target.ways.insert(way(&words)) {
                 target.seeds.push(input.clone());
             }
         }
