@@ -86,8 +86,16 @@ pub struct WorkersConfig {
 pub struct RequestsConfig {
     /// Plan requests that may wait for a worker.
     pub queue: usize,
+    /// Those of one client (a process).
+    pub waiting_per_client: usize,
+    /// Plans of one client that are worked on at once; 0 for all workers but one.
+    pub working_per_client: usize,
     /// Megabytes that one upload may have.
     pub max_upload_mb: u64,
+    /// Megabytes of uploads that may wait to be taken in.
+    pub uploads_mb: u64,
+    /// Those of one client.
+    pub uploads_mb_per_client: u64,
     /// Megabytes of a plan that may wait for a client to read.
     pub outbox_mb: u64,
     /// Seconds that a client may leave a waiting plan unread.
@@ -170,7 +178,16 @@ impl Default for WorkersConfig {
 
 impl Default for RequestsConfig {
     fn default() -> Self {
-        Self { queue: 16, max_upload_mb: 1024, outbox_mb: 64, slow_reader_s: 60.0 }
+        Self {
+            queue: 64,
+            waiting_per_client: 8,
+            working_per_client: 0,
+            max_upload_mb: 1024,
+            uploads_mb: 2048,
+            uploads_mb_per_client: 1024,
+            outbox_mb: 64,
+            slow_reader_s: 60.0,
+        }
     }
 }
 
@@ -221,7 +238,15 @@ impl Config {
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| ConfigError::Unreadable { path: path.to_owned(), source })?;
-        let config: Self = toml::from_str(&text)
+        Self::parse(&text, path)
+    }
+
+    /// Reads and checks a text; `path` is where it came from.
+    ///
+    /// # Errors
+    /// It has an unknown key or a value out of range.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, ConfigError> {
+        let config: Self = toml::from_str(text)
             .map_err(|e| ConfigError::Invalid { path: path.to_owned(), source: Box::new(e) })?;
         config.check()?;
         Ok(config)
@@ -235,6 +260,11 @@ impl Config {
         within("workers.count", self.workers.count, 1..=256, "1 to 256")?;
         within("workers.threads_per_request", self.workers.threads_per_request, 0..=1024, "0 to 1024")?;
         within("requests.queue", self.requests.queue, 1..=4096, "1 to 4096")?;
+        within("requests.waiting_per_client", self.requests.waiting_per_client, 1..=4096, "1 to 4096")?;
+        within("requests.working_per_client", self.requests.working_per_client, 0..=256, "0 to 256")?;
+        within("requests.uploads_mb", self.requests.uploads_mb, 1..=65_536, "1 to 65536")?;
+        let own = self.requests.uploads_mb_per_client;
+        within("requests.uploads_mb_per_client", own, 1..=65_536, "1 to 65536")?;
         within("requests.max_upload_mb", self.requests.max_upload_mb, 1..=65_536, "1 to 65536")?;
         within("requests.outbox_mb", self.requests.outbox_mb, 1..=65_536, "1 to 65536")?;
         within("requests.slow_reader_s", self.requests.slow_reader_s, 0.1..=86_400.0, "0.1 to 86400")?;

@@ -9,6 +9,7 @@ pub mod daemon;
 #[cfg(test)]
 mod fixtures;
 pub mod geometry;
+pub mod hostile_input;
 mod lru;
 pub mod plan;
 pub mod sdf;

@@ -156,6 +156,7 @@ fn the_daemon_answers_to_the_bit_what_the_service_answers_in_process() {
                 assert_eq!(there.blockers, numbers(&here.waited_for));
             }
             Event::Progress(_) => {}
+            Event::Restarted => panic!("nothing was restarted"),
             Event::Done(there) => {
                 assert!(steps.next().is_none());
                 assert_eq!((there.parts, there.units), (here.parts, here.units));

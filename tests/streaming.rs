@@ -143,6 +143,7 @@ fn read(client: &Client, options: &PlanOptions, pause: Duration) -> usize {
                 steps += 1;
             }
             Some(Event::Progress(_)) => {}
+            Some(Event::Restarted) => panic!("nothing was restarted"),
             Some(Event::Done(summary)) => {
                 assert_eq!((summary.steps as usize, summary.parts.len()), (steps, steps));
                 assert_eq!(summary.reason.as_deref(), Some("scripted"));

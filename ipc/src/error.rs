@@ -75,12 +75,20 @@ pub struct WireError {
     pub code: ErrorCode,
     /// What happened and what to do.
     pub message: String,
+    /// Of `Busy`: milliseconds after which asking again makes sense; else 0. It travels in the response's
+    /// header, not in the message.
+    pub retry_ms: u32,
 }
 
 impl WireError {
     /// An error with a message.
     pub fn new(code: ErrorCode, message: impl Into<String>) -> Self {
-        Self { code, message: message.into() }
+        Self { code, message: message.into(), retry_ms: 0 }
+    }
+
+    /// `Busy`, and when to come again.
+    pub fn busy(message: impl Into<String>, retry_ms: u32) -> Self {
+        Self { retry_ms, ..Self::new(ErrorCode::Busy, message) }
     }
 
     /// The message's bytes. Long texts are cut so that an error always fits one chunk.

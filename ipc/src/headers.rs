@@ -76,7 +76,8 @@ pub struct RequestHeader {
     pub flags: u32,
     /// Number of the plan request, unique within its client port; for `Control` the one meant.
     pub request: u64,
-    /// For `Control`: chunks of that request received so far, in all.
+    /// For `Control`: chunks of that request received so far, in all. For `Upload` and `Revise`: when the
+    /// answer is of no use any more (CLOCK_MONOTONIC nanoseconds), 0 for never.
     pub consumed: u64,
     /// Id of the listener on `wake/client` that the daemon notifies, low half first; 0 for none.
     pub listener: [u64; 2],
@@ -89,8 +90,8 @@ pub struct RequestHeader {
 pub struct ResponseHeader {
     /// A [`ResponseKind`].
     pub kind: u32,
-    /// Reserved, 0.
-    pub flags: u32,
+    /// Beside the error `busy`: milliseconds after which asking again makes sense. Else 0.
+    pub retry_ms: u32,
     /// Number of the plan request.
     pub request: u64,
     /// Number of this chunk in its request, from 0 without gaps.
@@ -107,12 +108,21 @@ pub struct ResponseHeader {
     pub sent_ns: u64,
 }
 
+impl RequestHeader {
+    /// When an upload or revision is of no use to its client any more.
+    #[must_use]
+    pub fn upload_deadline_ns(&self) -> Option<u64> {
+        (self.consumed != 0).then_some(self.consumed)
+    }
+}
+
 const _: () = {
     assert!(size_of::<RequestHeader>() == 40 && align_of::<RequestHeader>() == 8);
     assert!(offset_of!(RequestHeader, request) == 8);
     assert!(offset_of!(RequestHeader, consumed) == 16);
     assert!(offset_of!(RequestHeader, listener) == 24);
     assert!(size_of::<ResponseHeader>() == 64 && align_of::<ResponseHeader>() == 8);
+    assert!(offset_of!(ResponseHeader, retry_ms) == 4);
     assert!(offset_of!(ResponseHeader, request) == 8);
     assert!(offset_of!(ResponseHeader, sequence) == 16);
     assert!(offset_of!(ResponseHeader, offset) == 24);

@@ -19,6 +19,9 @@ pub const PLAN_SWEEPS: u32 = 4;
 /// They are simulated, too. Neither flag leaves it to the daemon; both are malformed.
 pub const PLAN_NO_SWEEPS: u32 = 8;
 
+/// Others go first: nobody waits for this plan.
+pub const PLAN_BATCH: u32 = 16;
+
 /// Names of the planners; the wire carries the index.
 pub const PLANNERS: [&str; 5] = ["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star"];
 /// Names of the engines; the wire carries the index.
@@ -39,7 +42,7 @@ pub struct PlanRequestHeader {
     pub engine: u32,
     /// Index into [`ACTION_SETS`].
     pub actions: u32,
-    /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`], [`PLAN_SWEEPS`], [`PLAN_NO_SWEEPS`].
+    /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`], [`PLAN_SWEEPS`], [`PLAN_NO_SWEEPS`], [`PLAN_BATCH`].
     pub flags: u32,
     /// Threads for this request; 0 leaves it to the daemon.
     pub threads: u32,
@@ -133,6 +136,8 @@ pub struct PlanRequest {
     pub sweeps: Option<bool>,
     /// Neither read nor write anything remembered.
     pub no_cache: bool,
+    /// Others go first: nobody waits for this plan.
+    pub batch: bool,
     /// Threads; 0 leaves it to the daemon.
     pub threads: u32,
     /// CLOCK_MONOTONIC nanoseconds.
@@ -162,6 +167,7 @@ impl PlanRequest {
             engine: self.engine,
             actions: self.actions,
             flags: flag(self.no_cache, PLAN_NO_CACHE)
+                | flag(self.batch, PLAN_BATCH)
                 | flag(self.targets.is_some(), PLAN_HAS_TARGETS)
                 | self.sweeps.map_or(0, |s| if s { PLAN_SWEEPS } else { PLAN_NO_SWEEPS }),
             threads: self.threads,
@@ -188,7 +194,7 @@ impl PlanRequest {
         let removed = reader.array::<u32>("removed", u64::from(h.removed))?.to_vec();
         let targets = reader.array::<u32>("targets", u64::from(h.targets))?.to_vec();
         let moved = reader.array::<MovedPart>("moved", u64::from(h.moved))?.to_vec();
-        const KNOWN: u32 = PLAN_NO_CACHE | PLAN_HAS_TARGETS | PLAN_SWEEPS | PLAN_NO_SWEEPS;
+        const KNOWN: u32 = PLAN_NO_CACHE | PLAN_HAS_TARGETS | PLAN_SWEEPS | PLAN_NO_SWEEPS | PLAN_BATCH;
         let set = |bit: u32| h.flags & bit != 0;
         if set(!KNOWN) || (set(PLAN_SWEEPS) && set(PLAN_NO_SWEEPS)) {
             return Err(Malformed::OutOfRange { field: "flags", value: u64::from(h.flags) });
@@ -200,6 +206,7 @@ impl PlanRequest {
             actions: h.actions,
             sweeps: (set(PLAN_SWEEPS) || set(PLAN_NO_SWEEPS)).then_some(set(PLAN_SWEEPS)),
             no_cache: set(PLAN_NO_CACHE),
+            batch: set(PLAN_BATCH),
             threads: h.threads,
             deadline_ns: (h.deadline_ns != 0).then_some(h.deadline_ns),
             max_simulations: (h.max_simulations != u64::MAX).then_some(h.max_simulations),

@@ -5,7 +5,7 @@
 //! (`tables`, `figure`). Only `runner` starts anything; whatever comes after it works on the
 //! records alone, so that shards of several machines can be put together later.
 //!
-//! `latency` and `replan` ask a `daemon` of their own; the first beside a `raw_peer`.
+//! `latency`, `load` and `replan` ask a `daemon` of their own; the first beside a `raw_peer`.
 
 mod corpus;
 mod daemon;
@@ -13,6 +13,7 @@ mod estimate;
 pub(crate) mod families;
 mod figure;
 mod latency;
+mod load;
 mod raw_peer;
 mod record;
 mod replan;
@@ -35,6 +36,10 @@ use std::time::Duration;
 pub use corpus::{Category, Problem, Shard, find};
 pub use families::Family;
 pub use latency::{Latency, LatencyRequest, Percentiles, latency};
+pub use load::{
+    DaemonFigures, Footprint, Kind, KindFigures, Load, LoadClient, LoadRequest, Phase, Role, load,
+    load_client,
+};
 pub use raw_peer::serve as serve_raw;
 pub use record::{Key, Record, Settings, Store, read};
 pub use replan::{Cost, ReplanRecord, replan};

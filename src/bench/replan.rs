@@ -112,6 +112,7 @@ impl Asked {
         while let Some(event) = stream.next_event().map_err(BenchError::failed)? {
             match event {
                 Event::Progress(_) => {}
+                Event::Restarted => steps.clear(),
                 Event::Step(step) => steps.push((step.part as usize, step.path.to_vec())),
                 Event::Done(summary) => return Ok((Answered { status: summary.status, steps }, summary)),
             }

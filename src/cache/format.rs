@@ -14,8 +14,15 @@ const CHECKSUM_AT: usize = 16;
 /// What can be remembered: the types of `records.rs`.
 pub trait Record: Serialize + DeserializeOwned {}
 
-const LAYOUT: bincode::config::Configuration<bincode::config::LittleEndian, bincode::config::Fixint> =
-    bincode::config::standard().with_fixed_int_encoding();
+/// No record is read that announces more bytes than this: a count in a damaged one is asked of the
+/// allocator before anything is seen to be missing.
+const LONGEST: usize = 256 << 20;
+
+const LAYOUT: bincode::config::Configuration<
+    bincode::config::LittleEndian,
+    bincode::config::Fixint,
+    bincode::config::Limit<LONGEST>,
+> = bincode::config::standard().with_fixed_int_encoding().with_limit::<LONGEST>();
 
 /// The payload of a record; `None` if it cannot be encoded, which the types of `records.rs` can.
 pub(super) fn encode(record: &impl Record) -> Option<Vec<u8>> {

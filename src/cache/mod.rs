@@ -16,6 +16,7 @@
 mod answer;
 mod disk;
 mod format;
+mod hostile;
 mod kind;
 mod memory;
 mod motion;
@@ -38,6 +39,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 pub use disk::DiskError;
 pub use format::Record;
+pub(crate) use hostile::read_as_records;
 pub use kind::{Digest, Key, Kind};
 pub use motion::MotionQuestion;
 pub use pair::{blocking_key, overlap_key};

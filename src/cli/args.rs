@@ -13,6 +13,10 @@ use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::{Pose, Waypoint, waypoint_from_pose};
 use crate::search;
 
+mod load;
+
+pub(super) use load::{BenchLoad, BenchLoadClient};
+
 /// Plans how assemblies come apart.
 #[derive(Debug, Parser)]
 #[command(name = "sbdp", version, about, after_help = EXIT_CODES)]
@@ -164,6 +168,11 @@ pub(super) enum BenchCommand {
     Latency(BenchLatency),
     /// Plan again through a daemon when one part changed, beside a daemon that planned nothing before
     Replan(BenchReplan),
+    /// Put a daemon under the load of many clients at once: nothing may be lost, and it may not grow
+    Load(BenchLoad),
+    /// A client of `load`
+    #[command(hide = true)]
+    LoadClient(BenchLoadClient),
     /// The peer of `latency`
     #[command(hide = true)]
     RawPeer(BenchRawPeer),

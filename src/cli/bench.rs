@@ -1,5 +1,6 @@
 //! `sbdp bench`.
 
+mod load;
 mod through_daemon;
 
 use std::io::IsTerminal;
@@ -29,6 +30,8 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<ExitCode, CliError> {
         (Some(BenchCommand::Scale(scale)), _) => measure_growth(scale),
         (Some(BenchCommand::Latency(latency)), _) => through_daemon::latency(latency),
         (Some(BenchCommand::Replan(replan)), _) => through_daemon::replan(replan),
+        (Some(BenchCommand::Load(arguments)), _) => load::load(arguments),
+        (Some(BenchCommand::LoadClient(client)), _) => load::client(client),
         (Some(BenchCommand::RawPeer(peer)), _) => through_daemon::raw_peer(peer),
         (None, Some(run)) => measure(run),
         (None, None) => Err(CliError::Refused("give folders of assemblies, or `report`".to_owned())),

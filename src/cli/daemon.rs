@@ -81,6 +81,10 @@ fn receive(
                 steps.push(plan_step(&step));
                 steps.last().into_iter().for_each(|s| sink.step(s));
             }
+            Ok(Some(Event::Restarted)) => {
+                eprintln!("the daemon was restarted: the plan begins anew");
+                steps.clear();
+            }
             Ok(Some(Event::Done(summary))) => {
                 return Ok(Plan { poses: poses(&question.revision), ..plan(summary, steps) });
             }
@@ -130,6 +134,7 @@ fn options(question: &Question<'_>) -> PlanOptions {
         targets: request.targets.as_deref().map(numbers),
         sweeps: request.sweeps,
         no_cache: request.no_cache,
+        batch: false,
         moved: Vec::new(),
     }
 }

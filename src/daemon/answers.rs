@@ -56,7 +56,8 @@ impl Answer {
 /// nothing is to be remembered.
 pub(crate) fn question(request: &PlanRequest) -> Option<Vec<u8>> {
     let PlanRequest { no_cache, .. } = *request;
-    (!no_cache).then(|| PlanRequest { threads: 0, deadline_ns: None, ..request.clone() }.encode())
+    (!no_cache)
+        .then(|| PlanRequest { threads: 0, batch: false, deadline_ns: None, ..request.clone() }.encode())
 }
 
 /// The answers that are remembered: those that were asked for last, within a number of bytes.
@@ -138,7 +139,7 @@ mod tests {
     #[test]
     fn threads_and_deadlines_make_no_other_question() {
         let request = PlanRequest { fixed: vec![1], ..PlanRequest::default() };
-        let same = PlanRequest { threads: 4, deadline_ns: Some(9), ..request.clone() };
+        let same = PlanRequest { threads: 4, batch: true, deadline_ns: Some(9), ..request.clone() };
         assert_eq!(question(&request), question(&same));
         assert_ne!(question(&request), question(&PlanRequest { fixed: vec![2], ..request.clone() }));
         assert_eq!(question(&PlanRequest { no_cache: true, ..request }), None);

@@ -15,9 +15,11 @@ use sbdp_ipc::status::{Status, StatusHeader};
 
 use super::answers::{Answers, question};
 use super::convert;
-use super::request_queue::Rejected;
+use super::intake::Upload;
+use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::session::{End, Input, Link, Session, State};
-use super::workers::{AdmitJob, PlanJob, Planning, Queues, SessionKey, WorkerEvent};
+use super::shared_queue::Queues;
+use super::workers::{AdmitJob, PlanJob, Planning, SessionKey, WorkerEvent};
 use crate::config::{Config, seconds};
 use crate::search::Termination;
 use crate::service::AssemblyId;
@@ -26,7 +28,10 @@ use crate::service::AssemblyId;
 #[derive(Debug)]
 pub(crate) struct Incoming<L> {
     pub(crate) link: L,
+    /// The client's port.
     pub(crate) client: u128,
+    /// Who counts for quotas.
+    pub(crate) owner: Owner,
     pub(crate) header: RequestHeader,
     pub(crate) payload: AlignedBytes,
 }
@@ -78,16 +83,16 @@ struct Limits {
 /// The desk.
 #[derive(Debug)]
 pub(crate) struct Desk<L, P> {
-    service: Arc<P>,
-    queues: Queues,
+    pub(super) service: Arc<P>,
+    pub(super) queues: Queues,
     limits: Limits,
     sessions: HashMap<SessionKey, Session<L>>,
-    uploads: HashMap<u64, (L, u128)>,
+    pub(super) uploads: HashMap<u64, Upload<L>>,
     running: BTreeSet<(u128, u64)>,
     answers: Answers,
-    next_upload: u64,
+    pub(super) next_upload: u64,
     closing: Closing,
-    counters: StatusHeader,
+    pub(super) counters: StatusHeader,
     preloaded: Vec<(String, [u8; 32])>,
     started: Instant,
     /// Listeners to wake.
@@ -156,7 +161,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
 
     fn plan(&mut self, incoming: Incoming<L>) {
         self.counters.requests += 1;
-        let Incoming { link, client, header, payload } = incoming;
+        let Incoming { link, client, owner, header, payload } = incoming;
         let key = SessionKey { client, request: header.request };
         if self.sessions.contains_key(&key) {
             let error = WireError::new(ErrorCode::Malformed, "this request number is in use");
@@ -165,7 +170,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
         let mut session =
             Session::new(link, header.request, id_of_words(header.listener), self.limits.outbox);
-        if let Err((input, error)) = self.admit(&mut session, key, &payload) {
+        if let Err((input, error)) = self.admit(&mut session, key, owner, &payload) {
             session.end_with(input, &error);
         }
         // What is there goes out at once, not behind other requests.
@@ -184,11 +189,12 @@ impl<L: Link, P: Planning> Desk<L, P> {
         &mut self,
         session: &mut Session<L>,
         key: SessionKey,
+        owner: Owner,
         payload: &AlignedBytes,
     ) -> Result<(), (Input, WireError)> {
         let refuse = |code, message: String| (Input::Refuse, WireError::new(code, message));
         if self.closing != Closing::Open {
-            return Err(refuse(ErrorCode::ShuttingDown, "the daemon is shutting down".to_owned()));
+            return Err((Input::Refuse, self.shutting_down()));
         }
         let wire = PlanRequest::decode(payload.as_slice())
             .map_err(|e| refuse(ErrorCode::Malformed, format!("plan request: {e}")))?;
@@ -211,26 +217,27 @@ impl<L: Link, P: Planning> Desk<L, P> {
             self.counters.remembered += 1;
             return Ok(());
         }
-        match self.queues.plans.push(PlanJob {
-            key,
-            assembly,
-            question,
-            moved: convert::moved(&wire.moved),
-            request,
-            termination,
-        }) {
+        let class = if wire.batch { Class::Batch } else { Class::Interactive };
+        let job =
+            PlanJob { key, assembly, question, moved: convert::moved(&wire.moved), request, termination };
+        let rejected = match self.queues.plans.push(Ticket { owner, class, bytes: 0 }, job) {
             Ok(()) => {
                 session.input(Input::Enqueue);
-                Ok(())
+                return Ok(());
             }
-            Err(Rejected::Full) => Err(refuse(
-                ErrorCode::Busy,
-                format!("busy: {} requests wait already", self.queues.plans.len()),
-            )),
-            Err(Rejected::Closed) => {
-                Err(refuse(ErrorCode::ShuttingDown, "the daemon is shutting down".to_owned()))
-            }
-        }
+            Err(rejected) => rejected,
+        };
+        let busy = |message: String| WireError::busy(message, self.queues.plans.hint_ms());
+        let error = match rejected {
+            Rejected::Full => busy(format!("busy: {} requests wait already", self.queues.plans.len())),
+            Rejected::OwnerFull => busy("busy: as many requests of this client wait as may wait".to_owned()),
+            Rejected::Closed => self.shutting_down(),
+        };
+        Err((Input::Refuse, error))
+    }
+
+    pub(super) fn shutting_down(&self) -> WireError {
+        WireError::new(ErrorCode::ShuttingDown, "the daemon is shutting down")
     }
 
     fn control(&mut self, incoming: &Incoming<L>) {
@@ -245,36 +252,6 @@ impl<L: Link, P: Planning> Desk<L, P> {
             let error = WireError::new(ErrorCode::Cancelled, "cancelled before planning began");
             session.end_with(Input::Cancel, &error);
         }
-    }
-
-    fn have(&mut self, incoming: &Incoming<L>) {
-        match <[u8; 32]>::try_from(incoming.payload.as_slice()) {
-            Ok(handle) => {
-                let known = self.service.knows(AssemblyId(handle));
-                self.answer_handle(&incoming.link, &incoming.header, handle, known);
-            }
-            Err(_) => {
-                let error = WireError::new(ErrorCode::Malformed, "a handle has 32 bytes");
-                self.answer_error(&incoming.link, &incoming.header, &error);
-            }
-        }
-    }
-
-    /// Lets meshes be taken in.
-    fn take_in(&mut self, incoming: Incoming<L>, job: impl FnOnce(u64, AlignedBytes) -> AdmitJob) {
-        self.counters.uploads += 1;
-        let Incoming { link, header, payload, .. } = incoming;
-        let number = self.next_upload;
-        self.next_upload += 1;
-        if self.closing == Closing::Open && self.queues.admissions.push(job(number, payload)).is_ok() {
-            self.uploads.insert(number, (link, id_of_words(header.listener)));
-            return;
-        }
-        let error = match self.closing {
-            Closing::Open => WireError::new(ErrorCode::Busy, "busy: too many uploads wait"),
-            _ => WireError::new(ErrorCode::ShuttingDown, "the daemon is shutting down"),
-        };
-        self.answer_error(&link, &header, &error);
     }
 
     fn worker(&mut self, event: WorkerEvent) {
@@ -325,15 +302,6 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
     }
 
-    fn admitted(&mut self, number: u64, result: Result<AssemblyId, WireError>) {
-        let Some((link, listener)) = self.uploads.remove(&number) else { return };
-        let header = RequestHeader { listener: id_words(listener), ..RequestHeader::default() };
-        match result {
-            Ok(id) => self.answer_handle(&link, &header, id.0, true),
-            Err(error) => self.answer_error(&link, &header, &error),
-        }
-    }
-
     /// First signal: nothing new, and running requests get their grace. Second: no more grace.
     fn terminate(&mut self, now: Instant) {
         self.closing = match self.closing {
@@ -342,7 +310,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
             drain @ Closing::Drain(_) => drain,
         };
         self.queues.close();
-        let error = WireError::new(ErrorCode::ShuttingDown, "the daemon is shutting down");
+        let error = self.shutting_down();
         for (key, session) in &mut self.sessions {
             if session.state() == State::Queued && self.queues.plans.withdraw(|job| job.key == *key) {
                 session.end_with(Input::Refuse, &error);
@@ -374,6 +342,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
         for key in over {
             self.remove(key);
         }
+        self.settle_uploads(now);
         self.close_down(now);
     }
 
@@ -403,7 +372,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
                 self.closing = Closing::Drain(now + self.limits.drain);
             }
             Closing::Drain(end) if end <= now => {
-                let error = WireError::new(ErrorCode::ShuttingDown, "the daemon is shutting down");
+                let error = self.shutting_down();
                 for session in self.sessions.values_mut() {
                     // Legal from every live state: a worker that does not stop is left behind.
                     let input =
@@ -425,13 +394,13 @@ impl<L: Link, P: Planning> Desk<L, P> {
     }
 
     /// When `settle` must be called next without anything happening.
-    pub(crate) fn next_deadline(&self) -> Option<Instant> {
+    pub(crate) fn next_deadline(&self, now: Instant) -> Option<Instant> {
         let queued = self.sessions.values().filter(|s| s.state() == State::Queued).filter_map(|s| s.deadline);
         let closing = match self.closing {
             Closing::Open => None,
             Closing::Grace(end) | Closing::Drain(end) => Some(end),
         };
-        queued.chain(closing).min()
+        queued.chain(closing).chain(self.next_upload_deadline(now)).min()
     }
 
     fn status(&self) -> Status {
@@ -447,19 +416,31 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
     }
 
-    fn answer_handle(&mut self, link: &L, header: &RequestHeader, handle: [u8; 32], known: bool) {
+    pub(super) fn answer_handle(&mut self, link: &L, header: &RequestHeader, handle: [u8; 32], known: bool) {
         let response = HandleResponse { handle, known: u32::from(known), reserved: 0 };
         self.answer(link, header, ResponseKind::Handle, bytemuck::bytes_of(&response));
     }
 
-    fn answer_error(&mut self, link: &L, header: &RequestHeader, error: &WireError) {
-        self.answer(link, header, ResponseKind::Error, &error.encode());
+    pub(super) fn answer_error(&mut self, link: &L, header: &RequestHeader, error: &WireError) {
+        self.respond(link, header, ResponseKind::Error, &error.encode(), error.retry_ms);
+    }
+
+    fn answer(&mut self, link: &L, request: &RequestHeader, kind: ResponseKind, bytes: &[u8]) {
+        self.respond(link, request, kind, bytes, 0);
     }
 
     /// The one response to a request that is not a plan; its buffer is empty, so it fits.
-    fn answer(&mut self, link: &L, request: &RequestHeader, kind: ResponseKind, bytes: &[u8]) {
+    fn respond(
+        &mut self,
+        link: &L,
+        request: &RequestHeader,
+        kind: ResponseKind,
+        bytes: &[u8],
+        retry_ms: u32,
+    ) {
         let header = ResponseHeader {
             kind: kind as u32,
+            retry_ms,
             request: request.request,
             total: bytes.len() as u64,
             sent_ns: clock::monotonic_ns(),

@@ -146,7 +146,8 @@ impl Bench {
         config.requests.queue = queue;
         config.times.grace_s = 0.0;
         let service = Arc::new(Scripted::default());
-        let queues = Queues::new(queue);
+        config.requests.waiting_per_client = queue;
+        let queues = Queues::new(&config);
         let (sender, reports): (Sender<WorkerEvent>, _) = channel();
         let sender = Mutex::new(sender);
         let report: Report = Arc::new(move |event| {
@@ -162,7 +163,7 @@ impl Bench {
         let header =
             RequestHeader { kind: kind as u32, request: self.next_request, ..RequestHeader::default() };
         let payload = AlignedBytes::copy_of(payload);
-        (wire.clone(), Incoming { link: wire, client: 5, header, payload })
+        (wire.clone(), Incoming { link: wire, client: 5, owner: Owner(5), header, payload })
     }
 
     fn ask(&mut self, request: &PlanRequest) -> Wire {
@@ -302,7 +303,7 @@ fn a_deadline_that_passes_in_the_queue_is_answered_expired() {
         ..PlanRequest::default()
     };
     let wire = bench.ask(&request);
-    assert!(bench.desk.next_deadline().is_some());
+    assert!(bench.desk.next_deadline(Instant::now()).is_some());
     bench.until(|desk| desk.counters.expired == 1);
     assert_eq!(wire.error(), Some(ErrorCode::Expired));
     bench.service.let_go.store(true, Ordering::Relaxed);
@@ -352,4 +353,91 @@ fn an_upload_that_makes_admission_panic_is_answered_failed() {
     bench.handle(Event::Upload(incoming));
     bench.until(|desk| desk.uploads.is_empty());
     assert_eq!(wire.error(), Some(ErrorCode::Malformed));
+}
+
+/// Another process than the one that all other requests come from.
+const OTHER: Owner = Owner(6);
+
+impl Bench {
+    fn ask_as(&mut self, owner: Owner, request: &PlanRequest) -> Wire {
+        let (wire, incoming) = self.incoming(RequestKind::Plan, &request.encode());
+        self.handle(Event::Plan(Incoming { owner, ..incoming }));
+        wire
+    }
+
+    fn upload(&mut self, deadline_ns: u64) -> Wire {
+        let (wire, mut incoming) = self.incoming(RequestKind::Upload, &[0xff; 200]);
+        incoming.header.consumed = deadline_ns;
+        self.handle(Event::Upload(incoming));
+        wire
+    }
+}
+
+#[test]
+fn a_client_that_fills_its_share_is_told_when_to_come_again_and_others_are_taken() {
+    let mut bench = Bench::new(4);
+    bench.desk.queues = {
+        let mut config = Config::default();
+        config.requests.waiting_per_client = 1;
+        Queues::new(&config)
+    };
+    let unremembered = PlanRequest { no_cache: true, ..request(QUICK) };
+    assert!(bench.ask(&unremembered).kinds().is_empty());
+    let refused = bench.ask(&unremembered);
+    assert_eq!(refused.error(), Some(ErrorCode::Busy));
+    assert!(refused.got.borrow()[0].0.retry_ms > 0);
+    assert!(bench.ask_as(OTHER, &unremembered).kinds().is_empty(), "it waits");
+    assert_eq!(bench.desk.queues.plans.len(), 2);
+}
+
+#[test]
+fn a_batch_request_waits_for_interactive_ones() {
+    let mut bench = Bench::new(4);
+    bench.script(HOLD);
+    bench.until_running();
+    let unremembered = PlanRequest { no_cache: true, ..request(QUICK) };
+    let batch = bench.ask(&PlanRequest { batch: true, ..unremembered.clone() });
+    let urgent = bench.ask_as(OTHER, &unremembered);
+    bench.service.let_go.store(true, Ordering::Relaxed);
+    bench.until(|desk| desk.counters.done >= 2);
+    assert_eq!(urgent.summary_status(), Some("complete"));
+    bench.until(|desk| desk.counters.done == 3);
+    assert_eq!(batch.summary_status(), Some("complete"));
+}
+
+#[test]
+fn an_upload_that_is_late_is_answered_expired() {
+    let mut bench = Bench::new(4);
+    assert_eq!(bench.upload(1).error(), Some(ErrorCode::Expired));
+    // Nobody takes these up: they are late while they wait.
+    bench.desk.queues = Queues::new(&Config::default());
+    let waiting = bench.upload(clock::deadline_in(Duration::from_millis(20)));
+    assert!(waiting.kinds().is_empty() && bench.desk.next_deadline(Instant::now()).is_some());
+    bench.until(|desk| desk.uploads.is_empty());
+    assert_eq!(waiting.error(), Some(ErrorCode::Expired));
+    assert_eq!(bench.desk.queues.admissions.len(), 0);
+}
+
+#[test]
+fn an_upload_whose_client_leaves_keeps_no_memory() {
+    let mut bench = Bench::new(4);
+    bench.desk.queues = Queues::new(&Config::default());
+    let waiting = bench.upload(0);
+    waiting.gone.set(true);
+    bench.desk.settle(Instant::now());
+    assert!(bench.desk.uploads.is_empty() && bench.desk.queues.admissions.len() == 0);
+    assert!(waiting.kinds().is_empty());
+}
+
+#[test]
+fn more_uploaded_bytes_than_may_wait_are_refused_before_they_are_copied() {
+    let mut bench = Bench::new(4);
+    let mut config = Config::default();
+    config.requests.uploads_mb_per_client = 1;
+    bench.desk.queues = Queues::new(&config);
+    assert!(bench.desk.refuses_upload(OTHER, 5 << 20).is_none(), "one that would wait alone is taken");
+    bench.upload(0);
+    let error = bench.desk.refuses_upload(Owner(5), 5 << 20).unwrap();
+    assert_eq!(error.code, ErrorCode::Busy);
+    assert!(error.retry_ms > 0 && bench.desk.refuses_upload(OTHER, 5 << 20).is_none());
 }

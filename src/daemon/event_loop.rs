@@ -9,20 +9,25 @@ use sbdp_ipc::Transport;
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::RequestKind;
-use sbdp_ipc::layout::PLAN_REQUEST;
+use sbdp_ipc::layout::{MAX_CLIENTS, PLAN_ACTIVE_REQUESTS, PLAN_REQUEST};
 use sbdp_ipc::services::{Active, ServerPort};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use super::DaemonError;
 use super::desk::{Desk, Event, Incoming};
+use super::intake::ticket;
 use super::lifecycle::{Lease, Place, raise_file_limit, warn_of_small_shared_memory};
 use super::ports::{ActiveLink, Ports};
-use super::workers::{AdmitJob, Planning, Queues, Report, WorkerEvent, start, start_prefetch};
+use super::request_queue::Owner;
+use super::shared_queue::Queues;
+use super::workers::{AdmitJob, Planning, Report, WorkerEvent, start, start_prefetch};
 use crate::config::{Config, seconds};
 
 /// Requests taken from one port before workers' reports are looked at again.
-const RECEIVE_AT_ONCE: usize = 64;
+/// Nobody's requests are taken twice before everybody's were taken once: iceoryx2 looks at the ports in
+/// the same order each time, but gives no more of one than it may have active.
+const RECEIVE_AT_ONCE: usize = (MAX_CLIENTS + 1) * PLAN_ACTIVE_REQUESTS;
 
 /// Runs the daemon until SIGTERM or SIGINT.
 ///
@@ -37,7 +42,7 @@ pub fn run<P: Planning>(config: &Config, service: Arc<P>) -> Result<(), DaemonEr
     let ports = Ports::open(&iceoryx2)?;
     let (sender, inbox) = channel();
     watch_signals(&ports, sender.clone())?;
-    let queues = Queues::new(config.requests.queue);
+    let queues = Queues::new(config);
     start(config.workers.count, &queues, &service, &reporter(&ports, sender))
         .map_err(|source| DaemonError::System { what: "starting workers", source })?;
     if config.cache.prefetch {
@@ -45,7 +50,7 @@ pub fn run<P: Planning>(config: &Config, service: Arc<P>) -> Result<(), DaemonEr
             .map_err(|source| DaemonError::System { what: "starting workers", source })?;
     }
     for path in &config.preload.assemblies {
-        if queues.admissions.push(AdmitJob::Preload(path.clone())).is_err() {
+        if queues.admissions.push(ticket(Owner::default(), 0), AdmitJob::Preload(path.clone())).is_err() {
             tracing::warn!(path = %path.display(), "not preloaded: the list is too long");
         }
     }
@@ -136,6 +141,7 @@ impl<P: Planning> EventLoop<P> {
             if Instant::now() >= next_tick {
                 // A killed client is seen, and its memory given back, only by this.
                 let _ = self.ports.node.try_cleanup_dead_nodes();
+                self.ports.forget_owners();
                 next_tick = Instant::now() + self.tick;
                 continue;
             }
@@ -146,8 +152,9 @@ impl<P: Planning> EventLoop<P> {
     }
 
     fn wait(&self, next_tick: Instant) {
-        let until = self.desk.next_deadline().map_or(next_tick, |d| d.min(next_tick));
-        let timeout = until.saturating_duration_since(Instant::now());
+        let now = Instant::now();
+        let until = self.desk.next_deadline(now).map_or(next_tick, |d| d.min(next_tick));
+        let timeout = until.saturating_duration_since(now);
         if let Err(error) = self.ports.listener.timed_wait(|_| {}, timeout) {
             // A signal, or a listener out of order: never spin on it.
             tracing::debug!(%error, "waiting was interrupted");
@@ -174,7 +181,10 @@ impl<P: Planning> EventLoop<P> {
             let taken: Vec<Active> = std::iter::from_fn(|| receive(port)).take(RECEIVE_AT_ONCE).collect();
             more |= taken.len() == RECEIVE_AT_ONCE;
             for active in taken {
-                let event = read(active, geometry, self.limits);
+                let owner = self.ports.owner_of(active.origin().value(), geometry);
+                let length = active.payload().len();
+                let refused = if geometry { self.desk.refuses_upload(owner, length) } else { None };
+                let event = read(active, owner, geometry, self.limits, refused);
                 self.desk.handle(event, Instant::now());
                 // Whoever is answered already is not to wait for those behind.
                 self.deliver();
@@ -204,19 +214,32 @@ fn receive(port: &ServerPort) -> Option<Active> {
 }
 
 /// Copies a request out of shared memory: the client may change it after sending.
-fn read(active: Active, geometry: bool, limits: ReceiveLimits) -> Event<ActiveLink> {
+fn read(
+    active: Active,
+    owner: Owner,
+    geometry: bool,
+    limits: ReceiveLimits,
+    refused: Option<WireError>,
+) -> Event<ActiveLink> {
     let header = *active.user_header();
     let length = active.payload().len();
     let limit = if geometry { limits.upload } else { PLAN_REQUEST as u64 };
-    let fits = length as u64 <= limit;
+    let meshes = [RequestKind::Upload, RequestKind::Revise];
+    let kind = RequestKind::from_wire(header.kind);
+    // What waits within its quota is not to be joined by copies that will be refused.
+    let refused = refused.filter(|_| kind.is_some_and(|k| meshes.contains(&k)));
+    let fits = length as u64 <= limit && refused.is_none();
     let payload = if fits { AlignedBytes::copy_of(active.payload()) } else { AlignedBytes::default() };
     let client = active.origin().value();
-    let incoming = Incoming { link: ActiveLink(active), client, header, payload };
+    let incoming = Incoming { link: ActiveLink(active), client, owner, header, payload };
+    if let Some(error) = refused.filter(|_| length as u64 <= limit) {
+        return Event::Unusable(incoming, error);
+    }
     if !fits {
         let message = format!("{length} bytes are more than the {limit} that this daemon takes");
         return Event::Unusable(incoming, WireError::new(ErrorCode::TooLarge, message));
     }
-    match (geometry, RequestKind::from_wire(header.kind)) {
+    match (geometry, kind) {
         (false, Some(RequestKind::Plan)) => Event::Plan(incoming),
         (false, Some(RequestKind::Control)) => Event::Control(incoming),
         (false, Some(RequestKind::Status)) => Event::Status(incoming),

@@ -12,14 +12,17 @@ mod answers;
 mod convert;
 mod desk;
 mod event_loop;
+mod intake;
 mod lifecycle;
 mod outbox;
 mod ports;
 mod prefetch;
 mod request_queue;
 mod session;
+mod shared_queue;
 mod workers;
 
+pub(crate) use convert::source_assembly as uploaded_assembly;
 pub use event_loop::run;
 pub use lifecycle::LifecycleError;
 pub use lifecycle::check_place;

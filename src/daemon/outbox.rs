@@ -71,6 +71,7 @@ struct Sending {
     kind: ResponseKind,
     bytes: Arc<Vec<u8>>,
     offset: usize,
+    retry_ms: u32,
 }
 
 /// A chunk to send now.
@@ -80,6 +81,7 @@ pub(crate) struct Chunk<'o> {
     pub(crate) sequence: u64,
     pub(crate) offset: u64,
     pub(crate) total: u64,
+    pub(crate) retry_ms: u32,
     pub(crate) bytes: &'o [u8],
 }
 
@@ -135,8 +137,12 @@ impl Outbox {
         self.waiting.clear();
         self.waiting_bytes = 0;
         self.window = RESPONSE_BUFFER as u64;
-        self.sending =
-            Some(Sending { kind: ResponseKind::Error, bytes: Arc::new(error.encode()), offset: 0 });
+        self.sending = Some(Sending {
+            kind: ResponseKind::Error,
+            bytes: Arc::new(error.encode()),
+            offset: 0,
+            retry_ms: error.retry_ms,
+        });
     }
 
     /// The client has received this many chunks in all. Nonsense changes nothing.
@@ -167,6 +173,7 @@ impl Outbox {
             sequence,
             offset: sending.offset as u64,
             total: sending.bytes.len() as u64,
+            retry_ms: sending.retry_ms,
             bytes: &sending.bytes[sending.offset..end],
         })
     }
@@ -184,7 +191,7 @@ impl Outbox {
     fn encode_next(&mut self) -> Option<Sending> {
         let first = self.pop()?;
         match first {
-            Message::Whole { kind, bytes } => Some(Sending { kind, bytes, offset: 0 }),
+            Message::Whole { kind, bytes } => Some(Sending { kind, bytes, offset: 0, retry_ms: 0 }),
             Message::Step(step) => Some(self.encode_steps(step)),
         }
     }
@@ -202,7 +209,7 @@ impl Outbox {
         }
         let encoded = encode_steps(self.steps, &steps);
         self.steps += steps.len() as u32;
-        Sending { kind: ResponseKind::Steps, bytes: Arc::new(encoded), offset: 0 }
+        Sending { kind: ResponseKind::Steps, bytes: Arc::new(encoded), offset: 0, retry_ms: 0 }
     }
 
     fn pop(&mut self) -> Option<Message> {

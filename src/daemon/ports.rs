@@ -1,5 +1,6 @@
 //! The daemon's iceoryx2 ports. Only the port thread holds them.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use iceoryx2::node::Node;
@@ -7,13 +8,14 @@ use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::port::{BackpressureAction, BackpressureInfo, SendError};
-use iceoryx2::prelude::{CallbackProgression, Config};
+use iceoryx2::prelude::{CallbackProgression, Config, PortFactory};
 use sbdp_ipc::Transport;
 use sbdp_ipc::headers::ResponseHeader;
 use sbdp_ipc::layout::{self, WAKE_CLIENT_SERVICE, WAKE_SERVER_SERVICE};
 use sbdp_ipc::progress::ProgressSample;
 use sbdp_ipc::services::{self, Active, ExchangeService, ServerPort, SetupError};
 
+use super::request_queue::Owner;
 use super::session::{Link, Undelivered};
 
 /// All ports of the daemon.
@@ -26,6 +28,9 @@ pub(crate) struct Ports {
     /// Wakes this daemon; shared with workers and the signal thread.
     pub(crate) wake_self: Arc<Notifier<Transport>>,
     wake_clients: Notifier<Transport>,
+    services: [ExchangeService; 2],
+    /// By client port, what was asked of the services before.
+    owners: HashMap<u128, Owner>,
     pub(crate) node: Node<Transport>,
 }
 
@@ -64,8 +69,34 @@ impl Ports {
                 .notifier_builder()
                 .create()
                 .map_err(SetupError::at("creating the clients' notifier"))?,
+            services: [plan, geometry],
+            owners: HashMap::new(),
             node,
         })
+    }
+
+    /// Whose port this is: the process that opened it, or the port itself where that cannot be told.
+    pub(crate) fn owner_of(&mut self, client: u128, geometry: bool) -> Owner {
+        if let Some(owner) = self.owners.get(&client) {
+            return *owner;
+        }
+        let mut owner = Owner(client as u64 ^ (client >> 64) as u64);
+        self.services[usize::from(geometry)].dynamic_config().list_clients(|details| {
+            if details.client_id.value() != client {
+                return CallbackProgression::Continue;
+            }
+            if let Ok(pid) = details.node_id.pid::<Transport>() {
+                owner = Owner(pid.value() as u64);
+            }
+            CallbackProgression::Stop
+        });
+        self.owners.insert(client, owner);
+        owner
+    }
+
+    /// Those that are still there are asked again.
+    pub(crate) fn forget_owners(&mut self) {
+        self.owners.clear();
     }
 
     /// Wakes the clients with these listener ids, and no others.

@@ -1,48 +1,209 @@
-//! A bounded first-in-first-out queue of jobs. It holds no locks; `workers` shares it.
+//! A bounded queue of jobs with priorities, quotas and fair turns. It holds no locks; `shared_queue`
+//! shares it.
+//!
+//! Who waits is taken in this order: interactive jobs before batch jobs (but a batch job that saw
+//! [`PATIENCE`] others pass goes next); of these, those of the client with the fewest jobs at work; of
+//! these, the client whose last turn is longest ago; of its jobs the oldest. A client that asks a hundred
+//! times so waits for itself, not the others for it.
 
-use std::collections::VecDeque;
+use std::collections::HashMap;
+use std::time::Duration;
+
+/// A client, as far as quotas go: a process, however many ports it has.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(crate) struct Owner(pub(crate) u64);
+
+/// How urgent a job is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Class {
+    /// Somebody waits for it.
+    Interactive,
+    /// It may wait.
+    Batch,
+}
+
+/// What the queue knows of a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Ticket {
+    pub(crate) owner: Owner,
+    pub(crate) class: Class,
+    /// Bytes that it keeps while it waits.
+    pub(crate) bytes: u64,
+}
 
 /// Why a job was not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Rejected {
     /// As many wait as may wait.
     Full,
+    /// As many of this client wait as may wait of one.
+    OwnerFull,
     /// Nothing is taken any more.
     Closed,
 }
 
+/// What may wait and work at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Bounds {
+    /// Jobs that wait.
+    pub(crate) waiting: usize,
+    /// Those of one client.
+    pub(crate) waiting_per_owner: usize,
+    /// Bytes that waiting jobs keep. A job that would wait alone is always taken.
+    pub(crate) bytes: u64,
+    /// Those of one client.
+    pub(crate) bytes_per_owner: u64,
+    /// Who takes jobs; only for the hint when to come again.
+    pub(crate) workers: usize,
+    /// Jobs of one client at work.
+    pub(crate) working_per_owner: usize,
+    /// Batch jobs at work.
+    pub(crate) working_batch: usize,
+}
+
+/// So many interactive jobs go before a batch job that waits.
+const PATIENCE: u32 = 16;
+/// The share of the newest in the running mean of how long jobs take.
+const NEWEST: f64 = 0.2;
+/// The least and the most milliseconds that a client is told to wait.
+const HINT_MS: (f64, f64) = (10.0, 10_000.0);
+
 /// The queue.
 #[derive(Debug)]
 pub(crate) struct RequestQueue<J> {
-    waiting: VecDeque<J>,
-    limit: usize,
+    waiting: Vec<(Ticket, J)>,
+    bounds: Bounds,
+    /// By client: jobs at work, and the number of its last turn.
+    owners: HashMap<Owner, Turns>,
+    turns: u64,
+    batch_working: usize,
+    /// Interactive jobs taken while a batch job waited.
+    passed: u32,
+    mean_ms: f64,
     closed: bool,
 }
 
+#[derive(Debug, Clone, Copy, Default)]
+struct Turns {
+    working: usize,
+    last: u64,
+}
+
 impl<J> RequestQueue<J> {
-    pub(crate) fn new(limit: usize) -> Self {
-        Self { waiting: VecDeque::new(), limit, closed: false }
+    pub(crate) fn new(bounds: Bounds) -> Self {
+        Self {
+            waiting: Vec::new(),
+            bounds,
+            owners: HashMap::new(),
+            turns: 0,
+            batch_working: 0,
+            passed: 0,
+            mean_ms: 0.0,
+            closed: false,
+        }
     }
 
-    pub(crate) fn push(&mut self, job: J) -> Result<(), Rejected> {
+    /// Whether a job would be taken now.
+    pub(crate) fn check(&self, ticket: Ticket) -> Result<(), Rejected> {
         if self.closed {
             return Err(Rejected::Closed);
         }
-        if self.waiting.len() >= self.limit {
+        let (mut bytes, mut own, mut own_bytes) = (ticket.bytes, 0, ticket.bytes);
+        for (other, _) in &self.waiting {
+            bytes = bytes.saturating_add(other.bytes);
+            if other.owner == ticket.owner {
+                own += 1;
+                own_bytes = own_bytes.saturating_add(other.bytes);
+            }
+        }
+        let Bounds { waiting_per_owner, bytes_per_owner, .. } = self.bounds;
+        if own >= waiting_per_owner || (own > 0 && own_bytes > bytes_per_owner) {
+            return Err(Rejected::OwnerFull);
+        }
+        let full = self.waiting.len() >= self.bounds.waiting;
+        if full || (!self.waiting.is_empty() && bytes > self.bounds.bytes) {
             return Err(Rejected::Full);
         }
-        self.waiting.push_back(job);
         Ok(())
     }
 
-    pub(crate) fn pop(&mut self) -> Option<J> {
-        self.waiting.pop_front()
+    pub(crate) fn push(&mut self, ticket: Ticket, job: J) -> Result<(), Rejected> {
+        self.check(ticket)?;
+        // Who comes (again) stands behind everybody who waits already: else a few who come again at once
+        // would always go before one who waits.
+        if !self.waiting.iter().any(|(other, _)| other.owner == ticket.owner) {
+            self.owners.entry(ticket.owner).or_default().last = self.turns;
+        }
+        self.waiting.push((ticket, job));
+        Ok(())
+    }
+
+    /// The job whose turn it is, if any may be worked on now. [`Self::done`] must follow.
+    pub(crate) fn pop(&mut self) -> Option<(Ticket, J)> {
+        let place = self.next_place()?;
+        let (ticket, job) = self.waiting.remove(place);
+        self.turns += 1;
+        let owner = self.owners.entry(ticket.owner).or_default();
+        owner.working += 1;
+        owner.last = self.turns;
+        match ticket.class {
+            Class::Batch => {
+                self.batch_working += 1;
+                self.passed = 0;
+            }
+            Class::Interactive if self.waiting.iter().any(|(t, _)| t.class == Class::Batch) => {
+                self.passed += 1;
+            }
+            Class::Interactive => self.passed = 0,
+        }
+        Some((ticket, job))
+    }
+
+    fn next_place(&self) -> Option<usize> {
+        let may_work = |ticket: &Ticket| {
+            let room = self.turns_of(ticket.owner).working < self.bounds.working_per_owner;
+            room && (ticket.class == Class::Interactive || self.batch_working < self.bounds.working_batch)
+        };
+        let urgent = if self.passed < PATIENCE { Class::Interactive } else { Class::Batch };
+        let rank = |(place, ticket): &(usize, Ticket)| {
+            let Turns { working, last } = self.turns_of(ticket.owner);
+            (ticket.class != urgent, working, last, *place)
+        };
+        let tickets = self.waiting.iter().map(|(ticket, _)| *ticket).enumerate();
+        tickets.filter(|(_, t)| may_work(t)).min_by_key(rank).map(|(place, _)| place)
+    }
+
+    fn turns_of(&self, owner: Owner) -> Turns {
+        self.owners.get(&owner).copied().unwrap_or_default()
+    }
+
+    /// A job that was popped is over, after so long.
+    pub(crate) fn done(&mut self, ticket: Ticket, took: Duration) {
+        let took_ms = took.as_secs_f64() * 1e3;
+        self.mean_ms =
+            if self.mean_ms == 0.0 { took_ms } else { self.mean_ms + NEWEST * (took_ms - self.mean_ms) };
+        if ticket.class == Class::Batch {
+            self.batch_working = self.batch_working.saturating_sub(1);
+        }
+        if let Some(turns) = self.owners.get_mut(&ticket.owner) {
+            turns.working = turns.working.saturating_sub(1);
+        }
+        // Who neither waits nor works need not be known.
+        let waiting = &self.waiting;
+        self.owners.retain(|o, turns| turns.working > 0 || waiting.iter().any(|(t, _)| t.owner == *o));
+    }
+
+    /// Milliseconds after which a client that was refused had better come again: when what waits will
+    /// about have been done.
+    pub(crate) fn hint_ms(&self) -> u32 {
+        let jobs = self.waiting.len().max(1) as f64;
+        (self.mean_ms * jobs / self.bounds.workers.max(1) as f64).clamp(HINT_MS.0, HINT_MS.1) as u32
     }
 
     /// Takes back what still waits and fits; false if nothing did.
     pub(crate) fn withdraw(&mut self, fits: impl Fn(&J) -> bool) -> bool {
         let before = self.waiting.len();
-        self.waiting.retain(|job| !fits(job));
+        self.waiting.retain(|(_, job)| !fits(job));
         self.waiting.len() < before
     }
 
@@ -51,8 +212,9 @@ impl<J> RequestQueue<J> {
         self.closed = true;
     }
 
-    pub(crate) fn is_closed(&self) -> bool {
-        self.closed
+    /// Nothing waits, and nothing will.
+    pub(crate) fn is_over(&self) -> bool {
+        self.closed && self.waiting.is_empty()
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -61,48 +223,5 @@ impl<J> RequestQueue<J> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn it_keeps_its_limit_and_order_and_loses_nothing(
-            limit in 1_usize..6,
-            steps in proptest::collection::vec(0_u8..10, 0..80),
-        ) {
-            let mut queue = RequestQueue::new(limit);
-            let mut model: Vec<u32> = Vec::new();
-            for (number, step) in (0_u32..).zip(steps) {
-                match step {
-                    0..=4 => {
-                        let expected = if model.len() < limit { Ok(()) } else { Err(Rejected::Full) };
-                        prop_assert_eq!(queue.push(number), expected);
-                        if expected.is_ok() {
-                            model.push(number);
-                        }
-                    }
-                    5..=7 => {
-                        let expected = (!model.is_empty()).then(|| model.remove(0));
-                        prop_assert_eq!(queue.pop(), expected);
-                    }
-                    _ => {
-                        let before = model.len();
-                        model.retain(|n| n % 3 != 0);
-                        prop_assert_eq!(queue.withdraw(|n| n % 3 == 0), model.len() < before);
-                    }
-                }
-                prop_assert_eq!(queue.len(), model.len());
-            }
-        }
-    }
-
-    #[test]
-    fn a_closed_queue_takes_nothing_but_gives_what_it_has() {
-        let mut queue = RequestQueue::new(3);
-        queue.push(1).unwrap();
-        queue.close();
-        assert_eq!(queue.push(2), Err(Rejected::Closed));
-        assert_eq!((queue.pop(), queue.pop()), (Some(1), None));
-    }
-}
+#[path = "request_queue_tests.rs"]
+mod tests;

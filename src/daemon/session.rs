@@ -236,7 +236,7 @@ impl<L: Link> Session<L> {
         while let Some(chunk) = self.outbox.next_chunk() {
             let header = ResponseHeader {
                 kind: chunk.kind as u32,
-                flags: 0,
+                retry_ms: chunk.retry_ms,
                 request: self.request,
                 sequence: chunk.sequence,
                 offset: chunk.offset,

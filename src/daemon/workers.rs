@@ -2,7 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -12,8 +12,7 @@ use sbdp_ipc::plan::Step;
 
 use super::answers::Answer;
 use super::convert;
-use super::prefetch::Prefetch;
-use super::request_queue::{Rejected, RequestQueue};
+use super::shared_queue::Queues;
 use crate::geometry::{Pose, Revision, SourceAssembly, load_assembly};
 use crate::plan::{Plan, PlanStep};
 use crate::search::{PlanRequest, PlanSink, Progress, Termination};
@@ -175,85 +174,6 @@ pub(crate) enum WorkerEvent {
 /// Takes reports to the port thread and wakes it.
 pub(crate) type Report = Arc<dyn Fn(WorkerEvent) + Send + Sync>;
 
-/// A queue that threads share.
-#[derive(Debug)]
-pub(crate) struct SharedQueue<J> {
-    queue: Mutex<RequestQueue<J>>,
-    ready: Condvar,
-}
-
-impl<J> SharedQueue<J> {
-    fn new(limit: usize) -> Self {
-        Self { queue: Mutex::new(RequestQueue::new(limit)), ready: Condvar::new() }
-    }
-
-    /// The queue holds plain data: it is whole even if a holder panicked.
-    fn lock(&self) -> MutexGuard<'_, RequestQueue<J>> {
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(crate) fn push(&self, job: J) -> Result<(), Rejected> {
-        self.lock().push(job)?;
-        self.ready.notify_one();
-        Ok(())
-    }
-
-    /// Waits for a job; `None` when the queue is closed and empty.
-    fn pop(&self) -> Option<J> {
-        let mut queue = self.lock();
-        loop {
-            if let Some(job) = queue.pop() {
-                return Some(job);
-            }
-            if queue.is_closed() {
-                return None;
-            }
-            queue = self.ready.wait(queue).unwrap_or_else(PoisonError::into_inner);
-        }
-    }
-
-    pub(crate) fn withdraw(&self, fits: impl Fn(&J) -> bool) -> bool {
-        self.lock().withdraw(fits)
-    }
-
-    pub(crate) fn close(&self) {
-        self.lock().close();
-        self.ready.notify_all();
-    }
-
-    pub(crate) fn len(&self) -> usize {
-        self.lock().len()
-    }
-}
-
-/// Uploads that may wait to be healed; each client port has at most one.
-const ADMISSION_QUEUE: usize = 128;
-
-/// The queues that feed the threads.
-#[derive(Debug, Clone)]
-pub(crate) struct Queues {
-    pub(crate) plans: Arc<SharedQueue<PlanJob>>,
-    pub(crate) admissions: Arc<SharedQueue<AdmitJob>>,
-    /// What is made ready while nothing is asked, if anything is.
-    prefetch: Arc<Prefetch>,
-}
-
-impl Queues {
-    pub(crate) fn new(plan_limit: usize) -> Self {
-        Self {
-            plans: Arc::new(SharedQueue::new(plan_limit)),
-            admissions: Arc::new(SharedQueue::new(ADMISSION_QUEUE)),
-            prefetch: Arc::default(),
-        }
-    }
-
-    pub(crate) fn close(&self) {
-        self.plans.close();
-        self.admissions.close();
-        self.prefetch.close();
-    }
-}
-
 /// Starts `count` planning threads, and one that takes assemblies in, so that an upload never
 /// waits behind a long plan.
 pub(crate) fn start<P: Planning>(
@@ -265,7 +185,7 @@ pub(crate) fn start<P: Planning>(
     for number in 0..count {
         let (queues, service, report) = (queues.clone(), Arc::clone(service), Arc::clone(report));
         thread::Builder::new().name(format!("sbdp-plan-{number}")).spawn(move || {
-            while let Some(job) = queues.plans.pop() {
+            while let Some((job, _working)) = queues.plans.pop() {
                 let _busy = queues.prefetch.busy();
                 plan(&*service, &job, &report);
             }
@@ -273,7 +193,7 @@ pub(crate) fn start<P: Planning>(
     }
     let (its_queues, its_service, report) = (queues.clone(), Arc::clone(service), Arc::clone(report));
     thread::Builder::new().name("sbdp-admit".to_owned()).spawn(move || {
-        while let Some(job) = its_queues.admissions.pop() {
+        while let Some((job, _working)) = its_queues.admissions.pop() {
             let _busy = its_queues.prefetch.busy();
             if let Some(id) = admit(&*its_service, job, &report) {
                 its_queues.prefetch.want(id);

@@ -47,6 +47,7 @@ pub use helix::{Footprint, Helix, radii};
 pub use hull::{gap_along, hull_vertices, separating_direction, transformed};
 pub use linking_number::linking_number;
 pub use load::{load_assembly, natural_order};
+pub(crate) use load::{parse_notes, parse_part, parse_scene};
 pub use mass::MassProperties;
 pub use mesh::{Edge, Mesh, Solidity};
 pub use oriented::OrientedSamples;

@@ -141,9 +141,14 @@ pub fn wait(child: &mut Child) -> ExitStatus {
     }
 }
 
+/// A client that tells at once when its daemon is gone.
+pub fn options(runtime_dir: &Path) -> ConnectOptions {
+    let runtime_dir = Some(runtime_dir.to_owned());
+    ConnectOptions { runtime_dir, reconnect: Duration::ZERO, ..ConnectOptions::default() }
+}
+
 pub fn connect(runtime_dir: &Path) -> Client {
-    let options = ConnectOptions { runtime_dir: Some(runtime_dir.to_owned()), ..ConnectOptions::default() };
-    Client::connect_with(options).unwrap()
+    Client::connect_with(options(runtime_dir)).unwrap()
 }
 
 /// Boxes in a lattice, each touching its neighbours.
@@ -234,6 +239,7 @@ pub fn plan(client: &Client, handle: Handle, options: &PlanOptions) -> (Vec<u32>
                 parts.push(step.part);
             }
             Some(Event::Progress(_)) => {}
+            Some(Event::Restarted) => parts.clear(),
             Some(Event::Done(summary)) => {
                 assert_eq!(summary.steps as usize, parts.len());
                 return (parts, summary);

@@ -54,6 +54,7 @@ pub struct Client {
     pub(crate) runtime_dir: PathBuf,
     daemon: RefCell<Watched>,
     pub(crate) planning: Cell<bool>,
+    restarts: Cell<u32>,
     next_request: Cell<u64>,
     pub(crate) plan_port: ClientPort,
     pub(crate) ask_port: ClientPort,
@@ -111,6 +112,7 @@ impl Client {
             runtime_dir,
             daemon: RefCell::new(Watched::new(endpoint)),
             planning: Cell::new(false),
+            restarts: Cell::new(0),
             next_request: Cell::new(1),
             node,
         })
@@ -122,8 +124,8 @@ impl Client {
     /// The daemon is gone or gives no answer.
     pub fn status(&self) -> Result<Status, ClientError> {
         let header = self.header(RequestKind::Status, self.new_request());
-        let pending = self.send("status", &self.plan_port, header, bytes::ALIGNMENT, |_| {})?;
-        let answer = self.answer("status", &pending, self.options.timeout)?;
+        let length = bytes::ALIGNMENT;
+        let answer = self.ask("status", &self.plan_port, header, length, |_| {}, self.options.timeout)?;
         Ok(Status::decode(answer.as_slice())?)
     }
 
@@ -131,6 +133,12 @@ impl Client {
     #[must_use]
     pub fn pid(&self) -> u32 {
         self.daemon.borrow().endpoint.pid
+    }
+
+    /// How often this client has followed a daemon that was restarted at the same place.
+    #[must_use]
+    pub fn restarts(&self) -> u32 {
+        self.restarts.get()
     }
 
     pub(crate) fn new_request(&self) -> u64 {
@@ -159,6 +167,7 @@ impl Client {
             return Err(ClientError::DaemonDied { pid: *pid });
         }
         *known = Watched::new(found);
+        self.restarts.set(self.restarts.get() + 1);
         Ok(())
     }
 }

@@ -88,6 +88,17 @@ impl ClientError {
         }
     }
 
+    /// If the daemon is busy, when to come again.
+    #[must_use]
+    pub fn retry_after(&self) -> Option<Duration> {
+        match self {
+            Self::Refused(error) if error.code == ErrorCode::Busy => {
+                Some(Duration::from_millis(u64::from(error.retry_ms.max(1))))
+            }
+            _ => None,
+        }
+    }
+
     /// Whether there is no daemon to talk to (any more).
     #[must_use]
     pub fn is_no_daemon(&self) -> bool {

@@ -11,6 +11,7 @@ use sbdp_ipc::services::{Answer, ClientPort, Pending, SetupError};
 
 use crate::client::Client;
 use crate::error::ClientError;
+use crate::patience::Patience;
 
 /// Longest sleep between two looks at the port: a lost wake-up costs at most this.
 pub(crate) const SLICE: Duration = Duration::from_millis(200);
@@ -76,8 +77,28 @@ impl Client {
         }
     }
 
+    /// Sends a request and waits for the one response to it; both once more where the options say so.
+    pub(crate) fn ask(
+        &self,
+        what: &'static str,
+        port: &ClientPort,
+        header: RequestHeader,
+        length: usize,
+        fill: impl Fn(&mut [u8]),
+        timeout: Duration,
+    ) -> Result<AlignedBytes, ClientError> {
+        let mut patience = Patience::default();
+        loop {
+            let sent = self.send(what, port, header, length, &fill);
+            match sent.and_then(|pending| self.answer(what, &pending, timeout)) {
+                Ok(answer) => return Ok(answer),
+                Err(error) => patience.after(self, error)?,
+            };
+        }
+    }
+
     /// Waits for the one response to a request.
-    pub(crate) fn answer(
+    fn answer(
         &self,
         what: &'static str,
         pending: &Pending,
@@ -127,8 +148,10 @@ fn try_send(
 /// A copy of a response's payload; an error response becomes an error.
 fn open(answer: &Answer) -> Result<AlignedBytes, ClientError> {
     let bytes = AlignedBytes::copy_of(answer.payload());
-    if ResponseKind::from_wire(answer.user_header().kind) == Some(ResponseKind::Error) {
-        return Err(ClientError::Refused(WireError::decode(bytes.as_slice())?));
+    let header = answer.user_header();
+    if ResponseKind::from_wire(header.kind) == Some(ResponseKind::Error) {
+        let error = WireError { retry_ms: header.retry_ms, ..WireError::decode(bytes.as_slice())? };
+        return Err(ClientError::Refused(error));
     }
     Ok(bytes)
 }

@@ -25,6 +25,7 @@ mod content_hash;
 mod error;
 mod exchange;
 mod options;
+mod patience;
 mod stream;
 mod summary;
 mod upload;

@@ -27,11 +27,25 @@ pub struct ConnectOptions {
     pub timeout: Duration,
     /// How long the daemon may take to check and heal an upload.
     pub upload_timeout: Duration,
+    /// How long to wait for a new daemon when the one that was asked went away. What was asked is then
+    /// asked again by itself: see [`Event::Restarted`](crate::Event::Restarted) and
+    /// [`Client::restarts`](crate::Client::restarts). Zero reports the loss at once.
+    pub reconnect: Duration,
+    /// How long to come again by itself, when the daemon says that it does, while it answers `busy`.
+    /// Zero (the default) reports `busy` at once; [`ClientError::retry_after`](crate::ClientError::retry_after)
+    /// then tells when to come again.
+    pub busy_wait: Duration,
 }
 
 impl Default for ConnectOptions {
     fn default() -> Self {
-        Self { runtime_dir: None, timeout: Duration::from_secs(10), upload_timeout: Duration::from_secs(300) }
+        Self {
+            runtime_dir: None,
+            timeout: Duration::from_secs(10),
+            upload_timeout: Duration::from_secs(300),
+            reconnect: Duration::from_secs(10),
+            busy_wait: Duration::ZERO,
+        }
     }
 }
 
@@ -100,6 +114,8 @@ pub struct PlanOptions {
     pub moved: Vec<(u32, Waypoint)>,
     /// Neither read nor write anything remembered.
     pub no_cache: bool,
+    /// Others go first: nobody waits for this plan.
+    pub batch: bool,
 }
 
 impl PlanOptions {
@@ -111,6 +127,7 @@ impl PlanOptions {
             actions: self.actions as u32,
             sweeps: self.sweeps,
             no_cache: self.no_cache,
+            batch: self.batch,
             threads: self.threads,
             deadline_ns: self.timeout.map(clock::deadline_in),
             max_simulations: self.max_simulations,

@@ -4,7 +4,8 @@ use std::time::{Duration, Instant};
 
 use iceoryx2::prelude::EventId;
 use sbdp_ipc::bytes::AlignedBytes;
-use sbdp_ipc::error::WireError;
+use sbdp_ipc::error::{ErrorCode, WireError};
+use sbdp_ipc::geometry::Assembly;
 use sbdp_ipc::headers::{CONTROL_CANCEL, RequestKind, ResponseHeader, ResponseKind, id_of_words};
 use sbdp_ipc::layout::{CREDIT_STEP, PLAN_REQUEST};
 use sbdp_ipc::plan::{StepView, StepsView};
@@ -14,10 +15,14 @@ use sbdp_ipc::services::{Answer, Pending};
 use crate::client::Client;
 use crate::error::ClientError;
 use crate::options::{Handle, PlanOptions};
+use crate::patience::{Again, Patience};
 use crate::summary::Summary;
 
 /// No message may announce more than this (it would be put together in memory).
 const LONGEST_MESSAGE: u64 = 1 << 30;
+/// So often one assembly is uploaded again for one plan: a daemon that forgets it again at once has no
+/// room for it.
+const UPLOADS_AGAIN: u32 = 3;
 
 /// The stages of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,6 +55,9 @@ pub enum Event<'s> {
     /// A verified step, in order; its slices lie in shared memory and live as long as the
     /// borrow of the stream, that is until the next event is asked for.
     Step(StepView<'s>),
+    /// The daemon went away, and another one has taken its place and was asked again: the steps so far
+    /// are void, and all of them come again from the first.
+    Restarted,
     /// The end: everything else about the plan.
     Done(Summary),
 }
@@ -58,6 +66,8 @@ pub enum Event<'s> {
 #[derive(Debug)]
 pub struct PlanStream<'c> {
     client: &'c Client,
+    /// It is the client's one plan.
+    is_open: bool,
     pending: Option<Pending>,
     /// The last control request: it must live until the daemon saw it or a newer one.
     control: Option<Pending>,
@@ -69,6 +79,18 @@ pub struct PlanStream<'c> {
     message: Message,
     next_step: usize,
     parts: Option<Parts>,
+    question: Question<'c>,
+    patience: Patience,
+}
+
+/// What was asked, to ask it again.
+#[derive(Debug)]
+struct Question<'c> {
+    bytes: Vec<u8>,
+    /// To be uploaded again if the daemon does not know it any more.
+    assembly: Option<&'c Assembly<'c>>,
+    /// How often that happened without a plan.
+    uploads: u32,
 }
 
 /// The message that is being read.
@@ -92,6 +114,7 @@ struct Parts {
 /// What `advance` found; the borrow of the step is made by the caller.
 #[allow(clippy::large_enum_variant, reason = "there is one summary in a stream")]
 enum Found {
+    Restarted,
     Progress(Progress),
     Step(usize),
     Done(Summary),
@@ -114,19 +137,38 @@ impl Client {
     /// The daemon is gone, or this client receives a plan already. What the daemon refuses
     /// (`busy`, an unknown handle) comes as the stream's first result.
     pub fn plan(&self, handle: Handle, options: &PlanOptions) -> Result<PlanStream<'_>, ClientError> {
+        self.stream(Question { bytes: options.to_wire(handle).encode(), assembly: None, uploads: 0 })
+    }
+
+    /// Uploads an assembly and asks for a plan; uploads it again whenever the daemon does not know it any
+    /// more, as after a restart.
+    ///
+    /// # Errors
+    /// The geometry is refused, the daemon is gone, or this client receives a plan already.
+    pub fn plan_assembly<'c>(
+        &'c self,
+        assembly: &'c Assembly<'c>,
+        options: &PlanOptions,
+    ) -> Result<PlanStream<'c>, ClientError> {
+        let handle = self.upload(assembly)?;
+        let bytes = options.to_wire(handle).encode();
+        self.stream(Question { bytes, assembly: Some(assembly), uploads: 0 })
+    }
+
+    fn stream<'c>(&'c self, question: Question<'c>) -> Result<PlanStream<'c>, ClientError> {
+        if question.bytes.len() > PLAN_REQUEST {
+            return Err(ClientError::RequestTooLong { bytes: question.bytes.len() });
+        }
         if self.planning.replace(true) {
             return Err(ClientError::StreamOpen);
         }
-        let request = self.new_request();
-        let sent = self.send_plan(request, handle, options);
-        if sent.is_err() {
-            self.planning.set(false);
-        }
-        Ok(PlanStream {
+        // From here on the stream lets the client go, however this ends.
+        let mut stream = PlanStream {
             client: self,
-            pending: Some(sent?),
+            is_open: true,
+            pending: None,
             control: None,
-            request,
+            request: 0,
             received: 0,
             granted: 0,
             cancel_wanted: false,
@@ -134,16 +176,49 @@ impl Client {
             message: Message::None,
             next_step: 0,
             parts: None,
-        })
+            question,
+            patience: Patience::default(),
+        };
+        while let Err(error) = stream.send() {
+            stream.patience.after(self, error)?;
+        }
+        Ok(stream)
+    }
+}
+
+impl PlanStream<'_> {
+    /// Asks, as if nothing had been asked before.
+    fn send(&mut self) -> Result<(), ClientError> {
+        self.message = Message::None;
+        self.parts = None;
+        self.control = None;
+        self.pending = None;
+        (self.received, self.granted, self.next_step) = (0, 0, 0);
+        self.request = self.client.new_request();
+        let header = self.client.header(RequestKind::Plan, self.request);
+        let (port, bytes) = (&self.client.plan_port, &self.question.bytes);
+        self.pending =
+            Some(self.client.send("plan", port, header, bytes.len(), |out| out.copy_from_slice(bytes))?);
+        Ok(())
     }
 
-    fn send_plan(&self, request: u64, handle: Handle, options: &PlanOptions) -> Result<Pending, ClientError> {
-        let bytes = options.to_wire(handle).encode();
-        if bytes.len() > PLAN_REQUEST {
-            return Err(ClientError::RequestTooLong { bytes: bytes.len() });
+    /// Asks once more after an error that a client gets over by itself.
+    fn recover(&mut self, error: ClientError) -> Result<Option<Found>, ClientError> {
+        if self.cancel_wanted {
+            return Err(error);
         }
-        let header = self.header(RequestKind::Plan, request);
-        self.send("plan", &self.plan_port, header, bytes.len(), |out| out.copy_from_slice(&bytes))
+        let forgotten = error.code() == Some(ErrorCode::UnknownHandle);
+        if let Some(assembly) = self.question.assembly.filter(|_| forgotten)
+            && self.question.uploads < UPLOADS_AGAIN
+        {
+            self.question.uploads += 1;
+            self.client.upload(assembly)?;
+            self.send()?;
+            return Ok(None);
+        }
+        let again = self.patience.after(self.client, error)?;
+        self.send()?;
+        Ok((again == Again::Restarted).then_some(Found::Restarted))
     }
 }
 
@@ -178,17 +253,24 @@ impl PlanStream<'_> {
         deadline: Option<Instant>,
         timeout: Duration,
     ) -> Result<Option<Event<'_>>, ClientError> {
-        let found = match self.advance(deadline, timeout) {
-            Ok(found) => found,
-            Err(error) => {
-                if !matches!(error, ClientError::Timeout { .. }) {
+        let found = loop {
+            let error = match self.advance(deadline, timeout) {
+                Ok(found) => break found,
+                Err(timeout @ ClientError::Timeout { .. }) => return Err(timeout),
+                Err(error) => error,
+            };
+            match self.recover(error) {
+                Ok(None) => {}
+                Ok(found) => break found,
+                Err(error) => {
                     self.close();
+                    return Err(error);
                 }
-                return Err(error);
             }
         };
         Ok(match found {
             None => None,
+            Some(Found::Restarted) => Some(Event::Restarted),
             Some(Found::Progress(progress)) => Some(Event::Progress(progress)),
             Some(Found::Done(summary)) => Some(Event::Done(summary)),
             Some(Found::Step(index)) => {
@@ -252,10 +334,10 @@ impl PlanStream<'_> {
         self.received += 1;
         self.send_control();
         if header.offset == 0 && header.total == answer.payload().len() as u64 {
-            return self.open(header.kind, Message::Shared(answer));
+            return self.open(&header, Message::Shared(answer));
         }
         match self.put_together(&header, &answer)? {
-            Some(bytes) => self.open(header.kind, Message::Owned(bytes)),
+            Some(bytes) => self.open(&header, Message::Owned(bytes)),
             None => Ok(None),
         }
     }
@@ -286,8 +368,8 @@ impl PlanStream<'_> {
     }
 
     /// Opens a whole message.
-    fn open(&mut self, kind: u32, message: Message) -> Result<Option<Found>, ClientError> {
-        match ResponseKind::from_wire(kind) {
+    fn open(&mut self, header: &ResponseHeader, message: Message) -> Result<Option<Found>, ClientError> {
+        match ResponseKind::from_wire(header.kind) {
             Some(ResponseKind::Steps) => {
                 self.message = message;
                 self.next_step = 0;
@@ -302,9 +384,10 @@ impl PlanStream<'_> {
             }
             Some(ResponseKind::Error) => {
                 let copy = AlignedBytes::copy_of(message.bytes());
-                Err(ClientError::Refused(WireError::decode(copy.as_slice())?))
+                let error = WireError::decode(copy.as_slice())?;
+                Err(ClientError::Refused(WireError { retry_ms: header.retry_ms, ..error }))
             }
-            _ => Err(ClientError::Protocol(format!("a response of kind {kind} in a plan"))),
+            _ => Err(ClientError::Protocol(format!("a response of kind {} in a plan", header.kind))),
         }
     }
 
@@ -345,8 +428,11 @@ impl PlanStream<'_> {
     fn close(&mut self) {
         self.message = Message::None;
         self.control = None;
-        if self.pending.take().is_some() {
+        if self.is_open {
+            self.is_open = false;
             self.client.planning.set(false);
+        }
+        if self.pending.take().is_some() {
             // The daemon asks whether we are still there when it is woken, not before.
             let _ = self.client.notifier.notify_with_custom_event_id(EventId::new(0));
         }

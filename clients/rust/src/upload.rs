@@ -1,6 +1,7 @@
 //! Handing an assembly over.
 
 use sbdp_ipc::bytes::Reader;
+use sbdp_ipc::clock;
 use sbdp_ipc::geometry::{Assembly, HandleResponse, Part};
 use sbdp_ipc::headers::RequestKind;
 use sbdp_ipc::plan::Waypoint;
@@ -50,8 +51,7 @@ impl Client {
     pub fn knows(&self, handle: Handle) -> Result<bool, ClientError> {
         let header = self.header(RequestKind::Have, 0);
         let fill = |out: &mut [u8]| out.copy_from_slice(&handle.0);
-        let pending = self.send("have", &self.ask_port, header, handle.0.len(), fill)?;
-        let answer = self.answer("have", &pending, self.options.timeout)?;
+        let answer = self.ask("have", &self.ask_port, header, handle.0.len(), fill, self.options.timeout)?;
         let response: HandleResponse = Reader::new(answer.as_slice())?.value("handle")?;
         Ok(response.known != 0)
     }
@@ -88,13 +88,14 @@ impl Client {
     ) -> Result<Handle, ClientError> {
         check_shared_memory(length as u64)?;
         let port = client_port(&self.geometry, length)?;
-        let header = self.header(kind, 0);
+        let mut header = self.header(kind, 0);
+        // Nobody reads what comes later.
+        header.consumed = clock::deadline_in(self.options.upload_timeout);
         let fill = |out: &mut [u8]| {
             let fits = encode(out);
             debug_assert!(fits, "the port was made as long as the message");
         };
-        let pending = self.send(what, &port, header, length, fill)?;
-        let answer = self.answer(what, &pending, self.options.upload_timeout)?;
+        let answer = self.ask(what, &port, header, length, fill, self.options.upload_timeout)?;
         let response: HandleResponse = Reader::new(answer.as_slice())?.value("handle")?;
         Ok(Handle(response.handle))
     }

@@ -81,7 +81,7 @@ pub(super) fn raw_peer(arguments: &BenchRawPeer) -> Result<ExitCode, CliError> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn frame() -> SourceAssembly {
+pub(super) fn frame() -> SourceAssembly {
     let part = |(name, mesh)| SourcePart { name, origin: "benchmark".to_owned(), mesh };
     let parts = Family::BoltedFrame.member(PARTS).into_iter().map(part).collect();
     SourceAssembly {
@@ -92,7 +92,7 @@ fn frame() -> SourceAssembly {
     }
 }
 
-fn written(file: Option<&Path>, figures: &impl Serialize) -> Result<ExitCode, CliError> {
+pub(super) fn written(file: Option<&Path>, figures: &impl Serialize) -> Result<ExitCode, CliError> {
     let Some(file) = file else { return Ok(ExitCode::SUCCESS) };
     let failed = |e: String| CliError::Failed(format!("{}: {e}", file.display()));
     let mut text = serde_json::to_string_pretty(figures).map_err(|e| failed(e.to_string()))?;

@@ -45,7 +45,7 @@ impl<'a> Surfaces<'a> {
         let (few, many) = if self.shells[a].len() <= self.shells[b].len() { (a, b) } else { (b, a) };
         self.shells[few].iter().any(|&t| {
             let region = self.aabb(t).loosened(TOUCH);
-            self.tree(many).intersect_aabb(&region).any(|u| self.touch(t, u))
+            self.within(many, &region).any(|u| self.touch(t, u))
         })
     }
 
@@ -57,13 +57,20 @@ impl<'a> Surfaces<'a> {
         };
         self.shells[shell].iter().any(|&t| {
             let region = self.aabb(t);
-            self.tree(shell).intersect_aabb(&region).any(|u| u > t && apart(t, u) && self.cross(t, u))
+            self.within(shell, &region).any(|u| u > t && apart(t, u) && self.cross(t, u))
         })
+    }
+
+    /// A shell's triangles whose boxes meet a region.
+    fn within<'s>(&'s self, shell: usize, region: &'s Aabb) -> impl Iterator<Item = u32> + 's {
+        let triangles = &self.shells[shell];
+        self.tree(shell).intersect_aabb(region).map(|place| triangles[place as usize])
     }
 
     fn tree(&self, shell: usize) -> &Bvh {
         self.trees[shell].get_or_init(|| {
-            let leaves = self.shells[shell].iter().map(|&t| (t as usize, self.aabb(t)));
+            // By their places in the shell: of one or two leaves parry panics on other numbers than 0 and 1.
+            let leaves = self.shells[shell].iter().map(|&t| self.aabb(t)).enumerate();
             Bvh::from_iter(BvhBuildStrategy::Binned, leaves)
         })
     }

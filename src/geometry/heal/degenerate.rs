@@ -154,6 +154,8 @@ fn split_round(draft: &mut Draft, tolerance: f64) -> usize {
 
 /// The vertices along the border of a surface, in a tree.
 struct BorderVertices {
+    vertices: Vec<u32>,
+    /// By place in `vertices`: of one or two leaves parry panics on other numbers than 0 and 1.
     tree: Bvh,
     tolerance: f64,
     scale: f64,
@@ -166,9 +168,9 @@ impl BorderVertices {
         vertices.dedup();
         // The tree multiplies lengths: in units of the part's size they stay in range.
         let scale = RELATIVE_TOLERANCE / draft.tolerance;
-        let leaf = |&v: &u32| (v as usize, around(&[draft.vertices[v as usize]], scale, tolerance));
-        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, vertices.iter().map(leaf));
-        Self { tree, tolerance, scale }
+        let leaf = |&v: &u32| around(&[draft.vertices[v as usize]], scale, tolerance);
+        let tree = Bvh::from_iter(BvhBuildStrategy::Binned, vertices.iter().map(leaf).enumerate());
+        Self { vertices, tree, tolerance, scale }
     }
 
     /// The first border vertex strictly between the ends of an edge, and on it.
@@ -183,7 +185,8 @@ impl BorderVertices {
                 && distance_to_line(&m, &p, &q) <= self.tolerance
         };
         let region = around(&[p, q], self.scale, self.tolerance);
-        self.tree.intersect_aabb(&region).filter(|v| !ends.contains(v)).filter(on_it).min()
+        let near = self.tree.intersect_aabb(&region).map(|place| self.vertices[place as usize]);
+        near.filter(|v| !ends.contains(v)).filter(on_it).min()
     }
 }
 

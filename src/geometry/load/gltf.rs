@@ -18,7 +18,7 @@ use crate::geometry::SourceMesh;
 ///
 /// # Errors
 /// What is wrong and what to do, without the file's name.
-pub(super) fn parse_gltf(bytes: &[u8], folder: &Path) -> Result<Vec<(String, SourceMesh)>, String> {
+pub(crate) fn parse_gltf(bytes: &[u8], folder: &Path) -> Result<Vec<(String, SourceMesh)>, String> {
     if bytes.is_empty() {
         return Err("the file is empty (0 bytes); export the scene again".into());
     }

@@ -57,20 +57,34 @@ pub(super) fn read_manifest(folder: &Path) -> Result<Option<(String, Manifest)>,
             return Err(GeometryError::Assembly { origin: folder.display().to_string(), reason });
         }
         (true, false) => {
-            let manifest = serde_json::from_str(&super::read_text(&json)?);
-            (json, manifest.map_err(|e| e.to_string()))
+            let manifest = parse_json(&super::read_text(&json)?);
+            (json, manifest)
         }
         (false, true) => {
-            let manifest = toml::from_str(&super::read_text(&toml)?);
-            (toml, manifest.map_err(|e| e.to_string().trim().to_owned()))
+            let manifest = parse_toml(&super::read_text(&toml)?);
+            (toml, manifest)
         }
         (false, false) => return Ok(None),
     };
     let origin = path.display().to_string();
-    let manifest: Manifest =
-        manifest.map_err(|reason| GeometryError::Assembly { origin: origin.clone(), reason })?;
-    check(&manifest).map_err(|reason| GeometryError::Assembly { origin: origin.clone(), reason })?;
+    let manifest = manifest.and_then(|m| check(&m).map(|()| m));
+    let manifest = manifest.map_err(|reason| GeometryError::Assembly { origin: origin.clone(), reason })?;
     Ok(Some((origin, manifest)))
+}
+
+fn parse_json(text: &str) -> Result<Manifest, String> {
+    serde_json::from_str(text).map_err(|e| e.to_string())
+}
+
+fn parse_toml(text: &str) -> Result<Manifest, String> {
+    toml::from_str(text).map_err(|e| e.to_string().trim().to_owned())
+}
+
+/// Reads a text as each of the descriptions that a folder may hold; what came of it, in words.
+pub(crate) fn parse_notes(text: &str) -> String {
+    let manifest = |read: Result<Manifest, String>| read.and_then(|m| check(&m)).err().unwrap_or_default();
+    let translations = parse_translations(text).map(drop).err().unwrap_or_default();
+    format!("{}; {}; {translations}", manifest(parse_json(text)), manifest(parse_toml(text)))
 }
 
 fn check(manifest: &Manifest) -> Result<(), String> {
@@ -102,17 +116,20 @@ pub(super) fn read_translations(
     }
     let refused = |reason: String| GeometryError::Assembly { origin: path.display().to_string(), reason };
     let text = super::read_text(&path)?;
-    // First as plain JSON: of a broken untagged value serde only says that nothing fitted.
-    let value: serde_json::Value = serde_json::from_str(&text).map_err(|e| refused(e.to_string()))?;
-    let translations = Translations::deserialize(value)
-        .map_err(|_| refused(r#"expected {"part": [x, y, z], …} or [[x, y, z], …]"#.into()))?;
-    match translations {
+    match parse_translations(&text).map_err(refused)? {
         Translations::InOrder(offsets) if offsets.len() == names.len() => Ok(Some(offsets)),
         Translations::InOrder(offsets) => {
             Err(refused(format!("{} offsets for {} parts", offsets.len(), names.len())))
         }
         Translations::ByName(by_name) => by_part(by_name, names).map(Some).map_err(refused),
     }
+}
+
+fn parse_translations(text: &str) -> Result<Translations, String> {
+    // First as plain JSON: of a broken untagged value serde only says that nothing fitted.
+    let value: serde_json::Value = serde_json::from_str(text).map_err(|e| e.to_string())?;
+    Translations::deserialize(value)
+        .map_err(|_| r#"expected {"part": [x, y, z], …} or [[x, y, z], …]"#.into())
 }
 
 fn by_part(by_name: BTreeMap<String, [f64; 3]>, names: &[String]) -> Result<Vec<[f64; 3]>, String> {

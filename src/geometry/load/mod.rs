@@ -12,6 +12,8 @@ use std::path::{Path, PathBuf};
 use self::manifest::Manifest;
 use super::{GeometryError, SourceAssembly, SourceMesh, SourcePart};
 
+pub(crate) use gltf::parse_gltf as parse_scene;
+pub(crate) use manifest::parse_notes;
 pub use natural_order::natural_order;
 
 /// Reads an assembly: a folder of OBJ and STL files in assembled pose (with an optional
@@ -161,12 +163,16 @@ fn apply(
     Ok(assembly)
 }
 
+/// The mesh of a file of this name with these bytes; what is wrong with it, without its name.
+pub(crate) fn parse_part(name: impl AsRef<Path>, bytes: &[u8]) -> Result<SourceMesh, String> {
+    match Format::of(name.as_ref()) {
+        Some(Format::Stl) => stl::parse_stl(bytes),
+        _ => obj::parse_obj(bytes),
+    }
+}
+
 fn load_part(path: &Path) -> Result<SourcePart, GeometryError> {
-    let bytes = read_bytes(path)?;
-    let parsed = match Format::of(path) {
-        Some(Format::Stl) => stl::parse_stl(&bytes),
-        _ => obj::parse_obj(&bytes),
-    };
+    let parsed = parse_part(path, &read_bytes(path)?);
     let origin = path.display().to_string();
     match parsed {
         Ok(mesh) => Ok(SourcePart { name: stem(path), origin, mesh }),
@@ -176,7 +182,7 @@ fn load_part(path: &Path) -> Result<SourcePart, GeometryError> {
 
 fn load_scene(path: &Path) -> Result<SourceAssembly, GeometryError> {
     let folder = path.parent().unwrap_or(Path::new("."));
-    let parts = gltf::parse_gltf(&read_bytes(path)?, folder).map_err(|e| assembly_error(path, &e))?;
+    let parts = parse_scene(&read_bytes(path)?, folder).map_err(|e| assembly_error(path, &e))?;
     let origin = path.display().to_string();
     let mut parts: Vec<SourcePart> =
         parts.into_iter().map(|(name, mesh)| SourcePart { name, origin: origin.clone(), mesh }).collect();

@@ -1,0 +1,73 @@
+//! The arguments of `sbdp bench load`.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use crate::bench;
+
+/// A benchmark of many clients at once.
+#[derive(Debug, Args)]
+pub(in super::super) struct BenchLoad {
+    /// What is planned [default: a bolted frame of 20 parts]
+    pub(in super::super) assembly: Option<PathBuf>,
+    /// How many clients ask at the same time, each a process of its own (the daemon takes 40)
+    #[arg(long, value_name = "N", default_value = "16")]
+    pub(in super::super) clients: NonZeroUsize,
+    /// How many requests they make in all
+    #[arg(long, value_name = "N", default_value = "20000")]
+    pub(in super::super) requests: NonZeroUsize,
+    /// How many different questions of each kind there are
+    #[arg(long, value_name = "N", default_value = "64")]
+    pub(in super::super) variety: u64,
+    /// Which questions are asked
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub(in super::super) seed: u64,
+    /// Do it all once more beside three further clients: one stopped, one that floods, one that never reads
+    #[arg(long)]
+    pub(in super::super) disturb: bool,
+    /// The folder of the running daemon to ask [default: starts one of its own, `sbdpd` beside `sbdp`]
+    #[arg(long, value_name = "DIR")]
+    pub(in super::super) runtime_dir: Option<PathBuf>,
+    /// Write the figures there as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(in super::super) json: Option<PathBuf>,
+}
+
+/// A client of `load`.
+#[derive(Debug, Args)]
+pub(in super::super) struct BenchLoadClient {
+    #[arg(long)]
+    pub(in super::super) assembly: Option<PathBuf>,
+    #[arg(long)]
+    pub(in super::super) runtime_dir: PathBuf,
+    #[arg(long, value_enum)]
+    pub(in super::super) role: Role,
+    #[arg(long)]
+    pub(in super::super) requests: usize,
+    #[arg(long)]
+    pub(in super::super) seed: u64,
+    #[arg(long)]
+    pub(in super::super) variety: u64,
+}
+
+/// What such a client does.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(in super::super) enum Role {
+    Asking,
+    Stopped,
+    Flooding,
+    Deaf,
+}
+
+impl From<Role> for bench::Role {
+    fn from(role: Role) -> Self {
+        match role {
+            Role::Asking => Self::Asking,
+            Role::Stopped => Self::Stopped,
+            Role::Flooding => Self::Flooding,
+            Role::Deaf => Self::Deaf,
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Meshes that come in: what happens to uploads and revisions, without any transport.
+
+use std::time::Instant;
+
+use sbdp_ipc::bytes::AlignedBytes;
+use sbdp_ipc::clock;
+use sbdp_ipc::error::{ErrorCode, WireError};
+use sbdp_ipc::headers::RequestHeader;
+
+use super::desk::{Desk, Incoming};
+use super::request_queue::{Class, Owner, Rejected, Ticket};
+use super::session::Link;
+use super::workers::{AdmitJob, Planning};
+use crate::service::AssemblyId;
+
+/// An upload that waits or is being taken in.
+#[derive(Debug)]
+pub(super) struct Upload<L> {
+    link: L,
+    header: RequestHeader,
+    /// When it is of no use to its client any more, if it still waits then.
+    pub(super) deadline: Option<Instant>,
+}
+
+/// What the queue knows of an upload.
+pub(crate) fn ticket(owner: Owner, bytes: usize) -> Ticket {
+    Ticket { owner, class: Class::Interactive, bytes: bytes as u64 }
+}
+
+impl<L: Link, P: Planning> Desk<L, P> {
+    pub(super) fn have(&mut self, incoming: &Incoming<L>) {
+        match <[u8; 32]>::try_from(incoming.payload.as_slice()) {
+            Ok(handle) => {
+                let known = self.service.knows(AssemblyId(handle));
+                self.answer_handle(&incoming.link, &incoming.header, handle, known);
+            }
+            Err(_) => {
+                let error = WireError::new(ErrorCode::Malformed, "a handle has 32 bytes");
+                self.answer_error(&incoming.link, &incoming.header, &error);
+            }
+        }
+    }
+
+    /// Why an upload of so many bytes would not be taken now. Asked before they are copied.
+    pub(crate) fn refuses_upload(&self, owner: Owner, bytes: usize) -> Option<WireError> {
+        let rejected = self.queues.admissions.check(ticket(owner, bytes)).err()?;
+        let busy = |message: &str| WireError::busy(message, self.queues.admissions.hint_ms());
+        Some(match rejected {
+            Rejected::Closed => self.shutting_down(),
+            Rejected::Full => busy("busy: too many uploads wait"),
+            Rejected::OwnerFull => busy("busy: too much of what this client uploaded waits already"),
+        })
+    }
+
+    /// Lets meshes be taken in.
+    pub(super) fn take_in(&mut self, incoming: Incoming<L>, job: impl FnOnce(u64, AlignedBytes) -> AdmitJob) {
+        self.counters.uploads += 1;
+        let Incoming { link, owner, header, payload, .. } = incoming;
+        let deadline_ns = header.upload_deadline_ns();
+        if deadline_ns.is_some_and(|d| d <= clock::monotonic_ns()) {
+            return self.answer_error(&link, &header, &expired());
+        }
+        let bytes = payload.as_slice().len();
+        if let Some(error) = self.refuses_upload(owner, bytes) {
+            return self.answer_error(&link, &header, &error);
+        }
+        let number = self.next_upload;
+        self.next_upload += 1;
+        match self.queues.admissions.push(ticket(owner, bytes), job(number, payload)) {
+            Ok(()) => {
+                let deadline = deadline_ns.and_then(clock::instant_of);
+                self.uploads.insert(number, Upload { link, header, deadline });
+            }
+            Err(_) => {
+                let error = self.shutting_down();
+                self.answer_error(&link, &header, &error);
+            }
+        }
+    }
+
+    pub(super) fn admitted(&mut self, number: u64, result: Result<AssemblyId, WireError>) {
+        let Some(Upload { link, header, .. }) = self.uploads.remove(&number) else { return };
+        match result {
+            Ok(id) => self.answer_handle(&link, &header, id.0, true),
+            Err(error) => self.answer_error(&link, &header, &error),
+        }
+    }
+
+    /// Those whose client left, and those that are late, do not wait any longer.
+    pub(super) fn settle_uploads(&mut self, now: Instant) {
+        let mut over = Vec::new();
+        for (&number, upload) in &self.uploads {
+            let gone = !upload.link.is_connected();
+            if gone || upload.deadline.is_some_and(|d| d <= now) {
+                let withdrawn = self.queues.admissions.withdraw(|job| job.number() == Some(number));
+                if gone || withdrawn {
+                    over.push((number, gone));
+                }
+            }
+        }
+        for (number, gone) in over {
+            if gone {
+                self.uploads.remove(&number);
+            } else {
+                self.admitted(number, Err(expired()));
+            }
+        }
+    }
+
+    /// When the first of them is late.
+    pub(super) fn next_upload_deadline(&self, now: Instant) -> Option<Instant> {
+        // One that is late and still there is at work: nothing is to be done then.
+        self.uploads.values().filter_map(|u| u.deadline).filter(|d| *d > now).min()
+    }
+}
+
+fn expired() -> WireError {
+    WireError::new(ErrorCode::Expired, "the deadline passed before the upload was looked at")
+}
+
+impl AdmitJob {
+    /// The upload's number, if it is one.
+    pub(super) fn number(&self) -> Option<u64> {
+        match self {
+            Self::Upload { number, .. } | Self::Revise { number, .. } => Some(*number),
+            Self::Preload(_) => None,
+        }
+    }
+}

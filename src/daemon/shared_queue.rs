@@ -1,0 +1,142 @@
+//! The queues that feed the threads.
+
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use super::prefetch::Prefetch;
+use super::request_queue::{Bounds, Rejected, RequestQueue, Ticket};
+use super::workers::{AdmitJob, PlanJob};
+use crate::config::Config;
+
+/// A queue that threads share.
+#[derive(Debug)]
+pub(crate) struct SharedQueue<J> {
+    queue: Mutex<RequestQueue<J>>,
+    ready: Condvar,
+}
+
+/// A job at work; the queue is told when this is dropped, also by a panic.
+#[derive(Debug)]
+pub(crate) struct Working<'q, J> {
+    queue: &'q SharedQueue<J>,
+    ticket: Ticket,
+    started: Instant,
+}
+
+impl<J> Drop for Working<'_, J> {
+    fn drop(&mut self) {
+        self.queue.lock().done(self.ticket, self.started.elapsed());
+        // What its client has waiting may go on now.
+        self.queue.ready.notify_all();
+    }
+}
+
+impl<J> SharedQueue<J> {
+    fn new(bounds: Bounds) -> Self {
+        Self { queue: Mutex::new(RequestQueue::new(bounds)), ready: Condvar::new() }
+    }
+
+    /// The queue holds plain data: it is whole even if a holder panicked.
+    fn lock(&self) -> MutexGuard<'_, RequestQueue<J>> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn check(&self, ticket: Ticket) -> Result<(), Rejected> {
+        self.lock().check(ticket)
+    }
+
+    pub(crate) fn push(&self, ticket: Ticket, job: J) -> Result<(), Rejected> {
+        self.lock().push(ticket, job)?;
+        self.ready.notify_one();
+        Ok(())
+    }
+
+    /// Waits for a job; `None` when the queue is closed and empty.
+    pub(crate) fn pop(&self) -> Option<(J, Working<'_, J>)> {
+        let mut queue = self.lock();
+        loop {
+            if let Some((ticket, job)) = queue.pop() {
+                return Some((job, Working { queue: self, ticket, started: Instant::now() }));
+            }
+            if queue.is_over() {
+                return None;
+            }
+            queue = self.ready.wait(queue).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    pub(crate) fn withdraw(&self, fits: impl Fn(&J) -> bool) -> bool {
+        let withdrawn = self.lock().withdraw(fits);
+        if withdrawn {
+            // A closed queue may be empty now.
+            self.ready.notify_all();
+        }
+        withdrawn
+    }
+
+    pub(crate) fn close(&self) {
+        self.lock().close();
+        self.ready.notify_all();
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.lock().len()
+    }
+
+    pub(crate) fn hint_ms(&self) -> u32 {
+        self.lock().hint_ms()
+    }
+}
+
+/// Uploads that may wait to be healed; each client port has at most one.
+const ADMISSION_QUEUE: usize = 128;
+
+/// The queues of plans, of assemblies to take in, and of those to make ready.
+#[derive(Debug, Clone)]
+pub(crate) struct Queues {
+    pub(crate) plans: Arc<SharedQueue<PlanJob>>,
+    pub(crate) admissions: Arc<SharedQueue<AdmitJob>>,
+    /// What is made ready while nothing is asked, if anything is.
+    pub(super) prefetch: Arc<Prefetch>,
+}
+
+impl Queues {
+    pub(crate) fn new(config: &Config) -> Self {
+        let (workers, requests) = (config.workers.count, &config.requests);
+        // One worker is left to others, if there is more than one.
+        let share = workers.saturating_sub(1).max(1);
+        let megabytes = |mb: u64| mb.saturating_mul(1 << 20);
+        let plans = Bounds {
+            waiting: requests.queue,
+            waiting_per_owner: requests.waiting_per_client.min(requests.queue),
+            bytes: u64::MAX,
+            bytes_per_owner: u64::MAX,
+            workers,
+            working_per_owner: match requests.working_per_client {
+                0 => share,
+                most => most,
+            },
+            working_batch: share,
+        };
+        let admissions = Bounds {
+            waiting: ADMISSION_QUEUE,
+            waiting_per_owner: ADMISSION_QUEUE,
+            bytes: megabytes(requests.uploads_mb),
+            bytes_per_owner: megabytes(requests.uploads_mb_per_client),
+            workers: 1,
+            working_per_owner: 1,
+            working_batch: 1,
+        };
+        Self {
+            plans: Arc::new(SharedQueue::new(plans)),
+            admissions: Arc::new(SharedQueue::new(admissions)),
+            prefetch: Arc::default(),
+        }
+    }
+
+    pub(crate) fn close(&self) {
+        self.plans.close();
+        self.admissions.close();
+        self.prefetch.close();
+    }
+}

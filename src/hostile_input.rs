@@ -1,0 +1,140 @@
+//! Everything that reads a stranger's bytes, behind one door: for `tests/fuzz`, which looks for bytes that
+//! make it panic, hang or grow. Nothing else depends on it.
+
+use std::path::Path;
+
+use sbdp_ipc::bytes::AlignedBytes;
+use sbdp_ipc::error::WireError;
+use sbdp_ipc::plan::{PlanRequest, StepsView};
+use sbdp_ipc::revision;
+use sbdp_ipc::status::Status;
+use sbdp_ipc::summary::SummaryView;
+
+use crate::config::Config;
+use crate::daemon::uploaded_assembly;
+use crate::geometry::{self, Assembly, SourceAssembly, SourceMesh, SourcePart};
+
+/// A reader.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Reader {
+    /// All messages of the wire but meshes.
+    Messages,
+    /// Uploads and revisions, not further than into source meshes.
+    Meshes,
+    /// Uploads, taken in as the daemon does.
+    Admission,
+    /// OBJ files.
+    Obj,
+    /// STL files.
+    Stl,
+    /// glTF and GLB scenes.
+    Gltf,
+    /// OBJ files, healed.
+    Healing,
+    /// `assembly.json`, `assembly.toml` and `translation.json`.
+    Manifest,
+    /// The daemon's configuration.
+    Config,
+    /// Records of the cache.
+    Records,
+    /// `daemon.json`.
+    Endpoint,
+}
+
+impl Reader {
+    /// All of them.
+    pub const ALL: [Self; 11] = [
+        Self::Messages,
+        Self::Meshes,
+        Self::Admission,
+        Self::Obj,
+        Self::Stl,
+        Self::Gltf,
+        Self::Healing,
+        Self::Manifest,
+        Self::Config,
+        Self::Records,
+        Self::Endpoint,
+    ];
+
+    /// Reads bytes. What came of it, in words: different words for different ways through the reader.
+    #[must_use]
+    pub fn read(self, bytes: &[u8]) -> String {
+        match self {
+            Self::Messages => messages(bytes),
+            Self::Meshes => meshes(bytes),
+            Self::Admission => admission(bytes),
+            Self::Obj => mesh(geometry::parse_part("a.obj", bytes)),
+            Self::Stl => mesh(geometry::parse_part("a.stl", bytes)),
+            // No buffers are there to be found.
+            Self::Gltf => said(geometry::parse_scene(bytes, Path::new("/nowhere"))),
+            Self::Healing => match geometry::parse_part("a.obj", bytes) {
+                Ok(mesh) => admitted(&SourceAssembly {
+                    parts: vec![SourcePart { name: "a".into(), origin: "a.obj".into(), mesh }],
+                    ..SourceAssembly::default()
+                }),
+                Err(reason) => reason,
+            },
+            Self::Manifest => String::from_utf8(bytes.to_vec())
+                .map_or_else(|e| e.to_string(), |t| geometry::parse_notes(&t)),
+            Self::Config => String::from_utf8(bytes.to_vec()).map_or_else(|e| e.to_string(), |t| config(&t)),
+            Self::Records => format!("{:?}", crate::cache::read_as_records(bytes)),
+            Self::Endpoint => {
+                said(serde_json::from_slice::<sbdp_ipc::endpoint::Endpoint>(bytes).map_err(|e| e.to_string()))
+            }
+        }
+    }
+}
+
+fn said<T>(result: Result<T, String>) -> String {
+    result.map_or_else(|reason| reason, |_| "fine".to_owned())
+}
+
+fn mesh(parsed: Result<SourceMesh, String>) -> String {
+    said(parsed)
+}
+
+fn messages(bytes: &[u8]) -> String {
+    let copy = AlignedBytes::copy_of(bytes);
+    let bytes = copy.as_slice();
+    let request = said(PlanRequest::decode(bytes).map_err(|e| e.to_string()));
+    let error = said(WireError::decode(bytes).map_err(|e| e.to_string()));
+    let status = said(Status::decode(bytes).map_err(|e| e.to_string()));
+    let steps = said(StepsView::new(bytes).map_err(|e| e.to_string()).map(|steps| {
+        steps.iter().map(|s| s.path.len() + s.blockers.len()).sum::<usize>();
+    }));
+    let summary = said(SummaryView::new(bytes).map_err(|e| e.to_string()).map(|view| {
+        let _ = (view.part_names().count(), view.blocked().count(), view.warnings().count());
+        let _ = (view.reason(), view.units(), view.planner(), view.engine(), view.status());
+    }));
+    [request, error, status, steps, summary].join("; ")
+}
+
+fn meshes(bytes: &[u8]) -> String {
+    let copy = AlignedBytes::copy_of(bytes);
+    let upload = said(uploaded_assembly(&copy).map_err(|e| e.message));
+    let revision = revision::Revision::decode(copy.as_slice());
+    let revision = said(revision.map_err(|e| e.to_string()).map(|r| r.added.len() + r.replaced.len()));
+    format!("{upload}; {revision}")
+}
+
+/// Healing may take its time over many triangles, whoever sends them: here are few.
+const FEW: usize = 300;
+
+fn admission(bytes: &[u8]) -> String {
+    match uploaded_assembly(&AlignedBytes::copy_of(bytes)) {
+        Ok(source) => admitted(&source),
+        Err(error) => error.message,
+    }
+}
+
+fn admitted(source: &SourceAssembly) -> String {
+    if source.parts.iter().map(|p| p.mesh.triangles.len()).sum::<usize>() > FEW {
+        return "many triangles".to_owned();
+    }
+    said(Assembly::new(source).map_err(|e| e.to_string()))
+}
+
+fn config(text: &str) -> String {
+    said(Config::parse(text, Path::new("config.toml")).map_err(|e| e.to_string()))
+}

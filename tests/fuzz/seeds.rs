@@ -1,0 +1,154 @@
+//! What mutation begins with: good messages and files, known bad ones, and what was found before.
+
+use std::path::Path;
+
+use sbdp::hostile_input::Reader;
+use sbdp_ipc::endpoint::Endpoint;
+use sbdp_ipc::error::{ErrorCode, WireError};
+use sbdp_ipc::geometry::{Assembly, Part, Vertices};
+use sbdp_ipc::plan::{MovedPart, PlanRequest, Step, encode_steps};
+use sbdp_ipc::revision::Revision;
+use sbdp_ipc::status::{Status, StatusHeader};
+use sbdp_ipc::summary::{NO_PART, OverlapRecord, SummaryParts};
+
+/// Longer files say nothing that shorter ones do not, and are read slowly.
+const LONGEST: u64 = 16 * 1024;
+
+/// The readers that a file of this extension is for.
+fn readers(path: &Path) -> &'static [Reader] {
+    match path.extension().and_then(|e| e.to_str()).unwrap_or_default() {
+        "obj" => &[Reader::Obj, Reader::Healing],
+        "stl" => &[Reader::Stl],
+        "gltf" | "glb" => &[Reader::Gltf],
+        "json" => &[Reader::Manifest, Reader::Endpoint],
+        "toml" => &[Reader::Config, Reader::Manifest],
+        _ => &[],
+    }
+}
+
+/// Seeds for a reader: those built in, and those among the files below some folders.
+pub(crate) fn seeds(reader: Reader, folders: &[std::path::PathBuf]) -> Vec<Vec<u8>> {
+    let mut seeds = built_in(reader);
+    folders.iter().for_each(|folder| collect(reader, folder, &mut seeds));
+    seeds.push(Vec::new());
+    seeds
+}
+
+fn collect(reader: Reader, folder: &Path, seeds: &mut Vec<Vec<u8>>) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    let mut paths: Vec<_> = entries.flatten().map(|e| e.path()).collect();
+    paths.sort();
+    for path in paths {
+        if path.is_dir() {
+            collect(reader, &path, seeds);
+        } else if readers(&path).contains(&reader)
+            && std::fs::metadata(&path).is_ok_and(|m| m.len() <= LONGEST)
+            && let Ok(bytes) = std::fs::read(&path)
+        {
+            seeds.push(bytes);
+        }
+    }
+}
+
+fn built_in(reader: Reader) -> Vec<Vec<u8>> {
+    match reader {
+        Reader::Messages => messages(),
+        Reader::Meshes | Reader::Admission => meshes(),
+        Reader::Config => vec![include_bytes!("../../config/default.toml").to_vec()],
+        Reader::Manifest => vec![
+            br#"{"name": "a", "units": "mm", "fixed": ["0"], "densities": {"0": 1.5}, "parts": ["0.obj"]}"#.to_vec(),
+            b"name = \"a\"\nfixed = [\"0\"]\n[densities]\n0 = 1.5\n[[parts]]\nfile = \"0.obj\"\n".to_vec(),
+            br#"{"0": [1.0, 2.0, 3.0]}"#.to_vec(),
+            b"[[1.0, 2.0, 3.0]]".to_vec(),
+        ],
+        Reader::Records => records(),
+        Reader::Endpoint => {
+            let endpoint = Endpoint::of_this_process("sbdp_x_", Path::new("/tmp/iox"));
+            vec![serde_json::to_vec(&endpoint).unwrap_or_default()]
+        }
+        Reader::Obj | Reader::Healing => vec![
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n".to_vec(),
+            b"o a\nv 0 0 0\nvn 0 0 1\nvt 0 0\nf -1/1/1 1//1 1\n".to_vec(),
+        ],
+        Reader::Stl => vec![b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), binary_stl()],
+        Reader::Gltf => vec![],
+    }
+}
+
+fn binary_stl() -> Vec<u8> {
+    let mut bytes = vec![0; 80];
+    bytes.extend(2_u32.to_le_bytes());
+    for triangle in 0..2_u8 {
+        bytes.extend((0..12_u8).flat_map(|i| f32::from(i * triangle).to_le_bytes()));
+        bytes.extend([0, 0]);
+    }
+    bytes
+}
+
+/// Payloads as bincode lays them out: counts of eight bytes, then what is counted.
+fn records() -> Vec<Vec<u8>> {
+    let mut seeds = vec![1.5_f64.to_le_bytes().to_vec()];
+    for count in [0_u64, 1, 3] {
+        let mut bytes = count.to_le_bytes().to_vec();
+        bytes.extend((0..count * 56).map(|i| (i % 3) as u8));
+        seeds.push(bytes);
+    }
+    let mut sealed = b"SBDC\x01\0\x02\0\x01\0\0\0\x0b\0\0\0".to_vec();
+    sealed.extend([7; 27]);
+    seeds.push(sealed);
+    seeds
+}
+
+fn messages() -> Vec<Vec<u8>> {
+    let path = vec![[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 5.0, 1.0, 0.0, 0.0, 0.0]];
+    let step = Step { part: 1, path, blockers: vec![0, 2], verified_depth: 1e-4, ..Step::default() };
+    let summary = SummaryParts {
+        reason: Some("exhausted"),
+        planner: "sbdp-star",
+        engine: "sliding",
+        units: Some("mm"),
+        parts: vec!["0", "1", "größer"],
+        overlaps: vec![OverlapRecord { parts: [0, 1], depth: 0.25 }],
+        blocked: vec![(2, vec![0, 1], "+x"), (2, vec![], "-rz")],
+        warnings: vec![(NO_PART, "whole"), (1, "one")],
+        removed: vec![0],
+        targets: Some(vec![1]),
+        remaining: vec![1, 2],
+        ..SummaryParts::default()
+    };
+    let request = PlanRequest {
+        fixed: vec![1, 2],
+        targets: Some(vec![0]),
+        moved: vec![MovedPart { part: 1, ..MovedPart::default() }],
+        ..PlanRequest::default()
+    };
+    let status = Status {
+        numbers: StatusHeader::default(),
+        version: "0.1.0".to_owned(),
+        preloaded: vec![("frame".to_owned(), [3; 32])],
+    };
+    vec![
+        request.encode(),
+        PlanRequest::default().encode(),
+        encode_steps(0, [&step, &step]),
+        summary.encode(),
+        status.encode(),
+        WireError::new(ErrorCode::Busy, "busy").encode(),
+    ]
+}
+
+fn meshes() -> Vec<Vec<u8>> {
+    const TETRAHEDRON: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    let wide = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let narrow = wide.map(|v| v.map(|x| x as f32 + 2.0));
+    let parts = vec![
+        Part { name: "a", vertices: Vertices::F64(&wide), triangles: &TETRAHEDRON },
+        Part { name: "b", vertices: Vertices::F32(&narrow), triangles: &TETRAHEDRON },
+    ];
+    let revision =
+        Revision { base: [1; 32], replaced: vec![(0, parts[0])], added: vec![parts[1]], moved: vec![] };
+    let assembly = Assembly { name: "demo", units: Some("mm"), parts, fixed: vec!["b"] };
+    let mut bytes = [vec![0; assembly.encoded_len()], vec![0; revision.encoded_len()]];
+    assert!(assembly.encode_into(&mut bytes[0]) && revision.encode_into(&mut bytes[1]));
+    bytes.into()
+}
