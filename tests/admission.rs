@@ -10,6 +10,7 @@ use sbdp_client::{
 };
 
 /// One plan is made, one waits.
+const NARROW: &str = "[workers]\ncount = 1\n[requests]\nqueue = 1\n";
 
 fn unremembered() -> PlanOptions {
     PlanOptions { no_cache: true, ..PlanOptions::default() }
