@@ -36,6 +36,10 @@ impl Place {
         self.folder.join("run")
     }
 
+    pub(super) fn cache(&self) -> PathBuf {
+        self.folder.join("cache")
+    }
+
     pub(super) fn root(&self) -> PathBuf {
         self.folder.join("iox")
     }
@@ -54,34 +58,75 @@ impl Drop for Place {
 #[derive(Debug)]
 pub(super) struct Server {
     child: Child,
+    command: Command,
     place: Place,
 }
 
 impl Server {
     /// Starts `sbdpd`, which lies beside this program.
     pub(super) fn daemon(place: Place) -> Result<Self, BenchError> {
+        Self::daemon_with(place, "")
+    }
+
+    /// The same with a configuration.
+    pub(super) fn daemon_with(place: Place, config: &str) -> Result<Self, BenchError> {
         let program = std::env::current_exe().map_err(BenchError::failed)?;
+        let file = place.folder().join("config.toml");
+        std::fs::write(&file, config).map_err(|e| BenchError::file(&file, &e))?;
         let mut command = Command::new(program.with_file_name("sbdpd"));
+        command.arg("--config").arg(file);
         command.arg("--runtime-dir").arg(place.runtime_dir()).arg("--root").arg(place.root());
-        command.env("SBDP_CACHE_DIR", place.folder().join("cache")).env("SBDP_LOG", "warn");
+        command.env("SBDP_CACHE_DIR", place.cache()).env("SBDP_LOG", "warn");
         Self::start(place, command)
     }
 
     /// Starts a process that publishes itself at the place as a daemon does.
     pub(super) fn start(place: Place, mut command: Command) -> Result<Self, BenchError> {
-        let program = PathBuf::from(command.get_program());
         command.stdin(Stdio::null()).stdout(Stdio::null());
-        let child = command.spawn().map_err(|e| BenchError::file(&program, &e))?;
-        let mut server = Self { child, place };
+        let child = spawned(&mut command)?;
+        let mut server = Self { child, command, place };
+        server.wait_until_ready()?;
+        Ok(server)
+    }
+
+    /// Ends the process and starts another in its place.
+    pub(super) fn restart(&mut self) -> Result<(), BenchError> {
+        self.end();
+        self.child = spawned(&mut self.command)?;
+        self.wait_until_ready()
+    }
+
+    fn wait_until_ready(&mut self) -> Result<(), BenchError> {
+        let program = PathBuf::from(self.command.get_program());
         let started = Instant::now();
-        while Endpoint::find(&server.place.runtime_dir()).map(|e| e.pid).ok() != Some(server.child.id()) {
-            let ended = server.child.try_wait().map_err(|e: io::Error| BenchError::file(&program, &e))?;
+        while Endpoint::find(&self.place.runtime_dir()).map(|e| e.pid).ok() != Some(self.child.id()) {
+            let ended = self.child.try_wait().map_err(|e: io::Error| BenchError::file(&program, &e))?;
             if ended.is_some() || started.elapsed() > READY {
                 return Err(BenchError::Failed(format!("{} does not become ready", program.display())));
             }
             std::thread::sleep(LOOK);
         }
-        Ok(server)
+        Ok(())
+    }
+
+    fn end(&mut self) {
+        let pid = rustix::process::Pid::from_child(&self.child);
+        let _ = rustix::process::kill_process(pid, rustix::process::Signal::TERM);
+        let started = Instant::now();
+        while let Ok(None) = self.child.try_wait() {
+            if started.elapsed() > READY {
+                let _ = self.child.kill();
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    pub(super) fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    pub(super) fn place(&self) -> &Place {
+        &self.place
     }
 
     pub(super) fn connect(&self) -> Result<Client, BenchError> {
@@ -97,14 +142,10 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
-        let pid = rustix::process::Pid::from_child(&self.child);
-        let _ = rustix::process::kill_process(pid, rustix::process::Signal::TERM);
-        let started = Instant::now();
-        while let Ok(None) = self.child.try_wait() {
-            if started.elapsed() > READY {
-                let _ = self.child.kill();
-            }
-            std::thread::sleep(LOOK);
-        }
+        self.end();
     }
+}
+
+fn spawned(command: &mut Command) -> Result<Child, BenchError> {
+    command.spawn().map_err(|e| BenchError::file(Path::new(command.get_program()), &e))
 }

@@ -6,11 +6,12 @@ use std::process::Command;
 use std::sync::Barrier;
 use std::time::{Duration, Instant};
 
-use sbdp_client::{Client, Event, Handle, PlanOptions, Summary};
+use sbdp_client::{Client, Handle, PlanOptions, Summary};
 use sbdp_ipc::plan::PlanRequest;
 use serde::Serialize;
 
 use super::BenchError;
+use super::asking::summary;
 use super::daemon::{Place, Server};
 use super::raw_peer::RawClient;
 use crate::geometry::SourceAssembly;
@@ -154,22 +155,15 @@ fn question(handle: Handle) -> Vec<u8> {
     .encode()
 }
 
-/// Plans to the end.
 fn ask(client: &Client, handle: Handle) -> Result<Summary, BenchError> {
-    let mut stream = client.plan(handle, &PlanOptions::default()).map_err(BenchError::failed)?;
-    while let Some(event) = stream.next_event().map_err(BenchError::failed)? {
-        if let Event::Done(summary) = event {
-            return Ok(summary);
-        }
-    }
-    Err(BenchError::Failed("a plan ended without its summary".to_owned()))
+    summary(client, handle, &PlanOptions::default())
 }
 
-fn micros(time: Duration) -> f64 {
+pub(super) fn micros(time: Duration) -> f64 {
     time.as_secs_f64() * 1e6
 }
 
-fn percentiles(mut times: Vec<Duration>) -> Percentiles {
+pub(super) fn percentiles(mut times: Vec<Duration>) -> Percentiles {
     times.sort_unstable();
     let at = |share: f64| {
         let place = (times.len() as f64 * share) as usize;

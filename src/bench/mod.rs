@@ -7,6 +7,8 @@
 //!
 //! `latency`, `load` and `replan` ask a `daemon` of their own; the first beside a `raw_peer`.
 
+mod asking;
+mod churn;
 mod corpus;
 mod daemon;
 mod estimate;
@@ -17,6 +19,7 @@ mod load;
 mod raw_peer;
 mod record;
 mod replan;
+mod restart;
 mod rotated;
 mod rotation;
 mod runner;
@@ -33,6 +36,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::time::Duration;
 
+pub use churn::{Churn, ChurnRequest, ChurnSample, churn};
 pub use corpus::{Category, Problem, Shard, find};
 pub use families::Family;
 pub use latency::{Latency, LatencyRequest, Percentiles, latency};
@@ -43,6 +47,7 @@ pub use load::{
 pub use raw_peer::serve as serve_raw;
 pub use record::{Key, Record, Settings, Store, read};
 pub use replan::{Cost, ReplanRecord, replan};
+pub use restart::{Restart, restart};
 pub use scale::{Growth, PARTS, ScaleRequest, scale};
 
 use estimate::Estimate;

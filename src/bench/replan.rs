@@ -4,10 +4,11 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use sbdp_client::{Change, Client, Event, Handle, PlanOptions, PlanStatus, Summary};
+use sbdp_client::{Change, Client, Handle, PlanOptions};
 use serde::Serialize;
 
 use super::BenchError;
+use super::asking::{Answered, plan};
 use super::daemon::{Place, Server};
 use crate::geometry::{SourceAssembly, SourceMesh, load_assembly};
 use crate::upload::{wire_assembly, wire_part};
@@ -62,7 +63,7 @@ pub fn replan(
     for path in assemblies {
         let source = load_assembly(path).map_err(BenchError::failed)?;
         let base = Asked::of(&source, "base")?;
-        let (plan, _) = base.plan(base.handle, &PlanOptions::default())?;
+        let (plan, _) = plan(&base.client, base.handle, &PlanOptions::default())?;
         let part = fastener(&source, &plan)
             .ok_or_else(|| BenchError::Failed(format!("{}: nothing comes off", source.name)))?;
         let outward = plan.outward(part);
@@ -79,7 +80,7 @@ pub fn replan(
 fn compared(source: &SourceAssembly, part: usize, change: &Changed) -> Result<ReplanRecord, BenchError> {
     let (cold_plan, cold) = Asked::of(source, "cold")?.changed(source, part, change)?;
     let warm = Asked::of(source, "warm")?;
-    warm.plan(warm.handle, &PlanOptions::default())?;
+    plan(&warm.client, warm.handle, &PlanOptions::default())?;
     let (plan, changed) = warm.changed(source, part, change)?;
     Ok(ReplanRecord {
         assembly: source.name.clone(),
@@ -106,20 +107,6 @@ impl Asked {
         Ok(Self { client, handle, _daemon: daemon })
     }
 
-    fn plan(&self, handle: Handle, options: &PlanOptions) -> Result<(Answered, Summary), BenchError> {
-        let mut stream = self.client.plan(handle, options).map_err(BenchError::failed)?;
-        let mut steps = Vec::new();
-        while let Some(event) = stream.next_event().map_err(BenchError::failed)? {
-            match event {
-                Event::Progress(_) => {}
-                Event::Restarted => steps.clear(),
-                Event::Step(step) => steps.push((step.part as usize, step.path.to_vec())),
-                Event::Done(summary) => return Ok((Answered { status: summary.status, steps }, summary)),
-            }
-        }
-        Err(BenchError::Failed("a plan ended without its summary".to_owned()))
-    }
-
     fn changed(
         &self,
         source: &SourceAssembly,
@@ -134,33 +121,15 @@ impl Asked {
             let change = Change { replaced: vec![(part as u32, with)], ..Change::default() };
             handle = self.client.revise(handle, &change).map_err(BenchError::failed)?;
         }
-        let (answered, summary) = self.plan(handle, &change.options)?;
+        let (answered, summary) = plan(&self.client, handle, &change.options)?;
         let cost =
             Cost { time_s: started.elapsed().as_secs_f64(), simulations: summary.stats.simulations_run };
         Ok((answered, cost))
     }
 }
 
-/// What was answered, to the bit.
-#[derive(Debug, PartialEq)]
-struct Answered {
-    status: PlanStatus,
-    steps: Vec<(usize, Vec<[f64; 7]>)>,
-}
-
-impl Answered {
-    /// The unit vector along which a part begins to leave.
-    fn outward(&self, part: usize) -> [f64; 3] {
-        let path = self.steps.iter().find(|(p, _)| *p == part).map(|(_, path)| path.as_slice());
-        let way = path.and_then(|path| path.iter().find(|w| w[..3].iter().any(|x| x.abs() > 1e-9)));
-        let [x, y, z] = way.map_or([0.0, 0.0, 1.0], |w| [w[0], w[1], w[2]]);
-        let length = (x * x + y * y + z * z).sqrt();
-        [x, y, z].map(|x| x / length)
-    }
-}
-
 /// A part that comes off and is called a bolt or screw, else the first that comes off.
-fn fastener(source: &SourceAssembly, plan: &Answered) -> Option<usize> {
+pub(super) fn fastener(source: &SourceAssembly, plan: &Answered) -> Option<usize> {
     let leaves = || plan.steps.iter().map(|(part, _)| *part);
     let is_fastener = |&part: &usize| {
         let name = source.parts[part].name.to_lowercase();

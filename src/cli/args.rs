@@ -14,8 +14,10 @@ use crate::geometry::{Pose, Waypoint, waypoint_from_pose};
 use crate::search;
 
 mod load;
+mod through_daemon;
 
 pub(super) use load::{BenchLoad, BenchLoadClient};
+pub(super) use through_daemon::{BenchChurn, BenchLatency, BenchRawPeer, BenchReplan, BenchRestart};
 
 /// Plans how assemblies come apart.
 #[derive(Debug, Parser)]
@@ -168,6 +170,10 @@ pub(super) enum BenchCommand {
     Latency(BenchLatency),
     /// Plan again through a daemon when one part changed, beside a daemon that planned nothing before
     Replan(BenchReplan),
+    /// Start a daemon again and again: its first answers with a warm disk, beside answers from memory
+    Restart(BenchRestart),
+    /// Plan many different assemblies, one after the other, through a daemon with small budgets
+    Churn(BenchChurn),
     /// Put a daemon under the load of many clients at once: nothing may be lost, and it may not grow
     Load(BenchLoad),
     /// A client of `load`
@@ -176,44 +182,6 @@ pub(super) enum BenchCommand {
     /// The peer of `latency`
     #[command(hide = true)]
     RawPeer(BenchRawPeer),
-}
-
-/// A benchmark of answers from memory.
-#[derive(Debug, Args)]
-pub(super) struct BenchLatency {
-    /// What is planned [default: a bolted frame of 20 parts]
-    pub(super) assembly: Option<PathBuf>,
-    /// How many clients ask at the same time
-    #[arg(long, value_name = "N", default_value = "1")]
-    pub(super) clients: NonZeroUsize,
-    /// How often each asks
-    #[arg(long, value_name = "N", default_value = "2000")]
-    pub(super) rounds: NonZeroUsize,
-    /// Write the figures there as JSON
-    #[arg(long, value_name = "FILE")]
-    pub(super) json: Option<PathBuf>,
-}
-
-/// A benchmark of changed questions.
-#[derive(Debug, Args)]
-pub(super) struct BenchReplan {
-    /// Folders or files of assemblies; of each, a bolt is removed, moved, replaced and locked
-    #[arg(value_name = "ASSEMBLY", required = true)]
-    pub(super) assemblies: Vec<PathBuf>,
-    /// Write the figures there as JSON
-    #[arg(long, value_name = "FILE")]
-    pub(super) json: Option<PathBuf>,
-}
-
-/// The raw peer.
-#[derive(Debug, Args)]
-pub(super) struct BenchRawPeer {
-    #[arg(long)]
-    pub(super) runtime_dir: PathBuf,
-    #[arg(long)]
-    pub(super) root: PathBuf,
-    #[arg(long, value_delimiter = ',')]
-    pub(super) chunks: Vec<usize>,
 }
 
 /// A benchmark to be run.

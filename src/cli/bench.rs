@@ -32,6 +32,8 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<ExitCode, CliError> {
         (Some(BenchCommand::Replan(replan)), _) => through_daemon::replan(replan),
         (Some(BenchCommand::Load(arguments)), _) => load::load(arguments),
         (Some(BenchCommand::LoadClient(client)), _) => load::client(client),
+        (Some(BenchCommand::Restart(restart)), _) => through_daemon::restart(restart),
+        (Some(BenchCommand::Churn(churn)), _) => through_daemon::churn(churn),
         (Some(BenchCommand::RawPeer(peer)), _) => through_daemon::raw_peer(peer),
         (None, Some(run)) => measure(run),
         (None, None) => Err(CliError::Refused("give folders of assemblies, or `report`".to_owned())),

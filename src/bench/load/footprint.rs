@@ -8,7 +8,7 @@ use super::figures::{DaemonFigures, Footprint};
 const SETTLED: u64 = 2000;
 
 /// What the process holds now; zeros where the system does not tell.
-pub(super) fn footprint(pid: u32, requests: u64) -> Footprint {
+pub(in crate::bench) fn footprint(pid: u32, requests: u64) -> Footprint {
     let proc = Path::new("/proc").join(pid.to_string());
     let status = std::fs::read_to_string(proc.join("status")).unwrap_or_default();
     let kib = |name: &str| -> u64 {

@@ -28,6 +28,7 @@ use super::BenchError;
 use super::daemon::{Place, Server};
 use figures::ClientFigures;
 use footprint::Watch;
+pub(super) use footprint::footprint;
 
 /// What to do.
 #[derive(Debug, Clone)]

@@ -7,29 +7,24 @@ use std::sync::atomic::AtomicBool;
 
 use serde::Serialize;
 
-use super::super::args::{BenchLatency, BenchRawPeer, BenchReplan};
+use super::super::args::{BenchChurn, BenchLatency, BenchRawPeer, BenchReplan, BenchRestart};
 use super::super::error::CliError;
 use super::super::print;
 use super::THIS_PROGRAM;
-use crate::bench::{self, Family, LatencyRequest, Percentiles, ReplanRecord};
+use crate::bench::{self, ChurnRequest, Family, LatencyRequest, Percentiles, ReplanRecord};
 use crate::geometry::{SourceAssembly, SourcePart, load_assembly};
 
 /// Parts of the assembly that is planned by default.
 const PARTS: usize = 20;
 
 pub(super) fn latency(arguments: &BenchLatency) -> Result<ExitCode, CliError> {
-    let assembly = match &arguments.assembly {
-        Some(path) => load_assembly(path)?,
-        None => frame(),
-    };
     let request = LatencyRequest {
-        assembly,
+        assembly: assembly(arguments.assembly.as_deref())?,
         clients: arguments.clients.get(),
         rounds: arguments.rounds.get(),
         program: PathBuf::from(THIS_PROGRAM),
     };
     let latency = bench::latency(&request)?;
-    let row = |what: &str, p: Percentiles| format!("{what:<22}{:>10.1}{:>10.1}\n", p.p50, p.p99);
     let (raw, repeated) = (latency.raw_event_rtt_us, latency.repeat_plan_us);
     print(&format!(
         "{} clients, {} rounds each, {} bytes an answer; planned first in {:.1} ms\n\
@@ -41,8 +36,8 @@ pub(super) fn latency(arguments: &BenchLatency) -> Result<ExitCode, CliError> {
         "microseconds",
         "p50",
         "p99",
-        row("raw round trip", raw),
-        row("the same plan again", repeated),
+        row("raw round trip", 22, raw),
+        row("the same plan again", 22, repeated),
         "ratio",
         repeated.p50 / raw.p50,
         repeated.p99 / raw.p99,
@@ -70,6 +65,47 @@ fn line(r: &ReplanRecord) -> String {
         100.0 * r.changed.simulations as f64 / r.cold.simulations.max(1) as f64,
         if r.verified { "the same plan" } else { "NOT the same plan" }
     )
+}
+
+pub(super) fn restart(arguments: &BenchRestart) -> Result<ExitCode, CliError> {
+    let restart = bench::restart(&assembly(arguments.assembly.as_deref())?, arguments.rounds.get())?;
+    let heading = format!("{:<36}{:>10}{:>10}\n", "microseconds, first answers", "p50", "p99");
+    let rows = [
+        ("the same plan, from memory", restart.repeat_plan_us),
+        ("the same plan, started again", restart.restarted_plan_us),
+        ("a part moved, from memory", restart.changed_us),
+        ("a part moved, started again", restart.restarted_changed_us),
+        ("a part moved, two seconds later", restart.prepared_changed_us),
+    ];
+    print(&rows.map(|(what, times)| row(what, 36, times)).into_iter().fold(heading, |all, row| all + &row))?;
+    written(arguments.json.as_deref(), &restart)
+}
+
+pub(super) fn churn(arguments: &BenchChurn) -> Result<ExitCode, CliError> {
+    let request = ChurnRequest {
+        assemblies: arguments.assemblies.get(),
+        memory_mb: arguments.memory_mb,
+        disk_mb: arguments.disk_mb,
+    };
+    eprintln!("assemblies: anonymous and resident memory, files, disk");
+    let churn = bench::churn(&request, |s| {
+        eprintln!(
+            "{}: {:.1} MB, {:.1} MB, {}, {:.1} MB",
+            s.assemblies, s.private_mb, s.resident_mb, s.descriptors, s.disk_mb
+        );
+    })?;
+    print(&format!("{} answered, {} refused\n", churn.answered, churn.refused))?;
+    print(&churn.reasons.iter().fold(String::new(), |all, reason| format!("{all}{reason}\n")))?;
+    written(arguments.json.as_deref(), &churn)
+}
+
+fn row(what: &str, width: usize, p: Percentiles) -> String {
+    format!("{what:<width$}{:>10.1}{:>10.1}\n", p.p50, p.p99)
+}
+
+/// The one that is named, or the default one.
+fn assembly(path: Option<&Path>) -> Result<SourceAssembly, CliError> {
+    Ok(path.map(load_assembly).transpose()?.unwrap_or_else(frame))
 }
 
 pub(super) fn raw_peer(arguments: &BenchRawPeer) -> Result<ExitCode, CliError> {

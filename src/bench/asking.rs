@@ -1,0 +1,53 @@
+//! Plans asked of a daemon, to the end.
+
+use sbdp_client::{Client, Event, Handle, PlanOptions, PlanStatus, Summary};
+
+use super::BenchError;
+
+/// What was answered, to the bit.
+#[derive(Debug, PartialEq)]
+pub(super) struct Answered {
+    pub(super) status: PlanStatus,
+    pub(super) steps: Vec<(usize, Vec<[f64; 7]>)>,
+}
+
+/// Plans to the end.
+pub(super) fn plan(
+    client: &Client,
+    handle: Handle,
+    options: &PlanOptions,
+) -> Result<(Answered, Summary), BenchError> {
+    let mut stream = client.plan(handle, options).map_err(BenchError::failed)?;
+    let mut steps = Vec::new();
+    while let Some(event) = stream.next_event().map_err(BenchError::failed)? {
+        match event {
+            Event::Progress(_) => {}
+            Event::Restarted => steps.clear(),
+            Event::Step(step) => steps.push((step.part as usize, step.path.to_vec())),
+            Event::Done(summary) => return Ok((Answered { status: summary.status, steps }, summary)),
+        }
+    }
+    Err(BenchError::Failed("a plan ended without its summary".to_owned()))
+}
+
+/// The same, of which nothing but the summary is kept.
+pub(super) fn summary(client: &Client, handle: Handle, options: &PlanOptions) -> Result<Summary, BenchError> {
+    let mut stream = client.plan(handle, options).map_err(BenchError::failed)?;
+    while let Some(event) = stream.next_event().map_err(BenchError::failed)? {
+        if let Event::Done(summary) = event {
+            return Ok(summary);
+        }
+    }
+    Err(BenchError::Failed("a plan ended without its summary".to_owned()))
+}
+
+impl Answered {
+    /// The unit vector along which a part begins to leave.
+    pub(super) fn outward(&self, part: usize) -> [f64; 3] {
+        let path = self.steps.iter().find(|(p, _)| *p == part).map(|(_, path)| path.as_slice());
+        let way = path.and_then(|path| path.iter().find(|w| w[..3].iter().any(|x| x.abs() > 1e-9)));
+        let [x, y, z] = way.map_or([0.0, 0.0, 1.0], |w| [w[0], w[1], w[2]]);
+        let length = (x * x + y * y + z * z).sqrt();
+        [x, y, z].map(|x| x / length)
+    }
+}

@@ -1,0 +1,101 @@
+//! `sbdp bench restart`: what a daemon that was started again still knows: the first answers after a
+//! restart with a warm disk, beside those of a daemon that has everything in memory.
+
+use std::time::{Duration, Instant};
+
+use sbdp_client::{Client, Handle, PlanOptions};
+use serde::Serialize;
+
+use super::BenchError;
+use super::asking::{plan, summary};
+use super::daemon::{Place, Server};
+use super::latency::{Percentiles, percentiles};
+use super::replan::fastener;
+use crate::geometry::SourceAssembly;
+use crate::upload::wire_assembly;
+
+/// So long a restarted daemon is left alone, where it may make ready what was asked last.
+const QUIET: Duration = Duration::from_secs(2);
+
+/// What was measured, in microseconds; connecting is left out.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Restart {
+    /// Restarts of each kind.
+    pub rounds: usize,
+    /// The same plan again, by a daemon that has it in memory.
+    pub repeat_plan_us: Percentiles,
+    /// The same plan, as the first question after a restart.
+    pub restarted_plan_us: Percentiles,
+    /// A question about a part that stands elsewhere, by a daemon that planned the assembly.
+    pub changed_us: Percentiles,
+    /// Such a question, as the first one after a restart.
+    pub restarted_changed_us: Percentiles,
+    /// Such a question, after the restarted daemon was left alone for two seconds.
+    pub prepared_changed_us: Percentiles,
+}
+
+/// Measures; each changed question is another one.
+///
+/// # Errors
+/// A process cannot be started, or does not answer.
+pub fn restart(assembly: &SourceAssembly, rounds: usize) -> Result<Restart, BenchError> {
+    let mut daemon = Server::daemon(Place::new("restart")?)?;
+    let client = daemon.connect()?;
+    let handle = client.upload(&wire_assembly(assembly)).map_err(BenchError::failed)?;
+    let (answered, _) = plan(&client, handle, &PlanOptions::default())?;
+    let part = fastener(assembly, &answered)
+        .ok_or_else(|| BenchError::Failed(format!("{}: nothing comes off", assembly.name)))?;
+    let outward = answered.outward(part);
+    drop(client);
+    let mut asked = 0;
+    let mut changed = || {
+        asked += 1;
+        let by = FIRST * (1.0 + f64::from(asked) / 256.0);
+        let [x, y, z] = outward.map(|x| x * by);
+        let moved = vec![(part as u32, [x, y, z, 1.0, 0.0, 0.0, 0.0])];
+        PlanOptions { moved, ..PlanOptions::default() }
+    };
+    let mut times: [Vec<Duration>; 5] = Default::default();
+    for _ in 0..rounds {
+        let client = daemon.connect()?;
+        plan(&client, handle, &PlanOptions::default())?;
+        times[0].push(took(&client, handle, &PlanOptions::default(), true)?);
+        times[2].push(took(&client, handle, &changed(), false)?);
+        drop(client);
+        daemon.restart()?;
+        let client = daemon.connect()?;
+        times[1].push(took(&client, handle, &PlanOptions::default(), true)?);
+        drop(client);
+        daemon.restart()?;
+        let client = daemon.connect()?;
+        times[3].push(took(&client, handle, &changed(), false)?);
+        drop(client);
+        daemon.restart()?;
+        let client = daemon.connect()?;
+        std::thread::sleep(QUIET);
+        times[4].push(took(&client, handle, &changed(), false)?);
+    }
+    let [repeat, restarted, changed, restarted_changed, prepared] = times.map(percentiles);
+    Ok(Restart {
+        rounds,
+        repeat_plan_us: repeat,
+        restarted_plan_us: restarted,
+        changed_us: changed,
+        restarted_changed_us: restarted_changed,
+        prepared_changed_us: prepared,
+    })
+}
+
+/// How far the part is moved at least, in the assembly's unit.
+const FIRST: f64 = 0.5;
+
+fn took(client: &Client, handle: Handle, options: &PlanOptions, known: bool) -> Result<Duration, BenchError> {
+    let started = Instant::now();
+    let summary = summary(client, handle, options)?;
+    let took = started.elapsed();
+    if (summary.stats.plan_hit == 1) == known {
+        Ok(took)
+    } else {
+        Err(BenchError::Failed(format!("the plan was {}remembered", if known { "not " } else { "" })))
+    }
+}
