@@ -10,7 +10,7 @@ use crate::plan::{Plan, PlanStatus, Verifier};
 use crate::search::{
     Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_blockages, search,
 };
-use crate::simulation::{PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
+use crate::simulation::{JoinedHulls, PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
 use super::answer::{self, Found, Frame, Times};
@@ -24,12 +24,14 @@ pub(super) struct Entry {
     pub(super) assembly: Assembly,
     /// Those of the assembly, with their fields.
     pub(super) shapes: Vec<Arc<SharedShape>>,
+    /// Joined so far, also for others.
+    hulls: Arc<JoinedHulls>,
     prepared: Mutex<Option<Arc<Prepared>>>,
 }
 
 impl Entry {
-    pub(super) fn new(assembly: Assembly, shapes: Vec<Arc<SharedShape>>) -> Self {
-        Self { assembly, shapes, prepared: Mutex::default() }
+    pub(super) fn new(assembly: Assembly, shapes: Vec<Arc<SharedShape>>, hulls: Arc<JoinedHulls>) -> Self {
+        Self { assembly, shapes, hulls, prepared: Mutex::default() }
     }
 
     /// Bytes in memory beside its shapes, about.
@@ -216,7 +218,9 @@ impl Entry {
             if let Some(prepared) = &*slot {
                 return Ok((Arc::clone(prepared), true));
             }
-            let prepared = Arc::new(Prepared::new(&self.assembly, &self.shapes, termination, sink, recall)?);
+            let mut prepared = Prepared::new(&self.assembly, &self.shapes, termination, sink, recall)?;
+            prepared.scene.hulls = Arc::clone(&self.hulls);
+            let prepared = Arc::new(prepared);
             *slot = Some(Arc::clone(&prepared));
             return Ok((prepared, false));
         }

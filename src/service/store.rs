@@ -1,5 +1,6 @@
 //! The assemblies that the service knows, in memory, up to a budget in bytes: those not asked about for
-//! longest leave. What does not depend on the assembly is shared: equal shapes with their fields.
+//! longest leave. What does not depend on the assembly is shared: equal shapes with their fields, and joined
+//! hulls.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -9,6 +10,7 @@ use super::entry::Entry;
 use crate::geometry::{Assembly, Shape};
 use crate::lru::Lru;
 use crate::sdf::Field;
+use crate::simulation::JoinedHulls;
 use crate::termination::{Interrupt, Termination};
 
 /// A shape and its field, for all assemblies that have it.
@@ -61,6 +63,7 @@ pub struct StoreStatistics {
 #[derive(Debug)]
 pub(super) struct Store {
     budget: usize,
+    hulls: Arc<JoinedHulls>,
     held: Mutex<Held>,
 }
 
@@ -87,7 +90,7 @@ struct Counted {
 impl Store {
     /// Nothing yet; `budget` in bytes.
     pub(super) fn new(budget: usize) -> Self {
-        Self { budget, held: Mutex::default() }
+        Self { budget, hulls: Arc::default(), held: Mutex::default() }
     }
 
     /// An assembly, which is used by this.
@@ -110,7 +113,7 @@ impl Store {
             .map(|(content, shape)| held.share(content, shape))
             .collect();
         assembly.shapes = shapes.iter().map(|shared| Arc::clone(&shared.shape)).collect();
-        let entry = Arc::new(Entry::new(assembly, shapes));
+        let entry = Arc::new(Entry::new(assembly, shapes, Arc::clone(&self.hulls)));
         held.entries.insert(id, Arc::clone(&entry));
         held.measure(id, &entry);
         held.make_room(self.budget);

@@ -4,9 +4,11 @@
 //! parts: without one part only the hulls above it differ, each made of two smaller ones. So leaving
 //! costs the logarithm of the number of parts, where a hull of all points would cost their number.
 
+use std::sync::Arc;
+
 use nalgebra::Point3;
 
-use crate::geometry::{hull_vertices, transformed};
+use crate::geometry::transformed;
 
 use super::{Scene, Surroundings};
 
@@ -15,7 +17,7 @@ use super::{Scene, Surroundings};
 pub struct HullTree {
     standing: Vec<usize>,
     /// Node `i` has the children `2 i` and `2 i + 1`; the root is 1. Empty for nodes without parts.
-    hulls: Vec<Vec<Point3<f64>>>,
+    hulls: Vec<Arc<[Point3<f64>]>>,
     /// Per part of the scene: its leaf, or 0.
     leaf: Vec<usize>,
 }
@@ -28,14 +30,14 @@ impl HullTree {
         let mut order = standing.clone();
         group(scene, &mut order);
         let mut tree =
-            Self { hulls: vec![Vec::new(); 2 * leaves], leaf: vec![0; scene.bodies.len()], standing };
+            Self { hulls: vec![Arc::default(); 2 * leaves], leaf: vec![0; scene.bodies.len()], standing };
         for (k, &part) in order.iter().enumerate() {
             let body = &scene.bodies[part];
             tree.leaf[part] = leaves + k;
-            tree.hulls[leaves + k] = transformed(&body.shape.hull, &body.planning_from_shape);
+            tree.hulls[leaves + k] = transformed(&body.shape.hull, &body.planning_from_shape).into();
         }
         for node in (1..leaves).rev() {
-            tree.hulls[node] = joined(&tree.hulls[2 * node], &tree.hulls[2 * node + 1]);
+            tree.hulls[node] = scene.hulls.of(&tree.hulls[2 * node], &tree.hulls[2 * node + 1]);
         }
         tree
     }
@@ -49,7 +51,7 @@ impl HullTree {
     /// Vertices of the hull of them all.
     #[must_use]
     pub fn hull(&self) -> &[Point3<f64>] {
-        self.hulls.get(1).map_or(&[], Vec::as_slice)
+        self.hulls.get(1).map_or(&[], |hull| hull)
     }
 
     /// All that stands but one part.
@@ -84,19 +86,16 @@ impl HullTree {
         self.standing.remove(at);
         let mut node = self.leaf[part];
         self.leaf[part] = 0;
-        self.hulls[node].clear();
+        let gone = std::mem::take(&mut self.hulls[node]);
         while node > 1 {
             node /= 2;
-            self.hulls[node] = joined(&self.hulls[2 * node], &self.hulls[2 * node + 1]);
+            // A hull that had none of its points stays, and all above.
+            if !self.hulls[node].iter().any(|v| gone.contains(v)) {
+                break;
+            }
+            self.hulls[node] = scene.hulls.of(&self.hulls[2 * node], &self.hulls[2 * node + 1]);
         }
         shaped
-    }
-}
-
-fn joined(a: &[Point3<f64>], b: &[Point3<f64>]) -> Vec<Point3<f64>> {
-    match (a, b) {
-        ([], hull) | (hull, []) => hull.to_vec(),
-        _ => hull_vertices(&[a, b].concat()),
     }
 }
 

@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use crate::geometry::{Assembly, Bounds, Closest, Part, Pose, SampleTree, Shape};
 use crate::sdf::Field;
 
-use super::{BroadPhase, KeptCells};
+use super::{BroadPhase, JoinedHulls, KeptCells};
 
 /// A part with its field, at its place.
 #[derive(Debug, Clone)]
@@ -85,6 +85,8 @@ pub struct Scene {
     pub broad_phase: Arc<BroadPhase>,
     /// What the engine keeps of pairs where motions begin.
     pub kept: Arc<KeptCells>,
+    /// Hulls joined so far, also in other scenes.
+    pub hulls: Arc<JoinedHulls>,
 }
 
 impl Scene {
@@ -105,6 +107,7 @@ impl Scene {
             longest_side: resolution(assembly),
             broad_phase: Arc::new(BroadPhase::new(&boxes)),
             kept: Arc::default(),
+            hulls: Arc::default(),
         }
     }
 
@@ -117,6 +120,7 @@ impl Scene {
             longest_side,
             broad_phase: Arc::new(BroadPhase::new(&[])),
             kept: Arc::default(),
+            hulls: Arc::default(),
         }
     }
 

@@ -1,0 +1,98 @@
+//! Hulls of two hulls, remembered by their points: planning again what changed a little joins the same ones
+//! again.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use nalgebra::Point3;
+
+use crate::geometry::hull_vertices;
+use crate::lru::Lru;
+
+/// Points that are remembered, of some hundred joined hulls.
+const MOST_POINTS: usize = 200_000;
+
+/// What is remembered. The result is a function of the points alone, so it may be shared by all scenes.
+#[derive(Debug, Default)]
+pub struct JoinedHulls {
+    held: Mutex<Held>,
+}
+
+#[derive(Debug, Default)]
+struct Held {
+    joined: Lru<[u8; 32], [Point3<f64>]>,
+    points: usize,
+}
+
+impl JoinedHulls {
+    /// Vertices of the convex hull of the points of two hulls.
+    pub(super) fn of(&self, a: &Arc<[Point3<f64>]>, b: &Arc<[Point3<f64>]>) -> Arc<[Point3<f64>]> {
+        if a.is_empty() || b.is_empty() {
+            return Arc::clone(if a.is_empty() { b } else { a });
+        }
+        let key = key(a, b);
+        if let Some(known) = self.held().joined.get(&key) {
+            return known;
+        }
+        let joined: Arc<[Point3<f64>]> = hull_vertices(&[&**a, &**b].concat()).into();
+        self.held().keep(key, Arc::clone(&joined));
+        joined
+    }
+
+    /// A holder that panicked cannot have left more than the sum wrong.
+    fn held(&self) -> std::sync::MutexGuard<'_, Held> {
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Held {
+    fn keep(&mut self, key: [u8; 32], joined: Arc<[Point3<f64>]>) {
+        self.points += joined.len();
+        self.points -= self.joined.insert(key, joined).map_or(0, |before| before.len());
+        let Self { joined, points } = self;
+        if *points > MOST_POINTS {
+            joined.evict(|_, gone| {
+                *points -= gone.len();
+                *points > MOST_POINTS / 2
+            });
+        }
+    }
+}
+
+fn key(a: &[Point3<f64>], b: &[Point3<f64>]) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    for points in [a, b] {
+        hasher.update(&(points.len() as u64).to_le_bytes());
+        for p in points {
+            hasher.update(bytemuck::cast_slice(p.coords.as_slice()));
+        }
+    }
+    hasher.finalize().into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::spread;
+
+    #[test]
+    fn what_is_remembered_is_what_would_be_joined_and_not_too_much() {
+        let hulls = JoinedHulls::default();
+        let cloud = |at: f64| -> Arc<[Point3<f64>]> { spread([at; 3], [at + 1.0; 3], 40).collect() };
+        for at in 0..4000 {
+            let (a, b) = (cloud(f64::from(at)), cloud(f64::from(at) + 0.5));
+            let joined = hulls.of(&a, &b);
+            assert!(Arc::ptr_eq(&joined, &hulls.of(&a, &b)), "it is remembered");
+            assert_eq!(*joined, *hull_vertices(&[&*a, &*b].concat()));
+        }
+        let held = hulls.held();
+        assert!((1..=MOST_POINTS).contains(&held.points));
+        assert_eq!(held.points, held.joined.iter().map(|(_, h)| h.len()).sum::<usize>());
+    }
+
+    #[test]
+    fn nothing_and_a_hull_are_that_hull() {
+        let (hulls, none) = (JoinedHulls::default(), Arc::default());
+        let some: Arc<[Point3<f64>]> = spread([0.0; 3], [1.0; 3], 9).collect();
+        assert!(Arc::ptr_eq(&hulls.of(&some, &none), &some) && Arc::ptr_eq(&hulls.of(&none, &some), &some));
+    }
+}
