@@ -17,7 +17,7 @@ pub enum Kind {
     Witness = 3,
     /// A motion of the transition function.
     Motion = 4,
-    /// What verification found along a path.
+    /// What verification found along a path past one part.
     Verdict = 5,
     /// What a search answered.
     Plan = 6,
@@ -74,11 +74,11 @@ impl Kind {
             | Self::Blocking
             | Self::Witness
             | Self::Motion
-            | Self::Verdict
             | Self::Plan
             | Self::Touching
             | Self::Source
             | Self::Answer => 1,
+            Self::Verdict => 2,
         }
     }
 

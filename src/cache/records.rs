@@ -73,7 +73,7 @@ pub(super) enum MotionEnd {
     },
 }
 
-/// What verification found; parts are given by their place among its witnesses.
+/// What verification found past one part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct VerdictRecord {
     pub(super) depth: f64,
@@ -83,7 +83,6 @@ pub(super) struct VerdictRecord {
 /// A point that got too deep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct EntryRecord {
-    pub(super) other: u32,
     pub(super) on_moving: bool,
     pub(super) point: [f64; 3],
     pub(super) over: f64,

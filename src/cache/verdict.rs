@@ -1,5 +1,5 @@
-//! Verification: what the check of a path found, with the rule of motions. A verdict depends on the path
-//! and on the standing parts that it comes near, and those are known beforehand: they are in the key.
+//! Verification: what the check of a path found past one part that stands. It depends on the path and on
+//! that part alone, so a change costs only the checks of the paths that come near it.
 
 use nalgebra::Point3;
 
@@ -13,51 +13,45 @@ use crate::plan::{Entry, Verdict};
 use crate::simulation::Scene;
 use crate::termination::Interrupt;
 
-/// The check of a path, to be refused at a depth of `limit`, among the standing parts that it comes near
-/// (ascending).
-#[derive(Debug, Clone, Copy)]
+/// The check of a path, to be refused at a depth.
+#[derive(Debug, Clone)]
 pub struct VerdictQuestion<'a> {
-    /// The bodies.
-    pub scene: &'a Scene,
-    /// The parts that the path comes near.
-    pub near: &'a [usize],
-    /// What moves.
-    pub part: usize,
-    /// Poses of its shape.
-    pub path: &'a [Pose],
-    /// The depth that is refused.
-    pub limit: f64,
+    scene: &'a Scene,
+    part: usize,
+    /// Of all but the part that stands.
+    digest: Digest,
 }
 
 impl Recall {
-    /// What the check of a path found, as remembered, or else as checked, which is then remembered.
+    /// What the check of a path found past a part that stands, as remembered, or else as checked, which is
+    /// then remembered.
     ///
     /// # Errors
     /// What `check` returns.
     pub fn verdict(
         &self,
         question: &VerdictQuestion<'_>,
+        other: usize,
         check: impl FnOnce() -> Result<Verdict, Interrupt>,
     ) -> Result<Verdict, Interrupt> {
         if !self.remembers() {
             return check();
         }
-        let key = question.key();
-        if let Some(verdict) = self.get(&key).and_then(|record| question.verdict(record)) {
+        let key = question.key(other);
+        if let Some(record) = self.get(&key) {
             self.count(About::Verdict);
-            return Ok(verdict);
+            return Ok(verdict(record, other));
         }
         let verdict = check()?;
-        if let Some(record) = question.record(&verdict) {
-            self.put(key, &record);
-        }
+        self.put(key, &record(&verdict));
         Ok(verdict)
     }
 }
 
-impl VerdictQuestion<'_> {
-    fn key(&self) -> Key {
-        let Self { scene, near, part, path, limit } = *self;
+impl<'a> VerdictQuestion<'a> {
+    /// About a part on a path of poses of its shape; `limit` is the depth that is refused.
+    #[must_use]
+    pub fn new(scene: &'a Scene, part: usize, path: &[Pose], limit: f64) -> Self {
         let mut digest = Digest::new();
         digest.hash(scene.bodies[part].shape.content());
         digest.numbers([limit, scene.longest_side]);
@@ -65,25 +59,23 @@ impl VerdictQuestion<'_> {
         digest.numbers(scene.centre_in_shape(part).iter().copied());
         digest.integer(path.len() as u64);
         path.iter().for_each(|pose| add_pose(&mut digest, pose));
-        near.iter().for_each(|&other| add_standing(&mut digest, scene, part, other));
+        Self { scene, part, digest }
+    }
+
+    fn key(&self, other: usize) -> Key {
+        let mut digest = self.digest.clone();
+        add_standing(&mut digest, self.scene, self.part, other);
         digest.key(Kind::Verdict)
     }
+}
 
-    fn record(&self, verdict: &Verdict) -> Option<VerdictRecord> {
-        let entry = |e: &Entry| {
-            let other = self.near.binary_search(&e.other).ok()? as u32;
-            Some(EntryRecord { other, on_moving: e.on_moving, point: e.point.into(), over: e.over })
-        };
-        let entries = verdict.entries.iter().map(entry).collect::<Option<_>>()?;
-        Some(VerdictRecord { depth: verdict.depth, entries })
-    }
+fn record(verdict: &Verdict) -> VerdictRecord {
+    let entry = |e: &Entry| EntryRecord { on_moving: e.on_moving, point: e.point.into(), over: e.over };
+    VerdictRecord { depth: verdict.depth, entries: verdict.entries.iter().map(entry).collect() }
+}
 
-    fn verdict(&self, record: VerdictRecord) -> Option<Verdict> {
-        let entry = |e: EntryRecord| {
-            let other = *self.near.get(e.other as usize)?;
-            Some(Entry { other, on_moving: e.on_moving, point: Point3::from(e.point), over: e.over })
-        };
-        let entries = record.entries.into_iter().map(entry).collect::<Option<_>>()?;
-        Some(Verdict { depth: record.depth, entries })
-    }
+fn verdict(record: VerdictRecord, other: usize) -> Verdict {
+    let entry =
+        |e: EntryRecord| Entry { other, on_moving: e.on_moving, point: Point3::from(e.point), over: e.over };
+    Verdict { depth: record.depth, entries: record.entries.into_iter().map(entry).collect() }
 }

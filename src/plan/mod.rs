@@ -11,4 +11,4 @@ mod verify;
 
 pub use model::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
 pub use shorten::thinned;
-pub use verify::{Entry, Verdict, Verifier};
+pub use verify::{Check, Entry, Verdict, Verifier};

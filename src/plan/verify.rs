@@ -60,11 +60,19 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// On a path where nothing but these points gets deeper than `bound`; entries up to `limit` make
-    /// a good path and are dropped.
-    fn new(bound: f64, entries: Vec<Entry>, limit: f64) -> Self {
-        let depth = deepest(bound, &entries);
-        Self { depth, entries: if depth <= limit { Vec::new() } else { entries } }
+    /// On a path where nothing but these points gets deeper than `bound` into one part.
+    fn past(bound: f64, entries: Vec<Entry>) -> Self {
+        Self { depth: deepest(bound, &entries), entries }
+    }
+
+    /// Of what was found past each of the parts that stand; entries up to `limit` make a good path and
+    /// are dropped.
+    #[must_use]
+    pub fn of_all(past: Vec<Self>, limit: f64) -> Self {
+        let depth = past.iter().map(|v| v.depth).fold(0.0, f64::max);
+        let entries =
+            if depth <= limit { Vec::new() } else { past.into_iter().flat_map(|v| v.entries).collect() };
+        Self { depth, entries }
     }
 }
 
@@ -195,46 +203,86 @@ impl Verifier {
         path: &[Pose],
         termination: &Termination,
     ) -> Result<Verdict, Interrupt> {
-        let asked = Asked { scene, allowances, standing, part, path, termination };
-        let shape = &scene.bodies[part].shape;
+        let check = self.along(scene, allowances, part, path, termination);
+        let past: Vec<_> =
+            check.near(standing).par_iter().map(|&other| check.past(other)).collect::<Result<_, _>>()?;
+        Ok(Verdict::of_all(past, self.limit))
+    }
+
+    /// The check of a path, to be asked part by part of what stands.
+    #[must_use]
+    pub fn along<'a>(
+        &'a self,
+        scene: &'a Scene,
+        allowances: &'a Allowances,
+        part: usize,
+        path: &'a [Pose],
+        termination: &'a Termination,
+    ) -> Check<'a> {
         let centre = scene.centre_in_shape(part);
-        let reach = shape.hull.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
-        let course = Course::new(path, centre, reach);
-        let precision = Precision {
-            spare: self.limit * SPARE,
-            deep: self.limit,
-            finest: self.limit * FINEST,
-            coarse: COARSE * scene.longest_side,
-        };
+        let reach = scene.bodies[part].shape.hull.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
         let swept = path.iter().fold(Bounds::EMPTY, |b, pose| {
             let c = pose * centre;
             b.union(&Bounds { min: c, max: c })
         });
-        let swept = swept.grown(reach);
-        let others: Vec<usize> =
-            standing.iter().filter(|&&o| scene.bodies[o].bounds.meets(&swept)).copied().collect();
-        let far = turns_far(path);
-        let found = others
-            .par_iter()
-            .map(|&other| {
-                let share = if allowances.of(part, other) > 0.0 { SPARE_IN_OVERLAP } else { SPARE };
-                let precision = Precision { spare: self.limit * share, ..precision };
-                let way = Way { asked: &asked, course: &course, precision, other };
-                if far { depth_on_screw(&way, self.limit) } else { way.depth() }
-            })
-            .collect::<Result<Vec<_>, Interrupt>>()?;
-        let bound = found.iter().flatten().map(|f| f.bound).fold(0.0, f64::max);
-        let mut entries = deepest_entries(scene, &others, &found);
-        if bound <= self.limit {
-            for (other, [one, two]) in others.iter().zip(&found) {
-                for stretch in joined(&course, one.open.iter().chain(&two.open)) {
-                    let (standing, path) = ([*other], course.path_between(stretch));
-                    let asked = Asked { standing: &standing, path: &path, ..asked };
-                    entries.extend(self.samples.entries_along(&asked, self.limit)?);
-                }
+        Check {
+            verifier: self,
+            asked: Asked { scene, allowances, standing: &[], part, path, termination },
+            course: Course::new(path, centre, reach),
+            swept: swept.grown(reach),
+            far: turns_far(path),
+        }
+    }
+}
+
+/// The check of one path.
+#[derive(Debug)]
+pub struct Check<'a> {
+    verifier: &'a Verifier,
+    asked: Asked<'a>,
+    course: Course,
+    /// Holds the part all along.
+    swept: Bounds,
+    /// Whether it is a screw of many turns.
+    far: bool,
+}
+
+impl Check<'_> {
+    /// Of the parts that stand, those that the path may meet.
+    #[must_use]
+    pub fn near(&self, standing: &[usize]) -> Vec<usize> {
+        let meets = |o: &usize| self.asked.scene.bodies[*o].bounds.meets(&self.swept);
+        standing.iter().copied().filter(meets).collect()
+    }
+
+    /// What is found past one part that stands: it depends on no other.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn past(&self, other: usize) -> Result<Verdict, Interrupt> {
+        let Self { verifier, asked, course, .. } = self;
+        let (scene, limit) = (asked.scene, verifier.limit);
+        let share = if asked.allowances.of(asked.part, other) > 0.0 { SPARE_IN_OVERLAP } else { SPARE };
+        let precision = Precision {
+            spare: limit * share,
+            deep: limit,
+            finest: limit * FINEST,
+            coarse: COARSE * scene.longest_side,
+        };
+        let standing = [other];
+        let asked = Asked { standing: &standing, ..*asked };
+        let way = Way { asked: &asked, course, precision, other };
+        let found = if self.far { depth_on_screw(&way, limit)? } else { way.depth()? };
+        let bound = found.iter().map(|f| f.bound).fold(0.0, f64::max);
+        let mut entries = deepest_entries(scene, other, &found);
+        if bound <= limit {
+            for stretch in joined(course, found.iter().flat_map(|f| &f.open)) {
+                let path = course.path_between(stretch);
+                let asked = Asked { path: &path, ..asked };
+                entries.extend(verifier.samples.entries_along(&asked, limit)?);
             }
         }
-        Ok(Verdict::new(bound, entries, self.limit))
+        Ok(Verdict::past(bound, entries))
     }
 }
 
@@ -290,16 +338,12 @@ fn joined<'i>(course: &Course, intervals: impl Iterator<Item = &'i Interval>) ->
 }
 
 /// The points that help in refining a motion: of those that are near each other, the deepest.
-fn deepest_entries(scene: &Scene, others: &[usize], found: &[[Found; 2]]) -> Vec<Entry> {
+fn deepest_entries(scene: &Scene, other: usize, [moving, standing]: &[Found; 2]) -> Vec<Entry> {
     let cell = COARSE * scene.longest_side;
-    let mut taken: BTreeMap<(usize, bool, [i64; 3]), Entry> = BTreeMap::new();
-    let sides = others
-        .iter()
-        .zip(found)
-        .flat_map(|(o, [moving, standing])| [(*o, true, moving), (*o, false, standing)]);
-    for (other, on_moving, side) in sides {
+    let mut taken: BTreeMap<(bool, [i64; 3]), Entry> = BTreeMap::new();
+    for (on_moving, side) in [(true, moving), (false, standing)] {
         for &(point, over) in &side.deep {
-            let key = (other, on_moving, point.coords.map(|x| (x / cell).floor() as i64).into());
+            let key = (on_moving, point.coords.map(|x| (x / cell).floor() as i64).into());
             let entry = Entry { other, on_moving, point, over };
             match taken.entry(key) {
                 Occupied(mut known) if known.get().over < over => {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use nalgebra::Point3;
+use rayon::prelude::*;
 
 use crate::blocking_graph::StaticAnalysis;
 use crate::cache::{Recall, VerdictQuestion};
@@ -147,9 +148,11 @@ impl Problem<'_> {
     /// Verifies a path past all that it may meet.
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
         let Self { scene, verifier, .. } = self;
-        let question = VerdictQuestion { scene, near, part, path, limit: verifier.limit() };
-        let check = || verifier.check(scene, &scene.allowances, near, part, path, &self.termination);
-        self.recall.verdict(&question, check)
+        let check = verifier.along(scene, &scene.allowances, part, path, &self.termination);
+        let question = VerdictQuestion::new(scene, part, path, verifier.limit());
+        let past = |&other: &usize| self.recall.verdict(&question, other, || check.past(other));
+        let past: Vec<_> = check.near(near).par_iter().map(past).collect::<Result<_, _>>()?;
+        Ok(Verdict::of_all(past, verifier.limit()))
     }
 
     /// A box that holds a part all along a path: where it turns, a ball about the point that moves on
