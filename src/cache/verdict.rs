@@ -13,34 +13,38 @@ use crate::plan::{Entry, Verdict};
 use crate::simulation::Scene;
 use crate::termination::Interrupt;
 
-/// The check of a path, to be refused at a depth.
-#[derive(Debug, Clone)]
+/// The check of a path, to be refused at a depth of `limit`, past a part that stands.
+#[derive(Debug, Clone, Copy)]
 pub struct VerdictQuestion<'a> {
-    scene: &'a Scene,
-    part: usize,
-    /// Of all but the part that stands.
-    digest: Digest,
+    /// The bodies.
+    pub scene: &'a Scene,
+    /// What stands.
+    pub other: usize,
+    /// What moves.
+    pub part: usize,
+    /// Poses of its shape.
+    pub path: &'a [Pose],
+    /// The depth that is refused.
+    pub limit: f64,
 }
 
 impl Recall {
-    /// What the check of a path found past a part that stands, as remembered, or else as checked, which is
-    /// then remembered.
+    /// What the check of a path found, as remembered, or else as checked, which is then remembered.
     ///
     /// # Errors
     /// What `check` returns.
     pub fn verdict(
         &self,
         question: &VerdictQuestion<'_>,
-        other: usize,
         check: impl FnOnce() -> Result<Verdict, Interrupt>,
     ) -> Result<Verdict, Interrupt> {
         if !self.remembers() {
             return check();
         }
-        let key = question.key(other);
+        let key = question.key();
         if let Some(record) = self.get(&key) {
             self.count(About::Verdict);
-            return Ok(verdict(record, other));
+            return Ok(verdict(record, question.other));
         }
         let verdict = check()?;
         self.put(key, &record(&verdict));
@@ -48,10 +52,9 @@ impl Recall {
     }
 }
 
-impl<'a> VerdictQuestion<'a> {
-    /// About a part on a path of poses of its shape; `limit` is the depth that is refused.
-    #[must_use]
-    pub fn new(scene: &'a Scene, part: usize, path: &[Pose], limit: f64) -> Self {
+impl VerdictQuestion<'_> {
+    fn key(&self) -> Key {
+        let Self { scene, other, part, path, limit } = *self;
         let mut digest = Digest::new();
         digest.hash(scene.bodies[part].shape.content());
         digest.numbers([limit, scene.longest_side]);
@@ -59,12 +62,7 @@ impl<'a> VerdictQuestion<'a> {
         digest.numbers(scene.centre_in_shape(part).iter().copied());
         digest.integer(path.len() as u64);
         path.iter().for_each(|pose| add_pose(&mut digest, pose));
-        Self { scene, part, digest }
-    }
-
-    fn key(&self, other: usize) -> Key {
-        let mut digest = self.digest.clone();
-        add_standing(&mut digest, self.scene, self.part, other);
+        add_standing(&mut digest, scene, part, other);
         digest.key(Kind::Verdict)
     }
 }

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry::{Occupied, Vacant};
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Translation3, Vector3};
 use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Pose, Shape, Surface, area_normal};
@@ -35,6 +35,12 @@ const COARSE: f64 = 4e-3;
 /// for what is between the corners of the smallest pieces, which are no larger than this.
 const OVERLAP_SPARE: f64 = 2e-6;
 const OVERLAP_FINEST: f64 = 1e-4;
+
+/// Directions are alike within this, and boxes left behind by this more than they meet (planning frame).
+const ALIKE: f64 = 1.0 / (1u64 << 40) as f64;
+const CLEAR: f64 = 1e-6;
+/// Along an axis to which the direction is steeper than this, boxes do not come apart soon.
+const STEEP: f64 = 1e-3;
 
 /// A point that got too deep.
 #[derive(Debug, Clone, PartialEq)]
@@ -204,8 +210,8 @@ impl Verifier {
         termination: &Termination,
     ) -> Result<Verdict, Interrupt> {
         let check = self.along(scene, allowances, part, path, termination);
-        let past: Vec<_> =
-            check.near(standing).par_iter().map(|&other| check.past(other)).collect::<Result<_, _>>()?;
+        let past = |&other: &usize| check.past(other, &check.way_past(other));
+        let past: Vec<_> = check.near(standing).par_iter().map(past).collect::<Result<_, _>>()?;
         Ok(Verdict::of_all(past, self.limit))
     }
 
@@ -228,9 +234,9 @@ impl Verifier {
         Check {
             verifier: self,
             asked: Asked { scene, allowances, standing: &[], part, path, termination },
-            course: Course::new(path, centre, reach),
+            centre,
+            reach,
             swept: swept.grown(reach),
-            far: turns_far(path),
         }
     }
 }
@@ -240,11 +246,11 @@ impl Verifier {
 pub struct Check<'a> {
     verifier: &'a Verifier,
     asked: Asked<'a>,
-    course: Course,
+    /// The point of the shape that moves on a line between waypoints, and how far from it the shape reaches.
+    centre: Point3<f64>,
+    reach: f64,
     /// Holds the part all along.
     swept: Bounds,
-    /// Whether it is a screw of many turns.
-    far: bool,
 }
 
 impl Check<'_> {
@@ -255,12 +261,34 @@ impl Check<'_> {
         standing.iter().copied().filter(meets).collect()
     }
 
-    /// What is found past one part that stands: it depends on no other.
+    /// The path up to where the part has passed another for good: its last piece, if it is straight, as
+    /// far as their boxes meet. So what is found past it does not depend on how far others reach.
+    #[must_use]
+    pub fn way_past(&self, other: usize) -> Vec<Pose> {
+        let Asked { scene, path, part, .. } = self.asked;
+        let mut way = path.to_vec();
+        if let [.., from, to] = &mut way[..]
+            && from.rotation == to.rotation
+            && let Some(direction) = (to.translation.vector - from.translation.vector).try_normalize(0.0)
+        {
+            // The same to the bit wherever the path ends.
+            let direction = direction.map(|x| (x / ALIKE).round() * ALIKE);
+            let moving = scene.bodies[part].shape.bounds().transformed(from);
+            let passed = way_out_of(&moving, &scene.bodies[other].bounds, &direction);
+            if passed < (to.translation.vector - from.translation.vector).norm() {
+                *to = Translation3::from(direction * passed) * *from;
+            }
+        }
+        way
+    }
+
+    /// What is found past one part that stands, on the way past it: it depends on no other.
     ///
     /// # Errors
     /// The termination condition became true.
-    pub fn past(&self, other: usize) -> Result<Verdict, Interrupt> {
-        let Self { verifier, asked, course, .. } = self;
+    pub fn past(&self, other: usize, way: &[Pose]) -> Result<Verdict, Interrupt> {
+        let Self { verifier, asked, .. } = self;
+        let course = &Course::new(way, self.centre, self.reach);
         let (scene, limit) = (asked.scene, verifier.limit);
         let share = if asked.allowances.of(asked.part, other) > 0.0 { SPARE_IN_OVERLAP } else { SPARE };
         let precision = Precision {
@@ -270,9 +298,10 @@ impl Check<'_> {
             coarse: COARSE * scene.longest_side,
         };
         let standing = [other];
-        let asked = Asked { standing: &standing, ..*asked };
+        let asked = Asked { standing: &standing, path: way, ..*asked };
+        let far = turns_far(way);
         let way = Way { asked: &asked, course, precision, other };
-        let found = if self.far { depth_on_screw(&way, limit)? } else { way.depth()? };
+        let found = if far { depth_on_screw(&way, limit)? } else { way.depth()? };
         let bound = found.iter().map(|f| f.bound).fold(0.0, f64::max);
         let mut entries = deepest_entries(scene, other, &found);
         if bound <= limit {
@@ -284,6 +313,18 @@ impl Check<'_> {
         }
         Ok(Verdict::past(bound, entries))
     }
+}
+
+/// How far a box has to go along a unit vector until it has left another one for good; infinity if it stays
+/// beside it.
+fn way_out_of(moving: &Bounds, standing: &Bounds, direction: &Vector3<f64>) -> f64 {
+    let along = |a: usize| match direction[a] {
+        d if d > STEEP => (standing.max[a] - moving.min[a]) / d,
+        d if d < -STEEP => (standing.min[a] - moving.max[a]) / d,
+        _ => f64::INFINITY,
+    };
+    // A little further, so that nothing is lost to rounding.
+    (0..3).map(along).fold(f64::INFINITY, f64::min).max(0.0) + CLEAR
 }
 
 /// The way of a part past one that stands.

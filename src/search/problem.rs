@@ -149,8 +149,11 @@ impl Problem<'_> {
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
         let Self { scene, verifier, .. } = self;
         let check = verifier.along(scene, &scene.allowances, part, path, &self.termination);
-        let question = VerdictQuestion::new(scene, part, path, verifier.limit());
-        let past = |&other: &usize| self.recall.verdict(&question, other, || check.past(other));
+        let past = |&other: &usize| {
+            let way = &check.way_past(other);
+            let question = VerdictQuestion { scene, other, part, path: way, limit: verifier.limit() };
+            self.recall.verdict(&question, || check.past(other, way))
+        };
         let past: Vec<_> = check.near(near).par_iter().map(past).collect::<Result<_, _>>()?;
         Ok(Verdict::of_all(past, verifier.limit()))
     }
