@@ -86,7 +86,9 @@ pub fn soak(request: &SoakRequest) -> Result<Soak, BenchError> {
         }
         killing.look()?;
     }
-    let Killing { failed, mut figures, .. } = killing;
+    let Killing { failed, mut figures, clients: victims, .. } = killing;
+    // Those that are alive would keep the daemon from clearing up.
+    drop(victims);
     figures.merge(run_to_the_end(&start)?);
     let wall_s = began.elapsed().as_secs_f64();
     let (compared, differing) = figures.compare(&undisturbed);
