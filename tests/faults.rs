@@ -255,40 +255,43 @@ fn a_client_that_dies_while_uploading_or_holding_responses_costs_the_daemon_noth
     assert_eq!((status.running, status.queued), (0, 0));
 }
 
-#[test]
-fn shared_memory_that_is_too_small_is_refused_before_it_is_touched() {
-    // Needs a file system of its own, which may not be had everywhere.
-    let alone = "unshare --user --map-root-user --mount";
-    let possible = Command::new("sh")
-        .args(["-c", &format!("{alone} mount -t tmpfs -o size=4m tmpfs /dev/shm 2>/dev/null")])
-        .status()
-        .unwrap();
-    if !possible.success() {
+/// Runs a daemon and a client in that role where `mount` has been done, in namespaces of their own; none
+/// where these may not be had.
+fn mounted(mount: &str, role: &str) -> Option<std::process::Output> {
+    let alone = ["--user", "--map-root-user", "--mount"];
+    if !Command::new("unshare").args(alone).arg("true").status().is_ok_and(|s| s.success()) {
         eprintln!("skipped: no namespaces here");
-        return;
+        return None;
     }
     let folder = tempfile::tempdir().unwrap();
-    let exe = std::env::current_exe().unwrap();
     let script = format!(
-        "mount -t tmpfs -o size=24m tmpfs /dev/shm; \"$SBDPD\" --runtime-dir run & pid=$!; \
+        "mkdir cache; {mount} || exit 8; \"$SBDPD\" --runtime-dir run & pid=$!; \
          while ! [ -e run/daemon.json ]; do sleep 0.05; done; \
-         SBDP_RUNTIME_DIR=run SBDP_TEST_ROLE=too-large {} --exact acts_as_a_client_process --nocapture; \
-         code=$?; kill -TERM $pid; wait $pid || exit 9; exit $code",
-        exe.display()
+         SBDP_RUNTIME_DIR=run SBDP_TEST_ROLE={role} \"$CLIENT\" --exact acts_as_a_client_process --nocapture; \
+         code=$?; kill -TERM $pid; wait $pid || exit 9; exit $code"
     );
-    let output = Command::new("sh")
-        .args(["-c", &format!("{alone} sh -c '{script}'")])
-        .current_dir(folder.path())
-        .env("SBDPD", env!("CARGO_BIN_EXE_sbdpd"))
-        .env("SBDP_CACHE_DIR", folder.path().join("cache"))
-        .output()
-        .unwrap();
+    let mut command = Command::new("unshare");
+    command.args(alone).args(["sh", "-c", &script]).current_dir(folder.path());
+    command.env("SBDPD", env!("CARGO_BIN_EXE_sbdpd")).env("CLIENT", std::env::current_exe().unwrap());
+    command.env("SBDP_CACHE_DIR", folder.path().join("cache"));
+    Some(command.output().unwrap())
+}
+
+#[test]
+fn shared_memory_that_is_too_small_is_refused_before_it_is_touched() {
+    let Some(output) = mounted("mount -t tmpfs -o size=24m tmpfs /dev/shm", "too-large") else { return };
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(
-        output.status.success() && text.contains("refused: ") && text.contains("then planned"),
-        "{output:?}"
-    );
-    assert!(text.contains("/dev/shm has only"), "{text}");
+    assert!(output.status.success() && text.contains("then planned"), "{output:?}");
+    assert!(text.contains("refused: ") && text.contains("/dev/shm has only"), "{text}");
+}
+
+#[test]
+fn a_cache_disk_that_is_full_or_cannot_be_written_costs_nobody_an_answer() {
+    for mount in ["mount -t tmpfs -o size=64k tmpfs cache", "mount -t tmpfs -o ro tmpfs cache"] {
+        let Some(output) = mounted(mount, "small-lattice") else { return };
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success() && text.contains("complete after"), "{mount}: {output:?}");
+    }
 }
 
 #[test]
