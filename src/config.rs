@@ -26,6 +26,16 @@ pub enum ConfigError {
         /// What is wrong, with line and key.
         source: Box<toml::de::Error>,
     },
+    /// A value is out of range, and where.
+    #[error("{path}, line {line}: {source}")]
+    AtLine {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        /// What is wrong there.
+        source: Box<ConfigError>,
+    },
     /// A value is out of range.
     #[error("`{key}` is {value}, but must be {range}")]
     OutOfRange {
@@ -56,6 +66,8 @@ pub struct Config {
     pub preload: PreloadConfig,
     /// What is logged.
     pub log: LogConfig,
+    /// Where figures are told.
+    pub metrics: MetricsConfig,
 }
 
 /// Where the daemon is found.
@@ -159,6 +171,14 @@ pub struct LogConfig {
     pub filter: String,
 }
 
+/// Where figures are told.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MetricsConfig {
+    /// A Unix socket for Prometheus; relative to the runtime folder. None for none.
+    pub socket: Option<PathBuf>,
+}
+
 /// How a log line looks.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -248,8 +268,22 @@ impl Config {
     pub fn parse(text: &str, path: &Path) -> Result<Self, ConfigError> {
         let config: Self = toml::from_str(text)
             .map_err(|e| ConfigError::Invalid { path: path.to_owned(), source: Box::new(e) })?;
-        config.check()?;
+        config.check().map_err(|error| at_line(error, text, path))?;
         Ok(config)
+    }
+
+    /// The first level of keys whose values only a restart changes, of those that differ.
+    #[must_use]
+    pub fn restart_needed(&self, other: &Self) -> Vec<&'static str> {
+        let same = [
+            ("endpoint", self.endpoint == other.endpoint),
+            ("workers", self.workers == other.workers),
+            ("cache", self.cache == other.cache),
+            ("preload", self.preload == other.preload),
+            ("log", self.log == other.log),
+            ("metrics", self.metrics == other.metrics),
+        ];
+        same.into_iter().filter(|(_, same)| !same).map(|(key, _)| key).collect()
     }
 
     /// Checks the ranges.
@@ -274,6 +308,38 @@ impl Config {
         within("times.grace_s", self.times.grace_s, 0.0..=3600.0, "0 to 3600")?;
         within("times.drain_s", self.times.drain_s, 0.1..=3600.0, "0.1 to 3600")
     }
+}
+
+/// An error about a key, with the line where the key is.
+fn at_line(error: ConfigError, text: &str, path: &Path) -> ConfigError {
+    let line = match &error {
+        ConfigError::OutOfRange { key, .. } => line_of(text, key),
+        _ => None,
+    };
+    match line {
+        Some(line) => ConfigError::AtLine { path: path.to_owned(), line, source: Box::new(error) },
+        None => error,
+    }
+}
+
+/// The line, from 1, where a file gives `table.key`, in whichever way.
+fn line_of(text: &str, wanted: &str) -> Option<usize> {
+    let (wanted_table, wanted_key) = wanted.split_once('.')?;
+    let mut table = String::new();
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if let Some(name) = line.strip_prefix('[') {
+            table = name.split(']').next().unwrap_or_default().trim().to_owned();
+            continue;
+        }
+        let Some((key, value)) = line.split_once('=') else { continue };
+        let key: String = key.chars().filter(|c| !c.is_whitespace() && *c != '"').collect();
+        let inline = table.is_empty() && key == wanted_table && value.contains(wanted_key);
+        if inline || (table == wanted_table && key == wanted_key) || (table.is_empty() && key == wanted) {
+            return Some(number + 1);
+        }
+    }
+    None
 }
 
 fn within<T: PartialOrd + ToString>(
@@ -309,6 +375,31 @@ mod tests {
     fn an_unknown_key_is_named() {
         let error = toml::from_str::<Config>("[workers]\ncuont = 3\n").unwrap_err();
         assert!(error.to_string().contains("cuont"), "{error}");
+    }
+
+    #[test]
+    fn a_value_out_of_range_is_found_in_its_line() {
+        for (text, line) in [
+            ("# a\n[times]\ntick_s = 0.0\n", 3),
+            ("times.tick_s = 99\n", 1),
+            ("\n\ntimes = { tick_s = 99 }\n", 3),
+            ("[workers]\ncount = 1\n[times]\n\n  tick_s=-1\n", 5),
+        ] {
+            let error = Config::parse(text, Path::new("a.toml")).unwrap_err().to_string();
+            assert!(error.contains(&format!("a.toml, line {line}: `times.tick_s`")), "{error}");
+        }
+        let error = Config::parse("[workers]\ncuont = 1\n", Path::new("a.toml")).unwrap_err().to_string();
+        assert!(error.contains("line 2"), "{error}");
+    }
+
+    #[test]
+    fn what_needs_a_restart_is_told() {
+        let mut other = Config::default();
+        other.requests.queue = 1;
+        other.times.tick_s = 2.0;
+        assert!(Config::default().restart_needed(&other).is_empty());
+        other.workers.count = 7;
+        assert_eq!(Config::default().restart_needed(&other), ["workers"]);
     }
 
     #[test]

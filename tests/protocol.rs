@@ -317,3 +317,42 @@ fn garbage_is_answered_with_errors_and_the_daemon_lives_on() {
     let handle = client.upload(&Boxes::two().assembly()).unwrap();
     assert_eq!(plan(&client, handle, &PlanOptions::default()).1.status, PlanStatus::Complete);
 }
+
+#[test]
+#[allow(unsafe_code, reason = "a sender that cheats has to write where it may not")]
+fn contents_that_change_after_they_were_sent_are_answered_and_harm_nobody() {
+    let daemon = Daemon::start();
+    let rude = Rude::connect(&daemon);
+    let boxes = Boxes::two();
+    let upload = boxes.assembly();
+    let mut bytes = vec![0; upload.encoded_len()];
+    assert!(upload.encode_into(&mut bytes));
+    let mut answers = [0; 2];
+    for round in 0..300_usize {
+        let mut request = rude.geometry.loan_slice(bytes.len()).unwrap();
+        *request.user_header_mut() =
+            RequestHeader { kind: RequestKind::Upload as u32, ..RequestHeader::default() };
+        request.payload_mut().copy_from_slice(&bytes);
+        let sent = request.payload_mut().as_mut_ptr();
+        let pending = request.send().unwrap();
+        rude.wake.notify().unwrap();
+        let (start, mut step) = (std::time::Instant::now(), round);
+        let answer = loop {
+            if let Some(answer) = pending.receive().unwrap() {
+                break answer;
+            }
+            assert!(start.elapsed() < HANG, "no answer");
+            step = step.wrapping_mul(1_103_515_245).wrapping_add(12_345);
+            // Counts and offsets stand in front.
+            let place = (step >> 8) % if round % 2 == 0 { 96 } else { bytes.len() };
+            // SAFETY: `place` lies within the payload, whose memory `pending` keeps for this process alone
+            // to write; the daemon reads it meanwhile, which is what is tested.
+            unsafe { sent.add(place).write_volatile((step >> 16) as u8) };
+        };
+        answers[usize::from(error_of(&answer).is_some())] += 1;
+    }
+    assert_eq!(answers.iter().sum::<usize>(), 300);
+    let client = daemon.connect();
+    let handle = client.upload(&boxes.assembly()).unwrap();
+    assert_eq!(plan(&client, handle, &PlanOptions::default()).1.status, PlanStatus::Complete);
+}

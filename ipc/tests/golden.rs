@@ -75,16 +75,18 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
         RequestKind::Have,
         RequestKind::Upload,
         RequestKind::Revise,
+        RequestKind::Figures,
     ];
-    assert_eq!(requests.map(|k| k as u32), [1, 2, 3, 4, 5, 6]);
+    assert_eq!(requests.map(|k| k as u32), [1, 2, 3, 4, 5, 6, 7]);
     let responses = [
         ResponseKind::Steps,
         ResponseKind::Summary,
         ResponseKind::Error,
         ResponseKind::Status,
         ResponseKind::Handle,
+        ResponseKind::Figures,
     ];
-    assert_eq!(responses.map(|k| k as u32), [1, 2, 3, 4, 5]);
+    assert_eq!(responses.map(|k| k as u32), [1, 2, 3, 4, 5, 6]);
     let codes: Vec<u32> = (0..20).filter(|c| ErrorCode::from_wire(*c).is_some()).collect();
     assert_eq!(codes, (1..=12).collect::<Vec<u32>>());
     assert_eq!((ErrorCode::Busy as u32, ErrorCode::Cancelled as u32), (3, 12));

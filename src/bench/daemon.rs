@@ -109,7 +109,19 @@ impl Server {
         Ok(())
     }
 
-    fn end(&mut self) {
+    /// SIGKILL, and another daemon at the same place.
+    pub(super) fn kill_and_restart(&mut self) -> Result<(), BenchError> {
+        self.child.kill().and_then(|()| self.child.wait()).map_err(BenchError::failed)?;
+        self.child = spawned(&mut self.command)?;
+        self.wait_until_ready()
+    }
+
+    /// A clean end; what it leaves behind can be looked at until the server is dropped.
+    pub(super) fn end(&mut self) {
+        if !matches!(self.child.try_wait(), Ok(None)) {
+            // Its number may be another's by now.
+            return;
+        }
         let pid = rustix::process::Pid::from_child(&self.child);
         let _ = rustix::process::kill_process(pid, rustix::process::Signal::TERM);
         let started = Instant::now();

@@ -8,6 +8,7 @@
 //! `latency`, `load` and `replan` ask a `daemon` of their own; the first beside a `raw_peer`.
 
 mod asking;
+mod cancel;
 mod churn;
 mod corpus;
 mod daemon;
@@ -36,13 +37,14 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::time::Duration;
 
+pub use cancel::{CancelRecord, CancelRequest, cancel};
 pub use churn::{Churn, ChurnRequest, ChurnSample, churn};
 pub use corpus::{Category, Problem, Shard, find};
 pub use families::Family;
 pub use latency::{Latency, LatencyRequest, Percentiles, latency};
 pub use load::{
-    DaemonFigures, Footprint, Kind, KindFigures, Load, LoadClient, LoadRequest, Phase, Role, load,
-    load_client,
+    DaemonFigures, Footprint, Kind, KindFigures, Load, LoadClient, LoadRequest, Phase, Role, Soak,
+    SoakRequest, load, load_client, soak,
 };
 pub use raw_peer::serve as serve_raw;
 pub use record::{Key, Record, Settings, Store, read};

@@ -48,8 +48,8 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let cache = Arc::new(cache(&config));
-    let service = Service::new(Arc::clone(&cache), config.cache.memory().assemblies);
-    let ended = daemon::run(&config, Arc::new(service));
+    let service = Arc::new(Service::new(Arc::clone(&cache), config.cache.memory().assemblies));
+    let ended = daemon::run_reloading(&config, service, Box::new(move || read(&arguments)));
     // A worker that does not end in time still holds the service.
     cache.flush();
     match ended {
@@ -72,6 +72,12 @@ fn cache(config: &Config) -> Cache {
 
 /// The file's values, then what the command line says; logging runs afterwards.
 fn configuration(arguments: &Arguments) -> Result<Config, String> {
+    let config = read(arguments)?;
+    telemetry::start(&config.log).map_err(|e| e.to_string())?;
+    Ok(config)
+}
+
+fn read(arguments: &Arguments) -> Result<Config, String> {
     let mut config = match &arguments.config {
         Some(path) => Config::load(path).map_err(|e| e.to_string())?,
         None => Config::default(),
@@ -81,6 +87,5 @@ fn configuration(arguments: &Arguments) -> Result<Config, String> {
     endpoint.root = arguments.root.clone().or(endpoint.root.take());
     endpoint.runtime_dir = arguments.runtime_dir.clone().or(endpoint.runtime_dir.take());
     daemon::check_place(endpoint).map_err(|e| e.to_string())?;
-    telemetry::start(&config.log).map_err(|e| e.to_string())?;
     Ok(config)
 }

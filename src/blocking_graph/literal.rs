@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 
 use crate::geometry::{Bounds, Pose};
 use crate::simulation::{Action, Body, Scene};
+use crate::termination::{Interrupt, Termination};
 
 /// How often a contacting point is extended.
 const EXTENSIONS: usize = 5;
@@ -18,21 +19,26 @@ const SHARE: f64 = 1.0 / 20.0;
 
 /// For each translation, whether the paper's rule adds an edge from `part` at `pose` to `other`:
 /// either is mobile in turn, since a hit of one adds the other's reverse edge.
+///
+/// # Errors
+/// The termination condition became true.
 pub(super) fn pair_blocks(
     scene: &Scene,
     part: usize,
     pose: &Pose,
     other: usize,
     translations: &[Action],
-) -> Vec<bool> {
+    termination: &Termination,
+) -> Result<Vec<bool>, Interrupt> {
     let mine = Placed::new(&scene.bodies[part], pose);
     let theirs = Placed::new(&scene.bodies[other], &scene.bodies[other].planning_from_shape);
     if !mine.bounds.meets(&theirs.bounds) {
-        return vec![false; translations.len()];
+        return Ok(vec![false; translations.len()]);
     }
     let blocked = |action: &Action| {
+        termination.check()?;
         let direction = action.force();
-        mine.hits(&theirs, &direction) || theirs.hits(&mine, &-direction)
+        Ok(mine.hits(&theirs, &direction) || theirs.hits(&mine, &-direction))
     };
     translations.iter().map(blocked).collect()
 }
@@ -73,7 +79,8 @@ mod tests {
 
     fn blocked(scene: &Scene, part: usize, other: usize) -> Vec<usize> {
         let pose = scene.bodies[part].planning_from_shape;
-        let blocks = pair_blocks(scene, part, &pose, other, &Action::translations());
+        let blocks = pair_blocks(scene, part, &pose, other, &Action::translations(), &Termination::default());
+        let blocks = blocks.unwrap();
         (0..6).filter(|&a| blocks[a]).collect()
     }
 

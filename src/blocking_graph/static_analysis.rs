@@ -80,7 +80,7 @@ impl Analysis<'_> {
             .map(|&i| {
                 termination.check()?;
                 let (key, pair) = &pairs[i];
-                Ok(self.pair_blocks(*key, pair, least(pair.parts[0])))
+                self.pair_blocks(*key, pair, least(pair.parts[0]), termination)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
         let mut out = vec![Blockage::open(translations.len()); scene.bodies.len()];
@@ -94,19 +94,28 @@ impl Analysis<'_> {
     }
 
     /// The blockage of one displaced part among the parts that stand.
-    #[must_use]
-    pub fn blocked_from(&self, standing: &[usize], part: usize, pose: &Pose, least: f64) -> Blockage {
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn blocked_from(
+        &self,
+        standing: &[usize],
+        part: usize,
+        pose: &Pose,
+        least: f64,
+        termination: &Termination,
+    ) -> Result<Blockage, Interrupt> {
         let Self { scene, translations, .. } = *self;
         let mut out = Blockage::open(translations.len());
         let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(NEAR);
         for other in scene.broad_phase.meeting_of(standing, &bounds) {
             let (key, pair) = self.keyed(part, pose, other, least);
-            let blocked = self.pair_blocks(key, &pair, least);
+            let blocked = self.pair_blocks(key, &pair, least, termination)?;
             for a in (0..translations.len()).filter(|&a| blocked[a]) {
                 out.block_single(a, other);
             }
         }
-        out
+        Ok(out)
     }
 
     fn keyed(&self, part: usize, pose: &Pose, other: usize, least: f64) -> (Key, Pair) {
@@ -115,12 +124,22 @@ impl Analysis<'_> {
     }
 
     /// For each translation, whether the second part of a pair blocks the first.
-    fn pair_blocks(&self, key: Key, pair: &Pair, least: f64) -> Vec<bool> {
+    fn pair_blocks(
+        &self,
+        key: Key,
+        pair: &Pair,
+        least: f64,
+        termination: &Termination,
+    ) -> Result<Vec<bool>, Interrupt> {
         self.recall.blocking(key, self.translations.len(), || {
             let (alone, pose) = (pair.scene(self.scene), &pair.poses[0]);
             match self.rule {
-                StaticAnalysis::Sliding => pair_blocks(&alone, 0, pose, 1, self.translations, least),
-                StaticAnalysis::Paper => literal::pair_blocks(&alone, 0, pose, 1, self.translations),
+                StaticAnalysis::Sliding => {
+                    pair_blocks(&alone, 0, pose, 1, self.translations, least, termination)
+                }
+                StaticAnalysis::Paper => {
+                    literal::pair_blocks(&alone, 0, pose, 1, self.translations, termination)
+                }
             }
         })
     }
@@ -161,7 +180,7 @@ mod tests {
     fn from(scene: &Scene, standing: &[usize], part: usize, pose: &Pose) -> Blockage {
         let (translations, recall) = (Action::translations(), Recall::default());
         let analysis = Analysis { rule: RULE, scene, translations: &translations, recall: &recall };
-        analysis.blocked_from(standing, part, pose, LEAST)
+        analysis.blocked_from(standing, part, pose, LEAST, &Termination::default()).unwrap()
     }
 
     fn open(b: &Blockage) -> Vec<usize> {

@@ -10,6 +10,7 @@ use super::records::{BlockingRecord, OverlapRecord};
 use super::{Digest, Key, Kind, Recall};
 use crate::geometry::Pose;
 use crate::simulation::{Action, Body, Pair, Scene};
+use crate::termination::Interrupt;
 
 impl Recall {
     /// The depth of a pair, as remembered, or else as measured, which is then remembered.
@@ -28,16 +29,24 @@ impl Recall {
 
     /// For each of so many translations whether it is blocked, as remembered, or else as analysed, which is
     /// then remembered.
-    pub fn blocking(&self, key: Key, actions: usize, analyse: impl FnOnce() -> Vec<bool>) -> Vec<bool> {
+    ///
+    /// # Errors
+    /// The analysis was interrupted.
+    pub fn blocking(
+        &self,
+        key: Key,
+        actions: usize,
+        analyse: impl FnOnce() -> Result<Vec<bool>, Interrupt>,
+    ) -> Result<Vec<bool>, Interrupt> {
         if let Some(BlockingRecord { blocked }) = self.get(&key)
             && blocked.len() == actions
         {
             self.count(About::Blocking);
-            return blocked;
+            return Ok(blocked);
         }
-        let blocked = analyse();
+        let blocked = analyse()?;
         self.put(key, &BlockingRecord { blocked: blocked.clone() });
-        blocked
+        Ok(blocked)
     }
 }
 

@@ -16,7 +16,7 @@ use crate::search;
 mod load;
 mod through_daemon;
 
-pub(super) use load::{BenchLoad, BenchLoadClient};
+pub(super) use load::{BenchCancel, BenchLoad, BenchLoadClient, BenchSoak};
 pub(super) use through_daemon::{BenchChurn, BenchLatency, BenchRawPeer, BenchReplan, BenchRestart};
 
 /// Plans how assemblies come apart.
@@ -40,7 +40,9 @@ pub(super) enum Command {
     /// Tell in words what a search did, from its trace
     Explain(ExplainArguments),
     /// Say how the running daemon is
-    Status,
+    Status(super::status::StatusArguments),
+    /// Look at a configuration of the daemon
+    Config(super::config::ConfigArguments),
     /// Look after what is remembered on disk (stop the daemon first: it holds the store alone)
     Cache(super::cache::CacheArguments),
     /// Run planners over folders of assemblies and evaluate what comes out
@@ -176,6 +178,10 @@ pub(super) enum BenchCommand {
     Churn(BenchChurn),
     /// Put a daemon under the load of many clients at once: nothing may be lost, and it may not grow
     Load(BenchLoad),
+    /// Kill clients and daemons at random moments: in the end all answers are there, and nothing is left over
+    Soak(BenchSoak),
+    /// End plans at moments all over them, by cancelling and by deadline: how long until the worker is free
+    Cancel(BenchCancel),
     /// A client of `load`
     #[command(hide = true)]
     LoadClient(BenchLoadClient),

@@ -31,6 +31,8 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<ExitCode, CliError> {
         (Some(BenchCommand::Latency(latency)), _) => through_daemon::latency(latency),
         (Some(BenchCommand::Replan(replan)), _) => through_daemon::replan(replan),
         (Some(BenchCommand::Load(arguments)), _) => load::load(arguments),
+        (Some(BenchCommand::Soak(arguments)), _) => load::soak(arguments),
+        (Some(BenchCommand::Cancel(arguments)), _) => load::cancel(arguments),
         (Some(BenchCommand::LoadClient(client)), _) => load::client(client),
         (Some(BenchCommand::Restart(restart)), _) => through_daemon::restart(restart),
         (Some(BenchCommand::Churn(churn)), _) => through_daemon::churn(churn),

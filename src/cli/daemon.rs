@@ -31,6 +31,10 @@ impl Daemon {
         self.client.status()
     }
 
+    pub(super) fn figures(&self) -> Result<String, ClientError> {
+        self.client.figures()
+    }
+
     fn ask(&self, question: &Question<'_>, sink: &mut dyn PlanSink) -> Result<Plan, ClientError> {
         let mut handle = self.client.upload(&wire_assembly(question.assembly))?;
         if !question.revision.is_empty() {

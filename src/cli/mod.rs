@@ -8,6 +8,7 @@ mod backend;
 mod bench;
 mod cache;
 mod check;
+mod config;
 mod daemon;
 mod error;
 mod explain;
@@ -35,7 +36,8 @@ pub fn run() -> ExitCode {
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
-        Command::Status => status::run(),
+        Command::Status(arguments) => status::run(&arguments),
+        Command::Config(arguments) => config::run(&arguments),
         Command::Cache(arguments) => cache::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
     };

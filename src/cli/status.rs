@@ -3,15 +3,28 @@
 use std::process::ExitCode;
 use std::time::Duration;
 
+use clap::Args;
 use sbdp_client::{Handle, Status};
 
 use super::daemon::Daemon;
 use super::error::CliError;
 use super::print;
 
-pub(super) fn run() -> Result<ExitCode, CliError> {
+/// Arguments of `sbdp status`.
+#[derive(Debug, Args)]
+pub(super) struct StatusArguments {
+    /// Everything, as one JSON object to which fields may be added
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &StatusArguments) -> Result<ExitCode, CliError> {
     let failed = |e: sbdp_client::ClientError| CliError::Failed(e.to_string());
     let daemon = Daemon::connect().map_err(failed)?;
+    if arguments.json {
+        print(&format!("{}\n", daemon.figures().map_err(failed)?))?;
+        return Ok(ExitCode::SUCCESS);
+    }
     print(&describe(&daemon.status().map_err(failed)?))?;
     Ok(ExitCode::SUCCESS)
 }

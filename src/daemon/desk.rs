@@ -14,7 +14,9 @@ use sbdp_ipc::progress::ProgressSample;
 use sbdp_ipc::status::{Status, StatusHeader};
 
 use super::answers::{Answers, question};
+use super::closing::Closing;
 use super::convert;
+use super::figures::{Figures, Latencies};
 use super::intake::Upload;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::session::{End, Input, Link, Session, State};
@@ -45,6 +47,8 @@ pub(crate) enum Event<L> {
     Control(Incoming<L>),
     /// The status is asked for.
     Status(Incoming<L>),
+    /// The figures are asked for.
+    Figures(Incoming<L>),
     /// Is this handle known?
     Have(Incoming<L>),
     /// Meshes.
@@ -59,25 +63,30 @@ pub(crate) enum Event<L> {
     Terminate,
 }
 
-/// How far shutting down is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Closing {
-    /// Not asked for.
-    Open,
-    /// Running requests may finish until then.
-    Grace(Instant),
-    /// They are cancelled and get until then to be answered.
-    Drain(Instant),
-}
-
 /// The limits that the desk keeps.
 #[derive(Debug, Clone, Copy)]
-struct Limits {
+pub(super) struct Limits {
     outbox: usize,
-    patience: Duration,
+    pub(super) patience: Duration,
     threads: usize,
-    grace: Duration,
-    drain: Duration,
+    pub(super) grace: Duration,
+    pub(super) drain: Duration,
+}
+
+impl Limits {
+    fn of(config: &Config) -> Self {
+        Self {
+            outbox: megabytes(config.requests.outbox_mb),
+            patience: seconds(config.requests.slow_reader_s),
+            threads: config.workers.threads_per_request,
+            grace: seconds(config.times.grace_s),
+            drain: seconds(config.times.drain_s),
+        }
+    }
+}
+
+fn megabytes(mb: u64) -> usize {
+    usize::try_from(mb.saturating_mul(1 << 20)).unwrap_or(usize::MAX)
 }
 
 /// The desk.
@@ -85,13 +94,14 @@ struct Limits {
 pub(crate) struct Desk<L, P> {
     pub(super) service: Arc<P>,
     pub(super) queues: Queues,
-    limits: Limits,
-    sessions: HashMap<SessionKey, Session<L>>,
+    pub(super) limits: Limits,
+    pub(super) sessions: HashMap<SessionKey, Session<L>>,
     pub(super) uploads: HashMap<u64, Upload<L>>,
     running: BTreeSet<(u128, u64)>,
     answers: Answers,
     pub(super) next_upload: u64,
-    closing: Closing,
+    pub(super) latencies: Latencies,
+    pub(super) closing: Closing,
     pub(super) counters: StatusHeader,
     preloaded: Vec<(String, [u8; 32])>,
     started: Instant,
@@ -103,7 +113,6 @@ pub(crate) struct Desk<L, P> {
 
 impl<L: Link, P: Planning> Desk<L, P> {
     pub(crate) fn new(service: Arc<P>, queues: Queues, config: &Config) -> Self {
-        let megabytes = |mb: u64| usize::try_from(mb.saturating_mul(1 << 20)).unwrap_or(usize::MAX);
         let counters = StatusHeader {
             pid: std::process::id(),
             protocol: sbdp_ipc::PROTOCOL,
@@ -114,13 +123,8 @@ impl<L: Link, P: Planning> Desk<L, P> {
         Self {
             service,
             queues,
-            limits: Limits {
-                outbox: megabytes(config.requests.outbox_mb),
-                patience: seconds(config.requests.slow_reader_s),
-                threads: config.workers.threads_per_request,
-                grace: seconds(config.times.grace_s),
-                drain: seconds(config.times.drain_s),
-            },
+            limits: Limits::of(config),
+            latencies: Latencies::default(),
             sessions: HashMap::new(),
             uploads: HashMap::new(),
             running: BTreeSet::new(),
@@ -135,6 +139,13 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
     }
 
+    /// Keeps other limits from now on; what was taken under the old ones stays.
+    pub(crate) fn reload(&mut self, config: &Config) {
+        self.limits = Limits { threads: self.limits.threads, ..Limits::of(config) };
+        self.counters.queue_limit = config.requests.queue as u32;
+        self.queues.reload(config);
+    }
+
     pub(crate) fn handle(&mut self, event: Event<L>, now: Instant) {
         match event {
             Event::Plan(incoming) => self.plan(incoming),
@@ -142,6 +153,10 @@ impl<L: Link, P: Planning> Desk<L, P> {
             Event::Status(incoming) => {
                 let status = self.status().encode();
                 self.answer(&incoming.link, &incoming.header, ResponseKind::Status, &status);
+            }
+            Event::Figures(incoming) => {
+                let text = self.figures().json();
+                self.answer(&incoming.link, &incoming.header, ResponseKind::Figures, text.as_bytes());
             }
             Event::Have(incoming) => self.have(&incoming),
             Event::Upload(incoming) => {
@@ -236,10 +251,6 @@ impl<L: Link, P: Planning> Desk<L, P> {
         Err((Input::Refuse, error))
     }
 
-    pub(super) fn shutting_down(&self) -> WireError {
-        WireError::new(ErrorCode::ShuttingDown, "the daemon is shutting down")
-    }
-
     fn control(&mut self, incoming: &Incoming<L>) {
         let key = SessionKey { client: incoming.client, request: incoming.header.request };
         let Some(session) = self.sessions.get_mut(&key) else { return };
@@ -302,22 +313,6 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
     }
 
-    /// First signal: nothing new, and running requests get their grace. Second: no more grace.
-    fn terminate(&mut self, now: Instant) {
-        self.closing = match self.closing {
-            Closing::Open => Closing::Grace(now + self.limits.grace),
-            Closing::Grace(_) => Closing::Grace(now),
-            drain @ Closing::Drain(_) => drain,
-        };
-        self.queues.close();
-        let error = self.shutting_down();
-        for (key, session) in &mut self.sessions {
-            if session.state() == State::Queued && self.queues.plans.withdraw(|job| job.key == *key) {
-                session.end_with(Input::Refuse, &error);
-            }
-        }
-    }
-
     /// Looks after every session: who left, what expired, what can be sent. Called whenever
     /// anything happened.
     pub(crate) fn settle(&mut self, now: Instant) {
@@ -356,6 +351,9 @@ impl<L: Link, P: Planning> Desk<L, P> {
             _ => &mut self.counters.failed,
         };
         *counter += 1;
+        if let Some((kind, time)) = session.timed() {
+            self.latencies.add(kind, time);
+        }
         tracing::debug!(request = key.request, state = ?session.state(), "request over");
         // The request is let go before its client is woken, so that it sees the end.
         let listener = session.listener;
@@ -363,54 +361,30 @@ impl<L: Link, P: Planning> Desk<L, P> {
         self.wakes.push(listener);
     }
 
-    fn close_down(&mut self, now: Instant) {
-        match self.closing {
-            Closing::Grace(end) if end <= now => {
-                for session in self.sessions.values() {
-                    session.cancel_work();
-                }
-                self.closing = Closing::Drain(now + self.limits.drain);
-            }
-            Closing::Drain(end) if end <= now => {
-                let error = self.shutting_down();
-                for session in self.sessions.values_mut() {
-                    // Legal from every live state: a worker that does not stop is left behind.
-                    let input =
-                        if matches!(session.state(), State::Streaming) { Input::Fail } else { Input::Refuse };
-                    session.end_with(input, &error);
-                    session.pump(now, self.limits.patience);
-                    self.wakes.push(session.listener);
-                }
-                self.sessions.clear();
-                self.uploads.clear();
-            }
-            _ => {}
-        }
-    }
-
-    /// Shutting down, and everybody is answered.
-    pub(crate) fn is_closed(&self) -> bool {
-        self.closing != Closing::Open && self.sessions.is_empty() && self.uploads.is_empty()
-    }
-
     /// When `settle` must be called next without anything happening.
     pub(crate) fn next_deadline(&self, now: Instant) -> Option<Instant> {
         let queued = self.sessions.values().filter(|s| s.state() == State::Queued).filter_map(|s| s.deadline);
-        let closing = match self.closing {
-            Closing::Open => None,
-            Closing::Grace(end) | Closing::Drain(end) => Some(end),
-        };
+        let closing = self.closing.end();
         queued.chain(closing).chain(self.next_upload_deadline(now)).min()
+    }
+
+    fn numbers(&self) -> StatusHeader {
+        StatusHeader {
+            uptime_ns: u64::try_from(self.started.elapsed().as_nanos()).unwrap_or(u64::MAX),
+            running: self.running.len() as u32,
+            queued: self.queues.plans.len() as u32,
+            ..self.counters
+        }
+    }
+
+    pub(crate) fn figures(&self) -> Figures {
+        let open = self.sessions.len() + self.uploads.len();
+        Figures::of(&self.numbers(), open, &self.latencies, &self.preloaded)
     }
 
     fn status(&self) -> Status {
         Status {
-            numbers: StatusHeader {
-                uptime_ns: u64::try_from(self.started.elapsed().as_nanos()).unwrap_or(u64::MAX),
-                running: self.running.len() as u32,
-                queued: self.queues.plans.len() as u32,
-                ..self.counters
-            },
+            numbers: self.numbers(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             preloaded: self.preloaded.clone(),
         }

@@ -11,16 +11,18 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::RequestKind;
 use sbdp_ipc::layout::{MAX_CLIENTS, PLAN_ACTIVE_REQUESTS, PLAN_REQUEST};
 use sbdp_ipc::services::{Active, ServerPort};
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 
 use super::DaemonError;
 use super::desk::{Desk, Event, Incoming};
 use super::intake::ticket;
 use super::lifecycle::{Lease, Place, raise_file_limit, warn_of_small_shared_memory};
+use super::metrics::Metrics;
 use super::ports::{ActiveLink, Ports};
 use super::request_queue::Owner;
 use super::shared_queue::Queues;
+use super::supervisor::Supervisor;
 use super::workers::{AdmitJob, Planning, Report, WorkerEvent, start, start_prefetch};
 use crate::config::{Config, seconds};
 
@@ -34,6 +36,25 @@ const RECEIVE_AT_ONCE: usize = (MAX_CLIENTS + 1) * PLAN_ACTIVE_REQUESTS;
 /// # Errors
 /// The place is taken, or shared memory cannot be set up.
 pub fn run<P: Planning>(config: &Config, service: Arc<P>) -> Result<(), DaemonError> {
+    run_reloading(
+        config,
+        service,
+        Box::new(|| Err("there is no configuration file to read again".to_owned())),
+    )
+}
+
+/// Reads the configuration again.
+pub type Reload = Box<dyn Fn() -> Result<Config, String>>;
+
+/// Runs the daemon until SIGTERM or SIGINT; at SIGHUP it takes over what `reload` gives.
+///
+/// # Errors
+/// The place is taken, or shared memory cannot be set up.
+pub fn run_reloading<P: Planning>(
+    config: &Config,
+    service: Arc<P>,
+    reload: Reload,
+) -> Result<(), DaemonError> {
     raise_file_limit();
     warn_of_small_shared_memory();
     let place = Place::of(&config.endpoint)?;
@@ -54,7 +75,13 @@ pub fn run<P: Planning>(config: &Config, service: Arc<P>) -> Result<(), DaemonEr
             tracing::warn!(path = %path.display(), "not preloaded: the list is too long");
         }
     }
+    let metrics = config.metrics.socket.as_ref().map(|path| Metrics::serve(&place.runtime_dir.join(path)));
+    let metrics = metrics
+        .transpose()
+        .map_err(|source| DaemonError::System { what: "opening the metrics socket", source })?;
     lease.publish()?;
+    let supervisor = Supervisor::of_this_process();
+    supervisor.ready();
     tracing::info!(
         pid = std::process::id(),
         runtime_dir = %place.runtime_dir.display(),
@@ -62,8 +89,9 @@ pub fn run<P: Planning>(config: &Config, service: Arc<P>) -> Result<(), DaemonEr
         "sbdpd is ready"
     );
     let desk = Desk::new(service, queues, config);
-    EventLoop { ports, desk, inbox, tick: seconds(config.times.tick_s), limits: ReceiveLimits::of(config) }
-        .run();
+    let limits = ReceiveLimits::of(config);
+    let tick = seconds(config.times.tick_s);
+    EventLoop { ports, desk, inbox, tick, limits, config: config.clone(), reload, metrics, supervisor }.run();
     tracing::info!("sbdpd has answered everybody and leaves");
     Ok(())
 }
@@ -72,6 +100,7 @@ pub fn run<P: Planning>(config: &Config, service: Arc<P>) -> Result<(), DaemonEr
 enum Inbound {
     Worker(WorkerEvent),
     Terminate,
+    Reload,
 }
 
 /// Other threads hold the notifier weakly: one that is still busy when the daemon leaves must
@@ -96,10 +125,10 @@ fn reporter(ports: &Ports, sender: Sender<Inbound>) -> Report {
 fn watch_signals(ports: &Ports, sender: Sender<Inbound>) -> Result<(), DaemonError> {
     let system = |source| DaemonError::System { what: "watching signals", source };
     let notifier = Arc::downgrade(&ports.wake_self);
-    let mut signals = Signals::new([SIGTERM, SIGINT]).map_err(system)?;
+    let mut signals = Signals::new([SIGTERM, SIGINT, SIGHUP]).map_err(system)?;
     let watch = move || {
-        for _ in signals.forever() {
-            let _ = sender.send(Inbound::Terminate);
+        for signal in signals.forever() {
+            let _ = sender.send(if signal == SIGHUP { Inbound::Reload } else { Inbound::Terminate });
             wake(&notifier);
         }
     };
@@ -125,6 +154,10 @@ struct EventLoop<P> {
     inbox: Receiver<Inbound>,
     tick: Duration,
     limits: ReceiveLimits,
+    config: Config,
+    reload: Reload,
+    metrics: Option<Metrics>,
+    supervisor: Supervisor,
 }
 
 impl<P: Planning> EventLoop<P> {
@@ -135,6 +168,7 @@ impl<P: Planning> EventLoop<P> {
             self.read_inbox();
             self.desk.settle(Instant::now());
             self.deliver();
+            self.supervisor.alive();
             if self.desk.is_closed() {
                 return;
             }
@@ -142,7 +176,11 @@ impl<P: Planning> EventLoop<P> {
                 // A killed client is seen, and its memory given back, only by this.
                 let _ = self.ports.node.try_cleanup_dead_nodes();
                 self.ports.forget_owners();
-                next_tick = Instant::now() + self.tick;
+                if let Some(metrics) = &self.metrics {
+                    metrics.update(self.desk.figures().prometheus());
+                }
+                let tick = self.supervisor.patience().map_or(self.tick, |p| p.min(self.tick));
+                next_tick = Instant::now() + tick;
                 continue;
             }
             if !more {
@@ -166,10 +204,34 @@ impl<P: Planning> EventLoop<P> {
         while let Ok(inbound) = self.inbox.try_recv() {
             let event = match inbound {
                 Inbound::Worker(event) => Event::Worker(event),
-                Inbound::Terminate => Event::Terminate,
+                Inbound::Terminate => {
+                    self.supervisor.stopping();
+                    Event::Terminate
+                }
+                Inbound::Reload => {
+                    self.reload();
+                    continue;
+                }
             };
             self.desk.handle(event, Instant::now());
         }
+    }
+
+    fn reload(&mut self) {
+        self.supervisor.reloading(false);
+        match (self.reload)() {
+            Ok(config) => {
+                for key in self.config.restart_needed(&config) {
+                    tracing::warn!(key, "changed in the configuration, which only a restart puts in force");
+                }
+                self.desk.reload(&config);
+                self.tick = seconds(config.times.tick_s);
+                self.limits = ReceiveLimits::of(&config);
+                tracing::info!("the configuration was read again");
+            }
+            Err(error) => tracing::warn!(error, "the configuration stays as it was"),
+        }
+        self.supervisor.reloading(true);
     }
 
     /// True if there may be more.
@@ -243,6 +305,7 @@ fn read(
         (false, Some(RequestKind::Plan)) => Event::Plan(incoming),
         (false, Some(RequestKind::Control)) => Event::Control(incoming),
         (false, Some(RequestKind::Status)) => Event::Status(incoming),
+        (false, Some(RequestKind::Figures)) => Event::Figures(incoming),
         (true, Some(RequestKind::Have)) => Event::Have(incoming),
         (true, Some(RequestKind::Upload)) => Event::Upload(incoming),
         (true, Some(RequestKind::Revise)) => Event::Revise(incoming),

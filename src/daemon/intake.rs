@@ -8,6 +8,7 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::RequestHeader;
 
 use super::desk::{Desk, Incoming};
+use super::figures::Timed;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::session::Link;
 use super::workers::{AdmitJob, Planning};
@@ -20,6 +21,7 @@ pub(super) struct Upload<L> {
     header: RequestHeader,
     /// When it is of no use to its client any more, if it still waits then.
     pub(super) deadline: Option<Instant>,
+    received: Instant,
 }
 
 /// What the queue knows of an upload.
@@ -69,7 +71,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
         match self.queues.admissions.push(ticket(owner, bytes), job(number, payload)) {
             Ok(()) => {
                 let deadline = deadline_ns.and_then(clock::instant_of);
-                self.uploads.insert(number, Upload { link, header, deadline });
+                self.uploads.insert(number, Upload { link, header, deadline, received: Instant::now() });
             }
             Err(_) => {
                 let error = self.shutting_down();
@@ -79,7 +81,8 @@ impl<L: Link, P: Planning> Desk<L, P> {
     }
 
     pub(super) fn admitted(&mut self, number: u64, result: Result<AssemblyId, WireError>) {
-        let Some(Upload { link, header, .. }) = self.uploads.remove(&number) else { return };
+        let Some(Upload { link, header, received, .. }) = self.uploads.remove(&number) else { return };
+        self.latencies.add(Timed::Upload, received.elapsed());
         match result {
             Ok(id) => self.answer_handle(&link, &header, id.0, true),
             Err(error) => self.answer_error(&link, &header, &error),

@@ -173,6 +173,12 @@ fn wipe_if_unused(place: &Place, config: &IoxConfig) -> Result<(), LifecycleErro
             _ => {}
         }
     }
+    // Sockets by which killed processes were woken.
+    for entry in fs::read_dir(&place.root).into_iter().flatten().flatten() {
+        if entry.file_name().as_encoded_bytes().starts_with(place.prefix.as_bytes()) {
+            remove_if_there(&entry.path())?;
+        }
+    }
     let shm = Path::new("/dev/shm");
     let kept = place.prefix_lock();
     for path in layout::shared_memory_files(&place.prefix).map_err(io_error(shm))? {
@@ -265,10 +271,15 @@ mod tests {
         let services = place.root.join("services");
         fs::create_dir_all(&services).unwrap();
         fs::write(services.join("half.service"), b"").unwrap();
+        let event = place.root.join(format!("{}1.event", place.prefix));
+        fs::write(&event, b"").unwrap();
+        let other = place.root.join("notes.txt");
+        fs::write(&other, b"").unwrap();
         let segment = Path::new("/dev/shm").join(format!("{}stale", place.prefix));
         fs::write(&segment, b"stale").unwrap();
         let lease = Lease::take(place.clone(), &config).unwrap();
-        assert!(!services.join("half.service").exists() && !segment.exists());
+        assert!(!services.join("half.service").exists() && !segment.exists() && !event.exists());
+        assert!(other.exists(), "what is not ours stays");
         lease.publish().unwrap();
         assert!(Endpoint::find(&place.runtime_dir).is_ok());
         drop(lease);

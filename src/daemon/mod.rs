@@ -9,21 +9,25 @@
 //! working types.
 
 mod answers;
+mod closing;
 mod convert;
 mod desk;
 mod event_loop;
+mod figures;
 mod intake;
 mod lifecycle;
+mod metrics;
 mod outbox;
 mod ports;
 mod prefetch;
 mod request_queue;
 mod session;
 mod shared_queue;
+mod supervisor;
 mod workers;
 
 pub(crate) use convert::source_assembly as uploaded_assembly;
-pub use event_loop::run;
+pub use event_loop::{Reload, run, run_reloading};
 pub use lifecycle::LifecycleError;
 pub use lifecycle::check_place;
 pub use workers::Planning;

@@ -103,6 +103,11 @@ impl<J> RequestQueue<J> {
         }
     }
 
+    /// Other bounds from now on; what waits stays.
+    pub(crate) fn rebound(&mut self, bounds: Bounds) {
+        self.bounds = bounds;
+    }
+
     /// Whether a job would be taken now.
     pub(crate) fn check(&self, ticket: Ticket) -> Result<(), Rejected> {
         if self.closed {

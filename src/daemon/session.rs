@@ -10,6 +10,7 @@ use sbdp_ipc::headers::{ResponseHeader, ResponseKind};
 use sbdp_ipc::plan::Step;
 
 use super::answers::Answer;
+use super::figures::Timed;
 use super::outbox::Outbox;
 
 /// Where a request stands.
@@ -115,6 +116,8 @@ pub(crate) struct Session<L> {
     started_ns: u64,
     /// Since when something waits that the client does not take.
     stuck_since: Option<Instant>,
+    received: Instant,
+    remembered: bool,
 }
 
 impl<L: Link> Session<L> {
@@ -130,6 +133,8 @@ impl<L: Link> Session<L> {
             admitted_ns: 0,
             started_ns: 0,
             stuck_since: None,
+            received: Instant::now(),
+            remembered: false,
         }
     }
 
@@ -191,6 +196,7 @@ impl<L: Link> Session<L> {
 
     /// Answers what runs with what was answered before.
     pub(crate) fn answer_running(&mut self, answer: &Answer) {
+        self.remembered = true;
         for message in &answer.steps {
             if self.outbox.push_whole(ResponseKind::Steps, Arc::clone(message)).is_err() {
                 return self.lose("its outbox is full");
@@ -258,6 +264,12 @@ impl<L: Link> Session<L> {
             }
         }
         sent
+    }
+
+    /// How long a plan took that was sent to its end, and from where it came.
+    pub(crate) fn timed(&self) -> Option<(Timed, Duration)> {
+        let kind = if self.remembered { Timed::RememberedPlan } else { Timed::Plan };
+        (self.state == State::Ended(End::Done)).then(|| (kind, self.received.elapsed()))
     }
 
     /// Over, and the client has what it can get.

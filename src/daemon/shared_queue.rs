@@ -41,6 +41,11 @@ impl<J> SharedQueue<J> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    fn rebound(&self, bounds: Bounds) {
+        self.lock().rebound(bounds);
+        self.ready.notify_all();
+    }
+
     pub(crate) fn check(&self, ticket: Ticket) -> Result<(), Rejected> {
         self.lock().check(ticket)
     }
@@ -100,38 +105,51 @@ pub(crate) struct Queues {
     pub(super) prefetch: Arc<Prefetch>,
 }
 
+/// The bounds of plans, and of assemblies to take in.
+fn bounds(config: &Config) -> [Bounds; 2] {
+    let (workers, requests) = (config.workers.count, &config.requests);
+    // One worker is left to others, if there is more than one.
+    let share = workers.saturating_sub(1).max(1);
+    let megabytes = |mb: u64| mb.saturating_mul(1 << 20);
+    let plans = Bounds {
+        waiting: requests.queue,
+        waiting_per_owner: requests.waiting_per_client.min(requests.queue),
+        bytes: u64::MAX,
+        bytes_per_owner: u64::MAX,
+        workers,
+        working_per_owner: match requests.working_per_client {
+            0 => share,
+            most => most,
+        },
+        working_batch: share,
+    };
+    let admissions = Bounds {
+        waiting: ADMISSION_QUEUE,
+        waiting_per_owner: ADMISSION_QUEUE,
+        bytes: megabytes(requests.uploads_mb),
+        bytes_per_owner: megabytes(requests.uploads_mb_per_client),
+        workers: 1,
+        working_per_owner: 1,
+        working_batch: 1,
+    };
+    [plans, admissions]
+}
+
 impl Queues {
     pub(crate) fn new(config: &Config) -> Self {
-        let (workers, requests) = (config.workers.count, &config.requests);
-        // One worker is left to others, if there is more than one.
-        let share = workers.saturating_sub(1).max(1);
-        let megabytes = |mb: u64| mb.saturating_mul(1 << 20);
-        let plans = Bounds {
-            waiting: requests.queue,
-            waiting_per_owner: requests.waiting_per_client.min(requests.queue),
-            bytes: u64::MAX,
-            bytes_per_owner: u64::MAX,
-            workers,
-            working_per_owner: match requests.working_per_client {
-                0 => share,
-                most => most,
-            },
-            working_batch: share,
-        };
-        let admissions = Bounds {
-            waiting: ADMISSION_QUEUE,
-            waiting_per_owner: ADMISSION_QUEUE,
-            bytes: megabytes(requests.uploads_mb),
-            bytes_per_owner: megabytes(requests.uploads_mb_per_client),
-            workers: 1,
-            working_per_owner: 1,
-            working_batch: 1,
-        };
+        let [plans, admissions] = bounds(config);
         Self {
             plans: Arc::new(SharedQueue::new(plans)),
             admissions: Arc::new(SharedQueue::new(admissions)),
             prefetch: Arc::default(),
         }
+    }
+
+    /// Keeps other bounds from now on.
+    pub(crate) fn reload(&self, config: &Config) {
+        let [plans, admissions] = bounds(config);
+        self.plans.rebound(plans);
+        self.admissions.rebound(admissions);
     }
 
     pub(crate) fn close(&self) {

@@ -279,7 +279,7 @@ impl<'a, 'o> Search<'a, 'o> {
                 termination.check()?;
                 let node = &nodes[i];
                 let least = least_travel(scene, node.part);
-                Ok(analysis.blocked_from(&standing, node.part, node.pose(), least))
+                analysis.blocked_from(&standing, node.part, node.pose(), least, termination)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
         for (&i, blockage) in todo.iter().zip(found) {

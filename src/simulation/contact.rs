@@ -10,6 +10,7 @@ use std::collections::HashMap;
 use nalgebra::{Point3, Vector3, Vector6};
 
 use crate::geometry::{Bounds, Closest, Pose, SampleTree};
+use crate::termination::Termination;
 
 use super::projection::Row;
 use super::sliding::FREE_STEP;
@@ -52,11 +53,20 @@ pub(super) struct Mover<'a> {
     pub(super) body: &'a Body,
     pub(super) part: usize,
     pub(super) pose: Pose,
+    /// See [`Self::until`].
+    pub(super) termination: Option<&'a Termination>,
 }
 
 impl<'a> Mover<'a> {
     pub(super) fn new(scene: &'a Scene, part: usize, pose: Pose) -> Self {
-        Self { scene, body: &scene.bodies[part], part, pose }
+        Self { scene, body: &scene.bodies[part], part, pose, termination: None }
+    }
+
+    /// The same, but once the condition is true it finds only part of its contacts: whoever asks must
+    /// look at the condition before believing what was found. The first look at two large surfaces fills
+    /// their fields, which takes longer than a cancelled request may.
+    pub(super) fn until(self, termination: &'a Termination) -> Self {
+        Self { termination: Some(termination), ..self }
     }
 
     /// The centre of mass, about which twists turn.
@@ -92,7 +102,8 @@ impl<'a> Mover<'a> {
             let mut found = Near { contacts: Vec::new(), clearance: near.clearance };
             for tree in [&sampled.shape.samples, &sampled.extra_samples] {
                 let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
-                gather(tree, measured, to_measured, allowance, reach, &mut found, tag);
+                let measured = Measured { body: measured, to_measured, allowance, reach };
+                gather(tree, &measured, self.termination, &mut found, tag);
             }
             found
         };
@@ -319,23 +330,34 @@ impl Sample {
     }
 }
 
-fn gather(
-    tree: &SampleTree,
-    measured: &Body,
-    to_measured: &Pose,
+/// What samples are measured against.
+struct Measured<'m> {
+    body: &'m Body,
+    to_measured: &'m Pose,
     allowance: f64,
     reach: f64,
+}
+
+fn gather(
+    tree: &SampleTree,
+    measured: &Measured<'_>,
+    termination: Option<&Termination>,
     near: &mut Near,
     tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
 ) {
+    let Measured { body, to_measured, allowance, reach } = *measured;
     // Deeper than nothing cannot be excluded by a bound that is only sure outside.
     let limit = (reach - allowance).max(0.0);
     let clearance = std::cell::Cell::new(near.clearance);
     let keep = |bound: f64| clearance.set(clearance.get().min(bound + allowance));
+    let is_over = || termination.is_some_and(|t| t.check().is_err());
     tree.walk(
         (),
         |node, ()| {
-            let bound = measured.field.estimate(&(to_measured * node.centre)).lower_bound - node.radius;
+            if is_over() {
+                return None;
+            }
+            let bound = body.field.estimate(&(to_measured * node.centre)).lower_bound - node.radius;
             if bound > limit {
                 keep(bound);
             }
@@ -343,11 +365,11 @@ fn gather(
         },
         |sample, ()| {
             let p = to_measured * sample;
-            let bound = measured.field.estimate(&p).lower_bound;
+            let bound = body.field.estimate(&p).lower_bound;
             if bound > limit {
                 return keep(bound);
             }
-            match measured.closest(&p, limit) {
+            match body.closest(&p, limit) {
                 Some((closest, distance)) if distance + allowance < reach => {
                     near.contacts.push(tag(*sample, distance + allowance, closest));
                 }

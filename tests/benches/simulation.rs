@@ -67,7 +67,7 @@ fn measure(folder: &std::path::Path) -> Result<[Vec<f64>; 5], String> {
     let translations = Action::translations();
     for (a, b) in scene.broad_phase.pairs(0.0) {
         let pose = scene.bodies[a].planning_from_shape;
-        times[0].push(timed(|| pair_blocks(&scene, a, &pose, b, &translations, LEAST_TRAVEL)).1);
+        times[0].push(timed(|| pair_blocks(&scene, a, &pose, b, &translations, LEAST_TRAVEL, &never)).1);
     }
     let turning = Action::rotations_about(&Axis::WORLD);
     for part in 0..scene.bodies.len() {

@@ -60,6 +60,11 @@ impl Daemon {
         self.child.id()
     }
 
+    /// Writes another configuration; it is read at the next start, or at SIGHUP.
+    pub fn configure(&self, config: &str) {
+        std::fs::write(self.folder.path().join("config.toml"), config).unwrap();
+    }
+
     pub fn connect(&self) -> Client {
         connect(&self.runtime_dir())
     }
@@ -253,6 +258,12 @@ pub fn plan(client: &Client, handle: Handle, options: &PlanOptions) -> (Vec<u32>
 pub fn act_as_client() {
     let Ok(role) = std::env::var(ROLE) else { return };
     let client = Client::connect().unwrap();
+    match role.as_str() {
+        "uploading" => upload_for_ever(&client),
+        "holding" => hold_for_ever(&client),
+        "too-large" => return upload_too_much(&client),
+        _ => {}
+    }
     let assembly = match role.as_str() {
         "two" => Boxes::two(),
         "small-lattice" => Boxes::lattice(3),
@@ -262,4 +273,39 @@ pub fn act_as_client() {
     println!("uploaded");
     let (parts, summary) = plan(&client, handle, &PlanOptions::default());
     println!("{} after {} steps", summary.status.name(), parts.len());
+}
+
+/// Uploads ten megabytes again and again, as changes of a part, which are always sent.
+fn upload_for_ever(client: &Client) -> ! {
+    let boxes = Boxes::two();
+    let base = client.upload(&boxes.assembly()).unwrap();
+    let mut vertices = vec![[0.5; 3]; 400_000];
+    vertices[..8].copy_from_slice(&boxes.vertices[0]);
+    let part = Part { name: "0", vertices: Vertices::F64(&vertices), triangles: &TRIANGLES };
+    loop {
+        let change = sbdp_client::Change { replaced: vec![(0, part)], ..sbdp_client::Change::default() };
+        client.revise(base, &change).unwrap();
+    }
+}
+
+/// Holds a response of a plan that goes on.
+fn hold_for_ever(client: &Client) -> ! {
+    let handle = client.upload(&Boxes::lattice(5).assembly()).unwrap();
+    let options = PlanOptions { no_cache: true, ..PlanOptions::default() };
+    let mut stream = client.plan(handle, &options).unwrap();
+    while !matches!(stream.next_event().unwrap(), Some(Event::Step(_))) {}
+    loop {
+        std::thread::park();
+    }
+}
+
+/// Uploads more than there is room for, then something small.
+fn upload_too_much(client: &Client) {
+    let vertices = vec![[0.5; 3]; 2_000_000];
+    let part = Part { name: "0", vertices: Vertices::F64(&vertices), triangles: &TRIANGLES };
+    let error = client.upload(&Assembly { parts: vec![part], ..Assembly::default() }).unwrap_err();
+    println!("refused: {error}");
+    let handle = client.upload(&Boxes::lattice(2).assembly()).unwrap();
+    let (parts, _) = plan(client, handle, &PlanOptions::default());
+    println!("then planned {}", parts.len());
 }

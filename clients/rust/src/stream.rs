@@ -72,6 +72,8 @@ pub struct PlanStream<'c> {
     /// The last control request: it must live until the daemon saw it or a newer one.
     control: Option<Pending>,
     request: u64,
+    /// Whose chunks these are.
+    server: Option<u128>,
     received: u64,
     granted: u64,
     cancel_wanted: bool,
@@ -169,6 +171,7 @@ impl Client {
             pending: None,
             control: None,
             request: 0,
+            server: None,
             received: 0,
             granted: 0,
             cancel_wanted: false,
@@ -193,6 +196,7 @@ impl PlanStream<'_> {
         self.parts = None;
         self.control = None;
         self.pending = None;
+        self.server = None;
         (self.received, self.granted, self.next_step) = (0, 0, 0);
         self.request = self.client.new_request();
         let header = self.client.header(RequestKind::Plan, self.request);
@@ -325,6 +329,12 @@ impl PlanStream<'_> {
     /// Takes a chunk in.
     fn take(&mut self, answer: Answer) -> Result<Option<Found>, ClientError> {
         let header = *answer.user_header();
+        // A request that was under way when a daemon died may reach the next one, too: what both have sent
+        // is no stream.
+        let server = answer.origin().value();
+        if *self.server.get_or_insert(server) != server {
+            return Err(ClientError::DaemonDied { pid: self.client.pid() });
+        }
         if header.sequence != self.received {
             return Err(ClientError::Protocol(format!(
                 "chunk {} came where {} was due",

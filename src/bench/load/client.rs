@@ -47,6 +47,8 @@ pub struct LoadClient {
 
 /// Nothing that the daemon owes takes so long, however much it has to do.
 const PATIENCE: Duration = Duration::from_secs(120);
+/// So often in a row a daemon may be restarted between an upload and a question.
+const UPLOADS_AGAIN: usize = 10;
 /// So many requests are reported together.
 const REPORT: usize = 10;
 
@@ -58,9 +60,10 @@ pub fn load_client(load: &LoadClient) -> Result<(), BenchError> {
     let options = ConnectOptions {
         runtime_dir: Some(load.runtime_dir.clone()),
         timeout: PATIENCE,
+        reconnect: PATIENCE,
         ..ConnectOptions::default()
     };
-    let client = Client::connect_with(options).map_err(BenchError::failed)?;
+    let client = connect(&options)?;
     let base = client.upload(&wire_assembly(&load.assembly)).map_err(BenchError::failed)?;
     let me = Asking { client, base, load };
     match load.role {
@@ -87,6 +90,18 @@ pub fn load_client(load: &LoadClient) -> Result<(), BenchError> {
         }
     }
     Ok(())
+}
+
+/// Connects, also while a daemon is just being restarted.
+fn connect(options: &ConnectOptions) -> Result<Client, BenchError> {
+    let until = Instant::now() + PATIENCE;
+    loop {
+        match Client::connect_with(options.clone()) {
+            Ok(client) => return Ok(client),
+            Err(error) if Instant::now() >= until => return Err(BenchError::failed(error)),
+            Err(_) => std::thread::sleep(Duration::from_millis(20)),
+        }
+    }
 }
 
 fn say(line: &str) -> Result<(), BenchError> {
@@ -117,13 +132,27 @@ impl Asking<'_> {
         for number in 1..=self.load.requests {
             let question = mix.next();
             let started = Instant::now();
-            let ending = self.ask(question, &mut figures);
+            let ending = self.ask_known(question, &mut figures);
             figures.add(question.kind, ending, started.elapsed().as_secs_f64() * 1e6);
             if number % REPORT == 0 {
                 say(&format!("done {REPORT}"))?;
             }
         }
         Ok(figures)
+    }
+
+    /// Asks, after another upload if the daemon was restarted and does not know the assembly any more.
+    fn ask_known(&self, question: Question, figures: &mut ClientFigures) -> Ending {
+        for _ in 0..UPLOADS_AGAIN {
+            match self.ask(question, figures) {
+                Ending::Refused(code) if code == "UnknownHandle" => {}
+                ending => return ending,
+            }
+            if let Err(error) = self.client.upload(&wire_assembly(&self.load.assembly)) {
+                return Ending::Lost(format!("upload: {error}"));
+            }
+        }
+        Ending::Lost("the assembly is forgotten again and again".to_owned())
     }
 
     fn ask(&self, question: Question, figures: &mut ClientFigures) -> Ending {

@@ -77,6 +77,12 @@ impl ClientFigures {
         self.plans.insert(question, hash);
     }
 
+    /// How many questions both answered, and how many of these with another plan.
+    pub(super) fn compare(&self, other: &Self) -> (u64, u64) {
+        let both = self.plans.iter().filter_map(|(question, hash)| Some((hash, other.plans.get(question)?)));
+        both.fold((0, 0), |(all, differing), (a, b)| (all + 1, differing + u64::from(a != b)))
+    }
+
     pub(super) fn merge(&mut self, other: Self) {
         for (kind, theirs) in other.kinds {
             let ours = self.kinds.entry(kind).or_default();

@@ -6,10 +6,11 @@ mod client;
 mod figures;
 mod footprint;
 mod mix;
+mod soak;
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -23,6 +24,7 @@ use serde::Serialize;
 pub use client::{LoadClient, Role, load_client};
 pub use figures::{DaemonFigures, Footprint, KindFigures, Phase};
 pub use mix::Kind;
+pub use soak::{Soak, SoakRequest, soak};
 
 use super::BenchError;
 use super::daemon::{Place, Server};
@@ -88,9 +90,7 @@ pub fn load(request: &LoadRequest) -> Result<Load, BenchError> {
         (None, Some(folder)) => folder.clone(),
         (None, None) => sbdp_ipc::endpoint::default_runtime_dir(),
     };
-    let options = ConnectOptions { runtime_dir: Some(runtime_dir.clone()), ..ConnectOptions::default() };
-    let observer = Client::connect_with(options).map_err(BenchError::failed)?;
-    let start = Start { request, runtime_dir: &runtime_dir, pid: observer.pid(), observer };
+    let start = Start::at(request, &runtime_dir)?;
     let calm = start.phase(&[])?;
     let disturbed = request.disturb.then(|| start.phase(&[Role::Stopped, Role::Flooding, Role::Deaf]));
     let disturbed = disturbed.transpose()?;
@@ -146,12 +146,23 @@ enum Said {
 
 struct Start<'r> {
     request: &'r LoadRequest,
-    runtime_dir: &'r std::path::Path,
+    runtime_dir: PathBuf,
     pid: u32,
     observer: Client,
 }
 
-impl Start<'_> {
+impl<'r> Start<'r> {
+    fn new(request: &'r LoadRequest, server: &Server) -> Result<Self, BenchError> {
+        Self::at(request, &server.runtime_dir())
+    }
+
+    fn at(request: &'r LoadRequest, runtime_dir: &Path) -> Result<Self, BenchError> {
+        let runtime_dir = runtime_dir.to_owned();
+        let options = ConnectOptions { runtime_dir: Some(runtime_dir.clone()), ..ConnectOptions::default() };
+        let observer = Client::connect_with(options).map_err(BenchError::failed)?;
+        Ok(Self { request, runtime_dir, pid: observer.pid(), observer })
+    }
+
     /// All clients at the same time, beside disturbers.
     fn phase(&self, disturbers: &[Role]) -> Result<Phase, BenchError> {
         let ended = Arc::new(AtomicU64::new(0));
@@ -214,7 +225,7 @@ impl Start<'_> {
         ended: &Arc<AtomicU64>,
     ) -> Result<Process, BenchError> {
         let mut command = Command::new(&self.request.program);
-        command.args(["bench", "load-client", "--role", role.name(), "--runtime-dir"]).arg(self.runtime_dir);
+        command.args(["bench", "load-client", "--role", role.name(), "--runtime-dir"]).arg(&self.runtime_dir);
         command.args(["--requests", &requests.to_string(), "--seed", &seed.to_string()]);
         command.args(["--variety", &self.request.variety.to_string()]);
         if let Some(assembly) = &self.request.assembly {

@@ -1,4 +1,4 @@
-//! The arguments of `sbdp bench load`.
+//! The arguments of benchmarks that put a daemon under load, or end what it does.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -30,6 +30,48 @@ pub(in super::super) struct BenchLoad {
     /// The folder of the running daemon to ask [default: starts one of its own, `sbdpd` beside `sbdp`]
     #[arg(long, value_name = "DIR")]
     pub(in super::super) runtime_dir: Option<PathBuf>,
+    /// Write the figures there as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(in super::super) json: Option<PathBuf>,
+}
+
+/// A test of endurance.
+#[derive(Debug, Args)]
+pub(in super::super) struct BenchSoak {
+    /// What is planned [default: a bolted frame of 20 parts]
+    pub(in super::super) assembly: Option<PathBuf>,
+    /// How many clients ask at the same time
+    #[arg(long, value_name = "N", default_value = "4")]
+    pub(in super::super) clients: NonZeroUsize,
+    /// How many clients are killed, and replaced
+    #[arg(long, value_name = "N", default_value = "200")]
+    pub(in super::super) client_kills: u32,
+    /// How many daemons are killed, and restarted
+    #[arg(long, value_name = "N", default_value = "50")]
+    pub(in super::super) daemon_kills: u32,
+    /// How many requests each client makes, if it lives so long
+    #[arg(long, value_name = "N", default_value = "300")]
+    pub(in super::super) requests: NonZeroUsize,
+    /// Which moments and victims
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub(in super::super) seed: u64,
+    /// Write the figures there as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(in super::super) json: Option<PathBuf>,
+}
+
+/// A benchmark of ending plans.
+#[derive(Debug, Args)]
+pub(in super::super) struct BenchCancel {
+    /// Folders or files of assemblies
+    #[arg(value_name = "ASSEMBLY", required = true)]
+    pub(in super::super) assemblies: Vec<PathBuf>,
+    /// At how many moments of each plan it is ended
+    #[arg(long, value_name = "N", default_value = "200")]
+    pub(in super::super) samples: u32,
+    /// Threads that plan [default: all processors]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+    pub(in super::super) threads: usize,
     /// Write the figures there as JSON
     #[arg(long, value_name = "FILE")]
     pub(in super::super) json: Option<PathBuf>,

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use super::super::args::{BenchLoad, BenchLoadClient};
+use super::super::args::{BenchCancel, BenchLoad, BenchLoadClient, BenchSoak};
 use super::super::error::CliError;
 use super::super::print;
 use super::THIS_PROGRAM;
 use super::through_daemon::{frame, written};
-use crate::bench::{self, Load, LoadClient, LoadRequest, Phase};
+use crate::bench::{self, CancelRequest, Load, LoadClient, LoadRequest, Phase, SoakRequest};
 use crate::geometry::{SourceAssembly, load_assembly};
 
 pub(super) fn load(arguments: &BenchLoad) -> Result<ExitCode, CliError> {
@@ -25,6 +25,56 @@ pub(super) fn load(arguments: &BenchLoad) -> Result<ExitCode, CliError> {
     let load = bench::load(&request)?;
     print(&text(&load))?;
     written(arguments.json.as_deref(), &load)
+}
+
+pub(super) fn soak(arguments: &BenchSoak) -> Result<ExitCode, CliError> {
+    let request = SoakRequest {
+        load: LoadRequest {
+            assembly: arguments.assembly.clone(),
+            clients: arguments.clients.get(),
+            requests: arguments.requests.get(),
+            variety: 16,
+            seed: arguments.seed,
+            disturb: false,
+            runtime_dir: None,
+            program: PathBuf::from(THIS_PROGRAM),
+        },
+        client_kills: arguments.client_kills,
+        daemon_kills: arguments.daemon_kills,
+    };
+    let soak = bench::soak(&request)?;
+    let left = soak.left_in_shared_memory.iter().chain(&soak.left_in_root);
+    let left: String = left.map(|path| format!("left: {}\n", path.display())).collect();
+    print(&format!(
+        "{} clients and {} daemons killed; a new daemon was ready within {:.0} ms; {} clients gave up\n\
+         {} of {} questions answered otherwise than undisturbed\n{}{left}",
+        soak.client_kills,
+        soak.daemon_kills,
+        soak.slowest_restart_ms,
+        soak.clients_failed,
+        soak.differing_from_undisturbed,
+        soak.compared,
+        phase("those who lived", &soak.phase),
+    ))?;
+    written(arguments.json.as_deref(), &soak)
+}
+
+pub(super) fn cancel(arguments: &BenchCancel) -> Result<ExitCode, CliError> {
+    let request = CancelRequest {
+        assemblies: arguments.assemblies.clone(),
+        samples: arguments.samples,
+        threads: arguments.threads,
+    };
+    eprintln!(
+        "assembly: plan ms; ended: p50, p99, longest ms until the worker is free (at this share of the plan)"
+    );
+    let records = bench::cancel(&request, |r| {
+        eprintln!(
+            "{}: {:.1}; {}: {:.2}, {:.2}, {:.2} ({:.2})",
+            r.assembly, r.plan_ms, r.ended, r.p50_ms, r.p99_ms, r.longest_ms, r.longest_at
+        );
+    })?;
+    written(arguments.json.as_deref(), &records)
 }
 
 pub(super) fn client(arguments: &BenchLoadClient) -> Result<ExitCode, CliError> {

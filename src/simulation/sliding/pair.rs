@@ -1,7 +1,7 @@
 //! Static analysis by sliding: what contact with one part alone lets another do.
 
 use crate::geometry::Pose;
-use crate::termination::Termination;
+use crate::termination::{Interrupt, Termination};
 
 use super::super::contact::{Mover, Near};
 use super::super::{Action, Scene};
@@ -16,7 +16,9 @@ const PUSHES: usize = 32;
 
 /// For each action, whether `other` alone keeps `part` at `pose` from following it by more than
 /// `least`: the static analysis that suits this engine, which excludes nothing that could slide.
-#[must_use]
+///
+/// # Errors
+/// The termination condition became true.
 pub fn pair_blocks(
     scene: &Scene,
     part: usize,
@@ -24,14 +26,17 @@ pub fn pair_blocks(
     other: usize,
     actions: &[Action],
     least: f64,
-) -> Vec<bool> {
-    if actions.iter().all(|a| !a.turns())
-        && let Ok(blocked) = translations_blocked(scene, part, pose, other, actions, least)
-    {
-        return blocked;
+    termination: &Termination,
+) -> Result<Vec<bool>, Interrupt> {
+    if actions.iter().all(|a| !a.turns()) {
+        match translations_blocked(scene, part, pose, other, actions, least, termination) {
+            Ok(blocked) => return Ok(blocked),
+            Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
+            Err(Halt::Lost | Halt::Blocked) => {}
+        }
     }
-    let start = Mover::new(scene, part, *pose);
-    let Some(first) = actions.first() else { return Vec::new() };
+    let start = Mover::new(scene, part, *pose).until(termination);
+    let Some(first) = actions.first() else { return Ok(Vec::new()) };
     let reach = Drive::new(scene, part, pose, *first).reach();
     let within = |reach: f64, mover: &Mover<'_>| {
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
@@ -39,8 +44,9 @@ pub fn pair_blocks(
         near
     };
     let near = within(reach, &start);
+    termination.check()?;
     if near.contacts.is_empty() {
-        return vec![false; actions.len()];
+        return Ok(vec![false; actions.len()]);
     }
     // Whether a step can be made is told by what enters at its end alone; what is merely near there
     // matters only if another step follows.
@@ -49,14 +55,17 @@ pub fn pair_blocks(
         let drive = Drive::new(scene, part, pose, *action);
         let mut step = drive.advance(&start, &near, &entering);
         for _ in 1..STATIC_STEPS {
-            let Step::Moved(Moved { pose: there, .. }) = step else { return true };
-            let mover = Mover::new(scene, part, there);
+            termination.check()?;
+            let Step::Moved(Moved { pose: there, .. }) = step else { return Ok(true) };
+            let mover = Mover::new(scene, part, there).until(termination);
             if (mover.centre() - start.centre()).norm() > least {
-                return false;
+                return Ok(false);
             }
             step = drive.advance(&mover, &within(reach, &mover), &entering);
         }
-        matches!(step, Step::Stuck { .. })
+        // What was found of a cut walk is not to be believed.
+        termination.check()?;
+        Ok(matches!(step, Step::Stuck { .. }))
     };
     actions.iter().map(blocked).collect()
 }
@@ -69,11 +78,11 @@ fn translations_blocked(
     other: usize,
     actions: &[Action],
     least: f64,
+    termination: &Termination,
 ) -> Result<Vec<bool>, Halt> {
-    let termination = Termination::default();
     let standing = [other];
     let blocked = |action: &Action| {
-        let mut push = Push::new(scene, &standing, (part, pose), action.force(), &termination).short();
+        let mut push = Push::new(scene, &standing, (part, pose), action.force(), termination).short();
         for _ in 0..PUSHES {
             if let push::Step::Stuck { .. } = push.step()? {
                 return Ok(true);

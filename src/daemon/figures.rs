@@ -1,0 +1,253 @@
+//! How the daemon does, in figures: for `sbdp status --json`, and as Prometheus wants them.
+
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::time::Duration;
+
+use sbdp_ipc::status::StatusHeader;
+use serde::Serialize;
+
+/// What requests are told apart by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Timed {
+    /// Plans that a worker made.
+    Plan,
+    /// Plans from memory.
+    RememberedPlan,
+    /// Uploads and revisions.
+    Upload,
+}
+
+impl Timed {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Plan => "plan",
+            Self::RememberedPlan => "remembered_plan",
+            Self::Upload => "upload",
+        }
+    }
+}
+
+/// Eight buckets for each power of two of microseconds: a percentile is off by an eighth at most.
+const PER_OCTAVE: u32 = 8;
+const BUCKETS: usize = 64 * PER_OCTAVE as usize;
+
+/// Times of requests, from their reception to their last byte, in a fixed amount of memory.
+#[derive(Debug, Clone)]
+struct Histogram {
+    counts: Vec<u64>,
+    count: u64,
+    sum: Duration,
+}
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self { counts: vec![0; BUCKETS], count: 0, sum: Duration::ZERO }
+    }
+}
+
+impl Histogram {
+    fn add(&mut self, time: Duration) {
+        let us = u64::try_from(time.as_micros()).unwrap_or(u64::MAX).max(1);
+        let octave = us.ilog2();
+        let within = ((us as f64 / 2_f64.powi(octave as i32) - 1.0) * f64::from(PER_OCTAVE)) as u32;
+        let bucket = (octave * PER_OCTAVE + within.min(PER_OCTAVE - 1)) as usize;
+        self.counts[bucket.min(BUCKETS - 1)] += 1;
+        self.count += 1;
+        self.sum = self.sum.saturating_add(time);
+    }
+
+    /// The upper end of the bucket that holds it, seconds.
+    fn percentile(&self, share: f64) -> f64 {
+        let wanted = (self.count as f64 * share).ceil().max(1.0) as u64;
+        let mut seen = 0;
+        for (bucket, count) in self.counts.iter().enumerate() {
+            seen += count;
+            if seen >= wanted {
+                let (octave, within) = (bucket as u32 / PER_OCTAVE, bucket as u32 % PER_OCTAVE);
+                let us = 2_f64.powi(octave as i32) * (1.0 + f64::from(within + 1) / f64::from(PER_OCTAVE));
+                return us * 1e-6;
+            }
+        }
+        0.0
+    }
+}
+
+/// Times by kind of request, since the daemon started.
+#[derive(Debug, Default)]
+pub(crate) struct Latencies {
+    by_kind: BTreeMap<Timed, Histogram>,
+}
+
+impl Latencies {
+    pub(crate) fn add(&mut self, kind: Timed, time: Duration) {
+        self.by_kind.entry(kind).or_default().add(time);
+    }
+}
+
+/// Percentiles of one kind, seconds.
+#[derive(Debug, Serialize)]
+struct LatencyFigures {
+    count: u64,
+    sum_s: f64,
+    p50_s: f64,
+    p90_s: f64,
+    p99_s: f64,
+}
+
+/// Everything, as `sbdp status --json` prints it.
+#[derive(Debug, Serialize)]
+pub(crate) struct Figures {
+    version: &'static str,
+    pid: u32,
+    protocol: u32,
+    uptime_s: f64,
+    workers: u32,
+    running: u32,
+    queued: u32,
+    queue_limit: u32,
+    /// Plan requests and uploads that are not over.
+    open_requests: usize,
+    requests: u64,
+    done: u64,
+    remembered: u64,
+    cancelled: u64,
+    expired: u64,
+    refused: u64,
+    failed: u64,
+    uploads: u64,
+    latency: BTreeMap<&'static str, LatencyFigures>,
+    preloaded: Vec<String>,
+}
+
+impl Figures {
+    pub(crate) fn of(
+        n: &StatusHeader,
+        open_requests: usize,
+        latencies: &Latencies,
+        preloaded: &[(String, [u8; 32])],
+    ) -> Self {
+        let latency = |(kind, h): (&Timed, &Histogram)| {
+            let figures = LatencyFigures {
+                count: h.count,
+                sum_s: h.sum.as_secs_f64(),
+                p50_s: h.percentile(0.5),
+                p90_s: h.percentile(0.9),
+                p99_s: h.percentile(0.99),
+            };
+            (kind.name(), figures)
+        };
+        Self {
+            version: env!("CARGO_PKG_VERSION"),
+            pid: n.pid,
+            protocol: n.protocol,
+            uptime_s: n.uptime_ns as f64 * 1e-9,
+            workers: n.workers,
+            running: n.running,
+            queued: n.queued,
+            queue_limit: n.queue_limit,
+            open_requests,
+            requests: n.requests,
+            done: n.done,
+            remembered: n.remembered,
+            cancelled: n.cancelled,
+            expired: n.expired,
+            refused: n.refused,
+            failed: n.failed,
+            uploads: n.uploads,
+            latency: latencies.by_kind.iter().map(latency).collect(),
+            preloaded: preloaded.iter().map(|(name, _)| name.clone()).collect(),
+        }
+    }
+
+    /// One JSON object.
+    pub(crate) fn json(&self) -> String {
+        // Numbers and texts can always be written.
+        serde_json::to_string_pretty(self).unwrap_or_default()
+    }
+
+    /// The text format of Prometheus, version 0.0.4.
+    pub(crate) fn prometheus(&self) -> String {
+        let mut text = String::new();
+        let gauges = [
+            ("uptime_seconds", self.uptime_s),
+            ("workers", f64::from(self.workers)),
+            ("workers_busy", f64::from(self.running)),
+            ("requests_waiting", f64::from(self.queued)),
+            ("requests_waiting_limit", f64::from(self.queue_limit)),
+            ("requests_open", self.open_requests as f64),
+        ];
+        for (name, value) in gauges {
+            let _ = writeln!(text, "# TYPE sbdp_{name} gauge\nsbdp_{name} {value}");
+        }
+        let _ = writeln!(text, "# TYPE sbdp_plan_requests_total counter");
+        let _ = writeln!(text, "sbdp_plan_requests_total {}", self.requests);
+        let _ = writeln!(text, "# TYPE sbdp_plan_requests_ended_total counter");
+        let ends = [
+            ("done", self.done),
+            ("cancelled", self.cancelled),
+            ("expired", self.expired),
+            ("refused", self.refused),
+            ("failed", self.failed),
+        ];
+        for (end, count) in ends {
+            let _ = writeln!(text, "sbdp_plan_requests_ended_total{{end=\"{end}\"}} {count}");
+        }
+        for (name, count) in [("plans_remembered", self.remembered), ("uploads", self.uploads)] {
+            let _ = writeln!(text, "# TYPE sbdp_{name}_total counter\nsbdp_{name}_total {count}");
+        }
+        let _ = writeln!(text, "# TYPE sbdp_request_seconds summary");
+        for (kind, l) in &self.latency {
+            for (quantile, value) in [("0.5", l.p50_s), ("0.9", l.p90_s), ("0.99", l.p99_s)] {
+                let labels = format!("kind=\"{kind}\",quantile=\"{quantile}\"");
+                let _ = writeln!(text, "sbdp_request_seconds{{{labels}}} {value}");
+            }
+            let _ = writeln!(text, "sbdp_request_seconds_sum{{kind=\"{kind}\"}} {}", l.sum_s);
+            let _ = writeln!(text, "sbdp_request_seconds_count{{kind=\"{kind}\"}} {}", l.count);
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_are_off_by_an_eighth_at_most() {
+        let mut histogram = Histogram::default();
+        (1..=10_000_u64).for_each(|us| histogram.add(Duration::from_micros(us)));
+        for share in [0.5, 0.9, 0.99] {
+            let (exact, found) = (share * 1e-2, histogram.percentile(share));
+            assert!(found >= exact && found <= exact * 1.126, "{share}: {found} for {exact}");
+        }
+        histogram.add(Duration::MAX);
+        histogram.add(Duration::ZERO);
+        assert_eq!(histogram.count, 10_002);
+        assert_eq!(Histogram::default().percentile(0.5), 0.0);
+    }
+
+    #[test]
+    fn figures_are_told_as_json_and_as_prometheus_wants_them() {
+        let mut latencies = Latencies::default();
+        latencies.add(Timed::Plan, Duration::from_millis(3));
+        let numbers = StatusHeader { pid: 7, requests: 5, done: 4, refused: 1, ..StatusHeader::default() };
+        let figures = Figures::of(&numbers, 2, &latencies, &[("frame".to_owned(), [0; 32])]);
+        let json: serde_json::Value = serde_json::from_str(&figures.json()).unwrap();
+        assert_eq!((json["pid"].as_u64(), json["latency"]["plan"]["count"].as_u64()), (Some(7), Some(1)));
+        assert_eq!(json["preloaded"][0], "frame");
+        let text = figures.prometheus();
+        for line in [
+            "sbdp_plan_requests_total 5",
+            "sbdp_plan_requests_ended_total{end=\"refused\"} 1",
+            "sbdp_request_seconds_count{kind=\"plan\"} 1",
+        ] {
+            assert!(text.lines().any(|l| l == line), "{line} in\n{text}");
+        }
+        for line in text.lines().filter(|l| !l.starts_with('#')) {
+            let (_, value) = line.rsplit_once(' ').unwrap();
+            assert!(value.parse::<f64>().is_ok(), "{line}");
+        }
+    }
+}
