@@ -224,12 +224,12 @@ impl Default for CacheConfig {
 }
 
 impl CacheConfig {
-    /// Half of the memory is for assemblies, three eighths for records, the rest for answers.
+    /// Of the memory, six sixteenths are for assemblies, three for records and one for answers. The rest
+    /// is for requests under way, for the pages of the store, and for what the allocator cannot give back.
     #[must_use]
     pub fn memory(&self) -> MemoryBudget {
         let all = usize::try_from(self.memory_mb.saturating_mul(1 << 20)).unwrap_or(usize::MAX);
-        let (assemblies, records) = (all / 2, all / 8 * 3);
-        MemoryBudget { assemblies, records, answers: all - assemblies - records }
+        MemoryBudget { assemblies: all / 16 * 6, records: all / 16 * 3, answers: all / 16 }
     }
 
     /// The same for the cache.
@@ -369,6 +369,12 @@ mod tests {
         let explained: Config = toml::from_str(include_str!("../config/default.toml")).unwrap();
         assert_eq!(explained, Config::default());
         explained.check().unwrap();
+    }
+
+    #[test]
+    fn the_memory_is_shared_out_with_some_to_spare() {
+        let MemoryBudget { assemblies, records, answers } = CacheConfig::default().memory();
+        assert_eq!([assemblies, records, answers].map(|bytes| bytes >> 20), [96, 48, 16]);
     }
 
     #[test]

@@ -86,6 +86,7 @@ impl<K: Clone + Eq + Hash, V: ?Sized> Lru<K, V> {
         }
     }
 
+    #[cfg(test)]
     pub(crate) fn iter(&self) -> impl Iterator<Item = (&K, &Arc<V>)> {
         self.entries.iter().map(|(key, entry)| (key, &entry.value))
     }

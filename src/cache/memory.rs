@@ -13,6 +13,8 @@ const OVERHEAD: usize = 192;
 pub(super) struct Memory {
     budget: usize,
     bytes: usize,
+    /// By kind.
+    held: [Held; Kind::ALL.len()],
     payloads: Lru<Key, [u8]>,
 }
 
@@ -23,9 +25,21 @@ pub(super) struct Held {
     pub(super) bytes: u64,
 }
 
+impl Held {
+    fn add(&mut self, payload: &[u8]) {
+        self.entries += 1;
+        self.bytes += payload.len() as u64;
+    }
+
+    fn take(&mut self, payload: &[u8]) {
+        self.entries -= 1;
+        self.bytes -= payload.len() as u64;
+    }
+}
+
 impl Memory {
     pub(super) fn new(budget: usize) -> Self {
-        Self { budget, bytes: 0, payloads: Lru::default() }
+        Self { budget, bytes: 0, held: Default::default(), payloads: Lru::default() }
     }
 
     pub(super) fn get(&mut self, key: &Key) -> Option<Arc<[u8]>> {
@@ -41,6 +55,7 @@ impl Memory {
         }
         let evicted = self.make_room(cost);
         self.bytes += cost;
+        self.held[key.kind().index()].add(&payload);
         self.payloads.insert(key, payload);
         evicted
     }
@@ -48,15 +63,17 @@ impl Memory {
     pub(super) fn remove(&mut self, key: &Key) {
         if let Some(payload) = self.payloads.remove(key) {
             self.bytes -= cost(&payload);
+            self.held[key.kind().index()].take(&payload);
         }
     }
 
     fn make_room(&mut self, needed: usize) -> Vec<Kind> {
-        let Self { budget, bytes, payloads } = self;
+        let Self { budget, bytes, held, payloads } = self;
         let mut evicted = Vec::new();
         if *bytes + needed > *budget {
             payloads.evict(|key, payload| {
                 *bytes -= cost(&payload);
+                held[key.kind().index()].take(&payload);
                 evicted.push(key.kind());
                 *bytes + needed > *budget
             });
@@ -65,11 +82,7 @@ impl Memory {
     }
 
     pub(super) fn held(&self, kind: Kind) -> Held {
-        let of_kind = self.payloads.iter().filter(|(key, _)| key.kind() == kind);
-        of_kind.fold(Held::default(), |held, (_, payload)| Held {
-            entries: held.entries + 1,
-            bytes: held.bytes + payload.len() as u64,
-        })
+        self.held[kind.index()]
     }
 
     /// Of payloads and of what is kept beside them.
@@ -159,6 +172,10 @@ mod tests {
                     }
                 }
                 prop_assert!(memory.bytes() <= budget);
+                let held = Kind::ALL.map(|kind| memory.held(kind));
+                let (entries, bytes) = held.iter().fold((0, 0), |(n, b), h| (n + h.entries, b + h.bytes));
+                prop_assert_eq!(entries as usize, model.len());
+                prop_assert_eq!(bytes as usize, model.iter().map(|(_, l)| l).sum::<usize>());
             }
         }
     }

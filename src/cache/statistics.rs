@@ -39,10 +39,12 @@ pub struct KindStatistics {
     pub bytes: u64,
     /// Records that left memory for others.
     pub evictions: u64,
-    /// Records on disk.
-    pub disk_entries: u64,
-    /// Their bytes.
-    pub disk_bytes: u64,
+    /// Records on disk, where they were counted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub disk_entries: Option<u64>,
+    /// Their bytes, likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub disk_bytes: Option<u64>,
     /// Records that left the disk for others.
     pub disk_evictions: u64,
     /// Records found damaged, or of another version.
@@ -65,8 +67,18 @@ impl Cache {
     #[must_use]
     pub fn statistics(&self) -> CacheStatistics {
         let on_disk = by_kind(&self.list());
+        let mut counters = self.counters();
+        for (kind, (entries, bytes)) in counters.kinds.iter_mut().zip(on_disk) {
+            (kind.disk_entries, kind.disk_bytes) = (Some(entries), Some(bytes));
+        }
+        counters
+    }
+
+    /// The same without counting what is on disk: at any time, at once.
+    #[must_use]
+    pub fn counters(&self) -> CacheStatistics {
         let memory = self.memory();
-        let kind = |(kind, (disk_entries, disk_bytes)): (Kind, (u64, u64))| {
+        let kind = |kind: Kind| {
             let (tally, held) = (self.tally.of(kind), memory.held(kind));
             KindStatistics {
                 kind: kind.name(),
@@ -75,8 +87,8 @@ impl Cache {
                 entries: held.entries,
                 bytes: held.bytes,
                 evictions: tally.evictions.count(),
-                disk_entries,
-                disk_bytes,
+                disk_entries: None,
+                disk_bytes: None,
                 disk_evictions: tally.disk_evictions.count(),
                 damaged: tally.damaged.count(),
             }
@@ -88,7 +100,7 @@ impl Cache {
             overflows: self.tally.overflows.count(),
             write_failures: self.tally.write_failures.count(),
             set_aside: self.tally.set_aside.count(),
-            kinds: Kind::ALL.into_iter().zip(on_disk).map(kind).collect(),
+            kinds: Kind::ALL.into_iter().map(kind).collect(),
         }
     }
 

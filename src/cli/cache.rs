@@ -114,7 +114,11 @@ fn stats(cache: &Cache, json: Option<&Path>) -> Result<(), CliError> {
 fn described(statistics: &CacheStatistics) -> String {
     let mut table = Table::new(&["kind", "records", "bytes"]);
     for kind in &statistics.kinds {
-        table.row([kind.kind.to_owned(), kind.disk_entries.to_string(), kind.disk_bytes.to_string()]);
+        table.row([
+            kind.kind.to_owned(),
+            kind.disk_entries.unwrap_or(0).to_string(),
+            kind.disk_bytes.unwrap_or(0).to_string(),
+        ]);
     }
     format!("{}file     {} bytes\n", table.render(), statistics.file_bytes)
 }

@@ -36,7 +36,7 @@ fn describe(status: &Status) -> String {
         "sbdpd {} (protocol {}), pid {}, up {uptime} s\n\
          workers   {}, {} busy; {} of {} requests wait\n\
          requests  {}: {} answered ({} of them from memory), {} cancelled, {} expired, {} refused, {} failed\n\
-         uploads   {}\n",
+         uploads   {}; what is remembered: `sbdp status --json`\n",
         status.version,
         n.protocol,
         n.pid,

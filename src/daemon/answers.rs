@@ -6,6 +6,7 @@ use std::sync::Arc;
 use sbdp_ipc::plan::PlanRequest;
 
 use super::convert;
+use super::figures::AnswerFigures;
 use super::outbox::steps_messages;
 use crate::lru::Lru;
 use crate::plan::{Plan, PlanStats, PlanStatus};
@@ -71,6 +72,10 @@ pub(crate) struct Answers {
 impl Answers {
     pub(crate) fn new(limit: usize) -> Self {
         Self { limit, ..Self::default() }
+    }
+
+    pub(crate) fn figures(&self) -> AnswerFigures {
+        AnswerFigures { entries: self.by_question.len(), bytes: self.bytes }
     }
 
     /// The answer to a question.

@@ -379,7 +379,14 @@ impl<L: Link, P: Planning> Desk<L, P> {
 
     pub(crate) fn figures(&self) -> Figures {
         let open = self.sessions.len() + self.uploads.len();
-        Figures::of(&self.numbers(), open, &self.latencies, &self.preloaded)
+        Figures::of(
+            &self.numbers(),
+            open,
+            &self.latencies,
+            &self.preloaded,
+            self.answers.figures(),
+            self.service.remembered(),
+        )
     }
 
     fn status(&self) -> Status {

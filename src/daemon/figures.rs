@@ -7,6 +7,9 @@ use std::time::Duration;
 use sbdp_ipc::status::StatusHeader;
 use serde::Serialize;
 
+use crate::cache::KindStatistics;
+use crate::service::Remembered;
+
 /// What requests are told apart by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -111,7 +114,7 @@ pub(crate) struct Figures {
     open_requests: usize,
     requests: u64,
     done: u64,
-    remembered: u64,
+    plans_remembered: u64,
     cancelled: u64,
     expired: u64,
     refused: u64,
@@ -119,6 +122,17 @@ pub(crate) struct Figures {
     uploads: u64,
     latency: BTreeMap<&'static str, LatencyFigures>,
     preloaded: Vec<String>,
+    /// Answers in memory, as they were sent.
+    answers: AnswerFigures,
+    /// Assemblies and records; what is on disk is not counted.
+    remembered: Option<Remembered>,
+}
+
+/// Answers in memory.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub(crate) struct AnswerFigures {
+    pub(crate) entries: usize,
+    pub(crate) bytes: usize,
 }
 
 impl Figures {
@@ -127,6 +141,8 @@ impl Figures {
         open_requests: usize,
         latencies: &Latencies,
         preloaded: &[(String, [u8; 32])],
+        answers: AnswerFigures,
+        remembered: Option<Remembered>,
     ) -> Self {
         let latency = |(kind, h): (&Timed, &Histogram)| {
             let figures = LatencyFigures {
@@ -150,7 +166,7 @@ impl Figures {
             open_requests,
             requests: n.requests,
             done: n.done,
-            remembered: n.remembered,
+            plans_remembered: n.remembered,
             cancelled: n.cancelled,
             expired: n.expired,
             refused: n.refused,
@@ -158,6 +174,8 @@ impl Figures {
             uploads: n.uploads,
             latency: latencies.by_kind.iter().map(latency).collect(),
             preloaded: preloaded.iter().map(|(name, _)| name.clone()).collect(),
+            answers,
+            remembered,
         }
     }
 
@@ -194,7 +212,7 @@ impl Figures {
         for (end, count) in ends {
             let _ = writeln!(text, "sbdp_plan_requests_ended_total{{end=\"{end}\"}} {count}");
         }
-        for (name, count) in [("plans_remembered", self.remembered), ("uploads", self.uploads)] {
+        for (name, count) in [("plans_remembered", self.plans_remembered), ("uploads", self.uploads)] {
             let _ = writeln!(text, "# TYPE sbdp_{name}_total counter\nsbdp_{name}_total {count}");
         }
         let _ = writeln!(text, "# TYPE sbdp_request_seconds summary");
@@ -206,13 +224,41 @@ impl Figures {
             let _ = writeln!(text, "sbdp_request_seconds_sum{{kind=\"{kind}\"}} {}", l.sum_s);
             let _ = writeln!(text, "sbdp_request_seconds_count{{kind=\"{kind}\"}} {}", l.count);
         }
+        let _ = writeln!(text, "# TYPE sbdp_answers_bytes gauge\nsbdp_answers_bytes {}", self.answers.bytes);
+        self.remembered.iter().for_each(|remembered| cache_metrics(&mut text, remembered));
         text
     }
+}
+
+fn cache_metrics(text: &mut String, Remembered { assemblies, records }: &Remembered) {
+    let gauges = [
+        ("assemblies", assemblies.assemblies),
+        ("assemblies_bytes", assemblies.bytes),
+        ("cache_memory_bytes", records.memory_bytes),
+        ("cache_file_bytes", records.file_bytes),
+    ];
+    for (name, value) in gauges {
+        let _ = writeln!(text, "# TYPE sbdp_{name} gauge\nsbdp_{name} {value}");
+    }
+    let _ = writeln!(text, "# TYPE sbdp_assemblies_evicted_total counter");
+    let _ = writeln!(text, "sbdp_assemblies_evicted_total {}", assemblies.evictions);
+    let mut counter = |name: &str, value: &dyn Fn(&KindStatistics) -> u64| {
+        let _ = writeln!(text, "# TYPE sbdp_cache_{name}_total counter");
+        for kind in &records.kinds {
+            let _ = writeln!(text, "sbdp_cache_{name}_total{{kind=\"{}\"}} {}", kind.kind, value(kind));
+        }
+    };
+    counter("hits", &|k| k.hits);
+    counter("misses", &|k| k.misses);
+    counter("evictions", &|k| k.evictions);
+    counter("disk_evictions", &|k| k.disk_evictions);
+    counter("damaged", &|k| k.damaged);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::service::Service;
 
     #[test]
     fn percentiles_are_off_by_an_eighth_at_most() {
@@ -233,7 +279,14 @@ mod tests {
         let mut latencies = Latencies::default();
         latencies.add(Timed::Plan, Duration::from_millis(3));
         let numbers = StatusHeader { pid: 7, requests: 5, done: 4, refused: 1, ..StatusHeader::default() };
-        let figures = Figures::of(&numbers, 2, &latencies, &[("frame".to_owned(), [0; 32])]);
+        let figures = Figures::of(
+            &numbers,
+            2,
+            &latencies,
+            &[("frame".to_owned(), [0; 32])],
+            AnswerFigures::default(),
+            Some(Service::default().remembered()),
+        );
         let json: serde_json::Value = serde_json::from_str(&figures.json()).unwrap();
         assert_eq!((json["pid"].as_u64(), json["latency"]["plan"]["count"].as_u64()), (Some(7), Some(1)));
         assert_eq!(json["preloaded"][0], "frame");
@@ -242,6 +295,8 @@ mod tests {
             "sbdp_plan_requests_total 5",
             "sbdp_plan_requests_ended_total{end=\"refused\"} 1",
             "sbdp_request_seconds_count{kind=\"plan\"} 1",
+            "sbdp_cache_hits_total{kind=\"motion\"} 0",
+            "sbdp_assemblies 0",
         ] {
             assert!(text.lines().any(|l| l == line), "{line} in\n{text}");
         }

@@ -16,7 +16,7 @@ use super::shared_queue::Queues;
 use crate::geometry::{Pose, Revision, SourceAssembly, load_assembly};
 use crate::plan::{Plan, PlanStep};
 use crate::search::{PlanRequest, PlanSink, Progress, Termination};
-use crate::service::{Admission, AssemblyId, Service, ServiceError};
+use crate::service::{Admission, AssemblyId, Remembered, Service, ServiceError};
 
 /// What the workers ask of the planning service; tests script it.
 pub trait Planning: Send + Sync + 'static {
@@ -49,6 +49,10 @@ pub trait Planning: Send + Sync + 'static {
     /// See [`Service::recent`].
     fn recent(&self, _: usize) -> Vec<AssemblyId> {
         Vec::new()
+    }
+    /// See [`Service::remembered`]. Called on the port thread: it must not block.
+    fn remembered(&self) -> Option<Remembered> {
+        None
     }
     /// The messages that answered a question before, also before a restart.
     fn answered(&self, _question: &[u8]) -> Option<Vec<Vec<u8>>> {
@@ -98,6 +102,10 @@ impl Planning for Service {
 
     fn recent(&self, most: usize) -> Vec<AssemblyId> {
         Self::recent(self, most)
+    }
+
+    fn remembered(&self) -> Option<Remembered> {
+        Some(Self::remembered(self))
     }
 
     fn answered(&self, question: &[u8]) -> Option<Vec<Vec<u8>>> {

@@ -17,8 +17,10 @@ mod tests;
 
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use crate::blocking_graph::{Audit, StaticAnalysis, audit};
-use crate::cache::{Cache, Recall, Source};
+use crate::cache::{Cache, CacheStatistics, Recall, Source};
 use crate::geometry::{Assembly, GeometryError, Revision, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, Warning};
 use crate::search::{Engine, PlanRequest, PlanSink, least_travel};
@@ -43,6 +45,15 @@ pub struct Admission {
     pub known: bool,
     /// What healing found.
     pub warnings: Vec<Warning>,
+}
+
+/// What a service remembers.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Remembered {
+    /// Assemblies, in memory.
+    pub assemblies: StoreStatistics,
+    /// Records; those on disk are not counted.
+    pub records: CacheStatistics,
 }
 
 /// Why a request was not planned at all.
@@ -105,6 +116,12 @@ impl Service {
     #[must_use]
     pub fn store_statistics(&self) -> StoreStatistics {
         self.store.statistics()
+    }
+
+    /// What it remembers; told at once.
+    #[must_use]
+    pub fn remembered(&self) -> Remembered {
+        Remembered { assemblies: self.store.statistics(), records: self.cache.counters() }
     }
 
     /// What it remembers in.

@@ -5,6 +5,8 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
+use serde::Serialize;
+
 use super::AssemblyId;
 use super::entry::Entry;
 use crate::geometry::{Assembly, Shape};
@@ -45,7 +47,7 @@ impl SharedShape {
 }
 
 /// How much there is.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct StoreStatistics {
     /// Assemblies.
     pub assemblies: u64,
