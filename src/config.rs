@@ -224,12 +224,12 @@ impl Default for CacheConfig {
 }
 
 impl CacheConfig {
-    /// Of the memory, six sixteenths are for assemblies, three for records and one for answers. The rest
+    /// Of the memory, five sixteenths are for assemblies, two for records and one for answers. The rest
     /// is for requests under way, for the pages of the store, and for what the allocator cannot give back.
     #[must_use]
     pub fn memory(&self) -> MemoryBudget {
         let all = usize::try_from(self.memory_mb.saturating_mul(1 << 20)).unwrap_or(usize::MAX);
-        MemoryBudget { assemblies: all / 16 * 6, records: all / 16 * 3, answers: all / 16 }
+        MemoryBudget { assemblies: all / 16 * 5, records: all / 16 * 2, answers: all / 16 }
     }
 
     /// The same for the cache.
@@ -374,7 +374,7 @@ mod tests {
     #[test]
     fn the_memory_is_shared_out_with_some_to_spare() {
         let MemoryBudget { assemblies, records, answers } = CacheConfig::default().memory();
-        assert_eq!([assemblies, records, answers].map(|bytes| bytes >> 20), [96, 48, 16]);
+        assert_eq!([assemblies, records, answers].map(|bytes| bytes >> 20), [80, 32, 16]);
     }
 
     #[test]
