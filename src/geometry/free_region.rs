@@ -21,6 +21,8 @@ const BOX_TOUCH: f64 = 1e-6;
 const INNER: f64 = 2.0 * TOUCH;
 /// Points nearer to the surface than this, in the planning frame, count as on it.
 const SKIN: f64 = 1e-6;
+/// What is no further below a plane counts as above it.
+const ROUNDING: f64 = 1e-12;
 /// With more planes than this, a region is not worth its tests.
 const MOST_PLANES: usize = 160;
 /// So far towards the seed, as a share of the way, hulls are taken to be apart from what they touch.
@@ -66,12 +68,42 @@ impl FreeRegion {
         self.nearest_within(p, most, 0.0).map(|q| (q - p).norm())
     }
 
+    /// How far the lowest of some points is above each of its planes, in their order.
+    #[must_use]
+    pub fn gaps(&self, points: &Cloud) -> Vec<f64> {
+        self.sides.iter().map(|side| points.least_above(side)).collect()
+    }
+
+    /// An upper bound of the distance of some points from the region when they are shifted, unless that
+    /// is more than `most`. `gaps` are those of the points without the shift.
+    #[must_use]
+    pub fn distance_of_shifted(
+        &self,
+        points: &[Point3<f64>],
+        gaps: &[f64],
+        shift: &Vector3<f64>,
+        most: f64,
+    ) -> Option<f64> {
+        // Most points are above all planes, as these tell all at once.
+        let sides = self.sides.iter().zip(gaps);
+        let passed = sides.filter(|(side, gap)| **gap + side.normal.dot(shift) < -ROUNDING);
+        let passed: Vec<&HalfSpace> = passed.map(|(side, _)| side).collect();
+        points.iter().try_fold(0.0, |farthest: f64, p| {
+            let p = p + shift;
+            let is_above = passed.iter().all(|side| side.above(&p) >= -ROUNDING);
+            if is_above && (p - self.centre).norm_squared() <= self.radius * self.radius {
+                return Some(farthest);
+            }
+            Some(farthest.max(self.distance_within(&p, most)?))
+        })
+    }
+
     /// A point `inset` inside all sides and no further than `most` from `p`, by alternating
     /// projection.
     fn nearest_within(&self, p: &Point3<f64>, most: f64, inset: f64) -> Option<Point3<f64>> {
         let mut q = *p;
         for _ in 0..PROJECTIONS {
-            let mut deepest = (1e-12, None);
+            let mut deepest = (ROUNDING, None);
             for side in &self.sides {
                 let below = inset - side.above(&q);
                 if below > deepest.0 {
@@ -89,9 +121,9 @@ impl FreeRegion {
         None
     }
 
-    /// The planes that bound it: unit normals, which point inside, and heights along them.
-    pub fn planes(&self) -> impl Iterator<Item = (Vector3<f64>, f64)> {
-        self.sides.iter().map(|side| (side.normal, side.height))
+    /// The unit normals of the planes that bound it, which point inside.
+    pub fn normals(&self) -> impl Iterator<Item = Vector3<f64>> {
+        self.sides.iter().map(|side| side.normal)
     }
 
     /// The middle of the ball that it was asked for in.
@@ -379,6 +411,26 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn shifted_points_are_as_far_as_each_of_them(
+            seed in prop::array::uniform3(-2.5..2.5f64),
+            shift in prop::array::uniform3(-0.3..0.3f64),
+        ) {
+            let (seed, shift) = (Point3::from(seed), Vector3::from(shift));
+            let s = surface(l_shape());
+            prop_assume!(s.signed_distance(&seed) >= 0.0);
+            let Ok(region) = s.free_region(&seed, 1.5, near(&[seed])) else { return Ok(()) };
+            let points: Vec<_> = spread([-0.2; 3], [0.2; 3], 30).map(|p| seed + p.coords).collect();
+            let mut cloud = Cloud::default();
+            cloud.refill(&points);
+            let gaps = region.gaps(&cloud);
+            for most in [0.05, 1.0] {
+                let each = points.iter().map(|p| region.distance_within(&(p + shift), most));
+                let farthest = each.collect::<Option<Vec<_>>>().map(|d| d.into_iter().fold(0.0, f64::max));
+                prop_assert_eq!(region.distance_of_shifted(&points, &gaps, &shift, most), farthest);
+            }
+        }
+
         #[test]
         fn no_surface_is_inside(seed in prop::array::uniform3(-2.5..2.5f64), radius in 0.05..3.0f64) {
             let seed = Point3::from(seed);

@@ -60,17 +60,31 @@ impl HalfSpace {
 }
 
 /// Points, four by four.
-#[derive(Debug, Default)]
-pub(super) struct Cloud {
+#[derive(Debug, Clone, Default)]
+pub struct Cloud {
     fours: Vec<[[f64; 4]; 3]>,
 }
 
 impl Cloud {
     /// Of some points, and one more that also fills the last four up.
     pub(super) fn new(points: &[Point3<f64>], one: &Point3<f64>) -> Self {
+        let mut cloud = Self::default();
+        cloud.fill(points, one);
+        cloud
+    }
+
+    /// Of some points in place of those that it had.
+    pub fn refill(&mut self, points: &[Point3<f64>]) {
+        self.fours.clear();
+        if let Some((one, others)) = points.split_last() {
+            self.fill(others, one);
+        }
+    }
+
+    fn fill(&mut self, points: &[Point3<f64>], one: &Point3<f64>) {
         let at = |i: usize| points.get(i).unwrap_or(one);
         let four = |g: usize| [0, 1, 2].map(|axis| std::array::from_fn(|k| at(4 * g + k)[axis]));
-        Self { fours: (0..=points.len() / 4).map(four).collect() }
+        self.fours.extend((0..=points.len() / 4).map(four));
     }
 
     /// How far the outermost point is inside a half-space.

@@ -1,5 +1,7 @@
 //! Rigid displacements as screws: a turn about an axis and a travel along it.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Translation3, UnitQuaternion, Vector3};
 
 use super::Pose;
@@ -11,7 +13,7 @@ const LEAST_TURN: f64 = 1e-9;
 /// the motion at constant twist.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Screw {
-    /// Axis times angle; shorter than half a turn.
+    /// Axis times angle.
     turn: Vector3<f64>,
     /// A point on the axis (the origin for pure translations).
     centre: Vector3<f64>,
@@ -44,6 +46,20 @@ impl Screw {
         Self { turn: whole.turn * share, travel: whole.travel * share, ..whole }
     }
 
+    /// The same for a displacement of about `angle` (radians) in all about the axis of a screw that is
+    /// alike: of all screws that lead there, which differ by whole turns, the one that turns most
+    /// nearly so far. Where all is nearly whole turns, nothing tells the axis.
+    #[must_use]
+    pub fn between_turning(from: &Pose, to: &Pose, count: usize, alike: &Self, angle: f64) -> Self {
+        let whole = Self::of(&(to * from.inverse()));
+        let Some(axis) = whole.turn.try_normalize(LEAST_TURN) else { return Self::between(from, to, count) };
+        let axis = if axis.dot(&alike.turn) < 0.0 { -axis } else { axis };
+        let turned = whole.turn.dot(&axis);
+        let angle = turned + ((angle - turned) / TAU).round() * TAU;
+        let share = 1.0 / count.max(1) as f64;
+        Self { turn: axis * (angle * share), travel: whole.travel * share, ..whole }
+    }
+
     /// The displacement done `times` times.
     #[must_use]
     pub fn times(&self, times: f64) -> Pose {
@@ -56,6 +72,13 @@ impl Screw {
     #[must_use]
     pub fn lead(&self) -> f64 {
         self.travel.norm() * std::f64::consts::TAU / self.angle()
+    }
+
+    /// The unit vector along its axis, or along its travel if it does not turn; zero if it is nothing.
+    #[must_use]
+    pub fn axis(&self) -> Vector3<f64> {
+        let line = if self.angle() > 0.0 { self.turn } else { self.travel };
+        line.try_normalize(0.0).unwrap_or_default()
     }
 
     /// The angle in radians.
@@ -85,6 +108,21 @@ mod tests {
         assert!((screw.lead() - 1.0).abs() < 1e-12);
         assert!(distance(&screw.times(4.0), &Pose::translation(0.0, 0.0, 1.0)) < 1e-12);
         assert!(distance(&screw.times(0.0), &Pose::identity()) < 1e-12);
+    }
+
+    #[test]
+    fn whole_turns_are_told_by_a_screw_that_is_alike() {
+        let once = Screw::of(&(Pose::translation(0.3, -0.2, 0.1) * Pose::rotation(Vector3::z() * 0.25)));
+        let roughly = Screw { turn: once.turn * 1.01, ..once };
+        let from = Pose::new(Vector3::new(1.0, -2.0, 0.5), Vector3::new(0.3, 0.1, -0.7));
+        // From a quarter of a turn to ten turns and a quarter.
+        for count in [6, 16, 31, 256] {
+            let to = once.times(f64::from(count)) * from;
+            let angle = roughly.angle() * f64::from(count);
+            let found = Screw::between_turning(&from, &to, count as usize, &roughly, angle);
+            assert!(distance(&found.times(1.0), &once.times(1.0)) < 1e-9, "{count}: {found:?}");
+            assert!((found.lead() - once.lead()).abs() < 1e-9);
+        }
     }
 
     proptest! {

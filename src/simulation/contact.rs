@@ -6,6 +6,7 @@
 //! is not, the check at the trial pose finds what is missing.
 
 use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
 
 use nalgebra::{Point3, Vector3, Vector6};
 
@@ -107,10 +108,10 @@ impl<'a> Mover<'a> {
             }
             found
         };
-        let (mut mine, theirs) = rayon::join(
-            || side(Side::Moving, self.body, standing, &standing_from_moving),
-            || side(Side::Standing, standing, self.body, &moving_from_standing),
-        );
+        // One after the other: several motions are simulated at a time, and one that waited for its half
+        // would begin with another motion meanwhile, and come back to its own only at the end of that.
+        let mut mine = side(Side::Moving, self.body, standing, &standing_from_moving);
+        let theirs = side(Side::Standing, standing, self.body, &moving_from_standing);
         near.clearance = mine.clearance.min(theirs.clearance);
         near.contacts.append(&mut mine.contacts);
         near.contacts.extend(theirs.contacts);
@@ -389,14 +390,14 @@ fn box_distance(a: &Bounds, b: &Bounds) -> f64 {
 /// `lever` is the length that makes moments comparable with forces.
 pub(super) fn reduced(rows: impl IntoIterator<Item = Row>, lever: f64) -> (Vec<Row>, Vec<usize>) {
     const BINS: f64 = 16.0;
-    let mut index: HashMap<(usize, [i16; 6]), usize> = HashMap::new();
+    let mut index: HashMap<u128, usize, BuildHasherDefault<BinHasher>> = HashMap::default();
     let (mut out, mut kept): (Vec<Row>, Vec<usize>) = (Vec::new(), Vec::new());
     for (i, row) in rows.into_iter().enumerate() {
-        let key = std::array::from_fn(|i| {
+        let key = (0..6).fold(row.other as u128, |key, i| {
             let x = if i < 3 { row.a[i] } else { row.a[i] / lever };
-            (x * BINS).round() as i16
+            key << 16 | u128::from((x * BINS).round() as i16 as u16)
         });
-        match index.entry((row.other, key)) {
+        match index.entry(key) {
             std::collections::hash_map::Entry::Occupied(e) => {
                 let at = *e.get();
                 if row.b < out[at].b {
@@ -411,4 +412,28 @@ pub(super) fn reduced(rows: impl IntoIterator<Item = Row>, lever: f64) -> (Vec<R
         }
     }
     (out, kept)
+}
+
+/// Hashes keys of bins: thousands of them at every step, and nobody chooses them to collide.
+#[derive(Default)]
+struct BinHasher(u64);
+
+impl Hasher for BinHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.write_u128(u128::from(byte));
+        }
+    }
+
+    fn write_u128(&mut self, key: u128) {
+        // Two odd factors with their bits spread (2^64 divided by the golden ratio, and by √2).
+        let low = (key as u64 ^ self.0).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let high = ((key >> 64) as u64).wrapping_mul(0xb504_f333_f9de_6485);
+        let mixed = low ^ high.rotate_left(32);
+        self.0 = (mixed ^ mixed >> 29).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
 }

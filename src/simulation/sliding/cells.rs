@@ -156,7 +156,8 @@ impl<'a> Cells<'a> {
     ) -> Result<(Vec<Vector3<f64>>, usize), Halt> {
         let left = MOST_REGIONS - self.regions;
         let Pair { facing, cells } = &mut self.pairs[i];
-        make_way(facing, cells, (at, u), left, self.termination)
+        let made = make_way(facing, cells, (at, u), left, self.termination)?;
+        Ok((made.blocked, made.regions))
     }
 
     fn count(&mut self, regions: usize) -> Result<(), Halt> {
@@ -179,14 +180,14 @@ fn way(
 ) -> Result<Way, Interrupt> {
     let base = kept(scene, place, termination)?;
     let facing = Facing::new(scene, (place.part, place.start), place.other, base.asks_part);
-    let lost = Way { blocked: Vec::new(), cells: None, regions: MOST_REGIONS };
+    let lost = Way { blocked: Vec::new(), cells: None, found: 0, regions: MOST_REGIONS };
     let Some(base) = &base.cells else { return Ok(lost) };
     let mut cells = Arc::clone(base);
     match make_way(&facing, &mut cells, (&Vector3::zeros(), u), MOST_REGIONS, termination) {
-        Ok((blocked, regions)) => {
+        Ok(Made { blocked, found, regions }) => {
             // Whoever is stopped goes another way from the same cells.
-            let cells = Some(if blocked.is_empty() { cells } else { Arc::clone(base) });
-            Ok(Way { blocked, cells, regions })
+            let (cells, found) = if blocked.is_empty() { (cells, found) } else { (Arc::clone(base), 0) };
+            Ok(Way { blocked, cells: Some(cells), found, regions })
         }
         Err(Halt::Interrupted(interrupt)) => Err(interrupt),
         Err(_) => Ok(lost),
@@ -205,15 +206,21 @@ fn long_way(
     let base = kept(scene, place, termination)?;
     let facing = Facing::new(scene, (place.part, place.start), place.other, base.asks_part);
     let mut finder = Finder::new(&facing, MOST_REGIONS, termination);
-    let lengthened = |cell: &Cell| {
+    let mut lengthened = |cell: &Cell| {
         termination.check()?;
-        let is_short = cell.length(&Vector3::zeros(), u) < FREE_STEP;
-        let longer = if is_short { finder.far(cell.spot, u) } else { None };
+        let length = cell.length(&Vector3::zeros(), u);
+        let longer = if length < FREE_STEP { finder.far(cell.spot, u, length) } else { None };
         Ok(longer.unwrap_or_else(|| cell.clone()))
     };
-    let cells = short.cells.as_deref();
-    let cells = cells.map(|cells| cells.iter().map(lengthened).collect::<Result<_, Interrupt>>());
-    Ok(Way { blocked: Vec::new(), cells: cells.transpose()?.map(Arc::new), regions: finder.regions })
+    let mut cells = short.cells.as_deref().cloned();
+    if let Some(cells) = &mut cells {
+        // Those that were found for this way are as long as can be.
+        let others = cells.len() - short.found;
+        for cell in &mut cells[..others] {
+            *cell = lengthened(cell)?;
+        }
+    }
+    Ok(Way { blocked: Vec::new(), cells: cells.map(Arc::new), found: 0, regions: finder.regions })
 }
 
 /// Cells for all of a pair's surface, at a shift.
@@ -251,17 +258,27 @@ fn gathered(
     Ok(Gathered { asks_part: true, cells: None, regions })
 }
 
-/// Makes way for a pair: the normals of what is in the way, and how many regions it took.
+/// What became of making way.
+struct Made {
+    /// The normals of what is in the way.
+    blocked: Vec<Vector3<f64>>,
+    /// How many cells were found for it: the last ones.
+    found: usize,
+    /// How many regions it took.
+    regions: usize,
+}
+
+/// Makes way for a pair.
 fn make_way(
     facing: &Facing<'_>,
     cells: &mut Arc<Vec<Cell>>,
     (at, u): (&Vector3<f64>, &Vector3<f64>),
     most: usize,
     termination: &Termination,
-) -> Result<(Vec<Vector3<f64>>, usize), Halt> {
+) -> Result<Made, Halt> {
     let ends = |cell: &Cell| cell.blocks(at, u) || cell.is_exhausted(at, u);
     if !cells.iter().any(ends) {
-        return Ok((Vec::new(), 0));
+        return Ok(Made { blocked: Vec::new(), found: 0, regions: 0 });
     }
     let mut finder = Finder::new(facing, most, termination);
     let mut ended = Ok(());
@@ -280,10 +297,11 @@ fn make_way(
         }
         i += 1;
     }
+    let (found, regions) = (finder.cells.len(), finder.regions);
     of_pair.append(&mut finder.cells);
     match ended {
-        Ok(()) => Ok((Vec::new(), finder.regions)),
-        Err(Halt::Blocked) => Ok((finder.obstacles, finder.regions)),
+        Ok(()) => Ok(Made { blocked: Vec::new(), found, regions }),
+        Err(Halt::Blocked) => Ok(Made { blocked: finder.obstacles, found, regions }),
         Err(halt) => Err(halt),
     }
 }

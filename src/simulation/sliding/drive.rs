@@ -11,7 +11,7 @@ use crate::geometry::{Pose, Shape, interpolate};
 
 use super::super::contact::{Contact, Mover, Near, reduced};
 use super::super::projection::{Projected, Row, project};
-use super::super::{Action, Scene};
+use super::super::{Action, Scene, Surroundings};
 use super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
 
 /// A motion that follows less than this share of the action (cos² of the angle between them) is
@@ -35,6 +35,8 @@ const LEAST_PRESSURE: f64 = 1e-4;
 const LIFT: f64 = 0.01;
 const LIFT_REACH: f64 = 0.04;
 const LIFT_ROUNDS: usize = 3;
+/// What is along an axis by less than this share does not hold a part there.
+const LEAST_SPEED: f64 = 0.1;
 
 /// What is near a mover's pose.
 pub(super) type Gather<'a> = &'a dyn Fn(&Mover<'_>) -> Near;
@@ -128,20 +130,22 @@ impl Drive {
         Step::Stuck { with }
     }
 
-    /// The pose in the middle of the play around the mover's, and what is near there: the smallest
-    /// correction that gives all contacts as large a gap as they can have at once.
-    pub(super) fn lifted(&self, mover: &Mover<'_>, gather: Gather<'_>) -> Option<(Pose, Near)> {
+    /// The pose in the middle of the play around the mover's: the smallest correction that gives all
+    /// contacts as large a gap as they can have at once, and as much room one way along `axis` (a unit
+    /// vector) as the other.
+    pub(super) fn lifted(
+        &self,
+        mover: &Mover<'_>,
+        axis: &Vector3<f64>,
+        surroundings: &Surroundings,
+    ) -> Option<Pose> {
         let mut here = *mover;
-        let mut near = gather(&here);
-        for _ in 0..LIFT_ROUNDS {
-            let least = near.contacts.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
-            if least >= LIFT * 0.5 {
+        let mut close = here.near(surroundings, LIFT_REACH);
+        for round in 0..LIFT_ROUNDS {
+            let least = close.contacts.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
+            if round > 0 && least >= LIFT * 0.5 {
                 break;
             }
-            let close = Near {
-                contacts: near.contacts.iter().filter(|c| c.gap < LIFT_REACH).copied().collect(),
-                clearance: near.clearance,
-            };
             let (rows, _) = self.chosen(&here, &close, &Vector6::zeros());
             let margins = (0..5).map(|halving| LIFT / f64::from(1 << halving)).chain([0.0]);
             let correction = margins.filter(|m| *m > least).find_map(|margin| {
@@ -149,15 +153,17 @@ impl Drive {
                 let scaled: Vec<Row> = rows.iter().map(scale).collect();
                 project(&Vector6::zeros(), &scaled)
             });
-            let Some(correction) = correction else { break };
-            let twist = correction.w.component_div(&self.metric);
-            if twist.norm() > LIFT_REACH {
+            let mut twist = correction.map_or(Vector6::zeros(), |c| c.w.component_div(&self.metric));
+            if let Some(along) = middle(&rows, &twist, axis) {
+                twist += Vector6::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0) * along;
+            }
+            if twist == Vector6::zeros() || twist.norm() > LIFT_REACH {
                 break;
             }
             here.pose = self.displaced(&here, &twist);
-            near = gather(&here);
+            close = here.near(surroundings, LIFT_REACH);
         }
-        near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE).then_some((here.pose, near))
+        close.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE).then_some(here.pose)
     }
 
     /// Projects the wanted twist until the trial pose is free of entry.
@@ -363,6 +369,22 @@ impl Drive {
         pose.rotation.renormalize();
         pose
     }
+}
+
+/// How far along an axis, after a twist, the middle is between the rows that hold a part on either side;
+/// `None` if they do not, or leave no room.
+fn middle(rows: &[Row], twist: &Vector6<f64>, axis: &Vector3<f64>) -> Option<f64> {
+    let (mut back, mut forth) = (f64::NEG_INFINITY, f64::INFINITY);
+    for row in rows {
+        let (gap, speed) = (row.a.dot(twist) + row.b, row.a.fixed_rows::<3>(0).dot(axis));
+        if speed > LEAST_SPEED {
+            back = back.max(-gap / speed);
+        } else if speed < -LEAST_SPEED {
+            forth = forth.min(-gap / speed);
+        }
+    }
+    let middle = f64::midpoint(back, forth);
+    (back < forth && middle.is_finite()).then_some(middle)
 }
 
 /// The longest step of a shape in contact.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::geometry::{Parts, PatchTree, Pose, Surface, bisected, separating_direction};
+use crate::geometry::{Cloud, Parts, PatchTree, Pose, Surface, bisected, separating_direction};
 
 use super::super::Scene;
 use super::DEPTH_TOLERANCE;
@@ -121,6 +121,7 @@ impl<'a> Facing<'a> {
                 placed.radius = corners.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
             }
         }
+        placed.cloud.refill(&placed.points);
     }
 
     /// Whether a triangle of the measured surface may lie beside a piece where it is.
@@ -226,6 +227,8 @@ pub(super) enum Piece {
 pub(super) struct Placed {
     /// Its corners.
     pub(super) points: Vec<Point3<f64>>,
+    /// The same, four by four.
+    pub(super) cloud: Cloud,
     /// Those that reach furthest.
     pub(super) extremes: Vec<Point3<f64>>,
     /// A ball that holds it.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::geometry::{Closest, FreeRegion, NoRegion, Wanted};
+use crate::geometry::{Closest, NoRegion, Wanted};
 use crate::termination::Termination;
 
 use super::DEPTH_TOLERANCE;
@@ -82,15 +82,16 @@ impl<'a> Finder<'a> {
         self.renew(spot, &Wish { at: *at, along: *u })
     }
 
-    /// A cell for all of a piece that lets it go far along the unit vector `u`, if there is one.
-    pub(super) fn far(&mut self, mut spot: Spot, u: &Vector3<f64>) -> Option<Cell> {
+    /// A cell for all of a piece that lets it go further than `least` along the unit vector `u`, if there
+    /// is one.
+    pub(super) fn far(&mut self, mut spot: Spot, u: &Vector3<f64>, least: f64) -> Option<Cell> {
         let wish = Wish { at: Vector3::zeros(), along: *u };
         self.pair.place(&spot.piece, &wish.at, &mut self.placed);
         let seen = look(self.pair, &self.placed.centre, spot.guess);
         spot.guess = seen.closest.triangle;
         let let_go =
             |level: usize| self.held(&Spot { level, ..spot }, &seen, &wish, &(u * AHEAD[level])).ok();
-        (0..=SHORT).find_map(let_go)
+        (0..SHORT).find_map(let_go).filter(|cell| cell.length(&wish.at, u) > least)
     }
 
     fn block(&mut self, by: &[Obstacle]) {
@@ -241,7 +242,7 @@ impl<'a> Finder<'a> {
         let pair = self.pair;
         let most = pair.allowance + spot.held;
         let ahead = pair.shifted * shift;
-        let Placed { points, extremes, centre, radius } = &self.placed;
+        let Placed { points, cloud, extremes, centre, radius } = &self.placed;
         let of = |points| Wanted { points, most, from_behind: true };
         let region = if ahead == Vector3::zeros() {
             let around = (radius + AROUND) * ROOM;
@@ -253,12 +254,15 @@ impl<'a> Finder<'a> {
             let seen = look(pair, &middle, spot.guess);
             pair.measured.free_region_around(&middle, around, (&seen.closest, seen.signed), of(&wanted))
         }?;
-        let depth = depth_below(points, &region, &ahead, most).ok_or(NoRegion::Cramped)?;
+        let gaps = region.gaps(cloud);
+        let below = |shift: &Vector3<f64>| {
+            region.distance_of_shifted(points, &gaps, shift, most).ok_or(NoRegion::Cramped)
+        };
+        let here = below(&Vector3::zeros())?;
+        let depth = if ahead == Vector3::zeros() { here } else { here.max(below(&ahead)?) };
         let slack = if pair.allowance > 0.0 { ((most - depth) / 3f64.sqrt()).max(0.0) } else { 0.0 };
         let back = pair.shifted.transpose();
-        let limits = region.planes().map(|(inward, height)| {
-            let above = |p: &Point3<f64>| inward.dot(&p.coords) - height;
-            let gap = points.iter().map(above).fold(f64::INFINITY, f64::min);
+        let limits = region.normals().zip(&gaps).map(|(inward, gap)| {
             let normal = back * inward;
             Limit { normal, height: normal.dot(&wish.at) - gap.max(0.0) - slack }
         });
@@ -269,8 +273,8 @@ impl<'a> Finder<'a> {
         let (middle, room) = if offset.norm() + radius < region.radius() {
             (wish.at - back * offset, region.radius() - radius)
         } else {
-            let far = points.iter().map(|p| (p - region.centre()).norm()).fold(0.0, f64::max);
-            (wish.at, region.radius() - far)
+            let squared = points.iter().map(|p| (p - region.centre()).norm_squared()).fold(0.0, f64::max);
+            (wish.at, region.radius() - squared.sqrt())
         };
         let held = if pair.allowance > 0.0 { HELD_AT_FIRST } else { HELD.max(depth + HELD / 10.0) };
         let held = held.min(spot.held);
@@ -284,14 +288,4 @@ impl<'a> Finder<'a> {
 fn look(pair: &Facing<'_>, p: &Point3<f64>, guess: u32) -> Seen {
     let closest = pair.measured.closest_from(p, guess);
     Seen { signed: pair.measured.signed(p, &closest), closest }
-}
-
-/// How deep some points are below a region, here and shifted, if no more than `most`.
-fn depth_below(points: &[Point3<f64>], region: &FreeRegion, shift: &Vector3<f64>, most: f64) -> Option<f64> {
-    let still = shift == &Vector3::zeros();
-    points.iter().try_fold(0.0, |depth: f64, p| {
-        let here = region.distance_within(p, most)?;
-        let there = if still { 0.0 } else { region.distance_within(&(p + shift), most)? };
-        Some(depth.max(here).max(there))
-    })
 }

@@ -65,6 +65,8 @@ pub(super) struct Way {
     /// The cells that let it go; those that it had where it is stopped; none where regions cannot
     /// tell.
     pub(super) cells: Option<Arc<Vec<Cell>>>,
+    /// How many of them were found for this way: the last ones.
+    pub(super) found: usize,
     /// How many regions it took.
     pub(super) regions: usize,
 }
@@ -73,7 +75,7 @@ impl Way {
     fn mirrored(&self) -> Self {
         let blocked = self.blocked.iter().map(|n| -n).collect();
         let cells = self.cells.as_deref().map(|cells| mirrored(cells));
-        Self { blocked, cells, regions: self.regions }
+        Self { blocked, cells, found: self.found, regions: self.regions }
     }
 }
 

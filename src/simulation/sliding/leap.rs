@@ -4,7 +4,10 @@
 //! the fields show that nothing is entered, and that what the part is pressed against is still
 //! there, so that it falls into a slot as it would in short steps. Where a leap lands, everything
 //! is measured exactly. Threads of triangles make a part that is pressed to them wobble; such a part
-//! is lifted into the middle of its play, and the mean screw of its steps is followed there.
+//! is lifted into the middle of its play, and the mean screw of its steps is followed there, each leap
+//! twice as long as the one before: where it lands, the screw is known twice as well.
+
+use std::f64::consts::TAU;
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 
@@ -20,11 +23,19 @@ const SAME: f64 = 0.02;
 /// … and belong to one helix up to this share.
 const ALIKE: f64 = 0.15;
 /// A helix is seen once so much of it, in radians, was passed in steps that are alike.
-const LEAST_HELIX: f64 = 0.4;
+const LEAST_HELIX: f64 = 0.25;
 /// A leap is at most so many steps long …
 const LONGEST: usize = 32;
 /// … and turns by at most this angle: less than half a turn, so that it tells its screw.
 const WIDEST: f64 = 2.4;
+/// The same for leaps along a helix. They may be many turns long, if what is left beyond whole turns is
+/// from `TELLING` to as much less than a turn: near whole turns, nothing tells the axis.
+const LONGEST_ON_HELIX: usize = 512;
+const TELLING: f64 = 0.25 * TAU;
+/// Every so many steps it is looked whether the part is still on the thread, and every so many, whether
+/// it clearly enters anything; then more closely where that ends.
+const HELD_STATIONS: [usize; 2] = [4, 1];
+const FREE_STATIONS: [usize; 3] = [16, 4, 1];
 /// Shorter leaps along a helix gain nothing over steps.
 const SHORTEST_ON_HELIX: usize = 4;
 /// A helix gets at least so much further with every turn, in the planning frame.
@@ -40,8 +51,8 @@ const PRESSED: f64 = 2e-3;
 pub(super) struct Leap {
     /// The poses on the way, the last one where it lands.
     pub(super) poses: Vec<Pose>,
-    /// What is near there.
-    pub(super) near: Near,
+    /// What is near there, if that was looked for.
+    pub(super) near: Option<Near>,
     /// The angle, in radians.
     pub(super) turned: f64,
 }
@@ -65,7 +76,7 @@ pub(super) struct Leaper<'a> {
     /// The last step, and how many steps the next leap along it is to have.
     last: Option<Screw>,
     length: usize,
-    /// Where the steps that are alike began, and how many there are.
+    /// Where the steps that are alike began, and how many there are; leaps count as all their steps.
     alike: Option<(Pose, usize)>,
     helix: Option<Helix>,
     /// Where points were found missing, short steps are the safe ones.
@@ -114,7 +125,7 @@ impl<'a> Leaper<'a> {
         if apart >= SAME * step {
             self.length = 2;
             self.begin_helix(mover, &now, pressing);
-            return self.follow(mover, gather);
+            return self.follow(mover);
         }
         let wanted = self.length.min(longest(&now));
         let holds = |there: &Mover<'_>| pressing.iter().all(|push| self.is_pressed(there, push));
@@ -124,7 +135,8 @@ impl<'a> Leaper<'a> {
             let near = gather(&there);
             if near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE) {
                 self.length = if steps == wanted { steps * 2 } else { steps };
-                return Some(leapt(mover, &now, steps, near));
+                self.alike = self.alike.map(|(begin, count)| (begin, count + steps));
+                return Some(leapt(mover, &now, steps, Some(near)));
             }
             steps /= 2;
         }
@@ -146,23 +158,38 @@ impl<'a> Leaper<'a> {
     }
 
     /// The next leap along a helix that is followed.
-    pub(super) fn follow(&mut self, mover: &Mover<'_>, gather: Gather<'_>) -> Option<Leap> {
+    pub(super) fn follow(&mut self, mover: &Mover<'_>) -> Option<Leap> {
         let Helix { screw, length, pressing } = self.helix.take()?;
-        let wanted = length.min(longest(&screw));
-        let holds = |there: &Mover<'_>| pressing.iter().all(|push| self.is_on_thread(there, push));
-        let mut steps = self.free_steps(mover, &screw, wanted, &holds);
+        let wanted = telling(&screw, length.min(LONGEST_ON_HELIX));
+        let mut steps = telling(&screw, self.free_on_helix(mover, &screw, wanted, &pressing));
         while steps >= SHORTEST_ON_HELIX {
             let there = Mover { pose: screw.times(steps as f64) * mover.pose, ..*mover };
-            if let Some((pose, near)) = self.drive.lifted(&there, gather) {
-                let screw = Screw::between(&mover.pose, &pose, steps);
+            if let Some(pose) = self.drive.lifted(&there, &screw.axis(), self.surroundings) {
+                let angle = screw.angle() * steps as f64;
+                let screw = Screw::between_turning(&mover.pose, &pose, steps, &screw, angle);
                 let length = if steps == wanted { steps * 2 } else { steps };
                 self.helix = Some(Helix { screw, length, pressing });
-                return Some(leapt(mover, &screw, steps, near));
+                return Some(leapt(mover, &screw, steps, None));
             }
-            steps /= 2;
+            steps = telling(&screw, steps / 2);
         }
         self.alike = None;
         None
+    }
+
+    /// How many steps along a helix, of those wanted, are on the thread and free.
+    fn free_on_helix(
+        &self,
+        mover: &Mover<'_>,
+        screw: &Screw,
+        wanted: usize,
+        pressing: &[Vector6<f64>],
+    ) -> usize {
+        let after = |k: usize| Mover { pose: screw.times(k as f64) * mover.pose, ..*mover };
+        let is_held = |k: usize| pressing.iter().all(|push| self.is_on_thread(&after(k), push));
+        let is_free = |k: usize| !after(k).clearly_enters(&self.surroundings.standing);
+        let held = good_until(wanted, &HELD_STATIONS, &is_held);
+        good_until(held, &FREE_STATIONS, &is_free)
     }
 
     /// How far apart two displacements take the part's points, at most.
@@ -215,19 +242,60 @@ fn longest(screw: &Screw) -> usize {
     most.min(LONGEST)
 }
 
-fn leapt(mover: &Mover<'_>, screw: &Screw, steps: usize, near: Near) -> Leap {
+/// Up to which step all that are looked at are good: every so many of them, and beyond the last good one
+/// every so many again, down to every one.
+fn good_until(last: usize, every: &[usize], is_good: &dyn Fn(usize) -> bool) -> usize {
+    every.iter().fold(0, |from, every| {
+        let stations = (1..=(last - from) / every).map(|i| from + i * every);
+        from + every * stations.take_while(|&k| is_good(k)).count()
+    })
+}
+
+/// The most steps of a leap along a helix, of those wanted, that tell its screw.
+fn telling(screw: &Screw, wanted: usize) -> usize {
+    let tells = |steps: &usize| {
+        let angle = screw.angle() * *steps as f64;
+        angle < WIDEST || (TELLING..=TAU - TELLING).contains(&angle.rem_euclid(TAU))
+    };
+    (1..=wanted).rev().find(tells).unwrap_or(0)
+}
+
+fn leapt(mover: &Mover<'_>, screw: &Screw, steps: usize, near: Option<Near>) -> Leap {
     let poses = (1..=steps).map(|k| screw.times(k as f64) * mover.pose).collect();
     Leap { poses, near, turned: screw.angle() * steps as f64 }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::TAU;
-
     use super::super::SlidingEngine;
+    use super::*;
     use crate::fixtures::{scene, thread};
-    use crate::simulation::{Action, Axis, End, Surroundings, TransitionFunction};
+    use crate::simulation::{Action, Axis, End, TransitionFunction};
     use crate::termination::Termination;
+
+    #[test]
+    fn the_last_good_step_is_found() {
+        for last in 0..70 {
+            for good in 0..=last {
+                for every in [&HELD_STATIONS[..], &FREE_STATIONS] {
+                    assert_eq!(good_until(last, every, &|k| k <= good), good, "of {last}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn leaps_along_a_helix_do_not_end_near_whole_turns() {
+        let turn = Pose::new(Vector3::z() * 0.01, Vector3::z() * 0.1);
+        let screw = Screw::between(&Pose::identity(), &turn, 1);
+        assert_eq!(telling(&screw, 20), 20, "within the first turn");
+        for wanted in 30..400 {
+            let steps = telling(&screw, wanted);
+            let left = (0.1 * steps as f64).rem_euclid(TAU);
+            assert!((TELLING..=TAU - TELLING).contains(&left) || steps < 24, "{steps} of {wanted}");
+            assert!(steps <= wanted && wanted - steps < 33, "{steps} of {wanted}");
+        }
+    }
 
     #[test]
     fn a_nut_is_followed_off_its_thread() {

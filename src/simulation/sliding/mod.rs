@@ -82,13 +82,14 @@ impl TransitionFunction for SlidingEngine {
         let mut turning = Turning::new(&mover);
         let gather = |mover: &Mover<'_>| mover.near(surroundings, drive.reach());
         let mut leaper = Leaper::new(scene, surroundings, part, &drive);
-        let mut near = gather(&mover);
+        let mut near = None;
         while path.len() < MOST_POSES {
             termination.check()?;
             let (mut turned, mut touching) = (0.0, Vec::new());
-            let mut leap = leaper.follow(&mover, &gather);
+            let mut leap = leaper.follow(&mover);
             if leap.is_none() {
-                let step = match drive.advance(&mover, &near, &gather) {
+                let here = near.take().unwrap_or_else(|| gather(&mover));
+                let step = match drive.advance(&mover, &here, &gather) {
                     Step::Stuck { with } => {
                         return Ok(Motion::simulated(path, asked, End::Collision { with }));
                     }
@@ -96,10 +97,10 @@ impl TransitionFunction for SlidingEngine {
                 };
                 let from = std::mem::replace(&mut mover.pose, step.pose);
                 path.push(step.pose);
-                if !near.contacts.is_empty() {
+                if !here.contacts.is_empty() {
                     leap = leaper.leap(&from, &mover, step.pressing, &gather);
                 }
-                (turned, touching, near) = (step.turned, step.touching, step.near);
+                (turned, touching, near) = (step.turned, step.touching, Some(step.near));
             }
             if let Some(leap) = leap {
                 path.extend(leap.poses);
