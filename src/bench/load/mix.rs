@@ -86,7 +86,7 @@ impl Mix {
             draw -= share;
         }
         let variant = self.random() % self.variety;
-        let past = self.random() % UNREMEMBERED == 0;
+        let past = self.random().is_multiple_of(UNREMEMBERED);
         let no_cache = match kind {
             Kind::Cancel | Kind::Drop | Kind::Deadline => true,
             Kind::Removed | Kind::Moved | Kind::Locked => past,
