@@ -23,9 +23,11 @@ fn patient(daemon: &Daemon) -> Client {
     Client::connect_with(options).unwrap()
 }
 
-/// Plans an assembly whatever happens meanwhile: the path of every step, the summary, and how often the
-/// plan began anew.
-fn plan_through(client: &Client, boxes: &Boxes) -> (Vec<(u32, Vec<[f64; 7]>)>, Summary, u32) {
+/// The part of every step, and its path.
+type Steps = Vec<(u32, Vec<[f64; 7]>)>;
+
+/// Plans an assembly whatever happens meanwhile: the steps, the summary, and how often the plan began anew.
+fn plan_through(client: &Client, boxes: &Boxes) -> (Steps, Summary, u32) {
     let assembly = boxes.assembly();
     let options = PlanOptions { no_cache: true, ..PlanOptions::default() };
     let mut stream = client.plan_assembly(&assembly, &options).unwrap();
@@ -234,7 +236,7 @@ fn a_client_that_dies_while_uploading_or_holding_responses_costs_the_daemon_noth
     plans(&observer);
     let descriptors = || std::fs::read_dir(format!("/proc/{}/fd", daemon.pid())).unwrap().count();
     let die = |round: u64| {
-        let mut client = daemon.client_process(if round % 2 == 0 { "uploading" } else { "holding" });
+        let mut client = daemon.client_process(if round.is_multiple_of(2) { "uploading" } else { "holding" });
         std::thread::sleep(Duration::from_millis(40 + 35 * round));
         client.kill().unwrap();
         client.wait().unwrap();

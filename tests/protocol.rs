@@ -344,7 +344,7 @@ fn contents_that_change_after_they_were_sent_are_answered_and_harm_nobody() {
             assert!(start.elapsed() < HANG, "no answer");
             step = step.wrapping_mul(1_103_515_245).wrapping_add(12_345);
             // Counts and offsets stand in front.
-            let place = (step >> 8) % if round % 2 == 0 { 96 } else { bytes.len() };
+            let place = (step >> 8) % if round.is_multiple_of(2) { 96 } else { bytes.len() };
             // SAFETY: `place` lies within the payload, whose memory `pending` keeps for this process alone
             // to write; the daemon reads it meanwhile, which is what is tested.
             unsafe { sent.add(place).write_volatile((step >> 16) as u8) };

@@ -104,7 +104,7 @@ fn choose(random: &mut Random, number: u64, count: usize) -> usize {
     loop {
         let place = random.below(count);
         let heavy = matches!(Reader::ALL[place], Reader::Healing | Reader::Admission);
-        if !heavy || number % HEAVY_TURN == 0 {
+        if !heavy || number.is_multiple_of(HEAVY_TURN) {
             return place;
         }
     }
