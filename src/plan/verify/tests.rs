@@ -196,10 +196,10 @@ proptest! {
         path.extend(steps.iter().map(|s| s * from));
         let verdict = checked_path(&scene, &verifier, &path);
         let centre = scene.centre_in_shape(1);
-        let dense: Vec<Pose> = path
-            .windows(2)
-            .flat_map(|w| (0..=40).map(|k| interpolate(&w[0], &w[1], &centre, f64::from(k) / 40.0)))
-            .collect();
+        let poses = |count: u32| -> Vec<Pose> {
+            let at = |w: &[Pose], k| interpolate(&w[0], &w[1], &centre, f64::from(k) / f64::from(count));
+            path.windows(2).flat_map(|w| (0..=count).map(move |k| at(w, k))).collect()
+        };
         let depth = |pose: &Pose, on_moving: bool, p: &Point3<f64>| {
             let relative = scene.bodies[0].planning_from_shape.inverse() * pose;
             let at = if on_moving { relative * p } else { relative.inverse() * p };
@@ -207,17 +207,18 @@ proptest! {
             -into.signed_distance(&at) - granted
         };
         // What a dense look finds, at points all over both.
-        let deepest = dense.iter().step_by(4).flat_map(|pose| {
+        let deepest = poses(10).into_iter().flat_map(|pose| {
             let sides = [(true, 1), (false, 0)];
             sides.map(|(on_moving, body)| {
                 let points = on_surface(&scene.bodies[body].shape.surface);
-                points.iter().map(|p| depth(pose, on_moving, p)).fold(0.0, f64::max)
+                points.iter().map(|p| depth(&pose, on_moving, p)).fold(0.0, f64::max)
             })
         });
         let deepest = deepest.fold(0.0, f64::max);
         prop_assert!(verdict.depth >= deepest.min(LIMIT) - 1e-5, "{} for {deepest}", verdict.depth);
         prop_assert_eq!(verdict.depth > LIMIT, !verdict.entries.is_empty());
-        // No alarm without a cause.
+        // No alarm without a cause; a corner may be deep for a moment only.
+        let dense = poses(600);
         for e in verdict.entries.iter().take(20) {
             let there = dense.iter().map(|pose| depth(pose, e.on_moving, &e.point)).fold(0.0, f64::max);
             prop_assert!(there > 0.25 * LIMIT && e.over <= there + 0.01, "{there} at {e:?}");
