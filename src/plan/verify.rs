@@ -275,7 +275,9 @@ impl Check<'_> {
             let direction = direction.map(|x| (x / ALIKE).round() * ALIKE);
             let moving = scene.bodies[part].shape.bounds().transformed(from);
             let passed = way_out_of(&moving, &scene.bodies[other].bounds, &direction);
-            if passed < (to.translation.vector - from.translation.vector).norm() {
+            if passed == 0.0 {
+                way.pop();
+            } else if passed < (to.translation.vector - from.translation.vector).norm() {
                 *to = Translation3::from(direction * passed) * *from;
             }
         }
@@ -315,8 +317,8 @@ impl Check<'_> {
     }
 }
 
-/// How far a box has to go along a unit vector until it has left another one for good; infinity if it stays
-/// beside it.
+/// How far a box has to go along a unit vector until it has left another one for good: 0 if it has, infinity
+/// if it stays beside it.
 fn way_out_of(moving: &Bounds, standing: &Bounds, direction: &Vector3<f64>) -> f64 {
     let along = |a: usize| match direction[a] {
         d if d > STEEP => (standing.max[a] - moving.min[a]) / d,
@@ -324,7 +326,7 @@ fn way_out_of(moving: &Bounds, standing: &Bounds, direction: &Vector3<f64>) -> f
         _ => f64::INFINITY,
     };
     // A little further, so that nothing is lost to rounding.
-    (0..3).map(along).fold(f64::INFINITY, f64::min).max(0.0) + CLEAR
+    ((0..3).map(along).fold(f64::INFINITY, f64::min) + CLEAR).max(0.0)
 }
 
 /// The way of a part past one that stands.
