@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
 use redb::Database;
 
 use super::kind::{Key, Kind};
-use super::tables::{Failure, Listed, Tables, agree, grew, holds, listed, make_tables, read, write};
+use super::tables::{Failure, Listed, Tables, agree, grew, listed, make_tables, read, write};
 use super::tally::Tally;
 
 const FILE: &str = "records.redb";
@@ -102,11 +102,6 @@ impl Disk {
         self.with_free(|database| read(database, key)).flatten()
     }
 
-    /// Whether there is an envelope of a key.
-    pub(super) fn contains(&self, key: &Key) -> bool {
-        self.with_free(|database| holds(database, key)).unwrap_or(false)
-    }
-
     /// Notes that a record was used; the next transaction writes it down.
     pub(super) fn touch(&self, key: Key) {
         let mut touched = self.touched.lock().unwrap_or_else(PoisonError::into_inner);
@@ -189,9 +184,9 @@ impl Disk {
         }
     }
 
-    /// All records, in the order of their keys.
-    pub(super) fn list(&self) -> Option<Vec<Listed>> {
-        self.with(listed)
+    /// The records of a kind, or all, in the order of their keys.
+    pub(super) fn list(&self, kind: Option<Kind>) -> Option<Vec<Listed>> {
+        self.with(|database| listed(database, kind))
     }
 
     /// Bytes of the file.

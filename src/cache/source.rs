@@ -1,6 +1,9 @@
 //! Assemblies by their handles, as they were given or revised: a daemon that starts again knows what its
 //! clients' handles mean.
 
+use std::collections::HashSet;
+use std::sync::{MutexGuard, PoisonError};
+
 use super::records::{
     AssemblyRecord, MeshRecord, PartRecord, RevisionRecord, SourceRecord, pose_of, pose_record,
 };
@@ -20,28 +23,33 @@ impl Cache {
     /// What the assembly of a handle was made of, if it is on disk.
     #[must_use]
     pub fn source(&self, handle: &[u8; 32]) -> Option<Source> {
-        Some(match self.get(&key(handle))? {
+        let Some(record) = self.get(&key(handle)) else {
+            self.sources().remove(handle);
+            return None;
+        };
+        Some(match record {
             SourceRecord::Given(record) => Source::Given(assembly(record)),
             SourceRecord::Revised(record) => Source::Revised(record.base, revision(record)),
         })
     }
 
-    /// Whether the assembly of a handle is on disk. Does not look at its bytes.
+    /// Whether the assembly of a handle is on disk, as far as is known without looking there: it may have
+    /// left for others since.
     #[must_use]
     pub fn has_source(&self, handle: &[u8; 32]) -> bool {
-        self.contains(&key(handle))
+        self.sources().contains(handle)
     }
 
     /// Remembers what was given, unless it is there.
     pub fn remember_given(&self, handle: &[u8; 32], source: &SourceAssembly) {
-        if self.is_on_disk() && !self.has_source(handle) {
+        if self.is_on_disk() && self.sources().insert(*handle) {
             self.put(key(handle), &SourceRecord::Given(assembly_record(source)));
         }
     }
 
     /// Remembers how an assembly was revised, unless it is there.
     pub fn remember_revised(&self, handle: &[u8; 32], base: &[u8; 32], revision: &Revision) {
-        if self.is_on_disk() && !self.has_source(handle) {
+        if self.is_on_disk() && self.sources().insert(*handle) {
             self.put(key(handle), &SourceRecord::Revised(revision_record(base, revision)));
         }
     }
@@ -49,10 +57,15 @@ impl Cache {
     /// The handles of the assemblies on disk, those used last first.
     #[must_use]
     pub fn recent_sources(&self, most: usize) -> Vec<[u8; 32]> {
-        let mut listed = self.list();
-        listed.retain(|l| l.key.kind() == Kind::Source);
+        let listed = self.disk.as_ref().and_then(|d| d.list(Some(Kind::Source)));
+        let mut listed = listed.unwrap_or_default();
         listed.sort_by_key(|l| std::cmp::Reverse(l.used));
         listed.iter().take(most).map(|l| *l.key.hash()).collect()
+    }
+
+    /// A holder that panicked cannot have left it half-changed.
+    fn sources(&self) -> MutexGuard<'_, HashSet<[u8; 32]>> {
+        self.sources.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -145,5 +158,11 @@ mod tests {
         assert_eq!(recent, [[1; 32], [2; 32]]);
         assert_eq!(cache.recent_sources(1).len(), 1);
         assert_eq!(cache.statistics().memory_bytes, 0, "they are in memory already, otherwise");
+        // What left for others is remembered when it comes again.
+        assert_eq!(cache.evict(0), 2);
+        assert!(cache.source(&[1; 32]).is_none() && !cache.has_source(&[1; 32]));
+        cache.remember_given(&[1; 32], &source(block_on_plate()));
+        cache.flush();
+        assert!(cache.source(&[1; 32]).is_some());
     }
 }

@@ -107,7 +107,7 @@ impl Cache {
     /// All records on disk.
     #[must_use]
     pub fn list(&self) -> Vec<Listed> {
-        self.disk.as_ref().and_then(|d| d.list()).unwrap_or_default()
+        self.disk.as_ref().and_then(|d| d.list(None)).unwrap_or_default()
     }
 
     /// Checks the file and every record in it, and takes damaged ones out.

@@ -5,7 +5,7 @@ use std::io::ErrorKind;
 
 use redb::{Database, ReadableDatabase, ReadableTable, ReadableTableMetadata, StorageError, TableDefinition};
 
-use super::kind::Key;
+use super::kind::{Key, Kind};
 
 /// Envelopes by key.
 const RECORDS: TableDefinition<'_, &[u8], &[u8]> = TableDefinition::new("records");
@@ -190,16 +190,12 @@ pub(super) fn read(database: &Database, key: &Key) -> Result<Option<Vec<u8>>, Fa
     Ok(records.get(&key.to_bytes()[..])?.map(|bytes| bytes.value().to_vec()))
 }
 
-pub(super) fn holds(database: &Database, key: &Key) -> Result<bool, Failure> {
-    let records = database.begin_read()?.open_table(RECORDS)?;
-    Ok(records.get(&key.to_bytes()[..])?.is_some())
-}
-
-/// All records, in the order of their keys.
-pub(super) fn listed(database: &Database) -> Result<Vec<Listed>, Failure> {
+/// The records of a kind, or all, in the order of their keys.
+pub(super) fn listed(database: &Database, kind: Option<Kind>) -> Result<Vec<Listed>, Failure> {
     let used = database.begin_read()?.open_table(USED)?;
     let mut out = Vec::new();
-    for entry in used.iter()? {
+    let (from, to) = kind.map_or((0, u8::MAX), |kind| (kind as u8, kind as u8 + 1));
+    for entry in used.range(&[from][..]..&[to][..])? {
         let (key, value) = entry?;
         let (stamp, bytes) = value.value();
         out.extend(Key::from_bytes(key.value()).map(|key| Listed { key, bytes, used: stamp }));
