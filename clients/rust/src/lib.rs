@@ -11,6 +11,7 @@
 //!     match event {
 //!         Event::Progress(progress) => eprintln!("{progress:?}"),
 //!         Event::Step(step) => println!("part {} along {} waypoints", step.part, step.path.len()),
+//!         Event::Restarted => println!("another daemon: the steps come again"),
 //!         Event::Done(summary) => println!("{}", summary.status.name()),
 //!     }
 //! }
