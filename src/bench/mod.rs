@@ -5,22 +5,15 @@
 //! (`tables`, `figure`). Only `runner` starts anything; whatever comes after it works on the
 //! records alone, so that shards of several machines can be put together later.
 //!
-//! `latency`, `load` and `replan` ask a `daemon` of their own; the first beside a `raw_peer`.
+//! Benchmarks of the daemon, which start ones of their own, are in `through_daemon`; `cancel` measures
+//! planning in this process.
 
-mod asking;
 mod cancel;
-mod churn;
 mod corpus;
-mod daemon;
 mod estimate;
 pub(crate) mod families;
 mod figure;
-mod latency;
-mod load;
-mod raw_peer;
 mod record;
-mod replan;
-mod restart;
 mod rotated;
 mod rotation;
 mod runner;
@@ -29,6 +22,7 @@ mod statistics;
 mod tables;
 #[cfg(test)]
 mod tests;
+mod through_daemon;
 
 use std::collections::HashSet;
 use std::io;
@@ -38,19 +32,15 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 pub use cancel::{CancelRecord, CancelRequest, cancel};
-pub use churn::{Churn, ChurnRequest, ChurnSample, churn};
 pub use corpus::{Category, Problem, Shard, find};
 pub use families::Family;
-pub use latency::{Latency, LatencyRequest, Percentiles, latency};
-pub use load::{
-    DaemonFigures, Footprint, Kind, KindFigures, Load, LoadClient, LoadRequest, Phase, Role, Soak,
-    SoakRequest, load, load_client, soak,
-};
-pub use raw_peer::serve as serve_raw;
 pub use record::{Key, Record, Settings, Store, read};
-pub use replan::{Cost, ReplanRecord, replan};
-pub use restart::{Restart, restart};
 pub use scale::{Growth, PARTS, ScaleRequest, scale};
+pub use through_daemon::{
+    Churn, ChurnRequest, ChurnSample, Cost, DaemonFigures, Footprint, Kind, KindFigures, Latency,
+    LatencyRequest, Load, LoadClient, LoadRequest, Percentiles, Phase, ReplanRecord, Restart, Role, Soak,
+    SoakRequest, churn, latency, load, load_client, replan, restart, serve_raw, soak,
+};
 
 use estimate::Estimate;
 use runner::{Job, Runner};

@@ -12,7 +12,7 @@ use sbdp_ipc::layout::shared_memory_files;
 use serde::Serialize;
 
 use super::super::BenchError;
-use super::super::daemon::{Place, Server};
+use super::super::server::{Place, Server};
 use super::client::Role;
 use super::figures::{ClientFigures, DaemonFigures, Phase};
 use super::mix::Mix;

@@ -27,7 +27,7 @@ pub use mix::Kind;
 pub use soak::{Soak, SoakRequest, soak};
 
 use super::BenchError;
-use super::daemon::{Place, Server};
+use super::server::{Place, Server};
 use figures::ClientFigures;
 use footprint::Watch;
 pub(super) use footprint::footprint;

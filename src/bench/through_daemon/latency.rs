@@ -12,8 +12,8 @@ use serde::Serialize;
 
 use super::BenchError;
 use super::asking::summary;
-use super::daemon::{Place, Server};
 use super::raw_peer::RawClient;
+use super::server::{Place, Server};
 use crate::geometry::SourceAssembly;
 use crate::upload::wire_assembly;
 

@@ -8,9 +8,9 @@ use serde::Serialize;
 
 use super::BenchError;
 use super::asking::{plan, summary};
-use super::daemon::{Place, Server};
 use super::latency::{Percentiles, percentiles};
 use super::replan::fastener;
+use super::server::{Place, Server};
 use crate::geometry::SourceAssembly;
 use crate::upload::wire_assembly;
 

@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::BenchError;
 use super::asking::{Answered, plan};
-use super::daemon::{Place, Server};
+use super::server::{Place, Server};
 use crate::geometry::{SourceAssembly, SourceMesh, load_assembly};
 use crate::upload::{wire_assembly, wire_part};
 

@@ -6,11 +6,11 @@ use std::path::Path;
 use sbdp_client::PlanOptions;
 use serde::Serialize;
 
+use super::super::families::Family;
 use super::BenchError;
 use super::asking::summary;
-use super::daemon::{Place, Server};
-use super::families::Family;
 use super::load::footprint;
+use super::server::{Place, Server};
 use crate::geometry::{SourceAssembly, SourcePart};
 use crate::upload::wire_assembly;
 
