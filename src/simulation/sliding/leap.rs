@@ -23,7 +23,7 @@ const SAME: f64 = 0.02;
 /// … and belong to one helix up to this share.
 const ALIKE: f64 = 0.15;
 /// A helix is seen once so much of it, in radians, was passed in steps that are alike.
-const LEAST_HELIX: f64 = 0.25;
+const LEAST_HELIX: f64 = 0.4;
 /// A leap is at most so many steps long …
 const LONGEST: usize = 32;
 /// … and turns by at most this angle: less than half a turn, so that it tells its screw.
