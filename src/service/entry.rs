@@ -13,6 +13,7 @@ use crate::search::{
 use crate::simulation::{JoinedHulls, PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
+use super::ServiceError;
 use super::answer::{self, Found, Frame, Times};
 use super::prepared::{self, Prepared};
 use super::relay::{Relay, Silent};
@@ -40,13 +41,17 @@ impl Entry {
         size_of::<Self>() + parts.sum::<usize>() + self.at_hand().map_or(0, |prepared| prepared.memory())
     }
 
+    /// Plans, on as many threads as the request has, unless it was planned before.
+    ///
+    /// # Errors
+    /// The threads could not be started.
     pub(super) fn plan(
         &self,
         request: &PlanRequest,
         termination: &Termination,
         sink: &mut dyn PlanSink,
         recall: &Recall,
-    ) -> Plan {
+    ) -> Result<Plan, ServiceError> {
         let started = Instant::now();
         let mut fixed = request.fixed.clone();
         fixed.extend(&self.assembly.fixed);
@@ -70,9 +75,24 @@ impl Entry {
         if !sink.traces()
             && let Some(answered) = recall.plan(&question)
         {
-            return self.answered(frame, answered, sink, started);
+            return Ok(self.answered(frame, answered, sink, started));
         }
-        let prepared = if request.no_cache {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(request.threads).build();
+        let pool = pool.map_err(|e| ServiceError::Threads(e.to_string()))?;
+        Ok(pool.install(|| self.made(frame, &question, termination, sink, recall, started)))
+    }
+
+    /// A plan that is not known yet.
+    fn made(
+        &self,
+        frame: Frame<'_>,
+        question: &PlanQuestion<'_>,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+        recall: &Recall,
+        started: Instant,
+    ) -> Plan {
+        let prepared = if question.request.no_cache {
             let fresh: Vec<_> =
                 self.assembly.shapes.iter().map(|s| Arc::new(SharedShape::new(Arc::clone(s)))).collect();
             Prepared::new(&self.assembly, &fresh, termination, sink, recall).map(|p| (Arc::new(p), false))
@@ -81,7 +101,7 @@ impl Entry {
         };
         match prepared {
             Ok((prepared, hit)) => {
-                let prepared = Ready { prepared: &prepared, hit, recall, question: &question };
+                let prepared = Ready { prepared: &prepared, hit, recall, question };
                 self.searched(frame, &prepared, termination, sink, started)
             }
             Err(Interrupt::Cancelled) => frame.empty(PlanStatus::Cancelled, Some("cancelled".to_owned())),

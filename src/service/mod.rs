@@ -212,14 +212,10 @@ impl Service {
     ) -> Result<Plan, ServiceError> {
         let entry = self.entry(id)?;
         check_parts(&named_parts(request), entry.assembly.parts.len())?;
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(request.threads)
-            .build()
-            .map_err(|e| ServiceError::Threads(e.to_string()))?;
         let recall = if request.no_cache { Recall::default() } else { Recall::of(Arc::clone(&self.cache)) };
-        let plan = pool.install(|| entry.plan(request, termination, sink, &recall));
+        let plan = entry.plan(request, termination, sink, &recall);
         self.store.settle(id, &entry);
-        Ok(plan)
+        plan
     }
 
     /// Compares the initial blocking graphs of an assembly with simulation.

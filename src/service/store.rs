@@ -101,7 +101,7 @@ impl Store {
     }
 
     /// Takes an assembly in, with the shapes that are there in place of equal ones. Of two that came at
-    /// the same time, the first stays.
+    /// the same time, the first stays. It is measured by [`Store::settle`].
     pub(super) fn insert(&self, id: AssemblyId, mut assembly: Assembly) -> Arc<Entry> {
         // Hashing is not for the lock.
         let contents: Vec<[u8; 32]> = assembly.shapes.iter().map(|shape| *shape.content()).collect();
@@ -117,15 +117,18 @@ impl Store {
         assembly.shapes = shapes.iter().map(|shared| Arc::clone(&shared.shape)).collect();
         let entry = Arc::new(Entry::new(assembly, shapes, Arc::clone(&self.hulls)));
         held.entries.insert(id, Arc::clone(&entry));
-        held.measure(id, &entry);
-        held.make_room(self.budget);
+        drop(held);
+        self.settle(id, &entry);
         entry
     }
 
-    /// Measures again what an assembly takes, after it was asked about, and lets others go for it.
+    /// Measures what an assembly takes, when it came and after it was asked about, and lets others go for it.
     pub(super) fn settle(&self, id: AssemblyId, entry: &Entry) {
+        // Whoever asks whether an assembly is known does not wait for this.
+        let own = entry.memory();
+        let shapes: Vec<usize> = entry.shapes.iter().map(|shape| shape.memory()).collect();
         let mut held = self.held();
-        held.measure(id, entry);
+        held.note(id, entry, own, &shapes);
         held.make_room(self.budget);
     }
 
@@ -160,19 +163,18 @@ impl Held {
         shared
     }
 
-    fn measure(&mut self, id: AssemblyId, entry: &Entry) {
-        let Some(known) = self.entries.peek(&id) else { return };
-        if !std::ptr::eq(Arc::as_ptr(known), entry) {
+    /// Notes what an assembly takes: beside its shapes, and each of these.
+    fn note(&mut self, id: AssemblyId, entry: &Entry, own: usize, shapes: &[usize]) {
+        // It may have left, and come again, while it was measured.
+        if !self.entries.peek(&id).is_some_and(|known| std::ptr::eq(Arc::as_ptr(known), entry)) {
             return;
         }
-        let own = entry.memory();
         self.bytes += own;
         self.bytes -= self.own.insert(id, own).unwrap_or(0);
-        for shape in &entry.shapes {
+        for (shape, bytes) in entry.shapes.iter().zip(shapes) {
             if let Some(counted) = self.shapes.get_mut(shape.shape.content()) {
-                let now = shape.memory();
-                self.bytes += now;
-                self.bytes -= std::mem::replace(&mut counted.bytes, now);
+                self.bytes += bytes;
+                self.bytes -= std::mem::replace(&mut counted.bytes, *bytes);
             }
         }
     }

@@ -17,25 +17,31 @@ pub(super) fn plan(
     handle: Handle,
     options: &PlanOptions,
 ) -> Result<(Answered, Summary), BenchError> {
-    let mut stream = client.plan(handle, options).map_err(BenchError::failed)?;
     let mut steps = Vec::new();
-    while let Some(event) = stream.next_event().map_err(BenchError::failed)? {
-        match event {
-            Event::Progress(_) => {}
-            Event::Restarted => steps.clear(),
-            Event::Step(step) => steps.push((step.part as usize, step.path.to_vec())),
-            Event::Done(summary) => return Ok((Answered { status: summary.status, steps }, summary)),
-        }
-    }
-    Err(BenchError::Failed("a plan ended without its summary".to_owned()))
+    let summary = follow(client, handle, options, |event| match event {
+        Event::Step(step) => steps.push((step.part as usize, step.path.to_vec())),
+        Event::Restarted => steps.clear(),
+        _ => {}
+    })?;
+    Ok((Answered { status: summary.status, steps }, summary))
 }
 
 /// The same, of which nothing but the summary is kept.
 pub(super) fn summary(client: &Client, handle: Handle, options: &PlanOptions) -> Result<Summary, BenchError> {
+    follow(client, handle, options, |_| {})
+}
+
+fn follow(
+    client: &Client,
+    handle: Handle,
+    options: &PlanOptions,
+    mut each: impl FnMut(Event<'_>),
+) -> Result<Summary, BenchError> {
     let mut stream = client.plan(handle, options).map_err(BenchError::failed)?;
     while let Some(event) = stream.next_event().map_err(BenchError::failed)? {
-        if let Event::Done(summary) = event {
-            return Ok(summary);
+        match event {
+            Event::Done(summary) => return Ok(summary),
+            event => each(event),
         }
     }
     Err(BenchError::Failed("a plan ended without its summary".to_owned()))
