@@ -9,7 +9,7 @@ use std::os::unix::fs::DirBuilderExt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, RwLock, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, TryLockError};
 
 use redb::Database;
 
@@ -54,6 +54,9 @@ pub(super) struct Disk {
     /// Counts the files that were opened: who failed on one must not set the next one aside.
     generation: AtomicU64,
     touched: Mutex<HashSet<Key>>,
+    /// The records in the file that are nowhere else: whoever asks for one that is not there does not wait
+    /// for the disk to hear so.
+    only_here: Mutex<HashSet<Key>>,
     tally: Arc<Tally>,
 }
 
@@ -69,6 +72,7 @@ impl Disk {
             database: RwLock::new(None),
             generation: AtomicU64::new(0),
             touched: Mutex::default(),
+            only_here: Mutex::default(),
             tally,
         };
         let database = match disk.database_at() {
@@ -81,6 +85,10 @@ impl Disk {
             }
         };
         *disk.database.write().unwrap_or_else(PoisonError::into_inner) = Some(database);
+        for kind in Kind::ALL.into_iter().filter(|kind| !kind.stays_in_memory()) {
+            let listed = disk.list(Some(kind)).unwrap_or_default();
+            disk.only_here().extend(listed.iter().map(|l| l.key));
+        }
         Ok(disk)
     }
 
@@ -99,7 +107,20 @@ impl Disk {
 
     /// The envelope of a key, as it was written.
     pub(super) fn get(&self, key: &Key) -> Option<Vec<u8>> {
+        if !key.kind().stays_in_memory() && !self.contains(key) {
+            return None;
+        }
         self.with_free(|database| read(database, key)).flatten()
+    }
+
+    /// Whether there is an envelope of a key of a kind that does not stay in memory.
+    pub(super) fn contains(&self, key: &Key) -> bool {
+        self.only_here().contains(key)
+    }
+
+    /// A holder that panicked cannot have left it half-changed.
+    fn only_here(&self) -> MutexGuard<'_, HashSet<Key>> {
+        self.only_here.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Notes that a record was used; the next transaction writes it down.
@@ -133,6 +154,8 @@ impl Disk {
             Ok((evicted, bytes))
         });
         let Some((evicted, bytes)) = written else { return };
+        let new = records.iter().map(|(key, _)| *key).filter(|key| !key.kind().stays_in_memory());
+        self.only_here().extend(new);
         self.count(&evicted);
         let after = self.file_bytes();
         if after > before {
@@ -160,6 +183,10 @@ impl Disk {
             drop(tables);
             Ok(transaction.commit()?)
         });
+        let mut only_here = self.only_here();
+        keys.iter().for_each(|key| {
+            only_here.remove(key);
+        });
         done.is_some()
     }
 
@@ -178,8 +205,11 @@ impl Disk {
         Some(evicted.len())
     }
 
+    /// Notes what left the file for others.
     fn count(&self, evicted: &[Key]) {
+        let mut only_here = self.only_here();
         for key in evicted {
+            only_here.remove(key);
             self.tally.of(key.kind()).disk_evictions.one_more();
         }
     }
@@ -248,6 +278,7 @@ impl Disk {
             return;
         }
         self.generation.store(generation + 1, Ordering::Relaxed);
+        self.only_here().clear();
         let database = slot.take();
         // redb writes when it is dropped.
         let closed = contained(|| {

@@ -35,7 +35,6 @@ mod touching;
 mod verdict;
 mod writer;
 
-use std::collections::HashSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 pub use disk::DiskError;
@@ -64,9 +63,6 @@ pub struct Cache {
     // Before the disk: what it has left to write is written when it is dropped.
     writer: Option<Writer>,
     disk: Option<Arc<Disk>>,
-    /// Assemblies that are on disk, or were when they were looked for last: whoever asks whether one is known
-    /// is not to wait for the disk.
-    sources: Mutex<HashSet<[u8; 32]>>,
     tally: Arc<Tally>,
 }
 
@@ -74,13 +70,7 @@ impl Cache {
     /// A store in memory alone, with a budget in bytes.
     #[must_use]
     pub fn in_memory(budget: usize) -> Self {
-        Self {
-            memory: Mutex::new(Memory::new(budget)),
-            writer: None,
-            disk: None,
-            sources: Mutex::default(),
-            tally: Arc::default(),
-        }
+        Self { memory: Mutex::new(Memory::new(budget)), writer: None, disk: None, tally: Arc::default() }
     }
 
     /// A store in memory and on disk.
@@ -92,11 +82,9 @@ impl Cache {
         let Some(folder) = &settings.folder else { return Ok(cache) };
         let tally = Arc::clone(&cache.tally);
         let disk = Arc::new(Disk::open(folder, settings.disk_bytes, Arc::clone(&tally))?);
-        let sources = disk.list(Some(Kind::Source)).unwrap_or_default();
-        let sources = Mutex::new(sources.iter().map(|l| *l.key.hash()).collect());
         let writer = Writer::start(Arc::clone(&disk), tally)
             .map_err(|e| DiskError::Unusable { path: folder.clone(), reason: e.to_string() })?;
-        Ok(Self { writer: Some(writer), disk: Some(disk), sources, ..cache })
+        Ok(Self { writer: Some(writer), disk: Some(disk), ..cache })
     }
 
     /// The record of a key, from memory or else from disk.
@@ -135,6 +123,11 @@ impl Cache {
         let payload: Arc<[u8]> = payload.into();
         self.keep(*key, Arc::clone(&payload));
         Some(payload)
+    }
+
+    /// Whether there is a record of a key that would be on disk only; told without looking there.
+    fn contains(&self, key: &Key) -> bool {
+        self.disk.as_ref().is_some_and(|d| d.contains(key))
     }
 
     /// Remembers a record, in place of one with the same key.

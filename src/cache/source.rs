@@ -1,9 +1,6 @@
 //! Assemblies by their handles, as they were given or revised: a daemon that starts again knows what its
 //! clients' handles mean.
 
-use std::collections::HashSet;
-use std::sync::{MutexGuard, PoisonError};
-
 use super::records::{
     AssemblyRecord, MeshRecord, PartRecord, RevisionRecord, SourceRecord, pose_of, pose_record,
 };
@@ -23,33 +20,28 @@ impl Cache {
     /// What the assembly of a handle was made of, if it is on disk.
     #[must_use]
     pub fn source(&self, handle: &[u8; 32]) -> Option<Source> {
-        let Some(record) = self.get(&key(handle)) else {
-            self.sources().remove(handle);
-            return None;
-        };
-        Some(match record {
+        Some(match self.get(&key(handle))? {
             SourceRecord::Given(record) => Source::Given(assembly(record)),
             SourceRecord::Revised(record) => Source::Revised(record.base, revision(record)),
         })
     }
 
-    /// Whether the assembly of a handle is on disk, as far as is known without looking there: it may have
-    /// left for others since.
+    /// Whether the assembly of a handle is on disk; told without looking there.
     #[must_use]
     pub fn has_source(&self, handle: &[u8; 32]) -> bool {
-        self.sources().contains(handle)
+        self.contains(&key(handle))
     }
 
     /// Remembers what was given, unless it is there.
     pub fn remember_given(&self, handle: &[u8; 32], source: &SourceAssembly) {
-        if self.is_on_disk() && self.sources().insert(*handle) {
+        if self.is_on_disk() && !self.has_source(handle) {
             self.put(key(handle), &SourceRecord::Given(assembly_record(source)));
         }
     }
 
     /// Remembers how an assembly was revised, unless it is there.
     pub fn remember_revised(&self, handle: &[u8; 32], base: &[u8; 32], revision: &Revision) {
-        if self.is_on_disk() && self.sources().insert(*handle) {
+        if self.is_on_disk() && !self.has_source(handle) {
             self.put(key(handle), &SourceRecord::Revised(revision_record(base, revision)));
         }
     }
@@ -61,11 +53,6 @@ impl Cache {
         let mut listed = listed.unwrap_or_default();
         listed.sort_by_key(|l| std::cmp::Reverse(l.used));
         listed.iter().take(most).map(|l| *l.key.hash()).collect()
-    }
-
-    /// A holder that panicked cannot have left it half-changed.
-    fn sources(&self) -> MutexGuard<'_, HashSet<[u8; 32]>> {
-        self.sources.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
