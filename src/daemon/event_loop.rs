@@ -244,9 +244,8 @@ impl<P: Planning> EventLoop<P> {
             more |= taken.len() == RECEIVE_AT_ONCE;
             for active in taken {
                 let owner = self.ports.owner_of(active.origin().value(), geometry);
-                let length = active.payload().len();
-                let refused = if geometry { self.desk.refuses_upload(owner, length) } else { None };
-                let event = read(active, owner, geometry, self.limits, refused);
+                let refuse = |length| self.desk.refuses_upload(owner, length);
+                let event = read(active, owner, geometry, self.limits, refuse);
                 self.desk.handle(event, Instant::now());
                 // Whoever is answered already is not to wait for those behind.
                 self.deliver();
@@ -275,31 +274,34 @@ fn receive(port: &ServerPort) -> Option<Active> {
     })
 }
 
-/// Copies a request out of shared memory: the client may change it after sending.
+/// Copies a request out of shared memory: the client may change it after sending. What `refuse` says of
+/// so many bytes of meshes comes first: what waits within its quota is not to be joined by copies that
+/// will be refused.
 fn read(
     active: Active,
     owner: Owner,
     geometry: bool,
     limits: ReceiveLimits,
-    refused: Option<WireError>,
+    refuse: impl FnOnce(usize) -> Option<WireError>,
 ) -> Event<ActiveLink> {
     let header = *active.user_header();
     let length = active.payload().len();
     let limit = if geometry { limits.upload } else { PLAN_REQUEST as u64 };
-    let meshes = [RequestKind::Upload, RequestKind::Revise];
     let kind = RequestKind::from_wire(header.kind);
-    // What waits within its quota is not to be joined by copies that will be refused.
-    let refused = refused.filter(|_| kind.is_some_and(|k| meshes.contains(&k)));
-    let fits = length as u64 <= limit && refused.is_none();
-    let payload = if fits { AlignedBytes::copy_of(active.payload()) } else { AlignedBytes::default() };
+    let error = if length as u64 > limit {
+        let message = format!("{length} bytes are more than the {limit} that this daemon takes");
+        Some(WireError::new(ErrorCode::TooLarge, message))
+    } else if geometry && matches!(kind, Some(RequestKind::Upload | RequestKind::Revise)) {
+        refuse(length)
+    } else {
+        None
+    };
+    let payload =
+        if error.is_none() { AlignedBytes::copy_of(active.payload()) } else { AlignedBytes::default() };
     let client = active.origin().value();
     let incoming = Incoming { link: ActiveLink(active), client, owner, header, payload };
-    if let Some(error) = refused.filter(|_| length as u64 <= limit) {
+    if let Some(error) = error {
         return Event::Unusable(incoming, error);
-    }
-    if !fits {
-        let message = format!("{length} bytes are more than the {limit} that this daemon takes");
-        return Event::Unusable(incoming, WireError::new(ErrorCode::TooLarge, message));
     }
     match (geometry, kind) {
         (false, Some(RequestKind::Plan)) => Event::Plan(incoming),

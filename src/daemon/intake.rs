@@ -46,12 +46,16 @@ impl<L: Link, P: Planning> Desk<L, P> {
     /// Why an upload of so many bytes would not be taken now. Asked before they are copied.
     pub(crate) fn refuses_upload(&self, owner: Owner, bytes: usize) -> Option<WireError> {
         let rejected = self.queues.admissions.check(ticket(owner, bytes)).err()?;
+        Some(self.upload_rejected(rejected))
+    }
+
+    fn upload_rejected(&self, rejected: Rejected) -> WireError {
         let busy = |message: &str| WireError::busy(message, self.queues.admissions.hint_ms());
-        Some(match rejected {
+        match rejected {
             Rejected::Closed => self.shutting_down(),
             Rejected::Full => busy("busy: too many uploads wait"),
             Rejected::OwnerFull => busy("busy: too much of what this client uploaded waits already"),
-        })
+        }
     }
 
     /// Lets meshes be taken in.
@@ -62,19 +66,16 @@ impl<L: Link, P: Planning> Desk<L, P> {
         if deadline_ns.is_some_and(|d| d <= clock::monotonic_ns()) {
             return self.answer_error(&link, &header, &expired());
         }
-        let bytes = payload.as_slice().len();
-        if let Some(error) = self.refuses_upload(owner, bytes) {
-            return self.answer_error(&link, &header, &error);
-        }
         let number = self.next_upload;
         self.next_upload += 1;
-        match self.queues.admissions.push(ticket(owner, bytes), job(number, payload)) {
+        let ticket = ticket(owner, payload.as_slice().len());
+        match self.queues.admissions.push(ticket, job(number, payload)) {
             Ok(()) => {
                 let deadline = deadline_ns.and_then(clock::instant_of);
                 self.uploads.insert(number, Upload { link, header, deadline, received: Instant::now() });
             }
-            Err(_) => {
-                let error = self.shutting_down();
+            Err(rejected) => {
+                let error = self.upload_rejected(rejected);
                 self.answer_error(&link, &header, &error);
             }
         }
