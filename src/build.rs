@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
-const SOURCES: [&str; 11] = [
+const SOURCES: [&str; 12] = [
     "Cargo.lock",
     "src/geometry",
     "src/sdf",
@@ -14,6 +14,7 @@ const SOURCES: [&str; 11] = [
     "src/blocking_graph",
     "src/search",
     "src/plan",
+    "src/assembling",
     "src/service",
     "src/cache",
     "src/daemon",

@@ -1,5 +1,6 @@
 //! sbdp plans how assemblies come apart. The stages, in the order of the data flow:
 
+pub mod assembling;
 pub mod bench;
 pub mod blocking_graph;
 pub mod cache;

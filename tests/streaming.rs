@@ -67,6 +67,7 @@ impl Planning for Scripted {
             steps.push(step);
         }
         Ok(Plan {
+            kind: sbdp::plan::PlanKind::default(),
             status,
             reason: Some("scripted".into()),
             planner: "sbdp-star".into(),

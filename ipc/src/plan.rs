@@ -22,6 +22,12 @@ pub const PLAN_NO_SWEEPS: u32 = 8;
 /// Others go first: nobody waits for this plan.
 pub const PLAN_BATCH: u32 = 16;
 
+/// An assembly plan is wanted: the disassembly reversed, with each part's way from where it waits.
+pub const PLAN_ASSEMBLY: u32 = 32;
+/// Its parts wait nowhere: each begins where its insertion does. Without [`PLAN_ASSEMBLY`] malformed, and
+/// with places given.
+pub const PLAN_NO_STAGING: u32 = 64;
+
 /// Names of the planners; the wire carries the index.
 pub const PLANNERS: [&str; 5] = ["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star"];
 /// Names of the engines; the wire carries the index.
@@ -30,7 +36,7 @@ pub const ENGINES: [&str; 2] = ["sliding", "penalty"];
 pub const ACTION_SETS: [&str; 2] = ["paper", "extended"];
 
 /// Header of a plan request; three lists of u32 part numbers follow: fixed, removed, targets; then
-/// [`MovedPart`]s.
+/// [`MovedPart`]s: those that stand elsewhere, and those that wait at given places.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct PlanRequestHeader {
@@ -42,7 +48,8 @@ pub struct PlanRequestHeader {
     pub engine: u32,
     /// Index into [`ACTION_SETS`].
     pub actions: u32,
-    /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`], [`PLAN_SWEEPS`], [`PLAN_NO_SWEEPS`], [`PLAN_BATCH`].
+    /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`], [`PLAN_SWEEPS`], [`PLAN_NO_SWEEPS`], [`PLAN_BATCH`],
+    /// [`PLAN_ASSEMBLY`], [`PLAN_NO_STAGING`].
     pub flags: u32,
     /// Threads for this request; 0 leaves it to the daemon.
     pub threads: u32,
@@ -54,15 +61,15 @@ pub struct PlanRequestHeader {
     pub targets: u32,
     /// Parts that stand elsewhere than in the assembly.
     pub moved: u32,
-    /// Reserved, 0.
-    pub reserved: u32,
+    /// Parts of an assembly plan that wait at given places; the others are laid out.
+    pub staged: u32,
     /// CLOCK_MONOTONIC nanoseconds; 0 for none.
     pub deadline_ns: u64,
     /// Simulations after which to give up; `u64::MAX` for no limit.
     pub max_simulations: u64,
 }
 
-/// A part that stands elsewhere.
+/// A part that stands elsewhere, or waits somewhere.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 pub struct MovedPart {
@@ -70,7 +77,8 @@ pub struct MovedPart {
     pub part: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// The rigid motion of its mesh from where the assembly has it.
+    /// The rigid motion of its mesh: of a part that stands elsewhere from where the assembly has it, of one
+    /// that waits from where it was given, as in paths.
     pub motion: Waypoint,
 }
 
@@ -120,6 +128,15 @@ const _: () = {
     assert!(size_of::<StepsHeader>() == 16 && size_of::<Waypoint>() == 56);
 };
 
+/// Where the parts of an assembly plan begin.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Staging {
+    /// Each where its insertion begins; it is not there before its turn.
+    None,
+    /// Laid out beside the assembly, but for these.
+    Beside(Vec<MovedPart>),
+}
+
 /// A plan request, owned.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlanRequest {
@@ -152,6 +169,8 @@ pub struct PlanRequest {
     pub targets: Option<Vec<u32>>,
     /// Parts that stand elsewhere than in the assembly.
     pub moved: Vec<MovedPart>,
+    /// An assembly plan is wanted, with parts that begin there.
+    pub assembly: Option<Staging>,
 }
 
 impl PlanRequest {
@@ -160,6 +179,10 @@ impl PlanRequest {
     pub fn encode(&self) -> Vec<u8> {
         let targets = self.targets.as_deref().unwrap_or(&[]);
         let flag = |set: bool, bit: u32| if set { bit } else { 0 };
+        let staged = match &self.assembly {
+            Some(Staging::Beside(staged)) => &staged[..],
+            _ => &[],
+        };
         let mut writer = Writer::default();
         writer.value(PlanRequestHeader {
             handle: self.handle,
@@ -169,17 +192,19 @@ impl PlanRequest {
             flags: flag(self.no_cache, PLAN_NO_CACHE)
                 | flag(self.batch, PLAN_BATCH)
                 | flag(self.targets.is_some(), PLAN_HAS_TARGETS)
+                | flag(self.assembly.is_some(), PLAN_ASSEMBLY)
+                | flag(matches!(self.assembly, Some(Staging::None)), PLAN_NO_STAGING)
                 | self.sweeps.map_or(0, |s| if s { PLAN_SWEEPS } else { PLAN_NO_SWEEPS }),
             threads: self.threads,
             fixed: self.fixed.len() as u32,
             removed: self.removed.len() as u32,
             targets: targets.len() as u32,
             moved: self.moved.len() as u32,
-            reserved: 0,
+            staged: staged.len() as u32,
             deadline_ns: self.deadline_ns.unwrap_or(0),
             max_simulations: self.max_simulations.unwrap_or(u64::MAX),
         });
-        writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.moved);
+        writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.moved).array(staged);
         writer.finish()
     }
 
@@ -194,9 +219,18 @@ impl PlanRequest {
         let removed = reader.array::<u32>("removed", u64::from(h.removed))?.to_vec();
         let targets = reader.array::<u32>("targets", u64::from(h.targets))?.to_vec();
         let moved = reader.array::<MovedPart>("moved", u64::from(h.moved))?.to_vec();
-        const KNOWN: u32 = PLAN_NO_CACHE | PLAN_HAS_TARGETS | PLAN_SWEEPS | PLAN_NO_SWEEPS | PLAN_BATCH;
+        let staged = reader.array::<MovedPart>("staged", u64::from(h.staged))?.to_vec();
+        const KNOWN: u32 = PLAN_NO_CACHE
+            | PLAN_HAS_TARGETS
+            | PLAN_SWEEPS
+            | PLAN_NO_SWEEPS
+            | PLAN_BATCH
+            | PLAN_ASSEMBLY
+            | PLAN_NO_STAGING;
         let set = |bit: u32| h.flags & bit != 0;
-        if set(!KNOWN) || (set(PLAN_SWEEPS) && set(PLAN_NO_SWEEPS)) {
+        let astray = (set(PLAN_NO_STAGING) || !staged.is_empty()) && !set(PLAN_ASSEMBLY);
+        let both = set(PLAN_NO_STAGING) && !staged.is_empty();
+        if set(!KNOWN) || (set(PLAN_SWEEPS) && set(PLAN_NO_SWEEPS)) || astray || both {
             return Err(Malformed::OutOfRange { field: "flags", value: u64::from(h.flags) });
         }
         Ok(Self {
@@ -214,6 +248,11 @@ impl PlanRequest {
             removed,
             targets: set(PLAN_HAS_TARGETS).then_some(targets),
             moved,
+            assembly: set(PLAN_ASSEMBLY).then_some(if set(PLAN_NO_STAGING) {
+                Staging::None
+            } else {
+                Staging::Beside(staged)
+            }),
         })
     }
 }

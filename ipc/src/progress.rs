@@ -9,6 +9,8 @@ use iceoryx2::prelude::ZeroCopySend;
 pub const STAGE_SDF: u32 = 1;
 /// Searching and verifying.
 pub const STAGE_SEARCH: u32 = 2;
+/// Finding the ways to where insertions begin.
+pub const STAGE_TRANSFER: u32 = 3;
 
 /// One sample on `progress`, seen by every client; each picks its own.
 #[repr(C)]
@@ -21,7 +23,7 @@ pub struct ProgressSample {
     pub request: u64,
     /// Simulations so far.
     pub simulations: u64,
-    /// [`STAGE_SDF`] or [`STAGE_SEARCH`].
+    /// [`STAGE_SDF`], [`STAGE_SEARCH`] or [`STAGE_TRANSFER`].
     pub stage: u32,
     /// Units of the stage done.
     pub done: u32,

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::bytes::{Malformed, Reader, Text, TextWriter, Texts, Writer};
-use crate::plan::{check_range, slice_of};
+use crate::plan::{MovedPart, check_range, slice_of};
 
 /// Names of the plan statuses; the wire carries the index.
 pub const STATUSES: [&str; 5] = ["complete", "partial", "infeasible", "timeout", "cancelled"];
@@ -14,6 +14,8 @@ pub const SUMMARY_HAS_REASON: u32 = 1;
 pub const SUMMARY_HAS_UNITS: u32 = 2;
 /// The list of targets is given.
 pub const SUMMARY_HAS_TARGETS: u32 = 4;
+/// It is an assembly plan.
+pub const SUMMARY_ASSEMBLY: u32 = 8;
 
 /// A warning about the assembly as a whole, not about a part.
 pub const NO_PART: u32 = u32::MAX;
@@ -80,8 +82,8 @@ pub struct SummaryHeader {
     pub blockers: u32,
     /// Bytes of text.
     pub text_bytes: u32,
-    /// Reserved, 0.
-    pub reserved: u32,
+    /// Parts that began elsewhere ([`MovedPart`]).
+    pub poses: u32,
     /// Why the plan is not complete.
     pub reason: Text,
     /// The planner's name.
@@ -150,6 +152,8 @@ pub struct Blocked<'a> {
 /// A summary to be sent. Part numbers are indices into `parts`.
 #[derive(Debug, Clone, Default)]
 pub struct SummaryParts<'a> {
+    /// It is an assembly plan.
+    pub assembly: bool,
     /// Index into [`STATUSES`].
     pub status: u32,
     /// Steps that were sent.
@@ -178,6 +182,8 @@ pub struct SummaryParts<'a> {
     pub fixed: Vec<u32>,
     /// Parts that remain.
     pub remaining: Vec<u32>,
+    /// Parts that began elsewhere than where their mesh was given, and where, as in paths.
+    pub poses: Vec<MovedPart>,
     /// Counters and times.
     pub stats: Stats,
 }
@@ -212,7 +218,7 @@ impl SummaryParts<'_> {
             fixed: self.fixed.len() as u32,
             remaining: self.remaining.len() as u32,
             blockers: blockers.len() as u32,
-            reserved: 0,
+            poses: self.poses.len() as u32,
             reason: texts.add(self.reason.unwrap_or("")),
             planner: texts.add(self.planner),
             engine: texts.add(self.engine),
@@ -223,7 +229,7 @@ impl SummaryParts<'_> {
         let mut writer = Writer::default();
         writer.value(header).array(&names).array(&self.overlaps).array(&blocked).array(&warnings);
         writer.array(&self.removed).array(targets).array(&self.fixed).array(&self.remaining);
-        writer.array(&blockers).array(texts.bytes());
+        writer.array(&blockers).array(&self.poses).array(texts.bytes());
         writer.finish()
     }
 
@@ -232,6 +238,7 @@ impl SummaryParts<'_> {
         flag(self.reason.is_some(), SUMMARY_HAS_REASON)
             | flag(self.units.is_some(), SUMMARY_HAS_UNITS)
             | flag(self.targets.is_some(), SUMMARY_HAS_TARGETS)
+            | flag(self.assembly, SUMMARY_ASSEMBLY)
     }
 }
 
@@ -248,6 +255,7 @@ pub struct SummaryView<'a> {
     fixed: &'a [u32],
     remaining: &'a [u32],
     blockers: &'a [u32],
+    poses: &'a [MovedPart],
     texts: Texts<'a>,
 }
 
@@ -270,6 +278,7 @@ impl<'a> SummaryView<'a> {
             fixed: reader.array("fixed", u64::from(header.fixed))?,
             remaining: reader.array("remaining", u64::from(header.remaining))?,
             blockers: reader.array("blockers", u64::from(header.blockers))?,
+            poses: reader.array("poses", u64::from(header.poses))?,
             texts: Texts(reader.array("texts", u64::from(header.text_bytes))?),
         };
         view.check()?;
@@ -298,7 +307,7 @@ impl<'a> SummaryView<'a> {
         let count = self.names.len();
         let lists = [self.removed, self.targets, self.fixed, self.remaining, self.blockers];
         let pairs = self.overlaps.iter().flat_map(|o| o.parts);
-        let singles = self.blocked.iter().map(|b| b.part);
+        let singles = self.blocked.iter().map(|b| b.part).chain(self.poses.iter().map(|p| p.part));
         let warned = self.warnings.iter().map(|w| w.part).filter(|p| *p != NO_PART);
         let listed = lists.into_iter().flatten().copied();
         match listed.chain(pairs).chain(singles).chain(warned).find(|p| *p as usize >= count) {
@@ -309,6 +318,12 @@ impl<'a> SummaryView<'a> {
 
     fn optional(&self, flag: u32, text: Text) -> Option<&'a str> {
         (self.header.flags & flag != 0).then(|| self.texts.get_checked(text))
+    }
+
+    /// Whether it is an assembly plan.
+    #[must_use]
+    pub fn is_assembly(&self) -> bool {
+        self.header.flags & SUMMARY_ASSEMBLY != 0
     }
 
     /// `complete`, `partial`, `infeasible`, `timeout` or `cancelled`.
@@ -386,6 +401,12 @@ impl<'a> SummaryView<'a> {
     #[must_use]
     pub fn remaining(&self) -> &'a [u32] {
         self.remaining
+    }
+
+    /// Parts that began elsewhere than where their mesh was given, and where, as in paths.
+    #[must_use]
+    pub fn poses(&self) -> &'a [MovedPart] {
+        self.poses
     }
 
     /// What blocks the parts that should have come off.

@@ -7,7 +7,7 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, HandleResponse, Part, Vertices};
 use sbdp_ipc::headers::{RequestHeader, RequestKind, ResponseHeader, ResponseKind};
 use sbdp_ipc::layout;
-use sbdp_ipc::plan::{MovedPart, PlanRequest, Step, StepsView, encode_steps};
+use sbdp_ipc::plan::{MovedPart, PlanRequest, Staging, Step, StepsView, encode_steps};
 use sbdp_ipc::progress::{ProgressSample, STAGE_SEARCH};
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
@@ -118,6 +118,7 @@ fn a_plan_request() {
         removed: vec![4],
         targets: Some(vec![5, 6]),
         moved: vec![MovedPart { part: 7, reserved: 0, motion: POSE }],
+        assembly: None,
     };
     check(
         "plan request",
@@ -130,6 +131,26 @@ fn a_plan_request() {
     );
     assert_eq!(PlanRequest::decode(AlignedBytes::copy_of(&request.encode()).as_slice()), Ok(request));
     check("plain plan request", &PlanRequest::default().encode(), "0000000000000000*10 ffffffffffffffff");
+}
+
+#[test]
+fn a_request_for_an_assembly_plan() {
+    let staged = vec![MovedPart { part: 7, reserved: 0, motion: POSE }];
+    let request = PlanRequest { assembly: Some(Staging::Beside(staged)), ..PlanRequest::default() };
+    check(
+        "assembly plan request",
+        &request.encode(),
+        "\
+         0000000000000000*5 0000000020000000 0000000000000000*2 0000000001000000 0000000000000000 \
+         ffffffffffffffff 0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf \
+         000000000000f03f 0000000000000000*3",
+    );
+    let request = PlanRequest { assembly: Some(Staging::None), ..PlanRequest::default() };
+    check(
+        "assembly plan request without staging",
+        &request.encode(),
+        "0000000000000000*5 0000000060000000 0000000000000000*4 ffffffffffffffff",
+    );
 }
 
 #[test]
@@ -151,6 +172,7 @@ fn steps() {
 #[test]
 fn a_summary() {
     let summary = SummaryParts {
+        assembly: true,
         status: 2,
         steps: 2,
         reason: Some("why"),
@@ -165,6 +187,7 @@ fn a_summary() {
         targets: Some(vec![1]),
         fixed: vec![],
         remaining: vec![1],
+        poses: vec![MovedPart { part: 1, reserved: 0, motion: POSE }],
         stats: Stats {
             simulations: 1,
             simulations_run: 2,
@@ -186,13 +209,14 @@ fn a_summary() {
         "summary",
         &bytes,
         "\
-         0200000007000000 0200000002000000 0100000001000000*2 0100000000000000 0100000001000000 \
-         0d00000000000000 0600000003000000 0900000001000000 0a00000001000000 0b00000002000000 \
+         020000000f000000 0200000002000000 0100000001000000*2 0100000000000000 0100000001000000 \
+         0d00000001000000 0600000003000000 0900000001000000 0a00000001000000 0b00000002000000 \
          0100000000000000 0200000000000000 0300000000000000 0400000000000000 000000000000e03f*5 \
          0500000000000000 0600000000000000 0700000000000000 0100000000000000 0000000001000000 \
          0100000002000000 0000000001000000 000000000000d03f 0100000000000000 0100000003000000 \
          0200000000000000 ffffffff05000000 0100000000000000 0000000000000000 0100000000000000*2 \
-         0000000000000000 6162632b78777768 7970656d6d000000",
+         0000000000000000 0100000000000000 000000000000f03f 0000000000000040 000000000000e0bf \
+         000000000000f03f 0000000000000000*3 6162632b78777768 7970656d6d000000",
     );
     assert_eq!(SummaryView::new(AlignedBytes::copy_of(&bytes).as_slice()).unwrap().reason(), Some("why"));
 }

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, Part, Vertices};
-use sbdp_ipc::plan::{MovedPart, PlanRequest, Step, StepsView, encode_steps};
+use sbdp_ipc::plan::{MovedPart, PLAN_ASSEMBLY, PlanRequest, Staging, Step, StepsView, encode_steps};
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts, SummaryView};
@@ -46,6 +46,7 @@ fn two_steps() -> Vec<Step> {
 
 fn summary() -> Vec<u8> {
     SummaryParts {
+        assembly: true,
         status: 2,
         steps: 2,
         reason: Some("exhausted"),
@@ -60,6 +61,7 @@ fn summary() -> Vec<u8> {
         targets: Some(vec![]),
         fixed: vec![1],
         remaining: vec![1, 2],
+        poses: vec![moved_part()],
         stats: Stats { simulations: 7, total_time_s: 1.5, plan_hit: 1, ..Stats::default() },
     }
     .encode()
@@ -157,6 +159,16 @@ fn requests_errors_and_status_come_back() {
         let bytes = AlignedBytes::copy_of(&request.encode());
         assert_eq!(PlanRequest::decode(bytes.as_slice()).unwrap(), request);
     }
+    for staging in [Staging::None, Staging::Beside(vec![]), Staging::Beside(vec![moved_part()])] {
+        let request = PlanRequest { assembly: Some(staging), ..request.clone() };
+        let bytes = AlignedBytes::copy_of(&request.encode());
+        assert_eq!(PlanRequest::decode(bytes.as_slice()).unwrap(), request);
+        // Places to wait at are for assembly plans.
+        let mut stray = request.encode();
+        stray[44] &= !(PLAN_ASSEMBLY as u8);
+        let stray = PlanRequest::decode(AlignedBytes::copy_of(&stray).as_slice());
+        assert_eq!(stray.is_err(), request.assembly != Some(Staging::Beside(vec![])), "{stray:?}");
+    }
 
     let error = WireError::new(ErrorCode::Busy, "ü".repeat(100_000));
     let bytes = AlignedBytes::copy_of(&error.encode());
@@ -180,6 +192,7 @@ fn messages() -> Vec<Vec<u8>> {
         fixed: vec![1, 2],
         targets: Some(vec![3]),
         moved: vec![moved_part()],
+        assembly: Some(Staging::Beside(vec![moved_part()])),
         ..PlanRequest::default()
     };
     let status = Status {

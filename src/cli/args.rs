@@ -6,17 +6,21 @@ use std::time::Duration;
 
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use nalgebra::UnitQuaternion;
 
 use crate::bench::{self, ENGINES, PARTS, PLANNERS, Shard};
 use crate::blocking_graph::StaticAnalysis;
-use crate::geometry::{Pose, Waypoint, waypoint_from_pose};
+use crate::geometry::Waypoint;
 use crate::search;
 
 mod load;
+mod poses;
 mod through_daemon;
 
+use poses::{moved, rotation};
+
 pub(super) use load::{BenchCancel, BenchLoad, BenchLoadClient, BenchSoak};
+pub(super) use poses::placed;
 pub(super) use through_daemon::{BenchChurn, BenchLatency, BenchRawPeer, BenchReplan, BenchRestart};
 
 /// Plans how assemblies come apart.
@@ -111,6 +115,15 @@ pub(super) struct PlanArguments {
     /// Further parts from a file or folder (repeatable)
     #[arg(long, value_name = "PATH")]
     pub(super) added: Vec<PathBuf>,
+    /// Plan how the assembly is put together: the disassembly reversed, and each part's way from where it
+    /// waits to where its insertion begins
+    #[arg(long = "assembly")]
+    pub(super) together: bool,
+    /// Where parts wait in an assembly plan: `auto` lays them out beside the assembly; with `none` each
+    /// appears where its insertion begins; a JSON file says {"PART": [X,Y,Z,W,X,Y,Z], …}, a motion of
+    /// the mesh from where it was given, turned or not (parts that it does not name are laid out)
+    #[arg(long, value_name = "auto|none|FILE", requires = "together", default_value = "auto")]
+    pub(super) staging: PathBuf,
     /// Write there what the search did, one JSON object per line (see `sbdp explain`); plans in
     /// this process
     #[arg(long, value_name = "FILE", conflicts_with = "daemon")]
@@ -422,33 +435,6 @@ fn seconds(text: &str) -> Result<Duration, String> {
 fn replaced(text: &str) -> Result<(String, PathBuf), String> {
     let (part, file) = text.rsplit_once('=').ok_or_else(|| "not PART=FILE".to_owned())?;
     Ok((part.to_owned(), file.into()))
-}
-
-fn moved(text: &str) -> Result<(String, Waypoint), String> {
-    let wrong = || "not PART=X,Y,Z or PART=X,Y,Z,W,X,Y,Z with a quaternion that is not 0".to_owned();
-    let (part, motion) = text.rsplit_once('=').ok_or_else(wrong)?;
-    let numbers: Vec<f64> =
-        motion.split(',').map(str::parse).collect::<Result<_, _>>().map_err(|_| wrong())?;
-    let shift = numbers.get(..3).filter(|shift| shift.iter().all(|x| x.is_finite())).ok_or_else(wrong)?;
-    let turn = match &numbers[3..] {
-        [] => UnitQuaternion::identity(),
-        &[w, x, y, z] => quaternion([w, x, y, z]).ok_or_else(wrong)?,
-        _ => return Err(wrong()),
-    };
-    let shift = Translation3::new(shift[0], shift[1], shift[2]);
-    Ok((part.to_owned(), waypoint_from_pose(&Pose::from_parts(shift, turn))))
-}
-
-fn quaternion([w, x, y, z]: [f64; 4]) -> Option<UnitQuaternion<f64>> {
-    UnitQuaternion::try_new(Quaternion::new(w, x, y, z), f64::MIN_POSITIVE)
-        .filter(|q| q.coords.iter().all(|c| c.is_finite()))
-}
-
-fn rotation(text: &str) -> Result<UnitQuaternion<f64>, String> {
-    let wrong = || "not four numbers W,X,Y,Z of which one is not 0".to_owned();
-    let numbers: Vec<f64> = text.split(',').map(str::parse).collect::<Result<_, _>>().map_err(|_| wrong())?;
-    let numbers: [f64; 4] = numbers.try_into().map_err(|_| wrong())?;
-    quaternion(numbers).ok_or_else(wrong)
 }
 
 #[cfg(test)]

@@ -9,9 +9,9 @@ use sbdp_client::{Client, ClientError, ErrorCode, Event, PlanOptions, PlanStream
 
 use super::backend::{Backend, Question};
 use super::error::CliError;
-use crate::geometry::{Revision, SourceAssembly, Waypoint, heal, waypoint_from_pose};
-use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
-use crate::search::{ActionSet, Engine, PlanSink, Planner, Progress, Stage};
+use crate::geometry::{Revision, SourceAssembly, heal, waypoint_from_pose};
+use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
+use crate::search::{ActionSet, Engine, PlanSink, Planner, Progress, Stage, Staging};
 use crate::upload::{wire_assembly, wire_mesh, wire_part};
 
 /// How long Ctrl-C may go unnoticed while the daemon has nothing to say.
@@ -90,7 +90,7 @@ fn receive(
                 steps.clear();
             }
             Ok(Some(Event::Done(summary))) => {
-                return Ok(Plan { poses: poses(&question.revision), ..plan(summary, steps) });
+                return Ok(plan(summary, steps));
             }
             Ok(None) => return Err(ClientError::Protocol("the plan ended without its summary".into())),
             Err(ClientError::Timeout { .. }) => {}
@@ -140,6 +140,16 @@ fn options(question: &Question<'_>) -> PlanOptions {
         no_cache: request.no_cache,
         batch: false,
         moved: Vec::new(),
+        assembly: request.assembly.as_ref().map(staging),
+    }
+}
+
+fn staging(staging: &Staging) -> client::Staging {
+    match staging {
+        Staging::None => client::Staging::None,
+        Staging::Beside(given) => {
+            client::Staging::Beside(given.iter().map(|(part, place)| (*part as u32, *place)).collect())
+        }
     }
 }
 
@@ -147,6 +157,7 @@ fn progress(p: client::Progress) -> Progress {
     let stage = match p.stage {
         client::Stage::Sdf => Stage::Sdf,
         client::Stage::Search => Stage::Search,
+        client::Stage::Transfer => Stage::Transfer,
     };
     Progress { stage, done: p.done, total: p.total, simulations: p.simulations }
 }
@@ -161,15 +172,9 @@ fn plan_step(step: &client::Step<'_>) -> PlanStep {
     }
 }
 
-/// Where moved parts stand: what was asked, which the wire does not tell again.
-fn poses(revision: &Revision) -> Vec<(usize, Waypoint)> {
-    let mut poses: Vec<_> = revision.moved.iter().map(|(p, pose)| (*p, waypoint_from_pose(pose))).collect();
-    poses.sort_by_key(|(part, _)| *part);
-    poses
-}
-
 fn plan(s: Summary, steps: Vec<PlanStep>) -> Plan {
     Plan {
+        kind: if s.assembly { PlanKind::Assembly } else { PlanKind::Disassembly },
         status: status(s.status),
         reason: s.reason,
         planner: s.planner,
@@ -177,7 +182,7 @@ fn plan(s: Summary, steps: Vec<PlanStep>) -> Plan {
         units: s.units,
         parts: s.parts,
         removed: indices(&s.removed),
-        poses: Vec::new(),
+        poses: s.poses.into_iter().map(|(part, pose)| (part as usize, pose)).collect(),
         targets: s.targets.as_deref().map(indices),
         fixed: indices(&s.fixed),
         steps,
@@ -220,6 +225,7 @@ fn stats(s: &client::Stats) -> PlanStats {
         // The wire has no room for these.
         load_time_s: None,
         overlap_time_s: None,
+        transfer_time_s: None,
         verdict_hits: None,
         sdf_time_s: s.sdf_time_s,
         static_analysis_time_s: s.static_analysis_time_s,
@@ -244,6 +250,7 @@ fn unplanned(question: &Question<'_>, status: PlanStatus, error: &ClientError) -
     let parts: Vec<String> = question.revised.parts.iter().map(|p| p.name.clone()).collect();
     let remaining = (0..parts.len()).filter(|p| !request.removed.contains(p)).collect();
     Plan {
+        kind: if request.assembly.is_some() { PlanKind::Assembly } else { PlanKind::Disassembly },
         status,
         reason: Some(error.to_string()),
         planner: request.planner.name().to_owned(),

@@ -18,6 +18,7 @@ mod part_names;
 mod plan;
 mod progress;
 mod report;
+mod staging;
 mod status;
 mod table;
 

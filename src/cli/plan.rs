@@ -10,6 +10,7 @@ use super::daemon::Daemon;
 use super::error::{CliError, exit_code};
 use super::listener::Listener;
 use super::part_names::{part_named, resolve};
+use super::staging::staging;
 use super::{cache, interrupt, print, report};
 use crate::geometry::{Revision, SourceAssembly, load_assembly, pose_from_waypoint};
 use crate::plan::Plan;
@@ -58,6 +59,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         fixed: resolve(assembly, "--fixed", &fixed)?,
         removed: resolve(assembly, "--removed", &arguments.removed)?,
         targets: (!arguments.target.is_empty()).then_some(targets),
+        assembly: arguments.together.then(|| staging(assembly, &arguments.staging)).transpose()?,
         no_cache: arguments.no_cache,
     })
 }

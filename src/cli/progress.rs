@@ -33,6 +33,7 @@ impl ProgressDisplay {
         let template = match stage {
             Stage::Sdf => "distance fields {bar:30} {pos}/{len}",
             Stage::Search => "search          {bar:30} {pos}/{len} parts out, {msg} [{elapsed}]",
+            Stage::Transfer => "ways            {bar:30} {pos}/{len} parts in [{elapsed}]",
         };
         // A template that does not parse would only cost the looks.
         if let Ok(style) = ProgressStyle::with_template(template) {
@@ -50,7 +51,9 @@ impl PlanSink for ProgressDisplay {
     }
 
     fn step(&mut self, _step: &PlanStep) {
-        self.enter(Stage::Search);
+        if self.stage != Some(Stage::Transfer) {
+            self.enter(Stage::Search);
+        }
     }
 }
 

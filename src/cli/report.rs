@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::table::{Table, length};
 use crate::geometry::{SourceAssembly, SourceMesh, pose_from_waypoint};
-use crate::plan::{MotionKind, Plan, PlanStats, PlanStep};
+use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStep};
 
 /// The table of steps and everything there is to know about the rest.
 pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan) -> String {
@@ -33,8 +33,12 @@ pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan) -> String {
 fn headline(assembly: &SourceAssembly, plan: &Plan) -> String {
     let reason = plan.reason.as_ref().map_or(String::new(), |r| format!(" ({r})"));
     let name = if assembly.name.is_empty() { "assembly" } else { &assembly.name };
+    let done = match plan.kind {
+        PlanKind::Disassembly => "come off",
+        PlanKind::Assembly => "are put in",
+    };
     format!(
-        "{name}: {}{reason}; {} of {} parts come off, planner {}, engine {}\n",
+        "{name}: {}{reason}; {} of {} parts {done}, planner {}, engine {}\n",
         plan.status.name(),
         plan.steps.len(),
         plan.parts.len().saturating_sub(plan.removed.len()),
@@ -51,7 +55,7 @@ fn steps(assembly: &SourceAssembly, plan: &Plan) -> String {
             format!("{number}"),
             plan.part_name(step.part).to_owned(),
             step.motion.name().to_owned(),
-            travelled(step, mesh, plan.units.as_deref()),
+            travelled(step, plan.kind, mesh, plan.units.as_deref()),
             names(plan, &step.waited_for),
         ]);
     }
@@ -59,12 +63,15 @@ fn steps(assembly: &SourceAssembly, plan: &Plan) -> String {
 }
 
 /// How far the middle of the part's box goes, and how far the part turns on the way.
-fn travelled(step: &PlanStep, mesh: Option<&SourceMesh>, units: Option<&str>) -> String {
+fn travelled(step: &PlanStep, kind: PlanKind, mesh: Option<&SourceMesh>, units: Option<&str>) -> String {
     let middle = mesh.map_or_else(Point3::origin, box_middle);
     let poses: Vec<_> = step.path.iter().map(pose_from_waypoint).collect();
     let distance: f64 = poses.windows(2).map(|w| (w[1] * middle - w[0] * middle).norm()).sum();
     if distance == 0.0 && step.motion == MotionKind::Translation {
-        return "free already".to_owned();
+        return match kind {
+            PlanKind::Disassembly => "free already".to_owned(),
+            PlanKind::Assembly => "in place".to_owned(),
+        };
     }
     let turned: f64 = poses.windows(2).map(|w| w[0].rotation.angle_to(&w[1].rotation)).sum();
     let straight = length(distance, units);
@@ -130,7 +137,7 @@ fn stats(plan: &Plan) -> String {
         |name: &str, time: Option<f64>| time.map_or_else(String::new, |t| format!("{name} {t:.3} s, "));
     format!(
         "{} simulations ({} run), {} sweeps, {} states{hit}; {}fields {:.3} s, {}static analysis {:.3} s, \
-         paths {:.3} s, verification {:.3} s, total {:.3} s; verified to {}\n",
+         paths {:.3} s, verification {:.3} s, {}total {:.3} s; verified to {}\n",
         s.simulations,
         s.simulations_run,
         s.sweeps,
@@ -141,6 +148,7 @@ fn stats(plan: &Plan) -> String {
         s.static_analysis_time_s,
         s.path_time_s,
         s.verify_time_s,
+        told("transfers", s.transfer_time_s),
         s.total_time_s,
         length(depth, plan.units.as_deref())
     )
@@ -186,6 +194,7 @@ mod tests {
         let step =
             |part, motion, path| PlanStep { part, motion, path, verified_depth: 0.01, waited_for: vec![1] };
         let plan = Plan {
+            kind: PlanKind::Disassembly,
             status: PlanStatus::Infeasible,
             reason: Some("exhausted".into()),
             planner: "sbdp-star".into(),

@@ -4,14 +4,14 @@ use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, Part};
 use sbdp_ipc::plan as wire;
-use sbdp_ipc::progress::{ProgressSample, STAGE_SDF, STAGE_SEARCH};
+use sbdp_ipc::progress::{ProgressSample, STAGE_SDF, STAGE_SEARCH, STAGE_TRANSFER};
 use sbdp_ipc::revision as wire_revision;
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts};
 
 use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::{Pose, Revision, SourceAssembly, SourceMesh, SourcePart, pose_from_waypoint};
-use crate::plan::{MotionKind, Plan, PlanStats, PlanStatus, PlanStep};
-use crate::search::{ActionSet, Engine, PlanRequest, Planner, Progress, Stage};
+use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep};
+use crate::search::{ActionSet, Engine, PlanRequest, Planner, Progress, Stage, Staging};
 use crate::service::{AssemblyId, ServiceError};
 use crate::simulation::PenaltyParameters;
 
@@ -34,8 +34,17 @@ pub(crate) fn plan_request(
         fixed: indices(&request.fixed),
         removed: indices(&request.removed),
         targets: request.targets.as_deref().map(indices),
+        assembly: request.assembly.as_ref().map(staging),
         no_cache: request.no_cache,
     })
+}
+
+fn staging(staging: &wire::Staging) -> Staging {
+    let place = |m: &wire::MovedPart| (m.part as usize, m.motion);
+    match staging {
+        wire::Staging::None => Staging::None,
+        wire::Staging::Beside(given) => Staging::Beside(given.iter().map(place).collect()),
+    }
 }
 
 /// What a plan request moves, and a revision on the wire, as the geometry stage takes it.
@@ -104,6 +113,7 @@ fn numbers(list: &[usize]) -> Vec<u32> {
 /// Everything of a plan but its steps, as it travels, with what its making took this time.
 pub(crate) fn summary(plan: &Plan, spent: &PlanStats) -> Vec<u8> {
     SummaryParts {
+        assembly: plan.kind == PlanKind::Assembly,
         status: status(plan.status),
         steps: plan.steps.len() as u32,
         reason: plan.reason.as_deref(),
@@ -126,6 +136,11 @@ pub(crate) fn summary(plan: &Plan, spent: &PlanStats) -> Vec<u8> {
         targets: plan.targets.as_deref().map(numbers),
         fixed: numbers(&plan.fixed),
         remaining: numbers(&plan.remaining),
+        poses: plan
+            .poses
+            .iter()
+            .map(|(part, pose)| wire::MovedPart { part: *part as u32, reserved: 0, motion: *pose })
+            .collect(),
         stats: stats(spent),
     }
     .encode()
@@ -168,6 +183,7 @@ pub(crate) fn progress(client: [u64; 2], request: u64, progress: Progress) -> Pr
         stage: match progress.stage {
             Stage::Sdf => STAGE_SDF,
             Stage::Search => STAGE_SEARCH,
+            Stage::Transfer => STAGE_TRANSFER,
         },
         done: progress.done,
         total: progress.total,

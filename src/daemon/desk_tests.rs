@@ -31,6 +31,7 @@ struct Scripted {
 
 fn plan_with(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
     Plan {
+        kind: crate::plan::PlanKind::default(),
         status,
         reason: None,
         planner: "sbdp-star".into(),

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
+use super::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
 use crate::geometry::Waypoint;
 
 /// The name and version of the contract.
@@ -17,6 +17,9 @@ pub const SCHEMA: &str = "sbdp-plan/1";
 pub struct PlanDocument {
     /// Always [`SCHEMA`].
     pub schema: String,
+    /// `disassembly` or `assembly`.
+    #[serde(default = "disassembly")]
+    pub kind: String,
     /// `complete`, `partial`, `infeasible`, `timeout` or `cancelled`.
     pub status: String,
     /// Why it is not complete.
@@ -35,7 +38,7 @@ pub struct PlanDocument {
     pub targets: Option<Vec<String>>,
     /// Parts that may not move.
     pub fixed: Vec<String>,
-    /// The removals in order.
+    /// The removals, or insertions, in order.
     pub steps: Vec<StepDocument>,
     /// Parts that stand where they stood.
     pub remaining: Vec<String>,
@@ -49,16 +52,21 @@ pub struct PlanDocument {
     pub stats: StatsDocument,
 }
 
+/// What plans do that do not say it.
+fn disassembly() -> String {
+    PlanKind::Disassembly.name().to_owned()
+}
+
 /// The state that planning began with, where it differs from the assembly as given.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct InitialDocument {
     /// Parts that were gone.
     pub removed: Vec<String>,
-    /// Parts that stood elsewhere, and where.
+    /// Parts that stood elsewhere, and where: in an assembly plan also those that waited for their turn.
     pub poses: BTreeMap<String, Waypoint>,
 }
 
-/// One removal.
+/// One removal or insertion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StepDocument {
     /// The part that moves.
@@ -126,6 +134,9 @@ pub struct StatsDocument {
     pub path_time_s: f64,
     /// Shortening and verification.
     pub verify_time_s: f64,
+    /// Ways to where insertions begin; null where there are none, or the daemon planned.
+    #[serde(default)]
+    pub transfer_time_s: Option<f64>,
     /// All of it.
     pub total_time_s: f64,
     /// What was remembered.
@@ -146,6 +157,17 @@ pub struct CacheDocument {
     pub verdict_hits: Option<u64>,
     /// The whole plan.
     pub plan_hit: bool,
+}
+
+impl PlanKind {
+    /// The kind in the words of the contract.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Disassembly => "disassembly",
+            Self::Assembly => "assembly",
+        }
+    }
 }
 
 impl PlanStatus {
@@ -191,6 +213,7 @@ impl PlanDocument {
     pub fn new(plan: &Plan) -> Self {
         Self {
             schema: SCHEMA.to_owned(),
+            kind: plan.kind.name().to_owned(),
             status: plan.status.name().to_owned(),
             reason: plan.reason.clone(),
             planner: plan.planner.clone(),
@@ -270,6 +293,7 @@ fn stats(stats: &PlanStats) -> StatsDocument {
         static_analysis_time_s: stats.static_analysis_time_s,
         path_time_s: stats.path_time_s,
         verify_time_s: stats.verify_time_s,
+        transfer_time_s: stats.transfer_time_s,
         total_time_s: stats.total_time_s,
         cache: CacheDocument {
             sdf_hits: stats.sdf_hits,
@@ -287,6 +311,7 @@ mod tests {
 
     fn plan() -> Plan {
         Plan {
+            kind: PlanKind::Disassembly,
             status: PlanStatus::Infeasible,
             reason: Some("nothing moves".into()),
             planner: "sbdp-star".into(),
@@ -323,8 +348,8 @@ mod tests {
     #[test]
     fn the_shape_is_the_contract_to_the_letter() {
         let expected = concat!(
-            r#"{"schema":"sbdp-plan/1","status":"infeasible","reason":"nothing moves","planner":"sbdp-star","#,
-            r#""engine":"sliding","units":"mm","parts":["0","1","2","10"],"#,
+            r#"{"schema":"sbdp-plan/1","kind":"disassembly","status":"infeasible","reason":"nothing moves","#,
+            r#""planner":"sbdp-star","engine":"sliding","units":"mm","parts":["0","1","2","10"],"#,
             r#""initial":{"removed":["10"],"poses":{"1":[0.0,0.5,0.0,1.0,0.0,0.0,0.0]}},"targets":["1"],"fixed":["0"],"#,
             r#""steps":[{"part":"2","motion":"rotation","#,
             r#""path":[[0.0,0.0,0.0,1.0,0.0,0.0,0.0],[0.0,0.5,0.0,0.0,1.0,0.0,0.0]],"verified_depth":0.001}],"#,
@@ -333,7 +358,7 @@ mod tests {
             r#""warnings":[{"part":"2","message":"open"},{"part":null,"message":"small"}],"#,
             r#""stats":{"simulations":7,"simulations_run":0,"sweeps":0,"states":0,"load_time_s":null,"#,
             r#""sdf_time_s":0.0,"overlap_time_s":0.5,"#,
-            r#""static_analysis_time_s":0.0,"path_time_s":0.0,"verify_time_s":0.0,"total_time_s":0.0,"#,
+            r#""static_analysis_time_s":0.0,"path_time_s":0.0,"verify_time_s":0.0,"transfer_time_s":null,"total_time_s":0.0,"#,
             r#""cache":{"sdf_hits":0,"blocking_hits":0,"motion_hits":0,"verdict_hits":null,"plan_hit":true}}}"#,
         );
         assert_eq!(PlanDocument::new(&plan()).to_json().unwrap(), expected);

@@ -9,6 +9,6 @@ mod screw;
 mod shorten;
 mod verify;
 
-pub use model::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
+pub use model::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
 pub use shorten::thinned;
 pub use verify::{Check, Entry, Verdict, Verifier};

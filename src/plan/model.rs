@@ -2,10 +2,20 @@
 
 use crate::geometry::Waypoint;
 
+/// What a plan does with the parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PlanKind {
+    /// Takes them apart.
+    #[default]
+    Disassembly,
+    /// Puts them together.
+    Assembly,
+}
+
 /// How planning ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlanStatus {
-    /// Every part that was asked for is out, or was out from the start.
+    /// Every part that was asked for is out (of an assembly plan: in place), or was from the start.
     Complete,
     /// A budget ran out (the reason names it); the steps are the best so far.
     Partial,
@@ -26,19 +36,20 @@ pub enum MotionKind {
     Rotation,
 }
 
-/// One part leaves along a path.
+/// One part leaves, or comes in, along a path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanStep {
-    /// Index of the part that moves; all others that remain stand still.
+    /// Index of the part that moves; all others that are there stand still.
     pub part: usize,
     /// Whether the path turns the part.
     pub motion: MotionKind,
     /// Transforms of the mesh from where it was given; the first is the part's pose at the start, the
-    /// identity but for parts that stand elsewhere.
+    /// identity but for parts that stand elsewhere. In an assembly plan the last is the assembled pose.
     pub path: Vec<Waypoint>,
     /// Deepest penetration found by verification beyond the pair's assembled depth.
     pub verified_depth: f64,
-    /// Parts that had blocked this one and left before it.
+    /// Parts that had blocked this one and left before it; in an assembly plan, parts that this one would
+    /// have blocked and that came before it.
     pub waited_for: Vec<usize>,
 }
 
@@ -95,6 +106,9 @@ pub struct PlanStats {
     pub path_time_s: f64,
     /// Shortening and verification.
     pub verify_time_s: f64,
+    /// In an assembly plan, finding and verifying the ways to where insertions begin; `None` where there
+    /// are none or that is not told, as by the daemon.
+    pub transfer_time_s: Option<f64>,
     /// From admission to the last step.
     pub total_time_s: f64,
     /// Distance fields that were there already.
@@ -109,9 +123,11 @@ pub struct PlanStats {
     pub plan_hit: bool,
 }
 
-/// A disassembly plan, complete or not.
+/// A plan, complete or not.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
+    /// What it does.
+    pub kind: PlanKind,
     /// How planning ended.
     pub status: PlanStatus,
     /// Why it is not complete.
@@ -132,9 +148,9 @@ pub struct Plan {
     pub targets: Option<Vec<usize>>,
     /// Parts that may not move.
     pub fixed: Vec<usize>,
-    /// The removals in order.
+    /// The removals, or insertions, in order.
     pub steps: Vec<PlanStep>,
-    /// Parts that stand where they stood.
+    /// Parts that stand where they stood all the time.
     pub remaining: Vec<usize>,
     /// What blocks the parts that should have come off.
     pub blocked: Vec<Blocked>,

@@ -75,6 +75,11 @@ impl Samples {
         Self { parts: Arc::new(parts.map(|part| Arc::clone(&self.parts[part])).into()) }
     }
 
+    /// Those of all parts, and of all parts again.
+    pub(super) fn twice(&self) -> Self {
+        Self { parts: Arc::new([&self.parts[..], &self.parts[..]].concat()) }
+    }
+
     fn of(&self, part: usize) -> &[SampleTree; SHARES] {
         let Sampled { shape, shares } = &*self.parts[part];
         shares.get_or_init(|| dealt(&shape.surface))

@@ -132,6 +132,12 @@ impl Verifier {
         Self { limit: self.limit, samples: self.samples.of_pair(parts) }
     }
 
+    /// The same check for a scene that has every part twice: all of them, and then all of them again.
+    #[must_use]
+    pub fn twice(&self) -> Self {
+        Self { limit: self.limit, samples: self.samples.twice() }
+    }
+
     /// The depth at which a path is refused, in the planning frame.
     #[must_use]
     pub fn limit(&self) -> f64 {
@@ -226,7 +232,7 @@ impl Verifier {
         termination: &'a Termination,
     ) -> Check<'a> {
         let centre = scene.centre_in_shape(part);
-        let reach = scene.bodies[part].shape.hull.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
+        let reach = scene.reach(part);
         let swept = path.iter().fold(Bounds::EMPTY, |b, pose| {
             let c = pose * centre;
             b.union(&Bounds { min: c, max: c })

@@ -28,7 +28,7 @@ mod trace;
 pub use crate::termination::{Interrupt, Termination};
 pub use outcome::{BlockedAction, Counters, Outcome, Removal};
 pub use problem::{Checked, Observer, Problem};
-pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage};
+pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging};
 pub use sbdp::initial_blockages;
 pub use state::least_travel;
 pub use trace::{BlockedBy, TraceEvent, TracePhase};

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::blocking_graph::StaticAnalysis;
 use crate::cache::{Recall, VerdictQuestion};
-use crate::geometry::{Bounds, Pose, SampleTree};
+use crate::geometry::{Pose, SampleTree};
 use crate::plan::{Entry, Verdict, Verifier, thinned};
 use crate::simulation::{Action, Scene, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
@@ -142,7 +142,8 @@ impl Problem<'_> {
 
     /// Of the parts that stand, those that a path may meet.
     fn near(&self, standing: &[usize], part: usize, path: &[Pose]) -> Vec<usize> {
-        self.scene.broad_phase.meeting_of(standing, &self.swept_bounds(part, path))
+        let swept = self.scene.swept_bounds(part, path).grown(self.verifier.limit());
+        self.scene.broad_phase.meeting_of(standing, &swept)
     }
 
     /// Verifies a path past all that it may meet.
@@ -156,18 +157,6 @@ impl Problem<'_> {
         };
         let past: Vec<_> = check.near(near).par_iter().map(past).collect::<Result<_, _>>()?;
         Ok(Verdict::of_all(past, verifier.limit()))
-    }
-
-    /// A box that holds a part all along a path: where it turns, a ball about the point that moves on
-    /// a line between waypoints.
-    fn swept_bounds(&self, part: usize, path: &[Pose]) -> Bounds {
-        let (shape, centre) = (&self.scene.bodies[part].shape, self.scene.centre_in_shape(part));
-        let radius = shape.hull.iter().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
-        let at = |pose: &Pose| shape.bounds().transformed(pose);
-        let ball = |pose: &Pose| Bounds::of([&(pose * centre)]).grown(radius);
-        let turns = path.iter().any(|p| p.rotation != path[0].rotation);
-        let held = path.iter().map(|p| if turns { ball(p) } else { at(p) });
-        held.fold(Bounds::EMPTY, |all, b| all.union(&b)).grown(self.verifier.limit())
     }
 
     /// Makes points that refuted a path samples of their bodies.

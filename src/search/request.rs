@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::blocking_graph::StaticAnalysis;
+use crate::geometry::Waypoint;
 use crate::simulation::PenaltyParameters;
 
 /// Which search runs.
@@ -101,6 +102,16 @@ impl ActionSet {
     }
 }
 
+/// Where the parts of an assembly plan begin.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Staging {
+    /// Each where its insertion begins; it is not there before its turn.
+    None,
+    /// Laid out beside the assembly, but for those whose place is given: the rigid motion of their mesh from
+    /// where it was given, in the input's units and frame.
+    Beside(Vec<(usize, Waypoint)>),
+}
+
 /// A planning question about one assembly. Part numbers are indices into its parts.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PlanRequest {
@@ -130,6 +141,8 @@ pub struct PlanRequest {
     pub removed: Vec<usize>,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<usize>>,
+    /// An assembly plan is wanted (the disassembly reversed), with parts that begin there.
+    pub assembly: Option<Staging>,
     /// Neither read nor write anything remembered.
     pub no_cache: bool,
 }
@@ -163,6 +176,8 @@ pub enum Stage {
     Sdf,
     /// Searching and verifying.
     Search,
+    /// Finding the ways to where insertions begin.
+    Transfer,
 }
 
 /// Receives what a request yields while it runs.

@@ -2,30 +2,53 @@
 
 use std::time::Duration;
 
+use crate::assembling::Insertion;
 use crate::cache::Reused;
-use crate::geometry::{Assembly, Pose, Waypoint, waypoint_from_pose};
-use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
+use crate::geometry::{Assembly, Pose, Waypoint, pose_from_waypoint, waypoint_from_pose};
+use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
 use crate::search::{BlockedAction, Outcome, PlanRequest, Removal};
 
 /// Turns below this are rounding.
 const NO_TURN: f64 = 1e-9;
 
 /// A removal as a step of a plan.
-pub(super) fn step(assembly: &Assembly, removal: &Removal) -> PlanStep {
-    let start = removal.path.first().copied().unwrap_or_default();
-    let motions: Vec<Pose> = removal.path.iter().map(|p| motion(assembly, &start, p)).collect();
-    let turns = motions.iter().any(|m| waypoint_from_pose(m)[3] < 1.0);
-    let moved = assembly.parts[removal.part].moved;
-    // What was given where it stands keeps its numbers.
-    let of_mesh = |m: &Pose| if moved == Pose::identity() { *m } else { m * moved };
-    let path = motions.iter().map(|m| waypoint_from_pose(&of_mesh(m))).collect();
+pub(super) fn removal(assembly: &Assembly, removal: &Removal) -> PlanStep {
+    let Removal { part, path, depth, waited_for } = removal;
+    step(assembly, *part, path, *depth, waited_for)
+}
+
+/// An insertion as a step of a plan.
+pub(super) fn insertion(assembly: &Assembly, insertion: &Insertion) -> PlanStep {
+    let Insertion { part, path, depth, waited_for } = insertion;
+    step(assembly, *part, path, *depth, waited_for)
+}
+
+fn step(assembly: &Assembly, part: usize, path: &[Pose], depth: f64, waited_for: &[usize]) -> PlanStep {
+    let path: Vec<Waypoint> = path.iter().map(|pose| waypoint(assembly, part, pose)).collect();
+    let turns = path.iter().any(|w| w[3..] != path[0][3..]);
     PlanStep {
-        part: removal.part,
+        part,
         motion: if turns { MotionKind::Rotation } else { MotionKind::Translation },
         path,
-        verified_depth: removal.depth / assembly.scale,
-        waited_for: removal.waited_for.clone(),
+        verified_depth: depth / assembly.scale,
+        waited_for: waited_for.to_vec(),
     }
+}
+
+/// The transform of a part's mesh from where it was given to where a pose of its shape puts it.
+pub(super) fn waypoint(assembly: &Assembly, part: usize, pose: &Pose) -> Waypoint {
+    let part = &assembly.parts[part];
+    let motion = motion(assembly, &part.planning_from_shape, pose);
+    // What was given where it stands keeps its numbers.
+    waypoint_from_pose(&if part.moved == Pose::identity() { motion } else { motion * part.moved })
+}
+
+/// The pose of a part's shape that a transform of its mesh from where it was given leads to.
+pub(super) fn pose(assembly: &Assembly, part: usize, waypoint: &Waypoint) -> Pose {
+    let part = &assembly.parts[part];
+    let mut motion = pose_from_waypoint(waypoint) * part.moved.inverse();
+    motion.translation.vector *= assembly.scale;
+    motion * part.planning_from_shape
 }
 
 /// The transform of the assembled mesh that brings it from `start` to `pose`, in input units.
@@ -84,9 +107,17 @@ pub(super) struct Times {
     pub(super) total: Duration,
 }
 
+/// What a search found, in the planning frame, now or before.
+pub(super) struct Answer {
+    pub(super) outcome: Outcome,
+    pub(super) times: Times,
+    pub(super) found: Found,
+}
+
 impl Frame<'_> {
     /// The plan of a finished search.
-    pub(super) fn plan(self, outcome: Outcome, times: &Times, found: &Found) -> Plan {
+    pub(super) fn plan(self, answer: Answer) -> Plan {
+        let Answer { outcome, times, found } = answer;
         let c = outcome.counters;
         let stats = PlanStats {
             simulations: c.simulations,
@@ -106,7 +137,7 @@ impl Frame<'_> {
             plan_hit: found.plan,
             ..PlanStats::default()
         };
-        let steps = outcome.removals.iter().map(|r| step(self.assembly, r)).collect();
+        let steps = outcome.removals.iter().map(|r| removal(self.assembly, r)).collect();
         let blocked = outcome.blocked.into_iter().map(|BlockedAction { part, action, by }| Blocked {
             part,
             by,
@@ -127,7 +158,12 @@ impl Frame<'_> {
         let count = self.assembly.parts.len();
         let mut warnings = warnings(self.assembly);
         warnings.extend(self.notes.into_iter().map(|message| Warning { part: None, message }));
+        let kind = match self.request.assembly {
+            Some(_) => PlanKind::Assembly,
+            None => PlanKind::Disassembly,
+        };
         Plan {
+            kind,
             status,
             reason,
             planner: self.request.planner.name().to_owned(),

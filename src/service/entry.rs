@@ -14,9 +14,10 @@ use crate::simulation::{JoinedHulls, PenaltyEngine, PenaltyParameters, SlidingEn
 use crate::termination::{Interrupt, Termination};
 
 use super::ServiceError;
-use super::answer::{self, Found, Frame, Times};
+use super::answer::{self, Answer, Found, Frame, Times};
 use super::prepared::{self, Prepared};
-use super::relay::{Relay, Silent};
+use super::putting_back::PuttingBack;
+use super::relay::{Quiet, Relay, Silent};
 use super::store::SharedShape;
 
 /// One admitted assembly; fields and overlaps are made when first needed.
@@ -72,72 +73,94 @@ impl Entry {
         let (fixed, removed) = (frame.fixed.clone(), frame.removed.clone());
         let question = PlanQuestion { assembly: &self.assembly, request, fixed: &fixed, removed: &removed };
         // Whoever wants to be told what the search does wants it done.
-        if !sink.traces()
-            && let Some(answered) = recall.plan(&question)
-        {
-            return Ok(self.answered(frame, answered, sink, started));
-        }
+        let known = if sink.traces() { None } else { recall.plan(&question) };
+        let known = match known {
+            Some(answered) if request.assembly.is_none() => {
+                let (frame, answer) = self.remembered(frame, answered, sink, started);
+                return Ok(frame.plan(answer));
+            }
+            known => known,
+        };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(request.threads).build();
         let pool = pool.map_err(|e| ServiceError::Threads(e.to_string()))?;
-        Ok(pool.install(|| self.made(frame, &question, termination, sink, recall, started)))
+        let time = Time { started, termination };
+        Ok(pool.install(|| self.made(frame, &question, known, time, sink, recall)))
     }
 
-    /// A plan that is not known yet.
+    /// A plan of which at most the search is known.
     fn made(
         &self,
         frame: Frame<'_>,
         question: &PlanQuestion<'_>,
-        termination: &Termination,
+        known: Option<Answered>,
+        time: Time<'_>,
         sink: &mut dyn PlanSink,
         recall: &Recall,
-        started: Instant,
     ) -> Plan {
         let prepared = if question.request.no_cache {
             let fresh: Vec<_> =
                 self.assembly.shapes.iter().map(|s| Arc::new(SharedShape::new(Arc::clone(s)))).collect();
-            Prepared::new(&self.assembly, &fresh, termination, sink, recall).map(|p| (Arc::new(p), false))
+            Prepared::new(&self.assembly, &fresh, time.termination, sink, recall)
+                .map(|p| (Arc::new(p), false))
         } else {
-            self.prepared(termination, sink, recall)
+            self.prepared(time.termination, sink, recall)
         };
-        match prepared {
-            Ok((prepared, hit)) => {
-                let prepared = Ready { prepared: &prepared, hit, recall, question };
-                self.searched(frame, &prepared, termination, sink, started)
+        let (prepared, hit) = match prepared {
+            Ok(prepared) => prepared,
+            Err(Interrupt::Cancelled) => {
+                return frame.empty(PlanStatus::Cancelled, Some("cancelled".to_owned()));
             }
-            Err(Interrupt::Cancelled) => frame.empty(PlanStatus::Cancelled, Some("cancelled".to_owned())),
-            Err(Interrupt::DeadlinePassed) => frame
-                .empty(PlanStatus::Timeout, Some("the deadline passed while fields were built".to_owned())),
-        }
+            Err(Interrupt::DeadlinePassed) => {
+                let reason = "the deadline passed while fields were built".to_owned();
+                return frame.empty(PlanStatus::Timeout, Some(reason));
+            }
+        };
+        let ready = Ready { prepared: &prepared, hit, recall, question };
+        let Some(staging) = &question.request.assembly else {
+            let (frame, answer) = self.searched(frame, &ready, time, sink);
+            return frame.plan(answer);
+        };
+        // The steps of an assembly plan are others.
+        let quiet = &mut Quiet { sink: &mut *sink };
+        let (frame, answer) = match known {
+            Some(known) => self.remembered(frame, known, quiet, time.started),
+            None => self.searched(frame, &ready, time, quiet),
+        };
+        let removals = answer.outcome.removals.clone();
+        let plan = frame.plan(answer);
+        let back =
+            PuttingBack { assembly: &self.assembly, prepared: &prepared, removals: &removals, staging };
+        back.plan(plan, time, sink)
     }
 
-    /// A plan that was made before, told as if it were made now.
-    fn answered(
+    /// An answer that was found before, told as if it were found now.
+    fn remembered<'f>(
         &self,
-        mut frame: Frame<'_>,
+        mut frame: Frame<'f>,
         answered: Answered,
         sink: &mut dyn PlanSink,
         started: Instant,
-    ) -> Plan {
+    ) -> (Frame<'f>, Answer) {
         let Answered { outcome, overlaps } = answered;
         frame.overlaps = answer::overlaps(&self.assembly, &overlaps);
         let engine = engine_of(frame.request.engine, frame.request.penalty);
         frame.notes.extend(accepted(&*engine, prepared::depth_limit(&self.assembly), &self.assembly).1);
         for removal in &outcome.removals {
-            sink.step(&answer::step(&self.assembly, removal));
+            sink.step(&answer::removal(&self.assembly, removal));
         }
         let times = Times { total: started.elapsed(), ..Times::default() };
-        frame.plan(outcome, &times, &Found { plan: true, ..Found::default() })
+        (frame, Answer { outcome, times, found: Found { plan: true, ..Found::default() } })
     }
 
-    fn searched(
+    fn searched<'f>(
         &self,
-        mut frame: Frame<'_>,
+        mut frame: Frame<'f>,
         ready: &Ready<'_>,
-        termination: &Termination,
+        time: Time<'_>,
         sink: &mut dyn PlanSink,
-        started: Instant,
-    ) -> Plan {
+    ) -> (Frame<'f>, Answer) {
         let request = frame.request;
+        let Time { started, termination } = time;
         let Ready { prepared, hit, recall, question } = *ready;
         frame.overlaps = answer::overlaps(&self.assembly, &prepared.overlaps);
         let engine = engine_of(request.engine, request.penalty);
@@ -165,7 +188,7 @@ impl Entry {
             overlaps: spent(prepared.overlap_time),
             total: started.elapsed(),
         };
-        frame.plan(outcome, &times, &found)
+        (frame, Answer { outcome, times, found })
     }
 
     /// The question in the planning frame.
@@ -252,6 +275,13 @@ struct Asked<'a> {
     question: &'a PlanQuestion<'a>,
     engine: &'a dyn TransitionFunction,
     verifier: &'a Verifier,
+}
+
+/// Since when a request is worked on, and what ends it.
+#[derive(Clone, Copy)]
+pub(super) struct Time<'a> {
+    pub(super) started: Instant,
+    pub(super) termination: &'a Termination,
 }
 
 /// What a search works with.

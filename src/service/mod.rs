@@ -4,12 +4,14 @@
 //! tested is what is used. It knows nothing of shared memory.
 //!
 //! Data flow of a request: assembly (`geometry`; those in memory: `store`) → fields (`sdf`) and overlaps
-//! (`prepared`) → `search` (`entry`) → plan in the input's units (`answer`). What was answered before, in
+//! (`prepared`) → `search` (`entry`), for an assembly plan → `assembling` (`putting_back`) → plan in the
+//! input's units (`answer`). What was answered before, in
 //! whole or in part, the `cache` knows.
 
 mod answer;
 mod entry;
 mod prepared;
+mod putting_back;
 mod relay;
 mod store;
 #[cfg(test)]
@@ -23,7 +25,7 @@ use crate::blocking_graph::{Audit, StaticAnalysis, audit};
 use crate::cache::{Cache, CacheStatistics, Recall, Source};
 use crate::geometry::{Assembly, GeometryError, Revision, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, Warning};
-use crate::search::{Engine, PlanRequest, PlanSink, least_travel};
+use crate::search::{Engine, PlanRequest, PlanSink, Staging, least_travel};
 use crate::simulation::PenaltyParameters;
 use crate::termination::Termination;
 
@@ -268,9 +270,14 @@ impl Service {
 /// Parts that a request or a change names, by field.
 type Named = [(&'static str, Vec<usize>)];
 
-fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 3] {
-    let PlanRequest { fixed, removed, targets, .. } = request;
-    [("fixed", fixed.clone()), ("removed", removed.clone()), ("targets", targets.clone().unwrap_or_default())]
+fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 4] {
+    let PlanRequest { fixed, removed, targets, assembly, .. } = request;
+    let staged = match assembly {
+        Some(Staging::Beside(given)) => given.iter().map(|(part, _)| *part).collect(),
+        _ => Vec::new(),
+    };
+    let targets = targets.clone().unwrap_or_default();
+    [("fixed", fixed.clone()), ("removed", removed.clone()), ("targets", targets), ("staged", staged)]
 }
 
 fn revised_parts(revision: &Revision) -> [(&'static str, Vec<usize>); 2] {

@@ -18,8 +18,29 @@ impl Observer for Relay<'_> {
     }
 
     fn removal(&mut self, removal: &Removal) {
-        self.sink.step(&answer::step(self.assembly, removal));
+        self.sink.step(&answer::removal(self.assembly, removal));
     }
+
+    fn traces(&self) -> bool {
+        self.sink.traces()
+    }
+
+    fn traced(&mut self, event: TraceEvent) {
+        self.sink.traced(event);
+    }
+}
+
+/// Hands on how a search gets on, but no step.
+pub(super) struct Quiet<'a> {
+    pub(super) sink: &'a mut dyn PlanSink,
+}
+
+impl PlanSink for Quiet<'_> {
+    fn progress(&mut self, progress: Progress) {
+        self.sink.progress(progress);
+    }
+
+    fn step(&mut self, _: &crate::plan::PlanStep) {}
 
     fn traces(&self) -> bool {
         self.sink.traces()

@@ -130,6 +130,19 @@ impl<'a> Mover<'a> {
         })
     }
 
+    /// Whether the fields alone show that no sample of either surface is within some distance of the other;
+    /// of parts whose boxes do not meet nothing is asked.
+    pub(super) fn seems_clear(&self, standing: &[usize], by: f64) -> bool {
+        !self.any_pair(standing, |sampled, measured, to_measured, _| {
+            let field = &measured.field;
+            let limit = by + field.error_bound();
+            sampled.shape.samples.any(
+                |node| field.value(&(to_measured * node.centre)) - node.radius < limit,
+                |sample| field.value(&(to_measured * sample)) < limit,
+            )
+        })
+    }
+
     /// Whether a sample of either surface is deeper by `depth` than granted: quick where many are.
     pub(super) fn enters_by(&self, depth: f64, standing: &[usize]) -> bool {
         self.any_pair(standing, |sampled, measured, to_measured, allowance| {

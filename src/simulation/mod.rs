@@ -33,7 +33,7 @@ pub use broad_phase::BroadPhase;
 pub use disassembled::{HULL_MARGIN, Surroundings, exit_direction};
 pub use hull_tree::HullTree;
 pub use joined_hulls::JoinedHulls;
-pub use passage::passes_straight;
+pub use passage::{passes_straight, seems_clear};
 pub use penalty::{PenaltyEngine, PenaltyParameters};
 pub use scene::{Allowances, Body, Scene, resolution};
 pub use sliding::{KeptCells, SlidingEngine, pair_blocks};

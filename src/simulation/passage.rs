@@ -1,4 +1,5 @@
-//! Whether a part gets straight from one pose to another: for telling rooms apart, not for plans.
+//! Whether a part gets straight from one pose to another, at a glance: for telling rooms apart and for
+//! trying ways, not for plans.
 
 use crate::geometry::{Pose, interpolate};
 
@@ -23,6 +24,13 @@ pub fn passes_straight(scene: &Scene, standing: &[usize], part: usize, from: &Po
         let pose = interpolate(from, to, &centre, i as f64 / count as f64);
         !Mover::new(scene, part, pose).clearly_enters(standing)
     })
+}
+
+/// Whether a part at a pose is seen to keep clear of all parts that stand, by some distance and what the
+/// distance fields can be wrong by. Seen at samples of the surfaces: what is finer goes unseen.
+#[must_use]
+pub fn seems_clear(scene: &Scene, standing: &[usize], part: usize, pose: &Pose, by: f64) -> bool {
+    Mover::new(scene, part, *pose).seems_clear(standing, by)
 }
 
 #[cfg(test)]

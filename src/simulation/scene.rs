@@ -131,6 +131,31 @@ impl Scene {
         let body = &self.bodies[part];
         body.planning_from_shape.inverse_transform_point(&body.bounds.centre())
     }
+
+    /// How far a part reaches from that point.
+    #[must_use]
+    pub fn reach(&self, part: usize) -> f64 {
+        let centre = self.centre_in_shape(part);
+        let hull = &self.bodies[part].shape.hull;
+        hull.iter().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt()
+    }
+
+    /// A box that holds a part all along a path (poses of its shape): where it turns, a ball about that
+    /// point.
+    #[must_use]
+    pub fn swept_bounds(&self, part: usize, path: &[Pose]) -> Bounds {
+        let (shape, centre) = (&self.bodies[part].shape, self.centre_in_shape(part));
+        let turns = path.iter().any(|p| p.rotation != path[0].rotation);
+        let radius = if turns { self.reach(part) } else { 0.0 };
+        let held = path.iter().map(|pose| {
+            if turns {
+                Bounds::of([&(pose * centre)]).grown(radius)
+            } else {
+                shape.bounds().transformed(pose)
+            }
+        });
+        held.fold(Bounds::EMPTY, |all, b| all.union(&b))
+    }
 }
 
 /// The longest side of an assembly, rounded down by less than a sixteenth.

@@ -6,7 +6,7 @@ use sbdp::hostile_input::Reader;
 use sbdp_ipc::endpoint::Endpoint;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, Part, Vertices};
-use sbdp_ipc::plan::{MovedPart, PlanRequest, Step, encode_steps};
+use sbdp_ipc::plan::{MovedPart, PlanRequest, Staging, Step, encode_steps};
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, SummaryParts};
@@ -114,12 +114,14 @@ fn messages() -> Vec<Vec<u8>> {
         removed: vec![0],
         targets: Some(vec![1]),
         remaining: vec![1, 2],
+        poses: vec![MovedPart { part: 1, ..MovedPart::default() }],
         ..SummaryParts::default()
     };
     let request = PlanRequest {
         fixed: vec![1, 2],
         targets: Some(vec![0]),
         moved: vec![MovedPart { part: 1, ..MovedPart::default() }],
+        assembly: Some(Staging::Beside(vec![MovedPart::default()])),
         ..PlanRequest::default()
     };
     let status = Status {

@@ -34,7 +34,7 @@ mod upload;
 pub use client::Client;
 pub use content_hash::content_hash;
 pub use error::ClientError;
-pub use options::{ActionSet, ConnectOptions, Engine, Handle, PlanOptions, Planner};
+pub use options::{ActionSet, ConnectOptions, Engine, Handle, PlanOptions, Planner, Staging};
 pub use sbdp_ipc::error::ErrorCode;
 pub use sbdp_ipc::geometry::{Assembly, Part, Vertices};
 pub use sbdp_ipc::plan::{StepView as Step, Waypoint};

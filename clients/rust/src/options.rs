@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use sbdp_ipc::clock;
-use sbdp_ipc::plan::{MovedPart, PlanRequest, Waypoint};
+use sbdp_ipc::plan::{self, MovedPart, PlanRequest, Waypoint};
 
 /// The name of an assembly: the hash of its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -85,6 +85,16 @@ pub enum ActionSet {
     Extended,
 }
 
+/// Where the parts of an assembly plan begin.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Staging {
+    /// Each where its insertion begins; it is not there before its turn.
+    None,
+    /// Laid out beside the assembly, but for those whose place is given: the rigid motion of their mesh from
+    /// where it was given, as in paths.
+    Beside(Vec<(u32, Waypoint)>),
+}
+
 /// What to plan. Part numbers are places in the uploaded assembly's list of parts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlanOptions {
@@ -112,6 +122,9 @@ pub struct PlanOptions {
     /// Parts that stand elsewhere than in the assembly, with the rigid motion of their mesh from there
     /// (input units and frame).
     pub moved: Vec<(u32, Waypoint)>,
+    /// An assembly plan is wanted (the disassembly reversed, with each part's way from where it waits), with
+    /// parts that begin there.
+    pub assembly: Option<Staging>,
     /// Neither read nor write anything remembered.
     pub no_cache: bool,
     /// Others go first: nobody waits for this plan.
@@ -135,6 +148,10 @@ impl PlanOptions {
             removed: self.removed.clone(),
             targets: self.targets.clone(),
             moved: self.moved.iter().map(moved_part).collect(),
+            assembly: self.assembly.as_ref().map(|staging| match staging {
+                Staging::None => plan::Staging::None,
+                Staging::Beside(given) => plan::Staging::Beside(given.iter().map(moved_part).collect()),
+            }),
         }
     }
 }

@@ -9,7 +9,7 @@ use sbdp_ipc::geometry::Assembly;
 use sbdp_ipc::headers::{CONTROL_CANCEL, RequestKind, ResponseHeader, ResponseKind, id_of_words};
 use sbdp_ipc::layout::{CREDIT_STEP, PLAN_REQUEST};
 use sbdp_ipc::plan::{StepView, StepsView};
-use sbdp_ipc::progress::STAGE_SDF;
+use sbdp_ipc::progress::{STAGE_SDF, STAGE_TRANSFER};
 use sbdp_ipc::services::{Answer, Pending};
 
 use crate::client::Client;
@@ -31,6 +31,8 @@ pub enum Stage {
     Sdf,
     /// Searching and verifying.
     Search,
+    /// Finding the ways to where insertions begin.
+    Transfer,
 }
 
 /// What the daemon is doing; some of these are lost on purpose.
@@ -424,7 +426,11 @@ impl PlanStream<'_> {
         while let Ok(Some(sample)) = self.client.progress.receive() {
             if id_of_words(sample.client) == me && sample.request == self.request {
                 return Some(Progress {
-                    stage: if sample.stage == STAGE_SDF { Stage::Sdf } else { Stage::Search },
+                    stage: match sample.stage {
+                        STAGE_SDF => Stage::Sdf,
+                        STAGE_TRANSFER => Stage::Transfer,
+                        _ => Stage::Search,
+                    },
                     done: sample.done,
                     total: sample.total,
                     simulations: sample.simulations,

@@ -1,6 +1,7 @@
 //! What ends a plan.
 
 use sbdp_ipc::bytes::Malformed;
+use sbdp_ipc::plan::Waypoint;
 use sbdp_ipc::summary::{STATUSES, Stats, SummaryView};
 
 /// How planning ended.
@@ -60,6 +61,8 @@ pub struct Warning {
 /// Everything about a plan except its steps. Part numbers are places in `parts`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Summary {
+    /// It is an assembly plan.
+    pub assembly: bool,
     /// How planning ended.
     pub status: PlanStatus,
     /// Why it is not complete.
@@ -82,6 +85,9 @@ pub struct Summary {
     pub fixed: Vec<u32>,
     /// Parts that stand where they stood.
     pub remaining: Vec<u32>,
+    /// Parts that began elsewhere than where their mesh was given, and where: the rigid motion of the mesh,
+    /// as in paths. Parts of an assembly plan that wait are among them.
+    pub poses: Vec<(u32, Waypoint)>,
     /// What blocks the parts that should have come off.
     pub blocked: Vec<Blocked>,
     /// Overlaps at the assembled pose.
@@ -98,6 +104,7 @@ impl Summary {
         let owned = |text: &str| text.to_owned();
         let status = PlanStatus::ALL.into_iter().find(|s| s.name() == view.status());
         Ok(Self {
+            assembly: view.is_assembly(),
             status: status.unwrap_or(PlanStatus::Partial),
             reason: view.reason().map(owned),
             planner: view.planner().to_owned(),
@@ -109,6 +116,7 @@ impl Summary {
             targets: view.targets().map(<[u32]>::to_vec),
             fixed: view.fixed().to_vec(),
             remaining: view.remaining().to_vec(),
+            poses: view.poses().iter().map(|p| (p.part, p.motion)).collect(),
             blocked: view.blocked().map(blocked).collect(),
             overlaps: view.overlaps().iter().map(|o| Overlap { parts: o.parts, depth: o.depth }).collect(),
             warnings: view.warnings().map(|(part, m)| Warning { part, message: m.to_owned() }).collect(),

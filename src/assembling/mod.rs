@@ -1,0 +1,236 @@
+//! Assembly plans: a disassembly reversed, and every part's way from where it waits to where its insertion
+//! begins (the paper's discussion: reverse the plan, link each part's start to it by RRT-Connect).
+//!
+//! Data flow: removals (from `search`) → where parts wait (`staging`) → all that stands and waits while one
+//! part moves (`room`) → its way through that (`transfer`, by `rrt_connect`) → [`Insertion`]s in order.
+//!
+//! A path in reverse passes the same places, so an insertion past what stands is as verified as the removal
+//! was. The rest is verified here, with the same check and no overlap granted: the way to the insertion
+//! past all that stands and waits, and the insertion past all that waits. Ways are found by random poses:
+//! the same for the same question, but a way that is not found is no proof that there is none. No floor is
+//! in the way of anything.
+
+mod room;
+mod rrt_connect;
+mod staging;
+#[cfg(test)]
+mod tests;
+mod transfer;
+
+use nalgebra::{Translation3, Vector3};
+use rayon::prelude::*;
+
+use crate::geometry::{Bounds, Pose};
+use crate::plan::Verifier;
+use crate::search::Removal;
+use crate::simulation::{Scene, Surroundings, exit_direction};
+use crate::termination::{Interrupt, Termination};
+
+use room::Room;
+use transfer::{MOST_SAMPLES, Transfer};
+
+/// So many insertions are looked for at once; they are told in order.
+const AT_ONCE: usize = 8;
+/// How far a part is led away from where its insertion begins before it may go anywhere: this share of its
+/// reach, or of this share of the longest side if that is more.
+const RETREAT: f64 = 0.5;
+const LEAST_RETREAT: f64 = 0.04;
+
+/// Where parts begin, in the planning frame.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Waiting {
+    /// Each where its insertion begins; it is not there before its turn.
+    Nowhere,
+    /// Beside the assembly, but for those whose pose (of their shape) is given.
+    Beside(Vec<(usize, Pose)>),
+}
+
+/// One part put in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Insertion {
+    /// The part.
+    pub part: usize,
+    /// Poses of its shape, the last one assembled; verified.
+    pub path: Vec<Pose>,
+    /// Largest depth beyond what is granted that verification found.
+    pub depth: f64,
+    /// Parts that came before, since this one would have blocked them.
+    pub waited_for: Vec<usize>,
+}
+
+/// Why a part could not be put in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Hindrance {
+    /// It waits in others.
+    WaitsIn,
+    /// Others wait where it is inserted.
+    InsertionMeets,
+    /// No way from where it waits to where its insertion begins was found with so many random poses.
+    NoWay(usize),
+}
+
+/// Why not all parts were put in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Unfinished {
+    /// One part could not be, and who hinders it, ascending, if that is known.
+    Hindered(usize, Hindrance, Vec<usize>),
+    /// The termination condition became true.
+    Interrupted(Interrupt),
+}
+
+impl From<Interrupt> for Unfinished {
+    fn from(interrupt: Interrupt) -> Self {
+        Self::Interrupted(interrupt)
+    }
+}
+
+/// A disassembly in reverse.
+pub struct Assembling<'a> {
+    removals: &'a [Removal],
+    /// Parts that stand from the start.
+    standing: Vec<usize>,
+    /// Where the others wait; `None` if they are not there before their turn.
+    waiting: Option<Vec<(usize, Pose)>>,
+    room: Room,
+    termination: &'a Termination,
+}
+
+impl<'a> Assembling<'a> {
+    /// What puts the parts of some removals back to those that `remain`. A pose given for a part that
+    /// does not move is of no use.
+    #[must_use]
+    pub fn new(
+        scene: &Scene,
+        verifier: &Verifier,
+        removals: &'a [Removal],
+        remain: &[usize],
+        waiting: &Waiting,
+        termination: &'a Termination,
+    ) -> Self {
+        let waiting = match waiting {
+            Waiting::Nowhere => None,
+            Waiting::Beside(given) => Some(waiting_beside(scene, removals, given)),
+        };
+        let room = Room::new(scene, verifier, waiting.as_deref().unwrap_or_default());
+        let mut standing = remain.to_vec();
+        standing.sort_unstable();
+        Self { removals, standing, waiting, room, termination }
+    }
+
+    /// Where each part that will move begins, in the order in which they move.
+    #[must_use]
+    pub fn starts(&self) -> Vec<(usize, Pose)> {
+        let begin = |r: &Removal| (r.part, self.start_of(r));
+        self.removals.iter().rev().map(begin).collect()
+    }
+
+    fn start_of(&self, removal: &Removal) -> Pose {
+        let given = self.waiting.iter().flatten().find(|(part, _)| *part == removal.part);
+        let end = removal.path.last().copied().unwrap_or_default();
+        given.map_or(end, |(_, pose)| *pose)
+    }
+
+    /// Tells the insertions in order, as they are found.
+    ///
+    /// # Errors
+    /// Some part could not be put in; those told before it stand.
+    pub fn run(&self, mut tell: impl FnMut(Insertion)) -> Result<(), Unfinished> {
+        let order: Vec<usize> = (0..self.removals.len()).rev().collect();
+        for some in order.chunks(AT_ONCE) {
+            let found: Vec<_> = some.par_iter().map(|&place| self.insertion(place)).collect();
+            for insertion in found {
+                tell(insertion?);
+            }
+        }
+        Ok(())
+    }
+
+    /// The reverse of the removal that was at some place in the order.
+    fn insertion(&self, place: usize) -> Result<Insertion, Unfinished> {
+        let removal = &self.removals[place];
+        let part = removal.part;
+        let in_order: Vec<Pose> = removal.path.iter().rev().copied().collect();
+        let (mut path, mut depth) = (in_order, removal.depth);
+        if self.waiting.is_some() {
+            let waits = self.removals[..place].iter().map(|r| self.room.waiting(r.part));
+            let mut waiting: Vec<usize> = waits.collect();
+            waiting.sort_unstable();
+            let past = self.room.check(&waiting, part, &path, self.termination)?;
+            if !past.entries.is_empty() {
+                return Err(self.hindered(part, Hindrance::InsertionMeets, &past));
+            }
+            let (way, to_there) = self.transfer(place, waiting)?;
+            depth = depth.max(past.depth).max(to_there);
+            path.splice(..1, way);
+        }
+        let waited_for = self.removals[place + 1..].iter().filter(|later| later.waited_for.contains(&part));
+        let waited_for = waited_for.map(|later| later.part).collect();
+        Ok(Insertion { part, path, depth, waited_for })
+    }
+
+    /// The way from where a part waits to where its insertion begins, and how deep it gets into anything.
+    fn transfer(&self, place: usize, waiting: Vec<usize>) -> Result<(Vec<Pose>, f64), Unfinished> {
+        let removal = &self.removals[place];
+        let part = removal.part;
+        let mut among = self.standing.clone();
+        among.extend(self.removals[place + 1..].iter().map(|r| r.part));
+        among.sort_unstable();
+        among.extend(waiting);
+        let ends = [self.start_of(removal), removal.path.last().copied().unwrap_or_default()];
+        let at_start = self.room.check(&among, part, &ends[..1], self.termination)?;
+        if !at_start.entries.is_empty() {
+            return Err(self.hindered(part, Hindrance::WaitsIn, &at_start));
+        }
+        let away = self.away(removal, &among);
+        // Away from all that it touches first, as far as that is free: the way there is easier to find.
+        let [start, goal] = ends;
+        let retreat = RETREAT * self.room.scene.reach(part).max(LEAST_RETREAT * self.room.scene.longest_side);
+        let clear = Translation3::from(away * retreat) * goal;
+        let last = self.room.check(&among, part, &[clear, goal], self.termination)?;
+        let (goal, last) = if last.entries.is_empty() { (clear, Some(last.depth)) } else { (goal, None) };
+        let found = Transfer::new(&self.room, &among, part, [start, goal], away, self.termination).path()?;
+        let (mut way, depth) =
+            found.ok_or_else(|| Unfinished::Hindered(part, Hindrance::NoWay(MOST_SAMPLES), Vec::new()))?;
+        way.extend(last.map(|_| ends[1]));
+        Ok((way, depth.max(last.unwrap_or(0.0))))
+    }
+
+    /// Where a removal leads at its end, a unit vector: if it leads nowhere, away from what stands.
+    fn away(&self, removal: &Removal, among: &[usize]) -> Vector3<f64> {
+        if let [.., from, to] = &removal.path[..]
+            && let Some(direction) =
+                (to.translation.vector - from.translation.vector).try_normalize(f64::MIN_POSITIVE)
+        {
+            return direction;
+        }
+        let stands = |number: &usize| self.room.part(*number) == *number;
+        let standing = among.iter().copied().filter(stands).collect();
+        let around = Surroundings::new(&self.room.scene, standing);
+        let pose = removal.path.last().copied().unwrap_or_default();
+        let out = exit_direction(&self.room.scene, &around, removal.part, &pose, None);
+        // It tells where the others lie.
+        out.map_or_else(Vector3::z, |direction| -direction)
+    }
+
+    fn hindered(&self, part: usize, what: Hindrance, verdict: &crate::plan::Verdict) -> Unfinished {
+        let mut by: Vec<usize> = verdict.entries.iter().map(|e| self.room.part(e.other)).collect();
+        by.sort_unstable();
+        by.dedup();
+        Unfinished::Hindered(part, what, by)
+    }
+}
+
+/// Where parts wait: those given where they are given, the others laid out beside these and all that any
+/// insertion passes.
+fn waiting_beside(scene: &Scene, removals: &[Removal], given: &[(usize, Pose)]) -> Vec<(usize, Pose)> {
+    let moves = |part: &usize| removals.iter().any(|r| r.part == *part);
+    let mut waiting: Vec<_> = given.iter().filter(|(part, _)| moves(part)).copied().collect();
+    let others: Vec<usize> = removals.iter().rev().map(|r| r.part).collect();
+    let others: Vec<usize> = others.into_iter().filter(|p| given.iter().all(|(g, _)| g != p)).collect();
+    let placed = waiting.iter().map(|(part, pose)| scene.bodies[*part].shape.bounds().transformed(pose));
+    let assembled = scene.bodies.iter().map(|body| body.bounds);
+    let inserted = removals.iter().map(|r| scene.swept_bounds(r.part, &r.path));
+    let occupied = placed.chain(assembled).chain(inserted).fold(Bounds::EMPTY, |all, b| all.union(&b));
+    waiting.extend(staging::laid_out(scene, &others, &occupied));
+    waiting
+}

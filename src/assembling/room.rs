@@ -1,0 +1,162 @@
+//! What is around a part that moves: parts that stand assembled and parts that wait.
+
+use std::sync::Arc;
+
+use crate::geometry::{Bounds, Pose, interpolate, separating_direction, transformed};
+use crate::plan::{Verdict, Verifier};
+use crate::simulation::{Allowances, BroadPhase, Scene, seems_clear};
+use crate::termination::{Interrupt, Termination};
+
+/// Turns between two waypoints stay below this, so that the slerp is unambiguous.
+const MOST_TURN: f64 = 1.5;
+/// A way is looked at piece by piece, up to so many.
+const MOST_GLANCES: f64 = 64.0;
+/// Looks are no closer and no further apart than these shares of the longest side.
+const FINE: f64 = 0.005;
+const COARSE: f64 = 0.02;
+
+/// All parts twice: numbered as in the assembly where they stand assembled, and after them all once more
+/// where they wait.
+pub(super) struct Room {
+    pub(super) scene: Scene,
+    verifier: Verifier,
+    parts: usize,
+    /// Holds every part at both places.
+    pub(super) bounds: Bounds,
+}
+
+impl Room {
+    /// Parts that wait nowhere are never asked about there.
+    pub(super) fn new(scene: &Scene, verifier: &Verifier, waiting: &[(usize, Pose)]) -> Self {
+        let parts = scene.bodies.len();
+        let mut bodies = [&scene.bodies[..], &scene.bodies[..]].concat();
+        for (part, pose) in waiting {
+            let body = &mut bodies[parts + part];
+            body.planning_from_shape = *pose;
+            body.bounds = Bounds::of(&transformed(&body.shape.hull, pose));
+        }
+        let boxes: Vec<Bounds> = bodies.iter().map(|b| b.bounds).collect();
+        Self {
+            scene: Scene {
+                bodies: Arc::new(bodies),
+                allowances: Allowances::none(),
+                longest_side: scene.longest_side,
+                broad_phase: Arc::new(BroadPhase::new(&boxes)),
+                kept: Arc::default(),
+                hulls: Arc::clone(&scene.hulls),
+            },
+            verifier: verifier.twice(),
+            parts,
+            bounds: boxes.iter().fold(Bounds::EMPTY, |all, b| all.union(b)),
+        }
+    }
+
+    /// The number of a part where it waits.
+    pub(super) fn waiting(&self, part: usize) -> usize {
+        self.parts + part
+    }
+
+    /// The part that a number stands for.
+    pub(super) fn part(&self, number: usize) -> usize {
+        number % self.parts
+    }
+
+    /// Deeper than this is not free.
+    pub(super) fn limit(&self) -> f64 {
+        self.verifier.limit()
+    }
+
+    /// Checks a way of a part (poses of its shape) among some numbers (ascending), with no overlap granted.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn check(
+        &self,
+        among: &[usize],
+        part: usize,
+        path: &[Pose],
+        termination: &Termination,
+    ) -> Result<Verdict, Interrupt> {
+        let pieces = path.iter().zip(path.iter().skip(1).chain(path.last()));
+        let mut found = Vec::new();
+        for glance in pieces.flat_map(|(from, to)| self.glances(part, [from, to])) {
+            let near = self.near(among, part, &glance);
+            if !near.is_empty() {
+                let allowances = &self.scene.allowances;
+                found.push(self.verifier.check(
+                    &self.scene,
+                    allowances,
+                    &near,
+                    part,
+                    &glance,
+                    termination,
+                )?);
+            }
+        }
+        Ok(Verdict::of_all(found, self.limit()))
+    }
+
+    /// Whether a part on a straight way is seen to keep clear of some numbers (ascending), at poses so close
+    /// that it cannot get at anything in between: for trying ways, not for plans.
+    pub(super) fn seems_clear(&self, among: &[usize], part: usize, piece: [&Pose; 2]) -> bool {
+        let thin = self.scene.bodies[part].shape.bounds().extents().min() / 2.0;
+        let step = thin.clamp(FINE * self.scene.longest_side, COARSE * self.scene.longest_side);
+        let clear = |glance: &[Pose; 2]| {
+            let near = self.near(among, part, glance);
+            if near.is_empty() {
+                return true;
+            }
+            let count = (self.travel(part, glance) / step).ceil().max(1.0);
+            let at = |i: usize| self.between(part, glance, i as f64 / count);
+            (0..=count as usize).all(|i| seems_clear(&self.scene, &near, part, &at(i), step / 2.0))
+        };
+        self.glances(part, piece).iter().all(clear)
+    }
+
+    /// The poses of a straight way, so close that the rotation between two is unambiguous.
+    pub(super) fn way(&self, part: usize, from: &Pose, to: &Pose) -> Vec<Pose> {
+        let count = (from.rotation.angle_to(&to.rotation) / MOST_TURN).ceil().max(1.0);
+        let inner = (1..count as usize).map(|i| self.between(part, &[*from, *to], i as f64 / count));
+        std::iter::once(*from).chain(inner).chain([*to]).collect()
+    }
+
+    /// No point of a part moves further on a straight piece of its way.
+    fn travel(&self, part: usize, [from, to]: &[Pose; 2]) -> f64 {
+        let centre = self.scene.centre_in_shape(part);
+        let shift = (to * centre - from * centre).norm();
+        shift + self.scene.reach(part) * from.rotation.angle_to(&to.rotation)
+    }
+
+    fn between(&self, part: usize, [from, to]: &[Pose; 2], share: f64) -> Pose {
+        interpolate(from, to, &self.scene.centre_in_shape(part), share)
+    }
+
+    /// A straight piece of the way cut into pieces no longer than the part, if they are not too many.
+    fn glances(&self, part: usize, [from, to]: [&Pose; 2]) -> Vec<[Pose; 2]> {
+        let ends = [*from, *to];
+        let reach = self.scene.reach(part).max(f64::MIN_POSITIVE);
+        let count = (self.travel(part, &ends) / reach).ceil().clamp(1.0, MOST_GLANCES);
+        // The ends stay as they are to the bit.
+        let at = |i: usize| match i {
+            0 => ends[0],
+            i if i as f64 >= count => ends[1],
+            i => self.between(part, &ends, i as f64 / count),
+        };
+        (0..count as usize).map(|i| [at(i), at(i + 1)]).collect()
+    }
+
+    /// Of some numbers, those that a part may meet on a short piece of its way.
+    fn near(&self, among: &[usize], part: usize, glance: &[Pose; 2]) -> Vec<usize> {
+        let mut near = self.scene.broad_phase.meeting_of(among, &self.scene.swept_bounds(part, glance));
+        if glance[0].rotation == glance[1].rotation && !near.is_empty() {
+            let hull = &self.scene.bodies[part].shape.hull;
+            let swept: Vec<_> = glance.iter().flat_map(|pose| transformed(hull, pose)).collect();
+            near.retain(|&other| {
+                let body = &self.scene.bodies[other];
+                let theirs = transformed(&body.shape.hull, &body.planning_from_shape);
+                separating_direction(&swept, &theirs, 0.0, None).is_none()
+            });
+        }
+        near
+    }
+}

@@ -1,0 +1,148 @@
+//! The way of a part from where it waits to where its insertion begins.
+
+use nalgebra::{Point3, Translation3, Vector3};
+
+use crate::geometry::{Bounds, Pose, Uniform, interpolate};
+use crate::termination::{Interrupt, Termination};
+
+use super::room::Room;
+use super::rrt_connect::{Space, rrt_connect, shortened};
+
+/// Random poses after which no way is looked for any more.
+pub(super) const MOST_SAMPLES: usize = 1000;
+/// The same for a way with room to spare.
+const FEW_SAMPLES: usize = 300;
+/// Shortcuts that are tried on a way.
+const SHORTCUTS: usize = 24;
+/// Mostly the part need not turn: so many poses at first, and then this share of them, are turned as the
+/// way's ends are, or between them.
+const SOME: usize = 100;
+const TURNED_ALIKE: f64 = 0.5;
+/// Directions away from an end of the way.
+const LIFTS: [[f64; 3]; 6] =
+    [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
+
+/// A part that moves among others.
+pub(super) struct Transfer<'a> {
+    room: &'a Room,
+    /// What is in its way, as numbers in the room, ascending.
+    among: &'a [usize],
+    part: usize,
+    ends: [Pose; 2],
+    /// Where to leave the second end to, a unit vector.
+    away: Vector3<f64>,
+    centre: Point3<f64>,
+    /// Of the part, from its centre.
+    reach: f64,
+    /// Where its centre may be.
+    bounds: Bounds,
+    uniform: Uniform,
+    /// Poses sampled so far.
+    sampled: usize,
+    /// Ways are free that the check finds free, not those that seem clear.
+    exact: bool,
+    termination: &'a Termination,
+}
+
+impl<'a> Transfer<'a> {
+    pub(super) fn new(
+        room: &'a Room,
+        among: &'a [usize],
+        part: usize,
+        ends: [Pose; 2],
+        away: Vector3<f64>,
+        termination: &'a Termination,
+    ) -> Self {
+        let centre = room.scene.centre_in_shape(part);
+        let reach = room.scene.reach(part);
+        let bounds =
+            ends.iter().fold(room.bounds, |b, pose| b.with_point(&(pose * centre))).grown(2.0 * reach);
+        let uniform = Uniform::seeded(&[]);
+        let (sampled, exact) = (0, false);
+        Self { room, among, part, ends, away, centre, reach, bounds, uniform, sampled, exact, termination }
+    }
+
+    /// The way with what its check found, if there is one: straight, else by RRT-Connect, shortened. It is
+    /// tried with room to spare, at a glance; where that finds none, or overlooked something, with the check
+    /// itself.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn path(mut self) -> Result<Option<(Vec<Pose>, f64)>, Interrupt> {
+        for exact in [false, true] {
+            self.exact = exact;
+            let Some(way) = self.tried(if exact { MOST_SAMPLES } else { FEW_SAMPLES })? else { continue };
+            let verdict = self.room.check(self.among, self.part, &way, self.termination)?;
+            if verdict.entries.is_empty() {
+                return Ok(Some((way, verdict.depth)));
+            }
+        }
+        Ok(None)
+    }
+
+    fn tried(&mut self, most_samples: usize) -> Result<Option<Vec<Pose>>, Interrupt> {
+        let [start, goal] = self.ends;
+        self.uniform = Uniform::seeded(&(self.part as u64).to_le_bytes());
+        self.sampled = 0;
+        let Some(path) = rrt_connect(self, &start, &goal, most_samples)? else { return Ok(None) };
+        let mut uniform = self.uniform.clone();
+        let path = shortened(self, path, SHORTCUTS, &mut uniform)?;
+        let pieces = path.windows(2).flat_map(|p| self.room.way(self.part, &p[0], &p[1]).into_iter().skip(1));
+        Ok(Some(std::iter::once(start).chain(pieces).collect()))
+    }
+
+    /// A pose away from one end of the way, out of everything's reach: from where the part waits and from
+    /// where its insertion begins in turn. What is put together by hand is mostly reached like that.
+    fn lifted(&self, number: usize) -> Option<Pose> {
+        let (end, number) = (number % 2, number / 2);
+        let (pose, away) = (self.ends[end], [Vector3::from(LIFTS[0]), self.away][end]);
+        let direction = if number == 0 { away } else { Vector3::from(*LIFTS.get(number - 1)?) };
+        let at = (pose * self.centre).coords;
+        let far = self.room.bounds.support(&direction) + self.reach;
+        Some(Translation3::from(direction * (far - at.dot(&direction)).max(0.0)) * pose)
+    }
+
+    fn random(&mut self) -> Pose {
+        let [from, to] = self.ends.map(|pose| pose.rotation);
+        let alike = if self.sampled < SOME { 1.0 } else { TURNED_ALIKE };
+        let rotation = if self.uniform.number() < alike {
+            from.try_slerp(&to, self.uniform.number(), 1e-9).unwrap_or(to)
+        } else {
+            self.uniform.rotation()
+        };
+        let extents = self.bounds.extents();
+        let at = self.bounds.min + extents.map(|side| side * self.uniform.number());
+        Pose::from_parts(Translation3::from(at - rotation * self.centre), rotation)
+    }
+}
+
+impl Space for Transfer<'_> {
+    /// No point of the part moves further.
+    fn distance(&self, a: &Pose, b: &Pose) -> f64 {
+        (a * self.centre - b * self.centre).norm() + self.reach * a.rotation.angle_to(&b.rotation)
+    }
+
+    fn between(&self, a: &Pose, b: &Pose, share: f64) -> Pose {
+        interpolate(a, b, &self.centre, share)
+    }
+
+    fn is_free(&self, from: &Pose, to: &Pose) -> Result<bool, Interrupt> {
+        self.termination.check()?;
+        if !self.exact {
+            return Ok(self.room.seems_clear(self.among, self.part, [from, to]));
+        }
+        let way = self.room.way(self.part, from, to);
+        let verdict = self.room.check(self.among, self.part, &way, self.termination)?;
+        Ok(verdict.entries.is_empty())
+    }
+
+    fn sample(&mut self) -> Pose {
+        let number = self.sampled;
+        self.sampled += 1;
+        self.lifted(number).unwrap_or_else(|| self.random())
+    }
+
+    fn extent(&self) -> f64 {
+        self.bounds.extents().norm()
+    }
+}
