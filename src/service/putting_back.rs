@@ -75,7 +75,7 @@ impl PuttingBack<'_> {
         let Staging::Beside(given) = self.staging else { return Vec::new() };
         let moves = |part: usize| self.removals.iter().any(|r| r.part == part);
         let idle = given.iter().map(|(part, _)| *part).filter(|&part| !moves(part));
-        let message = "its staging pose is not used: it stands assembled from the start";
+        let message = "its staging pose is not used: the plan does not move it";
         idle.map(|part| Warning { part: Some(part), message: message.to_owned() }).collect()
     }
 
