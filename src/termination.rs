@@ -1,5 +1,6 @@
 //! The one condition that everything long-running polls: cancelled, or past its deadline.
 
+use std::cell::Cell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -77,5 +78,52 @@ impl Termination {
             Some(d) if Instant::now() >= d => Err(Interrupt::DeadlinePassed),
             _ => Ok(()),
         }
+    }
+}
+
+/// Polls a condition now and then, for work of many short steps: once it has become true it stays so. The
+/// clock is not asked at each step: that takes as long as many a step.
+#[derive(Debug)]
+pub struct Poll<'t> {
+    termination: Option<&'t Termination>,
+    every: u32,
+    steps: Cell<u32>,
+    over: Cell<bool>,
+}
+
+impl<'t> Poll<'t> {
+    /// Looks at the condition, if there is one, at the first step and at every so many.
+    #[must_use]
+    pub fn every(every: u32, termination: Option<&'t Termination>) -> Self {
+        Self { termination, every, steps: Cell::new(0), over: Cell::new(false) }
+    }
+
+    /// To be called at each step: whether the condition was seen to be true.
+    pub fn is_over(&self) -> bool {
+        let Some(termination) = self.termination else { return false };
+        let steps = self.steps.get();
+        if steps == 0 && termination.check().is_err() {
+            self.over.set(true);
+        }
+        self.steps.set(if steps + 1 < self.every { steps + 1 } else { 0 });
+        self.over.get()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_poll_looks_now_and_then_and_stays_over() {
+        let termination = Termination::new(None);
+        let poll = Poll::every(4, Some(&termination));
+        assert!((0..5).all(|_| !poll.is_over()));
+        termination.cancel_flag().store(true, Ordering::Relaxed);
+        assert!((5..8).all(|_| !poll.is_over()), "not looked at");
+        assert!(poll.is_over());
+        termination.cancel_flag().store(false, Ordering::Relaxed);
+        assert!((0..9).all(|_| poll.is_over()));
+        assert!(!Poll::every(1, None).is_over());
     }
 }

@@ -17,12 +17,14 @@ use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
 use crate::simulation::Scene;
-use crate::termination::Interrupt;
+use crate::termination::{Interrupt, Poll};
 
 use super::verify::{Asked, Entry};
 
 /// Largest travel of a vertex between two checked poses, as a share of the longest side.
 const DENSITY: f64 = 0.004;
+/// Samples and nodes between two looks at the termination condition: on open surfaces each takes long.
+const SAMPLES_POLL: u32 = 4;
 /// A path that turns further than this (radians) is a screw.
 const FAR: f64 = 4.0;
 
@@ -96,7 +98,9 @@ impl Samples {
             .map(|(i, pose)| {
                 asked.termination.check()?;
                 let moment = Moment { pose, turn: Turn::of(i, poses.len()), deep: limit / 2.0 };
-                Ok(self.entries_at(asked, &moment))
+                let entries = self.entries_at(asked, &moment);
+                // What was found of samples that were cut short is not to be believed.
+                asked.termination.check().map(|()| entries)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
         Ok(found.into_iter().flatten().collect())
@@ -115,6 +119,7 @@ impl Samples {
     /// The samples of a pair deeper than granted, on either side: the deepest of each side, and all
     /// that are deep enough to help in refining a motion.
     fn entries(&self, asked: &Asked<'_>, moment: &Moment<'_>, other: usize, out: &mut Vec<Entry>) {
+        let poll = Poll::every(SAMPLES_POLL, Some(asked.termination));
         let (moving, standing) = (&asked.scene.bodies[asked.part], &asked.scene.bodies[other]);
         let granted = asked.allowances.of(asked.part, other);
         let to_standing = standing.planning_from_shape.inverse() * moment.pose;
@@ -125,7 +130,7 @@ impl Samples {
             let mut worst: Option<Entry> = None;
             let trees = self.of(part).iter().enumerate();
             for tree in trees.filter(|(i, _)| moment.turn.takes(*i)).map(|(_, t)| t) {
-                entered(tree, to_measured, surface, granted, |point, over| {
+                entered(tree, to_measured, surface, granted, &poll, |point, over| {
                     let entry = Entry { other, on_moving, point, over };
                     if over > moment.deep {
                         out.push(entry.clone());
@@ -190,6 +195,7 @@ fn entered(
     to_measured: &Pose,
     surface: &Surface,
     granted: f64,
+    poll: &Poll<'_>,
     mut visit: impl FnMut(Point3<f64>, f64),
 ) {
     let inner = surface.bounds().grown(-granted);
@@ -198,6 +204,9 @@ fn entered(
     samples.walk(
         root,
         |node, (guess, _, _)| {
+            if poll.is_over() {
+                return None;
+            }
             let c = to_measured * node.centre;
             if surface.bounds().distance(&c) > node.radius {
                 return None;
@@ -210,7 +219,7 @@ fn entered(
         |sample, (guess, centre, distance)| {
             let p = to_measured * sample;
             let outside = distance > 0.0 && distance > (p - centre).norm() - granted;
-            if outside || !inner.contains(&p) {
+            if poll.is_over() || outside || !inner.contains(&p) {
                 return;
             }
             let over = -surface.signed(&p, &surface.closest_from(&p, guess)) - granted;

@@ -191,15 +191,18 @@ impl Verifier {
 
     /// A path from where a given one begins to where it ends that turns in the middle of the play of a
     /// thread, if the given one follows a thread. It is no better verified than any.
-    #[must_use]
+    ///
+    /// # Errors
+    /// The termination condition became true.
     pub fn centred_on_thread(
         &self,
         scene: &Scene,
         standing: &[usize],
         part: usize,
         path: &[Pose],
-    ) -> Option<Vec<Pose>> {
-        centred(scene, standing, part, path, self.limit)
+        termination: &Termination,
+    ) -> Result<Option<Vec<Pose>>, Interrupt> {
+        centred(scene, standing, part, path, self.limit, termination)
     }
 
     /// Checks a path of a part (poses of its shape) among the parts that stand.

@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, Unit, Vector3};
 
 use crate::geometry::Shape;
 use crate::simulation::{Axis, Scene};
+use crate::termination::Termination;
 
 /// cos of the angle within which two directions are one (a quarter of a degree).
 const ALIKE: f64 = 0.999_99;
@@ -51,13 +52,17 @@ impl Directions {
         Self { axes: Axis::WORLD.to_vec(), own: vec![None; scene.bodies.len()] }
     }
 
-    /// Those of the present parts; the world's axes where surfaces do not agree on any.
+    /// Those of the present parts; the world's axes where surfaces do not agree on any. Once the condition is
+    /// true parts are left out: whoever asks must look at it before using them.
     #[must_use]
-    pub(super) fn of(scene: &Scene, present: &[usize]) -> Self {
+    pub(super) fn of(scene: &Scene, present: &[usize], termination: &Termination) -> Self {
         let mut of_shape: HashMap<*const Shape, Faces> = HashMap::new();
         let mut votes = Axis::WORLD.map(|a| Candidate { direction: a.unit(), weight: 0.0 }).to_vec();
         let mut own: Vec<Option<Candidate>> = vec![None; scene.bodies.len()];
         for &part in present {
+            if termination.check().is_err() {
+                break;
+            }
             let body = &scene.bodies[part];
             let faces = of_shape.entry(Arc::as_ptr(&body.shape)).or_insert_with(|| Faces::of(&body.shape));
             let rotation = body.planning_from_shape.rotation;
@@ -262,7 +267,7 @@ mod tests {
     fn axes_of(meshes: impl IntoIterator<Item = SourceMesh>) -> Vec<Axis> {
         let (scene, _) = scene(meshes);
         let present: Vec<_> = (0..scene.bodies.len()).collect();
-        Directions::of(&scene, &present).axes
+        Directions::of(&scene, &present, &Termination::default()).axes
     }
 
     #[test]
@@ -302,7 +307,7 @@ mod tests {
     fn a_nut_and_its_bolt_are_made_along_the_thread() {
         let turn = Pose::rotation(Vector3::new(0.3, -0.5, 0.2));
         let (scene, _) = scene(crate::fixtures::thread(3.0, 0.5).map(|m| moved(m, &turn)));
-        let directions = Directions::of(&scene, &[0, 1]);
+        let directions = Directions::of(&scene, &[0, 1], &Termination::default());
         let along =
             directions.axes.iter().position(|a| a.unit().dot(&(turn * Vector3::z())).abs() > 0.999_999);
         assert!(along.is_some() && directions.own == [along, along], "{directions:?}");

@@ -119,6 +119,15 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         Arc::clone(self.around.entry(part).or_insert_with(|| Arc::new(everything.without(scene, part))))
     }
 
+    /// Those of all runs; hulls of many parts take long.
+    fn all_surroundings(&mut self, runs: &[Run]) -> Result<Vec<Arc<Surroundings>>, Stop> {
+        let around = |run: &Run| {
+            self.problem.termination.check()?;
+            Ok(self.surroundings(run.part))
+        };
+        runs.iter().map(around).collect()
+    }
+
     pub(super) fn standing(&self, part: usize) -> Vec<usize> {
         self.everything.standing().iter().copied().filter(|&i| i != part).collect()
     }
@@ -179,7 +188,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     /// question to which later ones were answers, so they are stopped.
     pub(super) fn simulate(&mut self, runs: &[Run]) -> Result<Vec<Motion>, Stop> {
         let started = Instant::now();
-        let around: Vec<_> = runs.iter().map(|run| self.surroundings(run.part)).collect();
+        let around = self.all_surroundings(runs)?;
         let problem = &self.problem;
         let winner = Arc::new(AtomicUsize::new(usize::MAX));
         let simulated = |(rank, run): (usize, &Run)| {
@@ -224,12 +233,13 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     pub(super) fn sweep(&mut self, runs: &[Run]) -> Result<Vec<Option<Sweep>>, Stop> {
         self.problem.termination.check()?;
         let started = Instant::now();
-        let around: Vec<_> = runs.iter().map(|run| self.surroundings(run.part)).collect();
-        let scene = &self.problem.scene;
+        let around = self.all_surroundings(runs)?;
+        let Problem { scene, termination, .. } = &self.problem;
         let swept = |(run, around): (&Run, &Arc<Surroundings>)| {
-            straight_sweep(scene, around, run.part, &run.start, &run.action.force())
+            straight_sweep(scene, around, run.part, &run.start, &run.action.force(), termination)
         };
-        let mut results: Vec<_> = runs.par_iter().zip(&around).map(swept).collect();
+        let mut results: Vec<_> =
+            runs.par_iter().zip(&around).map(swept).collect::<Result<_, Interrupt>>()?;
         let clear = |s: &Option<Sweep>| matches!(s, Some(Sweep::Clear { .. }));
         if let Some(first) = results.iter().position(clear) {
             results.truncate(first + 1);

@@ -76,7 +76,7 @@ impl Problem<'_> {
     pub(super) fn directions(&self) -> Directions {
         match self.actions {
             ActionSet::Paper => Directions::of_world(&self.scene),
-            ActionSet::Extended => Directions::of(&self.scene, &self.present),
+            ActionSet::Extended => Directions::of(&self.scene, &self.present, &self.termination),
         }
     }
 
@@ -125,7 +125,8 @@ impl Problem<'_> {
     ) -> Result<Checked, Interrupt> {
         let thin = self.thinned(part, path);
         let near = self.near(&standing, part, &thin);
-        if let Some(centred) = self.verifier.centred_on_thread(&self.scene, &near, part, &thin) {
+        let centred = self.verifier.centred_on_thread(&self.scene, &near, part, &thin, &self.termination)?;
+        if let Some(centred) = centred {
             let thin = self.thinned(part, &centred);
             let verdict = self.verdict(&self.near(&standing, part, &thin), part, &thin)?;
             if verdict.entries.is_empty() {

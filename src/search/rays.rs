@@ -63,7 +63,7 @@ impl Search<'_, '_> {
             termination.check()?;
             let others: Vec<usize> = standing.iter().copied().filter(|&p| p != part).collect();
             let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
-            Ok(problem.recall.touching(scene, part, &pose, &others, reach))
+            problem.recall.touching(scene, part, &pose, &others, reach, termination)
         };
         let found = parts.par_iter().map(touching).collect::<Result<Vec<_>, Interrupt>>()?;
         let before = self.rays.offered.len();

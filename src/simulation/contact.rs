@@ -11,7 +11,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 use nalgebra::{Point3, Vector3, Vector6};
 
 use crate::geometry::{Bounds, Closest, Pose, SampleTree};
-use crate::termination::Termination;
+use crate::termination::{Poll, Termination};
 
 use super::projection::Row;
 use super::sliding::FREE_STEP;
@@ -63,11 +63,16 @@ impl<'a> Mover<'a> {
         Self { scene, body: &scene.bodies[part], part, pose, termination: None }
     }
 
-    /// The same, but once the condition is true it finds only part of its contacts: whoever asks must
-    /// look at the condition before believing what was found. The first look at two large surfaces fills
+    /// The same, but once the condition is true it finds only part of its contacts, and that it enters
+    /// whatever it is asked about: whoever asks must look at the condition before believing what was found. The first look at two large surfaces fills
     /// their fields, which takes longer than a cancelled request may.
     pub(super) fn until(self, termination: &'a Termination) -> Self {
         Self { termination: Some(termination), ..self }
+    }
+
+    /// Whether the condition is true.
+    pub(super) fn is_over(&self) -> bool {
+        self.termination.is_some_and(|t| t.check().is_err())
     }
 
     /// The centre of mass, about which twists turn.
@@ -120,12 +125,13 @@ impl<'a> Mover<'a> {
     /// Whether the fields alone show that a sample of either surface is deeper than granted: deeper
     /// than they can be wrong by. Measures nothing exactly, so it is quick.
     pub(super) fn clearly_enters(&self, standing: &[usize]) -> bool {
+        let poll = Poll::every(ENTER_POLL, self.termination);
         self.any_pair(standing, |sampled, measured, to_measured, allowance| {
             let field = &measured.field;
             let limit = -allowance - field.error_bound();
             sampled.shape.samples.any(
-                |node| field.value(&(to_measured * node.centre)) - node.radius < limit,
-                |sample| field.value(&(to_measured * sample)) < limit,
+                |node| poll.is_over() || field.value(&(to_measured * node.centre)) - node.radius < limit,
+                |sample| poll.is_over() || field.value(&(to_measured * sample)) < limit,
             )
         })
     }
@@ -145,15 +151,17 @@ impl<'a> Mover<'a> {
 
     /// Whether a sample of either surface is deeper by `depth` than granted: quick where many are.
     pub(super) fn enters_by(&self, depth: f64, standing: &[usize]) -> bool {
+        let poll = Poll::every(ENTER_POLL, self.termination);
         self.any_pair(standing, |sampled, measured, to_measured, allowance| {
             let (field, limit) = (&measured.field, -allowance - depth);
             let least = |p: &Point3<f64>| field.value(p) - field.error_bound();
             sampled.shape.samples.any(
-                |node| least(&(to_measured * node.centre)) - node.radius < limit,
+                |node| poll.is_over() || least(&(to_measured * node.centre)) - node.radius < limit,
                 |sample| {
                     let p = to_measured * sample;
-                    least(&p) < limit
-                        && measured.closest(&p, 0.0).is_some_and(|(_, distance)| distance < limit)
+                    poll.is_over()
+                        || least(&p) < limit
+                            && measured.closest(&p, 0.0).is_some_and(|(_, distance)| distance < limit)
                 },
             )
         })
@@ -352,6 +360,12 @@ struct Measured<'m> {
     reach: f64,
 }
 
+/// Nodes of samples between two looks at the condition: the first samples that come near a large surface
+/// fill its field.
+const GATHER_POLL: u32 = 1;
+/// The same where the surface is only looked up.
+const ENTER_POLL: u32 = 64;
+
 fn gather(
     tree: &SampleTree,
     measured: &Measured<'_>,
@@ -364,11 +378,11 @@ fn gather(
     let limit = (reach - allowance).max(0.0);
     let clearance = std::cell::Cell::new(near.clearance);
     let keep = |bound: f64| clearance.set(clearance.get().min(bound + allowance));
-    let is_over = || termination.is_some_and(|t| t.check().is_err());
+    let poll = Poll::every(GATHER_POLL, termination);
     tree.walk(
         (),
         |node, ()| {
-            if is_over() {
+            if poll.is_over() {
                 return None;
             }
             let bound = body.field.estimate(&(to_measured * node.centre)).lower_bound - node.radius;

@@ -17,6 +17,7 @@
 use nalgebra::{Point3, Translation3, Vector3};
 
 use crate::geometry::{Bounds, OrientedSamples, Pose, Surface, separating_direction, transformed};
+use crate::termination::{Interrupt, Poll, Termination};
 
 use super::sliding::DEPTH_TOLERANCE;
 use super::{HULL_MARGIN, Scene, Surroundings, exit_direction};
@@ -25,6 +26,8 @@ use super::{HULL_MARGIN, Scene, Surroundings, exit_direction};
 const STEEPNESS: f64 = 1e-3;
 /// The way out is found to this share of the way beyond everything.
 const HALVINGS: usize = 8;
+/// Samples between two looks at the termination condition.
+const CAST_POLL: u32 = 64;
 
 /// What a straight sweep told.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,27 +48,35 @@ pub enum Sweep {
 
 /// Sweeps a part from `start` along the unit vector `direction` out of its surroundings.
 /// `None` where no way out along it is found.
-#[must_use]
+///
+/// # Errors
+/// The termination condition became true.
 pub fn straight_sweep(
     scene: &Scene,
     surroundings: &Surroundings,
     part: usize,
     start: &Pose,
     direction: &Vector3<f64>,
-) -> Option<Sweep> {
+    termination: &Termination,
+) -> Result<Option<Sweep>, Interrupt> {
+    termination.check()?;
     if let Some(exit) = exit_direction(scene, surroundings, part, start, Some(-direction)) {
-        return Some(Sweep::Clear { path: vec![*start], exit });
+        return Ok(Some(Sweep::Clear { path: vec![*start], exit }));
     }
-    let (travel, exit) = way_out(scene, surroundings, part, start, direction)?;
+    let Some((travel, exit)) = way_out(scene, surroundings, part, start, direction) else { return Ok(None) };
+    let poll = Poll::every(CAST_POLL, Some(termination));
     let end = moved(start, direction, travel);
     let bounds = scene.bodies[part].shape.bounds();
     let swept = bounds.transformed(start).union(&bounds.transformed(&end));
-    let blocks = |&other: &usize| enters(scene, part, start, direction, travel, other);
+    let blocks = |&other: &usize| enters(scene, part, start, direction, travel, other, &poll);
     let met = scene.broad_phase.meeting_of(&surroundings.standing, &swept);
-    Some(match met.into_iter().find(blocks) {
+    let blocking = met.into_iter().find(blocks);
+    // What was found of casts that were cut short is not to be believed.
+    termination.check()?;
+    Ok(Some(match blocking {
         Some(by) => Sweep::Blocked { by },
         None => Sweep::Clear { path: vec![*start, end], exit },
-    })
+    }))
 }
 
 fn moved(pose: &Pose, direction: &Vector3<f64>, travel: f64) -> Pose {
@@ -105,7 +116,7 @@ fn way_out(
     certified(far, hint).or_else(|| certified(beyond, Some(-direction)))
 }
 
-/// Whether the sweep enters a standing part.
+/// Whether the sweep enters a standing part; true, too, once the poll is over.
 fn enters(
     scene: &Scene,
     part: usize,
@@ -113,6 +124,7 @@ fn enters(
     direction: &Vector3<f64>,
     travel: f64,
     other: usize,
+    poll: &Poll<'_>,
 ) -> bool {
     let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
     let standing_from_moving = standing.planning_from_shape.inverse() * start;
@@ -121,7 +133,7 @@ fn enters(
     let backward = start.rotation.inverse() * -direction;
     let granted = scene.allowances.of(part, other) + DEPTH_TOLERANCE;
     let casts = |samples, target, to_target, along: &Vector3<f64>| {
-        let cast = Cast { target, to_target, along: *along, travel, granted };
+        let cast = Cast { target, to_target, along: *along, travel, granted, poll };
         cast.enters(samples)
     };
     casts(&moving.shape.oriented, &standing.shape.surface, standing_from_moving, &forward)
@@ -136,6 +148,7 @@ struct Cast<'a> {
     along: Vector3<f64>,
     travel: f64,
     granted: f64,
+    poll: &'a Poll<'a>,
 }
 
 impl Cast<'_> {
@@ -144,6 +157,9 @@ impl Cast<'_> {
         let along = self.to_target.rotation.inverse() * self.along;
         let corridor = self.corridor();
         samples.iter().any(|(point, normals)| {
+            if self.poll.is_over() {
+                return true;
+            }
             let leads = normals.iter().any(|n| n.dot(&along) > STEEPNESS);
             if !leads {
                 return false;
@@ -187,7 +203,19 @@ mod tests {
     fn swept(scene: &Scene, part: usize, direction: Vector3<f64>) -> Option<Sweep> {
         let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != part).collect();
         let around = Surroundings::new(scene, standing);
-        straight_sweep(scene, &around, part, &scene.bodies[part].planning_from_shape, &direction)
+        let start = &scene.bodies[part].planning_from_shape;
+        straight_sweep(scene, &around, part, start, &direction, &Termination::default()).unwrap()
+    }
+
+    #[test]
+    fn a_cancelled_sweep_claims_nothing() {
+        let (scene, _) = scene(peg_in_hole(0.0));
+        let around = Surroundings::new(&scene, vec![0]);
+        let termination = Termination::default();
+        termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+        let start = &scene.bodies[1].planning_from_shape;
+        let swept = straight_sweep(&scene, &around, 1, start, &Vector3::z(), &termination);
+        assert_eq!(swept, Err(Interrupt::Cancelled));
     }
 
     fn is_clear(scene: &Scene, part: usize, direction: Vector3<f64>) -> bool {

@@ -8,6 +8,7 @@
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::geometry::{Bounds, Pose, Surface, bisected};
+use crate::termination::{Interrupt, Poll, Termination};
 
 use super::{Body, Scene};
 
@@ -17,6 +18,8 @@ const ALIKE: f64 = 0.999_99;
 const FINENESS: f64 = 0.125;
 /// cos of the angle within which faces in contact look against each other (8 degrees).
 const OPPOSED: f64 = 0.99;
+/// Bits between two looks at the termination condition.
+const BITS_POLL: u32 = 16;
 /// Planes after which the search for more is given up: round fits have many, and threads more.
 const MOST_PLANES: usize = 64;
 
@@ -40,8 +43,18 @@ impl Touching {
 
     /// The planes of faces within `reach` (a gap in the planning frame) of a part at a pose; `standing`
     /// is ascending.
-    #[must_use]
-    pub fn of(scene: &Scene, part: usize, pose: &Pose, standing: &[usize], reach: f64) -> Self {
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn of(
+        scene: &Scene,
+        part: usize,
+        pose: &Pose,
+        standing: &[usize],
+        reach: f64,
+        termination: &Termination,
+    ) -> Result<Self, Interrupt> {
+        let poll = Poll::every(BITS_POLL, Some(termination));
         let body = &scene.bodies[part];
         let bounds = body.shape.bounds().transformed(pose).grown(reach);
         let parts = Self::near(scene, part, pose, standing, reach);
@@ -54,14 +67,18 @@ impl Touching {
                 (body, pose, still, &still.planning_from_shape, 1.0),
                 (still, &still.planning_from_shape, body, pose, -1.0),
             ] {
+                let bits = Vec::new();
                 let mut faces =
-                    Faces { asked, at, measured, stands, within, reach, deepest, bits: Vec::new() };
-                if !faces.planes(sense, &mut normals) {
-                    return Self { normals: None, parts };
+                    Faces { asked, at, measured, stands, within, reach, deepest, bits, poll: &poll };
+                let told = faces.planes(sense, &mut normals);
+                // What was found of faces that were cut short is not to be believed.
+                termination.check()?;
+                if !told {
+                    return Ok(Self { normals: None, parts });
                 }
             }
         }
-        Self { normals: Some(normals), parts }
+        Ok(Self { normals: Some(normals), parts })
     }
 }
 
@@ -82,6 +99,7 @@ struct Faces<'a> {
     deepest: f64,
     /// Bits still to be looked at, by their corners in the planning frame.
     bits: Vec<[Point3<f64>; 3]>,
+    poll: &'a Poll<'a>,
 }
 
 impl Faces<'_> {
@@ -94,6 +112,9 @@ impl Faces<'_> {
             let looks = self.at.rotation * surface.face_normal(t);
             self.bits.push(surface.corners(t).map(|p| self.at * p));
             while let Some(bit) = self.bits.pop() {
+                if self.poll.is_over() {
+                    return false;
+                }
                 if !Bounds::of(&bit).meets(&self.within) {
                     continue;
                 }
@@ -145,7 +166,15 @@ mod tests {
 
     fn normals(meshes: [SourceMesh; 2], reach: f64) -> Option<Vec<Unit<Vector3<f64>>>> {
         let (scene, _) = scene(meshes);
-        let found = Touching::of(&scene, 1, &scene.bodies[1].planning_from_shape, &[0], reach);
+        let found = Touching::of(
+            &scene,
+            1,
+            &scene.bodies[1].planning_from_shape,
+            &[0],
+            reach,
+            &Termination::default(),
+        )
+        .unwrap();
         assert_eq!(found.parts, [0]);
         found.normals
     }

@@ -75,7 +75,7 @@ fn measure(folder: &std::path::Path) -> Result<[Vec<f64>; 5], String> {
         let around = Surroundings::new(&scene, standing);
         let pose = scene.bodies[part].planning_from_shape;
         for action in &translations {
-            let sweep = || straight_sweep(&scene, &around, part, &pose, &action.force());
+            let sweep = || straight_sweep(&scene, &around, part, &pose, &action.force(), &never);
             times[1].push(timed(sweep).1);
         }
         for action in translations.iter().chain(&turning) {

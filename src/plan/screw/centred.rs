@@ -11,13 +11,14 @@ use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::geometry::{Helix, Pose, Surface, interpolate};
 use crate::simulation::Scene;
+use crate::termination::{Interrupt, Poll, Termination};
 
 use super::super::course::{Course, Interval};
 use super::super::sampling::turns_far;
-use super::FINEST;
 use super::envelope::{Envelope, Zone};
 use super::path::ScrewPath;
 use super::slip::{Facet, slipping};
+use super::{ENVELOPE_POLL, FINEST};
 
 /// So far from the helix, as a share of the pitch, a path has left it.
 const LEFT: f64 = 0.25;
@@ -35,12 +36,31 @@ const MOST_FURTHER: f64 = 2.0 * TAU;
 /// A path with the same start and end as a given one that turns along the thread which a part shares
 /// with one of those standing; `None` if there is no such thread, or no play in it. `limit` is the depth
 /// at which paths are refused.
+///
+/// # Errors
+/// The termination condition became true.
 pub(in crate::plan) fn centred(
     scene: &Scene,
     standing: &[usize],
     part: usize,
     path: &[Pose],
     limit: f64,
+    termination: &Termination,
+) -> Result<Option<Vec<Pose>>, Interrupt> {
+    let poll = Poll::every(ENVELOPE_POLL, Some(termination));
+    let path = proposed(scene, standing, part, path, limit, &poll);
+    // What profiles tell that were cut short is not to be believed.
+    termination.check()?;
+    Ok(path)
+}
+
+fn proposed(
+    scene: &Scene,
+    standing: &[usize],
+    part: usize,
+    path: &[Pose],
+    limit: f64,
+    poll: &Poll<'_>,
 ) -> Option<Vec<Pose>> {
     if !turns_far(path) {
         return None;
@@ -55,7 +75,7 @@ pub(in crate::plan) fn centred(
     let (_, thread) = standing
         .iter()
         .filter(|&&other| scene.allowances.of(part, other) == 0.0)
-        .filter_map(|&other| Thread::shared(scene, part, other, &followed, left))
+        .filter_map(|&other| Thread::shared(scene, (part, other), &followed, left, poll))
         .fold(None, |best: Option<(f64, Thread)>, (play, thread)| match best {
             Some(best) if best.0 >= play => Some(best),
             _ => Some((play, thread)),
@@ -96,11 +116,14 @@ impl Thread {
     /// The thread that a part on its way shares with one that stands, and the play in it.
     fn shared(
         scene: &Scene,
-        part: usize,
-        other: usize,
+        (part, other): (usize, usize),
         followed: &ScrewPath,
         left: f64,
+        poll: &Poll<'_>,
     ) -> Option<(f64, Self)> {
+        if poll.is_over() {
+            return None;
+        }
         let ScrewPath { helix: guess, reference, .. } = followed;
         let (moving, standing) = (&scene.bodies[part].shape.surface, &scene.bodies[other].shape.surface);
         let guess_from_standing = guess.axis_from_planning * scene.bodies[other].planning_from_shape;
@@ -124,7 +147,7 @@ impl Thread {
         let frame = helix.axis_from_planning;
         let envelope = |t: &[[Point3<f64>; 3]], frame: Pose| {
             let moved = t.iter().map(|c| c.map(|p| frame * p));
-            Envelope::new(moved, &helix, &zone)
+            Envelope::new(moved, &helix, &zone, poll)
         };
         let (one, two) = (envelope(&moving, frame * to_other), envelope(&standing, frame));
         let (play, shift) = two.widest_gap(&one, LEFT * helix.pitch().abs())?;

@@ -11,6 +11,7 @@ use std::f64::consts::TAU;
 use nalgebra::Point3;
 
 use crate::geometry::{Footprint, Helix, radii};
+use crate::termination::Poll;
 
 /// Slabs along the axis per pitch: what is elsewhere does not count.
 const SLABS: f64 = 4.0;
@@ -111,13 +112,21 @@ pub(super) struct Envelope {
 
 impl Envelope {
     /// The profile of triangles (axis frame) along a helix that rises, where another part can be
-    /// near: in `zone`.
-    pub(super) fn new(triangles: impl Iterator<Item = [Point3<f64>; 3]>, helix: &Helix, zone: &Zone) -> Self {
+    /// near: in `zone`. Once the poll is over the rest is left out.
+    pub(super) fn new(
+        triangles: impl Iterator<Item = [Point3<f64>; 3]>,
+        helix: &Helix,
+        zone: &Zone,
+        poll: &Poll<'_>,
+    ) -> Self {
         let pitch = helix.pitch().abs();
         let [near, far] = zone.across;
         let zone = Zone { across: [near - BESIDE * pitch, far + BESIDE * pitch], ..*zone };
         let mut envelope = Self { pitch, finest: pitch / BINS as f64, zone, first: 0, slabs: Vec::new() };
         for corners in triangles {
+            if poll.is_over() {
+                break;
+            }
             envelope.add(&corners, helix.rise);
         }
         envelope

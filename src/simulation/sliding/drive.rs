@@ -143,7 +143,7 @@ impl Drive {
         let mut close = here.near(surroundings, LIFT_REACH);
         for round in 0..LIFT_ROUNDS {
             let least = close.contacts.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
-            if round > 0 && least >= LIFT * 0.5 {
+            if mover.is_over() || round > 0 && least >= LIFT * 0.5 {
                 break;
             }
             let (rows, _) = self.chosen(&here, &close, &Vector6::zeros());
@@ -182,6 +182,9 @@ impl Drive {
         }
         let mut entered = Vec::new();
         for round in 0..if start == Start::Lazy { LAZY_ROUNDS } else { EAGER_ROUNDS } {
+            if mover.is_over() {
+                break;
+            }
             let Some(result) = self.projected(&target, &rows, round == 0) else { break };
             let touching = others(&result.active, &rows);
             let share = result.w.dot(&target) / target.norm_squared();

@@ -77,7 +77,7 @@ impl TransitionFunction for SlidingEngine {
             }
         }
         let drive = Drive::new(scene, part, start, action);
-        let mut mover = Mover::new(scene, part, *start);
+        let mut mover = Mover::new(scene, part, *start).until(termination);
         let (mut path, mut asked) = (vec![*start], Vec::new());
         let mut turning = Turning::new(&mover);
         let gather = |mover: &Mover<'_>| mover.near(surroundings, drive.reach());
@@ -89,7 +89,10 @@ impl TransitionFunction for SlidingEngine {
             let mut leap = leaper.follow(&mover);
             if leap.is_none() {
                 let here = near.take().unwrap_or_else(|| gather(&mover));
-                let step = match drive.advance(&mover, &here, &gather) {
+                let step = drive.advance(&mover, &here, &gather);
+                // What was found of contacts that were cut short is not to be believed.
+                termination.check()?;
+                let step = match step {
                     Step::Stuck { with } => {
                         return Ok(Motion::simulated(path, asked, End::Collision { with }));
                     }
@@ -108,6 +111,7 @@ impl TransitionFunction for SlidingEngine {
                 near = leap.near;
                 turned += leap.turned;
             }
+            termination.check()?;
             let hint = asked_again(&action, asked.len());
             asked.push(path.len() as u32 - 1);
             if let Some(d) = exit_direction(scene, surroundings, part, &mover.pose, hint) {
