@@ -102,6 +102,8 @@ pub struct RequestsConfig {
     pub waiting_per_client: usize,
     /// Plans of one client that are worked on at once; 0 for all workers but one.
     pub working_per_client: usize,
+    /// Seconds of workers' time per minute that one client may have; 0 for no limit.
+    pub work_s_per_client: f64,
     /// Megabytes that one upload may have.
     pub max_upload_mb: u64,
     /// Megabytes of uploads that may wait to be taken in.
@@ -124,6 +126,8 @@ pub struct TimesConfig {
     pub grace_s: f64,
     /// Seconds that cancelled requests then get to be answered.
     pub drain_s: f64,
+    /// Seconds after which a daemon ends that serves nobody any more.
+    pub hang_s: f64,
 }
 
 /// What is remembered.
@@ -202,6 +206,7 @@ impl Default for RequestsConfig {
             queue: 64,
             waiting_per_client: 8,
             working_per_client: 0,
+            work_s_per_client: 0.0,
             max_upload_mb: 1024,
             uploads_mb: 2048,
             uploads_mb_per_client: 1024,
@@ -213,7 +218,7 @@ impl Default for RequestsConfig {
 
 impl Default for TimesConfig {
     fn default() -> Self {
-        Self { tick_s: 1.0, grace_s: 2.0, drain_s: 10.0 }
+        Self { tick_s: 1.0, grace_s: 2.0, drain_s: 10.0, hang_s: 30.0 }
     }
 }
 
@@ -296,6 +301,7 @@ impl Config {
         within("requests.queue", self.requests.queue, 1..=4096, "1 to 4096")?;
         within("requests.waiting_per_client", self.requests.waiting_per_client, 1..=4096, "1 to 4096")?;
         within("requests.working_per_client", self.requests.working_per_client, 0..=256, "0 to 256")?;
+        within("requests.work_s_per_client", self.requests.work_s_per_client, 0.0..=86_400.0, "0 to 86400")?;
         within("requests.uploads_mb", self.requests.uploads_mb, 1..=65_536, "1 to 65536")?;
         let own = self.requests.uploads_mb_per_client;
         within("requests.uploads_mb_per_client", own, 1..=65_536, "1 to 65536")?;
@@ -306,7 +312,10 @@ impl Config {
         within("cache.memory_mb", self.cache.memory_mb, 0..=1_048_576, "0 to 1048576")?;
         within("times.tick_s", self.times.tick_s, 0.05..=60.0, "0.05 to 60")?;
         within("times.grace_s", self.times.grace_s, 0.0..=3600.0, "0 to 3600")?;
-        within("times.drain_s", self.times.drain_s, 0.1..=3600.0, "0.1 to 3600")
+        within("times.drain_s", self.times.drain_s, 0.1..=3600.0, "0.1 to 3600")?;
+        within("times.hang_s", self.times.hang_s, 1.0..=3600.0, "1 to 3600")?;
+        let least = 2.0 * self.times.tick_s;
+        within("times.hang_s", self.times.hang_s, least..=f64::MAX, "at least twice `times.tick_s`")
     }
 }
 

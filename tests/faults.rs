@@ -257,6 +257,57 @@ fn a_client_that_dies_while_uploading_or_holding_responses_costs_the_daemon_noth
     assert_eq!((status.running, status.queued), (0, 0));
 }
 
+#[test]
+fn an_upload_whose_daemon_dies_is_noticed_and_done_again_at_the_next() {
+    let mut daemon = Daemon::start();
+    let (two, lattice) = (Boxes::two(), Boxes::lattice(6));
+    let [impatient, patient] = [Duration::ZERO, HANG].map(|reconnect| {
+        let options = ConnectOptions { reconnect, timeout: HANG, ..options(&daemon.runtime_dir()) };
+        Client::connect_with(options).unwrap()
+    });
+    let base = impatient.upload(&two.assembly()).unwrap();
+    // The daemon takes nothing while it is stopped: both are under way when it dies.
+    daemon.signal(Signal::STOP);
+    std::thread::scope(|scope| {
+        let (added, lattice) = (vec![two.assembly().parts[0]], &lattice);
+        let lost = scope.spawn(move || {
+            let change = sbdp_client::Change { added, ..sbdp_client::Change::default() };
+            impatient.revise(base, &change).unwrap_err()
+        });
+        let done = scope.spawn(move || {
+            let handle = patient.upload(&lattice.assembly()).unwrap();
+            (handle, patient.restarts())
+        });
+        std::thread::sleep(Duration::from_millis(300));
+        daemon.kill_and_restart();
+        let lost = lost.join().unwrap();
+        assert!(matches!(lost, ClientError::DaemonDied { .. }), "{lost}");
+        let (handle, restarts) = done.join().unwrap();
+        assert_eq!(restarts, 1);
+        assert!(daemon.connect().knows(handle).unwrap());
+    });
+}
+
+#[test]
+fn a_daemon_never_meets_what_a_killed_one_left() {
+    let mut daemon = Daemon::start();
+    let place = |daemon: &Daemon| {
+        let endpoint = Endpoint::find(&daemon.runtime_dir()).unwrap();
+        (endpoint.prefix, endpoint.root)
+    };
+    let client = patient(&daemon);
+    plans(&client);
+    let (prefix, root) = place(&daemon);
+    daemon.kill_and_restart();
+    let (next_prefix, next_root) = place(&daemon);
+    assert!(next_prefix != prefix && next_root != root);
+    plans(&client);
+    assert_eq!(client.restarts(), 1);
+    drop(client);
+    let left = sbdp_ipc::layout::shared_memory_files(&prefix).unwrap();
+    assert!(left.is_empty() && !root.exists(), "{left:?}");
+}
+
 /// Runs a daemon and a client in that role where `mount` has been done, in namespaces of their own; none
 /// where these may not be had.
 fn mounted(mount: &str, role: &str) -> Option<std::process::Output> {

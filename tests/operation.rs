@@ -27,6 +27,12 @@ fn figures_tell_what_was_asked_and_how_long_it_took() {
     assert!(output.status.success(), "{output:?}");
     let figures: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((figures["pid"].as_u64(), figures["done"].as_u64()), (Some(u64::from(daemon.pid())), Some(2)));
+    assert_eq!(
+        (figures["clients"].as_u64(), figures["connections"].as_u64()),
+        (Some(2), Some(2)),
+        "and `sbdp`"
+    );
+    assert!(figures["shared_memory_free_bytes"].as_u64() != Some(0));
     for kind in ["plan", "remembered_plan", "upload"] {
         let latency = &figures["latency"][kind];
         assert_eq!(latency["count"], 1, "{kind}");

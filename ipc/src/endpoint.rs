@@ -174,7 +174,7 @@ pub fn default_runtime_dir() -> PathBuf {
 #[must_use]
 pub fn default_prefix(runtime_dir: &Path) -> String {
     let hash = blake3::hash(runtime_dir.as_os_str().as_encoded_bytes()).to_hex();
-    format!("sbdp_{}_", &hash[..12])
+    format!("sbdp_{}_", &hash[..8])
 }
 
 /// Creates the runtime folder with mode 0700, or checks the one that is there.

@@ -50,30 +50,58 @@ pub const PROGRESS_BUFFER: usize = 8;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LayoutError {
     /// The prefix is not a file name part.
-    #[error("prefix `{0}` is not usable: take 1 to 64 letters, digits, `_` or `-`")]
+    #[error("prefix `{0}` is not usable: take a few letters, digits, `_` or `-`, at most {LONGEST_PREFIX}")]
     Prefix(String),
     /// The root is not usable as a path.
-    #[error("root `{0}` is not usable: take an absolute path of at most 180 bytes")]
+    #[error(
+        "root `{0}` is not usable: take an absolute path that has, together with the prefix, at most \
+         {LONGEST_PLACE} bytes (sockets lie there, and their paths are short)"
+    )]
     Root(PathBuf),
 }
 
-/// The iceoryx2 configuration for a prefix and a root.
+/// Bytes that the prefix and the root may have together, as they are configured. The path of a socket has at
+/// most 107: root, tag and prefix with tag and their separators, an id of iceoryx2 (35 digits are more than a
+/// daemon comes to in years) and `.event`.
+pub const LONGEST_PLACE: usize = 107 - 2 * TAG - 3 - 35 - 6;
+/// Characters that a configured prefix may have.
+const LONGEST_PREFIX: usize = 30;
+/// Characters of the tag that a daemon adds to its prefix and its root, so that no two share files.
+pub const TAG: usize = 5;
+
+/// Checks the prefix and the root that a daemon is given.
+///
+/// # Errors
+/// Prefix or root are not usable.
+pub fn check_place(prefix: &str, root: &Path) -> Result<(), LayoutError> {
+    check(prefix, root, LONGEST_PLACE)
+}
+
+fn check(prefix: &str, root: &Path, longest: usize) -> Result<(), LayoutError> {
+    let sane = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if prefix.is_empty()
+        || prefix.len() > LONGEST_PREFIX + longest - LONGEST_PLACE
+        || !prefix.chars().all(sane)
+    {
+        return Err(LayoutError::Prefix(prefix.to_owned()));
+    }
+    if !root.is_absolute() || prefix.len() + root.as_os_str().len() > longest {
+        return Err(LayoutError::Root(root.to_owned()));
+    }
+    Ok(())
+}
+
+/// The iceoryx2 configuration for the prefix and root that `daemon.json` names.
 ///
 /// # Errors
 /// Prefix or root are not usable.
 pub fn iceoryx2_config(prefix: &str, root: &Path) -> Result<Config, LayoutError> {
-    let sane = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
-    if prefix.is_empty() || prefix.len() > 64 || !prefix.chars().all(sane) {
-        return Err(LayoutError::Prefix(prefix.to_owned()));
-    }
-    let root_bytes = root.as_os_str().as_encoded_bytes();
-    if !root.is_absolute() || root_bytes.len() > 180 {
-        return Err(LayoutError::Root(root.to_owned()));
-    }
+    check(prefix, root, LONGEST_PLACE + 2 * TAG + 2)?;
     let mut config = Config::default();
     config.global.prefix =
         FileName::new(prefix.as_bytes()).map_err(|_| LayoutError::Prefix(prefix.to_owned()))?;
-    let root_path = IoxPath::new(root_bytes).map_err(|_| LayoutError::Root(root.to_owned()))?;
+    let root_path =
+        IoxPath::new(root.as_os_str().as_encoded_bytes()).map_err(|_| LayoutError::Root(root.to_owned()))?;
     config.global.set_root_path(&root_path);
     Ok(config)
 }
@@ -91,4 +119,26 @@ pub fn shared_memory_files(prefix: &str) -> std::io::Result<Vec<PathBuf>> {
         }
     }
     Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_that_is_taken_leaves_sockets_room_for_their_paths() {
+        let (prefix, root) = ("sbdp_main_", Path::new("/run/user/1000/sbdp/iox/that/is/no/longer"));
+        assert_eq!(prefix.len() + root.as_os_str().len(), 51);
+        check_place(prefix, root).unwrap();
+        let socket = format!("{}/i1234/{prefix}i1234_{}.event", root.display(), "9".repeat(35));
+        assert!(socket.len() + LONGEST_PLACE - 51 <= 107);
+        let longer = root.join("abc");
+        let error = check_place(prefix, &longer).unwrap_err().to_string();
+        assert!(error.contains("at most 53 bytes"), "{error}");
+        for bad in ["", "a/b", "a.b", &"x".repeat(31)] {
+            assert!(matches!(check_place(bad, Path::new("/tmp")), Err(LayoutError::Prefix(_))), "{bad}");
+        }
+        assert!(matches!(check_place("a_", Path::new("tmp")), Err(LayoutError::Root(_))));
+        iceoryx2_config("sbdp_main_i1234_", &root.join("i1234")).unwrap();
+    }
 }

@@ -16,7 +16,7 @@ use sbdp_ipc::status::{Status, StatusHeader};
 use super::answers::{Answers, question};
 use super::closing::Closing;
 use super::convert;
-use super::figures::{Figures, Latencies};
+use super::figures::{Figures, Latencies, Surroundings};
 use super::intake::Upload;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::session::{End, Input, Link, Session, State};
@@ -105,6 +105,8 @@ pub(crate) struct Desk<L, P> {
     pub(super) counters: StatusHeader,
     preloaded: Vec<(String, [u8; 32])>,
     started: Instant,
+    /// What only the ports and the system know.
+    pub(crate) surroundings: Surroundings,
     /// Listeners to wake.
     pub(crate) wakes: Vec<u128>,
     /// Progress to publish.
@@ -134,6 +136,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
             counters,
             preloaded: Vec::new(),
             started: Instant::now(),
+            surroundings: Surroundings::default(),
             wakes: Vec::new(),
             samples: Vec::new(),
         }
@@ -233,8 +236,9 @@ impl<L: Link, P: Planning> Desk<L, P> {
             return Ok(());
         }
         let class = if wire.batch { Class::Batch } else { Class::Interactive };
-        let job =
-            PlanJob { key, assembly, question, moved: convert::moved(&wire.moved), request, termination };
+        let moved = convert::moved(&wire.moved);
+        let received = Instant::now();
+        let job = PlanJob { key, owner, received, assembly, question, moved, request, termination };
         let rejected = match self.queues.plans.push(Ticket { owner, class, bytes: 0 }, job) {
             Ok(()) => {
                 session.input(Input::Enqueue);
@@ -242,10 +246,13 @@ impl<L: Link, P: Planning> Desk<L, P> {
             }
             Err(rejected) => rejected,
         };
-        let busy = |message: String| WireError::busy(message, self.queues.plans.hint_ms());
+        let busy = |message: String| WireError::busy(message, self.queues.plans.hint_ms(owner));
         let error = match rejected {
             Rejected::Full => busy(format!("busy: {} requests wait already", self.queues.plans.len())),
             Rejected::OwnerFull => busy("busy: as many requests of this client wait as may wait".to_owned()),
+            Rejected::OwnerSpent => {
+                busy("busy: this client has had its share of the workers' time".to_owned())
+            }
             Rejected::Closed => self.shutting_down(),
         };
         Err((Input::Refuse, error))
@@ -351,10 +358,12 @@ impl<L: Link, P: Planning> Desk<L, P> {
             _ => &mut self.counters.failed,
         };
         *counter += 1;
-        if let Some((kind, time)) = session.timed() {
+        let timed = session.timed();
+        if let Some((kind, time)) = timed {
             self.latencies.add(kind, time);
         }
-        tracing::debug!(request = key.request, state = ?session.state(), "request over");
+        let total_ms = timed.map(|(_, time)| time.as_secs_f64() * 1e3);
+        tracing::debug!(request = key.request, state = ?session.state(), total_ms, "request over");
         // The request is let go before its client is woken, so that it sees the end.
         let listener = session.listener;
         drop(session);
@@ -382,6 +391,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
         Figures::of(
             &self.numbers(),
             open,
+            self.surroundings,
             &self.latencies,
             &self.preloaded,
             self.answers.figures(),

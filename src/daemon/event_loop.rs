@@ -16,13 +16,15 @@ use signal_hook::iterator::Signals;
 
 use super::DaemonError;
 use super::desk::{Desk, Event, Incoming};
+use super::figures::Surroundings;
 use super::intake::ticket;
-use super::lifecycle::{Lease, Place, raise_file_limit, warn_of_small_shared_memory};
+use super::lifecycle::{Lease, Place, SharedMemory, raise_file_limit};
 use super::metrics::Metrics;
 use super::ports::{ActiveLink, Ports};
 use super::request_queue::Owner;
 use super::shared_queue::Queues;
 use super::supervisor::Supervisor;
+use super::watchdog::{Watchdog, give_up};
 use super::workers::{AdmitJob, Planning, Report, WorkerEvent, start, start_prefetch};
 use crate::config::{Config, seconds};
 
@@ -30,6 +32,9 @@ use crate::config::{Config, seconds};
 /// Nobody's requests are taken twice before everybody's were taken once: iceoryx2 looks at the ports in
 /// the same order each time, but gives no more of one than it may have active.
 const RECEIVE_AT_ONCE: usize = (MAX_CLIENTS + 1) * PLAN_ACTIVE_REQUESTS;
+
+/// Between two looks for what clients of dead daemons left.
+const SWEEP: Duration = Duration::from_secs(60);
 
 /// Runs the daemon until SIGTERM or SIGINT.
 ///
@@ -56,11 +61,13 @@ pub fn run_reloading<P: Planning>(
     reload: Reload,
 ) -> Result<(), DaemonError> {
     raise_file_limit();
-    warn_of_small_shared_memory();
+    let mut shared_memory = SharedMemory::default();
+    shared_memory.look();
     let place = Place::of(&config.endpoint)?;
-    let iceoryx2 = place.iceoryx2_config()?;
-    let lease = Lease::take(place.clone(), &iceoryx2)?;
-    let ports = Ports::open(&iceoryx2)?;
+    let lease = Lease::take(place.clone())?;
+    let watchdog = watch(config, &place)?;
+    let ports = Ports::open(&lease.instance.iceoryx2_config()?)?;
+    lease.instance.close_to_others()?;
     let (sender, inbox) = channel();
     watch_signals(&ports, sender.clone())?;
     let queues = Queues::new(config);
@@ -85,15 +92,40 @@ pub fn run_reloading<P: Planning>(
     tracing::info!(
         pid = std::process::id(),
         runtime_dir = %place.runtime_dir.display(),
-        prefix = place.prefix,
+        prefix = lease.instance.prefix,
         "sbdpd is ready"
     );
     let desk = Desk::new(service, queues, config);
     let limits = ReceiveLimits::of(config);
     let tick = seconds(config.times.tick_s);
-    EventLoop { ports, desk, inbox, tick, limits, config: config.clone(), reload, metrics, supervisor }.run();
+    let config = config.clone();
+    let next_sweep = Instant::now() + SWEEP;
+    let event_loop = EventLoop {
+        ports,
+        desk,
+        inbox,
+        tick,
+        limits,
+        config,
+        reload,
+        metrics,
+        supervisor,
+        watchdog,
+        shared_memory,
+        lease: &lease,
+        next_sweep,
+    };
+    event_loop.run();
     tracing::info!("sbdpd has answered everybody and leaves");
     Ok(())
+}
+
+/// Ends this daemon if the port thread stands still, from the opening of its ports on.
+fn watch(config: &Config, place: &Place) -> Result<Watchdog, DaemonError> {
+    let limit = seconds(config.times.hang_s);
+    let place = place.runtime_dir.display().to_string();
+    Watchdog::start(limit, move || give_up(limit, &place))
+        .map_err(|source| DaemonError::System { what: "starting the watchdog", source })
 }
 
 /// What comes from other threads of this process.
@@ -148,7 +180,11 @@ impl ReceiveLimits {
     }
 }
 
-struct EventLoop<P> {
+struct EventLoop<'l, P> {
+    lease: &'l Lease,
+    next_sweep: Instant,
+    watchdog: Watchdog,
+    shared_memory: SharedMemory,
     ports: Ports,
     desk: Desk<ActiveLink, P>,
     inbox: Receiver<Inbound>,
@@ -160,7 +196,7 @@ struct EventLoop<P> {
     supervisor: Supervisor,
 }
 
-impl<P: Planning> EventLoop<P> {
+impl<P: Planning> EventLoop<'_, P> {
     fn run(mut self) {
         let mut next_tick = Instant::now() + self.tick;
         loop {
@@ -169,16 +205,12 @@ impl<P: Planning> EventLoop<P> {
             self.desk.settle(Instant::now());
             self.deliver();
             self.supervisor.alive();
+            self.watchdog.beat();
             if self.desk.is_closed() {
                 return;
             }
             if Instant::now() >= next_tick {
-                // A killed client is seen, and its memory given back, only by this.
-                let _ = self.ports.node.try_cleanup_dead_nodes();
-                self.ports.forget_owners();
-                if let Some(metrics) = &self.metrics {
-                    metrics.update(self.desk.figures().prometheus());
-                }
+                self.tick();
                 let tick = self.supervisor.patience().map_or(self.tick, |p| p.min(self.tick));
                 next_tick = Instant::now() + tick;
                 continue;
@@ -187,6 +219,27 @@ impl<P: Planning> EventLoop<P> {
                 self.wait(next_tick);
             }
         }
+    }
+
+    fn tick(&mut self) {
+        // A killed client is seen, and its memory given back, only by this.
+        let _ = self.ports.node.try_cleanup_dead_nodes();
+        self.ports.forget_owners();
+        if Instant::now() >= self.next_sweep {
+            self.next_sweep = Instant::now() + SWEEP;
+            self.lease.sweep();
+        }
+        self.look_around();
+        if let Some(metrics) = &self.metrics {
+            metrics.update(self.desk.figures().prometheus());
+        }
+    }
+
+    /// Brings up to date what the desk is to tell of its surroundings.
+    fn look_around(&mut self) {
+        let (connections, clients) = self.ports.clients();
+        let shared_memory_free = self.shared_memory.look();
+        self.desk.surroundings = Surroundings { connections, clients, shared_memory_free };
     }
 
     fn wait(&self, next_tick: Instant) {
@@ -246,6 +299,9 @@ impl<P: Planning> EventLoop<P> {
                 let owner = self.ports.owner_of(active.origin().value(), geometry);
                 let refuse = |length| self.desk.refuses_upload(owner, length);
                 let event = read(active, owner, geometry, self.limits, refuse);
+                if matches!(event, Event::Figures(_)) {
+                    self.look_around();
+                }
                 self.desk.handle(event, Instant::now());
                 // Whoever is answered already is not to wait for those behind.
                 self.deliver();

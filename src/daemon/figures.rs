@@ -99,6 +99,17 @@ struct LatencyFigures {
     p99_s: f64,
 }
 
+/// Who is connected, and what the system has left.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct Surroundings {
+    /// Connections of clients.
+    pub(crate) connections: usize,
+    /// Processes that these belong to.
+    pub(crate) clients: usize,
+    /// Bytes free in /dev/shm; none where it has no limit.
+    pub(crate) shared_memory_free: Option<u64>,
+}
+
 /// Everything, as `sbdp status --json` prints it.
 #[derive(Debug, Serialize)]
 pub(crate) struct Figures {
@@ -112,6 +123,10 @@ pub(crate) struct Figures {
     queue_limit: u32,
     /// Plan requests and uploads that are not over.
     open_requests: usize,
+    /// Processes that are connected, and their connections.
+    clients: usize,
+    connections: usize,
+    shared_memory_free_bytes: Option<u64>,
     requests: u64,
     done: u64,
     plans_remembered: u64,
@@ -139,6 +154,7 @@ impl Figures {
     pub(crate) fn of(
         n: &StatusHeader,
         open_requests: usize,
+        surroundings: Surroundings,
         latencies: &Latencies,
         preloaded: &[(String, [u8; 32])],
         answers: AnswerFigures,
@@ -164,6 +180,9 @@ impl Figures {
             queued: n.queued,
             queue_limit: n.queue_limit,
             open_requests,
+            clients: surroundings.clients,
+            connections: surroundings.connections,
+            shared_memory_free_bytes: surroundings.shared_memory_free,
             requests: n.requests,
             done: n.done,
             plans_remembered: n.remembered,
@@ -195,8 +214,11 @@ impl Figures {
             ("requests_waiting", f64::from(self.queued)),
             ("requests_waiting_limit", f64::from(self.queue_limit)),
             ("requests_open", self.open_requests as f64),
+            ("clients", self.clients as f64),
+            ("connections", self.connections as f64),
         ];
-        for (name, value) in gauges {
+        let free = self.shared_memory_free_bytes.map(|free| ("shared_memory_free_bytes", free as f64));
+        for (name, value) in gauges.into_iter().chain(free) {
             let _ = writeln!(text, "# TYPE sbdp_{name} gauge\nsbdp_{name} {value}");
         }
         let _ = writeln!(text, "# TYPE sbdp_plan_requests_total counter");
@@ -282,6 +304,7 @@ mod tests {
         let figures = Figures::of(
             &numbers,
             2,
+            Surroundings { connections: 3, clients: 2, shared_memory_free: Some(1 << 20) },
             &latencies,
             &[("frame".to_owned(), [0; 32])],
             AnswerFigures::default(),
@@ -297,6 +320,8 @@ mod tests {
             "sbdp_request_seconds_count{kind=\"plan\"} 1",
             "sbdp_cache_hits_total{kind=\"motion\"} 0",
             "sbdp_assemblies 0",
+            "sbdp_clients 2",
+            "sbdp_shared_memory_free_bytes 1048576",
         ] {
             assert!(text.lines().any(|l| l == line), "{line} in\n{text}");
         }

@@ -46,14 +46,15 @@ impl<L: Link, P: Planning> Desk<L, P> {
     /// Why an upload of so many bytes would not be taken now. Asked before they are copied.
     pub(crate) fn refuses_upload(&self, owner: Owner, bytes: usize) -> Option<WireError> {
         let rejected = self.queues.admissions.check(ticket(owner, bytes)).err()?;
-        Some(self.upload_rejected(rejected))
+        Some(self.upload_rejected(owner, rejected))
     }
 
-    fn upload_rejected(&self, rejected: Rejected) -> WireError {
-        let busy = |message: &str| WireError::busy(message, self.queues.admissions.hint_ms());
+    fn upload_rejected(&self, owner: Owner, rejected: Rejected) -> WireError {
+        let busy = |message: &str| WireError::busy(message, self.queues.admissions.hint_ms(owner));
         match rejected {
             Rejected::Closed => self.shutting_down(),
             Rejected::Full => busy("busy: too many uploads wait"),
+            Rejected::OwnerSpent => busy("busy: this client has had its share of the time for uploads"),
             Rejected::OwnerFull => busy("busy: too much of what this client uploaded waits already"),
         }
     }
@@ -75,7 +76,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
                 self.uploads.insert(number, Upload { link, header, deadline, received: Instant::now() });
             }
             Err(rejected) => {
-                let error = self.upload_rejected(rejected);
+                let error = self.upload_rejected(owner, rejected);
                 self.answer_error(&link, &header, &error);
             }
         }

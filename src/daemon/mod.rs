@@ -14,6 +14,7 @@ mod convert;
 mod desk;
 mod event_loop;
 mod figures;
+mod instance;
 mod intake;
 mod lifecycle;
 mod metrics;
@@ -24,6 +25,7 @@ mod request_queue;
 mod session;
 mod shared_queue;
 mod supervisor;
+mod watchdog;
 mod workers;
 
 pub(crate) use convert::source_assembly as uploaded_assembly;

@@ -1,6 +1,6 @@
 //! The daemon's iceoryx2 ports. Only the port thread holds them.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use iceoryx2::node::Node;
@@ -92,6 +92,17 @@ impl Ports {
         });
         self.owners.insert(client, owner);
         owner
+    }
+
+    /// Connections of clients, and the processes that they belong to.
+    pub(crate) fn clients(&self) -> (usize, usize) {
+        let (mut connections, mut processes) = (0, BTreeSet::new());
+        self.services[0].dynamic_config().list_clients(|details| {
+            connections += 1;
+            processes.extend(details.node_id.pid::<Transport>().ok().map(|pid| pid.value()));
+            CallbackProgression::Continue
+        });
+        (connections, processes.len())
     }
 
     /// Those that are still there are asked again.

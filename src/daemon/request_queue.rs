@@ -7,7 +7,7 @@
 //! times so waits for itself, not the others for it.
 
 use std::collections::HashMap;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A client, as far as quotas go: a process, however many ports it has.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -38,12 +38,14 @@ pub(crate) enum Rejected {
     Full,
     /// As many of this client wait as may wait of one.
     OwnerFull,
+    /// This client has had as much time of workers as it may have.
+    OwnerSpent,
     /// Nothing is taken any more.
     Closed,
 }
 
 /// What may wait and work at once.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bounds {
     /// Jobs that wait.
     pub(crate) waiting: usize,
@@ -59,6 +61,8 @@ pub(crate) struct Bounds {
     pub(crate) working_per_owner: usize,
     /// Batch jobs at work.
     pub(crate) working_batch: usize,
+    /// Seconds of work per minute that one client may have in the long run, and at once after a pause.
+    pub(crate) work_s_per_owner: Option<f64>,
 }
 
 /// So many interactive jobs go before a batch job that waits.
@@ -67,6 +71,10 @@ const PATIENCE: u32 = 16;
 const NEWEST: f64 = 0.2;
 /// The least and the most milliseconds that a client is told to wait.
 const HINT_MS: (f64, f64) = (10.0, 10_000.0);
+/// Work is shared out by the minute.
+const MINUTE_S: f64 = 60.0;
+/// The most for one that has had more than its share.
+const LONGEST_HINT_MS: f64 = 3_600_000.0;
 
 /// The queue.
 #[derive(Debug)]
@@ -81,12 +89,16 @@ pub(crate) struct RequestQueue<J> {
     passed: u32,
     mean_ms: f64,
     closed: bool,
+    /// The time up to which what clients have had was forgiven.
+    now: Instant,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Turns {
     working: usize,
     last: u64,
+    /// Seconds of work that this client had, less what was forgiven since.
+    spent_s: f64,
 }
 
 impl<J> RequestQueue<J> {
@@ -100,12 +112,27 @@ impl<J> RequestQueue<J> {
             passed: 0,
             mean_ms: 0.0,
             closed: false,
+            now: Instant::now(),
         }
+    }
+
+    /// Lets time pass: what clients have had of workers is forgiven at the rate at which they may have it.
+    pub(crate) fn pass_until(&mut self, now: Instant) {
+        let passed = now.saturating_duration_since(self.now).as_secs_f64();
+        self.now = self.now.max(now);
+        let Some(most) = self.bounds.work_s_per_owner else { return };
+        for turns in self.owners.values_mut() {
+            turns.spent_s = (turns.spent_s - most / MINUTE_S * passed).max(0.0);
+        }
+        self.forget_idle();
     }
 
     /// Other bounds from now on; what waits stays.
     pub(crate) fn rebound(&mut self, bounds: Bounds) {
         self.bounds = bounds;
+        if bounds.work_s_per_owner.is_none() {
+            self.owners.values_mut().for_each(|turns| turns.spent_s = 0.0);
+        }
     }
 
     /// Whether a job would be taken now.
@@ -121,6 +148,9 @@ impl<J> RequestQueue<J> {
                 own_bytes = own_bytes.saturating_add(other.bytes);
             }
         }
+        if self.overspent(ticket.owner) > 0.0 {
+            return Err(Rejected::OwnerSpent);
+        }
         let Bounds { waiting_per_owner, bytes_per_owner, .. } = self.bounds;
         if own >= waiting_per_owner || (own > 0 && own_bytes > bytes_per_owner) {
             return Err(Rejected::OwnerFull);
@@ -130,6 +160,11 @@ impl<J> RequestQueue<J> {
             return Err(Rejected::Full);
         }
         Ok(())
+    }
+
+    /// Seconds of work that a client has had beyond what it may have.
+    fn overspent(&self, owner: Owner) -> f64 {
+        self.bounds.work_s_per_owner.map_or(0.0, |most| self.turns_of(owner).spent_s - most)
     }
 
     pub(crate) fn push(&mut self, ticket: Ticket, job: J) -> Result<(), Rejected> {
@@ -171,7 +206,7 @@ impl<J> RequestQueue<J> {
         };
         let urgent = if self.passed < PATIENCE { Class::Interactive } else { Class::Batch };
         let rank = |(place, ticket): &(usize, Ticket)| {
-            let Turns { working, last } = self.turns_of(ticket.owner);
+            let Turns { working, last, .. } = self.turns_of(ticket.owner);
             (ticket.class != urgent, working, last, *place)
         };
         let tickets = self.waiting.iter().map(|(ticket, _)| *ticket).enumerate();
@@ -192,15 +227,31 @@ impl<J> RequestQueue<J> {
         }
         if let Some(turns) = self.owners.get_mut(&ticket.owner) {
             turns.working = turns.working.saturating_sub(1);
+            if self.bounds.work_s_per_owner.is_some() {
+                turns.spent_s += took.as_secs_f64();
+            }
         }
-        // Who neither waits nor works need not be known.
+        self.forget_idle();
+    }
+
+    /// Who neither waits nor works, and owes nothing, need not be known.
+    fn forget_idle(&mut self) {
         let waiting = &self.waiting;
-        self.owners.retain(|o, turns| turns.working > 0 || waiting.iter().any(|(t, _)| t.owner == *o));
+        let is_known = |owner: &Owner, turns: &Turns| {
+            turns.working > 0 || turns.spent_s > 0.0 || waiting.iter().any(|(t, _)| t.owner == *owner)
+        };
+        self.owners.retain(|owner, turns| is_known(owner, turns));
     }
 
     /// Milliseconds after which a client that was refused had better come again: when what waits will
-    /// about have been done.
-    pub(crate) fn hint_ms(&self) -> u32 {
+    /// about have been done, and what it has had beyond its share is forgiven.
+    pub(crate) fn hint_ms(&self, owner: Owner) -> u32 {
+        if let Some(most) = self.bounds.work_s_per_owner
+            && self.overspent(owner) > 0.0
+        {
+            let ms = self.overspent(owner) / most * MINUTE_S * 1e3;
+            return ms.clamp(HINT_MS.0, LONGEST_HINT_MS) as u32;
+        }
         let jobs = self.waiting.len().max(1) as f64;
         (self.mean_ms * jobs / self.bounds.workers.max(1) as f64).clamp(HINT_MS.0, HINT_MS.1) as u32
     }

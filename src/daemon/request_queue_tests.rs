@@ -12,6 +12,7 @@ const FREE: Bounds = Bounds {
     workers: 1,
     working_per_owner: 100,
     working_batch: 100,
+    work_s_per_owner: None,
 };
 
 fn of(owner: u64) -> Ticket {
@@ -161,16 +162,16 @@ fn waiting_bytes_are_bounded_in_all_and_per_client_but_one_always_fits() {
 #[test]
 fn the_hint_grows_with_what_waits_and_how_long_it_takes() {
     let mut queue = RequestQueue::new(Bounds { workers: 2, ..FREE });
-    assert_eq!(queue.hint_ms(), HINT_MS.0 as u32);
+    assert_eq!(queue.hint_ms(Owner(1)), HINT_MS.0 as u32);
     queue.push(of(1), 0).unwrap();
     let (ticket, _) = queue.pop().unwrap();
     queue.done(ticket, Duration::from_millis(400));
     (0..4).for_each(|n| queue.push(of(1), n).unwrap());
-    assert_eq!(queue.hint_ms(), 800);
+    assert_eq!(queue.hint_ms(Owner(1)), 800);
     queue.push(of(1), 0).unwrap();
     let (ticket, _) = queue.pop().unwrap();
     queue.done(ticket, Duration::from_secs(10_000));
-    assert_eq!(queue.hint_ms(), HINT_MS.1 as u32);
+    assert_eq!(queue.hint_ms(Owner(1)), HINT_MS.1 as u32);
 }
 
 #[test]
@@ -182,4 +183,24 @@ fn a_closed_queue_takes_nothing_but_gives_what_it_has() {
     assert!(!queue.is_over());
     assert_eq!(order(&mut queue), [1]);
     assert!(queue.is_over() && queue.owners.is_empty());
+}
+
+#[test]
+fn who_has_had_its_share_of_the_workers_is_told_when_there_is_more_and_others_are_not_kept_from_theirs() {
+    let mut queue = RequestQueue::new(Bounds { work_s_per_owner: Some(6.0), ..FREE });
+    let start = queue.now;
+    queue.push(of(1), 0).unwrap();
+    let (ticket, _) = queue.pop().unwrap();
+    queue.done(ticket, Duration::from_secs(9));
+    assert_eq!(queue.push(of(1), 1), Err(Rejected::OwnerSpent));
+    // 3 s too many, at 6 s a minute.
+    assert!((29_000..=31_000).contains(&queue.hint_ms(Owner(1))), "{}", queue.hint_ms(Owner(1)));
+    queue.push(of(2), 2).unwrap();
+    queue.pass_until(start + Duration::from_secs(29));
+    assert_eq!(queue.push(of(1), 3), Err(Rejected::OwnerSpent));
+    queue.pass_until(start + Duration::from_secs(31));
+    queue.push(of(1), 4).unwrap();
+    assert_eq!(order(&mut queue), [2, 4]);
+    queue.pass_until(start + Duration::from_secs(200));
+    assert!(queue.owners.is_empty(), "whoever owes nothing is forgotten");
 }

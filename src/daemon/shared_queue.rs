@@ -4,7 +4,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use super::prefetch::Prefetch;
-use super::request_queue::{Bounds, Rejected, RequestQueue, Ticket};
+use super::request_queue::{Bounds, Owner, Rejected, RequestQueue, Ticket};
 use super::workers::{AdmitJob, PlanJob};
 use crate::config::Config;
 
@@ -25,7 +25,7 @@ pub(crate) struct Working<'q, J> {
 
 impl<J> Drop for Working<'_, J> {
     fn drop(&mut self) {
-        self.queue.lock().done(self.ticket, self.started.elapsed());
+        self.queue.lock_now().done(self.ticket, self.started.elapsed());
         // What its client has waiting may go on now.
         self.queue.ready.notify_all();
     }
@@ -41,17 +41,24 @@ impl<J> SharedQueue<J> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The same, with the time that has passed.
+    fn lock_now(&self) -> MutexGuard<'_, RequestQueue<J>> {
+        let mut queue = self.lock();
+        queue.pass_until(Instant::now());
+        queue
+    }
+
     fn rebound(&self, bounds: Bounds) {
         self.lock().rebound(bounds);
         self.ready.notify_all();
     }
 
     pub(crate) fn check(&self, ticket: Ticket) -> Result<(), Rejected> {
-        self.lock().check(ticket)
+        self.lock_now().check(ticket)
     }
 
     pub(crate) fn push(&self, ticket: Ticket, job: J) -> Result<(), Rejected> {
-        self.lock().push(ticket, job)?;
+        self.lock_now().push(ticket, job)?;
         self.ready.notify_one();
         Ok(())
     }
@@ -88,8 +95,8 @@ impl<J> SharedQueue<J> {
         self.lock().len()
     }
 
-    pub(crate) fn hint_ms(&self) -> u32 {
-        self.lock().hint_ms()
+    pub(crate) fn hint_ms(&self, owner: Owner) -> u32 {
+        self.lock().hint_ms(owner)
     }
 }
 
@@ -122,6 +129,7 @@ fn bounds(config: &Config) -> [Bounds; 2] {
             most => most,
         },
         working_batch: share,
+        work_s_per_owner: Some(requests.work_s_per_client).filter(|most| *most > 0.0),
     };
     let admissions = Bounds {
         waiting: ADMISSION_QUEUE,
@@ -131,6 +139,7 @@ fn bounds(config: &Config) -> [Bounds; 2] {
         workers: 1,
         working_per_owner: 1,
         working_batch: 1,
+        work_s_per_owner: None,
     };
     [plans, admissions]
 }

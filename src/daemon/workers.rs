@@ -12,6 +12,7 @@ use sbdp_ipc::plan::Step;
 
 use super::answers::Answer;
 use super::convert;
+use super::request_queue::Owner;
 use super::shared_queue::Queues;
 use crate::geometry::{Pose, Revision, SourceAssembly, load_assembly};
 use crate::plan::{Plan, PlanStep};
@@ -138,6 +139,8 @@ pub(crate) struct SessionKey {
 #[derive(Debug)]
 pub(crate) struct PlanJob {
     pub(crate) key: SessionKey,
+    pub(crate) owner: Owner,
+    pub(crate) received: Instant,
     pub(crate) assembly: AssemblyId,
     /// What is remembered with its answer, if anything is to be.
     pub(crate) question: Option<Vec<u8>>,
@@ -267,7 +270,35 @@ impl PlanSink for Sink<'_> {
     }
 }
 
+/// The span of a request: whatever is logged while it is worked on names it.
+fn span(job: &PlanJob) -> tracing::Span {
+    let waited_ms = job.received.elapsed().as_secs_f64() * 1e3;
+    let assembly = format!(
+        "{:02x}{:02x}{:02x}{:02x}",
+        job.assembly.0[0], job.assembly.0[1], job.assembly.0[2], job.assembly.0[3]
+    );
+    tracing::info_span!("request", client = job.owner.0, request = job.key.request, assembly, waited_ms)
+}
+
+/// Tells how a request's plan came about: its stages, in seconds.
+fn log_plan(plan: &Plan) {
+    let stats = &plan.stats;
+    tracing::info!(
+        status = ?plan.status,
+        steps = plan.steps.len(),
+        simulations = stats.simulations,
+        sdf_s = stats.sdf_time_s,
+        overlap_s = stats.overlap_time_s,
+        static_analysis_s = stats.static_analysis_time_s,
+        path_s = stats.path_time_s,
+        verify_s = stats.verify_time_s,
+        total_s = stats.total_time_s,
+        "planned"
+    );
+}
+
 fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
+    let _span = span(job).entered();
     report(WorkerEvent::Started(job.key));
     let before = job.question.as_ref().and_then(|q| Some((q, Answer::from_messages(service.answered(q)?)?)));
     if let Some((question, answer)) = before {
@@ -284,13 +315,17 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
     });
     report(match planned {
         Ok(Ok(plan)) => {
+            log_plan(&plan);
             let again = job.question.clone().zip(Answer::of(&plan));
             if let Some((question, answer)) = &again {
                 service.remember(question, answer.messages());
             }
             WorkerEvent::Planned(job.key, Arc::new(convert::summary(&plan, &plan.stats)), again)
         }
-        Ok(Err(error)) => WorkerEvent::Unplanned(job.key, convert::service_error(&error)),
+        Ok(Err(error)) => {
+            tracing::info!(%error, "not planned");
+            WorkerEvent::Unplanned(job.key, convert::service_error(&error))
+        }
         Err(panic) => WorkerEvent::Unplanned(job.key, panic),
     });
 }

@@ -22,6 +22,7 @@
 //! Everything blocks, with timeouts; every [`ClientError`] says what to do.
 
 mod client;
+mod connection;
 mod content_hash;
 mod error;
 mod exchange;

@@ -48,8 +48,8 @@ impl Client {
     fn await_daemon(&self, error: ClientError) -> Result<(), ClientError> {
         let until = Instant::now() + self.options.reconnect;
         loop {
-            match self.refresh_endpoint() {
-                Ok(()) => return Ok(()),
+            match self.connection() {
+                Ok(_) => return Ok(()),
                 Err(e) if !e.is_no_daemon() => return Err(e),
                 Err(_) if Instant::now() >= until => return Err(error),
                 Err(_) => std::thread::sleep(LOOK),

@@ -1,8 +1,8 @@
 //! A plan as it comes in.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use iceoryx2::prelude::EventId;
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::Assembly;
@@ -13,6 +13,7 @@ use sbdp_ipc::progress::{STAGE_SDF, STAGE_TRANSFER};
 use sbdp_ipc::services::{Answer, Pending};
 
 use crate::client::Client;
+use crate::connection::{Connection, SLICE};
 use crate::error::ClientError;
 use crate::options::{Handle, PlanOptions};
 use crate::patience::{Again, Patience};
@@ -68,14 +69,13 @@ pub enum Event<'s> {
 #[derive(Debug)]
 pub struct PlanStream<'c> {
     client: &'c Client,
+    connection: Arc<Connection>,
     /// It is the client's one plan.
     is_open: bool,
     pending: Option<Pending>,
     /// The last control request: it must live until the daemon saw it or a newer one.
     control: Option<Pending>,
     request: u64,
-    /// Whose chunks these are.
-    server: Option<u128>,
     received: u64,
     granted: u64,
     cancel_wanted: bool,
@@ -163,17 +163,18 @@ impl Client {
         if question.bytes.len() > PLAN_REQUEST {
             return Err(ClientError::RequestTooLong { bytes: question.bytes.len() });
         }
+        let connection = self.known_connection();
         if self.planning.replace(true) {
             return Err(ClientError::StreamOpen);
         }
         // From here on the stream lets the client go, however this ends.
         let mut stream = PlanStream {
             client: self,
+            connection,
             is_open: true,
             pending: None,
             control: None,
             request: 0,
-            server: None,
             received: 0,
             granted: 0,
             cancel_wanted: false,
@@ -198,13 +199,14 @@ impl PlanStream<'_> {
         self.parts = None;
         self.control = None;
         self.pending = None;
-        self.server = None;
         (self.received, self.granted, self.next_step) = (0, 0, 0);
         self.request = self.client.new_request();
-        let header = self.client.header(RequestKind::Plan, self.request);
-        let (port, bytes) = (&self.client.plan_port, &self.question.bytes);
-        self.pending =
-            Some(self.client.send("plan", port, header, bytes.len(), |out| out.copy_from_slice(bytes))?);
+        self.connection = self.client.connection()?;
+        let header = Client::header(RequestKind::Plan, self.request);
+        let (connection, bytes) = (&self.connection, &self.question.bytes);
+        let fill = |out: &mut [u8]| out.copy_from_slice(bytes);
+        let timeout = self.client.options.timeout;
+        self.pending = Some(connection.send("plan", &connection.plan, header, bytes.len(), fill, timeout)?);
         Ok(())
     }
 
@@ -296,7 +298,7 @@ impl PlanStream<'_> {
                 return Ok(Some(Found::Step(index)));
             }
             let Some(pending) = self.pending.as_ref() else { return Ok(None) };
-            if let Some(answer) = self.client.try_receive(pending)? {
+            if let Some(answer) = self.connection.try_receive(pending)? {
                 if let Some(found) = self.take(answer)? {
                     return Ok(Some(found));
                 }
@@ -310,7 +312,7 @@ impl PlanStream<'_> {
             if deadline.is_some_and(|d| now >= d) {
                 return Err(ClientError::Timeout { what: "plan", after: timeout });
             }
-            self.client.sleep(deadline.unwrap_or(now + crate::exchange::SLICE));
+            self.connection.sleep(deadline.unwrap_or(now + SLICE));
         }
     }
 
@@ -331,12 +333,6 @@ impl PlanStream<'_> {
     /// Takes a chunk in.
     fn take(&mut self, answer: Answer) -> Result<Option<Found>, ClientError> {
         let header = *answer.user_header();
-        // A request that was under way when a daemon died may reach the next one, too: what both have sent
-        // is no stream.
-        let server = answer.origin().value();
-        if *self.server.get_or_insert(server) != server {
-            return Err(ClientError::DaemonDied { pid: self.client.pid() });
-        }
         if header.sequence != self.received {
             return Err(ClientError::Protocol(format!(
                 "chunk {} came where {} was due",
@@ -411,10 +407,10 @@ impl PlanStream<'_> {
             return;
         }
         self.control = None;
-        let mut header = self.client.header(RequestKind::Control, self.request);
+        let mut header = Client::header(RequestKind::Control, self.request);
         header.consumed = self.received;
         header.flags = if self.cancel_wanted { CONTROL_CANCEL } else { 0 };
-        if let Some(pending) = self.client.try_send_control(header) {
+        if let Some(pending) = self.connection.try_send_control(header) {
             self.control = Some(pending);
             self.granted = self.received;
             self.cancel_sent = self.cancel_wanted;
@@ -422,8 +418,8 @@ impl PlanStream<'_> {
     }
 
     fn progress(&self) -> Option<Progress> {
-        let me = self.client.plan_port.id().value();
-        while let Ok(Some(sample)) = self.client.progress.receive() {
+        let me = self.connection.plan.id().value();
+        while let Ok(Some(sample)) = self.connection.progress.receive() {
             if id_of_words(sample.client) == me && sample.request == self.request {
                 return Some(Progress {
                     stage: match sample.stage {
@@ -450,7 +446,7 @@ impl PlanStream<'_> {
         }
         if self.pending.take().is_some() {
             // The daemon asks whether we are still there when it is woken, not before.
-            let _ = self.client.notifier.notify_with_custom_event_id(EventId::new(0));
+            self.connection.wake_daemon();
         }
     }
 }

@@ -7,7 +7,8 @@ use sbdp_ipc::headers::RequestKind;
 use sbdp_ipc::plan::Waypoint;
 use sbdp_ipc::revision::Revision;
 
-use crate::client::{Client, client_port};
+use crate::client::Client;
+use crate::connection::Through;
 use crate::content_hash;
 use crate::error::ClientError;
 use crate::options::{Handle, moved_part};
@@ -49,9 +50,9 @@ impl Client {
     /// # Errors
     /// The daemon is gone or gives no answer.
     pub fn knows(&self, handle: Handle) -> Result<bool, ClientError> {
-        let header = self.header(RequestKind::Have, 0);
+        let header = Self::header(RequestKind::Have, 0);
         let fill = |out: &mut [u8]| out.copy_from_slice(&handle.0);
-        let answer = self.ask("have", &self.ask_port, header, handle.0.len(), fill, self.options.timeout)?;
+        let answer = self.ask("have", Through::Ask, header, handle.0.len(), fill, self.options.timeout)?;
         let response: HandleResponse = Reader::new(answer.as_slice())?.value("handle")?;
         Ok(response.known != 0)
     }
@@ -87,15 +88,15 @@ impl Client {
         encode: impl Fn(&mut [u8]) -> bool,
     ) -> Result<Handle, ClientError> {
         check_shared_memory(length as u64)?;
-        let port = client_port(&self.geometry, length)?;
-        let mut header = self.header(kind, 0);
+        let mut header = Self::header(kind, 0);
         // Nobody reads what comes later.
         header.consumed = clock::deadline_in(self.options.upload_timeout);
         let fill = |out: &mut [u8]| {
             let fits = encode(out);
             debug_assert!(fits, "the port was made as long as the message");
         };
-        let answer = self.ask(what, &port, header, length, fill, self.options.upload_timeout)?;
+        let answer =
+            self.ask(what, Through::Upload(length), header, length, fill, self.options.upload_timeout)?;
         let response: HandleResponse = Reader::new(answer.as_slice())?.value("handle")?;
         Ok(Handle(response.handle))
     }

@@ -23,7 +23,7 @@ pub(super) struct Place {
 
 impl Place {
     pub(super) fn new(name: &str) -> Result<Self, BenchError> {
-        let folder = std::env::temp_dir().join(format!("sbdp-bench-{}-{name}", std::process::id()));
+        let folder = std::env::temp_dir().join(format!("sbdp-{}-{name}", std::process::id()));
         std::fs::create_dir(&folder).map_err(|e| BenchError::file(&folder, &e))?;
         Ok(Self { folder })
     }

@@ -62,7 +62,7 @@ const PAUSE_MS: u64 = 250;
 /// A process cannot be started.
 pub fn soak(request: &SoakRequest) -> Result<Soak, BenchError> {
     let undisturbed = {
-        let daemon = Server::daemon(Place::new("soak-undisturbed")?)?;
+        let daemon = Server::daemon(Place::new("calm")?)?;
         run_to_the_end(&Start::new(&request.load, &daemon)?)?
     };
     let mut daemon = Server::daemon(Place::new("soak")?)?;
