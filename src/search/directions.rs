@@ -37,6 +37,13 @@ const WORLD_PREFERENCE: f64 = 1.2;
 /// Axes of askew parts beyond the frame, at most.
 const MOST_EXTRA: usize = 3;
 
+/// The axes along which a search of some parts of an assembly moves them: a right-angled frame, the world's
+/// where surfaces do not agree on another, and those of parts that stand askew in it.
+#[must_use]
+pub fn axes_of(scene: &Scene, present: &[usize]) -> Vec<Axis> {
+    Directions::of(scene, present).axes
+}
+
 /// The directions that a search draws from the geometry.
 #[derive(Debug, Clone)]
 pub(super) struct Directions {
