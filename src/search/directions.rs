@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Unit, Vector3};
 
 use crate::geometry::Shape;
 use crate::simulation::{Axis, Scene};
-use crate::termination::Termination;
+use crate::termination::{Interrupt, Termination};
 
 /// cos of the angle within which two directions are one (a quarter of a degree).
 const ALIKE: f64 = 0.999_99;
@@ -39,9 +39,13 @@ const MOST_EXTRA: usize = 3;
 
 /// The axes along which a search of some parts of an assembly moves them: a right-angled frame, the world's
 /// where surfaces do not agree on another, and those of parts that stand askew in it.
-#[must_use]
-pub fn axes_of(scene: &Scene, present: &[usize]) -> Vec<Axis> {
-    Directions::of(scene, present).axes
+///
+/// # Errors
+/// The termination condition became true.
+pub fn axes_of(scene: &Scene, present: &[usize], termination: &Termination) -> Result<Vec<Axis>, Interrupt> {
+    let directions = Directions::of(scene, present, termination);
+    termination.check()?;
+    Ok(directions.axes)
 }
 
 /// The directions that a search draws from the geometry.

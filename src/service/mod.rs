@@ -260,7 +260,8 @@ impl Service {
         let scene = &prepared.scene;
         let there = |part: &usize| removed.binary_search(part).is_err();
         let present: Vec<usize> = (0..scene.bodies.len()).filter(there).collect();
-        let axes = axes.map_or_else(|| axes_of(scene, &present), <[Axis]>::to_vec);
+        let found = axes.map_or_else(|| axes_of(scene, &present, termination), |axes| Ok(axes.to_vec()));
+        let Ok(axes) = found else { return Ok(None) };
         let translations = &Action::translations_along(&axes);
         let analysis = Analysis { rule: StaticAnalysis::default(), scene, translations, recall: &recall };
         let blockages = analysis.initial_blockages(&present, &|part| least_travel(scene, part), termination);
