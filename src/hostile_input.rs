@@ -13,6 +13,7 @@ use sbdp_ipc::summary::SummaryView;
 use crate::config::Config;
 use crate::daemon::uploaded_assembly;
 use crate::geometry::{self, Assembly, SourceAssembly, SourceMesh, SourcePart};
+use crate::view::{self, Scene, Up, read_plan};
 
 /// A reader.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -39,11 +40,13 @@ pub enum Reader {
     Records,
     /// `daemon.json`.
     Endpoint,
+    /// Plans as JSON, told and drawn.
+    Plan,
 }
 
 impl Reader {
     /// All of them.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Messages,
         Self::Meshes,
         Self::Admission,
@@ -55,6 +58,7 @@ impl Reader {
         Self::Config,
         Self::Records,
         Self::Endpoint,
+        Self::Plan,
     ];
 
     /// Reads bytes. What came of it, in words: different words for different ways through the reader.
@@ -82,6 +86,7 @@ impl Reader {
             Self::Endpoint => {
                 said(serde_json::from_slice::<sbdp_ipc::endpoint::Endpoint>(bytes).map_err(|e| e.to_string()))
             }
+            Self::Plan => String::from_utf8(bytes.to_vec()).map_or_else(|e| e.to_string(), |t| plan(&t)),
         }
     }
 }
@@ -137,4 +142,34 @@ fn admitted(source: &SourceAssembly) -> String {
 
 fn config(text: &str) -> String {
     said(Config::parse(text, Path::new("config.toml")).map_err(|e| e.to_string()))
+}
+
+/// Plans of more parts are read, but not drawn.
+const FEW_PARTS: usize = 8;
+
+/// A plan is told, and drawn with a tetrahedron for every part.
+fn plan(text: &str) -> String {
+    let plan = match read_plan(text) {
+        Ok(plan) => plan,
+        Err(error) => return error.to_string(),
+    };
+    let words = view::steps::markdown(&plan, None);
+    if plan.parts.len() > FEW_PARTS || words.is_empty() {
+        return "many parts".to_owned();
+    }
+    let part = |name: &String| SourcePart { name: name.clone(), origin: "a.obj".into(), mesh: tetrahedron() };
+    let parts = plan.parts.iter().map(part).collect();
+    let assembly = Assembly::new(&SourceAssembly { parts, ..SourceAssembly::default() });
+    said(assembly.map_err(|e| e.to_string()).and_then(|assembly| {
+        let scene = Scene::new(&assembly, Up::Z, &plan).map_err(|e| e.to_string())?;
+        view::page::page(&scene, &plan.parts, &[]).map_err(|e| e.to_string())?;
+        view::glb::glb(&scene).map_err(|e| e.to_string())
+    }))
+}
+
+fn tetrahedron() -> SourceMesh {
+    SourceMesh {
+        vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+    }
 }

@@ -20,3 +20,4 @@ pub mod simulation;
 pub mod telemetry;
 pub mod termination;
 mod upload;
+pub mod view;

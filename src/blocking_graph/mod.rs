@@ -6,9 +6,11 @@
 
 mod audit;
 mod blockage;
+mod graph;
 mod literal;
 mod static_analysis;
 
 pub use audit::{Audit, audit};
 pub use blockage::{Blockage, Evaluation};
+pub use graph::DirectionalGraph;
 pub use static_analysis::{Analysis, StaticAnalysis};

@@ -16,12 +16,14 @@ use crate::search;
 mod load;
 mod poses;
 mod through_daemon;
+mod view;
 
 use poses::{moved, rotation};
 
 pub(super) use load::{BenchCancel, BenchLoad, BenchLoadClient, BenchSoak};
 pub(super) use poses::placed;
 pub(super) use through_daemon::{BenchChurn, BenchLatency, BenchRawPeer, BenchReplan, BenchRestart};
+pub(super) use view::{GraphArguments, StepsArguments, ViewArguments};
 
 /// Plans how assemblies come apart.
 #[derive(Debug, Parser)]
@@ -43,6 +45,12 @@ pub(super) enum Command {
     Check(CheckArguments),
     /// Tell in words what a search did, from its trace
     Explain(ExplainArguments),
+    /// Show a plan as a page: one HTML file that plays it and needs no network
+    View(Box<ViewArguments>),
+    /// Draw who blocks whom in which direction
+    Graph(GraphArguments),
+    /// Tell a plan as instructions in words (Markdown)
+    Steps(StepsArguments),
     /// Say how the running daemon is
     Status(super::status::StatusArguments),
     /// Look at a configuration of the daemon
@@ -65,6 +73,9 @@ pub(super) struct PlanArguments {
     /// Write the plan there as JSON (contract sbdp-plan/1); `-` writes it to stdout in place of the table
     #[arg(long, value_name = "FILE")]
     pub(super) json: Option<PathBuf>,
+    /// Also write the plan there as a glTF scene in motion (GLB)
+    #[arg(long, value_name = "FILE")]
+    pub(super) glb: Option<PathBuf>,
     /// Which search
     #[arg(long, value_enum, default_value_t)]
     pub(super) planner: Planner,

@@ -1,7 +1,7 @@
 //! The command line `sbdp`.
 //!
 //! `plan` asks the daemon if one runs, else a service in this process; `check` always works
-//! here; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
+//! here; `view`, `graph` and `steps` show; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
 
 mod args;
 mod backend;
@@ -12,6 +12,7 @@ mod config;
 mod daemon;
 mod error;
 mod explain;
+mod graph;
 mod interrupt;
 mod listener;
 mod part_names;
@@ -20,9 +21,13 @@ mod progress;
 mod report;
 mod staging;
 mod status;
+mod steps;
+mod subject;
 mod table;
+mod view;
 
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -37,6 +42,9 @@ pub fn run() -> ExitCode {
         Command::Plan(arguments) => plan::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
+        Command::View(arguments) => view::run(&arguments),
+        Command::Graph(arguments) => graph::run(&arguments),
+        Command::Steps(arguments) => steps::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Cache(arguments) => cache::run(&arguments),
@@ -57,4 +65,9 @@ fn print(text: &str) -> Result<(), CliError> {
         }
         _ => Ok(()),
     }
+}
+
+/// Writes a file whole.
+fn written(file: &Path, bytes: &[u8]) -> Result<(), CliError> {
+    std::fs::write(file, bytes).map_err(|e| CliError::Failed(format!("{}: {e}", file.display())))
 }

@@ -1,6 +1,6 @@
 //! `sbdp plan`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -11,14 +11,38 @@ use super::error::{CliError, exit_code};
 use super::listener::Listener;
 use super::part_names::{part_named, resolve};
 use super::staging::staging;
-use super::{cache, interrupt, print, report};
-use crate::geometry::{Revision, SourceAssembly, load_assembly, pose_from_waypoint};
+use super::subject::Subject;
+use super::{cache, interrupt, print, report, written};
+use crate::geometry::{Revision, SourceAssembly, SourceMesh, load_assembly, pose_from_waypoint};
 use crate::plan::Plan;
-use crate::plan::export::PlanDocument;
+use crate::plan::export::{PlanDocument, SourceDocument};
 use crate::search::{PlanRequest, Planner, Termination};
 use crate::simulation::PenaltyParameters;
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
+    let planned = planned(arguments)?;
+    write_files(arguments, &planned)?;
+    if arguments.json.as_deref() != Some(Path::new(STDOUT)) {
+        print(&report::plan(&planned.revised, &planned.plan))?;
+    }
+    Ok(exit_code(planned.plan.status))
+}
+
+/// The name of the file that is stdout.
+const STDOUT: &str = "-";
+
+/// A plan with all that is needed to show it.
+pub(super) struct Planned {
+    /// The plan.
+    pub(super) plan: Plan,
+    /// The assembly that it is about, with what differs.
+    revised: SourceAssembly,
+    /// The plan in the words of its contract, with the assembly before what differs.
+    pub(super) subject: Subject,
+}
+
+/// Plans as the arguments say, wherever they say.
+pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let deadline = arguments.timeout.and_then(|t| Instant::now().checked_add(t));
     let termination = Termination::new(deadline);
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
@@ -38,8 +62,22 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     let plan = backend.plan(&question, &mut listener);
     listener.finish()?;
     let plan = plan?;
-    write_results(arguments.json.as_deref(), &revised, &plan)?;
-    Ok(exit_code(plan.status))
+    let revision = question.revision;
+    let document = PlanDocument { source: Some(source(arguments)), ..PlanDocument::new(&plan) };
+    Ok(Planned { plan, revised, subject: Subject::new(assembly, revision, document) })
+}
+
+/// Where the meshes are, for who reads the plan later and elsewhere.
+fn source(arguments: &PlanArguments) -> SourceDocument {
+    let absolute =
+        |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone()).display().to_string();
+    let replaced = arguments.replaced.iter().map(|(part, file)| (part.clone(), absolute(file)));
+    SourceDocument {
+        assembly: absolute(&arguments.assembly),
+        rotate: arguments.rotate.map(|q| [q.w, q.i, q.j, q.k]),
+        replaced: replaced.collect(),
+        added: arguments.added.iter().map(absolute).collect(),
+    }
 }
 
 fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanRequest, CliError> {
@@ -70,18 +108,10 @@ fn revision(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<Revi
         .moved
         .iter()
         .map(|(name, motion)| Ok((part_named(assembly, "--moved", name)?, pose_from_waypoint(motion))));
-    let replaced = arguments.replaced.iter().map(|(name, file)| {
-        let place = part_named(assembly, "--replaced", name)?;
-        let mut parts = load_assembly(file)?.parts;
-        match (parts.pop(), parts.len()) {
-            (Some(part), 0) => Ok((place, part.mesh)),
-            (_, rest) => Err(CliError::Refused(format!(
-                "--replaced: `{}` has {} parts where one is wanted",
-                file.display(),
-                rest + 1
-            ))),
-        }
-    });
+    let replaced = arguments
+        .replaced
+        .iter()
+        .map(|(name, file)| Ok((part_named(assembly, "--replaced", name)?, only_mesh(file, "--replaced")?)));
     let added = arguments.added.iter().map(|path| Ok(load_assembly(path)?.parts));
     Ok(Revision {
         moved: moved.collect::<Result<_, CliError>>()?,
@@ -126,15 +156,26 @@ fn choose_backend(arguments: &PlanArguments) -> Result<Box<dyn Backend>, CliErro
     }
 }
 
-fn write_results(json: Option<&Path>, assembly: &SourceAssembly, plan: &Plan) -> Result<(), CliError> {
-    let Some(file) = json else { return print(&report::plan(assembly, plan)) };
-    let mut text = PlanDocument::new(plan)
-        .to_json()
-        .map_err(|e| CliError::Failed(format!("cannot write the plan as JSON: {e}")))?;
-    text.push('\n');
-    if file == Path::new("-") {
-        return print(&text);
+/// The mesh of a file that has just one.
+pub(super) fn only_mesh(file: &Path, option: &str) -> Result<SourceMesh, CliError> {
+    let mut parts = load_assembly(file)?.parts;
+    match (parts.pop(), parts.len()) {
+        (Some(part), 0) => Ok(part.mesh),
+        (_, rest) => Err(CliError::Refused(format!(
+            "{option}: `{}` has {} parts where one is wanted",
+            file.display(),
+            rest + 1
+        ))),
     }
-    std::fs::write(file, text).map_err(|e| CliError::Failed(format!("{}: {e}", file.display())))?;
-    print(&report::plan(assembly, plan))
+}
+
+/// Writes the plan to the files that the arguments name.
+pub(super) fn write_files(arguments: &PlanArguments, planned: &Planned) -> Result<(), CliError> {
+    if let Some(file) = &arguments.glb {
+        written(file, &planned.subject.glb()?)?;
+    }
+    let Some(file) = &arguments.json else { return Ok(()) };
+    let json = planned.subject.plan.to_json();
+    let text = json.map_err(|e| CliError::Failed(format!("cannot write the plan as JSON: {e}")))? + "\n";
+    if file == Path::new(STDOUT) { print(&text) } else { written(file, text.as_bytes()) }
 }

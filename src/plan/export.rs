@@ -20,6 +20,9 @@ pub struct PlanDocument {
     /// `disassembly` or `assembly`.
     #[serde(default = "disassembly")]
     pub kind: String,
+    /// Where the meshes are, if that is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<SourceDocument>,
     /// `complete`, `partial`, `infeasible`, `timeout` or `cancelled`.
     pub status: String,
     /// Why it is not complete.
@@ -57,6 +60,22 @@ fn disassembly() -> String {
     PlanKind::Disassembly.name().to_owned()
 }
 
+/// The files that the meshes came from, and what was done to them before planning, but for `initial.poses`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct SourceDocument {
+    /// The file or folder of the assembly.
+    pub assembly: String,
+    /// The quaternion `[w, x, y, z]` by which all was turned about the origin (`--rotate`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rotate: Option<[f64; 4]>,
+    /// Parts with the mesh of another file (`--replaced`).
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub replaced: BTreeMap<String, String>,
+    /// Files and folders of further parts (`--added`).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub added: Vec<String>,
+}
+
 /// The state that planning began with, where it differs from the assembly as given.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct InitialDocument {
@@ -78,6 +97,10 @@ pub struct StepDocument {
     pub path: Vec<Waypoint>,
     /// Deepest penetration along the path beyond the pair's assembled depth.
     pub verified_depth: f64,
+    /// Parts that had blocked this one, in whichever direction, and left before it; in an assembly plan, parts
+    /// that this one would have blocked and that came before it.
+    #[serde(default)]
+    pub waited_for: Vec<String>,
 }
 
 /// A part that remains and what blocks it.
@@ -214,6 +237,7 @@ impl PlanDocument {
         Self {
             schema: SCHEMA.to_owned(),
             kind: plan.kind.name().to_owned(),
+            source: None,
             status: plan.status.name().to_owned(),
             reason: plan.reason.clone(),
             planner: plan.planner.clone(),
@@ -259,6 +283,7 @@ fn step(plan: &Plan, step: &PlanStep) -> StepDocument {
         motion: step.motion.name().to_owned(),
         path: step.path.clone(),
         verified_depth: step.verified_depth,
+        waited_for: plan.names(&step.waited_for),
     }
 }
 
@@ -352,7 +377,7 @@ mod tests {
             r#""planner":"sbdp-star","engine":"sliding","units":"mm","parts":["0","1","2","10"],"#,
             r#""initial":{"removed":["10"],"poses":{"1":[0.0,0.5,0.0,1.0,0.0,0.0,0.0]}},"targets":["1"],"fixed":["0"],"#,
             r#""steps":[{"part":"2","motion":"rotation","#,
-            r#""path":[[0.0,0.0,0.0,1.0,0.0,0.0,0.0],[0.0,0.5,0.0,0.0,1.0,0.0,0.0]],"verified_depth":0.001}],"#,
+            r#""path":[[0.0,0.0,0.0,1.0,0.0,0.0,0.0],[0.0,0.5,0.0,0.0,1.0,0.0,0.0]],"verified_depth":0.001,"waited_for":["1"]}],"#,
             r#""remaining":["0","1"],"blocked":[{"part":"1","by":["0"],"action":"+x"}],"#,
             r#""overlaps":[{"parts":["0","1"],"depth":0.25}],"#,
             r#""warnings":[{"part":"2","message":"open"},{"part":null,"message":"small"}],"#,

@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, Unit, Vector3};
 
 use crate::geometry::Shape;
 use crate::simulation::{Axis, Scene};
-use crate::termination::Termination;
+use crate::termination::{Interrupt, Termination};
 
 /// cos of the angle within which two directions are one (a quarter of a degree).
 const ALIKE: f64 = 0.999_99;
@@ -36,6 +36,17 @@ const TURNED_APART: f64 = 0.06;
 const WORLD_PREFERENCE: f64 = 1.2;
 /// Axes of askew parts beyond the frame, at most.
 const MOST_EXTRA: usize = 3;
+
+/// The axes along which a search of some parts of an assembly moves them: a right-angled frame, the world's
+/// where surfaces do not agree on another, and those of parts that stand askew in it.
+///
+/// # Errors
+/// The termination condition became true.
+pub fn axes_of(scene: &Scene, present: &[usize], termination: &Termination) -> Result<Vec<Axis>, Interrupt> {
+    let directions = Directions::of(scene, present, termination);
+    termination.check()?;
+    Ok(directions.axes)
+}
 
 /// The directions that a search draws from the geometry.
 #[derive(Debug, Clone)]

@@ -26,6 +26,7 @@ mod tests;
 mod trace;
 
 pub use crate::termination::{Interrupt, Termination};
+pub use directions::axes_of;
 pub use outcome::{BlockedAction, Counters, Outcome, Removal};
 pub use problem::{Checked, Observer, Problem};
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging};

@@ -21,12 +21,12 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use crate::blocking_graph::{Audit, StaticAnalysis, audit};
+use crate::blocking_graph::{Analysis, Audit, DirectionalGraph, StaticAnalysis, audit};
 use crate::cache::{Cache, CacheStatistics, Recall, Source};
 use crate::geometry::{Assembly, GeometryError, Revision, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, Warning};
-use crate::search::{Engine, PlanRequest, PlanSink, Staging, least_travel};
-use crate::simulation::PenaltyParameters;
+use crate::search::{Engine, PlanRequest, PlanSink, Staging, axes_of, least_travel};
+use crate::simulation::{Action, Axis, PenaltyParameters};
 use crate::termination::Termination;
 
 use entry::{Entry, engine_of};
@@ -239,6 +239,41 @@ impl Service {
         let least = |part| least_travel(scene, part);
         let engine = engine_of(engine, PenaltyParameters::default());
         Ok(audit(rule, scene, &present, &*engine, &least, termination).ok())
+    }
+
+    /// The blocking graphs of the assembled state along some axes, both ways each, without the parts that
+    /// are gone already (ascending). No axes given: those that a search moves the parts along.
+    ///
+    /// # Errors
+    /// The assembly is unknown, a part does not exist, or the termination condition became true (`Ok(None)`).
+    pub fn blocking_graphs(
+        &self,
+        id: AssemblyId,
+        axes: Option<&[Axis]>,
+        removed: &[usize],
+        termination: &Termination,
+    ) -> Result<Option<Vec<DirectionalGraph>>, ServiceError> {
+        let entry = self.entry(id)?;
+        check_parts(&[("removed", removed.to_vec())], entry.assembly.parts.len())?;
+        let recall = Recall::of(Arc::clone(&self.cache));
+        let Ok((prepared, _)) = entry.prepared(termination, &mut Silent, &recall) else { return Ok(None) };
+        let scene = &prepared.scene;
+        let there = |part: &usize| removed.binary_search(part).is_err();
+        let present: Vec<usize> = (0..scene.bodies.len()).filter(there).collect();
+        let found = axes.map_or_else(|| axes_of(scene, &present, termination), |axes| Ok(axes.to_vec()));
+        let Ok(axes) = found else { return Ok(None) };
+        let translations = &Action::translations_along(&axes);
+        let analysis = Analysis { rule: StaticAnalysis::default(), scene, translations, recall: &recall };
+        let blockages = analysis.initial_blockages(&present, &|part| least_travel(scene, part), termination);
+        Ok(blockages.ok().map(|b| DirectionalGraph::of(&b, translations)))
+    }
+
+    /// A known assembly, healed and in the planning frame.
+    ///
+    /// # Errors
+    /// The id is unknown.
+    pub fn assembly(&self, id: AssemblyId) -> Result<Assembly, ServiceError> {
+        Ok(self.entry(id)?.assembly.clone())
     }
 
     fn entry(&self, id: AssemblyId) -> Result<Arc<Entry>, ServiceError> {

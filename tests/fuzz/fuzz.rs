@@ -103,7 +103,7 @@ fn target(reader: Reader, folders: &[PathBuf]) -> Target {
 fn choose(random: &mut Random, number: u64, count: usize) -> usize {
     loop {
         let place = random.below(count);
-        let heavy = matches!(Reader::ALL[place], Reader::Healing | Reader::Admission);
+        let heavy = matches!(Reader::ALL[place], Reader::Healing | Reader::Admission | Reader::Plan);
         if !heavy || number.is_multiple_of(HEAVY_TURN) {
             return place;
         }

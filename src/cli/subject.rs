@@ -1,0 +1,153 @@
+//! A plan with the assembly that it is about, for what shows plans.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Quaternion, UnitQuaternion};
+
+use super::error::CliError;
+use super::part_names::part_named;
+use crate::blocking_graph::DirectionalGraph;
+use crate::geometry::{
+    Assembly, Pose, Revision, SourceAssembly, Waypoint, load_assembly, pose_from_waypoint,
+};
+use crate::plan::PlanKind;
+use crate::plan::export::{PlanDocument, SourceDocument};
+use crate::search::Termination;
+use crate::service::{AssemblyId, Service};
+use crate::view::{Scene, Up, ViewError, glb, kind_of, page, read_plan};
+
+/// A plan, and the meshes that it moves.
+pub(super) struct Subject {
+    /// The assembly as it was read (and turned).
+    pub(super) base: SourceAssembly,
+    /// What differs from it.
+    pub(super) revision: Revision,
+    /// The plan.
+    pub(super) plan: PlanDocument,
+}
+
+impl From<ViewError> for CliError {
+    fn from(error: ViewError) -> Self {
+        match error {
+            ViewError::TooLarge(_) => Self::Failed(error.to_string()),
+            ViewError::NoPlan { .. } | ViewError::Mismatch { .. } => Self::Refused(error.to_string()),
+        }
+    }
+}
+
+impl Subject {
+    /// A plan about an assembly that differs by a revision from what was read. Parts are moved as the plan has
+    /// them assembled.
+    pub(super) fn new(base: SourceAssembly, revision: Revision, plan: PlanDocument) -> Self {
+        let names: Vec<&String> = base.parts.iter().chain(&revision.added).map(|p| &p.name).collect();
+        // A part that is not there is found when plan and assembly are put together.
+        let place = |name: &String| names.iter().position(|n| *n == name);
+        let moved = assembled_poses(&plan).into_iter().filter_map(|(name, pose)| Some((place(name)?, pose)));
+        let revision = Revision { moved: moved.collect(), ..revision };
+        Self { base, revision, plan }
+    }
+
+    /// A plan from a file, with the assembly that it names or another one.
+    pub(super) fn read(file: &Path, meshes: Option<&Path>) -> Result<Self, CliError> {
+        Self::of(plan_in(file)?, meshes)
+    }
+
+    /// A plan with the assembly that it names or another one.
+    pub(super) fn of(plan: PlanDocument, meshes: Option<&Path>) -> Result<Self, CliError> {
+        let source = plan.source.clone().unwrap_or_default();
+        let path = match meshes {
+            Some(path) => path.to_owned(),
+            None if source.assembly.is_empty() => {
+                let reason = "the plan does not say where its meshes are; name the assembly with --meshes";
+                return Err(CliError::Refused(reason.to_owned()));
+            }
+            None => PathBuf::from(&source.assembly),
+        };
+        if meshes.is_none() && !path.exists() {
+            return Err(CliError::Refused(format!(
+                "the meshes of the plan were in {}, where there is nothing; name the assembly with --meshes",
+                path.display()
+            )));
+        }
+        let mut base = load_assembly(&path)?;
+        if let Some([w, x, y, z]) = source.rotate {
+            base.rotate(&UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)));
+        }
+        let revision = revision(&base, &source)?;
+        Ok(Self::new(base, revision, plan))
+    }
+
+    fn admitted(&self) -> Result<(Service, AssemblyId), CliError> {
+        let service = Service::default();
+        let base = service.admit(&self.base)?;
+        let id = service.revise(base.id, &self.revision)?.id;
+        Ok((service, id))
+    }
+
+    /// The assembly as the plan begins with it.
+    pub(super) fn assembly(&self) -> Result<Assembly, CliError> {
+        let (service, id) = self.admitted()?;
+        Ok(service.assembly(id)?)
+    }
+
+    fn up(&self) -> Up {
+        let is_scene = |origin: &str| {
+            let extension = Path::new(origin).extension().and_then(|e| e.to_str()).unwrap_or_default();
+            ["gltf", "glb"].iter().any(|e| extension.eq_ignore_ascii_case(e))
+        };
+        let scene = self.base.parts.iter().all(|p| is_scene(&p.origin));
+        if scene { Up::Y } else { Up::Z }
+    }
+
+    /// The plan as a GLB scene.
+    pub(super) fn glb(&self) -> Result<Vec<u8>, CliError> {
+        Ok(glb::glb(&Scene::new(&self.assembly()?, self.up(), &self.plan)?)?)
+    }
+
+    /// The plan as a page, blocking graphs included.
+    pub(super) fn page(&self, termination: &Termination) -> Result<String, CliError> {
+        let (service, id) = self.admitted()?;
+        let assembly = service.assembly(id)?;
+        let names: Vec<String> = assembly.parts.iter().map(|p| p.name.clone()).collect();
+        let is_gone = |name: &String| self.plan.initial.removed.contains(name);
+        let removed: Vec<usize> = (0..names.len()).filter(|&i| is_gone(&names[i])).collect();
+        let graphs: Option<Vec<DirectionalGraph>> =
+            service.blocking_graphs(id, None, &removed, termination)?;
+        let graphs = graphs.ok_or_else(|| CliError::Failed("interrupted".to_owned()))?;
+        let scene = Scene::new(&assembly, self.up(), &self.plan)?;
+        page::page(&scene, &names, &graphs)
+            .map_err(|e| CliError::Failed(format!("cannot write the scene as JSON: {e}")))
+    }
+}
+
+/// The plan in a file.
+pub(super) fn plan_in(file: &Path) -> Result<PlanDocument, CliError> {
+    let refused = |e: &dyn std::fmt::Display| CliError::Refused(format!("{}: {e}", file.display()));
+    let text = std::fs::read_to_string(file).map_err(|e| refused(&e))?;
+    read_plan(&text).map_err(|e| refused(&e))
+}
+
+/// What was changed before the plan began, but for parts that were moved.
+fn revision(base: &SourceAssembly, source: &SourceDocument) -> Result<Revision, CliError> {
+    let mut revision = Revision::default();
+    for (name, file) in &source.replaced {
+        let place = part_named(base, "source.replaced", name)?;
+        revision.replaced.push((place, super::plan::only_mesh(Path::new(file), "source.replaced")?));
+    }
+    for path in &source.added {
+        revision.added.extend(load_assembly(Path::new(path))?.parts);
+    }
+    Ok(revision)
+}
+
+/// The parts that stand assembled elsewhere than where they were given, and where. Those that an assembly plan
+/// puts in begin elsewhere, too, but belong where their paths end.
+fn assembled_poses(plan: &PlanDocument) -> Vec<(&String, Pose)> {
+    let mut poses: BTreeMap<&String, Waypoint> = plan.initial.poses.iter().map(|(n, w)| (n, *w)).collect();
+    if kind_of(plan) == PlanKind::Assembly {
+        poses.extend(plan.steps.iter().filter_map(|s| Some((&s.part, *s.path.last()?))));
+    }
+    let is_moved = |w: &Waypoint| *w != [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+    poses.into_iter().filter(|(_, w)| is_moved(w)).map(|(n, w)| (n, pose_from_waypoint(&w))).collect()
+}

@@ -1,0 +1,61 @@
+//! `sbdp view`: a plan as a page.
+
+use std::process::ExitCode;
+
+use clap::CommandFactory;
+use clap::parser::ValueSource;
+
+use super::args::{Arguments, ViewArguments};
+use super::error::CliError;
+use super::subject::Subject;
+use super::{interrupt, plan, print, written};
+use crate::search::Termination;
+
+pub(super) fn run(arguments: &ViewArguments) -> Result<ExitCode, CliError> {
+    let file = &arguments.plan.assembly;
+    let is_plan = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+    let (subject, code, termination) = if is_plan {
+        refuse_options_of_planning()?;
+        let termination = Termination::default();
+        interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
+        (Subject::read(file, arguments.meshes.as_deref())?, ExitCode::SUCCESS, termination)
+    } else {
+        if arguments.meshes.is_some() {
+            return Err(CliError::Refused("--meshes is for a PLAN.json; an assembly has its own".to_owned()));
+        }
+        let planned = plan::planned(&arguments.plan)?;
+        plan::write_files(&arguments.plan, &planned)?;
+        let code = super::error::exit_code(planned.plan.status);
+        // The page is due also where planning was ended early.
+        (planned.subject, code, Termination::default())
+    };
+    let html = subject.page(&termination)?;
+    written(&arguments.output, html.as_bytes())?;
+    print(&format!(
+        "{}: {} in {} steps, {} kB\n",
+        arguments.output.display(),
+        subject.plan.status,
+        subject.plan.steps.len(),
+        html.len().div_ceil(1000)
+    ))?;
+    Ok(code)
+}
+
+/// What is planned already is not planned otherwise: options that would be without effect are refused.
+fn refuse_options_of_planning() -> Result<(), CliError> {
+    let command = Arguments::command();
+    let matches = command.clone().get_matches();
+    let (Some(view), Some(given)) = (command.find_subcommand("view"), matches.subcommand_matches("view"))
+    else {
+        return Ok(());
+    };
+    let own = ["assembly", "output", "meshes", "help", "version"];
+    let planning = view.get_arguments().filter(|a| !own.contains(&a.get_id().as_str()));
+    let is_given = |a: &&clap::Arg| given.value_source(a.get_id().as_str()) == Some(ValueSource::CommandLine);
+    match planning.filter(is_given).find_map(|a| a.get_long()) {
+        None => Ok(()),
+        Some(option) => Err(CliError::Refused(format!(
+            "--{option} is for planning, but a PLAN.json is planned already; give the assembly instead"
+        ))),
+    }
+}

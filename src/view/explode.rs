@@ -1,0 +1,119 @@
+//! Where parts stand in an exploded view: along their own ways out, just so far that boxes are apart.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::geometry::Bounds;
+
+/// Space between boxes, as a share of the part's longest side.
+const GAP: f64 = 0.15;
+/// Ways shorter than this share of the part's longest side are none.
+const NO_WAY: f64 = 1e-6;
+
+/// A part that has its place: its box when assembled, and how it is shifted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Placed {
+    pub(super) bounds: Bounds,
+    pub(super) shift: Vector3<f64>,
+}
+
+impl Placed {
+    fn shown(&self) -> Bounds {
+        shifted(&self.bounds, &self.shift)
+    }
+}
+
+fn shifted(bounds: &Bounds, shift: &Vector3<f64>) -> Bounds {
+    Bounds { min: bounds.min + shift, max: bounds.max + shift }
+}
+
+/// The unit direction of a part's way out: to the first of the points along its path (of the middle of its box,
+/// from the assembled place) where its box is clear of all others as assembled, else to the last. Zero if it
+/// does not move.
+pub(super) fn way_out(part: &Bounds, around: &[Placed], centres: &[Point3<f64>]) -> Vector3<f64> {
+    let Some(first) = centres.first() else { return Vector3::zeros() };
+    let size = part.extents().max();
+    let is_clear = |c: &&Point3<f64>| {
+        let shift = *c - first;
+        let there = shifted(part, &shift);
+        shift.norm() > size / 2.0 && !around.iter().any(|o| o.bounds.meets(&there))
+    };
+    let end = centres.iter().find(is_clear).or(centres.last()).unwrap_or(first);
+    (end - first).try_normalize(size * NO_WAY).unwrap_or_else(Vector3::zeros)
+}
+
+/// How a part is shifted along the unit vector `way` so that its box is clear of the others where these are shown,
+/// and no part that was behind it comes to stand before it.
+pub(super) fn exploded(part: &Bounds, around: &[Placed], way: &Vector3<f64>) -> Vector3<f64> {
+    if *way == Vector3::zeros() {
+        return *way;
+    }
+    let behind = around.iter().filter(|o| meeting(&o.bounds, part, way).is_some());
+    let mut at = behind.map(|o| o.shift.dot(way)).fold(0.0, f64::max);
+    let grown = part.grown(part.extents().max() * GAP);
+    let mut met: Vec<[f64; 2]> = around.iter().filter_map(|o| meeting(&grown, &o.shown(), way)).collect();
+    met.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    for [from, to] in met {
+        if from > at {
+            break;
+        }
+        at = f64::max(at, to);
+    }
+    way * at
+}
+
+/// From where to where a box that is shifted along a direction meets another, if it ever does.
+fn meeting(moving: &Bounds, other: &Bounds, way: &Vector3<f64>) -> Option<[f64; 2]> {
+    let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+    for a in 0..3 {
+        let (near, far) = (other.min[a] - moving.max[a], other.max[a] - moving.min[a]);
+        if way[a].abs() < 1e-9 {
+            if near > 0.0 || far < 0.0 {
+                return None;
+            }
+        } else {
+            let (s, t) = (near / way[a], far / way[a]);
+            from = from.max(s.min(t));
+            to = to.min(s.max(t));
+        }
+    }
+    (from < to && to > 0.0).then_some([from, to])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube(lo: [f64; 3], side: f64) -> Bounds {
+        let min = Point3::from(lo);
+        Bounds { min, max: min + Vector3::repeat(side) }
+    }
+
+    fn still(bounds: Bounds) -> Placed {
+        Placed { bounds, shift: Vector3::zeros() }
+    }
+
+    #[test]
+    fn a_part_stops_behind_all_that_it_passes() {
+        let around = [[0.0; 3], [0.0, 0.0, 1.2], [0.0, 0.0, 9.0], [5.0; 3]].map(|lo| still(cube(lo, 1.0)));
+        let shift = exploded(&cube([0.0; 3], 1.0), &around, &Vector3::z());
+        assert!((shift.z - 2.35).abs() < 1e-12 && shift.xy().norm() == 0.0, "{shift}");
+        assert_eq!(exploded(&cube([0.0; 3], 1.0), &around, &Vector3::zeros()), Vector3::zeros());
+    }
+
+    #[test]
+    fn what_is_outside_stays_outside() {
+        // A plate that went far away, on which a nut sits: there were room for it where the plate was.
+        let plate = Placed { bounds: cube([0.0; 3], 1.0), shift: Vector3::z() * 5.0 };
+        let shift = exploded(&cube([0.4, 0.4, 1.0], 0.2), &[plate], &Vector3::z());
+        assert!((shift.z - 5.03).abs() < 1e-12, "{shift}");
+    }
+
+    #[test]
+    fn the_way_out_is_where_it_first_gets_clear() {
+        let around = [still(cube([0.0; 3], 1.0))];
+        let part = cube([0.0; 3], 1.0);
+        let staged = [[0.5, 0.5, 0.5], [0.5, 0.5, 3.0], [9.0, 0.5, 3.0]].map(Point3::from);
+        assert!((way_out(&part, &around, &staged) - Vector3::z()).norm() < 1e-12);
+        assert_eq!(way_out(&part, &around, &staged[..1]), Vector3::zeros());
+    }
+}

@@ -1,0 +1,47 @@
+//! Plans for people: in motion as a GLB scene or a page, in words, and blocking graphs as pictures.
+//!
+//! Data flow: a plan's JSON ([`read_plan`]) and the assembly that it is about → [`Scene`], parts with meshes
+//! and a timeline → [`glb`] or [`page`]. [`steps`] tells the plan alone in words; [`picture`] draws
+//! blocking graphs, which [`layout`] arranges. No planning module depends on anything here.
+//!
+//! Frames: a scene is in the input's units and frame. Every part has a *node frame*, whose origin is the
+//! middle of the part's box: that point moves on a line between waypoints of a plan, and the rotation slerps,
+//! which is what glTF does between key frames.
+
+mod colour;
+mod document;
+mod explode;
+pub mod glb;
+pub mod layout;
+pub mod page;
+pub mod picture;
+mod scene;
+mod shading;
+pub mod steps;
+mod words;
+
+pub use colour::{PALETTE, Rgb};
+pub use document::{kind_of, read_plan};
+pub use scene::{Drawn, Key, Placement, Scene, ScenePart, SceneStep, Up};
+
+/// Why a plan cannot be shown.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ViewError {
+    /// The text is no plan.
+    #[error("not a plan (JSON `{schema}`, as `sbdp plan --json` writes it): {reason}", schema = crate::plan::export::SCHEMA)]
+    NoPlan {
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// Plan and meshes do not belong together.
+    #[error("the plan does not fit the assembly `{assembly}`: {reason}")]
+    Mismatch {
+        /// The assembly's name.
+        assembly: String,
+        /// What differs.
+        reason: String,
+    },
+    /// A scene is too large for the format.
+    #[error("cannot write the scene: {0}")]
+    TooLarge(String),
+}

@@ -1,0 +1,299 @@
+//! A scene as one HTML file that needs no network: opened from disk, it plays.
+//!
+//! `page/` holds its sources: `index.html`, `style.css`, and the JavaScript in `src/`, bundled with three.js into
+//! `dist/page.js`. The bundle is committed, so that no Node is needed to build sbdp; `.ci/view` makes it anew
+//! from the lock file and compares the bytes.
+//!
+//! The scene is embedded as JSON, numbers in bulk as base64 of little-endian arrays: vertices as 16-bit steps
+//! along the mesh's longest side, normals as bytes, key frames as single floats about the middle of the assembly.
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde::Serialize;
+
+use super::layout::layout;
+use super::{Drawn, Key, PALETTE, Placement, Scene, ScenePart, SceneStep, Up};
+use crate::blocking_graph::DirectionalGraph;
+use crate::plan::export::BlockedDocument;
+use nalgebra::Point3;
+
+const HTML: &str = include_str!("page/index.html");
+const STYLE: &str = include_str!("page/style.css");
+const SCRIPT: &str = include_str!("page/dist/page.js");
+
+/// The page. The graphs are those of the assembled state; their parts are those of `names`, by place.
+///
+/// # Errors
+/// None that is known: all keys are text.
+pub fn page(scene: &Scene, names: &[String], graphs: &[DirectionalGraph]) -> serde_json::Result<String> {
+    let data = serde_json::to_string(&data(scene, names, graphs))?;
+    let title = if scene.name.is_empty() { "assembly" } else { &scene.name };
+    // In this order: what a name holds is never taken for a placeholder.
+    Ok(HTML
+        .replace("{{TITLE}}", &escaped(title))
+        .replacen("{{STYLE}}", STYLE, 1)
+        .replacen("{{SCRIPT}}", SCRIPT, 1)
+        .replacen("{{DATA}}", &data.replace('<', "\\u003c"), 1))
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('{', "&#123;")
+}
+
+/// What the page's `data.js` reads. Offsets are in bytes.
+#[derive(Debug, Serialize)]
+struct Data<'a> {
+    name: &'a str,
+    units: Option<&'a str>,
+    up: &'static str,
+    kind: &'static str,
+    status: &'a str,
+    reason: Option<&'a str>,
+    duration: f64,
+    palette: Vec<String>,
+    meshes: Vec<Mesh>,
+    parts: Vec<Part<'a>>,
+    steps: Vec<Step<'a>>,
+    blocked: Vec<Stuck<'a>>,
+    graphs: Vec<Graph>,
+    bytes: String,
+}
+
+#[derive(Debug, Serialize)]
+struct Mesh {
+    /// Length of a step, and where step 0 is.
+    step: f64,
+    origin: [f64; 3],
+    vertices: usize,
+    positions: usize,
+    normals: usize,
+    triangles: [usize; 2],
+    edges: [usize; 2],
+    /// Bytes of an index.
+    index: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct Part<'a> {
+    name: &'a str,
+    mesh: usize,
+    colour: usize,
+    fixed: bool,
+    stays: bool,
+    step: Option<usize>,
+    /// `[x, y, z, qx, qy, qz, qw]`.
+    assembled: [f64; 7],
+    start: [f64; 7],
+    exploded: [f64; 3],
+    size: [f64; 3],
+}
+
+#[derive(Debug, Serialize)]
+struct Step<'a> {
+    part: usize,
+    words: &'a str,
+    waited: &'a [usize],
+    ends: f64,
+    times: Vec<f64>,
+    /// Seven numbers per key, as of a part.
+    keys: usize,
+}
+
+#[derive(Debug, Serialize)]
+struct Stuck<'a> {
+    part: Option<usize>,
+    by: Vec<usize>,
+    action: &'a str,
+}
+
+#[derive(Debug, Serialize)]
+struct Graph {
+    direction: String,
+    rows: usize,
+    columns: usize,
+    /// One per part.
+    places: Vec<[f64; 2]>,
+    edges: Vec<[usize; 2]>,
+}
+
+fn data<'a>(scene: &'a Scene, names: &[String], graphs: &[DirectionalGraph]) -> Data<'a> {
+    let middle = scene.bounds().centre();
+    let mut bytes = Vec::new();
+    let meshes = scene.drawn.iter().map(|m| mesh(m, &mut bytes)).collect();
+    let steps = scene.steps.iter().map(|s| step(s, &middle, &mut bytes)).collect();
+    Data {
+        name: &scene.name,
+        units: scene.units.as_deref(),
+        up: match scene.up {
+            Up::Y => "y",
+            Up::Z => "z",
+        },
+        kind: scene.kind.name(),
+        status: &scene.status,
+        reason: scene.reason.as_deref(),
+        duration: scene.duration(),
+        palette: PALETTE.iter().map(|[r, g, b]| format!("#{r:02x}{g:02x}{b:02x}")).collect(),
+        meshes,
+        parts: scene.parts.iter().map(|p| part(p, &middle)).collect(),
+        steps,
+        blocked: scene.blocked.iter().map(|b| stuck(scene, b)).collect(),
+        graphs: graphs.iter().map(|g| graph(scene, names, g)).collect(),
+        bytes: STANDARD.encode(&bytes),
+    }
+}
+
+/// Appends numbers where any may begin; where that is.
+fn append(bytes: &mut Vec<u8>, numbers: &[u8]) -> usize {
+    bytes.resize(bytes.len().next_multiple_of(4), 0);
+    bytes.extend_from_slice(numbers);
+    bytes.len() - numbers.len()
+}
+
+fn mesh(mesh: &Drawn, bytes: &mut Vec<u8>) -> Mesh {
+    let of =
+        |pick: fn(f32, f32) -> f32, a: usize| mesh.positions.iter().map(|p| p[a]).reduce(pick).unwrap_or(0.0);
+    let origin = [0, 1, 2].map(|a| of(f32::min, a));
+    let longest = (0..3).map(|a| of(f32::max, a) - origin[a]).fold(f32::MIN_POSITIVE, f32::max);
+    let step = f64::from(longest) / f64::from(u16::MAX);
+    let steps = |p: &[f32; 3]| [0, 1, 2].map(|a| (f64::from(p[a] - origin[a]) / step).round() as u16);
+    // Four numbers per vertex: graphics cards want them aligned.
+    let positions =
+        mesh.positions.iter().map(steps).flat_map(|[x, y, z]| [x, y, z, 0]).flat_map(u16::to_le_bytes);
+    let byte = |x: f32| (x * 127.0).round() as i8;
+    let normals =
+        mesh.normals.iter().flat_map(|n| [byte(n[0]), byte(n[1]), byte(n[2]), 0]).flat_map(i8::to_le_bytes);
+    let wide = mesh.positions.len() > usize::from(u16::MAX);
+    let indices = |list: &[u32]| -> Vec<u8> {
+        let short = |i: &u32| (*i as u16).to_le_bytes();
+        if wide {
+            list.iter().flat_map(|i| i.to_le_bytes()).collect()
+        } else {
+            list.iter().flat_map(short).collect()
+        }
+    };
+    let (triangles, edges) = (mesh.triangles.as_flattened(), mesh.edges.as_flattened());
+    Mesh {
+        step,
+        origin: origin.map(f64::from),
+        vertices: mesh.positions.len(),
+        positions: append(bytes, &positions.collect::<Vec<_>>()),
+        normals: append(bytes, &normals.collect::<Vec<_>>()),
+        triangles: [append(bytes, &indices(triangles)), triangles.len()],
+        edges: [append(bytes, &indices(edges)), edges.len()],
+        index: if wide { 4 } else { 2 },
+    }
+}
+
+fn placed(placement: &Placement, middle: &Point3<f64>) -> [f64; 7] {
+    let [x, y, z] = (placement.centre - middle).into();
+    let [i, j, k, w] = placement.rotation.coords.into();
+    [x, y, z, i, j, k, w]
+}
+
+fn part<'a>(part: &'a ScenePart, middle: &Point3<f64>) -> Part<'a> {
+    Part {
+        name: &part.name,
+        mesh: part.drawn,
+        colour: part.colour,
+        fixed: part.fixed,
+        stays: part.stays,
+        step: part.step,
+        assembled: placed(&part.assembled, middle),
+        start: placed(&part.start, middle),
+        exploded: part.exploded.into(),
+        size: part.bounds.extents().into(),
+    }
+}
+
+fn step<'a>(step: &'a SceneStep, middle: &Point3<f64>, bytes: &mut Vec<u8>) -> Step<'a> {
+    let numbers = |k: &Key| placed(&k.placement, middle).map(|x| x as f32);
+    let keys: Vec<u8> = step.keys.iter().flat_map(numbers).flat_map(f32::to_le_bytes).collect();
+    Step {
+        part: step.part,
+        words: &step.words,
+        waited: &step.waited_for,
+        ends: step.ends,
+        times: step.keys.iter().map(|k| k.time).collect(),
+        keys: append(bytes, &keys),
+    }
+}
+
+fn place(scene: &Scene, name: &str) -> Option<usize> {
+    scene.parts.iter().position(|p| p.name == name)
+}
+
+fn stuck<'a>(scene: &Scene, blocked: &'a BlockedDocument) -> Stuck<'a> {
+    Stuck {
+        part: place(scene, &blocked.part),
+        by: blocked.by.iter().filter_map(|n| place(scene, n)).collect(),
+        action: &blocked.action,
+    }
+}
+
+fn graph(scene: &Scene, names: &[String], graph: &DirectionalGraph) -> Graph {
+    let at = |part: usize| names.get(part).and_then(|n| place(scene, n));
+    let edges: Vec<_> = graph.edges.iter().filter_map(|[p, b]| Some([at(*p)?, at(*b)?])).collect();
+    let layout = layout(scene.parts.len(), &edges);
+    let (rows, columns) = (layout.rows, layout.columns);
+    Graph { direction: graph.direction.to_string(), rows, columns, places: layout.places, edges }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{block_on_plate, source};
+    use crate::geometry::Assembly;
+    use crate::simulation::Action;
+    use crate::view::document::tests::plan;
+
+    fn scene(name: &str) -> Scene {
+        let assembly = Assembly { name: name.into(), ..Assembly::new(&source(block_on_plate())).unwrap() };
+        Scene::new(&assembly, Up::Z, &plan()).unwrap()
+    }
+
+    fn written(scene: &Scene) -> String {
+        let names = ["0", "1"].map(String::from);
+        let graph = DirectionalGraph { direction: Action::translations()[4], edges: vec![[0, 1]] };
+        page(scene, &names, &[graph]).unwrap()
+    }
+
+    /// The scene as the page's script reads it.
+    fn embedded(page: &str) -> serde_json::Value {
+        let begin = page.find("id=\"scene\">").unwrap() + "id=\"scene\">".len();
+        let end = begin + page[begin..].find("</script>").unwrap();
+        serde_json::from_str(&page[begin..end]).unwrap()
+    }
+
+    #[test]
+    fn positions_are_rounded_by_half_a_step_at_most() {
+        let scene = scene("pair");
+        let data = embedded(&written(&scene));
+        let bytes = STANDARD.decode(data["bytes"].as_str().unwrap()).unwrap();
+        for (drawn, mesh) in scene.drawn.iter().zip(data["meshes"].as_array().unwrap()) {
+            let step = mesh["step"].as_f64().unwrap();
+            let at = mesh["positions"].as_u64().unwrap() as usize;
+            for (v, position) in drawn.positions.iter().enumerate() {
+                for (a, x) in position.iter().enumerate() {
+                    let place = at + v * 8 + a * 2;
+                    let steps = u16::from_le_bytes([bytes[place], bytes[place + 1]]);
+                    let read = mesh["origin"][a].as_f64().unwrap() + f64::from(steps) * step;
+                    assert!((read - f64::from(*x)).abs() <= 0.51 * step, "{read} is not {x}");
+                }
+            }
+        }
+        assert_eq!(data["graphs"][0]["edges"], serde_json::json!([[0, 1]]));
+        assert_eq!(
+            (data["parts"][1]["step"].as_u64(), data["kind"].as_str()),
+            (Some(0), Some("disassembly"))
+        );
+    }
+
+    #[test]
+    fn names_cannot_break_the_page() {
+        let wild = "</script><b>{{DATA}}{{SCRIPT}}";
+        let page = written(&scene(wild));
+        assert_eq!(embedded(&page)["name"], wild);
+        assert!(!page.contains(wild) && !page.contains("<b>"));
+        assert_eq!(page.matches("</script>").count(), written(&scene("pair")).matches("</script>").count());
+    }
+}

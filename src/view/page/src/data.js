@@ -1,0 +1,84 @@
+/**
+ * The scene as `page.rs` embeds it: JSON with base64 of little-endian numbers. Everything is in the input's units
+ * and directions, about the middle of the assembly's box.
+ *
+ * @typedef {{x: number, y: number, z: number}} Vector
+ * @typedef {number[] | Float32Array} Placement `[x, y, z, qx, qy, qz, qw]` of a part's middle
+ *
+ * @typedef {object} Mesh
+ * @property {number} step length of one of the 65535 steps in which positions are given
+ * @property {number[]} origin where step 0 is, from the part's middle
+ * @property {Uint16Array} positions four numbers per vertex, the last unused
+ * @property {Int8Array} normals four numbers per vertex, the last unused
+ * @property {Uint16Array | Uint32Array} triangles
+ * @property {Uint16Array | Uint32Array} edges
+ *
+ * @typedef {object} Part
+ * @property {string} name
+ * @property {number} mesh
+ * @property {number} colour place in the palette
+ * @property {boolean} fixed
+ * @property {boolean} stays it stands in the assembly all the time
+ * @property {number | null} step
+ * @property {Placement} assembled
+ * @property {Placement} start where it stands before its step
+ * @property {number[]} exploded from its assembled place to that in the exploded view
+ * @property {number[]} size of its box
+ *
+ * @typedef {object} Step
+ * @property {number} part
+ * @property {string} words
+ * @property {number[]} waited parts that it could not go before
+ * @property {number[]} times ascending
+ * @property {Float32Array} keys a placement per time
+ * @property {number} ends
+ *
+ * @typedef {object} Graph
+ * @property {string} direction
+ * @property {number} rows
+ * @property {number} columns
+ * @property {number[][]} places column and row per part
+ * @property {number[][]} edges pairs: the first is blocked by the second
+ *
+ * @typedef {object} Scene
+ * @property {string} name
+ * @property {string | null} units
+ * @property {"y" | "z"} up
+ * @property {"assembly" | "disassembly"} kind
+ * @property {string} status
+ * @property {string | null} reason
+ * @property {number} duration seconds
+ * @property {string[]} palette
+ * @property {Mesh[]} meshes
+ * @property {Part[]} parts
+ * @property {Step[]} steps
+ * @property {{part: number | null, by: number[], action: string}[]} blocked
+ * @property {Graph[]} graphs
+ */
+
+/**
+ * Reads the scene.
+ * @param {string} text JSON
+ * @returns {Scene}
+ */
+export function decode(text) {
+  const { bytes, ...scene } = JSON.parse(text);
+  const buffer = Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0)).buffer;
+  return { ...scene, meshes: scene.meshes.map((m) => mesh(m, buffer)), steps: scene.steps.map((s) => step(s, buffer)) };
+}
+
+function mesh(m, buffer) {
+  const Index = m.index === 4 ? Uint32Array : Uint16Array;
+  return {
+    step: m.step,
+    origin: m.origin,
+    positions: new Uint16Array(buffer, m.positions, m.vertices * 4),
+    normals: new Int8Array(buffer, m.normals, m.vertices * 4),
+    triangles: new Index(buffer, ...m.triangles),
+    edges: new Index(buffer, ...m.edges),
+  };
+}
+
+function step(s, buffer) {
+  return { ...s, keys: new Float32Array(buffer, s.keys, s.times.length * 7) };
+}

@@ -1,0 +1,308 @@
+/**
+ * The picture: parts, camera, light. Draws only when something changed.
+ * @import { Scene } from "./data.js"
+ * @import { Selection } from "./selection.js"
+ */
+import {
+  Box3,
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  DirectionalLight,
+  HemisphereLight,
+  LineBasicMaterial,
+  LineSegments,
+  PerspectiveCamera,
+  Raycaster,
+  Scene as World,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+} from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { Body, geometries } from "./meshes.js";
+import { isMoving, isWaiting, placementAt, visibility } from "./timeline.js";
+
+/** Parts that should have moved and could not: dark among the light colours of the palette, with bright edges. */
+const STUCK = { colour: "#2b1d24", glow: "#3a0010", edge: "#ff2d55" };
+const THROUGH = 0.22;
+const BESIDE = 0.12;
+/** What blocks a part often stands all around it. */
+const BLOCKER = 0.45;
+/** So much wider than the parts is the picture. */
+const ROOM = 1.25;
+/** In pictures wider than this (width over height) height is what matters. */
+const WIDE = 1.4;
+/** Milliseconds without a change after which all is still. */
+const STILL = 250;
+
+export class Stage {
+  /**
+   * @param {HTMLCanvasElement} canvas
+   * @param {Scene} scene
+   * @param {Selection} selection
+   */
+  constructor(canvas, scene, selection) {
+    Object.assign(this, { canvas, scene, selection, time: 0, stale: true });
+    const soft = isSoftware();
+    this.renderer = new WebGLRenderer({ canvas, antialias: !soft });
+    const ratio = Math.min(devicePixelRatio, 2);
+    /** Pixels per CSS pixel while something moves, and once all is still. Without a graphics card smooth edges
+     * take most of the time, so they wait. */
+    this.ratio = soft ? { moving: 1, still: 2 } : { moving: ratio, still: ratio };
+    this.renderer.setPixelRatio(this.ratio.moving);
+    this.world = new World();
+    this.world.background = new Color("#eef1f5");
+    this.stuck = new Set(scene.blocked.map((b) => b.part));
+    const shapes = scene.meshes.map(geometries);
+    this.bodies = scene.parts.map(
+      (p, i) => new Body(p, scene.meshes[p.mesh], shapes[p.mesh], scene.palette[p.colour], i),
+    );
+    this.world.add(...this.bodies.map((b) => b.group));
+    this.guides = guides(scene);
+    this.world.add(this.guides);
+    this.lit();
+    this.radius = Math.max(...scene.parts.map((p) => reach(p)), 1e-9);
+    this.look();
+    selection.addEventListener("change", () => this.invalidate());
+    this.controls.addEventListener("change", () => (this.stale = true));
+    new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
+  }
+
+  lit() {
+    this.world.add(new HemisphereLight("#ffffff", "#9aa3b2", 1.9));
+    this.camera = new PerspectiveCamera(32, 1, 0.01, 100);
+    const lamp = new DirectionalLight("#ffffff", 1.7);
+    lamp.position.set(-0.6, 1, 0.8);
+    this.camera.add(lamp);
+    this.world.add(this.camera);
+  }
+
+  /** From the front, right and above, near enough to see all. */
+  look() {
+    const z = this.scene.up === "z";
+    this.camera.up.fromArray(z ? [0, 0, 1] : [0, 1, 0]);
+    this.camera.position.fromArray(z ? [0.75, -1, 0.62] : [0.75, 0.62, 1]);
+    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.resize();
+    this.fit();
+  }
+
+  /** Comes as near as all parts that are seen allow. */
+  fit() {
+    this.pose();
+    const { target, length } = this.frame();
+    this.aim(target, length);
+  }
+
+  /** Steps back as far as the exploded view needs; comes back when all is together again.
+   * @param {number} amount 0 to 1 */
+  explode(amount) {
+    const { controls, camera } = this;
+    this.before ??= { target: controls.target.clone(), length: camera.position.distanceTo(controls.target) };
+    this.pose();
+    const { target, length } = amount > 0 ? this.frame() : this.before;
+    this.aim(target, amount > 0 ? Math.max(length, this.before.length) : length);
+    if (amount === 0) this.before = null;
+  }
+
+  /** Looks at a point from a distance, from the side where the camera is.
+   * @param {Vector3} target
+   * @param {number} length */
+  aim(target, length) {
+    const { camera, controls } = this;
+    const offset = camera.position.clone().sub(controls.target).setLength(length);
+    controls.target.copy(target);
+    camera.position.copy(target).add(offset);
+    camera.near = Math.min(length, this.radius) / 100;
+    camera.far = length + this.radius * 40;
+    camera.updateProjectionMatrix();
+    controls.maxDistance = Math.max(this.radius * 30, length * 2);
+    controls.update();
+    this.stale = true;
+  }
+
+  /** Goes around what it looks at, and nearer or further.
+   * @param {number} right radians
+   * @param {number} up radians; it stops short of the pole
+   * @param {number} nearer factor of the distance */
+  turn(right, up, nearer = 1) {
+    const { camera, controls } = this;
+    const offset = camera.position.clone().sub(controls.target);
+    const side = new Vector3().crossVectors(camera.up, offset).normalize();
+    const polar = offset.angleTo(camera.up);
+    offset.applyAxisAngle(side, Math.min(Math.max(polar - up, 0.05), Math.PI - 0.05) - polar);
+    offset.applyAxisAngle(camera.up, right);
+    camera.position.copy(controls.target).add(offset);
+    this.aim(controls.target.clone(), offset.length() * nearer);
+  }
+
+  /** Where to look, and from how far, so that the boxes of all parts that are seen are in the picture. */
+  frame() {
+    const corners = this.bodies.flatMap(({ group }, i) =>
+      group.visible ? boxAt(group.position, this.scene.parts[i].size) : [],
+    );
+    const target = new Box3().setFromPoints(corners).getCenter(new Vector3());
+    if (corners.length === 0) target.set(0, 0, 0);
+    const back = this.camera.position.clone().sub(this.controls.target).normalize();
+    const right = new Vector3().crossVectors(this.camera.up, back).normalize();
+    const up = new Vector3().crossVectors(back, right);
+    const high = Math.tan((this.camera.fov / 2) * (Math.PI / 180)) / ROOM;
+    const wide = high * this.camera.aspect;
+    const needed = corners.map((corner) => {
+      const at = corner.sub(target);
+      return at.dot(back) + Math.max(Math.abs(at.dot(right)) / wide, Math.abs(at.dot(up)) / high);
+    });
+    return { target, length: Math.max(this.radius / 10, ...needed) };
+  }
+
+  /** Takes the size that the page gives it. In a narrower picture as much is seen, from further away. */
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+    if (!width || !height) return;
+    this.renderer.setSize(width, height, false);
+    const { camera, controls } = this;
+    const before = Math.min(camera.aspect, WIDE);
+    camera.aspect = width / height;
+    const further = before / Math.min(camera.aspect, WIDE);
+    this.aim(controls.target.clone(), camera.position.distanceTo(controls.target) * further);
+    this.invalidate();
+  }
+
+  /** @param {number} time */
+  at(time) {
+    this.time = time;
+    this.invalidate();
+  }
+
+  invalidate() {
+    this.stale = true;
+    this.moved = true;
+  }
+
+  /** Draws if something changed; whether it did. */
+  draw() {
+    if (!this.stale) return false;
+    if (this.moved) this.pose();
+    this.sharpen(this.ratio.moving);
+    this.renderer.render(this.world, this.camera);
+    this.stale = this.moved = false;
+    this.drawn = performance.now();
+    return true;
+  }
+
+  /** Draws once more with smooth edges, where nothing changed for a while. */
+  refine() {
+    if (this.renderer.getPixelRatio() === this.ratio.still || performance.now() - this.drawn < STILL) return;
+    this.sharpen(this.ratio.still);
+    this.renderer.render(this.world, this.camera);
+  }
+
+  /** @param {number} ratio */
+  sharpen(ratio) {
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+  }
+
+  pose() {
+    const { explode } = this.selection;
+    this.bodies.forEach((body, i) => {
+      const part = this.scene.parts[i];
+      if (explode > 0) {
+        const [x, y, z, ...turn] = part.assembled;
+        const [dx, dy, dz] = part.exploded;
+        body.place([x + dx * explode, y + dy * explode, z + dz * explode, ...turn]);
+      } else {
+        body.place(placementAt(this.scene, i, this.time));
+      }
+      this.dress(body, i);
+    });
+    this.guides.visible = explode > 0;
+    if (explode > 0) this.stretch(explode);
+  }
+
+  /** How a part looks, by what was chosen.
+   * @param {Body} body
+   * @param {number} part */
+  dress(body, part) {
+    const { selection, scene } = this;
+    const pointed = selection.part === part || selection.others.has(part);
+    let opacity = selection.explode > 0 ? 1 : visibility(scene, part, this.time);
+    const waits = selection.explode === 0 && scene.kind === "assembly" && isWaiting(scene, part, this.time);
+    if (selection.hidden.has(part) || (waits && !selection.waiting)) opacity = 0;
+    else if (selection.through.has(part)) opacity *= THROUGH;
+    else if (selection.others.has(part)) opacity *= BLOCKER;
+    else if (selection.others.size > 0 && !pointed) opacity *= BESIDE;
+    body.fade(opacity);
+    const moving = selection.explode === 0 && isMoving(scene, part, this.time);
+    body.outline(moving || selection.part === part);
+    // Where it is told what blocks one, the others that are stuck are but blockers.
+    if (this.stuck.has(part) && (selection.others.size === 0 || selection.part === part)) {
+      body.paint(STUCK.colour, pointed ? "#7a0022" : STUCK.glow, STUCK.edge);
+    } else {
+      const glow = selection.part === part || moving ? "#2c3a55" : selection.others.has(part) ? "#332a10" : "#000000";
+      body.paint(scene.palette[scene.parts[part].colour], glow, pointed || moving ? "#000000" : "#1b2330");
+    }
+  }
+
+  /** Guide lines reach from where parts stand assembled to where they are shown.
+   * @param {number} amount */
+  stretch(amount) {
+    const ends = this.guides.geometry.getAttribute("position");
+    this.guides.userData.parts.forEach((part, k) => {
+      const { assembled, exploded } = this.scene.parts[part];
+      const shown = this.bodies[part].group.visible ? amount : 0;
+      ends.setXYZ(2 * k + 1, ...[0, 1, 2].map((a) => assembled[a] + exploded[a] * shown));
+    });
+    ends.needsUpdate = true;
+  }
+
+  /**
+   * The part under a point of the window, if one is.
+   * @param {number} x
+   * @param {number} y
+   */
+  pick(x, y) {
+    const box = this.canvas.getBoundingClientRect();
+    const point = new Vector2(((x - box.left) / box.width) * 2 - 1, 1 - ((y - box.top) / box.height) * 2);
+    const ray = new Raycaster();
+    ray.setFromCamera(point, this.camera);
+    const solid = this.bodies.filter((b) => b.group.visible && b.opacity > BESIDE).map((b) => b.surface);
+    return ray.intersectObjects(solid, false)[0]?.object.userData.part ?? null;
+  }
+}
+
+/** Whether pictures are drawn without a graphics card. */
+function isSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const info = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
+
+/** The corners of a box about a point.
+ * @param {Vector3} at
+ * @param {number[]} size */
+function boxAt(at, size) {
+  const half = (k) => size.map((s, a) => (k & (1 << a) ? s : -s) / 2);
+  return Array.from({ length: 8 }, (_, k) => new Vector3().fromArray(half(k)).add(at));
+}
+
+/** How far from the middle of all a part's box reaches. */
+function reach({ assembled, size }) {
+  return Math.hypot(...assembled.slice(0, 3)) + Math.hypot(...size) / 2;
+}
+
+/** @param {Scene} scene */
+function guides(scene) {
+  const parts = scene.parts.flatMap((p, i) => (p.exploded.some((x) => x !== 0) ? [i] : []));
+  const ends = new Float32Array(parts.flatMap((i) => [...scene.parts[i].assembled.slice(0, 3), 0, 0, 0]));
+  const geometry = new BufferGeometry().setAttribute("position", new BufferAttribute(ends, 3));
+  const lines = new LineSegments(
+    geometry,
+    new LineBasicMaterial({ color: "#3d5a99", transparent: true, opacity: 0.7 }),
+  );
+  lines.frustumCulled = false;
+  lines.userData.parts = parts;
+  return lines;
+}

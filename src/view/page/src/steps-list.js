@@ -1,0 +1,36 @@
+/**
+ * The list of steps, with what each waited for; a click goes there.
+ * @import { Player } from "./player.js"
+ * @import { Selection } from "./selection.js"
+ */
+import { byId, element } from "./dom.js";
+
+/**
+ * @param {Player} player
+ * @param {Selection} selection
+ */
+export function stepsList(player, selection) {
+  const { scene } = player;
+  const verb = scene.kind === "assembly" ? "goes in after" : "freed after";
+  const items = scene.steps.map((step, i) => {
+    const names = step.waited.map((p) => scene.parts[p].name).join(", ");
+    const after = names ? element("span", { class: "after" }, `${verb} ${names}`) : "";
+    const go = () => {
+      selection.pick(step.part);
+      player.playStep(i);
+    };
+    return element("button", { type: "button", onclick: go }, element("span", {}, step.words), after);
+  });
+  byId("steps").append(...items.map((button) => element("li", {}, button)));
+  let current = -1;
+  const mark = () => {
+    const step = player.step;
+    if (step === current) return;
+    items[current]?.removeAttribute("aria-current");
+    items[step]?.setAttribute("aria-current", "step");
+    items[step]?.scrollIntoView({ block: "nearest" });
+    current = step;
+  };
+  player.addEventListener("change", mark);
+  mark();
+}

@@ -1,0 +1,255 @@
+//! A plan as instructions in words: Markdown, in English, lengths in the plan's units.
+
+use std::fmt::Write;
+
+use super::document::kind_of;
+use super::words::{Words, waited_for};
+use crate::plan::PlanKind;
+use crate::plan::export::{BlockedDocument, PlanDocument};
+
+/// So many parts that a step waited for are named, and the others counted.
+const MOST_NAMES: usize = 6;
+
+/// The instructions. Steps in a row that do the same with equal parts are told as one. Parts are equal if they
+/// are of one `class` (one per part of the plan); without classes, if their names
+/// differ in a number only.
+#[must_use]
+pub fn markdown(plan: &PlanDocument, classes: Option<&[usize]>) -> String {
+    let account = Account { plan, classes, words: Words::of(plan), waited: waited_for(plan) };
+    let mut text = account.headline();
+    for group in account.groups() {
+        text.push_str(&account.group(&group));
+    }
+    text.push_str(&account.rest());
+    text
+}
+
+/// The name without the number at its end: what `bolt-1` and `bolt-12` have in common.
+fn stem(name: &str) -> &str {
+    name.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches(['-', '_', ' ', '.', '#'])
+}
+
+struct Account<'a> {
+    plan: &'a PlanDocument,
+    classes: Option<&'a [usize]>,
+    words: Words<'a>,
+    waited: Vec<Vec<&'a str>>,
+}
+
+impl Account<'_> {
+    fn headline(&self) -> String {
+        let steps = self.plan.steps.len();
+        let count = if steps == 1 { "1 step".to_owned() } else { format!("{steps} steps") };
+        let what = match kind_of(self.plan) {
+            PlanKind::Disassembly => "Taking apart",
+            PlanKind::Assembly => "Putting together",
+        };
+        let mut text = format!("# {what}: {count}\n\n");
+        if self.plan.status != "complete" {
+            let reason = self.plan.reason.as_ref().map(|r| format!(": {r}")).unwrap_or_default();
+            let _ = writeln!(text, "**Not complete ({}){reason}**\n", self.plan.status);
+        }
+        let gone = &self.plan.initial.removed;
+        if !gone.is_empty() {
+            let _ = writeln!(text, "Gone before: {}.\n", gone.join(", "));
+        }
+        text
+    }
+
+    fn is_equal(&self, a: &str, b: &str) -> bool {
+        let class = |name: &str| {
+            let at = self.plan.parts.iter().position(|p| p == name)?;
+            self.classes?.get(at)
+        };
+        match (class(a), class(b)) {
+            (Some(a), Some(b)) => a == b,
+            _ => !stem(a).is_empty() && stem(a) == stem(b),
+        }
+    }
+
+    /// Runs of steps that are told as one.
+    fn groups(&self) -> Vec<Vec<usize>> {
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for (i, step) in self.plan.steps.iter().enumerate() {
+            let joins = |group: &&mut Vec<usize>| {
+                let first = group[0];
+                self.is_equal(&self.plan.steps[first].part, &step.part)
+                    && self.words.done(first, "") == self.words.done(i, "")
+                    && !group.iter().any(|&g| self.waited[i].contains(&self.plan.steps[g].part.as_str()))
+            };
+            match groups.last_mut().filter(joins) {
+                Some(group) => group.push(i),
+                None => groups.push(vec![i]),
+            }
+        }
+        groups
+    }
+
+    fn group(&self, group: &[usize]) -> String {
+        let names: Vec<&str> = group.iter().map(|&i| self.plan.steps[i].part.as_str()).collect();
+        let first = group[0];
+        let after = self.after(group);
+        if let [only] = names[..] {
+            return format!("**{}.** {}{after}.\n\n", first + 1, self.words.done(first, only));
+        }
+        let what = format!("{} × {}", names.len(), common_name(&names));
+        let (told, list) = (self.words.done(first, &what), names.join(", "));
+        // One by one: of several "it" would be wrong.
+        let told = told
+            .replace("nothing holds it", "nothing holds them")
+            .replace("in its place: it touches", "in place: they touch");
+        format!("**{}–{}.** {told}, one by one: {list}{after}.\n\n", first + 1, first + group.len())
+    }
+
+    /// The parts that the steps of a group could not go before.
+    fn after(&self, group: &[usize]) -> String {
+        let mut names: Vec<&str> = Vec::new();
+        for name in group.iter().flat_map(|&i| &self.waited[i]) {
+            if !names.contains(name) {
+                names.push(name);
+            }
+        }
+        let verb = match (kind_of(self.plan), group.len()) {
+            (PlanKind::Disassembly, _) => "freed after",
+            (PlanKind::Assembly, 1) => "goes in after",
+            (PlanKind::Assembly, _) => "go in after",
+        };
+        match names.len() {
+            0 => String::new(),
+            n if n <= MOST_NAMES => format!(", {verb} {}", names.join(", ")),
+            n => format!(", {verb} {} and {} more", names[..MOST_NAMES].join(", "), n - MOST_NAMES),
+        }
+    }
+
+    /// What stays, and what keeps it.
+    fn rest(&self) -> String {
+        let plan = self.plan;
+        let mut text = String::new();
+        let stays = match kind_of(plan) {
+            PlanKind::Disassembly => "Stays",
+            PlanKind::Assembly => "Stands from the start",
+        };
+        if !plan.remaining.is_empty() {
+            let _ = writeln!(text, "{stays}: {}.\n", plan.remaining.join(", "));
+        }
+        if !plan.blocked.is_empty() {
+            text.push_str("## What is stuck\n\n");
+        }
+        for some in plan.blocked.chunk_by(|a, b| a.part == b.part) {
+            let _ = writeln!(text, "- {}: {}", some[0].part, kept(some));
+        }
+        text
+    }
+}
+
+/// What keeps one part. Straight ways are told one by one, ways with turns counted: they are many, and mostly
+/// kept by the same.
+fn kept(blocked: &[BlockedDocument]) -> String {
+    let is_straight = |b: &&BlockedDocument| !["+r", "-r", "~"].iter().any(|turn| b.action.contains(turn));
+    let mut told: Vec<String> =
+        blocked.iter().filter(is_straight).map(|b| format!("{} by {}", b.action, b.by.join(", "))).collect();
+    let turns = blocked.len() - told.len();
+    if turns > 0 {
+        told.push(format!("and {turns} ways with turns"));
+    }
+    told.join("; ")
+}
+
+fn common_name<'a>(names: &[&'a str]) -> &'a str {
+    let first = stem(names.first().unwrap_or(&""));
+    if !first.is_empty() && names.iter().all(|n| stem(n) == first) { first } else { "equal parts" }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::document::tests::{plan, step};
+    use super::*;
+
+    fn lifted(part: &str, by: f64, after: &[&str]) -> crate::plan::export::StepDocument {
+        let mut step = step(part, &[[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, by, 1.0, 0.0, 0.0, 0.0]]);
+        step.waited_for = after.iter().map(|&n| n.to_owned()).collect();
+        step
+    }
+
+    fn bolted() -> PlanDocument {
+        let names = ["bolt-1", "bolt-2", "bolt-3", "cover", "base"];
+        let steps = vec![
+            lifted("bolt-1", 14.0, &[]),
+            lifted("bolt-2", 14.0, &[]),
+            lifted("bolt-3", 14.0, &[]),
+            lifted("cover", 3.0, &names[..3]),
+        ];
+        PlanDocument {
+            parts: names.map(String::from).into(),
+            steps,
+            remaining: vec!["base".into()],
+            ..plan()
+        }
+    }
+
+    #[test]
+    fn equal_fasteners_are_one_instruction() {
+        let text = markdown(&bolted(), None);
+        assert_eq!(
+            text,
+            "# Taking apart: 4 steps\n\n\
+             **1–3.** Take 3 × bolt out along +Z (14 mm), one by one: bolt-1, bolt-2, bolt-3.\n\n\
+             **4.** Take cover out along +Z (3 mm), freed after bolt-1, bolt-2, bolt-3.\n\n\
+             Stays: base.\n\n"
+        );
+    }
+
+    #[test]
+    fn only_what_is_equal_and_does_the_same_is_grouped() {
+        let told = |plan: &PlanDocument, classes: Option<&[usize]>| {
+            markdown(plan, classes).lines().filter(|l| l.starts_with("**")).count()
+        };
+        assert_eq!(told(&bolted(), Some(&[0, 1, 0, 2, 3])), 4, "bolt-2 is another kind of bolt");
+        assert_eq!(told(&bolted(), Some(&[0, 0, 0, 0, 3])), 2, "the cover goes another way");
+        let mut plan = bolted();
+        plan.steps[1] = lifted("bolt-2", 14.0, &["bolt-1"]);
+        assert_eq!(told(&plan, None), 3, "bolt-2 waited for bolt-1");
+        let named = |n: &str| n.replace("bolt-", "");
+        plan = bolted();
+        plan.parts.iter_mut().for_each(|p| *p = named(p));
+        plan.steps.iter_mut().for_each(|s| s.part = named(&s.part));
+        assert_eq!(told(&plan, None), 4, "numbers alone say nothing");
+        assert!(markdown(&plan, Some(&[0, 0, 0, 1, 2])).contains("3 × equal parts"));
+    }
+
+    #[test]
+    fn what_is_stuck_is_told() {
+        let blocked = |part: &str, action: &str| BlockedDocument {
+            part: part.into(),
+            by: vec!["base".into()],
+            action: action.into(),
+        };
+        let plan = PlanDocument {
+            status: "infeasible".into(),
+            reason: Some("linked".into()),
+            blocked: vec![
+                blocked("cover", "+x"),
+                blocked("cover", "+rx"),
+                blocked("cover", "-x~"),
+                blocked("bolt-1", "insertion"),
+            ],
+            ..bolted()
+        };
+        let text = markdown(&plan, None);
+        assert!(text.contains("**Not complete (infeasible): linked**"), "{text}");
+        assert!(
+            text.ends_with("- cover: +x by base; and 2 ways with turns\n- bolt-1: insertion by base\n"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn assemblies_are_told_the_other_way() {
+        let text = markdown(&PlanDocument { kind: "assembly".into(), ..bolted() }, None);
+        assert!(
+            text.starts_with("# Putting together") && text.contains("Put 3 × bolt in along +Z"),
+            "{text}"
+        );
+        assert!(text.contains("goes in after bolt-1"), "{text}");
+    }
+}
