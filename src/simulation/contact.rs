@@ -126,7 +126,7 @@ impl<'a> Mover<'a> {
     /// than they can be wrong by. Measures nothing exactly, so it is quick.
     pub(super) fn clearly_enters(&self, standing: &[usize]) -> bool {
         let poll = Poll::every(ENTER_POLL, self.termination);
-        self.any_pair(standing, |sampled, measured, to_measured, allowance| {
+        self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
             let field = &measured.field;
             let limit = -allowance - field.error_bound();
             sampled.shape.samples.any(
@@ -136,10 +136,9 @@ impl<'a> Mover<'a> {
         })
     }
 
-    /// Whether the fields alone show that no sample of either surface is within some distance of the other;
-    /// of parts whose boxes do not meet nothing is asked.
+    /// Whether the fields alone show that no sample of either surface is within some distance of the other.
     pub(super) fn seems_clear(&self, standing: &[usize], by: f64) -> bool {
-        !self.any_pair(standing, |sampled, measured, to_measured, _| {
+        !self.any_pair(standing, by, |sampled, measured, to_measured, _| {
             let field = &measured.field;
             let limit = by + field.error_bound();
             sampled.shape.samples.any(
@@ -152,7 +151,7 @@ impl<'a> Mover<'a> {
     /// Whether a sample of either surface is deeper by `depth` than granted: quick where many are.
     pub(super) fn enters_by(&self, depth: f64, standing: &[usize]) -> bool {
         let poll = Poll::every(ENTER_POLL, self.termination);
-        self.any_pair(standing, |sampled, measured, to_measured, allowance| {
+        self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
             let (field, limit) = (&measured.field, -allowance - depth);
             let least = |p: &Point3<f64>| field.value(p) - field.error_bound();
             sampled.shape.samples.any(
@@ -168,10 +167,15 @@ impl<'a> Mover<'a> {
     }
 
     /// Whether a test of one surface's samples against the other's body holds for any pair that may
-    /// meet, given the sampled and the measured body, the way from one's frame to the other's, and
-    /// the pair's allowance.
-    fn any_pair(&self, standing: &[usize], test: impl Fn(&Body, &Body, &Pose, f64) -> bool) -> bool {
-        let bounds = self.body.shape.bounds().transformed(&self.pose);
+    /// come as close as `margin`, given the sampled and the measured body, the way from one's frame to the
+    /// other's, and the pair's allowance.
+    fn any_pair(
+        &self,
+        standing: &[usize],
+        margin: f64,
+        test: impl Fn(&Body, &Body, &Pose, f64) -> bool,
+    ) -> bool {
+        let bounds = self.body.shape.bounds().transformed(&self.pose).grown(margin);
         self.scene.broad_phase.meeting_of(standing, &bounds).into_iter().any(|other| {
             let still = &self.scene.bodies[other];
             let allowance = self.scene.allowances.of(self.part, other);
