@@ -304,6 +304,29 @@ fn what_was_changed_for_planning_is_shown_so() {
 }
 
 #[test]
+fn meshes_that_changed_since_are_not_shown_as_planned() {
+    let here = tempfile::tempdir().unwrap();
+    let at = |name: &str| here.path().join(name).display().to_string();
+    let (json, html, assembly) = (at("plan.json"), at("plan.html"), at("slot"));
+    fs::create_dir(&assembly).unwrap();
+    for file in fs::read_dir(folder("l-slot")).unwrap().map(|entry| entry.unwrap().path()) {
+        fs::copy(&file, here.path().join("slot").join(file.file_name().unwrap())).unwrap();
+    }
+    let turned = ["--rotate", "0.1,0.7,-0.3,0.2"];
+    succeeded(&run(&[&["plan", &assembly, "--no-cache", "--json", &json], &turned[..]].concat()));
+    succeeded(&run(&["view", &json, "-o", &html]));
+    let pin = at("slot/t-pin.obj");
+    let mesh = fs::read_to_string(&pin).unwrap();
+    let changed = mesh.replacen("v -8 -4 14\n", "v -8 -4 14.5\n", 1);
+    assert_ne!(changed, mesh);
+    fs::write(&pin, changed).unwrap();
+    refused(&run(&["view", &json, "-o", &html]), &["not those that were planned", "--meshes"]);
+    let named = run(&["view", &json, "--meshes", &assembly, "-o", &html]);
+    assert!(text(&named.stderr).contains("not those that were planned"));
+    succeeded(&named);
+}
+
+#[test]
 fn refusals_say_what_to_do() {
     let here = tempfile::tempdir().unwrap();
     let at = |name: &str| here.path().join(name).display().to_string();

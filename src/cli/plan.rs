@@ -11,9 +11,11 @@ use super::error::{CliError, exit_code};
 use super::listener::Listener;
 use super::part_names::{part_named, resolve};
 use super::staging::staging;
-use super::subject::Subject;
+use super::subject::{Subject, content_of};
 use super::{cache, interrupt, print, report, written};
-use crate::geometry::{Revision, SourceAssembly, SourceMesh, load_assembly, pose_from_waypoint};
+use crate::geometry::{
+    Revision, SourceAssembly, SourceMesh, content_hash, load_assembly, pose_from_waypoint,
+};
 use crate::plan::Plan;
 use crate::plan::export::{PlanDocument, SourceDocument};
 use crate::search::{PlanRequest, Planner, Termination};
@@ -49,6 +51,7 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let started = Instant::now();
     let mut assembly = load_assembly(&arguments.assembly)?;
     let read = started.elapsed();
+    let content = content_hash(&assembly);
     if let Some(rotation) = &arguments.rotate {
         assembly.rotate(rotation);
     }
@@ -63,17 +66,19 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     listener.finish()?;
     let plan = plan?;
     let revision = question.revision;
-    let document = PlanDocument { source: Some(source(arguments)), ..PlanDocument::new(&plan) };
+    let source = source(arguments, content_of(&content, &revision));
+    let document = PlanDocument { source: Some(source), ..PlanDocument::new(&plan) };
     Ok(Planned { plan, revised, subject: Subject::new(assembly, revision, document) })
 }
 
 /// Where the meshes are, for who reads the plan later and elsewhere.
-fn source(arguments: &PlanArguments) -> SourceDocument {
+fn source(arguments: &PlanArguments, content: String) -> SourceDocument {
     let absolute =
         |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone()).display().to_string();
     let replaced = arguments.replaced.iter().map(|(part, file)| (part.clone(), absolute(file)));
     SourceDocument {
         assembly: absolute(&arguments.assembly),
+        content,
         rotate: arguments.rotate.map(|q| [q.w, q.i, q.j, q.k]),
         replaced: replaced.collect(),
         added: arguments.added.iter().map(absolute).collect(),

@@ -9,7 +9,7 @@ use super::error::CliError;
 use super::part_names::part_named;
 use crate::blocking_graph::DirectionalGraph;
 use crate::geometry::{
-    Assembly, Pose, Revision, SourceAssembly, Waypoint, load_assembly, pose_from_waypoint,
+    Assembly, Pose, Revision, SourceAssembly, Waypoint, content_hash, load_assembly, pose_from_waypoint,
 };
 use crate::plan::PlanKind;
 use crate::plan::export::{PlanDocument, SourceDocument};
@@ -71,10 +71,22 @@ impl Subject {
             )));
         }
         let mut base = load_assembly(&path)?;
+        let content = content_hash(&base);
         if let Some([w, x, y, z]) = source.rotate {
             base.rotate(&UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)));
         }
         let revision = revision(&base, &source)?;
+        if !source.content.is_empty() && content_of(&content, &revision) != source.content {
+            let other = format!("the meshes in {} are not those that were planned", path.display());
+            match meshes {
+                // Whoever names them may mean them: finer ones of the same parts.
+                Some(_) => eprintln!("warning: {other}"),
+                None => {
+                    let advice = "plan again, or name the assembly with --meshes";
+                    return Err(CliError::Refused(format!("{other}: {advice}")));
+                }
+            }
+        }
         Ok(Self::new(base, revision, plan))
     }
 
@@ -119,6 +131,14 @@ impl Subject {
         page::page(&scene, &names, &graphs)
             .map_err(|e| CliError::Failed(format!("cannot write the scene as JSON: {e}")))
     }
+}
+
+/// A hash of an assembly as it was read (whose own hash is given), with the meshes that differ.
+pub(super) fn content_of(base: &[u8; 32], revision: &Revision) -> String {
+    let Revision { replaced, added, .. } = revision.clone();
+    let meshes = Revision { replaced, added, ..Revision::default() };
+    let hash = if meshes.is_empty() { *base } else { meshes.content_hash(base) };
+    blake3::Hash::from_bytes(hash).to_hex().to_string()
 }
 
 /// The plan in a file.

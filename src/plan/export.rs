@@ -65,6 +65,9 @@ fn disassembly() -> String {
 pub struct SourceDocument {
     /// The file or folder of the assembly.
     pub assembly: String,
+    /// A hash of all meshes as they were read: others are not those that were planned.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub content: String,
     /// The quaternion `[w, x, y, z]` by which all was turned about the origin (`--rotate`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<[f64; 4]>,
