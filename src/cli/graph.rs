@@ -32,7 +32,7 @@ pub(super) fn run(arguments: &GraphArguments) -> Result<ExitCode, CliError> {
     written(&arguments.output, draw(&picture).as_bytes())?;
     let edges: usize = graphs.iter().map(|g| g.edges.len()).sum();
     print(&format!(
-        "{}: {} parts, {} directions, {edges} edges\n",
+        "{}: parts {}, directions {}, edges {edges}\n",
         arguments.output.display(),
         present.len(),
         graphs.len()

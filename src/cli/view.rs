@@ -32,7 +32,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<ExitCode, CliError> {
     let html = subject.page(&termination)?;
     written(&arguments.output, html.as_bytes())?;
     print(&format!(
-        "{}: {} in {} steps, {} kB\n",
+        "{}: {}, steps {}, {} kB\n",
         arguments.output.display(),
         subject.plan.status,
         subject.plan.steps.len(),
