@@ -224,9 +224,17 @@ impl PlanStream<'_> {
             self.send()?;
             return Ok(None);
         }
-        let again = self.patience.after(self.client, error)?;
-        self.send()?;
-        Ok((again == Again::Restarted).then_some(Found::Restarted))
+        let (mut error, mut restarted) = (error, false);
+        let until = Instant::now() + self.client.options.reconnect;
+        loop {
+            restarted |= self.patience.after(self.client, error)? == Again::Restarted;
+            // The next daemon may die, too, before it is asked.
+            match self.send() {
+                Ok(()) => return Ok(restarted.then_some(Found::Restarted)),
+                Err(e) if !e.is_no_daemon() || Instant::now() >= until => return Err(e),
+                Err(e) => error = e,
+            }
+        }
     }
 }
 
