@@ -185,8 +185,8 @@ impl Client {
             question,
             patience: Patience::default(),
         };
-        while let Err(error) = stream.send() {
-            stream.patience.after(self, error)?;
+        if let Err(error) = stream.send() {
+            stream.ask_again(error)?;
         }
         Ok(stream)
     }
@@ -200,6 +200,7 @@ impl PlanStream<'_> {
         self.control = None;
         self.pending = None;
         (self.received, self.granted, self.next_step) = (0, 0, 0);
+        self.cancel_sent = false;
         self.request = self.client.new_request();
         self.connection = self.client.connection()?;
         let header = Client::header(RequestKind::Plan, self.request);
@@ -212,7 +213,8 @@ impl PlanStream<'_> {
 
     /// Asks once more after an error that a client gets over by itself.
     fn recover(&mut self, error: ClientError) -> Result<Option<Found>, ClientError> {
-        if self.cancel_wanted {
+        // Of a plan that is not wanted any more only the end is: where a daemon is, it has said it.
+        if self.cancel_wanted && !error.is_no_daemon() {
             return Err(error);
         }
         let forgotten = error.code() == Some(ErrorCode::UnknownHandle);
@@ -224,14 +226,18 @@ impl PlanStream<'_> {
             self.send()?;
             return Ok(None);
         }
-        let (mut error, mut restarted) = (error, false);
-        let until = Instant::now() + self.client.options.reconnect;
+        Ok(self.ask_again(error)?.then_some(Found::Restarted))
+    }
+
+    /// Asks until it could be asked; whether that was another daemon.
+    fn ask_again(&mut self, mut error: ClientError) -> Result<bool, ClientError> {
+        let (until, mut restarted) = (Instant::now() + self.client.options.reconnect, false);
         loop {
             restarted |= self.patience.after(self.client, error)? == Again::Restarted;
-            // The next daemon may die, too, before it is asked.
+            // That daemon may die, too, before it is asked.
             match self.send() {
-                Ok(()) => return Ok(restarted.then_some(Found::Restarted)),
-                Err(e) if !e.is_no_daemon() || Instant::now() >= until => return Err(e),
+                Ok(()) => return Ok(restarted),
+                Err(e) if restarted && Instant::now() >= until => return Err(e),
                 Err(e) => error = e,
             }
         }
