@@ -21,7 +21,7 @@ use nalgebra::{Translation3, Vector3};
 use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Pose};
-use crate::plan::Verifier;
+use crate::plan::{Verdict, Verifier};
 use crate::search::Removal;
 use crate::simulation::{Scene, Surroundings, exit_direction};
 use crate::termination::{Interrupt, Termination};
@@ -184,7 +184,7 @@ impl<'a> Assembling<'a> {
         let away = self.away(removal, &among);
         // Away from all that it touches first, as far as that is free: the way there is easier to find.
         let [start, goal] = ends;
-        let retreat = RETREAT * self.room.scene.reach(part).max(LEAST_RETREAT * self.room.scene.longest_side);
+        let retreat = RETREAT * self.room.reach(part).max(LEAST_RETREAT * self.room.scene.longest_side);
         let clear = Translation3::from(away * retreat) * goal;
         let last = self.room.check(&among, part, &[clear, goal], self.termination)?;
         let (goal, last) = if last.entries.is_empty() { (clear, Some(last.depth)) } else { (goal, None) };
@@ -212,7 +212,7 @@ impl<'a> Assembling<'a> {
         out.map_or_else(Vector3::z, |direction| -direction)
     }
 
-    fn hindered(&self, part: usize, what: Hindrance, verdict: &crate::plan::Verdict) -> Unfinished {
+    fn hindered(&self, part: usize, what: Hindrance, verdict: &Verdict) -> Unfinished {
         let mut by: Vec<usize> = verdict.entries.iter().map(|e| self.room.part(e.other)).collect();
         by.sort_unstable();
         by.dedup();

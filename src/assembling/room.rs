@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use nalgebra::Point3;
+
 use crate::geometry::{Bounds, Pose, interpolate, separating_direction, transformed};
 use crate::plan::{Verdict, Verifier};
 use crate::simulation::{Allowances, BroadPhase, Scene, seems_clear};
@@ -21,6 +23,10 @@ pub(super) struct Room {
     pub(super) scene: Scene,
     verifier: Verifier,
     parts: usize,
+    /// By number: its hull where it stands or waits, in the planning frame.
+    hulls: Vec<Vec<Point3<f64>>>,
+    /// By part: how far it reaches from the point that moves on lines.
+    reach: Vec<f64>,
     /// Holds every part at both places.
     pub(super) bounds: Bounds,
 }
@@ -35,6 +41,7 @@ impl Room {
             body.planning_from_shape = *pose;
             body.bounds = Bounds::of(&transformed(&body.shape.hull, pose));
         }
+        let hulls = bodies.iter().map(|b| transformed(&b.shape.hull, &b.planning_from_shape)).collect();
         let boxes: Vec<Bounds> = bodies.iter().map(|b| b.bounds).collect();
         Self {
             scene: Scene {
@@ -47,6 +54,8 @@ impl Room {
             },
             verifier: verifier.twice(),
             parts,
+            hulls,
+            reach: (0..parts).map(|part| scene.reach(part)).collect(),
             bounds: boxes.iter().fold(Bounds::EMPTY, |all, b| all.union(b)),
         }
     }
@@ -59,6 +68,11 @@ impl Room {
     /// The part that a number stands for.
     pub(super) fn part(&self, number: usize) -> usize {
         number % self.parts
+    }
+
+    /// How far a part reaches from the point that moves on lines.
+    pub(super) fn reach(&self, part: usize) -> f64 {
+        self.reach[part]
     }
 
     /// Deeper than this is not free.
@@ -98,7 +112,16 @@ impl Room {
 
     /// Whether a part on a straight way is seen to keep clear of some numbers (ascending), at poses so close
     /// that it cannot get at anything in between: for trying ways, not for plans.
-    pub(super) fn seems_clear(&self, among: &[usize], part: usize, piece: [&Pose; 2]) -> bool {
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn seems_clear(
+        &self,
+        among: &[usize],
+        part: usize,
+        piece: [&Pose; 2],
+        termination: &Termination,
+    ) -> Result<bool, Interrupt> {
         let thin = self.scene.bodies[part].shape.bounds().extents().min() / 2.0;
         let step = thin.clamp(FINE * self.scene.longest_side, COARSE * self.scene.longest_side);
         let clear = |glance: &[Pose; 2]| {
@@ -110,7 +133,13 @@ impl Room {
             let at = |i: usize| self.between(part, glance, i as f64 / count);
             (0..=count as usize).all(|i| seems_clear(&self.scene, &near, part, &at(i), step / 2.0))
         };
-        self.glances(part, piece).iter().all(clear)
+        for glance in self.glances(part, piece) {
+            termination.check()?;
+            if !clear(&glance) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// The poses of a straight way, so close that the rotation between two is unambiguous.
@@ -124,7 +153,7 @@ impl Room {
     fn travel(&self, part: usize, [from, to]: &[Pose; 2]) -> f64 {
         let centre = self.scene.centre_in_shape(part);
         let shift = (to * centre - from * centre).norm();
-        shift + self.scene.reach(part) * from.rotation.angle_to(&to.rotation)
+        shift + self.reach(part) * from.rotation.angle_to(&to.rotation)
     }
 
     fn between(&self, part: usize, [from, to]: &[Pose; 2], share: f64) -> Pose {
@@ -134,7 +163,7 @@ impl Room {
     /// A straight piece of the way cut into pieces no longer than the part, if they are not too many.
     fn glances(&self, part: usize, [from, to]: [&Pose; 2]) -> Vec<[Pose; 2]> {
         let ends = [*from, *to];
-        let reach = self.scene.reach(part).max(f64::MIN_POSITIVE);
+        let reach = self.reach(part).max(f64::MIN_POSITIVE);
         let count = (self.travel(part, &ends) / reach).ceil().clamp(1.0, MOST_GLANCES);
         // The ends stay as they are to the bit.
         let at = |i: usize| match i {
@@ -151,11 +180,7 @@ impl Room {
         if glance[0].rotation == glance[1].rotation && !near.is_empty() {
             let hull = &self.scene.bodies[part].shape.hull;
             let swept: Vec<_> = glance.iter().flat_map(|pose| transformed(hull, pose)).collect();
-            near.retain(|&other| {
-                let body = &self.scene.bodies[other];
-                let theirs = transformed(&body.shape.hull, &body.planning_from_shape);
-                separating_direction(&swept, &theirs, 0.0, None).is_none()
-            });
+            near.retain(|&other| separating_direction(&swept, &self.hulls[other], 0.0, None).is_none());
         }
         near
     }

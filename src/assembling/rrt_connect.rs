@@ -5,7 +5,7 @@
 //! Ways between poses are asked for as a whole, so a greedy try costs one question; where it fails, the tree
 //! goes as far as its shorter steps get.
 
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Uniform};
 use crate::termination::Interrupt;
 
 /// A step towards a random pose goes all the way, or so much of it where something is in the way.
@@ -144,7 +144,7 @@ pub(super) fn shortened(
     space: &impl Space,
     path: Vec<Pose>,
     tries: usize,
-    uniform: &mut crate::geometry::Uniform,
+    uniform: &mut Uniform,
 ) -> Result<Vec<Pose>, Interrupt> {
     let mut path = pruned(space, &path)?;
     for _ in 0..tries {
@@ -190,7 +190,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::geometry::{Uniform, interpolate};
+    use crate::geometry::interpolate;
 
     /// A point in a square of side 10 with a wall at x = 5 that has a gap, or none.
     struct Walled {

@@ -54,7 +54,7 @@ impl<'a> Transfer<'a> {
         termination: &'a Termination,
     ) -> Self {
         let centre = room.scene.centre_in_shape(part);
-        let reach = room.scene.reach(part);
+        let reach = room.reach(part);
         let bounds =
             ends.iter().fold(room.bounds, |b, pose| b.with_point(&(pose * centre))).grown(2.0 * reach);
         let uniform = Uniform::seeded(&[]);
@@ -127,9 +127,8 @@ impl Space for Transfer<'_> {
     }
 
     fn is_free(&self, from: &Pose, to: &Pose) -> Result<bool, Interrupt> {
-        self.termination.check()?;
         if !self.exact {
-            return Ok(self.room.seems_clear(self.among, self.part, [from, to]));
+            return self.room.seems_clear(self.among, self.part, [from, to], self.termination);
         }
         let way = self.room.way(self.part, from, to);
         let verdict = self.room.check(self.among, self.part, &way, self.termination)?;
