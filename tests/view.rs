@@ -258,7 +258,7 @@ fn a_plan_becomes_a_scene_a_page_and_words() {
     assert_eq!(played.document.animations().count(), 1);
     let notes = played.document.as_json().asset.extras.as_ref().unwrap().get();
     assert!(notes.contains(r#""up":"z""#) && notes.contains(r#""metresPerUnit":0.001"#), "{notes}");
-    assert!(succeeded(&run(&["view", &json, "-o", &html])).contains("complete in"));
+    assert!(succeeded(&run(&["view", &json, "-o", &html])).contains(": complete, steps 3"));
     let page = fs::read_to_string(&html).unwrap();
     assert!(page.starts_with("<!doctype html>") && !page.contains("{{"), "a placeholder is left");
     for loading in ["src=\"", "href=\"", "@import"] {
