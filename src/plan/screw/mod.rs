@@ -16,7 +16,7 @@ mod tests;
 
 use nalgebra::Point3;
 
-use crate::geometry::{Pose, Surface};
+use crate::geometry::{Bounds, Pose, Surface};
 use crate::termination::{Interrupt, Poll, Termination};
 
 pub(super) use centred::centred;
@@ -25,7 +25,7 @@ use super::course::{Course, Interval};
 use super::depth::{Found, MOST_EFFORT};
 use super::verify::{Asked, Way};
 use envelope::{Envelope, Zone};
-use path::{Pair, ScrewPath};
+use path::{Boxes, ScrewPath};
 
 /// Triangles of a profile between two looks at the termination condition.
 const ENVELOPE_POLL: u32 = 16;
@@ -37,6 +37,14 @@ const FINEST: f64 = 1.0 / 2.0;
 const FIRST_EFFORT: usize = 8_000;
 /// Stretches that turn further (radians) are bounded in pieces.
 const LONGEST: f64 = 4.0;
+
+/// Two surfaces of which one is screwed past the other.
+#[derive(Clone, Copy)]
+struct Pair<'a> {
+    moving: &'a Surface,
+    standing: &'a Surface,
+    planning_from_standing: Pose,
+}
 
 /// The stretches of the way on which the profiles of two surfaces do not show that they are apart.
 ///
@@ -60,6 +68,8 @@ fn unsettled(
     };
     let moving = triangles(pair.moving, &screw.reference);
     let standing = triangles(pair.standing, &axis_from_standing);
+    let [of_moving, of_standing] = [&moving, &standing].map(|t| Bounds::of(t.as_flattened()));
+    let boxes = Boxes { moving: of_moving, standing: of_standing };
     let [one, other] = [&moving, &standing].map(|t| Zone::of(t).everywhere());
     let zone = one.common(&other);
     let envelope = |triangles: Vec<[Point3<f64>; 3]>| {
@@ -72,7 +82,7 @@ fn unsettled(
     let mut stack = stretches;
     while let Some(interval) = stack.pop() {
         termination.check()?;
-        let Some(stretch) = screw.stretch(interval, pair) else { continue };
+        let Some(stretch) = screw.stretch(interval, &boxes) else { continue };
         let stray = |radius: f64| stretch.stray(radius);
         let places = [stretch.places_of_standing, stretch.places_of_moving];
         if standing.is_apart(places[0], &moving, places[1], stretch.shift, stray) {

@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Point3, Quaternion, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
 
-use crate::geometry::{Bounds, Helix, Pose, Surface, interpolate};
+use crate::geometry::{Bounds, Helix, Pose, interpolate};
 
 use super::super::course::{Course, Interval, Segment};
 
@@ -48,12 +48,12 @@ pub(super) struct ScrewPath {
     knots: Vec<Knot>,
 }
 
-/// Two surfaces of which one is screwed past the other.
-#[derive(Clone, Copy)]
-pub(super) struct Pair<'a> {
-    pub(super) moving: &'a Surface,
-    pub(super) standing: &'a Surface,
-    pub(super) planning_from_standing: Pose,
+/// Where two parts are in the axis frame, the moving one at the reference pose: boxes along the axis do not
+/// depend on how the parts lie in the world.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Boxes {
+    pub(super) moving: Bounds,
+    pub(super) standing: Bounds,
 }
 
 /// A stretch of the way, as far as the two parts can meet there.
@@ -132,8 +132,8 @@ impl ScrewPath {
     }
 
     /// What is known of a stretch: `None` if the two parts are nowhere near each other.
-    pub(super) fn stretch(&self, interval: Interval, pair: &Pair<'_>) -> Option<Stretch> {
-        let (moving, standing) = (pair.moving.bounds(), pair.standing.bounds());
+    pub(super) fn stretch(&self, interval: Interval, Boxes { moving, standing }: &Boxes) -> Option<Stretch> {
+        let planning_from_axis = self.helix.axis_from_planning.inverse();
         let [from, to] = interval.of(self.length);
         let first = self.knots.partition_point(|k| k.way[1] < from);
         let knots = || self.knots[first..].iter().take_while(|k| k.way[0] <= to);
@@ -141,7 +141,7 @@ impl ScrewPath {
         let zones = knots().map(|k| {
             let near = standing
                 .grown((k.way[1] - k.way[0]) / 2.0)
-                .transformed(&(k.pose.inverse() * pair.planning_from_standing));
+                .transformed(&(self.reference * k.pose.inverse() * planning_from_axis));
             Bounds { min: near.min.sup(&moving.min), max: near.max.inf(&moving.max) }
         });
         let zone = zones
@@ -150,7 +150,6 @@ impl ScrewPath {
         if !zone.meets(moving) {
             return None;
         }
-        let zone = zone.transformed(&self.reference);
         let middle = Point3::new(0.0, 0.0, zone.centre().z);
         let own = self.reference.inverse() * middle;
         let off = |k: &Knot| k.unscrewed * own - middle;

@@ -12,8 +12,7 @@ use crate::termination::Termination;
 
 use super::super::Verifier;
 use super::super::course::{Course, Interval};
-use super::path::Pair;
-use super::unsettled;
+use super::{Pair, unsettled};
 
 const TURNS: f64 = 3.0;
 const PITCH: f64 = 0.5;
