@@ -140,7 +140,7 @@ impl TriangleTree {
         p: &Point3<f64>,
         direction: &Vector3<f64>,
         length: f64,
-        test: impl Fn(u32) -> bool,
+        mut test: impl FnMut(u32) -> bool,
     ) -> bool {
         let q = p - self.origin;
         let slack = (ROUNDING * (q.amax() + self.radius + length)) as f32;

@@ -1,12 +1,20 @@
 //! In which order a state-based search expands states and tries actions.
 
 use std::cmp::Reverse;
+use std::collections::BTreeSet;
+
+use rayon::prelude::*;
 
 use crate::blocking_graph::{Blockage, Evaluation};
-use crate::simulation::Action;
+use crate::simulation::{Action, obstruction};
+use crate::termination::Poll;
 
+use super::disassembly::Stop;
 use super::sbdp::{Job, Search};
 use super::state::{Node, Phase};
+
+/// Rays between two looks at the termination condition.
+const RAY_POLL: u32 = 64;
 
 impl Search<'_, '_> {
     /// The states to expand, the initial one included. Of two last parts it is the same which one
@@ -109,17 +117,46 @@ impl Search<'_, '_> {
         self.nodes[node].blockage(phase).map_or(none, Blockage::evaluation)
     }
 
-    /// Of actions that may turn a part, those first that pull it along its own axis, over all parts;
-    /// of these, those that fewer parts stand against, as far as pushes tell. Smaller is better.
-    pub(super) fn promise(&self, job: Job) -> (bool, usize) {
-        let node = &self.nodes[job.node];
-        let action = self.rotations[job.action];
-        let Action::Screw(axis, ..) = action else { return (true, 0) };
-        if !self.directions.is_own(node.part, axis) {
-            return (true, 0);
+    /// What stands in the way of the parts of some jobs along their own axes, as far as it is not known.
+    pub(super) fn look_ahead(&mut self, jobs: &[Job]) -> Result<(), Stop> {
+        let version = self.disassembly.version();
+        let asked: BTreeSet<(usize, usize)> = jobs
+            .iter()
+            .filter_map(|&job| Some((job.node, self.pull(job)?)))
+            .filter(|key| self.in_the_way.get(key).is_none_or(|(at, _)| *at != version))
+            .collect();
+        let standing = |&(node, _): &(usize, usize)| self.disassembly.standing(self.nodes[node].part);
+        let asked: Vec<_> = asked.into_iter().map(|key| (key, standing(&key))).collect();
+        let (nodes, translations, problem) = (&self.nodes, &self.translations, &self.disassembly.problem);
+        let found = asked.par_iter().map(|((node, push), standing)| {
+            let (node, force) = (&nodes[*node], translations[*push].force());
+            let poll = Poll::every(RAY_POLL, Some(&problem.termination));
+            obstruction(&problem.scene, standing, node.part, node.pose(), &force, &poll)
+        });
+        let found: Vec<f64> = found.collect();
+        problem.termination.check()?;
+        for ((key, _), way) in asked.into_iter().zip(found) {
+            let doublings = if way > 0.0 { way.log2().floor() as i32 } else { i32::MIN };
+            self.in_the_way.insert(key, (version, doublings));
         }
-        let push = self.translations.iter().position(|t| t.force() == action.force());
-        let against = |b: &Blockage| push.map_or(0, |push| b.blockers(push).len());
-        (false, node.translation.as_ref().map_or(0, against))
+        Ok(())
+    }
+
+    /// The push that pulls as an action does that also turns a part about its own axis.
+    fn pull(&self, job: Job) -> Option<usize> {
+        let action = self.rotations[job.action];
+        let Action::Screw(axis, ..) = action else { return None };
+        let pulls = |t: &Action| t.force() == action.force();
+        self.directions.is_own(self.nodes[job.node].part, axis).then_some(())?;
+        self.translations.iter().position(pulls)
+    }
+
+    /// Of actions that may turn a part, those first that pull it along its own axis, over all parts;
+    /// of these, those that fewer parts stand against, as far as pushes tell, and then those in whose way
+    /// less stands: a nut is not turned towards the head of its bolt. Smaller is better.
+    pub(super) fn promise(&self, job: Job) -> (bool, usize, i32) {
+        let Some(push) = self.pull(job) else { return (true, 0, 0) };
+        let against = self.nodes[job.node].translation.as_ref().map_or(0, |b| b.blockers(push).len());
+        (false, against, self.in_the_way.get(&(job.node, push)).map_or(0, |(_, way)| *way))
     }
 }

@@ -9,7 +9,7 @@
 //! ahead in parallel, but their results are taken in the order of the serial algorithm and thrown
 //! away where an earlier one changed the question: plans do not depend on the number of threads.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -87,6 +87,8 @@ pub(super) struct Search<'a, 'o> {
     pub(super) swept: Swept,
     pub(super) rays: Rays,
     ahead: Ahead,
+    /// Of a node and a push: how long a stretch of others is in its way (powers of two), and as of when.
+    pub(super) in_the_way: HashMap<(usize, usize), ((usize, usize), i32)>,
     /// How coarsely two states were taken for one, at most.
     pub(super) coarsest: f64,
     /// Which parts are balls, which no action has to turn.
@@ -128,6 +130,7 @@ impl<'a, 'o> Search<'a, 'o> {
             swept: Swept::default(),
             rays: Rays::default(),
             ahead: Ahead::default(),
+            in_the_way: HashMap::new(),
             coarsest: 1.0,
             balls,
             links: None,
@@ -303,6 +306,7 @@ impl<'a, 'o> Search<'a, 'o> {
             batch.iter().flat_map(|&node| (0..count).map(move |action| Job { node, action })).collect();
         let by_action = self.turns_by_action(phase);
         if by_action {
+            self.look_ahead(&jobs)?;
             jobs.sort_by_cached_key(|job| self.promise(*job));
         }
         let mut gain = Gain::default();

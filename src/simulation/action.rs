@@ -78,10 +78,11 @@ impl Action {
         turns.chain(drags).collect()
     }
 
-    /// The wrenches that pull along some axes while turning about them, all four ways each.
+    /// The wrenches that pull along some axes while turning about them, all four ways each: first those that
+    /// follow a right-hand thread, as most are.
     #[must_use]
     pub fn screws_along(axes: &[Axis]) -> Vec<Self> {
-        let signs = [(true, true), (true, false), (false, true), (false, false)];
+        let signs = [(true, true), (false, false), (true, false), (false, true)];
         axes.iter().flat_map(|&a| signs.map(|(f, t)| Self::Screw(a, f, t))).collect()
     }
 
@@ -149,6 +150,6 @@ mod tests {
             ["+rx", "-rx", "+ry", "-ry", "+rz", "-rz", "+x~", "-x~", "+y~", "-y~", "+z~", "-z~"]
         );
         let screws = names(Action::screws_along(&Axis::WORLD));
-        assert_eq!((screws.len(), screws[9].as_str()), (12, "+z-rz"));
+        assert_eq!((screws.len(), screws[9].as_str()), (12, "-z-rz"));
     }
 }

@@ -1,0 +1,108 @@
+//! How much stands in the way of a part that goes straight, as a hint at which way it is to be turned
+//! out: past the flanks of a thread it goes through a tooth at a time, past a head through all of it.
+
+use nalgebra::{Point3, Translation3, Vector3};
+
+use crate::geometry::{Bounds, OrientedSamples, Pose, Surface};
+use crate::termination::Poll;
+
+use super::Scene;
+
+/// Of the samples of a surface, about so many are looked at.
+const RAYS: usize = 128;
+/// Faces that look along the direction, or against it, by less than this count as walls.
+const STEEPNESS: f64 = 1e-3;
+
+/// The longest stretch that a point of a part, going from `start` along the unit vector `direction` until it
+/// is past all that stands, is inside of another part, or a point of another inside of it. Told by some of
+/// their samples: what is small may go unseen.
+#[must_use]
+pub fn obstruction(
+    scene: &Scene,
+    standing: &[usize],
+    part: usize,
+    start: &Pose,
+    direction: &Vector3<f64>,
+    poll: &Poll<'_>,
+) -> f64 {
+    let moving = &scene.bodies[part];
+    let bounds = moving.shape.bounds().transformed(start);
+    let furthest = standing.iter().map(|&s| scene.bodies[s].bounds.support(direction));
+    let travel = furthest.fold(f64::NEG_INFINITY, f64::max) + bounds.support(&-direction);
+    if travel <= 0.0 {
+        return 0.0;
+    }
+    let end = Translation3::from(direction * travel);
+    let swept = bounds.union(&bounds.transformed(&Pose::from_parts(end, Default::default())));
+    let past = |other: usize| {
+        let standing = &scene.bodies[other];
+        let standing_from_moving = standing.planning_from_shape.inverse() * start;
+        let forward = standing.planning_from_shape.rotation.inverse() * direction;
+        let backward = start.rotation.inverse() * -direction;
+        let one = Rays { target: &standing.shape.surface, to_target: standing_from_moving, along: forward };
+        let to_moving = standing_from_moving.inverse();
+        let other = Rays { target: &moving.shape.surface, to_target: to_moving, along: backward };
+        let one = one.longest(&moving.shape.oriented, travel, poll);
+        one.max(other.longest(&standing.shape.oriented, travel, poll))
+    };
+    scene.broad_phase.meeting_of(standing, &swept).into_iter().map(past).fold(0.0, f64::max)
+}
+
+/// Segments from samples of one surface through another.
+struct Rays<'a> {
+    target: &'a Surface,
+    to_target: Pose,
+    /// How the samples move against the target, in its frame.
+    along: Vector3<f64>,
+}
+
+impl Rays<'_> {
+    fn longest(&self, samples: &OrientedSamples, travel: f64, poll: &Poll<'_>) -> f64 {
+        let corridor = self.corridor(travel);
+        let inside = |p: Point3<f64>| {
+            if !corridor.contains(&p) || poll.is_over() {
+                return 0.0;
+            }
+            self.target.longest_inside_along(&p, &self.along, travel, STEEPNESS)
+        };
+        let every = samples.iter().count().div_ceil(RAYS).max(1);
+        samples.iter().step_by(every).map(|(p, _)| inside(self.to_target * p)).fold(0.0, f64::max)
+    }
+
+    /// From where the target is met.
+    fn corridor(&self, travel: f64) -> Bounds {
+        let bounds = *self.target.bounds();
+        let back = self.along * -travel;
+        bounds.union(&Bounds { min: bounds.min + back, max: bounds.max + back })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{peg_in_hole, scene, thread};
+
+    fn along(scene: &Scene, part: usize, direction: Vector3<f64>) -> f64 {
+        let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != part).collect();
+        let start = &scene.bodies[part].planning_from_shape;
+        obstruction(scene, &standing, part, start, &direction, &Poll::every(1, None))
+    }
+
+    #[test]
+    fn a_blind_hole_is_open_upwards_and_its_bottom_stands_in_the_way() {
+        let (scene, _) = scene(peg_in_hole(-0.05));
+        assert_eq!(along(&scene, 1, Vector3::z()), 0.0);
+        assert_eq!(along(&scene, 0, -Vector3::z()), 0.0);
+        let down = along(&scene, 1, -Vector3::z());
+        assert!(down > 0.3 && (down - along(&scene, 0, Vector3::z())).abs() < 1e-9, "{down}");
+        assert!(along(&scene, 1, Vector3::x()) > 1.0);
+    }
+
+    #[test]
+    fn a_thread_stands_in_the_way_by_a_tooth() {
+        let pitch = 0.5;
+        let (scene, _) = scene(thread(3.0, pitch));
+        let up = along(&scene, 1, Vector3::z());
+        assert!(up > 0.1 * pitch && up < pitch, "{up}");
+    }
+}
