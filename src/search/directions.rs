@@ -70,6 +70,7 @@ impl Directions {
         let mut of_shape: HashMap<*const Shape, Faces> = HashMap::new();
         let mut votes = Axis::WORLD.map(|a| Candidate { direction: a.unit(), weight: 0.0 }).to_vec();
         let mut own: Vec<Option<Candidate>> = vec![None; scene.bodies.len()];
+        let mut principal: Vec<Candidate> = Vec::new();
         for &part in present {
             if termination.check().is_err() {
                 break;
@@ -85,14 +86,17 @@ impl Directions {
                 count(&mut votes, c);
             }
             own[part] = faces.own.as_ref().map(turned);
+            faces.principal.iter().map(turned).for_each(|c| count(&mut principal, c));
         }
-        votes.sort_by(|a, b| b.rank().total_cmp(&a.rank()));
-        let mut axes = frame(&votes);
+        let best_first = |c: &mut Vec<Candidate>| c.sort_by(|a, b| b.rank().total_cmp(&a.rank()));
+        best_first(&mut votes);
+        best_first(&mut principal);
+        let mut axes = frame(&votes, &principal);
         let mut extra: Vec<Candidate> = Vec::new();
-        for c in own.iter().flatten().filter(|c| nearest(&axes, &c.direction).is_none()) {
+        for c in own.iter().flatten().chain(&principal).filter(|c| nearest(&axes, &c.direction).is_none()) {
             count(&mut extra, *c);
         }
-        extra.sort_by(|a, b| b.rank().total_cmp(&a.rank()));
+        best_first(&mut extra);
         axes.extend(extra.into_iter().take(MOST_EXTRA).map(|c| c.direction));
         let own = own.iter().map(|c| nearest(&axes, &c.as_ref()?.direction)).collect();
         Self { axes: axes.into_iter().map(Axis::along).collect(), own }
@@ -150,14 +154,22 @@ struct Faces {
     candidates: Vec<Candidate>,
     /// The axis that the shape is turned about, or else the best candidate.
     own: Option<Candidate>,
+    /// Of a shape whose surface agrees on none, the principal axes that stand apart: an open ring has them
+    /// along and across its gap.
+    principal: Vec<Candidate>,
 }
 
 impl Faces {
     fn of(shape: &Shape) -> Self {
         let (normals, area) = normals(shape);
-        let mut faces = Self { normals, area, candidates: Vec::new(), own: None };
+        let mut faces = Self { normals, area, candidates: Vec::new(), own: None, principal: Vec::new() };
         faces.candidates = faces.agreed();
-        let turned = turning_axis(shape).map(|axis| {
+        let spread = Spread::of(shape);
+        if faces.candidates.is_empty() {
+            let principal = (0..3).filter(|&i| spread.apart(i) > TURNED_APART).filter_map(|i| spread.axis(i));
+            faces.principal = principal.map(|direction| Candidate { direction, weight: area }).collect();
+        }
+        let turned = spread.turning_axis().map(|axis| {
             let mut known = faces.candidates.iter().chain(&faces.normals).map(|c| c.direction);
             let direction = known.find(|d| d.dot(&axis).abs() > NEAR).unwrap_or(axis);
             Candidate { direction, weight: faces.speaking_for(&direction) }
@@ -197,27 +209,44 @@ impl Faces {
     }
 }
 
-/// The axis of a shape whose normals are spread alike all around it, as those of a bolt or a nut are,
-/// threads included: an eigenvalue of ∫nnᵀdA stands apart from two others that are equal.
-fn turning_axis(shape: &Shape) -> Option<Unit<Vector3<f64>>> {
-    let surface = &shape.surface;
-    let mut spread = Matrix3::zeros();
-    for t in 0..surface.triangles().len() as u32 {
-        let [a, b, c] = surface.corners(t);
-        let twice = (b - a).cross(&(c - a));
-        let area = twice.norm();
-        if area > 0.0 {
-            spread += twice * twice.transpose() / area;
+/// How the normals of a shape are spread: ∫nnᵀdA, and its eigenvalues as shares of their sum.
+struct Spread {
+    axes: Matrix3<f64>,
+    shares: Vector3<f64>,
+}
+
+impl Spread {
+    fn of(shape: &Shape) -> Self {
+        let surface = &shape.surface;
+        let mut spread = Matrix3::zeros();
+        for t in 0..surface.triangles().len() as u32 {
+            let [a, b, c] = surface.corners(t);
+            let twice = (b - a).cross(&(c - a));
+            let area = twice.norm();
+            if area > 0.0 {
+                spread += twice * twice.transpose() / area;
+            }
         }
+        let eigen = spread.symmetric_eigen();
+        Self { axes: eigen.eigenvectors, shares: eigen.eigenvalues / spread.trace() }
     }
-    let eigen = spread.symmetric_eigen();
-    let (values, whole) = (eigen.eigenvalues, spread.trace());
-    let apart = |i: usize, j: usize| (values[i] - values[j]).abs() / whole;
-    let alone = (0..3).find(|&i| {
-        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-        apart(j, k) < TURNED_ALIKE && apart(i, j).min(apart(i, k)) > TURNED_APART
-    })?;
-    Unit::try_new(eigen.eigenvectors.column(alone).into_owned(), 0.5).map(oriented)
+
+    /// How far an eigenvalue is from the nearer of the two others.
+    fn apart(&self, i: usize) -> f64 {
+        let from = |j: usize| (self.shares[i] - self.shares[j]).abs();
+        from((i + 1) % 3).min(from((i + 2) % 3))
+    }
+
+    fn axis(&self, i: usize) -> Option<Unit<Vector3<f64>>> {
+        Unit::try_new(self.axes.column(i).into_owned(), 0.5).map(oriented)
+    }
+
+    /// The axis of a shape whose normals are spread alike all around it, as those of a bolt or a nut are,
+    /// threads included: an eigenvalue stands apart from two others that are equal.
+    fn turning_axis(&self) -> Option<Unit<Vector3<f64>>> {
+        let alike = |i: usize| (self.shares[(i + 1) % 3] - self.shares[(i + 2) % 3]).abs() < TURNED_ALIKE;
+        self.axis((0..3).find(|&i| alike(i) && self.apart(i) > TURNED_APART)?)
+    }
 }
 
 /// The directions in which most of a shape's surface faces, with their areas, largest first;
@@ -246,16 +275,18 @@ fn normals(shape: &Shape) -> (Vec<Candidate>, f64) {
     (out, area)
 }
 
-/// Three axes at right angles: the best, the best at right angles to it, and the third.
-fn frame(votes: &[Candidate]) -> Vec<Unit<Vector3<f64>>> {
+/// Three axes at right angles: the best, the best at right angles to it (a part's principal axis if surfaces
+/// agree on none), and the third.
+fn frame(votes: &[Candidate], principal: &[Candidate]) -> Vec<Unit<Vector3<f64>>> {
     let world = Axis::WORLD.map(Axis::unit).to_vec();
     let Some(first) = votes.first().map(|c| c.direction) else { return world };
     let square = |c: &&Candidate| c.direction.dot(&first).abs() < SQUARE;
     let across = |d: &Unit<Vector3<f64>>| Unit::try_new(d.into_inner() - *first * first.dot(d), 0.1);
-    let second = votes.iter().find(square).and_then(|c| across(&c.direction)).or_else(|| {
-        let flattest = world.iter().min_by(|a, b| a.dot(&first).abs().total_cmp(&b.dot(&first).abs()));
-        flattest.and_then(across)
-    });
+    let second =
+        votes.iter().chain(principal).find(square).and_then(|c| across(&c.direction)).or_else(|| {
+            let flattest = world.iter().min_by(|a, b| a.dot(&first).abs().total_cmp(&b.dot(&first).abs()));
+            flattest.and_then(across)
+        });
     let Some(second) = second else { return world };
     let third = Unit::new_normalize(first.cross(&second));
     // In the order of the world's axes that they are nearest to.
@@ -322,6 +353,42 @@ mod tests {
         let along =
             directions.axes.iter().position(|a| a.unit().dot(&(turn * Vector3::z())).abs() > 0.999_999);
         assert!(along.is_some() && directions.own == [along, along], "{directions:?}");
+    }
+
+    #[test]
+    fn a_ring_that_is_open_has_the_axis_of_its_gap() {
+        let turn = Pose::rotation(Vector3::new(0.3, -0.5, 0.2));
+        let lean = Pose::rotation(Vector3::new(0.0, 0.0, 0.5));
+        // Where nothing else tells a direction across the rod, and where the rod's end tells another one.
+        for (pose, sides) in [(turn, 24), (lean, 4)] {
+            let found = axes_of([rod(0.3, [-4.0, 4.0], sides), open_ring(1.0, 0.2)].map(|m| moved(m, &pose)));
+            let gap = pose * Vector3::x();
+            assert!(found.iter().any(|a| a.unit().dot(&gap).abs() > 1.0 - 1e-6), "{found:?}");
+        }
+    }
+
+    /// A ring about z without the sixth of it that is around +x: a torus, whose surface agrees on no axis.
+    fn open_ring(radius: f64, thickness: f64) -> SourceMesh {
+        use std::f64::consts::{PI, TAU};
+        const ALONG: u32 = 60;
+        const AROUND: u32 = 16;
+        let mut mesh = SourceMesh::default();
+        for (i, j) in (0..=ALONG).flat_map(|i| (0..AROUND).map(move |j| (i, j))) {
+            let a = PI / 6.0 + f64::from(i) / f64::from(ALONG) * PI * 5.0 / 3.0;
+            let b = f64::from(j) / f64::from(AROUND) * TAU;
+            let r = radius + thickness * b.cos();
+            mesh.vertices.push([r * a.cos(), r * a.sin(), thickness * b.sin()]);
+        }
+        let at = |i: u32, j: u32| i * AROUND + j % AROUND;
+        for (i, j) in (0..ALONG).flat_map(|i| (0..AROUND).map(move |j| (i, j))) {
+            mesh.triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            mesh.triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+        for j in 1..AROUND - 1 {
+            mesh.triangles.push([at(0, 0), at(0, j), at(0, j + 1)]);
+            mesh.triangles.push([at(ALONG, 0), at(ALONG, j + 1), at(ALONG, j)]);
+        }
+        mesh
     }
 
     fn cube() -> SourceMesh {
