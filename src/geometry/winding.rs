@@ -5,6 +5,8 @@
 //! and J. Strackee 1983). Known error: about 1e-2 at the far-field factor used here, so only
 //! the comparison with 0.5 away from the surface is meaningful.
 
+use std::f64::consts::{PI, TAU};
+
 use nalgebra::{Point3, Vector3};
 
 use super::triangle::area_normal;
@@ -51,6 +53,7 @@ impl WindingTree {
     #[must_use]
     pub(super) fn winding(&self, p: &Point3<f64>) -> f64 {
         let mut sum = 0.0;
+        let mut near = SolidAngle::default();
         let mut stack = Vec::with_capacity(64);
         if !self.nodes.is_empty() {
             stack.push(0usize);
@@ -63,13 +66,13 @@ impl WindingTree {
                 sum += node.dipole.dot(&d) / (r2 * r2.sqrt());
             } else if node.right == 0 {
                 let (a, b) = node.range;
-                sum += self.corners[a as usize..b as usize].iter().map(|t| solid_angle(p, t)).sum::<f64>();
+                self.corners[a as usize..b as usize].iter().for_each(|t| near.add(p, t));
             } else {
                 stack.push(node.right as usize);
                 stack.push(i + 1);
             }
         }
-        sum / (4.0 * std::f64::consts::PI)
+        (sum + near.sum()) / (4.0 * PI)
     }
 }
 
@@ -111,12 +114,46 @@ fn summary(triangles: &[[Point3<f64>; 3]], offset: usize) -> Node {
     Node { centre, radius, dipole, range: (offset as u32, (offset + triangles.len()) as u32), right: 0 }
 }
 
-fn solid_angle(p: &Point3<f64>, t: &[Point3<f64>; 3]) -> f64 {
-    let (a, b, c) = (t[0] - p, t[1] - p, t[2] - p);
-    let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
-    let det = a.dot(&b.cross(&c));
-    let den = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
-    2.0 * det.atan2(den)
+/// The sum of the solid angles of triangles. Half of each is the angle of a complex number; the sum of
+/// angles is that of the product, and how often it went around is counted: one arc tangent for all.
+#[derive(Debug, Clone, Copy)]
+struct SolidAngle {
+    re: f64,
+    im: f64,
+    around: f64,
+}
+
+impl Default for SolidAngle {
+    fn default() -> Self {
+        Self { re: 1.0, im: 0.0, around: 0.0 }
+    }
+}
+
+impl SolidAngle {
+    fn add(&mut self, p: &Point3<f64>, t: &[Point3<f64>; 3]) {
+        let (a, b, c) = (t[0] - p, t[1] - p, t[2] - p);
+        let (la, lb, lc) = (a.norm(), b.norm(), c.norm());
+        let im = a.dot(&b.cross(&c));
+        let re = la * lb * lc + a.dot(&b) * lc + b.dot(&c) * la + c.dot(&a) * lb;
+        let before = self.im;
+        let product = [self.re * re - before * im, self.re * im + before * re];
+        // Of no size: the point is a corner.
+        let size = product[0].abs() + product[1].abs();
+        if size == 0.0 {
+            return;
+        }
+        (self.re, self.im) = (product[0] / size, product[1] / size);
+        // Above the real axis, and turned further up, it is below only beyond the half turn.
+        if before >= 0.0 && im > 0.0 && self.im < 0.0 {
+            self.around += 1.0;
+        } else if before < 0.0 && im < 0.0 && self.im >= 0.0 {
+            self.around -= 1.0;
+        }
+    }
+
+    fn sum(&self) -> f64 {
+        2.0 * (self.im.atan2(self.re) + TAU * self.around)
+    }
 }
 
 #[cfg(test)]
@@ -143,6 +180,29 @@ mod tests {
                 let expected = if d < 0.0 { 1.0 } else { 0.0 };
                 let w = tree.winding(&p);
                 assert!(d.abs() < 1e-6 || (w - expected).abs() < ERROR, "{w} at {p}, distance {d}");
+            }
+        }
+    }
+
+    #[test]
+    fn solid_angles_add_up_however_often_they_go_around() {
+        let points: Vec<_> = spread([-1.0; 3], [1.0; 3], 300).collect();
+        let angle = |p: &Point3<f64>, t: &[Point3<f64>; 3]| {
+            let mut one = SolidAngle::default();
+            one.add(p, t);
+            one.sum()
+        };
+        for p in spread([-0.3; 3], [0.3; 3], 20) {
+            for turned in [false, true] {
+                let (mut all, mut expected) = (SolidAngle::default(), 0.0);
+                for t in points.chunks_exact(3) {
+                    let t = if turned { [t[1], t[0], t[2]] } else { [t[0], t[1], t[2]] };
+                    // All the same way around, so that it goes around often.
+                    let t = if (angle(&p, &t) < 0.0) == turned { t } else { [t[1], t[0], t[2]] };
+                    all.add(&p, &t);
+                    expected += angle(&p, &t);
+                }
+                assert!(expected.abs() > 4.0 * TAU && (all.sum() - expected).abs() < 1e-9, "{expected}");
             }
         }
     }
