@@ -36,6 +36,8 @@ pub struct FreeRegion {
     centre: Point3<f64>,
     radius: f64,
     sides: Vec<HalfSpace>,
+    /// A point well inside, which is outside the surface.
+    inner: Point3<f64>,
 }
 
 /// What a region is to hold.
@@ -138,6 +140,13 @@ impl FreeRegion {
         self.radius
     }
 
+    /// Whether all of it is outside a surface that does not enter it: of an open one, part of it may be inside.
+    #[must_use]
+    pub fn is_outside(&self, surface: &Surface) -> bool {
+        let farthest = (self.inner - self.centre).norm() + self.radius;
+        !surface.is_open() || surface.stays_outside(&self.inner, farthest)
+    }
+
     /// Whether a ball lies inside.
     #[must_use]
     pub fn holds_ball(&self, centre: &Point3<f64>, radius: f64) -> bool {
@@ -183,7 +192,7 @@ impl Surface {
     ) -> Result<FreeRegion, NoRegion> {
         let Wanted { points, most, .. } = wanted;
         let sides = Vec::with_capacity(8);
-        let region = FreeRegion { centre: *seed, radius, sides };
+        let region = FreeRegion { centre: *seed, radius, sides, inner: *seed };
         let reach = points.iter().map(|p| (p - seed).norm()).fold(0.0, f64::max);
         let mut growth = Growth {
             surface: self,
@@ -207,7 +216,8 @@ impl Surface {
         // too thin to have one may follow the plane of a face into the solid.)
         let inner = region.nearest_within(seed, most + 4.0 * INNER, INNER).ok_or(NoRegion::Cramped)?;
         let closest = self.closest_from(&inner, nearest.unwrap_or(0));
-        if self.signed(&inner, &closest) > 0.0 { Ok(region) } else { Err(NoRegion::Cramped) }
+        let is_outside = self.signed(&inner, &closest) > 0.0;
+        if is_outside { Ok(FreeRegion { inner, ..region }) } else { Err(NoRegion::Cramped) }
     }
 }
 

@@ -8,6 +8,7 @@
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::folds::Folds;
+use super::rim::{Rim, WINDING_DOUBT};
 use super::triangle::{Feature, area_normal, closest_on_triangle, crossing};
 use super::triangle_tree::{TriangleTree, Visitor};
 use super::winding::WindingTree;
@@ -43,6 +44,8 @@ pub struct Surface {
     fan: Vec<u32>,
     tree: TriangleTree,
     winding: Option<WindingTree>,
+    /// Where signs come from winding numbers.
+    rim: Option<Rim>,
     folds: Option<Folds>,
     bounds: Bounds,
 }
@@ -72,6 +75,7 @@ impl Surface {
         let neighbours = neighbours(mesh);
         let folds = if winding.is_some() { None } else { Folds::of(mesh, &face_normals, &neighbours) };
         Self {
+            rim: winding.is_some().then(|| Rim::of(&mesh.vertices, &mesh.triangles)),
             folds,
             neighbours,
             vertex_normals: vertex_normals(mesh, &face_normals),
@@ -98,6 +102,7 @@ impl Surface {
             + size_of_val(&*self.fan)
             + self.tree.memory()
             + self.winding.as_ref().map_or(0, WindingTree::memory)
+            + self.rim.as_ref().map_or(0, Rim::memory)
             + self.folds.as_ref().map_or(0, Folds::memory)
     }
 
@@ -156,6 +161,24 @@ impl Surface {
     #[cfg(test)]
     pub(super) fn is_folded_anywhere(&self) -> bool {
         self.folds.is_some()
+    }
+
+    /// The edges at which it is open, where signs come from winding numbers. There are none where it only
+    /// crosses itself: winding numbers change at the surface alone then.
+    #[must_use]
+    pub fn rim(&self) -> Option<&Rim> {
+        self.rim.as_ref()
+    }
+
+    /// Whether all that a straight line of at most `radius` joins with `p`, without meeting the surface, is
+    /// outside as `p` is. Not if it cannot be told.
+    #[must_use]
+    pub fn stays_outside(&self, p: &Point3<f64>, radius: f64) -> bool {
+        let (Some(winding), Some(rim)) = (&self.winding, &self.rim) else {
+            return self.signed_distance(p) > 0.0;
+        };
+        let margin = 0.5 - WINDING_DOUBT - winding.winding(p);
+        margin > 0.0 && rim.slope(p, radius) * radius < margin
     }
 
     /// The winding number at `p`, where signs come from it.

@@ -12,8 +12,9 @@
 //! middle of another, this takes too long: a count ends it ([`Found::gave_up`]).
 //!
 //! So for closed surfaces the answer is a bound for all points and all times, not for samples (but
-//! for [`FreeRegion`]'s rounding). Surfaces with holes have no outside that a region could be in:
-//! there, only small pieces are settled, by their corners.
+//! for [`FreeRegion`]'s rounding). Of surfaces with holes that holds where the winding number cannot
+//! come near one half in a region ([`Rim`](crate::geometry::Rim)); in sight of holes a region may be partly
+//! inside, and only small pieces are settled, by their corners.
 
 use std::collections::HashMap;
 
@@ -141,6 +142,13 @@ type Place = (i32, [i64; 3]);
 /// How far a piece is from a region: the distance of its worst corner, and that.
 type Fit = Option<(f64, Point3<f64>)>;
 
+/// A region, and whether all of it is outside the surface that is measured: of one with holes, part of it may be
+/// inside.
+struct Region {
+    free: FreeRegion,
+    is_outside: bool,
+}
+
 /// So many regions of a place are tried.
 const TRIED: usize = 3;
 
@@ -151,7 +159,7 @@ struct Search<'a> {
     most_effort: usize,
     view: View<'a>,
     termination: &'a Termination,
-    regions: Vec<FreeRegion>,
+    regions: Vec<Region>,
     /// Regions by the places of pieces that they held.
     places: HashMap<Place, Vec<u32>>,
     /// The corners of the hull in question.
@@ -278,15 +286,17 @@ impl Search<'_> {
     ) -> bool {
         let asked = self.asked;
         let spared = self.spared() - slack;
-        if spared < 0.0 || (asked.measured.is_open() && swept.radius > asked.precision.coarse) {
+        if spared < 0.0 || (swept.radius > asked.precision.coarse && self.is_beside_rim(swept)) {
             return false;
         }
         let place = place(swept);
         let known = self.places.get(&place).map_or(&[][..], Vec::as_slice);
         for region in known.iter().rev().take(TRIED).copied().chain(hint.region) {
-            if let Some((depth, _)) = fits(&self.regions[region as usize], spared) {
+            let Region { free, is_outside } = &self.regions[region as usize];
+            if let Some((depth, _)) = fits(free, spared) {
                 hint.region = Some(region);
-                return self.is_outside(spared, hint.triangle) && self.settled(depth + slack);
+                return (*is_outside || self.is_outside(swept, spared, hint.triangle))
+                    && self.settled(depth + slack);
             }
         }
         let closest = asked.measured.closest_from(&swept.centre, hint.triangle);
@@ -296,7 +306,9 @@ impl Search<'_> {
         // sign in mid-air, too, where the winding number passes a half: next to a point far outside
         // may be one as far inside.
         if swept.radius - signed <= spared {
-            return (!self.has_rim || self.is_outside(spared, hint.triangle))
+            return (!self.has_rim
+                || asked.measured.stays_outside(&swept.centre, swept.radius)
+                || self.is_outside(swept, spared, hint.triangle))
                 && self.settled(swept.radius - signed + slack);
         }
         // Wider regions than large pieces need are vain; small ones tell how deep they really are.
@@ -307,17 +319,18 @@ impl Search<'_> {
             return false;
         }
         self.found.effort += REGION_EFFORT;
-        let Some(region) = self.region(swept, &closest, signed, most) else { return false };
-        let fit = fits(&region, most);
+        let Some(free) = self.region(swept, &closest, signed, most) else { return false };
+        let fit = fits(&free, most);
         let id = self.regions.len() as u32;
-        self.regions.push(region);
+        let is_outside = free.is_outside(asked.measured);
+        self.regions.push(Region { free, is_outside });
         hint.region = Some(id);
         let Some((depth, worst)) = fit else { return false };
         self.places.entry(place).or_default().push(id);
         if depth > spared && !self.is_told(swept, depth, &worst, hint.triangle) {
             return false;
         }
-        self.is_outside(most, hint.triangle) && self.settled(depth + slack)
+        (is_outside || self.is_outside(swept, most, hint.triangle)) && self.settled(depth + slack)
     }
 
     /// A region for a piece, around its middle or what is outside nearest to that.
@@ -350,12 +363,18 @@ impl Search<'_> {
         true
     }
 
-    /// Whether the corners in question are no deeper than `most`: a region beside a surface with
-    /// holes may be inside.
-    fn is_outside(&self, most: f64, guess: u32) -> bool {
-        let measured = self.asked.measured;
+    /// Whether holes are so near that no sign would hold for all of a piece.
+    fn is_beside_rim(&self, swept: &Swept) -> bool {
+        let rim = self.asked.measured.rim().filter(|_| self.has_rim);
+        rim.is_some_and(|rim| rim.slope(&swept.centre, swept.radius) * swept.radius > 0.5)
+    }
+
+    /// Whether a piece is small, and its corners no deeper than `most`: a region beside a surface with holes
+    /// may be inside.
+    fn is_outside(&self, swept: &Swept, most: f64, guess: u32) -> bool {
+        let Question { measured, precision, .. } = self.asked;
         let depth = |p: &Point3<f64>| -measured.signed(p, &measured.closest_from(p, guess));
-        !measured.is_open() || self.wanted.iter().all(|p| depth(p) <= most)
+        swept.radius <= precision.coarse && self.wanted.iter().all(|p| depth(p) <= most)
     }
 
     /// Measures the corners of a piece at its end; whether that is all that can be said about it.

@@ -6,7 +6,7 @@ use crate::geometry::{Closest, Surface};
 
 use super::facet::{ACROSS, Facet, Lanes, POINTS};
 use super::grid::{BAND, BRICK, CELLS, FAR_NODE, NODES, Nodes};
-use super::rim::Rim;
+use super::rim::sign;
 
 /// Lattices along a brick's side.
 const LATTICES: usize = NODES / ACROSS;
@@ -16,7 +16,6 @@ const _: () = assert!(NODES == LATTICES * ACROSS && LATTICES == ACROSS, "a latti
 pub(super) struct Brick<'a> {
     pub(super) surface: &'a Surface,
     /// Where the surface is open, if it is.
-    pub(super) rim: Option<&'a Rim>,
     /// Its lowest node.
     pub(super) origin: Point3<f64>,
     pub(super) cell: f64,
@@ -136,7 +135,7 @@ impl Brick<'_> {
             if found.distance < BAND * self.cell {
                 let i = node(&corner, i);
                 out.nearest[i] = found.triangle;
-                out.values[i] = match (self.rim, &found.foot) {
+                out.values[i] = match (self.surface.rim(), &found.foot) {
                     (Some(_), _) => found.distance,
                     (None, Foot::Face(height)) => height * self.cell,
                     (None, Foot::Other(closest)) => self.surface.signed(&self.node_at(i), closest),
@@ -153,11 +152,11 @@ impl Brick<'_> {
     /// Signs of what lies outside the band, or of all nodes if the surface is open.
     fn sign_untouched(&self, out: &mut Nodes) {
         let band = (BAND * self.cell) as f32;
-        if let Some(rim) = self.rim {
+        if let Some(rim) = self.surface.rim() {
             for v in out.values.iter_mut().filter(|v| v.is_nan()) {
                 *v = band;
             }
-            return rim.sign(self, &mut out.values);
+            return sign(rim, self, &mut out.values);
         }
         if out.nearest.iter().all(|&t| t == FAR_NODE) {
             // The band passes between the nodes, or beside the brick: all lie on one side.

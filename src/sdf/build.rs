@@ -12,7 +12,6 @@ use crate::termination::{Interrupt, Termination};
 
 use super::brick::Brick;
 use super::grid::{BAND, CELLS, EMPTY, Field, NearBrick, Nodes};
-use super::rim::Rim;
 
 /// Cells are no larger than this, in units of the planning frame.
 const LARGEST_CELL: f64 = 0.05;
@@ -53,7 +52,6 @@ impl Field {
         // They stay for long.
         field.triangles.shrink_to_fit();
         field.near.shrink_to_fit();
-        field.rim = surface.is_open().then(|| Rim::of(surface));
         field.fill_far();
         Ok(field)
     }
@@ -64,7 +62,7 @@ impl Field {
         near.nodes.get_or_init(|| {
             let [start, end] = near.triangles.map(|i| i as usize);
             let origin = self.brick_min(near.brick as usize);
-            let brick = Brick { surface: &self.surface, rim: self.rim.as_ref(), origin, cell: self.cell };
+            let brick = Brick { surface: &self.surface, origin, cell: self.cell };
             Box::new(brick.nodes(&self.triangles[start..end]))
         })
     }
@@ -87,7 +85,6 @@ impl Field {
             near: Vec::new(),
             triangles: Vec::new(),
             surface: Arc::clone(surface),
-            rim: None,
             bounds: *bounds,
         })
     }

@@ -15,7 +15,7 @@ impl Field {
         let (side, band) = (self.cell * CELLS as f64, BAND * self.cell);
         let bound = |steps: u16| (f64::from(steps.saturating_sub(1)) * side + band) as f32;
         self.far = steps.into_iter().map(bound).collect();
-        if self.rim.is_some() {
+        if self.surface.is_open() {
             self.far_inside = vec![OnceLock::new(); self.slots.len()];
         } else {
             self.sign_components();

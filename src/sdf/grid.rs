@@ -7,8 +7,6 @@ use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Surface};
 
-use super::rim::Rim;
-
 /// Cells along a brick's side.
 pub(super) const CELLS: usize = 8;
 /// Nodes along a brick's side; neighbouring bricks repeat their common nodes.
@@ -41,7 +39,6 @@ pub struct Field {
     pub(super) triangles: Vec<u32>,
     pub(super) surface: Arc<Surface>,
     /// Where the surface is open, if it is.
-    pub(super) rim: Option<Rim>,
     pub(super) bounds: Bounds,
 }
 
