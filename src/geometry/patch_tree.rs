@@ -3,6 +3,8 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::termination::Poll;
+
 use super::{Bounds, Surface};
 
 /// A node: a sphere that holds the triangles of its subtree.
@@ -56,14 +58,14 @@ impl PatchTree {
             + size_of_val(&**extremes)
     }
 
-    /// The tree of all triangles of a surface.
+    /// The tree of all triangles of a surface; once the poll is over, no tree to be used.
     #[must_use]
-    pub fn new(surface: &Surface) -> Self {
+    pub fn new(surface: &Surface, poll: &Poll<'_>) -> Self {
         let mut triangles: Vec<u32> = (0..surface.triangles().len() as u32).collect();
         let mut tree = Self::default();
         let n = triangles.len();
         if n > 0 {
-            tree.build(surface, &mut triangles, 0, n);
+            tree.build(surface, &mut triangles, 0, n, poll);
         }
         tree.nodes.shrink_to_fit();
         tree.vertices.shrink_to_fit();
@@ -114,7 +116,10 @@ impl PatchTree {
         }
     }
 
-    fn build(&mut self, surface: &Surface, triangles: &mut [u32], start: usize, end: usize) {
+    fn build(&mut self, surface: &Surface, triangles: &mut [u32], start: usize, end: usize, poll: &Poll<'_>) {
+        if poll.is_over() {
+            return;
+        }
         let slice = &mut triangles[start..end];
         let corners = || slice.iter().flat_map(|&t| surface.corners(t));
         let bounds = corners().fold(Bounds::EMPTY, |b, p| b.with_point(&p));
@@ -142,9 +147,9 @@ impl PatchTree {
             let middle = |t: u32| surface.corners(t).iter().map(|p| p[axis]).sum::<f64>();
             let half = slice.len() / 2;
             slice.select_nth_unstable_by(half, |&s, &t| middle(s).total_cmp(&middle(t)).then(s.cmp(&t)));
-            self.build(surface, triangles, start, start + half);
+            self.build(surface, triangles, start, start + half, poll);
             self.nodes[me].right = self.nodes.len() as u32;
-            self.build(surface, triangles, start + half, end);
+            self.build(surface, triangles, start + half, end, poll);
         }
         let node = &mut self.nodes[me];
         node.last_vertex = self.vertices.len() as u32;
@@ -207,7 +212,7 @@ mod tests {
     fn every_triangle_is_in_one_leaf_and_in_all_spheres_above() {
         for mesh in [ball(3), l_shape(), open_box([0.0; 3], [1.0; 3])] {
             let s = surface(mesh);
-            let tree = PatchTree::new(&s);
+            let tree = PatchTree::new(&s, &Poll::every(1, None));
             let mut all = held(&tree, &s, tree.root().unwrap());
             all.sort_unstable();
             assert_eq!(all, (0..s.triangles().len() as u32).collect::<Vec<_>>());

@@ -4,12 +4,17 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Point3, Vector3};
 
+use crate::termination::{Interrupt, Poll, Termination};
+
 use super::content_hash::mesh_hash;
 use super::hull::hull_vertices;
 use super::samples::sited;
 use super::{
     Bounds, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Solidity, Spacing, Surface,
 };
+
+/// Nodes of the tree of patches between two looks at the termination condition.
+const PATCH_POLL: u32 = 64;
 
 /// A mesh in its own frame (origin at the middle of its box, lengths of the planning frame).
 #[derive(Debug, Clone)]
@@ -63,8 +68,16 @@ impl Shape {
     }
 
     /// The triangles in a tree of patches.
-    pub fn patches(&self) -> &PatchTree {
-        self.patches.get_or_init(|| PatchTree::new(&self.surface))
+    ///
+    /// # Errors
+    /// The termination condition became true before there was one.
+    pub fn patches(&self, termination: &Termination) -> Result<&PatchTree, Interrupt> {
+        if let Some(tree) = self.patches.get() {
+            return Ok(tree);
+        }
+        let tree = PatchTree::new(&self.surface, &Poll::every(PATCH_POLL, Some(termination)));
+        termination.check()?;
+        Ok(self.patches.get_or_init(|| tree))
     }
 
     /// Bytes in memory, of what was derived so far.
@@ -115,6 +128,17 @@ mod tests {
         assert_eq!(shape.hull.len(), 8);
         assert!((shape.reach - (1.0f64 + 4.0 + 0.25).sqrt()).abs() < 1e-12);
         assert_eq!(shape.bounds().extents(), Vector3::new(2.0, 4.0, 1.0));
+    }
+
+    #[test]
+    fn a_tree_of_patches_that_was_cut_short_is_made_anew() {
+        let shape = Shape::new(&healed(ball(3)));
+        let termination = Termination::default();
+        termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+        assert_eq!(shape.patches(&termination).err(), Some(Interrupt::Cancelled));
+        let tree = shape.patches(&Termination::default()).unwrap();
+        let all = tree.root().map_or(0, |root| tree.triangles(root).len());
+        assert_eq!(all, shape.surface.triangles().len());
     }
 
     #[test]

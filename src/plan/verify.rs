@@ -368,7 +368,7 @@ impl Way<'_> {
         let view = View::new(course, standing.planning_from_shape, on_moving, precision.finest / 16.0);
         let question = Question {
             surface: &looked_at.shape.surface,
-            tree: looked_at.shape.patches(),
+            tree: looked_at.shape.patches(asked.termination)?,
             measured: &measured.shape.surface,
             granted: asked.allowances.of(asked.part, other),
             precision,

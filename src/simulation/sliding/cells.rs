@@ -87,7 +87,7 @@ impl<'a> Cells<'a> {
         } else {
             Arc::new(gathered(scene, &place, at, termination)?)
         };
-        let facing = Facing::new(scene, (self.part, &self.start), other, gathered.asks_part);
+        let facing = Facing::new(scene, (self.part, &self.start), other, gathered.asks_part, termination)?;
         let cells = gathered.cells.clone().ok_or(Halt::Lost)?;
         self.pairs.push(Pair { facing, cells });
         self.count(gathered.regions)
@@ -179,7 +179,7 @@ fn way(
     termination: &Termination,
 ) -> Result<Way, Interrupt> {
     let base = kept(scene, place, termination)?;
-    let facing = Facing::new(scene, (place.part, place.start), place.other, base.asks_part);
+    let facing = Facing::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
     let lost = Way { blocked: Vec::new(), cells: None, found: 0, regions: MOST_REGIONS };
     let Some(base) = &base.cells else { return Ok(lost) };
     let mut cells = Arc::clone(base);
@@ -204,7 +204,7 @@ fn long_way(
     let short =
         scene.kept.way(scene, place, (u, false), |scene, place, u| way(scene, place, u, termination))?;
     let base = kept(scene, place, termination)?;
-    let facing = Facing::new(scene, (place.part, place.start), place.other, base.asks_part);
+    let facing = Facing::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
     let mut finder = Finder::new(&facing, MOST_REGIONS, termination);
     let mut lengthened = |cell: &Cell| {
         termination.check()?;
@@ -236,7 +236,7 @@ fn gathered(
     let mut regions = 0;
     // The one inside the other, or the plainer one, needs fewer pieces: which, shows in trying.
     while let Some(asks_part) = sides.pop() {
-        let facing = Facing::new(scene, (part, start), other, asks_part);
+        let facing = Facing::new(scene, (part, start), other, asks_part, termination)?;
         let most = if sides.is_empty() { MOST_REGIONS } else { budget };
         let mut finder = Finder::new(&facing, most, termination);
         let root = facing.root().map(|piece| Spot { piece, guess: 0, level: 0, held: HELD_AT_FIRST });

@@ -3,6 +3,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::geometry::{Cloud, Parts, PatchTree, Pose, Surface, bisected, separating_direction};
+use crate::termination::{Interrupt, Termination};
 
 use super::super::Scene;
 use super::DEPTH_TOLERANCE;
@@ -46,12 +47,16 @@ pub(super) struct Facing<'a> {
 
 impl<'a> Facing<'a> {
     /// With the moving part's surface asked, or the standing one's.
+    ///
+    /// # Errors
+    /// The termination condition became true.
     pub(super) fn new(
         scene: &'a Scene,
         (part, start): (usize, &Pose),
         other: usize,
         asks_part: bool,
-    ) -> Self {
+        termination: &Termination,
+    ) -> Result<Self, Interrupt> {
         let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
         let stand = standing.planning_from_shape;
         let [mine, theirs] = [moving, standing].map(|body| &body.shape);
@@ -61,15 +66,15 @@ impl<'a> Facing<'a> {
             (theirs, mine, start.inverse() * stand, start.rotation.inverse())
         };
         let sense = if asks_part { 1.0 } else { -1.0 };
-        Self {
+        Ok(Self {
             other,
             asked: &asked.surface,
-            tree: asked.patches(),
+            tree: asked.patches(termination)?,
             measured: &measured.surface,
             measured_from_asked,
             shifted: *turn.to_rotation_matrix().matrix() * sense,
             allowance: scene.allowances.of(part, other),
-        }
+        })
     }
 
     /// Which sides of a pair can be asked, as what is closed can be measured: whether it is the
