@@ -141,15 +141,21 @@ impl Endpoint {
         write().map_err(|source| EndpointError::Io { path: path.clone(), source })
     }
 
-    /// Whether its process lives. One that ended but was not waited for by its parent yet (a
-    /// zombie) can still be signalled, but answers nobody: it counts as dead.
+    /// Whether its process lives ([`is_process_alive`]).
     #[must_use]
     pub fn is_alive(&self) -> bool {
-        let Some(pid) = i32::try_from(self.pid).ok().and_then(rustix::process::Pid::from_raw) else {
-            return false;
-        };
-        rustix::process::test_kill_process(pid) != Err(rustix::io::Errno::SRCH) && !has_ended(self.pid)
+        is_process_alive(self.pid)
     }
+}
+
+/// Whether a process lives. One that ended but was not waited for by its parent yet (a
+/// zombie) can still be signalled, but answers nobody: it counts as dead.
+#[must_use]
+pub fn is_process_alive(pid: u32) -> bool {
+    let Some(id) = i32::try_from(pid).ok().and_then(rustix::process::Pid::from_raw) else {
+        return false;
+    };
+    rustix::process::test_kill_process(id) != Err(rustix::io::Errno::SRCH) && !has_ended(pid)
 }
 
 /// Whether the process is a zombie; `false` where /proc does not tell.

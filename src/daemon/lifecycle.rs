@@ -1,14 +1,13 @@
 //! The daemon's place: its lock, its `daemon.json`, and its own part of shared memory.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{Read, Seek, SeekFrom, Write};
-use std::os::unix::fs::OpenOptionsExt;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use sbdp_ipc::endpoint::{self, DAEMON_FILE, Endpoint, EndpointError};
 use sbdp_ipc::layout::{self, LayoutError};
 
 use super::instance::{Instance, ignore_missing, sweep};
+use super::lock::{LockError, LockFile};
 use crate::config::EndpointConfig;
 
 const LOCK_FILE: &str = "lock";
@@ -81,7 +80,7 @@ pub(crate) struct Lease {
     place: Place,
     /// This daemon's part of shared memory.
     pub(crate) instance: Instance,
-    _locks: [File; 2],
+    _locks: [LockFile; 2],
 }
 
 impl Lease {
@@ -128,32 +127,15 @@ pub(super) fn io_error(path: &Path) -> impl FnOnce(std::io::Error) -> LifecycleE
     move |source| LifecycleError::Io { path, source }
 }
 
-fn take_lock(path: &Path, option: &'static str) -> Result<File, LifecycleError> {
-    let mut file = OpenOptions::new()
-        .read(true)
-        .write(true)
-        .create(true)
-        .truncate(false)
-        .mode(0o600)
-        .open(path)
-        .map_err(io_error(path))?;
-    match file.try_lock() {
-        Ok(()) => {}
-        Err(TryLockError::WouldBlock) => {
-            let mut pid = String::new();
-            let _ = file.read_to_string(&mut pid);
-            let pid = if pid.trim().is_empty() { "unknown".to_owned() } else { pid.trim().to_owned() };
-            return Err(LifecycleError::Taken { pid, lock: path.to_owned(), option });
-        }
-        Err(TryLockError::Error(source)) => return Err(io_error(path)(source)),
-    }
-    let mut write = || {
-        file.set_len(0)?;
-        file.seek(SeekFrom::Start(0))?;
-        writeln!(file, "{}", std::process::id())
-    };
-    write().map_err(io_error(path))?;
-    Ok(file)
+fn take_lock(path: &Path, option: &'static str) -> Result<LockFile, LifecycleError> {
+    LockFile::take(path).map_err(|error| match error {
+        LockError::Held(pid) => LifecycleError::Taken {
+            pid: pid.map_or_else(|| "unknown".to_owned(), |pid| pid.to_string()),
+            lock: path.to_owned(),
+            option,
+        },
+        LockError::Io(source) => io_error(path)(source),
+    })
 }
 
 fn remove_if_there(path: &Path) -> Result<(), LifecycleError> {

@@ -17,6 +17,7 @@ mod figures;
 mod instance;
 mod intake;
 mod lifecycle;
+mod lock;
 mod metrics;
 mod outbox;
 mod ports;
