@@ -1,9 +1,14 @@
 //! The one condition that everything long-running polls: cancelled, or past its deadline.
 
+mod silence;
+
 use std::cell::Cell;
+use std::panic::Location;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
+
+pub use silence::{Silence, Watch};
 
 /// Why work stopped early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,13 +25,14 @@ pub struct Termination {
     cancelled: Arc<AtomicBool>,
     deadline: Option<Instant>,
     race: Option<(Arc<AtomicUsize>, usize)>,
+    watch: Option<Arc<Watch>>,
 }
 
 impl Termination {
     /// A condition with an optional deadline.
     #[must_use]
     pub fn new(deadline: Option<Instant>) -> Self {
-        Self { cancelled: Arc::default(), deadline, race: None }
+        Self { cancelled: Arc::default(), deadline, ..Self::default() }
     }
 
     /// A flag that ends the work when it is set; shared with whoever may cancel.
@@ -39,6 +45,12 @@ impl Termination {
     #[must_use]
     pub fn unless_won(&self, winner: &Arc<AtomicUsize>, rank: usize) -> Self {
         Self { race: Some((Arc::clone(winner), rank)), ..self.clone() }
+    }
+
+    /// The same, and who looks at it is watched.
+    #[must_use]
+    pub fn watched(&self, watch: &Arc<Watch>) -> Self {
+        Self { watch: Some(Arc::clone(watch)), ..self.clone() }
     }
 
     /// The same with at most so much time from now on.
@@ -65,7 +77,11 @@ impl Termination {
 
     /// # Errors
     /// The reason to stop, if there is one.
+    #[track_caller]
     pub fn check(&self) -> Result<(), Interrupt> {
+        if let Some(watch) = &self.watch {
+            watch.looked(Location::caller());
+        }
         if self.cancelled.load(Ordering::Relaxed) {
             return Err(Interrupt::Cancelled);
         }
@@ -99,6 +115,7 @@ impl<'t> Poll<'t> {
     }
 
     /// To be called at each step: whether the condition was seen to be true.
+    #[track_caller]
     pub fn is_over(&self) -> bool {
         let Some(termination) = self.termination else { return false };
         let steps = self.steps.get();

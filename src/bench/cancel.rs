@@ -2,6 +2,7 @@
 //! moments spread over all of a plan, whatever it is at.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -12,7 +13,7 @@ use crate::geometry::load_assembly;
 use crate::plan::PlanStep;
 use crate::search::{PlanRequest, PlanSink, Progress};
 use crate::service::{AssemblyId, Service};
-use crate::termination::Termination;
+use crate::termination::{Silence, Termination, Watch};
 
 /// What to measure.
 #[derive(Debug, Clone)]
@@ -42,6 +43,11 @@ pub struct CancelRecord {
     pub longest_ms: f64,
     /// At which share of the plan's time that was.
     pub longest_at: f64,
+    /// Longest work of one thread in the whole plan without a look at whether it is to end, in processor
+    /// time: what the longest would be at most on a machine that does nothing else.
+    pub silence_ms: f64,
+    /// The looks before and after it, in the source.
+    pub silent_between: String,
 }
 
 /// Measures, every other moment by a deadline.
@@ -61,7 +67,8 @@ pub fn cancel(
         let question = PlanRequest { no_cache: true, threads: request.threads, ..PlanRequest::default() };
         let plan = |termination: &Termination| ended(&service, id, &question, termination);
         let started = Instant::now();
-        plan(&Termination::new(None))?;
+        let watch = Arc::new(Watch::default());
+        plan(&Termination::new(None).watched(&watch))?;
         let whole = started.elapsed();
         let mut times = Vec::new();
         for sample in 0..request.samples {
@@ -70,7 +77,7 @@ pub fn cancel(
                 times.push((late, share));
             }
         }
-        let record = record(source.name, whole, times);
+        let record = record(source.name, whole, times, watch.longest());
         told(&record);
         records.push(record);
     }
@@ -115,7 +122,12 @@ fn late(
     Ok((ended > due).then(|| ended - due))
 }
 
-fn record(assembly: String, whole: Duration, mut times: Vec<(Duration, f64)>) -> CancelRecord {
+fn record(
+    assembly: String,
+    whole: Duration,
+    mut times: Vec<(Duration, f64)>,
+    silence: Option<Silence>,
+) -> CancelRecord {
     times.sort_by_key(|(late, _)| *late);
     let ms = |time: Duration| time.as_secs_f64() * 1e3;
     let at = |share: f64| {
@@ -130,6 +142,8 @@ fn record(assembly: String, whole: Duration, mut times: Vec<(Duration, f64)>) ->
         p99_ms: ms(at(0.99).0),
         longest_ms: ms(at(1.0).0),
         longest_at: at(1.0).1,
+        silence_ms: silence.map_or(0.0, |s| ms(s.time)),
+        silent_between: silence.map_or_else(String::new, |s| s.between.map(|p| p.to_string()).join(" and ")),
     }
 }
 
@@ -157,8 +171,8 @@ mod tests {
     #[test]
     fn the_longest_is_told_with_its_moment() {
         let times = (1..=200).map(|i| (Duration::from_millis(i), i as f64 / 200.0)).rev().collect();
-        let record = record("a".into(), Duration::from_secs(1), times);
+        let record = record("a".into(), Duration::from_secs(1), times, None);
         assert_eq!((record.p50_ms, record.p99_ms, record.longest_ms), (101.0, 199.0, 200.0));
-        assert_eq!((record.ended, record.longest_at), (200, 1.0));
+        assert_eq!((record.ended, record.longest_at, record.silence_ms), (200, 1.0, 0.0));
     }
 }

@@ -9,12 +9,17 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point3, Vector3};
 
+use crate::termination::Poll;
+
 /// The linking number of two closed polygons, which come no nearer to each other than
-/// `clearance`; `None` if they do, for then it means nothing.
+/// `clearance`; `None` if they do, for then it means nothing, or if `poll` is over.
 #[must_use]
-pub fn linking_number(a: &[Point3<f64>], b: &[Point3<f64>], clearance: f64) -> Option<i64> {
+pub fn linking_number(a: &[Point3<f64>], b: &[Point3<f64>], clearance: f64, poll: &Poll<'_>) -> Option<i64> {
     let mut solid_angle = 0.0;
     for (a0, a1) in sides(a) {
+        if poll.is_over() {
+            return None;
+        }
         for (b0, b1) in sides(b) {
             let corner = a0 - b0;
             let (along, across) = (a1 - a0, b0 - b1);
@@ -67,6 +72,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    fn linking_number(a: &[Point3<f64>], b: &[Point3<f64>], clearance: f64) -> Option<i64> {
+        super::linking_number(a, b, clearance, &Poll::every(1, None))
+    }
 
     /// A circle about `centre`, of radius 1, at right angles to an axis, run through `turns` times.
     fn circle(centre: [f64; 3], axis: Vector3<f64>, count: usize, turns: f64) -> Vec<Point3<f64>> {

@@ -88,7 +88,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         let count = problem.scene.bodies.len();
         Self {
             observer,
-            everything: HullTree::new(&problem.scene, problem.present.clone()),
+            everything: HullTree::new(&problem.scene, problem.present.clone(), &problem.termination),
             around: HashMap::new(),
             entangled: vec![None; count],
             held_since: vec![None; count],

@@ -12,7 +12,7 @@ use nalgebra::Point3;
 
 use crate::geometry::{linking_number, surface_loops};
 use crate::simulation::Scene;
-use crate::termination::{Interrupt, Termination};
+use crate::termination::{Interrupt, Poll, Termination};
 
 use super::sbdp::Search;
 
@@ -20,6 +20,8 @@ use super::sbdp::Search;
 const MOST_LOOPS: usize = 64;
 /// Pairs of loop segments that are looked at for one pair of parts.
 const MOST_SEGMENT_PAIRS: usize = 4_000_000;
+/// Segments of one loop, each against all of another, between two looks at the termination condition.
+const SIDES_POLL: u32 = 4;
 /// Curves that come closer than this, in the planning frame, might meet by what engines tolerate.
 const CLEARANCE: f64 = 2e-3;
 
@@ -36,6 +38,7 @@ impl Links {
     /// # Errors
     /// The termination condition became true.
     fn among(scene: &Scene, parts: &[usize], termination: &Termination) -> Result<Self, Interrupt> {
+        let poll = Poll::every(SIDES_POLL, Some(termination));
         // Many parts have nobody near whom they could be linked with: theirs are never looked for.
         let known = vec![OnceCell::new(); scene.bodies.len()];
         let loops = |part: usize| known[part].get_or_init(|| loops(scene, part));
@@ -43,11 +46,11 @@ impl Links {
         for &a in parts {
             let near = scene.broad_phase.meeting_of(parts, &scene.bodies[a].bounds);
             for b in near.into_iter().filter(|&b| b > a && scene.allowances.of(a, b) == 0.0) {
-                termination.check()?;
-                if are_linked(loops(a), loops(b)) {
+                if are_linked(loops(a), loops(b), &poll) {
                     links[a].push(b);
                     links[b].push(a);
                 }
+                termination.check()?;
             }
         }
         Ok(Self(links))
@@ -91,9 +94,10 @@ fn loops(scene: &Scene, part: usize) -> Vec<Loop> {
     loops
 }
 
-fn are_linked(a: &[Loop], b: &[Loop]) -> bool {
+/// Not once `poll` is over.
+fn are_linked(a: &[Loop], b: &[Loop], poll: &Poll<'_>) -> bool {
     let segments = |loops: &[Loop]| loops.iter().map(Vec::len).sum::<usize>();
-    let linked = |(a, b): (&Loop, &Loop)| linking_number(a, b, CLEARANCE).is_some_and(|n| n != 0);
+    let linked = |(a, b): (&Loop, &Loop)| linking_number(a, b, CLEARANCE, poll).is_some_and(|n| n != 0);
     segments(a) * segments(b) <= MOST_SEGMENT_PAIRS
         && a.iter().flat_map(|a| b.iter().map(move |b| (a, b))).any(linked)
 }

@@ -1,11 +1,23 @@
 //! Balls: parts that turning does not change.
 
+use nalgebra::{Point3, Vector3};
+
 use crate::geometry::Shape;
 
 /// Whether a shape is a ball but for `tolerance`: its whole surface is that far from a sphere about
 /// the centre of mass at most. Turning it is then no motion, at this resolution.
 pub(super) fn is_ball(shape: &Shape, tolerance: f64) -> bool {
     let (surface, centre) = (&shape.surface, shape.mass.centre);
+    // What is about as far on all sides takes a search for the closest point longest, and few such parts are
+    // balls: most have a vertex or the middle of a triangle that says so.
+    let is_near = |p: &Point3<f64>| shape.reach - (p - centre).norm() > tolerance;
+    let middle =
+        |t: u32| Point3::from(surface.corners(t).iter().map(|p| p.coords).sum::<Vector3<f64>>() / 3.0);
+    if surface.vertices().iter().any(is_near)
+        || (0..surface.triangles().len() as u32).any(|t| is_near(&middle(t)))
+    {
+        return false;
+    }
     let least = surface.closest(&centre, f64::INFINITY).map_or(0.0, |c| c.distance);
     // No point is farther than the farthest vertex, none nearer than the nearest of the surface.
     least > 0.0 && shape.reach - least <= tolerance

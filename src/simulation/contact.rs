@@ -367,6 +367,8 @@ struct Measured<'m> {
 /// Nodes of samples between two looks at the condition: the first samples that come near a large surface
 /// fill its field.
 const GATHER_POLL: u32 = 1;
+/// The same for the samples of a node.
+const SAMPLE_POLL: u32 = 4;
 /// The same where the surface is only looked up.
 const ENTER_POLL: u32 = 64;
 
@@ -383,6 +385,7 @@ fn gather(
     let clearance = std::cell::Cell::new(near.clearance);
     let keep = |bound: f64| clearance.set(clearance.get().min(bound + allowance));
     let poll = Poll::every(GATHER_POLL, termination);
+    let sample_poll = Poll::every(SAMPLE_POLL, termination);
     tree.walk(
         (),
         |node, ()| {
@@ -396,6 +399,9 @@ fn gather(
             (bound <= limit).then_some(())
         },
         |sample, ()| {
+            if sample_poll.is_over() {
+                return;
+            }
             let p = to_measured * sample;
             let bound = body.field.estimate(&p).lower_bound;
             if bound > limit {

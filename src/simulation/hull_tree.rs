@@ -7,8 +7,10 @@
 use std::sync::Arc;
 
 use nalgebra::Point3;
+use rayon::prelude::*;
 
 use crate::geometry::transformed;
+use crate::termination::Termination;
 
 use super::{Scene, Surroundings};
 
@@ -23,9 +25,10 @@ pub struct HullTree {
 }
 
 impl HullTree {
-    /// Of some parts (ascending) at their assembled poses.
+    /// Of some parts (ascending) at their assembled poses. Once the condition is true hulls are left out:
+    /// whoever asks must look at it before using them.
     #[must_use]
-    pub fn new(scene: &Scene, standing: Vec<usize>) -> Self {
+    pub fn new(scene: &Scene, standing: Vec<usize>, termination: &Termination) -> Self {
         let leaves = standing.len().next_power_of_two();
         let mut order = standing.clone();
         group(scene, &mut order);
@@ -36,8 +39,16 @@ impl HullTree {
             tree.leaf[part] = leaves + k;
             tree.hulls[leaves + k] = transformed(&body.shape.hull, &body.planning_from_shape).into();
         }
-        for node in (1..leaves).rev() {
-            tree.hulls[node] = scene.hulls.of(&tree.hulls[2 * node], &tree.hulls[2 * node + 1]);
+        // Level by level: the hulls of one do not depend on each other.
+        let mut level = leaves / 2;
+        while level > 0 && termination.check().is_ok() {
+            let (above, below) = tree.hulls.split_at_mut(2 * level);
+            above[level..].par_iter_mut().zip(below.par_chunks_exact(2)).for_each(|(hull, children)| {
+                if termination.check().is_ok() {
+                    *hull = scene.hulls.of(&children[0], &children[1]);
+                }
+            });
+            level /= 2;
         }
         tree
     }
@@ -128,7 +139,7 @@ mod tests {
             .map(|p| cuboid([p.x, p.y, p.z], [p.x + 0.6, p.y + 0.5, p.z + 0.7]));
         let (scene, _) = scene(cubes.chain([cuboid([-4.0; 3], [-3.9; 3]), cuboid([3.9; 3], [4.0; 3])]));
         let mut left: Vec<usize> = (0..scene.bodies.len()).collect();
-        let mut tree = HullTree::new(&scene, left.clone());
+        let mut tree = HullTree::new(&scene, left.clone(), &Termination::default());
         let same = |hull: &[Point3<f64>], parts: Vec<usize>| {
             let all = Surroundings::new(&scene, parts).hull;
             for d in spread([-1.0; 3], [1.0; 3], 40) {

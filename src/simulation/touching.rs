@@ -19,7 +19,7 @@ const FINENESS: f64 = 0.125;
 /// cos of the angle within which faces in contact look against each other (8 degrees).
 const OPPOSED: f64 = 0.99;
 /// Bits between two looks at the termination condition.
-const BITS_POLL: u32 = 16;
+const BITS_POLL: u32 = 4;
 /// Planes after which the search for more is given up: round fits have many, and threads more.
 const MOST_PLANES: usize = 64;
 

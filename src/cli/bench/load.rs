@@ -66,12 +66,21 @@ pub(super) fn cancel(arguments: &BenchCancel) -> Result<ExitCode, CliError> {
         threads: arguments.threads,
     };
     eprintln!(
-        "assembly: plan ms; ended: p50, p99, longest ms until the worker is free (at this share of the plan)"
+        "assembly: plan ms; ended: p50, p99, longest ms until the worker is free (at this share of the plan); \
+         longest work in processor ms without a look at whether to end (between these looks)"
     );
     let records = bench::cancel(&request, |r| {
         eprintln!(
-            "{}: {:.1}; {}: {:.2}, {:.2}, {:.2} ({:.2})",
-            r.assembly, r.plan_ms, r.ended, r.p50_ms, r.p99_ms, r.longest_ms, r.longest_at
+            "{}: {:.1}; {}: {:.2}, {:.2}, {:.2} ({:.2}); {:.2} ({})",
+            r.assembly,
+            r.plan_ms,
+            r.ended,
+            r.p50_ms,
+            r.p99_ms,
+            r.longest_ms,
+            r.longest_at,
+            r.silence_ms,
+            r.silent_between
         );
     })?;
     written(arguments.json.as_deref(), &records)

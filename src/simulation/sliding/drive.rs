@@ -8,6 +8,7 @@
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::geometry::{Pose, Shape, interpolate};
+use crate::termination::Poll;
 
 use super::super::contact::{Contact, Mover, Near, reduced};
 use super::super::projection::{Projected, Row, project};
@@ -37,6 +38,10 @@ const LIFT_REACH: f64 = 0.04;
 const LIFT_ROUNDS: usize = 3;
 /// What is along an axis by less than this share does not hold a part there.
 const LEAST_SPEED: f64 = 0.1;
+
+/// Contacts between two looks at the termination condition: large surfaces that lie on each other have tens
+/// of thousands.
+const ROWS_POLL: u32 = 16;
 
 /// What is near a mover's pose.
 pub(super) type Gather<'a> = &'a dyn Fn(&Mover<'_>) -> Near;
@@ -262,11 +267,13 @@ impl Drive {
 
     /// One constraint per contact, reduced, and which contacts they come from. Where a contact
     /// leaves a choice of planes, the one is taken along which the motion gets furthest that the
-    /// contacts without a choice allow: at the rim of a hole, that is the hole's wall.
+    /// contacts without a choice allow: at the rim of a hole, that is the hole's wall. Once the condition is
+    /// true contacts are left out: whoever asks must look at it before believing what was chosen.
     fn chosen(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>) -> (Vec<Row>, Vec<Contact>) {
+        let poll = Poll::every(ROWS_POLL, mover.termination);
         let mut options = Vec::with_capacity(near.contacts.len() * 2);
         let mut ends = Vec::with_capacity(near.contacts.len());
-        for contact in &near.contacts {
+        for contact in near.contacts.iter().take_while(|_| !poll.is_over()) {
             mover.options(contact, wanted, &mut options);
             ends.push(options.len());
         }
@@ -275,7 +282,7 @@ impl Drive {
         }
         let starts = std::iter::once(&0).chain(&ends);
         let groups: Vec<&[Row]> = starts.zip(&ends).map(|(a, b)| &options[*a..*b]).collect();
-        let certain = groups.iter().filter(|g| g.len() == 1).map(|g| g[0]);
+        let certain = groups.iter().filter(|g| g.len() == 1 && !poll.is_over()).map(|g| g[0]);
         let (certain, _) = reduced(certain, self.gyration);
         let likely = self.projected(&wanted.component_mul(&self.metric), &certain, true);
         let motion = likely.map_or(*wanted, |p| p.w.component_div(&self.metric));
@@ -288,7 +295,8 @@ impl Drive {
             }
             best
         };
-        let (rows, kept) = reduced(groups.iter().map(best), self.gyration);
+        let groups = groups.iter().take_while(|_| !poll.is_over());
+        let (rows, kept) = reduced(groups.map(best), self.gyration);
         (rows, kept.into_iter().map(|i| near.contacts[i]).collect())
     }
 
