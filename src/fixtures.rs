@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 use crate::geometry::{
-    Assembly, Mesh, Pose, Solidity, SourceAssembly, SourceMesh, SourcePart, Surface, heal,
+    Assembly, Mesh, Pose, Shape, Solidity, SourceAssembly, SourceMesh, SourcePart, Surface, heal,
 };
 use crate::plan::Verifier;
 use crate::sdf::Field;
@@ -143,6 +143,11 @@ pub(crate) fn moved(mut mesh: SourceMesh, pose: &Pose) -> SourceMesh {
 /// A mesh, healed.
 pub(crate) fn healed(mesh: SourceMesh) -> Mesh {
     heal(&SourcePart { name: "part".into(), origin: "test".into(), mesh }).unwrap().mesh
+}
+
+/// The shape of a healed mesh.
+pub(crate) fn shape_of(mesh: &Mesh) -> Shape {
+    Shape::of(mesh, &Termination::default()).unwrap()
 }
 
 /// A mesh, healed and prepared.

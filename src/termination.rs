@@ -11,11 +11,13 @@ use std::time::{Duration, Instant};
 pub use silence::{Silence, Watch};
 
 /// Why work stopped early.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Interrupt {
     /// Somebody asked for it.
+    #[error("cancelled")]
     Cancelled,
     /// The deadline passed.
+    #[error("the deadline passed")]
     DeadlinePassed,
 }
 

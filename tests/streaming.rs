@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use common::{Boxes, HANG, connect};
 use sbdp::config::Config;
 use sbdp::daemon::Planning;
-use sbdp::geometry::SourceAssembly;
+use sbdp::geometry::{Revision, SourceAssembly};
 use sbdp::plan::{MotionKind, Plan, PlanStats, PlanStatus, PlanStep};
 use sbdp::search::{PlanRequest, PlanSink, Progress, Stage, Termination};
 use sbdp::service::{Admission, AssemblyId, ServiceError};
@@ -25,12 +25,12 @@ fn waypoint(step: usize, number: usize) -> [f64; 7] {
 }
 
 impl Planning for Scripted {
-    fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError> {
+    fn admit(&self, source: &SourceAssembly, _: &Termination) -> Result<Admission, ServiceError> {
         let id = AssemblyId(sbdp::geometry::content_hash(source));
         Ok(Admission { id, known: false, warnings: vec![] })
     }
 
-    fn revise(&self, base: AssemblyId, _: &sbdp::geometry::Revision) -> Result<Admission, ServiceError> {
+    fn revise(&self, base: AssemblyId, _: &Revision, _: &Termination) -> Result<Admission, ServiceError> {
         Ok(Admission { id: base, known: true, warnings: vec![] })
     }
 

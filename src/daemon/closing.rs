@@ -5,6 +5,7 @@ use std::time::Instant;
 use sbdp_ipc::error::{ErrorCode, WireError};
 
 use super::desk::Desk;
+use super::intake::Upload;
 use super::session::{Input, Link, State};
 use super::workers::Planning;
 
@@ -56,6 +57,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
                 for session in self.sessions.values() {
                     session.cancel_work();
                 }
+                self.uploads.values().for_each(Upload::cancel_work);
                 self.closing = Closing::Drain(now + self.limits.drain);
             }
             Closing::Drain(end) if end <= now => {

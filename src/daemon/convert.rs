@@ -9,11 +9,14 @@ use sbdp_ipc::revision as wire_revision;
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts};
 
 use crate::blocking_graph::StaticAnalysis;
-use crate::geometry::{Pose, Revision, SourceAssembly, SourceMesh, SourcePart, pose_from_waypoint};
+use crate::geometry::{
+    GeometryError, Pose, Revision, SourceAssembly, SourceMesh, SourcePart, pose_from_waypoint,
+};
 use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep};
 use crate::search::{ActionSet, Engine, PlanRequest, Planner, Progress, Stage, Staging};
 use crate::service::{AssemblyId, ServiceError};
 use crate::simulation::PenaltyParameters;
+use crate::termination::Interrupt;
 
 /// What a wire request asks; the handle and the deadline are handled by the desk.
 pub(crate) fn plan_request(
@@ -216,6 +219,8 @@ pub(crate) fn service_error(error: &ServiceError) -> WireError {
     let code = match error {
         ServiceError::UnknownAssembly => ErrorCode::UnknownHandle,
         ServiceError::NoSuchPart { .. } => ErrorCode::NoSuchPart,
+        ServiceError::Geometry(GeometryError::Interrupted(Interrupt::Cancelled)) => ErrorCode::Cancelled,
+        ServiceError::Geometry(GeometryError::Interrupted(Interrupt::DeadlinePassed)) => ErrorCode::Expired,
         ServiceError::Geometry(_) => ErrorCode::Geometry,
         ServiceError::Threads(_) => ErrorCode::Failed,
     };

@@ -163,10 +163,10 @@ impl<L: Link, P: Planning> Desk<L, P> {
             }
             Event::Have(incoming) => self.have(&incoming),
             Event::Upload(incoming) => {
-                self.take_in(incoming, |number, bytes| AdmitJob::Upload { number, bytes });
+                self.take_in(incoming, AdmitJob::Upload);
             }
             Event::Revise(incoming) => {
-                self.take_in(incoming, |number, bytes| AdmitJob::Revise { number, bytes });
+                self.take_in(incoming, AdmitJob::Revise);
             }
             Event::Unusable(incoming, error) => {
                 self.counters.refused += 1;

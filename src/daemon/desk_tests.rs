@@ -2,15 +2,17 @@
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Mutex, atomic::AtomicBool, atomic::Ordering};
 
+use sbdp_ipc::geometry::{Assembly, Part, Vertices};
 use sbdp_ipc::headers::RequestKind;
 
 use super::*;
 use crate::daemon::session::Undelivered;
 use crate::daemon::workers::{Report, start};
-use crate::geometry::SourceAssembly;
+use crate::geometry::{Revision, SourceAssembly};
 use crate::plan::{MotionKind, Plan, PlanStats, PlanStatus, PlanStep};
 use crate::search::{Interrupt, PlanSink};
 use crate::service::{Admission, ServiceError};
@@ -24,9 +26,14 @@ const PANIC: u64 = 1;
 /// Runs until it is cancelled or let go.
 const HOLD: u64 = 2;
 
+/// An upload of this name is taken in until that is cancelled.
+const ENDLESS: &str = "endless";
+
 #[derive(Default)]
 struct Scripted {
     let_go: AtomicBool,
+    /// Uploads that are being taken in.
+    taking_in: AtomicUsize,
 }
 
 fn plan_with(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
@@ -52,12 +59,17 @@ fn plan_with(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
 }
 
 impl Planning for Scripted {
-    fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError> {
+    fn admit(&self, source: &SourceAssembly, termination: &Termination) -> Result<Admission, ServiceError> {
         assert!(!source.parts.is_empty(), "scripted to panic on an empty assembly");
+        self.taking_in.fetch_add(1, Ordering::Relaxed);
+        while source.name == ENDLESS && termination.check().is_ok() {
+            std::thread::yield_now();
+        }
+        self.taking_in.fetch_sub(1, Ordering::Relaxed);
         Ok(Admission { id: AssemblyId([7; 32]), known: false, warnings: vec![] })
     }
 
-    fn revise(&self, base: AssemblyId, _: &crate::geometry::Revision) -> Result<Admission, ServiceError> {
+    fn revise(&self, base: AssemblyId, _: &Revision, _: &Termination) -> Result<Admission, ServiceError> {
         Ok(Admission { id: base, known: true, warnings: vec![] })
     }
 
@@ -343,7 +355,7 @@ fn terminating_cancels_what_runs_refuses_what_waits_and_then_is_closed() {
 #[test]
 fn an_upload_that_makes_admission_panic_is_answered_failed() {
     let mut bench = Bench::new(4);
-    let empty = sbdp_ipc::geometry::Assembly::default();
+    let empty = Assembly::default();
     let mut bytes = vec![0; empty.encoded_len()];
     assert!(empty.encode_into(&mut bytes));
     let (wire, incoming) = bench.incoming(RequestKind::Upload, &bytes);
@@ -428,6 +440,30 @@ fn an_upload_whose_client_leaves_keeps_no_memory() {
     bench.desk.settle(Instant::now());
     assert!(bench.desk.uploads.is_empty() && bench.desk.queues.admissions.len() == 0);
     assert!(waiting.kinds().is_empty());
+}
+
+#[test]
+fn an_upload_whose_client_leaves_while_it_is_taken_in_is_not_taken_in_to_the_end() {
+    let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    let part = Part { name: "part", vertices: Vertices::F64(&corners), triangles: &[[0, 1, 2]] };
+    let endless = Assembly { name: ENDLESS, parts: vec![part], ..Assembly::default() };
+    let mut bytes = vec![0; endless.encoded_len()];
+    assert!(endless.encode_into(&mut bytes));
+    let mut bench = Bench::new(4);
+    let (wire, incoming) = bench.incoming(RequestKind::Upload, &bytes);
+    bench.handle(Event::Upload(incoming));
+    let service = Arc::clone(&bench.service);
+    let busy = || service.taking_in.load(Ordering::Relaxed) > 0;
+    bench.until(|_| busy());
+    wire.gone.set(true);
+    bench.until(|desk| desk.uploads.is_empty() && !busy());
+    // When the daemon leaves, and its grace is over, it is the same.
+    let (_wire, incoming) = bench.incoming(RequestKind::Upload, &bytes);
+    bench.handle(Event::Upload(incoming));
+    bench.until(|_| busy());
+    bench.handle(Event::Terminate);
+    bench.handle(Event::Terminate);
+    bench.until(|_| !busy());
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! Meshes that come in: what happens to uploads and revisions, without any transport.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::clock;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::RequestHeader;
@@ -11,8 +12,9 @@ use super::desk::{Desk, Incoming};
 use super::figures::Timed;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::session::Link;
-use super::workers::{AdmitJob, Planning};
+use super::workers::{AdmitJob, Planning, Received};
 use crate::service::AssemblyId;
+use crate::termination::Termination;
 
 /// An upload that waits or is being taken in.
 #[derive(Debug)]
@@ -22,6 +24,14 @@ pub(super) struct Upload<L> {
     /// When it is of no use to its client any more, if it still waits then.
     pub(super) deadline: Option<Instant>,
     received: Instant,
+    cancel: Arc<AtomicBool>,
+}
+
+impl<L> Upload<L> {
+    /// Nobody waits for it any more.
+    pub(super) fn cancel_work(&self) {
+        self.cancel.store(true, Ordering::Relaxed);
+    }
 }
 
 /// What the queue knows of an upload.
@@ -60,7 +70,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
     }
 
     /// Lets meshes be taken in.
-    pub(super) fn take_in(&mut self, incoming: Incoming<L>, job: impl FnOnce(u64, AlignedBytes) -> AdmitJob) {
+    pub(super) fn take_in(&mut self, incoming: Incoming<L>, job: impl FnOnce(Received) -> AdmitJob) {
         self.counters.uploads += 1;
         let Incoming { link, owner, header, payload, .. } = incoming;
         let deadline_ns = header.upload_deadline_ns();
@@ -70,10 +80,14 @@ impl<L: Link, P: Planning> Desk<L, P> {
         let number = self.next_upload;
         self.next_upload += 1;
         let ticket = ticket(owner, payload.as_slice().len());
-        match self.queues.admissions.push(ticket, job(number, payload)) {
+        // Not by the deadline: what is late but nearly taken in serves the client that comes again.
+        let termination = Termination::default();
+        let cancel = termination.cancel_flag();
+        match self.queues.admissions.push(ticket, job(Received { number, bytes: payload, termination })) {
             Ok(()) => {
                 let deadline = deadline_ns.and_then(clock::instant_of);
-                self.uploads.insert(number, Upload { link, header, deadline, received: Instant::now() });
+                let received = Instant::now();
+                self.uploads.insert(number, Upload { link, header, deadline, received, cancel });
             }
             Err(rejected) => {
                 let error = self.upload_rejected(owner, rejected);
@@ -105,7 +119,9 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
         for (number, gone) in over {
             if gone {
-                self.uploads.remove(&number);
+                if let Some(upload) = self.uploads.remove(&number) {
+                    upload.cancel_work();
+                }
             } else {
                 self.admitted(number, Err(expired()));
             }
@@ -127,7 +143,7 @@ impl AdmitJob {
     /// The upload's number, if it is one.
     pub(super) fn number(&self) -> Option<u64> {
         match self {
-            Self::Upload { number, .. } | Self::Revise { number, .. } => Some(*number),
+            Self::Upload(received) | Self::Revise(received) => Some(received.number),
             Self::Preload(_) => None,
         }
     }

@@ -24,19 +24,29 @@ pub trait Planning: Send + Sync + 'static {
     /// See [`Service::admit`]. What was given is remembered.
     ///
     /// # Errors
-    /// The geometry was refused.
-    fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError>;
-    /// See [`Service::revise`]. The change is remembered.
+    /// The geometry was refused, or the termination condition became true.
+    fn admit(&self, source: &SourceAssembly, termination: &Termination) -> Result<Admission, ServiceError>;
+    /// See [`Service::revise_until`]. The change is remembered.
     ///
     /// # Errors
-    /// The base is unknown, or the change is refused.
-    fn revise(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError>;
+    /// The base is unknown, the change is refused, or the termination condition became true.
+    fn revise(
+        &self,
+        base: AssemblyId,
+        revision: &Revision,
+        termination: &Termination,
+    ) -> Result<Admission, ServiceError>;
     /// The same for a question that brings its change along: nobody will ask for its handle.
     ///
     /// # Errors
-    /// The base is unknown, or the change is refused.
-    fn revise_for_now(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError> {
-        self.revise(base, revision)
+    /// As [`Planning::revise`].
+    fn revise_for_now(
+        &self,
+        base: AssemblyId,
+        revision: &Revision,
+        termination: &Termination,
+    ) -> Result<Admission, ServiceError> {
+        self.revise(base, revision, termination)
     }
     /// See [`Service::knows`]. Called on the port thread: it must not block.
     fn knows(&self, id: AssemblyId) -> bool;
@@ -75,22 +85,32 @@ pub trait Planning: Send + Sync + 'static {
 }
 
 impl Planning for Service {
-    fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError> {
-        let admission = Self::admit(self, source)?;
+    fn admit(&self, source: &SourceAssembly, termination: &Termination) -> Result<Admission, ServiceError> {
+        let admission = self.admit_until(source, termination)?;
         self.cache().remember_given(&admission.id.0, source);
         Ok(admission)
     }
 
-    fn revise(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError> {
-        let admission = Self::revise(self, base, revision)?;
+    fn revise(
+        &self,
+        base: AssemblyId,
+        revision: &Revision,
+        termination: &Termination,
+    ) -> Result<Admission, ServiceError> {
+        let admission = self.revise_until(base, revision, termination)?;
         if admission.id != base {
             self.cache().remember_revised(&admission.id.0, &base.0, revision);
         }
         Ok(admission)
     }
 
-    fn revise_for_now(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError> {
-        Self::revise(self, base, revision)
+    fn revise_for_now(
+        &self,
+        base: AssemblyId,
+        revision: &Revision,
+        termination: &Termination,
+    ) -> Result<Admission, ServiceError> {
+        self.revise_until(base, revision, termination)
     }
 
     fn knows(&self, id: AssemblyId) -> bool {
@@ -150,13 +170,23 @@ pub(crate) struct PlanJob {
     pub(crate) termination: Termination,
 }
 
+/// What was received with an upload.
+#[derive(Debug)]
+pub(crate) struct Received {
+    pub(crate) number: u64,
+    /// A private copy.
+    pub(crate) bytes: AlignedBytes,
+    /// True once nobody waits for it.
+    pub(crate) termination: Termination,
+}
+
 /// An assembly to take in.
 #[derive(Debug)]
 pub(crate) enum AdmitJob {
-    /// Received bytes, a private copy.
-    Upload { number: u64, bytes: AlignedBytes },
+    /// Received meshes.
+    Upload(Received),
     /// The same of what differs from a known assembly.
-    Revise { number: u64, bytes: AlignedBytes },
+    Revise(Received),
     /// A file or folder of the configuration.
     Preload(PathBuf),
 }
@@ -309,7 +339,7 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
         let mut assembly = job.assembly;
         if !job.moved.is_empty() {
             let revision = Revision { moved: job.moved.clone(), ..Revision::default() };
-            assembly = service.revise_for_now(assembly, &revision)?.id;
+            assembly = service.revise_for_now(assembly, &revision, &job.termination)?.id;
         }
         service.plan(assembly, &job.request, &job.termination, &mut sink)
     });
@@ -333,14 +363,14 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
 /// Which assembly was taken in, if it was.
 fn admit<P: Planning>(service: &P, job: AdmitJob, report: &Report) -> Option<AssemblyId> {
     match job {
-        AdmitJob::Upload { number, bytes } => {
-            let result = contained(|| admit_upload(service, bytes)).unwrap_or_else(Err);
+        AdmitJob::Upload(Received { number, bytes, termination }) => {
+            let result = contained(|| admit_upload(service, bytes, &termination)).unwrap_or_else(Err);
             let id = result.as_ref().ok().copied();
             report(WorkerEvent::Admitted { number, result });
             id
         }
-        AdmitJob::Revise { number, bytes } => {
-            let result = contained(|| admit_revision(service, bytes)).unwrap_or_else(Err);
+        AdmitJob::Revise(Received { number, bytes, termination }) => {
+            let result = contained(|| admit_revision(service, bytes, &termination)).unwrap_or_else(Err);
             let id = result.as_ref().ok().copied();
             report(WorkerEvent::Admitted { number, result });
             id
@@ -360,22 +390,31 @@ fn admit<P: Planning>(service: &P, job: AdmitJob, report: &Report) -> Option<Ass
 
 fn preload<P: Planning>(service: &P, path: &Path) -> Result<(String, AssemblyId), WireError> {
     let source = load_assembly(path).map_err(|e| convert::service_error(&e.into()))?;
-    let admission = service.admit(&source).map_err(|e| convert::service_error(&e))?;
+    let admission =
+        service.admit(&source, &Termination::default()).map_err(|e| convert::service_error(&e))?;
     Ok((source.name, admission.id))
 }
 
-fn admit_upload<P: Planning>(service: &P, bytes: AlignedBytes) -> Result<AssemblyId, WireError> {
+fn admit_upload<P: Planning>(
+    service: &P,
+    bytes: AlignedBytes,
+    termination: &Termination,
+) -> Result<AssemblyId, WireError> {
     let source = convert::source_assembly(&bytes)?;
     // Healing takes memory of its own: an upload need not be there three times.
     drop(bytes);
-    let admission = service.admit(&source).map_err(|e| convert::service_error(&e))?;
+    let admission = service.admit(&source, termination).map_err(|e| convert::service_error(&e))?;
     Ok(admission.id)
 }
 
-fn admit_revision<P: Planning>(service: &P, bytes: AlignedBytes) -> Result<AssemblyId, WireError> {
+fn admit_revision<P: Planning>(
+    service: &P,
+    bytes: AlignedBytes,
+    termination: &Termination,
+) -> Result<AssemblyId, WireError> {
     let (base, revision) = convert::revision(&bytes)?;
     drop(bytes);
-    let admission = service.revise(base, &revision).map_err(|e| convert::service_error(&e))?;
+    let admission = service.revise(base, &revision, termination).map_err(|e| convert::service_error(&e))?;
     Ok(admission.id)
 }
 

@@ -6,8 +6,9 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use super::congruence::congruence;
-use super::heal::heal;
+use super::heal::heal_until;
 use super::{Bounds, GeometryError, Mesh, Pose, Shape, SourceAssembly};
+use crate::termination::{Interrupt, Termination};
 
 /// A part of an assembly.
 #[derive(Debug, Clone)]
@@ -49,11 +50,20 @@ impl Assembly {
     /// # Errors
     /// A part's mesh cannot be used, there is no part, or a name that is declared fixed is none.
     pub fn new(source: &SourceAssembly) -> Result<Self, GeometryError> {
+        Self::new_until(source, &Termination::default())
+    }
+
+    /// The same, unless the termination condition becomes true before it is done.
+    ///
+    /// # Errors
+    /// As [`Assembly::new`], and the interruption.
+    pub fn new_until(source: &SourceAssembly, termination: &Termination) -> Result<Self, GeometryError> {
         let refuse = |reason: String| GeometryError::Assembly { origin: source.name.clone(), reason };
         if source.parts.is_empty() {
             return Err(refuse("the assembly has no parts; add at least one mesh".into()));
         }
-        let healed = source.parts.par_iter().map(heal).collect::<Result<Vec<_>, _>>()?;
+        let healed =
+            source.parts.par_iter().map(|p| heal_until(p, termination)).collect::<Result<Vec<_>, _>>()?;
         let mut findings = Vec::new();
         let mut meshes = Vec::new();
         for (i, h) in healed.into_iter().enumerate() {
@@ -66,7 +76,7 @@ impl Assembly {
         }
         findings.extend(odd_sizes(&meshes));
         let names: Vec<_> = source.parts.iter().map(|p| p.name.clone()).collect();
-        let (shapes, parts) = share_shapes(meshes, names);
+        let (shapes, parts) = share_shapes(meshes, names, termination)?;
         let fixed = source
             .fixed
             .iter()
@@ -134,11 +144,16 @@ fn planning_scale(meshes: &[Mesh]) -> f64 {
     scale
 }
 
-fn share_shapes(meshes: Vec<Mesh>, names: Vec<String>) -> (Vec<Arc<Shape>>, Vec<Part>) {
+fn share_shapes(
+    meshes: Vec<Mesh>,
+    names: Vec<String>,
+    termination: &Termination,
+) -> Result<(Vec<Arc<Shape>>, Vec<Part>), Interrupt> {
     // The mesh of each shape, as its first part gave it, and the middle of its box.
     let mut originals: Vec<(usize, Point3<f64>)> = Vec::new();
     let mut parts = Vec::new();
     for (i, (mesh, name)) in meshes.iter().zip(names).enumerate() {
+        termination.check()?;
         let bounds = Bounds::of(&mesh.vertices);
         let copy = originals
             .iter()
@@ -154,9 +169,9 @@ fn share_shapes(meshes: Vec<Mesh>, names: Vec<String>) -> (Vec<Arc<Shape>>, Vec<
         };
         parts.push(Part { name, shape, planning_from_shape, bounds, moved: Pose::identity() });
     }
-    let shapes =
-        originals.par_iter().map(|(i, centre)| Arc::new(Shape::about(&meshes[*i], centre))).collect();
-    (shapes, parts)
+    let shape = |(i, centre): &(usize, Point3<f64>)| Shape::about(&meshes[*i], centre, termination);
+    let shapes = originals.par_iter().map(|o| shape(o).map(Arc::new)).collect::<Result<_, _>>()?;
+    Ok((shapes, parts))
 }
 
 #[cfg(test)]
@@ -223,6 +238,19 @@ mod tests {
         s.fixed = vec!["bolt".into()];
         let refusal = Assembly::new(&s).unwrap_err().to_string();
         assert!(refusal.contains("`bolt`") && refusal.contains("does not exist"), "{refusal}");
+    }
+
+    #[test]
+    fn what_is_cancelled_is_not_taken_in() {
+        let given = source(block_on_plate());
+        let termination = Termination::default();
+        termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+        let interrupted = GeometryError::Interrupted(Interrupt::Cancelled);
+        assert_eq!(Assembly::new_until(&given, &termination).unwrap_err(), interrupted);
+        let replaced = vec![(0, cuboid([0.0; 3], [1.0; 3]))];
+        let revision = crate::geometry::Revision { replaced, ..Default::default() };
+        let base = Assembly::new(&given).unwrap();
+        assert_eq!(base.revised_until(&revision, &termination).unwrap_err(), interrupted);
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Why geometry is refused. Every refusal names the file (or upload), the part and the reason.
 
+use crate::termination::Interrupt;
+
 /// A refusal of input geometry.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GeometryError {
@@ -21,6 +23,9 @@ pub enum GeometryError {
         /// What is wrong and what to do.
         reason: String,
     },
+    /// The termination condition became true before the geometry was ready.
+    #[error("{0} while meshes were taken in")]
+    Interrupted(#[from] Interrupt),
     /// The assembly as a whole cannot be used.
     #[error("{origin}: {reason}")]
     Assembly {

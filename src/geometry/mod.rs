@@ -45,7 +45,7 @@ pub use content_hash::content_hash;
 pub use error::GeometryError;
 pub use free_region::{FreeRegion, NoRegion, Wanted};
 pub use half_space::Cloud;
-pub use heal::{Healed, heal};
+pub use heal::{Healed, heal, heal_until};
 pub use helix::{Footprint, Helix, radii};
 pub use hull::{gap_along, hull_vertices, separating_direction, transformed};
 pub use linking_number::linking_number;

@@ -66,12 +66,11 @@ fn faces_at(surface: &Surface, site: Site, mut visit: impl FnMut(u32)) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Shape;
-    use crate::fixtures::{cuboid, healed};
+    use crate::fixtures::{cuboid, healed, shape_of};
 
     #[test]
     fn corners_edges_and_faces_of_a_box_have_three_two_and_one_normals() {
-        let shape = Shape::new(&healed(cuboid([-1.0; 3], [1.0; 3])));
+        let shape = shape_of(&healed(cuboid([-1.0; 3], [1.0; 3])));
         let mut seen = [0; 4];
         for (p, normals) in shape.oriented.iter() {
             let on = (0..3).filter(|&a| (p[a].abs() - 1.0).abs() < 1e-12).count();

@@ -8,8 +8,9 @@ use nalgebra::Point3;
 use super::congruence::congruence;
 use super::{
     Assembly, Bounds, GeometryError, Mesh, Part, Pose, Shape, Solidity, SourceAssembly, SourceMesh,
-    SourcePart, heal, transformed, waypoint_from_pose,
+    SourcePart, heal_until, transformed, waypoint_from_pose,
 };
+use crate::termination::Termination;
 
 /// Names the byte stream that is hashed; a changed stream gets a new tag.
 const TAG: &[u8] = b"sbdp-revision/1";
@@ -98,6 +99,18 @@ impl Assembly {
     /// A part that is named does not exist, a name is given or a part moved twice, a mesh cannot be used, a pose is not
     /// finite, or the whole would be so much larger or smaller that another scale were due.
     pub fn revised(&self, revision: &Revision) -> Result<Self, GeometryError> {
+        self.revised_until(revision, &Termination::default())
+    }
+
+    /// The same, unless the termination condition becomes true before it is done.
+    ///
+    /// # Errors
+    /// As [`Assembly::revised`], and the interruption.
+    pub fn revised_until(
+        &self,
+        revision: &Revision,
+        termination: &Termination,
+    ) -> Result<Self, GeometryError> {
         let refuse = |reason: String| GeometryError::Assembly { origin: self.name.clone(), reason };
         let mut revised = self.clone();
         let part_at = |part: usize| {
@@ -107,13 +120,13 @@ impl Assembly {
         for (part, mesh) in &revision.replaced {
             let source = SourcePart { name: part_at(*part)?, origin: "change".into(), mesh: mesh.clone() };
             revised.findings.retain(|(of, _)| of != part);
-            revised.parts[*part] = revised.taken_in(*part, &source)?;
+            revised.parts[*part] = revised.taken_in(*part, &source, termination)?;
         }
         for source in &revision.added {
             if revised.parts.iter().any(|p| p.name == source.name) {
                 return Err(refuse(format!("there is a part `{}` already; give another name", source.name)));
             }
-            let part = revised.taken_in(revised.parts.len(), source)?;
+            let part = revised.taken_in(revised.parts.len(), source, termination)?;
             revised.parts.push(part);
         }
         for (i, (part, pose)) in revision.moved.iter().enumerate() {
@@ -145,8 +158,13 @@ impl Assembly {
     }
 
     /// A part as given, with its shape among the shapes.
-    fn taken_in(&mut self, place: usize, source: &SourcePart) -> Result<Part, GeometryError> {
-        let healed = heal(source)?;
+    fn taken_in(
+        &mut self,
+        place: usize,
+        source: &SourcePart,
+        termination: &Termination,
+    ) -> Result<Part, GeometryError> {
+        let healed = heal_until(source, termination)?;
         self.findings.extend(healed.findings.into_iter().map(|finding| (place, finding)));
         let mut mesh = healed.mesh;
         for vertex in &mut mesh.vertices {
@@ -155,11 +173,14 @@ impl Assembly {
         let bounds = Bounds::of(&mesh.vertices);
         let copied = |(k, shape): (usize, &Arc<Shape>)| Some((k, congruence(&mesh_of(shape), &mesh)?));
         let copy = self.shapes.iter().enumerate().filter(|(_, s)| is_like(s, &mesh)).find_map(copied);
-        let (shape, planning_from_shape) = copy.unwrap_or_else(|| {
-            let c = bounds.centre();
-            self.shapes.push(Arc::new(Shape::about(&mesh, &c)));
-            (self.shapes.len() - 1, Pose::translation(c.x, c.y, c.z))
-        });
+        let (shape, planning_from_shape) = match copy {
+            Some(copy) => copy,
+            None => {
+                let c = bounds.centre();
+                self.shapes.push(Arc::new(Shape::about(&mesh, &c, termination)?));
+                (self.shapes.len() - 1, Pose::translation(c.x, c.y, c.z))
+            }
+        };
         let moved = Pose::identity();
         Ok(Part { name: source.name.clone(), shape, planning_from_shape, bounds, moved })
     }

@@ -44,27 +44,37 @@ const GRID: f64 = 1.0 / (1u64 << 33) as f64;
 
 impl Shape {
     /// The shape of a part's mesh with its origin at a point, in the planning frame.
-    #[must_use]
-    pub fn about(mesh: &Mesh, origin: &Point3<f64>) -> Self {
+    ///
+    /// # Errors
+    /// The termination condition became true before there was one.
+    pub fn about(mesh: &Mesh, origin: &Point3<f64>, termination: &Termination) -> Result<Self, Interrupt> {
         // Adding zero makes zeros positive.
         let onto_grid = |v: &Point3<f64>| (v - origin.coords).map(|x| (x / GRID).round() * GRID + 0.0);
-        Self::new(&Mesh { vertices: mesh.vertices.iter().map(onto_grid).collect(), ..mesh.clone() })
+        let vertices = mesh.vertices.iter().map(onto_grid).collect();
+        Self::of(&Mesh { vertices, ..mesh.clone() }, termination)
     }
 
     /// Derives everything from a mesh.
-    #[must_use]
-    pub fn new(mesh: &Mesh) -> Self {
+    ///
+    /// # Errors
+    /// The termination condition became true before that was done.
+    pub fn of(mesh: &Mesh, termination: &Termination) -> Result<Self, Interrupt> {
+        termination.check()?;
         let surface = Arc::new(Surface::new(mesh));
+        termination.check()?;
         let mass = surface.mass_properties();
         let reach =
             surface.vertices().iter().map(|v| (v - mass.centre).norm_squared()).fold(0.0, f64::max).sqrt();
+        termination.check()?;
         let sited = sited(&surface, &spacing(surface.bounds()));
         let oriented = OrientedSamples::new(&surface, &sited);
         let samples = SampleTree::over(sited.into_iter().map(|(p, _)| p).collect());
+        termination.check()?;
         let hull = hull_vertices(surface.vertices());
+        termination.check()?;
         let solidity = mesh.solidity;
         let (patches, content) = (OnceLock::new(), OnceLock::new());
-        Self { hull, samples, oriented, mass, reach, surface, patches, solidity, content }
+        Ok(Self { hull, samples, oriented, mass, reach, surface, patches, solidity, content })
     }
 
     /// The triangles in a tree of patches.
@@ -120,11 +130,11 @@ fn spacing(bounds: &Bounds) -> Spacing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::{ball, cuboid, healed, l_shape};
+    use crate::fixtures::{ball, cuboid, healed, l_shape, shape_of};
 
     #[test]
     fn a_box_has_its_corners_as_hull_and_reach() {
-        let shape = Shape::new(&healed(cuboid([-1.0, -2.0, -0.5], [1.0, 2.0, 0.5])));
+        let shape = shape_of(&healed(cuboid([-1.0, -2.0, -0.5], [1.0, 2.0, 0.5])));
         assert_eq!(shape.hull.len(), 8);
         assert!((shape.reach - (1.0f64 + 4.0 + 0.25).sqrt()).abs() < 1e-12);
         assert_eq!(shape.bounds().extents(), Vector3::new(2.0, 4.0, 1.0));
@@ -132,7 +142,7 @@ mod tests {
 
     #[test]
     fn a_tree_of_patches_that_was_cut_short_is_made_anew() {
-        let shape = Shape::new(&healed(ball(3)));
+        let shape = shape_of(&healed(ball(3)));
         let termination = Termination::default();
         termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
         assert_eq!(shape.patches(&termination).err(), Some(Interrupt::Cancelled));
@@ -143,7 +153,7 @@ mod tests {
 
     #[test]
     fn the_radius_about_an_axis_is_that_of_the_farthest_corner() {
-        let shape = Shape::new(&healed(cuboid([-1.0, -2.0, -0.5], [1.0, 2.0, 0.5])));
+        let shape = shape_of(&healed(cuboid([-1.0, -2.0, -0.5], [1.0, 2.0, 0.5])));
         let about = |c: [f64; 3], axis: Vector3<f64>| shape.radius_about(&Point3::from(c), &axis);
         assert!((about([0.0; 3], Vector3::z()) - 5f64.sqrt()).abs() < 1e-12);
         assert!((about([0.0; 3], Vector3::y()) - 1.25f64.sqrt()).abs() < 1e-12);
@@ -156,7 +166,8 @@ mod tests {
         let content = |by: f64| {
             let vertices = ball.vertices.iter().map(|v| v + Vector3::new(by, -by / 3.0, by * by)).collect();
             let moved = Mesh { vertices, ..ball.clone() };
-            *Shape::about(&moved, &Bounds::of(&moved.vertices).centre()).content()
+            let centre = Bounds::of(&moved.vertices).centre();
+            *Shape::about(&moved, &centre, &Termination::default()).unwrap().content()
         };
         let there = [0.1, 1.0 / 3.0, -2.7].map(content);
         assert_eq!(there, [content(0.0); 3]);
@@ -165,7 +176,7 @@ mod tests {
     #[test]
     fn no_vertex_is_beyond_the_reach_or_an_axis_radius() {
         for mesh in [ball(3), l_shape()] {
-            let shape = Shape::new(&healed(mesh));
+            let shape = shape_of(&healed(mesh));
             let axis = Vector3::new(1.0, -2.0, 0.5).normalize();
             let radius = shape.radius_about(&shape.mass.centre, &axis);
             for v in shape.surface.vertices() {

@@ -8,7 +8,7 @@ use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Surface, closest_on_triangle};
-use crate::termination::{Interrupt, Termination};
+use crate::termination::{Interrupt, Poll, Termination};
 
 use super::brick::Brick;
 use super::grid::{BAND, CELLS, EMPTY, Field, NearBrick, Nodes};
@@ -105,13 +105,18 @@ fn brick_triangles(
 ) -> Result<Option<Vec<(u32, u32)>>, Interrupt> {
     /// Triangles that one task looks at.
     const SHARE: u32 = 64;
+    /// The same between two looks at the termination condition: a large one touches many bricks.
+    const BAND_POLL: u32 = 8;
     let count = surface.triangles().len() as u32;
     let known: Vec<AtomicBool> = field.slots.iter().map(|_| AtomicBool::new(false)).collect();
     let bricks = AtomicUsize::new(0);
     let share = |task: u32| {
-        termination.check()?;
+        let poll = Poll::every(BAND_POLL, Some(termination));
         let mut pairs = Vec::new();
         for t in task * SHARE..count.min((task + 1) * SHARE) {
+            if poll.is_over() {
+                break;
+            }
             let fits = bricks_near(field, surface, t, |brick| {
                 pairs.push((brick, t));
                 let is_new = !known[brick as usize].swap(true, Ordering::Relaxed);
@@ -121,7 +126,8 @@ fn brick_triangles(
                 break;
             }
         }
-        Ok(pairs)
+        // What was found of triangles that were cut short is not to be believed.
+        termination.check().map(|()| pairs)
     };
     let shares: Vec<Vec<(u32, u32)>> =
         (0..count.div_ceil(SHARE)).into_par_iter().map(share).collect::<Result<_, _>>()?;
@@ -129,7 +135,9 @@ fn brick_triangles(
         return Ok(None);
     }
     let mut pairs = shares.concat();
+    termination.check()?;
     pairs.par_sort_unstable();
+    termination.check()?;
     Ok(Some(pairs))
 }
 

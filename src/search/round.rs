@@ -26,11 +26,11 @@ pub(super) fn is_ball(shape: &Shape, tolerance: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::{ball, cuboid, healed, rod};
+    use crate::fixtures::{ball, cuboid, healed, rod, shape_of};
 
     #[test]
     fn balls_are_round_and_dice_are_not() {
-        let shape = |mesh| Shape::new(&healed(mesh));
+        let shape = |mesh| shape_of(&healed(mesh));
         assert!(is_ball(&shape(ball(3)), 0.05));
         assert!(!is_ball(&shape(ball(0)), 0.05), "an octahedron");
         assert!(!is_ball(&shape(cuboid([-1.0; 3], [1.0; 3])), 0.05));

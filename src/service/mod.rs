@@ -137,11 +137,23 @@ impl Service {
     /// # Errors
     /// The geometry was refused; the error names the part and the reason.
     pub fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError> {
+        self.admit_until(source, &Termination::default())
+    }
+
+    /// The same, unless the termination condition becomes true before it is done: then nothing is registered.
+    ///
+    /// # Errors
+    /// As [`Service::admit`], and the interruption.
+    pub fn admit_until(
+        &self,
+        source: &SourceAssembly,
+        termination: &Termination,
+    ) -> Result<Admission, ServiceError> {
         let id = AssemblyId(content_hash(source));
         if let Some(entry) = self.store.get(id) {
             return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly) });
         }
-        Ok(self.taken_in(id, Assembly::new(source)?))
+        Ok(self.taken_in(id, Assembly::new_until(source, termination)?))
     }
 
     /// Registers what becomes of a known assembly with some change. Of no change it is the same.
@@ -149,13 +161,26 @@ impl Service {
     /// # Errors
     /// The base is unknown, or the change is refused; the error names the part and the reason.
     pub fn revise(&self, base: AssemblyId, revision: &Revision) -> Result<Admission, ServiceError> {
-        let entry = self.entry(base)?;
+        self.revise_until(base, revision, &Termination::default())
+    }
+
+    /// The same, unless the termination condition becomes true before it is done: then nothing is registered.
+    ///
+    /// # Errors
+    /// As [`Service::revise`], and the interruption.
+    pub fn revise_until(
+        &self,
+        base: AssemblyId,
+        revision: &Revision,
+        termination: &Termination,
+    ) -> Result<Admission, ServiceError> {
+        let entry = self.entry(base, termination)?;
         check_parts(&revised_parts(revision), entry.assembly.parts.len())?;
         let id = if revision.is_empty() { base } else { AssemblyId(revision.content_hash(&base.0)) };
         if let Some(entry) = self.store.get(id) {
             return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly) });
         }
-        Ok(self.taken_in(id, entry.assembly.revised(revision)?))
+        Ok(self.taken_in(id, entry.assembly.revised_until(revision, termination)?))
     }
 
     fn taken_in(&self, id: AssemblyId, assembly: Assembly) -> Admission {
@@ -183,7 +208,7 @@ impl Service {
     /// # Errors
     /// The id is unknown.
     pub fn prepare(&self, id: AssemblyId, termination: &Termination) -> Result<(), ServiceError> {
-        let entry = self.entry(id)?;
+        let entry = self.entry(id, termination)?;
         let recall = Recall::of(Arc::clone(&self.cache));
         entry.prepare(termination, &recall);
         self.store.settle(id, &entry);
@@ -195,7 +220,7 @@ impl Service {
     /// # Errors
     /// The id is unknown.
     pub fn overlaps(&self, id: AssemblyId) -> Result<Vec<Overlap>, ServiceError> {
-        let entry = self.entry(id)?;
+        let entry = self.entry(id, &Termination::default())?;
         let recall = Recall::of(Arc::clone(&self.cache));
         let found = entry.prepared(&Termination::default(), &mut Silent, &recall);
         Ok(found.map_or_else(|_| Vec::new(), |(p, _)| answer::overlaps(&entry.assembly, &p.overlaps)))
@@ -212,7 +237,7 @@ impl Service {
         termination: &Termination,
         sink: &mut dyn PlanSink,
     ) -> Result<Plan, ServiceError> {
-        let entry = self.entry(id)?;
+        let entry = self.entry(id, termination)?;
         check_parts(&named_parts(request), entry.assembly.parts.len())?;
         let recall = if request.no_cache { Recall::default() } else { Recall::of(Arc::clone(&self.cache)) };
         let plan = entry.plan(request, termination, sink, &recall);
@@ -231,7 +256,7 @@ impl Service {
         rule: StaticAnalysis,
         termination: &Termination,
     ) -> Result<Option<Audit>, ServiceError> {
-        let entry = self.entry(id)?;
+        let entry = self.entry(id, termination)?;
         let recall = Recall::of(Arc::clone(&self.cache));
         let Ok((prepared, _)) = entry.prepared(termination, &mut Silent, &recall) else { return Ok(None) };
         let scene = &prepared.scene;
@@ -253,7 +278,7 @@ impl Service {
         removed: &[usize],
         termination: &Termination,
     ) -> Result<Option<Vec<DirectionalGraph>>, ServiceError> {
-        let entry = self.entry(id)?;
+        let entry = self.entry(id, termination)?;
         check_parts(&[("removed", removed.to_vec())], entry.assembly.parts.len())?;
         let recall = Recall::of(Arc::clone(&self.cache));
         let Ok((prepared, _)) = entry.prepared(termination, &mut Silent, &recall) else { return Ok(None) };
@@ -273,22 +298,24 @@ impl Service {
     /// # Errors
     /// The id is unknown.
     pub fn assembly(&self, id: AssemblyId) -> Result<Assembly, ServiceError> {
-        Ok(self.entry(id)?.assembly.clone())
+        Ok(self.entry(id, &Termination::default())?.assembly.clone())
     }
 
-    fn entry(&self, id: AssemblyId) -> Result<Arc<Entry>, ServiceError> {
-        self.store.get(id).map_or_else(|| self.reloaded(id), Ok)
+    fn entry(&self, id: AssemblyId, termination: &Termination) -> Result<Arc<Entry>, ServiceError> {
+        self.store.get(id).map_or_else(|| self.reloaded(id, termination), Ok)
     }
 
     /// An assembly that is not in memory, from what the disk knows of it.
-    fn reloaded(&self, id: AssemblyId) -> Result<Arc<Entry>, ServiceError> {
+    fn reloaded(&self, id: AssemblyId, termination: &Termination) -> Result<Arc<Entry>, ServiceError> {
         let (mut at, mut revisions) = (id, Vec::new());
         let mut entry = loop {
             if let Some(entry) = self.store.get(at) {
                 break entry;
             }
             match self.cache.source(&at.0).ok_or(ServiceError::UnknownAssembly)? {
-                Source::Given(source) => break self.store.insert(at, Assembly::new(&source)?),
+                Source::Given(source) => {
+                    break self.store.insert(at, Assembly::new_until(&source, termination)?);
+                }
                 Source::Revised(base, revision) => {
                     revisions.push((at, revision));
                     at = AssemblyId(base);
@@ -296,7 +323,7 @@ impl Service {
             }
         };
         while let Some((at, revision)) = revisions.pop() {
-            entry = self.store.insert(at, entry.assembly.revised(&revision)?);
+            entry = self.store.insert(at, entry.assembly.revised_until(&revision, termination)?);
         }
         Ok(entry)
     }

@@ -1,15 +1,17 @@
 //! Whether surfaces meet, or cross themselves.
 
-use std::cell::OnceCell;
+use std::sync::OnceLock;
 
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d_f64::query;
 use parry3d_f64::shape::Triangle;
+use rayon::prelude::*;
 
 use super::Draft;
 use crate::geometry::mesh;
+use crate::termination::{Poll, Termination};
 
 /// Surfaces nearer than this (of the part's size) touch: their nearest points could be
 /// confused.
@@ -19,16 +21,24 @@ const TOUCH: f64 = 1e-7;
 /// the part's size); less is rounding between neighbours.
 const PIERCE: f64 = 1e-6;
 
-/// The shells of a part, scaled to unit size, in trees that are built when first asked.
+/// Fewer triangles are not worth another thread.
+const FEW: usize = 512;
+
+/// Triangles between two looks at the termination condition.
+const CROSSING_POLL: u32 = 256;
+
+/// The shells of a part, scaled to unit size, in trees that are built when first asked. Once the condition is
+/// true triangles are left out: whoever asks must look at it before believing what was found.
 pub(super) struct Surfaces<'a> {
+    termination: &'a Termination,
     shells: &'a [Vec<u32>],
     corners: Vec<[Vector; 3]>,
     indices: Vec<[u32; 3]>,
-    trees: Vec<OnceCell<Bvh>>,
+    trees: Vec<OnceLock<Bvh>>,
 }
 
 impl<'a> Surfaces<'a> {
-    pub(super) fn new(draft: &Draft, shells: &'a [Vec<u32>]) -> Self {
+    pub(super) fn new(draft: &Draft, shells: &'a [Vec<u32>], termination: &'a Termination) -> Self {
         let (lo, hi) = mesh::bounds(&draft.vertices);
         let scale = (hi - lo).amax().max(f64::MIN_POSITIVE);
         let unit = |v: u32| {
@@ -36,14 +46,15 @@ impl<'a> Surfaces<'a> {
             Vector::new(p.x, p.y, p.z)
         };
         let corners = draft.triangles.iter().map(|t| t.map(unit)).collect();
-        let trees = shells.iter().map(|_| OnceCell::new()).collect();
-        Self { shells, corners, indices: draft.triangles.clone(), trees }
+        let trees = shells.iter().map(|_| OnceLock::new()).collect();
+        Self { termination, shells, corners, indices: draft.triangles.clone(), trees }
     }
 
     /// Whether two shells cross or touch.
     pub(super) fn meet(&self, a: usize, b: usize) -> bool {
         let (few, many) = if self.shells[a].len() <= self.shells[b].len() { (a, b) } else { (b, a) };
-        self.shells[few].iter().any(|&t| {
+        let poll = Poll::every(CROSSING_POLL, Some(self.termination));
+        self.shells[few].iter().take_while(|_| !poll.is_over()).any(|&t| {
             let region = self.aabb(t).loosened(TOUCH);
             self.within(many, &region).any(|u| self.touch(t, u))
         })
@@ -55,9 +66,12 @@ impl<'a> Surfaces<'a> {
             let (t, u) = (&self.indices[t as usize], &self.indices[u as usize]);
             !t.iter().any(|v| u.contains(v))
         };
-        self.shells[shell].iter().any(|&t| {
-            let region = self.aabb(t);
-            self.within(shell, &region).any(|u| u > t && apart(t, u) && self.cross(t, u))
+        self.shells[shell].par_chunks(FEW).any(|some| {
+            let poll = Poll::every(CROSSING_POLL, Some(self.termination));
+            some.iter().take_while(|_| !poll.is_over()).any(|&t| {
+                let region = self.aabb(t);
+                self.within(shell, &region).any(|u| u > t && apart(t, u) && self.cross(t, u))
+            })
         })
     }
 

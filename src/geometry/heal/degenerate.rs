@@ -5,7 +5,7 @@ use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 
-use super::incidence::sides_by_edge;
+use super::incidence::Sides;
 use super::{Draft, Findings, RELATIVE_TOLERANCE};
 use crate::geometry::mesh::{self, directed_edges};
 
@@ -43,8 +43,8 @@ fn remove_slivers(draft: &mut Draft) -> usize {
     if slivers.is_empty() {
         return 0;
     }
-    let sides = sides_by_edge(&draft.triangles);
-    let others = |a: u32, b: u32| sides.get(&[a.min(b), a.max(b)]).map_or(0, |s| s.len() - 1);
+    let sides = Sides::of(&draft.triangles);
+    let others = |a: u32, b: u32| sides.at(a, b).len().saturating_sub(1);
     let mut removed = vec![false; draft.triangles.len()];
     let mut touched = removed.clone();
     let mut added = Vec::new();
@@ -54,7 +54,7 @@ fn remove_slivers(draft: &mut Draft) -> usize {
             continue;
         }
         let belongs = others(p, q) == 1 && others(p, middle) % 2 == 1 && others(middle, q) % 2 == 1;
-        let across = sides.get(&[p.min(q), p.max(q)]).and_then(|s| s.iter().find(|s| s.triangle != triangle));
+        let across = sides.at(p, q).iter().find(|s| s.triangle != triangle);
         if let (true, Some(across)) = (belongs, across) {
             let n = across.triangle as usize;
             if touched[n] {
@@ -127,12 +127,10 @@ pub(super) fn split_at_junctions(draft: &mut Draft, tolerance: f64, findings: &m
 }
 
 fn split_round(draft: &mut Draft, tolerance: f64) -> usize {
-    let mut border: Vec<([u32; 2], u32)> = sides_by_edge(&draft.triangles)
-        .into_iter()
-        .filter(|(_, sides)| sides.len() == 1)
-        .map(|(edge, sides)| (edge, sides[0].triangle))
+    let border: Vec<([u32; 2], u32)> = Sides::of(&draft.triangles)
+        .iter()
+        .filter_map(|(edge, sides)| Some((edge, <[_; 1]>::try_from(sides).ok()?[0].triangle)))
         .collect();
-    border.sort_unstable();
     let vertices = BorderVertices::new(draft, &border, tolerance);
     let mut touched = vec![false; draft.triangles.len()];
     let mut count = 0;

@@ -9,10 +9,10 @@ use super::{Draft, Findings};
 /// with both orientations, or the wall between two bodies that touch: what leaves fewer edges
 /// open decides.
 pub(super) fn drop_repeated(draft: &mut Draft, findings: &mut Findings) {
-    let groups = groups(&draft.triangles);
-    if groups.len() == draft.triangles.len() {
+    if !any_repeated(&draft.triangles) {
         return;
     }
+    let groups = groups(&draft.triangles);
     let before = draft.triangles.len();
     let keep = |walls: bool| -> Vec<[u32; 3]> {
         let mut kept: Vec<usize> = groups.values().filter_map(|g| g.survivor(walls)).collect();
@@ -43,6 +43,18 @@ impl Group {
             if self.forwards.len() >= self.backwards.len() { &self.forwards } else { &self.backwards };
         majority.first().copied()
     }
+}
+
+/// Whether any two triangles have the same corners.
+fn any_repeated(triangles: &[[u32; 3]]) -> bool {
+    let sorted = |t: &[u32; 3]| {
+        let mut corners = *t;
+        corners.sort_unstable();
+        corners
+    };
+    let mut corners: Vec<[u32; 3]> = triangles.iter().map(sorted).collect();
+    corners.sort_unstable();
+    corners.windows(2).any(|pair| pair[0] == pair[1])
 }
 
 fn groups(triangles: &[[u32; 3]]) -> HashMap<[u32; 3], Group> {

@@ -20,6 +20,7 @@ mod tests;
 use nalgebra::Point3;
 
 use super::{GeometryError, Mesh, Solidity, SourcePart};
+use crate::termination::{Interrupt, Termination};
 use incidence::open_edges;
 
 /// Lengths below this share of a part's largest extent are rounding, not shape.
@@ -44,11 +45,38 @@ pub struct Healed {
 /// Nothing of it can be used: no triangles, indices out of range, coordinates that are not
 /// finite, no volume at all. The error names the file, the part and the reason.
 pub fn heal(part: &SourcePart) -> Result<Healed, GeometryError> {
-    heal_mesh(part).map_err(|reason| GeometryError::Part {
-        origin: part.origin.clone(),
-        part: part.name.clone(),
-        reason,
+    heal_until(part, &Termination::default())
+}
+
+/// The same, unless the termination condition becomes true before it is done.
+///
+/// # Errors
+/// As [`heal`], and the interruption.
+pub fn heal_until(part: &SourcePart, termination: &Termination) -> Result<Healed, GeometryError> {
+    heal_mesh(part, termination).map_err(|unhealed| match unhealed {
+        Unhealed::Interrupted(interrupt) => GeometryError::Interrupted(interrupt),
+        Unhealed::Unusable(reason) => {
+            GeometryError::Part { origin: part.origin.clone(), part: part.name.clone(), reason }
+        }
     })
+}
+
+/// Why there is no healed mesh.
+enum Unhealed {
+    Unusable(String),
+    Interrupted(Interrupt),
+}
+
+impl From<String> for Unhealed {
+    fn from(reason: String) -> Self {
+        Self::Unusable(reason)
+    }
+}
+
+impl From<Interrupt> for Unhealed {
+    fn from(interrupt: Interrupt) -> Self {
+        Self::Interrupted(interrupt)
+    }
 }
 
 /// A mesh on its way through healing.
@@ -60,11 +88,13 @@ struct Draft {
     tolerance: f64,
 }
 
-fn heal_mesh(part: &SourcePart) -> Result<Healed, String> {
+fn heal_mesh(part: &SourcePart, termination: &Termination) -> Result<Healed, Unhealed> {
     let mut findings = Findings::default();
     let draft = validate::usable(&part.mesh, &mut findings)?;
-    let mut draft = welded_and_clean(draft, &mut findings)?;
+    let mut draft = welded_and_clean(draft, &mut findings, termination)?;
+    termination.check()?;
     let mut oriented = orientation::orient(&draft, &mut findings);
+    termination.check()?;
     let gaps = open_edges(&oriented.triangles);
     draft.triangles = std::mem::take(&mut oriented.triangles);
     let solidity = if gaps > 0 {
@@ -72,29 +102,37 @@ fn heal_mesh(part: &SourcePart) -> Result<Healed, String> {
         orientation::face_outward(&mut draft);
         Solidity::Winding
     } else {
-        shells::settle(&mut draft, oriented.one_sided, &mut findings)
+        shells::settle(&mut draft, oriented.one_sided, &mut findings, termination)?
     };
     let mesh = compact(draft, solidity);
     Ok(Healed { mesh, findings: findings.list })
 }
 
 /// Welds and cleans, coarser where that closes the part.
-fn welded_and_clean(draft: Draft, findings: &mut Findings) -> Result<Draft, String> {
+fn welded_and_clean(
+    draft: Draft,
+    findings: &mut Findings,
+    termination: &Termination,
+) -> Result<Draft, Unhealed> {
     let size = draft.tolerance / RELATIVE_TOLERANCE;
-    let attempt = |tolerance: f64| {
+    let attempt = |tolerance: f64| -> Result<_, Interrupt> {
         let mut notes = Findings::default();
+        termination.check()?;
         let mut attempt = weld::weld(&draft, tolerance, &mut notes);
+        termination.check()?;
         degenerate::drop_degenerate(&mut attempt, &mut notes);
+        termination.check()?;
         duplicate::drop_repeated(&mut attempt, &mut notes);
-        (open_edges(&attempt.triangles), attempt, notes, tolerance)
+        termination.check()?;
+        Ok((open_edges(&attempt.triangles), attempt, notes, tolerance))
     };
     // Welding by distance could only harm where equal coordinates close the part already.
-    let mut best = attempt(0.0);
+    let mut best = attempt(0.0)?;
     for tolerance in [RELATIVE_TOLERANCE].into_iter().chain(CLOSING_TOLERANCES) {
         if best.0 == 0 {
             break;
         }
-        let other = attempt(tolerance * size);
+        let other = attempt(tolerance * size)?;
         if other.0 == 0 || (tolerance == RELATIVE_TOLERANCE && other.0 < best.0) {
             best = other;
         }
@@ -103,7 +141,7 @@ fn welded_and_clean(draft: Draft, findings: &mut Findings) -> Result<Draft, Stri
     degenerate::split_at_junctions(&mut draft, tolerance, &mut notes);
     findings.list.extend(notes.list);
     if draft.triangles.is_empty() {
-        return Err("no triangle has an area; export the part as a solid".into());
+        return Err("no triangle has an area; export the part as a solid".to_owned().into());
     }
     Ok(draft)
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::incidence::{Side, sides_by_edge};
+use super::incidence::Sides;
 use super::{Draft, Findings};
 use crate::geometry::mesh;
 
@@ -36,16 +36,21 @@ pub(super) fn orient(draft: &Draft, findings: &mut Findings) -> Oriented {
     Oriented { triangles, one_sided: flood.one_sided }
 }
 
-/// For each triangle its neighbours over manifold edges, and whether they agree with it.
-fn neighbours(triangles: &[[u32; 3]]) -> Vec<Vec<(u32, bool)>> {
-    let mut neighbours = vec![Vec::with_capacity(3); triangles.len()];
-    let mut pairs: Vec<[Side; 2]> =
-        sides_by_edge(triangles).into_values().filter_map(|s| <[Side; 2]>::try_from(s).ok()).collect();
-    pairs.sort_unstable_by_key(|[a, b]| (a.triangle, b.triangle));
-    for [a, b] in pairs {
+/// The neighbours of a triangle over manifold edges, and whether they agree with it.
+type Neighbours = [Option<(u32, bool)>; 3];
+
+fn neighbours(triangles: &[[u32; 3]]) -> Vec<Neighbours> {
+    let mut neighbours = vec![Neighbours::default(); triangles.len()];
+    let mut add = |to: u32, neighbour: (u32, bool)| {
+        if let Some(free) = neighbours[to as usize].iter_mut().find(|n| n.is_none()) {
+            *free = Some(neighbour);
+        }
+    };
+    for (_, sides) in Sides::of(triangles).iter() {
+        let [a, b] = sides else { continue };
         let agree = a.upwards != b.upwards;
-        neighbours[a.triangle as usize].push((b.triangle, agree));
-        neighbours[b.triangle as usize].push((a.triangle, agree));
+        add(a.triangle, (b.triangle, agree));
+        add(b.triangle, (a.triangle, agree));
     }
     neighbours
 }
@@ -57,14 +62,14 @@ struct Flood {
 
 impl Flood {
     /// The surface of a seed, its triangles marked by whether they must turn to agree with it.
-    fn run(&mut self, seed: usize, neighbours: &[Vec<(u32, bool)>]) -> Vec<usize> {
+    fn run(&mut self, seed: usize, neighbours: &[Neighbours]) -> Vec<usize> {
         self.turned[seed] = Some(false);
         let mut surface = vec![seed];
         let mut next = 0;
         while let Some(&t) = surface.get(next) {
             next += 1;
             let here = self.turned[t] == Some(true);
-            for &(other, agree) in &neighbours[t] {
+            for &(other, agree) in neighbours[t].iter().flatten() {
                 let wanted = here == agree;
                 let other = other as usize;
                 match self.turned[other] {

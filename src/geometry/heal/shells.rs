@@ -1,25 +1,36 @@
 //! Shells: the closed surfaces of a part, each turned outward or, as a void, inward.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 
 use super::crossing::Surfaces;
-use super::incidence::{Side, sides_by_edge};
+use super::incidence::{Side, Sides};
 use super::orientation::{face_outward, winding_number};
 use super::{Draft, Findings, plural};
 use crate::geometry::{Solidity, mesh};
+use crate::termination::{Interrupt, Termination};
 
 /// Tells the shells of a part without open edges apart, gives each its own vertices and turns
 /// it. Where a part is no set of separate manifolds, the winding number must do.
-pub(super) fn settle(draft: &mut Draft, one_sided: bool, findings: &mut Findings) -> Solidity {
+///
+/// # Errors
+/// The termination condition became true.
+pub(super) fn settle(
+    draft: &mut Draft,
+    one_sided: bool,
+    findings: &mut Findings,
+    termination: &Termination,
+) -> Result<Solidity, Interrupt> {
     if one_sided {
         findings.list.push("a surface with one side only; inside and outside by winding number".into());
         face_outward(draft);
-        return Solidity::Winding;
+        return Ok(Solidity::Winding);
     }
     let given = draft.triangles.clone();
     turn_patches_outward(draft);
+    termination.check()?;
     let Some(pairs) = paired_sides(draft) else {
         findings.list.push(
             "edges where more than two triangles meet without order; inside and outside by winding number"
@@ -27,20 +38,23 @@ pub(super) fn settle(draft: &mut Draft, one_sided: bool, findings: &mut Findings
         );
         draft.triangles = given;
         face_outward(draft);
-        return Solidity::Winding;
+        return Ok(Solidity::Winding);
     };
+    termination.check()?;
     let shell_of = components(draft.triangles.len(), pairs.iter().map(|p| p.triangles));
     separate_vertices(draft, &pairs);
+    termination.check()?;
     let shells = Shells::new(draft, &shell_of);
-    shells.settle(draft, &given, findings)
+    shells.settle(draft, &given, findings, termination)
 }
 
 /// The orientation that makes the volume positive, for every patch of surface over manifold
 /// edges. A patch that closes only together with others keeps what it has: it is judged again
 /// as part of its shell.
 fn turn_patches_outward(draft: &mut Draft) {
-    let sides = sides_by_edge(&draft.triangles);
-    let manifold = sides.values().filter(|s| s.len() == 2).map(|s| [s[0].triangle, s[1].triangle]);
+    let sides = Sides::of(&draft.triangles);
+    let two = |sides: &[Side]| Some(<[Side; 2]>::try_from(sides).ok()?.map(|s| s.triangle));
+    let manifold = sides.iter().filter_map(|(_, sides)| two(sides));
     let patch_of = components(draft.triangles.len(), manifold);
     for patch in members(&patch_of).values() {
         if volume(draft, patch) < 0.0 {
@@ -66,12 +80,13 @@ struct Pair {
 /// Pairs the triangles at every edge so that solid lies between the two of a pair. `None` if
 /// at some edge inside and outside do not alternate.
 fn paired_sides(draft: &Draft) -> Option<Vec<Pair>> {
-    let mut edges: Vec<([u32; 2], Vec<Side>)> = sides_by_edge(&draft.triangles).into_iter().collect();
-    edges.sort_unstable_by_key(|(edge, _)| *edge);
-    let mut pairs = Vec::with_capacity(edges.len());
-    for (edge, mut sides) in edges {
+    let all = Sides::of(&draft.triangles);
+    let mut pairs = Vec::with_capacity(draft.triangles.len() * 3 / 2);
+    for (edge, sides) in all.iter() {
+        let mut sides = Cow::Borrowed(sides);
         if sides.len() > 2 {
-            sort_around(draft, edge, &mut sides);
+            let sides = sides.to_mut();
+            sort_around(draft, edge, sides);
             // Upwards, the inside lies clockwise of the triangle: a pair begins with a side
             // that travels down.
             let first_down = sides.iter().position(|s| !s.upwards)?;
@@ -176,20 +191,27 @@ impl Shells {
         Self { triangles, boxes }
     }
 
-    fn settle(&self, draft: &mut Draft, given: &[[u32; 3]], findings: &mut Findings) -> Solidity {
+    fn settle(
+        &self,
+        draft: &mut Draft,
+        given: &[[u32; 3]],
+        findings: &mut Findings,
+        termination: &Termination,
+    ) -> Result<Solidity, Interrupt> {
         let count = self.triangles.len();
         for shell in 0..count {
             if volume(draft, &self.triangles[shell]) < 0.0 {
                 self.flip(draft, shell);
             }
         }
-        let surfaces = Surfaces::new(draft, &self.triangles);
+        let surfaces = Surfaces::new(draft, &self.triangles, termination);
         let mut depth = vec![0; count];
         let mut meet = vec![false; count];
         for (i, j) in (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))) {
             if !overlap(&self.boxes[i], &self.boxes[j]) {
                 continue;
             }
+            termination.check()?;
             if surfaces.meet(i, j) {
                 (meet[i], meet[j]) = (true, true);
             } else if self.contains(draft, i, j) {
@@ -205,12 +227,14 @@ impl Shells {
         let meeting = meet.iter().filter(|m| **m).count();
         findings.add(meeting, "shell", "that cross or touch; inside and outside by winding number");
         let crossing = (0..count).filter(|&i| surfaces.crosses_itself(i)).count();
+        // What was found of surfaces that were looked at in part is not to be believed.
+        termination.check()?;
         if crossing > 0 {
             let shells = plural(crossing, "shell");
             let verb = if crossing == 1 { "crosses itself" } else { "cross themselves" };
             findings.list.push(format!("{crossing} {shells} {verb}; inside and outside by winding number"));
         }
-        if meeting + crossing > 0 { Solidity::Winding } else { Solidity::Closed }
+        Ok(if meeting + crossing > 0 { Solidity::Winding } else { Solidity::Closed })
     }
 
     fn of(&self, draft: &Draft, shell: usize) -> impl Iterator<Item = [u32; 3]> {

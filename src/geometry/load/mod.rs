@@ -9,6 +9,8 @@ mod stl;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use rayon::prelude::*;
+
 use self::manifest::Manifest;
 use super::{GeometryError, SourceAssembly, SourceMesh, SourcePart};
 
@@ -68,7 +70,9 @@ fn load_folder(folder: &Path) -> Result<SourceAssembly, GeometryError> {
         let assembly = load_scene(scene)?;
         return described.map_or(Ok(assembly.clone()), |(origin, m)| apply(assembly, m, &origin));
     }
-    let mut parts = files.iter().map(|f| load_part(f)).collect::<Result<Vec<_>, _>>()?;
+    // Of several that cannot be read always the first is named.
+    let parts: Vec<_> = files.par_iter().map(|f| load_part(f)).collect();
+    let mut parts = parts.into_iter().collect::<Result<Vec<_>, _>>()?;
     parts.sort_by(|a, b| natural_order(&a.name, &b.name));
     let names: Vec<String> = parts.iter().map(|p| p.name.clone()).collect();
     if let Some(offsets) = manifest::read_translations(folder, &names)? {

@@ -94,7 +94,7 @@ impl PointCache {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::{ball, cuboid, healed, l_shape, surface};
+    use crate::fixtures::{ball, cuboid, healed, l_shape, shape_of, surface};
 
     #[test]
     fn a_box_has_points_at_the_spacing_and_each_once() {
@@ -132,7 +132,7 @@ mod tests {
     #[test]
     fn a_cache_gives_each_shape_its_own_points_and_forgets_the_dead() {
         let cache = PointCache::default();
-        let shape = |mesh| Arc::new(Shape::new(&healed(mesh)));
+        let shape = |mesh| Arc::new(shape_of(&healed(mesh)));
         let (a, b) = (shape(l_shape()), shape(cuboid([0.0; 3], [1.0; 3])));
         let [of_a, of_b] = [&a, &b].map(|s| cache.of(s, 0.5));
         assert!(Arc::ptr_eq(&of_a, &cache.of(&a, 0.5)) && Arc::ptr_eq(&of_b, &cache.of(&b, 0.5)));
