@@ -18,6 +18,7 @@ use super::closing::Closing;
 use super::convert;
 use super::figures::{Figures, Latencies, Surroundings};
 use super::intake::Upload;
+use super::memory;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::session::{End, Input, Link, Session, State};
 use super::shared_queue::Queues;
@@ -71,6 +72,8 @@ pub(super) struct Limits {
     threads: usize,
     pub(super) grace: Duration,
     pub(super) drain: Duration,
+    /// How much memory is left, in bytes, if the system says.
+    pub(super) free_memory: fn() -> Option<u64>,
 }
 
 impl Limits {
@@ -81,6 +84,7 @@ impl Limits {
             threads: config.workers.threads_per_request,
             grace: seconds(config.times.grace_s),
             drain: seconds(config.times.drain_s),
+            free_memory: memory::available,
         }
     }
 }

@@ -467,6 +467,18 @@ fn an_upload_whose_client_leaves_while_it_is_taken_in_is_not_taken_in_to_the_end
 }
 
 #[test]
+fn an_upload_that_memory_is_not_enough_for_is_refused_before_it_is_copied() {
+    let mut bench = Bench::new(4);
+    bench.desk.limits.free_memory = || Some(1 << 30);
+    assert!(bench.desk.refuses_upload(OTHER, 1 << 20).is_none());
+    let error = bench.desk.refuses_upload(OTHER, 500 << 20).unwrap();
+    assert_eq!(error.code, ErrorCode::TooLarge);
+    assert!(error.message.contains("500 MB") && error.message.contains("1024 MB are free"), "{error:?}");
+    bench.desk.limits.free_memory = || None;
+    assert!(bench.desk.refuses_upload(OTHER, 500 << 20).is_none(), "where nothing is known, it is tried");
+}
+
+#[test]
 fn more_uploaded_bytes_than_may_wait_are_refused_before_they_are_copied() {
     let mut bench = Bench::new(4);
     let mut config = Config::default();

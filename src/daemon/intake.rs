@@ -10,6 +10,7 @@ use sbdp_ipc::headers::RequestHeader;
 
 use super::desk::{Desk, Incoming};
 use super::figures::Timed;
+use super::memory;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::session::Link;
 use super::workers::{AdmitJob, Planning, Received};
@@ -34,6 +35,9 @@ impl<L> Upload<L> {
     }
 }
 
+/// What needs less memory than this is not asked for: the answer takes reading files.
+const SMALL: u64 = 64 << 20;
+
 /// What the queue knows of an upload.
 pub(crate) fn ticket(owner: Owner, bytes: usize) -> Ticket {
     Ticket { owner, class: Class::Interactive, bytes: bytes as u64 }
@@ -55,8 +59,22 @@ impl<L: Link, P: Planning> Desk<L, P> {
 
     /// Why an upload of so many bytes would not be taken now. Asked before they are copied.
     pub(crate) fn refuses_upload(&self, owner: Owner, bytes: usize) -> Option<WireError> {
-        let rejected = self.queues.admissions.check(ticket(owner, bytes)).err()?;
-        Some(self.upload_rejected(owner, rejected))
+        if let Err(rejected) = self.queues.admissions.check(ticket(owner, bytes)) {
+            return Some(self.upload_rejected(owner, rejected));
+        }
+        let needed = memory::needed(bytes as u64);
+        if needed < SMALL {
+            return None;
+        }
+        let free = (self.limits.free_memory)().filter(|free| *free < needed)?;
+        let message = format!(
+            "to take in these {} MB of meshes needs about {} MB of memory, and {} MB are free: upload coarser \
+             meshes, or give the daemon more memory",
+            bytes >> 20,
+            needed >> 20,
+            free >> 20
+        );
+        Some(WireError::new(ErrorCode::TooLarge, message))
     }
 
     fn upload_rejected(&self, owner: Owner, rejected: Rejected) -> WireError {

@@ -18,6 +18,7 @@ mod instance;
 mod intake;
 mod lifecycle;
 mod lock;
+mod memory;
 mod metrics;
 mod outbox;
 mod ports;

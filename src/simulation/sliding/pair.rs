@@ -1,5 +1,7 @@
 //! Static analysis by sliding: what contact with one part alone lets another do.
 
+use rayon::prelude::*;
+
 use crate::geometry::Pose;
 use crate::termination::{Interrupt, Termination};
 
@@ -67,7 +69,8 @@ pub fn pair_blocks(
         termination.check()?;
         Ok(matches!(step, Step::Stuck { .. }))
     };
-    actions.iter().map(blocked).collect()
+    // Side by side: two parts alone are but one pair.
+    actions.par_iter().map(blocked).collect()
 }
 
 /// The same by regions, for translations.
@@ -94,5 +97,5 @@ fn translations_blocked(
         tracing::debug!(part, other, %action, travel = push.travel(), "no end of a short push");
         Err(Halt::Lost)
     };
-    actions.iter().map(blocked).collect()
+    actions.par_iter().map(blocked).collect()
 }
