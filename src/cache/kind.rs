@@ -27,11 +27,15 @@ pub enum Kind {
     Source = 8,
     /// A plan as it was sent.
     Answer = 9,
+    /// A healed mesh in its own frame.
+    Shape = 10,
+    /// An assembly of such shapes.
+    Healed = 11,
 }
 
 impl Kind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::Overlap,
         Self::Blocking,
         Self::Witness,
@@ -41,6 +45,8 @@ impl Kind {
         Self::Touching,
         Self::Source,
         Self::Answer,
+        Self::Shape,
+        Self::Healed,
     ];
 
     /// The name in statistics.
@@ -56,13 +62,15 @@ impl Kind {
             Self::Touching => "touching",
             Self::Source => "source",
             Self::Answer => "answer",
+            Self::Shape => "shape",
+            Self::Healed => "healed",
         }
     }
 
     /// Whether records are kept in memory, too. Assemblies and answers are there already, as what was made
     /// of them and as they are sent.
     pub(super) fn stays_in_memory(self) -> bool {
-        !matches!(self, Self::Source | Self::Answer)
+        !matches!(self, Self::Source | Self::Answer | Self::Shape | Self::Healed)
     }
 
     /// The version of what computes such records: to be raised with every change that may give another
@@ -77,7 +85,9 @@ impl Kind {
             | Self::Plan
             | Self::Touching
             | Self::Source
-            | Self::Answer => 1,
+            | Self::Answer
+            | Self::Shape
+            | Self::Healed => 1,
             Self::Verdict => 2,
         }
     }

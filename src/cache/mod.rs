@@ -5,7 +5,7 @@
 //! file that one process holds, with its `tables`; `writer`, the one thread that writes to it) → bytes
 //! (`format`, drawn in `FORMAT.md`; `records`, what is in them). What is asked, under which key, and when
 //! an old answer still holds, is said once for each kind: `pair`, `touching`, `motion`, `verdict`, `plan`,
-//! `source`, `answer`.
+//! `source`, `healed`, `answer`.
 //! A request sees it all through its [`Recall`], which counts what was reused; with none of it, it
 //! remembers nothing.
 //!
@@ -16,6 +16,7 @@
 mod answer;
 mod disk;
 mod format;
+mod healed;
 mod hostile;
 mod kind;
 mod memory;
@@ -128,6 +129,13 @@ impl Cache {
     /// Whether there is a record of a key that would be on disk only; told without looking there.
     fn contains(&self, key: &Key) -> bool {
         self.disk.as_ref().is_some_and(|d| d.contains(key))
+    }
+
+    /// Notes that a record on disk was used.
+    fn touch(&self, key: Key) {
+        if let Some(disk) = &self.disk {
+            disk.touch(key);
+        }
     }
 
     /// Remembers a record, in place of one with the same key.

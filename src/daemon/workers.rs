@@ -78,6 +78,7 @@ impl Planning for Service {
     fn admit(&self, source: &SourceAssembly) -> Result<Admission, ServiceError> {
         let admission = Self::admit(self, source)?;
         self.cache().remember_given(&admission.id.0, source);
+        self.keep(admission.id)?;
         Ok(admission)
     }
 
@@ -85,6 +86,7 @@ impl Planning for Service {
         let admission = Self::revise(self, base, revision)?;
         if admission.id != base {
             self.cache().remember_revised(&admission.id.0, &base.0, revision);
+            self.keep(admission.id)?;
         }
         Ok(admission)
     }

@@ -54,6 +54,16 @@ impl Shape {
     /// Derives everything from a mesh.
     #[must_use]
     pub fn new(mesh: &Mesh) -> Self {
+        Self::with_hull(mesh, hull_vertices(&mesh.vertices))
+    }
+
+    /// A shape of which the hull and the content are known.
+    #[must_use]
+    pub(crate) fn known(mesh: &Mesh, hull: Vec<Point3<f64>>, content: [u8; 32]) -> Self {
+        Self { content: OnceLock::from(content), ..Self::with_hull(mesh, hull) }
+    }
+
+    fn with_hull(mesh: &Mesh, hull: Vec<Point3<f64>>) -> Self {
         let surface = Arc::new(Surface::new(mesh));
         let mass = surface.mass_properties();
         let reach =
@@ -61,10 +71,16 @@ impl Shape {
         let sited = sited(&surface, &spacing(surface.bounds()));
         let oriented = OrientedSamples::new(&surface, &sited);
         let samples = SampleTree::over(sited.into_iter().map(|(p, _)| p).collect());
-        let hull = hull_vertices(surface.vertices());
         let solidity = mesh.solidity;
         let (patches, content) = (OnceLock::new(), OnceLock::new());
         Self { hull, samples, oriented, mass, reach, surface, patches, solidity, content }
+    }
+
+    /// The mesh that it was made of, in its frame.
+    #[must_use]
+    pub fn mesh(&self) -> Mesh {
+        let (vertices, triangles) = (self.surface.vertices().to_vec(), self.surface.triangles().to_vec());
+        Mesh { vertices, triangles, solidity: self.solidity }
     }
 
     /// The triangles in a tree of patches.

@@ -101,6 +101,9 @@ impl<'a> Mover<'a> {
     /// Gathers the contacts with one standing part.
     pub(super) fn near_pair(&self, other: usize, reach: f64, near: &mut Near) {
         let standing = &self.scene.bodies[other];
+        if !self.fields_are_ready(standing) {
+            return;
+        }
         let allowance = self.scene.allowances.of(self.part, other);
         let standing_from_moving = standing.planning_from_shape.inverse() * self.pose;
         let moving_from_standing = standing_from_moving.inverse();
@@ -120,6 +123,12 @@ impl<'a> Mover<'a> {
         near.clearance = mine.clearance.min(theirs.clearance);
         near.contacts.append(&mut mine.contacts);
         near.contacts.extend(theirs.contacts);
+    }
+
+    /// Builds the fields of a pair that are not there yet; not to the end once the condition is true.
+    fn fields_are_ready(&self, standing: &Body) -> bool {
+        let ready = |body: &Body| self.termination.is_none_or(|t| body.field.make_ready(t).is_ok());
+        ready(self.body) && ready(standing)
     }
 
     /// Whether the fields alone show that a sample of either surface is deeper than granted: deeper
@@ -178,6 +187,9 @@ impl<'a> Mover<'a> {
         let bounds = self.body.shape.bounds().transformed(&self.pose).grown(margin);
         self.scene.broad_phase.meeting_of(standing, &bounds).into_iter().any(|other| {
             let still = &self.scene.bodies[other];
+            if !self.fields_are_ready(still) {
+                return true;
+            }
             let allowance = self.scene.allowances.of(self.part, other);
             let to_still = still.planning_from_shape.inverse() * self.pose;
             test(self.body, still, &to_still, allowance)
