@@ -5,6 +5,7 @@
 use std::sync::Arc;
 
 use nalgebra::Point3;
+use rayon::prelude::*;
 
 use super::records::{HealedPartRecord, HealedRecord, ShapeRecord, pose_of, pose_record};
 use super::{Cache, Digest, Key, Kind, source};
@@ -17,14 +18,14 @@ impl Cache {
     pub fn healed(
         &self,
         handle: &[u8; 32],
-        known: impl Fn(&[u8; 32]) -> Option<Arc<Shape>>,
+        known: impl Fn(&[u8; 32]) -> Option<Arc<Shape>> + Sync,
     ) -> Option<Assembly> {
         let record: HealedRecord = self.get(&assembly_key(handle))?;
         let shape = |content: &[u8; 32]| {
             let read = || shape(self.get(&shape_key(content))?, content).map(Arc::new);
             known(content).or_else(read)
         };
-        let shapes = record.shapes.iter().map(shape).collect::<Option<Vec<_>>>()?;
+        let shapes = record.shapes.par_iter().map(shape).collect::<Option<Vec<_>>>()?;
         // What it was made of is in use with it.
         self.touch(source::key(handle));
         assembly(record, shapes)
@@ -155,7 +156,8 @@ mod tests {
 
     fn told(assembly: &Assembly) -> String {
         let Assembly { name, units, scale, parts, shapes, fixed, findings } = assembly;
-        let shapes: Vec<_> = shapes.iter().map(|s| (s.mesh(), &s.hull, s.mass, s.samples.points())).collect();
+        let shapes: Vec<_> =
+            shapes.iter().map(|s| (s.mesh(), &s.hull, s.mass, s.samples().points())).collect();
         format!("{name} {units:?} {scale} {parts:?} {shapes:?} {fixed:?} {findings:?}")
     }
 

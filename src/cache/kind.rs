@@ -31,11 +31,15 @@ pub enum Kind {
     Shape = 10,
     /// An assembly of such shapes.
     Healed = 11,
+    /// The hull of two hulls.
+    Hull = 12,
+    /// What a part that goes along a line enters.
+    Swept = 13,
 }
 
 impl Kind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::Overlap,
         Self::Blocking,
         Self::Witness,
@@ -47,6 +51,8 @@ impl Kind {
         Self::Answer,
         Self::Shape,
         Self::Healed,
+        Self::Hull,
+        Self::Swept,
     ];
 
     /// The name in statistics.
@@ -64,13 +70,15 @@ impl Kind {
             Self::Answer => "answer",
             Self::Shape => "shape",
             Self::Healed => "healed",
+            Self::Hull => "hull",
+            Self::Swept => "swept",
         }
     }
 
-    /// Whether records are kept in memory, too. Assemblies and answers are there already, as what was made
-    /// of them and as they are sent.
+    /// Whether records are kept in memory, too. Assemblies, answers and hulls are there already, as what was
+    /// made of them and as they are used.
     pub(super) fn stays_in_memory(self) -> bool {
-        !matches!(self, Self::Source | Self::Answer | Self::Shape | Self::Healed)
+        !matches!(self, Self::Source | Self::Answer | Self::Shape | Self::Healed | Self::Hull)
     }
 
     /// The version of what computes such records: to be raised with every change that may give another
@@ -87,7 +95,9 @@ impl Kind {
             | Self::Source
             | Self::Answer
             | Self::Shape
-            | Self::Healed => 1,
+            | Self::Healed
+            | Self::Hull
+            | Self::Swept => 1,
             Self::Verdict => 2,
         }
     }

@@ -4,8 +4,8 @@
 //! memory (`memory`, a budget in bytes, the least recently used leave) → the tier on disk (`disk`, a redb
 //! file that one process holds, with its `tables`; `writer`, the one thread that writes to it) → bytes
 //! (`format`, drawn in `FORMAT.md`; `records`, what is in them). What is asked, under which key, and when
-//! an old answer still holds, is said once for each kind: `pair`, `touching`, `motion`, `verdict`, `plan`,
-//! `source`, `healed`, `answer`.
+//! an old answer still holds, is said once for each kind: `pair`, `touching`, `motion`, `swept`, `verdict`,
+//! `plan`, `hull`, `source`, `healed`, `answer`.
 //! A request sees it all through its [`Recall`], which counts what was reused; with none of it, it
 //! remembers nothing.
 //!
@@ -18,6 +18,7 @@ mod disk;
 mod format;
 mod healed;
 mod hostile;
+mod hull;
 mod kind;
 mod memory;
 mod motion;
@@ -28,6 +29,7 @@ mod records;
 mod settings;
 mod source;
 mod statistics;
+mod swept;
 mod tables;
 mod tally;
 #[cfg(test)]

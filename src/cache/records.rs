@@ -206,6 +206,20 @@ pub(super) struct HealedPartRecord {
     pub(super) moved: PoseRecord,
 }
 
+/// Vertices of a convex hull.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct HullRecord {
+    pub(super) vertices: Vec<[f64; 3]>,
+}
+
+/// Of the parts that one passed along a line, by hashes of how they stand and how far it went: whether it
+/// entered them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct SweptRecord {
+    /// Those that were looked at last come last.
+    pub(super) past: Vec<([u8; 16], bool)>,
+}
+
 /// A plan in the messages that it was sent in; the last one ends it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct AnswerRecord {
@@ -216,6 +230,8 @@ impl Record for SourceRecord {}
 impl Record for AnswerRecord {}
 impl Record for ShapeRecord {}
 impl Record for HealedRecord {}
+impl Record for HullRecord {}
+impl Record for SweptRecord {}
 impl Record for OverlapRecord {}
 impl Record for BlockingRecord {}
 impl Record for WitnessRecord {}

@@ -23,15 +23,14 @@ pub struct Shape {
     pub surface: Arc<Surface>,
     /// Vertices of the convex hull.
     pub hull: Vec<Point3<f64>>,
-    /// Where contact is looked for.
-    pub samples: SampleTree,
-    /// The same points, with the faces that meet there.
+    /// Where contact is looked for, with the faces that meet there.
     pub oriented: OrientedSamples,
     /// Centre of mass and radius of gyration.
     pub mass: MassProperties,
     /// Largest distance of a vertex from the centre of mass.
     pub reach: f64,
-    /// Built when it is asked for.
+    /// The same points in a tree. Built when it is asked for, as what follows.
+    samples: OnceLock<SampleTree>,
     patches: OnceLock<PatchTree>,
     solidity: Solidity,
     content: OnceLock<[u8; 32]>,
@@ -70,9 +69,8 @@ impl Shape {
             surface.vertices().iter().map(|v| (v - mass.centre).norm_squared()).fold(0.0, f64::max).sqrt();
         let sited = sited(&surface, &spacing(surface.bounds()));
         let oriented = OrientedSamples::new(&surface, &sited);
-        let samples = SampleTree::over(sited.into_iter().map(|(p, _)| p).collect());
         let solidity = mesh.solidity;
-        let (patches, content) = (OnceLock::new(), OnceLock::new());
+        let (samples, patches, content) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
         Self { hull, samples, oriented, mass, reach, surface, patches, solidity, content }
     }
 
@@ -81,6 +79,11 @@ impl Shape {
     pub fn mesh(&self) -> Mesh {
         let (vertices, triangles) = (self.surface.vertices().to_vec(), self.surface.triangles().to_vec());
         Mesh { vertices, triangles, solidity: self.solidity }
+    }
+
+    /// Where contact is looked for, in a tree.
+    pub fn samples(&self) -> &SampleTree {
+        self.samples.get_or_init(|| SampleTree::over(self.oriented.iter().map(|(p, _)| *p).collect()))
     }
 
     /// The triangles in a tree of patches.
@@ -102,7 +105,7 @@ impl Shape {
         size_of::<Self>()
             + self.surface.memory()
             + size_of_val(&*self.hull)
-            + self.samples.memory()
+            + self.samples.get().map_or(0, SampleTree::memory)
             + self.oriented.memory()
             + self.patches.get().map_or(0, PatchTree::memory)
     }

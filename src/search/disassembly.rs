@@ -11,9 +11,7 @@ use rayon::prelude::*;
 use crate::cache::MotionQuestion;
 use crate::geometry::{Pose, separating_direction, transformed};
 use crate::plan::{Entry, PlanStatus};
-use crate::simulation::{
-    Action, End, HULL_MARGIN, HullTree, Motion, Surroundings, Sweep, exit_direction, straight_sweep,
-};
+use crate::simulation::{Action, End, HULL_MARGIN, HullTree, Motion, Surroundings, Sweep, exit_direction};
 use crate::termination::Interrupt;
 
 use super::outcome::{BlockedAction, Counters, Outcome, Removal};
@@ -234,9 +232,9 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.problem.termination.check()?;
         let started = Instant::now();
         let around = self.all_surroundings(runs)?;
-        let Problem { scene, termination, .. } = &self.problem;
+        let Problem { scene, termination, recall, .. } = &self.problem;
         let swept = |(run, around): (&Run, &Arc<Surroundings>)| {
-            straight_sweep(scene, around, run.part, &run.start, &run.action.force(), termination)
+            recall.sweep(scene, around, run.part, &run.start, &run.action.force(), termination)
         };
         let mut results: Vec<_> =
             runs.par_iter().zip(&around).map(swept).collect::<Result<_, Interrupt>>()?;

@@ -26,7 +26,7 @@ use crate::cache::{Cache, CacheStatistics, Recall, Source};
 use crate::geometry::{Assembly, GeometryError, Revision, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, Warning};
 use crate::search::{Engine, PlanRequest, PlanSink, Staging, axes_of, least_travel};
-use crate::simulation::{Action, Axis, PenaltyParameters};
+use crate::simulation::{Action, Axis, HullStore, JoinedHulls, PenaltyParameters};
 use crate::termination::Termination;
 
 use entry::{Entry, engine_of};
@@ -110,7 +110,8 @@ impl Service {
     /// A service that remembers in a cache, and knows assemblies up to so many bytes of memory.
     #[must_use]
     pub fn new(cache: Arc<Cache>, budget: usize) -> Self {
-        Self { store: Store::new(budget), cache }
+        let hulls = JoinedHulls::stored(Arc::clone(&cache) as Arc<dyn HullStore>);
+        Self { store: Store::new(budget, hulls), cache }
     }
 
     /// How many assemblies it knows, and what they take.

@@ -76,8 +76,8 @@ struct Counted {
 
 impl Store {
     /// Nothing yet; `budget` in bytes.
-    pub(super) fn new(budget: usize) -> Self {
-        Self { budget, hulls: Arc::default(), held: Mutex::default() }
+    pub(super) fn new(budget: usize, hulls: JoinedHulls) -> Self {
+        Self { budget, hulls: Arc::new(hulls), held: Mutex::default() }
     }
 
     /// An assembly, which is used by this.

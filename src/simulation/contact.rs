@@ -109,7 +109,7 @@ impl<'a> Mover<'a> {
         let moving_from_standing = standing_from_moving.inverse();
         let side = |side, sampled: &Body, measured: &Body, to_measured: &Pose| {
             let mut found = Near { contacts: Vec::new(), clearance: near.clearance };
-            for tree in [&sampled.shape.samples, &sampled.extra_samples] {
+            for tree in [&sampled.shape.samples(), &sampled.extra_samples] {
                 let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
                 let measured = Measured { body: measured, to_measured, allowance, reach };
                 gather(tree, &measured, self.termination, &mut found, tag);
@@ -138,7 +138,7 @@ impl<'a> Mover<'a> {
         self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
             let field = &measured.field;
             let limit = -allowance - field.error_bound();
-            sampled.shape.samples.any(
+            sampled.shape.samples().any(
                 |node| poll.is_over() || field.value(&(to_measured * node.centre)) - node.radius < limit,
                 |sample| poll.is_over() || field.value(&(to_measured * sample)) < limit,
             )
@@ -150,7 +150,7 @@ impl<'a> Mover<'a> {
         !self.any_pair(standing, by, |sampled, measured, to_measured, _| {
             let field = &measured.field;
             let limit = by + field.error_bound();
-            sampled.shape.samples.any(
+            sampled.shape.samples().any(
                 |node| field.value(&(to_measured * node.centre)) - node.radius < limit,
                 |sample| field.value(&(to_measured * sample)) < limit,
             )
@@ -163,7 +163,7 @@ impl<'a> Mover<'a> {
         self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
             let (field, limit) = (&measured.field, -allowance - depth);
             let least = |p: &Point3<f64>| field.value(p) - field.error_bound();
-            sampled.shape.samples.any(
+            sampled.shape.samples().any(
                 |node| poll.is_over() || least(&(to_measured * node.centre)) - node.radius < limit,
                 |sample| {
                     let p = to_measured * sample;
