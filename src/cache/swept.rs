@@ -66,3 +66,62 @@ fn place(scene: &Scene, part: usize, crossing: &Crossing<'_>) -> [u8; 16] {
     let [first, _]: [[u8; 16]; 2] = bytemuck::cast(digest.finish());
     first
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::cache::Cache;
+    use crate::fixtures::{cuboid, moved, peg_in_hole, scene};
+    use crate::geometry::SourceMesh;
+    use crate::simulation::straight_sweep;
+
+    /// A peg in a blind hole, a post that makes its way out longer than the hole is deep, and a lid over it at
+    /// some height.
+    fn machine(post: f64, lid: f64) -> Vec<SourceMesh> {
+        let [block, peg] = peg_in_hole(0.0);
+        let post = cuboid([2.6, 2.6, 0.0], [3.0, 3.0, post]);
+        vec![
+            block,
+            peg,
+            post,
+            moved(cuboid([-1.0, -1.0, 0.0], [1.0, 1.0, 0.1]), &Pose::translation(0.0, 0.0, lid)),
+        ]
+    }
+
+    /// What a sweep of the peg upwards tells, and how many pairs were cast for it.
+    fn swept(recall: &Recall, meshes: Vec<SourceMesh>) -> (Option<Sweep>, usize) {
+        let (scene, _) = scene(meshes);
+        let around = Surroundings::new(&scene, vec![0, 2, 3]);
+        let (start, up) = (scene.bodies[1].planning_from_shape, Vector3::z());
+        let never = Termination::default();
+        let cold = straight_sweep(&scene, &around, 1, &start, &up, &never).unwrap();
+        let warm = recall.sweep(&scene, &around, 1, &start, &up, &never).unwrap();
+        assert_eq!(warm, cold);
+        let mut digest = Digest::new();
+        digest.hash(scene.bodies[1].shape.content());
+        add_pose(&mut digest, &start);
+        let key = digest.numbers(up.iter().copied()).key(Kind::Swept);
+        (warm, recall.get::<SweptRecord>(&key).map_or(0, |known| known.past.len()))
+    }
+
+    #[test]
+    fn only_what_changed_on_the_way_is_looked_at_again() {
+        let recall = Recall::of(Arc::new(Cache::in_memory(1 << 20)));
+        let is_clear = |s: &Option<Sweep>| matches!(s, Some(Sweep::Clear { .. }));
+        let (first, looked_at) = swept(&recall, machine(3.0, 3.5));
+        assert!(!is_clear(&first) && looked_at == 2, "{first:?}, {looked_at}");
+        assert_eq!(swept(&recall, machine(3.0, 3.5)), (first.clone(), looked_at), "all is known");
+        // The lid is elsewhere: the block is known.
+        assert_eq!(swept(&recall, machine(3.0, 3.25)), (first, looked_at + 1));
+        // The way is longer, beside it stands something else: past the block and the lid nothing changed.
+        let (longer, then) = swept(&recall, machine(3.75, 3.5));
+        assert!(!is_clear(&longer) && then == looked_at + 1, "{then}");
+        // And what blocked it does so no more where it is beside.
+        let mut aside = machine(3.0, 3.5);
+        let lid = aside.pop().unwrap();
+        aside.push(moved(lid, &Pose::translation(2.5, 0.0, 0.0)));
+        assert!(is_clear(&swept(&recall, aside).0));
+    }
+}

@@ -251,6 +251,13 @@ mod tests {
         let start = &scene.bodies[1].planning_from_shape;
         let swept = straight_sweep(&scene, &around, 1, start, &Vector3::z(), &termination);
         assert_eq!(swept, Err(Interrupt::Cancelled));
+        let termination = Termination::default();
+        let up = &Vector3::z();
+        let swept = straight_sweep_past(&scene, &around, 1, start, up, &termination, |crossing| {
+            termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+            crossing.enters()
+        });
+        assert_eq!(swept, Err(Interrupt::Cancelled), "a cast that was cut short");
     }
 
     fn is_clear(scene: &Scene, part: usize, direction: Vector3<f64>) -> bool {
