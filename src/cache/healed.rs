@@ -64,8 +64,9 @@ fn points(of: &[Point3<f64>]) -> Vec<[f64; 3]> {
 
 fn shape_record(shape: &Shape) -> ShapeRecord {
     let Mesh { vertices, triangles, solidity } = shape.mesh();
-    let winding = solidity == Solidity::Winding;
-    ShapeRecord { vertices: points(&vertices), triangles, winding, hull: points(&shape.hull) }
+    let winding = *solidity == Solidity::Winding;
+    let (vertices, triangles) = (points(vertices), triangles.clone());
+    ShapeRecord { vertices, triangles, winding, hull: points(&shape.hull) }
 }
 
 /// The shape of a record, unless its triangles have corners that are not there.
@@ -75,7 +76,7 @@ fn shape(record: ShapeRecord, content: &[u8; 32]) -> Option<Shape> {
     let whole = !triangles.is_empty() && triangles.iter().flatten().all(|&v| u64::from(v) < count);
     let solidity = if winding { Solidity::Winding } else { Solidity::Closed };
     let of = |points: Vec<[f64; 3]>| points.into_iter().map(Point3::from).collect::<Vec<_>>();
-    whole.then(|| Shape::known(&Mesh { vertices: of(vertices), triangles, solidity }, of(hull), *content))
+    whole.then(|| Shape::known(Mesh { vertices: of(vertices), triangles, solidity }, of(hull), *content))
 }
 
 fn assembly_record(assembly: &Assembly) -> HealedRecord {
@@ -174,7 +175,7 @@ mod tests {
         let found = cache.healed(&HANDLE, |_| None).unwrap();
         assert_eq!(told(&found), told(&assembly));
         for shape in &found.shapes {
-            assert_eq!(shape.content(), Shape::new(&shape.mesh()).content());
+            assert_eq!(shape.content(), Shape::new(shape.mesh()).content());
         }
         let shared = cache.healed(&HANDLE, |of| assembly.shapes.iter().find(|s| s.content() == of).cloned());
         assert!(shared.unwrap().shapes.iter().zip(&assembly.shapes).all(|(a, b)| Arc::ptr_eq(a, b)));

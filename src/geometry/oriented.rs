@@ -147,7 +147,7 @@ mod tests {
         let turn = Pose::new(Vector3::new(0.4, -1.3, 0.7), Vector3::new(0.3, -0.5, 0.2));
         let (mut told, mut all) = (0, 0);
         for shape in [ball(4), l_shape(), cuboid([-1.0, -2.0, -0.1], [1.0, 2.0, 0.1])].map(healed) {
-            let samples = Shape::new(&shape).oriented;
+            let samples = Shape::new(&shape).oriented().clone();
             for (at, pose) in
                 spread([-2.0; 3], [2.0; 3], 30).zip([turn, Pose::identity()].into_iter().cycle())
             {
@@ -172,7 +172,7 @@ mod tests {
     fn corners_edges_and_faces_of_a_box_have_three_two_and_one_normals() {
         let shape = Shape::new(&healed(cuboid([-1.0; 3], [1.0; 3])));
         let mut seen = [0; 4];
-        for (p, normals) in shape.oriented.iter() {
+        for (p, normals) in shape.oriented().iter() {
             let on = (0..3).filter(|&a| (p[a].abs() - 1.0).abs() < 1e-12).count();
             assert_eq!(normals.len(), on, "at {p}");
             assert!(normals.iter().all(|n| (n.dot(&p.coords) - 1.0).abs() < 1e-12));

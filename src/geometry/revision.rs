@@ -153,7 +153,7 @@ impl Assembly {
             *vertex *= self.scale;
         }
         let bounds = Bounds::of(&mesh.vertices);
-        let copied = |(k, shape): (usize, &Arc<Shape>)| Some((k, congruence(&shape.mesh(), &mesh)?));
+        let copied = |(k, shape): (usize, &Arc<Shape>)| Some((k, congruence(shape.mesh(), &mesh)?));
         let copy = self.shapes.iter().enumerate().filter(|(_, s)| is_like(s, &mesh)).find_map(copied);
         let (shape, planning_from_shape) = copy.unwrap_or_else(|| {
             let c = bounds.centre();

@@ -167,8 +167,9 @@ impl Crossing<'_> {
             let cast = Cast { target, to_target, along: *along, travel, granted, poll };
             cast.enters(samples)
         };
-        let entered = casts(&moving.shape.oriented, &standing.shape.surface, standing_from_moving, &forward)
-            || casts(&standing.shape.oriented, &moving.shape.surface, moving_from_standing, &backward);
+        let entered =
+            casts(&moving.shape.oriented(), &standing.shape.surface, standing_from_moving, &forward)
+                || casts(&standing.shape.oriented(), &moving.shape.surface, moving_from_standing, &backward);
         // What was found of casts that were cut short is not to be believed.
         termination.check()?;
         Ok(entered)
