@@ -70,6 +70,17 @@ impl Shape {
         Self { surface: Arc::new(surface), hull, mass, reach, oriented, samples, patches, content }
     }
 
+    /// Derives now what was not yet, but for the tree of samples.
+    ///
+    /// # Errors
+    /// The termination condition became true before all was there.
+    pub fn derive(&self, termination: &Termination) -> Result<(), Interrupt> {
+        termination.check()?;
+        self.surface.prepare();
+        self.oriented();
+        self.patches(termination).map(|_| ())
+    }
+
     /// The mesh that it was made of, in its frame.
     #[must_use]
     pub fn mesh(&self) -> &Mesh {

@@ -54,7 +54,7 @@ impl Surface {
     #[must_use]
     pub fn new(mesh: &Mesh) -> Self {
         let surface = Self::deferred(mesh.clone());
-        surface.derived();
+        surface.prepare();
         surface
     }
 
@@ -62,6 +62,11 @@ impl Surface {
     #[must_use]
     pub fn deferred(mesh: Mesh) -> Self {
         Self { bounds: Bounds::of(&mesh.vertices), mesh, derived: OnceLock::new() }
+    }
+
+    /// Prepares it now, unless that was done.
+    pub fn prepare(&self) {
+        self.derived();
     }
 
     #[inline]

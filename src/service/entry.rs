@@ -4,6 +4,8 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, TryLockError};
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
+
 use crate::blocking_graph::StaticAnalysis;
 use crate::cache::{Answered, PlanQuestion, Recall};
 use crate::geometry::{Assembly, Shape};
@@ -11,7 +13,9 @@ use crate::plan::{Plan, PlanStatus, Verifier};
 use crate::search::{
     Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_blockages, search,
 };
-use crate::simulation::{JoinedHulls, PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
+use crate::simulation::{
+    HullTree, JoinedHulls, PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction,
+};
 use crate::termination::{Interrupt, Termination};
 
 use super::ServiceError;
@@ -241,14 +245,20 @@ impl Entry {
 
     /// Makes ready what any plan needs, as far as `termination` lets it.
     pub(super) fn prepare(&self, termination: &Termination, recall: &Recall) {
+        // First what no record holds: after a restart, whoever asks at once waits for this.
+        if self.shapes.par_iter().try_for_each(|shape| shape.shape.derive(termination)).is_err() {
+            return;
+        }
         let Ok((prepared, _)) = self.prepared(termination, recall) else { return };
+        // Joined hulls are known to all scenes then.
+        drop(HullTree::new(&prepared.scene, (0..self.assembly.parts.len()).collect()));
         let request = PlanRequest::default();
         let question = PlanQuestion { assembly: &self.assembly, request: &request, fixed: &[], removed: &[] };
         let engine = engine_of(request.engine, request.penalty);
         let asked = Asked { question: &question, engine: &*engine, verifier: &prepared.verifier };
-        // Interrupted, it has kept what it found.
-        let _ = prepared.build_fields(termination, &mut Silent);
+        // Interrupted, they have kept what they found.
         let _ = initial_blockages(&self.problem(&prepared, &asked, termination, recall));
+        let _ = prepared.build_fields(termination, &mut Silent);
     }
 
     /// Overlaps, if they are there.

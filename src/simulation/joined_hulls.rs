@@ -12,7 +12,7 @@ use crate::lru::Lru;
 const MOST_POINTS: usize = 200_000;
 
 /// Of fewer points, joining takes no longer than finding it in a store.
-const FEWEST_STORED: usize = 48;
+const FEWEST_STORED: usize = 12;
 
 /// Where hulls are found that were joined before this process began.
 pub trait HullStore: std::fmt::Debug + Send + Sync {
@@ -130,11 +130,11 @@ mod tests {
             }
         }
         let cloud = |count: usize| -> Arc<[Point3<f64>]> { spread([0.0; 3], [1.0; 3], count).collect() };
-        let (large, small) = (cloud(FEWEST_STORED), cloud(FEWEST_STORED / 2 - 1));
+        let (large, small) = (cloud(FEWEST_STORED), cloud(9));
         let store = Arc::new(Stored::default());
         let first = JoinedHulls::stored(store.clone());
         let joined = first.of(&large, &small);
-        first.of(&small, &cloud(9));
+        first.of(&cloud(4), &cloud(5));
         assert_eq!(store.0.lock().unwrap().len(), 1, "few points are joined as quickly");
         assert_eq!(*JoinedHulls::stored(store.clone()).of(&large, &small), *joined);
         assert_eq!(store.0.lock().unwrap().len(), 1, "it was found");
