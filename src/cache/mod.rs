@@ -144,7 +144,7 @@ impl Cache {
     pub fn put(&self, key: Key, record: &impl Record) {
         let Some(payload) = format::encode(record) else { return };
         if let Some(writer) = &self.writer
-            && self.disk.as_ref().is_some_and(|d| d.is_open())
+            && self.disk.as_ref().is_some_and(|d| d.may_write())
             && let Some(bytes) = format::sealed(&key, &payload)
         {
             writer.write(key, bytes);

@@ -2,14 +2,11 @@
 //! part depends on that part alone, and on the way no further than past it; so a change costs only the casts
 //! at what changed. Where the way ends, and what is on it, is told afresh.
 
-use nalgebra::Vector3;
-
 use super::motion::add_standing;
 use super::pair::add_pose;
 use super::records::SweptRecord;
-use super::{Digest, Kind, Recall};
-use crate::geometry::Pose;
-use crate::simulation::{Crossing, Scene, Surroundings, Sweep, straight_sweep_past};
+use super::{Digest, Key, Kind, Recall};
+use crate::simulation::{Crossing, Sweep, SweepQuestion, straight_sweep_past};
 use crate::termination::{Interrupt, Termination};
 
 /// Of the parts that one passed along a line, so many are remembered.
@@ -23,23 +20,16 @@ impl Recall {
     /// The termination condition became true.
     pub fn sweep(
         &self,
-        scene: &Scene,
-        surroundings: &Surroundings,
-        part: usize,
-        start: &Pose,
-        direction: &Vector3<f64>,
+        question: &SweepQuestion<'_>,
         termination: &Termination,
     ) -> Result<Option<Sweep>, Interrupt> {
-        let mut digest = Digest::new();
-        digest.hash(scene.bodies[part].shape.content());
-        add_pose(&mut digest, start);
-        let key = digest.numbers(direction.iter().copied()).key(Kind::Swept);
+        let key = key(question);
         // Read where there is something to ask: mostly a part is out, or blocked by the first one.
         let mut known: Option<SweptRecord> = None;
         let mut is_new = false;
         let enters = |crossing: &Crossing<'_>| {
             let known = known.get_or_insert_with(|| self.get(&key).unwrap_or_default());
-            let place = place(scene, part, crossing);
+            let place = place(question, crossing);
             if let Some((_, entered)) = known.past.iter().find(|(of, _)| *of == place) {
                 return Ok(*entered);
             }
@@ -48,7 +38,7 @@ impl Recall {
             is_new = true;
             Ok(entered)
         };
-        let swept = straight_sweep_past(scene, surroundings, part, start, direction, termination, enters);
+        let swept = straight_sweep_past(question, termination, enters);
         // Also of a sweep that was cut short: what was seen to the end holds.
         if let Some(mut known) = known.filter(|_| is_new) {
             known.past.drain(..known.past.len().saturating_sub(MOST_PAST));
@@ -58,11 +48,18 @@ impl Recall {
     }
 }
 
+fn key(question: &SweepQuestion<'_>) -> Key {
+    let mut digest = Digest::new();
+    digest.hash(question.scene.bodies[question.part].shape.content());
+    add_pose(&mut digest, question.start);
+    digest.numbers(question.direction.iter().copied()).key(Kind::Swept)
+}
+
 /// How a part on the way stands, and how far the way past it goes.
-fn place(scene: &Scene, part: usize, crossing: &Crossing<'_>) -> [u8; 16] {
+fn place(question: &SweepQuestion<'_>, crossing: &Crossing<'_>) -> [u8; 16] {
     let mut digest = Digest::new();
     digest.numbers([crossing.travel, crossing.granted]);
-    add_standing(&mut digest, scene, part, crossing.other);
+    add_standing(&mut digest, question.scene, question.part, crossing.other);
     let [first, _]: [[u8; 16]; 2] = bytemuck::cast(digest.finish());
     first
 }
@@ -71,11 +68,13 @@ fn place(scene: &Scene, part: usize, crossing: &Crossing<'_>) -> [u8; 16] {
 mod tests {
     use std::sync::Arc;
 
+    use nalgebra::Vector3;
+
     use super::*;
     use crate::cache::Cache;
     use crate::fixtures::{cuboid, moved, peg_in_hole, scene};
-    use crate::geometry::SourceMesh;
-    use crate::simulation::straight_sweep;
+    use crate::geometry::{Pose, SourceMesh};
+    use crate::simulation::{Surroundings, straight_sweep};
 
     /// A peg in a blind hole, a post that makes its way out longer than the hole is deep, and a lid over it at
     /// some height.
@@ -94,16 +93,12 @@ mod tests {
     fn swept(recall: &Recall, meshes: Vec<SourceMesh>) -> (Option<Sweep>, usize) {
         let (scene, _) = scene(meshes);
         let around = Surroundings::new(&scene, vec![0, 2, 3]);
-        let (start, up) = (scene.bodies[1].planning_from_shape, Vector3::z());
+        let (start, direction) = (&scene.bodies[1].planning_from_shape, &Vector3::z());
+        let question = SweepQuestion { scene: &scene, surroundings: &around, part: 1, start, direction };
         let never = Termination::default();
-        let cold = straight_sweep(&scene, &around, 1, &start, &up, &never).unwrap();
-        let warm = recall.sweep(&scene, &around, 1, &start, &up, &never).unwrap();
-        assert_eq!(warm, cold);
-        let mut digest = Digest::new();
-        digest.hash(scene.bodies[1].shape.content());
-        add_pose(&mut digest, &start);
-        let key = digest.numbers(up.iter().copied()).key(Kind::Swept);
-        (warm, recall.get::<SweptRecord>(&key).map_or(0, |known| known.past.len()))
+        let warm = recall.sweep(&question, &never).unwrap();
+        assert_eq!(warm, straight_sweep(&question, &never).unwrap());
+        (warm, recall.get::<SweptRecord>(&key(&question)).map_or(0, |known| known.past.len()))
     }
 
     #[test]

@@ -109,7 +109,7 @@ impl<'a> Mover<'a> {
         let moving_from_standing = standing_from_moving.inverse();
         let side = |side, sampled: &Body, measured: &Body, to_measured: &Pose| {
             let mut found = Near { contacts: Vec::new(), clearance: near.clearance };
-            for tree in [&sampled.shape.samples(), &sampled.extra_samples] {
+            for tree in [sampled.shape.samples(), &sampled.extra_samples] {
                 let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
                 let measured = Measured { body: measured, to_measured, allowance, reach };
                 gather(tree, &measured, self.termination, &mut found, tag);

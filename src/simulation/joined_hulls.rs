@@ -98,6 +98,8 @@ fn key(a: &[Point3<f64>], b: &[Point3<f64>]) -> [u8; 32] {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::HashMap;
+
     use super::*;
     use crate::fixtures::spread;
 
@@ -119,14 +121,13 @@ mod tests {
     #[test]
     fn what_a_store_has_is_not_joined_again() {
         #[derive(Debug, Default)]
-        struct Stored(Mutex<Vec<([u8; 32], Vec<Point3<f64>>)>>);
+        struct Stored(Mutex<HashMap<[u8; 32], Vec<Point3<f64>>>>);
         impl HullStore for Stored {
             fn hull(&self, points: &[u8; 32]) -> Option<Vec<Point3<f64>>> {
-                let all = self.0.lock().unwrap();
-                all.iter().find(|(key, _)| key == points).map(|(_, hull)| hull.clone())
+                self.0.lock().unwrap().get(points).cloned()
             }
             fn remember_hull(&self, points: &[u8; 32], vertices: &[Point3<f64>]) {
-                self.0.lock().unwrap().push((*points, vertices.to_vec()));
+                self.0.lock().unwrap().insert(*points, vertices.to_vec());
             }
         }
         let cloud = |count: usize| -> Arc<[Point3<f64>]> { spread([0.0; 3], [1.0; 3], count).collect() };
@@ -138,7 +139,7 @@ mod tests {
         assert_eq!(store.0.lock().unwrap().len(), 1, "few points are joined as quickly");
         assert_eq!(*JoinedHulls::stored(store.clone()).of(&large, &small), *joined);
         assert_eq!(store.0.lock().unwrap().len(), 1, "it was found");
-        store.0.lock().unwrap()[0].1.truncate(4);
+        store.0.lock().unwrap().values_mut().for_each(|hull| hull.truncate(4));
         let told = JoinedHulls::stored(store.clone()).of(&large, &small);
         assert_eq!(*told, joined[..4], "nothing was joined");
     }

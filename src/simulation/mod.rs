@@ -39,6 +39,6 @@ pub use passage::{passes_straight, seems_clear};
 pub use penalty::{PenaltyEngine, PenaltyParameters};
 pub use scene::{Allowances, Body, Scene, resolution};
 pub use sliding::{KeptCells, SlidingEngine, pair_blocks};
-pub use sweep::{Crossing, Sweep, straight_sweep, straight_sweep_past};
+pub use sweep::{Crossing, Sweep, SweepQuestion, straight_sweep, straight_sweep_past};
 pub use touching::Touching;
 pub use transition::{End, Motion, TransitionFunction, asked_again};

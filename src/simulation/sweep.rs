@@ -46,20 +46,30 @@ pub enum Sweep {
     },
 }
 
-/// Sweeps a part from `start` along the unit vector `direction` out of its surroundings.
-/// `None` where no way out along it is found.
+/// A part that is to go along a line out of its surroundings.
+#[derive(Debug, Clone, Copy)]
+pub struct SweepQuestion<'a> {
+    /// The bodies.
+    pub scene: &'a Scene,
+    /// What stands.
+    pub surroundings: &'a Surroundings,
+    /// What moves.
+    pub part: usize,
+    /// From where.
+    pub start: &'a Pose,
+    /// The unit vector along the line.
+    pub direction: &'a Vector3<f64>,
+}
+
+/// Sweeps a part along a line out of its surroundings. `None` where no way out along it is found.
 ///
 /// # Errors
 /// The termination condition became true.
 pub fn straight_sweep(
-    scene: &Scene,
-    surroundings: &Surroundings,
-    part: usize,
-    start: &Pose,
-    direction: &Vector3<f64>,
+    question: &SweepQuestion<'_>,
     termination: &Termination,
 ) -> Result<Option<Sweep>, Interrupt> {
-    straight_sweep_past(scene, surroundings, part, start, direction, termination, |c| c.enters())
+    straight_sweep_past(question, termination, |crossing| crossing.enters())
 }
 
 /// The same, with somebody who tells of each part on the way whether the sweep enters it.
@@ -67,14 +77,11 @@ pub fn straight_sweep(
 /// # Errors
 /// The termination condition became true, or what `enters` returns.
 pub fn straight_sweep_past(
-    scene: &Scene,
-    surroundings: &Surroundings,
-    part: usize,
-    start: &Pose,
-    direction: &Vector3<f64>,
+    question: &SweepQuestion<'_>,
     termination: &Termination,
     mut enters: impl FnMut(&Crossing<'_>) -> Result<bool, Interrupt>,
 ) -> Result<Option<Sweep>, Interrupt> {
+    let SweepQuestion { scene, surroundings, part, start, direction } = *question;
     termination.check()?;
     if let Some(exit) = exit_direction(scene, surroundings, part, start, Some(-direction)) {
         return Ok(Some(Sweep::Clear { path: vec![*start], exit }));
@@ -167,9 +174,8 @@ impl Crossing<'_> {
             let cast = Cast { target, to_target, along: *along, travel, granted, poll };
             cast.enters(samples)
         };
-        let entered =
-            casts(&moving.shape.oriented(), &standing.shape.surface, standing_from_moving, &forward)
-                || casts(&standing.shape.oriented(), &moving.shape.surface, moving_from_standing, &backward);
+        let entered = casts(moving.shape.oriented(), &standing.shape.surface, standing_from_moving, &forward)
+            || casts(standing.shape.oriented(), &moving.shape.surface, moving_from_standing, &backward);
         // What was found of casts that were cut short is not to be believed.
         termination.check()?;
         Ok(entered)
@@ -240,7 +246,8 @@ mod tests {
         let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != part).collect();
         let around = Surroundings::new(scene, standing);
         let start = &scene.bodies[part].planning_from_shape;
-        straight_sweep(scene, &around, part, start, &direction, &Termination::default()).unwrap()
+        let question = SweepQuestion { scene, surroundings: &around, part, start, direction: &direction };
+        straight_sweep(&question, &Termination::default()).unwrap()
     }
 
     #[test]
@@ -250,11 +257,11 @@ mod tests {
         let termination = Termination::default();
         termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
         let start = &scene.bodies[1].planning_from_shape;
-        let swept = straight_sweep(&scene, &around, 1, start, &Vector3::z(), &termination);
-        assert_eq!(swept, Err(Interrupt::Cancelled));
+        let (scene, direction) = (&scene, &Vector3::z());
+        let question = SweepQuestion { scene, surroundings: &around, part: 1, start, direction };
+        assert_eq!(straight_sweep(&question, &termination), Err(Interrupt::Cancelled));
         let termination = Termination::default();
-        let up = &Vector3::z();
-        let swept = straight_sweep_past(&scene, &around, 1, start, up, &termination, |crossing| {
+        let swept = straight_sweep_past(&question, &termination, |crossing| {
             termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
             crossing.enters()
         });

@@ -60,7 +60,7 @@ fn holds(
 
 /// Whether a sample of one body is deeper than `limit` in the other.
 fn is_deeper(sampled: &Body, measured: &Body, to_measured: &Pose, limit: f64) -> bool {
-    let trees: [&SampleTree; 2] = [&sampled.shape.samples(), &sampled.extra_samples];
+    let trees: [&SampleTree; 2] = [sampled.shape.samples(), &sampled.extra_samples];
     let found = std::cell::Cell::new(false);
     for tree in trees {
         tree.walk(
