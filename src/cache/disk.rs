@@ -61,9 +61,9 @@ pub(super) struct Disk {
     failed_at: Mutex<Option<Instant>>,
     pause: Duration,
     touched: Mutex<HashSet<Key>>,
-    /// The records in the file that are nowhere else: whoever asks for one that is not there does not wait
+    /// The records in the file of kinds that are noted: whoever asks for one that is not there does not wait
     /// for the disk to hear so.
-    only_here: Mutex<HashSet<Key>>,
+    noted: Mutex<HashSet<Key>>,
     tally: Arc<Tally>,
 }
 
@@ -81,7 +81,7 @@ impl Disk {
             failed_at: Mutex::default(),
             pause: PAUSE,
             touched: Mutex::default(),
-            only_here: Mutex::default(),
+            noted: Mutex::default(),
             tally,
         };
         let database = match disk.database_or_new() {
@@ -99,9 +99,9 @@ impl Disk {
     /// Works with a file from now on.
     fn begin(&self, database: Database) {
         *self.database.write().unwrap_or_else(PoisonError::into_inner) = Some(database);
-        for kind in Kind::ALL.into_iter().filter(|kind| !kind.stays_in_memory()) {
+        for kind in Kind::ALL.into_iter().filter(|kind| kind.is_noted()) {
             let listed = self.list(Some(kind)).unwrap_or_default();
-            self.only_here().extend(listed.iter().map(|l| l.key));
+            self.noted().extend(listed.iter().map(|l| l.key));
         }
     }
 
@@ -159,20 +159,20 @@ impl Disk {
 
     /// The envelope of a key, as it was written.
     pub(super) fn get(&self, key: &Key) -> Option<Vec<u8>> {
-        if !key.kind().stays_in_memory() && !self.contains(key) {
+        if key.kind().is_noted() && !self.contains(key) {
             return None;
         }
         self.with_free(|database| read(database, key)).flatten()
     }
 
-    /// Whether there is an envelope of a key of a kind that does not stay in memory.
+    /// Whether there is an envelope of a key of a kind that is noted.
     pub(super) fn contains(&self, key: &Key) -> bool {
-        self.only_here().contains(key)
+        self.noted().contains(key)
     }
 
     /// A holder that panicked cannot have left it half-changed.
-    fn only_here(&self) -> MutexGuard<'_, HashSet<Key>> {
-        self.only_here.lock().unwrap_or_else(PoisonError::into_inner)
+    fn noted(&self) -> MutexGuard<'_, HashSet<Key>> {
+        self.noted.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Notes that a record was used; the next transaction writes it down.
@@ -207,8 +207,8 @@ impl Disk {
             Ok((evicted, bytes))
         });
         let Some((evicted, bytes)) = written else { return };
-        let new = records.iter().map(|(key, _)| *key).filter(|key| !key.kind().stays_in_memory());
-        self.only_here().extend(new);
+        let new = records.iter().map(|(key, _)| *key).filter(|key| key.kind().is_noted());
+        self.noted().extend(new);
         self.count(&evicted);
         let after = self.file_bytes();
         if after > before {
@@ -236,9 +236,9 @@ impl Disk {
             drop(tables);
             Ok(transaction.commit()?)
         });
-        let mut only_here = self.only_here();
+        let mut noted = self.noted();
         keys.iter().for_each(|key| {
-            only_here.remove(key);
+            noted.remove(key);
         });
         done.is_some()
     }
@@ -260,9 +260,9 @@ impl Disk {
 
     /// Notes what left the file for others.
     fn count(&self, evicted: &[Key]) {
-        let mut only_here = self.only_here();
+        let mut noted = self.noted();
         for key in evicted {
-            only_here.remove(key);
+            noted.remove(key);
             self.tally.of(key.kind()).disk_evictions.one_more();
         }
     }
@@ -331,7 +331,7 @@ impl Disk {
             return;
         }
         self.generation.store(generation + 1, Ordering::Relaxed);
-        self.only_here().clear();
+        self.noted().clear();
         let database = slot.take();
         // redb writes when it is dropped.
         let closed = contained(|| {

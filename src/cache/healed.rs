@@ -20,7 +20,9 @@ impl Cache {
         handle: &[u8; 32],
         known: impl Fn(&[u8; 32]) -> Option<Arc<Shape>> + Sync,
     ) -> Option<Assembly> {
-        let record: HealedRecord = self.get(&assembly_key(handle))?;
+        let key = assembly_key(handle);
+        // That it is not there, as of what was never taken in, is no miss.
+        let record: HealedRecord = if self.contains(&key) { self.get(&key)? } else { return None };
         let shape = |content: &[u8; 32]| {
             let read = || shape(self.get(&shape_key(content))?, content).map(Arc::new);
             known(content).or_else(read)

@@ -81,6 +81,12 @@ impl Kind {
         !matches!(self, Self::Source | Self::Answer | Self::Shape | Self::Healed | Self::Hull)
     }
 
+    /// Whether it is told without the disk if there is a record: of assemblies and answers, which are few, that
+    /// is asked where nobody may wait.
+    pub(super) fn is_noted(self) -> bool {
+        matches!(self, Self::Source | Self::Answer | Self::Shape | Self::Healed)
+    }
+
     /// The version of what computes such records: to be raised with every change that may give another
     /// answer to the same question, or another layout of the record. Older records are then misses.
     #[must_use]

@@ -128,7 +128,7 @@ impl Cache {
         Some(payload)
     }
 
-    /// Whether there is a record of a key that would be on disk only; told without looking there.
+    /// Whether there is a record of a key of a kind that is noted; told without looking on disk.
     fn contains(&self, key: &Key) -> bool {
         self.disk.as_ref().is_some_and(|d| d.contains(key))
     }

@@ -198,8 +198,8 @@ fn memory_and_disk_keep_their_budgets() {
     assert!(largest <= budget, "the file had {largest} bytes");
     let s = cache.statistics();
     assert!(s.kinds.iter().all(|k| k.disk_evictions > 0), "{s:?}");
-    let in_memory = |k: &KindStatistics| k.evictions > 0 || ["source", "answer"].contains(&k.kind);
-    assert!(s.kinds.iter().all(in_memory), "{s:?}");
+    let left = |(kind, k): (Kind, &KindStatistics)| k.evictions > 0 || !kind.stays_in_memory();
+    assert!(Kind::ALL.into_iter().zip(&s.kinds).all(left), "{s:?}");
     assert_eq!(s.overflows, 0);
     // What came last is there.
     assert!(has(&cache, 19_999, 100 + (19_999 * 37) % 8000));
