@@ -11,6 +11,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 use nalgebra::{Point3, Vector3, Vector6};
 
 use crate::geometry::{Bounds, Closest, Pose, SampleTree};
+use crate::sdf::Grid;
 use crate::termination::{Poll, Termination};
 
 use super::projection::Row;
@@ -136,7 +137,7 @@ impl<'a> Mover<'a> {
     pub(super) fn clearly_enters(&self, standing: &[usize]) -> bool {
         let poll = Poll::every(ENTER_POLL, self.termination);
         self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
-            let field = &measured.field;
+            let field: &Grid = &measured.field;
             let limit = -allowance - field.error_bound();
             sampled.shape.samples().any(
                 |node| poll.is_over() || field.value(&(to_measured * node.centre)) - node.radius < limit,
@@ -148,7 +149,7 @@ impl<'a> Mover<'a> {
     /// Whether the fields alone show that no sample of either surface is within some distance of the other.
     pub(super) fn seems_clear(&self, standing: &[usize], by: f64) -> bool {
         !self.any_pair(standing, by, |sampled, measured, to_measured, _| {
-            let field = &measured.field;
+            let field: &Grid = &measured.field;
             let limit = by + field.error_bound();
             sampled.shape.samples().any(
                 |node| field.value(&(to_measured * node.centre)) - node.radius < limit,
@@ -161,7 +162,7 @@ impl<'a> Mover<'a> {
     pub(super) fn enters_by(&self, depth: f64, standing: &[usize]) -> bool {
         let poll = Poll::every(ENTER_POLL, self.termination);
         self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
-            let (field, limit) = (&measured.field, -allowance - depth);
+            let (field, limit): (&Grid, f64) = (&measured.field, -allowance - depth);
             let least = |p: &Point3<f64>| field.value(p) - field.error_bound();
             sampled.shape.samples().any(
                 |node| poll.is_over() || least(&(to_measured * node.centre)) - node.radius < limit,
@@ -392,6 +393,7 @@ fn gather(
     let Measured { body, to_measured, allowance, reach } = *measured;
     // Deeper than nothing cannot be excluded by a bound that is only sure outside.
     let limit = (reach - allowance).max(0.0);
+    let field: &Grid = &body.field;
     let clearance = std::cell::Cell::new(near.clearance);
     let keep = |bound: f64| clearance.set(clearance.get().min(bound + allowance));
     let poll = Poll::every(GATHER_POLL, termination);
@@ -401,7 +403,7 @@ fn gather(
             if poll.is_over() {
                 return None;
             }
-            let bound = body.field.estimate(&(to_measured * node.centre)).lower_bound - node.radius;
+            let bound = field.estimate(&(to_measured * node.centre)).lower_bound - node.radius;
             if bound > limit {
                 keep(bound);
             }
@@ -409,7 +411,7 @@ fn gather(
         },
         |sample, ()| {
             let p = to_measured * sample;
-            let bound = body.field.estimate(&p).lower_bound;
+            let bound = field.estimate(&p).lower_bound;
             if bound > limit {
                 return keep(bound);
             }

@@ -2,7 +2,8 @@
 //!
 //! A binary tree over the parts, neighbours in space together, whose nodes hold the hull of their
 //! parts: without one part only the hulls above it differ, each made of two smaller ones. So leaving
-//! costs the logarithm of the number of parts, where a hull of all points would cost their number.
+//! costs the logarithm of the number of parts, where a hull of all points would cost their number. All parts
+//! of the scene have their places in it, whichever stand: so what is gone from the start costs no more.
 
 use std::sync::Arc;
 
@@ -26,12 +27,15 @@ impl HullTree {
     /// Of some parts (ascending) at their assembled poses.
     #[must_use]
     pub fn new(scene: &Scene, standing: Vec<usize>) -> Self {
-        let leaves = standing.len().next_power_of_two();
-        let mut order = standing.clone();
+        let mut order: Vec<usize> = (0..scene.bodies.len()).collect();
+        let leaves = order.len().next_power_of_two();
         group(scene, &mut order);
         let mut tree =
             Self { hulls: vec![Arc::default(); 2 * leaves], leaf: vec![0; scene.bodies.len()], standing };
         for (k, &part) in order.iter().enumerate() {
+            if tree.standing.binary_search(&part).is_err() {
+                continue;
+            }
             let body = &scene.bodies[part];
             tree.leaf[part] = leaves + k;
             tree.hulls[leaves + k] = transformed(&body.shape.hull, &body.planning_from_shape).into();
@@ -152,5 +156,25 @@ mod tests {
         }
         assert!(tree.remove(&scene, left[0]) && tree.hull().is_empty());
         assert!(!tree.remove(&scene, left[0]), "it is gone");
+    }
+
+    #[test]
+    fn what_is_gone_from_the_start_costs_few_hulls() {
+        let cubes =
+            spread([-4.0; 3], [3.0; 3], 32).map(|p| cuboid(p.into(), (p.coords.add_scalar(0.5)).into()));
+        let (scene, _) = scene(cubes.chain([cuboid([-4.0; 3], [-3.9; 3]), cuboid([3.9; 3], [4.0; 3])]));
+        let all: Vec<usize> = (0..scene.bodies.len()).collect();
+        let mut whole = HullTree::new(&scene, all.clone());
+        let joined = scene.hulls.count();
+        for gone in [0, 7, 33] {
+            let before = scene.hulls.count();
+            let without = HullTree::new(&scene, all.iter().copied().filter(|&part| part != gone).collect());
+            let new = scene.hulls.count() - before;
+            assert!(new <= 6, "{new} hulls more than {joined}");
+            let mut whole = whole.clone();
+            whole.remove(&scene, gone);
+            assert_eq!((without.standing(), without.hull()), (whole.standing(), whole.hull()));
+        }
+        assert!(joined >= 31 && whole.remove(&scene, 33));
     }
 }

@@ -65,6 +65,12 @@ impl JoinedHulls {
         joined
     }
 
+    /// How many are remembered.
+    #[cfg(test)]
+    pub(super) fn count(&self) -> usize {
+        self.held().joined.iter().count()
+    }
+
     /// A holder that panicked cannot have left more than the sum wrong.
     fn held(&self) -> std::sync::MutexGuard<'_, Held> {
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
