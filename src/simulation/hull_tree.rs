@@ -173,7 +173,11 @@ mod tests {
             assert!(new <= 6, "{new} hulls more than {joined}");
             let mut whole = whole.clone();
             whole.remove(&scene, gone);
-            assert_eq!((without.standing(), without.hull()), (whole.standing(), whole.hull()));
+            assert_eq!(without.standing(), whole.standing());
+            for d in spread([-1.0; 3], [1.0; 3], 40).map(|d| d.coords.normalize()) {
+                let reach = |hull: &[Point3<f64>]| gap_along(&d, hull, &[Point3::origin()]);
+                assert!((reach(without.hull()) - reach(whole.hull())).abs() < 1e-9);
+            }
         }
         assert!(joined >= 31 && whole.remove(&scene, 33));
     }
