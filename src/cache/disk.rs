@@ -2,7 +2,8 @@
 //!
 //! redb may panic or fail on a file that was damaged from outside, so everything that touches it is
 //! contained: such a file is set aside and another begun. A file that cannot be written (a full disk)
-//! is closed, and the process goes on in memory. Only the writer's thread ([`super::writer`]) writes.
+//! is closed, and the process goes on in memory; it is opened again after a while, if there is something to
+//! write. Only the writer's thread ([`super::writer`]) writes.
 
 use std::collections::HashSet;
 use std::os::unix::fs::DirBuilderExt;
@@ -10,6 +11,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock, TryLockError};
+use std::time::{Duration, Instant};
 
 use redb::Database;
 
@@ -25,6 +27,8 @@ const PAGE_CACHE: usize = 16 << 20;
 const AFTER_OVERGROWTH: f64 = 0.5;
 /// Evicting goes on down to this share of what records may take, so that it is not done all the time.
 const AFTER_EVICTION: f64 = 0.9;
+/// A file that could not be read or written is left alone for so long.
+const PAUSE: Duration = Duration::from_secs(30);
 /// So many records are remembered as used until the next transaction notes it.
 const MOST_TOUCHED: usize = 1 << 16;
 
@@ -53,10 +57,13 @@ pub(super) struct Disk {
     database: RwLock<Option<Database>>,
     /// Counts the files that were opened: who failed on one must not set the next one aside.
     generation: AtomicU64,
+    /// When the file failed that is closed for this.
+    failed_at: Mutex<Option<Instant>>,
+    pause: Duration,
     touched: Mutex<HashSet<Key>>,
-    /// The records in the file that are nowhere else: whoever asks for one that is not there does not wait
+    /// The records in the file of kinds that are noted: whoever asks for one that is not there does not wait
     /// for the disk to hear so.
-    only_here: Mutex<HashSet<Key>>,
+    noted: Mutex<HashSet<Key>>,
     tally: Arc<Tally>,
 }
 
@@ -71,25 +78,42 @@ impl Disk {
             budget,
             database: RwLock::new(None),
             generation: AtomicU64::new(0),
+            failed_at: Mutex::default(),
+            pause: PAUSE,
             touched: Mutex::default(),
-            only_here: Mutex::default(),
+            noted: Mutex::default(),
             tally,
         };
-        let database = match disk.database_at() {
+        let database = match disk.database_or_new() {
             Ok(database) => database,
             Err(Failure::InUse) => return Err(DiskError::InUse(folder.join(FILE))),
             Err(Failure::Io(reason)) => return Err(unusable(reason)),
             Err(Failure::Damaged(reason)) => {
-                disk.rename(&reason);
-                disk.database_at().map_err(|_| unusable(format!("cannot begin anew after: {reason}")))?
+                return Err(unusable(format!("cannot begin anew after: {reason}")));
             }
         };
-        *disk.database.write().unwrap_or_else(PoisonError::into_inner) = Some(database);
-        for kind in Kind::ALL.into_iter().filter(|kind| !kind.stays_in_memory()) {
-            let listed = disk.list(Some(kind)).unwrap_or_default();
-            disk.only_here().extend(listed.iter().map(|l| l.key));
-        }
+        disk.begin(database);
         Ok(disk)
+    }
+
+    /// Works with a file from now on.
+    fn begin(&self, database: Database) {
+        *self.database.write().unwrap_or_else(PoisonError::into_inner) = Some(database);
+        for kind in Kind::ALL.into_iter().filter(|kind| kind.is_noted()) {
+            let listed = self.list(Some(kind)).unwrap_or_default();
+            self.noted().extend(listed.iter().map(|l| l.key));
+        }
+    }
+
+    /// The file; another one, if it is damaged.
+    fn database_or_new(&self) -> Result<Database, Failure> {
+        match self.database_at() {
+            Err(Failure::Damaged(reason)) => {
+                self.rename(&reason);
+                self.database_at()
+            }
+            opened => opened,
+        }
     }
 
     fn database_at(&self) -> Result<Database, Failure> {
@@ -105,22 +129,50 @@ impl Disk {
         self.database.read().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 
+    /// Whether something may be written: to the open file, or to one that is worth another try.
+    pub(super) fn may_write(&self) -> bool {
+        self.is_open() || self.is_due()
+    }
+
+    fn is_due(&self) -> bool {
+        self.failed_at().is_some_and(|at| at.elapsed() >= self.pause)
+    }
+
+    fn failed_at(&self) -> MutexGuard<'_, Option<Instant>> {
+        self.failed_at.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Opens a file that failed a while ago. Only the writer's thread does: nobody else opens or closes it then.
+    fn try_again(&self) {
+        if self.is_open() || !self.is_due() {
+            return;
+        }
+        match self.database_or_new() {
+            Ok(database) => {
+                *self.failed_at() = None;
+                self.begin(database);
+                tracing::info!(folder = %self.folder.display(), "the store on disk is open again");
+            }
+            Err(_) => *self.failed_at() = Some(Instant::now()),
+        }
+    }
+
     /// The envelope of a key, as it was written.
     pub(super) fn get(&self, key: &Key) -> Option<Vec<u8>> {
-        if !key.kind().stays_in_memory() && !self.contains(key) {
+        if key.kind().is_noted() && !self.contains(key) {
             return None;
         }
         self.with_free(|database| read(database, key)).flatten()
     }
 
-    /// Whether there is an envelope of a key of a kind that does not stay in memory.
+    /// Whether there is an envelope of a key of a kind that is noted.
     pub(super) fn contains(&self, key: &Key) -> bool {
-        self.only_here().contains(key)
+        self.noted().contains(key)
     }
 
     /// A holder that panicked cannot have left it half-changed.
-    fn only_here(&self) -> MutexGuard<'_, HashSet<Key>> {
-        self.only_here.lock().unwrap_or_else(PoisonError::into_inner)
+    fn noted(&self) -> MutexGuard<'_, HashSet<Key>> {
+        self.noted.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Notes that a record was used; the next transaction writes it down.
@@ -133,6 +185,7 @@ impl Disk {
 
     /// Writes envelopes in one transaction, with what was used since the last one.
     pub(super) fn write(&self, records: &[(Key, Vec<u8>)]) {
+        self.try_again();
         let touched = std::mem::take(&mut *self.touched.lock().unwrap_or_else(PoisonError::into_inner));
         let before = self.file_bytes();
         let written = self.with(|database| {
@@ -154,8 +207,8 @@ impl Disk {
             Ok((evicted, bytes))
         });
         let Some((evicted, bytes)) = written else { return };
-        let new = records.iter().map(|(key, _)| *key).filter(|key| !key.kind().stays_in_memory());
-        self.only_here().extend(new);
+        let new = records.iter().map(|(key, _)| *key).filter(|key| key.kind().is_noted());
+        self.noted().extend(new);
         self.count(&evicted);
         let after = self.file_bytes();
         if after > before {
@@ -183,9 +236,9 @@ impl Disk {
             drop(tables);
             Ok(transaction.commit()?)
         });
-        let mut only_here = self.only_here();
+        let mut noted = self.noted();
         keys.iter().for_each(|key| {
-            only_here.remove(key);
+            noted.remove(key);
         });
         done.is_some()
     }
@@ -207,9 +260,9 @@ impl Disk {
 
     /// Notes what left the file for others.
     fn count(&self, evicted: &[Key]) {
-        let mut only_here = self.only_here();
+        let mut noted = self.noted();
         for key in evicted {
-            only_here.remove(key);
+            noted.remove(key);
             self.tally.of(key.kind()).disk_evictions.one_more();
         }
     }
@@ -278,7 +331,7 @@ impl Disk {
             return;
         }
         self.generation.store(generation + 1, Ordering::Relaxed);
-        self.only_here().clear();
+        self.noted().clear();
         let database = slot.take();
         // redb writes when it is dropped.
         let closed = contained(|| {
@@ -295,6 +348,7 @@ impl Disk {
             }
             Failure::Io(reason) => {
                 self.tally.write_failures.one_more();
+                *self.failed_at() = Some(Instant::now());
                 tracing::warn!(folder = %self.folder.display(), reason, "the store on disk fails: on in memory");
             }
             // Not of an open file.
@@ -324,4 +378,36 @@ pub(super) fn by_kind(list: &[Listed]) -> Vec<(u64, u64)> {
         listed.fold((0, 0), |(entries, bytes), l| (entries + 1, bytes + l.bytes))
     };
     Kind::ALL.into_iter().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::kind::Digest;
+    use super::*;
+
+    #[test]
+    fn a_file_that_failed_is_opened_again_after_a_while() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut disk = Disk::open(folder.path(), 64 << 20, Arc::default()).unwrap();
+        let key = |n: u64| Digest::new().integer(n).key(Kind::Source);
+        let fail = |disk: &Disk| {
+            disk.failed(Failure::Io("no space left".into()), disk.generation.load(Ordering::Relaxed));
+        };
+        disk.write(&[(key(1), vec![1; 9])]);
+        fail(&disk);
+        assert!(!disk.is_open() && !disk.may_write() && !disk.contains(&key(1)));
+        disk.write(&[(key(2), vec![2; 9])]);
+        assert!(!disk.is_open(), "so soon it is left alone");
+        disk.pause = Duration::ZERO;
+        assert!(disk.may_write());
+        disk.write(&[(key(3), vec![3; 9])]);
+        assert!(disk.is_open() && disk.get(&key(2)).is_none());
+        assert_eq!([1, 3].map(|n| disk.get(&key(n))), [Some(vec![1; 9]), Some(vec![3; 9])]);
+        assert_eq!(disk.tally.write_failures.count(), 1);
+        // Where nothing can be opened it stays closed, and is tried again.
+        fail(&disk);
+        std::fs::remove_dir_all(folder.path()).unwrap();
+        disk.write(&[(key(4), vec![4; 9])]);
+        assert!(!disk.is_open() && disk.may_write());
+    }
 }

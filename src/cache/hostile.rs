@@ -3,8 +3,8 @@
 use super::format::{Record, decode, opened};
 use super::kind::{Key, Kind};
 use super::records::{
-    AnswerRecord, BlockingRecord, MotionRecord, OverlapRecord, PlanRecord, SourceRecord, TouchingRecord,
-    VerdictRecord, WitnessRecord,
+    AnswerRecord, BlockingRecord, HealedRecord, HullRecord, MotionRecord, OverlapRecord, PlanRecord,
+    ShapeRecord, SourceRecord, SweptRecord, TouchingRecord, VerdictRecord, WitnessRecord,
 };
 
 /// Reads bytes as an envelope and as the payload of every kind; the kinds that they can be read as.
@@ -24,6 +24,10 @@ pub(crate) fn read_as_records(bytes: &[u8]) -> Vec<Kind> {
             Kind::Touching => reads::<TouchingRecord>(payload),
             Kind::Source => reads::<SourceRecord>(payload),
             Kind::Answer => reads::<AnswerRecord>(payload),
+            Kind::Shape => reads::<ShapeRecord>(payload),
+            Kind::Healed => reads::<HealedRecord>(payload),
+            Kind::Hull => reads::<HullRecord>(payload),
+            Kind::Swept => reads::<SweptRecord>(payload),
         }
     };
     Kind::ALL.into_iter().filter(|kind| is_record(*kind)).collect()

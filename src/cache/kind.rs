@@ -27,11 +27,19 @@ pub enum Kind {
     Source = 8,
     /// A plan as it was sent.
     Answer = 9,
+    /// A healed mesh in its own frame.
+    Shape = 10,
+    /// An assembly of such shapes.
+    Healed = 11,
+    /// The hull of two hulls.
+    Hull = 12,
+    /// What a part that goes along a line enters.
+    Swept = 13,
 }
 
 impl Kind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 13] = [
         Self::Overlap,
         Self::Blocking,
         Self::Witness,
@@ -41,6 +49,10 @@ impl Kind {
         Self::Touching,
         Self::Source,
         Self::Answer,
+        Self::Shape,
+        Self::Healed,
+        Self::Hull,
+        Self::Swept,
     ];
 
     /// The name in statistics.
@@ -56,13 +68,23 @@ impl Kind {
             Self::Touching => "touching",
             Self::Source => "source",
             Self::Answer => "answer",
+            Self::Shape => "shape",
+            Self::Healed => "healed",
+            Self::Hull => "hull",
+            Self::Swept => "swept",
         }
     }
 
-    /// Whether records are kept in memory, too. Assemblies and answers are there already, as what was made
-    /// of them and as they are sent.
+    /// Whether records are kept in memory, too. Assemblies, answers and hulls are there already, as what was
+    /// made of them and as they are used.
     pub(super) fn stays_in_memory(self) -> bool {
-        !matches!(self, Self::Source | Self::Answer)
+        !matches!(self, Self::Source | Self::Answer | Self::Shape | Self::Healed | Self::Hull)
+    }
+
+    /// Whether it is told without the disk if there is a record: of assemblies and answers, which are few, that
+    /// is asked where nobody may wait.
+    pub(super) fn is_noted(self) -> bool {
+        matches!(self, Self::Source | Self::Answer | Self::Shape | Self::Healed)
     }
 
     /// The version of what computes such records: to be raised with every change that may give another
@@ -77,7 +99,11 @@ impl Kind {
             | Self::Plan
             | Self::Touching
             | Self::Source
-            | Self::Answer => 1,
+            | Self::Answer
+            | Self::Shape
+            | Self::Healed
+            | Self::Hull
+            | Self::Swept => 1,
             Self::Verdict => 2,
         }
     }

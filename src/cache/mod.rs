@@ -4,8 +4,8 @@
 //! memory (`memory`, a budget in bytes, the least recently used leave) → the tier on disk (`disk`, a redb
 //! file that one process holds, with its `tables`; `writer`, the one thread that writes to it) → bytes
 //! (`format`, drawn in `FORMAT.md`; `records`, what is in them). What is asked, under which key, and when
-//! an old answer still holds, is said once for each kind: `pair`, `touching`, `motion`, `verdict`, `plan`,
-//! `source`, `answer`.
+//! an old answer still holds, is said once for each kind: `pair`, `touching`, `motion`, `swept`, `verdict`,
+//! `plan`, `hull`, `source`, `healed`, `answer`.
 //! A request sees it all through its [`Recall`], which counts what was reused; with none of it, it
 //! remembers nothing.
 //!
@@ -16,7 +16,9 @@
 mod answer;
 mod disk;
 mod format;
+mod healed;
 mod hostile;
+mod hull;
 mod kind;
 mod memory;
 mod motion;
@@ -27,6 +29,7 @@ mod records;
 mod settings;
 mod source;
 mod statistics;
+mod swept;
 mod tables;
 mod tally;
 #[cfg(test)]
@@ -125,16 +128,23 @@ impl Cache {
         Some(payload)
     }
 
-    /// Whether there is a record of a key that would be on disk only; told without looking there.
+    /// Whether there is a record of a key of a kind that is noted; told without looking on disk.
     fn contains(&self, key: &Key) -> bool {
         self.disk.as_ref().is_some_and(|d| d.contains(key))
+    }
+
+    /// Notes that a record on disk was used.
+    fn touch(&self, key: Key) {
+        if let Some(disk) = &self.disk {
+            disk.touch(key);
+        }
     }
 
     /// Remembers a record, in place of one with the same key.
     pub fn put(&self, key: Key, record: &impl Record) {
         let Some(payload) = format::encode(record) else { return };
         if let Some(writer) = &self.writer
-            && self.disk.as_ref().is_some_and(|d| d.is_open())
+            && self.disk.as_ref().is_some_and(|d| d.may_write())
             && let Some(bytes) = format::sealed(&key, &payload)
         {
             writer.write(key, bytes);

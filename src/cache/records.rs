@@ -171,6 +171,55 @@ pub(super) struct RevisionRecord {
     pub(super) added: Vec<PartRecord>,
 }
 
+/// A healed mesh in its own frame, in lengths of the planning frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct ShapeRecord {
+    pub(super) vertices: Vec<[f64; 3]>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Inside is told by winding number.
+    pub(super) winding: bool,
+    /// Vertices of the convex hull.
+    pub(super) hull: Vec<[f64; 3]>,
+}
+
+/// An assembly as it was taken in.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct HealedRecord {
+    pub(super) name: String,
+    pub(super) units: Option<String>,
+    pub(super) scale: f64,
+    pub(super) parts: Vec<HealedPartRecord>,
+    /// The contents of the distinct shapes.
+    pub(super) shapes: Vec<[u8; 32]>,
+    pub(super) fixed: Vec<u32>,
+    pub(super) findings: Vec<(u32, String)>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct HealedPartRecord {
+    pub(super) name: String,
+    /// Its place among the shapes.
+    pub(super) shape: u32,
+    pub(super) planning_from_shape: PoseRecord,
+    /// Least and greatest corner.
+    pub(super) bounds: [[f64; 3]; 2],
+    pub(super) moved: PoseRecord,
+}
+
+/// Vertices of a convex hull.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct HullRecord {
+    pub(super) vertices: Vec<[f64; 3]>,
+}
+
+/// Of the parts that one passed along a line, by hashes of how they stand and how far it went: whether it
+/// entered them.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct SweptRecord {
+    /// Those that were looked at last come last.
+    pub(super) past: Vec<([u8; 16], bool)>,
+}
+
 /// A plan in the messages that it was sent in; the last one ends it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct AnswerRecord {
@@ -179,6 +228,10 @@ pub(super) struct AnswerRecord {
 
 impl Record for SourceRecord {}
 impl Record for AnswerRecord {}
+impl Record for ShapeRecord {}
+impl Record for HealedRecord {}
+impl Record for HullRecord {}
+impl Record for SweptRecord {}
 impl Record for OverlapRecord {}
 impl Record for BlockingRecord {}
 impl Record for WitnessRecord {}

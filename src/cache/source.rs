@@ -57,7 +57,7 @@ impl Cache {
 }
 
 /// The handle is the hash of the content, whatever build asks.
-fn key(handle: &[u8; 32]) -> Key {
+pub(super) fn key(handle: &[u8; 32]) -> Key {
     Key::new(Kind::Source, *handle)
 }
 

@@ -13,7 +13,7 @@ use super::tally::Tally;
 
 /// So many records may wait …
 const MOST_WAITING: usize = 16_384;
-/// … of so many bytes in all.
+/// … of so many bytes in all, and one more: a large mesh is one record.
 const MOST_BYTES: usize = 64 << 20;
 /// A transaction has at most so many bytes, so that a crash costs little.
 const BATCH: usize = 4 << 20;
@@ -51,7 +51,7 @@ impl Writer {
     /// Hands a record over, or drops it if too much waits.
     pub(super) fn write(&self, key: Key, bytes: Vec<u8>) {
         let length = bytes.len();
-        let full = self.waiting.fetch_add(length, Ordering::Relaxed) + length > MOST_BYTES;
+        let full = self.waiting.fetch_add(length, Ordering::Relaxed) > MOST_BYTES;
         let message = Message::Record(key, bytes);
         let sent = match &self.sender {
             Some(sender) if !full => sender.try_send(message),

@@ -88,6 +88,7 @@ impl Planning for Service {
     fn admit(&self, source: &SourceAssembly, termination: &Termination) -> Result<Admission, ServiceError> {
         let admission = self.admit_until(source, termination)?;
         self.cache().remember_given(&admission.id.0, source);
+        self.keep(admission.id)?;
         Ok(admission)
     }
 
@@ -100,6 +101,7 @@ impl Planning for Service {
         let admission = self.revise_until(base, revision, termination)?;
         if admission.id != base {
             self.cache().remember_revised(&admission.id.0, &base.0, revision);
+            self.keep(admission.id)?;
         }
         Ok(admission)
     }

@@ -4,6 +4,11 @@ use nalgebra::{Point3, Vector3};
 
 use super::Pose;
 
+/// Along an axis to which the direction is steeper than this, boxes do not come apart soon.
+const STEEP: f64 = 1e-3;
+/// A box is left behind by this more than it is met, in units of the planning frame.
+const CLEAR: f64 = 1e-6;
+
 /// An axis-aligned box; `min` > `max` on some axis means empty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
@@ -79,6 +84,19 @@ impl Bounds {
     #[must_use]
     pub fn support(&self, direction: &Vector3<f64>) -> f64 {
         (0..3).map(|a| (direction[a] * self.min[a]).max(direction[a] * self.max[a])).sum()
+    }
+
+    /// How far the box has to go along a unit vector until it has left another one for good (both in units of
+    /// the planning frame): 0 if it has, infinity if it stays beside it.
+    #[must_use]
+    pub fn way_past(&self, standing: &Self, direction: &Vector3<f64>) -> f64 {
+        let along = |a: usize| match direction[a] {
+            d if d > STEEP => (standing.max[a] - self.min[a]) / d,
+            d if d < -STEEP => (standing.min[a] - self.max[a]) / d,
+            _ => f64::INFINITY,
+        };
+        // A little further, so that nothing is lost to rounding.
+        ((0..3).map(along).fold(f64::INFINITY, f64::min) + CLEAR).max(0.0)
     }
 
     /// A box that holds this one after `pose` (tight for the eight corners).

@@ -3,7 +3,7 @@
 //! The hashed byte stream is part of the wire contract (`ipc/PROTOCOL.md`), because clients
 //! compute the same handle over what they are about to upload. A test pins that both agree.
 
-use crate::geometry::{Solidity, SourceAssembly, Surface};
+use crate::geometry::{Mesh, Solidity, SourceAssembly};
 
 /// Names the byte stream; a changed stream gets a new tag.
 const TAG: &str = "sbdp-content/1";
@@ -34,19 +34,19 @@ pub fn content_hash(assembly: &SourceAssembly) -> [u8; 32] {
 }
 
 /// The hash of a healed mesh as it is used: in its own frame, in lengths of the planning frame.
-pub(super) fn mesh_hash(surface: &Surface, solidity: Solidity) -> [u8; 32] {
+pub(super) fn mesh_hash(mesh: &Mesh) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     text(&mut hasher, MESH_TAG);
-    hasher.update(&[match solidity {
+    hasher.update(&[match mesh.solidity {
         Solidity::Closed => 0,
         Solidity::Winding => 1,
     }]);
-    number(&mut hasher, surface.vertices().len());
-    for vertex in surface.vertices() {
+    number(&mut hasher, mesh.vertices.len());
+    for vertex in &mesh.vertices {
         hasher.update(bytemuck::cast_slice(vertex.coords.as_slice()));
     }
-    number(&mut hasher, surface.triangles().len());
-    hasher.update(bytemuck::cast_slice(surface.triangles()));
+    number(&mut hasher, mesh.triangles.len());
+    hasher.update(bytemuck::cast_slice(&mesh.triangles));
     hasher.finalize().into()
 }
 

@@ -2,12 +2,15 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::Surface;
 use super::samples::{Site, Sited};
 use super::surface::NO_TRIANGLE;
+use super::{Bounds, Pose, Surface};
 
 /// cos of the angle below which two normals are one (about a tenth of a degree).
 const SAME: f64 = 0.999_998;
+
+/// Points of a group, at most.
+const GROUP: usize = 32;
 
 /// Points of a surface, each with the unit normals of the faces that meet there.
 #[derive(Debug, Clone, Default)]
@@ -16,12 +19,29 @@ pub struct OrientedSamples {
     /// Where each point's normals begin, and where the last one's end.
     starts: Vec<u32>,
     normals: Vec<Vector3<f64>>,
+    /// The numbers of the points, those of a group one after the other.
+    grouped: Vec<u32>,
+    groups: Vec<Group>,
+}
+
+/// Points near each other.
+#[derive(Debug, Clone)]
+struct Group {
+    /// Where they begin and end among the grouped ones.
+    range: [u32; 2],
+    points: Bounds,
+    /// The box of their normals, taken as points.
+    normals: Bounds,
 }
 
 impl OrientedSamples {
     /// Bytes in memory.
     pub(super) fn memory(&self) -> usize {
-        size_of_val(&*self.points) + size_of_val(&*self.starts) + size_of_val(&*self.normals)
+        size_of_val(&*self.points)
+            + size_of_val(&*self.starts)
+            + size_of_val(&*self.normals)
+            + size_of_val(&*self.grouped)
+            + size_of_val(&*self.groups)
     }
 
     pub(super) fn new(surface: &Surface, sited: &[Sited]) -> Self {
@@ -40,13 +60,63 @@ impl OrientedSamples {
         out.points.shrink_to_fit();
         out.starts.shrink_to_fit();
         out.normals.shrink_to_fit();
+        out.group();
         out
+    }
+
+    fn group(&mut self) {
+        let mut grouped: Vec<u32> = (0..self.points.len() as u32).collect();
+        let mut groups = Vec::new();
+        self.split(&mut grouped, 0, &mut groups);
+        groups.shrink_to_fit();
+        (self.grouped, self.groups) = (grouped, groups);
+    }
+
+    /// Halves a part of the grouped points, which begins at `start`, until the halves are small.
+    fn split(&self, grouped: &mut [u32], start: u32, groups: &mut Vec<Group>) {
+        let points = Bounds::of(grouped.iter().map(|&i| &self.points[i as usize]));
+        if grouped.len() > GROUP {
+            let axis = points.extents().imax();
+            let middle = grouped.len() / 2;
+            let along = |i: &u32| self.points[*i as usize][axis];
+            grouped.select_nth_unstable_by(middle, |i, j| along(i).total_cmp(&along(j)).then(i.cmp(j)));
+            let (low, high) = grouped.split_at_mut(middle);
+            self.split(low, start, groups);
+            self.split(high, start + middle as u32, groups);
+        } else if !grouped.is_empty() {
+            let all = grouped.iter().flat_map(|&i| self.at(i).1).map(|n| Point3::from(*n));
+            let normals = all.fold(Bounds::EMPTY, |bounds, n| bounds.with_point(&n));
+            groups.push(Group { range: [start, start + grouped.len() as u32], points, normals });
+        }
+    }
+
+    fn at(&self, i: u32) -> (&Point3<f64>, &[Vector3<f64>]) {
+        let [from, to] = [i, i + 1].map(|i| self.starts[i as usize] as usize);
+        (&self.points[i as usize], &self.normals[from..to])
+    }
+
+    /// Those points of which any may lie in a box with a pose and have a normal with more than `steepness`
+    /// along a direction, in no order that matters: groups of which none can are left out as a whole.
+    pub fn leading<'s>(
+        &'s self,
+        box_from_self: &'s Pose,
+        within: &'s Bounds,
+        direction: &'s Vector3<f64>,
+        steepness: f64,
+    ) -> impl Iterator<Item = (&'s Point3<f64>, &'s [Vector3<f64>])> {
+        /// Boxes are rounded otherwise than the points in them.
+        const ROUNDING: f64 = 1e-9;
+        let wanted = move |group: &&Group| {
+            group.normals.support(direction) > steepness - ROUNDING
+                && group.points.transformed(box_from_self).grown(ROUNDING).meets(within)
+        };
+        let all = self.groups.iter().filter(wanted).map(|group| group.range.map(|i| i as usize));
+        all.flat_map(|[from, to]| self.grouped[from..to].iter().map(|&i| self.at(i)))
     }
 
     /// All points with their normals.
     pub fn iter(&self) -> impl Iterator<Item = (&Point3<f64>, &[Vector3<f64>])> {
-        let ranges = self.starts.iter().zip(self.starts.iter().skip(1));
-        self.points.iter().zip(ranges.map(|(a, b)| &self.normals[*a as usize..*b as usize]))
+        (0..self.points.len() as u32).map(|i| self.at(i))
     }
 }
 
@@ -66,19 +136,49 @@ fn faces_at(surface: &Surface, site: Site, mut visit: impl FnMut(u32)) {
 
 #[cfg(test)]
 mod tests {
-    use crate::fixtures::{cuboid, healed, shape_of};
+    use nalgebra::Vector3;
+
+    use super::super::{Bounds, Pose};
+    use crate::fixtures::{ball, cuboid, healed, l_shape, shape_of, spread};
+
+    /// Against looking at each point.
+    #[test]
+    fn all_points_that_lead_within_a_box_are_told() {
+        let turn = Pose::new(Vector3::new(0.4, -1.3, 0.7), Vector3::new(0.3, -0.5, 0.2));
+        let (mut told, mut all) = (0, 0);
+        for shape in [ball(4), l_shape(), cuboid([-1.0, -2.0, -0.1], [1.0, 2.0, 0.1])].map(healed) {
+            let samples = shape_of(&shape).oriented().clone();
+            for (at, pose) in
+                spread([-2.0; 3], [2.0; 3], 30).zip([turn, Pose::identity()].into_iter().cycle())
+            {
+                let within = Bounds { min: at, max: at + Vector3::new(1.0, 0.3, 2.0) };
+                let along = at.coords.normalize();
+                let leads = |(p, normals): &(&_, &[Vector3<f64>])| {
+                    within.contains(&(pose * *p)) && normals.iter().any(|n| n.dot(&along) > 1e-3)
+                };
+                let mut expected: Vec<_> = samples.iter().filter(leads).map(|(p, _)| p as *const _).collect();
+                let some = || samples.leading(&pose, &within, &along, 1e-3);
+                let mut found: Vec<_> = some().filter(leads).map(|(p, _)| p as *const _).collect();
+                expected.sort_unstable();
+                found.sort_unstable();
+                assert_eq!(found, expected);
+                (told, all) = (told + some().count(), all + samples.iter().count());
+            }
+        }
+        assert!(told > 0 && told * 4 < all, "{told} of {all}");
+    }
 
     #[test]
     fn corners_edges_and_faces_of_a_box_have_three_two_and_one_normals() {
         let shape = shape_of(&healed(cuboid([-1.0; 3], [1.0; 3])));
         let mut seen = [0; 4];
-        for (p, normals) in shape.oriented.iter() {
+        for (p, normals) in shape.oriented().iter() {
             let on = (0..3).filter(|&a| (p[a].abs() - 1.0).abs() < 1e-12).count();
             assert_eq!(normals.len(), on, "at {p}");
             assert!(normals.iter().all(|n| (n.dot(&p.coords) - 1.0).abs() < 1e-12));
             seen[on] += 1;
         }
         assert_eq!((seen[0], seen[3]), (0, 8));
-        assert!(seen[1] > 6 && seen[2] > 12 && seen.iter().sum::<usize>() == shape.samples.points().len());
+        assert!(seen[1] > 6 && seen[2] > 12 && seen.iter().sum::<usize>() == shape.samples().points().len());
     }
 }

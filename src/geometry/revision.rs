@@ -7,8 +7,8 @@ use nalgebra::Point3;
 
 use super::congruence::congruence;
 use super::{
-    Assembly, Bounds, GeometryError, Mesh, Part, Pose, Shape, Solidity, SourceAssembly, SourceMesh,
-    SourcePart, heal_until, transformed, waypoint_from_pose,
+    Assembly, Bounds, GeometryError, Mesh, Part, Pose, Shape, SourceAssembly, SourceMesh, SourcePart,
+    heal_until, transformed, waypoint_from_pose,
 };
 use crate::termination::Termination;
 
@@ -171,7 +171,7 @@ impl Assembly {
             *vertex *= self.scale;
         }
         let bounds = Bounds::of(&mesh.vertices);
-        let copied = |(k, shape): (usize, &Arc<Shape>)| Some((k, congruence(&mesh_of(shape), &mesh)?));
+        let copied = |(k, shape): (usize, &Arc<Shape>)| Some((k, congruence(shape.mesh(), &mesh)?));
         let copy = self.shapes.iter().enumerate().filter(|(_, s)| is_like(s, &mesh)).find_map(copied);
         let (shape, planning_from_shape) = match copy {
             Some(copy) => copy,
@@ -203,16 +203,6 @@ impl Assembly {
 fn is_like(shape: &Shape, mesh: &Mesh) -> bool {
     let surface = &shape.surface;
     surface.vertices().len() == mesh.vertices.len() && surface.triangles() == mesh.triangles
-}
-
-/// The mesh that a shape was made of, in its frame.
-fn mesh_of(shape: &Shape) -> Mesh {
-    let surface = &shape.surface;
-    Mesh {
-        vertices: surface.vertices().to_vec(),
-        triangles: surface.triangles().to_vec(),
-        solidity: if surface.is_open() { Solidity::Winding } else { Solidity::Closed },
-    }
 }
 
 #[cfg(test)]

@@ -9,9 +9,7 @@ use crate::termination::{Interrupt, Poll, Termination};
 use super::content_hash::mesh_hash;
 use super::hull::hull_vertices;
 use super::samples::sited;
-use super::{
-    Bounds, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Solidity, Spacing, Surface,
-};
+use super::{Bounds, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Spacing, Surface};
 
 /// Nodes of the tree of patches between two looks at the termination condition.
 const PATCH_POLL: u32 = 64;
@@ -23,17 +21,14 @@ pub struct Shape {
     pub surface: Arc<Surface>,
     /// Vertices of the convex hull.
     pub hull: Vec<Point3<f64>>,
-    /// Where contact is looked for.
-    pub samples: SampleTree,
-    /// The same points, with the faces that meet there.
-    pub oriented: OrientedSamples,
     /// Centre of mass and radius of gyration.
     pub mass: MassProperties,
     /// Largest distance of a vertex from the centre of mass.
     pub reach: f64,
-    /// Built when it is asked for.
+    /// Built when they are asked for, as what follows.
+    oriented: OnceLock<OrientedSamples>,
+    samples: OnceLock<SampleTree>,
     patches: OnceLock<PatchTree>,
-    solidity: Solidity,
     content: OnceLock<[u8; 32]>,
 }
 
@@ -54,27 +49,64 @@ impl Shape {
         Self::of(&Mesh { vertices, ..mesh.clone() }, termination)
     }
 
-    /// Derives everything from a mesh.
+    /// Derives everything from a mesh that is not said to be derived later.
     ///
     /// # Errors
     /// The termination condition became true before that was done.
     pub fn of(mesh: &Mesh, termination: &Termination) -> Result<Self, Interrupt> {
         termination.check()?;
-        let surface = Arc::new(Surface::new(mesh));
+        let hull = hull_vertices(&mesh.vertices);
         termination.check()?;
+        let shape = Self::over(Surface::new(mesh), hull, OnceLock::new());
+        termination.check()?;
+        shape.oriented();
+        Ok(shape)
+    }
+
+    /// A shape of which the hull and the content are known: all else is derived when it is asked for. Of most
+    /// parts that is little, where what was found out about them is remembered.
+    #[must_use]
+    pub(crate) fn known(mesh: Mesh, hull: Vec<Point3<f64>>, content: [u8; 32]) -> Self {
+        Self::over(Surface::deferred(mesh), hull, OnceLock::from(content))
+    }
+
+    fn over(surface: Surface, hull: Vec<Point3<f64>>, content: OnceLock<[u8; 32]>) -> Self {
         let mass = surface.mass_properties();
         let reach =
             surface.vertices().iter().map(|v| (v - mass.centre).norm_squared()).fold(0.0, f64::max).sqrt();
+        let (oriented, samples, patches) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
+        Self { surface: Arc::new(surface), hull, mass, reach, oriented, samples, patches, content }
+    }
+
+    /// Derives now what was not yet, but for the tree of samples.
+    ///
+    /// # Errors
+    /// The termination condition became true before all was there.
+    pub fn derive(&self, termination: &Termination) -> Result<(), Interrupt> {
         termination.check()?;
-        let sited = sited(&surface, &spacing(surface.bounds()));
-        let oriented = OrientedSamples::new(&surface, &sited);
-        let samples = SampleTree::over(sited.into_iter().map(|(p, _)| p).collect());
-        termination.check()?;
-        let hull = hull_vertices(surface.vertices());
-        termination.check()?;
-        let solidity = mesh.solidity;
-        let (patches, content) = (OnceLock::new(), OnceLock::new());
-        Ok(Self { hull, samples, oriented, mass, reach, surface, patches, solidity, content })
+        self.surface.prepare();
+        self.oriented();
+        self.patches(termination).map(|_| ())
+    }
+
+    /// The mesh that it was made of, in its frame.
+    #[must_use]
+    pub fn mesh(&self) -> &Mesh {
+        self.surface.mesh()
+    }
+
+    /// Where contact is looked for, with the faces that meet there.
+    pub fn oriented(&self) -> &OrientedSamples {
+        let derive = || {
+            let sited = sited(&self.surface, &spacing(self.surface.bounds()));
+            OrientedSamples::new(&self.surface, &sited)
+        };
+        self.oriented.get_or_init(derive)
+    }
+
+    /// The same points in a tree.
+    pub fn samples(&self) -> &SampleTree {
+        self.samples.get_or_init(|| SampleTree::over(self.oriented().iter().map(|(p, _)| *p).collect()))
     }
 
     /// The triangles in a tree of patches.
@@ -96,14 +128,14 @@ impl Shape {
         size_of::<Self>()
             + self.surface.memory()
             + size_of_val(&*self.hull)
-            + self.samples.memory()
-            + self.oriented.memory()
+            + self.samples.get().map_or(0, SampleTree::memory)
+            + self.oriented.get().map_or(0, OrientedSamples::memory)
             + self.patches.get().map_or(0, PatchTree::memory)
     }
 
     /// The hash of the mesh, on which alone everything here depends.
     pub fn content(&self) -> &[u8; 32] {
-        self.content.get_or_init(|| mesh_hash(&self.surface, self.solidity))
+        self.content.get_or_init(|| mesh_hash(self.mesh()))
     }
 
     /// Largest distance of a point of the shape from the line through `centre` along the unit

@@ -3,18 +3,20 @@
 //! Sign: for closed meshes by the angle-weighted pseudo-normal of the closest feature
 //! (J. A. Bærentzen and H. Aanæs 2005), which is exact for closed, outward oriented meshes that do
 //! not cross or touch themselves; for all others by winding number > 0.5, and so where a closed one
-//! is folded (`folds`). Where segments meet it: `segments`.
+//! is folded (`folds`). What that needs of a mesh: `derived`. Where segments meet it: `segments`.
 
+mod derived;
 mod segments;
 
-use nalgebra::{Point3, Unit, Vector3};
+use std::sync::OnceLock;
 
-use super::folds::Folds;
+use nalgebra::{Point3, Vector3};
+
 use super::rim::{Rim, WINDING_DOUBT};
-use super::triangle::{Feature, area_normal, closest_on_triangle};
-use super::triangle_tree::{TriangleTree, Visitor};
-use super::winding::WindingTree;
+use super::triangle::{Feature, closest_on_triangle};
+use super::triangle_tree::Visitor;
 use super::{Bounds, Mesh, Solidity};
+use derived::Derived;
 
 /// No triangle.
 pub(super) const NO_TRIANGLE: u32 = u32::MAX;
@@ -35,26 +37,15 @@ pub struct Closest {
 /// A triangle surface with its adjacency, normals and bounding-volume hierarchy.
 #[derive(Clone)]
 pub struct Surface {
-    vertices: Vec<Point3<f64>>,
-    triangles: Vec<[u32; 3]>,
-    face_normals: Vec<Vector3<f64>>,
-    /// Per triangle and edge: the triangle on the other side.
-    neighbours: Vec<[u32; 3]>,
-    vertex_normals: Vec<Vector3<f64>>,
-    /// Triangles around each vertex, as ranges of `fan`.
-    fan_start: Vec<u32>,
-    fan: Vec<u32>,
-    tree: TriangleTree,
-    winding: Option<WindingTree>,
-    /// Where signs come from winding numbers.
-    rim: Option<Rim>,
-    folds: Option<Folds>,
+    mesh: Mesh,
     bounds: Bounds,
+    /// Worked out when it is first asked for, if not at once.
+    derived: OnceLock<Derived>,
 }
 
 impl std::fmt::Debug for Surface {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Surface({} vertices, {} triangles)", self.vertices.len(), self.triangles.len())
+        write!(f, "Surface({} vertices, {} triangles)", self.mesh.vertices.len(), self.mesh.triangles.len())
     }
 }
 
@@ -62,62 +53,51 @@ impl Surface {
     /// Prepares a healed mesh.
     #[must_use]
     pub fn new(mesh: &Mesh) -> Self {
-        let corner = |t: &[u32; 3]| t.map(|i| mesh.vertices[i as usize]);
-        let face_normals = mesh
-            .triangles
-            .iter()
-            .map(|t| {
-                let [a, b, c] = corner(t);
-                area_normal(&a, &b, &c).try_normalize(0.0).unwrap_or_else(Vector3::zeros)
-            })
-            .collect::<Vec<_>>();
-        let (fan_start, fan) = fans(mesh);
-        let winding =
-            (mesh.solidity == Solidity::Winding).then(|| WindingTree::new(&mesh.vertices, &mesh.triangles));
-        let neighbours = neighbours(mesh);
-        let folds = if winding.is_some() { None } else { Folds::of(mesh, &face_normals, &neighbours) };
-        Self {
-            rim: winding.is_some().then(|| Rim::of(&mesh.vertices, &mesh.triangles)),
-            folds,
-            neighbours,
-            vertex_normals: vertex_normals(mesh, &face_normals),
-            face_normals,
-            fan_start,
-            fan,
-            tree: TriangleTree::new(&mesh.triangles.iter().map(corner).collect::<Vec<_>>()),
-            winding,
-            bounds: Bounds::of(&mesh.vertices),
-            vertices: mesh.vertices.clone(),
-            triangles: mesh.triangles.clone(),
-        }
+        let surface = Self::deferred(mesh.clone());
+        surface.prepare();
+        surface
+    }
+
+    /// A healed mesh, to be prepared when more than its triangles is asked for. That depends on the mesh alone.
+    #[must_use]
+    pub fn deferred(mesh: Mesh) -> Self {
+        Self { bounds: Bounds::of(&mesh.vertices), mesh, derived: OnceLock::new() }
+    }
+
+    /// Prepares it now, unless that was done.
+    pub fn prepare(&self) {
+        self.derived();
+    }
+
+    #[inline]
+    fn derived(&self) -> &Derived {
+        self.derived.get_or_init(|| Derived::of(&self.mesh))
     }
 
     /// Bytes in memory.
     #[must_use]
     pub fn memory(&self) -> usize {
-        size_of_val(&*self.vertices)
-            + size_of_val(&*self.triangles)
-            + size_of_val(&*self.face_normals)
-            + size_of_val(&*self.neighbours)
-            + size_of_val(&*self.vertex_normals)
-            + size_of_val(&*self.fan_start)
-            + size_of_val(&*self.fan)
-            + self.tree.memory()
-            + self.winding.as_ref().map_or(0, WindingTree::memory)
-            + self.rim.as_ref().map_or(0, Rim::memory)
-            + self.folds.as_ref().map_or(0, Folds::memory)
+        size_of_val(&*self.mesh.vertices)
+            + size_of_val(&*self.mesh.triangles)
+            + self.derived.get().map_or(0, Derived::memory)
+    }
+
+    /// The mesh.
+    #[must_use]
+    pub fn mesh(&self) -> &Mesh {
+        &self.mesh
     }
 
     /// The vertices.
     #[must_use]
     pub fn vertices(&self) -> &[Point3<f64>] {
-        &self.vertices
+        &self.mesh.vertices
     }
 
     /// The triangles.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
+        &self.mesh.triangles
     }
 
     /// The box of all vertices.
@@ -130,53 +110,53 @@ impl Surface {
     #[must_use]
     #[inline]
     pub fn corners(&self, triangle: u32) -> [Point3<f64>; 3] {
-        self.triangles[triangle as usize].map(|i| self.vertices[i as usize])
+        self.mesh.triangles[triangle as usize].map(|i| self.mesh.vertices[i as usize])
     }
 
     /// The unit normal of a triangle (zero if degenerate).
     #[must_use]
     #[inline]
     pub fn face_normal(&self, triangle: u32) -> Vector3<f64> {
-        self.face_normals[triangle as usize]
+        self.derived().face_normals[triangle as usize]
     }
 
     /// The triangle across edge `edge` of `triangle`, or `u32::MAX` where there is none.
     #[must_use]
     #[inline]
     pub fn neighbour(&self, triangle: u32, edge: u8) -> u32 {
-        self.neighbours[triangle as usize][edge as usize]
+        self.derived().neighbours[triangle as usize][edge as usize]
     }
 
     /// Whether inside and outside are told apart by winding number.
     #[must_use]
     pub fn is_open(&self) -> bool {
-        self.winding.is_some()
+        self.mesh.solidity == Solidity::Winding
     }
 
     /// Whether a triangle is folded on another: then being above its face does not mean outside.
     #[must_use]
     #[inline]
     pub fn is_folded(&self, triangle: u32) -> bool {
-        self.folds.as_ref().is_some_and(|folds| folds.has_face(triangle))
+        self.derived().folds.as_ref().is_some_and(|folds| folds.has_face(triangle))
     }
 
     #[cfg(test)]
     pub(super) fn is_folded_anywhere(&self) -> bool {
-        self.folds.is_some()
+        self.derived().folds.is_some()
     }
 
     /// The edges at which it is open, where signs come from winding numbers. There are none where it only
     /// crosses itself: winding numbers change at the surface alone then.
     #[must_use]
     pub fn rim(&self) -> Option<&Rim> {
-        self.rim.as_ref()
+        self.derived().rim.as_ref()
     }
 
     /// Whether all that a straight line of at most `radius` joins with `p`, without meeting the surface, is
     /// outside as `p` is. Not if it cannot be told.
     #[must_use]
     pub fn stays_outside(&self, p: &Point3<f64>, radius: f64) -> bool {
-        let (Some(winding), Some(rim)) = (&self.winding, &self.rim) else {
+        let (Some(winding), Some(rim)) = (&self.derived().winding, &self.derived().rim) else {
             return self.signed_distance(p) > 0.0;
         };
         let margin = 0.5 - WINDING_DOUBT - winding.winding(p);
@@ -186,7 +166,7 @@ impl Surface {
     /// The winding number at `p`, where signs come from it.
     #[must_use]
     pub fn winding(&self, p: &Point3<f64>) -> Option<f64> {
-        self.winding.as_ref().map(|w| w.winding(p))
+        self.derived().winding.as_ref().map(|w| w.winding(p))
     }
 
     /// The closest point on one triangle.
@@ -201,7 +181,7 @@ impl Surface {
     /// The closest surface point nearer than `reach`, if there is one.
     #[must_use]
     pub fn closest(&self, p: &Point3<f64>, reach: f64) -> Option<Closest> {
-        self.tree.closest(p, reach, |t| self.closest_on(t, p))
+        self.derived().tree.closest(p, reach, |t| self.closest_on(t, p))
     }
 
     /// The closest surface point, given any triangle that is likely to be near: much quicker than
@@ -214,14 +194,14 @@ impl Surface {
 
     /// Shows `visitor` the triangles within its reach of `p`, nearest first.
     pub(super) fn nearest_first(&self, p: &Point3<f64>, visitor: &mut impl Visitor) {
-        self.tree.nearest_first(p, visitor);
+        self.derived().tree.nearest_first(p, visitor);
     }
 
     /// Signed distance given the closest point: negative inside.
     #[must_use]
     pub fn signed(&self, p: &Point3<f64>, closest: &Closest) -> f64 {
-        let corners = &self.triangles[closest.triangle as usize];
-        let inside = match (&self.winding, &self.folds) {
+        let corners = &self.mesh.triangles[closest.triangle as usize];
+        let inside = match (&self.derived().winding, &self.derived().folds) {
             (Some(w), _) => w.winding(p) > 0.5,
             (None, Some(folds)) if folds.doubts(closest, corners) => folds.is_inside(p),
             _ => self.pseudo_normal(closest).dot(&(p - closest.point)) < 0.0,
@@ -246,7 +226,8 @@ impl Surface {
                 other => own + self.face_normal(other),
             },
             Feature::Vertex(v) => {
-                self.vertex_normals[self.triangles[closest.triangle as usize][v as usize] as usize]
+                self.derived().vertex_normals
+                    [self.mesh.triangles[closest.triangle as usize][v as usize] as usize]
             }
         }
     }
@@ -263,7 +244,7 @@ impl Surface {
                 }
             }
             Feature::Vertex(v) => {
-                for &t in self.fan(self.triangles[closest.triangle as usize][v as usize]) {
+                for &t in self.fan(self.mesh.triangles[closest.triangle as usize][v as usize]) {
                     visit(self.face_normal(t));
                 }
             }
@@ -274,67 +255,9 @@ impl Surface {
     #[must_use]
     pub fn fan(&self, vertex: u32) -> &[u32] {
         let i = vertex as usize;
-        &self.fan[self.fan_start[i] as usize..self.fan_start[i + 1] as usize]
+        let Derived { fan, fan_start, .. } = self.derived();
+        &fan[fan_start[i] as usize..fan_start[i + 1] as usize]
     }
-}
-
-fn neighbours(mesh: &Mesh) -> Vec<[u32; 3]> {
-    let mut sides: Vec<(u32, u32, u32, u8)> = Vec::with_capacity(mesh.triangles.len() * 3);
-    for (i, t) in mesh.triangles.iter().enumerate() {
-        for e in 0..3usize {
-            let (a, b) = (t[e], t[(e + 1) % 3]);
-            sides.push((a.min(b), a.max(b), i as u32, e as u8));
-        }
-    }
-    sides.sort_unstable();
-    let mut out = vec![[NO_TRIANGLE; 3]; mesh.triangles.len()];
-    let mut i = 0;
-    while i < sides.len() {
-        let same = sides[i..].iter().take_while(|s| (s.0, s.1) == (sides[i].0, sides[i].1)).count();
-        // Edges of more than two faces are paired in order: there, any pairing is as good.
-        for pair in sides[i..i + same].chunks_exact(2) {
-            out[pair[0].2 as usize][pair[0].3 as usize] = pair[1].2;
-            out[pair[1].2 as usize][pair[1].3 as usize] = pair[0].2;
-        }
-        i += same;
-    }
-    out
-}
-
-fn vertex_normals(mesh: &Mesh, face_normals: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-    let mut out = vec![Vector3::zeros(); mesh.vertices.len()];
-    for (t, n) in mesh.triangles.iter().zip(face_normals) {
-        for k in 0..3 {
-            let p = mesh.vertices[t[k] as usize];
-            let a = mesh.vertices[t[(k + 1) % 3] as usize] - p;
-            let b = mesh.vertices[t[(k + 2) % 3] as usize] - p;
-            if let (Some(a), Some(b)) = (Unit::try_new(a, 0.0), Unit::try_new(b, 0.0)) {
-                out[t[k] as usize] += n * a.dot(&b).clamp(-1.0, 1.0).acos();
-            }
-        }
-    }
-    out
-}
-
-fn fans(mesh: &Mesh) -> (Vec<u32>, Vec<u32>) {
-    let mut start = vec![0u32; mesh.vertices.len() + 1];
-    for t in &mesh.triangles {
-        for &v in t {
-            start[v as usize + 1] += 1;
-        }
-    }
-    for i in 0..mesh.vertices.len() {
-        start[i + 1] += start[i];
-    }
-    let mut next = start.clone();
-    let mut fan = vec![0u32; mesh.triangles.len() * 3];
-    for (i, t) in mesh.triangles.iter().enumerate() {
-        for &v in t {
-            fan[next[v as usize] as usize] = i as u32;
-            next[v as usize] += 1;
-        }
-    }
-    (start, fan)
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry::{Occupied, Vacant};
 use std::sync::Arc;
 
-use nalgebra::{Point3, Translation3, Vector3};
+use nalgebra::{Point3, Translation3};
 use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Pose, Shape, Surface, area_normal};
@@ -36,11 +36,8 @@ const COARSE: f64 = 4e-3;
 const OVERLAP_SPARE: f64 = 2e-6;
 const OVERLAP_FINEST: f64 = 1e-4;
 
-/// Directions are alike within this, and boxes left behind by this more than they meet (planning frame).
+/// Directions are alike within this.
 const ALIKE: f64 = 1.0 / (1u64 << 40) as f64;
-const CLEAR: f64 = 1e-6;
-/// Along an axis to which the direction is steeper than this, boxes do not come apart soon.
-const STEEP: f64 = 1e-3;
 
 /// A point that got too deep.
 #[derive(Debug, Clone, PartialEq)]
@@ -283,7 +280,7 @@ impl Check<'_> {
             // The same to the bit wherever the path ends.
             let direction = direction.map(|x| (x / ALIKE).round() * ALIKE);
             let moving = scene.bodies[part].shape.bounds().transformed(from);
-            let passed = way_out_of(&moving, &scene.bodies[other].bounds, &direction);
+            let passed = moving.way_past(&scene.bodies[other].bounds, &direction);
             if passed == 0.0 {
                 way.pop();
             } else if passed < (to.translation.vector - from.translation.vector).norm() {
@@ -324,18 +321,6 @@ impl Check<'_> {
         }
         Ok(Verdict::past(bound, entries))
     }
-}
-
-/// How far a box has to go along a unit vector until it has left another one for good: 0 if it has, infinity
-/// if it stays beside it.
-fn way_out_of(moving: &Bounds, standing: &Bounds, direction: &Vector3<f64>) -> f64 {
-    let along = |a: usize| match direction[a] {
-        d if d > STEEP => (standing.max[a] - moving.min[a]) / d,
-        d if d < -STEEP => (standing.min[a] - moving.max[a]) / d,
-        _ => f64::INFINITY,
-    };
-    // A little further, so that nothing is lost to rounding.
-    ((0..3).map(along).fold(f64::INFINITY, f64::min) + CLEAR).max(0.0)
 }
 
 /// The way of a part past one that stands.

@@ -11,7 +11,7 @@ use crate::geometry::{Bounds, Surface, closest_on_triangle};
 use crate::termination::{Interrupt, Poll, Termination};
 
 use super::brick::Brick;
-use super::grid::{BAND, CELLS, EMPTY, Field, NearBrick, Nodes};
+use super::grid::{BAND, CELLS, EMPTY, Grid, NearBrick, Nodes};
 
 /// Cells are no larger than this, in units of the planning frame.
 const LARGEST_CELL: f64 = 0.05;
@@ -22,19 +22,29 @@ const MOST_BRICKS: usize = 8192;
 /// Bricks of the whole box, empty ones included.
 const MOST_SLOTS: usize = 1 << 21;
 
-impl Field {
-    /// Builds the field of a surface, in parallel on the current rayon pool. Bricks are filled when
-    /// they are first looked at: of most parts, contact never sees but a small share.
-    ///
-    /// # Errors
-    /// The termination condition became true.
-    pub fn build(surface: &Arc<Surface>, termination: &Termination) -> Result<Self, Interrupt> {
+/// Who builds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Threads {
+    /// Those of the current rayon pool.
+    All,
+    /// The one that asks.
+    This,
+}
+
+impl Grid {
+    /// Builds the field of a surface. Bricks are filled when they are first looked at: of most parts, contact
+    /// never sees but a small share.
+    pub(super) fn build(
+        surface: &Arc<Surface>,
+        threads: Threads,
+        termination: &Termination,
+    ) -> Result<Self, Interrupt> {
         let smallest = surface.bounds().extents().min().max(1e-3);
         let mut cell = 2f64.powf((smallest / CELLS_ACROSS).min(LARGEST_CELL).log2().floor());
         let (mut field, pairs) = loop {
             termination.check()?;
             if let Some(field) = Self::empty(surface, cell)
-                && let Some(pairs) = brick_triangles(&field, surface, termination)?
+                && let Some(pairs) = brick_triangles(&field, surface, threads, termination)?
             {
                 break (field, pairs);
             }
@@ -99,8 +109,9 @@ impl Field {
 /// For every brick that the band touches, the triangles that may be nearest in it, both in
 /// ascending order. `None` if there are too many bricks.
 fn brick_triangles(
-    field: &Field,
+    field: &Grid,
     surface: &Surface,
+    threads: Threads,
     termination: &Termination,
 ) -> Result<Option<Vec<(u32, u32)>>, Interrupt> {
     /// Triangles that one task looks at.
@@ -129,21 +140,27 @@ fn brick_triangles(
         // What was found of triangles that were cut short is not to be believed.
         termination.check().map(|()| pairs)
     };
-    let shares: Vec<Vec<(u32, u32)>> =
-        (0..count.div_ceil(SHARE)).into_par_iter().map(share).collect::<Result<_, _>>()?;
+    let tasks = 0..count.div_ceil(SHARE);
+    let shares: Vec<Vec<(u32, u32)>> = match threads {
+        Threads::All => tasks.into_par_iter().map(share).collect::<Result<_, _>>()?,
+        Threads::This => tasks.map(share).collect::<Result<_, _>>()?,
+    };
     if bricks.into_inner() > MOST_BRICKS {
         return Ok(None);
     }
     let mut pairs = shares.concat();
     termination.check()?;
-    pairs.par_sort_unstable();
+    match threads {
+        Threads::All => pairs.par_sort_unstable(),
+        Threads::This => pairs.sort_unstable(),
+    }
     termination.check()?;
     Ok(Some(pairs))
 }
 
 /// Visits the bricks that the band of one triangle touches, until a visit says to stop; whether none
 /// did.
-fn bricks_near(field: &Field, surface: &Surface, t: u32, mut visit: impl FnMut(u32) -> bool) -> bool {
+fn bricks_near(field: &Grid, surface: &Surface, t: u32, mut visit: impl FnMut(u32) -> bool) -> bool {
     let side = field.cell * CELLS as f64;
     let band = BAND * field.cell;
     let reach = side * 0.5 * 3f64.sqrt() + band;

@@ -4,9 +4,9 @@ use std::sync::OnceLock;
 
 use nalgebra::{Point3, Vector3};
 
-use super::grid::{BAND, CELLS, EMPTY, Field};
+use super::grid::{BAND, CELLS, EMPTY, Grid};
 
-impl Field {
+impl Grid {
     /// Fills `far`. Bricks fewer than `n` steps away (Chebyshev) do not touch the band, so whoever
     /// walks to the surface leaves them after `n - 1` sides, with the band still to cross. A component
     /// of empty bricks has the sign of any of its points.

@@ -20,9 +20,9 @@ pub(super) const EMPTY: u32 = u32::MAX;
 /// Marks a node outside the band: it knows no nearest triangle.
 pub(super) const FAR_NODE: u32 = u32::MAX;
 
-/// A distance field in its shape's frame.
+/// What a [`Field`](super::Field) is when it was built.
 #[derive(Debug, Clone)]
-pub struct Field {
+pub struct Grid {
     pub(super) origin: Point3<f64>,
     pub(super) cell: f64,
     pub(super) dims: [usize; 3],
@@ -95,7 +95,7 @@ impl FieldSample {
     }
 }
 
-impl Field {
+impl Grid {
     /// Cell size, in the shape's units.
     #[must_use]
     pub fn cell(&self) -> f64 {
@@ -152,7 +152,7 @@ impl Field {
         Estimate { lower_bound: (value - self.error_bound()).max(boxed), value }
     }
 
-    /// The value of [`Field::sample`], to the bit.
+    /// The value of [`Grid::sample`], to the bit.
     #[must_use]
     pub fn value(&self, p: &Point3<f64>) -> f64 {
         let Some((brick, local)) = self.locate(p) else { return self.bounds.distance(p) };
@@ -287,16 +287,17 @@ fn trilinear_derivatives(v: &[f32], f: &Vector3<f64>) -> FieldSample {
 
 #[cfg(test)]
 mod tests {
+    use super::super::build::Threads;
     use super::*;
     use crate::fixtures::{ball, l_shape, spread, surface};
     use crate::termination::Termination;
 
     /// Solids with their fields and points in and around the band, none within 1e-6 of a face of a
     /// cell, where derivatives jump.
-    fn cases() -> Vec<(Arc<Surface>, Field, Vec<Point3<f64>>)> {
+    fn cases() -> Vec<(Arc<Surface>, Grid, Vec<Point3<f64>>)> {
         let case = |mesh| {
             let s = Arc::new(surface(mesh));
-            let field = Field::build(&s, &Termination::default()).unwrap();
+            let field = Grid::build(&s, Threads::All, &Termination::default()).unwrap();
             let b = s.bounds().grown(0.05);
             let inside_a_cell = |p: &Point3<f64>| {
                 let at = (p - field.origin) / field.cell;

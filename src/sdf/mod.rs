@@ -1,6 +1,6 @@
 //! Signed distance fields: sparse bricks near the surface, conservative bounds elsewhere.
 //!
-//! A field is made per distinct mesh, in the shape's own frame. Values are negative inside.
+//! A field is made per distinct mesh, in the shape's own frame, when it is first looked at (`field`). Values are negative inside.
 //! Guarantees: at nodes of the narrow band the stored distance is that of the nearest triangle
 //! (exact, then rounded to f32), and that triangle's index is kept, so that whoever needs an exact
 //! distance measures against a few triangles instead of interpolating. Everywhere else a field
@@ -10,9 +10,11 @@ mod brick;
 mod build;
 mod facet;
 mod far_field;
+mod field;
 mod grid;
 mod rim;
 #[cfg(test)]
 mod tests;
 
-pub use grid::{Estimate, Field, FieldSample};
+pub use field::Field;
+pub use grid::{Estimate, FieldSample, Grid};

@@ -3,13 +3,15 @@ use std::sync::atomic::Ordering;
 
 use nalgebra::{Point3, Vector3};
 
-use super::grid::{BAND, BRICK, CELLS, EMPTY, FAR_NODE, Field, NODES};
+use super::Field;
+use super::build::Threads;
+use super::grid::{BAND, BRICK, CELLS, EMPTY, FAR_NODE, Grid, NODES};
 use crate::fixtures::{ball, cuboid, l_shape, moved, open_box, spread, surface, winding_surface};
 use crate::geometry::{Pose, Surface};
 use crate::termination::{Interrupt, Termination};
 
-fn field(surface: &Surface) -> Field {
-    Field::build(&Arc::new(surface.clone()), &Termination::default()).unwrap()
+fn field(surface: &Surface) -> Grid {
+    Grid::build(&Arc::new(surface.clone()), Threads::All, &Termination::default()).unwrap()
 }
 
 /// Closed solids of the kinds that parts are made of, none on the grid's planes.
@@ -31,7 +33,7 @@ fn around(surface: &Surface, margin: f64, count: usize) -> impl Iterator<Item = 
 }
 
 /// All nodes: position, stored value, nearest triangle.
-fn nodes(field: &Field) -> impl Iterator<Item = (Point3<f64>, f64, u32)> + '_ {
+fn nodes(field: &Grid) -> impl Iterator<Item = (Point3<f64>, f64, u32)> + '_ {
     let [nx, ny, _] = field.dims;
     let with_nodes = field.slots.iter().enumerate().filter(|(_, s)| **s != EMPTY);
     with_nodes.flat_map(move |(brick, &slot)| {
@@ -185,8 +187,11 @@ fn interpolation_in_the_band_is_within_the_error_bound() {
 fn a_cancelled_build_ends_with_the_reason() {
     let termination = Termination::default();
     termination.cancel_flag().store(true, Ordering::Relaxed);
-    let built = Field::build(&Arc::new(surface(cuboid([0.0; 3], [1.0; 3]))), &termination);
-    assert_eq!(built.err(), Some(Interrupt::Cancelled));
+    let built = Field::of(&Arc::new(surface(cuboid([0.0; 3], [1.0; 3]))));
+    for end in [built.prepare(&termination), built.make_ready(&termination)] {
+        assert_eq!(end.err(), Some(Interrupt::Cancelled));
+    }
+    assert!(!built.is_built());
 }
 
 #[test]

@@ -12,7 +12,7 @@ use crate::cache::MotionQuestion;
 use crate::geometry::{Pose, separating_direction, transformed};
 use crate::plan::{Entry, PlanStatus};
 use crate::simulation::{
-    Action, End, HULL_MARGIN, HullTree, Motion, Surroundings, Sweep, exit_direction, straight_sweep,
+    Action, End, HULL_MARGIN, HullTree, Motion, Surroundings, Sweep, SweepQuestion, exit_direction,
 };
 use crate::termination::Interrupt;
 
@@ -234,9 +234,12 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.problem.termination.check()?;
         let started = Instant::now();
         let around = self.all_surroundings(runs)?;
-        let Problem { scene, termination, .. } = &self.problem;
+        let Problem { scene, termination, recall, .. } = &self.problem;
         let swept = |(run, around): (&Run, &Arc<Surroundings>)| {
-            straight_sweep(scene, around, run.part, &run.start, &run.action.force(), termination)
+            let Run { part, start, action } = run;
+            let direction = &action.force();
+            let question = SweepQuestion { scene, surroundings: around, part: *part, start, direction };
+            recall.sweep(&question, termination)
         };
         let mut results: Vec<_> =
             runs.par_iter().zip(&around).map(swept).collect::<Result<_, Interrupt>>()?;

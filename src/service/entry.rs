@@ -4,13 +4,18 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, TryLockError};
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
+
+use crate::blocking_graph::StaticAnalysis;
 use crate::cache::{Answered, PlanQuestion, Recall};
-use crate::geometry::Assembly;
+use crate::geometry::{Assembly, Shape};
 use crate::plan::{Plan, PlanStatus, Verifier};
 use crate::search::{
     Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_blockages, search,
 };
-use crate::simulation::{JoinedHulls, PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
+use crate::simulation::{
+    HullTree, JoinedHulls, PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction,
+};
 use crate::termination::{Interrupt, Termination};
 
 use super::ServiceError;
@@ -20,20 +25,27 @@ use super::putting_back::PuttingBack;
 use super::relay::{Quiet, Relay, Silent};
 use super::store::SharedShape;
 
-/// One admitted assembly; fields and overlaps are made when first needed.
+/// One admitted assembly; overlaps are measured, and fields built, when first needed.
 #[derive(Debug)]
 pub(super) struct Entry {
     pub(super) assembly: Assembly,
     /// Those of the assembly, with their fields.
     pub(super) shapes: Vec<Arc<SharedShape>>,
+    /// So many of them were there before, as another assembly's.
+    shapes_known: u64,
     /// Joined so far, also for others.
     hulls: Arc<JoinedHulls>,
     prepared: Mutex<Option<Arc<Prepared>>>,
 }
 
 impl Entry {
-    pub(super) fn new(assembly: Assembly, shapes: Vec<Arc<SharedShape>>, hulls: Arc<JoinedHulls>) -> Self {
-        Self { assembly, shapes, hulls, prepared: Mutex::default() }
+    pub(super) fn new(
+        assembly: Assembly,
+        shapes: Vec<Arc<SharedShape>>,
+        shapes_known: u64,
+        hulls: Arc<JoinedHulls>,
+    ) -> Self {
+        Self { assembly, shapes, shapes_known, hulls, prepared: Mutex::default() }
     }
 
     /// Bytes in memory beside its shapes, about.
@@ -97,25 +109,17 @@ impl Entry {
         sink: &mut dyn PlanSink,
         recall: &Recall,
     ) -> Plan {
-        let prepared = if question.request.no_cache {
-            let fresh: Vec<_> =
-                self.assembly.shapes.iter().map(|s| Arc::new(SharedShape::new(Arc::clone(s)))).collect();
-            Prepared::new(&self.assembly, &fresh, time.termination, sink, recall)
-                .map(|p| (Arc::new(p), false))
-        } else {
-            self.prepared(time.termination, sink, recall)
-        };
-        let (prepared, hit) = match prepared {
+        let (prepared, hit) = match self.ready(question.request, time.termination, recall) {
             Ok(prepared) => prepared,
-            Err(Interrupt::Cancelled) => {
-                return frame.empty(PlanStatus::Cancelled, Some("cancelled".to_owned()));
-            }
-            Err(Interrupt::DeadlinePassed) => {
-                let reason = "the deadline passed while fields were built".to_owned();
-                return frame.empty(PlanStatus::Timeout, Some(reason));
-            }
+            Err(interrupt) => return ended_before(frame, interrupt, "overlaps were measured"),
         };
-        let ready = Ready { prepared: &prepared, hit, recall, question };
+        let started = Instant::now();
+        if looks_at_all_fields(question.request)
+            && let Err(interrupt) = prepared.build_fields(time.termination, sink)
+        {
+            return ended_before(frame, interrupt, "fields were built");
+        }
+        let ready = Ready { prepared: &prepared, hit, fields: started.elapsed(), recall, question };
         let Some(staging) = &question.request.assembly else {
             let (frame, answer) = self.searched(frame, &ready, time, sink);
             return frame.plan(answer);
@@ -131,6 +135,21 @@ impl Entry {
         let back =
             PuttingBack { assembly: &self.assembly, prepared: &prepared, removals: &removals, staging };
         back.plan(plan, time, sink)
+    }
+
+    /// Overlaps, and whether they were there already.
+    fn ready(
+        &self,
+        request: &PlanRequest,
+        termination: &Termination,
+        recall: &Recall,
+    ) -> Result<(Arc<Prepared>, bool), Interrupt> {
+        if !request.no_cache {
+            return self.prepared(termination, recall);
+        }
+        let fresh = |shape: &Arc<Shape>| Arc::new(SharedShape::new(Arc::clone(shape)));
+        let fresh: Vec<_> = self.assembly.shapes.iter().map(fresh).collect();
+        Ok((Arc::new(Prepared::new(&self.assembly, &fresh, termination, recall)?), false))
     }
 
     /// An answer that was found before, told as if it were found now.
@@ -161,7 +180,7 @@ impl Entry {
     ) -> (Frame<'f>, Answer) {
         let request = frame.request;
         let Time { started, termination } = time;
-        let Ready { prepared, hit, recall, question } = *ready;
+        let Ready { prepared, hit, fields, recall, question } = *ready;
         frame.overlaps = answer::overlaps(&self.assembly, &prepared.overlaps);
         let engine = engine_of(request.engine, request.penalty);
         let (limit, note) = accepted(&*engine, prepared.verifier.limit(), &self.assembly);
@@ -180,15 +199,19 @@ impl Entry {
         }
         let outcome = search(request.planner, problem, &mut relay);
         recall.remember_plan(question, termination, &outcome, &prepared.overlaps);
-        let fields = if hit { self.assembly.shapes.len() as u64 } else { prepared.fields_known };
-        let found = Found { fields, pieces: recall.reused(), plan: false };
-        let spent = |time: Duration| if hit { Duration::ZERO } else { time };
-        let times = Times {
-            fields: spent(prepared.sdf_time),
-            overlaps: spent(prepared.overlap_time),
-            total: started.elapsed(),
-        };
+        let found = Found { fields: self.shapes_reused(request, hit), pieces: recall.reused(), plan: false };
+        let overlaps = if hit { Duration::ZERO } else { prepared.overlap_time };
+        let times = Times { fields, overlaps, total: started.elapsed() };
         (frame, Answer { outcome, times, found })
+    }
+
+    /// How many shapes were there already, with their fields, as far as anything had looked at these.
+    fn shapes_reused(&self, request: &PlanRequest, prepared: bool) -> u64 {
+        match (request.no_cache, prepared) {
+            (true, _) => 0,
+            (false, true) => self.shapes.len() as u64,
+            (false, false) => self.shapes_known,
+        }
     }
 
     /// The question in the planning frame.
@@ -222,16 +245,23 @@ impl Entry {
 
     /// Makes ready what any plan needs, as far as `termination` lets it.
     pub(super) fn prepare(&self, termination: &Termination, recall: &Recall) {
-        let Ok((prepared, _)) = self.prepared(termination, &mut Silent, recall) else { return };
+        // First what no record holds: after a restart, whoever asks at once waits for this.
+        if self.shapes.par_iter().try_for_each(|shape| shape.shape.derive(termination)).is_err() {
+            return;
+        }
+        let Ok((prepared, _)) = self.prepared(termination, recall) else { return };
+        // Joined hulls are known to all scenes then.
+        drop(HullTree::new(&prepared.scene, (0..self.assembly.parts.len()).collect(), termination));
         let request = PlanRequest::default();
         let question = PlanQuestion { assembly: &self.assembly, request: &request, fixed: &[], removed: &[] };
         let engine = engine_of(request.engine, request.penalty);
         let asked = Asked { question: &question, engine: &*engine, verifier: &prepared.verifier };
-        // Interrupted, it has remembered what it found.
+        // Interrupted, they have kept what they found.
         let _ = initial_blockages(&self.problem(&prepared, &asked, termination, recall));
+        let _ = prepared.build_fields(termination, &mut Silent);
     }
 
-    /// Fields and overlaps, if they are there.
+    /// Overlaps, if they are there.
     fn at_hand(&self) -> Option<Arc<Prepared>> {
         match self.prepared.try_lock() {
             Ok(slot) => slot.clone(),
@@ -240,12 +270,11 @@ impl Entry {
         }
     }
 
-    /// Fields and overlaps, and whether they were there already. Whoever comes while they are
+    /// Overlaps, and whether they were there already. Whoever comes while they are
     /// being made waits for them, but not beyond its own termination.
     pub(super) fn prepared(
         &self,
         termination: &Termination,
-        sink: &mut dyn PlanSink,
         recall: &Recall,
     ) -> Result<(Arc<Prepared>, bool), Interrupt> {
         loop {
@@ -261,7 +290,7 @@ impl Entry {
             if let Some(prepared) = &*slot {
                 return Ok((Arc::clone(prepared), true));
             }
-            let mut prepared = Prepared::new(&self.assembly, &self.shapes, termination, sink, recall)?;
+            let mut prepared = Prepared::new(&self.assembly, &self.shapes, termination, recall)?;
             prepared.scene.hulls = Arc::clone(&self.hulls);
             let prepared = Arc::new(prepared);
             *slot = Some(Arc::clone(&prepared));
@@ -290,8 +319,27 @@ struct Ready<'a> {
     prepared: &'a Prepared,
     /// It was there already.
     hit: bool,
+    /// How long fields took that were built before the search.
+    fields: Duration,
     recall: &'a Recall,
     question: &'a PlanQuestion<'a>,
+}
+
+/// Whether what answers a request looks at the fields of all parts, again and again: the others build those
+/// that they come to look at.
+fn looks_at_all_fields(request: &PlanRequest) -> bool {
+    let PlanRequest { engine, static_analysis, assembly, .. } = request;
+    *engine == Engine::Penalty || *static_analysis == StaticAnalysis::Paper || assembly.is_some()
+}
+
+/// The plan of a request that ended before its search began.
+fn ended_before(frame: Frame<'_>, interrupt: Interrupt, what: &str) -> Plan {
+    match interrupt {
+        Interrupt::Cancelled => frame.empty(PlanStatus::Cancelled, Some("cancelled".to_owned())),
+        Interrupt::DeadlinePassed => {
+            frame.empty(PlanStatus::Timeout, Some(format!("the deadline passed while {what}")))
+        }
+    }
 }
 
 /// The depth to which paths are verified, and what the reader of a plan should know of it: an engine that

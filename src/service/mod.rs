@@ -26,11 +26,10 @@ use crate::cache::{Cache, CacheStatistics, Recall, Source};
 use crate::geometry::{Assembly, GeometryError, Revision, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, Warning};
 use crate::search::{Engine, PlanRequest, PlanSink, Staging, axes_of, least_travel};
-use crate::simulation::{Action, Axis, PenaltyParameters};
+use crate::simulation::{Action, Axis, HullStore, JoinedHulls, PenaltyParameters};
 use crate::termination::Termination;
 
 use entry::{Entry, engine_of};
-use relay::Silent;
 use store::Store;
 pub use store::StoreStatistics;
 
@@ -111,7 +110,8 @@ impl Service {
     /// A service that remembers in a cache, and knows assemblies up to so many bytes of memory.
     #[must_use]
     pub fn new(cache: Arc<Cache>, budget: usize) -> Self {
-        Self { store: Store::new(budget), cache }
+        let hulls = JoinedHulls::stored(Arc::clone(&cache) as Arc<dyn HullStore>);
+        Self { store: Store::new(budget, hulls), cache }
     }
 
     /// How many assemblies it knows, and what they take.
@@ -150,7 +150,7 @@ impl Service {
         termination: &Termination,
     ) -> Result<Admission, ServiceError> {
         let id = AssemblyId(content_hash(source));
-        if let Some(entry) = self.store.get(id) {
+        if let Some(entry) = self.kept(id) {
             return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly) });
         }
         Ok(self.taken_in(id, Assembly::new_until(source, termination)?))
@@ -177,7 +177,7 @@ impl Service {
         let entry = self.entry(base, termination)?;
         check_parts(&revised_parts(revision), entry.assembly.parts.len())?;
         let id = if revision.is_empty() { base } else { AssemblyId(revision.content_hash(&base.0)) };
-        if let Some(entry) = self.store.get(id) {
+        if let Some(entry) = self.kept(id) {
             return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly) });
         }
         Ok(self.taken_in(id, entry.assembly.revised_until(revision, termination)?))
@@ -186,6 +186,16 @@ impl Service {
     fn taken_in(&self, id: AssemblyId, assembly: Assembly) -> Admission {
         let entry = self.store.insert(id, assembly);
         Admission { id, known: false, warnings: answer::warnings(&entry.assembly) }
+    }
+
+    /// Keeps an assembly on disk as it was taken in, if there is a store on disk: it is ready sooner after a
+    /// restart then.
+    ///
+    /// # Errors
+    /// The id is unknown.
+    pub fn keep(&self, id: AssemblyId) -> Result<(), ServiceError> {
+        self.cache.remember_healed(&id.0, &self.entry(id, &Termination::default())?.assembly);
+        Ok(())
     }
 
     /// Whether an assembly is known, here or on disk. If it is, it counts as used: whoever asks is about
@@ -212,6 +222,8 @@ impl Service {
         let recall = Recall::of(Arc::clone(&self.cache));
         entry.prepare(termination, &recall);
         self.store.settle(id, &entry);
+        // One that was loaded from what it was made of, because another build had taken it in.
+        self.cache.remember_healed(&id.0, &entry.assembly);
         Ok(())
     }
 
@@ -222,7 +234,7 @@ impl Service {
     pub fn overlaps(&self, id: AssemblyId) -> Result<Vec<Overlap>, ServiceError> {
         let entry = self.entry(id, &Termination::default())?;
         let recall = Recall::of(Arc::clone(&self.cache));
-        let found = entry.prepared(&Termination::default(), &mut Silent, &recall);
+        let found = entry.prepared(&Termination::default(), &recall);
         Ok(found.map_or_else(|_| Vec::new(), |(p, _)| answer::overlaps(&entry.assembly, &p.overlaps)))
     }
 
@@ -258,7 +270,7 @@ impl Service {
     ) -> Result<Option<Audit>, ServiceError> {
         let entry = self.entry(id, termination)?;
         let recall = Recall::of(Arc::clone(&self.cache));
-        let Ok((prepared, _)) = entry.prepared(termination, &mut Silent, &recall) else { return Ok(None) };
+        let Ok((prepared, _)) = entry.prepared(termination, &recall) else { return Ok(None) };
         let scene = &prepared.scene;
         let present: Vec<usize> = (0..scene.bodies.len()).collect();
         let least = |part| least_travel(scene, part);
@@ -281,7 +293,7 @@ impl Service {
         let entry = self.entry(id, termination)?;
         check_parts(&[("removed", removed.to_vec())], entry.assembly.parts.len())?;
         let recall = Recall::of(Arc::clone(&self.cache));
-        let Ok((prepared, _)) = entry.prepared(termination, &mut Silent, &recall) else { return Ok(None) };
+        let Ok((prepared, _)) = entry.prepared(termination, &recall) else { return Ok(None) };
         let scene = &prepared.scene;
         let there = |part: &usize| removed.binary_search(part).is_err();
         let present: Vec<usize> = (0..scene.bodies.len()).filter(there).collect();
@@ -302,14 +314,20 @@ impl Service {
     }
 
     fn entry(&self, id: AssemblyId, termination: &Termination) -> Result<Arc<Entry>, ServiceError> {
-        self.store.get(id).map_or_else(|| self.reloaded(id, termination), Ok)
+        self.kept(id).map_or_else(|| self.reloaded(id, termination), Ok)
     }
 
-    /// An assembly that is not in memory, from what the disk knows of it.
+    /// An assembly that is in memory, or on disk as it was taken in.
+    fn kept(&self, id: AssemblyId) -> Option<Arc<Entry>> {
+        let on_disk = || self.cache.healed(&id.0, |content| self.store.shape(content));
+        self.store.get(id).or_else(|| Some(self.store.insert(id, on_disk()?)))
+    }
+
+    /// An assembly that is not there as it was taken in, from what it was made of.
     fn reloaded(&self, id: AssemblyId, termination: &Termination) -> Result<Arc<Entry>, ServiceError> {
         let (mut at, mut revisions) = (id, Vec::new());
         let mut entry = loop {
-            if let Some(entry) = self.store.get(at) {
+            if let Some(entry) = self.kept(at) {
                 break entry;
             }
             match self.cache.source(&at.0).ok_or(ServiceError::UnknownAssembly)? {

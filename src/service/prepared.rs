@@ -30,28 +30,21 @@ pub(super) struct Prepared {
     pub(super) verifier: Verifier,
     /// Overlapping pairs and their depths in the planning frame.
     pub(super) overlaps: Vec<(usize, usize, f64)>,
-    /// Shapes whose field was there already.
-    pub(super) fields_known: u64,
-    /// How long the fields took.
-    pub(super) sdf_time: Duration,
+    /// Those of the shapes.
+    fields: Vec<Arc<Field>>,
     /// How long it took to prepare verification and measure overlaps.
     pub(super) overlap_time: Duration,
 }
 
 impl Prepared {
-    /// Builds the fields that are not there yet in parallel on the current rayon pool, and measures all
-    /// overlaps.
+    /// Measures all overlaps, in parallel on the current rayon pool. Fields are built when they are looked at.
     pub(super) fn new(
         assembly: &Assembly,
         shapes: &[Arc<SharedShape>],
         termination: &Termination,
-        sink: &mut dyn PlanSink,
         recall: &Recall,
     ) -> Result<Self, Interrupt> {
-        let started = Instant::now();
-        let fields_known = shapes.iter().filter(|shape| shape.known_field().is_some()).count() as u64;
-        let fields = build_fields(shapes, termination, sink)?;
-        let sdf_time = started.elapsed();
+        let fields: Vec<_> = shapes.iter().map(|shape| Arc::clone(&shape.field)).collect();
         let started = Instant::now();
         let mut scene = Scene::assembled(assembly, &fields);
         let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
@@ -63,7 +56,30 @@ impl Prepared {
         let mut overlaps = overlaps;
         overlaps.extend(coincident_pairs(&scene, &verifier, termination)?);
         overlaps.sort_by_key(|&(a, b, _)| (a, b));
-        Ok(Self { scene, verifier, overlaps, fields_known, sdf_time, overlap_time: started.elapsed() })
+        Ok(Self { scene, verifier, overlaps, fields, overlap_time: started.elapsed() })
+    }
+
+    /// Builds the fields that are not there yet, in parallel on the current rayon pool.
+    pub(super) fn build_fields(
+        &self,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+    ) -> Result<(), Interrupt> {
+        let total = self.fields.len() as u32;
+        let done = AtomicU32::new(0);
+        let report = |sink: &mut dyn PlanSink, done| {
+            sink.progress(Progress { stage: Stage::Sdf, done, total, simulations: 0 });
+        };
+        report(sink, 0);
+        let sink = std::sync::Mutex::new(sink);
+        self.fields.par_iter().try_for_each(|field| {
+            field.prepare(termination)?;
+            let n = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if let Ok(mut sink) = sink.lock() {
+                report(&mut **sink, n);
+            }
+            Ok(())
+        })
     }
 
     /// Bytes in memory beside the shapes and their fields, about.
@@ -76,29 +92,6 @@ impl Prepared {
 /// The depth beyond what is granted at which paths are refused, in the planning frame.
 pub(super) fn depth_limit(assembly: &Assembly) -> f64 {
     DEPTH_LIMIT * resolution(assembly)
-}
-
-fn build_fields(
-    shapes: &[Arc<SharedShape>],
-    termination: &Termination,
-    sink: &mut dyn PlanSink,
-) -> Result<Vec<Arc<Field>>, Interrupt> {
-    let total = shapes.len() as u32;
-    let done = AtomicU32::new(0);
-    let report = |sink: &mut dyn PlanSink, done| {
-        sink.progress(Progress { stage: Stage::Sdf, done, total, simulations: 0 });
-    };
-    report(sink, 0);
-    let sink = std::sync::Mutex::new(sink);
-    let field = |shape: &Arc<SharedShape>| {
-        let field = shape.field(termination)?;
-        let n = done.fetch_add(1, Ordering::Relaxed) + 1;
-        if let Ok(mut sink) = sink.lock() {
-            report(&mut **sink, n);
-        }
-        Ok(field)
-    };
-    shapes.par_iter().map(field).collect()
 }
 
 fn measure_overlaps(

@@ -3,7 +3,7 @@
 //! hulls.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::Serialize;
 
@@ -13,36 +13,21 @@ use crate::geometry::{Assembly, Shape};
 use crate::lru::Lru;
 use crate::sdf::Field;
 use crate::simulation::JoinedHulls;
-use crate::termination::{Interrupt, Termination};
 
 /// A shape and its field, for all assemblies that have it.
 #[derive(Debug)]
 pub(super) struct SharedShape {
     pub(super) shape: Arc<Shape>,
-    field: OnceLock<Arc<Field>>,
+    pub(super) field: Arc<Field>,
 }
 
 impl SharedShape {
     pub(super) fn new(shape: Arc<Shape>) -> Self {
-        Self { shape, field: OnceLock::new() }
-    }
-
-    /// The field, if it is there.
-    pub(super) fn known_field(&self) -> Option<&Arc<Field>> {
-        self.field.get()
-    }
-
-    /// The field. Two that ask at the same time may both build it: neither waits for the other.
-    pub(super) fn field(&self, termination: &Termination) -> Result<Arc<Field>, Interrupt> {
-        if let Some(field) = self.field.get() {
-            return Ok(Arc::clone(field));
-        }
-        let built = Arc::new(Field::build(&self.shape.surface, termination)?);
-        Ok(Arc::clone(self.field.get_or_init(|| built)))
+        Self { field: Arc::new(Field::of(&shape.surface)), shape }
     }
 
     fn memory(&self) -> usize {
-        self.shape.memory() + self.field.get().map_or(0, |field| field.memory())
+        self.shape.memory() + self.field.memory()
     }
 }
 
@@ -91,13 +76,18 @@ struct Counted {
 
 impl Store {
     /// Nothing yet; `budget` in bytes.
-    pub(super) fn new(budget: usize) -> Self {
-        Self { budget, hulls: Arc::default(), held: Mutex::default() }
+    pub(super) fn new(budget: usize, hulls: JoinedHulls) -> Self {
+        Self { budget, hulls: Arc::new(hulls), held: Mutex::default() }
     }
 
     /// An assembly, which is used by this.
     pub(super) fn get(&self, id: AssemblyId) -> Option<Arc<Entry>> {
         self.held().entries.get(&id)
+    }
+
+    /// A shape that some assembly has, by its content.
+    pub(super) fn shape(&self, content: &[u8; 32]) -> Option<Arc<Shape>> {
+        self.held().shapes.get(content).map(|counted| Arc::clone(&counted.shared.shape))
     }
 
     /// Takes an assembly in, with the shapes that are there in place of equal ones. Of two that came at
@@ -109,13 +99,15 @@ impl Store {
         if let Some(entry) = held.entries.get(&id) {
             return entry;
         }
+        let known = held.shared;
         let shapes: Vec<_> = contents
             .iter()
             .zip(&assembly.shapes)
             .map(|(content, shape)| held.share(content, shape))
             .collect();
+        let known = held.shared - known;
         assembly.shapes = shapes.iter().map(|shared| Arc::clone(&shared.shape)).collect();
-        let entry = Arc::new(Entry::new(assembly, shapes, Arc::clone(&self.hulls)));
+        let entry = Arc::new(Entry::new(assembly, shapes, known, Arc::clone(&self.hulls)));
         held.entries.insert(id, Arc::clone(&entry));
         drop(held);
         self.settle(id, &entry);

@@ -6,6 +6,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 
 use super::*;
+use crate::cache::CacheSettings;
 use crate::fixtures::{cuboid, l_shape, moved, peg_in_hole, source};
 use crate::geometry::{Pose, SourceMesh};
 use crate::plan::PlanStep;
@@ -180,6 +181,54 @@ proptest! {
                 let warm = told(question.ask(&remembering, false, &mut Told { all }));
                 prop_assert_eq!(&warm, &cold, "after {:?}", edit);
             }
+        }
+    }
+}
+
+/// A service that remembers in a folder as well.
+fn on_disk(folder: &std::path::Path) -> Service {
+    let settings = CacheSettings { folder: Some(folder.to_owned()), ..CacheSettings::default() };
+    Service::remembering(Arc::new(Cache::open(&settings).unwrap()))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(
+        std::env::var("SBDP_TEST_EDITS").ok().and_then(|n| n.parse().ok()).unwrap_or(6)
+    ))]
+    /// Every question is asked of a service that just started, about an assembly that an earlier one took in.
+    #[test]
+    fn a_service_that_starts_again_plans_as_one_that_does_not_remember(
+        request in requests(),
+        meshes in prop::sample::select(vec![machine(), posts()]),
+        edits in prop::collection::vec(edit(), 1..4),
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let mut question = Question { meshes, request };
+        for edit in &edits {
+            let id = {
+                let service = on_disk(folder.path());
+                let id = service.admit(&source(question.meshes.clone())).unwrap().id;
+                service.keep(id).unwrap();
+                question.ask(&service, false, &mut Told { all: true });
+                id
+            };
+            let service = on_disk(folder.path());
+            prop_assert!(service.cache().source(&id.0).is_none(), "there is nothing to heal it from");
+            let cold = told(question.ask(&Service::default(), true, &mut Told { all: false }));
+            let kept = service.plan(id, &question.request, &Termination::default(), &mut Told { all: true });
+            prop_assert_eq!(told(kept.unwrap()), cold);
+            // A change of what was kept, beside the same change of what was just taken in.
+            let shifted = Pose::translation(0.0, 0.0, 0.25);
+            let change = Revision { moved: vec![(1, shifted)], ..Revision::default() };
+            let changed = |service: &Service, no_cache: bool| {
+                let request = PlanRequest { no_cache, ..question.request.clone() };
+                let id = service.revise(id, &change).unwrap().id;
+                service.plan(id, &request, &Termination::default(), &mut Told { all: true }).unwrap()
+            };
+            let fresh = Service::default();
+            fresh.admit(&source(question.meshes.clone())).unwrap();
+            prop_assert_eq!(told(changed(&service, false)), told(changed(&fresh, true)), "before {:?}", edit);
+            question = question.edited(edit);
         }
     }
 }

@@ -11,6 +11,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 use nalgebra::{Point3, Vector3, Vector6};
 
 use crate::geometry::{Bounds, Closest, Pose, SampleTree};
+use crate::sdf::Grid;
 use crate::termination::{Poll, Termination};
 
 use super::projection::Row;
@@ -101,12 +102,15 @@ impl<'a> Mover<'a> {
     /// Gathers the contacts with one standing part.
     pub(super) fn near_pair(&self, other: usize, reach: f64, near: &mut Near) {
         let standing = &self.scene.bodies[other];
+        if !self.fields_are_ready(standing) {
+            return;
+        }
         let allowance = self.scene.allowances.of(self.part, other);
         let standing_from_moving = standing.planning_from_shape.inverse() * self.pose;
         let moving_from_standing = standing_from_moving.inverse();
         let side = |side, sampled: &Body, measured: &Body, to_measured: &Pose| {
             let mut found = Near { contacts: Vec::new(), clearance: near.clearance };
-            for tree in [&sampled.shape.samples, &sampled.extra_samples] {
+            for tree in [sampled.shape.samples(), &sampled.extra_samples] {
                 let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
                 let measured = Measured { body: measured, to_measured, allowance, reach };
                 gather(tree, &measured, self.termination, &mut found, tag);
@@ -122,14 +126,20 @@ impl<'a> Mover<'a> {
         near.contacts.extend(theirs.contacts);
     }
 
+    /// Builds the fields of a pair that are not there yet; not to the end once the condition is true.
+    fn fields_are_ready(&self, standing: &Body) -> bool {
+        let ready = |body: &Body| self.termination.is_none_or(|t| body.field.make_ready(t).is_ok());
+        ready(self.body) && ready(standing)
+    }
+
     /// Whether the fields alone show that a sample of either surface is deeper than granted: deeper
     /// than they can be wrong by. Measures nothing exactly, so it is quick.
     pub(super) fn clearly_enters(&self, standing: &[usize]) -> bool {
         let poll = Poll::every(ENTER_POLL, self.termination);
         self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
-            let field = &measured.field;
+            let field: &Grid = &measured.field;
             let limit = -allowance - field.error_bound();
-            sampled.shape.samples.any(
+            sampled.shape.samples().any(
                 |node| poll.is_over() || field.value(&(to_measured * node.centre)) - node.radius < limit,
                 |sample| poll.is_over() || field.value(&(to_measured * sample)) < limit,
             )
@@ -139,9 +149,9 @@ impl<'a> Mover<'a> {
     /// Whether the fields alone show that no sample of either surface is within some distance of the other.
     pub(super) fn seems_clear(&self, standing: &[usize], by: f64) -> bool {
         !self.any_pair(standing, by, |sampled, measured, to_measured, _| {
-            let field = &measured.field;
+            let field: &Grid = &measured.field;
             let limit = by + field.error_bound();
-            sampled.shape.samples.any(
+            sampled.shape.samples().any(
                 |node| field.value(&(to_measured * node.centre)) - node.radius < limit,
                 |sample| field.value(&(to_measured * sample)) < limit,
             )
@@ -152,9 +162,9 @@ impl<'a> Mover<'a> {
     pub(super) fn enters_by(&self, depth: f64, standing: &[usize]) -> bool {
         let poll = Poll::every(ENTER_POLL, self.termination);
         self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
-            let (field, limit) = (&measured.field, -allowance - depth);
+            let (field, limit): (&Grid, f64) = (&measured.field, -allowance - depth);
             let least = |p: &Point3<f64>| field.value(p) - field.error_bound();
-            sampled.shape.samples.any(
+            sampled.shape.samples().any(
                 |node| poll.is_over() || least(&(to_measured * node.centre)) - node.radius < limit,
                 |sample| {
                     let p = to_measured * sample;
@@ -178,6 +188,9 @@ impl<'a> Mover<'a> {
         let bounds = self.body.shape.bounds().transformed(&self.pose).grown(margin);
         self.scene.broad_phase.meeting_of(standing, &bounds).into_iter().any(|other| {
             let still = &self.scene.bodies[other];
+            if !self.fields_are_ready(still) {
+                return true;
+            }
             let allowance = self.scene.allowances.of(self.part, other);
             let to_still = still.planning_from_shape.inverse() * self.pose;
             test(self.body, still, &to_still, allowance)
@@ -382,6 +395,7 @@ fn gather(
     let Measured { body, to_measured, allowance, reach } = *measured;
     // Deeper than nothing cannot be excluded by a bound that is only sure outside.
     let limit = (reach - allowance).max(0.0);
+    let field: &Grid = &body.field;
     let clearance = std::cell::Cell::new(near.clearance);
     let keep = |bound: f64| clearance.set(clearance.get().min(bound + allowance));
     let poll = Poll::every(GATHER_POLL, termination);
@@ -392,7 +406,7 @@ fn gather(
             if poll.is_over() {
                 return None;
             }
-            let bound = body.field.estimate(&(to_measured * node.centre)).lower_bound - node.radius;
+            let bound = field.estimate(&(to_measured * node.centre)).lower_bound - node.radius;
             if bound > limit {
                 keep(bound);
             }
@@ -403,7 +417,7 @@ fn gather(
                 return;
             }
             let p = to_measured * sample;
-            let bound = body.field.estimate(&p).lower_bound;
+            let bound = field.estimate(&p).lower_bound;
             if bound > limit {
                 return keep(bound);
             }

@@ -2,7 +2,8 @@
 //!
 //! A binary tree over the parts, neighbours in space together, whose nodes hold the hull of their
 //! parts: without one part only the hulls above it differ, each made of two smaller ones. So leaving
-//! costs the logarithm of the number of parts, where a hull of all points would cost their number.
+//! costs the logarithm of the number of parts, where a hull of all points would cost their number. All parts
+//! of the scene have their places in it, whichever stand: so what is gone from the start costs no more.
 
 use std::sync::Arc;
 
@@ -29,12 +30,15 @@ impl HullTree {
     /// whoever asks must look at it before using them.
     #[must_use]
     pub fn new(scene: &Scene, standing: Vec<usize>, termination: &Termination) -> Self {
-        let leaves = standing.len().next_power_of_two();
-        let mut order = standing.clone();
+        let mut order: Vec<usize> = (0..scene.bodies.len()).collect();
+        let leaves = order.len().next_power_of_two();
         group(scene, &mut order);
         let mut tree =
             Self { hulls: vec![Arc::default(); 2 * leaves], leaf: vec![0; scene.bodies.len()], standing };
         for (k, &part) in order.iter().enumerate() {
+            if tree.standing.binary_search(&part).is_err() {
+                continue;
+            }
             let body = &scene.bodies[part];
             tree.leaf[part] = leaves + k;
             tree.hulls[leaves + k] = transformed(&body.shape.hull, &body.planning_from_shape).into();
@@ -163,5 +167,33 @@ mod tests {
         }
         assert!(tree.remove(&scene, left[0]) && tree.hull().is_empty());
         assert!(!tree.remove(&scene, left[0]), "it is gone");
+    }
+
+    #[test]
+    fn what_is_gone_from_the_start_costs_few_hulls() {
+        let cubes =
+            spread([-4.0; 3], [3.0; 3], 32).map(|p| cuboid(p.into(), (p.coords.add_scalar(0.5)).into()));
+        let (scene, _) = scene(cubes.chain([cuboid([-4.0; 3], [-3.9; 3]), cuboid([3.9; 3], [4.0; 3])]));
+        let all: Vec<usize> = (0..scene.bodies.len()).collect();
+        let mut whole = HullTree::new(&scene, all.clone(), &Termination::default());
+        let joined = scene.hulls.count();
+        for gone in [0, 7, 33] {
+            let before = scene.hulls.count();
+            let without = HullTree::new(
+                &scene,
+                all.iter().copied().filter(|&part| part != gone).collect(),
+                &Termination::default(),
+            );
+            let new = scene.hulls.count() - before;
+            assert!(new <= 6, "{new} hulls more than {joined}");
+            let mut whole = whole.clone();
+            whole.remove(&scene, gone);
+            assert_eq!(without.standing(), whole.standing());
+            for d in spread([-1.0; 3], [1.0; 3], 40).map(|d| d.coords.normalize()) {
+                let reach = |hull: &[Point3<f64>]| gap_along(&d, hull, &[Point3::origin()]);
+                assert!((reach(without.hull()) - reach(whole.hull())).abs() < 1e-9);
+            }
+        }
+        assert!(joined >= 31 && whole.remove(&scene, 33));
     }
 }

@@ -1,5 +1,5 @@
 //! Hulls of two hulls, remembered by their points: planning again what changed a little joins the same ones
-//! again.
+//! again. The larger ones are in a store as well, if there is one.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -11,10 +11,22 @@ use crate::lru::Lru;
 /// Points that are remembered, of some hundred joined hulls.
 const MOST_POINTS: usize = 200_000;
 
+/// Of fewer points, joining takes no longer than finding it in a store.
+const FEWEST_STORED: usize = 12;
+
+/// Where hulls are found that were joined before this process began.
+pub trait HullStore: std::fmt::Debug + Send + Sync {
+    /// The vertices of the hull of points with a hash, if they are there.
+    fn hull(&self, points: &[u8; 32]) -> Option<Vec<Point3<f64>>>;
+    /// Remembers them.
+    fn remember_hull(&self, points: &[u8; 32], vertices: &[Point3<f64>]);
+}
+
 /// What is remembered. The result is a function of the points alone, so it may be shared by all scenes.
 #[derive(Debug, Default)]
 pub struct JoinedHulls {
     held: Mutex<Held>,
+    store: Option<Arc<dyn HullStore>>,
 }
 
 #[derive(Debug, Default)]
@@ -24,6 +36,12 @@ struct Held {
 }
 
 impl JoinedHulls {
+    /// Nothing yet but what is in a store.
+    #[must_use]
+    pub fn stored(store: Arc<dyn HullStore>) -> Self {
+        Self { held: Mutex::default(), store: Some(store) }
+    }
+
     /// Vertices of the convex hull of the points of two hulls.
     pub(super) fn of(&self, a: &Arc<[Point3<f64>]>, b: &Arc<[Point3<f64>]>) -> Arc<[Point3<f64>]> {
         if a.is_empty() || b.is_empty() {
@@ -33,9 +51,24 @@ impl JoinedHulls {
         if let Some(known) = self.held().joined.get(&key) {
             return known;
         }
-        let joined: Arc<[Point3<f64>]> = hull_vertices(&[&**a, &**b].concat()).into();
+        let store = self.store.as_ref().filter(|_| a.len() + b.len() >= FEWEST_STORED);
+        let stored = store.and_then(|store| store.hull(&key));
+        let join = || {
+            let joined = hull_vertices(&[&**a, &**b].concat());
+            if let Some(store) = store {
+                store.remember_hull(&key, &joined);
+            }
+            joined
+        };
+        let joined: Arc<[Point3<f64>]> = stored.unwrap_or_else(join).into();
         self.held().keep(key, Arc::clone(&joined));
         joined
+    }
+
+    /// How many are remembered.
+    #[cfg(test)]
+    pub(super) fn count(&self) -> usize {
+        self.held().joined.iter().count()
     }
 
     /// A holder that panicked cannot have left more than the sum wrong.
@@ -71,6 +104,8 @@ fn key(a: &[Point3<f64>], b: &[Point3<f64>]) -> [u8; 32] {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::HashMap;
+
     use super::*;
     use crate::fixtures::spread;
 
@@ -87,6 +122,32 @@ mod tests {
         let held = hulls.held();
         assert!((1..=MOST_POINTS).contains(&held.points));
         assert_eq!(held.points, held.joined.iter().map(|(_, h)| h.len()).sum::<usize>());
+    }
+
+    #[test]
+    fn what_a_store_has_is_not_joined_again() {
+        #[derive(Debug, Default)]
+        struct Stored(Mutex<HashMap<[u8; 32], Vec<Point3<f64>>>>);
+        impl HullStore for Stored {
+            fn hull(&self, points: &[u8; 32]) -> Option<Vec<Point3<f64>>> {
+                self.0.lock().unwrap().get(points).cloned()
+            }
+            fn remember_hull(&self, points: &[u8; 32], vertices: &[Point3<f64>]) {
+                self.0.lock().unwrap().insert(*points, vertices.to_vec());
+            }
+        }
+        let cloud = |count: usize| -> Arc<[Point3<f64>]> { spread([0.0; 3], [1.0; 3], count).collect() };
+        let (large, small) = (cloud(FEWEST_STORED), cloud(9));
+        let store = Arc::new(Stored::default());
+        let first = JoinedHulls::stored(store.clone());
+        let joined = first.of(&large, &small);
+        first.of(&cloud(4), &cloud(5));
+        assert_eq!(store.0.lock().unwrap().len(), 1, "few points are joined as quickly");
+        assert_eq!(*JoinedHulls::stored(store.clone()).of(&large, &small), *joined);
+        assert_eq!(store.0.lock().unwrap().len(), 1, "it was found");
+        store.0.lock().unwrap().values_mut().for_each(|hull| hull.truncate(4));
+        let told = JoinedHulls::stored(store.clone()).of(&large, &small);
+        assert_eq!(*told, joined[..4], "nothing was joined");
     }
 
     #[test]

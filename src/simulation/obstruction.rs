@@ -42,8 +42,8 @@ pub fn obstruction(
         let one = Rays { target: &standing.shape.surface, to_target: standing_from_moving, along: forward };
         let to_moving = standing_from_moving.inverse();
         let other = Rays { target: &moving.shape.surface, to_target: to_moving, along: backward };
-        let one = one.longest(&moving.shape.oriented, travel, poll);
-        one.max(other.longest(&standing.shape.oriented, travel, poll))
+        let one = one.longest(moving.shape.oriented(), travel, poll);
+        one.max(other.longest(standing.shape.oriented(), travel, poll))
     };
     scene.broad_phase.meeting_of(standing, &swept).into_iter().map(past).fold(0.0, f64::max)
 }

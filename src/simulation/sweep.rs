@@ -46,37 +46,77 @@ pub enum Sweep {
     },
 }
 
-/// Sweeps a part from `start` along the unit vector `direction` out of its surroundings.
-/// `None` where no way out along it is found.
+/// A part that is to go along a line out of its surroundings.
+#[derive(Debug, Clone, Copy)]
+pub struct SweepQuestion<'a> {
+    /// The bodies.
+    pub scene: &'a Scene,
+    /// What stands.
+    pub surroundings: &'a Surroundings,
+    /// What moves.
+    pub part: usize,
+    /// From where.
+    pub start: &'a Pose,
+    /// The unit vector along the line.
+    pub direction: &'a Vector3<f64>,
+}
+
+/// Sweeps a part along a line out of its surroundings. `None` where no way out along it is found.
 ///
 /// # Errors
 /// The termination condition became true.
 pub fn straight_sweep(
-    scene: &Scene,
-    surroundings: &Surroundings,
-    part: usize,
-    start: &Pose,
-    direction: &Vector3<f64>,
+    question: &SweepQuestion<'_>,
     termination: &Termination,
 ) -> Result<Option<Sweep>, Interrupt> {
+    straight_sweep_past(question, termination, |crossing| crossing.enters())
+}
+
+/// The same, with somebody who tells of each part on the way whether the sweep enters it.
+///
+/// # Errors
+/// The termination condition became true, or what `enters` returns.
+pub fn straight_sweep_past(
+    question: &SweepQuestion<'_>,
+    termination: &Termination,
+    mut enters: impl FnMut(&Crossing<'_>) -> Result<bool, Interrupt>,
+) -> Result<Option<Sweep>, Interrupt> {
+    let SweepQuestion { scene, surroundings, part, start, direction } = *question;
     termination.check()?;
     if let Some(exit) = exit_direction(scene, surroundings, part, start, Some(-direction)) {
         return Ok(Some(Sweep::Clear { path: vec![*start], exit }));
     }
     let Some((travel, exit)) = way_out(scene, surroundings, part, start, direction) else { return Ok(None) };
-    let poll = Poll::every(CAST_POLL, Some(termination));
     let end = moved(start, direction, travel);
     let bounds = scene.bodies[part].shape.bounds();
-    let swept = bounds.transformed(start).union(&bounds.transformed(&end));
-    let blocks = |&other: &usize| enters(scene, part, start, direction, travel, other, &poll);
-    let met = scene.broad_phase.meeting_of(&surroundings.standing, &swept);
-    let blocking = met.into_iter().find(blocks);
-    // What was found of casts that were cut short is not to be believed.
-    termination.check()?;
-    Ok(Some(match blocking {
-        Some(by) => Sweep::Blocked { by },
-        None => Sweep::Clear { path: vec![*start, end], exit },
-    }))
+    let here = bounds.transformed(start);
+    let swept = here.union(&bounds.transformed(&end));
+    for other in scene.broad_phase.meeting_of(&surroundings.standing, &swept) {
+        let granted = scene.allowances.of(part, other) + DEPTH_TOLERANCE;
+        // Beyond, it has passed the other for good: so what is found does not depend on how far others reach.
+        let passed = here.grown(granted).way_past(&scene.bodies[other].bounds, direction);
+        let travel = travel.min(passed);
+        if enters(&Crossing { scene, part, start, direction, travel, other, granted, termination })? {
+            return Ok(Some(Sweep::Blocked { by: other }));
+        }
+    }
+    Ok(Some(Sweep::Clear { path: vec![*start, end], exit }))
+}
+
+/// A part that goes straight past one that stands.
+#[derive(Debug)]
+pub struct Crossing<'a> {
+    scene: &'a Scene,
+    part: usize,
+    start: &'a Pose,
+    direction: &'a Vector3<f64>,
+    /// What stands.
+    pub other: usize,
+    /// How far the part goes, until it is past the other or out of them all.
+    pub travel: f64,
+    /// How deep it may get into the other.
+    pub granted: f64,
+    termination: &'a Termination,
 }
 
 fn moved(pose: &Pose, direction: &Vector3<f64>, travel: f64) -> Pose {
@@ -116,28 +156,30 @@ fn way_out(
     certified(far, hint).or_else(|| certified(beyond, Some(-direction)))
 }
 
-/// Whether the sweep enters a standing part; true, too, once the poll is over.
-fn enters(
-    scene: &Scene,
-    part: usize,
-    start: &Pose,
-    direction: &Vector3<f64>,
-    travel: f64,
-    other: usize,
-    poll: &Poll<'_>,
-) -> bool {
-    let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
-    let standing_from_moving = standing.planning_from_shape.inverse() * start;
-    let moving_from_standing = standing_from_moving.inverse();
-    let forward = standing.planning_from_shape.rotation.inverse() * direction;
-    let backward = start.rotation.inverse() * -direction;
-    let granted = scene.allowances.of(part, other) + DEPTH_TOLERANCE;
-    let casts = |samples, target, to_target, along: &Vector3<f64>| {
-        let cast = Cast { target, to_target, along: *along, travel, granted, poll };
-        cast.enters(samples)
-    };
-    casts(&moving.shape.oriented, &standing.shape.surface, standing_from_moving, &forward)
-        || casts(&standing.shape.oriented, &moving.shape.surface, moving_from_standing, &backward)
+impl Crossing<'_> {
+    /// Whether the part enters the other on the way. That depends on nothing but what is in here, and on the
+    /// shapes of both and where the other stands.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn enters(&self) -> Result<bool, Interrupt> {
+        let Self { scene, part, start, direction, other, travel, granted, termination } = *self;
+        let poll = &Poll::every(CAST_POLL, Some(termination));
+        let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
+        let standing_from_moving = standing.planning_from_shape.inverse() * start;
+        let moving_from_standing = standing_from_moving.inverse();
+        let forward = standing.planning_from_shape.rotation.inverse() * direction;
+        let backward = start.rotation.inverse() * -direction;
+        let casts = |samples, target, to_target, along: &Vector3<f64>| {
+            let cast = Cast { target, to_target, along: *along, travel, granted, poll };
+            cast.enters(samples)
+        };
+        let entered = casts(moving.shape.oriented(), &standing.shape.surface, standing_from_moving, &forward)
+            || casts(standing.shape.oriented(), &moving.shape.surface, moving_from_standing, &backward);
+        // What was found of casts that were cut short is not to be believed.
+        termination.check()?;
+        Ok(entered)
+    }
 }
 
 /// Segments from the samples of one surface against another.
@@ -156,7 +198,7 @@ impl Cast<'_> {
         // In the samples' frame.
         let along = self.to_target.rotation.inverse() * self.along;
         let corridor = self.corridor();
-        samples.iter().any(|(point, normals)| {
+        samples.leading(&self.to_target, &corridor, &along, STEEPNESS).any(|(point, normals)| {
             if self.poll.is_over() {
                 return true;
             }
@@ -204,7 +246,8 @@ mod tests {
         let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != part).collect();
         let around = Surroundings::new(scene, standing);
         let start = &scene.bodies[part].planning_from_shape;
-        straight_sweep(scene, &around, part, start, &direction, &Termination::default()).unwrap()
+        let question = SweepQuestion { scene, surroundings: &around, part, start, direction: &direction };
+        straight_sweep(&question, &Termination::default()).unwrap()
     }
 
     #[test]
@@ -214,8 +257,15 @@ mod tests {
         let termination = Termination::default();
         termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
         let start = &scene.bodies[1].planning_from_shape;
-        let swept = straight_sweep(&scene, &around, 1, start, &Vector3::z(), &termination);
-        assert_eq!(swept, Err(Interrupt::Cancelled));
+        let (scene, direction) = (&scene, &Vector3::z());
+        let question = SweepQuestion { scene, surroundings: &around, part: 1, start, direction };
+        assert_eq!(straight_sweep(&question, &termination), Err(Interrupt::Cancelled));
+        let termination = Termination::default();
+        let swept = straight_sweep_past(&question, &termination, |crossing| {
+            termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+            crossing.enters()
+        });
+        assert_eq!(swept, Err(Interrupt::Cancelled), "a cast that was cut short");
     }
 
     fn is_clear(scene: &Scene, part: usize, direction: Vector3<f64>) -> bool {

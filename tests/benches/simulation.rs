@@ -19,7 +19,8 @@ use sbdp::geometry::{Assembly, load_assembly};
 use sbdp::plan::Verifier;
 use sbdp::sdf::Field;
 use sbdp::simulation::{
-    Action, Axis, Motion, Scene, SlidingEngine, Surroundings, TransitionFunction, pair_blocks, straight_sweep,
+    Action, Axis, Motion, Scene, SlidingEngine, Surroundings, SweepQuestion, TransitionFunction, pair_blocks,
+    straight_sweep,
 };
 use sbdp::termination::Termination;
 
@@ -75,7 +76,10 @@ fn measure(folder: &std::path::Path) -> Result<[Vec<f64>; 5], String> {
         let around = Surroundings::new(&scene, standing);
         let pose = scene.bodies[part].planning_from_shape;
         for action in &translations {
-            let sweep = || straight_sweep(&scene, &around, part, &pose, &action.force(), &never);
+            let direction = &action.force();
+            let question =
+                SweepQuestion { scene: &scene, surroundings: &around, part, start: &pose, direction };
+            let sweep = || straight_sweep(&question, &never);
             times[1].push(timed(sweep).1);
         }
         for action in translations.iter().chain(&turning) {

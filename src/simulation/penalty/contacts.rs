@@ -13,7 +13,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::geometry::{Pose, SampleTree};
-use crate::sdf::{Field, FieldSample};
+use crate::sdf::{FieldSample, Grid};
 use crate::simulation::{Body, Scene, Surroundings};
 
 use super::parameters::PenaltyParameters;
@@ -204,7 +204,7 @@ impl<'a> Contacts<'a> {
             ([&self.mine, &self.body.extra_samples], pair.standing, to_standing),
             ([theirs, &pair.standing.extra_samples], self.body, to_standing.inverse()),
         ] {
-            let field = &measured.field;
+            let field: &Grid = &measured.field;
             points_near(&trees, field, &to_measured, 0.0, |p| {
                 depth = depth.max(-field.value(&(to_measured * p)));
             });
@@ -314,7 +314,7 @@ struct Law {
 
 /// How the points of one side of a pair are seen at a placement.
 struct View<'a> {
-    field: &'a Field,
+    field: &'a Grid,
     /// From the frame of the points to that of the field.
     to_measured: Matrix3<f64>,
     measured_offset: Vector3<f64>,
@@ -390,7 +390,7 @@ impl View<'_> {
 /// Visits the points whose distance from the surface may be `reach` or less, or that may be inside.
 fn points_near(
     trees: &[&SampleTree; 2],
-    field: &Field,
+    field: &Grid,
     to_measured: &Pose,
     reach: f64,
     mut visit: impl FnMut(Point3<f64>),

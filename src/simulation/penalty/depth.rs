@@ -5,6 +5,7 @@
 //! `sliding` uses, against the triangles. The field only tells which samples need not be asked.
 
 use crate::geometry::{Pose, SampleTree, interpolate};
+use crate::sdf::Grid;
 use crate::simulation::Body;
 
 use super::contacts::Contacts;
@@ -60,8 +61,9 @@ fn holds(
 
 /// Whether a sample of one body is deeper than `limit` in the other.
 fn is_deeper(sampled: &Body, measured: &Body, to_measured: &Pose, limit: f64) -> bool {
-    let trees: [&SampleTree; 2] = [&sampled.shape.samples, &sampled.extra_samples];
+    let trees: [&SampleTree; 2] = [sampled.shape.samples(), &sampled.extra_samples];
     let found = std::cell::Cell::new(false);
+    let field: &Grid = &measured.field;
     for tree in trees {
         tree.walk(
             (),
@@ -69,9 +71,9 @@ fn is_deeper(sampled: &Body, measured: &Body, to_measured: &Pose, limit: f64) ->
                 let p = to_measured * node.centre;
                 // Spheres no larger than the limit are left out by their depth: outside it is 0.
                 let is_left_out = if node.radius > limit {
-                    measured.field.estimate(&p).lower_bound > node.radius
+                    field.estimate(&p).lower_bound > node.radius
                 } else {
-                    measured.field.deepest(&p) + node.radius <= limit
+                    field.deepest(&p) + node.radius <= limit
                 };
                 (!found.get() && !is_left_out).then_some(())
             },

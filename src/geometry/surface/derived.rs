@@ -1,0 +1,128 @@
+//! What questions about a surface need of its mesh: adjacency, normals, trees.
+
+use nalgebra::{Unit, Vector3};
+
+use super::NO_TRIANGLE;
+use crate::geometry::folds::Folds;
+use crate::geometry::rim::Rim;
+use crate::geometry::triangle::area_normal;
+use crate::geometry::triangle_tree::TriangleTree;
+use crate::geometry::winding::WindingTree;
+use crate::geometry::{Mesh, Solidity};
+
+/// All that derives from a mesh.
+#[derive(Clone)]
+pub(super) struct Derived {
+    pub(super) face_normals: Vec<Vector3<f64>>,
+    /// Per triangle and edge: the triangle on the other side.
+    pub(super) neighbours: Vec<[u32; 3]>,
+    pub(super) vertex_normals: Vec<Vector3<f64>>,
+    /// Triangles around each vertex, as ranges of `fan`.
+    pub(super) fan_start: Vec<u32>,
+    pub(super) fan: Vec<u32>,
+    pub(super) tree: TriangleTree,
+    pub(super) winding: Option<WindingTree>,
+    /// Where signs come from winding numbers.
+    pub(super) rim: Option<Rim>,
+    pub(super) folds: Option<Folds>,
+}
+
+impl Derived {
+    pub(super) fn of(mesh: &Mesh) -> Self {
+        let face_normals = (0..mesh.triangles.len())
+            .map(|t| {
+                let [a, b, c] = mesh.corners(t);
+                area_normal(&a, &b, &c).try_normalize(0.0).unwrap_or_else(Vector3::zeros)
+            })
+            .collect::<Vec<_>>();
+        let (fan_start, fan) = fans(mesh);
+        let winding =
+            (mesh.solidity == Solidity::Winding).then(|| WindingTree::new(&mesh.vertices, &mesh.triangles));
+        let neighbours = neighbours(mesh);
+        let folds = if winding.is_some() { None } else { Folds::of(mesh, &face_normals, &neighbours) };
+        let corners: Vec<_> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
+        Self {
+            rim: winding.is_some().then(|| Rim::of(&mesh.vertices, &mesh.triangles)),
+            folds,
+            neighbours,
+            vertex_normals: vertex_normals(mesh, &face_normals),
+            face_normals,
+            fan_start,
+            fan,
+            tree: TriangleTree::new(&corners),
+            winding,
+        }
+    }
+
+    /// Bytes in memory.
+    pub(super) fn memory(&self) -> usize {
+        size_of_val(&*self.face_normals)
+            + size_of_val(&*self.neighbours)
+            + size_of_val(&*self.vertex_normals)
+            + size_of_val(&*self.fan_start)
+            + size_of_val(&*self.fan)
+            + self.tree.memory()
+            + self.winding.as_ref().map_or(0, WindingTree::memory)
+            + self.rim.as_ref().map_or(0, Rim::memory)
+            + self.folds.as_ref().map_or(0, Folds::memory)
+    }
+}
+
+fn neighbours(mesh: &Mesh) -> Vec<[u32; 3]> {
+    let mut sides: Vec<(u32, u32, u32, u8)> = Vec::with_capacity(mesh.triangles.len() * 3);
+    for (i, t) in mesh.triangles.iter().enumerate() {
+        for e in 0..3usize {
+            let (a, b) = (t[e], t[(e + 1) % 3]);
+            sides.push((a.min(b), a.max(b), i as u32, e as u8));
+        }
+    }
+    sides.sort_unstable();
+    let mut out = vec![[NO_TRIANGLE; 3]; mesh.triangles.len()];
+    let mut i = 0;
+    while i < sides.len() {
+        let same = sides[i..].iter().take_while(|s| (s.0, s.1) == (sides[i].0, sides[i].1)).count();
+        // Edges of more than two faces are paired in order: there, any pairing is as good.
+        for pair in sides[i..i + same].chunks_exact(2) {
+            out[pair[0].2 as usize][pair[0].3 as usize] = pair[1].2;
+            out[pair[1].2 as usize][pair[1].3 as usize] = pair[0].2;
+        }
+        i += same;
+    }
+    out
+}
+
+fn vertex_normals(mesh: &Mesh, face_normals: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let mut out = vec![Vector3::zeros(); mesh.vertices.len()];
+    for (t, n) in mesh.triangles.iter().zip(face_normals) {
+        for k in 0..3 {
+            let p = mesh.vertices[t[k] as usize];
+            let a = mesh.vertices[t[(k + 1) % 3] as usize] - p;
+            let b = mesh.vertices[t[(k + 2) % 3] as usize] - p;
+            if let (Some(a), Some(b)) = (Unit::try_new(a, 0.0), Unit::try_new(b, 0.0)) {
+                out[t[k] as usize] += n * a.dot(&b).clamp(-1.0, 1.0).acos();
+            }
+        }
+    }
+    out
+}
+
+fn fans(mesh: &Mesh) -> (Vec<u32>, Vec<u32>) {
+    let mut start = vec![0u32; mesh.vertices.len() + 1];
+    for t in &mesh.triangles {
+        for &v in t {
+            start[v as usize + 1] += 1;
+        }
+    }
+    for i in 0..mesh.vertices.len() {
+        start[i + 1] += start[i];
+    }
+    let mut next = start.clone();
+    let mut fan = vec![0u32; mesh.triangles.len() * 3];
+    for (i, t) in mesh.triangles.iter().enumerate() {
+        for &v in t {
+            fan[next[v as usize] as usize] = i as u32;
+            next[v as usize] += 1;
+        }
+    }
+    (start, fan)
+}
