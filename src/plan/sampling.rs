@@ -24,7 +24,7 @@ use super::verify::{Asked, Entry};
 /// Largest travel of a vertex between two checked poses, as a share of the longest side.
 const DENSITY: f64 = 0.004;
 /// Samples and nodes between two looks at the termination condition: on open surfaces each takes long.
-const SAMPLES_POLL: u32 = 2;
+const SAMPLES_POLL: u32 = 1;
 /// A path that turns further than this (radians) is a screw.
 const FAR: f64 = 4.0;
 
