@@ -116,6 +116,12 @@ impl<'t> Poll<'t> {
         Self { termination, every, steps: Cell::new(0), over: Cell::new(false) }
     }
 
+    /// The same, but the first look is after so many steps.
+    #[cfg(test)]
+    pub(crate) fn first_after(steps: u32, termination: &'t Termination) -> Self {
+        Self { steps: Cell::new(1), ..Self::every(steps + 1, Some(termination)) }
+    }
+
     /// To be called at each step: whether the condition was seen to be true.
     #[track_caller]
     pub fn is_over(&self) -> bool {

@@ -150,6 +150,10 @@ impl PatchTree {
             self.build(surface, triangles, start, start + half, poll);
             self.nodes[me].right = self.nodes.len() as u32;
             self.build(surface, triangles, start + half, end, poll);
+            // A half that was left out has no node.
+            if poll.is_over() {
+                return;
+            }
         }
         let node = &mut self.nodes[me];
         node.last_vertex = self.vertices.len() as u32;
@@ -193,6 +197,7 @@ fn furthest(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
 mod tests {
     use super::*;
     use crate::fixtures::{ball, l_shape, open_box, surface};
+    use crate::termination::Termination;
 
     /// The triangles below a node; checks that its sphere holds them.
     fn held(tree: &PatchTree, surface: &Surface, index: u32) -> Vec<u32> {
@@ -206,6 +211,19 @@ mod tests {
             assert!((p - patch.centre).norm() <= patch.radius * (1.0 + 1e-12));
         }
         found
+    }
+
+    #[test]
+    fn a_tree_may_be_cut_short_anywhere() {
+        let surface = surface(ball(3));
+        let termination = Termination::default();
+        let whole = PatchTree::new(&surface, &Poll::every(1, Some(&termination))).nodes.len();
+        termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+        for steps in 1..whole as u32 {
+            let poll = Poll::first_after(steps, &termination);
+            let tree = PatchTree::new(&surface, &poll);
+            assert!(poll.is_over() && tree.nodes.len() <= steps as usize);
+        }
     }
 
     #[test]
