@@ -15,6 +15,9 @@ use crate::search::{PlanRequest, PlanSink, Progress};
 use crate::service::{AssemblyId, Service};
 use crate::termination::{Silence, Termination, Watch};
 
+/// A plan that takes longer is watched for so long, and ended at moments within that.
+const LONGEST: Duration = Duration::from_secs(60);
+
 /// What to measure.
 #[derive(Debug, Clone)]
 pub struct CancelRequest {
@@ -68,7 +71,7 @@ pub fn cancel(
         let plan = |termination: &Termination| ended(&service, id, &question, termination);
         let started = Instant::now();
         let watch = Arc::new(Watch::default());
-        plan(&Termination::new(None).watched(&watch))?;
+        plan(&Termination::new(started.checked_add(LONGEST)).watched(&watch))?;
         let whole = started.elapsed();
         let mut times = Vec::new();
         for sample in 0..request.samples {
