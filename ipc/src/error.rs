@@ -28,9 +28,9 @@ pub enum ErrorCode {
     SlowReader = 9,
     /// The daemon is shutting down.
     ShuttingDown = 10,
-    /// The message exceeds a limit of the daemon.
+    /// The message exceeds a limit of the daemon, or what memory is left.
     TooLarge = 11,
-    /// The client cancelled before planning began.
+    /// The client cancelled, or left, before planning began.
     Cancelled = 12,
 }
 

@@ -18,8 +18,8 @@ use super::closing::Closing;
 use super::convert;
 use super::figures::{Figures, Latencies, Surroundings};
 use super::intake::Upload;
-use super::memory;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
+use super::resources;
 use super::session::{End, Input, Link, Session, State};
 use super::shared_queue::Queues;
 use super::workers::{AdmitJob, PlanJob, Planning, SessionKey, WorkerEvent};
@@ -84,7 +84,7 @@ impl Limits {
             threads: config.workers.threads_per_request,
             grace: seconds(config.times.grace_s),
             drain: seconds(config.times.drain_s),
-            free_memory: memory::available,
+            free_memory: resources::free_memory,
         }
     }
 }

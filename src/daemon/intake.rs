@@ -10,8 +10,8 @@ use sbdp_ipc::headers::RequestHeader;
 
 use super::desk::{Desk, Incoming};
 use super::figures::Timed;
-use super::memory;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
+use super::resources;
 use super::session::Link;
 use super::workers::{AdmitJob, Planning, Received};
 use crate::service::AssemblyId;
@@ -62,7 +62,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
         if let Err(rejected) = self.queues.admissions.check(ticket(owner, bytes)) {
             return Some(self.upload_rejected(owner, rejected));
         }
-        let needed = memory::needed(bytes as u64);
+        let needed = resources::memory_needed(bytes as u64);
         if needed < SMALL {
             return None;
         }

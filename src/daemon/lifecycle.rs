@@ -142,49 +142,6 @@ fn remove_if_there(path: &Path) -> Result<(), LifecycleError> {
     ignore_missing(fs::remove_file(path)).map_err(io_error(path))
 }
 
-/// Each client costs a few file descriptors: take as many as the system allows.
-pub(crate) fn raise_file_limit() {
-    use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
-    let limit = getrlimit(Resource::Nofile);
-    let raised = Rlimit { current: limit.maximum, maximum: limit.maximum };
-    if let Err(error) = setrlimit(Resource::Nofile, raised) {
-        tracing::debug!(%error, "the limit of open files stays as it is");
-    }
-}
-
-/// Less free shared memory than this is worth a warning.
-const SMALL_SHARED_MEMORY: u64 = 256 << 20;
-
-/// Looks how much shared memory is left. What runs full is a SIGBUS, not an error: it is said before that.
-#[derive(Debug, Default)]
-pub(crate) struct SharedMemory {
-    /// It was little when it was looked at last.
-    is_small: bool,
-}
-
-impl SharedMemory {
-    /// Bytes that are free; none where there is no limit. Warns when it has become little.
-    pub(crate) fn look(&mut self) -> Option<u64> {
-        let stat = rustix::fs::statvfs("/dev/shm").ok().filter(|stat| stat.f_blocks > 0)?;
-        let free = stat.f_bavail.saturating_mul(stat.f_frsize);
-        self.judge(free);
-        Some(free)
-    }
-
-    fn judge(&mut self, free: u64) {
-        // What goes up and down about the limit is not worth a line each time.
-        let limit = if self.is_small { 2 * SMALL_SHARED_MEMORY } else { SMALL_SHARED_MEMORY };
-        let was_small = std::mem::replace(&mut self.is_small, free < limit);
-        if self.is_small && !was_small {
-            tracing::warn!(
-                free_mb = free >> 20,
-                "little is free in /dev/shm: many clients or large uploads may end the daemon; enlarge it \
-                 (`mount -o remount,size=…`, `docker run --shm-size`), or see who fills it (`ls -l /dev/shm`)"
-            );
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -233,16 +190,6 @@ mod tests {
         drop(lease);
         assert!(matches!(Endpoint::find(&place.runtime_dir), Err(EndpointError::NoDaemon(_))));
         assert_eq!(fs::read_dir(&place.root).unwrap().count(), 0);
-    }
-
-    #[test]
-    fn little_shared_memory_is_noticed_until_there_is_clearly_more() {
-        let mut memory = SharedMemory::default();
-        let mut small = |free_mb: u64| {
-            memory.judge(free_mb << 20);
-            memory.is_small
-        };
-        assert!(!small(300) && small(200) && small(300) && !small(600) && !small(300));
     }
 
     #[test]

@@ -78,7 +78,7 @@ impl Mesh {
 }
 
 /// The edges of a triangle in its direction of travel.
-pub(super) fn directed_edges(t: &[u32; 3]) -> [[u32; 2]; 3] {
+pub(in crate::geometry) fn directed_edges(t: &[u32; 3]) -> [[u32; 2]; 3] {
     [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]
 }
 

@@ -18,6 +18,7 @@ mod half_space;
 mod heal;
 mod helix;
 mod hull;
+mod incidence;
 mod linking_number;
 mod load;
 mod mass;

@@ -8,6 +8,8 @@
 
 use nalgebra::Point3;
 
+use super::incidence::{Side, Sides};
+
 /// Winding numbers nearer to one half tell no sign that holds beside their point, too: twice what those of
 /// [`Surface::winding`](super::Surface::winding) are off by.
 pub const WINDING_DOUBT: f64 = 0.1;
@@ -48,20 +50,14 @@ impl Rim {
     /// The rim of triangles: edges that they do not use as often in one direction as in the other.
     #[must_use]
     pub fn of(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
-        let sides = triangles.iter().flat_map(|t| {
-            [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]]
-                .map(|[a, b]| if a < b { ([a, b], 1i32) } else { ([b, a], -1) })
-        });
-        let mut sides: Vec<_> = sides.collect();
-        sides.sort_unstable();
-        let edge = |group: &[([u32; 2], i32)]| {
-            let excess = group.iter().map(|s| s.1).sum::<i32>().unsigned_abs();
-            let [a, b] = group[0].0.map(|i| vertices[i as usize]);
+        let edge = |(edge, sides): ([u32; 2], &[Side])| {
+            let excess = sides.iter().map(|s| if s.upwards { 1i32 } else { -1 }).sum::<i32>().unsigned_abs();
+            let [a, b] = edge.map(|i| vertices[i as usize]);
             let length = (b - a).norm();
             let weight = length * f64::from(excess);
             (excess > 0).then(|| RimEdge { middle: nalgebra::center(&a, &b), length, weight })
         };
-        Self { edges: sides.chunk_by(|a, b| a.0 == b.0).filter_map(edge).collect() }
+        Self { edges: Sides::of(triangles).iter().filter_map(edge).collect() }
     }
 
     /// Its edges.

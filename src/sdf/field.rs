@@ -46,7 +46,7 @@ impl Field {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub fn make_ready(&self, termination: &Termination) -> Result<(), Interrupt> {
+    pub fn prepare_here(&self, termination: &Termination) -> Result<(), Interrupt> {
         self.built(Threads::This, termination)
     }
 

@@ -188,7 +188,7 @@ fn a_cancelled_build_ends_with_the_reason() {
     let termination = Termination::default();
     termination.cancel_flag().store(true, Ordering::Relaxed);
     let built = Field::of(&Arc::new(surface(cuboid([0.0; 3], [1.0; 3]))));
-    for end in [built.prepare(&termination), built.make_ready(&termination)] {
+    for end in [built.prepare(&termination), built.prepare_here(&termination)] {
         assert_eq!(end.err(), Some(Interrupt::Cancelled));
     }
     assert!(!built.is_built());

@@ -128,7 +128,7 @@ impl<'a> Mover<'a> {
 
     /// Builds the fields of a pair that are not there yet; not to the end once the condition is true.
     fn fields_are_ready(&self, standing: &Body) -> bool {
-        let ready = |body: &Body| self.termination.is_none_or(|t| body.field.make_ready(t).is_ok());
+        let ready = |body: &Body| self.termination.is_none_or(|t| body.field.prepare_here(t).is_ok());
         ready(self.body) && ready(standing)
     }
 

@@ -61,8 +61,8 @@ impl Touching {
         let mut normals = Vec::new();
         for &other in &parts {
             let still = &scene.bodies[other];
-            body.field.make_ready(termination)?;
-            still.field.make_ready(termination)?;
+            body.field.prepare_here(termination)?;
+            still.field.prepare_here(termination)?;
             let within = common(&bounds, &still.bounds.grown(reach));
             let deepest = reach + scene.allowances.of(part, other);
             for (asked, at, measured, stands, sense) in [

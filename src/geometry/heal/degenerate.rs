@@ -5,8 +5,8 @@ use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 
-use super::incidence::Sides;
 use super::{Draft, Findings, RELATIVE_TOLERANCE};
+use crate::geometry::incidence::Sides;
 use crate::geometry::mesh::{self, directed_edges};
 
 /// Slivers can make new slivers of their neighbours; after so many rounds the rest stays.

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use super::incidence::open_edges;
 use super::{Draft, Findings};
+use crate::geometry::incidence::open_edges;
 
 /// Drops repetitions of triangles. Two that face each other are either one triangle given
 /// with both orientations, or the wall between two bodies that touch: what leaves fewer edges

@@ -8,7 +8,6 @@
 mod crossing;
 mod degenerate;
 mod duplicate;
-mod incidence;
 mod orientation;
 mod shells;
 mod validate;
@@ -19,9 +18,9 @@ mod tests;
 
 use nalgebra::Point3;
 
+use super::incidence::open_edges;
 use super::{GeometryError, Mesh, Solidity, SourcePart};
 use crate::termination::{Interrupt, Termination};
-use incidence::open_edges;
 
 /// Lengths below this share of a part's largest extent are rounding, not shape.
 const RELATIVE_TOLERANCE: f64 = 1e-9;

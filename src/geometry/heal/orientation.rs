@@ -2,8 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::incidence::Sides;
 use super::{Draft, Findings};
+use crate::geometry::incidence::Sides;
 use crate::geometry::mesh;
 
 /// Triangles made consistent.

@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use nalgebra::{Point3, Vector3};
 
 use super::crossing::Surfaces;
-use super::incidence::{Side, Sides};
 use super::orientation::{face_outward, winding_number};
 use super::{Draft, Findings, plural};
+use crate::geometry::incidence::{Side, Sides};
 use crate::geometry::{Solidity, mesh};
 use crate::termination::{Interrupt, Termination};
 

@@ -4,6 +4,8 @@ use nalgebra::{Unit, Vector3};
 
 use super::NO_TRIANGLE;
 use crate::geometry::folds::Folds;
+use crate::geometry::incidence::Sides;
+use crate::geometry::mesh::directed_edges;
 use crate::geometry::rim::Rim;
 use crate::geometry::triangle::area_normal;
 use crate::geometry::triangle_tree::TriangleTree;
@@ -69,24 +71,20 @@ impl Derived {
 }
 
 fn neighbours(mesh: &Mesh) -> Vec<[u32; 3]> {
-    let mut sides: Vec<(u32, u32, u32, u8)> = Vec::with_capacity(mesh.triangles.len() * 3);
-    for (i, t) in mesh.triangles.iter().enumerate() {
-        for e in 0..3usize {
-            let (a, b) = (t[e], t[(e + 1) % 3]);
-            sides.push((a.min(b), a.max(b), i as u32, e as u8));
-        }
-    }
-    sides.sort_unstable();
     let mut out = vec![[NO_TRIANGLE; 3]; mesh.triangles.len()];
-    let mut i = 0;
-    while i < sides.len() {
-        let same = sides[i..].iter().take_while(|s| (s.0, s.1) == (sides[i].0, sides[i].1)).count();
-        // Edges of more than two faces are paired in order: there, any pairing is as good.
-        for pair in sides[i..i + same].chunks_exact(2) {
-            out[pair[0].2 as usize][pair[0].3 as usize] = pair[1].2;
-            out[pair[1].2 as usize][pair[1].3 as usize] = pair[0].2;
+    let mut set = |triangle: u32, edge: [u32; 2], other: u32| {
+        let edges = directed_edges(&mesh.triangles[triangle as usize]);
+        let at = edges.iter().position(|[a, b]| [*a.min(b), *a.max(b)] == edge);
+        if let Some(at) = at {
+            out[triangle as usize][at] = other;
         }
-        i += same;
+    };
+    for (edge, sides) in Sides::of(&mesh.triangles).iter() {
+        // Edges of more than two faces are paired in order: there, any pairing is as good.
+        for pair in sides.chunks_exact(2) {
+            set(pair[0].triangle, edge, pair[1].triangle);
+            set(pair[1].triangle, edge, pair[0].triangle);
+        }
     }
     out
 }

@@ -1,18 +1,18 @@
 //! Which triangles meet at an edge.
 
-use crate::geometry::mesh::directed_edges;
+use super::mesh::directed_edges;
 
 /// A triangle at an edge: its index, and whether it travels the edge upwards (from the
 /// smaller vertex index to the larger).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Side {
-    pub(super) triangle: u32,
-    pub(super) upwards: bool,
+pub(in crate::geometry) struct Side {
+    pub(in crate::geometry) triangle: u32,
+    pub(in crate::geometry) upwards: bool,
 }
 
-/// The sides of every edge. Sorted rather than hashed: healing asks for them again and again, of every part.
+/// The sides of every edge. Sorted rather than hashed: they are asked for again and again, of every part.
 #[derive(Debug)]
-pub(super) struct Sides {
+pub(in crate::geometry) struct Sides {
     /// Edges by their vertices, smaller index first, ascending; where their sides begin.
     edges: Vec<([u32; 2], u32)>,
     /// By edge, and of an edge by triangle.
@@ -20,7 +20,7 @@ pub(super) struct Sides {
 }
 
 impl Sides {
-    pub(super) fn of(triangles: &[[u32; 3]]) -> Self {
+    pub(in crate::geometry) fn of(triangles: &[[u32; 3]]) -> Self {
         let sides = (0u32..).zip(triangles).flat_map(|(triangle, t)| {
             directed_edges(t).map(|[a, b]| ([a.min(b), a.max(b)], Side { triangle, upwards: a < b }))
         });
@@ -36,14 +36,14 @@ impl Sides {
     }
 
     /// All edges, ascending, with the triangles at each, ascending.
-    pub(super) fn iter(&self) -> impl Iterator<Item = ([u32; 2], &[Side])> {
+    pub(in crate::geometry) fn iter(&self) -> impl Iterator<Item = ([u32; 2], &[Side])> {
         let ends = self.edges[1.min(self.edges.len())..].iter().map(|e| e.1 as usize);
         let ends = ends.chain([self.sides.len()]);
         self.edges.iter().zip(ends).map(|(&(edge, start), end)| (edge, &self.sides[start as usize..end]))
     }
 
     /// The triangles at the edge between two vertices, ascending.
-    pub(super) fn at(&self, a: u32, b: u32) -> &[Side] {
+    pub(in crate::geometry) fn at(&self, a: u32, b: u32) -> &[Side] {
         let Ok(i) = self.edges.binary_search_by_key(&[a.min(b), a.max(b)], |e| e.0) else { return &[] };
         let end = self.edges.get(i + 1).map_or(self.sides.len(), |next| next.1 as usize);
         &self.sides[self.edges[i].1 as usize..end]
@@ -51,7 +51,7 @@ impl Sides {
 }
 
 /// How many edges have an odd number of triangles: the border of a surface that is not closed.
-pub(super) fn open_edges(triangles: &[[u32; 3]]) -> usize {
+pub(in crate::geometry) fn open_edges(triangles: &[[u32; 3]]) -> usize {
     Sides::of(triangles).iter().filter(|(_, s)| s.len() % 2 == 1).count()
 }
 

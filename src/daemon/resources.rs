@@ -1,5 +1,5 @@
-//! How much memory is left. To run out of it ends the process, and with it everybody's requests: what would
-//! need more is refused before.
+//! What the system leaves to this process: memory, shared memory, file descriptors. To run out of memory of
+//! either kind ends the process, and with it everybody's requests: what would need more is refused before.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,13 +10,13 @@ use std::path::{Path, PathBuf};
 const NEEDED: u64 = 48;
 
 /// What taking in an upload of so many bytes needs.
-pub(super) fn needed(upload: u64) -> u64 {
+pub(super) fn memory_needed(upload: u64) -> u64 {
     upload.saturating_mul(NEEDED)
 }
 
 /// Bytes that this process can still take: what the machine has, or less where a control group (v2) that it
 /// is in allows less. `None` where the system does not say.
-pub(super) fn available() -> Option<u64> {
+pub(super) fn free_memory() -> Option<u64> {
     let machine = fs::read_to_string("/proc/meminfo").ok().and_then(|text| of_machine(&text));
     let groups = fs::read_to_string("/proc/self/cgroup").ok();
     let groups = groups.and_then(|text| of_groups(&text, |file| fs::read_to_string(file).ok()));
@@ -40,6 +40,49 @@ fn of_groups(text: &str, read: impl Fn(&Path) -> Option<String>) -> Option<u64> 
         Some(number(group.join("memory.max"))?.saturating_sub(number(group.join("memory.current"))?))
     };
     group.ancestors().filter_map(left).min()
+}
+
+/// Each client costs a few file descriptors: take as many as the system allows.
+pub(crate) fn raise_file_limit() {
+    use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
+    let limit = getrlimit(Resource::Nofile);
+    let raised = Rlimit { current: limit.maximum, maximum: limit.maximum };
+    if let Err(error) = setrlimit(Resource::Nofile, raised) {
+        tracing::debug!(%error, "the limit of open files stays as it is");
+    }
+}
+
+/// Less free shared memory than this is worth a warning.
+const SMALL_SHARED_MEMORY: u64 = 256 << 20;
+
+/// Looks how much shared memory is left. What runs full is a SIGBUS, not an error: it is said before that.
+#[derive(Debug, Default)]
+pub(crate) struct SharedMemory {
+    /// It was little when it was looked at last.
+    is_small: bool,
+}
+
+impl SharedMemory {
+    /// Bytes that are free; none where there is no limit. Warns when it has become little.
+    pub(crate) fn look(&mut self) -> Option<u64> {
+        let stat = rustix::fs::statvfs("/dev/shm").ok().filter(|stat| stat.f_blocks > 0)?;
+        let free = stat.f_bavail.saturating_mul(stat.f_frsize);
+        self.judge(free);
+        Some(free)
+    }
+
+    fn judge(&mut self, free: u64) {
+        // What goes up and down about the limit is not worth a line each time.
+        let limit = if self.is_small { 2 * SMALL_SHARED_MEMORY } else { SMALL_SHARED_MEMORY };
+        let was_small = std::mem::replace(&mut self.is_small, free < limit);
+        if self.is_small && !was_small {
+            tracing::warn!(
+                free_mb = free >> 20,
+                "little is free in /dev/shm: many clients or large uploads may end the daemon; enlarge it \
+                 (`mount -o remount,size=…`, `docker run --shm-size`), or see who fills it (`ls -l /dev/shm`)"
+            );
+        }
+    }
 }
 
 #[cfg(test)]
@@ -78,6 +121,16 @@ mod tests {
 
     #[test]
     fn this_process_can_take_some() {
-        assert!(available().is_none_or(|bytes| bytes > 1 << 20), "{:?}", available());
+        assert!(free_memory().is_none_or(|bytes| bytes > 1 << 20), "{:?}", free_memory());
+    }
+
+    #[test]
+    fn little_shared_memory_is_noticed_until_there_is_clearly_more() {
+        let mut memory = SharedMemory::default();
+        let mut small = |free_mb: u64| {
+            memory.judge(free_mb << 20);
+            memory.is_small
+        };
+        assert!(!small(300) && small(200) && small(300) && !small(600) && !small(300));
     }
 }
