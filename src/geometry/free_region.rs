@@ -6,27 +6,22 @@
 //! convex has all of a hull in it that has the hull's corners: a few points decide about a whole
 //! piece of surface, and about all of its straight motion.
 
+mod growth;
+
 use nalgebra::{Point3, Vector3};
 
 use super::half_space::{Cloud, HalfSpace};
-use super::surface::NO_TRIANGLE;
-use super::triangle_tree::{Corners, Visitor, WIDTH};
-use super::{Closest, Surface, separating_direction};
+use super::{Closest, Surface};
+use growth::grown;
 
 /// A surface may reach so far into a region, in the planning frame: rounding of flush faces.
 const TOUCH: f64 = 2e-6;
-/// A box so far inside may hold nothing that reaches further than that.
-const BOX_TOUCH: f64 = 1e-6;
 /// A point so deep in a region is well inside.
 const INNER: f64 = 2.0 * TOUCH;
 /// Points nearer to the surface than this, in the planning frame, count as on it.
 const SKIN: f64 = 1e-6;
 /// What is no further below a plane counts as above it.
 const ROUNDING: f64 = 1e-12;
-/// With more planes than this, a region is not worth its tests.
-const MOST_PLANES: usize = 160;
-/// So far towards the seed, as a share of the way, hulls are taken to be apart from what they touch.
-const INSET: f64 = 0.02;
 /// Steps of alternating projection before a point counts as too far.
 const PROJECTIONS: usize = 8;
 
@@ -51,6 +46,8 @@ pub struct Wanted<'a> {
     /// another side is nearer. Not worth its time where points may be inside: what is seen from
     /// behind is entered there, mostly.
     pub from_behind: bool,
+    /// A unit vector across the points, towards where they are free, if any is likely; else zero.
+    pub facing: Vector3<f64>,
 }
 
 /// Why there is no region worth having.
@@ -190,185 +187,15 @@ impl Surface {
         radius: f64,
         wanted: Wanted<'_>,
     ) -> Result<FreeRegion, NoRegion> {
-        let Wanted { points, most, .. } = wanted;
-        let sides = Vec::with_capacity(8);
-        let region = FreeRegion { centre: *seed, radius, sides, inner: *seed };
-        let reach = points.iter().map(|p| (p - seed).norm()).fold(0.0, f64::max);
-        let mut growth = Growth {
-            surface: self,
-            wanted,
-            cloud: Cloud::new(points, seed),
-            inset: Vec::new(),
-            least: (radius * 0.5).max(reach - most),
-            nearest: None,
-            region,
-            amid: None,
-        };
-        self.nearest_first(seed, &mut growth);
-        let Growth { region, nearest, least, amid, .. } = growth;
-        if let Some(triangle) = amid {
-            return Err(NoRegion::Amid(triangle));
-        }
-        if region.radius < least {
-            return Err(NoRegion::Cramped);
-        }
+        let most = wanted.most;
+        let (region, nearest) = grown(self, seed, radius, wanted)?;
         // No surface passes through: all of the region is where one point well inside is. (A region
         // too thin to have one may follow the plane of a face into the solid.)
         let inner = region.nearest_within(seed, most + 4.0 * INNER, INNER).ok_or(NoRegion::Cramped)?;
-        let closest = self.closest_from(&inner, nearest.unwrap_or(0));
+        let closest = self.closest_from(&inner, nearest);
         let is_outside = self.signed(&inner, &closest) > 0.0;
         if is_outside { Ok(FreeRegion { inner, ..region }) } else { Err(NoRegion::Cramped) }
     }
-}
-
-/// A region as its planes are found.
-struct Growth<'a> {
-    surface: &'a Surface,
-    wanted: Wanted<'a>,
-    /// The wanted points and the seed.
-    cloud: Cloud,
-    /// The wanted points, a little towards the seed, so that hulls which touch are apart: made when
-    /// first needed.
-    inset: Vec<Point3<f64>>,
-    /// A smaller region is not worth having: some wanted point is further than [`Wanted::most`] from it.
-    least: f64,
-    /// The triangle of the first side.
-    nearest: Option<u32>,
-    region: FreeRegion,
-    /// The triangle that ended it.
-    amid: Option<u32>,
-}
-
-/// A half-space, and how far the worst of the wanted points is inside.
-type Candidate = Option<(f64, HalfSpace)>;
-
-impl Growth<'_> {
-    /// The better of two half-spaces: that in front of some corners with this normal, and the best
-    /// so far.
-    fn better(
-        &self,
-        triangle: u32,
-        corners: &[Point3<f64>; 3],
-        normal: Vector3<f64>,
-        best: Candidate,
-    ) -> Candidate {
-        // Seen from behind, a surface is entered already, mostly.
-        let from_behind = normal.dot(&self.surface.face_normal(triangle)) < -0.6;
-        if from_behind { best } else { self.any_better(corners, normal, best) }
-    }
-
-    /// The same, also from behind: the back of a wall of which another side is nearer.
-    fn any_better(&self, corners: &[Point3<f64>; 3], normal: Vector3<f64>, best: Candidate) -> Candidate {
-        if normal == Vector3::zeros() {
-            return best;
-        }
-        let side = HalfSpace::before(corners, normal);
-        let worth = self.cloud.least_above(&side);
-        if best.is_none_or(|(most, _)| worth > most) { Some((worth, side)) } else { best }
-    }
-
-    /// The best half-space in front of a triangle, of those that are worth trying.
-    fn best(&mut self, triangle: u32, corners: &[Point3<f64>; 3], closest: &Closest) -> Candidate {
-        let seed = self.region.centre;
-        // The faces that meet where the triangle is nearest, and the way there.
-        let mut best = None;
-        self.surface.feature_normals(closest, |n| best = self.better(triangle, corners, n, best));
-        if closest.distance > TOUCH {
-            best = self.better(triangle, corners, (seed - closest.point) / closest.distance, best);
-        }
-        let enough = |best: Candidate| best.is_some_and(|(worth, _)| worth >= 0.0);
-        if !enough(best) {
-            // Beside the triangle: along the faces across its sides, and in its own plane.
-            for edge in 0..3 {
-                let across = self.surface.neighbour(triangle, edge as u8);
-                if across != NO_TRIANGLE {
-                    best = self.better(triangle, corners, self.surface.face_normal(across), best);
-                }
-                let along = corners[(edge + 1) % 3] - corners[edge];
-                let outward = along.cross(&self.surface.face_normal(triangle));
-                if let Some(outward) = outward.try_normalize(0.0) {
-                    best = self.better(triangle, corners, outward, best);
-                }
-            }
-        }
-        if !enough(best)
-            && let Some(apart) = separating_direction(corners, self.inset(), f64::NEG_INFINITY, None)
-        {
-            best = self.better(triangle, corners, apart, best);
-            if self.wanted.from_behind && best.is_none_or(|(worth, _)| worth < -self.wanted.most) {
-                best = self.any_better(corners, apart, best);
-            }
-        }
-        best
-    }
-
-    fn inset(&mut self) -> &[Point3<f64>] {
-        if self.inset.is_empty() {
-            let (seed, most) = (self.region.centre, self.wanted.most);
-            let inset = |p: &Point3<f64>| p + (seed - p) * (most / (seed - p).norm().max(most)).max(INSET);
-            self.inset = self.wanted.points.iter().map(inset).collect();
-        }
-        &self.inset
-    }
-}
-
-impl Visitor for Growth<'_> {
-    fn reach(&self) -> f64 {
-        self.region.radius
-    }
-
-    fn hides_boxes(
-        &self,
-        origin: &Point3<f64>,
-        min: &[[f32; WIDTH]; 3],
-        max: &[[f32; WIDTH]; 3],
-    ) -> [bool; WIDTH] {
-        any_of(&self.region.sides, |side| side.boxes_above(origin, min, max).map(|above| above <= BOX_TOUCH))
-    }
-
-    fn hides_triangles(&self, corners: &Corners) -> [bool; WIDTH] {
-        any_of(&self.region.sides, |side| side.triangles_above(corners).map(|above| above <= TOUCH))
-    }
-
-    fn visit(&mut self, triangle: u32) {
-        let corners = self.surface.corners(triangle);
-        let behind = |side: &HalfSpace| corners.iter().all(|v| side.above(v) <= TOUCH);
-        if self.region.sides.iter().any(behind) {
-            return;
-        }
-        let closest = self.surface.closest_on(triangle, &self.region.centre);
-        match self.best(triangle, &corners, &closest) {
-            // What cannot be held for this triangle cannot be held at all.
-            Some((worth, side)) if worth >= -self.wanted.most && self.region.sides.len() < MOST_PLANES => {
-                self.nearest.get_or_insert(triangle);
-                self.region.sides.push(side);
-            }
-            Some((worth, _)) if worth < -self.wanted.most => {
-                self.amid = Some(triangle);
-                self.region.radius = 0.0;
-            }
-            _ => {
-                self.region.radius = closest.distance.min(self.region.radius);
-                if self.region.radius < self.least {
-                    self.region.radius = 0.0;
-                }
-            }
-        }
-    }
-}
-
-/// Which of eight some side hides.
-#[inline]
-fn any_of(sides: &[HalfSpace], hides: impl Fn(&HalfSpace) -> [bool; WIDTH]) -> [bool; WIDTH] {
-    let mut hidden = [false; WIDTH];
-    for side in sides {
-        let by = hides(side);
-        (0..WIDTH).for_each(|k| hidden[k] |= by[k]);
-        if hidden == [true; WIDTH] {
-            break;
-        }
-    }
-    hidden
 }
 
 #[cfg(test)]
@@ -376,10 +203,26 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::fixtures::{ball, cuboid, l_shape, spread, surface, tube};
+    use crate::fixtures::{ball, cuboid, l_shape, rod, spread, surface, tube};
 
     fn near(points: &[Point3<f64>]) -> Wanted<'_> {
-        Wanted { points, most: 0.1, from_behind: true }
+        Wanted { points, most: 0.1, from_behind: true, facing: Vector3::zeros() }
+    }
+
+    #[test]
+    fn across_the_ridge_of_a_long_bar_there_is_room_for_what_lies_a_little_askew() {
+        // A strip 0.0003 below the ridge at x = 1, not quite along it: below the planes of both faces it is
+        // too deep, and a plane along it would have to be far out to be clear of the bar's other end.
+        let bar = surface(rod(1.0, [-4.0, 4.0], 24));
+        let (tilt, below) = (1e-3, 3e-4);
+        for z in [-3.0, 0.0, 3.0] {
+            let corner = |y: f64, along: f64| Point3::new(1.0 - below - tilt * along, y, z + along);
+            let points = [corner(-0.008, -0.1), corner(0.008, -0.1), corner(0.0, 0.1)];
+            let facing = Vector3::new(1.0, 0.0, tilt).normalize();
+            let wanted = Wanted { most: 1e-3, facing, ..near(&points) };
+            let region = bar.free_region(&Point3::new(1.0 + 1e-6, 0.0, z), 0.2, wanted).unwrap();
+            assert!(points.iter().all(|p| region.distance_within(p, 1e-3).is_some()));
+        }
     }
 
     #[test]

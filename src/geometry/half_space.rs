@@ -15,8 +15,8 @@ pub(super) struct HalfSpace {
 }
 
 impl HalfSpace {
-    /// The half-space behind which a triangle just disappears, with this normal.
-    pub(super) fn before(corners: &[Point3<f64>; 3], normal: Vector3<f64>) -> Self {
+    /// The half-space behind which some points just disappear, with this normal.
+    pub(super) fn before(corners: &[Point3<f64>], normal: Vector3<f64>) -> Self {
         let height = corners.iter().map(|v| normal.dot(&v.coords)).fold(f64::NEG_INFINITY, f64::max);
         Self { normal, height }
     }

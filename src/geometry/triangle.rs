@@ -2,6 +2,8 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::Bounds;
+
 /// The feature of a triangle on which a closest point lies. Edge `i` joins corners `i` and `i + 1`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Feature {
@@ -92,6 +94,56 @@ pub fn bisected(corners: &[Point3<f64>; 3]) -> (f64, [[Point3<f64>; 3]; 2]) {
     (length(side), [[a, cut, c], [cut, b, c]])
 }
 
+/// The part of a triangle that lies in a box: a convex polygon, of nine corners at most.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Clipped {
+    corners: [Point3<f64>; 9],
+    count: usize,
+}
+
+impl Clipped {
+    /// Cut off plane by plane (I. E. Sutherland and G. W. Hodgman 1974). What lies on a plane stays.
+    pub(super) fn new(triangle: &[Point3<f64>; 3], bounds: &Bounds) -> Self {
+        let mut clipped = Self { corners: [Point3::origin(); 9], count: 3 };
+        clipped.corners[..3].copy_from_slice(triangle);
+        for axis in 0..3 {
+            clipped = clipped.cut(|p| bounds.max[axis] - p[axis]);
+            clipped = clipped.cut(|p| p[axis] - bounds.min[axis]);
+        }
+        clipped
+    }
+
+    /// What is left where a linear function is not negative.
+    fn cut(&self, inside: impl Fn(&Point3<f64>) -> f64) -> Self {
+        let corners = self.corners();
+        if corners.iter().all(|p| inside(p) >= 0.0) {
+            return *self;
+        }
+        let mut left = Self { corners: [Point3::origin(); 9], count: 0 };
+        for (p, q) in corners.iter().zip(corners.iter().cycle().skip(1)) {
+            let (here, there) = (inside(p), inside(q));
+            if here >= 0.0 {
+                left.push(*p);
+            }
+            if (here < 0.0 && there > 0.0) || (here > 0.0 && there < 0.0) {
+                left.push(p + (q - p) * (here / (here - there)));
+            }
+        }
+        left
+    }
+
+    fn push(&mut self, p: Point3<f64>) {
+        // Rounding may make a corner more than geometry has: then the last ones are as good as one.
+        let at = self.count.min(self.corners.len() - 1);
+        self.corners[at] = p;
+        self.count = at + 1;
+    }
+
+    pub(super) fn corners(&self) -> &[Point3<f64>] {
+        &self.corners[..self.count]
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,6 +154,31 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn what_is_left_of_a_triangle_is_all_that_lies_in_the_box(
+            triangle in prop::array::uniform3(point()),
+            corners in prop::array::uniform2(point()),
+            direction in point(),
+        ) {
+            let bounds = Bounds::of(&corners);
+            let clipped = Clipped::new(&triangle, &bounds);
+            prop_assert!(clipped.corners().iter().all(|p| bounds.grown(1e-9).contains(p)));
+            let on_triangle = |p: &Point3<f64>| {
+                let [a, b, c] = &triangle;
+                (closest_on_triangle(p, a, b, c).0 - p).norm() < 1e-9
+            };
+            prop_assert!(clipped.corners().iter().all(on_triangle));
+            let reach = |points: &mut dyn Iterator<Item = Point3<f64>>| {
+                points.map(|p| p.coords.dot(&direction.coords)).fold(f64::NEG_INFINITY, f64::max)
+            };
+            let weights = (0..=40u32).flat_map(|i| (0..=40 - i).map(move |j| [i, j, 40 - i - j]));
+            let at = |w: [u32; 3]| {
+                Point3::from((0..3).map(|k| triangle[k].coords * f64::from(w[k]) / 40.0).sum::<Vector3<f64>>())
+            };
+            let within = reach(&mut weights.map(at).filter(|p| bounds.contains(p)));
+            prop_assert!(within <= reach(&mut clipped.corners().iter().copied()) + 1e-9);
+        }
+
         #[test]
         fn no_point_of_the_triangle_is_closer(p in point(), a in point(), b in point(), c in point()) {
             let (q, _) = closest_on_triangle(&p, &a, &b, &c);

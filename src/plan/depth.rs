@@ -20,7 +20,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::geometry::{Closest, FreeRegion, Parts, PatchTree, Surface, Wanted, bisected};
+use crate::geometry::{Closest, FreeRegion, Parts, PatchTree, Surface, Wanted, area_normal, bisected};
 use crate::termination::{Interrupt, Termination};
 
 use super::course::{Interval, Leg, View};
@@ -110,6 +110,7 @@ impl Question<'_> {
             regions: Vec::new(),
             places: HashMap::new(),
             wanted: Vec::new(),
+            facing: Vector3::zeros(),
             found: Found::default(),
         };
         if let Some(root) = self.tree.root() {
@@ -164,6 +165,7 @@ struct Search<'a> {
     places: HashMap<Place, Vec<u32>>,
     /// The corners of the hull in question.
     wanted: Vec<Point3<f64>>,
+    facing: Vector3<f64>,
     found: Found,
 }
 
@@ -198,6 +200,7 @@ impl Search<'_> {
             // What is beyond the ball is half of the way.
             in_time = swept.radius - ball > 2.0 * patch.radius;
             self.wanted.clear();
+            self.facing = Vector3::zeros();
             self.wanted.extend(tree.extremes(index).flat_map(|p| leg.maps.iter().map(move |m| m.apply(p))));
             let points = tree.vertices(index);
             let fits = |region: &FreeRegion, most: f64| {
@@ -247,6 +250,8 @@ impl Search<'_> {
                 }
                 let swept = swept(&points, leg.slack);
                 self.wanted.clone_from(&points);
+                let outward = area_normal(&corners[0], &corners[1], &corners[2]);
+                self.facing = leg.end.rotation * -outward.try_normalize(0.0).unwrap_or_default();
                 let fits = |region: &FreeRegion, most: f64| furthest(points.iter().copied(), region, most);
                 if self.is_settled(&swept, leg.slack, &mut hint, fits)
                     || self.is_measured(&corners, &leg, &swept, hint.triangle)
@@ -337,7 +342,7 @@ impl Search<'_> {
     fn region(&self, swept: &Swept, closest: &Closest, signed: f64, most: f64) -> Option<FreeRegion> {
         let Swept { centre, radius, .. } = swept;
         let seen = (closest, signed);
-        let wanted = Wanted { points: &self.wanted, most, from_behind: false };
+        let wanted = Wanted { points: &self.wanted, most, from_behind: false, facing: self.facing };
         self.asked.measured.free_region_around(centre, radius * ROOM, seen, wanted).ok()
     }
 

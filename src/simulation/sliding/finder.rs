@@ -243,7 +243,7 @@ impl<'a> Finder<'a> {
         let most = pair.allowance + spot.held;
         let ahead = pair.shifted * shift;
         let Placed { points, cloud, extremes, centre, radius } = &self.placed;
-        let of = |points| Wanted { points, most, from_behind: true };
+        let of = |points| Wanted { points, most, from_behind: true, facing: Vector3::zeros() };
         let region = if ahead == Vector3::zeros() {
             let around = (radius + AROUND) * ROOM;
             pair.measured.free_region_around(centre, around, (&seen.closest, seen.signed), of(extremes))
