@@ -10,7 +10,7 @@ use crate::geometry::{
 };
 use crate::plan::Verifier;
 use crate::sdf::Field;
-use crate::simulation::Scene;
+use crate::simulation::{Pair, Scene};
 use crate::termination::Termination;
 
 pub(crate) use crate::bench::families::cells;
@@ -186,7 +186,8 @@ pub(crate) fn scene(meshes: impl IntoIterator<Item = SourceMesh>) -> (Scene, Ver
     let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
     let verifier = Verifier::new(&assembly.shapes, shape_of, LIMIT);
     for (a, b) in (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))) {
-        let depth = verifier.assembled_depth(&scene, a, b, &Termination::default()).unwrap();
+        let depth =
+            verifier.assembled_depth(&scene, &Pair::turned(&scene, a, b), &Termination::default()).unwrap();
         if depth > 1e-6 * scene.longest_side {
             scene.allowances.grant(a, b, depth);
         }

@@ -92,19 +92,15 @@ impl Kind {
     #[must_use]
     pub fn algorithm(self) -> u32 {
         match self {
-            Self::Overlap
-            | Self::Blocking
-            | Self::Witness
-            | Self::Motion
-            | Self::Plan
-            | Self::Touching
+            Self::Touching
             | Self::Source
             | Self::Answer
             | Self::Shape
             | Self::Healed
             | Self::Hull
             | Self::Swept => 1,
-            Self::Verdict => 2,
+            Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Plan => 2,
+            Self::Verdict => 3,
         }
     }
 

@@ -3,13 +3,16 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use super::verdict::KnownVerdicts;
 use super::{Cache, Key, Record};
 
-/// One request's view of the cache; without a cache, nothing is remembered. Copies count together.
+/// One request's view of the cache; without a cache, nothing outlives the request. Copies count together.
 #[derive(Debug, Clone, Default)]
 pub struct Recall {
     cache: Option<Arc<Cache>>,
     reused: Arc<Counts>,
+    /// What this request found itself, which also serves without a cache.
+    pub(super) verdicts: Arc<KnownVerdicts>,
 }
 
 #[derive(Debug, Default)]
@@ -46,7 +49,7 @@ impl Recall {
     /// A new request's view.
     #[must_use]
     pub fn of(cache: Arc<Cache>) -> Self {
-        Self { cache: Some(cache), reused: Arc::default() }
+        Self { cache: Some(cache), ..Self::default() }
     }
 
     /// Whether anything is remembered at all.

@@ -1,31 +1,52 @@
-//! Verification: what the check of a path found past one part that stands. It depends on the path and on
-//! that part alone, so a change costs only the checks of the paths that come near it.
+//! Verification: what the check of a path found past one part that stands. It depends on the two shapes and
+//! on how one passes the other alone ([`Passing`]), so a change costs only the checks of the paths that come
+//! near it, and what leaves alike is checked once.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use nalgebra::Point3;
 
-use super::motion::add_standing;
 use super::pair::add_pose;
 use super::recall::About;
 use super::records::{EntryRecord, VerdictRecord};
 use super::{Digest, Key, Kind, Recall};
-use crate::geometry::Pose;
-use crate::plan::{Entry, Verdict};
-use crate::simulation::Scene;
+use crate::plan::{Entry, Passing, Verdict};
 use crate::termination::Interrupt;
 
-/// The check of a path, to be refused at a depth of `limit`, past a part that stands.
+/// The check of a path past a part that stands, to be refused at some depth.
 #[derive(Debug, Clone, Copy)]
 pub struct VerdictQuestion<'a> {
-    /// The bodies.
-    pub scene: &'a Scene,
-    /// What stands.
-    pub other: usize,
-    /// What moves.
-    pub part: usize,
-    /// Poses of its shape.
-    pub path: &'a [Pose],
+    /// What moves, past what, and how.
+    pub passing: &'a Passing<'a>,
     /// The depth that is refused.
     pub limit: f64,
+}
+
+/// What one request found.
+#[derive(Debug, Default)]
+pub(super) struct KnownVerdicts(Mutex<HashMap<Key, VerdictRecord>>);
+
+/// Of more, all are forgotten.
+const MOST_KNOWN: usize = 4096;
+
+impl KnownVerdicts {
+    fn get(&self, key: &Key) -> Option<VerdictRecord> {
+        self.lock().get(key).cloned()
+    }
+
+    fn put(&self, key: Key, record: VerdictRecord) {
+        let mut known = self.lock();
+        if known.len() >= MOST_KNOWN {
+            known.clear();
+        }
+        known.insert(key, record);
+    }
+
+    /// It holds plain data: it is whole even if a holder panicked.
+    fn lock(&self) -> MutexGuard<'_, HashMap<Key, VerdictRecord>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 impl Recall {
@@ -38,31 +59,33 @@ impl Recall {
         question: &VerdictQuestion<'_>,
         check: impl FnOnce() -> Result<Verdict, Interrupt>,
     ) -> Result<Verdict, Interrupt> {
-        if !self.remembers() {
-            return check();
+        let ([_, other], key) = (question.passing.parts, question.key());
+        if let Some(record) = self.verdicts.get(&key) {
+            return Ok(verdict(record, other));
         }
-        let key = question.key();
-        if let Some(record) = self.get(&key) {
+        let record = if let Some(record) = self.get(&key) {
             self.count(About::Verdict);
-            return Ok(verdict(record, question.other));
-        }
-        let verdict = check()?;
-        self.put(key, &record(&verdict));
-        Ok(verdict)
+            record
+        } else {
+            let record = record(&check()?);
+            self.put(key, &record);
+            record
+        };
+        self.verdicts.put(key, record.clone());
+        Ok(verdict(record, other))
     }
 }
 
 impl VerdictQuestion<'_> {
     fn key(&self) -> Key {
-        let Self { scene, other, part, path, limit } = *self;
+        let Passing { shapes, path, centre, granted, longest_side, .. } = self.passing;
         let mut digest = Digest::new();
-        digest.hash(scene.bodies[part].shape.content());
-        digest.numbers([limit, scene.longest_side]);
-        // Between waypoints, this point moves on a line.
-        digest.numbers(scene.centre_in_shape(part).iter().copied());
+        shapes.iter().for_each(|shape| {
+            digest.hash(shape.content());
+        });
+        digest.numbers([self.limit, *granted, *longest_side]).numbers(centre.iter().copied());
         digest.integer(path.len() as u64);
         path.iter().for_each(|pose| add_pose(&mut digest, pose));
-        add_standing(&mut digest, scene, part, other);
         digest.key(Kind::Verdict)
     }
 }

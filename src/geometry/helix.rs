@@ -17,8 +17,8 @@ const WIDEST: f64 = 0.7;
 /// The screw motion along one helix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Helix {
-    /// The axis frame: z along the axis, the origin on it.
-    pub axis_from_planning: Pose,
+    /// To the axis frame (z along the axis, the origin on it), from that in which the axis is given.
+    pub axis_from_frame: Pose,
     /// Travel along the axis per radian.
     pub rise: f64,
 }
@@ -30,8 +30,8 @@ impl Helix {
         let across = axis.cross(&Vector3::ith(axis.iamin(), 1.0)).normalize();
         let basis = Matrix3::from_columns(&[across, axis.cross(&across), *axis]);
         let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(basis));
-        let planning_from_axis = Pose::from_parts(Translation3::from(through.coords), rotation);
-        Self { axis_from_planning: planning_from_axis.inverse(), rise }
+        let frame_from_axis = Pose::from_parts(Translation3::from(through.coords), rotation);
+        Self { axis_from_frame: frame_from_axis.inverse(), rise }
     }
 
     /// The displacement by an angle, in the axis frame.
@@ -166,7 +166,7 @@ mod tests {
     fn the_axis_frame_has_the_axis_as_z() {
         let axis = Vector3::new(1.0, -2.0, 0.5).normalize();
         let helix = Helix::about(&axis, &Point3::new(3.0, 1.0, 2.0), 0.25);
-        let on_axis = helix.axis_from_planning * (Point3::new(3.0, 1.0, 2.0) + axis * 2.0);
+        let on_axis = helix.axis_from_frame * (Point3::new(3.0, 1.0, 2.0) + axis * 2.0);
         assert!((on_axis - Point3::new(0.0, 0.0, 2.0)).norm() < 1e-12);
         assert!(
             (helix.screwed(TAU) * Point3::new(1.0, 0.0, 0.0) - Point3::new(1.0, 0.0, helix.pitch())).norm()

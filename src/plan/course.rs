@@ -20,7 +20,7 @@ const REMEMBERED: u32 = 12;
 /// Legs of more bends than this likewise.
 const MOST_BENDS: usize = 12;
 
-/// The path of a part.
+/// The path of a part, in the frame of the one that it passes.
 #[derive(Debug)]
 pub(super) struct Course {
     pub(super) segments: Vec<Segment>,
@@ -164,7 +164,6 @@ pub(super) struct Leg {
 /// standing one, or the other way round.
 pub(super) struct View<'a> {
     course: &'a Course,
-    planning_from_standing: Pose,
     /// Whether points of the moving part are looked at.
     on_moving: bool,
     /// Shorter stretches are taken as a point, however bent.
@@ -173,13 +172,8 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    pub(super) fn new(
-        course: &'a Course,
-        planning_from_standing: Pose,
-        on_moving: bool,
-        shortest: f64,
-    ) -> Self {
-        Self { course, planning_from_standing, on_moving, shortest, legs: HashMap::new() }
+    pub(super) fn new(course: &'a Course, on_moving: bool, shortest: f64) -> Self {
+        Self { course, on_moving, shortest, legs: HashMap::new() }
     }
 
     pub(super) fn leg(&mut self, interval: Interval) -> Rc<Leg> {
@@ -196,8 +190,7 @@ impl<'a> View<'a> {
     fn measured(&self, interval: Interval) -> Leg {
         let length = self.course.length * interval.share();
         let from = length * interval.index as f64;
-        let end = self.course.pose(from + length).unwrap_or_else(Pose::identity);
-        let to_standing = self.planning_from_standing.inverse() * end;
+        let to_standing = self.course.pose(from + length).unwrap_or_else(Pose::identity);
         let mut leg = Leg {
             maps: Vec::new(),
             slack: 0.0,
@@ -254,16 +247,11 @@ impl<'a> View<'a> {
     /// The map for a part turned by `rotation` (or what stands for it) with its centre at `at`.
     fn map(&self, rotation: Matrix3<f64>, at: Vector3<f64>) -> Affine {
         let centre = self.course.centre.coords;
-        let stand = &self.planning_from_standing;
-        let standing = stand.rotation.to_rotation_matrix();
         if self.on_moving {
-            let linear = standing.matrix().transpose() * rotation;
-            let shift = standing.matrix().transpose() * (at - rotation * centre - stand.translation.vector);
-            Affine { linear, shift }
+            Affine { linear: rotation, shift: at - rotation * centre }
         } else {
-            let linear = rotation.transpose() * standing.matrix();
-            let shift = rotation.transpose() * (stand.translation.vector - at) + centre;
-            Affine { linear, shift }
+            let linear = rotation.transpose();
+            Affine { linear, shift: centre - linear * at }
         }
     }
 }
@@ -283,7 +271,6 @@ mod tests {
         fn where_a_point_passes_is_in_the_hull_of_its_images(
             turns in prop::collection::vec(vector(1.0), 2..5),
             shifts in prop::collection::vec(vector(2.0), 5),
-            stand in (vector(2.0), vector(3.0)),
             point in vector(3.0),
             directions in prop::collection::vec(vector(1.0), 20),
             share in 0.0..1.0f64,
@@ -291,15 +278,14 @@ mod tests {
             let path: Vec<Pose> = turns.iter().zip(&shifts).map(|(t, s)| Pose::new(*s, *t)).collect();
             let centre = Point3::new(0.3, -0.2, 0.5);
             let course = Course::new(&path, centre, 4.0);
-            let stand = Pose::new(stand.0, stand.1);
             let point = Point3::from(point);
             for on_moving in [true, false] {
-                let mut view = View::new(&course, stand, on_moving, 1e-3);
+                let mut view = View::new(&course, on_moving, 1e-3);
                 let mut interval = Interval::WHOLE;
                 for _ in 0..7 {
                     let leg = view.leg(interval);
                     let at = course.length * (interval.index as f64 + share) * interval.share();
-                    let pose = stand.inverse() * course.pose(at).unwrap();
+                    let pose = course.pose(at).unwrap();
                     let pose = if on_moving { pose } else { pose.inverse() };
                     let p = pose * point;
                     for n in directions.iter().filter_map(|d| d.try_normalize(1e-3)) {
@@ -319,7 +305,7 @@ mod tests {
         let turned = to * Pose::rotation(Vector3::z() * 0.5);
         let course = Course::new(&[Pose::identity(), to, turned], Point3::origin(), 1.0);
         assert!((course.length - 2.5).abs() < 1e-12);
-        let mut view = View::new(&course, Pose::identity(), true, 1e-3);
+        let mut view = View::new(&course, true, 1e-3);
         let whole = view.leg(Interval::WHOLE);
         assert_eq!((whole.maps.len(), whole.slack), (4, 0.0));
         let [first, second] = Interval::WHOLE.halves();
@@ -331,7 +317,7 @@ mod tests {
     #[test]
     fn a_path_of_one_pose_is_a_point() {
         let course = Course::new(&[Pose::translation(1.0, 2.0, 3.0)], Point3::origin(), 1.0);
-        let leg = View::new(&course, Pose::identity(), true, 1e-3).leg(Interval::WHOLE);
+        let leg = View::new(&course, true, 1e-3).leg(Interval::WHOLE);
         assert!(course.length == 0.0 && leg.length == 0.0);
         for m in &leg.maps {
             assert_eq!(m.apply(&Point3::origin()), Point3::new(1.0, 2.0, 3.0));

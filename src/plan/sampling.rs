@@ -16,10 +16,10 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
-use crate::simulation::Scene;
-use crate::termination::{Interrupt, Poll};
+use crate::termination::{Interrupt, Poll, Termination};
 
-use super::verify::{Asked, Entry};
+use super::passing::Passing;
+use super::verify::Entry;
 
 /// Largest travel of a vertex between two checked poses, as a share of the longest side.
 const DENSITY: f64 = 0.004;
@@ -72,11 +72,6 @@ impl Samples {
         taken.map(SampleTree::memory).sum()
     }
 
-    /// Those of two parts, as parts 0 and 1.
-    pub(super) fn of_pair(&self, parts: [usize; 2]) -> Self {
-        Self { parts: Arc::new(parts.map(|part| Arc::clone(&self.parts[part])).into()) }
-    }
-
     /// Those of all parts, and of all parts again.
     pub(super) fn twice(&self) -> Self {
         Self { parts: Arc::new([&self.parts[..], &self.parts[..]].concat()) }
@@ -87,50 +82,48 @@ impl Samples {
         shares.get_or_init(|| dealt(&shape.surface))
     }
 
-    /// The samples that get deeper than granted along a path: of every pose and pair the deepest,
-    /// and all that are deep enough, for a path that is refused beyond `limit`, to help in refining
-    /// a motion.
-    pub(super) fn entries_along(&self, asked: &Asked<'_>, limit: f64) -> Result<Vec<Entry>, Interrupt> {
-        let poses = dense(asked.scene, asked.part, asked.path);
+    /// The samples that get deeper than granted along a stretch of a way past a part: of every pose and side
+    /// the deepest, and all that are deep enough, for a path that is refused beyond `limit`, to help in
+    /// refining a motion.
+    pub(super) fn entries_along(
+        &self,
+        passing: &Passing<'_>,
+        stretch: &[Pose],
+        limit: f64,
+        termination: &Termination,
+    ) -> Result<Vec<Entry>, Interrupt> {
+        let poses = dense(passing, stretch);
         let found = poses
             .par_iter()
             .enumerate()
             .map(|(i, pose)| {
-                asked.termination.check()?;
+                termination.check()?;
                 let moment = Moment { pose, turn: Turn::of(i, poses.len()), deep: limit / 2.0 };
-                let entries = self.entries_at(asked, &moment);
+                let entries = self.entries(passing, &moment, termination);
                 // What was found of samples that were cut short is not to be believed.
-                asked.termination.check().map(|()| entries)
+                termination.check().map(|()| entries)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
         Ok(found.into_iter().flatten().collect())
     }
 
-    fn entries_at(&self, asked: &Asked<'_>, moment: &Moment<'_>) -> Vec<Entry> {
-        let bodies = &asked.scene.bodies;
-        let bounds = bodies[asked.part].shape.bounds().transformed(moment.pose);
-        let mut out = Vec::new();
-        for &other in asked.standing.iter().filter(|&&o| bodies[o].bounds.meets(&bounds)) {
-            self.entries(asked, moment, other, &mut out);
+    /// The samples deeper than granted, on either side: the deepest of each side, and all that are deep
+    /// enough to help in refining a motion.
+    fn entries(&self, passing: &Passing<'_>, moment: &Moment<'_>, termination: &Termination) -> Vec<Entry> {
+        let [moving, standing] = passing.surfaces();
+        let (to_standing, mut out) = (moment.pose, Vec::new());
+        if !standing.bounds().meets(&moving.bounds().transformed(to_standing)) {
+            return out;
         }
-        out
-    }
-
-    /// The samples of a pair deeper than granted, on either side: the deepest of each side, and all
-    /// that are deep enough to help in refining a motion.
-    fn entries(&self, asked: &Asked<'_>, moment: &Moment<'_>, other: usize, out: &mut Vec<Entry>) {
-        let poll = Poll::every(SAMPLES_POLL, Some(asked.termination));
-        let (moving, standing) = (&asked.scene.bodies[asked.part], &asked.scene.bodies[other]);
-        let granted = asked.allowances.of(asked.part, other);
-        let to_standing = standing.planning_from_shape.inverse() * moment.pose;
-        for (on_moving, part, to_measured, surface) in [
-            (true, asked.part, &to_standing, &standing.shape.surface),
-            (false, other, &to_standing.inverse(), &moving.shape.surface),
-        ] {
+        let poll = Poll::every(SAMPLES_POLL, Some(termination));
+        let Passing { parts: [part, other], granted, .. } = *passing;
+        for (on_moving, sampled, to_measured, measured) in
+            [(true, part, to_standing, standing), (false, other, &to_standing.inverse(), moving)]
+        {
             let mut worst: Option<Entry> = None;
-            let trees = self.of(part).iter().enumerate();
+            let trees = self.of(sampled).iter().enumerate();
             for tree in trees.filter(|(i, _)| moment.turn.takes(*i)).map(|(_, t)| t) {
-                entered(tree, to_measured, surface, granted, &poll, |point, over| {
+                entered(tree, to_measured, measured, granted, &poll, |point, over| {
                     let entry = Entry { other, on_moving, point, over };
                     if over > moment.deep {
                         out.push(entry.clone());
@@ -142,6 +135,7 @@ impl Samples {
             }
             out.extend(worst.filter(|w| w.over <= moment.deep));
         }
+        out
     }
 }
 
@@ -230,19 +224,17 @@ fn entered(
     );
 }
 
-/// The path's poses and as many between them as the density asks for.
-fn dense(scene: &Scene, part: usize, path: &[Pose]) -> Vec<Pose> {
-    let shape = &scene.bodies[part].shape;
-    // The point that moves on a line: fixed to the shape, the middle of the assembled part's box.
-    let centre = scene.centre_in_shape(part);
-    let step = DENSITY * scene.longest_side;
+/// The poses of a stretch of the way and as many between them as the density asks for.
+fn dense(passing: &Passing<'_>, path: &[Pose]) -> Vec<Pose> {
+    let Passing { shapes: [shape, _], centre, longest_side, .. } = passing;
+    let step = DENSITY * longest_side;
     let mut out = Vec::new();
     for (a, b) in path.iter().zip(path.iter().skip(1)) {
         let turn = (a.rotation.inverse() * b.rotation).scaled_axis();
-        let radius = turn.try_normalize(1e-12).map_or(0.0, |axis| shape.radius_about(&centre, &axis));
+        let radius = turn.try_normalize(1e-12).map_or(0.0, |axis| shape.radius_about(centre, &axis));
         let travel = (b * centre - a * centre).norm() + radius * turn.norm();
         let n = (travel / step).ceil().max(1.0) as usize;
-        out.extend((0..n).map(|k| interpolate(a, b, &centre, k as f64 / n as f64)));
+        out.extend((0..n).map(|k| interpolate(a, b, centre, k as f64 / n as f64)));
     }
     out.extend(path.last());
     out
@@ -262,7 +254,9 @@ mod tests {
         let turn = Pose::rotation(Vector3::new(0.0, 0.0, 1.0));
         let path =
             [from, Pose::translation(1.0, 0.0, 0.0) * from, Pose::translation(1.0, 0.0, 0.0) * turn * from];
-        let poses = dense(&scene, 1, &path);
+        let passing = Passing::new(&scene, &scene.allowances, [1, 0], &path);
+        let path = &passing.path;
+        let poses = dense(&passing, path);
         assert_eq!((poses[0], poses[poses.len() - 1]), (path[0], path[2]));
         assert!(poses.iter().any(|p| (p.to_matrix() - path[1].to_matrix()).norm() < 1e-12));
         for w in poses.windows(2) {

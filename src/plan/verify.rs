@@ -10,15 +10,16 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry::{Occupied, Vacant};
 use std::sync::Arc;
 
-use nalgebra::{Point3, Translation3};
+use nalgebra::Point3;
 use rayon::prelude::*;
 
-use crate::geometry::{Bounds, Pose, Shape, Surface, area_normal};
-use crate::simulation::{Allowances, Scene};
+use crate::geometry::{Pose, Shape, Surface, area_normal};
+use crate::simulation::{Allowances, Pair, Scene};
 use crate::termination::{Interrupt, Termination};
 
 use super::course::{Course, Interval, View};
 use super::depth::{Found, MOST_EFFORT, Precision, Question};
+use super::passing::Passing;
 use super::sampling::{Samples, turns_far};
 use super::screw::{centred, depth_on_screw};
 
@@ -35,9 +36,6 @@ const COARSE: f64 = 4e-3;
 /// for what is between the corners of the smallest pieces, which are no larger than this.
 const OVERLAP_SPARE: f64 = 2e-6;
 const OVERLAP_FINEST: f64 = 1e-4;
-
-/// Directions are alike within this.
-const ALIKE: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// A point that got too deep.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,17 +82,6 @@ fn deepest(depth: f64, entries: &[Entry]) -> f64 {
     entries.iter().map(|e| e.over).fold(depth, f64::max)
 }
 
-/// What is asked: how deep a part gets into those that stand, along a path of poses of its shape.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Asked<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) allowances: &'a Allowances,
-    pub(super) standing: &'a [usize],
-    pub(super) part: usize,
-    pub(super) path: &'a [Pose],
-    pub(super) termination: &'a Termination,
-}
-
 /// The check, prepared for all shapes.
 #[derive(Debug, Clone)]
 pub struct Verifier {
@@ -123,12 +110,6 @@ impl Verifier {
         Self { limit, samples: self.samples.clone() }
     }
 
-    /// The same check for a scene of two of the parts alone, as parts 0 and 1.
-    #[must_use]
-    pub fn of_pair(&self, parts: [usize; 2]) -> Self {
-        Self { limit: self.limit, samples: self.samples.of_pair(parts) }
-    }
-
     /// The same check for a scene that has every part twice: all of them, and then all of them again.
     #[must_use]
     pub fn twice(&self) -> Self {
@@ -141,15 +122,14 @@ impl Verifier {
         self.limit
     }
 
-    /// How deep two parts overlap at the assembled pose.
+    /// How deep two parts overlap as they stand.
     ///
     /// # Errors
     /// The termination condition became true.
     pub fn assembled_depth(
         &self,
         scene: &Scene,
-        a: usize,
-        b: usize,
+        pair: &Pair,
         termination: &Termination,
     ) -> Result<f64, Interrupt> {
         let precision = Precision {
@@ -158,18 +138,14 @@ impl Verifier {
             finest: OVERLAP_FINEST * scene.longest_side,
             coarse: COARSE * scene.longest_side,
         };
-        let path = [scene.bodies[a].planning_from_shape];
-        let course = Course::new(&path, scene.centre_in_shape(a), 0.0);
-        let allowances = Allowances::none();
-        let asked =
-            Asked { scene, allowances: &allowances, standing: &[b], part: a, path: &path, termination };
-        let way = Way { asked: &asked, course: &course, precision, other: b };
-        let side = |on_moving| way.depth_of_side(on_moving, Interval::WHOLE, MOST_EFFORT);
-        let (one, other) = rayon::join(|| side(true), || side(false));
-        let (one, other) = (one?, other?);
+        let passing = Passing::standing(scene, pair);
+        let course = Course::new(&passing.path, passing.centre, 0.0);
+        let way = Way { passing: &passing, course: &course, precision, termination };
+        let [one, other] = way.depth()?;
         let depth = one.depth.max(other.depth);
         if !one.open.is_empty() || !other.open.is_empty() {
-            return Ok(deepest(depth, &self.samples.entries_along(&asked, self.limit)?));
+            let entries = self.samples.entries_along(&passing, &passing.path, self.limit, termination)?;
+            return Ok(deepest(depth, &entries));
         }
         Ok(depth)
     }
@@ -215,108 +191,36 @@ impl Verifier {
         path: &[Pose],
         termination: &Termination,
     ) -> Result<Verdict, Interrupt> {
-        let check = self.along(scene, allowances, part, path, termination);
-        let past = |&other: &usize| check.past(other, &check.way_past(other));
-        let past: Vec<_> = check.near(standing).par_iter().map(past).collect::<Result<_, _>>()?;
+        let swept = scene.swept_bounds(part, path);
+        let near = standing.iter().filter(|&&other| scene.bodies[other].bounds.meets(&swept));
+        let passing = |&other: &usize| Passing::new(scene, allowances, [part, other], path);
+        let passing: Vec<_> = near.map(passing).collect();
+        let past: Vec<_> = passing.par_iter().map(|p| self.past(p, termination)).collect::<Result<_, _>>()?;
         Ok(Verdict::of_all(past, self.limit))
     }
 
-    /// The check of a path, to be asked part by part of what stands.
-    #[must_use]
-    pub fn along<'a>(
-        &'a self,
-        scene: &'a Scene,
-        allowances: &'a Allowances,
-        part: usize,
-        path: &'a [Pose],
-        termination: &'a Termination,
-    ) -> Check<'a> {
-        let centre = scene.centre_in_shape(part);
-        let reach = scene.reach(part);
-        let swept = path.iter().fold(Bounds::EMPTY, |b, pose| {
-            let c = pose * centre;
-            b.union(&Bounds { min: c, max: c })
-        });
-        Check {
-            verifier: self,
-            asked: Asked { scene, allowances, standing: &[], part, path, termination },
-            centre,
-            reach,
-            swept: swept.grown(reach),
-        }
-    }
-}
-
-/// The check of one path.
-#[derive(Debug)]
-pub struct Check<'a> {
-    verifier: &'a Verifier,
-    asked: Asked<'a>,
-    /// The point of the shape that moves on a line between waypoints, and how far from it the shape reaches.
-    centre: Point3<f64>,
-    reach: f64,
-    /// Holds the part all along.
-    swept: Bounds,
-}
-
-impl Check<'_> {
-    /// Of the parts that stand, those that the path may meet.
-    #[must_use]
-    pub fn near(&self, standing: &[usize]) -> Vec<usize> {
-        let meets = |o: &usize| self.asked.scene.bodies[*o].bounds.meets(&self.swept);
-        standing.iter().copied().filter(meets).collect()
-    }
-
-    /// The path up to where the part has passed another for good: its last piece, if it is straight, as
-    /// far as their boxes meet. So what is found past it does not depend on how far others reach.
-    #[must_use]
-    pub fn way_past(&self, other: usize) -> Vec<Pose> {
-        let Asked { scene, path, part, .. } = self.asked;
-        let mut way = path.to_vec();
-        if let [.., from, to] = &mut way[..]
-            && from.rotation == to.rotation
-            && let Some(direction) = (to.translation.vector - from.translation.vector).try_normalize(0.0)
-        {
-            // The same to the bit wherever the path ends.
-            let direction = direction.map(|x| (x / ALIKE).round() * ALIKE);
-            let moving = scene.bodies[part].shape.bounds().transformed(from);
-            let passed = moving.way_past(&scene.bodies[other].bounds, &direction);
-            if passed == 0.0 {
-                way.pop();
-            } else if passed < (to.translation.vector - from.translation.vector).norm() {
-                *to = Translation3::from(direction * passed) * *from;
-            }
-        }
-        way
-    }
-
-    /// What is found past one part that stands, on the way past it: it depends on no other.
+    /// What is found of a path past one part that stands: it depends on no other.
     ///
     /// # Errors
     /// The termination condition became true.
-    pub fn past(&self, other: usize, way: &[Pose]) -> Result<Verdict, Interrupt> {
-        let Self { verifier, asked, .. } = self;
-        let course = &Course::new(way, self.centre, self.reach);
-        let (scene, limit) = (asked.scene, verifier.limit);
-        let share = if asked.allowances.of(asked.part, other) > 0.0 { SPARE_IN_OVERLAP } else { SPARE };
+    pub fn past(&self, passing: &Passing<'_>, termination: &Termination) -> Result<Verdict, Interrupt> {
+        let Self { limit, samples } = self;
+        let course = &Course::new(&passing.path, passing.centre, passing.reach());
+        let share = if passing.granted > 0.0 { SPARE_IN_OVERLAP } else { SPARE };
         let precision = Precision {
             spare: limit * share,
-            deep: limit,
+            deep: *limit,
             finest: limit * FINEST,
-            coarse: COARSE * scene.longest_side,
+            coarse: COARSE * passing.longest_side,
         };
-        let standing = [other];
-        let asked = Asked { standing: &standing, path: way, ..*asked };
-        let far = turns_far(way);
-        let way = Way { asked: &asked, course, precision, other };
-        let found = if far { depth_on_screw(&way, limit)? } else { way.depth()? };
+        let way = Way { passing, course, precision, termination };
+        let found = if turns_far(&passing.path) { depth_on_screw(&way, *limit)? } else { way.depth()? };
         let bound = found.iter().map(|f| f.bound).fold(0.0, f64::max);
-        let mut entries = deepest_entries(scene, other, &found);
-        if bound <= limit {
+        let mut entries = deepest_entries(passing, &found);
+        if bound <= *limit {
             for stretch in joined(course, found.iter().flat_map(|f| &f.open)) {
                 let path = course.path_between(stretch);
-                let asked = Asked { path: &path, ..asked };
-                entries.extend(verifier.samples.entries_along(&asked, limit)?);
+                entries.extend(samples.entries_along(passing, &path, *limit, termination)?);
             }
         }
         Ok(Verdict::past(bound, entries))
@@ -325,10 +229,10 @@ impl Check<'_> {
 
 /// The way of a part past one that stands.
 pub(super) struct Way<'a> {
-    pub(super) asked: &'a Asked<'a>,
+    pub(super) passing: &'a Passing<'a>,
     pub(super) course: &'a Course,
     precision: Precision,
-    pub(super) other: usize,
+    pub(super) termination: &'a Termination,
 }
 
 impl Way<'_> {
@@ -347,18 +251,18 @@ impl Way<'_> {
         interval: Interval,
         most_effort: usize,
     ) -> Result<Found, Interrupt> {
-        let Self { asked, course, precision, other } = *self;
-        let (moving, standing) = (&asked.scene.bodies[asked.part], &asked.scene.bodies[other]);
+        let Self { passing, course, precision, termination } = *self;
+        let [moving, standing] = passing.shapes;
         let (looked_at, measured) = if on_moving { (moving, standing) } else { (standing, moving) };
-        let view = View::new(course, standing.planning_from_shape, on_moving, precision.finest / 16.0);
         let question = Question {
-            surface: &looked_at.shape.surface,
-            tree: looked_at.shape.patches(asked.termination)?,
-            measured: &measured.shape.surface,
-            granted: asked.allowances.of(asked.part, other),
+            surface: &looked_at.surface,
+            tree: looked_at.patches(termination)?,
+            measured: &measured.surface,
+            granted: passing.granted,
             precision,
         };
-        question.answer(view, interval, most_effort, asked.termination)
+        let view = View::new(course, on_moving, precision.finest / 16.0);
+        question.answer(view, interval, most_effort, termination)
     }
 }
 
@@ -375,8 +279,9 @@ fn joined<'i>(course: &Course, intervals: impl Iterator<Item = &'i Interval>) ->
 }
 
 /// The points that help in refining a motion: of those that are near each other, the deepest.
-fn deepest_entries(scene: &Scene, other: usize, [moving, standing]: &[Found; 2]) -> Vec<Entry> {
-    let cell = COARSE * scene.longest_side;
+fn deepest_entries(passing: &Passing<'_>, [moving, standing]: &[Found; 2]) -> Vec<Entry> {
+    let Passing { parts: [_, other], longest_side, .. } = *passing;
+    let cell = COARSE * longest_side;
     let mut taken: BTreeMap<(bool, [i64; 3]), Entry> = BTreeMap::new();
     for (on_moving, side) in [(true, moving), (false, standing)] {
         for &(point, over) in &side.deep {

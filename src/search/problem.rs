@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::blocking_graph::StaticAnalysis;
 use crate::cache::{Recall, VerdictQuestion};
 use crate::geometry::{Pose, SampleTree};
-use crate::plan::{Entry, Verdict, Verifier, thinned};
+use crate::plan::{Entry, Passing, Verdict, Verifier, thinned};
 use crate::simulation::{Action, Scene, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
@@ -149,14 +149,14 @@ impl Problem<'_> {
 
     /// Verifies a path past all that it may meet.
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
-        let Self { scene, verifier, .. } = self;
-        let check = verifier.along(scene, &scene.allowances, part, path, &self.termination);
+        let Self { scene, verifier, termination, recall, .. } = self;
         let past = |&other: &usize| {
-            let way = &check.way_past(other);
-            let question = VerdictQuestion { scene, other, part, path: way, limit: verifier.limit() };
-            self.recall.verdict(&question, || check.past(other, way))
+            let passing = &Passing::new(scene, &scene.allowances, [part, other], path);
+            recall.verdict(&VerdictQuestion { passing, limit: verifier.limit() }, || {
+                verifier.past(passing, termination)
+            })
         };
-        let past: Vec<_> = check.near(near).par_iter().map(past).collect::<Result<_, _>>()?;
+        let past: Vec<_> = near.par_iter().map(past).collect::<Result<_, _>>()?;
         Ok(Verdict::of_all(past, verifier.limit()))
     }
 

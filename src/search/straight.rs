@@ -8,12 +8,17 @@
 
 use std::collections::HashMap;
 
+use nalgebra::Vector3;
+
 use crate::simulation::Sweep;
 
 use super::disassembly::{Run, Stop};
 use super::sbdp::{Job, Search};
-use super::state::Phase;
+use super::state::{Node, Phase};
 use super::trace::TraceEvent;
+
+/// Shorter ways out are all alike, in the planning frame.
+const LEAST_WAY: f64 = 1e-6;
 
 /// Sweeps that need not be repeated, by state and action.
 #[derive(Debug, Default)]
@@ -73,12 +78,25 @@ impl Search<'_, '_> {
         (window, end)
     }
 
-    /// In the order of expansion: displaced states first, then all parts as assembled.
+    /// In the order of expansion: displaced states first, then all parts as assembled; each along the
+    /// shorter ways out first. Such a plan takes less room, and less is to be verified.
     fn jobs_to_sweep(&self, open: &[usize]) -> Vec<Job> {
-        let phase = Phase::Translation;
-        let actions = 0..self.translations.len();
-        let nodes = self.ranked(phase, open.to_vec());
-        nodes.into_iter().flat_map(|node| actions.clone().map(move |action| Job { node, action })).collect()
+        let hull = self.disassembly.everything.hull();
+        let forces: Vec<_> = self.translations.iter().map(|action| action.force()).collect();
+        let reach =
+            |force: &Vector3<f64>| hull.iter().map(|p| p.coords.dot(force)).fold(f64::NEG_INFINITY, f64::max);
+        let reaches: Vec<f64> = forces.iter().map(reach).collect();
+        let jobs = |node: usize| {
+            let Node { part, .. } = self.nodes[node];
+            let bounds = self.disassembly.problem.scene.bodies[part].shape.bounds();
+            let bounds = bounds.transformed(self.nodes[node].pose());
+            let way = |action: &usize| reaches[*action] + bounds.support(&-forces[*action]);
+            let mut actions: Vec<usize> = (0..forces.len()).collect();
+            // Only what is much longer counts: the order is then the same in all assemblies but for a little.
+            actions.sort_by_cached_key(|action| (way(action).max(LEAST_WAY).log2() * 2.0).floor() as i32);
+            actions.into_iter().map(move |action| Job { node, action })
+        };
+        self.ranked(Phase::Translation, open.to_vec()).into_iter().flat_map(jobs).collect()
     }
 
     fn is_known_blocked(&self, job: &Job) -> bool {

@@ -111,10 +111,7 @@ fn measure_overlaps(
         .par_iter()
         .map(|&i| {
             let (key, pair) = &keyed[i];
-            recall.overlap(*key, || {
-                let alone = pair.scene(scene);
-                verifier.of_pair(pair.parts).assembled_depth(&alone, 0, 1, termination)
-            })
+            recall.overlap(*key, || verifier.assembled_depth(scene, pair, termination))
         })
         .collect::<Result<Vec<_>, Interrupt>>()?;
     let overlaps = pairs.into_iter().zip(group_of).map(|((a, b), group)| (a, b, depths[group]));

@@ -44,9 +44,7 @@ impl Pair {
         let of = |parts: [usize; 2]| {
             let [from, to] = parts.map(|part| scene.bodies[part].planning_from_shape);
             let between = from.inverse() * to;
-            let way = between.translation.vector.map(rounded);
-            let there = Pose::from_parts(way.into(), rounded_turn(&between.rotation));
-            Self { parts, poses: [Pose::identity(), there] }
+            Self { parts, poses: [Pose::identity(), rounded_pose(&between)] }
         };
         let hash = |part: usize| scene.bodies[part].shape.content();
         let bits = |pair: &Self| -> ([u64; 3], [u64; 4]) {
@@ -94,11 +92,18 @@ pub fn grouped<K: Eq + Hash>(keys: impl IntoIterator<Item = K>) -> (Vec<usize>, 
     (first, group_of)
 }
 
-/// To about a billionth of the planning frame's unit.
-fn rounded(x: f64) -> f64 {
+/// To about a billionth, as are lengths in the planning frame.
+#[must_use]
+pub fn rounded(x: f64) -> f64 {
     const STEP: f64 = 1.0 / (1u64 << 30) as f64;
     // Without the sign of zero.
     (x / STEP).round() * STEP + 0.0
+}
+
+/// A pose, rounded: what stands alike is equal then, to the bit.
+#[must_use]
+pub fn rounded_pose(pose: &Pose) -> Pose {
+    Pose::from_parts(pose.translation.vector.map(rounded).into(), rounded_turn(&pose.rotation))
 }
 
 /// A rotation, of whose two quaternions one is taken.

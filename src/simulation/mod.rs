@@ -29,7 +29,7 @@ mod touching;
 mod transition;
 
 pub use action::{Action, Axis};
-pub use alike::{Pair, grouped};
+pub use alike::{Pair, grouped, rounded, rounded_pose};
 pub use broad_phase::BroadPhase;
 pub use disassembled::{HULL_MARGIN, Surroundings, exit_direction};
 pub use hull_tree::HullTree;

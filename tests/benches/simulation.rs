@@ -19,8 +19,8 @@ use sbdp::geometry::{Assembly, load_assembly};
 use sbdp::plan::Verifier;
 use sbdp::sdf::Field;
 use sbdp::simulation::{
-    Action, Axis, Motion, Scene, SlidingEngine, Surroundings, SweepQuestion, TransitionFunction, pair_blocks,
-    straight_sweep,
+    Action, Axis, Motion, Pair, Scene, SlidingEngine, Surroundings, SweepQuestion, TransitionFunction,
+    pair_blocks, straight_sweep,
 };
 use sbdp::termination::Termination;
 
@@ -103,7 +103,7 @@ fn scene(assembly: &Assembly, never: &Termination) -> Result<Scene, sbdp::termin
     let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
     let verifier = Verifier::new(&assembly.shapes, shape_of, DEPTH_LIMIT * scene.longest_side);
     for (a, b) in scene.broad_phase.pairs(0.0) {
-        let depth = verifier.assembled_depth(&scene, a, b, never)?;
+        let depth = verifier.assembled_depth(&scene, &Pair::turned(&scene, a, b), never)?;
         if depth > 1e-6 * scene.longest_side {
             scene.allowances.grant(a, b, depth);
         }

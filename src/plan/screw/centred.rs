@@ -110,7 +110,7 @@ struct Thread {
 impl Thread {
     /// The pose of the moving part after turning by an angle.
     fn pose(&self, angle: f64) -> Pose {
-        self.helix.axis_from_planning.inverse() * self.helix.screwed(angle) * self.reference
+        self.helix.axis_from_frame.inverse() * self.helix.screwed(angle) * self.reference
     }
 
     /// The thread that a part on its way shares with one that stands, and the play in it.
@@ -126,7 +126,7 @@ impl Thread {
         }
         let ScrewPath { helix: guess, reference, .. } = followed;
         let (moving, standing) = (&scene.bodies[part].shape.surface, &scene.bodies[other].shape.surface);
-        let guess_from_standing = guess.axis_from_planning * scene.bodies[other].planning_from_shape;
+        let guess_from_standing = guess.axis_from_frame * scene.bodies[other].planning_from_shape;
         let triangles = |surface: &Surface, frame: Pose| -> Vec<[Point3<f64>; 3]> {
             (0..surface.triangles().len() as u32).map(|t| surface.corners(t).map(|p| frame * p)).collect()
         };
@@ -144,7 +144,7 @@ impl Thread {
         let helix = Helix { rise: guess.rise, ..others };
         // The moving part's axis onto the standing one's.
         let to_other = onto(&own, &others, f64::midpoint(zone.along()[0], zone.along()[1]));
-        let frame = helix.axis_from_planning;
+        let frame = helix.axis_from_frame;
         let envelope = |t: &[[Point3<f64>; 3]], frame: Pose| {
             let moved = t.iter().map(|c| c.map(|p| frame * p));
             Envelope::new(moved, &helix, &zone, poll)
@@ -152,7 +152,7 @@ impl Thread {
         let (one, two) = (envelope(&moving, frame * to_other), envelope(&standing, frame));
         let (play, shift) = two.widest_gap(&one, LEFT * helix.pitch().abs())?;
         let reference = Translation3::from(Vector3::z() * shift) * frame * to_other * reference;
-        let helix = Helix { axis_from_planning: frame * guess.axis_from_planning, ..helix };
+        let helix = Helix { axis_from_frame: frame * guess.axis_from_frame, ..helix };
         let [own, others] = zones.map(|zone| zone.along());
         let travel = if helix.rise * left > 0.0 { others[1] - own[0] } else { others[0] - own[1] };
         let off = travel / helix.rise;
@@ -163,7 +163,7 @@ impl Thread {
 /// The smallest displacement that takes one axis onto another, at some height.
 fn onto(axis: &Helix, other: &Helix, height: f64) -> Pose {
     let [(from, along), (to, wanted)] = [axis, other].map(|h| {
-        let frame = h.axis_from_planning.inverse();
+        let frame = h.axis_from_frame.inverse();
         let along = frame * Vector3::z();
         let origin = frame * Point3::origin();
         (origin + along * ((height - origin.z) / along.z), along)

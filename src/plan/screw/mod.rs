@@ -23,7 +23,7 @@ pub(super) use centred::centred;
 
 use super::course::{Course, Interval};
 use super::depth::{Found, MOST_EFFORT};
-use super::verify::{Asked, Way};
+use super::verify::Way;
 use envelope::{Envelope, Zone};
 use path::{Boxes, ScrewPath};
 
@@ -38,21 +38,14 @@ const FIRST_EFFORT: usize = 8_000;
 /// Stretches that turn further (radians) are bounded in pieces.
 const LONGEST: f64 = 4.0;
 
-/// Two surfaces of which one is screwed past the other.
-#[derive(Clone, Copy)]
-struct Pair<'a> {
-    moving: &'a Surface,
-    standing: &'a Surface,
-    planning_from_standing: Pose,
-}
-
-/// The stretches of the way on which the profiles of two surfaces do not show that they are apart.
+/// The stretches of the way on which the profiles of two surfaces, one of which is screwed past the other,
+/// do not show that they are apart.
 ///
 /// # Errors
 /// The termination condition became true.
 fn unsettled(
     course: &Course,
-    pair: &Pair<'_>,
+    [moving, standing]: [&Surface; 2],
     stretches: Vec<Interval>,
     limit: f64,
     termination: &Termination,
@@ -61,13 +54,12 @@ fn unsettled(
     if screw.helix.rise == 0.0 {
         return Ok(stretches);
     }
-    let axis_from_standing = screw.helix.axis_from_planning * pair.planning_from_standing;
     let triangles = |surface: &Surface, axis_from_shape: &Pose| -> Vec<[Point3<f64>; 3]> {
         let corners = |t: u32| surface.corners(t).map(|p| axis_from_shape * p);
         (0..surface.triangles().len() as u32).map(corners).collect()
     };
-    let moving = triangles(pair.moving, &screw.reference);
-    let standing = triangles(pair.standing, &axis_from_standing);
+    let moving = triangles(moving, &screw.reference);
+    let standing = triangles(standing, &screw.helix.axis_from_frame);
     let [of_moving, of_standing] = [&moving, &standing].map(|t| Bounds::of(t.as_flattened()));
     let boxes = Boxes { moving: of_moving, standing: of_standing };
     let [one, other] = [&moving, &standing].map(|t| Zone::of(t).everywhere());
@@ -104,16 +96,14 @@ fn unsettled(
 /// # Errors
 /// The termination condition became true.
 pub(super) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], Interrupt> {
-    let Asked { scene, allowances, part, termination, .. } = *way.asked;
-    let (moving, standing) = (&scene.bodies[part], &scene.bodies[way.other]);
-    let [one, other] = [moving, standing].map(|body| &body.shape.surface);
-    if one.is_open() || other.is_open() {
+    let surfaces = way.passing.surfaces();
+    if surfaces.iter().any(|surface| surface.is_open()) {
         let unknown = || Found { open: vec![Interval::WHOLE], ..Found::default() };
         return Ok([unknown(), unknown()]);
     }
     // A part that shares no thread with the moving one is soon told to be apart.
     let mut found = bounded(way, vec![Interval::WHOLE], FIRST_EFFORT)?;
-    if allowances.of(part, way.other) > 0.0 {
+    if way.passing.granted > 0.0 {
         // One part lies in the other: surfaces cross, and no more effort would tell how deep.
         return Ok(found);
     }
@@ -122,8 +112,7 @@ pub(super) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], In
         return Ok(found);
     }
     // They do not overlap at the start: where neither surface meets the other, they stay apart.
-    let pair = Pair { moving: one, standing: other, planning_from_standing: standing.planning_from_shape };
-    let open = unsettled(way.course, &pair, open, limit, termination)?;
+    let open = unsettled(way.course, surfaces, open, limit, way.termination)?;
     let [more, others] = bounded(way, open, MOST_EFFORT)?;
     let [mut one, mut other] = found;
     one.add(more);

@@ -133,7 +133,7 @@ impl ScrewPath {
 
     /// What is known of a stretch: `None` if the two parts are nowhere near each other.
     pub(super) fn stretch(&self, interval: Interval, Boxes { moving, standing }: &Boxes) -> Option<Stretch> {
-        let planning_from_axis = self.helix.axis_from_planning.inverse();
+        let frame_from_axis = self.helix.axis_from_frame.inverse();
         let [from, to] = interval.of(self.length);
         let first = self.knots.partition_point(|k| k.way[1] < from);
         let knots = || self.knots[first..].iter().take_while(|k| k.way[0] <= to);
@@ -141,7 +141,7 @@ impl ScrewPath {
         let zones = knots().map(|k| {
             let near = standing
                 .grown((k.way[1] - k.way[0]) / 2.0)
-                .transformed(&(self.reference * k.pose.inverse() * planning_from_axis));
+                .transformed(&(self.reference * k.pose.inverse() * frame_from_axis));
             Bounds { min: near.min.sup(&moving.min), max: near.max.inf(&moving.max) }
         });
         let zone = zones
@@ -278,7 +278,7 @@ fn leave_out(weights: &mut [f64], off: &[f64]) {
 
 /// The way in pieces on which nothing moves much when it is screwed back.
 fn knots(course: &Course, helix: &Helix, finest: f64) -> Vec<Knot> {
-    let frame = helix.axis_from_planning;
+    let frame = helix.axis_from_frame;
     let mut angle = 0.0;
     let mut knots = Vec::new();
     for s in &course.segments {

@@ -98,7 +98,7 @@ mod tests {
         let place = Pose::new(Vector3::new(0.03, -0.02, 0.01), Vector3::new(0.004, -0.006, 0.4));
         for mesh in [bolt, nut] {
             let found = slipping(&facets(&surface(mesh), &place), pitch / std::f64::consts::TAU).unwrap();
-            let axis_from_thread = found.axis_from_planning * place;
+            let axis_from_thread = found.axis_from_frame * place;
             for z in [0.0, 6.0] {
                 let at = axis_from_thread * Point3::new(0.0, 0.0, z);
                 // A fifth of the play between the two.

@@ -10,9 +10,9 @@ use crate::geometry::{Bounds, Pose, SourceMesh, interpolate};
 use crate::simulation::Scene;
 use crate::termination::Termination;
 
-use super::super::Verifier;
 use super::super::course::{Course, Interval};
-use super::{Pair, unsettled};
+use super::super::{Passing, Verifier};
+use super::unsettled;
 
 const TURNS: f64 = 3.0;
 const PITCH: f64 = 0.5;
@@ -58,10 +58,9 @@ fn checked(scene: &Scene, verifier: &Verifier, path: &[Pose]) -> f64 {
 
 /// The share of the way that profiles leave open.
 fn open(scene: &Scene, path: &[Pose]) -> Vec<Interval> {
-    let [standing, moving] = [0, 1].map(|i| &scene.bodies[i].shape.surface);
-    let pair = Pair { moving, standing, planning_from_standing: scene.bodies[0].planning_from_shape };
-    let course = Course::new(path, scene.centre_in_shape(1), scene.bodies[1].shape.reach * 2.0);
-    unsettled(&course, &pair, vec![Interval::WHOLE], LIMIT, &Termination::default()).unwrap()
+    let passing = Passing::new(scene, &scene.allowances, [1, 0], path);
+    let course = Course::new(&passing.path, passing.centre, passing.reach());
+    unsettled(&course, passing.surfaces(), vec![Interval::WHOLE], LIMIT, &Termination::default()).unwrap()
 }
 
 fn nut_on_bolt() -> [SourceMesh; 2] {

@@ -20,7 +20,7 @@ fn checked_path(scene: &Scene, verifier: &Verifier, path: &[Pose]) -> Verdict {
 }
 
 fn overlap(scene: &Scene, verifier: &Verifier, a: usize, b: usize) -> f64 {
-    verifier.assembled_depth(scene, a, b, &Termination::default()).unwrap()
+    verifier.assembled_depth(scene, &Pair::turned(scene, a, b), &Termination::default()).unwrap()
 }
 
 #[test]
@@ -233,32 +233,4 @@ fn on_surface(surface: &Surface) -> Vec<Point3<f64>> {
         Point3::from((0..3).map(|k| corners[k].coords * f64::from(w[k]) / 6.0).sum::<Vector3<f64>>())
     };
     (0..surface.triangles().len() as u32).flat_map(|t| weights.clone().map(move |w| at(t, w))).collect()
-}
-
-#[test]
-fn the_way_past_a_part_ends_where_that_is_left_behind_and_does_not_depend_on_the_path() {
-    let [plate, block] = block_on_plate();
-    let wall = cuboid([2.5, -4.0, 0.0], [3.0, 4.0, 3.0]);
-    let (scene, verifier) = scene([plate, block, wall]);
-    let start = scene.bodies[1].planning_from_shape;
-    let termination = Termination::default();
-    let direction = Vector3::new(2.0, 0.3, 0.5).normalize();
-    let path = |travel: f64| [start, nalgebra::Translation3::from(direction * travel) * start];
-    let way = |path: &[Pose], other| {
-        verifier.along(&scene, &scene.allowances, 1, path, &termination).way_past(other)
-    };
-    // Past the wall and past the plate, from which it rises slowly.
-    for other in [0, 2] {
-        let long = way(&path(30.0), other);
-        assert_eq!(long, way(&path(47.3), other));
-        let gone = scene.bodies[1].shape.bounds().transformed(&long[1]);
-        assert!(!gone.meets(&scene.bodies[other].bounds), "it has left {other}");
-        let just = nalgebra::Translation3::from(direction * -1e-5) * long[1];
-        assert!(scene.bodies[1].shape.bounds().transformed(&just).meets(&scene.bodies[other].bounds));
-    }
-    let short = path(0.1);
-    assert_eq!(way(&short, 2), short, "a path that ends before is looked at as it is");
-    // What is found on it is what is found on the whole path.
-    let whole = verifier.check(&scene, &scene.allowances, &[0, 2], 1, &path(30.0), &termination).unwrap();
-    assert!(!whole.entries.is_empty() && whole.entries.iter().all(|e| e.other == 2));
 }

@@ -1,0 +1,164 @@
+//! A part on its way past another that stands: what a path is checked for, pair by pair.
+//!
+//! All is told in the frame of the one that stands, rounded far finer than depth is measured, and the
+//! way ends where that one is left behind. So the same is asked, to the bit, of all bolts that leave nuts
+//! that stand alike, wherever these are and however far the rest of the assembly reaches.
+
+use nalgebra::{Point3, Translation3};
+
+use crate::geometry::{Pose, Shape, Surface};
+use crate::simulation::{Allowances, Pair, Scene, rounded, rounded_pose};
+
+/// Directions are alike within this.
+const ALIKE: f64 = 1.0 / (1u64 << 40) as f64;
+
+/// A part on its way past one that stands.
+#[derive(Debug, Clone)]
+pub struct Passing<'a> {
+    /// The numbers of the moving and of the standing part.
+    pub parts: [usize; 2],
+    /// Their shapes.
+    pub shapes: [&'a Shape; 2],
+    /// Poses of the moving shape in the frame of the standing one, rounded.
+    pub path: Vec<Pose>,
+    /// The point of the moving shape, in its frame, that is on a line between two of these.
+    pub centre: Point3<f64>,
+    /// The depth that counts as none, in the planning frame.
+    pub granted: f64,
+    /// That of the assembly, by which depths are told.
+    pub longest_side: f64,
+}
+
+impl<'a> Passing<'a> {
+    /// Of a path (poses of the moving shape in the planning frame), what passes the standing part.
+    #[must_use]
+    pub fn new(scene: &'a Scene, allowances: &Allowances, parts: [usize; 2], path: &[Pose]) -> Self {
+        let [part, other] = parts;
+        let shapes = shapes(scene, parts);
+        let path = way_past(shapes, &scene.bodies[other].planning_from_shape, path);
+        let turns = path.iter().any(|pose| pose.rotation != path[0].rotation);
+        Self {
+            parts,
+            shapes,
+            // Of a path that does not turn, any point is on a line.
+            centre: if turns { scene.centre_in_shape(part) } else { shapes[0].bounds().centre() }
+                .map(rounded),
+            granted: allowances.of(part, other),
+            longest_side: scene.longest_side,
+            path,
+        }
+    }
+
+    /// A pair that does not move, with nothing granted.
+    #[must_use]
+    pub fn standing(scene: &'a Scene, pair: &Pair) -> Self {
+        let [one, other] = pair.poses;
+        let shapes = shapes(scene, pair.parts);
+        Self {
+            parts: pair.parts,
+            shapes,
+            path: vec![other.inverse() * one],
+            centre: shapes[0].bounds().centre(),
+            granted: 0.0,
+            longest_side: scene.longest_side,
+        }
+    }
+
+    /// How far the moving part reaches from its centre.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        let hull = self.shapes[0].hull.iter();
+        hull.map(|p| (p - self.centre).norm_squared()).fold(0.0, f64::max).sqrt()
+    }
+
+    /// Those of the moving and of the standing part.
+    #[must_use]
+    pub fn surfaces(&self) -> [&'a Surface; 2] {
+        self.shapes.map(|shape| &*shape.surface)
+    }
+}
+
+fn shapes(scene: &Scene, parts: [usize; 2]) -> [&Shape; 2] {
+    parts.map(|part| &*scene.bodies[part].shape)
+}
+
+/// The path up to where the part has passed the other for good: its last piece, if it is straight, as far
+/// as their boxes meet.
+fn way_past([moving, standing]: [&Shape; 2], planning_from_standing: &Pose, path: &[Pose]) -> Vec<Pose> {
+    let into = planning_from_standing.inverse();
+    let mut way: Vec<Pose> = path.iter().map(|pose| rounded_pose(&(into * pose))).collect();
+    if let ([.., start, end], [.., from, to]) = (path, &mut way[..])
+        && from.rotation == to.rotation
+        && let shift = end.translation.vector - start.translation.vector
+        && let Some(direction) = shift.try_normalize(0.0)
+    {
+        // The same to the bit wherever the path ends.
+        let direction = (into.rotation * direction).map(|x| (x / ALIKE).round() * ALIKE);
+        let passed = moving.bounds().transformed(from).way_past(standing.bounds(), &direction);
+        if passed == 0.0 {
+            way.pop();
+        } else if passed < shift.norm() {
+            *to = rounded_pose(&(Translation3::from(direction * passed) * *from));
+        }
+    }
+    way
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::fixtures::{block_on_plate, cuboid, moved, scene};
+    use crate::geometry::Bounds;
+
+    fn straight(start: &Pose, shift: Vector3<f64>) -> [Pose; 2] {
+        [*start, Translation3::from(shift) * *start]
+    }
+
+    #[test]
+    fn the_way_past_a_part_ends_where_that_is_left_behind_and_does_not_depend_on_the_path() {
+        let [plate, block] = block_on_plate();
+        let wall = cuboid([2.5, -4.0, 0.0], [3.0, 4.0, 3.0]);
+        let (scene, _) = scene([plate, block, wall]);
+        let start = scene.bodies[1].planning_from_shape;
+        let direction = Vector3::new(2.0, 0.3, 0.5).normalize();
+        let way = |travel: f64, other| {
+            Passing::new(&scene, &scene.allowances, [1, other], &straight(&start, direction * travel)).path
+        };
+        // Past the wall and past the plate, from which it rises slowly.
+        for other in [0, 2] {
+            let [moving, standing] = shapes(&scene, [1, other]).map(Shape::bounds);
+            let long = way(30.0, other);
+            assert_eq!(long, way(47.3, other));
+            let at = |back: f64| {
+                let into = scene.bodies[other].planning_from_shape.inverse();
+                let back = Translation3::from(into.rotation * direction * -back);
+                moving.transformed(&(back * long[1]))
+            };
+            let meets = |b: Bounds| b.meets(standing);
+            assert!(!meets(at(0.0)) && meets(at(1e-5)), "it has left {other}");
+        }
+        let [from, to] = <[Pose; 2]>::try_from(way(0.1, 2)).unwrap();
+        let short = (to.translation.vector - from.translation.vector).norm();
+        assert!((short - 0.1).abs() < 1e-8, "a path that ends before is looked at as it is");
+    }
+
+    #[test]
+    fn parts_that_stand_alike_are_passed_alike() {
+        // A pair, and the same elsewhere, turned about a slanted axis.
+        let place = Pose::new(Vector3::new(4.0, 1.0, -2.0), Vector3::new(0.3, -0.2, 0.9));
+        let foot = || cuboid([-1.0, -1.5, 0.0], [2.0, 1.0, 0.5]);
+        let post = || cuboid([0.0, 0.0, 0.5], [1.0, 0.75, 3.0]);
+        let (scene, _) = scene([foot(), post(), moved(foot(), &place), moved(post(), &place)]);
+        let way = |parts: [usize; 2], direction: Vector3<f64>, travel: f64| {
+            let start = &scene.bodies[parts[0]].planning_from_shape;
+            let path = straight(start, direction * travel);
+            let Passing { path, centre, shapes, .. } = Passing::new(&scene, &scene.allowances, parts, &path);
+            (path, centre, shapes.map(Shape::content))
+        };
+        let up = Vector3::z();
+        assert_eq!(way([1, 0], up, 20.0), way([3, 2], place * up, 31.0));
+        assert_ne!(way([1, 0], up, 20.0), way([1, 2], up, 20.0));
+    }
+}
