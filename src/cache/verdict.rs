@@ -100,3 +100,42 @@ fn verdict(record: VerdictRecord, other: usize) -> Verdict {
         |e: EntryRecord| Entry { other, on_moving: e.on_moving, point: Point3::from(e.point), over: e.over };
     Verdict { depth: record.depth, entries: record.entries.into_iter().map(entry).collect() }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+    use crate::cache::recall::Reused;
+    use crate::fixtures::{cuboid, moved, scene};
+    use crate::geometry::Pose;
+
+    #[test]
+    fn what_leaves_alike_is_checked_once_and_told_of_each() {
+        let place = Pose::translation(4.0, 1.0, 0.0) * Pose::rotation(nalgebra::Vector3::z() * 0.7);
+        let foot = || cuboid([-1.0, -1.5, 0.0], [2.0, 1.0, 0.5]);
+        let post = || cuboid([0.0, 0.0, 0.5], [1.0, 0.75, 3.0]);
+        let (scene, _) = scene([foot(), post(), moved(foot(), &place), moved(post(), &place)]);
+        let (recall, checks) = (Recall::default(), Cell::new(0));
+        let told = |parts: [usize; 2], height: f64, aside: f64| {
+            let start = scene.bodies[parts[0]].planning_from_shape;
+            let path = [start, Pose::translation(aside, 0.0, height) * start];
+            let passing = &Passing::new(&scene, &scene.allowances, parts, &path);
+            let check = || {
+                checks.set(checks.get() + 1);
+                let point = Point3::new(0.5, 0.0, height);
+                let entry = Entry { other: parts[1], on_moving: true, point, over: 0.5 };
+                Ok(Verdict { depth: 0.5, entries: vec![entry] })
+            };
+            recall.verdict(&VerdictQuestion { passing, limit: 2e-3 }, check).unwrap()
+        };
+        let (one, other) = (told([1, 0], 0.25, 0.0), told([3, 2], 0.5, 0.0));
+        assert_eq!((checks.get(), one.depth, other.depth), (1, 0.5, 0.5));
+        assert_eq!((one.entries[0].other, other.entries[0].other), (0, 2));
+        assert_eq!(one.entries[0].point, other.entries[0].point, "past the foot, both are out of its sight");
+        told([1, 0], 0.0, 0.25);
+        told([1, 2], 0.25, 0.0);
+        assert_eq!(checks.get(), 3, "another way, and past another part");
+        assert_eq!(recall.reused(), Reused::default(), "nothing was there before the request");
+    }
+}

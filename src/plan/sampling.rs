@@ -19,7 +19,7 @@ use crate::geometry::{Bounds, Pose, SampleTree, Shape, Spacing, Surface, interpo
 use crate::termination::{Interrupt, Poll, Termination};
 
 use super::passing::Passing;
-use super::verify::Entry;
+use super::verify::{Entry, HELPFUL};
 
 /// Largest travel of a vertex between two checked poses, as a share of the longest side.
 const DENSITY: f64 = 0.004;
@@ -98,7 +98,7 @@ impl Samples {
             .enumerate()
             .map(|(i, pose)| {
                 termination.check()?;
-                let moment = Moment { pose, turn: Turn::of(i, poses.len()), deep: limit / 2.0 };
+                let moment = Moment { pose, turn: Turn::of(i, poses.len()), deep: limit * HELPFUL };
                 let entries = self.entries(passing, &moment, termination);
                 // What was found of samples that were cut short is not to be believed.
                 termination.check().map(|()| entries)

@@ -37,6 +37,9 @@ const COARSE: f64 = 4e-3;
 const OVERLAP_SPARE: f64 = 2e-6;
 const OVERLAP_FINEST: f64 = 1e-4;
 
+/// Deeper than this, as a share of the limit, points help in refining a motion that is refused.
+pub(super) const HELPFUL: f64 = 1.0 / 2.0;
+
 /// A point that got too deep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
@@ -67,13 +70,15 @@ impl Verdict {
     }
 
     /// Of what was found past each of the parts that stand; entries up to `limit` make a good path and
-    /// are dropped.
+    /// are dropped, as are those of a refused one that are too shallow to help.
     #[must_use]
     pub fn of_all(past: Vec<Self>, limit: f64) -> Self {
         let depth = past.iter().map(|v| v.depth).fold(0.0, f64::max);
-        let entries =
-            if depth <= limit { Vec::new() } else { past.into_iter().flat_map(|v| v.entries).collect() };
-        Self { depth, entries }
+        if depth <= limit {
+            return Self { depth, entries: Vec::new() };
+        }
+        let entries = past.into_iter().flat_map(|v| v.entries);
+        Self { depth, entries: entries.filter(|e| e.over > limit * HELPFUL).collect() }
     }
 }
 

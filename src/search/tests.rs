@@ -284,6 +284,19 @@ fn what_leaves_straight_is_not_simulated() {
 }
 
 #[test]
+fn what_leaves_either_way_takes_the_shorter() {
+    for (heights, up) in [([0.5, 3.0], true), ([-3.0, -0.5], false)] {
+        let (scene, verifier) = scene([tube(1.0, 2.0, [-4.0, 4.0], 24), rod(0.9, heights, 24)]);
+        let (present, fixed, actions) = (vec![0, 1], vec![0], ActionSet::Extended);
+        let problem = Problem { present, fixed, actions, sweeps: true, ..problem(scene, &verifier) };
+        let outcome = search(Planner::SbdpStar, problem, &mut Recorder::default());
+        let [Removal { path, .. }] = &outcome.removals[..] else { panic!("{:?}", outcome.removals) };
+        let way = path[path.len() - 1].translation.vector - path[0].translation.vector;
+        assert!((way.z > 0.0) == up && way.norm() < 4.0, "{way}");
+    }
+}
+
+#[test]
 fn a_sweep_that_the_triangles_refute_takes_nothing_out_and_leaves_its_points_for_simulation() {
     use super::disassembly::{Disassembly, Run};
     use crate::geometry::Pose;
