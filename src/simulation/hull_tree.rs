@@ -2,8 +2,10 @@
 //!
 //! A binary tree over the parts, neighbours in space together, whose nodes hold the hull of their
 //! parts: without one part only the hulls above it differ, each made of two smaller ones. So leaving
-//! costs the logarithm of the number of parts, where a hull of all points would cost their number. All parts
-//! of the scene have their places in it, whichever stand: so what is gone from the start costs no more.
+//! costs the logarithm of the number of parts, where a hull of all points would cost their number. Most of
+//! these need not even be joined again: the points of both halves do as well, while they are few. All
+//! parts of the scene have their places in it, whichever stand: so what is gone from the start costs no
+//! more.
 
 use std::sync::Arc;
 
@@ -15,12 +17,17 @@ use crate::termination::Termination;
 
 use super::{Scene, Surroundings};
 
+/// So many times as many points as it had vertices when parts began to leave stand for a hull.
+const LOOSE: usize = 2;
+
 /// The parts that stand, with the hulls of groups of them.
 #[derive(Debug, Clone)]
 pub struct HullTree {
     standing: Vec<usize>,
     /// Node `i` has the children `2 i` and `2 i + 1`; the root is 1. Empty for nodes without parts.
     hulls: Vec<Arc<[Point3<f64>]>>,
+    /// How many points each had when it was last joined.
+    joined: Vec<usize>,
     /// Per part of the scene: its leaf, or 0.
     leaf: Vec<usize>,
 }
@@ -33,8 +40,12 @@ impl HullTree {
         let mut order: Vec<usize> = (0..scene.bodies.len()).collect();
         let leaves = order.len().next_power_of_two();
         group(scene, &mut order);
-        let mut tree =
-            Self { hulls: vec![Arc::default(); 2 * leaves], leaf: vec![0; scene.bodies.len()], standing };
+        let mut tree = Self {
+            hulls: vec![Arc::default(); 2 * leaves],
+            joined: Vec::new(),
+            leaf: vec![0; scene.bodies.len()],
+            standing,
+        };
         for (k, &part) in order.iter().enumerate() {
             if tree.standing.binary_search(&part).is_err() {
                 continue;
@@ -54,6 +65,7 @@ impl HullTree {
             });
             level /= 2;
         }
+        tree.joined = tree.hulls.iter().map(|hull| hull.len()).collect();
         tree
     }
 
@@ -63,7 +75,7 @@ impl HullTree {
         &self.standing
     }
 
-    /// Vertices of the hull of them all.
+    /// Vertices of the hull of them all, and perhaps other points of them.
     #[must_use]
     pub fn hull(&self) -> &[Point3<f64>] {
         self.hulls.get(1).map_or(&[], |hull| hull)
@@ -108,7 +120,16 @@ impl HullTree {
             if !self.hulls[node].iter().any(|v| gone.contains(v)) {
                 break;
             }
-            self.hulls[node] = scene.hulls.of(&self.hulls[2 * node], &self.hulls[2 * node + 1]);
+            let [one, other] = [2 * node, 2 * node + 1].map(|child| &self.hulls[child]);
+            // The points of both hold no more than their hull does: some that are inside cost less than to
+            // find them out at every step.
+            self.hulls[node] = if one.len() + other.len() <= LOOSE * self.joined[node] {
+                [&**one, &**other].concat().into()
+            } else {
+                let joined = scene.hulls.of(one, other);
+                self.joined[node] = joined.len();
+                joined
+            };
         }
         shaped
     }
