@@ -102,41 +102,41 @@ pub(super) struct Clipped {
 }
 
 impl Clipped {
-    /// Cut off plane by plane (I. E. Sutherland and G. W. Hodgman 1974). What lies on a plane stays.
-    pub(super) fn new(triangle: &[Point3<f64>; 3], bounds: &Bounds) -> Self {
+    /// Cut off plane by plane (I. E. Sutherland and G. W. Hodgman 1974). What lies on a plane stays. None if
+    /// rounding makes more corners than there is room for.
+    pub(super) fn new(triangle: &[Point3<f64>; 3], bounds: &Bounds) -> Option<Self> {
         let mut clipped = Self { corners: [Point3::origin(); 9], count: 3 };
         clipped.corners[..3].copy_from_slice(triangle);
         for axis in 0..3 {
-            clipped = clipped.cut(|p| bounds.max[axis] - p[axis]);
-            clipped = clipped.cut(|p| p[axis] - bounds.min[axis]);
+            clipped = clipped.cut(|p| bounds.max[axis] - p[axis])?;
+            clipped = clipped.cut(|p| p[axis] - bounds.min[axis])?;
         }
-        clipped
+        Some(clipped)
     }
 
     /// What is left where a linear function is not negative.
-    fn cut(&self, inside: impl Fn(&Point3<f64>) -> f64) -> Self {
+    fn cut(&self, inside: impl Fn(&Point3<f64>) -> f64) -> Option<Self> {
         let corners = self.corners();
         if corners.iter().all(|p| inside(p) >= 0.0) {
-            return *self;
+            return Some(*self);
         }
         let mut left = Self { corners: [Point3::origin(); 9], count: 0 };
         for (p, q) in corners.iter().zip(corners.iter().cycle().skip(1)) {
             let (here, there) = (inside(p), inside(q));
             if here >= 0.0 {
-                left.push(*p);
+                left.push(*p)?;
             }
             if (here < 0.0 && there > 0.0) || (here > 0.0 && there < 0.0) {
-                left.push(p + (q - p) * (here / (here - there)));
+                left.push(p + (q - p) * (here / (here - there)))?;
             }
         }
-        left
+        Some(left)
     }
 
-    fn push(&mut self, p: Point3<f64>) {
-        // Rounding may make a corner more than geometry has: then the last ones are as good as one.
-        let at = self.count.min(self.corners.len() - 1);
-        self.corners[at] = p;
-        self.count = at + 1;
+    fn push(&mut self, p: Point3<f64>) -> Option<()> {
+        *self.corners.get_mut(self.count)? = p;
+        self.count += 1;
+        Some(())
     }
 
     pub(super) fn corners(&self) -> &[Point3<f64>] {
@@ -161,7 +161,7 @@ mod tests {
             direction in point(),
         ) {
             let bounds = Bounds::of(&corners);
-            let clipped = Clipped::new(&triangle, &bounds);
+            let clipped = Clipped::new(&triangle, &bounds).unwrap();
             prop_assert!(clipped.corners().iter().all(|p| bounds.grown(1e-9).contains(p)));
             let on_triangle = |p: &Point3<f64>| {
                 let [a, b, c] = &triangle;

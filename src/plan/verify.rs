@@ -1,7 +1,7 @@
 //! Verification of a path on the triangles, independent of distance fields and engines.
 //!
-//! For every standing part that the moving one comes near, both surfaces are bounded against each
-//! other all along the way ([`depth`](super::depth) says how, and what that guarantees): what counts
+//! For every standing part that the moving one comes near ([`Passing`]), both surfaces are bounded against
+//! each other all along the way ([`depth`](super::depth) says how, and what that guarantees): what counts
 //! is depth beyond that of the pair at the assembled pose, which is measured with the same search.
 //! Screws of many turns are bounded by their profiles, too ([`screw`](super::screw)), and what
 //! neither settles is checked at samples ([`sampling`](super::sampling)).

@@ -17,7 +17,7 @@ use crate::termination::Termination;
 
 use super::{Scene, Surroundings};
 
-/// So many times as many points as it had vertices when parts began to leave stand for a hull.
+/// So many times as many points as it had when it was last joined stand for a hull.
 const LOOSE: usize = 2;
 
 /// The parts that stand, with the hulls of groups of them.

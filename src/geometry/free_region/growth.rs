@@ -151,7 +151,7 @@ impl Growth<'_> {
         let FreeRegion { centre, radius, .. } = self.region;
         let bounds = Bounds::of([&centre]).grown(radius);
         let beyond = |p: &Point3<f64>| (p - centre).amax() > 2.0 * radius;
-        let clipped = corners.iter().any(beyond).then(|| Clipped::new(corners, &bounds))?;
+        let clipped = corners.iter().any(beyond).then(|| Clipped::new(corners, &bounds))??;
         (!clipped.corners().is_empty()).then_some(clipped)
     }
 
