@@ -6,9 +6,8 @@
 //! at a vertex in which two sheets touch, the normals of both are mixed. There, the winding number
 //! decides.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
-use super::winding::WindingTree;
 use super::{Closest, Feature, Mesh, area_normal};
 
 /// cos of the angle between the normals of a fold's two sides, at least.
@@ -26,13 +25,12 @@ pub(super) struct Folds {
     /// Per triangle: a bit for each edge, and one for the face.
     bits: Vec<u8>,
     vertices: Vec<bool>,
-    winding: WindingTree,
 }
 
 impl Folds {
     /// Bytes in memory.
     pub(super) fn memory(&self) -> usize {
-        self.bits.len() + self.vertices.len() + self.winding.memory()
+        self.bits.len() + self.vertices.len()
     }
 
     /// What is folded of a mesh, if anything is; `across` are the neighbours of its triangles.
@@ -52,7 +50,7 @@ impl Folds {
             }
         }
         let any = bits.iter().any(|b| *b != 0) || vertices.contains(&true);
-        any.then(|| Self { bits, vertices, winding: WindingTree::new(&mesh.vertices, &mesh.triangles) })
+        any.then(|| Self { bits, vertices })
     }
 
     /// Whether the sign at the closest feature is in doubt; `corners` are its triangle's vertices.
@@ -67,11 +65,6 @@ impl Folds {
     /// Whether a face is folded.
     pub(super) fn has_face(&self, triangle: u32) -> bool {
         self.bits[triangle as usize] >> FACE == 1
-    }
-
-    /// Whether a point is inside, by the winding number.
-    pub(super) fn is_inside(&self, p: &Point3<f64>) -> bool {
-        self.winding.winding(p) > 0.5
     }
 }
 
@@ -132,6 +125,8 @@ fn pinched(mesh: &Mesh, across: &[[u32; 3]]) -> Vec<bool> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Point3;
+
     use super::*;
     use crate::fixtures::{ball, cuboid, healed, l_shape, spread, surface};
     use crate::geometry::{SourceMesh, Surface};

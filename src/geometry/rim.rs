@@ -9,6 +9,8 @@
 use nalgebra::Point3;
 
 use super::incidence::{Side, Sides};
+use super::ray::Ray;
+use super::solid_angle::SolidAngle;
 
 /// Winding numbers nearer to one half tell no sign that holds beside their point, too: twice what those of
 /// [`Surface::winding`](super::Surface::winding) are off by.
@@ -25,9 +27,13 @@ pub struct Rim {
 /// An edge of an opening.
 #[derive(Debug, Clone)]
 pub struct RimEdge {
+    /// In the direction in which more triangles use it.
+    ends: [Point3<f64>; 2],
+    /// How many more.
+    times: u32,
     middle: Point3<f64>,
     length: f64,
-    /// Length times how many triangles more use it in one direction than in the other.
+    /// Length times how many more triangles use it.
     weight: f64,
 }
 
@@ -51,11 +57,12 @@ impl Rim {
     #[must_use]
     pub fn of(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
         let edge = |(edge, sides): ([u32; 2], &[Side])| {
-            let excess = sides.iter().map(|s| if s.upwards { 1i32 } else { -1 }).sum::<i32>().unsigned_abs();
-            let [a, b] = edge.map(|i| vertices[i as usize]);
-            let length = (b - a).norm();
-            let weight = length * f64::from(excess);
-            (excess > 0).then(|| RimEdge { middle: nalgebra::center(&a, &b), length, weight })
+            let excess = sides.iter().map(|s| if s.upwards { 1i32 } else { -1 }).sum::<i32>();
+            let [low, high] = edge.map(|i| vertices[i as usize]);
+            let ends = if excess > 0 { [low, high] } else { [high, low] };
+            let (times, length) = (excess.unsigned_abs(), (high - low).norm());
+            let (middle, weight) = (nalgebra::center(&low, &high), length * f64::from(times));
+            (times > 0).then_some(RimEdge { ends, times, middle, length, weight })
         };
         Self { edges: Sides::of(triangles).iter().filter_map(edge).collect() }
     }
@@ -66,10 +73,41 @@ impl Rim {
         &self.edges
     }
 
+    /// Whether it has so many edges that they are not looked at one by one.
+    #[must_use]
+    pub fn is_long(&self) -> bool {
+        self.edges.len() > MOST_EDGES
+    }
+
+    /// The solid angle of the strips that go from the edges to infinity against a ray, and close the surface, as
+    /// seen from where the ray begins. `None` if the ray passes through an edge.
+    #[must_use]
+    pub(super) fn strips_behind(&self, ray: &Ray) -> Option<f64> {
+        let mut sum = SolidAngle::default();
+        let direction = ray.direction();
+        let length = direction.norm();
+        let back = -direction / length;
+        for edge in &self.edges {
+            let seen = edge.ends.map(|p| ray.see(|axis| p[axis]));
+            let side = seen[0].edge(&seen[1]);
+            let [a, b] = edge.ends.map(|p| p - ray.from());
+            let (la, lb) = (a.norm(), b.norm());
+            // Of the triangle with its third corner infinitely far along `back`: the strip runs along the edge
+            // the other way round than the surface does.
+            let re = la * lb + a.dot(&b) + a.dot(&back) * lb + b.dot(&back) * la;
+            if side == 0.0 && re <= 0.0 {
+                return None;
+            }
+            let im = ray.sense() * side / length;
+            (0..edge.times).for_each(|_| sum.add(re, im));
+        }
+        Some(sum.sum())
+    }
+
     /// How quickly the winding number may change within `radius` of `p`.
     #[must_use]
     pub fn slope(&self, p: &Point3<f64>, radius: f64) -> f64 {
-        if self.edges.len() > MOST_EDGES {
+        if self.is_long() {
             return f64::INFINITY;
         }
         self.edges.iter().map(|e| e.slope(p, radius)).sum()

@@ -3,10 +3,12 @@
 //! Sign: for closed meshes by the angle-weighted pseudo-normal of the closest feature
 //! (J. A. Bærentzen and H. Aanæs 2005), which is exact for closed, outward oriented meshes that do
 //! not cross or touch themselves; for all others by winding number > 0.5, and so where a closed one
-//! is folded (`folds`). What that needs of a mesh: `derived`. Where segments meet it: `segments`.
+//! is folded (`folds`). What that needs of a mesh: `derived`. Where segments meet it:
+//! `segments`. Winding numbers: `winding`.
 
 mod derived;
 mod segments;
+mod winding;
 
 use std::sync::OnceLock;
 
@@ -156,17 +158,15 @@ impl Surface {
     /// outside as `p` is. Not if it cannot be told.
     #[must_use]
     pub fn stays_outside(&self, p: &Point3<f64>, radius: f64) -> bool {
-        let (Some(winding), Some(rim)) = (&self.derived().winding, &self.derived().rim) else {
-            return self.signed_distance(p) > 0.0;
-        };
-        let margin = 0.5 - WINDING_DOUBT - winding.winding(p);
+        let Some(rim) = &self.derived().rim else { return self.signed_distance(p) > 0.0 };
+        let margin = 0.5 - WINDING_DOUBT - self.winding_number(p);
         margin > 0.0 && rim.slope(p, radius) * radius < margin
     }
 
     /// The winding number at `p`, where signs come from it.
     #[must_use]
     pub fn winding(&self, p: &Point3<f64>) -> Option<f64> {
-        self.derived().winding.as_ref().map(|w| w.winding(p))
+        self.is_open().then(|| self.winding_number(p))
     }
 
     /// The closest point on one triangle.
@@ -201,9 +201,9 @@ impl Surface {
     #[must_use]
     pub fn signed(&self, p: &Point3<f64>, closest: &Closest) -> f64 {
         let corners = &self.mesh.triangles[closest.triangle as usize];
-        let inside = match (&self.derived().winding, &self.derived().folds) {
-            (Some(w), _) => w.winding(p) > 0.5,
-            (None, Some(folds)) if folds.doubts(closest, corners) => folds.is_inside(p),
+        let inside = match (self.is_open(), &self.derived().folds) {
+            (true, _) => self.winding_number(p) > 0.5,
+            (false, Some(folds)) if folds.doubts(closest, corners) => self.winding_number(p) > 0.5,
             _ => self.pseudo_normal(closest).dot(&(p - closest.point)) < 0.0,
         };
         if inside { -closest.distance } else { closest.distance }

@@ -7,6 +7,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "loops over all lanes alike become vector instructions")]
 
+mod crossings;
 mod nearest_first;
 
 use nalgebra::{Point3, Vector3};
@@ -143,11 +144,7 @@ impl TriangleTree {
         mut test: impl FnMut(u32) -> bool,
     ) -> bool {
         let q = p - self.origin;
-        let slack = (ROUNDING * (q.amax() + self.radius + length)) as f32;
-        // Nearly parallel to a slab counts as parallel, without infinities.
-        let steep = |x: f64| if x.abs() < 1e-12 { 1e12 } else { 1.0 / x };
-        let (inverse, q) = (direction.map(|x| steep(x) as f32), q.map(|x| x as f32));
-        let segment = Segment { q: q.into(), inverse: inverse.into(), length: length as f32 + slack, slack };
+        let segment = self.segment(&q, direction, length);
         let mut stack = vec![self.root];
         while let Some(at) = stack.pop() {
             if at & LEAF != 0 {

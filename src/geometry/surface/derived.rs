@@ -3,13 +3,13 @@
 use nalgebra::{Unit, Vector3};
 
 use super::NO_TRIANGLE;
+use crate::geometry::dipoles::DipoleTree;
 use crate::geometry::folds::Folds;
 use crate::geometry::incidence::Sides;
 use crate::geometry::mesh::directed_edges;
 use crate::geometry::rim::Rim;
 use crate::geometry::triangle::area_normal;
 use crate::geometry::triangle_tree::TriangleTree;
-use crate::geometry::winding::WindingTree;
 use crate::geometry::{Mesh, Solidity};
 
 /// All that derives from a mesh.
@@ -23,9 +23,10 @@ pub(super) struct Derived {
     pub(super) fan_start: Vec<u32>,
     pub(super) fan: Vec<u32>,
     pub(super) tree: TriangleTree,
-    pub(super) winding: Option<WindingTree>,
     /// Where signs come from winding numbers.
     pub(super) rim: Option<Rim>,
+    /// Where the rim has so many edges that winding numbers are summed.
+    pub(super) dipoles: Option<DipoleTree>,
     pub(super) folds: Option<Folds>,
 }
 
@@ -38,13 +39,14 @@ impl Derived {
             })
             .collect::<Vec<_>>();
         let (fan_start, fan) = fans(mesh);
-        let winding =
-            (mesh.solidity == Solidity::Winding).then(|| WindingTree::new(&mesh.vertices, &mesh.triangles));
+        let rim = (mesh.solidity == Solidity::Winding).then(|| Rim::of(&mesh.vertices, &mesh.triangles));
+        let is_soup = rim.as_ref().is_some_and(Rim::is_long);
         let neighbours = neighbours(mesh);
-        let folds = if winding.is_some() { None } else { Folds::of(mesh, &face_normals, &neighbours) };
+        let folds = if rim.is_some() { None } else { Folds::of(mesh, &face_normals, &neighbours) };
         let corners: Vec<_> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
         Self {
-            rim: winding.is_some().then(|| Rim::of(&mesh.vertices, &mesh.triangles)),
+            dipoles: is_soup.then(|| DipoleTree::new(&mesh.vertices, &mesh.triangles)),
+            rim,
             folds,
             neighbours,
             vertex_normals: vertex_normals(mesh, &face_normals),
@@ -52,7 +54,6 @@ impl Derived {
             fan_start,
             fan,
             tree: TriangleTree::new(&corners),
-            winding,
         }
     }
 
@@ -64,7 +65,7 @@ impl Derived {
             + size_of_val(&*self.fan_start)
             + size_of_val(&*self.fan)
             + self.tree.memory()
-            + self.winding.as_ref().map_or(0, WindingTree::memory)
+            + self.dipoles.as_ref().map_or(0, DipoleTree::memory)
             + self.rim.as_ref().map_or(0, Rim::memory)
             + self.folds.as_ref().map_or(0, Folds::memory)
     }
