@@ -29,34 +29,43 @@ pub(super) struct Ray {
     /// Along the axis or against it: 1 or -1.
     sense: f64,
     lean: [f64; 2],
+    direction: Vector3<f64>,
+    length: f64,
 }
 
-/// A point as seen along a ray: beside it, in two directions, and how far along it.
+/// A point as seen along a ray: where beside it, and how far along it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Seen {
-    pub(super) x: f64,
-    pub(super) y: f64,
+    pub(super) beside: [f64; 2],
     pub(super) along: f64,
 }
 
-impl Seen {
-    /// On which side of the ray the edge to another point passes: positive if, seen against the ray, it goes
-    /// around it counter-clockwise.
-    #[inline]
-    pub(super) fn edge(&self, to: &Self) -> f64 {
-        self.x * to.y - self.y * to.x
-    }
+/// On which side of a ray the edge of two points beside it passes: positive if it goes around it
+/// counter-clockwise, seen along its axis.
+#[inline]
+pub(super) fn edge(from: [f64; 2], to: [f64; 2]) -> f64 {
+    from[0] * to[1] - from[1] * to[0]
 }
 
 impl Ray {
-    /// Rays from a point, to be tried in this order: out of a box by the nearest side first.
+    /// Rays from a point, to be tried in this order: the first leaves a box by its nearest side.
     pub(super) fn out_of(bounds: &Bounds, from: &Point3<f64>) -> impl Iterator<Item = Self> {
         let (below, above) = (from - bounds.min, bounds.max - from);
-        let mut sides: [(f64, usize, f64); 6] =
-            std::array::from_fn(|i| if i < 3 { (below[i], i, -1.0) } else { (above[i - 3], i - 3, 1.0) });
-        sides.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (down, up) = (below.imin(), above.imin());
+        let (nearest, sense) = if below[down] < above[up] { (down, -1.0) } else { (up, 1.0) };
         let from = *from;
-        sides.into_iter().zip(LEANINGS).map(move |((_, axis, sense), lean)| Self { from, axis, sense, lean })
+        (0..).zip(LEANINGS).map(move |(i, lean)| {
+            let sense = if i < 3 { sense } else { -sense };
+            Self::leaning(from, (nearest + i) % 3, sense, lean)
+        })
+    }
+
+    fn leaning(from: Point3<f64>, axis: usize, sense: f64, lean: [f64; 2]) -> Self {
+        let mut direction = Vector3::zeros();
+        direction[axis] = sense;
+        direction[(axis + 1) % 3] = lean[0];
+        direction[(axis + 2) % 3] = lean[1];
+        Self { from, axis, sense, lean, direction, length: direction.norm() }
     }
 
     /// Where it begins.
@@ -65,13 +74,13 @@ impl Ray {
     }
 
     /// Its direction: of length 1 along its axis.
-    pub(super) fn direction(&self) -> Vector3<f64> {
-        let mut out = Vector3::zeros();
-        out[self.axis] = self.sense;
-        // Along the ray, not along the axis.
-        out[(self.axis + 1) % 3] = self.lean[0];
-        out[(self.axis + 2) % 3] = self.lean[1];
-        out
+    pub(super) fn direction(&self) -> &Vector3<f64> {
+        &self.direction
+    }
+
+    /// The length of its direction.
+    pub(super) fn length(&self) -> f64 {
+        self.length
     }
 
     /// The sides on which the edge of two points passes are told in a plane that mirrors them if the ray goes
@@ -80,13 +89,32 @@ impl Ray {
         self.sense
     }
 
+    /// Whether it passes a ball, or nearly.
+    pub(super) fn passes(&self, centre: &Point3<f64>, radius: f64) -> bool {
+        let seen = self.see(centre);
+        // Across the axis it is no further than so many times the distance.
+        let reach = 1.1 * radius;
+        seen.along > -reach && seen.beside.iter().all(|x| x.abs() < reach)
+    }
+
+    /// The axes beside the ray, and that along it.
+    #[inline]
+    pub(super) fn axes(&self) -> [usize; 3] {
+        [(self.axis + 1) % 3, (self.axis + 2) % 3, self.axis]
+    }
+
     /// A point as it is seen along the ray.
     #[inline]
-    pub(super) fn see(&self, coordinate: impl Fn(usize) -> f64) -> Seen {
-        let at = |i: usize| coordinate(i) - self.from[i];
-        let along = self.sense * at(self.axis);
-        let x = at((self.axis + 1) % 3) - self.lean[0] * along;
-        let y = at((self.axis + 2) % 3) - self.lean[1] * along;
-        Seen { x, y, along }
+    pub(super) fn see(&self, p: &Point3<f64>) -> Seen {
+        let axes = self.axes();
+        let [x, y, along] = self.seen(axes.map(|a| p[a]), axes.map(|a| self.from[a]));
+        Seen { beside: [x, y], along }
+    }
+
+    /// What is seen of a point, given by its coordinates along [`Ray::axes`] as where the ray begins is.
+    #[inline]
+    pub(super) fn seen(&self, p: [f64; 3], from: [f64; 3]) -> [f64; 3] {
+        let along = self.sense * (p[2] - from[2]);
+        [p[0] - from[0] - self.lean[0] * along, p[1] - from[1] - self.lean[1] * along, along]
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! Strips from the edges of the rim to infinity close an open surface. A ray the other way meets none
 //! of them, so it leaves the closed surface more often than it enters it by as often as that winds
-//! around its beginning; the share of the strips is the sum of their solid angles. This is exact,
-//! and takes a walk through a tree and a few operations for each edge of the rim. Around the triangles
+//! around its beginning; the share of the strips is the sum of their solid angles. This is exact but for
+//! openings far away, and takes a walk through a tree and a few operations for each edge of the rim. Around the triangles
 //! of a soup, which have rims of many edges, dipoles are summed ([`DipoleTree`](super::DipoleTree)).
 //!
 //! Source: generalised winding numbers, A. Jacobson et al. (2013); the ray and the strips are ours.
@@ -64,18 +64,19 @@ mod tests {
 
     #[test]
     fn it_is_the_sum_of_the_solid_angles() {
+        // Openings count as dipoles where they are far.
         let surfaces = [
-            surface(open_box([0.0; 3], [1.0; 3])),
-            torn(ball(3), 2),
-            torn(ball(2), 7),
-            torn(cuboid([-1.0; 3], [1.0; 3]), 5),
-            surface(cuboid([-1.0; 3], [1.0; 3])),
+            (surface(open_box([0.0; 3], [1.0; 3])), 1e-3),
+            (torn(ball(3), 2), 1e-3),
+            (torn(ball(2), 7), 1e-3),
+            (torn(cuboid([-1.0; 3], [1.0; 3]), 5), 1e-3),
+            (surface(cuboid([-1.0; 3], [1.0; 3])), 1e-9),
         ];
-        for s in &surfaces {
+        for (s, off) in &surfaces {
             let mut told = 0;
             for p in points().filter(|p| s.closest(p, 1e-9).is_none()) {
                 let (found, expected) = (s.winding_number(&p), summed(s, &p));
-                assert!((found - expected).abs() < 1e-9, "{found} for {expected} at {p} of {s:?}");
+                assert!((found - expected).abs() < *off, "{found} for {expected} at {p} of {s:?}");
                 told += 1;
             }
             assert!(told > 2000);

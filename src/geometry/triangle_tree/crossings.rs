@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::super::ray::{Ray, Seen};
+use super::super::ray::{Ray, edge};
 use super::{LEAF, Leaf, Segment, TriangleTree, WIDTH};
 
 /// The ray passes through an edge or a vertex: another one has to be asked.
@@ -17,7 +17,7 @@ impl TriangleTree {
     pub(in super::super) fn crossings(&self, ray: &Ray) -> Result<i32, Ambiguous> {
         let q = ray.from() - self.origin;
         // Along its axis it is out of the tree so far on.
-        let segment = self.segment(&q, &ray.direction(), q.amax() + self.radius);
+        let segment = self.segment(&q, ray.direction(), q.amax() + self.radius);
         self.crossings_below(self.root, ray, &segment)
     }
 
@@ -43,20 +43,24 @@ impl TriangleTree {
 
 impl Leaf {
     fn crossings(&self, ray: &Ray) -> Result<i32, Ambiguous> {
-        let nowhere = Seen { x: 0.0, y: 0.0, along: 0.0 };
-        let mut seen = [[nowhere; WIDTH]; 3];
+        let axes = ray.axes();
+        let from = axes.map(|a| ray.from()[a]);
+        // By corner and coordinate.
+        let mut seen = [[[0.0; WIDTH]; 3]; 3];
         for (seen, corners) in seen.iter_mut().zip(&self.corners) {
+            let [x, y, z] = axes.map(|a| &corners[a]);
             for k in 0..WIDTH {
-                seen[k] = ray.see(|axis| corners[axis][k]);
+                [seen[0][k], seen[1][k], seen[2][k]] = ray.seen([x[k], y[k], z[k]], from);
             }
         }
         let [a, b, c] = &seen;
         let mut sides = [[0.0; WIDTH]; 3];
         for k in 0..WIDTH {
-            sides[0][k] = b[k].edge(&c[k]);
-            sides[1][k] = c[k].edge(&a[k]);
-            sides[2][k] = a[k].edge(&b[k]);
+            sides[0][k] = edge([b[0][k], b[1][k]], [c[0][k], c[1][k]]);
+            sides[1][k] = edge([c[0][k], c[1][k]], [a[0][k], a[1][k]]);
+            sides[2][k] = edge([a[0][k], a[1][k]], [b[0][k], b[1][k]]);
         }
+        let [a, b, c] = [&a[2], &b[2], &c[2]];
         let mut sum = 0;
         for k in (0..WIDTH).filter(|&k| self.height[k].is_finite()) {
             let [u, v, w] = [sides[0][k], sides[1][k], sides[2][k]];
@@ -65,14 +69,14 @@ impl Leaf {
                 continue;
             }
             // All of it lies behind.
-            if a[k].along < 0.0 && b[k].along < 0.0 && c[k].along < 0.0 {
+            if a[k] < 0.0 && b[k] < 0.0 && c[k] < 0.0 {
                 continue;
             }
             if u == 0.0 || v == 0.0 || w == 0.0 {
                 return Err(Ambiguous);
             }
             let around = least > 0.0;
-            let along = u * a[k].along + v * b[k].along + w * c[k].along;
+            let along = u * a[k] + v * b[k] + w * c[k];
             if (along > 0.0) == around && along != 0.0 {
                 sum += if around == (ray.sense() > 0.0) { 1 } else { -1 };
             }
