@@ -132,6 +132,17 @@ pub(crate) fn ball(rounds: u32) -> SourceMesh {
     SourceMesh { vertices, triangles }
 }
 
+/// Some meshes as one part.
+pub(crate) fn joined(meshes: impl IntoIterator<Item = SourceMesh>) -> SourceMesh {
+    let mut all = SourceMesh::default();
+    for mesh in meshes {
+        let base = all.vertices.len() as u32;
+        all.vertices.extend(mesh.vertices);
+        all.triangles.extend(mesh.triangles.into_iter().map(|t| t.map(|v| v + base)));
+    }
+    all
+}
+
 /// A mesh elsewhere.
 pub(crate) fn moved(mut mesh: SourceMesh, pose: &Pose) -> SourceMesh {
     for v in &mut mesh.vertices {

@@ -92,15 +92,10 @@ impl Kind {
     #[must_use]
     pub fn algorithm(self) -> u32 {
         match self {
-            Self::Touching
-            | Self::Source
-            | Self::Answer
-            | Self::Shape
-            | Self::Healed
-            | Self::Hull
-            | Self::Swept => 1,
-            Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Plan => 2,
-            Self::Verdict => 3,
+            Self::Source | Self::Shape | Self::Healed | Self::Hull | Self::Swept => 1,
+            Self::Touching | Self::Answer => 2,
+            Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Plan => 3,
+            Self::Verdict => 4,
         }
     }
 

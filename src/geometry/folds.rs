@@ -50,7 +50,7 @@ impl Folds {
             }
         }
         let any = bits.iter().any(|b| *b != 0) || vertices.contains(&true);
-        any.then(|| Self { bits, vertices })
+        any.then_some(Self { bits, vertices })
     }
 
     /// Whether the sign at the closest feature is in doubt; `corners` are its triangle's vertices.
@@ -128,7 +128,7 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
-    use crate::fixtures::{ball, cuboid, healed, l_shape, spread, surface};
+    use crate::fixtures::{ball, cuboid, joined, l_shape, spread, surface};
     use crate::geometry::{SourceMesh, Surface};
 
     fn inside_unit_box(p: &Point3<f64>) -> bool {
@@ -174,13 +174,7 @@ mod tests {
 
     #[test]
     fn boxes_that_touch_along_an_edge_have_their_own_insides() {
-        let mut mesh = cuboid([0.0; 3], [1.0; 3]);
-        let n = mesh.vertices.len() as u32;
-        let other = cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0]);
-        mesh.vertices.extend(other.vertices);
-        mesh.triangles.extend(other.triangles.into_iter().map(|t| t.map(|i| i + n)));
-        let healed = healed(mesh);
-        let s = Surface::new(&healed);
+        let s = surface(joined([cuboid([0.0; 3], [1.0; 3]), cuboid([1.0, 1.0, 0.0], [2.0, 2.0, 1.0])]));
         for p in spread([0.0, 0.0, 0.1], [2.0, 2.0, 0.9], 2000) {
             let inside = (p.x < 1.0) == (p.y < 1.0);
             assert_eq!(s.signed_distance(&p) < 0.0, inside, "{p}");

@@ -163,7 +163,7 @@ impl Rim {
         let mut near = SolidAngle::default();
         let mut far = 0.0;
         for opening in &self.openings {
-            match opening.from_afar(ray) {
+            match opening.as_dipole(ray) {
                 Some(angle) => far += angle,
                 None => self.edges[opening.edges.clone()].iter().try_for_each(|e| e.strip(ray, &mut near))?,
             }
@@ -198,7 +198,7 @@ impl Rim {
 impl Opening {
     /// The solid angle of the strips behind a ray, if the ray begins far from the opening and does not pass it:
     /// then it is that of whatever closes the opening.
-    fn from_afar(&self, ray: &Ray) -> Option<f64> {
+    fn as_dipole(&self, ray: &Ray) -> Option<f64> {
         let d = self.centre - ray.from();
         let r2 = d.norm_squared();
         let is_far = r2 > (FAR * self.radius).powi(2);

@@ -147,8 +147,8 @@ impl Surface {
         self.derived().folds.is_some()
     }
 
-    /// The edges at which it is open, where signs come from winding numbers. There are none where it only
-    /// crosses itself: winding numbers change at the surface alone then.
+    /// The edges at which it has holes. There are none where it only crosses itself: winding numbers change at
+    /// the surface alone then.
     #[must_use]
     pub fn rim(&self) -> Option<&Rim> {
         self.derived().rim.as_ref()
@@ -158,9 +158,11 @@ impl Surface {
     /// outside as `p` is. Not if it cannot be told.
     #[must_use]
     pub fn stays_outside(&self, p: &Point3<f64>, radius: f64) -> bool {
-        let Some(rim) = &self.derived().rim else { return self.signed_distance(p) > 0.0 };
+        if !self.is_open() {
+            return self.signed_distance(p) > 0.0;
+        }
         let margin = 0.5 - WINDING_DOUBT - self.winding_number(p);
-        margin > 0.0 && rim.slope(p, radius) * radius < margin
+        margin > 0.0 && self.rim().is_none_or(|rim| rim.slope(p, radius) * radius < margin)
     }
 
     /// The winding number at `p`, where signs come from it.
@@ -267,7 +269,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::fixtures::{ball, cuboid, l_shape, moved, open_box, spread, surface};
+    use crate::fixtures::{ball, cuboid, joined, l_shape, moved, open_box, spread, surface};
     use crate::geometry::Pose;
 
     static SOLIDS: LazyLock<Vec<Surface>> = LazyLock::new(|| {
@@ -365,6 +367,18 @@ mod tests {
                 }
             });
             assert_eq!(normals.len(), distinct, "{normals:?} at {p:?}");
+        }
+    }
+
+    #[test]
+    fn only_what_does_not_close_has_a_rim() {
+        assert!(surface(open_box([0.0; 3], [1.0; 3])).rim().is_some());
+        assert!(surface(cuboid([0.0; 3], [1.0; 3])).rim().is_none());
+        let both = surface(joined([cuboid([0.0; 3], [2.0; 3]), cuboid([1.0; 3], [3.0; 3])]));
+        assert!(both.is_open() && both.rim().is_none(), "it crosses itself, but closes");
+        for (x, outside) in [(1.5, false), (2.5, false), (3.5, true), (-0.5, true)] {
+            let p = Point3::new(x, x, x);
+            assert_eq!(both.stays_outside(&p, 0.1), outside, "{p}");
         }
     }
 

@@ -11,7 +11,6 @@ use nalgebra::Point3;
 
 use super::Surface;
 use super::mesh::directed_edges;
-use super::surface::NO_TRIANGLE;
 
 /// No vertex.
 const NONE: u32 = u32::MAX;
@@ -20,7 +19,7 @@ const NONE: u32 = u32::MAX;
 /// surface is not closed, or of more loops than `most`.
 #[must_use]
 pub fn surface_loops(surface: &Surface, most: usize) -> Option<Vec<Vec<Point3<f64>>>> {
-    if surface.is_open() || surface.has_rim() {
+    if surface.is_open() {
         return None;
     }
     let tree = VertexTree::of(surface);
@@ -39,20 +38,6 @@ pub fn surface_loops(surface: &Surface, most: usize) -> Option<Vec<Vec<Point3<f6
         }
     }
     Some(loops)
-}
-
-impl Surface {
-    /// Whether some edge lacks a neighbour that runs along it the other way. Without such, even where
-    /// a surface crosses itself, winding numbers change at the surface alone; looks at all edges.
-    #[must_use]
-    pub fn has_rim(&self) -> bool {
-        let is_matched = |t: u32, edge: u8, [a, b]: [u32; 2]| {
-            let other = self.neighbour(t, edge);
-            other != NO_TRIANGLE && directed_edges(&self.triangles()[other as usize]).contains(&[b, a])
-        };
-        let mut faces = (0u32..).zip(self.triangles());
-        !faces.all(|(t, corners)| (0u8..).zip(directed_edges(corners)).all(|(e, ab)| is_matched(t, e, ab)))
-    }
 }
 
 /// Twice the genus, summed over shells: by Euler's formula, shells · 2 − (V − E + F).
@@ -177,18 +162,6 @@ mod tests {
         assert!(loops.iter().all(|l| l.len() >= 3), "{loops:?}");
         assert_eq!(surface_loops(&tube, 1), None, "more than asked for");
         assert_eq!(surface_loops(&surface(open_box([0.0; 3], [1.0; 3])), 9), None);
-    }
-
-    #[test]
-    fn only_what_does_not_close_has_a_rim() {
-        assert!(surface(open_box([0.0; 3], [1.0; 3])).has_rim());
-        assert!(!surface(tube(1.0, 2.0, [0.0, 1.0], 12)).has_rim());
-        // Two boxes as one part: it crosses itself, but closes.
-        let (mut both, other) = (cuboid([0.0; 3], [2.0; 3]), cuboid([1.0; 3], [3.0; 3]));
-        let shift = both.vertices.len() as u32;
-        both.vertices.extend(other.vertices);
-        both.triangles.extend(other.triangles.iter().map(|t| t.map(|v| v + shift)));
-        assert!(!surface(both).has_rim());
     }
 
     #[test]

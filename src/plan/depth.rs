@@ -103,7 +103,7 @@ impl Question<'_> {
     ) -> Result<Found, Interrupt> {
         let mut search = Search {
             asked: self,
-            has_rim: self.measured.is_open() && self.measured.has_rim(),
+            has_rim: self.measured.rim().is_some(),
             most_effort,
             view,
             termination,
@@ -370,8 +370,10 @@ impl Search<'_> {
 
     /// Whether holes are so near that no sign would hold for all of a piece.
     fn is_beside_rim(&self, swept: &Swept) -> bool {
-        let rim = self.asked.measured.rim().filter(|_| self.has_rim);
-        rim.is_some_and(|rim| rim.slope(&swept.centre, swept.radius) * swept.radius > 0.5)
+        self.asked
+            .measured
+            .rim()
+            .is_some_and(|rim| rim.slope(&swept.centre, swept.radius) * swept.radius > 0.5)
     }
 
     /// Whether a piece is small, and its corners no deeper than `most`: a region beside a surface with holes

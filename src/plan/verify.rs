@@ -211,15 +211,7 @@ impl Verifier {
     pub fn past(&self, passing: &Passing<'_>, termination: &Termination) -> Result<Verdict, Interrupt> {
         let Self { limit, samples } = self;
         let course = &Course::new(&passing.path, passing.centre, passing.reach());
-        let share = if passing.granted > 0.0 { SPARE_IN_OVERLAP } else { SPARE };
-        let precision = Precision {
-            spare: limit * share,
-            deep: *limit,
-            finest: limit * FINEST,
-            coarse: COARSE * passing.longest_side,
-        };
-        let way = Way { passing, course, precision, termination };
-        let found = if turns_far(&passing.path) { depth_on_screw(&way, *limit)? } else { way.depth()? };
+        let found = self.bounds(passing, course, termination)?;
         let bound = found.iter().map(|f| f.bound).fold(0.0, f64::max);
         let mut entries = deepest_entries(passing, &found);
         if bound <= *limit {
@@ -229,6 +221,29 @@ impl Verifier {
             }
         }
         Ok(Verdict::past(bound, entries))
+    }
+
+    /// How deep the moving part gets into the standing one, and the other way round, as far as that can be
+    /// bounded.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn bounds(
+        &self,
+        passing: &Passing<'_>,
+        course: &Course,
+        termination: &Termination,
+    ) -> Result<[Found; 2], Interrupt> {
+        let limit = self.limit;
+        let share = if passing.granted > 0.0 { SPARE_IN_OVERLAP } else { SPARE };
+        let precision = Precision {
+            spare: limit * share,
+            deep: limit,
+            finest: limit * FINEST,
+            coarse: COARSE * passing.longest_side,
+        };
+        let way = Way { passing, course, precision, termination };
+        if turns_far(&passing.path) { depth_on_screw(&way, limit) } else { way.depth() }
     }
 }
 

@@ -2,6 +2,7 @@ use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 
 use super::{Healed, heal};
+use crate::fixtures::joined;
 use crate::geometry::{Solidity, SourceMesh, SourcePart};
 
 fn part(mesh: SourceMesh) -> SourcePart {
@@ -32,16 +33,6 @@ fn cube() -> SourceMesh {
 fn inverted(mut mesh: SourceMesh) -> SourceMesh {
     mesh.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     mesh
-}
-
-fn joined(meshes: &[SourceMesh]) -> SourceMesh {
-    let mut all = SourceMesh::default();
-    for mesh in meshes {
-        let base = all.vertices.len() as u32;
-        all.vertices.extend(&mesh.vertices);
-        all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|v| v + base)));
-    }
-    all
 }
 
 /// Every triangle with three vertices of its own.
@@ -91,7 +82,7 @@ fn a_soup_with_rounding_noise_is_welded_too() {
 
 #[test]
 fn small_features_survive_welding() {
-    let mesh = joined(&[soup(&cube()), soup(&cuboid([2.0, 0.0, 0.0], [2.0 + 1e-5, 1e-5, 1e-5]))]);
+    let mesh = joined([soup(&cube()), soup(&cuboid([2.0, 0.0, 0.0], [2.0 + 1e-5, 1e-5, 1e-5]))]);
     let result = healed(mesh);
     closed(&result, 1.0);
     assert_eq!(result.mesh.vertices.len(), 16);
@@ -108,7 +99,7 @@ fn an_inverted_cube_is_turned() {
 fn a_void_stays_a_void_however_it_is_given() {
     let inner = cuboid([0.25; 3], [0.75; 3]);
     for inner in [inner.clone(), inverted(inner)] {
-        let result = healed(joined(&[cube(), inner]));
+        let result = healed(joined([cube(), inner]));
         closed(&result, 1.0 - 0.125);
         says(&result, "1 inner shell taken as a void");
     }
@@ -117,7 +108,7 @@ fn a_void_stays_a_void_however_it_is_given() {
 #[test]
 fn a_body_in_a_void_is_solid_again() {
     let shells = [cube(), cuboid([0.2; 3], [0.8; 3]), cuboid([0.4; 3], [0.6; 3]), cuboid([2.0; 3], [3.0; 3])];
-    closed(&healed(joined(&shells)), 1.0 - 0.216 + 0.008 + 1.0);
+    closed(&healed(joined(shells)), 1.0 - 0.216 + 0.008 + 1.0);
 }
 
 #[test]
@@ -139,7 +130,7 @@ fn shells_that_cross_or_touch_are_signed_by_winding_number() {
         cuboid([1.0, 0.1, 0.1], [2.0, 0.9, 0.9]),
         cuboid([0.25, 0.25, -1.0], [0.75, 0.75, 2.0]),
     ] {
-        let result = healed(joined(&[cube(), other]));
+        let result = healed(joined([cube(), other]));
         assert_eq!(result.mesh.solidity, Solidity::Winding);
         says(&result, "2 shells that cross or touch");
     }
@@ -148,7 +139,7 @@ fn shells_that_cross_or_touch_are_signed_by_winding_number() {
 #[test]
 fn a_shell_that_crosses_itself_is_signed_by_winding_number() {
     // A bar bent back through itself: a fold of the top pulled down through the bottom.
-    let mut mesh = joined(&[cube()]);
+    let mut mesh = joined([cube()]);
     let tip = mesh.vertices.len() as u32;
     mesh.vertices.push([0.6, 0.5, -0.5]);
     let top = mesh.triangles.iter().position(|t| t.iter().all(|&v| v >= 4)).unwrap();
@@ -162,7 +153,7 @@ fn a_shell_that_crosses_itself_is_signed_by_winding_number() {
 
 #[test]
 fn bodies_that_share_a_wall_become_one() {
-    let result = healed(joined(&[cube(), cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])]));
+    let result = healed(joined([cube(), cuboid([1.0, 0.0, 0.0], [2.0, 1.0, 1.0])]));
     if result.mesh.solidity == Solidity::Closed {
         closed(&result, 2.0);
         says(&result, "4 duplicate triangles dropped");
@@ -174,7 +165,7 @@ fn a_body_that_touches_itself_along_an_edge_is_closed() {
     // Two cubes that meet in an edge, joined by a bridge of two more: one shell.
     let unit = |x: f64, y: f64, z: f64| cuboid([x, y, z], [x + 1.0, y + 1.0, z + 1.0]);
     let mesh =
-        joined(&[unit(0., 0., 0.), unit(1., 1., 0.), unit(0., 0., 1.), unit(1., 0., 1.), unit(1., 1., 1.)]);
+        joined([unit(0., 0., 0.), unit(1., 1., 0.), unit(0., 0., 1.), unit(1., 0., 1.), unit(1., 1., 1.)]);
     // Equal diagonals on shared walls: made so by listing both.
     let result = healed(mesh);
     if result.mesh.solidity == Solidity::Closed {
@@ -264,7 +255,7 @@ fn unused_vertices_count_for_nothing() {
 #[test]
 fn scale_does_not_matter() {
     for scale in [1e-30, 1e-7, 1e7, 1e30] {
-        let mesh = joined(&[cuboid([0.0; 3], [scale; 3]), cuboid([0.25 * scale; 3], [0.75 * scale; 3])]);
+        let mesh = joined([cuboid([0.0; 3], [scale; 3]), cuboid([0.25 * scale; 3], [0.75 * scale; 3])]);
         closed(&healed(mesh), 0.875 * scale.powi(3));
     }
 }

@@ -39,10 +39,11 @@ impl Derived {
             })
             .collect::<Vec<_>>();
         let (fan_start, fan) = fans(mesh);
-        let rim = (mesh.solidity == Solidity::Winding).then(|| Rim::of(&mesh.vertices, &mesh.triangles));
+        let is_open = mesh.solidity == Solidity::Winding;
+        let rim = is_open.then(|| Rim::of(&mesh.vertices, &mesh.triangles)).filter(|r| !r.edges().is_empty());
         let is_soup = rim.as_ref().is_some_and(Rim::is_long);
         let neighbours = neighbours(mesh);
-        let folds = if rim.is_some() { None } else { Folds::of(mesh, &face_normals, &neighbours) };
+        let folds = if is_open { None } else { Folds::of(mesh, &face_normals, &neighbours) };
         let corners: Vec<_> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
         Self {
             dipoles: is_soup.then(|| DipoleTree::new(&mesh.vertices, &mesh.triangles)),

@@ -3,8 +3,9 @@
 //! Strips from the edges of the rim to infinity close an open surface. A ray the other way meets none
 //! of them, so it leaves the closed surface more often than it enters it by as often as that winds
 //! around its beginning; the share of the strips is the sum of their solid angles. This is exact but for
-//! openings far away, and takes a walk through a tree and a few operations for each edge of the rim. Around the triangles
-//! of a soup, which have rims of many edges, dipoles are summed ([`DipoleTree`](super::DipoleTree)).
+//! openings far away, and takes a walk through a tree and a few operations for each edge of the rim. Around
+//! the triangles of a soup, which have rims of many edges, dipoles are summed
+//! ([`DipoleTree`](super::DipoleTree)).
 //!
 //! Source: generalised winding numbers, A. Jacobson et al. (2013); the ray and the strips are ours.
 

@@ -97,7 +97,8 @@ fn unsettled(
 /// The termination condition became true.
 pub(super) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], Interrupt> {
     let surfaces = way.passing.surfaces();
-    if surfaces.iter().any(|surface| surface.is_open()) {
+    // Depth changes its sign in mid-air where there are holes, and there alone.
+    if surfaces.iter().any(|surface| surface.rim().is_some()) {
         let unknown = || Found { open: vec![Interval::WHOLE], ..Found::default() };
         return Ok([unknown(), unknown()]);
     }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 
-use crate::fixtures::{LIMIT, cuboid, scene, thread};
+use crate::fixtures::{LIMIT, cuboid, joined, open_box, scene, thread};
 use crate::geometry::{Bounds, Pose, SourceMesh, interpolate};
 use crate::simulation::Scene;
 use crate::termination::Termination;
@@ -73,6 +73,25 @@ fn a_thread_that_fits_is_settled_whole() {
     let path = screwed(&scene, TURNS, PITCH, &Pose::identity());
     assert_eq!(open(&scene, &path), []);
     assert!(checked(&scene, &verifier, &path) < LIMIT / 8.0);
+}
+
+#[test]
+fn a_bolt_whose_head_crosses_its_shank_is_settled_as_others_are_and_one_with_holes_is_not() {
+    // The head's lower half sticks in the shank, below the nut.
+    let [bolt, nut] = nut_on_bolt();
+    let path = |scene: &Scene| screwed(scene, TURNS, PITCH, &Pose::identity());
+    for (head, open) in [(cuboid as fn(_, _) -> _, false), (open_box, true)] {
+        let head: SourceMesh = head([-1.5, -1.5, -1.0], [1.5, 1.5, 0.7]);
+        let (scene, verifier) = scene([joined([bolt.clone(), head]), nut.clone()]);
+        let bolt = &scene.bodies[0].shape.surface;
+        assert!(bolt.is_open() && bolt.rim().is_some() == open);
+        let passing = Passing::new(&scene, &scene.allowances, [1, 0], &path(&scene));
+        let course = Course::new(&passing.path, passing.centre, passing.reach());
+        let t = Termination::default();
+        let found = verifier.bounds(&passing, &course, &t).unwrap();
+        assert_eq!(found.iter().all(|f| f.open.is_empty()), !open, "{found:?}");
+        assert!(checked(&scene, &verifier, &path(&scene)) < LIMIT / 8.0);
+    }
 }
 
 #[test]
