@@ -203,7 +203,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::fixtures::{ball, cuboid, l_shape, rod, spread, surface, tube};
+    use crate::fixtures::{ball, cuboid, joined, l_shape, rod, spread, surface, tube};
+    use crate::geometry::SourceMesh;
 
     fn near(points: &[Point3<f64>]) -> Wanted<'_> {
         Wanted { points, most: 0.1, from_behind: true, facing: Vector3::zeros() }
@@ -239,6 +240,18 @@ mod tests {
             assert!(region.holds_ball(&(seed + Vector3::z()), 0.9));
             assert!(!region.holds_ball(&seed, 0.9) || seed.z >= 0.9);
         }
+    }
+
+    #[test]
+    fn needles_out_of_reach_are_not_in_the_way() {
+        // Beyond the tip of a needle, there is little between a point and the planes of its sides.
+        let pyramid = |tip: f64, base: f64, half: f64| SourceMesh {
+            vertices: vec![[0.0, 0.0, tip], [half, 0.0, base], [-half, half, base], [-half, -half, base]],
+            triangles: vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [3, 2, 1]],
+        };
+        let needle = surface(joined([pyramid(0.0, -1.0, 0.01), pyramid(1.5, 2.0, 1.0)]));
+        let region = needle.free_region(&Point3::new(0.0, 0.0, 0.5), 0.1, near(&[])).unwrap();
+        assert!(region.sides.is_empty() && region.radius == 0.1, "{region:?}");
     }
 
     #[test]

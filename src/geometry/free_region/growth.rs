@@ -189,6 +189,10 @@ impl Visitor for Growth<'_> {
             return;
         }
         let closest = self.surface.closest_on(triangle, &self.region.centre);
+        // Beyond the tip of a needle the tree tells no more than the distance from the planes of its sides.
+        if closest.distance > self.region.radius {
+            return;
+        }
         let mut best = self.best(triangle, &corners, &closest);
         if best.is_none_or(|(worth, _)| worth < 0.0)
             && let Some(clipped) = self.clipped(&corners)
