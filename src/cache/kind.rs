@@ -93,9 +93,10 @@ impl Kind {
     pub fn algorithm(self) -> u32 {
         match self {
             Self::Source | Self::Shape | Self::Healed | Self::Hull | Self::Swept => 1,
-            Self::Touching | Self::Answer => 2,
-            Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Plan => 3,
-            Self::Verdict => 4,
+            Self::Touching => 2,
+            Self::Answer => 3,
+            Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Plan => 4,
+            Self::Verdict => 5,
         }
     }
 

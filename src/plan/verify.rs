@@ -18,7 +18,7 @@ use crate::simulation::{Allowances, Pair, Scene};
 use crate::termination::{Interrupt, Termination};
 
 use super::course::{Course, Interval, View};
-use super::depth::{Found, MOST_EFFORT, Precision, Question};
+use super::depth::{Found, Precision, Question};
 use super::passing::Passing;
 use super::sampling::{Samples, turns_far};
 use super::screw::{centred, depth_on_screw};
@@ -36,6 +36,9 @@ const COARSE: f64 = 4e-3;
 /// for what is between the corners of the smallest pieces, which are no larger than this.
 const OVERLAP_SPARE: f64 = 2e-6;
 const OVERLAP_FINEST: f64 = 1e-4;
+/// So much effort ([`Found::effort`]) is spent on each surface before the way is left to samples: less than
+/// a second. What is no screw has not been seen to need it all.
+const MOST_EFFORT: usize = 5_000_000;
 
 /// Deeper than this, as a share of the limit, points help in refining a motion that is refused.
 pub(super) const HELPFUL: f64 = 1.0 / 2.0;

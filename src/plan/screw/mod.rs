@@ -22,7 +22,7 @@ use crate::termination::{Interrupt, Poll, Termination};
 pub(super) use centred::centred;
 
 use super::course::{Course, Interval};
-use super::depth::{Found, MOST_EFFORT};
+use super::depth::Found;
 use super::verify::Way;
 use envelope::{Envelope, Zone};
 use path::{Boxes, ScrewPath};
@@ -35,6 +35,8 @@ const LEAST_TURN: f64 = 0.25;
 const FINEST: f64 = 1.0 / 2.0;
 /// So much effort is spent on a side before profiles are asked.
 const FIRST_EFFORT: usize = 8_000;
+/// So much effort is spent on a side in all: threads that cross take much more, and most stay open all the same.
+const MOST_EFFORT: usize = 200_000;
 /// Stretches that turn further (radians) are bounded in pieces.
 const LONGEST: f64 = 4.0;
 

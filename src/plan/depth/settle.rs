@@ -1,0 +1,188 @@
+//! What bounds the depth of a whole piece: regions outside the measured surface, and triangles of it.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::geometry::{Closest, FreeRegion, HullDepth, Wanted};
+
+use super::walk::{Hint, Search};
+use super::{NEARLY, Question};
+
+/// What a region costs, in pieces.
+const REGION_EFFORT: usize = 40;
+/// Regions are asked for so much larger than the piece, that others find room.
+const ROOM: f64 = 1.25;
+/// So many regions of a place are tried.
+const TRIED: usize = 3;
+
+/// Where a piece passes: a ball that holds the hull.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Swept {
+    pub(super) centre: Point3<f64>,
+    pub(super) radius: f64,
+}
+
+/// Size and cell of a place.
+pub(super) type Place = (i32, [i64; 3]);
+
+/// How far a piece is from a region: the distance of its worst corner, and that.
+pub(super) type Fit = Option<(f64, Point3<f64>)>;
+
+/// A region, and whether all of it is outside the surface that is measured: of one with holes, part of it may be
+/// inside.
+pub(super) struct Region {
+    free: FreeRegion,
+    is_outside: bool,
+}
+
+impl Search<'_> {
+    /// Whether some region tells well how deep a piece gets; the bound is raised by that.
+    pub(super) fn is_settled(
+        &mut self,
+        swept: &Swept,
+        slack: f64,
+        hint: &mut Hint,
+        fits: impl Fn(&FreeRegion, f64) -> Fit,
+    ) -> bool {
+        let asked = self.asked;
+        let spared = self.spared() - slack;
+        if spared < 0.0 || (swept.radius > asked.precision.coarse && self.is_beside_rim(swept)) {
+            return false;
+        }
+        let place = place(swept);
+        let known = self.places.get(&place).map_or(&[][..], Vec::as_slice);
+        for region in known.iter().rev().take(TRIED).copied().chain(hint.region) {
+            let Region { free, is_outside } = &self.regions[region as usize];
+            if let Some((depth, _)) = fits(free, spared) {
+                hint.region = Some(region);
+                return (*is_outside || self.is_outside(swept, spared, hint.triangle))
+                    && self.settled(depth + slack);
+            }
+        }
+        let closest = asked.measured.closest_from(&swept.centre, hint.triangle);
+        hint.triangle = closest.triangle;
+        let signed = asked.measured.signed(&swept.centre, &closest);
+        // Depth changes by no more than the distance, unless the surface has holes. Then it changes its
+        // sign in mid-air, too, where the winding number passes a half: next to a point far outside
+        // may be one as far inside.
+        if swept.radius - signed <= spared {
+            return (!self.has_rim
+                || asked.measured.stays_outside(&swept.centre, swept.radius)
+                || self.is_outside(swept, spared, hint.triangle))
+                && self.settled(swept.radius - signed + slack);
+        }
+        if self.is_bounded(swept, signed, slack, hint.triangle) {
+            return true;
+        }
+        // Wider regions than large pieces need are vain; small ones tell how deep they really are.
+        let coarse = asked.precision.coarse;
+        let wide = if swept.radius > coarse { 0.0 } else { swept.radius.min(coarse / 8.0) };
+        let most = (asked.granted + asked.precision.deep - slack).min(wide).max(spared);
+        if -signed > most {
+            return false;
+        }
+        if std::mem::take(&mut hint.vain) {
+            return false;
+        }
+        hint.vain = true;
+        self.found.effort += REGION_EFFORT;
+        let Some(free) = self.region(swept, &closest, signed, most) else { return false };
+        let fit = fits(&free, most);
+        let id = self.regions.len() as u32;
+        let is_outside = free.is_outside(asked.measured);
+        self.regions.push(Region { free, is_outside });
+        hint.region = Some(id);
+        hint.vain = false;
+        let Some((depth, worst)) = fit else { return false };
+        self.places.entry(place).or_default().push(id);
+        if depth > spared && !self.is_told(swept, depth, &worst, hint.triangle) {
+            return false;
+        }
+        (is_outside || self.is_outside(swept, most, hint.triangle)) && self.settled(depth + slack)
+    }
+
+    /// Whether the triangles about a piece tell well how deep it gets; the bound is raised by that.
+    fn is_bounded(&mut self, swept: &Swept, signed: f64, slack: f64, guess: u32) -> bool {
+        let spared = self.spared() - slack;
+        let Question { measured, granted, precision, .. } = self.asked;
+        // What is deeper is to be recorded.
+        let most = spared.max(granted + precision.deep - slack);
+        // The middle is no nearer to any triangle than to the nearest.
+        if signed > spared || -signed > most {
+            return false;
+        }
+        let Some(HullDepth { bound, worst }) = measured.hull_depth(&self.hull, guess, spared) else {
+            return false;
+        };
+        let worst = self.hull[worst];
+        bound <= most
+            && (bound <= spared || self.is_told(swept, bound, &worst, guess))
+            && self.settled(bound + slack)
+    }
+
+    /// A region for a piece, around its middle or what is outside nearest to that.
+    fn region(&self, swept: &Swept, closest: &Closest, signed: f64, most: f64) -> Option<FreeRegion> {
+        let Swept { centre, radius, .. } = swept;
+        let seen = (closest, signed);
+        let wanted = Wanted { points: &self.wanted, most, from_behind: false, facing: self.facing };
+        self.asked.measured.free_region_around(centre, radius * ROOM, seen, wanted).ok()
+    }
+
+    /// Whether a depth is what it is, as measured at the worst corner, or small enough not to matter:
+    /// not only that of a region which is too narrow.
+    fn is_told(&mut self, swept: &Swept, depth: f64, worst: &Point3<f64>, guess: u32) -> bool {
+        let Question { measured, granted, precision, .. } = self.asked;
+        let real = -measured.signed(worst, &measured.closest_from(worst, guess));
+        let beyond = depth - granted;
+        let small = swept.radius <= precision.coarse && beyond <= precision.deep / 2.0;
+        let exact = real >= depth - precision.spare.max(NEARLY * depth);
+        let told = exact || (small && precision.deep.is_finite());
+        if !told {
+            return false;
+        }
+        self.found.depth = self.found.depth.max(real - granted);
+        true
+    }
+
+    /// Raises the bound.
+    pub(super) fn settled(&mut self, depth: f64) -> bool {
+        self.found.bound = self.found.bound.max(depth - self.asked.granted);
+        true
+    }
+
+    /// Whether holes are so near that no sign would hold for all of a piece.
+    fn is_beside_rim(&self, swept: &Swept) -> bool {
+        self.asked
+            .measured
+            .rim()
+            .is_some_and(|rim| rim.slope(&swept.centre, swept.radius) * swept.radius > 0.5)
+    }
+
+    /// Whether a piece is small, and its corners no deeper than `most`: a region beside a surface with holes
+    /// may be inside.
+    fn is_outside(&self, swept: &Swept, most: f64, guess: u32) -> bool {
+        let Question { measured, precision, .. } = self.asked;
+        let depth = |p: &Point3<f64>| -measured.signed(p, &measured.closest_from(p, guess));
+        swept.radius <= precision.coarse && self.wanted.iter().all(|p| depth(p) <= most)
+    }
+}
+
+/// The ball that holds balls around the corners of a hull.
+pub(super) fn swept(points: &[Point3<f64>], ball: f64) -> Swept {
+    let sum: Vector3<f64> = points.iter().map(|p| p.coords).sum();
+    let centre = Point3::from(sum / points.len().max(1) as f64);
+    let reach = points.iter().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
+    Swept { centre, radius: reach + ball }
+}
+/// How far the furthest of some points is from a region, and which, unless it is beyond `most`.
+pub(super) fn furthest(points: impl IntoIterator<Item = Point3<f64>>, region: &FreeRegion, most: f64) -> Fit {
+    points.into_iter().try_fold((0.0, Point3::origin()), |far, p| {
+        let d = region.distance_within(&p, most)?;
+        Some(if d > far.0 { (d, p) } else { far })
+    })
+}
+
+fn place(swept: &Swept) -> Place {
+    let level = swept.radius.max(1e-9).log2().ceil();
+    let cell = level.exp2();
+    (level as i32, (swept.centre.coords / cell).map(|x| x.floor() as i64).into())
+}

@@ -1,0 +1,239 @@
+//! The walk through pieces of a surface and stretches of the way: what no bound settles is split.
+
+use std::collections::HashMap;
+
+use nalgebra::{Point3, Vector3};
+
+use crate::geometry::{FreeRegion, Parts, area_normal, bisected};
+use crate::termination::{Interrupt, Termination};
+
+use super::super::course::{Interval, Leg, View};
+use super::settle::{Place, Region, Swept, furthest, swept};
+use super::{Found, NEARLY, Precision, Question};
+
+/// Hulls of more corners are not asked about as such.
+const MOST_CORNERS: usize = 64;
+/// Pieces that might be too deep are split until they are so much smaller than others.
+const DOUBT: f64 = 4.0;
+
+/// What is likely to be of use for a piece: a triangle near it, a region around it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hint {
+    pub(super) triangle: u32,
+    pub(super) region: Option<u32>,
+    /// Whether no region was found for the piece of which this is one half.
+    pub(super) vain: bool,
+}
+
+pub(super) struct Search<'a> {
+    pub(super) asked: &'a Question<'a>,
+    /// Whether the measured surface has holes, so that depth changes its sign off it, too.
+    pub(super) has_rim: bool,
+    most_effort: usize,
+    view: View<'a>,
+    termination: &'a Termination,
+    pub(super) regions: Vec<Region>,
+    /// Regions by the places of pieces that they held.
+    pub(super) places: HashMap<Place, Vec<u32>>,
+    /// The corners of the hull in question, or those that say most about where it reaches.
+    pub(super) wanted: Vec<Point3<f64>>,
+    /// All of them, unless they are too many.
+    pub(super) hull: Vec<Point3<f64>>,
+    pub(super) facing: Vector3<f64>,
+    pub(super) found: Found,
+}
+
+impl<'a> Search<'a> {
+    pub(super) fn new(
+        asked: &'a Question<'a>,
+        view: View<'a>,
+        most_effort: usize,
+        termination: &'a Termination,
+    ) -> Self {
+        Self {
+            asked,
+            has_rim: asked.measured.rim().is_some(),
+            most_effort,
+            view,
+            termination,
+            regions: Vec::new(),
+            places: HashMap::new(),
+            wanted: Vec::new(),
+            hull: Vec::new(),
+            facing: Vector3::zeros(),
+            found: Found::default(),
+        }
+    }
+
+    /// Looks at all of the surface on a stretch of the way.
+    pub(super) fn all(&mut self, interval: Interval) -> Result<(), Interrupt> {
+        if let Some(root) = self.asked.tree.root() {
+            self.patch(root, interval, Hint { triangle: 0, region: None, vain: false })?;
+        }
+        if self.gave_up() {
+            self.found.open.push(interval);
+        }
+        Ok(())
+    }
+
+    fn gave_up(&self) -> bool {
+        self.found.effort > self.most_effort
+    }
+
+    fn is_enough(&self) -> bool {
+        self.gave_up() || self.found.is_enough()
+    }
+
+    /// Looks into a node of the tree on a stretch of the way.
+    fn patch(&mut self, index: u32, interval: Interval, hint: Hint) -> Result<(), Interrupt> {
+        self.termination.check()?;
+        self.found.effort += 1;
+        if self.is_enough() {
+            return Ok(());
+        }
+        let tree = self.asked.tree;
+        let patch = tree.patch(index);
+        let leg = self.view.leg(interval);
+        let mut hint = hint;
+        let mut in_time = leg.maps.is_empty();
+        if !in_time {
+            let centres: Vec<_> = leg.maps.iter().map(|m| m.apply(&patch.centre)).collect();
+            let ball = patch.radius * leg.stretch + leg.slack;
+            if self.is_apart(&centres, ball) {
+                return Ok(());
+            }
+            let swept = swept(&centres, ball);
+            // What is beyond the ball is half of the way.
+            in_time = swept.radius - ball > 2.0 * patch.radius;
+            self.wanted.clear();
+            self.facing = Vector3::zeros();
+            self.wanted.extend(tree.extremes(index).flat_map(|p| leg.maps.iter().map(move |m| m.apply(p))));
+            let points = tree.vertices(index);
+            self.hull.clear();
+            if points.len() * leg.maps.len() <= MOST_CORNERS {
+                self.hull.extend(points.iter().flat_map(|p| leg.maps.iter().map(move |m| m.apply(p))));
+            }
+            let fits = |region: &FreeRegion, most: f64| {
+                if centres.iter().all(|c| region.holds_ball(c, ball)) {
+                    return Some((0.0, swept.centre));
+                }
+                furthest(points.iter().flat_map(|p| leg.maps.iter().map(|m| m.apply(p))), region, most)
+            };
+            if self.is_settled(&swept, leg.slack, &mut hint, fits) {
+                return Ok(());
+            }
+        }
+        if in_time && leg.length > self.finest() / (2.0 * DOUBT) {
+            return interval.halves().into_iter().try_for_each(|half| self.patch(index, half, hint));
+        }
+        match tree.parts(index) {
+            Parts::Patches(children) => {
+                children.into_iter().try_for_each(|child| self.patch(child, interval, hint))
+            }
+            Parts::Triangles(list) => {
+                list.iter().try_for_each(|&t| self.triangle(self.asked.surface.corners(t), interval, hint))
+            }
+        }
+    }
+
+    /// Looks at a triangle, or a piece of one, on a stretch of the way.
+    fn triangle(
+        &mut self,
+        corners: [Point3<f64>; 3],
+        interval: Interval,
+        hint: Hint,
+    ) -> Result<(), Interrupt> {
+        let mut stack = vec![(corners, interval, hint)];
+        while let Some((corners, interval, mut hint)) = stack.pop() {
+            self.termination.check()?;
+            self.found.effort += 1;
+            if self.is_enough() {
+                break;
+            }
+            let leg = self.view.leg(interval);
+            let (longest, halves) = bisected(&corners);
+            let mut in_time = leg.maps.is_empty();
+            if !in_time {
+                let points: Vec<_> = leg.maps.iter().flat_map(|m| corners.map(|p| m.apply(&p))).collect();
+                if self.is_apart(&points, leg.slack) {
+                    continue;
+                }
+                let swept = swept(&points, leg.slack);
+                self.wanted.clone_from(&points);
+                self.hull.clone_from(&points);
+                let outward = area_normal(&corners[0], &corners[1], &corners[2]);
+                self.facing = leg.end.rotation * -outward.try_normalize(0.0).unwrap_or_default();
+                let fits = |region: &FreeRegion, most: f64| furthest(points.iter().copied(), region, most);
+                if self.is_settled(&swept, leg.slack, &mut hint, fits)
+                    || self.is_measured(&corners, &leg, &swept, hint.triangle)
+                {
+                    continue;
+                }
+                in_time = points[..points.len() - 3]
+                    .iter()
+                    .zip(&points[3..])
+                    .any(|(a, b)| (b - a).norm() > longest);
+            }
+            if in_time && leg.length > self.finest() / (2.0 * DOUBT) {
+                stack.extend(interval.halves().map(|half| (corners, half, hint)));
+            } else {
+                stack.extend(halves.map(|half| (half, interval, hint)));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the box of the measured surface lies beside a hull, given by balls.
+    fn is_apart(&self, centres: &[Point3<f64>], radius: f64) -> bool {
+        let bounds = self.asked.measured.bounds();
+        (0..3).any(|a| {
+            centres.iter().all(|c| c[a] - radius >= bounds.max[a])
+                || centres.iter().all(|c| c[a] + radius <= bounds.min[a])
+        })
+    }
+    /// Measures the corners of a piece at its end; whether that is all that can be said about it.
+    fn is_measured(&mut self, corners: &[Point3<f64>; 3], leg: &Leg, swept: &Swept, guess: u32) -> bool {
+        let asked = self.asked;
+        let over = |at: &Point3<f64>| {
+            -asked.measured.signed(at, &asked.measured.closest_from(at, guess)) - asked.granted
+        };
+        for p in corners {
+            let over = over(&(leg.end * p));
+            self.found.depth = self.found.depth.max(over);
+            if over > asked.precision.deep {
+                self.found.deep.push((*p, over));
+            }
+        }
+        self.found.bound = self.found.bound.max(self.found.depth);
+        if swept.radius > self.finest() {
+            return self.is_enough();
+        }
+        if !self.found.deep.is_empty() {
+            return true;
+        }
+        // As in `is_settled`: depth changes by no more than the distance, but for surfaces with holes.
+        let mut bound = over(&swept.centre) + swept.radius;
+        if self.has_rim {
+            bound = self.wanted.iter().map(over).fold(bound, f64::max);
+        }
+        if bound > asked.precision.deep {
+            if swept.radius > self.finest() / DOUBT {
+                return false;
+            }
+            self.found.deep.push((corners[0], bound));
+        }
+        self.settled(asked.granted + bound)
+    }
+
+    /// The depth up to which nothing is looked into: it is granted, spared, or as good as found.
+    pub(super) fn spared(&self) -> f64 {
+        let Precision { spare, deep, .. } = self.asked.precision;
+        self.asked.granted + (self.found.depth * (1.0 + NEARLY)).min(deep).max(spare)
+    }
+
+    /// The smallest size of pieces, for now.
+    fn finest(&self) -> f64 {
+        let Precision { deep, finest, coarse, .. } = self.asked.precision;
+        if self.found.depth > deep { coarse } else { finest }
+    }
+}
