@@ -32,10 +32,13 @@ const FINEST: f64 = 1.0 / 4.0;
 /// Entries are no closer to each other than this, as a share of the longest side.
 const COARSE: f64 = 4e-3;
 /// The same for the overlap of assembled parts. No more is granted than is measured at some point, and
-/// no less than nine tenths of what there is ([`depth`](super::depth) tells depths to a tenth), but
-/// for what is between the corners of the smallest pieces, which are no larger than this.
+/// no less than nine tenths of what there is ([`depth`](super::depth) tells depths to a tenth), but for
+/// what is between the corners of the smallest pieces, which are no larger than this.
 const OVERLAP_SPARE: f64 = 2e-6;
 const OVERLAP_FINEST: f64 = 1e-4;
+/// Large ones are told more closely than to a tenth, as a share of the limit: what keeps its overlap on its
+/// way is to pass.
+const OVERLAP_MARGIN: f64 = 1.0 / 8.0;
 /// So much effort ([`Found::effort`]) is spent on each surface before the way is left to samples: less than
 /// a second. What is no screw has not been seen to need it all.
 const MOST_EFFORT: usize = 5_000_000;
@@ -143,6 +146,7 @@ impl Verifier {
         let precision = Precision {
             spare: OVERLAP_SPARE * scene.longest_side,
             deep: f64::INFINITY,
+            margin: OVERLAP_MARGIN * self.limit,
             finest: OVERLAP_FINEST * scene.longest_side,
             coarse: COARSE * scene.longest_side,
         };
@@ -242,6 +246,7 @@ impl Verifier {
         let precision = Precision {
             spare: limit * share,
             deep: limit,
+            margin: limit,
             finest: limit * FINEST,
             coarse: COARSE * passing.longest_side,
         };

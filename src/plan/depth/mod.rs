@@ -37,6 +37,8 @@ pub(super) struct Precision {
     /// Depth beyond what is granted from which on points are recorded, but not looked for any
     /// closer.
     pub(super) deep: f64,
+    /// Depth is told as closely as this, and to a tenth of it.
+    pub(super) margin: f64,
     /// Pieces of a smaller radius are not split.
     pub(super) finest: f64,
     /// The same once something deep was found.
@@ -76,6 +78,13 @@ pub(super) struct Found {
 const ENOUGH: usize = 400;
 /// Depths are told to this share.
 const NEARLY: f64 = 0.1;
+
+impl Precision {
+    /// How closely some depth is told.
+    fn margin_of(&self, depth: f64) -> f64 {
+        (NEARLY * depth).min(self.margin)
+    }
+}
 
 impl Found {
     /// Adds what was found elsewhere.

@@ -4,8 +4,8 @@ use nalgebra::{Point3, Vector3};
 
 use crate::geometry::{Closest, FreeRegion, HullDepth, Wanted};
 
+use super::Question;
 use super::walk::{Hint, Search};
-use super::{NEARLY, Question};
 
 /// What a region costs, in pieces.
 const REGION_EFFORT: usize = 40;
@@ -134,7 +134,7 @@ impl Search<'_> {
         let real = -measured.signed(worst, &measured.closest_from(worst, guess));
         let beyond = depth - granted;
         let small = swept.radius <= precision.coarse && beyond <= precision.deep / 2.0;
-        let exact = real >= depth - precision.spare.max(NEARLY * depth);
+        let exact = real >= depth - precision.spare.max(precision.margin_of(depth));
         let told = exact || (small && precision.deep.is_finite());
         if !told {
             return false;

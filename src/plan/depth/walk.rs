@@ -9,7 +9,7 @@ use crate::termination::{Interrupt, Termination};
 
 use super::super::course::{Interval, Leg, View};
 use super::settle::{Place, Region, Swept, furthest, swept};
-use super::{Found, NEARLY, Precision, Question};
+use super::{Found, Precision, Question};
 
 /// Hulls of more corners are not asked about as such.
 const MOST_CORNERS: usize = 64;
@@ -227,8 +227,9 @@ impl<'a> Search<'a> {
 
     /// The depth up to which nothing is looked into: it is granted, spared, or as good as found.
     pub(super) fn spared(&self) -> f64 {
-        let Precision { spare, deep, .. } = self.asked.precision;
-        self.asked.granted + (self.found.depth * (1.0 + NEARLY)).min(deep).max(spare)
+        let precision = self.asked.precision;
+        let found = self.found.depth + precision.margin_of(self.found.depth);
+        self.asked.granted + found.min(precision.deep).max(precision.spare)
     }
 
     /// The smallest size of pieces, for now.

@@ -2,7 +2,9 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 
 use super::*;
-use crate::fixtures::{LIMIT, block_on_plate, cells, cuboid, l_shape, moved, open_box, peg_in_hole, scene};
+use crate::fixtures::{
+    LIMIT, ball, block_on_plate, cells, cuboid, l_shape, moved, open_box, peg_in_hole, scene,
+};
 use crate::geometry::{SourceMesh, interpolate};
 
 /// The path of part 1 by steps from its assembled pose, checked against all others.
@@ -132,6 +134,25 @@ fn an_overlap_is_measured_and_granted() {
     assert!(checked(&scene, &verifier, &[Vector3::z() * 0.1, Vector3::x()]).depth < 1e-9);
     let deeper = checked(&scene, &verifier, &[Vector3::z() * -0.1]);
     assert!((deeper.depth - 0.1).abs() < 1e-9, "{}", deeper.depth);
+}
+
+#[test]
+fn what_keeps_a_deep_overlap_on_its_way_is_let_pass() {
+    let low = cuboid([-3.0, -3.0, -2.0], [3.0, 3.0, 0.0]);
+    let turned = Pose::new(Vector3::z() * 0.1, Vector3::new(0.7, 0.3, -0.4));
+    let (scene, verifier) = scene([low, moved(ball(3), &turned)]);
+    let depth = overlap(&scene, &verifier, 0, 1);
+    let [low, ball] = &scene.bodies[..] else { unreachable!() };
+    let low_from_ball = low.planning_from_shape.inverse() * ball.planning_from_shape;
+    let points = on_surface(&ball.shape.surface).into_iter();
+    let depths = points.map(|p| -low.shape.surface.signed_distance(&(low_from_ball * p)));
+    let deepest = depths.fold(0.0, f64::max);
+    assert!(
+        deepest > 20.0 * LIMIT && (deepest - LIMIT / 8.0..=deepest + 1e-9).contains(&depth),
+        "{depth} of {deepest}"
+    );
+    let verdict = checked(&scene, &verifier, &[Vector3::x() * 0.7]);
+    assert!(verdict.depth < LIMIT / 2.0 && verdict.entries.is_empty(), "{}", verdict.depth);
 }
 
 #[test]
