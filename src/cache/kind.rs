@@ -92,8 +92,8 @@ impl Kind {
     #[must_use]
     pub fn algorithm(self) -> u32 {
         match self {
-            Self::Source | Self::Shape | Self::Healed | Self::Hull | Self::Swept => 1,
-            Self::Touching => 2,
+            Self::Source | Self::Shape | Self::Hull | Self::Swept => 1,
+            Self::Healed | Self::Touching => 2,
             Self::Answer => 3,
             Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Plan => 4,
             Self::Verdict => 5,

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::congruence::congruence;
 use super::heal::heal_until;
+use super::own_frame::OwnFrame;
 use super::{Bounds, GeometryError, Mesh, Pose, Shape, SourceAssembly};
 use crate::termination::{Interrupt, Termination};
 
@@ -149,27 +150,37 @@ fn share_shapes(
     names: Vec<String>,
     termination: &Termination,
 ) -> Result<(Vec<Arc<Shape>>, Vec<Part>), Interrupt> {
-    // The mesh of each shape, as its first part gave it, and the middle of its box.
-    let mut originals: Vec<(usize, Point3<f64>)> = Vec::new();
-    let mut parts = Vec::new();
-    for (i, (mesh, name)) in meshes.iter().zip(names).enumerate() {
+    // The first part of each shape, and of each part its shape and where it stands against that first one.
+    let mut firsts: Vec<usize> = Vec::new();
+    let mut copies = Vec::new();
+    for (i, mesh) in meshes.iter().enumerate() {
         termination.check()?;
-        let bounds = Bounds::of(&mesh.vertices);
-        let copy = originals
-            .iter()
-            .enumerate()
-            .find_map(|(k, (j, centre))| Some((k, centre, congruence(&meshes[*j], mesh)?)));
-        let (shape, planning_from_shape) = match copy {
-            Some((k, centre, pose)) => (k, pose * Pose::translation(centre.x, centre.y, centre.z)),
-            None => {
-                let c = bounds.centre();
-                originals.push((i, c));
-                (originals.len() - 1, Pose::translation(c.x, c.y, c.z))
-            }
-        };
-        parts.push(Part { name, shape, planning_from_shape, bounds, moved: Pose::identity() });
+        let copied = |(k, first): (usize, &usize)| Some((k, congruence(&meshes[*first], mesh)?));
+        copies.push(firsts.iter().enumerate().find_map(copied).unwrap_or_else(|| {
+            firsts.push(i);
+            (firsts.len() - 1, Pose::identity())
+        }));
     }
-    let shape = |(i, centre): &(usize, Point3<f64>)| Shape::about(&meshes[*i], centre, termination);
+    let mut copies_of = vec![Vec::new(); firsts.len()];
+    for (i, (shape, _)) in copies.iter().enumerate() {
+        copies_of[*shape].push((i, &meshes[i]));
+    }
+    let originals: Vec<_> = copies_of.par_iter().filter_map(|copies| OwnFrame::among(copies)).collect();
+    let place = |(i, name): (usize, String)| {
+        let (shape, from_first) = copies[i];
+        let (original, frame) = &originals[shape];
+        // Where a copy stands depends on the two alone, and not on which came first.
+        let motion = match congruence(&meshes[*original], &meshes[i]) {
+            _ if i == *original => Pose::identity(),
+            Some(motion) => motion,
+            None => from_first * copies[*original].1.inverse(),
+        };
+        let planning_from_shape = motion * frame.pose();
+        let bounds = Bounds::of(&meshes[i].vertices);
+        Part { name, shape, planning_from_shape, bounds, moved: Pose::identity() }
+    };
+    let parts = names.into_iter().enumerate().map(place).collect();
+    let shape = |(i, frame): &(usize, OwnFrame)| Shape::within(&meshes[*i], frame, termination);
     let shapes = originals.par_iter().map(|o| shape(o).map(Arc::new)).collect::<Result<_, _>>()?;
     Ok((shapes, parts))
 }
@@ -179,7 +190,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::fixtures::{block_on_plate, cuboid, l_shape, moved, source};
+    use crate::fixtures::{block_on_plate, cuboid, healed, l_shape, moved, source};
 
     fn scaled(factor: f64) -> SourceAssembly {
         source(block_on_plate().map(|mut m| {
@@ -219,6 +230,35 @@ mod tests {
                 assert!(part.bounds.grown(1e-9).contains(&there));
             }
         }
+    }
+
+    #[test]
+    fn shapes_do_not_depend_on_which_copy_comes_first() {
+        let turns = [
+            Pose::identity(),
+            Pose::new(Vector3::new(0.1, 4.0, 1.0), Vector3::y() * std::f64::consts::FRAC_PI_2),
+            Pose::new(Vector3::new(0.0, -4.0, 0.3), Vector3::x() * std::f64::consts::PI),
+            Pose::new(Vector3::new(4.0, 0.2, 1.0), Vector3::new(0.3, -0.2, 1.0)),
+        ];
+        // As files round them: no two copies are the same.
+        let copy = |i: usize| {
+            let mut mesh = moved(moved(l_shape(), &turns[i]), &Pose::translation(1.0 / 3.0, 0.0, 0.1));
+            mesh.vertices.iter_mut().flatten().for_each(|x| *x = (*x * 1e6).round() / 1e6);
+            mesh
+        };
+        let content = |order: [usize; 4]| {
+            let a = Assembly::new(&source(order.map(copy))).unwrap();
+            assert_eq!(a.shapes.len(), 1);
+            for (part, i) in order.into_iter().enumerate() {
+                let there = a.parts[part].planning_from_shape;
+                let given = healed(copy(i)).vertices.into_iter();
+                let off = given.zip(a.shapes[0].surface.vertices());
+                let off = off.map(|(v, own)| (v * a.scale - there * own).norm()).fold(0.0, f64::max);
+                assert!(off < 1e-5, "copy {i} of {order:?} is {off} off");
+            }
+            *a.shapes[0].content()
+        };
+        assert_eq!([[3, 1, 0, 2], [2, 3, 1, 0], [1, 0, 2, 3]].map(content), [content([0, 1, 2, 3]); 3]);
     }
 
     #[test]

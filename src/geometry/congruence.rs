@@ -51,11 +51,14 @@ fn best_rotation(covariance: &Matrix3<f64>) -> Option<Rotation3<f64>> {
 /// Copies mostly stand at right angles: there the rotation is made exact, so that a copy's faces
 /// are as flush as the original's.
 fn snapped(r: Rotation3<f64>) -> Rotation3<f64> {
+    right_angled(&r).unwrap_or(r)
+}
+
+/// A rotation that maps axes to axes, exact, if one is that but for rounding.
+#[must_use]
+pub(super) fn right_angled(r: &Rotation3<f64>) -> Option<Rotation3<f64>> {
     let rounded = r.matrix().map(f64::round);
-    if (r.matrix() - rounded).abs().max() < 1e-7 {
-        return Rotation3::from_matrix_unchecked(rounded);
-    }
-    r
+    ((r.matrix() - rounded).abs().max() < 1e-7).then(|| Rotation3::from_matrix_unchecked(rounded))
 }
 
 #[cfg(test)]

@@ -26,6 +26,7 @@ mod load;
 mod mass;
 mod mesh;
 mod oriented;
+mod own_frame;
 mod patch_tree;
 mod pose;
 mod random;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 use super::congruence::congruence;
+use super::own_frame::OwnFrame;
 use super::{
     Assembly, Bounds, GeometryError, Mesh, Part, Pose, Shape, SourceAssembly, SourceMesh, SourcePart,
     heal_until, transformed, waypoint_from_pose,
@@ -176,9 +177,9 @@ impl Assembly {
         let (shape, planning_from_shape) = match copy {
             Some(copy) => copy,
             None => {
-                let c = bounds.centre();
-                self.shapes.push(Arc::new(Shape::about(&mesh, &c, termination)?));
-                (self.shapes.len() - 1, Pose::translation(c.x, c.y, c.z))
+                let frame = OwnFrame::along_faces(&mesh).unwrap_or_else(|| OwnFrame::as_given(&mesh));
+                self.shapes.push(Arc::new(Shape::within(&mesh, &frame, termination)?));
+                (self.shapes.len() - 1, frame.pose())
             }
         };
         let moved = Pose::identity();

@@ -8,6 +8,7 @@ use crate::termination::{Interrupt, Poll, Termination};
 
 use super::content_hash::mesh_hash;
 use super::hull::hull_vertices;
+use super::own_frame::OwnFrame;
 use super::samples::sited;
 use super::{Bounds, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Spacing, Surface};
 
@@ -32,21 +33,17 @@ pub struct Shape {
     content: OnceLock<[u8; 32]>,
 }
 
-/// Vertices of shapes stand on this grid, in units of the planning frame: a part that stands elsewhere in
-/// another assembly has the same shape to the bit, whatever was rounded on the way there, but for one
-/// coordinate in some ten thousand. Far below every tolerance of contact.
-const GRID: f64 = 1.0 / (1u64 << 33) as f64;
-
 impl Shape {
-    /// The shape of a part's mesh with its origin at a point, in the planning frame.
+    /// The shape of a part's mesh (planning frame) in a frame of its own.
     ///
     /// # Errors
     /// The termination condition became true before there was one.
-    pub fn about(mesh: &Mesh, origin: &Point3<f64>, termination: &Termination) -> Result<Self, Interrupt> {
-        // Adding zero makes zeros positive.
-        let onto_grid = |v: &Point3<f64>| (v - origin.coords).map(|x| (x / GRID).round() * GRID + 0.0);
-        let vertices = mesh.vertices.iter().map(onto_grid).collect();
-        Self::of(&Mesh { vertices, ..mesh.clone() }, termination)
+    pub(super) fn within(
+        mesh: &Mesh,
+        frame: &OwnFrame,
+        termination: &Termination,
+    ) -> Result<Self, Interrupt> {
+        Self::of(&frame.framed(mesh), termination)
     }
 
     /// Derives everything from a mesh that is not said to be derived later.
@@ -198,8 +195,7 @@ mod tests {
         let content = |by: f64| {
             let vertices = ball.vertices.iter().map(|v| v + Vector3::new(by, -by / 3.0, by * by)).collect();
             let moved = Mesh { vertices, ..ball.clone() };
-            let centre = Bounds::of(&moved.vertices).centre();
-            *Shape::about(&moved, &centre, &Termination::default()).unwrap().content()
+            *Shape::within(&moved, &OwnFrame::as_given(&moved), &Termination::default()).unwrap().content()
         };
         let there = [0.1, 1.0 / 3.0, -2.7].map(content);
         assert_eq!(there, [content(0.0); 3]);

@@ -211,11 +211,12 @@ fn a_screw_pulls_with_half_of_its_torque_over_the_radius() {
     let scene = free_block();
     let one = PenaltyParameters { most_blocks: 1, ..PenaltyParameters::default() };
     let shape = &scene.bodies[1].shape;
+    let start = scene.bodies[1].planning_from_shape;
     let motion = motion(one, &scene, Action::Screw(Axis::X, false, true));
     let last = motion.path[motion.path.len() - 1];
     let expected = -1.515 * shape.mass.gyration_squared / (2.0 * shape.reach);
     assert!((last.translation.x - expected).abs() < 1e-9, "{} for {expected}", last.translation.x);
-    assert!((last.rotation.angle() - 1.515).abs() < 1e-9);
+    assert!((start.rotation.angle_to(&last.rotation) - 1.515).abs() < 1e-9);
 }
 
 /// A body that turns about no principal axis keeps its angular momentum but for what a step of
@@ -326,7 +327,7 @@ fn newton_finds_minima_where_the_slope_of_the_field_jumps() {
     for (excess, way) in [(0.02, true), (0.02, false), (-0.05, true), (-0.05, false)] {
         let (tally, _) = tally(&scene(peg_in_hole(excess)).0, Action::Turn(Axis::Z, way));
         assert!(tally.steps > 40, "{excess}: {tally:?}");
-        assert!(tally.settled <= 2 && tally.iterations <= 4 * tally.steps, "{excess}: {tally:?}");
+        assert!(tally.settled <= 2 && tally.iterations <= 7 * tally.steps, "{excess}: {tally:?}");
     }
 }
 
