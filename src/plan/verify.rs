@@ -40,8 +40,10 @@ const OVERLAP_FINEST: f64 = 1e-4;
 /// way is to pass.
 const OVERLAP_MARGIN: f64 = 1.0 / 8.0;
 /// So much effort ([`Found::effort`]) is spent on each surface before the way is left to samples: less than
-/// a second. What is no screw has not been seen to need it all.
+/// a second. What is no screw, and sees no holes, has not been seen to need it all.
 const MOST_EFFORT: usize = 5_000_000;
+/// The same where holes are in sight, or threads cross: most stays open, however much is spent.
+pub(super) const MOST_EFFORT_IN_DOUBT: usize = 200_000;
 
 /// Deeper than this, as a share of the limit, points help in refining a motion that is refused.
 pub(super) const HELPFUL: f64 = 1.0 / 2.0;
@@ -266,7 +268,12 @@ pub(super) struct Way<'a> {
 impl Way<'_> {
     /// How deep the moving part gets into the standing one, and the other way round.
     fn depth(&self) -> Result<[Found; 2], Interrupt> {
-        let side = |on_moving| self.depth_of_side(on_moving, Interval::WHOLE, MOST_EFFORT);
+        let [moving, standing] = self.passing.surfaces();
+        let side = |on_moving| {
+            let measured = if on_moving { standing } else { moving };
+            let most_effort = if measured.rim().is_some() { MOST_EFFORT_IN_DOUBT } else { MOST_EFFORT };
+            self.depth_of_side(on_moving, Interval::WHOLE, most_effort)
+        };
         let (one, other) = rayon::join(|| side(true), || side(false));
         Ok([one?, other?])
     }

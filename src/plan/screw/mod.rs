@@ -23,7 +23,7 @@ pub(super) use centred::centred;
 
 use super::course::{Course, Interval};
 use super::depth::Found;
-use super::verify::Way;
+use super::verify::{MOST_EFFORT_IN_DOUBT, Way};
 use envelope::{Envelope, Zone};
 use path::{Boxes, ScrewPath};
 
@@ -35,8 +35,6 @@ const LEAST_TURN: f64 = 0.25;
 const FINEST: f64 = 1.0 / 2.0;
 /// So much effort is spent on a side before profiles are asked.
 const FIRST_EFFORT: usize = 8_000;
-/// So much effort is spent on a side in all: threads that cross take much more, and most stay open all the same.
-const MOST_EFFORT: usize = 200_000;
 /// Stretches that turn further (radians) are bounded in pieces.
 const LONGEST: f64 = 4.0;
 
@@ -116,7 +114,7 @@ pub(super) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], In
     }
     // They do not overlap at the start: where neither surface meets the other, they stay apart.
     let open = unsettled(way.course, surfaces, open, limit, way.termination)?;
-    let [more, others] = bounded(way, open, MOST_EFFORT)?;
+    let [more, others] = bounded(way, open, MOST_EFFORT_IN_DOUBT)?;
     let [mut one, mut other] = found;
     one.add(more);
     other.add(others);
