@@ -167,19 +167,23 @@ fn share_shapes(
     }
     let originals: Vec<_> = copies_of.par_iter().filter_map(|copies| OwnFrame::among(copies)).collect();
     let place = |(i, name): (usize, String)| {
+        termination.check()?;
         let (shape, from_first) = copies[i];
         let (original, frame) = &originals[shape];
         // Where a copy stands depends on the two alone, and not on which came first.
-        let motion = match congruence(&meshes[*original], &meshes[i]) {
-            _ if i == *original => Pose::identity(),
-            Some(motion) => motion,
-            None => from_first * copies[*original].1.inverse(),
+        let motion = if *original == firsts[shape] {
+            from_first
+        } else if i == *original {
+            Pose::identity()
+        } else {
+            let through_first = || from_first * copies[*original].1.inverse();
+            congruence(&meshes[*original], &meshes[i]).unwrap_or_else(through_first)
         };
         let planning_from_shape = motion * frame.pose();
         let bounds = Bounds::of(&meshes[i].vertices);
-        Part { name, shape, planning_from_shape, bounds, moved: Pose::identity() }
+        Ok(Part { name, shape, planning_from_shape, bounds, moved: Pose::identity() })
     };
-    let parts = names.into_iter().enumerate().map(place).collect();
+    let parts = names.into_iter().enumerate().map(place).collect::<Result<_, Interrupt>>()?;
     let shape = |(i, frame): &(usize, OwnFrame)| Shape::within(&meshes[*i], frame, termination);
     let shapes = originals.par_iter().map(|o| shape(o).map(Arc::new)).collect::<Result<_, _>>()?;
     Ok((shapes, parts))

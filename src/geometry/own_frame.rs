@@ -29,7 +29,7 @@ impl OwnFrame {
     /// That of a mesh, if its largest faces are at right angles to the axes in which it is given: coordinates are
     /// only permuted and change their signs.
     #[must_use]
-    pub(super) fn along_faces(mesh: &Mesh) -> Option<Self> {
+    fn along_faces(mesh: &Mesh) -> Option<Self> {
         Some(Self { turn: turn_into_own_axes(mesh)?, ..Self::as_given(mesh) })
     }
 
@@ -39,8 +39,15 @@ impl OwnFrame {
         Self { origin: Bounds::of(&mesh.vertices).centre(), turn: Rotation3::identity() }
     }
 
-    /// Of some copies (with their numbers) the one of which their shape is made, and its frame: one along its faces, if any is, and of
-    /// several the one whose vertices, which differ by what files round, have the least hash.
+    /// That of a mesh without copies: along its faces, if these allow it.
+    #[must_use]
+    pub(super) fn of(mesh: &Mesh) -> Self {
+        Self::along_faces(mesh).unwrap_or_else(|| Self::as_given(mesh))
+    }
+
+    /// Of some copies (with their numbers) the one of which their shape is made, and its frame: one along
+    /// its faces, if any is, and of several the one whose vertices, which differ by what files round, have
+    /// the least hash.
     #[must_use]
     pub(super) fn among(copies: &[(usize, &Mesh)]) -> Option<(usize, Self)> {
         let along_faces = |&(i, mesh)| Some((i, mesh, Self::along_faces(mesh)?));

@@ -177,7 +177,7 @@ impl Assembly {
         let (shape, planning_from_shape) = match copy {
             Some(copy) => copy,
             None => {
-                let frame = OwnFrame::along_faces(&mesh).unwrap_or_else(|| OwnFrame::as_given(&mesh));
+                let frame = OwnFrame::of(&mesh);
                 self.shapes.push(Arc::new(Shape::within(&mesh, &frame, termination)?));
                 (self.shapes.len() - 1, frame.pose())
             }

@@ -10,8 +10,8 @@
 //! ([`Surface::hull_depth`]). Other pieces are split, in space or in time, whichever is longer.
 //! Pieces of the smallest size are measured; their size is added.
 //!
-//! Where threads with granted overlap cross each other this takes too long: a count ends it
-//! ([`Found::open`]).
+//! Where threads with granted overlap cross each other, and in sight of holes, this may take too long: a
+//! count ends it ([`Found::open`]).
 //!
 //! So for closed surfaces the answer is a bound for all points and all times, not for samples (but
 //! for [`FreeRegion`]'s rounding). Of surfaces with holes that holds where the winding number cannot
@@ -37,7 +37,7 @@ pub(super) struct Precision {
     /// Depth beyond what is granted from which on points are recorded, but not looked for any
     /// closer.
     pub(super) deep: f64,
-    /// Depth is told as closely as this, and to a tenth of it.
+    /// Depth is told to a tenth, and as closely as this.
     pub(super) margin: f64,
     /// Pieces of a smaller radius are not split.
     pub(super) finest: f64,

@@ -173,6 +173,7 @@ pub(super) fn swept(points: &[Point3<f64>], ball: f64) -> Swept {
     let reach = points.iter().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
     Swept { centre, radius: reach + ball }
 }
+
 /// How far the furthest of some points is from a region, and which, unless it is beyond `most`.
 pub(super) fn furthest(points: impl IntoIterator<Item = Point3<f64>>, region: &FreeRegion, most: f64) -> Fit {
     points.into_iter().try_fold((0.0, Point3::origin()), |far, p| {

@@ -25,6 +25,8 @@ pub(super) struct Hint {
     pub(super) vain: bool,
 }
 
+/// The search for the deepest points: what is asked, what was learnt on the way, the piece in question, and what was
+/// found.
 pub(super) struct Search<'a> {
     pub(super) asked: &'a Question<'a>,
     /// Whether the measured surface has holes, so that depth changes its sign off it, too.
@@ -191,6 +193,7 @@ impl<'a> Search<'a> {
                 || centres.iter().all(|c| c[a] + radius <= bounds.min[a])
         })
     }
+
     /// Measures the corners of a piece at its end; whether that is all that can be said about it.
     fn is_measured(&mut self, corners: &[Point3<f64>; 3], leg: &Leg, swept: &Swept, guess: u32) -> bool {
         let asked = self.asked;
