@@ -60,6 +60,23 @@ pub enum NoRegion {
 }
 
 impl FreeRegion {
+    /// A ball cut by half-spaces, of which it is known from elsewhere that a surface does not enter it.
+    #[must_use]
+    pub fn known(
+        (centre, radius): (Point3<f64>, f64),
+        sides: impl IntoIterator<Item = (Vector3<f64>, f64)>,
+    ) -> Self {
+        let sides = sides.into_iter().map(|(normal, height)| HalfSpace { normal, height }).collect();
+        Self { centre, radius, sides, inner: centre }
+    }
+
+    /// How far a point is inside all sides and the ball; negative outside.
+    #[must_use]
+    pub fn slack(&self, p: &Point3<f64>) -> f64 {
+        let room = self.radius - (p - self.centre).norm();
+        self.sides.iter().map(|side| side.above(p)).fold(room, f64::min)
+    }
+
     /// An upper bound of the distance of a point from the region (0 inside), unless that is more
     /// than `most`.
     #[must_use]

@@ -39,6 +39,26 @@ pub(super) struct Contact {
     allowance: f64,
 }
 
+impl Contact {
+    /// A point on the moving part's surface, or on the standing one's (in its shape's frame), that was
+    /// measured against the other: its gap, negative where it is deeper than granted.
+    pub(super) fn measured(
+        other: usize,
+        is_moving: bool,
+        sample: Point3<f64>,
+        (gap, closest): (f64, Closest),
+        allowance: f64,
+    ) -> Self {
+        let side = if is_moving { Side::Moving } else { Side::Standing };
+        Self { other, side, sample, gap, closest, allowance }
+    }
+
+    /// Whether both are of one point of a pair.
+    pub(super) fn is_of_same_point(&self, other: &Self) -> bool {
+        (self.other, self.side, self.sample) == (other.other, other.side, other.sample)
+    }
+}
+
 /// What is near a pose.
 #[derive(Debug, Clone)]
 pub(super) struct Near {
@@ -83,6 +103,16 @@ impl<'a> Mover<'a> {
 
     /// Gathers all contacts with a gap below `reach`.
     pub(super) fn near(&self, surroundings: &Surroundings, reach: f64) -> Near {
+        self.near_by(surroundings, reach, |other, near| self.near_pair(other, reach, near))
+    }
+
+    /// The same; `gather` takes in what is near a standing part that may be within reach.
+    pub(super) fn near_by(
+        &self,
+        surroundings: &Surroundings,
+        reach: f64,
+        mut gather: impl FnMut(usize, &mut Near),
+    ) -> Near {
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
         let bounds = self.body.shape.bounds().transformed(&self.pose);
         // What is further off than any step is long need not be known.
@@ -93,7 +123,7 @@ impl<'a> Mover<'a> {
             if apart > reach {
                 near.clearance = near.clearance.min(apart);
             } else {
-                self.near_pair(other, reach, &mut near);
+                gather(other, &mut near);
             }
         }
         near

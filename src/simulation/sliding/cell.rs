@@ -1,11 +1,11 @@
 //! A piece of surface with the shifts at which it is certainly free.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use super::facing::{Facing, Obstacle, Piece, SUNK, TILT};
 
 /// A plane nearer than this is touched.
-const TOUCHED: f64 = 1e-6;
+pub(super) const TOUCHED: f64 = 1e-6;
 
 /// What a cell is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -27,6 +27,8 @@ pub(super) struct Cell {
     /// The shift must stay in this ball, too.
     pub(super) middle: Vector3<f64>,
     pub(super) room: f64,
+    /// The ball that holds the region, in the measured surface's frame.
+    pub(super) ball: (Point3<f64>, f64),
 }
 
 /// normal · shift ≥ height.

@@ -19,7 +19,7 @@ use crate::termination::{Interrupt, Termination};
 use super::super::Scene;
 use super::cell::{Cell, Spot};
 use super::drive::FREE_STEP;
-use super::facing::{Facing, Obstacle};
+use super::facing::{Facing, Obstacle, Witness};
 use super::finder::{Finder, HELD_AT_FIRST};
 use super::kept::{Gathered, Place, Way};
 
@@ -27,7 +27,13 @@ use super::kept::{Gathered, Place, Way};
 /// many, and so on.
 const FIRST_BUDGET: usize = 16;
 /// Where more overlap than this is granted, facets lie across each other, and regions tell little.
-const MOST_GRANTED: f64 = 1e-3;
+pub(super) const MOST_GRANTED: f64 = 1e-3;
+/// So many pieces in succession may get regions that lead nowhere.
+pub(super) const MOST_STALLS: usize = 16;
+/// Shifts that are shorter lead nowhere.
+pub(super) const STALL: f64 = 1e-7;
+/// So many points that showed obstacles are remembered of a pair.
+const MOST_WITNESSES: usize = 8;
 /// So many regions are looked for before a motion is given up.
 const MOST_REGIONS: usize = 20_000;
 
@@ -63,6 +69,8 @@ pub(super) struct Cells<'a> {
 struct Pair<'a> {
     facing: Facing<'a>,
     cells: Arc<Vec<Cell>>,
+    /// Points that showed what was in the way last: along an obstacle they do so at each step.
+    witnesses: Vec<Witness>,
 }
 
 impl<'a> Cells<'a> {
@@ -81,22 +89,56 @@ impl<'a> Cells<'a> {
         if scene.allowances.of(self.part, other) > MOST_GRANTED {
             return Err(Halt::Lost);
         }
-        let place = Place::new(self.part, &self.start, other);
         let gathered = if at == &Vector3::zeros() {
-            kept(scene, &place, termination)?
+            starting(scene, (self.part, &self.start), other, true, termination)?
         } else {
-            Arc::new(gathered(scene, &place, at, termination)?)
+            Arc::new(gathered(scene, &Place::new(self.part, &self.start, other), at, termination)?)
         };
         let facing = Facing::new(scene, (self.part, &self.start), other, gathered.asks_part, termination)?;
         let cells = gathered.cells.clone().ok_or(Halt::Lost)?;
-        self.pairs.push(Pair { facing, cells });
+        self.pairs.push(Pair { facing, cells, witnesses: Vec::new() });
         self.count(gathered.regions)
     }
 
-    /// How far the part may be shifted from `at` along the unit vector `u`.
-    pub(super) fn length(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> f64 {
-        let cells = self.pairs.iter().flat_map(|pair| pair.cells.iter());
-        cells.map(|cell| cell.length(at, u)).fold(f64::INFINITY, f64::min)
+    /// How far the part may be shifted from `at` along the unit vector `u`, for which way was made, up to
+    /// `most`. Pieces whose region ends before that get another where it ends.
+    pub(super) fn advance(&mut self, at: &Vector3<f64>, u: &Vector3<f64>, most: f64) -> Result<f64, Halt> {
+        // In the order in which they end, so that at each shift all pieces are in their regions.
+        let ends_of = |pair: &Pair<'_>| pair.cells.iter().map(|cell| cell.length(at, u)).collect();
+        let mut ends: Vec<Vec<f64>> = self.pairs.iter().map(ends_of).collect();
+        let (mut reached, mut stalls) = (0.0, 0);
+        loop {
+            let of_pair = |(i, ends): (usize, &Vec<f64>)| {
+                let first = ends.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
+                first.map(|(k, end)| (*end, i, k))
+            };
+            let first = ends.iter().enumerate().filter_map(of_pair).min_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((end, i, k)) = first.filter(|(end, ..)| *end < most) else { return Ok(most) };
+            stalls = if end - reached < STALL { stalls + 1 } else { 0 };
+            reached = end;
+            if stalls > MOST_STALLS {
+                return Ok(reached);
+            }
+            let there = at + u * reached;
+            let pair = &mut self.pairs[i];
+            let left = MOST_REGIONS - self.regions;
+            let mut finder = Finder::new(&pair.facing, left, self.termination);
+            let found = finder.find(pair.cells[k].spot, &there, u);
+            let (mut cells, regions) = (finder.cells, finder.regions);
+            match found {
+                // What is in the way there is found again by the next step, with the force as it is.
+                Err(Halt::Blocked | Halt::Lost) => return Ok(reached),
+                Err(halt) => return Err(halt),
+                Ok(()) => {
+                    let of_pair = Arc::make_mut(&mut pair.cells);
+                    of_pair.swap_remove(k);
+                    ends[i].swap_remove(k);
+                    ends[i].extend(cells.iter().map(|cell| reached + cell.length(&there, u)));
+                    of_pair.append(&mut cells);
+                }
+            }
+            self.count(regions)?;
+        }
     }
 
     /// Makes way for a shift from `at` along the unit vector `u`: pieces whose region does not let
@@ -155,14 +197,36 @@ impl<'a> Cells<'a> {
         u: &Vector3<f64>,
     ) -> Result<(Vec<Vector3<f64>>, usize), Halt> {
         let left = MOST_REGIONS - self.regions;
-        let Pair { facing, cells } = &mut self.pairs[i];
-        let made = make_way(facing, cells, (at, u), left, self.termination)?;
+        let Pair { facing, cells, witnesses } = &mut self.pairs[i];
+        let seen = facing.obstacles_seen_by(witnesses, (at, u));
+        if !seen.is_empty() {
+            return Ok((seen.into_iter().map(|o| o.normal).collect(), 0));
+        }
+        let mut made = make_way(facing, cells, (at, u), left, self.termination)?;
+        witnesses.append(&mut made.witnesses);
+        witnesses.drain(..witnesses.len().saturating_sub(MOST_WITNESSES));
         Ok((made.blocked, made.regions))
     }
 
     fn count(&mut self, regions: usize) -> Result<(), Halt> {
         self.regions += regions;
         if self.regions >= MOST_REGIONS { Err(Halt::Lost) } else { Ok(()) }
+    }
+}
+
+/// Cells for all of a pair's surface with the part at a pose; kept if a motion begins there.
+pub(super) fn starting(
+    scene: &Scene,
+    (part, pose): (usize, &Pose),
+    other: usize,
+    is_start: bool,
+    termination: &Termination,
+) -> Result<Arc<Gathered>, Interrupt> {
+    let place = Place::new(part, pose, other);
+    if is_start {
+        kept(scene, &place, termination)
+    } else {
+        gathered(scene, &place, &Vector3::zeros(), termination).map(Arc::new)
     }
 }
 
@@ -184,7 +248,7 @@ fn way(
     let Some(base) = &base.cells else { return Ok(lost) };
     let mut cells = Arc::clone(base);
     match make_way(&facing, &mut cells, (&Vector3::zeros(), u), MOST_REGIONS, termination) {
-        Ok(Made { blocked, found, regions }) => {
+        Ok(Made { blocked, found, regions, .. }) => {
             // Whoever is stopped goes another way from the same cells.
             let (cells, found) = if blocked.is_empty() { (cells, found) } else { (Arc::clone(base), 0) };
             Ok(Way { blocked, cells: Some(cells), found, regions })
@@ -262,6 +326,8 @@ fn gathered(
 struct Made {
     /// The normals of what is in the way.
     blocked: Vec<Vector3<f64>>,
+    /// Points that show that.
+    witnesses: Vec<Witness>,
     /// How many cells were found for it: the last ones.
     found: usize,
     /// How many regions it took.
@@ -278,7 +344,7 @@ fn make_way(
 ) -> Result<Made, Halt> {
     let ends = |cell: &Cell| cell.blocks(at, u) || cell.is_exhausted(at, u);
     if !cells.iter().any(ends) {
-        return Ok(Made { blocked: Vec::new(), found: 0, regions: 0 });
+        return Ok(Made { blocked: Vec::new(), witnesses: Vec::new(), found: 0, regions: 0 });
     }
     let mut finder = Finder::new(facing, most, termination);
     let mut ended = Ok(());
@@ -300,8 +366,10 @@ fn make_way(
     let (found, regions) = (finder.cells.len(), finder.regions);
     of_pair.append(&mut finder.cells);
     match ended {
-        Ok(()) => Ok(Made { blocked: Vec::new(), found, regions }),
-        Err(Halt::Blocked) => Ok(Made { blocked: finder.obstacles, found, regions }),
+        Ok(()) => Ok(Made { blocked: Vec::new(), witnesses: Vec::new(), found, regions }),
+        Err(Halt::Blocked) => {
+            Ok(Made { blocked: finder.obstacles, witnesses: finder.witnesses, found, regions })
+        }
         Err(halt) => Err(halt),
     }
 }

@@ -28,6 +28,9 @@ const LONGEST_FREE_TURN: f64 = 4.0;
 const EAGER_ROUNDS: usize = 6;
 const LAZY_ROUNDS: usize = 12;
 const HALVINGS: usize = 3;
+/// A step is no longer than what was wanted by more than this (in its square): contacts that are left make it
+/// a little longer.
+const FARTHEST: f64 = 4.0;
 /// Pressed is what holds back more than this share of the wanted motion (in its square).
 const LEAST_PRESSURE: f64 = 1e-4;
 
@@ -43,8 +46,30 @@ const LEAST_SPEED: f64 = 0.1;
 /// of thousands.
 const ROWS_POLL: u32 = 16;
 
-/// What is near a mover's pose.
-pub(super) type Gather<'a> = &'a dyn Fn(&Mover<'_>) -> Near;
+/// What a step asks about its surroundings.
+pub(super) trait Around {
+    /// What is near a mover's pose: at least all contacts that are deeper than the engine lets them.
+    fn near(&mut self, mover: &Mover<'_>) -> Near;
+
+    /// Takes contacts in that were found at other poses and may matter at the mover's, too.
+    fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) {
+        let _ = (mover, near);
+    }
+
+    /// Whether nothing is too deep at a pose between the last one that was looked at and the one before the
+    /// step, but for what the contacts near these tell.
+    fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
+        let _ = between;
+        true
+    }
+}
+
+/// What a function gathers.
+impl<F: Fn(&Mover<'_>) -> Near> Around for F {
+    fn near(&mut self, mover: &Mover<'_>) -> Near {
+        self(mover)
+    }
+}
 
 /// What a step came to.
 pub(super) enum Step {
@@ -109,19 +134,19 @@ impl Drive {
         self.step
     }
 
-    /// One step from the mover's pose; `gather` finds what is near a pose.
-    pub(super) fn advance(&self, mover: &Mover<'_>, near: &Near, gather: Gather<'_>) -> Step {
-        if near.contacts.is_empty() {
+    /// One step from the mover's pose.
+    pub(super) fn advance(&self, mover: &Mover<'_>, near: &mut Near, around: &mut dyn Around) -> Step {
+        if near.contacts.is_empty() && near.clearance >= self.step {
             let factor = (near.clearance.min(FREE_STEP) / self.step).max(1.0);
             let twist = self.wanted * if self.turns { factor.min(LONGEST_FREE_TURN) } else { factor };
             let there = Mover { pose: self.displaced(mover, &twist), ..*mover };
-            return Self::moved(&there, gather(&there), &twist, Vec::new(), Vec::new());
+            return Self::moved(&there, around.near(&there), &twist, Vec::new(), Vec::new());
         }
         let mut with = Vec::new();
         for start in [Start::Certain, Start::Lazy] {
             for halving in 0..=HALVINGS {
                 let wanted = self.wanted / f64::from(1u32 << halving);
-                match self.attempt(mover, near, &wanted, start, gather) {
+                match self.attempt(mover, near, &wanted, start, around) {
                     Attempt::Moved(step) => return step,
                     Attempt::Stuck(by) => {
                         with = by;
@@ -130,6 +155,7 @@ impl Drive {
                     }
                     Attempt::Entered(by) => with = by,
                 }
+                around.add_known(mover, near);
             }
         }
         Step::Stuck { with }
@@ -178,7 +204,7 @@ impl Drive {
         near: &Near,
         wanted: &Vector6<f64>,
         start: Start,
-        gather: Gather<'_>,
+        around: &mut dyn Around,
     ) -> Attempt {
         let target = wanted.component_mul(&self.metric);
         let (mut rows, mut working) = (Vec::new(), Vec::new());
@@ -190,7 +216,9 @@ impl Drive {
             if mover.is_over() {
                 break;
             }
-            let Some(result) = self.projected(&target, &rows, round == 0) else { break };
+            // Rows that nearly contradict each other meet far away: nothing on the way there is looked at.
+            let is_near = |p: &Projected| p.w.norm_squared() <= FARTHEST * target.norm_squared();
+            let Some(result) = self.projected(&target, &rows, round == 0).filter(is_near) else { break };
             let touching = others(&result.active, &rows);
             let share = result.w.dot(&target) / target.norm_squared();
             if share < LEAST_SHARE {
@@ -205,10 +233,10 @@ impl Drive {
                 violated = self.violations(&trial, &working, &twist);
             }
             if violated.is_empty() {
-                let there = gather(&trial);
+                let there = around.near(&trial);
                 violated = there.contacts.iter().filter(|c| c.gap < -DEPTH_TOLERANCE).copied().collect();
                 if violated.is_empty() {
-                    if self.turns && !self.is_clear_between(mover, near, &trial, &there, &twist) {
+                    if self.turns && !self.is_clear_between((mover, near), (&trial, &there), &twist, around) {
                         return Attempt::Entered(touching);
                     }
                     let pressing = self.pressing(&target, &result, &rows);
@@ -251,11 +279,10 @@ impl Drive {
     /// bulge. Contacts further off at both ends than twice the bulge are not asked.
     fn is_clear_between(
         &self,
-        from: &Mover<'_>,
-        near: &Near,
-        to: &Mover<'_>,
-        there: &Near,
+        (from, near): (&Mover<'_>, &Near),
+        (to, there): (&Mover<'_>, &Near),
         twist: &Vector6<f64>,
+        around: &mut dyn Around,
     ) -> bool {
         let centre = from.scene.centre_in_shape(from.part);
         let middle = Mover { pose: interpolate(&from.pose, &to.pose, &centre, 0.5), ..*from };
@@ -263,6 +290,7 @@ impl Drive {
         let close = |c: &&Contact| c.gap < 0.25 * turn * turn * from.arm(c).norm();
         let mut closest = near.contacts.iter().chain(&there.contacts).filter(close);
         closest.all(|c| middle.remeasured(c, 0.0).is_none_or(|c| c.gap >= -BULGE_TOLERANCE))
+            && around.is_clear_at(&middle)
     }
 
     /// One constraint per contact, reduced, and which contacts they come from. Where a contact

@@ -1,12 +1,14 @@
 //! Two surfaces that face each other: of one, pieces are asked for; into the other they may not get.
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Translation3, Vector3};
 
 use crate::geometry::{Cloud, Parts, PatchTree, Pose, Surface, bisected, separating_direction};
 use crate::termination::{Interrupt, Termination};
 
 use super::super::Scene;
 use super::DEPTH_TOLERANCE;
+use super::cell::TOUCHED;
+use super::finder::HELD;
 
 /// Pieces are drawn together by this share to see whether they only touch.
 const INSET: f64 = 0.02;
@@ -31,13 +33,32 @@ pub(super) struct Obstacle {
     pub(super) other: usize,
 }
 
+impl Obstacle {
+    fn is_like(&self, other: &Self) -> bool {
+        self.other == other.other && self.normal.dot(&other.normal) > PARALLEL
+    }
+}
+
+/// A point of the asked surface that got into the measured one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Witness {
+    /// Without a shift, in the measured surface's frame.
+    point: Point3<f64>,
+    /// The triangle that it was nearest to.
+    triangle: u32,
+}
+
 /// A moving and a standing part: the surface that is asked, and that into which it may not get.
 #[derive(Clone)]
 pub(super) struct Facing<'a> {
     pub(super) other: usize,
-    asked: &'a Surface,
+    pub(super) asked: &'a Surface,
     tree: &'a PatchTree,
     pub(super) measured: &'a Surface,
+    /// Whether the moving part's surface is the one that is asked.
+    pub(super) asks_part: bool,
+    /// Where the standing part stands.
+    stand: Pose,
     /// Without a shift.
     measured_from_asked: Pose,
     /// From shifts of the part to shifts of the asked surface against the measured one: orthogonal.
@@ -60,10 +81,10 @@ impl<'a> Facing<'a> {
         let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
         let stand = standing.planning_from_shape;
         let [mine, theirs] = [moving, standing].map(|body| &body.shape);
-        let (asked, measured, measured_from_asked, turn) = if asks_part {
-            (mine, theirs, stand.inverse() * start, stand.rotation.inverse())
+        let (asked, measured, turn) = if asks_part {
+            (mine, theirs, stand.rotation.inverse())
         } else {
-            (theirs, mine, start.inverse() * stand, start.rotation.inverse())
+            (theirs, mine, start.rotation.inverse())
         };
         let sense = if asks_part { 1.0 } else { -1.0 };
         Ok(Self {
@@ -71,7 +92,9 @@ impl<'a> Facing<'a> {
             asked: &asked.surface,
             tree: asked.patches(termination)?,
             measured: &measured.surface,
-            measured_from_asked,
+            asks_part,
+            stand,
+            measured_from_asked: measured_from_asked(&stand, start, asks_part),
             shifted: *turn.to_rotation_matrix().matrix() * sense,
             allowance: scene.allowances.of(part, other),
         })
@@ -86,6 +109,38 @@ impl<'a> Facing<'a> {
         let mut sides = vec![!mine_first, mine_first];
         sides.retain(|&asks_part| !surface(if asks_part { other } else { part }).is_open());
         sides
+    }
+
+    /// From the asked surface's frame to the measured one's with the part at a pose.
+    pub(super) fn with_part_at(&self, pose: &Pose) -> Pose {
+        measured_from_asked(&self.stand, pose, self.asks_part)
+    }
+
+    /// A corner of a piece, in the asked surface's frame, by its number in [`Placed::points`].
+    pub(super) fn corner(&self, piece: &Piece, number: usize) -> Point3<f64> {
+        match piece {
+            Piece::Patch(index) => self.tree.vertices(*index)[number],
+            Piece::Bit(corners) => corners[number],
+        }
+    }
+
+    /// A ball that holds a piece, in the asked surface's frame.
+    pub(super) fn ball(&self, piece: &Piece) -> (Point3<f64>, f64) {
+        match piece {
+            Piece::Patch(index) => {
+                let patch = self.tree.patch(*index);
+                (patch.centre, patch.radius)
+            }
+            Piece::Bit(corners) => ball_of(corners),
+        }
+    }
+
+    /// A triangle of a piece's, if it is a patch.
+    pub(super) fn triangle_of(&self, piece: &Piece) -> Option<u32> {
+        match piece {
+            Piece::Patch(index) => self.tree.triangles(*index).first().copied(),
+            Piece::Bit(_) => None,
+        }
     }
 
     /// The whole asked surface, unless it has no triangles.
@@ -106,8 +161,13 @@ impl<'a> Facing<'a> {
 
     /// Where a piece is against the measured surface when the part is shifted.
     pub(super) fn place(&self, piece: &Piece, at: &Vector3<f64>, placed: &mut Placed) {
-        let shift = self.shifted * at;
-        let place = |p: &Point3<f64>| self.measured_from_asked * p + shift;
+        let shift = Translation3::from(self.shifted * at);
+        self.place_at(piece, &(shift * self.measured_from_asked), placed);
+    }
+
+    /// Where a piece is when the asked surface stands so against the measured one.
+    pub(super) fn place_at(&self, piece: &Piece, measured_from_asked: &Pose, placed: &mut Placed) {
+        let place = |p: &Point3<f64>| measured_from_asked * p;
         placed.points.clear();
         placed.extremes.clear();
         match piece {
@@ -121,9 +181,7 @@ impl<'a> Facing<'a> {
                 let corners = corners.map(|p| place(&p));
                 placed.points.extend(corners);
                 placed.extremes.extend(corners);
-                let centre = Point3::from(corners.iter().map(|p| p.coords).sum::<Vector3<f64>>() / 3.0);
-                placed.centre = centre;
-                placed.radius = corners.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max);
+                (placed.centre, placed.radius) = ball_of(&corners);
             }
         }
         placed.cloud.refill(&placed.points);
@@ -140,47 +198,77 @@ impl<'a> Facing<'a> {
     }
 
     /// The faces that some points of the asked surface (measured surface's frame) get into when the part
-    /// moves along a unit vector: what is certainly in the way.
+    /// moves along a unit vector: what is certainly in the way. Points that show it are added to
+    /// `witnesses`.
     pub(super) fn obstacles(
         &self,
         probes: &[Point3<f64>],
-        along: &Vector3<f64>,
+        (at, along): (&Vector3<f64>, &Vector3<f64>),
         guess: u32,
+        witnesses: &mut Vec<Witness>,
     ) -> Vec<Obstacle> {
         let mut obstacles: Vec<Obstacle> = Vec::new();
+        let shift = self.shifted * at;
+        for p in probes {
+            let Some((obstacle, triangle)) = self.obstacle(p, along, guess) else { continue };
+            if !obstacles.iter().any(|o| o.is_like(&obstacle)) {
+                obstacles.push(obstacle);
+                witnesses.push(Witness { point: p - shift, triangle });
+            }
+        }
+        obstacles
+    }
+
+    /// What points that showed obstacles before still get into, at another shift or along another unit
+    /// vector.
+    pub(super) fn obstacles_seen_by(
+        &self,
+        witnesses: &[Witness],
+        (at, along): (&Vector3<f64>, &Vector3<f64>),
+    ) -> Vec<Obstacle> {
+        let shift = self.shifted * at;
+        let mut obstacles: Vec<Obstacle> = Vec::new();
+        for Witness { point, triangle } in witnesses {
+            let seen = self.obstacle(&(point + shift), along, *triangle);
+            if let Some((obstacle, _)) = seen.filter(|(seen, _)| !obstacles.iter().any(|o| o.is_like(seen))) {
+                obstacles.push(obstacle);
+            }
+        }
+        obstacles
+    }
+
+    /// The face that a point gets into when the part moves along a unit vector, and its triangle.
+    fn obstacle(&self, p: &Point3<f64>, along: &Vector3<f64>, guess: u32) -> Option<(Obstacle, u32)> {
         let ahead = self.shifted * along;
         let depth = |p: &Point3<f64>, guess: u32| {
             let closest = self.measured.closest_from(p, guess);
             (-self.measured.signed(p, &closest), closest)
         };
-        for p in probes {
-            let (now, closest) = depth(p, guess);
+        let (now, closest) = depth(p, guess);
+        let (mut least, mut most): (Option<Vector3<f64>>, Option<Vector3<f64>>) = (None, None);
+        self.measured.feature_normals(&closest, |n| {
+            let speed = n.dot(&ahead);
+            if least.is_none_or(|m| speed > m.dot(&ahead)) {
+                least = Some(n);
+            }
+            if most.is_none_or(|m| speed < m.dot(&ahead)) {
+                most = Some(n);
+            }
+        });
+        let blocking = |n: &Vector3<f64>| n.dot(&ahead) < -TILT;
+        // What touches enters below all faces that it touches, at however small an angle.
+        let touches = (-TOUCHED..=HELD).contains(&(now - self.allowance));
+        let is_certain = touches && least.as_ref().is_some_and(blocking) || {
             let (then, _) = depth(&(p + ahead * PROBE), closest.triangle);
-            if then <= now.max(self.allowance) + INSIDE * PROBE {
-                continue;
-            }
-            let (mut least, mut most): (Option<Vector3<f64>>, Option<Vector3<f64>>) = (None, None);
-            self.measured.feature_normals(&closest, |n| {
-                let speed = n.dot(&ahead);
-                if least.is_none_or(|m| speed > m.dot(&ahead)) {
-                    least = Some(n);
-                }
-                if most.is_none_or(|m| speed < m.dot(&ahead)) {
-                    most = Some(n);
-                }
-            });
-            // Before a convex edge either face is enough to stay above; if that does not help, it is
-            // a reentrant one.
-            let blocking = |n: &Vector3<f64>| n.dot(&ahead) < -TILT;
-            if let Some(n) = least.filter(blocking).or(most.filter(blocking)) {
-                let normal = self.shifted.transpose() * n;
-                let known = |o: &Obstacle| o.other == self.other && o.normal.dot(&normal) > PARALLEL;
-                if !obstacles.iter().any(known) {
-                    obstacles.push(Obstacle { normal, other: self.other });
-                }
-            }
+            then > now.max(self.allowance) + INSIDE * PROBE
+        };
+        if !is_certain {
+            return None;
         }
-        obstacles
+        // Before a convex edge either face is enough to stay above; if that does not help, it is
+        // a reentrant one.
+        let n = least.filter(blocking).or(most.filter(blocking))?;
+        Some((Obstacle { normal: self.shifted.transpose() * n, other: self.other }, closest.triangle))
     }
 
     /// Points of a piece that are likely to get inside first: corners in front, and the
@@ -216,6 +304,15 @@ impl<'a> Facing<'a> {
         probes.extend(middles.into_iter().take(PROBED).map(|(_, p)| measured_from_asked * p + shift));
         probes
     }
+}
+
+fn ball_of(corners: &[Point3<f64>; 3]) -> (Point3<f64>, f64) {
+    let centre = Point3::from(corners.iter().map(|p| p.coords).sum::<Vector3<f64>>() / 3.0);
+    (centre, corners.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max))
+}
+
+fn measured_from_asked(stand: &Pose, part: &Pose, asks_part: bool) -> Pose {
+    if asks_part { stand.inverse() * part } else { part.inverse() * stand }
 }
 
 /// A piece of the asked surface.

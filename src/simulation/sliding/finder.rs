@@ -8,36 +8,37 @@ use crate::termination::Termination;
 use super::DEPTH_TOLERANCE;
 use super::cell::{Cell, Limit, Spot};
 use super::cells::Halt;
-use super::facing::{Facing, Obstacle, Piece, Placed};
+use super::facing::{Facing, Obstacle, Piece, Placed, Witness};
 
 /// Pieces this far off need no region, in the planning frame.
-const FAR: f64 = 0.12;
+pub(super) const FAR: f64 = 0.12;
 /// Shifts that a region is asked to allow: the longest that works.
 const AHEAD: [f64; 5] = [4.0, 0.5, 0.06, 0.012, 2e-3];
 /// Which of these is asked for first; the shorter ones only where something is near ahead.
 const SHORT: usize = 2;
 /// Regions without a wanted shift are asked for so much around a piece.
-const AROUND: f64 = 0.12;
+pub(super) const AROUND: f64 = 0.12;
 /// A region that lets a piece go by less than this share of what was asked is too small.
 const LEAST_LET_GO: f64 = 0.25;
 /// Steps that are shorter lead nowhere.
 const LEAST_STEP: f64 = 1e-5;
 /// Regions are asked for so much larger than the piece.
-const ROOM: f64 = 1.25;
+pub(super) const ROOM: f64 = 1.25;
 /// So far outside its region, beyond what is granted, a piece may be where it begins: flat sides leave
 /// out a little of what is free, and where parts stand assembled nothing is entered.
 pub(super) const HELD_AT_FIRST: f64 = 1e-3;
 /// The same for what was not as far outside before. A corner of the measured surface gets deeper into a face
 /// than that gets into the corner, a few times: still within what the engine declares.
-const HELD: f64 = DEPTH_TOLERANCE / 2.0;
+pub(super) const HELD: f64 = DEPTH_TOLERANCE / 2.0;
 /// A bit of a triangle that is smaller than this and has no region ahead is in the way …
 const SMALL: f64 = 0.3;
 /// … and is lost if it has none at all and is smaller than this.
-const SMALLEST: f64 = 0.02;
+pub(super) const SMALLEST: f64 = 0.02;
+
 /// What of the measured surface is nearest to a point, and how near.
-struct Seen {
-    closest: Closest,
-    signed: f64,
+pub(super) struct Seen {
+    pub(super) closest: Closest,
+    pub(super) signed: f64,
 }
 
 /// A question about a piece: from which shift on, and which way it is to go on.
@@ -60,6 +61,8 @@ pub(super) struct Finder<'a> {
     pub(super) cells: Vec<Cell>,
     /// Normals of what is certainly in the way.
     pub(super) obstacles: Vec<Vector3<f64>>,
+    /// Points that show it.
+    pub(super) witnesses: Vec<Witness>,
     /// The piece at hand.
     placed: Placed,
 }
@@ -73,6 +76,7 @@ impl<'a> Finder<'a> {
             budget,
             cells: Vec::new(),
             obstacles: Vec::new(),
+            witnesses: Vec::new(),
             placed: Placed::default(),
         }
     }
@@ -112,7 +116,8 @@ impl<'a> Finder<'a> {
         if seen.signed - radius >= FAR {
             let limits = Vec::new();
             spot.held = if pair.allowance > 0.0 { spot.held } else { HELD };
-            self.cells.push(Cell { spot, limits, middle: wish.at, room: seen.signed - radius });
+            let ball = (self.placed.centre, seen.signed);
+            self.cells.push(Cell { spot, limits, middle: wish.at, room: seen.signed - radius, ball });
             return Ok(());
         }
         let still = Vector3::zeros();
@@ -147,7 +152,7 @@ impl<'a> Finder<'a> {
         }
         let pair = self.pair;
         let probes = pair.probes_ahead(&spot.piece, &self.placed, (&wish.at, &wish.along));
-        let certain = pair.obstacles(&probes, &wish.along, spot.guess);
+        let certain = pair.obstacles(&probes, (&wish.at, &wish.along), spot.guess, &mut self.witnesses);
         if !certain.is_empty() {
             self.block(&certain);
             return Err(Halt::Blocked);
@@ -227,6 +232,7 @@ impl<'a> Finder<'a> {
             limits: vec![Limit { normal, height }],
             middle: wish.at,
             room: AHEAD[SHORT],
+            ball: (*centre, self.placed.radius + AHEAD[SHORT]),
         })
     }
 
@@ -278,14 +284,16 @@ impl<'a> Finder<'a> {
         };
         let held = if pair.allowance > 0.0 { HELD_AT_FIRST } else { HELD.max(depth + HELD / 10.0) };
         let held = held.min(spot.held);
-        let cell = Cell { spot: Spot { held, ..*spot }, limits, middle, room };
+        let ball = (region.centre(), region.radius());
+        let cell = Cell { spot: Spot { held, ..*spot }, limits, middle, room, ball };
         let too_small =
             ahead != Vector3::zeros() && cell.length(&wish.at, &wish.along) < LEAST_LET_GO * shift.norm();
         if too_small { Err(NoRegion::Cramped) } else { Ok(cell) }
     }
 }
 
-fn look(pair: &Facing<'_>, p: &Point3<f64>, guess: u32) -> Seen {
+/// What a point in the measured surface's frame sees.
+pub(super) fn look(pair: &Facing<'_>, p: &Point3<f64>, guess: u32) -> Seen {
     let closest = pair.measured.closest_from(p, guess);
     Seen { signed: pair.measured.signed(p, &closest), closest }
 }

@@ -16,7 +16,7 @@ use crate::geometry::{Pose, Screw};
 use super::super::contact::{Mover, Near};
 use super::super::{Scene, Surroundings};
 use super::DEPTH_TOLERANCE;
-use super::drive::{Drive, Gather};
+use super::drive::{Around, Drive};
 
 /// Two steps are one motion if no point of the part differs by more than this share of a step …
 const SAME: f64 = 0.02;
@@ -110,7 +110,7 @@ impl<'a> Leaper<'a> {
         from: &Pose,
         mover: &Mover<'_>,
         pressing: Vec<Vector6<f64>>,
-        gather: Gather<'_>,
+        around: &mut dyn Around,
     ) -> Option<Leap> {
         if self.disabled {
             return None;
@@ -132,7 +132,7 @@ impl<'a> Leaper<'a> {
         let mut steps = self.free_steps(mover, &now, wanted, &holds);
         while steps > 1 {
             let there = Mover { pose: now.times(steps as f64) * mover.pose, ..*mover };
-            let near = gather(&there);
+            let near = around.near(&there);
             if near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE) {
                 self.length = if steps == wanted { steps * 2 } else { steps };
                 self.alike = self.alike.map(|(begin, count)| (begin, count + steps));

@@ -15,6 +15,7 @@ mod cells;
 mod drive;
 mod facing;
 mod finder;
+mod holds;
 mod kept;
 mod leap;
 mod pair;
@@ -28,6 +29,7 @@ use super::contact::Mover;
 use super::{Action, End, Motion, Scene, Surroundings, TransitionFunction, asked_again, exit_direction};
 use cells::Halt;
 use drive::{Drive, Step};
+use holds::Holds;
 use leap::Leaper;
 use push::Push;
 use turning::Turning;
@@ -69,7 +71,8 @@ impl TransitionFunction for SlidingEngine {
         action: Action,
         termination: &Termination,
     ) -> Result<Motion, Interrupt> {
-        if let (Action::Push(..), false) = (action, is_refined(scene, surroundings, part)) {
+        let is_refined = is_refined(scene, surroundings, part);
+        if let (Action::Push(..), false) = (action, is_refined) {
             match pushed(scene, surroundings, (part, start), action, termination) {
                 Err(Halt::Lost | Halt::Blocked) => {}
                 Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
@@ -80,7 +83,10 @@ impl TransitionFunction for SlidingEngine {
         let mut mover = Mover::new(scene, part, *start).until(termination);
         let (mut path, mut asked) = (vec![*start], Vec::new());
         let mut turning = Turning::new(&mover);
-        let gather = |mover: &Mover<'_>| mover.near(surroundings, drive.reach());
+        // What regions cannot tell of a push, they cannot tell of a motion that may turn either.
+        let by_samples = is_refined || !action.turns();
+        let mut around =
+            Holds::new(scene, surroundings, (part, start), drive.reach(), by_samples, termination);
         let mut leaper = Leaper::new(scene, surroundings, part, &drive);
         let mut near = None;
         while path.len() < MOST_POSES {
@@ -88,8 +94,8 @@ impl TransitionFunction for SlidingEngine {
             let (mut turned, mut touching) = (0.0, Vec::new());
             let mut leap = leaper.follow(&mover);
             if leap.is_none() {
-                let here = near.take().unwrap_or_else(|| gather(&mover));
-                let step = drive.advance(&mover, &here, &gather);
+                let mut here = around.settle(&mover, near.take());
+                let step = drive.advance(&mover, &mut here, &mut around);
                 // What was found of contacts that were cut short is not to be believed.
                 termination.check()?;
                 let step = match step {
@@ -100,8 +106,9 @@ impl TransitionFunction for SlidingEngine {
                 };
                 let from = std::mem::replace(&mut mover.pose, step.pose);
                 path.push(step.pose);
-                if !here.contacts.is_empty() {
-                    leap = leaper.leap(&from, &mover, step.pressing, &gather);
+                // Where regions tell, ordinary steps cost less than looking where a long one may lead.
+                if !here.contacts.is_empty() && around.samples() {
+                    leap = leaper.leap(&from, &mover, step.pressing, &mut around);
                 }
                 (turned, touching, near) = (step.turned, step.touching, Some(step.near));
             }

@@ -55,7 +55,8 @@ pub fn pair_blocks(
     let entering = |mover: &Mover<'_>| within(0.0, mover);
     let blocked = |action: &Action| {
         let drive = Drive::new(scene, part, pose, *action);
-        let mut step = drive.advance(&start, &near, &entering);
+        let mut entering = entering;
+        let mut step = drive.advance(&start, &mut near.clone(), &mut entering);
         for _ in 1..STATIC_STEPS {
             termination.check()?;
             let Step::Moved(Moved { pose: there, .. }) = step else { return Ok(true) };
@@ -63,7 +64,7 @@ pub fn pair_blocks(
             if (mover.centre() - start.centre()).norm() > least {
                 return Ok(false);
             }
-            step = drive.advance(&mover, &within(reach, &mover), &entering);
+            step = drive.advance(&mover, &mut within(reach, &mover), &mut entering);
         }
         // What was found of a cut walk is not to be believed.
         termination.check()?;

@@ -12,15 +12,12 @@ use crate::termination::Termination;
 
 use super::super::Scene;
 use super::super::projection::{Row, project};
-use super::cells::{Cells, Halt};
+use super::cells::{Cells, Halt, MOST_STALLS, STALL};
 use super::drive::{FREE_STEP, LEAST_SHARE, contact_step, others};
 use super::facing::Obstacle;
 
 /// So many times the direction is bent at one place.
 const MOST_BENDS: usize = 64;
-/// So many steps in succession may be vanishingly short.
-const MOST_STALLS: usize = 16;
-const STALL: f64 = 1e-7;
 
 /// A part that is pushed.
 pub(super) struct Push<'a> {
@@ -105,7 +102,7 @@ impl<'a> Push<'a> {
         }
         let longest = if obstacles.is_empty() { FREE_STEP } else { self.contact_step };
         let seen = self.asked_at.map_or(0.0, |at| FREE_STEP - (self.shift - at).norm());
-        let length = self.cells.length(&self.shift, &u).min(longest).min(seen);
+        let length = self.cells.advance(&self.shift, &u, longest.min(seen))?;
         self.stalls = if length < STALL { self.stalls + 1 } else { 0 };
         if self.stalls > MOST_STALLS {
             return Err(Halt::Lost);

@@ -1,0 +1,638 @@
+//! What is near a part that may turn.
+//!
+//! Of each pair one surface is in pieces, each with a convex region that the other surface does not
+//! enter (those of [`cells`](super::cells) to begin with). A piece whose corners are in its region is
+//! outside the other solid, however it came there: a few planes tell what hundreds of samples would have
+//! to be measured for. Of what leaves its region, corners that are inside the other solid are contacts;
+//! else another region is looked for that holds the piece at both ends of the step; else it is
+//! split. Where none of this tells, samples decide. Of contacts, those that were found to matter are
+//! kept from step to step and measured again.
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, Vector3};
+
+use crate::geometry::{Bounds, FreeRegion, NoRegion, Pose, Screw, Wanted};
+use crate::termination::Termination;
+
+use super::super::contact::{Contact, Mover, Near};
+use super::super::{Scene, Surroundings};
+use super::cell::{Cell, Spot};
+use super::cells::{MOST_GRANTED, starting};
+use super::drive::Around;
+use super::facing::{Facing, Piece, Placed};
+use super::finder::{AROUND, ROOM, SMALLEST, look};
+use super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
+
+/// Surfaces in more pieces than this are quicker told by samples.
+const MOST_PIECES: usize = 600;
+/// So many regions are looked for during one look at a pair …
+const MOST_RENEWED: usize = 40;
+/// … and so many where samples decided, to be sure of the pose again.
+const MOST_FOUND_AGAIN: usize = 100;
+/// Where a motion takes more regions than so many, and so many for each step, samples cost less.
+const MOST_IN_ALL: usize = 120;
+const MOST_PER_STEP: usize = 12;
+/// Where a bit of a triangle that is smaller than this has no region, its deepest point is looked for.
+const SMALL: f64 = 0.1;
+/// Steps of that search along an edge.
+const DEEPEST_STEPS: usize = 10;
+/// The inverse of the golden ratio.
+const GOLDEN: f64 = 0.618_033_988_749_895;
+/// A bit that is as small as can be is told by the face before it, so far around.
+const AROUND_SMALLEST: f64 = 4.0 * SMALLEST;
+/// So many contacts of a pair are kept from step to step.
+const MOST_KNOWN: usize = 128;
+/// So many contacts are looked for by pieces that have no region.
+const MOST_FOUND: usize = 4;
+/// So many times the displacement of a step regions are asked to allow, if they can.
+const AHEAD: f64 = 4.0;
+/// Poses of a step at which small bits are measured that no region holds at both ends.
+const BETWEEN: usize = 4;
+/// So many corners of a piece are measured.
+const MOST_PROBED: usize = 24;
+
+/// What is around a moving part.
+pub(super) struct Holds<'a> {
+    scene: &'a Scene,
+    surroundings: &'a Surroundings,
+    part: usize,
+    reach: f64,
+    termination: &'a Termination,
+    start: Pose,
+    /// The pose at which all pieces are known to be free.
+    base: Pose,
+    /// The pose that was looked at last.
+    looked_at: Option<Pose>,
+    pairs: Vec<Held<'a>>,
+    /// Standing parts that only samples tell of.
+    sampled: Vec<usize>,
+    /// Whether they tell of all.
+    all_sampled: bool,
+}
+
+/// A pair, one of whose surfaces is in pieces.
+struct Held<'a> {
+    facing: Facing<'a>,
+    pieces: Vec<Hold>,
+    /// Contacts that mattered.
+    known: Vec<Contact>,
+    /// Whether it was looked at there.
+    is_near: bool,
+    /// Whether regions could not tell: from the base on samples do.
+    is_left_to_samples: bool,
+    /// How many steps were made, and how many regions were looked for.
+    steps: usize,
+    regions: usize,
+    placed: Placed,
+}
+
+/// A piece in its region.
+#[derive(Clone)]
+struct Hold {
+    spot: Spot,
+    /// In the measured surface's frame.
+    region: Arc<FreeRegion>,
+    /// A ball that holds the piece, in the asked surface's frame, …
+    centre: Point3<f64>,
+    radius: f64,
+    /// … and where its centre is at the base, in the measured surface's.
+    stands: Point3<f64>,
+    /// How far inside its region all of it is there.
+    slack: f64,
+    /// The same at the pose that was looked at last; none if it was not in its region there.
+    next: Option<f64>,
+}
+
+/// Why a piece got no region.
+enum Unheld {
+    /// The other end is too deep.
+    Entered(Contact),
+    /// It is too deep between the two.
+    Crossed,
+    /// It took too long to tell.
+    Unsure,
+}
+
+/// From the asked surface's frame to the measured one's at the base and at another pose.
+#[derive(Clone, Copy)]
+struct Ends {
+    here: Pose,
+    there: Pose,
+    /// Between the two, if they differ.
+    between: [Pose; BETWEEN],
+    /// Where the motion from the one to the other leads.
+    ahead: Pose,
+}
+
+impl Ends {
+    fn of(facing: &Facing<'_>, base: &Pose, there: &Pose) -> Self {
+        let screw = Screw::between(base, there, 1);
+        let after = |share: f64| facing.with_part_at(&(screw.times(share) * base));
+        let between = std::array::from_fn(|i| after((i + 1) as f64 / (BETWEEN + 1) as f64));
+        let [here, there] = [base, there].map(|pose| facing.with_part_at(pose));
+        Self { here, there, between, ahead: after(AHEAD) }
+    }
+
+    /// A pose alone.
+    fn at(there: Pose) -> Self {
+        Self { here: there, there, between: [there; BETWEEN], ahead: there }
+    }
+}
+
+impl<'a> Holds<'a> {
+    /// With samples alone, or with regions where these tell.
+    pub(super) fn new(
+        scene: &'a Scene,
+        surroundings: &'a Surroundings,
+        (part, start): (usize, &Pose),
+        reach: f64,
+        all_sampled: bool,
+        termination: &'a Termination,
+    ) -> Self {
+        Self {
+            scene,
+            surroundings,
+            part,
+            reach,
+            termination,
+            start: *start,
+            base: *start,
+            looked_at: None,
+            pairs: Vec::new(),
+            sampled: Vec::new(),
+            all_sampled,
+        }
+    }
+
+    /// Whether samples tell of some part that is near or was.
+    pub(super) fn samples(&self) -> bool {
+        self.all_sampled || !self.sampled.is_empty()
+    }
+
+    /// Goes on from a pose: what is near it, if that is not known yet.
+    pub(super) fn settle(&mut self, mover: &Mover<'_>, near: Option<Near>) -> Near {
+        let mut near = match near {
+            Some(near) if self.looked_at == Some(mover.pose) => near,
+            _ => self.near(mover),
+        };
+        self.base = mover.pose;
+        let (reach, sampled) = (self.reach, &mut self.sampled);
+        // What is out of reach is found anew when it comes near.
+        self.pairs.retain_mut(|pair| {
+            let is_told =
+                pair.is_near && !pair.is_left_to_samples && pair.settle(mover, reach, self.termination);
+            if pair.is_near && !is_told {
+                sampled.push(pair.facing.other);
+            }
+            is_told
+        });
+        for contact in self.pairs.iter().flat_map(|pair| &pair.known) {
+            if !near.contacts.iter().any(|c| c.is_of_same_point(contact)) {
+                near.contacts.push(*contact);
+            }
+        }
+        near
+    }
+
+    /// Whether a standing part's pair is told by regions; takes it in if it is new.
+    fn pair_of(&mut self, other: usize) -> Option<usize> {
+        if self.all_sampled || self.sampled.contains(&other) {
+            return None;
+        }
+        let known = self.pairs.iter().position(|pair| pair.facing.other == other);
+        known.or_else(|| {
+            let pair = Held::new(
+                self.scene,
+                (self.part, &self.base),
+                other,
+                self.base == self.start,
+                self.termination,
+            );
+            if let Some(pair) = pair {
+                self.pairs.push(pair);
+                return Some(self.pairs.len() - 1);
+            }
+            self.sampled.push(other);
+            None
+        })
+    }
+}
+
+impl Around for Holds<'_> {
+    fn near(&mut self, mover: &Mover<'_>) -> Near {
+        self.pairs.iter_mut().for_each(|pair| pair.is_near = false);
+        self.looked_at = Some(mover.pose);
+        let (surroundings, reach, base) = (self.surroundings, self.reach, self.base);
+        mover.near_by(surroundings, reach, |other, near| match self.pair_of(other) {
+            Some(pair) => self.pairs[pair].near(&base, mover, reach, near),
+            None => mover.near_pair(other, reach, near),
+        })
+    }
+
+    fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) {
+        for pair in self.pairs.extract_if(.., |pair| pair.is_left_to_samples) {
+            let other = pair.facing.other;
+            near.contacts.retain(|c| c.other != other);
+            mover.near_pair(other, self.reach, near);
+            self.sampled.push(other);
+        }
+        for contact in self.pairs.iter().flat_map(|pair| &pair.known) {
+            if !near.contacts.iter().any(|c| c.is_of_same_point(contact)) {
+                let here = mover.remeasured(contact, self.reach).filter(|c| c.gap < self.reach);
+                near.contacts.extend(here);
+            }
+        }
+    }
+
+    fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
+        self.pairs.iter_mut().all(|pair| pair.is_clear_at(between))
+    }
+}
+
+impl<'a> Held<'a> {
+    /// A pair with the part at a pose, if regions tell of it.
+    fn new(
+        scene: &'a Scene,
+        (part, pose): (usize, &Pose),
+        other: usize,
+        is_start: bool,
+        termination: &Termination,
+    ) -> Option<Self> {
+        if scene.allowances.of(part, other) > MOST_GRANTED {
+            return None;
+        }
+        let gathered = starting(scene, (part, pose), other, is_start, termination).ok()?;
+        let cells = gathered.cells.as_ref().filter(|cells| cells.len() <= MOST_PIECES)?;
+        let facing = Facing::new(scene, (part, pose), other, gathered.asks_part, termination).ok()?;
+        let mut placed = Placed::default();
+        let here = facing.with_part_at(pose);
+        let pieces = cells.iter().map(|cell| Hold::of_cell(cell, &facing, &here, &mut placed)).collect();
+        let known = Vec::new();
+        Some(Self {
+            facing,
+            pieces,
+            known,
+            is_near: false,
+            is_left_to_samples: false,
+            steps: 0,
+            regions: 0,
+            placed,
+        })
+    }
+
+    /// What is near with the part at the mover's pose; it was free at `base`.
+    fn near(&mut self, base: &Pose, mover: &Mover<'_>, reach: f64, near: &mut Near) {
+        let ends = Ends::of(&self.facing, base, &mover.pose);
+        self.is_near = true;
+        let outside = self.outside(&ends, near);
+        // Contacts lie on pieces that have left their regions, mostly.
+        if outside.is_empty() {
+            return;
+        }
+        let again = self.known.iter().filter_map(|c| mover.remeasured(c, reach));
+        let mut found: Vec<Contact> = again.filter(|c| c.gap < -DEPTH_TOLERANCE).collect();
+        found.extend(self.corners_inside(&outside, &ends.there, DEPTH_TOLERANCE));
+        if found.is_empty() {
+            found = self.renew(&outside, &ends);
+        }
+        if self.is_left_to_samples {
+            return mover.near_pair(self.facing.other, reach, near);
+        }
+        self.learn(&found);
+        near.contacts.extend(found);
+    }
+
+    /// The pieces that are not in their regions at the other end. Tells of all what there is left for
+    /// them to move.
+    fn outside(&mut self, Ends { here, there, .. }: &Ends, near: &mut Near) -> Vec<usize> {
+        let angle = here.rotation.angle_to(&there.rotation);
+        let mut outside = Vec::new();
+        for (i, hold) in self.pieces.iter_mut().enumerate() {
+            let moved = (there * hold.centre - hold.stands).norm() + angle * hold.radius;
+            hold.next = if hold.slack > moved {
+                Some(hold.slack - moved)
+            } else {
+                hold.slack_at(&self.facing, there, 0.0, &mut self.placed)
+            };
+            match hold.next {
+                Some(slack) => near.clearance = near.clearance.min(slack.max(0.0)),
+                None => outside.push(i),
+            }
+        }
+        if !outside.is_empty() {
+            near.clearance = 0.0;
+        }
+        outside
+    }
+
+    /// The corners of some pieces that are deeper inside the measured solid than may be.
+    fn corners_inside(&mut self, pieces: &[usize], there: &Pose, most: f64) -> Vec<Contact> {
+        let mut inside = Vec::new();
+        let Self { facing, pieces: all, placed, .. } = self;
+        for &i in pieces {
+            let hold = &mut all[i];
+            facing.place_at(&hold.spot.piece, there, placed);
+            let slacks = placed.points.iter().map(|p| hold.region.slack(p)).enumerate();
+            let mut out: Vec<(usize, f64)> = slacks.filter(|(_, slack)| *slack < -most).collect();
+            out.sort_by(|a, b| a.1.total_cmp(&b.1));
+            for (k, _) in out.into_iter().take(MOST_PROBED) {
+                let seen = look(facing, &placed.points[k], hold.spot.guess);
+                hold.spot.guess = seen.closest.triangle;
+                let gap = seen.signed + facing.allowance;
+                if gap < -most {
+                    let sample = facing.corner(&hold.spot.piece, k);
+                    let (is_moving, at) = (facing.asks_part, (gap, seen.closest));
+                    inside.push(Contact::measured(facing.other, is_moving, sample, at, facing.allowance));
+                }
+            }
+        }
+        inside
+    }
+
+    /// Finds regions that hold these pieces at both ends, or contacts that are too deep at the other one.
+    fn renew(&mut self, outside: &[usize], ends: &Ends) -> Vec<Contact> {
+        let mut left = MOST_RENEWED;
+        let (mut found, mut entered) = (Vec::new(), Vec::new());
+        for &i in outside {
+            let hold = self.pieces[i].clone();
+            match self.held(&hold, ends, &mut left, &mut found) {
+                Ok(()) => {}
+                Err(Unheld::Entered(contact)) => {
+                    entered.push(contact);
+                    if entered.len() >= MOST_FOUND {
+                        break;
+                    }
+                }
+                Err(Unheld::Crossed | Unheld::Unsure) => {
+                    self.is_left_to_samples = entered.is_empty();
+                    return entered;
+                }
+            }
+        }
+        if entered.is_empty() {
+            for &i in outside.iter().rev() {
+                self.pieces.swap_remove(i);
+            }
+            self.pieces.extend(found);
+        }
+        entered
+    }
+
+    /// Finds regions for a piece that has none at the other end, or for its parts.
+    fn held(
+        &mut self,
+        hold: &Hold,
+        ends: &Ends,
+        left: &mut usize,
+        out: &mut Vec<Hold>,
+    ) -> Result<(), Unheld> {
+        if *left == 0 {
+            return Err(Unheld::Unsure);
+        }
+        *left -= 1;
+        self.regions += 1;
+        // What could not be held further ahead the last time is not tried at once again.
+        let goes_far = hold.spot.level == 0 && ends.here != ends.there;
+        let far = if goes_far { self.region(hold, &[ends.here, ends.there, ends.ahead]).ok() } else { None };
+        let level = usize::from(goes_far && far.is_none());
+        let found = far.map_or_else(|| self.region(hold, &[ends.here, ends.there]), Ok);
+        match found {
+            Ok(region) => {
+                let mut hold = Hold { region: Arc::new(region), ..hold.clone() };
+                hold.spot.level = level;
+                hold.slack = hold.slack_at(&self.facing, &ends.here, 0.0, &mut self.placed).unwrap_or(0.0);
+                hold.next = hold.slack_at(&self.facing, &ends.there, 0.0, &mut self.placed).or(Some(0.0));
+                out.push(hold);
+                return Ok(());
+            }
+            Err(NoRegion::Amid(triangle)) => {
+                if let Some(contact) = self.pierced(hold, triangle, &ends.there) {
+                    return Err(Unheld::Entered(contact));
+                }
+            }
+            Err(NoRegion::Cramped) => {}
+        }
+        if let Piece::Bit(corners) = &hold.spot.piece
+            && hold.radius < SMALL
+        {
+            if let Some(contact) = self.deepest_on_edges(corners, hold.spot.guess, &ends.there) {
+                return Err(Unheld::Entered(contact));
+            }
+            if hold.radius < SMALLEST {
+                let enters = |at: &Pose| self.deepest_on_edges(corners, hold.spot.guess, at).is_some();
+                if ends.here != ends.there && ends.between.iter().any(enters) {
+                    return Err(Unheld::Crossed);
+                }
+                out.push(self.before_face(hold, ends));
+                return Ok(());
+            }
+        }
+        for piece in self.facing.parts(&hold.spot.piece) {
+            let mut part =
+                Hold::new(Spot { piece, ..hold.spot }, Arc::clone(&hold.region), &self.facing, &ends.here);
+            let at_here = part.slack_at(&self.facing, &ends.here, 0.0, &mut self.placed);
+            part.next = part.slack_at(&self.facing, &ends.there, 0.0, &mut self.placed);
+            if let (Some(slack), Some(_)) = (at_here, part.next) {
+                part.slack = slack;
+                out.push(part);
+            } else {
+                self.held(&part, ends, left, out)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A region that holds a piece at some poses.
+    fn region(&mut self, hold: &Hold, at: &[Pose]) -> Result<FreeRegion, NoRegion> {
+        let (facing, placed) = (&self.facing, &mut self.placed);
+        let (mut wanted, mut centres) = (Vec::new(), Bounds::EMPTY);
+        for pose in at {
+            facing.place_at(&hold.spot.piece, pose, placed);
+            wanted.extend_from_slice(&placed.extremes);
+            centres = centres.with_point(&placed.centre);
+        }
+        let middle = centres.centre();
+        let around = (placed.radius + (centres.max - middle).norm() + AROUND) * ROOM;
+        let most = hold.most(facing);
+        let wanted = Wanted { points: &wanted, most, from_behind: true, facing: Vector3::zeros() };
+        let seen = look(facing, &middle, hold.spot.guess);
+        let region =
+            facing.measured.free_region_around(&middle, around, (&seen.closest, seen.signed), wanted)?;
+        for pose in at {
+            facing.place_at(&hold.spot.piece, pose, placed);
+            slack_within(&region, placed, most).ok_or(NoRegion::Cramped)?;
+        }
+        Ok(region)
+    }
+
+    /// The deepest point of a bit's edges, if it is deeper than may be: where edges cross, neither surface
+    /// has a corner inside the other. Below the two faces of an edge the depth along a line has one maximum
+    /// (found by golden sections).
+    fn deepest_on_edges(&self, corners: &[Point3<f64>; 3], guess: u32, there: &Pose) -> Option<Contact> {
+        let facing = &self.facing;
+        let gap = |p: &Point3<f64>| {
+            let seen = look(facing, &(there * p), guess);
+            (seen.signed + facing.allowance, seen.closest)
+        };
+        let at_corners = corners.map(|p| gap(&p).0);
+        let mut deepest: Option<(f64, Point3<f64>)> = None;
+        for edge in 0..3 {
+            let next = (edge + 1) % 3;
+            let (a, b) = (corners[edge], corners[next]);
+            if at_corners[edge].min(at_corners[next]) - (b - a).norm() / 2.0 > -DEPTH_TOLERANCE {
+                continue;
+            }
+            let (mut low, mut high) = (0.0, 1.0);
+            let at = |u: f64| a + (b - a) * u;
+            let (mut u, mut v) = (1.0 - GOLDEN, GOLDEN);
+            let (mut of_u, mut of_v) = (gap(&at(u)).0, gap(&at(v)).0);
+            for _ in 0..DEEPEST_STEPS {
+                if of_u < of_v {
+                    (high, v, of_v) = (v, u, of_u);
+                    u = high - GOLDEN * (high - low);
+                    of_u = gap(&at(u)).0;
+                } else {
+                    (low, u, of_u) = (u, v, of_v);
+                    v = low + GOLDEN * (high - low);
+                    of_v = gap(&at(v)).0;
+                }
+            }
+            let found = if of_u < of_v { (of_u, at(u)) } else { (of_v, at(v)) };
+            let corner = (at_corners[edge], a);
+            for found in [found, corner] {
+                if deepest.is_none_or(|(least, _)| found.0 < least) {
+                    deepest = Some(found);
+                }
+            }
+        }
+        let (_, p) = deepest.filter(|(gap, _)| *gap < -DEPTH_TOLERANCE)?;
+        Some(Contact::measured(facing.other, facing.asks_part, p, gap(&p), facing.allowance))
+    }
+
+    /// A small bit that is no deeper than may be, before the face that it is nearest to: where surfaces
+    /// cross by less than that, there are no regions. That is not certain, as regions are; paths are
+    /// verified.
+    fn before_face(&mut self, hold: &Hold, ends: &Ends) -> Hold {
+        let (facing, placed) = (&self.facing, &mut self.placed);
+        facing.place_at(&hold.spot.piece, &ends.there, placed);
+        let closest = look(facing, &placed.centre, hold.spot.guess).closest;
+        let normal = facing.measured.pseudo_normal(&closest).normalize();
+        let height = placed.points.iter().map(|p| normal.dot(&p.coords)).fold(f64::INFINITY, f64::min);
+        let ball = (placed.centre, AROUND_SMALLEST);
+        let region = Arc::new(FreeRegion::known(ball, [(normal, height)]));
+        Hold { region, slack: 0.0, next: Some(0.0), ..hold.clone() }
+    }
+
+    /// The corner of a measured triangle that is too deep inside the asked solid.
+    fn pierced(&self, hold: &Hold, triangle: u32, there: &Pose) -> Option<Contact> {
+        let facing = &self.facing;
+        if facing.asked.is_open() {
+            return None;
+        }
+        let guess = facing.triangle_of(&hold.spot.piece).unwrap_or(0);
+        facing.measured.corners(triangle).into_iter().find_map(|corner| {
+            let p = there.inverse_transform_point(&corner);
+            let closest = facing.asked.closest_from(&p, guess);
+            let gap = facing.asked.signed(&p, &closest) + facing.allowance;
+            let at = (gap, closest);
+            (gap < -DEPTH_TOLERANCE)
+                .then(|| Contact::measured(facing.other, !facing.asks_part, corner, at, facing.allowance))
+        })
+    }
+
+    /// Keeps contacts for the steps to come.
+    fn learn(&mut self, found: &[Contact]) {
+        for contact in found {
+            if !self.known.iter().any(|c| c.is_of_same_point(contact)) {
+                self.known.push(*contact);
+            }
+        }
+        self.known.drain(..self.known.len().saturating_sub(MOST_KNOWN));
+    }
+
+    /// Goes on from the pose that was looked at last; false where regions do not tell any more.
+    fn settle(&mut self, mover: &Mover<'_>, reach: f64, termination: &Termination) -> bool {
+        let there = self.facing.with_part_at(&mover.pose);
+        let again = self.known.iter().filter_map(|c| mover.remeasured(c, reach));
+        self.known = again.filter(|c| c.gap < reach).collect();
+        let outside: Vec<usize> = (0..self.pieces.len()).filter(|&i| self.pieces[i].next.is_none()).collect();
+        let (mut left, mut found) = (MOST_FOUND_AGAIN, Vec::new());
+        for &i in outside.iter().rev() {
+            let ends = Ends::at(there);
+            let hold = self.pieces.swap_remove(i);
+            if termination.check().is_err() || self.held(&hold, &ends, &mut left, &mut found).is_err() {
+                return false;
+            }
+        }
+        self.pieces.extend(found);
+        for hold in &mut self.pieces {
+            hold.stands = there * hold.centre;
+            hold.slack = hold.next.unwrap_or(0.0);
+        }
+        self.steps += 1;
+        self.regions <= MOST_IN_ALL + MOST_PER_STEP * self.steps
+    }
+
+    /// Whether nothing is too deep between the base and the pose that was looked at last.
+    fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
+        if self.is_left_to_samples || !self.is_near {
+            return !self.is_left_to_samples;
+        }
+        let there = self.facing.with_part_at(&between.pose);
+        let more = BULGE_TOLERANCE - DEPTH_TOLERANCE;
+        let outside: Vec<usize> = (0..self.pieces.len())
+            .filter(|&i| self.pieces[i].slack_at(&self.facing, &there, more, &mut self.placed).is_none())
+            .collect();
+        self.corners_inside(&outside, &there, BULGE_TOLERANCE).is_empty()
+    }
+}
+
+impl Hold {
+    fn new(spot: Spot, region: Arc<FreeRegion>, facing: &Facing<'_>, here: &Pose) -> Self {
+        let (centre, radius) = facing.ball(&spot.piece);
+        let stands = here * centre;
+        Self { spot, region, centre, radius, stands, slack: f64::NEG_INFINITY, next: None }
+    }
+
+    /// A piece that is free in a cell for shifts, without a shift.
+    fn of_cell(cell: &Cell, facing: &Facing<'_>, here: &Pose, placed: &mut Placed) -> Self {
+        facing.place_at(&cell.spot.piece, here, placed);
+        let sides = cell.limits.iter().map(|limit| {
+            let normal = facing.shifted * limit.normal;
+            let lowest = placed.points.iter().map(|p| normal.dot(&p.coords)).fold(f64::INFINITY, f64::min);
+            (normal, lowest + limit.height)
+        });
+        let region = Arc::new(FreeRegion::known(cell.ball, sides));
+        Self::new(cell.spot, region, facing, here)
+    }
+
+    /// How far outside its region it may be.
+    fn most(&self, facing: &Facing<'_>) -> f64 {
+        facing.allowance + self.spot.held.max(DEPTH_TOLERANCE)
+    }
+
+    /// How far inside its region all of it is at a pose, negative where it is outside by no more than it
+    /// may be and `more`; none where it is further.
+    fn slack_at(&self, facing: &Facing<'_>, there: &Pose, more: f64, placed: &mut Placed) -> Option<f64> {
+        let of_ball = self.region.slack(&(there * self.centre)) - self.radius;
+        if of_ball > 0.0 {
+            return Some(of_ball);
+        }
+        facing.place_at(&self.spot.piece, there, placed);
+        slack_within(&self.region, placed, self.most(facing) + more)
+    }
+}
+
+/// How far inside a region a piece is, at least; negative where it is outside by no more than `most`.
+fn slack_within(region: &FreeRegion, placed: &Placed, most: f64) -> Option<f64> {
+    let Placed { points, cloud, .. } = placed;
+    let gaps = region.gaps(cloud);
+    let farthest = points.iter().map(|p| (p - region.centre()).norm_squared()).fold(0.0, f64::max).sqrt();
+    let least = gaps.iter().copied().fold(region.radius() - farthest, f64::min);
+    if least >= 0.0 || least < -most {
+        return Some(least).filter(|least| *least >= 0.0);
+    }
+    let distance = region.distance_of_shifted(points, &gaps, &Vector3::zeros(), most)?;
+    Some(-distance)
+}
