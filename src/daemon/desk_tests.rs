@@ -16,6 +16,7 @@ use crate::geometry::{Revision, SourceAssembly};
 use crate::plan::{MotionKind, Plan, PlanStats, PlanStatus, PlanStep};
 use crate::search::{Interrupt, PlanSink};
 use crate::service::{Admission, ServiceError};
+use crate::termination::Termination;
 
 /// No test waits longer than this for what must happen.
 const HANG: Duration = Duration::from_secs(60);
@@ -239,6 +240,32 @@ fn what_was_answered_before_is_answered_at_once_while_no_worker_is_free() {
     assert!(bench.ask(&unremembered).kinds().is_empty(), "it waits for a worker");
     let error = bench.script(HOLD).error();
     assert_eq!(error, Some(ErrorCode::Busy), "what was not answered is not remembered");
+}
+
+#[test]
+fn of_a_question_asked_again_only_what_makes_it_another_counts() {
+    let mut bench = Bench::new(1);
+    bench.script(QUICK);
+    bench.until(|desk| desk.counters.done == 1);
+    let soon = Some(clock::monotonic_ns() + 1_000_000_000_000);
+    for same in [
+        request(QUICK),
+        PlanRequest { threads: 3, ..request(QUICK) },
+        PlanRequest { batch: true, ..request(QUICK) },
+        PlanRequest { deadline_ns: soon, ..request(QUICK) },
+    ] {
+        assert_eq!(bench.ask(&same).summary_status(), Some("complete"), "{same:?}");
+    }
+    assert_eq!(bench.desk.counters.remembered, 4);
+    let late = PlanRequest { deadline_ns: Some(1), ..request(QUICK) };
+    assert_eq!(bench.ask(&late).error(), Some(ErrorCode::Expired), "nobody waits for it any more");
+    let in_use = bench.next_request;
+    bench.script(HOLD);
+    bench.next_request = in_use;
+    assert_eq!(bench.script(QUICK).error(), Some(ErrorCode::Malformed), "its number is that of another");
+    bench.handle(Event::Terminate);
+    assert_eq!(bench.script(QUICK).error(), Some(ErrorCode::ShuttingDown));
+    assert_eq!(bench.desk.counters.remembered, 4);
 }
 
 #[test]
