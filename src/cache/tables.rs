@@ -214,17 +214,21 @@ impl<'t> Tables<'t> {
 /// between a file and its note, and anybody may have removed one.
 pub(super) fn make_tables(database: &Database, files: &[(Key, u64)]) -> Result<(), Failure> {
     let transaction = write(database)?;
-    let mut tables = Tables::of(&transaction)?;
-    let noted = listed_in(&tables.files, ..)?;
-    for lost in noted.iter().filter(|noted| !files.contains(&(noted.key, noted.bytes))) {
-        tables.remove_file(&lost.key)?;
+    // One after the other: where a file is damaged, redb may panic when a table is opened, and would again, which
+    // ends the process, when another one that is open is dropped for that.
+    transaction.open_table(RECORDS)?;
+    transaction.open_table(USED)?;
+    let clock = transaction.open_table(META)?.get(CLOCK)?.map_or(0, |clock| clock.value());
+    let mut table = transaction.open_table(FILES)?;
+    let noted: BTreeMap<Key, u64> = listed_in(&table, ..)?.iter().map(|l| (l.key, l.bytes)).collect();
+    let there: BTreeMap<Key, u64> = files.iter().copied().collect();
+    for key in noted.keys().filter(|key| !there.contains_key(key)) {
+        table.remove(&key.to_bytes()[..])?;
     }
-    for (key, bytes) in files {
-        if !noted.iter().any(|noted| (noted.key, noted.bytes) == (*key, *bytes)) {
-            tables.insert_file(key, *bytes)?;
-        }
+    for (key, bytes) in there.iter().filter(|(key, bytes)| noted.get(key) != Some(bytes)) {
+        table.insert(&key.to_bytes()[..], (clock, *bytes))?;
     }
-    drop(tables);
+    drop(table);
     Ok(transaction.commit()?)
 }
 

@@ -32,6 +32,10 @@ pub struct Restart {
     pub restarted_changed_us: Percentiles,
     /// Such a question, after the restarted daemon was left alone for two seconds.
     pub prepared_changed_us: Percentiles,
+    /// Distance fields that all first answers to such questions took from their files.
+    pub fields_found: u64,
+    /// Distance fields that they built, as there was no file.
+    pub fields_built: u64,
 }
 
 /// Measures; each changed question is another one.
@@ -56,6 +60,7 @@ pub fn restart(assembly: &SourceAssembly, rounds: usize) -> Result<Restart, Benc
         PlanOptions { moved, ..PlanOptions::default() }
     };
     let mut times: [Vec<Duration>; 5] = Default::default();
+    let (mut fields_found, mut fields_built) = (0, 0);
     for _ in 0..rounds {
         let client = daemon.connect()?;
         plan(&client, handle, &PlanOptions::default())?;
@@ -69,6 +74,8 @@ pub fn restart(assembly: &SourceAssembly, rounds: usize) -> Result<Restart, Benc
         daemon.restart()?;
         let client = daemon.connect()?;
         times[3].push(took(&client, handle, &changed(), false)?);
+        let (found, built) = fields(&client)?;
+        (fields_found, fields_built) = (fields_found + found, fields_built + built);
         drop(client);
         daemon.restart()?;
         let client = daemon.connect()?;
@@ -83,7 +90,19 @@ pub fn restart(assembly: &SourceAssembly, rounds: usize) -> Result<Restart, Benc
         changed_us: changed,
         restarted_changed_us: restarted_changed,
         prepared_changed_us: prepared,
+        fields_found,
+        fields_built,
     })
+}
+
+/// Distance fields that the daemon found on disk, and that it asked for and did not.
+fn fields(client: &Client) -> Result<(u64, u64), BenchError> {
+    let figures = client.figures().map_err(BenchError::failed)?;
+    let figures: serde_json::Value = serde_json::from_str(&figures).map_err(BenchError::failed)?;
+    let kinds = figures["remembered"]["records"]["kinds"].as_array().cloned().unwrap_or_default();
+    let of = |count: &str| kinds.iter().find(|k| k["kind"] == "field").and_then(|k| k[count].as_u64());
+    let counts = of("hits").zip(of("misses"));
+    counts.ok_or_else(|| BenchError::Failed("the daemon does not count distance fields".to_owned()))
 }
 
 /// How far the part is moved at least, in the assembly's unit.
