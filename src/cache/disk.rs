@@ -1,11 +1,11 @@
-//! The tier on disk: one redb file, which one process holds.
+//! The tier on disk: one redb file, which one process holds, and the files of fields beside it.
 //!
 //! redb may panic or fail on a file that was damaged from outside, so everything that touches it is
 //! contained: such a file is set aside and another begun. A file that cannot be written (a full disk)
 //! is closed, and the process goes on in memory; it is opened again after a while, if there is something to
 //! write. Only the writer's thread ([`super::writer`]) writes.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::os::unix::fs::DirBuilderExt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -15,14 +15,18 @@ use std::time::{Duration, Instant};
 
 use redb::Database;
 
+use super::fields::FieldFiles;
 use super::kind::{Key, Kind};
 use super::tables::{Failure, Listed, Tables, agree, grew, listed, make_tables, read, write};
 use super::tally::Tally;
+use crate::sdf::Field;
 
 const FILE: &str = "records.redb";
 const DAMAGED: &str = "records.redb.damaged";
 /// redb's own cache of pages.
 const PAGE_CACHE: usize = 16 << 20;
+/// Of the budget, what the files of fields may take: the rest is for the file of records.
+const FOR_FIELDS: f64 = 0.25;
 /// Of a file that has become too large all the same, so much of what records may take is left.
 const AFTER_OVERGROWTH: f64 = 0.5;
 /// Evicting goes on down to this share of what records may take, so that it is not done all the time.
@@ -54,6 +58,9 @@ pub(super) struct Disk {
     folder: PathBuf,
     /// Bytes that the file may take.
     budget: u64,
+    /// Bytes that the files of fields may take.
+    for_fields: u64,
+    pub(super) fields: FieldFiles,
     database: RwLock<Option<Database>>,
     /// Counts the files that were opened: who failed on one must not set the next one aside.
     generation: AtomicU64,
@@ -68,14 +75,17 @@ pub(super) struct Disk {
 }
 
 impl Disk {
-    /// Opens the store of a folder, or makes one; `budget` is for the whole file, in bytes.
+    /// Opens the store of a folder, or makes one; `budget` is for all of it, in bytes.
     pub(super) fn open(folder: &Path, budget: u64, tally: Arc<Tally>) -> Result<Self, DiskError> {
         let unusable = |reason: String| DiskError::Unusable { path: folder.to_owned(), reason };
         let mut builder = std::fs::DirBuilder::new();
         builder.recursive(true).mode(0o700).create(folder).map_err(|e| unusable(e.to_string()))?;
+        let for_fields = (budget as f64 * FOR_FIELDS) as u64;
         let disk = Self {
             folder: folder.to_owned(),
-            budget,
+            budget: budget - for_fields,
+            for_fields,
+            fields: FieldFiles::beside(folder),
             database: RwLock::new(None),
             generation: AtomicU64::new(0),
             failed_at: Mutex::default(),
@@ -119,7 +129,9 @@ impl Disk {
     fn database_at(&self) -> Result<Database, Failure> {
         contained(|| {
             let database = Database::builder().set_cache_size(PAGE_CACHE).create(self.folder.join(FILE))?;
-            make_tables(&database)?;
+            // Nobody else writes to the folder from here on.
+            let files = self.fields.look().map_err(|e| Failure::Io(e.to_string()))?;
+            make_tables(&database, &files)?;
             Ok(database)
         })
     }
@@ -183,9 +195,10 @@ impl Disk {
         }
     }
 
-    /// Writes envelopes in one transaction, with what was used since the last one.
-    pub(super) fn write(&self, records: &[(Key, Vec<u8>)]) {
+    /// Writes envelopes in one transaction, with what was used since the last one and the files of fields.
+    pub(super) fn write(&self, records: &[(Key, Vec<u8>)], fields: &HashMap<Key, Arc<Field>>) {
         self.try_again();
+        let files = self.written(fields);
         let touched = std::mem::take(&mut *self.touched.lock().unwrap_or_else(PoisonError::into_inner));
         let before = self.file_bytes();
         let written = self.with(|database| {
@@ -195,11 +208,15 @@ impl Disk {
                 for (key, bytes) in records {
                     tables.insert(key, bytes)?;
                 }
+                for (key, bytes) in &files {
+                    tables.insert_file(key, *bytes)?;
+                }
                 for key in touched.iter() {
                     tables.touch(key)?;
                 }
                 let limit = tables.limit(self.budget, before)?;
-                let evicted = tables.evict_above(limit, (limit as f64 * AFTER_EVICTION) as u64)?;
+                let mut evicted = tables.evict_above(limit, (limit as f64 * AFTER_EVICTION) as u64)?;
+                evicted.extend(tables.evict_files_above(self.for_fields)?);
                 tables.finish()?;
                 (evicted, tables.bytes)
             };
@@ -207,6 +224,7 @@ impl Disk {
             Ok((evicted, bytes))
         });
         let Some((evicted, bytes)) = written else { return };
+        self.fields.remove(&evicted);
         let new = records.iter().map(|(key, _)| *key).filter(|key| key.kind().is_noted());
         self.noted().extend(new);
         self.count(&evicted);
@@ -220,6 +238,24 @@ impl Disk {
         }
     }
 
+    /// Writes the files of fields; those that were written, with their bytes.
+    fn written(&self, fields: &HashMap<Key, Arc<Field>>) -> Vec<(Key, u64)> {
+        let mut files = Vec::new();
+        for (key, field) in fields {
+            if !self.is_open() || !self.fields.may_write() || field.unwritten() == 0 {
+                continue;
+            }
+            match self.fields.write(key, field) {
+                Ok(bytes) => files.push((*key, bytes)),
+                Err(error) => {
+                    self.tally.write_failures.one_more();
+                    tracing::warn!(folder = %self.folder.display(), %error, "a distance field is not written");
+                }
+            }
+        }
+        files
+    }
+
     fn note_growth(&self, bytes: u64) {
         self.with(|database| grew(database, bytes));
     }
@@ -230,12 +266,17 @@ impl Disk {
             let transaction = write(database)?;
             let mut tables = Tables::of(&transaction)?;
             for key in keys {
-                tables.remove(&key.to_bytes())?;
+                if key.kind().is_file() {
+                    tables.remove_file(key)?;
+                } else {
+                    tables.remove(&key.to_bytes())?;
+                }
             }
             tables.finish()?;
             drop(tables);
             Ok(transaction.commit()?)
         });
+        self.fields.remove(keys);
         let mut noted = self.noted();
         keys.iter().for_each(|key| {
             noted.remove(key);
@@ -243,8 +284,26 @@ impl Disk {
         done.is_some()
     }
 
+    /// Takes out what was used least recently, records and files alike, until so many bytes are left; how
+    /// much left.
+    pub(super) fn evict_all_above(&self, bytes: u64) -> Option<usize> {
+        let mut list = self.list(None)?;
+        list.sort_by_key(|listed| (listed.used, listed.key));
+        let mut left: u64 = list.iter().map(Listed::cost).sum();
+        let surplus = |listed: &&Listed| {
+            let more = left > bytes;
+            left -= listed.cost();
+            more
+        };
+        let evicted: Vec<Key> = list.iter().take_while(surplus).map(|listed| listed.key).collect();
+        if !evicted.is_empty() && self.remove(&evicted) {
+            self.count(&evicted);
+        }
+        Some(evicted.len())
+    }
+
     /// Evicts down to so many bytes of records; how many left.
-    pub(super) fn evict(&self, budget: u64) -> Option<usize> {
+    fn evict(&self, budget: u64) -> Option<usize> {
         let evicted = self.with(|database| {
             let transaction = write(database)?;
             let mut tables = Tables::of(&transaction)?;
@@ -393,21 +452,21 @@ mod tests {
         let fail = |disk: &Disk| {
             disk.failed(Failure::Io("no space left".into()), disk.generation.load(Ordering::Relaxed));
         };
-        disk.write(&[(key(1), vec![1; 9])]);
+        disk.write(&[(key(1), vec![1; 9])], &HashMap::new());
         fail(&disk);
         assert!(!disk.is_open() && !disk.may_write() && !disk.contains(&key(1)));
-        disk.write(&[(key(2), vec![2; 9])]);
+        disk.write(&[(key(2), vec![2; 9])], &HashMap::new());
         assert!(!disk.is_open(), "so soon it is left alone");
         disk.pause = Duration::ZERO;
         assert!(disk.may_write());
-        disk.write(&[(key(3), vec![3; 9])]);
+        disk.write(&[(key(3), vec![3; 9])], &HashMap::new());
         assert!(disk.is_open() && disk.get(&key(2)).is_none());
         assert_eq!([1, 3].map(|n| disk.get(&key(n))), [Some(vec![1; 9]), Some(vec![3; 9])]);
         assert_eq!(disk.tally.write_failures.count(), 1);
         // Where nothing can be opened it stays closed, and is tried again.
         fail(&disk);
         std::fs::remove_dir_all(folder.path()).unwrap();
-        disk.write(&[(key(4), vec![4; 9])]);
+        disk.write(&[(key(4), vec![4; 9])], &HashMap::new());
         assert!(!disk.is_open() && disk.may_write());
     }
 }

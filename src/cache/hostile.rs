@@ -28,6 +28,7 @@ pub(crate) fn read_as_records(bytes: &[u8]) -> Vec<Kind> {
             Kind::Healed => reads::<HealedRecord>(payload),
             Kind::Hull => reads::<HullRecord>(payload),
             Kind::Swept => reads::<SweptRecord>(payload),
+            Kind::Field => crate::sdf::is_intact(&[0; 32], bytes),
         }
     };
     Kind::ALL.into_iter().filter(|kind| is_record(*kind)).collect()

@@ -35,11 +35,13 @@ pub enum Kind {
     Hull = 12,
     /// What a part that goes along a line enters.
     Swept = 13,
+    /// The distance field of a shape, in a file of its own.
+    Field = 14,
 }
 
 impl Kind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Overlap,
         Self::Blocking,
         Self::Witness,
@@ -53,6 +55,7 @@ impl Kind {
         Self::Healed,
         Self::Hull,
         Self::Swept,
+        Self::Field,
     ];
 
     /// The name in statistics.
@@ -72,13 +75,14 @@ impl Kind {
             Self::Healed => "healed",
             Self::Hull => "hull",
             Self::Swept => "swept",
+            Self::Field => "field",
         }
     }
 
     /// Whether records are kept in memory, too. Assemblies, answers and hulls are there already, as what was
     /// made of them and as they are used.
     pub(super) fn stays_in_memory(self) -> bool {
-        !matches!(self, Self::Source | Self::Answer | Self::Shape | Self::Healed | Self::Hull)
+        !matches!(self, Self::Source | Self::Answer | Self::Shape | Self::Healed | Self::Hull | Self::Field)
     }
 
     /// Whether it is told without the disk if there is a record: of assemblies and answers, which are few, that
@@ -87,12 +91,17 @@ impl Kind {
         matches!(self, Self::Source | Self::Answer | Self::Shape | Self::Healed)
     }
 
+    /// Whether it is no record among others, but a file.
+    pub(super) fn is_file(self) -> bool {
+        self == Self::Field
+    }
+
     /// The version of what computes such records: to be raised with every change that may give another
     /// answer to the same question, or another layout of the record. Older records are then misses.
     #[must_use]
     pub fn algorithm(self) -> u32 {
         match self {
-            Self::Source | Self::Shape | Self::Hull | Self::Swept => 1,
+            Self::Source | Self::Shape | Self::Hull | Self::Swept | Self::Field => 1,
             Self::Healed | Self::Touching => 2,
             Self::Answer => 3,
             Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Plan => 4,

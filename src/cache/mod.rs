@@ -3,7 +3,8 @@
 //! Data flow: a kind of record and everything that it depends on make a [`Key`] (`kind`) → the tier in
 //! memory (`memory`, a budget in bytes, the least recently used leave) → the tier on disk (`disk`, a redb
 //! file that one process holds, with its `tables`; `writer`, the one thread that writes to it) → bytes
-//! (`format`, drawn in `FORMAT.md`; `records`, what is in them). What is asked, under which key, and when
+//! (`format`, drawn in `FORMAT.md`; `records`, what is in them). Distance fields have a file each (`fields`),
+//! which is mapped. What is asked, under which key, and when
 //! an old answer still holds, is said once for each kind: `pair`, `touching`, `motion`, `swept`, `verdict`,
 //! `plan`, `hull`, `source`, `healed`, `answer`.
 //! A request sees it all through its [`Recall`], which counts what was reused; with none of it, it
@@ -15,6 +16,7 @@
 
 mod answer;
 mod disk;
+mod fields;
 mod format;
 mod healed;
 mod hostile;

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 /// Where the store is and how large it may be.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CacheSettings {
-    /// The folder of the file on disk; `None` for memory alone.
+    /// The folder of the files on disk; `None` for memory alone.
     pub folder: Option<PathBuf>,
     /// The budget in memory, in bytes: payloads and what is kept beside them.
     pub memory_bytes: usize,
-    /// The budget of the file, in bytes.
+    /// The budget of all files, in bytes.
     pub disk_bytes: u64,
 }
 

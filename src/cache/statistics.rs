@@ -12,6 +12,10 @@ pub struct CacheStatistics {
     pub on_disk: bool,
     /// Bytes of the file.
     pub file_bytes: u64,
+    /// Bytes of the files of distance fields.
+    pub field_file_bytes: u64,
+    /// Bytes of such files that are mapped: the system's, no memory of this process.
+    pub mapped_bytes: u64,
     /// Bytes in memory: payloads and what is kept beside them.
     pub memory_bytes: u64,
     /// Records that were not written because too many waited, since the start.
@@ -54,7 +58,7 @@ pub struct KindStatistics {
 /// What a check of the file found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Verified {
-    /// Records that were looked at.
+    /// Records and files of fields that were looked at.
     pub records: usize,
     /// Of them, damaged or of another version, and taken out.
     pub damaged: usize,
@@ -90,12 +94,14 @@ impl Cache {
                 disk_entries: None,
                 disk_bytes: None,
                 disk_evictions: tally.disk_evictions.count(),
-                damaged: tally.damaged.count(),
+                damaged: tally.damaged.count() + self.damaged_files(kind),
             }
         };
         CacheStatistics {
             on_disk: self.is_on_disk(),
             file_bytes: self.disk.as_ref().map_or(0, |d| d.file_bytes()),
+            field_file_bytes: self.disk.as_ref().map_or(0, |d| d.fields.bytes()),
+            mapped_bytes: self.disk.as_ref().map_or(0, |d| d.fields.mapped().bytes()),
             memory_bytes: memory.bytes() as u64,
             overflows: self.tally.overflows.count(),
             write_failures: self.tally.write_failures.count(),
@@ -104,13 +110,19 @@ impl Cache {
         }
     }
 
-    /// All records on disk.
+    /// Files of a kind that were found damaged when they were used.
+    fn damaged_files(&self, kind: Kind) -> u64 {
+        let disk = self.disk.as_ref().filter(|_| kind.is_file());
+        disk.map_or(0, |disk| disk.fields.mapped().damaged())
+    }
+
+    /// All records and files of fields on disk.
     #[must_use]
     pub fn list(&self) -> Vec<Listed> {
         self.disk.as_ref().and_then(|d| d.list(None)).unwrap_or_default()
     }
 
-    /// Checks the file and every record in it, and takes damaged ones out.
+    /// Checks the file, every record in it and every file of a field, and takes damaged ones out.
     #[must_use]
     pub fn verify(&self) -> Verified {
         self.flush();
@@ -118,8 +130,10 @@ impl Cache {
         let checked = disk.check(false).unwrap_or(false);
         let clean = disk.holds_together() && checked;
         let list = self.list();
-        let intact =
-            |l: &&Listed| disk.get(&l.key).is_some_and(|bytes| format::opened(&l.key, &bytes).is_some());
+        let intact = |l: &&Listed| match l.key.kind().is_file() {
+            true => disk.fields.is_intact(&l.key),
+            false => disk.get(&l.key).is_some_and(|bytes| format::opened(&l.key, &bytes).is_some()),
+        };
         let damaged: Vec<_> = list.iter().filter(|l| !intact(l)).map(|l| l.key).collect();
         for key in &damaged {
             self.tally.of(key.kind()).damaged.one_more();
@@ -130,14 +144,14 @@ impl Cache {
         Verified { records: list.len(), damaged: damaged.len(), clean }
     }
 
-    /// Takes the least recently used records out of the file until so many bytes are left, and gives
-    /// unused space back; how many records left.
+    /// Takes out the records and files of fields used least recently until so many bytes are left, and gives
+    /// unused space back; how many left.
     #[must_use]
     pub fn evict(&self, bytes: u64) -> usize {
         self.flush();
         self.memory().clear();
         let Some(disk) = &self.disk else { return 0 };
-        let evicted = disk.evict(bytes).unwrap_or(0);
+        let evicted = disk.evict_all_above(bytes).unwrap_or(0);
         disk.check(true);
         evicted
     }

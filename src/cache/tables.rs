@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
+use std::ops::RangeBounds;
 
 use redb::{Database, ReadableDatabase, ReadableTable, ReadableTableMetadata, StorageError, TableDefinition};
 
@@ -12,6 +13,8 @@ const RECORDS: TableDefinition<'_, &[u8], &[u8]> = TableDefinition::new("records
 /// When a record was used last, and how long it is.
 const USED: TableDefinition<'_, &[u8], (u64, u64)> = TableDefinition::new("used");
 /// The count of transactions and of bytes, and how many bytes there were when the file last grew.
+/// The files of fields: when one was used last, and how long it is.
+const FILES: TableDefinition<'_, &[u8], (u64, u64)> = TableDefinition::new("files");
 const META: TableDefinition<'_, &str, u64> = TableDefinition::new("meta");
 const GROWN_AT: &str = "grown_at";
 const CLOCK: &str = "clock";
@@ -27,7 +30,7 @@ const GROWTH: f64 = 2.2;
 /// … and has room then for so many times as much as when it grew, surely.
 const ROOM: f64 = 1.4;
 
-/// A record as [`super::Cache::list`] tells it.
+/// A record, or the file of a field, as [`super::Cache::list`] tells it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Listed {
     /// Its key.
@@ -36,6 +39,13 @@ pub struct Listed {
     pub bytes: u64,
     /// The transaction in or before which it was used last.
     pub used: u64,
+}
+
+impl Listed {
+    /// What it takes on disk, about.
+    pub(super) fn cost(&self) -> u64 {
+        self.bytes + OVERHEAD
+    }
 }
 
 /// What a transaction failed with.
@@ -75,6 +85,7 @@ pub(super) fn write(database: &Database) -> Result<redb::WriteTransaction, Failu
 pub(super) struct Tables<'t> {
     records: redb::Table<'t, &'static [u8], &'static [u8]>,
     used: redb::Table<'t, &'static [u8], (u64, u64)>,
+    files: redb::Table<'t, &'static [u8], (u64, u64)>,
     meta: redb::Table<'t, &'static str, u64>,
     clock: u64,
     pub(super) bytes: u64,
@@ -84,11 +95,12 @@ impl<'t> Tables<'t> {
     pub(super) fn of(transaction: &'t redb::WriteTransaction) -> Result<Self, Failure> {
         let records = transaction.open_table(RECORDS)?;
         let used = transaction.open_table(USED)?;
+        let files = transaction.open_table(FILES)?;
         let meta = transaction.open_table(META)?;
         let number =
             |name: &str| -> Result<u64, StorageError> { Ok(meta.get(name)?.map_or(0, |n| n.value())) };
         let (clock, bytes) = (number(CLOCK)? + 1, number(BYTES)?);
-        Ok(Self { records, used, meta, clock, bytes })
+        Ok(Self { records, used, files, meta, clock, bytes })
     }
 
     pub(super) fn insert(&mut self, key: &Key, bytes: &[u8]) -> Result<(), Failure> {
@@ -109,12 +121,42 @@ impl<'t> Tables<'t> {
     }
 
     pub(super) fn touch(&mut self, key: &Key) -> Result<(), Failure> {
+        let table = if key.kind().is_file() { &mut self.files } else { &mut self.used };
         let key = key.to_bytes();
-        let length = self.used.get(&key[..])?.map(|used| used.value().1);
+        let length = table.get(&key[..])?.map(|used| used.value().1);
         if let Some(length) = length {
-            self.used.insert(&key[..], (self.clock, length))?;
+            table.insert(&key[..], (self.clock, length))?;
         }
         Ok(())
+    }
+
+    /// Notes a file that was written.
+    pub(super) fn insert_file(&mut self, key: &Key, bytes: u64) -> Result<(), Failure> {
+        self.files.insert(&key.to_bytes()[..], (self.clock, bytes))?;
+        Ok(())
+    }
+
+    /// Takes a file out; it is still in its folder.
+    pub(super) fn remove_file(&mut self, key: &Key) -> Result<(), Failure> {
+        self.files.remove(&key.to_bytes()[..])?;
+        Ok(())
+    }
+
+    /// Takes out the files used least recently, for as long as there are more bytes than `limit`.
+    pub(super) fn evict_files_above(&mut self, limit: u64) -> Result<Vec<Key>, Failure> {
+        let mut files = listed_in(&self.files, ..)?;
+        files.sort_by_key(|file| (file.used, file.key));
+        let mut bytes: u64 = files.iter().map(|file| file.bytes).sum();
+        let mut evicted = Vec::new();
+        for Listed { key, bytes: freed, .. } in files {
+            if bytes <= limit {
+                break;
+            }
+            self.remove_file(&key)?;
+            bytes -= freed;
+            evicted.push(key);
+        }
+        Ok(evicted)
     }
 
     /// What records may take in a file of some length, so that it keeps a budget.
@@ -168,12 +210,25 @@ impl<'t> Tables<'t> {
     }
 }
 
-/// Makes the tables, unless they are there.
-pub(super) fn make_tables(database: &Database) -> Result<(), Failure> {
+/// Makes the tables, unless they are there, and notes exactly the files that are: a writer may have been killed
+/// between a file and its note, and anybody may have removed one.
+pub(super) fn make_tables(database: &Database, files: &[(Key, u64)]) -> Result<(), Failure> {
     let transaction = write(database)?;
+    // One after the other: where a file is damaged, redb may panic when a table is opened, and would again, which
+    // ends the process, when another one that is open is dropped for that.
     transaction.open_table(RECORDS)?;
     transaction.open_table(USED)?;
-    transaction.open_table(META)?;
+    let clock = transaction.open_table(META)?.get(CLOCK)?.map_or(0, |clock| clock.value());
+    let mut table = transaction.open_table(FILES)?;
+    let noted: BTreeMap<Key, u64> = listed_in(&table, ..)?.iter().map(|l| (l.key, l.bytes)).collect();
+    let there: BTreeMap<Key, u64> = files.iter().copied().collect();
+    for key in noted.keys().filter(|key| !there.contains_key(key)) {
+        table.remove(&key.to_bytes()[..])?;
+    }
+    for (key, bytes) in there.iter().filter(|(key, bytes)| noted.get(key) != Some(bytes)) {
+        table.insert(&key.to_bytes()[..], (clock, *bytes))?;
+    }
+    drop(table);
     Ok(transaction.commit()?)
 }
 
@@ -192,13 +247,23 @@ pub(super) fn read(database: &Database, key: &Key) -> Result<Option<Vec<u8>>, Fa
 
 /// The records of a kind, or all, in the order of their keys.
 pub(super) fn listed(database: &Database, kind: Option<Kind>) -> Result<Vec<Listed>, Failure> {
-    let used = database.begin_read()?.open_table(USED)?;
-    let mut out = Vec::new();
+    let transaction = database.begin_read()?;
     let (from, to) = kind.map_or((0, u8::MAX), |kind| (kind as u8, kind as u8 + 1));
-    for entry in used.range(&[from][..]..&[to][..])? {
+    let range = &[from][..]..&[to][..];
+    let mut out = listed_in(&transaction.open_table(USED)?, range.clone())?;
+    out.extend(listed_in(&transaction.open_table(FILES)?, range)?);
+    Ok(out)
+}
+
+fn listed_in<'k>(
+    table: &impl ReadableTable<&'static [u8], (u64, u64)>,
+    range: impl RangeBounds<&'k [u8]> + 'k,
+) -> Result<Vec<Listed>, Failure> {
+    let mut out = Vec::new();
+    for entry in table.range(range)? {
         let (key, value) = entry?;
-        let (stamp, bytes) = value.value();
-        out.extend(Key::from_bytes(key.value()).map(|key| Listed { key, bytes, used: stamp }));
+        let (used, bytes) = value.value();
+        out.extend(Key::from_bytes(key.value()).map(|key| Listed { key, bytes, used }));
     }
     Ok(out)
 }

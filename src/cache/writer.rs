@@ -1,15 +1,17 @@
-//! The one thread that writes to disk. Whoever has a record to keep leaves it in a bounded channel and
-//! goes on; what does not fit stays in memory only, and is counted.
+//! The one thread that writes to disk. Whoever has a record or a field to keep leaves it in a bounded channel
+//! and goes on; what does not fit stays in memory only, and is counted.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::disk::Disk;
 use super::kind::Key;
 use super::tally::Tally;
+use crate::sdf::Field;
 
 /// So many records may wait …
 const MOST_WAITING: usize = 16_384;
@@ -25,6 +27,7 @@ type Waiting = (Key, Vec<u8>);
 
 enum Message {
     Record(Key, Vec<u8>),
+    Field(Key, Arc<Field>),
     Flush(SyncSender<()>),
 }
 
@@ -52,18 +55,28 @@ impl Writer {
     pub(super) fn write(&self, key: Key, bytes: Vec<u8>) {
         let length = bytes.len();
         let full = self.waiting.fetch_add(length, Ordering::Relaxed) > MOST_BYTES;
-        let message = Message::Record(key, bytes);
-        let sent = match &self.sender {
-            Some(sender) if !full => sender.try_send(message),
-            _ => Err(TrySendError::Full(message)),
-        };
-        if sent.is_err() {
+        if full || !self.handed_over(Message::Record(key, bytes)) {
             self.waiting.fetch_sub(length, Ordering::Relaxed);
-            let count = self.tally.overflows.one_more();
-            // One line for every doubling: whoever writes too much does so often.
-            if count.is_power_of_two() {
-                tracing::warn!(count, "more to remember than the disk takes: kept in memory only");
-            }
+            self.too_much();
+        }
+    }
+
+    /// Hands a field over, of which the thread writes what is known then.
+    pub(super) fn write_field(&self, key: Key, field: Arc<Field>) {
+        if !self.handed_over(Message::Field(key, field)) {
+            self.too_much();
+        }
+    }
+
+    fn handed_over(&self, message: Message) -> bool {
+        self.sender.as_ref().is_some_and(|sender| sender.try_send(message).is_ok())
+    }
+
+    fn too_much(&self) {
+        let count = self.tally.overflows.one_more();
+        // One line for every doubling: whoever writes too much does so often.
+        if count.is_power_of_two() {
+            tracing::warn!(count, "more to remember than the disk takes: kept in memory only");
         }
     }
 
@@ -93,38 +106,51 @@ impl Drop for Writer {
 
 fn run(disk: &Disk, receiver: &Receiver<Message>, waiting: &AtomicUsize) {
     while let Ok(first) = receiver.recv() {
-        let (records, flushed) = gathered(receiver, first);
-        let bytes: usize = records.iter().map(|(_, bytes)| bytes.len()).sum();
-        disk.write(&records);
-        waiting.fetch_sub(bytes, Ordering::Relaxed);
-        if let Some(flushed) = flushed {
+        let batch = gathered(receiver, first);
+        disk.write(&batch.records, &batch.fields);
+        waiting.fetch_sub(batch.bytes, Ordering::Relaxed);
+        if let Some(flushed) = batch.flushed {
             // Whoever asked may have given up waiting.
             let _gone = flushed.send(());
         }
     }
-    disk.write(&[]);
+    disk.write(&[], &HashMap::new());
+}
+
+/// What is written together.
+#[derive(Default)]
+struct Batch {
+    records: Vec<Waiting>,
+    /// Bytes of these.
+    bytes: usize,
+    fields: HashMap<Key, Arc<Field>>,
+    /// Who waits for it.
+    flushed: Option<SyncSender<()>>,
 }
 
 /// What comes within a short while of a first message.
-fn gathered(receiver: &Receiver<Message>, first: Message) -> (Vec<Waiting>, Option<SyncSender<()>>) {
+fn gathered(receiver: &Receiver<Message>, first: Message) -> Batch {
     let until = Instant::now() + GATHER;
-    let (mut records, mut bytes) = (Vec::new(), 0);
+    let mut batch = Batch::default();
     let mut next = Some(first);
     loop {
         match next.take() {
             Some(Message::Record(key, payload)) => {
-                bytes += payload.len();
-                records.push((key, payload));
+                batch.bytes += payload.len();
+                batch.records.push((key, payload));
             }
-            Some(Message::Flush(done)) => return (records, Some(done)),
+            Some(Message::Field(key, field)) => {
+                batch.fields.insert(key, field);
+            }
+            Some(Message::Flush(done)) => return Batch { flushed: Some(done), ..batch },
             None => {}
         }
-        if bytes >= BATCH {
-            return (records, None);
+        if batch.bytes >= BATCH {
+            return batch;
         }
         match receiver.recv_timeout(until.saturating_duration_since(Instant::now())) {
             Ok(message) => next = Some(message),
-            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => return (records, None),
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => return batch,
         }
     }
 }

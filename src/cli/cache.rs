@@ -24,7 +24,7 @@ pub(super) struct CacheArguments {
 /// What to do with the store.
 #[derive(Debug, Subcommand)]
 pub(super) enum CacheCommand {
-    /// List all records: kind, key, bytes, and the transaction in which it was used last
+    /// List all records and distance fields: kind, key, bytes, and the transaction in which it was used last
     Ls,
     /// Count records and bytes by kind
     Stats {
@@ -32,15 +32,15 @@ pub(super) enum CacheCommand {
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
-    /// Check the file and every record, and take out what is damaged; exits with 1 if anything was
+    /// Check all files and every record, and take out what is damaged; exits with 1 if anything was
     Verify,
-    /// Take out the records used least recently
+    /// Take out the records and distance fields used least recently
     Evict {
-        /// Until so many megabytes of records are left
+        /// Until so many megabytes of both are left
         #[arg(long, value_name = "MB")]
         to_mb: u64,
     },
-    /// Take out all records
+    /// Take out everything
     Clear,
 }
 
@@ -120,7 +120,8 @@ fn described(statistics: &CacheStatistics) -> String {
             kind.disk_bytes.unwrap_or(0).to_string(),
         ]);
     }
-    format!("{}file     {} bytes\n", table.render(), statistics.file_bytes)
+    let CacheStatistics { file_bytes, field_file_bytes, .. } = statistics;
+    format!("{}file     {file_bytes} bytes\nfields   {field_file_bytes} bytes\n", table.render())
 }
 
 fn verify(cache: &Cache) -> Result<ExitCode, CliError> {
@@ -140,5 +141,8 @@ fn verify(cache: &Cache) -> Result<ExitCode, CliError> {
 
 fn evict(cache: &Cache, bytes: u64) -> Result<(), CliError> {
     let evicted = cache.evict(bytes);
-    print(&format!("{evicted} records taken out; the file has {} bytes\n", cache.statistics().file_bytes))
+    let CacheStatistics { file_bytes, field_file_bytes, .. } = cache.counters();
+    print(&format!(
+        "{evicted} records taken out; the file has {file_bytes} bytes, distance fields {field_file_bytes}\n"
+    ))
 }

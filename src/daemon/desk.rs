@@ -13,7 +13,7 @@ use sbdp_ipc::plan::PlanRequest;
 use sbdp_ipc::progress::ProgressSample;
 use sbdp_ipc::status::{Status, StatusHeader};
 
-use super::answers::{Answers, question};
+use super::answers::{Answer, Answers, question};
 use super::closing::Closing;
 use super::convert;
 use super::figures::{Figures, Latencies, Surroundings};
@@ -24,7 +24,6 @@ use super::session::{End, Input, Link, Session, State};
 use super::shared_queue::Queues;
 use super::workers::{AdmitJob, PlanJob, Planning, SessionKey, WorkerEvent};
 use crate::config::{Config, seconds};
-use crate::search::Termination;
 use crate::service::AssemblyId;
 
 /// A request as it came in: header and payload are private copies.
@@ -192,18 +191,35 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
         let mut session =
             Session::new(link, header.request, id_of_words(header.listener), self.limits.outbox);
-        if let Err((input, error)) = self.admit(&mut session, key, owner, &payload) {
+        if let Some(answer) = self.answered_to_the_byte(&payload) {
+            session.admit(None);
+            self.answer_again(&mut session, &answer);
+        } else if let Err((input, error)) = self.admit(&mut session, key, owner, &payload) {
             session.end_with(input, &error);
         }
         // What is there goes out at once, not behind other requests.
         if session.pump(Instant::now(), self.limits.patience) {
             self.wakes.push(session.listener);
         }
-        let is_finished = session.is_finished();
-        self.sessions.insert(key, session);
-        if is_finished {
-            self.remove(key);
+        if session.is_finished() {
+            self.over(key, session);
+        } else {
+            self.sessions.insert(key, session);
         }
+    }
+
+    /// The answer to a request whose bytes are those of a question that was answered before: then all that
+    /// would be found by reading them was found then.
+    fn answered_to_the_byte(&mut self, payload: &AlignedBytes) -> Option<Arc<Answer>> {
+        if self.closing != Closing::Open {
+            return None;
+        }
+        self.answers.get(payload.as_slice())
+    }
+
+    fn answer_again(&mut self, session: &mut Session<L>, answer: &Answer) {
+        session.answer(answer);
+        self.counters.remembered += 1;
     }
 
     /// Reads a plan request and puts it into the queue.
@@ -232,13 +248,12 @@ impl<L: Link, P: Planning> Desk<L, P> {
         if wire.deadline_ns.is_some_and(|d| d <= clock::monotonic_ns()) {
             return Err(expired());
         }
-        let termination = Termination::new(deadline);
-        session.admit(termination.cancel_flag(), deadline);
+        session.admit(deadline);
         if let Some(answer) = answer {
-            session.answer(&answer);
-            self.counters.remembered += 1;
+            self.answer_again(session, &answer);
             return Ok(());
         }
+        let termination = session.termination();
         let class = if wire.batch { Class::Batch } else { Class::Interactive };
         let moved = convert::moved(&wire.moved);
         let received = Instant::now();
@@ -353,7 +368,13 @@ impl<L: Link, P: Planning> Desk<L, P> {
     }
 
     fn remove(&mut self, key: SessionKey) {
-        let Some(session) = self.sessions.remove(&key) else { return };
+        if let Some(session) = self.sessions.remove(&key) {
+            self.over(key, session);
+        }
+    }
+
+    /// Counts a session that is finished, and lets its request go.
+    fn over(&mut self, key: SessionKey, session: Session<L>) {
         let counter = match session.state() {
             State::Ended(End::Done) => &mut self.counters.done,
             State::Ended(End::Cancelled) => &mut self.counters.cancelled,

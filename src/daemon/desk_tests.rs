@@ -6,7 +6,6 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 
-use sbdp_ipc::geometry::{Assembly, Part, Vertices};
 use sbdp_ipc::headers::RequestKind;
 
 use super::*;
@@ -16,6 +15,7 @@ use crate::geometry::{Revision, SourceAssembly};
 use crate::plan::{MotionKind, Plan, PlanStats, PlanStatus, PlanStep};
 use crate::search::{Interrupt, PlanSink};
 use crate::service::{Admission, ServiceError};
+use crate::termination::Termination;
 
 /// No test waits longer than this for what must happen.
 const HANG: Duration = Duration::from_secs(60);
@@ -242,6 +242,32 @@ fn what_was_answered_before_is_answered_at_once_while_no_worker_is_free() {
 }
 
 #[test]
+fn of_a_question_asked_again_only_what_makes_it_another_counts() {
+    let mut bench = Bench::new(1);
+    bench.script(QUICK);
+    bench.until(|desk| desk.counters.done == 1);
+    let soon = Some(clock::monotonic_ns() + 1_000_000_000_000);
+    for same in [
+        request(QUICK),
+        PlanRequest { threads: 3, ..request(QUICK) },
+        PlanRequest { batch: true, ..request(QUICK) },
+        PlanRequest { deadline_ns: soon, ..request(QUICK) },
+    ] {
+        assert_eq!(bench.ask(&same).summary_status(), Some("complete"), "{same:?}");
+    }
+    assert_eq!(bench.desk.counters.remembered, 4);
+    let late = PlanRequest { deadline_ns: Some(1), ..request(QUICK) };
+    assert_eq!(bench.ask(&late).error(), Some(ErrorCode::Expired), "nobody waits for it any more");
+    let in_use = bench.next_request;
+    bench.script(HOLD);
+    bench.next_request = in_use;
+    assert_eq!(bench.script(QUICK).error(), Some(ErrorCode::Malformed), "its number is that of another");
+    bench.handle(Event::Terminate);
+    assert_eq!(bench.script(QUICK).error(), Some(ErrorCode::ShuttingDown));
+    assert_eq!(bench.desk.counters.remembered, 4);
+}
+
+#[test]
 fn more_than_the_queue_holds_is_answered_busy() {
     let mut bench = Bench::new(1);
     bench.script(HOLD);
@@ -352,22 +378,6 @@ fn terminating_cancels_what_runs_refuses_what_waits_and_then_is_closed() {
     assert_eq!(running.summary_status(), Some("cancelled"));
 }
 
-#[test]
-fn an_upload_that_makes_admission_panic_is_answered_failed() {
-    let mut bench = Bench::new(4);
-    let empty = Assembly::default();
-    let mut bytes = vec![0; empty.encoded_len()];
-    assert!(empty.encode_into(&mut bytes));
-    let (wire, incoming) = bench.incoming(RequestKind::Upload, &bytes);
-    bench.handle(Event::Upload(incoming));
-    bench.until(|desk| desk.uploads.is_empty());
-    assert_eq!(wire.error(), Some(ErrorCode::Failed));
-    let (wire, incoming) = bench.incoming(RequestKind::Upload, &[0xff; 200]);
-    bench.handle(Event::Upload(incoming));
-    bench.until(|desk| desk.uploads.is_empty());
-    assert_eq!(wire.error(), Some(ErrorCode::Malformed));
-}
-
 /// Another process than the one that all other requests come from.
 const OTHER: Owner = Owner(6);
 
@@ -375,13 +385,6 @@ impl Bench {
     fn ask_as(&mut self, owner: Owner, request: &PlanRequest) -> Wire {
         let (wire, incoming) = self.incoming(RequestKind::Plan, &request.encode());
         self.handle(Event::Plan(Incoming { owner, ..incoming }));
-        wire
-    }
-
-    fn upload(&mut self, deadline_ns: u64) -> Wire {
-        let (wire, mut incoming) = self.incoming(RequestKind::Upload, &[0xff; 200]);
-        incoming.header.consumed = deadline_ns;
-        self.handle(Event::Upload(incoming));
         wire
     }
 }
@@ -418,75 +421,5 @@ fn a_batch_request_waits_for_interactive_ones() {
     assert_eq!(batch.summary_status(), Some("complete"));
 }
 
-#[test]
-fn an_upload_that_is_late_is_answered_expired() {
-    let mut bench = Bench::new(4);
-    assert_eq!(bench.upload(1).error(), Some(ErrorCode::Expired));
-    // Nobody takes these up: they are late while they wait.
-    bench.desk.queues = Queues::new(&Config::default());
-    let waiting = bench.upload(clock::deadline_in(Duration::from_millis(20)));
-    assert!(waiting.kinds().is_empty() && bench.desk.next_deadline(Instant::now()).is_some());
-    bench.until(|desk| desk.uploads.is_empty());
-    assert_eq!(waiting.error(), Some(ErrorCode::Expired));
-    assert_eq!(bench.desk.queues.admissions.len(), 0);
-}
-
-#[test]
-fn an_upload_whose_client_leaves_keeps_no_memory() {
-    let mut bench = Bench::new(4);
-    bench.desk.queues = Queues::new(&Config::default());
-    let waiting = bench.upload(0);
-    waiting.gone.set(true);
-    bench.desk.settle(Instant::now());
-    assert!(bench.desk.uploads.is_empty() && bench.desk.queues.admissions.len() == 0);
-    assert!(waiting.kinds().is_empty());
-}
-
-#[test]
-fn an_upload_whose_client_leaves_while_it_is_taken_in_is_not_taken_in_to_the_end() {
-    let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    let part = Part { name: "part", vertices: Vertices::F64(&corners), triangles: &[[0, 1, 2]] };
-    let endless = Assembly { name: ENDLESS, parts: vec![part], ..Assembly::default() };
-    let mut bytes = vec![0; endless.encoded_len()];
-    assert!(endless.encode_into(&mut bytes));
-    let mut bench = Bench::new(4);
-    let (wire, incoming) = bench.incoming(RequestKind::Upload, &bytes);
-    bench.handle(Event::Upload(incoming));
-    let service = Arc::clone(&bench.service);
-    let busy = || service.taking_in.load(Ordering::Relaxed) > 0;
-    bench.until(|_| busy());
-    wire.gone.set(true);
-    bench.until(|desk| desk.uploads.is_empty() && !busy());
-    // When the daemon leaves, and its grace is over, it is the same.
-    let (_wire, incoming) = bench.incoming(RequestKind::Upload, &bytes);
-    bench.handle(Event::Upload(incoming));
-    bench.until(|_| busy());
-    bench.handle(Event::Terminate);
-    bench.handle(Event::Terminate);
-    bench.until(|_| !busy());
-}
-
-#[test]
-fn an_upload_that_memory_is_not_enough_for_is_refused_before_it_is_copied() {
-    let mut bench = Bench::new(4);
-    bench.desk.limits.free_memory = || Some(1 << 30);
-    assert!(bench.desk.refuses_upload(OTHER, 1 << 20).is_none());
-    let error = bench.desk.refuses_upload(OTHER, 500 << 20).unwrap();
-    assert_eq!(error.code, ErrorCode::TooLarge);
-    assert!(error.message.contains("500 MB") && error.message.contains("1024 MB are free"), "{error:?}");
-    bench.desk.limits.free_memory = || None;
-    assert!(bench.desk.refuses_upload(OTHER, 500 << 20).is_none(), "where nothing is known, it is tried");
-}
-
-#[test]
-fn more_uploaded_bytes_than_may_wait_are_refused_before_they_are_copied() {
-    let mut bench = Bench::new(4);
-    let mut config = Config::default();
-    config.requests.uploads_mb_per_client = 1;
-    bench.desk.queues = Queues::new(&config);
-    assert!(bench.desk.refuses_upload(OTHER, 5 << 20).is_none(), "one that would wait alone is taken");
-    bench.upload(0);
-    let error = bench.desk.refuses_upload(Owner(5), 5 << 20).unwrap();
-    assert_eq!(error.code, ErrorCode::Busy);
-    assert!(error.retry_ms > 0 && bench.desk.refuses_upload(OTHER, 5 << 20).is_none());
-}
+#[path = "intake_tests.rs"]
+mod intake;

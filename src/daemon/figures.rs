@@ -258,6 +258,8 @@ fn cache_metrics(text: &mut String, Remembered { assemblies, records }: &Remembe
         ("assemblies_bytes", assemblies.bytes),
         ("cache_memory_bytes", records.memory_bytes),
         ("cache_file_bytes", records.file_bytes),
+        ("cache_field_file_bytes", records.field_file_bytes),
+        ("cache_mapped_bytes", records.mapped_bytes),
     ];
     for (name, value) in gauges {
         let _ = writeln!(text, "# TYPE sbdp_{name} gauge\nsbdp_{name} {value}");
@@ -321,6 +323,7 @@ mod tests {
             "sbdp_cache_hits_total{kind=\"motion\"} 0",
             "sbdp_assemblies 0",
             "sbdp_clients 2",
+            "sbdp_cache_mapped_bytes 0",
             "sbdp_shared_memory_free_bytes 1048576",
         ] {
             assert!(text.lines().any(|l| l == line), "{line} in\n{text}");

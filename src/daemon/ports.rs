@@ -110,17 +110,19 @@ impl Ports {
         self.owners.clear();
     }
 
-    /// Wakes the clients with these listener ids, and no others.
+    /// Wakes the clients with these listener ids, each given once, and no others.
     pub(crate) fn wake(&self, listeners: &[u128]) {
         if listeners.is_empty() {
             return;
         }
+        let mut left = listeners.len();
         self.wake_clients.for_each_listener(|monofier, details| {
             if listeners.contains(&details.listener_id.value()) {
                 // A client that cannot be woken looks by itself a moment later.
                 let _ = monofier.notify();
+                left -= 1;
             }
-            CallbackProgression::Continue
+            if left == 0 { CallbackProgression::Stop } else { CallbackProgression::Continue }
         });
     }
 }

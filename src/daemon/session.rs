@@ -12,6 +12,7 @@ use sbdp_ipc::plan::Step;
 use super::answers::Answer;
 use super::figures::Timed;
 use super::outbox::Outbox;
+use crate::termination::Termination;
 
 /// Where a request stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,7 +110,8 @@ pub(crate) struct Session<L> {
     pub(crate) listener: u128,
     state: State,
     outbox: Outbox,
-    cancel: Arc<AtomicBool>,
+    /// The flag that its worker's termination condition polls, once there is one.
+    cancel: Option<Arc<AtomicBool>>,
     /// When planning must end.
     pub(crate) deadline: Option<Instant>,
     admitted_ns: u64,
@@ -128,7 +130,7 @@ impl<L: Link> Session<L> {
             listener,
             state: State::Received,
             outbox: Outbox::new(outbox_limit),
-            cancel: Arc::default(),
+            cancel: None,
             deadline: None,
             admitted_ns: 0,
             started_ns: 0,
@@ -162,16 +164,23 @@ impl<L: Link> Session<L> {
         true
     }
 
-    /// The flag is the one that the worker's termination condition polls.
-    pub(crate) fn admit(&mut self, cancel: Arc<AtomicBool>, deadline: Option<Instant>) {
-        self.cancel = cancel;
+    pub(crate) fn admit(&mut self, deadline: Option<Instant>) {
         self.deadline = deadline;
         self.input(Input::Admit);
     }
 
+    /// What ends the work of a worker on it.
+    pub(crate) fn termination(&mut self) -> Termination {
+        let termination = Termination::new(self.deadline);
+        self.cancel = Some(termination.cancel_flag());
+        termination
+    }
+
     /// Lets the worker stop soon; the request is still answered.
     pub(crate) fn cancel_work(&self) {
-        self.cancel.store(true, Ordering::Relaxed);
+        if let Some(cancel) = &self.cancel {
+            cancel.store(true, Ordering::Relaxed);
+        }
     }
 
     /// Ends with an error that the client gets.
@@ -320,9 +329,15 @@ mod tests {
 
     fn running(link: &Scripted) -> Session<Scripted> {
         let mut session = Session::new(link.clone(), 1, 0, 10_000);
-        session.admit(Arc::default(), None);
+        session.admit(None);
+        session.termination();
         assert!(session.input(Input::Enqueue) && session.input(Input::Start));
         session
+    }
+
+    /// Whether its worker is told to stop.
+    fn is_cancelled(session: &Session<Scripted>) -> bool {
+        session.cancel.as_ref().is_some_and(|cancel| cancel.load(Ordering::Relaxed))
     }
 
     #[test]
@@ -369,7 +384,7 @@ mod tests {
         assert!(session.stuck_since.is_some());
         session.pump(now + Duration::from_secs(2), Duration::from_secs(1));
         assert_eq!(session.state(), State::Ended(End::Failed));
-        assert!(session.cancel.load(Ordering::Relaxed), "its worker stops");
+        assert!(is_cancelled(&session), "its worker stops");
         link.room.set(1);
         session.pump(now, Duration::from_secs(1));
         assert_eq!(link.got.borrow()[0].kind, ResponseKind::Error as u32);
@@ -381,7 +396,7 @@ mod tests {
         let mut session = running(&link);
         link.gone.set(true);
         session.input(Input::Cancel);
-        assert!(session.cancel.load(Ordering::Relaxed));
+        assert!(is_cancelled(&session));
         assert!(session.is_finished());
     }
 

@@ -183,13 +183,28 @@ impl Surface {
         (closest, signed): (&Closest, f64),
         wanted: Wanted<'_>,
     ) -> Result<FreeRegion, NoRegion> {
+        self.free_region_sparing(centre, radius, (closest, signed), wanted, 0.0)
+    }
+
+    /// The same where it does not matter up to `spared` how far wanted points are from a side.
+    ///
+    /// # Errors
+    /// There is none worth having.
+    pub fn free_region_sparing(
+        &self,
+        centre: &Point3<f64>,
+        radius: f64,
+        (closest, signed): (&Closest, f64),
+        wanted: Wanted<'_>,
+        spared: f64,
+    ) -> Result<FreeRegion, NoRegion> {
         let seed = if signed > SKIN {
             *centre
         } else {
             let outward = self.pseudo_normal(closest).try_normalize(0.0);
             closest.point + outward.ok_or(NoRegion::Cramped)? * (closest.distance + SKIN)
         };
-        self.free_region(&seed, radius + wanted.most + (seed - centre).norm(), wanted)
+        self.region_from(&seed, radius + wanted.most + (seed - centre).norm(), wanted, spared)
     }
 
     /// A convex region around `seed`, within `radius`, that the surface does not enter. If
@@ -204,8 +219,18 @@ impl Surface {
         radius: f64,
         wanted: Wanted<'_>,
     ) -> Result<FreeRegion, NoRegion> {
+        self.region_from(seed, radius, wanted, 0.0)
+    }
+
+    fn region_from(
+        &self,
+        seed: &Point3<f64>,
+        radius: f64,
+        wanted: Wanted<'_>,
+        spared: f64,
+    ) -> Result<FreeRegion, NoRegion> {
         let most = wanted.most;
-        let (region, nearest) = grown(self, seed, radius, wanted)?;
+        let (region, nearest) = grown(self, seed, radius, wanted, spared)?;
         // No surface passes through: all of the region is where one point well inside is. (A region
         // too thin to have one may follow the plane of a face into the solid.)
         let inner = region.nearest_within(seed, most + 4.0 * INNER, INNER).ok_or(NoRegion::Cramped)?;

@@ -157,6 +157,8 @@ impl Verifier {
         let way = Way { passing: &passing, course: &course, precision, termination };
         let [one, other] = way.depth()?;
         let depth = one.depth.max(other.depth);
+        let effort = [one.effort, other.effort];
+        tracing::debug!(parts = ?pair.parts, depth, ?effort, "overlap measured");
         if !one.open.is_empty() || !other.open.is_empty() {
             let entries = self.samples.entries_along(&passing, &passing.path, self.limit, termination)?;
             return Ok(deepest(depth, &entries));
@@ -222,6 +224,9 @@ impl Verifier {
         let course = &Course::new(&passing.path, passing.centre, passing.reach());
         let found = self.bounds(passing, course, termination)?;
         let bound = found.iter().map(|f| f.bound).fold(0.0, f64::max);
+        let [part, other] = passing.parts;
+        let effort = found.each_ref().map(|f| f.effort);
+        tracing::debug!(part, other, granted = passing.granted, bound, ?effort, "verified");
         let mut entries = deepest_entries(passing, &found);
         if bound <= *limit {
             for stretch in joined(course, found.iter().flat_map(|f| &f.open)) {

@@ -15,7 +15,6 @@ const _: () = assert!(NODES == LATTICES * ACROSS && LATTICES == ACROSS, "a latti
 /// A brick to be measured.
 pub(super) struct Brick<'a> {
     pub(super) surface: &'a Surface,
-    /// Where the surface is open, if it is.
     /// Its lowest node.
     pub(super) origin: Point3<f64>,
     pub(super) cell: f64,

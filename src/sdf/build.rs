@@ -11,7 +11,8 @@ use crate::geometry::{Bounds, Surface, closest_on_triangle};
 use crate::termination::{Interrupt, Poll, Termination};
 
 use super::brick::Brick;
-use super::grid::{BAND, CELLS, EMPTY, Grid, NearBrick, Nodes};
+use super::file::NOT_STORED;
+use super::grid::{BAND, CELLS, EMPTY, Grid, Held, NearBrick, Nodes};
 
 /// Cells are no larger than this, in units of the planning frame.
 const LARGEST_CELL: f64 = 0.05;
@@ -20,7 +21,7 @@ const CELLS_ACROSS: f64 = 20.0;
 /// Bricks a field may hold (48 MB); the cell grows until it is met.
 const MOST_BRICKS: usize = 8192;
 /// Bricks of the whole box, empty ones included.
-const MOST_SLOTS: usize = 1 << 21;
+pub(super) const MOST_SLOTS: usize = 1 << 21;
 
 /// Who builds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +56,8 @@ impl Grid {
             let brick = group[0].0;
             let end = start + group.len() as u32;
             field.slots[brick as usize] = field.near.len() as u32;
-            field.near.push(NearBrick { brick, triangles: [start, end], nodes: OnceLock::new() });
+            let (triangles, stored, nodes) = ([start, end], NOT_STORED, OnceLock::new());
+            field.near.push(NearBrick { brick, triangles, stored, nodes });
             start = end;
         }
         field.triangles = pairs.into_iter().map(|(_, t)| t).collect();
@@ -66,19 +68,24 @@ impl Grid {
         Ok(field)
     }
 
-    /// The nodes of a brick, measured when they are first asked for.
+    /// The nodes of a brick, taken from the file or measured when they are first asked for.
+    #[inline]
     pub(super) fn nodes(&self, slot: u32) -> &Nodes {
         let near = &self.near[slot as usize];
         near.nodes.get_or_init(|| {
-            let [start, end] = near.triangles.map(|i| i as usize);
-            let origin = self.brick_min(near.brick as usize);
-            let brick = Brick { surface: &self.surface, origin, cell: self.cell };
-            Box::new(brick.nodes(&self.triangles[start..end]))
+            self.in_file(near).map_or_else(|| Held::Filled(Box::new(self.measured(near))), Held::Stored)
         })
     }
 
+    fn measured(&self, near: &NearBrick) -> Nodes {
+        let [start, end] = near.triangles.map(|i| i as usize);
+        let origin = self.brick_min(near.brick as usize);
+        let brick = Brick { surface: &self.surface, origin, cell: self.cell };
+        brick.nodes(&self.triangles[start..end])
+    }
+
     /// A grid without bricks around a surface; `None` if it would be too large.
-    fn empty(surface: &Arc<Surface>, cell: f64) -> Option<Self> {
+    pub(super) fn empty(surface: &Arc<Surface>, cell: f64) -> Option<Self> {
         let bounds = surface.bounds();
         let side = cell * CELLS as f64;
         // A brick of margin on every side, so that "outside" is connected.
@@ -96,6 +103,7 @@ impl Grid {
             triangles: Vec::new(),
             surface: Arc::clone(surface),
             bounds: *bounds,
+            file: None,
         })
     }
 

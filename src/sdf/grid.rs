@@ -1,10 +1,13 @@
 //! The sparse grid and its look-ups.
 
+use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
+use bytemuck::{Pod, Zeroable};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
+use super::file::{StoredBricks, StoredNodes};
 use crate::geometry::{Bounds, Surface};
 
 /// Cells along a brick's side.
@@ -21,7 +24,7 @@ pub(super) const EMPTY: u32 = u32::MAX;
 pub(super) const FAR_NODE: u32 = u32::MAX;
 
 /// What a [`Field`](super::Field) is when it was built.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Grid {
     pub(super) origin: Point3<f64>,
     pub(super) cell: f64,
@@ -38,23 +41,48 @@ pub struct Grid {
     /// The triangles of all of them.
     pub(super) triangles: Vec<u32>,
     pub(super) surface: Arc<Surface>,
-    /// Where the surface is open, if it is.
     pub(super) bounds: Bounds,
+    /// The file that it was read from, if it was.
+    pub(super) file: Option<Arc<StoredBricks>>,
 }
 
 /// A brick that the band touches.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct NearBrick {
     /// Its place in the grid.
     pub(super) brick: u32,
     /// Which of the field's triangles may be nearest in it, as a range.
     pub(super) triangles: [u32; 2],
+    /// Its place in the file, if there is one.
+    pub(super) stored: u32,
     /// Measured when first looked at: what comes out does not depend on when or by whom.
-    pub(super) nodes: OnceLock<Box<Nodes>>,
+    pub(super) nodes: OnceLock<Held>,
 }
 
-/// What is known at the nodes of a brick.
-#[derive(Debug, Clone)]
+/// Where the nodes of a brick are.
+#[derive(Debug)]
+pub(super) enum Held {
+    /// Measured here.
+    Filled(Box<Nodes>),
+    /// In the file.
+    Stored(StoredNodes),
+}
+
+impl Deref for Held {
+    type Target = Nodes;
+
+    #[inline]
+    fn deref(&self) -> &Nodes {
+        match self {
+            Self::Filled(nodes) => nodes,
+            Self::Stored(nodes) => nodes,
+        }
+    }
+}
+
+/// What is known at the nodes of a brick, in memory as in a file.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct Nodes {
     /// Distances; outside the band they stand at ± the band's half-width.
     pub(super) values: [f32; BRICK],
@@ -110,15 +138,26 @@ impl Grid {
         self.cell * 0.87
     }
 
-    /// Bytes in memory, of bricks looked at so far.
+    /// Bytes in memory, of bricks looked at so far; those of a file are not counted.
     #[must_use]
     pub fn memory(&self) -> usize {
-        let filled = self.near.iter().filter(|b| b.nodes.get().is_some()).count();
         self.slots.len() * 8
             + self.far_inside.len() * size_of::<OnceLock<bool>>()
             + self.triangles.len() * 4
             + self.near.len() * size_of::<NearBrick>()
-            + filled * size_of::<Nodes>()
+            + self.filled() * size_of::<Nodes>()
+    }
+
+    /// Bricks that were filled here, in no file then.
+    #[must_use]
+    pub fn filled(&self) -> usize {
+        self.near.iter().filter(|near| matches!(near.nodes.get(), Some(Held::Filled(_)))).count()
+    }
+
+    /// Bricks in the file that it was read from, and whether one of these was found damaged.
+    #[must_use]
+    pub fn in_its_file(&self) -> (usize, bool) {
+        self.file.as_ref().map_or((0, false), |file| (file.count(), file.is_damaged()))
     }
 
     /// Bricks that the band touches.

@@ -1,6 +1,7 @@
 //! Signed distance fields: sparse bricks near the surface, conservative bounds elsewhere.
 //!
-//! A field is made per distinct mesh, in the shape's own frame, when it is first looked at (`field`). Values are negative inside.
+//! A field is made per distinct mesh, in the shape's own frame, when it is first looked at (`field`), from its
+//! file (`file`, mapped by `mapping`) as far as that has it. Values are negative inside.
 //! Guarantees: at nodes of the narrow band the stored distance is that of the nearest triangle
 //! (exact, then rounded to f32), and that triangle's index is kept, so that whoever needs an exact
 //! distance measures against a few triangles instead of interpolating. Everywhere else a field
@@ -11,10 +12,14 @@ mod build;
 mod facet;
 mod far_field;
 mod field;
+mod file;
 mod grid;
+mod mapping;
 mod rim;
 #[cfg(test)]
 mod tests;
 
-pub use field::Field;
+pub use field::{Field, FieldStore};
+pub use file::is_intact;
 pub use grid::{Estimate, FieldSample, Grid};
+pub use mapping::{Mapping, MappingTally};

@@ -17,7 +17,7 @@ mod store;
 #[cfg(test)]
 mod tests;
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use serde::Serialize;
 
@@ -25,6 +25,7 @@ use crate::blocking_graph::{Analysis, Audit, DirectionalGraph, StaticAnalysis, a
 use crate::cache::{Cache, CacheStatistics, Recall, Source};
 use crate::geometry::{Assembly, GeometryError, Revision, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, Warning};
+use crate::sdf::FieldStore;
 use crate::search::{Engine, PlanRequest, PlanSink, Staging, axes_of, least_travel};
 use crate::simulation::{Action, Axis, HullStore, JoinedHulls, PenaltyParameters};
 use crate::termination::Termination;
@@ -111,7 +112,8 @@ impl Service {
     #[must_use]
     pub fn new(cache: Arc<Cache>, budget: usize) -> Self {
         let hulls = JoinedHulls::stored(Arc::clone(&cache) as Arc<dyn HullStore>);
-        Self { store: Store::new(budget, hulls), cache }
+        let fields = Arc::downgrade(&cache) as Weak<dyn FieldStore>;
+        Self { store: Store::new(budget, hulls, fields), cache }
     }
 
     /// How many assemblies it knows, and what they take.
@@ -221,7 +223,7 @@ impl Service {
         let entry = self.entry(id, termination)?;
         let recall = Recall::of(Arc::clone(&self.cache));
         entry.prepare(termination, &recall);
-        self.store.settle(id, &entry);
+        self.settle(id, &entry);
         // One that was loaded from what it was made of, because another build had taken it in.
         self.cache.remember_healed(&id.0, &entry.assembly);
         Ok(())
@@ -253,8 +255,16 @@ impl Service {
         check_parts(&named_parts(request), entry.assembly.parts.len())?;
         let recall = if request.no_cache { Recall::default() } else { Recall::of(Arc::clone(&self.cache)) };
         let plan = entry.plan(request, termination, sink, &recall);
-        self.store.settle(id, &entry);
+        self.settle(id, &entry);
         plan
+    }
+
+    /// After an assembly was asked about: measures what it takes, and keeps what was seen of its fields.
+    fn settle(&self, id: AssemblyId, entry: &Entry) {
+        self.store.settle(id, entry);
+        for shared in &entry.shapes {
+            self.cache.keep_field(shared.shape.content(), &shared.field);
+        }
     }
 
     /// Compares the initial blocking graphs of an assembly with simulation.
@@ -344,6 +354,15 @@ impl Service {
             entry = self.store.insert(at, entry.assembly.revised_until(&revision, termination)?);
         }
         Ok(entry)
+    }
+}
+
+impl Drop for Service {
+    /// Keeps what is left of the fields.
+    fn drop(&mut self) {
+        for shared in self.store.shapes() {
+            self.cache.keep_rest_of_field(shared.shape.content(), &shared.field);
+        }
     }
 }
 

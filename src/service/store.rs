@@ -3,7 +3,7 @@
 //! hulls.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use serde::Serialize;
 
@@ -11,7 +11,7 @@ use super::AssemblyId;
 use super::entry::Entry;
 use crate::geometry::{Assembly, Shape};
 use crate::lru::Lru;
-use crate::sdf::Field;
+use crate::sdf::{Field, FieldStore};
 use crate::simulation::JoinedHulls;
 
 /// A shape and its field, for all assemblies that have it.
@@ -22,8 +22,14 @@ pub(super) struct SharedShape {
 }
 
 impl SharedShape {
+    /// A shape whose field is built anew.
     pub(super) fn new(shape: Arc<Shape>) -> Self {
         Self { field: Arc::new(Field::of(&shape.surface)), shape }
+    }
+
+    /// A shape whose field may be in a store.
+    fn stored(shape: Arc<Shape>, fields: Weak<dyn FieldStore>) -> Self {
+        Self { field: Arc::new(Field::stored(&shape.surface, fields, *shape.content())), shape }
     }
 
     fn memory(&self) -> usize {
@@ -51,6 +57,7 @@ pub struct StoreStatistics {
 pub(super) struct Store {
     budget: usize,
     hulls: Arc<JoinedHulls>,
+    fields: Weak<dyn FieldStore>,
     held: Mutex<Held>,
 }
 
@@ -76,8 +83,8 @@ struct Counted {
 
 impl Store {
     /// Nothing yet; `budget` in bytes.
-    pub(super) fn new(budget: usize, hulls: JoinedHulls) -> Self {
-        Self { budget, hulls: Arc::new(hulls), held: Mutex::default() }
+    pub(super) fn new(budget: usize, hulls: JoinedHulls, fields: Weak<dyn FieldStore>) -> Self {
+        Self { budget, hulls: Arc::new(hulls), fields, held: Mutex::default() }
     }
 
     /// An assembly, which is used by this.
@@ -103,7 +110,7 @@ impl Store {
         let shapes: Vec<_> = contents
             .iter()
             .zip(&assembly.shapes)
-            .map(|(content, shape)| held.share(content, shape))
+            .map(|(content, shape)| held.share(content, shape, &self.fields))
             .collect();
         let known = held.shared - known;
         assembly.shapes = shapes.iter().map(|shared| Arc::clone(&shared.shape)).collect();
@@ -124,6 +131,11 @@ impl Store {
         held.make_room(self.budget);
     }
 
+    /// All shapes, by their contents.
+    pub(super) fn shapes(&self) -> Vec<Arc<SharedShape>> {
+        self.held().shapes.values().map(|counted| Arc::clone(&counted.shared)).collect()
+    }
+
     pub(super) fn statistics(&self) -> StoreStatistics {
         let held = self.held();
         StoreStatistics {
@@ -142,10 +154,15 @@ impl Store {
 }
 
 impl Held {
-    fn share(&mut self, content: &[u8; 32], shape: &Arc<Shape>) -> Arc<SharedShape> {
+    fn share(
+        &mut self,
+        content: &[u8; 32],
+        shape: &Arc<Shape>,
+        fields: &Weak<dyn FieldStore>,
+    ) -> Arc<SharedShape> {
         let known = self.shapes.len();
         let counted = self.shapes.entry(*content).or_insert_with(|| Counted {
-            shared: Arc::new(SharedShape::new(Arc::clone(shape))),
+            shared: Arc::new(SharedShape::stored(Arc::clone(shape), Weak::clone(fields))),
             entries: 0,
             bytes: 0,
         });

@@ -324,6 +324,35 @@ fn names_and_threads_do_not_count_but_what_is_asked_does() {
     assert!(!ask(&renamed, &timed).stats.plan_hit, "a plan that depends on the clock");
 }
 
+/// Hits and misses of distance fields on disk.
+fn fields_found(service: &Service) -> (u64, u64) {
+    let counts = service.remembered().records;
+    let field = counts.kinds.iter().find(|kind| kind.kind == "field").unwrap();
+    (field.hits, field.misses)
+}
+
+#[test]
+fn a_service_that_starts_again_maps_the_fields_that_were_looked_at() {
+    let folder = tempfile::tempdir().unwrap();
+    // Motions of this engine look at fields, and are not remembered.
+    let request = PlanRequest { engine: Engine::Penalty, max_simulations: Some(3), ..simulated() };
+    let cold = told(asked(&Service::default(), &machine(), &request));
+    let service = on_disk(folder.path());
+    assert_eq!(told(asked(&service, &machine(), &request)), cold);
+    let (found, built) = fields_found(&service);
+    assert!(found == 0 && built > 0);
+    assert_eq!(service.remembered().records.mapped_bytes, 0);
+    drop(service);
+    let service = on_disk(folder.path());
+    // The same, for a question that was not asked.
+    let request = PlanRequest { max_simulations: Some(4), ..request };
+    let cold = told(asked(&Service::default(), &machine(), &request));
+    assert_eq!(told(asked(&service, &machine(), &request)), cold);
+    let (found, _) = fields_found(&service);
+    let records = service.remembered().records;
+    assert!(found > 0 && records.mapped_bytes > 0 && records.mapped_bytes <= records.field_file_bytes);
+}
+
 #[test]
 fn no_cache_neither_reads_nor_writes() {
     let service = Service::default();

@@ -46,7 +46,8 @@ impl Client {
 }
 
 impl Connection {
-    /// Sends a request; tries until the daemon took it or the timeout has passed.
+    /// Sends a request; tries until the daemon took it or the timeout has passed. Whoever asks has just seen
+    /// the daemon alive.
     pub(crate) fn send(
         &self,
         what: &'static str,
@@ -58,11 +59,11 @@ impl Connection {
     ) -> Result<Pending, ClientError> {
         let start = Instant::now();
         loop {
-            self.check_alive()?;
             if let Some(pending) = self.try_send(port, header, length, &fill)? {
                 self.wake_daemon();
                 return Ok(pending);
             }
+            self.check_alive()?;
             if start.elapsed() > timeout {
                 return Err(ClientError::Timeout { what, after: timeout });
             }
@@ -97,13 +98,16 @@ impl Connection {
         }
     }
 
-    /// The next response, if one is there; an error if none will come.
-    pub(crate) fn try_receive(&self, pending: &Pending) -> Result<Option<Answer>, ClientError> {
+    /// The next response, if one is there; an error if none will come. Whether the daemon is still alive is
+    /// asked if this was waited for already (`slept`): it is a call to the system, which answers that come
+    /// soon do without.
+    pub(crate) fn try_receive(&self, pending: &Pending, slept: bool) -> Result<Option<Answer>, ClientError> {
         // Asked before looking: what was sent before the request was let go is then seen.
         let connected = pending.is_connected();
         match pending.receive() {
             Ok(Some(answer)) => Ok(Some(answer)),
-            Ok(None) if connected => self.check_alive().map(|()| None),
+            Ok(None) if connected && slept => self.check_alive().map(|()| None),
+            Ok(None) if connected => Ok(None),
             Ok(None) => Err(self.died()),
             Err(e) => Err(SetupError::at("receiving")(e).into()),
         }
@@ -117,14 +121,16 @@ impl Connection {
         timeout: Duration,
     ) -> Result<AlignedBytes, ClientError> {
         let deadline = Instant::now() + timeout;
+        let mut slept = false;
         loop {
-            if let Some(answer) = self.try_receive(pending)? {
+            if let Some(answer) = self.try_receive(pending, slept)? {
                 return open(&answer);
             }
             if Instant::now() >= deadline {
                 return Err(ClientError::Timeout { what, after: timeout });
             }
             self.sleep(deadline);
+            slept = true;
         }
     }
 }

@@ -307,12 +307,13 @@ impl PlanStream<'_> {
         deadline: Option<Instant>,
         timeout: Duration,
     ) -> Result<Option<Found>, ClientError> {
+        let mut slept = false;
         loop {
             if let Some(index) = self.step_at_hand()? {
                 return Ok(Some(Found::Step(index)));
             }
             let Some(pending) = self.pending.as_ref() else { return Ok(None) };
-            if let Some(answer) = self.connection.try_receive(pending)? {
+            if let Some(answer) = self.connection.try_receive(pending, slept)? {
                 if let Some(found) = self.take(answer)? {
                     return Ok(Some(found));
                 }
@@ -327,6 +328,7 @@ impl PlanStream<'_> {
                 return Err(ClientError::Timeout { what: "plan", after: timeout });
             }
             self.connection.sleep(deadline.unwrap_or(now + SLICE));
+            slept = true;
         }
     }
 
@@ -458,8 +460,12 @@ impl PlanStream<'_> {
             self.is_open = false;
             self.client.planning.set(false);
         }
-        if self.pending.take().is_some() {
-            // The daemon asks whether we are still there when it is woken, not before.
+        let Some(pending) = self.pending.take() else { return };
+        let daemon_holds_it = pending.is_connected();
+        drop(pending);
+        // The daemon asks whether we are still there when it is woken, not before. Of a request that it has
+        // let go of, as it does with the last message, it asks no more.
+        if daemon_holds_it {
             self.connection.wake_daemon();
         }
     }

@@ -1,8 +1,10 @@
 //! Plans asked of a daemon, to the end.
 
+use nalgebra::Point3;
 use sbdp_client::{Client, Event, Handle, PlanOptions, PlanStatus, Summary};
 
 use super::BenchError;
+use crate::geometry::{Pose, Waypoint, interpolate, pose_from_waypoint, waypoint_from_pose};
 
 /// What was answered, to the bit.
 #[derive(Debug, PartialEq)]
@@ -48,6 +50,16 @@ fn follow(
 }
 
 impl Answered {
+    /// Where a part is that begins to leave, when the middle of its box has gone so far; of a short first stretch
+    /// of its way, when it has done half as large a share. One in a thread turns with that.
+    pub(super) fn on_its_way(&self, part: usize, centre: &Point3<f64>, by: f64) -> Waypoint {
+        let path = self.steps.iter().find(|(p, _)| *p == part).map(|(_, path)| path.as_slice());
+        let Some([from, to, ..]) = path else { return waypoint_from_pose(&Pose::identity()) };
+        let (from, to) = (pose_from_waypoint(from), pose_from_waypoint(to));
+        let length = (to * centre - from * centre).norm();
+        waypoint_from_pose(&interpolate(&from, &to, centre, by / length.max(2.0)))
+    }
+
     /// The unit vector along which a part begins to leave.
     pub(super) fn outward(&self, part: usize) -> [f64; 3] {
         let path = self.steps.iter().find(|(p, _)| *p == part).map(|(_, path)| path.as_slice());

@@ -58,6 +58,9 @@ pub struct Latency {
 
 /// Rounds before the measurement.
 const WARM_UP: usize = 50;
+/// So many rounds all clients ask the one peer, then as many the other. Were each to change over by itself,
+/// nearly all would wait at the slower one, and the faster would be measured with hardly any client.
+const ALTERNATION: usize = 25;
 
 /// Measures, with raw and planned rounds in turn.
 ///
@@ -97,6 +100,9 @@ fn raw_peer(program: &Path, chunks: &[usize]) -> Result<Server, BenchError> {
     Server::start(place, command)
 }
 
+/// Times of all rounds: with the raw peer, and of plans.
+type Times = (Vec<Duration>, Vec<Duration>);
+
 /// All clients at the same time; the times of all rounds.
 fn rounds(
     request: &LatencyRequest,
@@ -104,35 +110,32 @@ fn rounds(
     peer: &Server,
     handle: Handle,
     chunks: &[usize],
-) -> Result<(Vec<Duration>, Vec<Duration>), BenchError> {
-    let barrier = Barrier::new(request.clients);
-    let length = chunks.iter().sum::<usize>();
-    let work = || -> Result<(Vec<Duration>, Vec<Duration>), BenchError> {
-        let connected =
-            daemon.connect().and_then(|client| Ok((client, RawClient::connect(&peer.runtime_dir())?)));
-        // Whoever cannot connect must not keep the others waiting.
-        barrier.wait();
-        let (client, raw) = connected?;
-        let question = question(handle);
-        let (mut raw_times, mut plan_times) = (Vec::new(), Vec::new());
-        for round in 0..WARM_UP + request.rounds {
-            let (took, came) = raw.round(&question, chunks.len())?;
-            let started = Instant::now();
-            let summary = ask(&client, handle)?;
-            let planned = started.elapsed();
-            if came != length || summary.stats.plan_hit == 0 {
-                return Err(BenchError::Failed(format!("{came} bytes came, not {length}")));
+) -> Result<Times, BenchError> {
+    let barrier = &Barrier::new(request.clients);
+    let work = || {
+        let mut asking = Asking::connected(daemon, peer, handle, chunks);
+        let mut times = Times::default();
+        let (mut done, all) = (0, WARM_UP + request.rounds);
+        while done < all {
+            let count = ALTERNATION.min(all - done);
+            let measured = done >= WARM_UP;
+            // Whoever has failed must not keep the others waiting.
+            for (ask, times) in [(Asking::raw as Ask<'_>, &mut times.0), (Asking::plan, &mut times.1)] {
+                barrier.wait();
+                let took = asking.as_ref().map(|asking| (0..count).map(|_| ask(asking)).collect());
+                match took {
+                    Ok(Ok(took)) if measured => times.extend::<Vec<_>>(took),
+                    Ok(Err(error)) => asking = Err(error),
+                    _ => {}
+                }
             }
-            if round >= WARM_UP {
-                raw_times.push(took);
-                plan_times.push(planned);
-            }
+            done += count;
         }
-        Ok((raw_times, plan_times))
+        asking.map(|_| times)
     };
     std::thread::scope(|scope| {
         let threads: Vec<_> = (0..request.clients).map(|_| scope.spawn(work)).collect();
-        let mut all = (Vec::new(), Vec::new());
+        let mut all = Times::default();
         for thread in threads {
             let times = thread.join().map_err(|_| BenchError::Failed("a client panicked".to_owned()))??;
             all.0.extend(times.0);
@@ -140,6 +143,48 @@ fn rounds(
         }
         Ok(all)
     })
+}
+
+/// One question of a client, and how long its answer took.
+type Ask<'a> = fn(&Asking<'a>) -> Result<Duration, BenchError>;
+
+/// A client of both.
+struct Asking<'a> {
+    client: Client,
+    raw: RawClient,
+    handle: Handle,
+    question: Vec<u8>,
+    chunks: &'a [usize],
+}
+
+impl<'a> Asking<'a> {
+    fn connected(
+        daemon: &Server,
+        peer: &Server,
+        handle: Handle,
+        chunks: &'a [usize],
+    ) -> Result<Self, BenchError> {
+        let (client, raw) = (daemon.connect()?, RawClient::connect(&peer.runtime_dir())?);
+        Ok(Self { client, raw, handle, question: question(handle), chunks })
+    }
+
+    fn raw(&self) -> Result<Duration, BenchError> {
+        let length = self.chunks.iter().sum::<usize>();
+        match self.raw.round(&self.question, self.chunks.len())? {
+            (took, came) if came == length => Ok(took),
+            (_, came) => Err(BenchError::Failed(format!("{came} bytes came, not {length}"))),
+        }
+    }
+
+    fn plan(&self) -> Result<Duration, BenchError> {
+        let started = Instant::now();
+        let summary = ask(&self.client, self.handle)?;
+        let took = started.elapsed();
+        if summary.stats.plan_hit == 0 {
+            return Err(BenchError::Failed("a plan was made that was made before".to_owned()));
+        }
+        Ok(took)
+    }
 }
 
 /// The request of a plan with all options as they are by default.

@@ -3,6 +3,7 @@
 
 use std::time::{Duration, Instant};
 
+use nalgebra::Point3;
 use sbdp_client::{Client, Handle, PlanOptions};
 use serde::Serialize;
 
@@ -11,7 +12,7 @@ use super::asking::{plan, summary};
 use super::latency::{Percentiles, percentiles};
 use super::replan::fastener;
 use super::server::{Place, Server};
-use crate::geometry::SourceAssembly;
+use crate::geometry::{Bounds, SourceAssembly};
 use crate::upload::wire_assembly;
 
 /// So long a restarted daemon is left alone, where it may make ready what was asked last.
@@ -32,6 +33,10 @@ pub struct Restart {
     pub restarted_changed_us: Percentiles,
     /// Such a question, after the restarted daemon was left alone for two seconds.
     pub prepared_changed_us: Percentiles,
+    /// Distance fields that all first answers to such questions took from their files.
+    pub fields_found: u64,
+    /// Distance fields that they built, as there was no file.
+    pub fields_built: u64,
 }
 
 /// Measures; each changed question is another one.
@@ -45,17 +50,18 @@ pub fn restart(assembly: &SourceAssembly, rounds: usize) -> Result<Restart, Benc
     let (answered, _) = plan(&client, handle, &PlanOptions::default())?;
     let part = fastener(assembly, &answered)
         .ok_or_else(|| BenchError::Failed(format!("{}: nothing comes off", assembly.name)))?;
-    let outward = answered.outward(part);
+    let vertices: Vec<_> = assembly.parts[part].mesh.vertices.iter().map(|v| Point3::from(*v)).collect();
+    let centre = Bounds::of(&vertices).centre();
     drop(client);
     let mut asked = 0;
     let mut changed = || {
         asked += 1;
         let by = FIRST * (1.0 + f64::from(asked) / 256.0);
-        let [x, y, z] = outward.map(|x| x * by);
-        let moved = vec![(part as u32, [x, y, z, 1.0, 0.0, 0.0, 0.0])];
+        let moved = vec![(part as u32, answered.on_its_way(part, &centre, by))];
         PlanOptions { moved, ..PlanOptions::default() }
     };
     let mut times: [Vec<Duration>; 5] = Default::default();
+    let (mut fields_found, mut fields_built) = (0, 0);
     for _ in 0..rounds {
         let client = daemon.connect()?;
         plan(&client, handle, &PlanOptions::default())?;
@@ -69,6 +75,8 @@ pub fn restart(assembly: &SourceAssembly, rounds: usize) -> Result<Restart, Benc
         daemon.restart()?;
         let client = daemon.connect()?;
         times[3].push(took(&client, handle, &changed(), false)?);
+        let (found, built) = fields(&client)?;
+        (fields_found, fields_built) = (fields_found + found, fields_built + built);
         drop(client);
         daemon.restart()?;
         let client = daemon.connect()?;
@@ -83,10 +91,22 @@ pub fn restart(assembly: &SourceAssembly, rounds: usize) -> Result<Restart, Benc
         changed_us: changed,
         restarted_changed_us: restarted_changed,
         prepared_changed_us: prepared,
+        fields_found,
+        fields_built,
     })
 }
 
-/// How far the part is moved at least, in the assembly's unit.
+/// Distance fields that the daemon found on disk, and that it asked for and did not.
+fn fields(client: &Client) -> Result<(u64, u64), BenchError> {
+    let figures = client.figures().map_err(BenchError::failed)?;
+    let figures: serde_json::Value = serde_json::from_str(&figures).map_err(BenchError::failed)?;
+    let kinds = figures["remembered"]["records"]["kinds"].as_array().cloned().unwrap_or_default();
+    let of = |count: &str| kinds.iter().find(|k| k["kind"] == "field").and_then(|k| k[count].as_u64());
+    // A daemon of an older build keeps none.
+    Ok(of("hits").zip(of("misses")).unwrap_or_default())
+}
+
+/// How far the part is moved at least on its way out, in the assembly's unit.
 const FIRST: f64 = 0.5;
 
 fn took(client: &Client, handle: Handle, options: &PlanOptions, known: bool) -> Result<Duration, BenchError> {

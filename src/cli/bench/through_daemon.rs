@@ -78,6 +78,8 @@ pub(super) fn restart(arguments: &BenchRestart) -> Result<ExitCode, CliError> {
         ("a part moved, two seconds later", restart.prepared_changed_us),
     ];
     print(&rows.map(|(what, times)| row(what, 36, times)).into_iter().fold(heading, |all, row| all + &row))?;
+    let (found, built) = (restart.fields_found, restart.fields_built);
+    print(&format!("a part moved, started again: {found} distance fields from disk, {built} built\n"))?;
     written(arguments.json.as_deref(), &restart)
 }
 

@@ -85,7 +85,8 @@ impl Search<'_> {
         }
         hint.vain = true;
         self.found.effort += REGION_EFFORT;
-        let Some(free) = self.region(swept, &closest, signed, most) else { return false };
+        let seen = (&closest, signed);
+        let Some(free) = self.region(swept, seen, most, spared) else { return false };
         let fit = fits(&free, most);
         let id = self.regions.len() as u32;
         let is_outside = free.is_outside(asked.measured);
@@ -120,11 +121,10 @@ impl Search<'_> {
     }
 
     /// A region for a piece, around its middle or what is outside nearest to that.
-    fn region(&self, swept: &Swept, closest: &Closest, signed: f64, most: f64) -> Option<FreeRegion> {
+    fn region(&self, swept: &Swept, seen: (&Closest, f64), most: f64, spared: f64) -> Option<FreeRegion> {
         let Swept { centre, radius, .. } = swept;
-        let seen = (closest, signed);
         let wanted = Wanted { points: &self.wanted, most, from_behind: false, facing: self.facing };
-        self.asked.measured.free_region_around(centre, radius * ROOM, seen, wanted).ok()
+        self.asked.measured.free_region_sparing(centre, radius * ROOM, seen, wanted, spared).ok()
     }
 
     /// Whether a depth is what it is, as measured at the worst corner, or small enough not to matter:

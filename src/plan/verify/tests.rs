@@ -3,7 +3,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::fixtures::{
-    LIMIT, ball, block_on_plate, cells, cuboid, l_shape, moved, open_box, peg_in_hole, scene,
+    LIMIT, ball, block_on_plate, cells, cuboid, l_shape, moved, open_box, peg_in_hole, rod, scene, tube,
 };
 use crate::geometry::{SourceMesh, interpolate};
 
@@ -153,6 +153,24 @@ fn what_keeps_a_deep_overlap_on_its_way_is_let_pass() {
     );
     let verdict = checked(&scene, &verifier, &[Vector3::x() * 0.7]);
     assert!(verdict.depth < LIMIT / 2.0 && verdict.entries.is_empty(), "{}", verdict.depth);
+}
+
+#[test]
+fn a_nut_a_hair_too_tight_for_its_bolt_is_bounded_as_easily_as_one_that_fits() {
+    let effort = |inner: f64| {
+        let (bolt, nut) = (rod(0.3, [-4.0, 4.0], 40), tube(inner, 0.6, [3.0, 3.4], 40));
+        let (scene, verifier) = scene([bolt, nut]);
+        assert_eq!(scene.allowances.of(1, 0) > 0.0, inner < 0.3);
+        let start = scene.bodies[1].planning_from_shape;
+        let path = [start, Pose::translation(0.0, 0.0, 1.2) * start];
+        let passing = &Passing::new(&scene, &scene.allowances, [1, 0], &path);
+        let course = &Course::new(&passing.path, passing.centre, passing.reach());
+        let found = verifier.bounds(passing, course, &Termination::default()).unwrap();
+        assert!(found.iter().all(|side| side.bound < LIMIT / 2.0 && side.open.is_empty()));
+        found.iter().map(|side| side.effort).sum::<usize>()
+    };
+    let (fitting, tight) = (effort(0.3), effort(0.2997));
+    assert!(tight < 4 * fitting, "{tight} where {fitting} is enough");
 }
 
 #[test]

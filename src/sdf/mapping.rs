@@ -1,0 +1,76 @@
+//! A file that is mapped to be read. The one place of the planning modules that the compiler does not check.
+
+#![allow(unsafe_code, reason = "only whoever maps a file knows that nobody writes to it")]
+
+use std::fs::File;
+use std::io;
+use std::ops::Deref;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use memmap2::Mmap;
+
+/// What a process has mapped, and what it found damaged in it.
+#[derive(Debug, Default)]
+pub struct MappingTally {
+    bytes: AtomicU64,
+    damaged: AtomicU64,
+}
+
+impl MappingTally {
+    /// Bytes of all files that are mapped now. They are the system's, which takes them back when it wants to.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.bytes.load(Ordering::Relaxed)
+    }
+
+    /// Pieces of files that were found damaged, since the start.
+    #[must_use]
+    pub fn damaged(&self) -> u64 {
+        self.damaged.load(Ordering::Relaxed)
+    }
+}
+
+/// The bytes of a file, for as long as this lives, whatever becomes of its name.
+#[derive(Debug)]
+pub struct Mapping {
+    bytes: Mmap,
+    tally: Arc<MappingTally>,
+}
+
+impl Mapping {
+    /// Maps a file that is complete: one that got its name when the last byte was written.
+    ///
+    /// # Errors
+    /// The file is not there, or cannot be mapped.
+    pub fn of(path: &Path, tally: &Arc<MappingTally>) -> io::Result<Self> {
+        let file = File::open(path)?;
+        // SAFETY: nobody writes to what is mapped. The one writer (`cache/fields.rs`) makes every file under a
+        // name of its own and renames it when it is complete; a file that has its name is only ever replaced
+        // or removed as a whole, which leaves the mapped one as it is. The folder is open to its owner alone.
+        let bytes = unsafe { Mmap::map(&file) }?;
+        tally.bytes.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        Ok(Self { bytes, tally: Arc::clone(tally) })
+    }
+
+    /// Something in it is not what was written.
+    pub(super) fn is_damaged(&self) {
+        self.tally.damaged.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Mapping {
+    fn drop(&mut self) {
+        self.tally.bytes.fetch_sub(self.bytes.len() as u64, Ordering::Relaxed);
+    }
+}
+
+impl Deref for Mapping {
+    type Target = [u8];
+
+    #[inline]
+    fn deref(&self) -> &[u8] {
+        &self.bytes
+    }
+}
