@@ -1,10 +1,10 @@
 //! The transition function f(s, a, p): where a part gets to when it is pushed, pulled or turned.
 //!
 //! Data flow: [`Scene`] (bodies and what each pair may overlap) → broad phase → `sliding` (steps
-//! until the part is out or stuck) → [`Motion`]. `sliding` has two ways to see contact: a part that
-//! does not turn is followed by convex regions around its surface, exact for steps of any length;
-//! one that may turn by `contact` (samples near the other surface, measured exactly) and
-//! `projection` (the nearest twist that contact allows). The paper's own
+//! until the part is out or stuck) → [`Motion`]. `sliding` has two ways to see contact: convex regions around
+//! the part's surface, exact for shifts of any length and good while a part turns, too; and, where
+//! these would be too many, `contact` (samples near the other surface, measured exactly). What may turn
+//! follows `projection` (the nearest twist that contact allows). The paper's own
 //! simulation stands beside it: [`PenaltyEngine`], with forces and time steps, on the fields alone.
 //! So does [`straight_sweep`], which tells of a part that leaves along a line without simulating.
 //! Everything here is in the planning frame and knows nothing of search.

@@ -177,10 +177,13 @@ fn measure(source: &SourceAssembly) -> Figures {
     for shape in &assembly.shapes {
         let surface = &shape.surface;
         let build = || Field::build(surface, &Termination::default()).expect("nobody cancels");
-        let (built, field) = least(build);
-        let unfilled = field.memory();
-        let (filled, _) = least(|| field.clone().fill());
-        field.fill();
+        let (built, unfilled) = least(|| build().memory());
+        let (whole, field) = least(|| {
+            let field = build();
+            field.fill();
+            field
+        });
+        let filled = whole.saturating_sub(built);
         let (cells, _) = dense_size(surface, field.cell());
         let dense = (cells <= MOST_DENSE).then(|| least(|| dense_grid(surface, field.cell())).0);
         sum.add(&Figures {

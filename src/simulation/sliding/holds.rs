@@ -5,7 +5,7 @@
 //! outside the other solid, however it came there: a few planes tell what hundreds of samples would have
 //! to be measured for. Of what leaves its region, corners that are inside the other solid are contacts;
 //! else another region is looked for that holds the piece at both ends of the step; else it is
-//! split. Where none of this tells, samples decide. Of contacts, those that were found to matter are
+//! split. Where that takes too many regions, samples tell of the pair from there on. Of contacts, those that were found to matter are
 //! kept from step to step and measured again.
 
 use std::sync::Arc;
@@ -28,7 +28,7 @@ use super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
 const MOST_PIECES: usize = 600;
 /// So many regions are looked for during one look at a pair …
 const MOST_RENEWED: usize = 40;
-/// … and so many where samples decided, to be sure of the pose again.
+/// … and so many where a pair comes near and a piece is outside the region that it came with.
 const MOST_FOUND_AGAIN: usize = 100;
 /// Where a motion takes more regions than so many, and so many for each step, samples cost less.
 const MOST_IN_ALL: usize = 120;
@@ -635,4 +635,66 @@ fn slack_within(region: &FreeRegion, placed: &Placed, most: f64) -> Option<f64> 
     }
     let distance = region.distance_of_shifted(points, &gaps, &Vector3::zeros(), most)?;
     Some(-distance)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use proptest::prelude::*;
+
+    use super::super::SlidingEngine;
+    use super::*;
+    use crate::fixtures::{cuboid, l_shape, moved, peg_in_hole, scene};
+    use crate::simulation::{Action, Axis, End, TransitionFunction};
+
+    #[test]
+    fn a_loose_peg_turns_and_is_told_by_regions_all_the_way() {
+        let (scene, _) = scene(peg_in_hole(-0.05));
+        let around = Surroundings::new(&scene, vec![0]);
+        let start = scene.bodies[1].planning_from_shape;
+        let termination = Termination::default();
+        let mut holds = Holds::new(&scene, &around, (1, &start), 0.1, false, &termination);
+        let mover = Mover::new(&scene, 1, start);
+        let near = holds.settle(&mover, None);
+        assert!(near.clearance > 0.0 && !holds.samples());
+        let turned = Mover { pose: start * Pose::rotation(Vector3::z() * 0.3), ..mover };
+        assert!(holds.near(&turned).contacts.iter().any(|c| c.gap < -0.01), "its corners are in the walls");
+        let lifted = Mover { pose: Pose::translation(0.0, 0.0, 0.1) * start, ..mover };
+        assert!(holds.near(&lifted).contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE));
+        assert!(!holds.settle(&lifted, None).contacts.is_empty(), "what was found of the walls is kept");
+        assert!(!holds.samples());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn nothing_is_entered_by_what_turns(
+            place in prop::array::uniform3(-2.5..2.5f64),
+            turn in prop::array::uniform3(0.0..TAU),
+            number in 0..24usize,
+        ) {
+            // Two solids with a reentrant corner each, and a third that stands about.
+            let pose = Pose::new(Vector3::from(place), Vector3::from(turn));
+            let post = cuboid([2.0, -3.0, -3.0], [2.5, -2.0, 3.0]);
+            let (scene, verifier) = scene([l_shape(), moved(l_shape(), &pose), post]);
+            let (t, standing) = (Termination::default(), vec![0, 2]);
+            let deep = |path: &[Pose]| {
+                verifier.check(&scene, &scene.allowances, &standing, 1, path, &t).unwrap().depth
+            };
+            let start = scene.bodies[1].planning_from_shape;
+            prop_assume!(deep(&[start]) < 1e-9);
+            let actions = Action::rotations_about(&Axis::WORLD).into_iter();
+            let action = actions.chain(Action::screws_along(&Axis::WORLD)).nth(number).unwrap();
+            let around = Surroundings::new(&scene, standing.clone());
+            let motion = SlidingEngine.simulate(&scene, &around, 1, &start, action, &t).unwrap();
+            for (i, step) in motion.path.windows(2).enumerate() {
+                let got = deep(step);
+                prop_assert!(got < 2e-3, "{} deep in step {} of {}: {}", got, i, motion.path.len(), action);
+            }
+            if let End::Collision { with } = motion.end {
+                prop_assert!(!with.is_empty());
+            }
+        }
+    }
 }

@@ -3,12 +3,14 @@
 //! A translation (`push`) is a shift: pieces of surface, each in a convex region that the other
 //! surface does not enter (`cells` of pairs that face each other: `facing`), tell how far it may go,
 //! and what is in the way. A `finder` finds the cells of a pair; those where motions begin are `kept`
-//! for all motions from there. Where regions cannot tell (open surfaces facing each other, deep
-//! granted overlap, points that verification found missing) and for all that turns, the wanted twist
-//! is projected at each step onto what contact of samples allows, in the metric of the part's mass
+//! for all motions from there. Of what may turn, and where regions cannot tell of a push (open surfaces
+//! facing each other, deep granted overlap, points that verification found missing), the wanted twist
+//! is projected at each step onto what contact allows, in the metric of the part's mass
 //! (rotation weighed by the squared radius of gyration), and the pose advances by the result
-//! (`drive`). In free space the step is the certified clearance; where the projected twist stays the
-//! same, along a wall or a thread, it is followed in long steps (`leap`).
+//! (`drive`). Contacts are told by pieces of surface that leave their regions (`holds`), or, where
+//! surfaces are too complicated for that, by samples. In free space the step is the certified
+//! clearance; where samples tell and the projected twist stays the same, along a wall or a thread, it
+//! is followed in long steps (`leap`).
 
 mod cell;
 mod cells;
