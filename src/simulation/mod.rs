@@ -20,6 +20,7 @@ mod obstruction;
 mod passage;
 mod penalty;
 mod projection;
+mod reduction;
 mod scene;
 mod sliding;
 mod sweep;

@@ -10,8 +10,9 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 use crate::geometry::{Pose, Shape, interpolate};
 use crate::termination::Poll;
 
-use super::super::contact::{Contact, Mover, Near, reduced};
+use super::super::contact::{Contact, Mover, Near};
 use super::super::projection::{Projected, Row, project};
+use super::super::reduction::reduced;
 use super::super::{Action, Scene, Surroundings};
 use super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
 

@@ -1,28 +1,20 @@
-//! What is near a part that may turn.
-//!
-//! Of each pair one surface is in pieces, each with a convex region that the other surface does not
-//! enter (those of [`cells`](super::cells) to begin with). A piece whose corners are in its region is
-//! outside the other solid, however it came there: a few planes tell what hundreds of samples would have
-//! to be measured for. Of what leaves its region, corners that are inside the other solid are contacts;
-//! else another region is looked for that holds the piece at both ends of the step; else it is
-//! split. Where that takes too many regions, samples tell of the pair from there on. Of contacts, those that were found to matter are
-//! kept from step to step and measured again.
+//! A pair, one of whose surfaces is in pieces that stay in regions.
 
 use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::geometry::{Bounds, FreeRegion, NoRegion, Pose, Screw, Wanted};
+use crate::geometry::{Bounds, FreeRegion, NoRegion, Pose, Wanted};
 use crate::termination::Termination;
 
-use super::super::contact::{Contact, Mover, Near};
-use super::super::{Scene, Surroundings};
-use super::cell::{Cell, Spot};
-use super::cells::{MOST_GRANTED, starting};
-use super::drive::Around;
-use super::facing::{Facing, Piece, Placed};
-use super::finder::{AROUND, ROOM, SMALLEST, look};
-use super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
+use super::super::super::Scene;
+use super::super::super::contact::{Contact, Mover, Near};
+use super::super::cell::Spot;
+use super::super::cells::{MOST_GRANTED, starting};
+use super::super::facing::{Facing, Piece, Placed};
+use super::super::finder::{AROUND, ROOM, SMALLEST, look};
+use super::super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
+use super::hold::{Ends, Hold, slack_within};
 
 /// Surfaces in more pieces than this are quicker told by samples.
 const MOST_PIECES: usize = 600;
@@ -45,63 +37,23 @@ const AROUND_SMALLEST: f64 = 4.0 * SMALLEST;
 const MOST_KNOWN: usize = 128;
 /// So many contacts are looked for by pieces that have no region.
 const MOST_FOUND: usize = 4;
-/// So many times the displacement of a step regions are asked to allow, if they can.
-const AHEAD: f64 = 4.0;
-/// Poses of a step at which small bits are measured that no region holds at both ends.
-const BETWEEN: usize = 4;
 /// So many corners of a piece are measured.
 const MOST_PROBED: usize = 24;
 
-/// What is around a moving part.
-pub(super) struct Holds<'a> {
-    scene: &'a Scene,
-    surroundings: &'a Surroundings,
-    part: usize,
-    reach: f64,
-    termination: &'a Termination,
-    start: Pose,
-    /// The pose at which all pieces are known to be free.
-    base: Pose,
-    /// The pose that was looked at last.
-    looked_at: Option<Pose>,
-    pairs: Vec<Held<'a>>,
-    /// Standing parts that only samples tell of.
-    sampled: Vec<usize>,
-    /// Whether they tell of all.
-    all_sampled: bool,
-}
-
 /// A pair, one of whose surfaces is in pieces.
-struct Held<'a> {
-    facing: Facing<'a>,
+pub(super) struct Held<'a> {
+    pub(super) facing: Facing<'a>,
     pieces: Vec<Hold>,
     /// Contacts that mattered.
-    known: Vec<Contact>,
+    pub(super) known: Vec<Contact>,
     /// Whether it was looked at there.
-    is_near: bool,
+    pub(super) is_near: bool,
     /// Whether regions could not tell: from the base on samples do.
-    is_left_to_samples: bool,
+    pub(super) is_left_to_samples: bool,
     /// How many steps were made, and how many regions were looked for.
     steps: usize,
     regions: usize,
     placed: Placed,
-}
-
-/// A piece in its region.
-#[derive(Clone)]
-struct Hold {
-    spot: Spot,
-    /// In the measured surface's frame.
-    region: Arc<FreeRegion>,
-    /// A ball that holds the piece, in the asked surface's frame, …
-    centre: Point3<f64>,
-    radius: f64,
-    /// … and where its centre is at the base, in the measured surface's.
-    stands: Point3<f64>,
-    /// How far inside its region all of it is there.
-    slack: f64,
-    /// The same at the pose that was looked at last; none if it was not in its region there.
-    next: Option<f64>,
 }
 
 /// Why a piece got no region.
@@ -114,145 +66,9 @@ enum Unheld {
     Unsure,
 }
 
-/// From the asked surface's frame to the measured one's at the base and at another pose.
-#[derive(Clone, Copy)]
-struct Ends {
-    here: Pose,
-    there: Pose,
-    /// Between the two, if they differ.
-    between: [Pose; BETWEEN],
-    /// Where the motion from the one to the other leads.
-    ahead: Pose,
-}
-
-impl Ends {
-    fn of(facing: &Facing<'_>, base: &Pose, there: &Pose) -> Self {
-        let screw = Screw::between(base, there, 1);
-        let after = |share: f64| facing.with_part_at(&(screw.times(share) * base));
-        let between = std::array::from_fn(|i| after((i + 1) as f64 / (BETWEEN + 1) as f64));
-        let [here, there] = [base, there].map(|pose| facing.with_part_at(pose));
-        Self { here, there, between, ahead: after(AHEAD) }
-    }
-
-    /// A pose alone.
-    fn at(there: Pose) -> Self {
-        Self { here: there, there, between: [there; BETWEEN], ahead: there }
-    }
-}
-
-impl<'a> Holds<'a> {
-    /// With samples alone, or with regions where these tell.
-    pub(super) fn new(
-        scene: &'a Scene,
-        surroundings: &'a Surroundings,
-        (part, start): (usize, &Pose),
-        reach: f64,
-        all_sampled: bool,
-        termination: &'a Termination,
-    ) -> Self {
-        Self {
-            scene,
-            surroundings,
-            part,
-            reach,
-            termination,
-            start: *start,
-            base: *start,
-            looked_at: None,
-            pairs: Vec::new(),
-            sampled: Vec::new(),
-            all_sampled,
-        }
-    }
-
-    /// Whether samples tell of some part that is near or was.
-    pub(super) fn samples(&self) -> bool {
-        self.all_sampled || !self.sampled.is_empty()
-    }
-
-    /// Goes on from a pose: what is near it, if that is not known yet.
-    pub(super) fn settle(&mut self, mover: &Mover<'_>, near: Option<Near>) -> Near {
-        let mut near = match near {
-            Some(near) if self.looked_at == Some(mover.pose) => near,
-            _ => self.near(mover),
-        };
-        self.base = mover.pose;
-        let (reach, sampled) = (self.reach, &mut self.sampled);
-        // What is out of reach is found anew when it comes near.
-        self.pairs.retain_mut(|pair| {
-            let is_told =
-                pair.is_near && !pair.is_left_to_samples && pair.settle(mover, reach, self.termination);
-            if pair.is_near && !is_told {
-                sampled.push(pair.facing.other);
-            }
-            is_told
-        });
-        for contact in self.pairs.iter().flat_map(|pair| &pair.known) {
-            if !near.contacts.iter().any(|c| c.is_of_same_point(contact)) {
-                near.contacts.push(*contact);
-            }
-        }
-        near
-    }
-
-    /// Whether a standing part's pair is told by regions; takes it in if it is new.
-    fn pair_of(&mut self, other: usize) -> Option<usize> {
-        if self.all_sampled || self.sampled.contains(&other) {
-            return None;
-        }
-        let known = self.pairs.iter().position(|pair| pair.facing.other == other);
-        known.or_else(|| {
-            let pair = Held::new(
-                self.scene,
-                (self.part, &self.base),
-                other,
-                self.base == self.start,
-                self.termination,
-            );
-            if let Some(pair) = pair {
-                self.pairs.push(pair);
-                return Some(self.pairs.len() - 1);
-            }
-            self.sampled.push(other);
-            None
-        })
-    }
-}
-
-impl Around for Holds<'_> {
-    fn near(&mut self, mover: &Mover<'_>) -> Near {
-        self.pairs.iter_mut().for_each(|pair| pair.is_near = false);
-        self.looked_at = Some(mover.pose);
-        let (surroundings, reach, base) = (self.surroundings, self.reach, self.base);
-        mover.near_by(surroundings, reach, |other, near| match self.pair_of(other) {
-            Some(pair) => self.pairs[pair].near(&base, mover, reach, near),
-            None => mover.near_pair(other, reach, near),
-        })
-    }
-
-    fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) {
-        for pair in self.pairs.extract_if(.., |pair| pair.is_left_to_samples) {
-            let other = pair.facing.other;
-            near.contacts.retain(|c| c.other != other);
-            mover.near_pair(other, self.reach, near);
-            self.sampled.push(other);
-        }
-        for contact in self.pairs.iter().flat_map(|pair| &pair.known) {
-            if !near.contacts.iter().any(|c| c.is_of_same_point(contact)) {
-                let here = mover.remeasured(contact, self.reach).filter(|c| c.gap < self.reach);
-                near.contacts.extend(here);
-            }
-        }
-    }
-
-    fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
-        self.pairs.iter_mut().all(|pair| pair.is_clear_at(between))
-    }
-}
-
 impl<'a> Held<'a> {
     /// A pair with the part at a pose, if regions tell of it.
-    fn new(
+    pub(super) fn new(
         scene: &'a Scene,
         (part, pose): (usize, &Pose),
         other: usize,
@@ -282,7 +98,7 @@ impl<'a> Held<'a> {
     }
 
     /// What is near with the part at the mover's pose; it was free at `base`.
-    fn near(&mut self, base: &Pose, mover: &Mover<'_>, reach: f64, near: &mut Near) {
+    pub(super) fn near(&mut self, base: &Pose, mover: &Mover<'_>, reach: f64, near: &mut Near) {
         let ends = Ends::of(&self.facing, base, &mover.pose);
         self.is_near = true;
         let outside = self.outside(&ends, near);
@@ -552,7 +368,7 @@ impl<'a> Held<'a> {
     }
 
     /// Goes on from the pose that was looked at last; false where regions do not tell any more.
-    fn settle(&mut self, mover: &Mover<'_>, reach: f64, termination: &Termination) -> bool {
+    pub(super) fn settle(&mut self, mover: &Mover<'_>, reach: f64, termination: &Termination) -> bool {
         let there = self.facing.with_part_at(&mover.pose);
         let again = self.known.iter().filter_map(|c| mover.remeasured(c, reach));
         self.known = again.filter(|c| c.gap < reach).collect();
@@ -575,7 +391,7 @@ impl<'a> Held<'a> {
     }
 
     /// Whether nothing is too deep between the base and the pose that was looked at last.
-    fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
+    pub(super) fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
         if self.is_left_to_samples || !self.is_near {
             return !self.is_left_to_samples;
         }
@@ -585,138 +401,5 @@ impl<'a> Held<'a> {
             .filter(|&i| self.pieces[i].slack_at(&self.facing, &there, more, &mut self.placed).is_none())
             .collect();
         self.corners_inside(&outside, &there, BULGE_TOLERANCE).is_empty()
-    }
-}
-
-impl Hold {
-    fn new(spot: Spot, region: Arc<FreeRegion>, facing: &Facing<'_>, here: &Pose) -> Self {
-        let (centre, radius) = facing.ball(&spot.piece);
-        let stands = here * centre;
-        Self { spot, region, centre, radius, stands, slack: f64::NEG_INFINITY, next: None }
-    }
-
-    /// A piece that is free in a cell for shifts, without a shift.
-    fn of_cell(cell: &Cell, facing: &Facing<'_>, here: &Pose, placed: &mut Placed) -> Self {
-        facing.place_at(&cell.spot.piece, here, placed);
-        let sides = cell.limits.iter().map(|limit| {
-            let normal = facing.shifted * limit.normal;
-            let lowest = placed.points.iter().map(|p| normal.dot(&p.coords)).fold(f64::INFINITY, f64::min);
-            (normal, lowest + limit.height)
-        });
-        let region = Arc::new(FreeRegion::known(cell.ball, sides));
-        Self::new(cell.spot, region, facing, here)
-    }
-
-    /// How far outside its region it may be.
-    fn most(&self, facing: &Facing<'_>) -> f64 {
-        facing.allowance + self.spot.held.max(DEPTH_TOLERANCE)
-    }
-
-    /// How far inside its region all of it is at a pose, negative where it is outside by no more than it
-    /// may be and `more`; none where it is further.
-    fn slack_at(&self, facing: &Facing<'_>, there: &Pose, more: f64, placed: &mut Placed) -> Option<f64> {
-        let of_ball = self.region.slack(&(there * self.centre)) - self.radius;
-        if of_ball > 0.0 {
-            return Some(of_ball);
-        }
-        facing.place_at(&self.spot.piece, there, placed);
-        slack_within(&self.region, placed, self.most(facing) + more)
-    }
-}
-
-/// How far inside a region a piece is, at least; negative where it is outside by no more than `most`.
-fn slack_within(region: &FreeRegion, placed: &Placed, most: f64) -> Option<f64> {
-    let Placed { points, cloud, .. } = placed;
-    let gaps = region.gaps(cloud);
-    let farthest = points.iter().map(|p| (p - region.centre()).norm_squared()).fold(0.0, f64::max).sqrt();
-    let least = gaps.iter().copied().fold(region.radius() - farthest, f64::min);
-    if least >= 0.0 || least < -most {
-        return Some(least).filter(|least| *least >= 0.0);
-    }
-    let distance = region.distance_of_shifted(points, &gaps, &Vector3::zeros(), most)?;
-    Some(-distance)
-}
-
-#[cfg(test)]
-mod tests {
-    use std::f64::consts::TAU;
-
-    use super::*;
-    use crate::fixtures::{cuboid, l_shape, moved, peg_in_hole, scene, spread};
-    use crate::geometry::interpolate;
-
-    #[test]
-    fn a_loose_peg_turns_and_is_told_by_regions_all_the_way() {
-        let (scene, _) = scene(peg_in_hole(-0.05));
-        let around = Surroundings::new(&scene, vec![0]);
-        let start = scene.bodies[1].planning_from_shape;
-        let termination = Termination::default();
-        let mut holds = Holds::new(&scene, &around, (1, &start), 0.1, false, &termination);
-        let mover = Mover::new(&scene, 1, start);
-        let near = holds.settle(&mover, None);
-        assert!(near.contacts.iter().all(|c| c.gap >= 0.0) && !holds.samples());
-        let turned = Mover { pose: start * Pose::rotation(Vector3::z() * 0.3), ..mover };
-        assert!(holds.near(&turned).contacts.iter().any(|c| c.gap < -0.01), "its corners are in the walls");
-        let lifted = Mover { pose: Pose::translation(0.0, 0.0, 0.1) * start, ..mover };
-        assert!(holds.near(&lifted).contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE));
-        assert!(!holds.settle(&lifted, None).contacts.is_empty(), "what was found of the walls is kept");
-        assert!(!holds.samples());
-    }
-
-    #[test]
-    fn what_regions_let_pass_enters_nothing() {
-        // Two solids with a reentrant corner each, and a third that stands about; the same places at each run. Where surfaces cross by less
-        // than the tolerance regions leave small bits to the face before them: a little more is let pass there.
-        const LET_PASS: f64 = 3e-3;
-        let termination = Termination::default();
-        let (mut passed, mut stopped) = (0, 0);
-        let turns = spread([0.0; 3], [TAU; 3], 90);
-        for (place, turn) in spread([-2.5; 3], [2.5; 3], 90).zip(turns) {
-            let pose = Pose::new(place.coords, turn.coords);
-            let post = cuboid([2.0, -3.0, -3.0], [2.5, -2.0, 3.0]);
-            let (scene, verifier) = scene([l_shape(), moved(l_shape(), &pose), post]);
-            let deep = |path: &[Pose]| {
-                verifier.check(&scene, &scene.allowances, &[0, 2], 1, path, &termination).unwrap().depth
-            };
-            let start = scene.bodies[1].planning_from_shape;
-            if deep(&[start]) > 1e-9 {
-                continue;
-            }
-            let around = Surroundings::new(&scene, vec![0, 2]);
-            let mover = Mover::new(&scene, 1, start);
-            for direction in spread([-1.0; 3], [1.0; 3], 12) {
-                let mut holds = Holds::new(&scene, &around, (1, &start), 0.12, false, &termination);
-                holds.settle(&mover, None);
-                // The way to the other solid, with a turn about another axis.
-                let step = Pose::new(
-                    (scene.bodies[0].bounds.centre() - mover.centre()).normalize() * 0.05
-                        + direction.coords * 0.03,
-                    direction.coords.yzx() * 0.04,
-                );
-                let mut there = mover;
-                for _ in 0..12 {
-                    let from = there.pose;
-                    let next = Mover { pose: step * from, ..mover };
-                    let near = holds.near(&next);
-                    let middle = Mover {
-                        pose: interpolate(&from, &next.pose, &scene.centre_in_shape(1), 0.5),
-                        ..mover
-                    };
-                    if near.contacts.iter().any(|c| c.gap < -DEPTH_TOLERANCE) || !holds.is_clear_at(&middle) {
-                        stopped += 1;
-                        break;
-                    }
-                    holds.settle(&next, Some(near));
-                    if holds.samples() {
-                        break;
-                    }
-                    let got = deep(&[from, next.pose]);
-                    assert!(got < LET_PASS, "{got} deep from {place}, {turn} along {direction}");
-                    passed += 1;
-                    there = next;
-                }
-            }
-        }
-        assert!(passed > 1000 && stopped > 100, "{passed} steps passed, {stopped} stopped");
     }
 }

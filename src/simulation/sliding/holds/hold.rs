@@ -1,0 +1,114 @@
+//! A piece in its region, and between which poses it is looked at.
+
+use std::sync::Arc;
+
+use nalgebra::{Point3, Vector3};
+
+use crate::geometry::{FreeRegion, Pose, Screw};
+
+use super::super::DEPTH_TOLERANCE;
+use super::super::cell::{Cell, Spot};
+use super::super::facing::{Facing, Placed};
+
+/// So many times the displacement of a step regions are asked to allow, if they can.
+const AHEAD: f64 = 4.0;
+/// Poses of a step at which small bits are measured that no region holds at both ends.
+const BETWEEN: usize = 4;
+
+/// A piece in its region.
+#[derive(Clone)]
+pub(super) struct Hold {
+    pub(super) spot: Spot,
+    /// In the measured surface's frame.
+    pub(super) region: Arc<FreeRegion>,
+    /// A ball that holds the piece, in the asked surface's frame, …
+    pub(super) centre: Point3<f64>,
+    pub(super) radius: f64,
+    /// … and where its centre is at the base, in the measured surface's.
+    pub(super) stands: Point3<f64>,
+    /// How far inside its region all of it is there.
+    pub(super) slack: f64,
+    /// The same at the pose that was looked at last; none if it was not in its region there.
+    pub(super) next: Option<f64>,
+}
+
+/// From the asked surface's frame to the measured one's at the base and at another pose.
+#[derive(Clone, Copy)]
+pub(super) struct Ends {
+    pub(super) here: Pose,
+    pub(super) there: Pose,
+    /// Between the two, if they differ.
+    pub(super) between: [Pose; BETWEEN],
+    /// Where the motion from the one to the other leads.
+    pub(super) ahead: Pose,
+}
+
+impl Ends {
+    pub(super) fn of(facing: &Facing<'_>, base: &Pose, there: &Pose) -> Self {
+        let screw = Screw::between(base, there, 1);
+        let after = |share: f64| facing.with_part_at(&(screw.times(share) * base));
+        let between = std::array::from_fn(|i| after((i + 1) as f64 / (BETWEEN + 1) as f64));
+        let [here, there] = [base, there].map(|pose| facing.with_part_at(pose));
+        Self { here, there, between, ahead: after(AHEAD) }
+    }
+
+    /// A pose alone.
+    pub(super) fn at(there: Pose) -> Self {
+        Self { here: there, there, between: [there; BETWEEN], ahead: there }
+    }
+}
+
+impl Hold {
+    pub(super) fn new(spot: Spot, region: Arc<FreeRegion>, facing: &Facing<'_>, here: &Pose) -> Self {
+        let (centre, radius) = facing.ball(&spot.piece);
+        let stands = here * centre;
+        Self { spot, region, centre, radius, stands, slack: f64::NEG_INFINITY, next: None }
+    }
+
+    /// A piece that is free in a cell for shifts, without a shift.
+    pub(super) fn of_cell(cell: &Cell, facing: &Facing<'_>, here: &Pose, placed: &mut Placed) -> Self {
+        facing.place_at(&cell.spot.piece, here, placed);
+        let sides = cell.limits.iter().map(|limit| {
+            let normal = facing.shifted * limit.normal;
+            let lowest = placed.points.iter().map(|p| normal.dot(&p.coords)).fold(f64::INFINITY, f64::min);
+            (normal, lowest + limit.height)
+        });
+        let region = Arc::new(FreeRegion::known(cell.ball, sides));
+        Self::new(cell.spot, region, facing, here)
+    }
+
+    /// How far outside its region it may be.
+    pub(super) fn most(&self, facing: &Facing<'_>) -> f64 {
+        facing.allowance + self.spot.held.max(DEPTH_TOLERANCE)
+    }
+
+    /// How far inside its region all of it is at a pose, negative where it is outside by no more than it
+    /// may be and `more`; none where it is further.
+    pub(super) fn slack_at(
+        &self,
+        facing: &Facing<'_>,
+        there: &Pose,
+        more: f64,
+        placed: &mut Placed,
+    ) -> Option<f64> {
+        let of_ball = self.region.slack(&(there * self.centre)) - self.radius;
+        if of_ball > 0.0 {
+            return Some(of_ball);
+        }
+        facing.place_at(&self.spot.piece, there, placed);
+        slack_within(&self.region, placed, self.most(facing) + more)
+    }
+}
+
+/// How far inside a region a piece is, at least; negative where it is outside by no more than `most`.
+pub(super) fn slack_within(region: &FreeRegion, placed: &Placed, most: f64) -> Option<f64> {
+    let Placed { points, cloud, .. } = placed;
+    let gaps = region.gaps(cloud);
+    let farthest = points.iter().map(|p| (p - region.centre()).norm_squared()).fold(0.0, f64::max).sqrt();
+    let least = gaps.iter().copied().fold(region.radius() - farthest, f64::min);
+    if least >= 0.0 || least < -most {
+        return Some(least).filter(|least| *least >= 0.0);
+    }
+    let distance = region.distance_of_shifted(points, &gaps, &Vector3::zeros(), most)?;
+    Some(-distance)
+}

@@ -1,0 +1,151 @@
+//! What is near a part that may turn.
+//!
+//! Of each pair one surface is in pieces, each with a convex region that the other surface does not
+//! enter (those of [`cells`](super::cells) to begin with). A piece whose corners are in its region is
+//! outside the other solid, however it came there: a few planes tell what hundreds of samples would have
+//! to be measured for. Of what leaves its region, corners that are inside the other solid are contacts;
+//! else another region is looked for that holds the piece at both ends of the step; else it is
+//! split. Where that takes too many regions, samples tell of the pair from there on. Of contacts, those that were found to matter are
+//! kept from step to step and measured again.
+
+mod held;
+mod hold;
+#[cfg(test)]
+mod tests;
+
+use crate::geometry::Pose;
+use crate::termination::Termination;
+
+use super::super::contact::{Mover, Near};
+use super::super::{Scene, Surroundings};
+use super::drive::Around;
+use held::Held;
+
+/// What is around a moving part.
+pub(super) struct Holds<'a> {
+    scene: &'a Scene,
+    surroundings: &'a Surroundings,
+    part: usize,
+    reach: f64,
+    termination: &'a Termination,
+    start: Pose,
+    /// The pose at which all pieces are known to be free.
+    base: Pose,
+    /// The pose that was looked at last.
+    looked_at: Option<Pose>,
+    pairs: Vec<Held<'a>>,
+    /// Standing parts that only samples tell of.
+    sampled: Vec<usize>,
+    /// Whether they tell of all.
+    all_sampled: bool,
+}
+
+impl<'a> Holds<'a> {
+    /// With samples alone, or with regions where these tell.
+    pub(super) fn new(
+        scene: &'a Scene,
+        surroundings: &'a Surroundings,
+        (part, start): (usize, &Pose),
+        reach: f64,
+        all_sampled: bool,
+        termination: &'a Termination,
+    ) -> Self {
+        Self {
+            scene,
+            surroundings,
+            part,
+            reach,
+            termination,
+            start: *start,
+            base: *start,
+            looked_at: None,
+            pairs: Vec::new(),
+            sampled: Vec::new(),
+            all_sampled,
+        }
+    }
+
+    /// Whether samples tell of some part that is near or was.
+    pub(super) fn samples(&self) -> bool {
+        self.all_sampled || !self.sampled.is_empty()
+    }
+
+    /// Goes on from a pose: what is near it, if that is not known yet.
+    pub(super) fn settle(&mut self, mover: &Mover<'_>, near: Option<Near>) -> Near {
+        let mut near = match near {
+            Some(near) if self.looked_at == Some(mover.pose) => near,
+            _ => self.near(mover),
+        };
+        self.base = mover.pose;
+        let (reach, sampled) = (self.reach, &mut self.sampled);
+        // What is out of reach is found anew when it comes near.
+        self.pairs.retain_mut(|pair| {
+            let is_told =
+                pair.is_near && !pair.is_left_to_samples && pair.settle(mover, reach, self.termination);
+            if pair.is_near && !is_told {
+                sampled.push(pair.facing.other);
+            }
+            is_told
+        });
+        for contact in self.pairs.iter().flat_map(|pair| &pair.known) {
+            if !near.contacts.iter().any(|c| c.is_of_same_point(contact)) {
+                near.contacts.push(*contact);
+            }
+        }
+        near
+    }
+
+    /// Whether a standing part's pair is told by regions; takes it in if it is new.
+    fn pair_of(&mut self, other: usize) -> Option<usize> {
+        if self.all_sampled || self.sampled.contains(&other) {
+            return None;
+        }
+        let known = self.pairs.iter().position(|pair| pair.facing.other == other);
+        known.or_else(|| {
+            let pair = Held::new(
+                self.scene,
+                (self.part, &self.base),
+                other,
+                self.base == self.start,
+                self.termination,
+            );
+            if let Some(pair) = pair {
+                self.pairs.push(pair);
+                return Some(self.pairs.len() - 1);
+            }
+            self.sampled.push(other);
+            None
+        })
+    }
+}
+
+impl Around for Holds<'_> {
+    fn near(&mut self, mover: &Mover<'_>) -> Near {
+        self.pairs.iter_mut().for_each(|pair| pair.is_near = false);
+        self.looked_at = Some(mover.pose);
+        let (surroundings, reach, base) = (self.surroundings, self.reach, self.base);
+        mover.near_by(surroundings, reach, |other, near| match self.pair_of(other) {
+            Some(pair) => self.pairs[pair].near(&base, mover, reach, near),
+            None => mover.near_pair(other, reach, near),
+        })
+    }
+
+    fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) {
+        for pair in self.pairs.extract_if(.., |pair| pair.is_left_to_samples) {
+            let other = pair.facing.other;
+            near.contacts.retain(|c| c.other != other);
+            mover.near_pair(other, self.reach, near);
+            self.sampled.push(other);
+        }
+        for contact in self.pairs.iter().flat_map(|pair| &pair.known) {
+            if !near.contacts.iter().any(|c| c.is_of_same_point(contact)) {
+                let here = mover.remeasured(contact, self.reach).filter(|c| c.gap < self.reach);
+                near.contacts.extend(here);
+            }
+        }
+    }
+
+    fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
+        self.pairs.iter_mut().all(|pair| pair.is_clear_at(between))
+    }
+}
