@@ -100,6 +100,12 @@ impl<'a> Cells<'a> {
         self.count(gathered.regions)
     }
 
+    /// How far the part may be shifted from `at` along the unit vector `u` with all pieces in their regions.
+    pub(super) fn length(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> f64 {
+        let cells = self.pairs.iter().flat_map(|pair| pair.cells.iter());
+        cells.map(|cell| cell.length(at, u)).fold(f64::INFINITY, f64::min)
+    }
+
     /// How far the part may be shifted from `at` along the unit vector `u`, for which way was made, up to
     /// `most`. Pieces whose region ends before that get another where it ends.
     pub(super) fn advance(&mut self, at: &Vector3<f64>, u: &Vector3<f64>, most: f64) -> Result<f64, Halt> {

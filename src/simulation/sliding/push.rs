@@ -102,7 +102,12 @@ impl<'a> Push<'a> {
         }
         let longest = if obstacles.is_empty() { FREE_STEP } else { self.contact_step };
         let seen = self.asked_at.map_or(0.0, |at| FREE_STEP - (self.shift - at).norm());
-        let length = self.cells.advance(&self.shift, &u, longest.min(seen))?;
+        let most = longest.min(seen);
+        // Whoever asks about a short way is not to pay for regions further on.
+        let length = match self.is_long {
+            true => self.cells.advance(&self.shift, &u, most)?,
+            false => self.cells.length(&self.shift, &u).min(most),
+        };
         self.stalls = if length < STALL { self.stalls + 1 } else { 0 };
         if self.stalls > MOST_STALLS {
             return Err(Halt::Lost);
