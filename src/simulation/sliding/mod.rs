@@ -85,7 +85,7 @@ impl TransitionFunction for SlidingEngine {
         let mut mover = Mover::new(scene, part, *start).until(termination);
         let (mut path, mut asked) = (vec![*start], Vec::new());
         let mut turning = Turning::new(&mover);
-        // What regions cannot tell of a push, they cannot tell of a motion that may turn either.
+        // A push that comes here is one that regions could not tell of.
         let by_samples = is_refined || !action.turns();
         let mut around =
             Holds::new(scene, surroundings, (part, start), drive.reach(), by_samples, termination);
