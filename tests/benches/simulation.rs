@@ -7,7 +7,8 @@
 //! all six translations; `sweep`, the test whether a part leaves straight along a world axis; `push`,
 //! a translation that travels more than one unit of the planning frame; `turn`, a motion under a
 //! torque, or a force with freedom to turn, that does; `stopped`, a motion of either kind that ends
-//! within that. Fields are warm: what fills their bricks is not counted.
+//! within that. Fields are warm: what fills their bricks is not counted. With `SBDP_MOTIONS` set, each motion
+//! is told in a line of its own.
 
 mod folders;
 
@@ -71,6 +72,7 @@ fn measure(folder: &std::path::Path) -> Result<[Vec<f64>; 5], String> {
         times[0].push(timed(|| pair_blocks(&scene, a, &pose, b, &translations, LEAST_TRAVEL, &never)).1);
     }
     let turning = Action::rotations_about(&Axis::WORLD);
+    let tells_each = std::env::var_os("SBDP_MOTIONS").is_some();
     for part in 0..scene.bodies.len() {
         let standing = (0..scene.bodies.len()).filter(|&i| i != part).collect();
         let around = Surroundings::new(&scene, standing);
@@ -91,6 +93,14 @@ fn measure(folder: &std::path::Path) -> Result<[Vec<f64>; 5], String> {
                 false => 4,
             };
             times[column].push(time);
+            if tells_each {
+                println!(
+                    "{part} {action} {time:.0} us, {} poses, {:.2} far: {:?}",
+                    motion.path.len(),
+                    travel(&motion),
+                    motion.end
+                );
+            }
         }
     }
     Ok(times)

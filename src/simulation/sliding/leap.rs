@@ -117,7 +117,7 @@ impl<'a> Leaper<'a> {
         }
         let now = Screw::between(from, &mover.pose, 1);
         let apart = self.last.replace(now).map_or(f64::INFINITY, |before| self.apart(&before, &now, from));
-        let step = self.drive.reach();
+        let step = self.drive.step();
         self.alike = match self.alike {
             Some((begin, count)) if apart < ALIKE * step => Some((begin, count + 1)),
             _ => Some((*from, 1)),
@@ -218,7 +218,7 @@ impl<'a> Leaper<'a> {
     fn is_pressed(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> bool {
         let (v, w): (Vector3<f64>, Vector3<f64>) =
             (push.fixed_rows::<3>(0).into(), push.fixed_rows::<3>(3).into());
-        let scale = PROBE * self.drive.reach() / (v.norm() + w.norm() * self.radius);
+        let scale = PROBE * self.drive.step() / (v.norm() + w.norm() * self.radius);
         let mut pose = mover.pose;
         let turn = UnitQuaternion::from_scaled_axis(w * scale);
         pose.append_rotation_wrt_point_mut(&turn, &mover.centre());
@@ -230,7 +230,7 @@ impl<'a> Leaper<'a> {
     fn is_on_thread(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> bool {
         let pull: Vector3<f64> = push.fixed_rows::<3>(0).into();
         let Some(direction) = pull.try_normalize(0.0) else { return false };
-        let step = direction * (PROBE_ON_HELIX * self.drive.reach());
+        let step = direction * (PROBE_ON_HELIX * self.drive.step());
         let pose = Translation3::from(step) * mover.pose;
         Mover { pose, ..*mover }.enters_by(PRESSED, &self.surroundings.standing)
     }

@@ -39,7 +39,7 @@ pub fn pair_blocks(
     }
     let start = Mover::new(scene, part, *pose).until(termination);
     let Some(first) = actions.first() else { return Ok(Vec::new()) };
-    let reach = Drive::new(scene, part, pose, *first).reach();
+    let reach = Drive::new(scene, part, pose, *first).step();
     let within = |reach: f64, mover: &Mover<'_>| {
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
         mover.near_pair(other, reach, &mut near);

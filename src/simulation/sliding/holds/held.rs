@@ -19,12 +19,12 @@ use super::hold::{Ends, Hold, slack_within};
 /// Surfaces in more pieces than this are quicker told by samples.
 const MOST_PIECES: usize = 600;
 /// So many regions are looked for during one look at a pair …
-const MOST_RENEWED: usize = 40;
+const MOST_RENEWED: usize = 100;
 /// … and so many where a pair comes near and a piece is outside the region that it came with.
-const MOST_FOUND_AGAIN: usize = 100;
+const MOST_FOUND_AGAIN: usize = 200;
 /// Where a motion takes more regions than so many, and so many for each step, samples cost less.
-const MOST_IN_ALL: usize = 120;
-const MOST_PER_STEP: usize = 12;
+const MOST_IN_ALL: usize = 400;
+const MOST_PER_STEP: usize = 40;
 /// Where a bit of a triangle that is smaller than this has no region, its deepest point is looked for.
 const SMALL: f64 = 0.1;
 /// Steps of that search along an edge.
@@ -54,6 +54,12 @@ pub(super) struct Held<'a> {
     steps: usize,
     regions: usize,
     placed: Placed,
+}
+
+/// Pieces that have left their regions.
+pub(super) struct Left {
+    outside: Vec<usize>,
+    ends: Ends,
 }
 
 /// Why a piece got no region.
@@ -97,21 +103,37 @@ impl<'a> Held<'a> {
         })
     }
 
-    /// What is near with the part at the mover's pose; it was free at `base`.
-    pub(super) fn near(&mut self, base: &Pose, mover: &Mover<'_>, reach: f64, near: &mut Near) {
+    /// What is known to be near with the part at the mover's pose; it was free at `base`. Tells which pieces
+    /// have left their regions, if none of them is known to enter anything: of these it is
+    /// [not yet known](Self::renewed).
+    pub(super) fn near(
+        &mut self,
+        base: &Pose,
+        mover: &Mover<'_>,
+        reach: f64,
+        near: &mut Near,
+    ) -> Option<Left> {
         let ends = Ends::of(&self.facing, base, &mover.pose);
         self.is_near = true;
         let outside = self.outside(&ends, near);
         // Contacts lie on pieces that have left their regions, mostly.
         if outside.is_empty() {
-            return;
+            return None;
         }
         let again = self.known.iter().filter_map(|c| mover.remeasured(c, reach));
         let mut found: Vec<Contact> = again.filter(|c| c.gap < -DEPTH_TOLERANCE).collect();
         found.extend(self.corners_inside(&outside, &ends.there, DEPTH_TOLERANCE));
         if found.is_empty() {
-            found = self.renew(&outside, &ends);
+            return Some(Left { outside, ends });
         }
+        self.learn(&found);
+        near.contacts.extend(found);
+        None
+    }
+
+    /// Finds regions for pieces that have left theirs, or what they enter.
+    pub(super) fn renewed(&mut self, left: &Left, mover: &Mover<'_>, reach: f64, near: &mut Near) {
+        let found = self.renew(&left.outside, &left.ends);
         if self.is_left_to_samples {
             return mover.near_pair(self.facing.other, reach, near);
         }

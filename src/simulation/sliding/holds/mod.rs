@@ -18,6 +18,7 @@ use crate::termination::Termination;
 
 use super::super::contact::{Mover, Near};
 use super::super::{Scene, Surroundings};
+use super::DEPTH_TOLERANCE;
 use super::drive::Around;
 use held::Held;
 
@@ -124,10 +125,19 @@ impl Around for Holds<'_> {
         self.pairs.iter_mut().for_each(|pair| pair.is_near = false);
         self.looked_at = Some(mover.pose);
         let (surroundings, reach, base) = (self.surroundings, self.reach, self.base);
-        mover.near_by(surroundings, reach, |other, near| match self.pair_of(other) {
-            Some(pair) => self.pairs[pair].near(&base, mover, reach, near),
+        let mut left = Vec::new();
+        let mut near = mover.near_by(surroundings, reach, |other, near| match self.pair_of(other) {
+            Some(pair) => left.extend(self.pairs[pair].near(&base, mover, reach, near).map(|l| (pair, l))),
             None => mover.near_pair(other, reach, near),
-        })
+        });
+        // Of a pose that is refused already it does not matter what else may be entered.
+        if near.contacts.iter().any(|c| c.gap < -DEPTH_TOLERANCE) {
+            return near;
+        }
+        for (pair, left) in left {
+            self.pairs[pair].renewed(&left, mover, reach, &mut near);
+        }
+        near
     }
 
     fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) {
