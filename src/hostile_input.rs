@@ -2,6 +2,7 @@
 //! make it panic, hang or grow. Nothing else depends on it.
 
 use std::path::Path;
+use std::sync::{Arc, LazyLock};
 
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::WireError;
@@ -12,7 +13,8 @@ use sbdp_ipc::summary::SummaryView;
 
 use crate::config::Config;
 use crate::daemon::uploaded_assembly;
-use crate::geometry::{self, Assembly, SourceAssembly, SourceMesh, SourcePart};
+use crate::geometry::{self, Assembly, SourceAssembly, SourceMesh, SourcePart, Surface};
+use crate::sdf;
 use crate::view::{self, Scene, Up, read_plan};
 
 /// A reader.
@@ -38,6 +40,8 @@ pub enum Reader {
     Config,
     /// Records of the cache.
     Records,
+    /// Files of distance fields.
+    Fields,
     /// `daemon.json`.
     Endpoint,
     /// Plans as JSON, told and drawn.
@@ -46,7 +50,7 @@ pub enum Reader {
 
 impl Reader {
     /// All of them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Messages,
         Self::Meshes,
         Self::Admission,
@@ -57,6 +61,7 @@ impl Reader {
         Self::Manifest,
         Self::Config,
         Self::Records,
+        Self::Fields,
         Self::Endpoint,
         Self::Plan,
     ];
@@ -83,12 +88,25 @@ impl Reader {
                 .map_or_else(|e| e.to_string(), |t| geometry::parse_notes(&t)),
             Self::Config => String::from_utf8(bytes.to_vec()).map_or_else(|e| e.to_string(), |t| config(&t)),
             Self::Records => format!("{:?}", crate::cache::read_as_records(bytes)),
+            Self::Fields => SOLID.as_ref().map_or_else(String::new, |solid| sdf::read_as_field(solid, bytes)),
             Self::Endpoint => {
                 said(serde_json::from_slice::<sbdp_ipc::endpoint::Endpoint>(bytes).map_err(|e| e.to_string()))
             }
             Self::Plan => String::from_utf8(bytes.to_vec()).map_or_else(|e| e.to_string(), |t| plan(&t)),
         }
     }
+}
+
+/// Of this are the fields.
+static SOLID: LazyLock<Option<Arc<Surface>>> = LazyLock::new(|| {
+    let part = SourcePart { name: "a".into(), origin: "a.obj".into(), mesh: tetrahedron() };
+    Some(Arc::new(Surface::new(&geometry::heal(&part).ok()?.mesh)))
+});
+
+/// A file of a distance field for [`Reader::Fields`], as it should be.
+#[must_use]
+pub fn field_file() -> Vec<u8> {
+    SOLID.as_ref().map_or_else(Vec::new, sdf::a_field_file)
 }
 
 fn said<T>(result: Result<T, String>) -> String {

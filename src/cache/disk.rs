@@ -16,6 +16,7 @@ use std::time::{Duration, Instant};
 use redb::Database;
 
 use super::fields::FieldFiles;
+use super::file;
 use super::kind::{Key, Kind};
 use super::tables::{Failure, Listed, Tables, agree, grew, listed, make_tables, read, write};
 use super::tally::Tally;
@@ -23,8 +24,6 @@ use crate::sdf::Field;
 
 const FILE: &str = "records.redb";
 const DAMAGED: &str = "records.redb.damaged";
-/// redb's own cache of pages.
-const PAGE_CACHE: usize = 16 << 20;
 /// Of the budget, what the files of fields may take: the rest is for the file of records.
 const FOR_FIELDS: f64 = 0.25;
 /// Of a file that has become too large all the same, so much of what records may take is left.
@@ -128,7 +127,7 @@ impl Disk {
 
     fn database_at(&self) -> Result<Database, Failure> {
         contained(|| {
-            let database = Database::builder().set_cache_size(PAGE_CACHE).create(self.folder.join(FILE))?;
+            let database = file::database_at(&self.folder.join(FILE))?;
             // Nobody else writes to the folder from here on.
             let files = self.fields.look().map_err(|e| Failure::Io(e.to_string()))?;
             make_tables(&database, &files)?;

@@ -17,6 +17,7 @@
 mod answer;
 mod disk;
 mod fields;
+mod file;
 mod format;
 mod healed;
 mod hostile;

@@ -17,17 +17,27 @@ use crate::sdf::Field;
 const MOST_WAITING: usize = 16_384;
 /// … of so many bytes in all, and one more: a large mesh is one record.
 const MOST_BYTES: usize = 64 << 20;
+/// And fields of so many, and one more: who evicted one has not freed its memory as long as it waits here.
+const MOST_FIELD_BYTES: usize = 32 << 20;
 /// A transaction has at most so many bytes, so that a crash costs little.
 const BATCH: usize = 4 << 20;
 /// So long is waited for more, because each transaction waits for the disk.
 const GATHER: Duration = Duration::from_millis(20);
+
+/// Bytes of what waits. Fields, which can be handed over another time, take no room from records.
+#[derive(Debug, Default)]
+struct Room {
+    records: AtomicUsize,
+    fields: AtomicUsize,
+}
 
 /// A record in its envelope.
 type Waiting = (Key, Vec<u8>);
 
 enum Message {
     Record(Key, Vec<u8>),
-    Field(Key, Arc<Field>),
+    /// With the bytes that it had when it was handed over.
+    Field(Key, Arc<Field>, usize),
     Flush(SyncSender<()>),
 }
 
@@ -36,7 +46,7 @@ enum Message {
 pub(super) struct Writer {
     sender: Option<SyncSender<Message>>,
     thread: Option<JoinHandle<()>>,
-    waiting: Arc<AtomicUsize>,
+    waiting: Arc<Room>,
     tally: Arc<Tally>,
 }
 
@@ -44,7 +54,7 @@ impl Writer {
     /// Starts the thread.
     pub(super) fn start(disk: Arc<Disk>, tally: Arc<Tally>) -> std::io::Result<Self> {
         let (sender, receiver) = sync_channel(MOST_WAITING);
-        let waiting = Arc::new(AtomicUsize::new(0));
+        let waiting = Arc::<Room>::default();
         let left = Arc::clone(&waiting);
         let work = move || run(&disk, &receiver, &left);
         let thread = std::thread::Builder::new().name("sbdp-cache".into()).spawn(work)?;
@@ -53,23 +63,25 @@ impl Writer {
 
     /// Hands a record over, or drops it if too much waits.
     pub(super) fn write(&self, key: Key, bytes: Vec<u8>) {
-        let length = bytes.len();
-        let full = self.waiting.fetch_add(length, Ordering::Relaxed) > MOST_BYTES;
-        if full || !self.handed_over(Message::Record(key, bytes)) {
-            self.waiting.fetch_sub(length, Ordering::Relaxed);
-            self.too_much();
-        }
+        let room = (&self.waiting.records, MOST_BYTES);
+        self.hand_over(room, bytes.len(), Message::Record(key, bytes));
     }
 
-    /// Hands a field over, of which the thread writes what is known then.
+    /// Hands a field over, of which the thread writes what is known then, or leaves it if too much waits: what
+    /// is new in it can be handed over another time.
     pub(super) fn write_field(&self, key: Key, field: Arc<Field>) {
-        if !self.handed_over(Message::Field(key, field)) {
-            self.too_much();
-        }
+        let bytes = field.memory();
+        let room = (&self.waiting.fields, MOST_FIELD_BYTES);
+        self.hand_over(room, bytes, Message::Field(key, field, bytes));
     }
 
-    fn handed_over(&self, message: Message) -> bool {
-        self.sender.as_ref().is_some_and(|sender| sender.try_send(message).is_ok())
+    fn hand_over(&self, (waiting, most): (&AtomicUsize, usize), bytes: usize, message: Message) {
+        let full = waiting.fetch_add(bytes, Ordering::Relaxed) > most;
+        let taken = |sender: &SyncSender<Message>| sender.try_send(message).is_ok();
+        if full || !self.sender.as_ref().is_some_and(taken) {
+            waiting.fetch_sub(bytes, Ordering::Relaxed);
+            self.too_much();
+        }
     }
 
     fn too_much(&self) {
@@ -104,11 +116,12 @@ impl Drop for Writer {
     }
 }
 
-fn run(disk: &Disk, receiver: &Receiver<Message>, waiting: &AtomicUsize) {
+fn run(disk: &Disk, receiver: &Receiver<Message>, waiting: &Room) {
     while let Ok(first) = receiver.recv() {
         let batch = gathered(receiver, first);
         disk.write(&batch.records, &batch.fields);
-        waiting.fetch_sub(batch.bytes, Ordering::Relaxed);
+        waiting.records.fetch_sub(batch.bytes, Ordering::Relaxed);
+        waiting.fields.fetch_sub(batch.field_bytes, Ordering::Relaxed);
         if let Some(flushed) = batch.flushed {
             // Whoever asked may have given up waiting.
             let _gone = flushed.send(());
@@ -124,6 +137,8 @@ struct Batch {
     /// Bytes of these.
     bytes: usize,
     fields: HashMap<Key, Arc<Field>>,
+    /// Bytes of these, one that came twice counted twice.
+    field_bytes: usize,
     /// Who waits for it.
     flushed: Option<SyncSender<()>>,
 }
@@ -139,7 +154,8 @@ fn gathered(receiver: &Receiver<Message>, first: Message) -> Batch {
                 batch.bytes += payload.len();
                 batch.records.push((key, payload));
             }
-            Some(Message::Field(key, field)) => {
+            Some(Message::Field(key, field, bytes)) => {
+                batch.field_bytes += bytes;
                 batch.fields.insert(key, field);
             }
             Some(Message::Flush(done)) => return Batch { flushed: Some(done), ..batch },
@@ -152,5 +168,42 @@ fn gathered(receiver: &Receiver<Message>, first: Message) -> Batch {
             Ok(message) => next = Some(message),
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => return batch,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::kind::{Digest, Kind};
+    use super::*;
+    use crate::fixtures::{ball, surface};
+
+    #[test]
+    fn fields_that_wait_count_as_what_they_keep_in_memory() {
+        let field = Arc::new(Field::of(&Arc::new(surface(ball(3)))));
+        // Looking at it builds it.
+        assert!(field.bricks() > 0);
+        let bytes = field.memory();
+        assert!(bytes * MOST_WAITING > 2 * MOST_FIELD_BYTES, "{bytes}");
+        // Nobody takes anything out.
+        let (sender, receiver) = sync_channel(MOST_WAITING);
+        let (waiting, tally) = (Arc::<Room>::default(), Arc::<Tally>::default());
+        let writer = Writer {
+            sender: Some(sender),
+            thread: None,
+            waiting: Arc::clone(&waiting),
+            tally: Arc::clone(&tally),
+        };
+        let key = Digest::new().integer(1).key(Kind::Field);
+        let fit = MOST_FIELD_BYTES / bytes + 1;
+        (0..fit + 5).for_each(|_| writer.write_field(key, Arc::clone(&field)));
+        assert_eq!((Arc::strong_count(&field), tally.overflows.count()), (1 + fit, 5));
+        assert_eq!(waiting.fields.load(Ordering::Relaxed), fit * bytes);
+        writer.write(key, vec![0; 100]);
+        assert_eq!(tally.overflows.count(), 5, "there is room for records all the same");
+        let mut taken = 0;
+        while taken < fit * bytes {
+            taken += gathered(&receiver, receiver.recv().unwrap()).field_bytes;
+        }
+        assert_eq!((taken, Arc::strong_count(&field)), (fit * bytes, 1));
     }
 }

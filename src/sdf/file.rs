@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 use std::mem::offset_of;
-use std::ops::Deref;
+use std::ops::{Deref, Range};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
@@ -76,13 +76,22 @@ struct Tables<'f> {
 impl<'f> Tables<'f> {
     /// `None` where anything is not as `FORMAT.md` says, bricks aside.
     fn of(bytes: &'f [u8], key: &[u8; 32]) -> Option<Self> {
+        let file = Self::laid_out(bytes)?;
+        let Header { magic, version, key: theirs, .. } = file.header;
+        let Range { start, end } = file.padding();
+        let ours = magic == MAGIC && version == VERSION && theirs == *key;
+        let intact = bytes.len() == file.bricks.end()
+            && bytes[start..end].iter().all(|&b| b == 0)
+            && file.header.checksum == checksum([&bytes[..CHECKSUM_AT], &bytes[HEADER..start]]);
+        (ours && intact).then_some(file)
+    }
+
+    /// Where tables are, going by what a header says; `None` if they are not all there.
+    fn laid_out(bytes: &'f [u8]) -> Option<Self> {
         let header: Header = bytemuck::pod_read_unaligned(bytes.get(..HEADER)?);
-        let Header { magic, version, dims, triangles, near, pairs, filled, open, .. } = header;
-        if magic != MAGIC || version != VERSION || header.key != *key || open > 1 {
-            return None;
-        }
+        let Header { dims, triangles, near, pairs, filled, open, .. } = header;
         let slots = dims.iter().try_fold(1, |n: usize, &d| n.checked_mul(d as usize))?;
-        if slots > MOST_SLOTS {
+        if slots > MOST_SLOTS || open > 1 {
             return None;
         }
         let mut end = HEADER;
@@ -97,12 +106,15 @@ impl<'f> Tables<'f> {
         let pairs = table(pairs as usize, size_of::<u32>())?;
         let checksums = table(filled as usize, size_of::<Checksum>())?;
         let insides = table(slots * open as usize, 1)?;
-        let at = end.next_multiple_of(ALIGNMENT);
-        let bricks = Bricks { filled, triangles, checksums_at: end - insides.len() - checksums.len(), at };
-        let intact = bytes.len() == bricks.end()
-            && bytes[end..at].iter().all(|&b| b == 0)
-            && header.checksum == checksum([&bytes[..CHECKSUM_AT], &bytes[HEADER..end]]);
-        intact.then_some(Self { header, far, near, pairs, insides, bricks })
+        let checksums_at = end - insides.len() - checksums.len();
+        let bricks = Bricks { filled, triangles, checksums_at, at: end.next_multiple_of(ALIGNMENT) };
+        (bricks.at <= bytes.len()).then_some(Self { header, far, near, pairs, insides, bricks })
+    }
+
+    /// Between the tables and the bricks.
+    fn padding(&self) -> Range<usize> {
+        let Bricks { filled, checksums_at, at, .. } = self.bricks;
+        checksums_at + filled as usize * size_of::<Checksum>() + self.insides.len()..at
     }
 
     /// The triangles near all bricks, unless one is not there.
@@ -337,5 +349,6 @@ fn checksum<'b>(pieces: impl IntoIterator<Item = &'b [u8]>) -> Checksum {
     sum
 }
 
+pub(crate) mod hostile;
 #[cfg(test)]
 mod tests;

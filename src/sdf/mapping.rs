@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use memmap2::Mmap;
+use memmap2::{Mmap, MmapMut};
 
 /// What a process has mapped, and what it found damaged in it.
 #[derive(Debug, Default)]
@@ -52,6 +52,18 @@ impl Mapping {
         let bytes = unsafe { Mmap::map(&file) }?;
         tally.bytes.fetch_add(bytes.len() as u64, Ordering::Relaxed);
         Ok(Self { bytes, tally: Arc::clone(tally) })
+    }
+
+    /// A copy of bytes, aligned as a file would be.
+    ///
+    /// # Errors
+    /// There is no memory for it, or there are no bytes.
+    pub(super) fn of_copy(bytes: &[u8]) -> io::Result<Self> {
+        let mut copy = MmapMut::map_anon(bytes.len())?;
+        copy.copy_from_slice(bytes);
+        let tally = Arc::<MappingTally>::default();
+        tally.bytes.fetch_add(bytes.len() as u64, Ordering::Relaxed);
+        Ok(Self { bytes: copy.make_read_only()?, tally })
     }
 
     /// Something in it is not what was written.

@@ -20,6 +20,7 @@ mod rim;
 mod tests;
 
 pub use field::{Field, FieldStore};
+pub(crate) use file::hostile::{a_field_file, read_as_field};
 pub use file::is_intact;
 pub use grid::{Estimate, FieldSample, Grid};
 pub use mapping::{Mapping, MappingTally};

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use sbdp::hostile_input::Reader;
+use sbdp::hostile_input::{Reader, field_file};
 use sbdp_ipc::endpoint::Endpoint;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, Part, Vertices};
@@ -65,6 +65,7 @@ fn built_in(reader: Reader) -> Vec<Vec<u8>> {
             b"[[1.0, 2.0, 3.0]]".to_vec(),
         ],
         Reader::Records => records(),
+        Reader::Fields => vec![field_file()],
         Reader::Endpoint => {
             let endpoint = Endpoint::of_this_process("sbdp_x_", Path::new("/tmp/iox"));
             vec![serde_json::to_vec(&endpoint).unwrap_or_default()]
