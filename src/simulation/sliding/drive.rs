@@ -53,7 +53,8 @@ const ROWS_POLL: u32 = 16;
 
 /// What a step asks about its surroundings.
 pub(super) trait Around {
-    /// What is near a mover's pose: at least all contacts that are deeper than the engine lets them.
+    /// What is near a mover's pose: if any contacts are deeper than the engine lets them, some of these at
+    /// least.
     fn near(&mut self, mover: &Mover<'_>) -> Near;
 
     /// Takes contacts in that were found at other poses and may matter at the mover's, too.
