@@ -31,6 +31,8 @@ pub struct FreeRegion {
     centre: Point3<f64>,
     radius: f64,
     sides: Vec<HalfSpace>,
+    /// The triangle in front of which each side is; none for those of a region that is known from elsewhere.
+    triangles: Vec<u32>,
     /// A point well inside, which is outside the surface.
     inner: Point3<f64>,
 }
@@ -67,7 +69,7 @@ impl FreeRegion {
         sides: impl IntoIterator<Item = (Vector3<f64>, f64)>,
     ) -> Self {
         let sides = sides.into_iter().map(|(normal, height)| HalfSpace { normal, height }).collect();
-        Self { centre, radius, sides, inner: centre }
+        Self { centre, radius, sides, triangles: Vec::new(), inner: centre }
     }
 
     /// How far a point is inside all sides and the ball; negative outside.
@@ -137,9 +139,10 @@ impl FreeRegion {
         None
     }
 
-    /// The unit normals of the planes that bound it, which point inside.
-    pub fn normals(&self) -> impl Iterator<Item = Vector3<f64>> {
-        self.sides.iter().map(|side| side.normal)
+    /// The unit normals of the planes that bound a region that was grown, which point inside, and the triangle
+    /// in front of which each of them is.
+    pub fn planes(&self) -> impl Iterator<Item = (Vector3<f64>, u32)> {
+        self.sides.iter().map(|side| side.normal).zip(self.triangles.iter().copied())
     }
 
     /// The middle of the ball that it was asked for in.
@@ -230,7 +233,8 @@ impl Surface {
         spared: f64,
     ) -> Result<FreeRegion, NoRegion> {
         let most = wanted.most;
-        let (region, nearest) = grown(self, seed, radius, wanted, spared)?;
+        let region = grown(self, seed, radius, wanted, spared)?;
+        let nearest = region.triangles.first().copied().unwrap_or(0);
         // No surface passes through: all of the region is where one point well inside is. (A region
         // too thin to have one may follow the plane of a face into the solid.)
         let inner = region.nearest_within(seed, most + 4.0 * INNER, INNER).ok_or(NoRegion::Cramped)?;

@@ -19,15 +19,14 @@ const INSET: f64 = 0.02;
 /// A triangle's own plane is taken if this share of what the best one leaves is left before it.
 const OWN: f64 = 0.15;
 
-/// A ball about `seed` cut by planes in front of all triangles of a surface that it meets, and the triangle of
-/// the first of these.
+/// A ball about `seed` cut by planes in front of all triangles of a surface that it meets.
 pub(super) fn grown(
     surface: &Surface,
     seed: &Point3<f64>,
     radius: f64,
     wanted: Wanted<'_>,
     spared: f64,
-) -> Result<(FreeRegion, u32), NoRegion> {
+) -> Result<FreeRegion, NoRegion> {
     let reach = wanted.points.iter().map(|p| (p - seed).norm()).fold(0.0, f64::max);
     let mut growth = Growth {
         surface,
@@ -36,16 +35,21 @@ pub(super) fn grown(
         cloud: Cloud::new(wanted.points, seed),
         inset: Vec::new(),
         least: (radius * 0.5).max(reach - wanted.most),
-        nearest: None,
-        region: FreeRegion { centre: *seed, radius, sides: Vec::with_capacity(8), inner: *seed },
+        region: FreeRegion {
+            centre: *seed,
+            radius,
+            sides: Vec::with_capacity(8),
+            triangles: Vec::with_capacity(8),
+            inner: *seed,
+        },
         amid: None,
     };
     surface.nearest_first(seed, &mut growth);
-    let Growth { region, nearest, least, amid, .. } = growth;
+    let Growth { region, least, amid, .. } = growth;
     match amid {
         Some(triangle) => Err(NoRegion::Amid(triangle)),
         None if region.radius < least => Err(NoRegion::Cramped),
-        None => Ok((region, nearest.unwrap_or(0))),
+        None => Ok(region),
     }
 }
 
@@ -65,8 +69,6 @@ struct Growth<'a> {
     inset: Vec<Point3<f64>>,
     /// A smaller region is not worth having: some wanted point is further than [`Wanted::most`] from it.
     least: f64,
-    /// The triangle of the first side.
-    nearest: Option<u32>,
     region: FreeRegion,
     /// The triangle that ended it.
     amid: Option<u32>,
@@ -213,8 +215,8 @@ impl Visitor for Growth<'_> {
         match best {
             // What cannot be held for this triangle cannot be held at all.
             Some((worth, side)) if worth >= -self.wanted.most && self.region.sides.len() < MOST_PLANES => {
-                self.nearest.get_or_insert(triangle);
                 self.region.sides.push(side);
+                self.region.triangles.push(triangle);
             }
             Some((worth, _)) if worth < -self.wanted.most => {
                 self.amid = Some(triangle);

@@ -2,10 +2,13 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::facing::{Facing, Obstacle, Piece, SUNK, TILT};
+use super::facing::{Facing, Obstacle, Piece, Placed, SUNK, TILT, Witness};
 
 /// A plane nearer than this is touched.
 pub(super) const TOUCHED: f64 = 1e-6;
+
+/// So many points of a piece are looked at before each plane that it touches.
+const MOST_LOWEST: usize = 8;
 
 /// What a cell is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +39,8 @@ pub(super) struct Cell {
 pub(super) struct Limit {
     pub(super) normal: Vector3<f64>,
     pub(super) height: f64,
+    /// The triangle of the measured surface that it keeps the piece in front of.
+    pub(super) triangle: u32,
 }
 
 impl Cell {
@@ -73,6 +78,42 @@ impl Cell {
         blocking.map(|l| Obstacle { normal: l.normal, other: pair.other }).collect()
     }
 
+    /// What is certainly in the way of a shift from `at` along `u`: what the points of the piece enter that are
+    /// lowest before limits no further off than `reach`, or what gets over the triangles of these. Points that show
+    /// it are added to `witnesses`.
+    pub(super) fn touched(
+        &self,
+        pair: &Facing<'_>,
+        (at, u): (&Vector3<f64>, &Vector3<f64>),
+        reach: f64,
+        placed: &mut Placed,
+        witnesses: &mut Vec<Witness>,
+    ) -> Vec<Obstacle> {
+        let Spot { piece, guess, .. } = &self.spot;
+        let ahead = || self.limits.iter().filter(|limit| limit.is_ahead(at, u, reach));
+        if ahead().next().is_none() {
+            return Vec::new();
+        }
+        pair.place(piece, at, placed);
+        let mut probes = Vec::new();
+        for limit in ahead() {
+            let inward = pair.shifted * limit.normal;
+            let heights = placed.points.iter().map(|p| (inward.dot(&p.coords), p));
+            let lowest = heights.clone().map(|(height, _)| height).fold(f64::INFINITY, f64::min);
+            let touching = heights.filter(|(height, _)| *height <= lowest + TOUCHED);
+            probes.extend(touching.take(MOST_LOWEST).map(|(_, p)| *p));
+        }
+        let by_points = pair.obstacles(&probes, (at, u), *guess, witnesses);
+        if !by_points.is_empty() {
+            return by_points;
+        }
+        let guess = pair.triangle_of(piece).unwrap_or(0);
+        ahead()
+            .find_map(|limit| pair.obstacle_of_triangle(limit.triangle, (at, u), guess))
+            .into_iter()
+            .collect()
+    }
+
     /// Whether there is nothing left to go on `u`.
     pub(super) fn is_exhausted(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> bool {
         let from = at - self.middle;
@@ -86,6 +127,11 @@ impl Limit {
     }
 
     fn blocks(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> bool {
-        self.normal.dot(u) < -TILT && self.gap(at) <= TOUCHED
+        self.is_ahead(at, u, TOUCHED)
+    }
+
+    /// Whether a shift along the unit vector `u` ends there, no further off than `reach`.
+    pub(super) fn is_ahead(&self, at: &Vector3<f64>, u: &Vector3<f64>, reach: f64) -> bool {
+        self.normal.dot(u) < -TILT && self.gap(at) <= reach
     }
 }

@@ -17,13 +17,13 @@ use crate::geometry::Pose;
 use crate::termination::{Interrupt, Termination};
 
 use super::super::Scene;
-use super::cell::{Cell, Spot};
+use super::cell::{Cell, TOUCHED};
 use super::drive::FREE_STEP;
-use super::facing::{Facing, Obstacle, Witness};
+use super::facing::{Facing, Obstacle, Placed, Witness};
 use super::finder::{Finder, HELD_AT_FIRST};
 use super::kept::{Gathered, Place, Way};
 
-/// So many regions are looked for on one side of a pair before the other is tried; then twice as
+/// So many regions are looked for on one side of a pair before as many are on the other; then twice as
 /// many, and so on.
 const FIRST_BUDGET: usize = 16;
 /// Where more overlap than this is granted, facets lie across each other, and regions tell little.
@@ -301,31 +301,30 @@ fn gathered(
     termination: &Termination,
 ) -> Result<Gathered, Interrupt> {
     let &Place { part, start, other, .. } = place;
-    let mut sides = Facing::asked_first(scene, part, other);
-    let mut budget = FIRST_BUDGET;
-    let mut regions = 0;
+    let facing = |asks_part| Facing::new(scene, (part, start), other, asks_part, termination);
+    let sides = Facing::asked_first(scene, part, other).into_iter();
+    let sides: Vec<Facing<'_>> = sides.map(facing).collect::<Result<_, _>>()?;
+    let mut finders: Vec<Finder<'_>> = sides.iter().map(|side| Finder::of_all(side, termination)).collect();
     // The one inside the other, or the plainer one, needs fewer pieces: which, shows in trying.
-    while let Some(asks_part) = sides.pop() {
-        let facing = Facing::new(scene, (part, start), other, asks_part, termination)?;
-        let most = if sides.is_empty() { MOST_REGIONS } else { budget };
-        let mut finder = Finder::new(&facing, most, termination);
-        let root = facing.root().map(|piece| Spot { piece, guess: 0, level: 0, held: HELD_AT_FIRST });
-        let found = root.map_or(Ok(()), |root| finder.find(root, at, &Vector3::zeros()));
-        regions += finder.regions;
-        match found {
-            Ok(()) => {
-                let cells = Some(Arc::new(finder.cells));
-                return Ok(Gathered { asks_part, cells, regions });
+    let mut budget = if sides.len() > 1 { FIRST_BUDGET } else { MOST_REGIONS };
+    while budget <= MOST_REGIONS {
+        for i in 0..finders.len() {
+            let found = finders[i].gather(at, budget);
+            let regions = finders.iter().map(|finder| finder.regions).sum();
+            let asks_part = sides[i].asks_part;
+            match found {
+                Ok(true) => {
+                    let cells = Some(Arc::new(std::mem::take(&mut finders[i].cells)));
+                    return Ok(Gathered { asks_part, cells, regions });
+                }
+                Ok(false) => {}
+                Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
+                Err(_) => return Ok(Gathered { asks_part, cells: None, regions }),
             }
-            Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
-            Err(_) if finder.regions >= most && !sides.is_empty() => {
-                sides.insert(0, asks_part);
-                budget *= 2;
-            }
-            Err(_) => break,
         }
+        budget *= 2;
     }
-    Ok(Gathered { asks_part: true, cells: None, regions })
+    Ok(Gathered { asks_part: true, cells: None, regions: MOST_REGIONS })
 }
 
 /// What became of making way.
@@ -340,6 +339,18 @@ struct Made {
     regions: usize,
 }
 
+/// What is certainly in the way, as the first pieces show that touch something ahead. Where overlap is granted,
+/// regions let pieces go on by what is left of that: it leads nowhere.
+fn touched(facing: &Facing<'_>, cells: &[Cell], way: (&Vector3<f64>, &Vector3<f64>)) -> Made {
+    let reach = if facing.allowance > 0.0 { HELD_AT_FIRST } else { TOUCHED };
+    let mut made = Made { blocked: Vec::new(), witnesses: Vec::new(), found: 0, regions: 0 };
+    let mut placed = Placed::default();
+    let of_cell = |cell: &Cell| cell.touched(facing, way, reach, &mut placed, &mut made.witnesses);
+    let found = cells.iter().map(of_cell).filter(|found| !found.is_empty()).take(1).flatten();
+    made.blocked = found.map(|obstacle| obstacle.normal).collect();
+    made
+}
+
 /// Makes way for a pair.
 fn make_way(
     facing: &Facing<'_>,
@@ -348,6 +359,10 @@ fn make_way(
     most: usize,
     termination: &Termination,
 ) -> Result<Made, Halt> {
+    let touching = touched(facing, cells, (at, u));
+    if !touching.blocked.is_empty() {
+        return Ok(touching);
+    }
     let ends = |cell: &Cell| cell.blocks(at, u) || cell.is_exhausted(at, u);
     if !cells.iter().any(ends) {
         return Ok(Made { blocked: Vec::new(), witnesses: Vec::new(), found: 0, regions: 0 });

@@ -101,12 +101,12 @@ impl<'a> Facing<'a> {
     }
 
     /// Which sides of a pair can be asked, as what is closed can be measured: whether it is the
-    /// part's. The smaller surface is the last of the list, to be asked first.
+    /// part's. The smaller surface is the first.
     pub(super) fn asked_first(scene: &Scene, part: usize, other: usize) -> Vec<bool> {
         let surface = |i: usize| &scene.bodies[i].shape.surface;
         let size = |i: usize| surface(i).bounds().extents().product();
         let mine_first = size(part) <= size(other);
-        let mut sides = vec![!mine_first, mine_first];
+        let mut sides = vec![mine_first, !mine_first];
         sides.retain(|&asks_part| !surface(if asks_part { other } else { part }).is_open());
         sides
     }
@@ -240,35 +240,30 @@ impl<'a> Facing<'a> {
     /// The face that a point gets into when the part moves along a unit vector, and its triangle.
     fn obstacle(&self, p: &Point3<f64>, along: &Vector3<f64>, guess: u32) -> Option<(Obstacle, u32)> {
         let ahead = self.shifted * along;
-        let depth = |p: &Point3<f64>, guess: u32| {
-            let closest = self.measured.closest_from(p, guess);
-            (-self.measured.signed(p, &closest), closest)
-        };
-        let (now, closest) = depth(p, guess);
-        let (mut least, mut most): (Option<Vector3<f64>>, Option<Vector3<f64>>) = (None, None);
-        self.measured.feature_normals(&closest, |n| {
-            let speed = n.dot(&ahead);
-            if least.is_none_or(|m| speed > m.dot(&ahead)) {
-                least = Some(n);
-            }
-            if most.is_none_or(|m| speed < m.dot(&ahead)) {
-                most = Some(n);
-            }
-        });
-        let blocking = |n: &Vector3<f64>| n.dot(&ahead) < -TILT;
-        // What touches enters below all faces that it touches, at however small an angle.
-        let touches = (-TOUCHED..=HELD).contains(&(now - self.allowance));
-        let is_certain = touches && least.as_ref().is_some_and(blocking) || {
-            let (then, _) = depth(&(p + ahead * PROBE), closest.triangle);
-            then > now.max(self.allowance) + INSIDE * PROBE
-        };
-        if !is_certain {
+        let (normal, triangle) = entered(self.measured, (p, &ahead), guess, self.allowance)?;
+        Some((Obstacle { normal: self.shifted.transpose() * normal, other: self.other }, triangle))
+    }
+
+    /// The face of the asked surface that gets over a corner of a measured triangle, or the middle of one of its
+    /// sides: a long face may have its own corners far from where it touches.
+    pub(super) fn obstacle_of_triangle(
+        &self,
+        triangle: u32,
+        (at, along): (&Vector3<f64>, &Vector3<f64>),
+        guess: u32,
+    ) -> Option<Obstacle> {
+        if self.asked.is_open() {
             return None;
         }
-        // Before a convex edge either face is enough to stay above; if that does not help, it is
-        // a reentrant one.
-        let n = least.filter(blocking).or(most.filter(blocking))?;
-        Some((Obstacle { normal: self.shifted.transpose() * n, other: self.other }, closest.triangle))
+        let here = Translation3::from(self.shifted * at) * self.measured_from_asked;
+        let ahead = -here.inverse_transform_vector(&(self.shifted * along));
+        let corners = self.measured.corners(triangle);
+        let middles = [0, 1, 2].map(|i| nalgebra::center(&corners[i], &corners[(i + 1) % 3]));
+        corners.iter().chain(&middles).find_map(|p| {
+            let p = here.inverse_transform_point(p);
+            let (normal, _) = entered(self.asked, (&p, &ahead), guess, self.allowance)?;
+            Some(Obstacle { normal: self.shifted.transpose() * (here * -normal), other: self.other })
+        })
     }
 
     /// Points of a piece that are likely to get inside first: corners in front, and the
@@ -306,6 +301,42 @@ impl<'a> Facing<'a> {
     }
 }
 
+/// The normal of the face of a surface that a point certainly gets deeper into than is granted on its way along a
+/// unit vector, and the triangle that it is nearest to.
+fn entered(
+    surface: &Surface,
+    (p, ahead): (&Point3<f64>, &Vector3<f64>),
+    guess: u32,
+    allowance: f64,
+) -> Option<(Vector3<f64>, u32)> {
+    let depth = |p: &Point3<f64>, guess: u32| {
+        let closest = surface.closest_from(p, guess);
+        (-surface.signed(p, &closest), closest)
+    };
+    let (now, closest) = depth(p, guess);
+    let (mut least, mut most): (Option<Vector3<f64>>, Option<Vector3<f64>>) = (None, None);
+    surface.feature_normals(&closest, |n| {
+        let speed = n.dot(ahead);
+        if least.is_none_or(|m| speed > m.dot(ahead)) {
+            least = Some(n);
+        }
+        if most.is_none_or(|m| speed < m.dot(ahead)) {
+            most = Some(n);
+        }
+    });
+    let blocking = |n: &Vector3<f64>| n.dot(ahead) < -TILT;
+    // What touches enters below all faces that it touches, at however small an angle.
+    let touches = (-TOUCHED..=HELD).contains(&(now - allowance));
+    let is_certain = touches && least.as_ref().is_some_and(blocking) || {
+        let (then, _) = depth(&(p + ahead * PROBE), closest.triangle);
+        then > now.max(allowance) + INSIDE * PROBE
+    };
+    // Before a convex edge either face is enough to stay above; if that does not help, it is
+    // a reentrant one.
+    let normal = is_certain.then_some(least.filter(blocking).or(most.filter(blocking))?)?;
+    Some((normal, closest.triangle))
+}
+
 fn ball_of(corners: &[Point3<f64>; 3]) -> (Point3<f64>, f64) {
     let centre = Point3::from(corners.iter().map(|p| p.coords).sum::<Vector3<f64>>() / 3.0);
     (centre, corners.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max))
@@ -336,4 +367,35 @@ pub(super) struct Placed {
     /// A ball that holds it.
     pub(super) centre: Point3<f64>,
     pub(super) radius: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{cells, cuboid, scene};
+
+    #[test]
+    fn a_long_pin_touches_with_its_faces_where_it_has_no_corners() {
+        // A square pin through a plate: the plate's corners about the hole lie on the pin's faces.
+        let plate = cells([&[-2.0, -0.5, 0.5, 2.0], &[-2.0, -0.5, 0.5, 2.0], &[-0.5, 0.5]], |c| {
+            c[0] != 1 || c[1] != 1
+        });
+        let pin = cuboid([-0.5, -0.5, -4.0], [0.5, 0.5, 4.0]);
+        let (scene, _) = scene([plate, pin]);
+        let start = scene.bodies[1].planning_from_shape;
+        let pair = Facing::new(&scene, (1, &start), 0, true, &Termination::default()).unwrap();
+        let mut placed = Placed::default();
+        let still = Vector3::zeros();
+        pair.place(&pair.root().unwrap(), &still, &mut placed);
+        for u in [Vector3::x(), -Vector3::y(), Vector3::new(0.6, 0.8, 0.0), Vector3::z(), -Vector3::z()] {
+            assert!(pair.obstacles(&placed.points, (&still, &u), 0, &mut Vec::new()).is_empty());
+            let of_triangle = |t| pair.obstacle_of_triangle(t, (&still, &u), 0);
+            let found = (0..pair.measured.triangles().len() as u32).filter_map(of_triangle);
+            let found: Vec<Obstacle> = found.collect();
+            assert_eq!(found.is_empty(), u.z != 0.0, "{u}");
+            for Obstacle { normal, other } in found {
+                assert!(other == 0 && normal.dot(&u) < 0.0 && normal.z.abs() < 1e-9, "{normal}");
+            }
+        }
+    }
 }

@@ -63,11 +63,21 @@ pub(super) struct Finder<'a> {
     pub(super) obstacles: Vec<Vector3<f64>>,
     /// Points that show it.
     pub(super) witnesses: Vec<Witness>,
+    /// Pieces that are to get cells yet, of those that are to have some where they are; the next one last.
+    waiting: Vec<Spot>,
     /// The piece at hand.
     placed: Placed,
 }
 
 impl<'a> Finder<'a> {
+    /// A search for cells of all of the asked surface.
+    pub(super) fn of_all(pair: &'a Facing<'a>, termination: &'a Termination) -> Self {
+        let mut finder = Self::new(pair, 0, termination);
+        let all = pair.root().map(|piece| Spot { piece, guess: 0, level: 0, held: HELD_AT_FIRST });
+        finder.waiting.extend(all);
+        finder
+    }
+
     pub(super) fn new(pair: &'a Facing<'a>, budget: usize, termination: &'a Termination) -> Self {
         Self {
             termination,
@@ -77,11 +87,38 @@ impl<'a> Finder<'a> {
             cells: Vec::new(),
             obstacles: Vec::new(),
             witnesses: Vec::new(),
+            waiting: Vec::new(),
             placed: Placed::default(),
         }
     }
 
-    /// Finds cells for a piece at a shift, as free along the unit vector `u`, or around it, as can be.
+    /// Goes on to find cells for [all](Self::of_all) pieces at a shift, as free around it as can be, with no more
+    /// than so many regions in all. Whether that was enough.
+    pub(super) fn gather(&mut self, at: &Vector3<f64>, budget: usize) -> Result<bool, Halt> {
+        let wish = Wish { at: *at, along: Vector3::zeros() };
+        self.budget = budget;
+        while let Some(mut spot) = self.waiting.pop() {
+            self.termination.check()?;
+            if self.regions >= self.budget {
+                self.waiting.push(spot);
+                return Ok(false);
+            }
+            let seen = self.place(&mut spot, &wish);
+            let free = self.free(&spot, &seen, &wish);
+            let cell = free.or_else(|| self.held(&spot, &seen, &wish, &Vector3::zeros()).ok());
+            if let Some(cell) = cell {
+                self.cells.push(cell);
+            } else if self.is_smallest(&spot) {
+                self.end(&spot, &wish)?;
+            } else {
+                let parts = self.pair.parts(&spot.piece);
+                self.waiting.extend(parts.into_iter().rev().map(|piece| Spot { piece, level: 0, ..spot }));
+            }
+        }
+        Ok(true)
+    }
+
+    /// Finds cells for a piece at a shift, as free along the unit vector `u` as can be.
     pub(super) fn find(&mut self, spot: Spot, at: &Vector3<f64>, u: &Vector3<f64>) -> Result<(), Halt> {
         self.renew(spot, &Wish { at: *at, along: *u })
     }
@@ -90,12 +127,27 @@ impl<'a> Finder<'a> {
     /// is one.
     pub(super) fn far(&mut self, mut spot: Spot, u: &Vector3<f64>, least: f64) -> Option<Cell> {
         let wish = Wish { at: Vector3::zeros(), along: *u };
-        self.pair.place(&spot.piece, &wish.at, &mut self.placed);
-        let seen = look(self.pair, &self.placed.centre, spot.guess);
-        spot.guess = seen.closest.triangle;
+        let seen = self.place(&mut spot, &wish);
         let let_go =
             |level: usize| self.held(&Spot { level, ..spot }, &seen, &wish, &(u * AHEAD[level])).ok();
         (0..SHORT).find_map(let_go).filter(|cell| cell.length(&wish.at, u) > least)
+    }
+
+    /// Takes a piece in hand: what its middle sees.
+    fn place(&mut self, spot: &mut Spot, wish: &Wish) -> Seen {
+        self.pair.place(&spot.piece, &wish.at, &mut self.placed);
+        let seen = look(self.pair, &self.placed.centre, spot.guess);
+        spot.guess = seen.closest.triangle;
+        seen
+    }
+
+    /// A cell for the piece at hand if it is so far off that it needs no region.
+    fn free(&self, spot: &Spot, seen: &Seen, wish: &Wish) -> Option<Cell> {
+        let room = seen.signed - self.placed.radius;
+        let held = if self.pair.allowance > 0.0 { spot.held } else { HELD };
+        let ball = (self.placed.centre, seen.signed);
+        let spot = Spot { held, ..*spot };
+        (room >= FAR).then(|| Cell { spot, limits: Vec::new(), middle: wish.at, room, ball })
     }
 
     fn block(&mut self, by: &[Obstacle]) {
@@ -108,29 +160,12 @@ impl<'a> Finder<'a> {
         if self.regions >= self.budget {
             return Err(Halt::Lost);
         }
-        let pair = self.pair;
-        pair.place(&spot.piece, &wish.at, &mut self.placed);
-        let radius = self.placed.radius;
-        let seen = look(pair, &self.placed.centre, spot.guess);
-        spot.guess = seen.closest.triangle;
-        if seen.signed - radius >= FAR {
-            let limits = Vec::new();
-            spot.held = if pair.allowance > 0.0 { spot.held } else { HELD };
-            let ball = (self.placed.centre, seen.signed);
-            self.cells.push(Cell { spot, limits, middle: wish.at, room: seen.signed - radius, ball });
+        let seen = self.place(&mut spot, wish);
+        if let Some(cell) = self.free(&spot, &seen, wish) {
+            self.cells.push(cell);
             return Ok(());
         }
-        let still = Vector3::zeros();
-        if wish.along == still {
-            return match self.held(&spot, &seen, wish, &still) {
-                Ok(cell) => {
-                    self.cells.push(cell);
-                    Ok(())
-                }
-                Err(_) => self.split(&spot, radius, wish),
-            };
-        }
-        let small = matches!(spot.piece, Piece::Bit(_)) && radius < SMALL;
+        let small = matches!(spot.piece, Piece::Bit(_)) && self.placed.radius < SMALL;
         let let_go = |cells: &mut Self, level: usize| {
             cells.held(&Spot { level, ..spot }, &seen, wish, &(wish.along * AHEAD[level]))
         };
@@ -140,13 +175,13 @@ impl<'a> Finder<'a> {
                 let cell = further.unwrap_or(short);
                 // What gets no further the second time may do so in pieces.
                 if !small && cell.spot.level > 0 && cell.spot.level == spot.level {
-                    return self.split(&spot, radius, wish);
+                    return self.split(&spot, wish);
                 }
                 self.cells.push(cell);
                 return Ok(());
             }
             Err(NoRegion::Amid(t)) if !small && !self.is_beside(&spot, t) => {
-                return self.split(&spot, radius, wish);
+                return self.split(&spot, wish);
             }
             Err(_) => {}
         }
@@ -160,12 +195,12 @@ impl<'a> Finder<'a> {
         let nearer = (SHORT + 1..AHEAD.len()).find_map(|level| let_go(self, level).ok());
         if let Some(cell) = nearer {
             if !small && cell.spot.level == spot.level {
-                return self.split(&spot, radius, wish);
+                return self.split(&spot, wish);
             }
             self.cells.push(cell);
             return Ok(());
         }
-        if let Ok(cell) = self.held(&Spot { level: 0, ..spot }, &seen, wish, &still) {
+        if let Ok(cell) = self.held(&Spot { level: 0, ..spot }, &seen, wish, &Vector3::zeros()) {
             if cell.length(&wish.at, &wish.along) > LEAST_STEP {
                 self.cells.push(cell);
                 return Ok(());
@@ -176,7 +211,7 @@ impl<'a> Finder<'a> {
                 return Err(Halt::Blocked);
             }
         }
-        self.split(&spot, radius, wish)
+        self.split(&spot, wish)
     }
 
     /// Whether a triangle may lie beside the piece at hand.
@@ -185,17 +220,27 @@ impl<'a> Finder<'a> {
         pair.is_beside(&self.placed, triangle, pair.allowance + spot.held)
     }
 
+    /// Whether the piece at hand, without a region, is too small to be split.
+    fn is_smallest(&self, spot: &Spot) -> bool {
+        matches!(spot.piece, Piece::Bit(_)) && self.placed.radius < SMALLEST
+    }
+
+    /// The piece at hand, too small to be split, gets a cell before a face, or is lost.
+    fn end(&mut self, spot: &Spot, wish: &Wish) -> Result<(), Halt> {
+        let cell = self.before_face(spot, wish).ok_or(Halt::Lost)?;
+        let blocked = cell.obstacles(self.pair, &wish.at, &wish.along);
+        if !blocked.is_empty() {
+            self.block(&blocked);
+            return Err(Halt::Blocked);
+        }
+        self.cells.push(cell);
+        Ok(())
+    }
+
     /// Finds cells for the parts of a piece.
-    fn split(&mut self, spot: &Spot, radius: f64, wish: &Wish) -> Result<(), Halt> {
-        if matches!(spot.piece, Piece::Bit(_)) && radius < SMALLEST {
-            let cell = self.before_face(spot, wish).ok_or(Halt::Lost)?;
-            let blocked = cell.obstacles(self.pair, &wish.at, &wish.along);
-            if wish.along != Vector3::zeros() && !blocked.is_empty() {
-                self.block(&blocked);
-                return Err(Halt::Blocked);
-            }
-            self.cells.push(cell);
-            return Ok(());
+    fn split(&mut self, spot: &Spot, wish: &Wish) -> Result<(), Halt> {
+        if self.is_smallest(spot) {
+            return self.end(spot, wish);
         }
         let parts = self.pair.parts(&spot.piece);
         parts.into_iter().try_for_each(|piece| self.renew(Spot { piece, level: 0, ..*spot }, wish))
@@ -229,7 +274,7 @@ impl<'a> Finder<'a> {
         let height = normal.dot(&wish.at) - gap.max(0.0) - (held - depth) / 3f64.sqrt();
         Some(Cell {
             spot: *spot,
-            limits: vec![Limit { normal, height }],
+            limits: vec![Limit { normal, height, triangle: closest.triangle }],
             middle: wish.at,
             room: AHEAD[SHORT],
             ball: (*centre, self.placed.radius + AHEAD[SHORT]),
@@ -268,9 +313,9 @@ impl<'a> Finder<'a> {
         let depth = if ahead == Vector3::zeros() { here } else { here.max(below(&ahead)?) };
         let slack = if pair.allowance > 0.0 { ((most - depth) / 3f64.sqrt()).max(0.0) } else { 0.0 };
         let back = pair.shifted.transpose();
-        let limits = region.normals().zip(&gaps).map(|(inward, gap)| {
+        let limits = region.planes().zip(&gaps).map(|((inward, triangle), gap)| {
             let normal = back * inward;
-            Limit { normal, height: normal.dot(&wish.at) - gap.max(0.0) - slack }
+            Limit { normal, height: normal.dot(&wish.at) - gap.max(0.0) - slack, triangle }
         });
         let limits = limits.collect();
         // The ball around the piece stays in that of the region, or all its points are far enough
