@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::facing::{Facing, Obstacle, Piece, Placed, SUNK, TILT, Witness};
+use super::facing::{Facing, Obstacle, Piece, Placed, SUNK, Slope, TILT, Witness};
 
 /// A plane nearer than this is touched.
 pub(super) const TOUCHED: f64 = 1e-6;
@@ -78,7 +78,7 @@ impl Cell {
         blocking.map(|l| Obstacle { normal: l.normal, other: pair.other }).collect()
     }
 
-    /// What is certainly in the way of a shift from `at` along `u`: what the points of the piece enter that are
+    /// What is certainly and steeply in the way of a shift from `at` along `u`: what the points of the piece enter that are
     /// lowest before limits no further off than `reach`, or what gets over the triangles of these. Points that show
     /// it are added to `witnesses`.
     pub(super) fn touched(
@@ -103,7 +103,7 @@ impl Cell {
             let touching = heights.filter(|(height, _)| *height <= lowest + TOUCHED);
             probes.extend(touching.take(MOST_LOWEST).map(|(_, p)| *p));
         }
-        let by_points = pair.obstacles(&probes, (at, u), *guess, witnesses);
+        let by_points = pair.obstacles(&probes, (at, u), (*guess, Slope::Steep), witnesses);
         if !by_points.is_empty() {
             return by_points;
         }

@@ -39,6 +39,15 @@ impl Obstacle {
     }
 }
 
+/// At which angles what enters a face is in the way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Slope {
+    /// However small: where regions did not let it go.
+    Any,
+    /// At those at which it soon gets deeper than any tolerance.
+    Steep,
+}
+
 /// A point of the asked surface that got into the measured one.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Witness {
@@ -204,13 +213,13 @@ impl<'a> Facing<'a> {
         &self,
         probes: &[Point3<f64>],
         (at, along): (&Vector3<f64>, &Vector3<f64>),
-        guess: u32,
+        (guess, slope): (u32, Slope),
         witnesses: &mut Vec<Witness>,
     ) -> Vec<Obstacle> {
         let mut obstacles: Vec<Obstacle> = Vec::new();
         let shift = self.shifted * at;
         for p in probes {
-            let Some((obstacle, triangle)) = self.obstacle(p, along, guess) else { continue };
+            let Some((obstacle, triangle)) = self.obstacle(p, along, (guess, slope)) else { continue };
             if !obstacles.iter().any(|o| o.is_like(&obstacle)) {
                 obstacles.push(obstacle);
                 witnesses.push(Witness { point: p - shift, triangle });
@@ -229,7 +238,7 @@ impl<'a> Facing<'a> {
         let shift = self.shifted * at;
         let mut obstacles: Vec<Obstacle> = Vec::new();
         for Witness { point, triangle } in witnesses {
-            let seen = self.obstacle(&(point + shift), along, *triangle);
+            let seen = self.obstacle(&(point + shift), along, (*triangle, Slope::Any));
             if let Some((obstacle, _)) = seen.filter(|(seen, _)| !obstacles.iter().any(|o| o.is_like(seen))) {
                 obstacles.push(obstacle);
             }
@@ -238,14 +247,19 @@ impl<'a> Facing<'a> {
     }
 
     /// The face that a point gets into when the part moves along a unit vector, and its triangle.
-    fn obstacle(&self, p: &Point3<f64>, along: &Vector3<f64>, guess: u32) -> Option<(Obstacle, u32)> {
+    fn obstacle(
+        &self,
+        p: &Point3<f64>,
+        along: &Vector3<f64>,
+        (guess, slope): (u32, Slope),
+    ) -> Option<(Obstacle, u32)> {
         let ahead = self.shifted * along;
-        let (normal, triangle) = entered(self.measured, (p, &ahead), guess, self.allowance)?;
+        let (normal, triangle) = entered(self.measured, (p, &ahead), (guess, slope), self.allowance)?;
         Some((Obstacle { normal: self.shifted.transpose() * normal, other: self.other }, triangle))
     }
 
     /// The face of the asked surface that gets over a corner of a measured triangle, or the middle of one of its
-    /// sides: a long face may have its own corners far from where it touches.
+    /// sides, steeply: a long face may have its own corners far from where it touches.
     pub(super) fn obstacle_of_triangle(
         &self,
         triangle: u32,
@@ -261,7 +275,7 @@ impl<'a> Facing<'a> {
         let middles = [0, 1, 2].map(|i| nalgebra::center(&corners[i], &corners[(i + 1) % 3]));
         corners.iter().chain(&middles).find_map(|p| {
             let p = here.inverse_transform_point(p);
-            let (normal, _) = entered(self.asked, (&p, &ahead), guess, self.allowance)?;
+            let (normal, _) = entered(self.asked, (&p, &ahead), (guess, Slope::Steep), self.allowance)?;
             Some(Obstacle { normal: self.shifted.transpose() * (here * -normal), other: self.other })
         })
     }
@@ -306,7 +320,7 @@ impl<'a> Facing<'a> {
 fn entered(
     surface: &Surface,
     (p, ahead): (&Point3<f64>, &Vector3<f64>),
-    guess: u32,
+    (guess, slope): (u32, Slope),
     allowance: f64,
 ) -> Option<(Vector3<f64>, u32)> {
     let depth = |p: &Point3<f64>, guess: u32| {
@@ -327,7 +341,8 @@ fn entered(
     let blocking = |n: &Vector3<f64>| n.dot(ahead) < -TILT;
     // What touches enters below all faces that it touches, at however small an angle.
     let touches = (-TOUCHED..=HELD).contains(&(now - allowance));
-    let is_certain = touches && least.as_ref().is_some_and(blocking) || {
+    let is_flat = slope == Slope::Any && touches && least.as_ref().is_some_and(blocking);
+    let is_certain = is_flat || {
         let (then, _) = depth(&(p + ahead * PROBE), closest.triangle);
         then > now.max(allowance) + INSIDE * PROBE
     };
@@ -388,7 +403,9 @@ mod tests {
         let still = Vector3::zeros();
         pair.place(&pair.root().unwrap(), &still, &mut placed);
         for u in [Vector3::x(), -Vector3::y(), Vector3::new(0.6, 0.8, 0.0), Vector3::z(), -Vector3::z()] {
-            assert!(pair.obstacles(&placed.points, (&still, &u), 0, &mut Vec::new()).is_empty());
+            assert!(
+                pair.obstacles(&placed.points, (&still, &u), (0, Slope::Any), &mut Vec::new()).is_empty()
+            );
             let of_triangle = |t| pair.obstacle_of_triangle(t, (&still, &u), 0);
             let found = (0..pair.measured.triangles().len() as u32).filter_map(of_triangle);
             let found: Vec<Obstacle> = found.collect();

@@ -8,7 +8,7 @@ use crate::termination::Termination;
 use super::DEPTH_TOLERANCE;
 use super::cell::{Cell, Limit, Spot};
 use super::cells::Halt;
-use super::facing::{Facing, Obstacle, Piece, Placed, Witness};
+use super::facing::{Facing, Obstacle, Piece, Placed, Slope, Witness};
 
 /// Pieces this far off need no region, in the planning frame.
 pub(super) const FAR: f64 = 0.12;
@@ -187,7 +187,8 @@ impl<'a> Finder<'a> {
         }
         let pair = self.pair;
         let probes = pair.probes_ahead(&spot.piece, &self.placed, (&wish.at, &wish.along));
-        let certain = pair.obstacles(&probes, (&wish.at, &wish.along), spot.guess, &mut self.witnesses);
+        let certain =
+            pair.obstacles(&probes, (&wish.at, &wish.along), (spot.guess, Slope::Any), &mut self.witnesses);
         if !certain.is_empty() {
             self.block(&certain);
             return Err(Halt::Blocked);
