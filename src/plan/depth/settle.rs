@@ -10,9 +10,11 @@ use super::walk::{Hint, Search};
 /// What a region costs, in pieces.
 const REGION_EFFORT: usize = 40;
 /// Regions are asked for so much larger than the piece, that others find room.
-const ROOM: f64 = 1.25;
-/// So many regions of a place are tried.
+const ROOM: f64 = 3.0;
+/// So many regions of a place are tried …
 const TRIED: usize = 3;
+/// … and so many of those that held a piece last: the next one lies beside that, mostly.
+const RECENT: usize = 4;
 
 /// Where a piece passes: a ball that holds the hull.
 #[derive(Debug, Clone, Copy)]
@@ -50,7 +52,9 @@ impl Search<'_> {
         }
         let place = place(swept);
         let known = self.places.get(&place).map_or(&[][..], Vec::as_slice);
-        for region in known.iter().rev().take(TRIED).copied().chain(hint.region) {
+        let of_place = known.iter().rev().take(TRIED);
+        let recent = self.held.iter().rev().take(RECENT);
+        for region in of_place.chain(&hint.region).chain(recent).copied() {
             let Region { free, is_outside } = &self.regions[region as usize];
             if let Some((depth, _)) = fits(free, spared) {
                 hint.region = Some(region);
@@ -95,6 +99,7 @@ impl Search<'_> {
         hint.vain = false;
         let Some((depth, worst)) = fit else { return false };
         self.places.entry(place).or_default().push(id);
+        self.held.push(id);
         if depth > spared && !self.is_told(swept, depth, &worst, hint.triangle) {
             return false;
         }

@@ -35,7 +35,9 @@ pub(super) struct Search<'a> {
     view: View<'a>,
     termination: &'a Termination,
     pub(super) regions: Vec<Region>,
-    /// Regions by the places of pieces that they held.
+    /// Regions in the order in which they held a piece.
+    pub(super) held: Vec<u32>,
+    /// The same by the places of the pieces.
     pub(super) places: HashMap<Place, Vec<u32>>,
     /// The corners of the hull in question, or those that say most about where it reaches.
     pub(super) wanted: Vec<Point3<f64>>,
@@ -59,6 +61,7 @@ impl<'a> Search<'a> {
             view,
             termination,
             regions: Vec::new(),
+            held: Vec::new(),
             places: HashMap::new(),
             wanted: Vec::new(),
             hull: Vec::new(),
