@@ -137,14 +137,14 @@ fn way_out(
         points.iter().map(|p| p.coords.dot(direction) * sign).fold(f64::NEG_INFINITY, f64::max)
     };
     let beyond = along(&surroundings.hull, 1.0) + along(&hull, -1.0) + 1.5 * HULL_MARGIN;
-    let apart = |travel: f64| {
+    let apart = |travel: f64, hint| {
         let there: Vec<_> = hull.iter().map(|p| p + direction * travel).collect();
-        separating_direction(&there, &surroundings.hull, HULL_MARGIN, None)
+        separating_direction(&there, &surroundings.hull, HULL_MARGIN, hint)
     };
     let (mut near, mut far, mut hint) = (0.0, beyond, Some(-direction));
     for _ in 0..HALVINGS {
         let middle = 0.5 * (near + far);
-        match apart(middle) {
+        match apart(middle, hint) {
             Some(d) => (far, hint) = (middle, Some(d)),
             None => near = middle,
         }
