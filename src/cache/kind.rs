@@ -103,9 +103,8 @@ impl Kind {
         match self {
             Self::Source | Self::Shape | Self::Hull | Self::Swept | Self::Field => 1,
             Self::Healed | Self::Touching => 2,
-            Self::Answer => 3,
-            Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Plan => 4,
-            Self::Verdict => 5,
+            Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Answer => 4,
+            Self::Verdict | Self::Plan => 5,
         }
     }
 

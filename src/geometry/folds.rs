@@ -33,10 +33,15 @@ impl Folds {
         self.bits.len() + self.vertices.len()
     }
 
-    /// What is folded of a mesh, if anything is; `across` are the neighbours of its triangles.
-    pub(super) fn of(mesh: &Mesh, normals: &[Vector3<f64>], across: &[[u32; 3]]) -> Option<Self> {
+    /// What is folded of a mesh, if anything is; `across` are the neighbours of its triangles, `shared` their edges
+    /// that more than two faces share.
+    pub(super) fn of(
+        mesh: &Mesh,
+        normals: &[Vector3<f64>],
+        across: &[[u32; 3]],
+        shared: &[[bool; 3]],
+    ) -> Option<Self> {
         let faces: Vec<bool> = (0..normals.len()).map(|t| is_folded(mesh, normals, across, t)).collect();
-        let shared = shared_edges(mesh);
         let mut vertices = pinched(mesh, across);
         let mut bits = vec![0u8; normals.len()];
         for (t, corners) in mesh.triangles.iter().enumerate() {
@@ -78,23 +83,6 @@ fn is_thin(mesh: &Mesh, t: usize) -> bool {
     let [a, b, c] = mesh.triangles[t].map(|i| mesh.vertices[i as usize]);
     let longest = (b - a).norm_squared().max((c - b).norm_squared()).max((a - c).norm_squared());
     area_normal(&a, &b, &c).norm() < THIN * longest
-}
-
-/// Per triangle and edge: whether more than two faces share it.
-fn shared_edges(mesh: &Mesh) -> Vec<[bool; 3]> {
-    let sides = mesh.triangles.iter().enumerate().flat_map(|(t, corners)| {
-        (0..3).map(move |e| {
-            let (a, b) = (corners[e], corners[(e + 1) % 3]);
-            ([a.min(b), a.max(b)], t, e)
-        })
-    });
-    let mut sides: Vec<_> = sides.collect();
-    sides.sort_unstable();
-    let mut out = vec![[false; 3]; mesh.triangles.len()];
-    for group in sides.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() > 2) {
-        group.iter().for_each(|&(_, t, e)| out[t][e] = true);
-    }
-    out
 }
 
 /// Per vertex: whether several sheets meet in it, by going round over the edges.

@@ -10,15 +10,13 @@ mod derived;
 mod segments;
 mod winding;
 
-use std::sync::OnceLock;
-
 use nalgebra::{Point3, Vector3};
 
 use super::rim::{Rim, WINDING_DOUBT};
 use super::triangle::{Feature, closest_on_triangle};
-use super::triangle_tree::Visitor;
+use super::triangle_tree::{TriangleTree, Visitor};
 use super::{Bounds, Mesh, Solidity};
-use derived::Derived;
+use derived::{Adjacency, Derived, Opening};
 
 /// No triangle.
 pub(super) const NO_TRIANGLE: u32 = u32::MAX;
@@ -41,8 +39,7 @@ pub struct Closest {
 pub struct Surface {
     mesh: Mesh,
     bounds: Bounds,
-    /// Worked out when it is first asked for, if not at once.
-    derived: OnceLock<Derived>,
+    derived: Derived,
 }
 
 impl std::fmt::Debug for Surface {
@@ -63,25 +60,32 @@ impl Surface {
     /// A healed mesh, to be prepared when more than its triangles is asked for. That depends on the mesh alone.
     #[must_use]
     pub fn deferred(mesh: Mesh) -> Self {
-        Self { bounds: Bounds::of(&mesh.vertices), mesh, derived: OnceLock::new() }
+        Self { bounds: Bounds::of(&mesh.vertices), mesh, derived: Derived::default() }
     }
 
     /// Prepares it now, unless that was done.
     pub fn prepare(&self) {
-        self.derived();
+        self.derived.all(&self.mesh);
     }
 
     #[inline]
-    fn derived(&self) -> &Derived {
-        self.derived.get_or_init(|| Derived::of(&self.mesh))
+    fn adjacency(&self) -> &Adjacency {
+        self.derived.adjacency(&self.mesh)
+    }
+
+    #[inline]
+    fn tree(&self) -> &TriangleTree {
+        self.derived.tree(&self.mesh)
+    }
+
+    fn opening(&self) -> &Opening {
+        self.derived.opening(&self.mesh)
     }
 
     /// Bytes in memory.
     #[must_use]
     pub fn memory(&self) -> usize {
-        size_of_val(&*self.mesh.vertices)
-            + size_of_val(&*self.mesh.triangles)
-            + self.derived.get().map_or(0, Derived::memory)
+        size_of_val(&*self.mesh.vertices) + size_of_val(&*self.mesh.triangles) + self.derived.memory()
     }
 
     /// The mesh.
@@ -119,14 +123,14 @@ impl Surface {
     #[must_use]
     #[inline]
     pub fn face_normal(&self, triangle: u32) -> Vector3<f64> {
-        self.derived().face_normals[triangle as usize]
+        self.derived.face_normals(&self.mesh)[triangle as usize]
     }
 
     /// The triangle across edge `edge` of `triangle`, or `u32::MAX` where there is none.
     #[must_use]
     #[inline]
     pub fn neighbour(&self, triangle: u32, edge: u8) -> u32 {
-        self.derived().neighbours[triangle as usize][edge as usize]
+        self.adjacency().neighbours[triangle as usize][edge as usize]
     }
 
     /// Whether inside and outside are told apart by winding number.
@@ -139,19 +143,19 @@ impl Surface {
     #[must_use]
     #[inline]
     pub fn is_folded(&self, triangle: u32) -> bool {
-        self.derived().folds.as_ref().is_some_and(|folds| folds.has_face(triangle))
+        self.adjacency().folds.as_ref().is_some_and(|folds| folds.has_face(triangle))
     }
 
     #[cfg(test)]
     pub(super) fn is_folded_anywhere(&self) -> bool {
-        self.derived().folds.is_some()
+        self.adjacency().folds.is_some()
     }
 
     /// The edges at which it has holes. There are none where it only crosses itself: winding numbers change at
     /// the surface alone then.
     #[must_use]
     pub fn rim(&self) -> Option<&Rim> {
-        self.derived().rim.as_ref()
+        self.opening().rim.as_ref()
     }
 
     /// Whether all that a straight line of at most `radius` joins with `p`, without meeting the surface, is
@@ -183,7 +187,7 @@ impl Surface {
     /// The closest surface point nearer than `reach`, if there is one.
     #[must_use]
     pub fn closest(&self, p: &Point3<f64>, reach: f64) -> Option<Closest> {
-        self.derived().tree.closest(p, reach, |t| self.closest_on(t, p))
+        self.tree().closest(p, reach, |t| self.closest_on(t, p))
     }
 
     /// The closest surface point, given any triangle that is likely to be near: much quicker than
@@ -196,14 +200,14 @@ impl Surface {
 
     /// Shows `visitor` the triangles within its reach of `p`, nearest first.
     pub(super) fn nearest_first(&self, p: &Point3<f64>, visitor: &mut impl Visitor) {
-        self.derived().tree.nearest_first(p, visitor);
+        self.tree().nearest_first(p, visitor);
     }
 
     /// Signed distance given the closest point: negative inside.
     #[must_use]
     pub fn signed(&self, p: &Point3<f64>, closest: &Closest) -> f64 {
         let corners = &self.mesh.triangles[closest.triangle as usize];
-        let inside = match (self.is_open(), &self.derived().folds) {
+        let inside = match (self.is_open(), &self.adjacency().folds) {
             (true, _) => self.winding_number(p) > 0.5,
             (false, Some(folds)) if folds.doubts(closest, corners) => self.winding_number(p) > 0.5,
             _ => self.pseudo_normal(closest).dot(&(p - closest.point)) < 0.0,
@@ -228,7 +232,7 @@ impl Surface {
                 other => own + self.face_normal(other),
             },
             Feature::Vertex(v) => {
-                self.derived().vertex_normals
+                self.adjacency().vertex_normals
                     [self.mesh.triangles[closest.triangle as usize][v as usize] as usize]
             }
         }
@@ -257,7 +261,7 @@ impl Surface {
     #[must_use]
     pub fn fan(&self, vertex: u32) -> &[u32] {
         let i = vertex as usize;
-        let Derived { fan, fan_start, .. } = self.derived();
+        let Adjacency { fan, fan_start, .. } = self.adjacency();
         &fan[fan_start[i] as usize..fan_start[i + 1] as usize]
     }
 }

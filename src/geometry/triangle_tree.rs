@@ -350,11 +350,15 @@ fn split<'a>(items: &[Bounds], order: &'a mut [u32]) -> (&'a mut [u32], &'a mut 
         }
         let mut above = [(0usize, Bounds::EMPTY); BINS + 1];
         for k in (0..BINS).rev() {
-            above[k] = (above[k + 1].0 + bins[k].0, above[k + 1].1.union(&bins[k].1));
+            above[k] = joined(&above[k + 1], &bins[k]);
         }
         let mut below = (0usize, Bounds::EMPTY);
         for k in 1..BINS {
-            below = (below.0 + bins[k - 1].0, below.1.union(&bins[k - 1].1));
+            // Behind an empty bin the split is the one before it.
+            if bins[k - 1].0 == 0 {
+                continue;
+            }
+            below = joined(&below, &bins[k - 1]);
             let (left, right) = (below.0, above[k].0);
             if left < least || right < least {
                 continue;
@@ -366,10 +370,7 @@ fn split<'a>(items: &[Bounds], order: &'a mut [u32]) -> (&'a mut [u32], &'a mut 
         }
     }
     let middle = match best {
-        Some((_, axis, at)) => {
-            order.sort_by_key(|&i| centre(i, axis) >= at);
-            order.partition_point(|&i| centre(i, axis) < at).clamp(least, order.len() - least)
-        }
+        Some((_, axis, at)) => parted(order, |i| centre(i, axis) < at).clamp(least, order.len() - least),
         None => {
             let longest =
                 order.iter().fold(Bounds::EMPTY, |b, &i| b.union(&items[i as usize])).extents().imax();
@@ -378,6 +379,28 @@ fn split<'a>(items: &[Bounds], order: &'a mut [u32]) -> (&'a mut [u32], &'a mut 
         }
     };
     order.split_at_mut(middle)
+}
+
+/// The items of two bins and the box of both; most bins of small groups are empty.
+fn joined(a: &(usize, Bounds), b: &(usize, Bounds)) -> (usize, Bounds) {
+    if b.0 == 0 { *a } else { (a.0 + b.0, a.1.union(&b.1)) }
+}
+
+/// Brings items that pass a test before those that do not, each in the order that they had; how many pass.
+fn parted(items: &mut [u32], passes: impl Fn(u32) -> bool) -> usize {
+    let mut rest = Vec::with_capacity(items.len());
+    let mut count = 0;
+    for at in 0..items.len() {
+        let item = items[at];
+        if passes(item) {
+            items[count] = item;
+            count += 1;
+        } else {
+            rest.push(item);
+        }
+    }
+    items[count..].copy_from_slice(&rest);
+    count
 }
 
 fn area(b: &Bounds) -> f64 {

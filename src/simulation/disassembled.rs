@@ -15,7 +15,7 @@ pub const HULL_MARGIN: f64 = 1e-3;
 pub struct Surroundings {
     /// The parts that stand, ascending.
     pub standing: Vec<usize>,
-    /// Points with the same convex hull as them all: few besides its vertices.
+    /// Points with the same convex hull as them all: its vertices, and perhaps some inside.
     pub hull: Vec<Point3<f64>>,
 }
 

@@ -95,9 +95,9 @@ fn key(a: &[Point3<f64>], b: &[Point3<f64>]) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     for points in [a, b] {
         hasher.update(&(points.len() as u64).to_le_bytes());
-        for p in points {
-            hasher.update(bytemuck::cast_slice(p.coords.as_slice()));
-        }
+        // In one piece: that is several times as fast as point by point.
+        let coordinates: Vec<[f64; 3]> = points.iter().map(|p| p.coords.into()).collect();
+        hasher.update(bytemuck::cast_slice(&coordinates));
     }
     hasher.finalize().into()
 }

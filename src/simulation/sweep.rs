@@ -16,7 +16,7 @@
 
 use nalgebra::{Point3, Translation3, Vector3};
 
-use crate::geometry::{Bounds, OrientedSamples, Pose, Surface, separating_direction, transformed};
+use crate::geometry::{Bounds, OrientedSamples, Pose, Surface, gap_along, separating_direction, transformed};
 use crate::termination::{Interrupt, Poll, Termination};
 
 use super::sliding::DEPTH_TOLERANCE;
@@ -25,7 +25,10 @@ use super::{HULL_MARGIN, Scene, Surroundings, exit_direction};
 /// Faces that look along the direction, or against it, by less than this count as walls.
 const STEEPNESS: f64 = 1e-3;
 /// The way out is found to this share of the way beyond everything.
-const HALVINGS: usize = 8;
+const FINENESS: f64 = 1.0 / 256.0;
+/// Where a part is taken to be out along a direction, the hulls are apart by so much more than asked for, as a share:
+/// it is not to hang on rounding.
+const ASSURED: f64 = 0.01;
 /// Samples between two looks at the termination condition.
 const CAST_POLL: u32 = 64;
 
@@ -124,7 +127,9 @@ fn moved(pose: &Pose, direction: &Vector3<f64>, travel: f64) -> Pose {
 }
 
 /// How far the part has to go until its hull is apart, and the direction that shows it. Two convex
-/// bodies of which one moves along a line meet during one interval: bisection finds its end.
+/// bodies of which one moves along a line meet during one interval. Its end is sought from beyond: a direction along
+/// which they are apart tells how far back they are so at least, as the gap along it changes evenly with the
+/// travel; further back it is looked again, in steps that double, and halved once they meet.
 fn way_out(
     scene: &Scene,
     surroundings: &Surroundings,
@@ -137,23 +142,28 @@ fn way_out(
         points.iter().map(|p| p.coords.dot(direction) * sign).fold(f64::NEG_INFINITY, f64::max)
     };
     let beyond = along(&surroundings.hull, 1.0) + along(&hull, -1.0) + 1.5 * HULL_MARGIN;
-    let apart = |travel: f64| {
-        let there: Vec<_> = hull.iter().map(|p| p + direction * travel).collect();
-        separating_direction(&there, &surroundings.hull, HULL_MARGIN, None)
+    let margin = HULL_MARGIN * (1.0 + ASSURED);
+    // From where on they are apart along a direction, if they are where it was found.
+    let since = |d: &Vector3<f64>| {
+        let speed = -d.dot(direction);
+        (speed > 0.0).then(|| (margin - gap_along(d, &hull, &surroundings.hull)) / speed)
     };
-    let (mut near, mut far, mut hint) = (0.0, beyond, Some(-direction));
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (near + far);
-        match apart(middle) {
-            Some(d) => (far, hint) = (middle, Some(d)),
-            None => near = middle,
+    let finest = FINENESS * beyond;
+    let (mut near, mut far, mut exit, mut step) = (0.0, beyond, -direction, finest);
+    while far - near > finest {
+        let at = (far - step).max(0.5 * (near + far));
+        let there: Vec<_> = hull.iter().map(|p| p + direction * at).collect();
+        if let Some(d) = separating_direction(&there, &surroundings.hull, HULL_MARGIN, None) {
+            (far, exit, step) = (since(&d).map_or(at, |t| t.clamp(near, at)), d, 2.0 * step);
+        } else {
+            near = at;
         }
     }
     let certified = |travel: f64, hint| {
         let pose = moved(start, direction, travel);
         exit_direction(scene, surroundings, part, &pose, hint).map(|d| (travel, d))
     };
-    certified(far, hint).or_else(|| certified(beyond, Some(-direction)))
+    certified(far, Some(exit)).or_else(|| certified(beyond, Some(-direction)))
 }
 
 impl Crossing<'_> {
@@ -357,7 +367,7 @@ mod tests {
         let around = Surroundings::new(&scene, vec![0]);
         assert_eq!(path[0], scene.bodies[1].planning_from_shape);
         assert!(exit_direction(&scene, &around, 1, &path[1], Some(exit)).is_some());
-        let short = Pose::translation(0.0, 0.0, -0.1) * path[1];
+        let short = Pose::translation(0.0, 0.0, -0.6 * HULL_MARGIN) * path[1];
         assert!(exit_direction(&scene, &around, 1, &short, None).is_none());
     }
 

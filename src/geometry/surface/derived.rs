@@ -1,4 +1,7 @@
-//! What questions about a surface need of its mesh: adjacency, normals, trees.
+//! What questions about a surface need of its mesh: normals, adjacency, trees. Each is worked out when it is first
+//! asked for: of most parts that were known before a restart, little is.
+
+use std::sync::OnceLock;
 
 use nalgebra::{Unit, Vector3};
 
@@ -12,83 +15,141 @@ use crate::geometry::triangle::area_normal;
 use crate::geometry::triangle_tree::TriangleTree;
 use crate::geometry::{Mesh, Solidity};
 
-/// All that derives from a mesh.
-#[derive(Clone)]
+/// All that derives from a mesh, as far as it was asked for.
+#[derive(Clone, Default)]
 pub(super) struct Derived {
-    pub(super) face_normals: Vec<Vector3<f64>>,
+    face_normals: OnceLock<Vec<Vector3<f64>>>,
+    adjacency: OnceLock<Adjacency>,
+    tree: OnceLock<TriangleTree>,
+    opening: OnceLock<Opening>,
+}
+
+/// What lies beside what.
+#[derive(Clone)]
+pub(super) struct Adjacency {
     /// Per triangle and edge: the triangle on the other side.
     pub(super) neighbours: Vec<[u32; 3]>,
     pub(super) vertex_normals: Vec<Vector3<f64>>,
     /// Triangles around each vertex, as ranges of `fan`.
     pub(super) fan_start: Vec<u32>,
     pub(super) fan: Vec<u32>,
-    pub(super) tree: TriangleTree,
-    /// Where signs come from winding numbers.
-    pub(super) rim: Option<Rim>,
-    /// Where the rim has so many edges that winding numbers are summed.
-    pub(super) dipoles: Option<DipoleTree>,
     pub(super) folds: Option<Folds>,
 }
 
+/// Where signs come from winding numbers.
+#[derive(Clone, Default)]
+pub(super) struct Opening {
+    pub(super) rim: Option<Rim>,
+    /// Where the rim has so many edges that winding numbers are summed.
+    pub(super) dipoles: Option<DipoleTree>,
+}
+
 impl Derived {
-    pub(super) fn of(mesh: &Mesh) -> Self {
-        let face_normals = (0..mesh.triangles.len())
-            .map(|t| {
-                let [a, b, c] = mesh.corners(t);
-                area_normal(&a, &b, &c).try_normalize(0.0).unwrap_or_else(Vector3::zeros)
-            })
-            .collect::<Vec<_>>();
-        let (fan_start, fan) = fans(mesh);
-        let is_open = mesh.solidity == Solidity::Winding;
-        let rim = is_open.then(|| Rim::of(&mesh.vertices, &mesh.triangles)).filter(|r| !r.edges().is_empty());
-        let is_soup = rim.as_ref().is_some_and(Rim::is_long);
-        let neighbours = neighbours(mesh);
-        let folds = if is_open { None } else { Folds::of(mesh, &face_normals, &neighbours) };
-        let corners: Vec<_> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
-        Self {
-            dipoles: is_soup.then(|| DipoleTree::new(&mesh.vertices, &mesh.triangles)),
-            rim,
-            folds,
-            neighbours,
-            vertex_normals: vertex_normals(mesh, &face_normals),
-            face_normals,
-            fan_start,
-            fan,
-            tree: TriangleTree::new(&corners),
-        }
+    /// The unit normals of the triangles; zero if degenerate.
+    #[inline]
+    pub(super) fn face_normals(&self, mesh: &Mesh) -> &[Vector3<f64>] {
+        self.face_normals.get_or_init(|| face_normals(mesh))
+    }
+
+    #[inline]
+    pub(super) fn adjacency(&self, mesh: &Mesh) -> &Adjacency {
+        self.adjacency.get_or_init(|| Adjacency::of(mesh, self.face_normals(mesh)))
+    }
+
+    #[inline]
+    pub(super) fn tree(&self, mesh: &Mesh) -> &TriangleTree {
+        let build = || {
+            let corners: Vec<_> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
+            TriangleTree::new(&corners)
+        };
+        self.tree.get_or_init(build)
+    }
+
+    pub(super) fn opening(&self, mesh: &Mesh) -> &Opening {
+        self.opening.get_or_init(|| Opening::of(mesh))
+    }
+
+    /// Works out what is not there yet.
+    pub(super) fn all(&self, mesh: &Mesh) {
+        self.adjacency(mesh);
+        self.tree(mesh);
+        self.opening(mesh);
     }
 
     /// Bytes in memory.
     pub(super) fn memory(&self) -> usize {
-        size_of_val(&*self.face_normals)
-            + size_of_val(&*self.neighbours)
+        self.face_normals.get().map_or(0, |normals| size_of_val(&**normals))
+            + self.adjacency.get().map_or(0, Adjacency::memory)
+            + self.tree.get().map_or(0, TriangleTree::memory)
+            + self.opening.get().map_or(0, Opening::memory)
+    }
+}
+
+impl Adjacency {
+    fn of(mesh: &Mesh, face_normals: &[Vector3<f64>]) -> Self {
+        let (fan_start, fan) = fans(mesh);
+        let (neighbours, shared) = across(mesh);
+        let is_open = mesh.solidity == Solidity::Winding;
+        let folds = if is_open { None } else { Folds::of(mesh, face_normals, &neighbours, &shared) };
+        Self { neighbours, vertex_normals: vertex_normals(mesh, face_normals), fan_start, fan, folds }
+    }
+
+    fn memory(&self) -> usize {
+        size_of_val(&*self.neighbours)
             + size_of_val(&*self.vertex_normals)
             + size_of_val(&*self.fan_start)
             + size_of_val(&*self.fan)
-            + self.tree.memory()
-            + self.dipoles.as_ref().map_or(0, DipoleTree::memory)
-            + self.rim.as_ref().map_or(0, Rim::memory)
             + self.folds.as_ref().map_or(0, Folds::memory)
     }
 }
 
-fn neighbours(mesh: &Mesh) -> Vec<[u32; 3]> {
-    let mut out = vec![[NO_TRIANGLE; 3]; mesh.triangles.len()];
-    let mut set = |triangle: u32, edge: [u32; 2], other: u32| {
-        let edges = directed_edges(&mesh.triangles[triangle as usize]);
-        let at = edges.iter().position(|[a, b]| [*a.min(b), *a.max(b)] == edge);
-        if let Some(at) = at {
-            out[triangle as usize][at] = other;
+impl Opening {
+    fn of(mesh: &Mesh) -> Self {
+        if mesh.solidity != Solidity::Winding {
+            return Self::default();
         }
+        let rim = Some(Rim::of(&mesh.vertices, &mesh.triangles)).filter(|r| !r.edges().is_empty());
+        let is_soup = rim.as_ref().is_some_and(Rim::is_long);
+        Self { dipoles: is_soup.then(|| DipoleTree::new(&mesh.vertices, &mesh.triangles)), rim }
+    }
+
+    fn memory(&self) -> usize {
+        self.dipoles.as_ref().map_or(0, DipoleTree::memory) + self.rim.as_ref().map_or(0, Rim::memory)
+    }
+}
+
+fn face_normals(mesh: &Mesh) -> Vec<Vector3<f64>> {
+    let normal = |t| {
+        let [a, b, c] = mesh.corners(t);
+        area_normal(&a, &b, &c).try_normalize(0.0).unwrap_or_else(Vector3::zeros)
+    };
+    (0..mesh.triangles.len()).map(normal).collect()
+}
+
+/// Per triangle and edge: the triangle on the other side, and whether more than two share it.
+fn across(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<[bool; 3]>) {
+    let mut neighbours = vec![[NO_TRIANGLE; 3]; mesh.triangles.len()];
+    let mut shared = vec![[false; 3]; mesh.triangles.len()];
+    let place = |triangle: u32, edge: [u32; 2]| {
+        let edges = directed_edges(&mesh.triangles[triangle as usize]);
+        edges.iter().position(|[a, b]| [*a.min(b), *a.max(b)] == edge)
     };
     for (edge, sides) in Sides::of(&mesh.triangles).iter() {
         // Edges of more than two faces are paired in order: there, any pairing is as good.
         for pair in sides.chunks_exact(2) {
-            set(pair[0].triangle, edge, pair[1].triangle);
-            set(pair[1].triangle, edge, pair[0].triangle);
+            for (side, other) in [(pair[0], pair[1]), (pair[1], pair[0])] {
+                if let Some(at) = place(side.triangle, edge) {
+                    neighbours[side.triangle as usize][at] = other.triangle;
+                }
+            }
+        }
+        for side in sides.iter().filter(|_| sides.len() > 2) {
+            if let Some(at) = place(side.triangle, edge) {
+                shared[side.triangle as usize][at] = true;
+            }
         }
     }
-    out
+    (neighbours, shared)
 }
 
 fn vertex_normals(mesh: &Mesh, face_normals: &[Vector3<f64>]) -> Vec<Vector3<f64>> {

@@ -17,7 +17,7 @@ impl Surface {
         length: f64,
         steepness: f64,
     ) -> bool {
-        self.derived().tree.any_along(p, direction, length, |t| {
+        self.tree().any_along(p, direction, length, |t| {
             let against = -self.face_normal(t).dot(direction);
             against > steepness
                 && crossing(p, direction, &self.corners(t)).is_some_and(|at| (0.0..=length).contains(&at))
@@ -35,7 +35,7 @@ impl Surface {
         steepness: f64,
     ) -> f64 {
         let mut crossings: Vec<(f64, bool)> = Vec::new();
-        self.derived().tree.any_along(p, direction, length, |t| {
+        self.tree().any_along(p, direction, length, |t| {
             let against = -self.face_normal(t).dot(direction);
             let at = crossing(p, direction, &self.corners(t)).filter(|at| (0.0..=length).contains(at));
             crossings.extend(at.filter(|_| against.abs() > steepness).map(|at| (at, against > 0.0)));

@@ -14,18 +14,19 @@ use std::f64::consts::PI;
 use nalgebra::Point3;
 
 use super::Surface;
+use super::derived::Opening;
 use crate::geometry::ray::Ray;
 
 impl Surface {
     /// The generalised winding number around `p`; on the surface, one half.
     pub(super) fn winding_number(&self, p: &Point3<f64>) -> f64 {
-        let derived = self.derived();
-        if let Some(dipoles) = &derived.dipoles {
+        let Opening { rim, dipoles } = self.opening();
+        if let Some(dipoles) = dipoles {
             return dipoles.winding(p);
         }
         let along = |ray: Ray| {
-            let crossings = f64::from(derived.tree.crossings(&ray).ok()?);
-            let strips = derived.rim.as_ref().map_or(Some(0.0), |rim| rim.strips_behind(&ray))?;
+            let crossings = f64::from(self.tree().crossings(&ray).ok()?);
+            let strips = rim.as_ref().map_or(Some(0.0), |rim| rim.strips_behind(&ray))?;
             Some(crossings - strips / (4.0 * PI))
         };
         Ray::out_of(&self.bounds, p).find_map(along).unwrap_or(0.5)
