@@ -31,7 +31,7 @@ pub struct FreeRegion {
     centre: Point3<f64>,
     radius: f64,
     sides: Vec<HalfSpace>,
-    /// The triangle in front of which each side is; none for those of a region that is known from elsewhere.
+    /// The triangle in front of which each side is.
     triangles: Vec<u32>,
     /// A point well inside, which is outside the surface.
     inner: Point3<f64>,
@@ -62,14 +62,16 @@ pub enum NoRegion {
 }
 
 impl FreeRegion {
-    /// A ball cut by half-spaces, of which it is known from elsewhere that a surface does not enter it.
+    /// A ball cut by half-spaces, each in front of a triangle, of which it is known from elsewhere that a surface
+    /// does not enter it.
     #[must_use]
     pub fn known(
         (centre, radius): (Point3<f64>, f64),
-        sides: impl IntoIterator<Item = (Vector3<f64>, f64)>,
+        sides: impl IntoIterator<Item = (Vector3<f64>, f64, u32)>,
     ) -> Self {
-        let sides = sides.into_iter().map(|(normal, height)| HalfSpace { normal, height }).collect();
-        Self { centre, radius, sides, triangles: Vec::new(), inner: centre }
+        let sides = sides.into_iter().map(|(normal, height, t)| (HalfSpace { normal, height }, t));
+        let (sides, triangles) = sides.unzip();
+        Self { centre, radius, sides, triangles, inner: centre }
     }
 
     /// How far a point is inside all sides and the ball; negative outside.
@@ -139,8 +141,14 @@ impl FreeRegion {
         None
     }
 
-    /// The unit normals of the planes that bound a region that was grown, which point inside, and the triangle
-    /// in front of which each of them is.
+    /// The triangles whose planes some of these points have passed by more than `most`.
+    pub fn passed(&self, points: &Cloud, most: f64) -> impl Iterator<Item = u32> {
+        let sides = self.sides.iter().zip(&self.triangles);
+        sides.filter(move |(side, _)| points.least_above(side) < -most).map(|(_, triangle)| *triangle)
+    }
+
+    /// The unit normals of the planes that bound it, which point inside, and the triangle in front of which each
+    /// of them is.
     pub fn planes(&self) -> impl Iterator<Item = (Vector3<f64>, u32)> {
         self.sides.iter().map(|side| side.normal).zip(self.triangles.iter().copied())
     }

@@ -10,7 +10,7 @@ mod derived;
 mod segments;
 mod winding;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Vector3, center};
 
 use super::rim::{Rim, WINDING_DOUBT};
 use super::triangle::{Feature, closest_on_triangle};
@@ -117,6 +117,13 @@ impl Surface {
     #[inline]
     pub fn corners(&self, triangle: u32) -> [Point3<f64>; 3] {
         self.mesh.triangles[triangle as usize].map(|i| self.mesh.vertices[i as usize])
+    }
+
+    /// The corners of a triangle, and the middles of its sides.
+    #[must_use]
+    pub fn corners_and_middles(&self, triangle: u32) -> [Point3<f64>; 6] {
+        let [a, b, c] = self.corners(triangle);
+        [a, b, c, center(&a, &b), center(&b, &c), center(&c, &a)]
     }
 
     /// The unit normal of a triangle (zero if degenerate).

@@ -271,9 +271,7 @@ impl<'a> Facing<'a> {
         }
         let here = Translation3::from(self.shifted * at) * self.measured_from_asked;
         let ahead = -here.inverse_transform_vector(&(self.shifted * along));
-        let corners = self.measured.corners(triangle);
-        let middles = [0, 1, 2].map(|i| nalgebra::center(&corners[i], &corners[(i + 1) % 3]));
-        corners.iter().chain(&middles).find_map(|p| {
+        self.measured.corners_and_middles(triangle).iter().find_map(|p| {
             let p = here.inverse_transform_point(p);
             let (normal, _) = entered(self.asked, (&p, &ahead), (guess, Slope::Steep), self.allowance)?;
             Some(Obstacle { normal: self.shifted.transpose() * (here * -normal), other: self.other })

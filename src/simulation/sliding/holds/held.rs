@@ -37,8 +37,10 @@ const AROUND_SMALLEST: f64 = 4.0 * SMALLEST;
 const MOST_KNOWN: usize = 128;
 /// So many contacts are looked for by pieces that have no region.
 const MOST_FOUND: usize = 4;
-/// So many corners of a piece are measured.
+/// So many corners of a piece are measured, …
 const MOST_PROBED: usize = 24;
+/// … and so many triangles whose planes it has passed.
+const MOST_PASSED: usize = 12;
 
 /// A pair, one of whose surfaces is in pieces.
 pub(super) struct Held<'a> {
@@ -124,6 +126,9 @@ impl<'a> Held<'a> {
         let mut found: Vec<Contact> = again.filter(|c| c.gap < -DEPTH_TOLERANCE).collect();
         found.extend(self.corners_inside(&outside, &ends.there, DEPTH_TOLERANCE));
         if found.is_empty() {
+            found = self.triangles_inside(&outside, &ends.there);
+        }
+        if found.is_empty() {
             return Some(Left { outside, ends });
         }
         self.learn(&found);
@@ -188,6 +193,24 @@ impl<'a> Held<'a> {
         inside
     }
 
+    /// The corners of measured triangles, and the middles of their sides, that are deeper inside some pieces' solid
+    /// than may be: of those that these have passed the planes of.
+    fn triangles_inside(&mut self, pieces: &[usize], there: &Pose) -> Vec<Contact> {
+        let mut inside = Vec::new();
+        for &i in pieces {
+            let Self { facing, pieces: all, placed, .. } = self;
+            let hold = &all[i];
+            facing.place_at(&hold.spot.piece, there, placed);
+            let passed = hold.region.passed(&placed.cloud, DEPTH_TOLERANCE).take(MOST_PASSED);
+            for contact in passed.filter_map(|triangle| pierced(facing, hold, triangle, there)) {
+                if !inside.iter().any(|c: &Contact| c.is_of_same_point(&contact)) {
+                    inside.push(contact);
+                }
+            }
+        }
+        inside
+    }
+
     /// Finds regions that hold these pieces at both ends, or contacts that are too deep at the other one.
     fn renew(&mut self, outside: &[usize], ends: &Ends) -> Vec<Contact> {
         let mut left = MOST_RENEWED;
@@ -245,7 +268,7 @@ impl<'a> Held<'a> {
                 return Ok(());
             }
             Err(NoRegion::Amid(triangle)) => {
-                if let Some(contact) = self.pierced(hold, triangle, &ends.there) {
+                if let Some(contact) = pierced(&self.facing, hold, triangle, &ends.there) {
                     return Err(Unheld::Entered(contact));
                 }
             }
@@ -358,25 +381,8 @@ impl<'a> Held<'a> {
         let normal = facing.measured.pseudo_normal(&closest).normalize();
         let height = placed.points.iter().map(|p| normal.dot(&p.coords)).fold(f64::INFINITY, f64::min);
         let ball = (placed.centre, AROUND_SMALLEST);
-        let region = Arc::new(FreeRegion::known(ball, [(normal, height)]));
+        let region = Arc::new(FreeRegion::known(ball, [(normal, height, closest.triangle)]));
         Hold { region, slack: 0.0, next: Some(0.0), ..hold.clone() }
-    }
-
-    /// The corner of a measured triangle that is too deep inside the asked solid.
-    fn pierced(&self, hold: &Hold, triangle: u32, there: &Pose) -> Option<Contact> {
-        let facing = &self.facing;
-        if facing.asked.is_open() {
-            return None;
-        }
-        let guess = facing.triangle_of(&hold.spot.piece).unwrap_or(0);
-        facing.measured.corners(triangle).into_iter().find_map(|corner| {
-            let p = there.inverse_transform_point(&corner);
-            let closest = facing.asked.closest_from(&p, guess);
-            let gap = facing.asked.signed(&p, &closest) + facing.allowance;
-            let at = (gap, closest);
-            (gap < -DEPTH_TOLERANCE)
-                .then(|| Contact::measured(facing.other, !facing.asks_part, corner, at, facing.allowance))
-        })
     }
 
     /// Keeps contacts for the steps to come.
@@ -424,4 +430,20 @@ impl<'a> Held<'a> {
             .collect();
         self.corners_inside(&outside, &there, BULGE_TOLERANCE).is_empty()
     }
+}
+
+/// The corner of a measured triangle, or the middle of one of its sides, that is too deep inside the asked solid.
+fn pierced(facing: &Facing<'_>, hold: &Hold, triangle: u32, there: &Pose) -> Option<Contact> {
+    if facing.asked.is_open() {
+        return None;
+    }
+    let guess = facing.triangle_of(&hold.spot.piece).unwrap_or(0);
+    facing.measured.corners_and_middles(triangle).into_iter().find_map(|point| {
+        let p = there.inverse_transform_point(&point);
+        let closest = facing.asked.closest_from(&p, guess);
+        let gap = facing.asked.signed(&p, &closest) + facing.allowance;
+        let at = (gap, closest);
+        (gap < -DEPTH_TOLERANCE)
+            .then(|| Contact::measured(facing.other, !facing.asks_part, point, at, facing.allowance))
+    })
 }

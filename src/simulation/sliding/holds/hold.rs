@@ -71,7 +71,7 @@ impl Hold {
         let sides = cell.limits.iter().map(|limit| {
             let normal = facing.shifted * limit.normal;
             let lowest = placed.points.iter().map(|p| normal.dot(&p.coords)).fold(f64::INFINITY, f64::min);
-            (normal, lowest + limit.height)
+            (normal, lowest + limit.height, limit.triangle)
         });
         let region = Arc::new(FreeRegion::known(cell.ball, sides));
         Self::new(cell.spot, region, facing, here)

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Vector3;
 
 use super::*;
-use crate::fixtures::{cuboid, l_shape, moved, peg_in_hole, scene, spread};
+use crate::fixtures::{cells, cuboid, l_shape, moved, peg_in_hole, scene, spread};
 use crate::geometry::interpolate;
 use crate::simulation::sliding::DEPTH_TOLERANCE;
 
@@ -25,6 +25,31 @@ fn a_loose_peg_turns_and_is_told_by_regions_all_the_way() {
     assert!(holds.near(&lifted).contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE));
     assert!(!holds.settle(&lifted, None).contacts.is_empty(), "what was found of the walls is kept");
     assert!(!holds.samples());
+}
+
+#[test]
+fn a_long_pin_is_stopped_by_what_its_faces_get_over_without_another_region() {
+    // The pin's corners are far from the plate: it is the plate's that get inside.
+    let plate =
+        cells([&[-2.0, -0.5, 0.5, 2.0], &[-2.0, -0.5, 0.5, 2.0], &[-0.5, 0.5]], |c| c[0] != 1 || c[1] != 1);
+    let (scene, _) = scene([plate, cuboid([-0.45, -0.45, -4.0], [0.45, 0.45, 4.0])]);
+    let start = scene.bodies[1].planning_from_shape;
+    let termination = Termination::default();
+    let mover = Mover::new(&scene, 1, start);
+    let mut pair = Held::new(&scene, (1, &start), 0, true, &termination).unwrap();
+    let mut looked = |pose: Pose| {
+        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+        let left = pair.near(&start, &Mover { pose, ..mover }, 0.1, &mut near);
+        (left.is_some(), near.contacts)
+    };
+    for shift in [Vector3::x() * 0.1, Vector3::new(0.08, 0.06, 1.0)] {
+        let (is_open, contacts) = looked(Pose::from(shift) * start);
+        assert!(!is_open && !contacts.is_empty(), "{shift}");
+        for contact in contacts {
+            assert!((-0.051..-DEPTH_TOLERANCE).contains(&contact.gap), "{}", contact.gap);
+        }
+    }
+    assert!(looked(Pose::from(Vector3::new(0.04, -0.04, 0.5)) * start).1.is_empty());
 }
 
 #[test]
