@@ -3,11 +3,12 @@
 //!
 //! Of each pair one surface is asked, piece by piece: a piece in a [`FreeRegion`] stays out of the
 //! other solid as long as it stays in there, which is a few linear inequalities in the shift, exact
-//! for shifts of any length. A peg in its hole is one piece with one region. A piece for which a
-//! shift is wanted that its region does not allow gets another, around all of that shift; where
-//! there is none, it is split, until a vertex that gets inside or a triangle without a region
-//! certifies that the other part is in the way. If no surface piece of the one gets into the other,
-//! the two surfaces do not cross, so that one side is enough.
+//! for shifts of any length. A peg in its hole is one piece with one region. Where a region ends that
+//! a shift leads out of, points that are there already may certify that the other part is in the way:
+//! those of the piece that are lowest before that plane, and those of the triangle behind it. Else
+//! the piece gets another region, around all of that shift; where there is none, it is split, until a
+//! vertex that gets inside or a triangle without a region certifies the same. If no surface piece of
+//! the one gets into the other, the two surfaces do not cross, so that one side is enough.
 
 use std::sync::Arc;
 
