@@ -9,6 +9,8 @@ pub(super) const TOUCHED: f64 = 1e-6;
 
 /// So many points of a piece are looked at before each plane that it touches.
 const MOST_LOWEST: usize = 8;
+/// Cosine of the angle up to which the face that is entered is the one that a plane keeps a piece before.
+const AGREED: f64 = 0.9;
 
 /// What a cell is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -103,15 +105,20 @@ impl Cell {
             let touching = heights.filter(|(height, _)| *height <= lowest + TOUCHED);
             probes.extend(touching.take(MOST_LOWEST).map(|(_, p)| *p));
         }
-        let by_points = pair.obstacles(&probes, (at, u), (*guess, Slope::Steep), witnesses);
+        // A point beside an edge enters a face that need not be passed: the plane lies before the other one.
+        let agrees = |limit: &Limit, o: &Obstacle| limit.normal.dot(&o.normal) > AGREED;
+        let mut seen = Vec::new();
+        let mut by_points = pair.obstacles(&probes, (at, u), (*guess, Slope::Steep), &mut seen);
+        by_points.retain(|o| ahead().any(|limit| agrees(limit, o)));
         if !by_points.is_empty() {
+            witnesses.append(&mut seen);
             return by_points;
         }
         let guess = pair.triangle_of(piece).unwrap_or(0);
-        ahead()
-            .find_map(|limit| pair.obstacle_of_triangle(limit.triangle, (at, u), guess))
-            .into_iter()
-            .collect()
+        let by_triangle = |limit: &Limit| {
+            pair.obstacle_of_triangle(limit.triangle, (at, u), guess).filter(|o| agrees(limit, o))
+        };
+        ahead().find_map(by_triangle).into_iter().collect()
     }
 
     /// Whether there is nothing left to go on `u`.

@@ -44,7 +44,8 @@ impl Obstacle {
 pub(super) enum Slope {
     /// However small: where regions did not let it go.
     Any,
-    /// At those at which it soon gets deeper than any tolerance.
+    /// At those at which it soon gets deeper than any tolerance, and where it is the only face that the point may be
+    /// before: beside an edge another one may let it go on.
     Steep,
 }
 
@@ -337,6 +338,9 @@ fn entered(
         }
     });
     let blocking = |n: &Vector3<f64>| n.dot(ahead) < -TILT;
+    if slope == Slope::Steep && least?.dot(&most?) < PARALLEL {
+        return None;
+    }
     // What touches enters below all faces that it touches, at however small an angle.
     let touches = (-TOUCHED..=HELD).contains(&(now - allowance));
     let is_flat = slope == Slope::Any && touches && least.as_ref().is_some_and(blocking);

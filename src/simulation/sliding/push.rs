@@ -211,6 +211,21 @@ mod tests {
     }
 
     #[test]
+    fn a_block_as_wide_as_its_plate_slides_off_it() {
+        // All corners of the one lie on edges of the other, or beside its upright faces, which stop nothing.
+        for width in [3.0, 3.0 - 1e-5, 3.0 + 1e-5] {
+            let plate = cuboid([-3.0, -3.0, -1.0], [3.0, 3.0, 0.0]);
+            let (scene, verifier) = scene([plate, cuboid([-width, -width, 0.0], [width, width, 1.0])]);
+            for force in [Vector3::new(0.6, 0.0, -0.8), Vector3::new(-0.48, 0.36, -0.8)] {
+                let (shifts, stopped) = pushed(&scene, force, 20);
+                let last = shifts[shifts.len() - 1];
+                assert!(stopped.is_none() && last.xy().norm() > 0.5, "{width}: {last}");
+                assert!(depth(&scene, &verifier, &shifts) < 1e-6);
+            }
+        }
+    }
+
+    #[test]
     fn a_block_stops_flush_with_a_wall() {
         let [plate, block] = block_on_plate();
         let wall = cuboid([2.7, -4.0, 0.0], [3.0, 4.0, 3.0]);
