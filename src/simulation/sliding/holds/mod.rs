@@ -3,11 +3,11 @@
 //! Of each pair one surface is in pieces, each with a convex region that the other surface does not
 //! enter (those of [`cells`](super::cells) to begin with). A piece whose corners are in its region is
 //! outside the other solid, however it came there: a few planes tell what hundreds of samples would have
-//! to be measured for. Of what leaves its region, corners that are inside the other solid are contacts;
-//! else another region is looked for that holds the piece at both ends of the step; else it is
-//! split: but not at a pose where corners already tell that it is refused. Where that takes too many regions,
-//! samples tell of the pair from there on. Of contacts, those that were found to matter are kept from step to
-//! step and measured again.
+//! to be measured for. Of what leaves its region, corners that are inside the other solid are contacts, or else
+//! points inside it of the triangles whose planes it has passed. Where there are none in any pair, another
+//! region is looked for that holds the piece at both ends of the step; else it is split. Where that takes too
+//! many regions, samples tell of the pair from there on. Of contacts, those that were found to matter are kept
+//! from step to step and measured again.
 
 mod held;
 mod hold;
