@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::facing::{Facing, Obstacle, Piece, Placed, SUNK, Slope, TILT, Witness};
+use super::facing::{Facing, Obstacle, Piece, Placed, SUNK, Slope, TILT};
 
 /// A plane nearer than this is touched.
 pub(super) const TOUCHED: f64 = 1e-6;
@@ -80,16 +80,14 @@ impl Cell {
         blocking.map(|l| Obstacle { normal: l.normal, other: pair.other }).collect()
     }
 
-    /// What is certainly and steeply in the way of a shift from `at` along `u`: what the points of the piece enter that are
-    /// lowest before limits no further off than `reach`, or what gets over the triangles of these. Points that show
-    /// it are added to `witnesses`.
+    /// What is certainly and steeply in the way of a shift from `at` along `u`: what the points of the piece enter
+    /// that are lowest before limits no further off than `reach`, or what gets over the triangles of these.
     pub(super) fn touched(
         &self,
         pair: &Facing<'_>,
         (at, u): (&Vector3<f64>, &Vector3<f64>),
         reach: f64,
         placed: &mut Placed,
-        witnesses: &mut Vec<Witness>,
     ) -> Vec<Obstacle> {
         let Spot { piece, guess, .. } = &self.spot;
         let ahead = || self.limits.iter().filter(|limit| limit.is_ahead(at, u, reach));
@@ -107,11 +105,10 @@ impl Cell {
         }
         // A point beside an edge enters a face that need not be passed: the plane lies before the other one.
         let agrees = |limit: &Limit, o: &Obstacle| limit.normal.dot(&o.normal) > AGREED;
-        let mut seen = Vec::new();
-        let mut by_points = pair.obstacles(&probes, (at, u), (*guess, Slope::Steep), &mut seen);
+        // Where it touches now it is seen again at the next step: no witnesses are kept of that.
+        let mut by_points = pair.obstacles(&probes, (at, u), (*guess, Slope::Steep), &mut Vec::new());
         by_points.retain(|o| ahead().any(|limit| agrees(limit, o)));
         if !by_points.is_empty() {
-            witnesses.append(&mut seen);
             return by_points;
         }
         let guess = pair.triangle_of(piece).unwrap_or(0);

@@ -340,16 +340,18 @@ struct Made {
     regions: usize,
 }
 
-/// What is certainly in the way, as the first pieces show that touch something ahead. Where overlap is granted,
-/// regions let pieces go on by what is left of that: it leads nowhere.
-fn touched(facing: &Facing<'_>, cells: &[Cell], way: (&Vector3<f64>, &Vector3<f64>)) -> Made {
+/// The normals of what is certainly in the way, as the first piece shows that touches something ahead, if any
+/// does. Where overlap is granted, regions let pieces go on by what is left of that: it leads nowhere.
+fn touched(
+    facing: &Facing<'_>,
+    cells: &[Cell],
+    way: (&Vector3<f64>, &Vector3<f64>),
+) -> Option<Vec<Vector3<f64>>> {
     let reach = if facing.allowance > 0.0 { HELD_AT_FIRST } else { TOUCHED };
-    let mut made = Made { blocked: Vec::new(), witnesses: Vec::new(), found: 0, regions: 0 };
     let mut placed = Placed::default();
-    let of_cell = |cell: &Cell| cell.touched(facing, way, reach, &mut placed, &mut made.witnesses);
-    let found = cells.iter().map(of_cell).filter(|found| !found.is_empty()).take(1).flatten();
-    made.blocked = found.map(|obstacle| obstacle.normal).collect();
-    made
+    let of_cell = |cell: &Cell| cell.touched(facing, way, reach, &mut placed);
+    let found = cells.iter().map(of_cell).find(|found| !found.is_empty())?;
+    Some(found.into_iter().map(|obstacle| obstacle.normal).collect())
 }
 
 /// Makes way for a pair.
@@ -360,9 +362,8 @@ fn make_way(
     most: usize,
     termination: &Termination,
 ) -> Result<Made, Halt> {
-    let touching = touched(facing, cells, (at, u));
-    if !touching.blocked.is_empty() {
-        return Ok(touching);
+    if let Some(blocked) = touched(facing, cells, (at, u)) {
+        return Ok(Made { blocked, witnesses: Vec::new(), found: 0, regions: 0 });
     }
     let ends = |cell: &Cell| cell.blocks(at, u) || cell.is_exhausted(at, u);
     if !cells.iter().any(ends) {
