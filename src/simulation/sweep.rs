@@ -1,36 +1,23 @@
 //! Straight sweeps: whether a part leaves along a straight direction without entering anything,
 //! told without simulating.
 //!
-//! A solid that is moved along `d` comes to overlap another exactly if on some line along `d` a
-//! point of its surface that faces `d` passes a point of the other's that faces against it. So only
-//! such points are asked: from every leading sample of the moving part a segment as long as the way
-//! out is cast against the triangles that face it, and from every sample of the standing part that
-//! faces the motion a segment backwards against the leading triangles. Walls along the direction
-//! face neither way: sliding along them, however flush, costs nothing.
-//!
-//! What a pair may overlap (its allowance, and the tolerance) is taken off the samples across the
-//! direction: a press fit's rim passes by its hole's. Known miss: edges that cross between two
-//! samples, as of all tests by samples; an overlap that is there at the start is taken for granted.
-//! Known refusals: contact that slides down a slope, overlaps that grow on the way. So "clear" is a
-//! claim to be verified like every path, and "blocked" leaves the question to simulation.
+//! The way out ends where the part's hull is apart from that of all others; each part on the way is asked
+//! whether it is entered ([`Crossing`], with what that may miss). So "clear" is a claim to be verified like
+//! every path, and "blocked" leaves the question to simulation.
 
 use nalgebra::{Point3, Translation3, Vector3};
 
-use crate::geometry::{Bounds, OrientedSamples, Pose, Surface, gap_along, separating_direction, transformed};
-use crate::termination::{Interrupt, Poll, Termination};
+use crate::geometry::{Pose, gap_along, separating_direction, transformed};
+use crate::termination::{Interrupt, Termination};
 
 use super::sliding::DEPTH_TOLERANCE;
-use super::{HULL_MARGIN, Scene, Surroundings, exit_direction};
+use super::{Crossing, HULL_MARGIN, Scene, Surroundings, exit_direction};
 
-/// Faces that look along the direction, or against it, by less than this count as walls.
-const STEEPNESS: f64 = 1e-3;
 /// The way out is found to this share of the way beyond everything.
 const FINENESS: f64 = 1.0 / 256.0;
 /// Where a part is taken to be out along a direction, the hulls are apart by so much more than asked for, as a share:
 /// it is not to hang on rounding.
 const ASSURED: f64 = 0.01;
-/// Samples between two looks at the termination condition.
-const CAST_POLL: u32 = 64;
 
 /// What a straight sweep told.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,22 +93,6 @@ pub fn straight_sweep_past(
     Ok(Some(Sweep::Clear { path: vec![*start, end], exit }))
 }
 
-/// A part that goes straight past one that stands.
-#[derive(Debug)]
-pub struct Crossing<'a> {
-    scene: &'a Scene,
-    part: usize,
-    start: &'a Pose,
-    direction: &'a Vector3<f64>,
-    /// What stands.
-    pub other: usize,
-    /// How far the part goes, until it is past the other or out of them all.
-    pub travel: f64,
-    /// How deep it may get into the other.
-    pub granted: f64,
-    termination: &'a Termination,
-}
-
 fn moved(pose: &Pose, direction: &Vector3<f64>, travel: f64) -> Pose {
     Translation3::from(direction * travel) * pose
 }
@@ -164,87 +135,6 @@ fn way_out(
         exit_direction(scene, surroundings, part, &pose, hint).map(|d| (travel, d))
     };
     certified(far, Some(exit)).or_else(|| certified(beyond, Some(-direction)))
-}
-
-impl Crossing<'_> {
-    /// Whether the part enters the other on the way. That depends on nothing but what is in here, and on the
-    /// shapes of both and where the other stands.
-    ///
-    /// # Errors
-    /// The termination condition became true.
-    pub fn enters(&self) -> Result<bool, Interrupt> {
-        let Self { scene, part, start, direction, other, travel, granted, termination } = *self;
-        let poll = &Poll::every(CAST_POLL, Some(termination));
-        let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
-        let standing_from_moving = standing.planning_from_shape.inverse() * start;
-        let moving_from_standing = standing_from_moving.inverse();
-        let forward = standing.planning_from_shape.rotation.inverse() * direction;
-        let backward = start.rotation.inverse() * -direction;
-        let casts = |samples, target, to_target, along: &Vector3<f64>| {
-            let cast = Cast { target, to_target, along: *along, travel, granted, poll };
-            cast.enters(samples)
-        };
-        let entered = casts(moving.shape.oriented(), &standing.shape.surface, standing_from_moving, &forward)
-            || casts(standing.shape.oriented(), &moving.shape.surface, moving_from_standing, &backward);
-        // What was found of casts that were cut short is not to be believed.
-        termination.check()?;
-        Ok(entered)
-    }
-}
-
-/// Segments from the samples of one surface against another.
-struct Cast<'a> {
-    target: &'a Surface,
-    to_target: Pose,
-    /// How the samples move against the target, in its frame.
-    along: Vector3<f64>,
-    travel: f64,
-    granted: f64,
-    poll: &'a Poll<'a>,
-}
-
-impl Cast<'_> {
-    fn enters(&self, samples: &OrientedSamples) -> bool {
-        // In the samples' frame.
-        let along = self.to_target.rotation.inverse() * self.along;
-        let corridor = self.corridor();
-        samples.leading(&self.to_target, &corridor, &along, STEEPNESS).any(|(point, normals)| {
-            if self.poll.is_over() {
-                return true;
-            }
-            let leads = normals.iter().any(|n| n.dot(&along) > STEEPNESS);
-            if !leads {
-                return false;
-            }
-            let p = self.to_target * point;
-            if !corridor.contains(&p) {
-                return false;
-            }
-            let from =
-                self.to_target * (point + inward(normals, &along, self.granted)) - self.along * self.granted;
-            self.target.is_entered_along(&from, &self.along, self.travel + self.granted, STEEPNESS)
-        })
-    }
-
-    /// From where the target's box is reached.
-    fn corridor(&self) -> Bounds {
-        let bounds = *self.target.bounds();
-        let back = self.along * -(self.travel + self.granted);
-        let before = Bounds { min: bounds.min + back, max: bounds.max + back };
-        bounds.union(&before).grown(2.0 * self.granted)
-    }
-}
-
-/// The offset across `along` that takes a point below all faces that meet there, by `depth`; none
-/// where they leave no room for it.
-fn inward(normals: &[Vector3<f64>], along: &Vector3<f64>, depth: f64) -> Vector3<f64> {
-    let across = |n: &Vector3<f64>| (n - along * n.dot(along)).try_normalize(0.1);
-    let mut offset = Vector3::zeros();
-    for side in normals.iter().filter_map(across) {
-        offset -= side * (side.dot(&offset) + depth).max(0.0);
-    }
-    let below = |side: Vector3<f64>| side.dot(&offset) <= -0.5 * depth;
-    if normals.iter().filter_map(across).all(below) { offset } else { Vector3::zeros() }
 }
 
 #[cfg(test)]

@@ -24,6 +24,26 @@ impl Surface {
         })
     }
 
+    /// Where that segment first crosses one, in units from `p`.
+    #[must_use]
+    pub fn entered_along(
+        &self,
+        p: &Point3<f64>,
+        direction: &Vector3<f64>,
+        length: f64,
+        steepness: f64,
+    ) -> Option<f64> {
+        let mut first: Option<f64> = None;
+        self.tree().any_along(p, direction, length, |t| {
+            if -self.face_normal(t).dot(direction) > steepness {
+                let at = crossing(p, direction, &self.corners(t));
+                first = at.filter(|at| (0.0..=first.unwrap_or(length)).contains(at)).or(first);
+            }
+            false
+        });
+        first
+    }
+
     /// The longest stretch of the segment of `length` from `p` along the unit vector `direction` that lies
     /// inside; faces met at less than a grazing angle (`steepness`: sine of the angle) are no ends of it.
     #[must_use]

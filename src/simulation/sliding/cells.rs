@@ -79,6 +79,11 @@ impl<'a> Cells<'a> {
         Self { scene, part, start: *start, termination, pairs: Vec::new(), regions: 0 }
     }
 
+    /// None of any pair yet.
+    pub(super) fn anew(&self) -> Self {
+        Self::new(self.scene, (self.part, &self.start), self.termination)
+    }
+
     /// Whether a standing part is among the pairs.
     pub(super) fn knows(&self, other: usize) -> bool {
         self.pairs.iter().any(|p| p.facing.other == other)

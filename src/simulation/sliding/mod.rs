@@ -17,6 +17,7 @@ mod cells;
 mod drive;
 mod facing;
 mod finder;
+mod flight;
 mod holds;
 mod kept;
 mod leap;
@@ -155,7 +156,15 @@ fn pushed(
     let mut push = Push::new(scene, &surroundings.standing, (part, start), action.force(), termination);
     let (mut path, mut asked) = (vec![*start], Vec::new());
     while path.len() < MOST_POSES {
-        match push.step()? {
+        let step = match push.step() {
+            // Where it landed regions cannot tell: they are to tell all the way.
+            Err(Halt::Lost) if push.begins_on_foot() => {
+                (path, asked) = (vec![*start], Vec::new());
+                continue;
+            }
+            step => step?,
+        };
+        match step {
             push::Step::Stuck { with } => {
                 return Ok(Motion::simulated(path, asked, End::Collision { with }));
             }

@@ -1,5 +1,5 @@
 //! Translations: a shift that follows a force as far as contact lets it, in steps as long as the
-//! regions around the part's surface allow ([`cells`](super::cells)).
+//! regions around the part's surface allow ([`cells`](super::cells)), or in flight ([`flight`](super::flight)).
 //!
 //! At each shift the force is projected onto the cone that the obstacles leave. Along an obstacle
 //! steps are short, and each begins with the force as it is: where the obstacle ends, the part
@@ -15,6 +15,7 @@ use super::super::projection::{Row, project};
 use super::cells::{Cells, Halt, MOST_STALLS, STALL};
 use super::drive::{FREE_STEP, LEAST_SHARE, contact_step, others};
 use super::facing::Obstacle;
+use super::flight::Flights;
 
 /// So many times the direction is bent at one place.
 const MOST_BENDS: usize = 64;
@@ -36,6 +37,7 @@ pub(super) struct Push<'a> {
     contact_step: f64,
     /// Whether it is to get far: the way is then made so from the start.
     is_long: bool,
+    flights: Flights<'a>,
 }
 
 /// What a step came to.
@@ -65,12 +67,24 @@ impl<'a> Push<'a> {
             stalls: 0,
             contact_step: contact_step(shape),
             is_long: true,
+            flights: Flights::new(scene, standing, part, termination),
         }
     }
 
     /// The same for a short way.
     pub(super) fn short(self) -> Self {
-        Self { is_long: false, ..self }
+        Self { is_long: false, flights: self.flights.never(), ..self }
+    }
+
+    /// Begins again, without flights, if there was one.
+    pub(super) fn begins_on_foot(&mut self) -> bool {
+        let has_flown = self.flights.any;
+        if has_flown {
+            self.flights = self.flights.never();
+            self.shift = Vector3::zeros();
+            self.land();
+        }
+        has_flown
     }
 
     /// How far it got.
@@ -80,6 +94,9 @@ impl<'a> Push<'a> {
 
     /// One step; `Halt::Lost` where regions cannot tell.
     pub(super) fn step(&mut self) -> Result<Step, Halt> {
+        if let Some(step) = self.flown()? {
+            return Ok(step);
+        }
         let mut obstacles = Vec::new();
         let mut u = self.force;
         self.look_around()?;
@@ -97,6 +114,11 @@ impl<'a> Push<'a> {
             }
             u = along.normalize();
         }
+        if !obstacles.is_empty() {
+            self.flights.bent();
+        } else if let Some(step) = self.flown()? {
+            return Ok(step);
+        }
         if self.is_long && self.shift == Vector3::zeros() {
             self.cells.lengthen(&u)?;
         }
@@ -113,9 +135,38 @@ impl<'a> Push<'a> {
             return Err(Halt::Lost);
         }
         self.shift += u * length;
+        Ok(Step::Moved(self.pose()))
+    }
+
+    /// A step of a flight, if it flies.
+    fn flown(&mut self) -> Result<Option<Step>, Halt> {
+        let was_aloft = self.flights.is_aloft();
+        let step = self.flights.step(&self.pose(), &self.here(), &self.force)?;
+        if let Some(length) = step {
+            self.shift += self.force * length;
+            return Ok(Some(Step::Moved(self.pose())));
+        }
+        if was_aloft {
+            self.land();
+        }
+        Ok(None)
+    }
+
+    /// Whatever regions there were are of elsewhere.
+    fn land(&mut self) {
+        self.cells = self.cells.anew();
+        (self.asked_at, self.stalls) = (None, 0);
+    }
+
+    fn pose(&self) -> Pose {
         let mut pose = self.start;
         pose.translation.vector += self.shift;
-        Ok(Step::Moved(pose))
+        pose
+    }
+
+    /// Where its box is.
+    fn here(&self) -> Bounds {
+        Bounds { min: self.bounds.min + self.shift, max: self.bounds.max + self.shift }
     }
 
     /// Takes in parts that come near.
@@ -124,8 +175,7 @@ impl<'a> Push<'a> {
             return Ok(());
         }
         self.asked_at = Some(self.shift);
-        let here = Bounds { min: self.bounds.min + self.shift, max: self.bounds.max + self.shift };
-        for other in self.scene.broad_phase.meeting_of(self.standing, &here.grown(FREE_STEP)) {
+        for other in self.scene.broad_phase.meeting_of(self.standing, &self.here().grown(FREE_STEP)) {
             if !self.cells.knows(other) {
                 self.cells.add(other, &self.shift)?;
             }

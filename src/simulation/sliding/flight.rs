@@ -1,0 +1,122 @@
+//! Free flight: how far a push goes before it meets anything.
+//!
+//! Where nothing bends a push, regions further on along its line would only tell that nothing is there. So the
+//! way to where it meets something is told by segments cast from what leads ([`Crossing`]), in stretches as
+//! long as the longest regions. There, and wherever the push is bent, regions tell. What segments may miss,
+//! edges that cross between samples, is for verification to find, as of all motions by samples.
+
+use nalgebra::Vector3;
+
+use crate::geometry::{Bounds, Pose};
+use crate::termination::{Interrupt, Termination};
+
+use super::super::{Crossing, Scene};
+use super::DEPTH_TOLERANCE;
+use super::drive::FREE_STEP;
+
+/// So far ahead is looked at once, in the planning frame.
+const STRETCH: f64 = 4.0;
+/// Flights that are shorter cost more than regions, which have to be found anew where one ends.
+const SHORTEST: f64 = FREE_STEP / 2.0;
+/// A flight ends so far before what is met: regions lead on to it.
+const LANDING: f64 = 4.0 * DEPTH_TOLERANCE;
+
+/// The flights of a push.
+#[derive(Clone, Copy)]
+pub(super) struct Flights<'a> {
+    scene: &'a Scene,
+    standing: &'a [usize],
+    part: usize,
+    termination: &'a Termination,
+    /// How much further it flies.
+    left: f64,
+    state: State,
+    /// Whether there was one.
+    pub(super) any: bool,
+}
+
+/// What a push is about to do.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// To fly, if nothing is in the way.
+    Ready,
+    /// To fly on, or to land.
+    Aloft,
+    /// To follow regions, until it was bent.
+    Grounded,
+    /// To follow regions.
+    Never,
+}
+
+impl<'a> Flights<'a> {
+    pub(super) fn new(
+        scene: &'a Scene,
+        standing: &'a [usize],
+        part: usize,
+        termination: &'a Termination,
+    ) -> Self {
+        Self { scene, standing, part, termination, left: 0.0, state: State::Ready, any: false }
+    }
+
+    /// The same of a push that is not to fly.
+    pub(super) fn never(self) -> Self {
+        Self { left: 0.0, state: State::Never, any: false, ..self }
+    }
+
+    /// The push was bent: where nothing does so any more it may fly again.
+    pub(super) fn bent(&mut self) {
+        if self.state == State::Grounded {
+            self.state = State::Ready;
+        }
+    }
+
+    /// The next step of a flight from a pose, where the part's box is so, along the unit vector `u`; none where
+    /// regions are to tell.
+    pub(super) fn step(
+        &mut self,
+        from: &Pose,
+        bounds: &Bounds,
+        u: &Vector3<f64>,
+    ) -> Result<Option<f64>, Interrupt> {
+        if matches!(self.state, State::Grounded | State::Never) {
+            return Ok(None);
+        }
+        if self.left == 0.0 {
+            self.left = self.length(from, bounds, u)?;
+        }
+        let step = self.left.min(FREE_STEP);
+        self.left -= step;
+        self.state = if step > 0.0 { State::Aloft } else { State::Grounded };
+        self.any |= step > 0.0;
+        Ok(Some(step).filter(|step| *step > 0.0))
+    }
+
+    /// Whether it flies.
+    pub(super) fn is_aloft(&self) -> bool {
+        self.state == State::Aloft
+    }
+
+    /// How far it gets before it meets anything, up to a [`STRETCH`]; 0 where that is hardly worth anything. It
+    /// depends on nothing but what the box meets on this stretch.
+    fn length(&self, from: &Pose, bounds: &Bounds, u: &Vector3<f64>) -> Result<f64, Interrupt> {
+        let Self { scene, standing, part, termination, .. } = *self;
+        let end = u * (STRETCH + LANDING);
+        let swept = bounds.union(&Bounds { min: bounds.min + end, max: bounds.max + end });
+        let mut length = STRETCH;
+        for other in scene.broad_phase.meeting_of(standing, &swept) {
+            let granted = scene.allowances.of(part, other) + DEPTH_TOLERANCE;
+            let passed = bounds.grown(granted).way_past(&scene.bodies[other].bounds, u);
+            let travel = passed.min(length + LANDING);
+            let crossing =
+                Crossing { scene, part, start: from, direction: u, travel, other, granted, termination };
+            let way = crossing.way(SHORTEST + LANDING)?;
+            if way < travel {
+                length = way - LANDING;
+            }
+            if length < SHORTEST {
+                return Ok(0.0);
+            }
+        }
+        Ok(length)
+    }
+}
