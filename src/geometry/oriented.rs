@@ -2,15 +2,13 @@
 
 use nalgebra::{Point3, Vector3};
 
+use super::leading::{Groups, Item};
 use super::samples::{Site, Sited};
 use super::surface::NO_TRIANGLE;
 use super::{Bounds, Pose, Surface};
 
 /// cos of the angle below which two normals are one (about a tenth of a degree).
 const SAME: f64 = 0.999_998;
-
-/// Points of a group, at most.
-const GROUP: usize = 32;
 
 /// Points of a surface, each with the unit normals of the faces that meet there.
 #[derive(Debug, Clone, Default)]
@@ -19,19 +17,7 @@ pub struct OrientedSamples {
     /// Where each point's normals begin, and where the last one's end.
     starts: Vec<u32>,
     normals: Vec<Vector3<f64>>,
-    /// The numbers of the points, those of a group one after the other.
-    grouped: Vec<u32>,
-    groups: Vec<Group>,
-}
-
-/// Points near each other.
-#[derive(Debug, Clone)]
-struct Group {
-    /// Where they begin and end among the grouped ones.
-    range: [u32; 2],
-    points: Bounds,
-    /// The box of their normals, taken as points.
-    normals: Bounds,
+    groups: Groups,
 }
 
 impl OrientedSamples {
@@ -40,8 +26,7 @@ impl OrientedSamples {
         size_of_val(&*self.points)
             + size_of_val(&*self.starts)
             + size_of_val(&*self.normals)
-            + size_of_val(&*self.grouped)
-            + size_of_val(&*self.groups)
+            + self.groups.memory()
     }
 
     pub(super) fn new(surface: &Surface, sited: &[Sited]) -> Self {
@@ -60,37 +45,15 @@ impl OrientedSamples {
         out.points.shrink_to_fit();
         out.starts.shrink_to_fit();
         out.normals.shrink_to_fit();
-        out.group();
+        let item = |i: u32| {
+            let (point, normals) = out.at(i);
+            Item::new([point], normals)
+        };
+        out.groups = Groups::new(&(0..out.points.len() as u32).map(item).collect::<Vec<_>>());
         out
     }
 
-    fn group(&mut self) {
-        let mut grouped: Vec<u32> = (0..self.points.len() as u32).collect();
-        let mut groups = Vec::new();
-        self.split(&mut grouped, 0, &mut groups);
-        groups.shrink_to_fit();
-        (self.grouped, self.groups) = (grouped, groups);
-    }
-
-    /// Halves a part of the grouped points, which begins at `start`, until the halves are small.
-    fn split(&self, grouped: &mut [u32], start: u32, groups: &mut Vec<Group>) {
-        let points = Bounds::of(grouped.iter().map(|&i| &self.points[i as usize]));
-        if grouped.len() > GROUP {
-            let axis = points.extents().imax();
-            let middle = grouped.len() / 2;
-            let along = |i: &u32| self.points[*i as usize][axis];
-            grouped.select_nth_unstable_by(middle, |i, j| along(i).total_cmp(&along(j)).then(i.cmp(j)));
-            let (low, high) = grouped.split_at_mut(middle);
-            self.split(low, start, groups);
-            self.split(high, start + middle as u32, groups);
-        } else if !grouped.is_empty() {
-            let all = grouped.iter().flat_map(|&i| self.at(i).1).map(|n| Point3::from(*n));
-            let normals = all.fold(Bounds::EMPTY, |bounds, n| bounds.with_point(&n));
-            groups.push(Group { range: [start, start + grouped.len() as u32], points, normals });
-        }
-    }
-
-    fn at(&self, i: u32) -> (&Point3<f64>, &[Vector3<f64>]) {
+    pub(super) fn at(&self, i: u32) -> (&Point3<f64>, &[Vector3<f64>]) {
         let [from, to] = [i, i + 1].map(|i| self.starts[i as usize] as usize);
         (&self.points[i as usize], &self.normals[from..to])
     }
@@ -104,14 +67,7 @@ impl OrientedSamples {
         direction: &'s Vector3<f64>,
         steepness: f64,
     ) -> impl Iterator<Item = (&'s Point3<f64>, &'s [Vector3<f64>])> {
-        /// Boxes are rounded otherwise than the points in them.
-        const ROUNDING: f64 = 1e-9;
-        let wanted = move |group: &&Group| {
-            group.normals.support(direction) > steepness - ROUNDING
-                && group.points.transformed(box_from_self).grown(ROUNDING).meets(within)
-        };
-        let all = self.groups.iter().filter(wanted).map(|group| group.range.map(|i| i as usize));
-        all.flat_map(|[from, to]| self.grouped[from..to].iter().map(|&i| self.at(i)))
+        self.groups.leading(box_from_self, within, direction, steepness).map(|i| self.at(i))
     }
 
     /// All points with their normals.

@@ -183,6 +183,13 @@ fn bend(surface: &Surface, t: u32, e: u8) -> Bend {
     }
 }
 
+/// The convex edges of a surface, and the rims of an open one, each once: a triangle and which of its edges it is.
+pub(super) fn convex_edges(surface: &Surface) -> impl Iterator<Item = (u32, u8)> {
+    let all = (0..surface.triangles().len() as u32).flat_map(|t| (0..3u8).map(move |e| (t, e)));
+    let is_first = |t: u32, other: u32| other == NO_TRIANGLE || other >= t;
+    all.filter(move |&(t, e)| is_first(t, surface.neighbour(t, e)) && bend(surface, t, e) > Bend::Inward)
+}
+
 /// The vertices at convex edges. On finely tessellated surfaces they stand much closer than any
 /// contact needs: blunt ones are thinned to the edge spacing, sharp ones only where they nearly
 /// coincide (the crest of a thread is narrow). All of

@@ -10,7 +10,9 @@ use super::content_hash::mesh_hash;
 use super::hull::hull_vertices;
 use super::own_frame::OwnFrame;
 use super::samples::sited;
-use super::{Bounds, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Spacing, Surface};
+use super::{
+    Bounds, ConvexEdges, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Spacing, Surface,
+};
 
 /// Nodes of the tree of patches between two looks at the termination condition.
 const PATCH_POLL: u32 = 64;
@@ -28,6 +30,7 @@ pub struct Shape {
     pub reach: f64,
     /// Built when they are asked for, as what follows.
     oriented: OnceLock<OrientedSamples>,
+    convex_edges: OnceLock<ConvexEdges>,
     samples: OnceLock<SampleTree>,
     patches: OnceLock<PatchTree>,
     content: OnceLock<[u8; 32]>,
@@ -56,7 +59,7 @@ impl Shape {
         termination.check()?;
         let shape = Self::over(Surface::new(mesh), hull, OnceLock::new());
         termination.check()?;
-        shape.oriented();
+        shape.convex_edges();
         Ok(shape)
     }
 
@@ -71,8 +74,10 @@ impl Shape {
         let mass = surface.mass_properties();
         let reach =
             surface.vertices().iter().map(|v| (v - mass.centre).norm_squared()).fold(0.0, f64::max).sqrt();
-        let (oriented, samples, patches) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
-        Self { surface: Arc::new(surface), hull, mass, reach, oriented, samples, patches, content }
+        let (oriented, samples) = (OnceLock::new(), OnceLock::new());
+        let (convex_edges, patches) = (OnceLock::new(), OnceLock::new());
+        let surface = Arc::new(surface);
+        Self { surface, hull, mass, reach, oriented, convex_edges, samples, patches, content }
     }
 
     /// Derives now what was not yet, but for the tree of samples.
@@ -82,7 +87,7 @@ impl Shape {
     pub fn derive(&self, termination: &Termination) -> Result<(), Interrupt> {
         termination.check()?;
         self.surface.prepare();
-        self.oriented();
+        self.convex_edges();
         self.patches(termination).map(|_| ())
     }
 
@@ -99,6 +104,11 @@ impl Shape {
             OrientedSamples::new(&self.surface, &sited)
         };
         self.oriented.get_or_init(derive)
+    }
+
+    /// Where it first touches what it is moved against.
+    pub fn convex_edges(&self) -> &ConvexEdges {
+        self.convex_edges.get_or_init(|| ConvexEdges::new(&self.surface))
     }
 
     /// The same points in a tree.
@@ -127,6 +137,7 @@ impl Shape {
             + size_of_val(&*self.hull)
             + self.samples.get().map_or(0, SampleTree::memory)
             + self.oriented.get().map_or(0, OrientedSamples::memory)
+            + self.convex_edges.get().map_or(0, ConvexEdges::memory)
             + self.patches.get().map_or(0, PatchTree::memory)
     }
 

@@ -35,6 +35,41 @@ pub(super) fn crossing(p: &Point3<f64>, direction: &Vector3<f64>, corners: &[Poi
     inside.then(|| ac.dot(&q) / determinant)
 }
 
+/// How far the edge `[a, b]` gets along the unit vector `direction` until it meets a triangle with a unit normal
+/// against that, from its outer side; 0 where it is through it already. The border belongs to the triangle.
+#[must_use]
+pub(super) fn met_by_edge(
+    [a, b]: &[Point3<f64>; 2],
+    direction: &Vector3<f64>,
+    corners: &[Point3<f64>; 3],
+    normal: &Vector3<f64>,
+) -> Option<f64> {
+    /// Slack, in units of the planning frame, so that no edge passes between two triangles.
+    const BORDER: f64 = 1e-9;
+    // The stretch of the edge that is before the triangle, seen along the direction.
+    let (mut from, mut to) = (0.0f64, 1.0f64);
+    for (i, p) in corners.iter().enumerate() {
+        let outline = (corners[(i + 1) % 3] - p).cross(direction);
+        let slack = BORDER * outline.norm();
+        let [at_a, at_b] = [a, b].map(|x| (x - p).dot(&outline) + slack);
+        if at_a < 0.0 && at_b < 0.0 {
+            return None;
+        }
+        if at_a < 0.0 {
+            from = from.max(at_a / (at_a - at_b));
+        } else if at_b < 0.0 {
+            to = to.min(at_a / (at_a - at_b));
+        }
+    }
+    if from > to {
+        return None;
+    }
+    let against = normal.dot(direction);
+    let [at_a, at_b] = [a, b].map(|x| (corners[0] - x).dot(normal) / against);
+    let [at_from, at_to] = [from, to].map(|t| at_a + (at_b - at_a) * t);
+    (at_from.max(at_to) >= 0.0).then(|| at_from.min(at_to).max(0.0))
+}
+
 /// The point of triangle `abc` closest to `p`, and its feature (C. Ericson, Real-Time Collision
 /// Detection, 5.1.5: Voronoi regions in barycentric terms).
 #[must_use]

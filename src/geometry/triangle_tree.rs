@@ -10,7 +10,7 @@
 mod crossings;
 mod nearest_first;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Vector3, center};
 
 use super::triangle::area_normal;
 use super::{Bounds, Closest};
@@ -141,10 +141,28 @@ impl TriangleTree {
         p: &Point3<f64>,
         direction: &Vector3<f64>,
         length: f64,
-        mut test: impl FnMut(u32) -> bool,
+        test: impl FnMut(u32) -> bool,
     ) -> bool {
-        let q = p - self.origin;
-        let segment = self.segment(&q, direction, length);
+        self.any_met(&self.segment(&(p - self.origin), direction, length), test)
+    }
+
+    /// The same of a segment `[a, b]` that is moved along `direction` by `length`.
+    pub(super) fn any_swept(
+        &self,
+        [a, b]: &[Point3<f64>; 2],
+        direction: &Vector3<f64>,
+        length: f64,
+        test: impl FnMut(u32) -> bool,
+    ) -> bool {
+        let mut segment = self.segment(&(center(a, b) - self.origin), direction, length);
+        let half = (b - a).abs() / 2.0;
+        for (margin, half) in segment.margin.iter_mut().zip(&half) {
+            *margin += *half as f32;
+        }
+        self.any_met(&segment, test)
+    }
+
+    fn any_met(&self, segment: &Segment, mut test: impl FnMut(u32) -> bool) -> bool {
         let mut stack = vec![self.root];
         while let Some(at) = stack.pop() {
             if at & LEAF != 0 {
@@ -155,7 +173,7 @@ impl TriangleTree {
                 continue;
             }
             let node = &self.nodes[at as usize];
-            let meets = node.meets(&segment);
+            let meets = node.meets(segment);
             stack.extend((0..WIDTH).filter(|&k| meets[k]).map(|k| node.child[k]));
         }
         false
@@ -224,24 +242,27 @@ struct Segment {
     q: [f32; 3],
     /// One over the direction.
     inverse: [f32; 3],
+    /// Where it begins, behind the point, and where it ends.
+    before: f32,
     length: f32,
-    slack: f32,
+    /// So much larger are boxes taken, along each axis.
+    margin: [f32; 3],
 }
 
 impl Node {
     /// Which boxes a segment meets.
     #[inline]
     fn meets(&self, segment: &Segment) -> [bool; WIDTH] {
-        let (mut from, mut to) = ([-segment.slack; WIDTH], [segment.length; WIDTH]);
+        let (mut from, mut to) = ([-segment.before; WIDTH], [segment.length; WIDTH]);
         for a in 0..3 {
             let (q, inverse) = (segment.q[a], segment.inverse[a]);
             // By the direction's sign: so an empty place, whose box is inside out, is never met.
             let (near, far) =
                 if inverse > 0.0 { (&self.min[a], &self.max[a]) } else { (&self.max[a], &self.min[a]) };
-            let slack = segment.slack.copysign(inverse);
+            let margin = segment.margin[a].copysign(inverse);
             for k in 0..WIDTH {
-                from[k] = larger(from[k], (near[k] - slack - q) * inverse);
-                to[k] = -larger(-to[k], -((far[k] + slack - q) * inverse));
+                from[k] = larger(from[k], (near[k] - margin - q) * inverse);
+                to[k] = -larger(-to[k], -((far[k] + margin - q) * inverse));
             }
         }
         std::array::from_fn(|k| from[k] <= to[k])

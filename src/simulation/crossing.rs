@@ -1,22 +1,21 @@
-//! Crossings: a part that goes straight past one that stands, told by segments cast from points of
-//! their surfaces.
+//! Crossings: a part that goes straight past one that stands, told by the edges and corners of both.
 //!
 //! A solid that is moved along `d` comes to overlap another exactly if on some line along `d` a
-//! point of its surface that faces `d` passes a point of the other's that faces against it. So only
-//! such points are asked: from every leading sample of the moving part a segment as long as the way
-//! is cast against the triangles that face it, and from every sample of the standing part that
-//! faces the motion a segment backwards against the leading triangles. Walls along the direction
-//! face neither way: sliding along them, however flush, costs nothing.
+//! point of its surface that faces `d` passes a point of the other's that faces against it. Walls along the
+//! direction face neither way: sliding along them, however flush, costs nothing.
 //!
-//! What a pair may overlap (its allowance, and the tolerance) is taken off the samples across the
-//! direction: a press fit's rim passes by its hole's. Known miss: edges that cross between two
-//! samples, as of all tests by samples; an overlap that is there at the start is taken for granted.
+//! Such a line first meets at an edge or a corner: of two faces, where an edge of the one passes an edge of the
+//! other or a corner of the one the other's face. So the convex edges of one surface are swept against the
+//! faces of the other, and the other's corners against the faces of the one: nothing passes between them.
+//!
+//! What a pair may overlap (its allowance, and the tolerance) is taken off the edges across the
+//! direction: a press fit's rim passes by its hole's. An overlap that is there at the start is taken for granted.
 //! Known refusals: contact that slides down a slope, overlaps that grow on the way.
 
 use nalgebra::{Point3, Vector3};
 
 use super::Scene;
-use crate::geometry::{Bounds, OrientedSamples, Pose, Surface};
+use crate::geometry::{Bounds, ConvexEdges, Pose, Surface};
 use crate::termination::{Interrupt, Poll, Termination};
 
 /// Faces that look along the direction, or against it, by less than this count as walls.
@@ -47,12 +46,7 @@ impl Crossing<'_> {
     /// # Errors
     /// The termination condition became true.
     pub fn enters(&self) -> Result<bool, Interrupt> {
-        let poll = &Poll::every(CAST_POLL, Some(self.termination));
-        let [forward, backward] = self.casts(poll);
-        let entered = forward.enters() || backward.enters();
-        // What was found of casts that were cut short is not to be believed.
-        self.termination.check()?;
-        Ok(entered)
+        Ok(self.way(self.travel)? < self.travel)
     }
 
     /// How far the part gets on the way until it meets the other: all of the way if it does not. Where that is less
@@ -61,80 +55,94 @@ impl Crossing<'_> {
     /// # Errors
     /// The termination condition became true.
     pub(super) fn way(&self, least: f64) -> Result<f64, Interrupt> {
-        let poll = &Poll::every(CAST_POLL, Some(self.termination));
-        let [forward, backward] = self.casts(poll);
-        let least = least.min(self.travel);
-        let travel = backward.way(forward.way(self.travel, least), least);
-        self.termination.check()?;
-        Ok(travel)
-    }
-
-    fn casts<'b>(&'b self, poll: &'b Poll<'b>) -> [Cast<'b>; 2] {
-        let Self { scene, part, start, direction, other, travel, granted, .. } = *self;
-        let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
-        let standing_from_moving = standing.planning_from_shape.inverse() * start;
-        let forward = standing.planning_from_shape.rotation.inverse() * direction;
-        let backward = start.rotation.inverse() * -direction;
-        let [mine, theirs] = [moving, standing].map(|body| &body.shape);
-        [
-            (mine, theirs, standing_from_moving, forward),
-            (theirs, mine, standing_from_moving.inverse(), backward),
+        let Self { scene, part, start, direction, other, travel, granted, termination } = *self;
+        let poll = &Poll::every(CAST_POLL, Some(termination));
+        let [mine, theirs] = [part, other].map(|i| &scene.bodies[i].shape);
+        let standing = &scene.bodies[other].planning_from_shape;
+        let standing_from_moving = standing.inverse() * start;
+        let along = [standing.rotation.inverse() * direction, start.rotation.inverse() * -direction];
+        let [forward, backward] = [
+            (mine, theirs, standing_from_moving, along[0]),
+            (theirs, mine, standing_from_moving.inverse(), along[1]),
         ]
-        .map(|(samples, target, to_target, along)| {
-            let (samples, target) = (samples.oriented(), &target.surface);
-            Cast { samples, target, to_target, along, travel, granted, poll }
-        })
+        .map(|(edges, target, to_target, along)| {
+            let (edges, target) = (edges.convex_edges(), &target.surface);
+            Cast { edges, target, to_target, along, travel, granted, least: least.min(travel), poll }
+        });
+        // Edges cost more than corners.
+        let way = if forward.edges.count() <= backward.edges.count() {
+            backward.corners(forward.edges(travel))
+        } else {
+            forward.corners(backward.edges(travel))
+        };
+        // What was found of casts that were cut short is not to be believed.
+        termination.check()?;
+        Ok(way)
     }
 }
 
-/// Segments from the samples of one surface against another.
+/// What leads of one surface, against another.
 struct Cast<'a> {
-    samples: &'a OrientedSamples,
+    edges: &'a ConvexEdges,
     target: &'a Surface,
     to_target: Pose,
-    /// How the samples move against the target, in its frame.
+    /// How the edges move against the target, in its frame.
     along: Vector3<f64>,
     travel: f64,
     granted: f64,
+    /// Nobody asks how much shorter a way is than this.
+    least: f64,
     poll: &'a Poll<'a>,
 }
 
 impl Cast<'_> {
-    fn enters(&self) -> bool {
-        let reach = self.travel + self.granted;
-        self.leading(|from| {
-            self.poll.is_over() || self.target.is_entered_along(from, &self.along, reach, STEEPNESS)
-        })
+    /// How far of `travel` the edges go until they meet a face.
+    fn edges(&self, travel: f64) -> f64 {
+        let (along, corridor) = (self.along_here(), self.corridor());
+        let leading = self.edges.leading(&self.to_target, &corridor, &along, STEEPNESS).filter_map(|edge| {
+            let ends = self.edges.ends_of(edge);
+            let is_met = leads(&edge.normals, &along)
+                && Bounds::of(&ends.map(|(p, _)| self.to_target * p)).meets(&corridor);
+            is_met.then(|| ends.map(|(p, normals)| self.from(p, normals, &along)))
+        });
+        self.way(travel, leading, |ends, reach| self.target.met_by_edge(ends, &self.along, reach, STEEPNESS))
     }
 
-    /// How far of `travel` it goes until something is entered; what is less than `least` may be too much.
-    fn way(&self, travel: f64, least: f64) -> f64 {
+    /// How far of `travel` their ends go.
+    fn corners(&self, travel: f64) -> f64 {
+        let (along, corridor) = (self.along_here(), self.corridor());
+        let ends = self.edges.ends().leading(&self.to_target, &corridor, &along, STEEPNESS);
+        let leading = ends.filter_map(|(p, normals)| {
+            let is_met = leads(normals, &along) && corridor.contains(&(self.to_target * p));
+            is_met.then(|| self.from(p, normals, &along))
+        });
+        self.way(travel, leading, |p, reach| self.target.met_by_point(p, &self.along, reach, STEEPNESS))
+    }
+
+    fn way<T>(
+        &self,
+        travel: f64,
+        leading: impl Iterator<Item = T>,
+        met: impl Fn(&T, f64) -> Option<f64>,
+    ) -> f64 {
         let mut reach = travel + self.granted;
-        let is_short = |reach: f64| reach < least + self.granted;
-        let _ = !is_short(reach)
-            && self.leading(|from| {
-                if let Some(at) = self.target.entered_along(from, &self.along, reach, STEEPNESS) {
-                    reach = at;
-                }
-                self.poll.is_over() || is_short(reach)
-            });
+        for item in leading {
+            if reach < self.least + self.granted || self.poll.is_over() {
+                break;
+            }
+            reach = met(&item, reach).unwrap_or(reach);
+        }
         reach - self.granted
     }
 
-    /// Whether a segment passes `test`, by where it begins: one from each leading sample, as far back and as far
-    /// below the faces there as is granted.
-    fn leading(&self, mut test: impl FnMut(&Point3<f64>) -> bool) -> bool {
-        // In the samples' frame.
-        let along = self.to_target.rotation.inverse() * self.along;
-        let corridor = self.corridor();
-        self.samples.leading(&self.to_target, &corridor, &along, STEEPNESS).any(|(point, normals)| {
-            let leads = normals.iter().any(|n| n.dot(&along) > STEEPNESS);
-            if !leads || !corridor.contains(&(self.to_target * point)) {
-                return false;
-            }
-            let below = self.to_target * (point + inward(normals, &along, self.granted));
-            test(&(below - self.along * self.granted))
-        })
+    /// In the edges' frame.
+    fn along_here(&self) -> Vector3<f64> {
+        self.to_target.rotation.inverse() * self.along
+    }
+
+    /// Where a corner begins, in the target's frame: as far back and as far below the faces there as is granted.
+    fn from(&self, p: &Point3<f64>, normals: &[Vector3<f64>], along: &Vector3<f64>) -> Point3<f64> {
+        self.to_target * (p + inward(normals, along, self.granted)) - self.along * self.granted
     }
 
     /// From where the target's box is reached.
@@ -144,6 +152,10 @@ impl Cast<'_> {
         let before = Bounds { min: bounds.min + back, max: bounds.max + back };
         bounds.union(&before).grown(2.0 * self.granted)
     }
+}
+
+fn leads(normals: &[Vector3<f64>], along: &Vector3<f64>) -> bool {
+    normals.iter().any(|n| n.dot(along) > STEEPNESS)
 }
 
 /// The offset across `along` that takes a point below all faces that meet there, by `depth`; none

@@ -2,46 +2,47 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::super::triangle::crossing;
+use super::super::triangle::{crossing, met_by_edge};
 use super::Surface;
 
 impl Surface {
-    /// Whether the segment from `p` along the unit vector `direction` crosses a triangle from its
-    /// outer side, at more than a grazing angle (`steepness`: sine of the angle). The border of a
-    /// triangle belongs to it.
+    /// How far a point gets from `p` along the unit vector `direction`, up to `length`, until it meets a triangle
+    /// from its outer side, at more than a grazing angle (`steepness`: sine of the angle); none where it does not.
+    /// The border of a triangle belongs to it.
     #[must_use]
-    pub fn is_entered_along(
-        &self,
-        p: &Point3<f64>,
-        direction: &Vector3<f64>,
-        length: f64,
-        steepness: f64,
-    ) -> bool {
-        self.tree().any_along(p, direction, length, |t| {
-            let against = -self.face_normal(t).dot(direction);
-            against > steepness
-                && crossing(p, direction, &self.corners(t)).is_some_and(|at| (0.0..=length).contains(&at))
-        })
-    }
-
-    /// Where that segment first crosses one, in units from `p`.
-    #[must_use]
-    pub fn entered_along(
+    pub fn met_by_point(
         &self,
         p: &Point3<f64>,
         direction: &Vector3<f64>,
         length: f64,
         steepness: f64,
     ) -> Option<f64> {
-        let mut first: Option<f64> = None;
+        let mut first = First { within: length, at: None };
         self.tree().any_along(p, direction, length, |t| {
-            if -self.face_normal(t).dot(direction) > steepness {
-                let at = crossing(p, direction, &self.corners(t));
-                first = at.filter(|at| (0.0..=first.unwrap_or(length)).contains(at)).or(first);
-            }
+            let is_met = -self.face_normal(t).dot(direction) > steepness;
+            first.take(if is_met { crossing(p, direction, &self.corners(t)) } else { None });
             false
         });
-        first
+        first.at
+    }
+
+    /// The same of an edge `[a, b]`: 0 where it is through a triangle already.
+    #[must_use]
+    pub fn met_by_edge(
+        &self,
+        edge: &[Point3<f64>; 2],
+        direction: &Vector3<f64>,
+        length: f64,
+        steepness: f64,
+    ) -> Option<f64> {
+        let mut first = First { within: length, at: None };
+        self.tree().any_swept(edge, direction, length, |t| {
+            let normal = self.face_normal(t);
+            let is_met = -normal.dot(direction) > steepness;
+            first.take(if is_met { met_by_edge(edge, direction, &self.corners(t), &normal) } else { None });
+            false
+        });
+        first.at
     }
 
     /// The longest stretch of the segment of `length` from `p` along the unit vector `direction` that lies
@@ -76,5 +77,20 @@ impl Surface {
             }
         }
         entered.map_or(longest, |from| longest.max(length - from))
+    }
+}
+
+/// The first of some places along a segment.
+struct First {
+    /// No further than this.
+    within: f64,
+    at: Option<f64>,
+}
+
+impl First {
+    fn take(&mut self, at: Option<f64>) {
+        if let Some(at) = at.filter(|at| (0.0..=self.within).contains(at)) {
+            (self.within, self.at) = (at, Some(at));
+        }
     }
 }

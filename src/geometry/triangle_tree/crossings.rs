@@ -37,7 +37,8 @@ impl TriangleTree {
         // Nearly parallel to a slab counts as parallel, without infinities.
         let steep = |x: f64| if x.abs() < 1e-12 { 1e12 } else { 1.0 / x };
         let (inverse, q) = (direction.map(|x| steep(x) as f32), q.map(|x| x as f32));
-        Segment { q: q.into(), inverse: inverse.into(), length: length as f32 + slack, slack }
+        let (inverse, margin) = (inverse.into(), [slack; 3]);
+        Segment { q: q.into(), inverse, before: slack, length: length as f32 + slack, margin }
     }
 }
 
