@@ -19,7 +19,7 @@ use crate::geometry::{Bounds, ConvexEdges, Pose, Surface};
 use crate::termination::{Interrupt, Poll, Termination};
 
 /// Faces that look along the direction, or against it, by less than this count as walls.
-const STEEPNESS: f64 = 1e-3;
+const STEEPNESS: f64 = 5e-5;
 /// Samples between two looks at the termination condition.
 const CAST_POLL: u32 = 64;
 

@@ -21,7 +21,7 @@ use super::super::Scene;
 use super::cell::{Cell, TOUCHED};
 use super::drive::FREE_STEP;
 use super::facing::{Facing, Obstacle, Placed, Witness};
-use super::finder::{Finder, HELD_AT_FIRST};
+use super::finder::{Finder, HELD, HELD_AT_FIRST};
 use super::kept::{Gathered, Place, Way};
 
 /// So many regions are looked for on one side of a pair before as many are on the other; then twice as
@@ -310,7 +310,10 @@ fn gathered(
     let facing = |asks_part| Facing::new(scene, (part, start), other, asks_part, termination);
     let sides = Facing::asked_first(scene, part, other).into_iter();
     let sides: Vec<Facing<'_>> = sides.map(facing).collect::<Result<_, _>>()?;
-    let mut finders: Vec<Finder<'_>> = sides.iter().map(|side| Finder::of_all(side, termination)).collect();
+    // On its way nothing gets deeper than the engine may let it.
+    let held = if at == &Vector3::zeros() { HELD_AT_FIRST } else { HELD };
+    let of_all = |side| Finder::of_all(side, held, termination);
+    let mut finders: Vec<Finder<'_>> = sides.iter().map(of_all).collect();
     // The one inside the other, or the plainer one, needs fewer pieces: which, shows in trying.
     let mut budget = if sides.len() > 1 { FIRST_BUDGET } else { MOST_REGIONS };
     while budget <= MOST_REGIONS {

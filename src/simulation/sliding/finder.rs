@@ -70,10 +70,10 @@ pub(super) struct Finder<'a> {
 }
 
 impl<'a> Finder<'a> {
-    /// A search for cells of all of the asked surface.
-    pub(super) fn of_all(pair: &'a Facing<'a>, termination: &'a Termination) -> Self {
+    /// A search for cells of all of the asked surface, of which no piece may be further outside than `held`.
+    pub(super) fn of_all(pair: &'a Facing<'a>, held: f64, termination: &'a Termination) -> Self {
         let mut finder = Self::new(pair, 0, termination);
-        let all = pair.root().map(|piece| Spot { piece, guess: 0, level: 0, held: HELD_AT_FIRST });
+        let all = pair.root().map(|piece| Spot { piece, guess: 0, level: 0, held });
         finder.waiting.extend(all);
         finder
     }

@@ -13,6 +13,7 @@ use crate::termination::{Interrupt, Termination};
 use super::super::{Crossing, Scene};
 use super::DEPTH_TOLERANCE;
 use super::drive::FREE_STEP;
+use super::facing::SUNK;
 
 /// So far ahead is looked at once, in the planning frame.
 const STRETCH: f64 = 4.0;
@@ -104,7 +105,7 @@ impl<'a> Flights<'a> {
         let swept = bounds.union(&Bounds { min: bounds.min + end, max: bounds.max + end });
         let mut length = STRETCH;
         for other in scene.broad_phase.meeting_of(standing, &swept) {
-            let granted = scene.allowances.of(part, other) + DEPTH_TOLERANCE;
+            let granted = scene.allowances.of(part, other) + SUNK;
             let passed = bounds.grown(granted).way_past(&scene.bodies[other].bounds, u);
             let travel = passed.min(length + LANDING);
             let crossing =
