@@ -101,10 +101,11 @@ impl Kind {
     #[must_use]
     pub fn algorithm(self) -> u32 {
         match self {
-            Self::Source | Self::Shape | Self::Hull | Self::Swept | Self::Field => 1,
-            Self::Healed | Self::Touching => 2,
-            Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Answer => 4,
-            Self::Verdict | Self::Plan => 5,
+            Self::Source | Self::Shape | Self::Hull | Self::Field => 1,
+            Self::Healed | Self::Touching | Self::Swept => 2,
+            Self::Overlap | Self::Blocking => 4,
+            Self::Witness | Self::Motion | Self::Answer | Self::Verdict => 5,
+            Self::Plan => 6,
         }
     }
 

@@ -15,11 +15,14 @@
 use nalgebra::{Point3, Vector3};
 
 use super::Scene;
+use super::sliding::DEPTH_TOLERANCE;
 use crate::geometry::{Bounds, ConvexEdges, Pose, Surface};
 use crate::termination::{Interrupt, Poll, Termination};
 
 /// Faces that look along the direction, or against it, by less than this count as walls.
-const STEEPNESS: f64 = 5e-5;
+const STEEPNESS: f64 = 1e-3;
+/// So deep a face may be entered: facets of round walls are a little askew, and are past before they matter.
+const SUNK: f64 = 0.2 * DEPTH_TOLERANCE;
 /// Samples between two looks at the termination condition.
 const CAST_POLL: u32 = 64;
 
@@ -105,7 +108,9 @@ impl Cast<'_> {
                 && Bounds::of(&ends.map(|(p, _)| self.to_target * p)).meets(&corridor);
             is_met.then(|| ends.map(|(p, normals)| self.from(p, normals, &along)))
         });
-        self.way(travel, leading, |ends, reach| self.target.met_by_edge(ends, &self.along, reach, STEEPNESS))
+        self.way(travel, leading, |ends, reach| {
+            self.target.met_by_edge(ends, &self.along, reach, [STEEPNESS, SUNK])
+        })
     }
 
     /// How far of `travel` their ends go.
@@ -116,7 +121,9 @@ impl Cast<'_> {
             let is_met = leads(normals, &along) && corridor.contains(&(self.to_target * p));
             is_met.then(|| self.from(p, normals, &along))
         });
-        self.way(travel, leading, |p, reach| self.target.met_by_point(p, &self.along, reach, STEEPNESS))
+        self.way(travel, leading, |p, reach| {
+            self.target.met_by_point(p, &self.along, reach, [STEEPNESS, SUNK])
+        })
     }
 
     fn way<T>(

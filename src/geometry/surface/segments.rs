@@ -6,40 +6,46 @@ use super::super::triangle::{crossing, met_by_edge};
 use super::Surface;
 
 impl Surface {
-    /// How far a point gets from `p` along the unit vector `direction`, up to `length`, until it meets a triangle
-    /// from its outer side, at more than a grazing angle (`steepness`: sine of the angle); none where it does not.
-    /// The border of a triangle belongs to it.
+    /// How far a point gets from `p` along the unit vector `direction`, up to `length`, until it is deeper than
+    /// `sunk` below a triangle that it met from its outer side, at more than a grazing angle (`steepness`: sine of
+    /// the angle); none where it gets there. The border of a triangle belongs to it.
     #[must_use]
     pub fn met_by_point(
         &self,
         p: &Point3<f64>,
         direction: &Vector3<f64>,
         length: f64,
-        steepness: f64,
+        [steepness, sunk]: [f64; 2],
     ) -> Option<f64> {
         let mut first = First { within: length, at: None };
         self.tree().any_along(p, direction, length, |t| {
-            let is_met = -self.face_normal(t).dot(direction) > steepness;
-            first.take(if is_met { crossing(p, direction, &self.corners(t)) } else { None });
+            let against = -self.face_normal(t).dot(direction);
+            if against > steepness {
+                let met = crossing(p, direction, &self.corners(t)).filter(|at| *at >= 0.0);
+                first.take(met.map(|at| at + sunk / against));
+            }
             false
         });
         first.at
     }
 
-    /// The same of an edge `[a, b]`: 0 where it is through a triangle already.
+    /// The same of an edge `[a, b]`; one that is through a triangle already meets it at once.
     #[must_use]
     pub fn met_by_edge(
         &self,
         edge: &[Point3<f64>; 2],
         direction: &Vector3<f64>,
         length: f64,
-        steepness: f64,
+        [steepness, sunk]: [f64; 2],
     ) -> Option<f64> {
         let mut first = First { within: length, at: None };
         self.tree().any_swept(edge, direction, length, |t| {
             let normal = self.face_normal(t);
-            let is_met = -normal.dot(direction) > steepness;
-            first.take(if is_met { met_by_edge(edge, direction, &self.corners(t), &normal) } else { None });
+            let against = -normal.dot(direction);
+            if against > steepness {
+                let met = met_by_edge(edge, direction, &self.corners(t), &normal);
+                first.take(met.map(|at| at + sunk / against));
+            }
             false
         });
         first.at
@@ -89,7 +95,7 @@ struct First {
 
 impl First {
     fn take(&mut self, at: Option<f64>) {
-        if let Some(at) = at.filter(|at| (0.0..=self.within).contains(at)) {
+        if let Some(at) = at.filter(|at| *at <= self.within) {
             (self.within, self.at) = (at, Some(at));
         }
     }
