@@ -132,14 +132,15 @@ impl Cast<'_> {
         leading: impl Iterator<Item = T>,
         met: impl Fn(&T, f64) -> Option<f64>,
     ) -> f64 {
-        let mut reach = travel + self.granted;
+        let mut way = travel;
         for item in leading {
-            if reach < self.least + self.granted || self.poll.is_over() {
+            if way < self.least || self.poll.is_over() {
                 break;
             }
-            reach = met(&item, reach).unwrap_or(reach);
+            // All of the way is told to the bit where nothing is met.
+            way = met(&item, way + self.granted).map_or(way, |at| way.min(at - self.granted));
         }
-        reach - self.granted
+        way
     }
 
     /// In the edges' frame.
@@ -175,4 +176,63 @@ fn inward(normals: &[Vector3<f64>], along: &Vector3<f64>, depth: f64) -> Vector3
     }
     let below = |side: Vector3<f64>| side.dot(&offset) <= -0.5 * depth;
     if normals.iter().filter_map(across).all(below) { offset } else { Vector3::zeros() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_4, TAU};
+
+    use super::*;
+    use crate::fixtures::{block_on_plate, cuboid, moved, rod, scene, tube};
+
+    /// How far part 1 gets along a direction, of `travel`, until it meets part 0.
+    fn way(scene: &Scene, direction: Vector3<f64>, travel: f64) -> f64 {
+        let start = &scene.bodies[1].planning_from_shape;
+        let (direction, granted) = (&direction, scene.allowances.of(0, 1) + DEPTH_TOLERANCE);
+        let termination = &Termination::default();
+        let crossing = Crossing { scene, part: 1, start, direction, travel, other: 0, granted, termination };
+        assert_eq!(crossing.enters().unwrap(), crossing.way(travel).unwrap() < travel);
+        crossing.way(0.0).unwrap()
+    }
+
+    #[test]
+    fn bars_across_each_other_meet_at_their_edges() {
+        // Turned about themselves, each ends in an edge towards the other; no corner passes over the other bar.
+        let bar = cuboid([-4.0, -0.2, -0.2], [4.0, 0.2, 0.2]);
+        let on_edge = Pose::rotation(Vector3::x() * FRAC_PI_4);
+        for turn in [0.3, TAU / 4.0, 2.0] {
+            let above = Pose::new(Vector3::z() * 2.0, Vector3::z() * turn) * on_edge;
+            let (scene, _) = scene([moved(bar.clone(), &on_edge), moved(bar.clone(), &above)]);
+            let gap = 2.0 - 2.0 * 0.2 * 2f64.sqrt();
+            let met = way(&scene, -Vector3::z(), 3.0);
+            assert!((gap - 1e-9..gap + 2.0 * DEPTH_TOLERANCE).contains(&met), "{met} of {gap}");
+            assert_eq!(way(&scene, -Vector3::z(), gap - 0.01), gap - 0.01);
+            assert_eq!(way(&scene, Vector3::z(), 3.0), 3.0);
+        }
+    }
+
+    #[test]
+    fn a_block_meets_what_is_wider_and_what_is_narrower_than_it() {
+        for wall in [cuboid([2.0, -4.0, -4.0], [3.0, 4.0, 4.0]), cuboid([2.0, -0.1, 0.9], [3.0, 0.1, 1.1])] {
+            let [plate, block] = block_on_plate();
+            let (scene, _) = scene([wall, block, plate]);
+            let met = way(&scene, Vector3::x(), 4.0);
+            assert!((1.0 - 1e-9..1.0 + DEPTH_TOLERANCE).contains(&met), "{met}");
+            assert_eq!(way(&scene, Vector3::y(), 4.0), 4.0);
+        }
+    }
+
+    #[test]
+    fn facets_askew_in_a_bore_stop_no_shaft_that_is_past_before_it_is_deeper() {
+        // The shaft's corners lie before the bore's flats, by the rim: a little deeper than its flats are, and
+        // nowhere near as deep further on, as it ends there.
+        let mut bore = tube(1.0, 3.0, [-1.0, 1.0], 24);
+        for v in bore.vertices.iter_mut().filter(|v| v[2] < 0.0 && v[0].hypot(v[1]) < 2.0) {
+            (v[0], v[1]) = (v[0] * 1.004, v[1] * 1.004);
+        }
+        let turned = Pose::rotation(Vector3::z() * (0.3 * TAU / 24.0));
+        let (scene, _) = scene([bore, moved(rod(0.9965, [0.0, 1.0], 24), &turned)]);
+        assert_eq!(way(&scene, Vector3::z(), 1e-3), 1e-3);
+        assert!(way(&scene, Vector3::x(), 1.0) < 0.02);
+    }
 }

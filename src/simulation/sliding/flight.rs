@@ -121,3 +121,57 @@ impl<'a> Flights<'a> {
         Ok(length)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{block_on_plate, cuboid, scene};
+
+    fn length(scene: &Scene, u: Vector3<f64>) -> f64 {
+        let standing: Vec<usize> = (0..scene.bodies.len()).filter(|&i| i != 1).collect();
+        let body = &scene.bodies[1];
+        let termination = Termination::default();
+        let flights = Flights::new(scene, &standing, 1, &termination);
+        flights.length(&body.planning_from_shape, &body.bounds, &u).unwrap()
+    }
+
+    #[test]
+    fn a_flight_ends_before_what_is_met_and_none_begins_where_that_is_near() {
+        let [plate, block] = block_on_plate();
+        let walls = [cuboid([2.0, -4.0, 0.0], [2.5, 4.0, 2.0]), cuboid([-4.0, 1.1, 0.0], [4.0, 1.5, 2.0])];
+        let [far, near] = walls;
+        let (scene, _) = scene([plate, block, far, near]);
+        let to_wall = length(&scene, Vector3::x());
+        // The bound is that of a face that is met squarely.
+        assert!((1.0 - LANDING..1.0 - LANDING + 2.0 * SUNK).contains(&to_wall), "{to_wall}");
+        assert_eq!(length(&scene, Vector3::y()), 0.0);
+        assert_eq!(length(&scene, -Vector3::z()), 0.0, "onto the plate");
+        assert_eq!(length(&scene, Vector3::z()), STRETCH);
+        assert_eq!(length(&scene, -Vector3::x()), STRETCH, "along the plate, and off it");
+    }
+
+    #[test]
+    fn a_push_that_landed_flies_again_only_after_it_was_bent() {
+        let [plate, block] = block_on_plate();
+        let (scene, _) = scene([plate, block, cuboid([2.0, -4.0, 0.0], [2.5, 4.0, 2.0])]);
+        let body = &scene.bodies[1];
+        let termination = Termination::default();
+        let mut flights = Flights::new(&scene, &[0, 2], 1, &termination);
+        let (mut pose, mut bounds, u) = (body.planning_from_shape, body.bounds, Vector3::x());
+        let mut steps = Vec::new();
+        while let Some(step) = flights.step(&pose, &bounds, &u).unwrap() {
+            assert!(flights.is_aloft() && flights.any);
+            pose.translation.vector += u * step;
+            (bounds.min, bounds.max) = (bounds.min + u * step, bounds.max + u * step);
+            steps.push(step);
+        }
+        assert_eq!(steps.len(), 2);
+        assert!(steps[0] == FREE_STEP && steps[1] < FREE_STEP && !flights.is_aloft());
+        assert_eq!(flights.step(&pose, &bounds, &Vector3::z()).unwrap(), None);
+        flights.bent();
+        assert_eq!(flights.step(&pose, &bounds, &Vector3::z()).unwrap(), Some(FREE_STEP));
+        let mut never = flights.never();
+        never.bent();
+        assert_eq!(never.step(&pose, &bounds, &Vector3::z()).unwrap(), None);
+    }
+}

@@ -253,6 +253,24 @@ mod tests {
     }
 
     #[test]
+    fn what_begins_again_on_foot_goes_the_same_way_by_regions_alone() {
+        let [plate, block] = block_on_plate();
+        let (scene, _) = scene([plate, block, cuboid([3.0, -4.0, 0.0], [3.5, 4.0, 3.0])]);
+        let termination = Termination::default();
+        let start = scene.bodies[1].planning_from_shape;
+        let mut push = Push::new(&scene, &[0, 2], (1, &start), Vector3::x(), &termination);
+        let mut stopped = |push: &mut Push<'_>| {
+            while let Step::Moved(_) = push.step().unwrap() {}
+            push.travel()
+        };
+        assert!((stopped(&mut push) - 2.0).abs() < 1e-6);
+        assert!(push.begins_on_foot());
+        assert_eq!(push.travel(), 0.0);
+        assert!((stopped(&mut push) - 2.0).abs() < 1e-6);
+        assert!(!push.begins_on_foot(), "there was no flight this time");
+    }
+
+    #[test]
     fn what_stands_in_the_way_is_named() {
         let (scene, _) = scene(peg_in_hole(0.0));
         for force in [-Vector3::z(), Vector3::x(), -Vector3::y()] {
