@@ -100,3 +100,55 @@ impl First {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{cuboid, moved, surface};
+    use crate::geometry::Pose;
+
+    /// A box on [-1, 1]³, turned about y by an angle: its left side faces up a little.
+    fn turned_box(angle: f64) -> Surface {
+        surface(moved(cuboid([-1.0; 3], [1.0; 3]), &Pose::rotation(Vector3::y() * angle)))
+    }
+
+    #[test]
+    fn points_and_edges_meet_the_first_face_that_they_get_below() {
+        let target = turned_box(0.0);
+        let up = Vector3::z();
+        let sunk = 1e-3;
+        let point =
+            |x: f64, length: f64| target.met_by_point(&Point3::new(x, 0.2, -3.0), &up, length, [1e-3, sunk]);
+        assert_eq!((point(0.3, 5.0), point(0.3, 1.5), point(1.3, 5.0)), (Some(2.0 + sunk), None, None));
+        // Its ends are beside the box, and one of them is lower.
+        let edge = [Point3::new(-2.0, 0.2, -3.0), Point3::new(2.0, 0.2, -2.0)];
+        let met = target.met_by_edge(&edge, &up, 5.0, [1e-3, sunk]);
+        assert!(met.is_some_and(|at| (at - (1.25 + sunk)).abs() < 1e-8), "{met:?}");
+        assert_eq!(target.met_by_edge(&edge, &up, 1.2, [1e-3, sunk]), None);
+        assert_eq!(
+            target.met_by_edge(&edge, &-up, 5.0, [1e-3, sunk]),
+            None,
+            "the upper side is not met from below"
+        );
+    }
+
+    #[test]
+    fn an_edge_through_a_face_meets_it_at_once_and_one_hardly_askew_after_it_got_as_deep() {
+        let sunk = 1e-4;
+        // From within the box to its left, where it is.
+        let edge = [Point3::new(-1.2, 0.1, 0.1), Point3::new(-0.8, 0.3, 0.1)];
+        for slope in [2e-3, 0.1, 0.5f64] {
+            let target = turned_box(slope);
+            for (along, against) in [(-Vector3::z(), slope.sin()), (Vector3::x(), slope.cos())] {
+                let met = |length: f64| target.met_by_edge(&edge, &along, length, [1e-3, sunk]);
+                let at = sunk / against;
+                assert!(
+                    met(1.01 * at).is_some_and(|met| (met - at).abs() < 1e-6 * at),
+                    "{slope}: {:?}",
+                    met(1.0)
+                );
+                assert_eq!(met(0.99 * at), None);
+            }
+        }
+    }
+}
