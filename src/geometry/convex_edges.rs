@@ -92,7 +92,6 @@ impl ConvexEdges {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::fixtures::{cuboid, healed, l_shape, shape_of};
 
     #[test]

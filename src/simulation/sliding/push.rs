@@ -259,7 +259,7 @@ mod tests {
         let termination = Termination::default();
         let start = scene.bodies[1].planning_from_shape;
         let mut push = Push::new(&scene, &[0, 2], (1, &start), Vector3::x(), &termination);
-        let mut stopped = |push: &mut Push<'_>| {
+        let stopped = |push: &mut Push<'_>| {
             while let Step::Moved(_) = push.step().unwrap() {}
             push.travel()
         };
