@@ -103,8 +103,9 @@ impl Kind {
         match self {
             Self::Source | Self::Shape | Self::Hull | Self::Swept | Self::Field => 1,
             Self::Healed | Self::Touching => 2,
-            Self::Overlap | Self::Blocking | Self::Witness | Self::Motion | Self::Answer => 4,
-            Self::Verdict | Self::Plan => 5,
+            Self::Overlap | Self::Blocking | Self::Witness | Self::Motion => 4,
+            Self::Answer | Self::Verdict => 5,
+            Self::Plan => 6,
         }
     }
 

@@ -10,7 +10,7 @@ use super::content_hash::mesh_hash;
 use super::hull::hull_vertices;
 use super::own_frame::OwnFrame;
 use super::samples::sited;
-use super::{Bounds, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Spacing, Surface};
+use super::{Bounds, Faces, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Spacing, Surface};
 
 /// Nodes of the tree of patches between two looks at the termination condition.
 const PATCH_POLL: u32 = 64;
@@ -30,6 +30,7 @@ pub struct Shape {
     oriented: OnceLock<OrientedSamples>,
     samples: OnceLock<SampleTree>,
     patches: OnceLock<PatchTree>,
+    faces: OnceLock<Faces>,
     content: OnceLock<[u8; 32]>,
 }
 
@@ -71,8 +72,17 @@ impl Shape {
         let mass = surface.mass_properties();
         let reach =
             surface.vertices().iter().map(|v| (v - mass.centre).norm_squared()).fold(0.0, f64::max).sqrt();
-        let (oriented, samples, patches) = (OnceLock::new(), OnceLock::new(), OnceLock::new());
-        Self { surface: Arc::new(surface), hull, mass, reach, oriented, samples, patches, content }
+        Self {
+            surface: Arc::new(surface),
+            hull,
+            mass,
+            reach,
+            oriented: OnceLock::new(),
+            samples: OnceLock::new(),
+            patches: OnceLock::new(),
+            faces: OnceLock::new(),
+            content,
+        }
     }
 
     /// Derives now what was not yet, but for the tree of samples.
@@ -83,6 +93,7 @@ impl Shape {
         termination.check()?;
         self.surface.prepare();
         self.oriented();
+        self.faces();
         self.patches(termination).map(|_| ())
     }
 
@@ -119,6 +130,11 @@ impl Shape {
         Ok(self.patches.get_or_init(|| tree))
     }
 
+    /// Where the surface faces.
+    pub fn faces(&self) -> &Faces {
+        self.faces.get_or_init(|| Faces::of(&self.surface))
+    }
+
     /// Bytes in memory, of what was derived so far.
     #[must_use]
     pub fn memory(&self) -> usize {
@@ -128,6 +144,7 @@ impl Shape {
             + self.samples.get().map_or(0, SampleTree::memory)
             + self.oriented.get().map_or(0, OrientedSamples::memory)
             + self.patches.get().map_or(0, PatchTree::memory)
+            + self.faces.get().map_or(0, Faces::memory)
     }
 
     /// The hash of the mesh, on which alone everything here depends.
