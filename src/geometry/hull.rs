@@ -44,8 +44,8 @@ pub struct Support<'a> {
     cloud: Option<Cloud>,
 }
 
-/// Of fewer points, the furthest is found before they are in a cloud.
-const MANY: usize = 16;
+/// Of fewer points, the furthest is found in all tests of a pair before they are in a cloud.
+const MANY: usize = 128;
 
 impl<'a> Support<'a> {
     /// That of some points.
@@ -66,6 +66,7 @@ impl<'a> Support<'a> {
     }
 
     /// How far the furthest point lies, and which it is.
+    #[inline]
     fn furthest(&self, along: &Vector3<f64>) -> (f64, usize) {
         if let Some(found) = self.cloud.as_ref().and_then(|cloud| cloud.furthest(along)) {
             return found;
