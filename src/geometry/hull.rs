@@ -36,6 +36,36 @@ fn covers(hull: &[ParryVector], points: &[Point3<f64>]) -> bool {
     })
 }
 
+/// The furthest of some points along a direction, and how far it lies.
+trait Furthest: SupportMap {
+    fn furthest(&self, along: &Vector3<f64>) -> (f64, usize);
+}
+
+/// Few points, of which one pair of tests is asked for.
+struct Few<'a>(&'a [Point3<f64>]);
+
+impl Furthest for Few<'_> {
+    #[inline]
+    fn furthest(&self, along: &Vector3<f64>) -> (f64, usize) {
+        let mut best = (f64::NEG_INFINITY, 0);
+        for (i, p) in self.0.iter().enumerate() {
+            let reach = p.coords.dot(along);
+            if reach > best.0 {
+                best = (reach, i);
+            }
+        }
+        best
+    }
+}
+
+impl SupportMap for Few<'_> {
+    #[inline]
+    fn local_support_point(&self, dir: ParryVector) -> ParryVector {
+        let p = self.0[self.furthest(&Vector3::new(dir.x, dir.y, dir.z)).1];
+        ParryVector::new(p.x, p.y, p.z)
+    }
+}
+
 /// The vertices of a hull, of which the furthest along a direction is asked for again and again.
 #[derive(Debug)]
 pub struct Support<'a> {
@@ -62,23 +92,14 @@ impl<'a> Support<'a> {
     /// How far another lies beyond it along a unit direction.
     #[must_use]
     pub fn gap_along(&self, direction: &Vector3<f64>, other: &Self) -> f64 {
-        -other.furthest(&-direction).0 - self.furthest(direction).0
+        gap_between(direction, self, other)
     }
+}
 
-    /// How far the furthest point lies, and which it is.
-    #[inline]
+impl Furthest for Support<'_> {
     fn furthest(&self, along: &Vector3<f64>) -> (f64, usize) {
-        if let Some(found) = self.cloud.as_ref().and_then(|cloud| cloud.furthest(along)) {
-            return found;
-        }
-        let mut best = (f64::NEG_INFINITY, 0);
-        for (i, p) in self.points.iter().enumerate() {
-            let reach = p.coords.dot(along);
-            if reach > best.0 {
-                best = (reach, i);
-            }
-        }
-        best
+        let found = self.cloud.as_ref().and_then(|cloud| cloud.furthest(along));
+        found.unwrap_or_else(|| Few(self.points).furthest(along))
     }
 }
 
@@ -87,6 +108,10 @@ impl SupportMap for Support<'_> {
         let p = self.points[self.furthest(&Vector3::new(dir.x, dir.y, dir.z)).1];
         ParryVector::new(p.x, p.y, p.z)
     }
+}
+
+fn gap_between<S: Furthest>(direction: &Vector3<f64>, a: &S, b: &S) -> f64 {
+    -b.furthest(&-direction).0 - a.furthest(direction).0
 }
 
 /// How far apart two vertex sets are along a unit direction (positive: `b` lies beyond `a`).
@@ -111,7 +136,13 @@ pub fn separating_direction(
     {
         return Some(d);
     }
-    separating(&Support::of(a), &Support::of(b), margin)
+    if a.len().max(b.len()) >= MANY {
+        return separating(&Support::of(a), &Support::of(b), margin);
+    }
+    if a.is_empty() || b.is_empty() {
+        return Some(Vector3::x());
+    }
+    proposed(&Few(a), &Few(b), margin)
 }
 
 /// The same of hulls of which more is asked, without a hint.
@@ -120,6 +151,11 @@ pub fn separating(a: &Support<'_>, b: &Support<'_>, margin: f64) -> Option<Vecto
     if a.points.is_empty() || b.points.is_empty() {
         return Some(Vector3::x());
     }
+    proposed(a, b, margin)
+}
+
+/// What GJK proposes for two hulls that have points, if it is right.
+fn proposed<S: Furthest>(a: &S, b: &S, margin: f64) -> Option<Vector3<f64>> {
     let start = a.local_support_point(ParryVector::X) - b.local_support_point(-ParryVector::X);
     let mut simplex = VoronoiSimplex::new();
     simplex.reset(CsoPoint::from_shapes(&ParryPose::IDENTITY, a, b, start));
@@ -129,7 +165,7 @@ pub fn separating(a: &Support<'_>, b: &Support<'_>, margin: f64) -> Option<Vecto
         GJKResult::Intersection => return None,
     };
     let d = Vector3::new(d.x, d.y, d.z).try_normalize(1e-12)?;
-    (a.gap_along(&d, b) >= margin).then_some(d)
+    (gap_between(&d, a, b) >= margin).then_some(d)
 }
 
 /// Points after a pose.
