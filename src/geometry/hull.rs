@@ -36,16 +36,11 @@ fn covers(hull: &[ParryVector], points: &[Point3<f64>]) -> bool {
     })
 }
 
-/// The furthest of some points along a direction, and how far it lies.
-trait Furthest: SupportMap {
-    fn furthest(&self, along: &Vector3<f64>) -> (f64, usize);
-}
-
-/// Few points, of which one pair of tests is asked for.
+/// Few points.
 struct Few<'a>(&'a [Point3<f64>]);
 
-impl Furthest for Few<'_> {
-    #[inline]
+impl Few<'_> {
+    /// How far the furthest along a direction lies, and which it is.
     fn furthest(&self, along: &Vector3<f64>) -> (f64, usize) {
         let mut best = (f64::NEG_INFINITY, 0);
         for (i, p) in self.0.iter().enumerate() {
@@ -59,7 +54,6 @@ impl Furthest for Few<'_> {
 }
 
 impl SupportMap for Few<'_> {
-    #[inline]
     fn local_support_point(&self, dir: ParryVector) -> ParryVector {
         let p = self.0[self.furthest(&Vector3::new(dir.x, dir.y, dir.z)).1];
         ParryVector::new(p.x, p.y, p.z)
@@ -74,7 +68,8 @@ pub struct Support<'a> {
     cloud: Option<Cloud>,
 }
 
-/// Of fewer points, the furthest is found in all tests of a pair before they are in a cloud.
+/// Of fewer points, the furthest is found in all tests of a pair before they are in a cloud. Regions, which grow
+/// by one test of many pairs, ask no cloud at all.
 const MANY: usize = 128;
 
 impl<'a> Support<'a> {
@@ -92,11 +87,9 @@ impl<'a> Support<'a> {
     /// How far another lies beyond it along a unit direction.
     #[must_use]
     pub fn gap_along(&self, direction: &Vector3<f64>, other: &Self) -> f64 {
-        gap_between(direction, self, other)
+        -other.furthest(&-direction).0 - self.furthest(direction).0
     }
-}
 
-impl Furthest for Support<'_> {
     fn furthest(&self, along: &Vector3<f64>) -> (f64, usize) {
         let found = self.cloud.as_ref().and_then(|cloud| cloud.furthest(along));
         found.unwrap_or_else(|| Few(self.points).furthest(along))
@@ -108,10 +101,6 @@ impl SupportMap for Support<'_> {
         let p = self.points[self.furthest(&Vector3::new(dir.x, dir.y, dir.z)).1];
         ParryVector::new(p.x, p.y, p.z)
     }
-}
-
-fn gap_between<S: Furthest>(direction: &Vector3<f64>, a: &S, b: &S) -> f64 {
-    -b.furthest(&-direction).0 - a.furthest(direction).0
 }
 
 /// How far apart two vertex sets are along a unit direction (positive: `b` lies beyond `a`).
@@ -136,26 +125,23 @@ pub fn separating_direction(
     {
         return Some(d);
     }
-    if a.len().max(b.len()) >= MANY {
-        return separating(&Support::of(a), &Support::of(b), margin);
-    }
     if a.is_empty() || b.is_empty() {
         return Some(Vector3::x());
     }
-    proposed(&Few(a), &Few(b), margin)
+    proposed(&Few(a), &Few(b)).filter(|d| gap_along(d, a, b) >= margin)
 }
 
-/// The same of hulls of which more is asked, without a hint.
+/// The same of large hulls, or such of which more is asked, without a hint.
 #[must_use]
 pub fn separating(a: &Support<'_>, b: &Support<'_>, margin: f64) -> Option<Vector3<f64>> {
     if a.points.is_empty() || b.points.is_empty() {
         return Some(Vector3::x());
     }
-    proposed(a, b, margin)
+    proposed(a, b).filter(|d| a.gap_along(d, b) >= margin)
 }
 
-/// What GJK proposes for two hulls that have points, if it is right.
-fn proposed<S: Furthest>(a: &S, b: &S, margin: f64) -> Option<Vector3<f64>> {
+/// The direction that GJK proposes for two hulls that have points.
+fn proposed<S: SupportMap>(a: &S, b: &S) -> Option<Vector3<f64>> {
     let start = a.local_support_point(ParryVector::X) - b.local_support_point(-ParryVector::X);
     let mut simplex = VoronoiSimplex::new();
     simplex.reset(CsoPoint::from_shapes(&ParryPose::IDENTITY, a, b, start));
@@ -164,8 +150,7 @@ fn proposed<S: Furthest>(a: &S, b: &S, margin: f64) -> Option<Vector3<f64>> {
         GJKResult::ClosestPoints(_, _, d) | GJKResult::Proximity(d) | GJKResult::NoIntersection(d) => d,
         GJKResult::Intersection => return None,
     };
-    let d = Vector3::new(d.x, d.y, d.z).try_normalize(1e-12)?;
-    (gap_between(&d, a, b) >= margin).then_some(d)
+    Vector3::new(d.x, d.y, d.z).try_normalize(1e-12)
 }
 
 /// Points after a pose.
