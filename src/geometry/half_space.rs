@@ -59,6 +59,9 @@ impl HalfSpace {
     }
 }
 
+/// So many fours are looked at before it is asked whether one of them lies further than those before.
+const BLOCK: usize = 8;
+
 /// Points, four by four.
 #[derive(Debug, Clone, Default)]
 pub struct Cloud {
@@ -85,6 +88,33 @@ impl Cloud {
         let at = |i: usize| points.get(i).unwrap_or(one);
         let four = |g: usize| [0, 1, 2].map(|axis| std::array::from_fn(|k| at(4 * g + k)[axis]));
         self.fours.extend((0..=points.len() / 4).map(four));
+    }
+
+    /// How far the furthest point lies along a direction, and which it is: the first of those that lie as
+    /// far. None of no points.
+    #[inline]
+    pub(super) fn furthest(&self, along: &Vector3<f64>) -> Option<(f64, usize)> {
+        let reaches = |[x, y, z]: &[[f64; 4]; 3]| -> [f64; 4] {
+            std::array::from_fn(|k| x[k] * along.x + y[k] * along.y + z[k] * along.z)
+        };
+        // Which it is, is looked for only among those of the best block: that takes no vector instructions.
+        let (mut most, mut best) = (f64::NEG_INFINITY, 0);
+        for (at, block) in self.fours.chunks(BLOCK).enumerate() {
+            let mut lanes = [f64::NEG_INFINITY; 4];
+            for four in block {
+                let reaches = reaches(four);
+                for k in 0..4 {
+                    lanes[k] = larger(reaches[k], lanes[k]);
+                }
+            }
+            let reach = lanes.into_iter().fold(f64::NEG_INFINITY, larger);
+            if reach > most {
+                (most, best) = (reach, at);
+            }
+        }
+        let first = best * BLOCK;
+        let at = self.fours.get(first..)?.iter().flat_map(reaches).position(|reach| reach == most)?;
+        Some((most, 4 * first + at))
     }
 
     /// How far the outermost point is inside a half-space.
@@ -130,6 +160,23 @@ mod tests {
                 let cloud = Cloud::new(&points[..n], &points[n]);
                 let least = points[..=n].iter().map(|p| side.above(p)).fold(f64::INFINITY, f64::min);
                 assert_eq!(cloud.least_above(&side), least);
+            }
+        }
+    }
+
+    #[test]
+    fn the_furthest_of_many_is_the_first_of_those_that_lie_furthest() {
+        // Each twice: whichever lies furthest, one before it and one after it lie as far.
+        let points: Vec<_> = spread([-2.0; 3], [3.0; 3], 11).flat_map(|p| [p, p]).collect();
+        let mut cloud = Cloud::default();
+        assert_eq!(cloud.furthest(&Vector3::x()), None);
+        for along in spread([-1.0; 3], [1.0; 3], 50).map(|p| p.coords) {
+            for n in 1..=points.len() {
+                cloud.refill(&points[..n]);
+                let reaches: Vec<f64> = points[..n].iter().map(|p| p.coords.dot(&along)).collect();
+                let most = reaches.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                let first = reaches.iter().position(|&reach| reach == most).unwrap();
+                assert_eq!(cloud.furthest(&along), Some((most, first)));
             }
         }
     }

@@ -11,7 +11,7 @@ use parry3d_f64::query::gjk::{GJKResult, VoronoiSimplex, closest_points};
 use parry3d_f64::shape::SupportMap;
 use parry3d_f64::transformation::try_convex_hull;
 
-use super::Pose;
+use super::{Cloud, Pose};
 
 /// The vertices of the convex hull of `points`; all points where they are too flat for a hull.
 #[must_use]
@@ -36,19 +36,69 @@ fn covers(hull: &[ParryVector], points: &[Point3<f64>]) -> bool {
     })
 }
 
-struct Cloud<'a>(&'a [Point3<f64>]);
+/// Few points.
+struct Few<'a>(&'a [Point3<f64>]);
 
-impl SupportMap for Cloud<'_> {
-    fn local_support_point(&self, dir: ParryVector) -> ParryVector {
-        let d = Vector3::new(dir.x, dir.y, dir.z);
+impl Few<'_> {
+    /// How far the furthest along a direction lies, and which it is.
+    fn furthest(&self, along: &Vector3<f64>) -> (f64, usize) {
         let mut best = (f64::NEG_INFINITY, 0);
         for (i, p) in self.0.iter().enumerate() {
-            let reach = p.coords.dot(&d);
+            let reach = p.coords.dot(along);
             if reach > best.0 {
                 best = (reach, i);
             }
         }
-        let p = self.0[best.1];
+        best
+    }
+}
+
+impl SupportMap for Few<'_> {
+    fn local_support_point(&self, dir: ParryVector) -> ParryVector {
+        let p = self.0[self.furthest(&Vector3::new(dir.x, dir.y, dir.z)).1];
+        ParryVector::new(p.x, p.y, p.z)
+    }
+}
+
+/// The vertices of a hull, of which the furthest along a direction is asked for again and again.
+#[derive(Debug)]
+pub struct Support<'a> {
+    points: &'a [Point3<f64>],
+    /// The same, if they are many.
+    cloud: Option<Cloud>,
+}
+
+/// Of fewer points, the furthest is found in all tests of a pair before they are in a cloud. Regions, which grow
+/// by one test of many pairs, ask no cloud at all.
+const MANY: usize = 128;
+
+impl<'a> Support<'a> {
+    /// That of some points.
+    #[must_use]
+    pub fn of(points: &'a [Point3<f64>]) -> Self {
+        let cloud = (points.len() >= MANY).then(|| {
+            let mut cloud = Cloud::default();
+            cloud.refill(points);
+            cloud
+        });
+        Self { points, cloud }
+    }
+
+    /// How far another lies beyond it along a unit direction.
+    #[must_use]
+    pub fn gap_along(&self, direction: &Vector3<f64>, other: &Self) -> f64 {
+        -other.furthest(&-direction).0 - self.furthest(direction).0
+    }
+
+    fn furthest(&self, along: &Vector3<f64>) -> (f64, usize) {
+        let found = self.cloud.as_ref().and_then(|cloud| cloud.furthest(along));
+        found.unwrap_or_else(|| Few(self.points).furthest(along))
+    }
+}
+
+impl SupportMap for Support<'_> {
+    fn local_support_point(&self, dir: ParryVector) -> ParryVector {
+        let p = self.points[self.furthest(&Vector3::new(dir.x, dir.y, dir.z)).1];
         ParryVector::new(p.x, p.y, p.z)
     }
 }
@@ -78,17 +128,29 @@ pub fn separating_direction(
     if a.is_empty() || b.is_empty() {
         return Some(Vector3::x());
     }
-    let (ca, cb) = (Cloud(a), Cloud(b));
-    let start = ca.local_support_point(ParryVector::X) - cb.local_support_point(-ParryVector::X);
+    proposed(&Few(a), &Few(b)).filter(|d| gap_along(d, a, b) >= margin)
+}
+
+/// The same of large hulls, or such of which more is asked, without a hint.
+#[must_use]
+pub fn separating(a: &Support<'_>, b: &Support<'_>, margin: f64) -> Option<Vector3<f64>> {
+    if a.points.is_empty() || b.points.is_empty() {
+        return Some(Vector3::x());
+    }
+    proposed(a, b).filter(|d| a.gap_along(d, b) >= margin)
+}
+
+/// The direction that GJK proposes for two hulls that have points.
+fn proposed<S: SupportMap>(a: &S, b: &S) -> Option<Vector3<f64>> {
+    let start = a.local_support_point(ParryVector::X) - b.local_support_point(-ParryVector::X);
     let mut simplex = VoronoiSimplex::new();
-    simplex.reset(CsoPoint::from_shapes(&ParryPose::IDENTITY, &ca, &cb, start));
-    let found = closest_points(&ParryPose::IDENTITY, &ca, &cb, f64::MAX, true, &mut simplex);
+    simplex.reset(CsoPoint::from_shapes(&ParryPose::IDENTITY, a, b, start));
+    let found = closest_points(&ParryPose::IDENTITY, a, b, f64::MAX, true, &mut simplex);
     let d = match found {
         GJKResult::ClosestPoints(_, _, d) | GJKResult::Proximity(d) | GJKResult::NoIntersection(d) => d,
         GJKResult::Intersection => return None,
     };
-    let d = Vector3::new(d.x, d.y, d.z).try_normalize(1e-12)?;
-    (gap_along(&d, a, b) >= margin).then_some(d)
+    Vector3::new(d.x, d.y, d.z).try_normalize(1e-12)
 }
 
 /// Points after a pose.

@@ -65,7 +65,8 @@ impl PatchTree {
         let mut tree = Self::default();
         let n = triangles.len();
         if n > 0 {
-            tree.build(surface, &mut triangles, 0, n, poll);
+            let given = Given::of(surface);
+            tree.build(&given, &mut triangles, 0, n, poll);
         }
         tree.nodes.shrink_to_fit();
         tree.vertices.shrink_to_fit();
@@ -116,13 +117,13 @@ impl PatchTree {
         }
     }
 
-    fn build(&mut self, surface: &Surface, triangles: &mut [u32], start: usize, end: usize, poll: &Poll<'_>) {
+    fn build(&mut self, given: &Given<'_>, triangles: &mut [u32], start: usize, end: usize, poll: &Poll<'_>) {
         if poll.is_over() {
             return;
         }
         let slice = &mut triangles[start..end];
-        let corners = || slice.iter().flat_map(|&t| surface.corners(t));
-        let bounds = corners().fold(Bounds::EMPTY, |b, p| b.with_point(&p));
+        let corners = || slice.iter().flat_map(|&t| &given.corners[t as usize]);
+        let bounds = corners().fold(Bounds::EMPTY, |b, p| b.with_point(p));
         let centre = bounds.centre();
         let radius = corners().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
         let me = self.nodes.len();
@@ -138,18 +139,19 @@ impl PatchTree {
             right: 0,
         });
         if slice.len() <= LEAF {
-            let mut ids: Vec<u32> = slice.iter().flat_map(|&t| surface.triangles()[t as usize]).collect();
+            let mut ids: Vec<u32> =
+                slice.iter().flat_map(|&t| given.surface.triangles()[t as usize]).collect();
             ids.sort_unstable();
             ids.dedup();
-            self.vertices.extend(ids.iter().map(|&v| surface.vertices()[v as usize]));
+            self.vertices.extend(ids.iter().map(|&v| given.surface.vertices()[v as usize]));
         } else {
             let axis = bounds.extents().imax();
-            let middle = |t: u32| surface.corners(t).iter().map(|p| p[axis]).sum::<f64>();
+            let middle = |t: u32| given.middles[t as usize][axis];
             let half = slice.len() / 2;
             slice.select_nth_unstable_by(half, |&s, &t| middle(s).total_cmp(&middle(t)).then(s.cmp(&t)));
-            self.build(surface, triangles, start, start + half, poll);
+            self.build(given, triangles, start, start + half, poll);
             self.nodes[me].right = self.nodes.len() as u32;
-            self.build(surface, triangles, start + half, end, poll);
+            self.build(given, triangles, start + half, end, poll);
             // A half that was left out has no node.
             if poll.is_over() {
                 return;
@@ -172,25 +174,47 @@ impl PatchTree {
     }
 }
 
+/// What is asked of a surface's triangles at every level of their tree, in one place.
+struct Given<'a> {
+    surface: &'a Surface,
+    corners: Vec<[Point3<f64>; 3]>,
+    /// The sums of their corners.
+    middles: Vec<[f64; 3]>,
+}
+
+impl<'a> Given<'a> {
+    fn of(surface: &'a Surface) -> Self {
+        let corners: Vec<_> = (0..surface.triangles().len() as u32).map(|t| surface.corners(t)).collect();
+        let sum = |corners: &[Point3<f64>; 3]| [0, 1, 2].map(|axis| corners.iter().map(|p| p[axis]).sum());
+        let middles = corners.iter().map(sum).collect();
+        Self { surface, corners, middles }
+    }
+}
+
 /// Points that reach furthest, in each of 26 directions: few points are kept as they are.
 fn furthest(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
     const FEW: usize = 26;
     if points.len() <= FEW {
         return points.to_vec();
     }
-    let steps = || -1..=1i32;
-    let directions = steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| [x, y, z])));
-    let mut found: Vec<usize> = directions
-        .filter(|d| *d != [0; 3])
-        .filter_map(|d| {
-            let along = Vector3::from(d.map(f64::from));
-            let reach = |i: &usize| points[*i].coords.dot(&along);
-            (0..points.len()).max_by(|i, j| reach(i).total_cmp(&reach(j)))
-        })
-        .collect();
-    found.sort_unstable();
-    found.dedup();
-    found.into_iter().map(|i| points[i]).collect()
+    let mut is_found = vec![false; points.len()];
+    // Of two opposite directions at once: the last of those that reach as far.
+    for code in 0..27 / 2 {
+        let along = Vector3::new(code % 3, code / 3 % 3, code / 9).map(|x| f64::from(x - 1));
+        let (mut least, mut most) = ((f64::INFINITY, 0), (f64::NEG_INFINITY, 0));
+        for (i, p) in points.iter().enumerate() {
+            let reach = p.coords.dot(&along);
+            if reach <= least.0 {
+                least = (reach, i);
+            }
+            if reach >= most.0 {
+                most = (reach, i);
+            }
+        }
+        is_found[least.1] = true;
+        is_found[most.1] = true;
+    }
+    points.iter().zip(is_found).filter(|(_, is_found)| *is_found).map(|(p, _)| *p).collect()
 }
 
 #[cfg(test)]

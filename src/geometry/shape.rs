@@ -11,7 +11,8 @@ use super::hull::hull_vertices;
 use super::own_frame::OwnFrame;
 use super::samples::sited;
 use super::{
-    Bounds, ConvexEdges, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Spacing, Surface,
+    Bounds, ConvexEdges, Faces, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Spacing,
+    Surface,
 };
 
 /// Nodes of the tree of patches between two looks at the termination condition.
@@ -33,6 +34,7 @@ pub struct Shape {
     convex_edges: OnceLock<ConvexEdges>,
     samples: OnceLock<SampleTree>,
     patches: OnceLock<PatchTree>,
+    faces: OnceLock<Faces>,
     content: OnceLock<[u8; 32]>,
 }
 
@@ -74,10 +76,18 @@ impl Shape {
         let mass = surface.mass_properties();
         let reach =
             surface.vertices().iter().map(|v| (v - mass.centre).norm_squared()).fold(0.0, f64::max).sqrt();
-        let (oriented, samples) = (OnceLock::new(), OnceLock::new());
-        let (convex_edges, patches) = (OnceLock::new(), OnceLock::new());
-        let surface = Arc::new(surface);
-        Self { surface, hull, mass, reach, oriented, convex_edges, samples, patches, content }
+        Self {
+            surface: Arc::new(surface),
+            hull,
+            mass,
+            reach,
+            oriented: OnceLock::new(),
+            convex_edges: OnceLock::new(),
+            samples: OnceLock::new(),
+            patches: OnceLock::new(),
+            faces: OnceLock::new(),
+            content,
+        }
     }
 
     /// Derives now what was not yet, but for the tree of samples.
@@ -88,6 +98,7 @@ impl Shape {
         termination.check()?;
         self.surface.prepare();
         self.convex_edges();
+        self.faces();
         self.patches(termination).map(|_| ())
     }
 
@@ -129,6 +140,11 @@ impl Shape {
         Ok(self.patches.get_or_init(|| tree))
     }
 
+    /// Where the surface faces.
+    pub fn faces(&self) -> &Faces {
+        self.faces.get_or_init(|| Faces::of(&self.surface))
+    }
+
     /// Bytes in memory, of what was derived so far.
     #[must_use]
     pub fn memory(&self) -> usize {
@@ -139,6 +155,7 @@ impl Shape {
             + self.oriented.get().map_or(0, OrientedSamples::memory)
             + self.convex_edges.get().map_or(0, ConvexEdges::memory)
             + self.patches.get().map_or(0, PatchTree::memory)
+            + self.faces.get().map_or(0, Faces::memory)
     }
 
     /// The hash of the mesh, on which alone everything here depends.

@@ -85,10 +85,22 @@ pub(super) struct Disassembly<'a, 'o> {
 
 impl<'a, 'o> Disassembly<'a, 'o> {
     pub(super) fn new(problem: Problem<'a>, observer: &'o mut dyn Observer) -> Self {
-        let count = problem.scene.bodies.len();
-        Self {
+        Self::beside(problem, observer, |_| ()).0
+    }
+
+    /// The same, with something else that depends on the problem alone: worked out while hulls are joined.
+    pub(super) fn beside<T: Send>(
+        problem: Problem<'a>,
+        observer: &'o mut dyn Observer,
+        other: impl FnOnce(&Problem<'a>) -> T + Send,
+    ) -> (Self, T) {
+        let Problem { scene, present, termination, .. } = &problem;
+        let (everything, other) =
+            rayon::join(|| HullTree::new(scene, present.clone(), termination), || other(&problem));
+        let count = scene.bodies.len();
+        let disassembly = Self {
             observer,
-            everything: HullTree::new(&problem.scene, problem.present.clone(), &problem.termination),
+            everything,
             around: HashMap::new(),
             entangled: vec![None; count],
             held_since: vec![None; count],
@@ -97,7 +109,8 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             counters: Counters::default(),
             path_time_ran_out: false,
             problem,
-        }
+        };
+        (disassembly, other)
     }
 
     pub(super) fn is_done(&self) -> bool {

@@ -5,6 +5,7 @@
 //! Everything below the request is in the planning frame.
 
 mod ahead;
+mod begun;
 mod directions;
 mod disassembly;
 mod known_states;
@@ -26,11 +27,11 @@ mod tests;
 mod trace;
 
 pub use crate::termination::{Interrupt, Termination};
+pub use begun::initial_blockages;
 pub use directions::axes_of;
 pub use outcome::{BlockedAction, Counters, Outcome, Removal};
 pub use problem::{Checked, Observer, Problem};
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging};
-pub use sbdp::initial_blockages;
 pub use state::least_travel;
 pub use trace::{BlockedBy, TraceEvent, TracePhase};
 

@@ -20,6 +20,7 @@ use crate::simulation::{Action, End, Motion};
 use crate::termination::Interrupt;
 
 use super::ahead::Ahead;
+use super::begun::Begun;
 use super::directions::Directions;
 use super::disassembly::{Disassembly, Proof, Run, Stop, joined};
 use super::known_states::KnownStates;
@@ -47,22 +48,6 @@ impl Gain {
     fn any(self) -> bool {
         self.removed || self.new_states
     }
-}
-
-/// The blocking graphs of the assembled state along the directions that a search would begin with.
-///
-/// # Errors
-/// The termination condition became true.
-pub fn initial_blockages(problem: &Problem<'_>) -> Result<Vec<Blockage>, Interrupt> {
-    let (translations, _) = problem.action_lists(&problem.directions());
-    assembled_blockages(problem, &translations)
-}
-
-fn assembled_blockages(problem: &Problem<'_>, translations: &[Action]) -> Result<Vec<Blockage>, Interrupt> {
-    let Problem { scene, present, static_analysis, termination, recall, .. } = problem;
-    let least = |part| least_travel(scene, part);
-    let analysis = Analysis { rule: *static_analysis, scene, translations, recall };
-    analysis.initial_blockages(present, &least, termination)
 }
 
 /// One simulation or sweep to run.
@@ -104,26 +89,33 @@ pub(super) struct Search<'a, 'o> {
 
 /// Searches until everything asked for is out, nothing more can be found, or a limit is met.
 pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bool) -> Outcome {
-    let mut search = Search::new(problem, observer, guided);
-    let stop = search.run().err();
+    let (mut search, blockages) = Search::new(problem, observer, guided);
+    let stop = search.run(blockages).err();
     let (evidence, blocked) = (search.evidence(), search.blocked());
     search.disassembly.outcome(stop, evidence, blocked)
 }
 
 impl<'a, 'o> Search<'a, 'o> {
-    fn new(problem: Problem<'a>, observer: &'o mut dyn Observer, guided: bool) -> Self {
-        let directions = problem.directions();
-        let (translations, rotations) = problem.action_lists(&directions);
+    /// A search, and the blockages of all parts as assembled.
+    fn new(
+        problem: Problem<'a>,
+        observer: &'o mut dyn Observer,
+        guided: bool,
+    ) -> (Self, Result<Vec<Blockage>, Interrupt>) {
+        let (mut disassembly, begun) = Disassembly::beside(problem, observer, |p| Begun::of(p, guided));
+        let Begun { directions, translations, rotations, blockages, took } = begun;
+        disassembly.counters.static_analysis += took;
+        let problem = &disassembly.problem;
         let as_paper = problem.actions == ActionSet::Paper;
         let scene = &problem.scene;
         let bodies = scene.bodies.iter().enumerate();
         let balls =
             bodies.map(|(p, b)| guided && !as_paper && is_ball(&b.shape, least_travel(scene, p))).collect();
-        Self {
+        let search = Self {
             guided,
             nodes: Vec::new(),
             roots: 0,
-            known: (0..problem.scene.bodies.len()).map(|p| KnownStates::new(&problem.scene, p)).collect(),
+            known: (0..scene.bodies.len()).map(|p| KnownStates::new(scene, p)).collect(),
             directions,
             translations,
             rotations,
@@ -137,12 +129,13 @@ impl<'a, 'o> Search<'a, 'o> {
             separate_lists: as_paper,
             translation_passes: if as_paper { 1 } else { TRANSLATION_PASSES },
             distrust_static: false,
-            disassembly: Disassembly::new(problem, observer),
-        }
+            disassembly,
+        };
+        (search, blockages)
     }
 
-    fn run(&mut self) -> Result<(), Stop> {
-        self.make_roots()?;
+    fn run(&mut self, blockages: Result<Vec<Blockage>, Interrupt>) -> Result<(), Stop> {
+        self.make_roots(blockages?);
         self.take_free_parts()?;
         loop {
             let mut gain = Gain::default();
@@ -176,16 +169,7 @@ impl<'a, 'o> Search<'a, 'o> {
         }
     }
 
-    fn make_roots(&mut self) -> Result<(), Stop> {
-        let problem = &self.disassembly.problem;
-        let blockages = if self.guided {
-            let started = Instant::now();
-            let found = assembled_blockages(problem, &self.translations)?;
-            self.disassembly.counters.static_analysis += started.elapsed();
-            found
-        } else {
-            vec![Blockage::open(self.translations.len()); problem.scene.bodies.len()]
-        };
+    fn make_roots(&mut self, blockages: Vec<Blockage>) {
         for (part, blockage) in blockages.into_iter().enumerate() {
             if self.disassembly.problem.may_move(part) {
                 self.add_node(Node {
@@ -201,7 +185,6 @@ impl<'a, 'o> Search<'a, 'o> {
             }
         }
         self.roots = self.nodes.len();
-        Ok(())
     }
 
     fn add_node(&mut self, node: Node) {

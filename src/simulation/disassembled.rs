@@ -3,7 +3,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::geometry::{Pose, gap_along, hull_vertices, separating_direction, transformed};
+use crate::geometry::{Pose, Support, gap_along, hull_vertices, separating, transformed};
 
 use super::Scene;
 
@@ -44,7 +44,9 @@ pub fn exit_direction(
 ) -> Option<Vector3<f64>> {
     let body = &scene.bodies[part];
     let mine = transformed(&body.shape.hull, pose);
-    let direction = separating_direction(&mine, &surroundings.hull, HULL_MARGIN, hint)?;
+    let hint = hint.filter(|d| gap_along(d, &mine, &surroundings.hull) >= HULL_MARGIN);
+    let sought = || separating(&Support::of(&mine), &Support::of(&surroundings.hull), HULL_MARGIN);
+    let direction = hint.or_else(sought)?;
     let reach = |pose: &Pose, points: &[Point3<f64>]| {
         points.iter().map(|p| (pose * p).coords.dot(&direction)).fold(f64::NEG_INFINITY, f64::max)
     };

@@ -12,14 +12,14 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use crate::geometry::transformed;
+use crate::geometry::{Bounds, transformed};
 use crate::termination::Termination;
 
 use super::{Scene, Surroundings};
 
 /// So many times as many points as it had when it was last joined stand for a hull. What is asked of it until the
-/// next part leaves costs less with them all than joining does: a join takes as long as a hundred tests.
-const LOOSE: usize = 8;
+/// next part leaves costs less with them all than joining does: a join takes as long as some hundred tests.
+const LOOSE: usize = 32;
 
 /// The parts that stand, with the hulls of groups of them.
 #[derive(Debug, Clone)]
@@ -115,10 +115,11 @@ impl HullTree {
         let mut node = self.leaf[part];
         self.leaf[part] = 0;
         let gone = std::mem::take(&mut self.hulls[node]);
+        let bounds = Bounds::of(gone.iter());
         while node > 1 {
             node /= 2;
-            // A hull that had none of its points stays, and all above.
-            if !self.hulls[node].iter().any(|v| gone.contains(v)) {
+            // A hull that had none of its points stays, and all above. Few others are where they were.
+            if !self.hulls[node].iter().any(|v| bounds.contains(v) && gone.contains(v)) {
                 break;
             }
             let [one, other] = [2 * node, 2 * node + 1].map(|child| &self.hulls[child]);
@@ -143,7 +144,7 @@ fn group(scene: &Scene, parts: &mut [usize]) {
     }
     let centre = |&i: &usize| scene.bodies[i].bounds.centre();
     let centres: Vec<_> = parts.iter().map(centre).collect();
-    let axis = crate::geometry::Bounds::of(&centres).extents().imax();
+    let axis = Bounds::of(&centres).extents().imax();
     parts.sort_by(|i, j| centre(i)[axis].total_cmp(&centre(j)[axis]).then(i.cmp(j)));
     // As the tree is full from the left.
     let (left, right) = parts.split_at_mut(parts.len().next_power_of_two() / 2);

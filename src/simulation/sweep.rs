@@ -7,7 +7,7 @@
 
 use nalgebra::{Point3, Translation3, Vector3};
 
-use crate::geometry::{Pose, gap_along, separating_direction, transformed};
+use crate::geometry::{Pose, Support, separating, transformed};
 use crate::termination::{Interrupt, Termination};
 
 use super::sliding::DEPTH_TOLERANCE;
@@ -113,18 +113,19 @@ fn way_out(
         points.iter().map(|p| p.coords.dot(direction) * sign).fold(f64::NEG_INFINITY, f64::max)
     };
     let beyond = along(&surroundings.hull, 1.0) + along(&hull, -1.0) + 1.5 * HULL_MARGIN;
+    let (mine, around) = (Support::of(&hull), Support::of(&surroundings.hull));
     let margin = HULL_MARGIN * (1.0 + ASSURED);
     // From where on they are apart along a direction, if they are where it was found.
     let since = |d: &Vector3<f64>| {
         let speed = -d.dot(direction);
-        (speed > 0.0).then(|| (margin - gap_along(d, &hull, &surroundings.hull)) / speed)
+        (speed > 0.0).then(|| (margin - mine.gap_along(d, &around)) / speed)
     };
     let finest = FINENESS * beyond;
     let (mut near, mut far, mut exit, mut step) = (0.0, beyond, -direction, finest);
     while far - near > finest {
         let at = (far - step).max(0.5 * (near + far));
         let there: Vec<_> = hull.iter().map(|p| p + direction * at).collect();
-        if let Some(d) = separating_direction(&there, &surroundings.hull, HULL_MARGIN, None) {
+        if let Some(d) = separating(&Support::of(&there), &around, HULL_MARGIN) {
             (far, exit, step) = (since(&d).map_or(at, |t| t.clamp(near, at)), d, 2.0 * step);
         } else {
             near = at;

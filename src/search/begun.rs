@@ -1,0 +1,52 @@
+//! What a search begins with: directions, actions along them, and the blocking graphs of the assembled state.
+
+use std::time::{Duration, Instant};
+
+use crate::blocking_graph::{Analysis, Blockage};
+use crate::simulation::Action;
+use crate::termination::Interrupt;
+
+use super::directions::Directions;
+use super::problem::Problem;
+use super::state::least_travel;
+
+/// The blocking graphs of the assembled state along the directions that a search would begin with.
+///
+/// # Errors
+/// The termination condition became true.
+pub fn initial_blockages(problem: &Problem<'_>) -> Result<Vec<Blockage>, Interrupt> {
+    let (translations, _) = problem.action_lists(&problem.directions());
+    assembled_blockages(problem, &translations)
+}
+
+fn assembled_blockages(problem: &Problem<'_>, translations: &[Action]) -> Result<Vec<Blockage>, Interrupt> {
+    let Problem { scene, present, static_analysis, termination, recall, .. } = problem;
+    let least = |part| least_travel(scene, part);
+    let analysis = Analysis { rule: *static_analysis, scene, translations, recall };
+    analysis.initial_blockages(present, &least, termination)
+}
+
+/// What a search begins with.
+pub(super) struct Begun {
+    pub(super) directions: Directions,
+    pub(super) translations: Vec<Action>,
+    pub(super) rotations: Vec<Action>,
+    /// Of all parts as assembled.
+    pub(super) blockages: Result<Vec<Blockage>, Interrupt>,
+    /// How long these took.
+    pub(super) took: Duration,
+}
+
+impl Begun {
+    pub(super) fn of(problem: &Problem<'_>, guided: bool) -> Self {
+        let directions = problem.directions();
+        let (translations, rotations) = problem.action_lists(&directions);
+        let started = Instant::now();
+        let blockages = if guided {
+            assembled_blockages(problem, &translations)
+        } else {
+            Ok(vec![Blockage::open(translations.len()); problem.scene.bodies.len()])
+        };
+        Self { directions, translations, rotations, blockages, took: started.elapsed() }
+    }
+}
