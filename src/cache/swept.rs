@@ -58,7 +58,7 @@ fn key(question: &SweepQuestion<'_>) -> Key {
 /// How a part on the way stands, and how far the way past it goes.
 fn place(question: &SweepQuestion<'_>, crossing: &Crossing<'_>) -> [u8; 16] {
     let mut digest = Digest::new();
-    digest.numbers([crossing.travel, crossing.granted]);
+    digest.numbers([crossing.travel, crossing.margins.granted]);
     add_standing(&mut digest, question.scene, question.part, crossing.other);
     let [first, _]: [[u8; 16]; 2] = bytemuck::cast(digest.finish());
     first

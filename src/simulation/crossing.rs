@@ -15,16 +15,25 @@
 use nalgebra::{Point3, Vector3};
 
 use super::Scene;
-use super::sliding::DEPTH_TOLERANCE;
 use crate::geometry::{Bounds, ConvexEdges, Pose, Surface};
 use crate::termination::{Interrupt, Poll, Termination};
 
-/// Faces that look along the direction, or against it, by less than this count as walls.
-const STEEPNESS: f64 = 1e-3;
-/// So deep a face may be entered: facets of round walls are a little askew, and are past before they matter.
-const SUNK: f64 = 0.2 * DEPTH_TOLERANCE;
 /// Samples between two looks at the termination condition.
 const CAST_POLL: u32 = 64;
+
+/// What a crossing lets pass.
+#[derive(Debug, Clone, Copy)]
+pub struct Margins {
+    /// How deep the part may get into the other across the direction.
+    pub granted: f64,
+    /// How far before the start it may have met the other: what it meets there, it meets at once.
+    pub back: f64,
+    /// Faces that look along the direction, or against it, by less than this count as walls.
+    pub steepness: f64,
+    /// So much deeper it may get into a face before it has met that: facets of round walls are a little askew, and
+    /// are past before they matter.
+    pub sunk: f64,
+}
 
 /// A part that goes straight past one that stands.
 #[derive(Debug)]
@@ -37,8 +46,8 @@ pub struct Crossing<'a> {
     pub other: usize,
     /// How far the part goes, until it is past the other or out of them all.
     pub travel: f64,
-    /// How deep it may get into the other.
-    pub granted: f64,
+    /// What is let pass.
+    pub margins: Margins,
     pub(super) termination: &'a Termination,
 }
 
@@ -58,7 +67,7 @@ impl Crossing<'_> {
     /// # Errors
     /// The termination condition became true.
     pub(super) fn way(&self, least: f64) -> Result<f64, Interrupt> {
-        let Self { scene, part, start, direction, other, travel, granted, termination } = *self;
+        let Self { scene, part, start, direction, other, travel, margins, termination } = *self;
         let poll = &Poll::every(CAST_POLL, Some(termination));
         let [mine, theirs] = [part, other].map(|i| &scene.bodies[i].shape);
         let standing = &scene.bodies[other].planning_from_shape;
@@ -70,7 +79,8 @@ impl Crossing<'_> {
         ]
         .map(|(edges, target, to_target, along)| {
             let (edges, target) = (edges.convex_edges(), &target.surface);
-            Cast { edges, target, to_target, along, travel, granted, least: least.min(travel), poll }
+            let least = least.min(travel);
+            Cast { edges, target, to_target, along, travel, margins, least, poll }
         });
         // Edges cost more than corners.
         let way = if forward.edges.count() <= backward.edges.count() {
@@ -92,7 +102,7 @@ struct Cast<'a> {
     /// How the edges move against the target, in its frame.
     along: Vector3<f64>,
     travel: f64,
-    granted: f64,
+    margins: Margins,
     /// Nobody asks how much shorter a way is than this.
     least: f64,
     poll: &'a Poll<'a>,
@@ -102,27 +112,30 @@ impl Cast<'_> {
     /// How far of `travel` the edges go until they meet a face.
     fn edges(&self, travel: f64) -> f64 {
         let (along, corridor) = (self.along_here(), self.corridor());
-        let leading = self.edges.leading(&self.to_target, &corridor, &along, STEEPNESS).filter_map(|edge| {
-            let ends = self.edges.ends_of(edge);
-            let is_met = leads(&edge.normals, &along)
-                && Bounds::of(&ends.map(|(p, _)| self.to_target * p)).meets(&corridor);
-            is_met.then(|| ends.map(|(p, normals)| self.from(p, normals, &along)))
-        });
+        let leading = self
+            .edges
+            .leading(&self.to_target, &corridor, &along, self.margins.steepness)
+            .filter_map(|edge| {
+                let ends = self.edges.ends_of(edge);
+                let is_met = self.leads(&edge.normals, &along)
+                    && Bounds::of(&ends.map(|(p, _)| self.to_target * p)).meets(&corridor);
+                is_met.then(|| ends.map(|(p, normals)| self.from(p, normals, &along)))
+            });
         self.way(travel, leading, |ends, reach| {
-            self.target.met_by_edge(ends, &self.along, reach, [STEEPNESS, SUNK])
+            self.target.met_by_edge(ends, &self.along, reach, [self.margins.steepness, self.margins.sunk])
         })
     }
 
     /// How far of `travel` their ends go.
     fn corners(&self, travel: f64) -> f64 {
         let (along, corridor) = (self.along_here(), self.corridor());
-        let ends = self.edges.ends().leading(&self.to_target, &corridor, &along, STEEPNESS);
+        let ends = self.edges.ends().leading(&self.to_target, &corridor, &along, self.margins.steepness);
         let leading = ends.filter_map(|(p, normals)| {
-            let is_met = leads(normals, &along) && corridor.contains(&(self.to_target * p));
+            let is_met = self.leads(normals, &along) && corridor.contains(&(self.to_target * p));
             is_met.then(|| self.from(p, normals, &along))
         });
         self.way(travel, leading, |p, reach| {
-            self.target.met_by_point(p, &self.along, reach, [STEEPNESS, SUNK])
+            self.target.met_by_point(p, &self.along, reach, [self.margins.steepness, self.margins.sunk])
         })
     }
 
@@ -138,9 +151,13 @@ impl Cast<'_> {
                 break;
             }
             // All of the way is told to the bit where nothing is met.
-            way = met(&item, way + self.granted).map_or(way, |at| way.min(at - self.granted));
+            way = met(&item, way + self.margins.back).map_or(way, |at| way.min(at - self.margins.back));
         }
         way
+    }
+
+    fn leads(&self, normals: &[Vector3<f64>], along: &Vector3<f64>) -> bool {
+        normals.iter().any(|n| n.dot(along) > self.margins.steepness)
     }
 
     /// In the edges' frame.
@@ -150,20 +167,16 @@ impl Cast<'_> {
 
     /// Where a corner begins, in the target's frame: as far back and as far below the faces there as is granted.
     fn from(&self, p: &Point3<f64>, normals: &[Vector3<f64>], along: &Vector3<f64>) -> Point3<f64> {
-        self.to_target * (p + inward(normals, along, self.granted)) - self.along * self.granted
+        self.to_target * (p + inward(normals, along, self.margins.granted)) - self.along * self.margins.back
     }
 
     /// From where the target's box is reached.
     fn corridor(&self) -> Bounds {
         let bounds = *self.target.bounds();
-        let back = self.along * -(self.travel + self.granted);
+        let back = self.along * -(self.travel + self.margins.back);
         let before = Bounds { min: bounds.min + back, max: bounds.max + back };
-        bounds.union(&before).grown(2.0 * self.granted)
+        bounds.union(&before).grown(2.0 * self.margins.granted)
     }
-}
-
-fn leads(normals: &[Vector3<f64>], along: &Vector3<f64>) -> bool {
-    normals.iter().any(|n| n.dot(along) > STEEPNESS)
 }
 
 /// The offset across `along` that takes a point below all faces that meet there, by `depth`; none
@@ -182,15 +195,19 @@ fn inward(normals: &[Vector3<f64>], along: &Vector3<f64>, depth: f64) -> Vector3
 mod tests {
     use std::f64::consts::{FRAC_PI_4, TAU};
 
+    use super::super::sliding::DEPTH_TOLERANCE;
     use super::*;
     use crate::fixtures::{block_on_plate, cuboid, moved, scene};
 
     /// How far part 1 gets along a direction, of `travel`, until it meets part 0.
     fn way(scene: &Scene, direction: Vector3<f64>, travel: f64) -> f64 {
         let start = &scene.bodies[1].planning_from_shape;
-        let (direction, granted) = (&direction, scene.allowances.of(0, 1) + DEPTH_TOLERANCE);
+        let granted = scene.allowances.of(0, 1) + DEPTH_TOLERANCE;
+        let margins = Margins { granted, back: granted, steepness: 1e-3, sunk: 0.2 * DEPTH_TOLERANCE };
+        let direction = &direction;
         let termination = &Termination::default();
-        let crossing = Crossing { scene, part: 1, start, direction, travel, other: 0, granted, termination };
+        let (part, other) = (1, 0);
+        let crossing = Crossing { scene, part, start, direction, travel, other, margins, termination };
         assert_eq!(crossing.enters().unwrap(), crossing.way(travel).unwrap() < travel);
         crossing.way(0.0).unwrap()
     }

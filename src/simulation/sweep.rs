@@ -10,9 +10,14 @@ use nalgebra::{Point3, Translation3, Vector3};
 use crate::geometry::{Pose, Support, separating, transformed};
 use crate::termination::{Interrupt, Termination};
 
+use super::crossing::{Crossing, Margins};
 use super::sliding::DEPTH_TOLERANCE;
-use super::{Crossing, HULL_MARGIN, Scene, Surroundings, exit_direction};
+use super::{HULL_MARGIN, Scene, Surroundings, exit_direction};
 
+/// Faces that look along the direction, or against it, by less than this count as walls.
+const STEEPNESS: f64 = 1e-3;
+/// So deep a face may be entered before it stops anything.
+const SUNK: f64 = 0.2 * DEPTH_TOLERANCE;
 /// The way out is found to this share of the way beyond everything.
 const FINENESS: f64 = 1.0 / 256.0;
 /// Where a part is taken to be out along a direction, the hulls are apart by so much more than asked for, as a share:
@@ -86,7 +91,9 @@ pub fn straight_sweep_past(
         // Beyond, it has passed the other for good: so what is found does not depend on how far others reach.
         let passed = here.grown(granted).way_past(&scene.bodies[other].bounds, direction);
         let travel = travel.min(passed);
-        if enters(&Crossing { scene, part, start, direction, travel, other, granted, termination })? {
+        let margins = Margins { granted, back: granted, steepness: STEEPNESS, sunk: SUNK };
+        let crossing = Crossing { scene, part, start, direction, travel, other, margins, termination };
+        if enters(&crossing)? {
             return Ok(Some(Sweep::Blocked { by: other }));
         }
     }

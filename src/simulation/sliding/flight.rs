@@ -10,10 +10,11 @@ use nalgebra::Vector3;
 use crate::geometry::{Bounds, Pose};
 use crate::termination::{Interrupt, Termination};
 
-use super::super::{Crossing, Scene};
-use super::DEPTH_TOLERANCE;
+use super::super::Scene;
+use super::super::crossing::{Crossing, Margins};
 use super::drive::FREE_STEP;
-use super::facing::SUNK;
+use super::facing::TILT;
+use super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
 
 /// So far ahead is looked at once, in the planning frame.
 const STRETCH: f64 = 4.0;
@@ -21,6 +22,9 @@ const STRETCH: f64 = 4.0;
 const SHORTEST: f64 = FREE_STEP / 2.0;
 /// A flight ends so far before what is met: regions lead on to it.
 const LANDING: f64 = 4.0 * DEPTH_TOLERANCE;
+
+/// So deep a flight may enter anything: what is rounded in files, and little enough for regions to go on from there.
+const LEAST: f64 = 1e-5;
 
 /// The flights of a push.
 #[derive(Clone, Copy)]
@@ -105,11 +109,14 @@ impl<'a> Flights<'a> {
         let swept = bounds.union(&Bounds { min: bounds.min + end, max: bounds.max + end });
         let mut length = STRETCH;
         for other in scene.broad_phase.meeting_of(standing, &swept) {
-            let granted = scene.allowances.of(part, other) + SUNK;
+            let granted = scene.allowances.of(part, other) + LEAST;
+            // As deep as it may be before.
+            let back = granted + BULGE_TOLERANCE;
+            let margins = Margins { granted, back, steepness: TILT, sunk: LEAST };
             let passed = bounds.grown(granted).way_past(&scene.bodies[other].bounds, u);
             let travel = passed.min(length + LANDING);
-            let crossing =
-                Crossing { scene, part, start: from, direction: u, travel, other, granted, termination };
+            let (start, direction) = (from, u);
+            let crossing = Crossing { scene, part, start, direction, travel, other, margins, termination };
             let way = crossing.way(SHORTEST + LANDING)?;
             if way < travel {
                 length = way - LANDING;
@@ -143,7 +150,7 @@ mod tests {
         let (scene, _) = scene([plate, block, far, near]);
         let to_wall = length(&scene, Vector3::x());
         // The bound is that of a face that is met squarely.
-        assert!((1.0 - LANDING..1.0 - LANDING + 2.0 * SUNK).contains(&to_wall), "{to_wall}");
+        assert!((1.0 - LANDING..1.0 - LANDING + 2.0 * LEAST).contains(&to_wall), "{to_wall}");
         assert_eq!(length(&scene, Vector3::y()), 0.0);
         assert_eq!(length(&scene, -Vector3::z()), 0.0, "onto the plate");
         assert_eq!(length(&scene, Vector3::z()), STRETCH);
