@@ -1,9 +1,8 @@
 //! Free flight: how far a push goes before it meets anything.
 //!
 //! Where nothing bends a push, regions further on along its line would only tell that nothing is there. So the
-//! way to where it meets something is told by segments cast from what leads ([`Crossing`]), in stretches as
-//! long as the longest regions. There, and wherever the push is bent, regions tell. What segments may miss,
-//! edges that cross between samples, is for verification to find, as of all motions by samples.
+//! way to where it meets something is told by the edges and corners that lead ([`Crossing`]), in stretches as
+//! long as the longest regions. There, and wherever the push is bent, regions tell.
 
 use nalgebra::Vector3;
 
@@ -22,7 +21,6 @@ const STRETCH: f64 = 4.0;
 const SHORTEST: f64 = FREE_STEP / 2.0;
 /// A flight ends so far before what is met: regions lead on to it.
 const LANDING: f64 = 4.0 * DEPTH_TOLERANCE;
-
 /// So deep a flight may enter anything: what is rounded in files, and little enough for regions to go on from there.
 const LEAST: f64 = 1e-5;
 

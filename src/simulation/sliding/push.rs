@@ -116,8 +116,6 @@ impl<'a> Push<'a> {
         }
         if !obstacles.is_empty() {
             self.flights.bent();
-        } else if let Some(step) = self.flown()? {
-            return Ok(step);
         }
         if self.is_long && self.shift == Vector3::zeros() {
             self.cells.lengthen(&u)?;
