@@ -4,8 +4,8 @@
 //! surface does not enter (`cells` of pairs that face each other: `facing`), tell how far it may go,
 //! and what is in the way. A `finder` finds the cells of a pair; those where motions begin are `kept`
 //! for all motions from there. Where nothing bends a push it flies to what it meets (`flight`). Of what may
-//! turn, and where regions cannot tell of a push (open surfaces facing each other, deep granted overlap, points that verification found missing), the wanted twist
-//! is projected at each step onto what contact allows, in the metric of the part's mass
+//! turn, and where regions cannot tell of a push (open surfaces facing each other, deep granted overlap,
+//! points that verification found missing), the wanted twist is projected at each step onto what contact allows, in the metric of the part's mass
 //! (rotation weighed by the squared radius of gyration), and the pose advances by the result
 //! (`drive`). Contacts are told by pieces of surface that leave their regions (`holds`), or, where
 //! surfaces are too complicated for that, by samples. In free space the step is the certified
