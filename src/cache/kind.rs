@@ -104,8 +104,9 @@ impl Kind {
             Self::Source | Self::Shape | Self::Hull | Self::Field => 1,
             Self::Healed | Self::Touching | Self::Swept => 2,
             Self::Overlap | Self::Blocking => 4,
-            Self::Witness | Self::Motion | Self::Answer | Self::Verdict => 5,
-            Self::Plan => 6,
+            Self::Verdict => 5,
+            Self::Witness | Self::Motion | Self::Answer => 6,
+            Self::Plan => 7,
         }
     }
 

@@ -41,7 +41,7 @@ pub use obstruction::obstruction;
 pub use passage::{passes_straight, seems_clear};
 pub use penalty::{PenaltyEngine, PenaltyParameters};
 pub use scene::{Allowances, Body, Scene, resolution};
-pub use sliding::{KeptCells, SlidingEngine, pair_blocks};
+pub use sliding::{KeptCells, SlidingEngine, StepCost, Telling, pair_blocks, step_costs};
 pub use sweep::{Sweep, SweepQuestion, straight_sweep, straight_sweep_past};
 pub use touching::Touching;
 pub use transition::{End, Motion, TransitionFunction, asked_again};

@@ -11,22 +11,18 @@
 //! is told in a line of its own.
 
 mod folders;
+mod scenes;
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Instant;
 
-use sbdp::geometry::{Assembly, load_assembly};
-use sbdp::plan::Verifier;
-use sbdp::sdf::Field;
 use sbdp::simulation::{
-    Action, Axis, Motion, Pair, Scene, SlidingEngine, Surroundings, SweepQuestion, TransitionFunction,
-    pair_blocks, straight_sweep,
+    Action, Axis, Motion, SlidingEngine, Surroundings, SweepQuestion, TransitionFunction, pair_blocks,
+    straight_sweep,
 };
 use sbdp::termination::Termination;
 
-/// Verification's limit, as a share of the longest side; and static analysis's least travel.
-const DEPTH_LIMIT: f64 = 2e-4;
+/// Static analysis's least travel.
 const LEAST_TRAVEL: f64 = 0.05;
 /// What a motion travels to count as one that gets somewhere.
 const FAR: f64 = 1.0;
@@ -61,10 +57,8 @@ fn main() {
 }
 
 fn measure(folder: &std::path::Path) -> Result<[Vec<f64>; 5], String> {
-    let source = load_assembly(folder).map_err(|e| e.to_string())?;
-    let assembly = Assembly::new(&source).map_err(|e| e.to_string())?;
     let never = Termination::default();
-    let scene = scene(&assembly, &never).map_err(|e| format!("{e:?}"))?;
+    let scene = scenes::of(folder, &never)?;
     let mut times: [Vec<f64>; 5] = Default::default();
     let translations = Action::translations();
     for (a, b) in scene.broad_phase.pairs(0.0) {
@@ -106,21 +100,6 @@ fn measure(folder: &std::path::Path) -> Result<[Vec<f64>; 5], String> {
     Ok(times)
 }
 
-/// The assembly with its fields and the overlaps it has.
-fn scene(assembly: &Assembly, never: &Termination) -> Result<Scene, sbdp::termination::Interrupt> {
-    let fields = assembly.shapes.iter().map(|s| Field::build(&s.surface, never).map(Arc::new));
-    let mut scene = Scene::assembled(assembly, &fields.collect::<Result<Vec<_>, _>>()?);
-    let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
-    let verifier = Verifier::new(&assembly.shapes, shape_of, DEPTH_LIMIT * scene.longest_side);
-    for (a, b) in scene.broad_phase.pairs(0.0) {
-        let depth = verifier.assembled_depth(&scene, &Pair::turned(&scene, a, b), never)?;
-        if depth > 1e-6 * scene.longest_side {
-            scene.allowances.grant(a, b, depth);
-        }
-    }
-    Ok(scene)
-}
-
 /// What a question comes to, and the microseconds it takes the second time.
 fn timed<T>(mut question: impl FnMut() -> T) -> (T, f64) {
     question();
@@ -135,12 +114,6 @@ fn travel(motion: &Motion) -> f64 {
 }
 
 fn print(name: &str, times: &[Vec<f64>; 5]) {
-    let columns = times.iter().map(|times| {
-        let mut sorted = times.clone();
-        sorted.sort_by(f64::total_cmp);
-        let at = |share: f64| sorted.get((sorted.len() as f64 * share) as usize);
-        let [median, high] = [0.5, 0.9].map(|s| at(s).map_or("–".to_owned(), |t| format!("{t:.0}")));
-        format!("{} | {median} | {high}", times.len())
-    });
+    let columns = times.iter().map(|times| scenes::told(times));
     println!("| {name} | {} |", columns.collect::<Vec<_>>().join(" | "));
 }

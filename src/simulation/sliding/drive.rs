@@ -5,6 +5,10 @@
 //! constraints linearised at that pose, and the step is projected again (sequential quadratic
 //! programming); a step that still enters is halved.
 
+mod lift;
+#[cfg(test)]
+mod tests;
+
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::geometry::{Pose, Shape, interpolate};
@@ -13,7 +17,7 @@ use crate::termination::Poll;
 use super::super::contact::{Contact, Mover, Near};
 use super::super::projection::{Projected, Row, project};
 use super::super::reduction::reduced;
-use super::super::{Action, Scene, Surroundings};
+use super::super::{Action, Scene};
 use super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
 
 /// A motion that follows less than this share of the action (cos² of the angle between them) is
@@ -26,10 +30,13 @@ pub(in crate::simulation) const FREE_STEP: f64 = 0.5;
 const LARGEST_BULGE: f64 = 1e-3;
 /// A free turn is at most so many contact steps long: exits show only at the ends of steps.
 const LONGEST_FREE_TURN: f64 = 4.0;
+/// Where contact takes most of a motion away, so many times as much is asked for, at least and at most.
+const STRETCH: std::ops::Range<f64> = 1.25..8.0;
 /// Contacts are looked for as near as this share of a step: most steps go along what is that near, and what
-/// is further off and matters nevertheless is found where the step leads. (In tight fits, where contacts take
-/// the most time, a whole step would be a sixth slower.)
-const REACH: f64 = 0.25;
+/// is further off and matters nevertheless is found where the step leads. In tight fits all of the wall is near,
+/// and contacts take the most time: with a quarter of a step turning there takes a fifth longer, with less than
+/// this what is found only where steps lead takes what that saves.
+const REACH: f64 = 0.06;
 const EAGER_ROUNDS: usize = 6;
 const LAZY_ROUNDS: usize = 12;
 const HALVINGS: usize = 3;
@@ -38,14 +45,6 @@ const HALVINGS: usize = 3;
 const FARTHEST: f64 = 4.0;
 /// Pressed is what holds back more than this share of the wanted motion (in its square).
 const LEAST_PRESSURE: f64 = 1e-4;
-
-/// The gap at which a part in the middle of its play is left alone, and the corrections that bring
-/// it there.
-const LIFT: f64 = 0.01;
-const LIFT_REACH: f64 = 0.04;
-const LIFT_ROUNDS: usize = 3;
-/// What is along an axis by less than this share does not hold a part there.
-const LEAST_SPEED: f64 = 0.1;
 
 /// Contacts between two looks at the termination condition: large surfaces that lie on each other have tens
 /// of thousands.
@@ -104,6 +103,8 @@ pub(super) struct Drive {
     gyration: f64,
     step: f64,
     turns: bool,
+    /// Whether it is pulled: along what it is pressed to it slides in steps as long as they may be.
+    is_pulled: bool,
 }
 
 impl Drive {
@@ -132,6 +133,7 @@ impl Drive {
             gyration,
             step,
             turns: action.turns(),
+            is_pulled: matches!(action, Action::Drag(..)),
         }
     }
 
@@ -145,20 +147,42 @@ impl Drive {
         self.step * REACH
     }
 
+    /// What a step begins with, as [`Self::advance`] does.
+    pub(super) fn constraints(&self, mover: &Mover<'_>, near: &Near) -> Known {
+        self.chosen(mover, near, &self.wanted)
+    }
+
+    /// The first projection of a step.
+    pub(super) fn solved(&self, known: &Known) -> Option<Projected> {
+        self.projected(&self.wanted.component_mul(&self.metric), &known.rows, true)
+    }
+
     /// One step from the mover's pose.
     pub(super) fn advance(&self, mover: &Mover<'_>, near: &mut Near, around: &mut dyn Around) -> Step {
         if near.contacts.is_empty() && near.clearance >= self.step {
             let factor = (near.clearance.min(FREE_STEP) / self.step).max(1.0);
             let twist = self.wanted * if self.turns { factor.min(LONGEST_FREE_TURN) } else { factor };
             let there = Mover { pose: self.displaced(mover, &twist), ..*mover };
-            return Self::moved(&there, around.near(&there), &twist, Vec::new(), Vec::new());
+            let near = around.near(&there);
+            return Step::Moved(Self::moved(&there, near, &twist, Vec::new(), Vec::new()));
         }
         let mut with = Vec::new();
         for start in [Start::Certain, Start::Lazy] {
             for halving in 0..=HALVINGS {
                 let wanted = self.wanted / f64::from(1u32 << halving);
-                match self.attempt(mover, near, &wanted, start, around) {
-                    Attempt::Moved(step) => return step,
+                let known = match start {
+                    Start::Certain => self.chosen(mover, near, &wanted),
+                    Start::Lazy => Known { rows: Vec::new(), working: Vec::new(), rounds: LAZY_ROUNDS },
+                };
+                let is_first = start == Start::Certain && halving == 0;
+                if let Some(longer) = self.stretched(mover, &known).filter(|_| is_first) {
+                    let attempt = self.attempt(mover, near, (&longer, true), known.clone(), around);
+                    if let Attempt::Moved(step) = attempt {
+                        return Step::Moved(step);
+                    }
+                }
+                match self.attempt(mover, near, (&wanted, false), known, around) {
+                    Attempt::Moved(step) => return Step::Moved(step),
                     Attempt::Stuck(by) => {
                         with = by;
                         // A shorter step would be stopped by the same constraints.
@@ -172,58 +196,49 @@ impl Drive {
         Step::Stuck { with }
     }
 
-    /// The pose in the middle of the play around the mover's: the smallest correction that gives all
-    /// contacts as large a gap as they can have at once, and as much room one way along `axis` (a unit
-    /// vector) as the other.
-    pub(super) fn lifted(
-        &self,
-        mover: &Mover<'_>,
-        axis: &Vector3<f64>,
-        surroundings: &Surroundings,
-    ) -> Option<Pose> {
-        let mut here = *mover;
-        let mut close = here.near(surroundings, LIFT_REACH);
-        for round in 0..LIFT_ROUNDS {
-            let least = close.contacts.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
-            if mover.is_over() || round > 0 && least >= LIFT * 0.5 {
-                break;
-            }
-            let (rows, _) = self.chosen(&here, &close, &Vector6::zeros());
-            let margins = (0..5).map(|halving| LIFT / f64::from(1 << halving)).chain([0.0]);
-            let correction = margins.filter(|m| *m > least).find_map(|margin| {
-                let scale = |r: &Row| Row { a: r.a.component_div(&self.metric), b: r.b - margin, ..*r };
-                let scaled: Vec<Row> = rows.iter().map(scale).collect();
-                project(&Vector6::zeros(), &scaled)
-            });
-            let mut twist = correction.map_or(Vector6::zeros(), |c| c.w.component_div(&self.metric));
-            if let Some(along) = middle(&rows, &twist, axis) {
-                twist += Vector6::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0) * along;
-            }
-            if twist == Vector6::zeros() || twist.norm() > LIFT_REACH {
-                break;
-            }
-            here.pose = self.displaced(&here, &twist);
-            close = here.near(surroundings, LIFT_REACH);
+    /// So much more of what is wanted that the motion, as contacts let it, is as long as a step in contact may be;
+    /// none if it nearly is already. Without inertia the same way is gone, in fewer steps.
+    fn stretched(&self, mover: &Mover<'_>, known: &Known) -> Option<Vector6<f64>> {
+        if !self.is_pulled || known.rows.is_empty() {
+            return None;
         }
-        close.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE).then_some(here.pose)
+        let target = self.wanted.component_mul(&self.metric);
+        let result = self.solved(known)?;
+        let share = result.w.dot(&target) / target.norm_squared();
+        let stretch = self.longest(mover, &result.w.component_div(&self.metric));
+        let is_worth_it = share >= LEAST_SHARE && stretch >= STRETCH.start;
+        is_worth_it.then(|| self.wanted * stretch.min(STRETCH.end))
     }
 
-    /// Projects the wanted twist until the trial pose is free of entry.
+    /// So many times a twist is as long as a step in contact may be: by how far points travel, and by how much the
+    /// arc bulges.
+    fn longest(&self, mover: &Mover<'_>, twist: &Vector6<f64>) -> f64 {
+        let shape = &mover.body.shape;
+        let (v, turn): (Vector3<f64>, Vector3<f64>) =
+            (twist.fixed_rows::<3>(0).into(), twist.fixed_rows::<3>(3).into());
+        let axis = mover.pose.rotation.inverse() * turn;
+        let radius =
+            axis.try_normalize(0.0).map_or(0.0, |axis| shape.radius_about(&shape.mass.centre, &axis));
+        let arc = turn.norm() * radius;
+        let by_travel = contact_step(shape) / (v.norm() + arc);
+        // An arc of length s bulges by s²/8r.
+        by_travel.min((8.0 * radius * LARGEST_BULGE).sqrt() / arc.max(f64::MIN_POSITIVE))
+    }
+
+    /// Projects the wanted twist until the trial pose is free of entry. If it is stretched, the motion is no longer
+    /// than a step in contact.
     fn attempt(
         &self,
         mover: &Mover<'_>,
         near: &Near,
-        wanted: &Vector6<f64>,
-        start: Start,
+        (wanted, is_stretched): (&Vector6<f64>, bool),
+        known: Known,
         around: &mut dyn Around,
     ) -> Attempt {
         let target = wanted.component_mul(&self.metric);
-        let (mut rows, mut working) = (Vec::new(), Vec::new());
-        if start != Start::Lazy {
-            (rows, working) = self.chosen(mover, near, wanted);
-        }
+        let Known { mut rows, mut working, rounds } = known;
         let mut entered = Vec::new();
-        for round in 0..if start == Start::Lazy { LAZY_ROUNDS } else { EAGER_ROUNDS } {
+        for round in 0..rounds {
             if mover.is_over() {
                 break;
             }
@@ -235,7 +250,10 @@ impl Drive {
             if share < LEAST_SHARE {
                 return Attempt::Stuck(touching);
             }
-            let twist = result.w.component_div(&self.metric);
+            let mut twist = result.w.component_div(&self.metric);
+            if is_stretched {
+                twist *= self.longest(mover, &twist).min(1.0);
+            }
             let trial = Mover { pose: self.displaced(mover, &twist), ..*mover };
             // From the second round on, those behind the constraints first: most of what enters is
             // among them.
@@ -308,7 +326,7 @@ impl Drive {
     /// leaves a choice of planes, the one is taken along which the motion gets furthest that the
     /// contacts without a choice allow: at the rim of a hole, that is the hole's wall. Once the condition is
     /// true contacts are left out: whoever asks must look at it before believing what was chosen.
-    fn chosen(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>) -> (Vec<Row>, Vec<Contact>) {
+    fn chosen(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>) -> Known {
         let poll = Poll::every(ROWS_POLL, mover.termination);
         let mut options = Vec::with_capacity(near.contacts.len() * 2);
         let mut ends = Vec::with_capacity(near.contacts.len());
@@ -336,7 +354,8 @@ impl Drive {
         };
         let groups = groups.iter().take_while(|_| !poll.is_over());
         let (rows, kept) = reduced(groups.map(best), self.gyration);
-        (rows, kept.into_iter().map(|i| near.contacts[i]).collect())
+        let working = kept.into_iter().map(|i| near.contacts[i]).collect();
+        Known { rows, working, rounds: EAGER_ROUNDS }
     }
 
     /// A row without the freedoms that the action does not give.
@@ -399,9 +418,9 @@ impl Drive {
         twist: &Vector6<f64>,
         touching: Vec<usize>,
         pressing: Vec<Vector6<f64>>,
-    ) -> Step {
+    ) -> Moved {
         let turned = twist.fixed_rows::<3>(3).norm();
-        Step::Moved(Moved { pose: there.pose, turned, touching, near, pressing })
+        Moved { pose: there.pose, turned, touching, near, pressing }
     }
 
     /// The pose after a twist about the centre of mass.
@@ -421,22 +440,6 @@ impl Drive {
     }
 }
 
-/// How far along an axis, after a twist, the middle is between the rows that hold a part on either side;
-/// `None` if they do not, or leave no room.
-fn middle(rows: &[Row], twist: &Vector6<f64>, axis: &Vector3<f64>) -> Option<f64> {
-    let (mut back, mut forth) = (f64::NEG_INFINITY, f64::INFINITY);
-    for row in rows {
-        let (gap, speed) = (row.a.dot(twist) + row.b, row.a.fixed_rows::<3>(0).dot(axis));
-        if speed > LEAST_SPEED {
-            back = back.max(-gap / speed);
-        } else if speed < -LEAST_SPEED {
-            forth = forth.min(-gap / speed);
-        }
-    }
-    let middle = f64::midpoint(back, forth);
-    (back < forth && middle.is_finite()).then_some(middle)
-}
-
 /// The longest step of a shape in contact.
 pub(super) fn contact_step(shape: &Shape) -> f64 {
     (shape.bounds().extents().min() * 0.5).clamp(0.03, CONTACT_STEP)
@@ -453,8 +456,19 @@ enum Start {
     Lazy,
 }
 
+/// What a step begins with.
+#[derive(Clone)]
+pub(super) struct Known {
+    /// The constraints, …
+    rows: Vec<Row>,
+    /// … and the contacts that they come from.
+    working: Vec<Contact>,
+    /// How many times it is projected at most.
+    rounds: usize,
+}
+
 enum Attempt {
-    Moved(Step),
+    Moved(Moved),
     /// The linear constraints alone stop it.
     Stuck(Vec<usize>),
     /// No allowed pose was found at this length of step.

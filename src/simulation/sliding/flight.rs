@@ -45,8 +45,10 @@ enum State {
     Ready,
     /// To fly on, or to land.
     Aloft,
-    /// To follow regions, until it was bent.
+    /// To follow regions, until it was bent …
     Grounded,
+    /// … and then until it is not any more.
+    Bent,
     /// To follow regions.
     Never,
 }
@@ -66,11 +68,14 @@ impl<'a> Flights<'a> {
         Self { left: 0.0, state: State::Never, any: false, ..self }
     }
 
-    /// The push was bent: where nothing does so any more it may fly again.
-    pub(super) fn bent(&mut self) {
-        if self.state == State::Grounded {
-            self.state = State::Ready;
-        }
+    /// A step by regions was bent, or was not: where nothing bends a push any more that something did bend, it may
+    /// fly again.
+    pub(super) fn stepped(&mut self, is_bent: bool) {
+        self.state = match (self.state, is_bent) {
+            (State::Grounded, true) => State::Bent,
+            (State::Bent, false) => State::Ready,
+            (state, _) => state,
+        };
     }
 
     /// The next step of a flight from a pose, where the part's box is so, along the unit vector `u`; none where
@@ -81,7 +86,7 @@ impl<'a> Flights<'a> {
         bounds: &Bounds,
         u: &Vector3<f64>,
     ) -> Result<Option<f64>, Interrupt> {
-        if matches!(self.state, State::Grounded | State::Never) {
+        if matches!(self.state, State::Grounded | State::Bent | State::Never) {
             return Ok(None);
         }
         if self.left == 0.0 {
@@ -156,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_push_that_landed_flies_again_only_after_it_was_bent() {
+    fn a_push_that_landed_flies_again_only_where_nothing_bends_it_any_more() {
         let [plate, block] = block_on_plate();
         let (scene, _) = scene([plate, block, cuboid([2.0, -4.0, 0.0], [2.5, 4.0, 2.0])]);
         let body = &scene.bodies[1];
@@ -173,10 +178,15 @@ mod tests {
         assert_eq!(steps.len(), 2);
         assert!(steps[0] == FREE_STEP && steps[1] < FREE_STEP && !flights.is_aloft());
         assert_eq!(flights.step(&pose, &bounds, &Vector3::z()).unwrap(), None);
-        flights.bent();
+        for is_bent in [false, true, true] {
+            flights.stepped(is_bent);
+            assert_eq!(flights.step(&pose, &bounds, &Vector3::z()).unwrap(), None);
+        }
+        flights.stepped(false);
         assert_eq!(flights.step(&pose, &bounds, &Vector3::z()).unwrap(), Some(FREE_STEP));
         let mut never = flights.never();
-        never.bent();
+        never.stepped(true);
+        never.stepped(false);
         assert_eq!(never.step(&pose, &bounds, &Vector3::z()).unwrap(), None);
     }
 }

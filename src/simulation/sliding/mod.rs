@@ -23,6 +23,7 @@ mod kept;
 mod leap;
 mod pair;
 mod push;
+mod stages;
 mod turning;
 
 use crate::geometry::Pose;
@@ -40,6 +41,7 @@ use turning::Turning;
 pub(super) use drive::FREE_STEP;
 pub use kept::KeptCells;
 pub use pair::pair_blocks;
+pub use stages::{StepCost, Telling, step_costs};
 
 /// A pair may get this much deeper than its allowance, in the planning frame.
 pub(super) const DEPTH_TOLERANCE: f64 = 3e-4;

@@ -114,9 +114,7 @@ impl<'a> Push<'a> {
             }
             u = along.normalize();
         }
-        if !obstacles.is_empty() {
-            self.flights.bent();
-        }
+        self.flights.stepped(!obstacles.is_empty());
         if self.is_long && self.shift == Vector3::zeros() {
             self.cells.lengthen(&u)?;
         }
@@ -183,7 +181,7 @@ impl<'a> Push<'a> {
 }
 
 /// The direction nearest to a force that no obstacle stops, and the parts that bend it, ascending.
-fn projected(force: &Vector3<f64>, obstacles: &[Obstacle]) -> Option<(Vector3<f64>, Vec<usize>)> {
+pub(super) fn projected(force: &Vector3<f64>, obstacles: &[Obstacle]) -> Option<(Vector3<f64>, Vec<usize>)> {
     let row = |o: &Obstacle| {
         let n = o.normal;
         Row { a: Vector6::new(n.x, n.y, n.z, 0.0, 0.0, 0.0), b: 0.0, other: o.other }

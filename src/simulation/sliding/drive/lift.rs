@@ -1,0 +1,73 @@
+//! Into the middle of the play.
+
+use nalgebra::{Vector3, Vector6};
+
+use crate::geometry::Pose;
+
+use super::super::super::Surroundings;
+use super::super::super::contact::Mover;
+use super::super::super::projection::{Row, project};
+use super::super::DEPTH_TOLERANCE;
+use super::{Drive, Known};
+
+/// The gap at which a part in the middle of its play is left alone, and the corrections that bring
+/// it there.
+const LIFT: f64 = 0.01;
+const LIFT_REACH: f64 = 0.04;
+const LIFT_ROUNDS: usize = 3;
+/// What is along an axis by less than this share does not hold a part there.
+const LEAST_SPEED: f64 = 0.1;
+
+impl Drive {
+    /// The pose in the middle of the play around the mover's: the smallest correction that gives all
+    /// contacts as large a gap as they can have at once, and as much room one way along `axis` (a unit
+    /// vector) as the other.
+    pub(in super::super) fn lifted(
+        &self,
+        mover: &Mover<'_>,
+        axis: &Vector3<f64>,
+        surroundings: &Surroundings,
+    ) -> Option<Pose> {
+        let mut here = *mover;
+        let mut close = here.near(surroundings, LIFT_REACH);
+        for round in 0..LIFT_ROUNDS {
+            let least = close.contacts.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
+            if mover.is_over() || round > 0 && least >= LIFT * 0.5 {
+                break;
+            }
+            let Known { rows, .. } = self.chosen(&here, &close, &Vector6::zeros());
+            let margins = (0..5).map(|halving| LIFT / f64::from(1 << halving)).chain([0.0]);
+            let correction = margins.filter(|m| *m > least).find_map(|margin| {
+                let scale = |r: &Row| Row { a: r.a.component_div(&self.metric), b: r.b - margin, ..*r };
+                let scaled: Vec<Row> = rows.iter().map(scale).collect();
+                project(&Vector6::zeros(), &scaled)
+            });
+            let mut twist = correction.map_or(Vector6::zeros(), |c| c.w.component_div(&self.metric));
+            if let Some(along) = middle(&rows, &twist, axis) {
+                twist += Vector6::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0) * along;
+            }
+            if twist == Vector6::zeros() || twist.norm() > LIFT_REACH {
+                break;
+            }
+            here.pose = self.displaced(&here, &twist);
+            close = here.near(surroundings, LIFT_REACH);
+        }
+        close.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE).then_some(here.pose)
+    }
+}
+
+/// How far along an axis, after a twist, the middle is between the rows that hold a part on either side;
+/// `None` if they do not, or leave no room.
+fn middle(rows: &[Row], twist: &Vector6<f64>, axis: &Vector3<f64>) -> Option<f64> {
+    let (mut back, mut forth) = (f64::NEG_INFINITY, f64::INFINITY);
+    for row in rows {
+        let (gap, speed) = (row.a.dot(twist) + row.b, row.a.fixed_rows::<3>(0).dot(axis));
+        if speed > LEAST_SPEED {
+            back = back.max(-gap / speed);
+        } else if speed < -LEAST_SPEED {
+            forth = forth.min(-gap / speed);
+        }
+    }
+    let middle = f64::midpoint(back, forth);
+    (back < forth && middle.is_finite()).then_some(middle)
+}

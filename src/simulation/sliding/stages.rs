@@ -1,0 +1,160 @@
+//! What the stages of a step cost, one by one: for benchmarks.
+//!
+//! All three ways to see contact have the same stages: contacts are gathered, reduced to what matters, the wanted
+//! motion is projected onto what they allow, and the pose advances.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use nalgebra::Vector3;
+
+use crate::geometry::Pose;
+use crate::termination::{Interrupt, Termination};
+
+use super::super::contact::Mover;
+use super::super::{Action, Scene, Surroundings};
+use super::cells::{Cells, Halt};
+use super::drive::{Drive, FREE_STEP};
+use super::holds::Holds;
+use super::push::projected;
+
+/// What tells of contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Telling {
+    /// Convex regions that pieces of surface may be shifted in: of translations.
+    Shifts,
+    /// Convex regions that pieces of surface stay in while they turn.
+    Regions,
+    /// Samples near the other surface.
+    Samples,
+}
+
+/// Microseconds that the stages of one step took.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepCost {
+    /// What told of contact.
+    pub telling: Telling,
+    /// Finding what is near; regions are found anew, as where a motion begins.
+    pub gather: f64,
+    /// What of it stops the motion: constraints of contacts, and the tightest of those that are alike.
+    pub reduce: f64,
+    /// The nearest motion to the wanted one that this allows.
+    pub solve: f64,
+    /// To where the step leads. Of what may turn this is the whole step, with all trials.
+    pub advance: f64,
+}
+
+/// What steps cost that begin at the poses of a motion of a part under an action, those that are free of anything
+/// near left out.
+///
+/// # Errors
+/// The termination condition became true.
+pub fn step_costs(
+    scene: &Scene,
+    surroundings: &Surroundings,
+    (part, poses): (usize, &[Pose]),
+    action: Action,
+    termination: &Termination,
+) -> Result<Vec<StepCost>, Interrupt> {
+    let mut costs = Vec::new();
+    if !action.turns() {
+        for pose in poses {
+            costs.extend(of_shift(scene, surroundings, (part, pose), action.force(), termination)?);
+        }
+        return Ok(costs);
+    }
+    let Some(start) = poses.first() else { return Ok(costs) };
+    let drive = Drive::new(scene, part, start, action);
+    for by_samples in [false, true] {
+        let mut around =
+            Holds::new(scene, surroundings, (part, start), drive.reach(), by_samples, termination);
+        for pose in poses {
+            termination.check()?;
+            // From some way on these would be the others.
+            if around.samples() != by_samples {
+                break;
+            }
+            let mover = Mover::new(scene, part, *pose).until(termination);
+            let (mut near, gather) = timed(|| around.settle(&mover, None));
+            if near.contacts.is_empty() && near.clearance >= drive.step() {
+                continue;
+            }
+            let (known, reduce) = timed(|| drive.constraints(&mover, &near));
+            let (_, solve) = timed(|| drive.solved(&known));
+            let (_, advance) = timed(|| drive.advance(&mover, &mut near, &mut around));
+            let telling = if around.samples() { Telling::Samples } else { Telling::Regions };
+            costs.push(StepCost { telling, gather, reduce, solve, advance });
+        }
+    }
+    Ok(costs)
+}
+
+/// Of a translation; none where nothing is near, or regions cannot tell.
+fn of_shift(
+    scene: &Scene,
+    surroundings: &Surroundings,
+    (part, start): (usize, &Pose),
+    force: Vector3<f64>,
+    termination: &Termination,
+) -> Result<Option<StepCost>, Interrupt> {
+    let scene = Scene { kept: Arc::default(), ..scene.clone() };
+    let bounds = scene.bodies[part].shape.bounds().transformed(start).grown(FREE_STEP);
+    let near = scene.broad_phase.meeting_of(&surroundings.standing, &bounds);
+    if near.is_empty() {
+        return Ok(None);
+    }
+    let mut cells = Cells::new(&scene, (part, start), termination);
+    let (here, mut obstacles) = (Vector3::zeros(), Vec::new());
+    let cost = (|| {
+        let (gathered, gather) = timed(|| near.iter().try_for_each(|&other| cells.add(other, &here)));
+        gathered?;
+        let (made, reduce) = timed(|| cells.make_way(&here, &force, &mut obstacles));
+        made?;
+        let (along, solve) = timed(|| projected(&force, &obstacles));
+        let along = along.and_then(|(along, _)| along.try_normalize(1e-9));
+        let (length, advance) = timed(|| along.map(|u| cells.advance(&here, &u, FREE_STEP)).transpose());
+        length?;
+        Ok(StepCost { telling: Telling::Shifts, gather, reduce, solve, advance })
+    })();
+    match cost {
+        Ok(cost) => Ok(Some(cost)),
+        Err(Halt::Interrupted(interrupt)) => Err(interrupt),
+        Err(Halt::Lost | Halt::Blocked) => Ok(None),
+    }
+}
+
+/// What a question comes to, and the microseconds it takes.
+fn timed<T>(question: impl FnOnce() -> T) -> (T, f64) {
+    let started = Instant::now();
+    let answer = question();
+    (answer, started.elapsed().as_secs_f64() * 1e6)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{block_on_plate, scene};
+    use crate::simulation::{Axis, SlidingEngine, TransitionFunction};
+
+    #[test]
+    fn all_ways_to_see_contact_are_told_apart() {
+        let (scene, _) = scene(block_on_plate());
+        let around = Surroundings::new(&scene, vec![0]);
+        let (start, t) = (scene.bodies[1].planning_from_shape, Termination::default());
+        let costs = |action: Action| {
+            let motion = SlidingEngine.simulate(&scene, &around, 1, &start, action, &t).unwrap();
+            step_costs(&scene, &around, (1, &motion.path), action, &t).unwrap()
+        };
+        let count = |costs: &[StepCost], telling| costs.iter().filter(|c| c.telling == telling).count();
+        let pushed = costs(Action::Push(Axis::X, true));
+        assert!(!pushed.is_empty() && count(&pushed, Telling::Shifts) == pushed.len());
+        let turned = costs(Action::Turn(Axis::Z, true));
+        assert!(count(&turned, Telling::Regions) > 0 && count(&turned, Telling::Samples) > 0);
+        for cost in pushed.iter().chain(&turned) {
+            assert!([cost.gather, cost.reduce, cost.solve, cost.advance].iter().all(|c| *c >= 0.0));
+        }
+        // The whole of a step is more than its parts.
+        let sum = |of: fn(&StepCost) -> f64| turned.iter().map(of).sum::<f64>();
+        assert!(sum(|c| c.advance) > sum(|c| c.solve));
+    }
+}
