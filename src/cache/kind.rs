@@ -103,9 +103,10 @@ impl Kind {
         match self {
             Self::Source | Self::Shape | Self::Hull | Self::Field => 1,
             Self::Healed | Self::Touching | Self::Swept => 2,
-            Self::Overlap | Self::Blocking => 4,
-            Self::Witness | Self::Motion | Self::Answer | Self::Verdict => 5,
-            Self::Plan => 6,
+            Self::Blocking => 4,
+            Self::Overlap | Self::Witness | Self::Motion => 5,
+            Self::Answer | Self::Verdict => 6,
+            Self::Plan => 7,
         }
     }
 
