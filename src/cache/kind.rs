@@ -103,9 +103,9 @@ impl Kind {
         match self {
             Self::Source | Self::Shape | Self::Hull | Self::Field => 1,
             Self::Healed | Self::Touching | Self::Swept => 2,
-            Self::Overlap | Self::Blocking => 4,
-            Self::Verdict => 5,
-            Self::Witness | Self::Motion | Self::Answer => 6,
+            Self::Blocking => 4,
+            Self::Overlap => 5,
+            Self::Witness | Self::Motion | Self::Answer | Self::Verdict => 6,
             Self::Plan => 7,
         }
     }

@@ -158,6 +158,8 @@ pub(super) struct Leg {
     pub(super) end: Pose,
     /// No point moves further.
     pub(super) length: f64,
+    /// The direction in which all points move, if they move alike.
+    pub(super) along: Option<Vector3<f64>>,
 }
 
 /// A course seen from one of the two parts: of points of the moving part in the frame of the
@@ -197,6 +199,7 @@ impl<'a> View<'a> {
             stretch: 1.0,
             end: if self.on_moving { to_standing } else { to_standing.inverse() },
             length,
+            along: None,
         };
         let bends = self.course.bends(from, from + length);
         let turns = |(segment, a, b): &(&Segment, f64, f64)| {
@@ -213,6 +216,10 @@ impl<'a> View<'a> {
         for (segment, a, b) in bends {
             let [a, b] = [a, b].map(|u| interpolate(&segment.from, &segment.to, &self.course.centre, u));
             self.bend(&a, &b, &mut leg);
+        }
+        // One bend that does not turn has two maps.
+        if let [first, last] = &leg.maps[..] {
+            leg.along = (last.shift - first.shift).try_normalize(0.0);
         }
         leg
     }
@@ -310,6 +317,8 @@ mod tests {
         assert_eq!((whole.maps.len(), whole.slack), (4, 0.0));
         let [first, second] = Interval::WHOLE.halves();
         assert_eq!(view.leg(first).maps.len(), 2);
+        assert_eq!(view.leg(first).along, Some(Vector3::x()));
+        assert_eq!((whole.along, view.leg(second).along), (None, None));
         assert!((view.leg(first).end.translation.vector.x - 1.25).abs() < 1e-12);
         assert_eq!(view.leg(second).maps.len(), 4);
     }

@@ -7,7 +7,8 @@
 //! slides along a face, in a hole or in a groove is settled at once, and remembered by its place, for
 //! what comes by later. What lies in the other surface with granted overlap, maybe nearer to one face
 //! of it here and to another there, is bounded by the triangles about it
-//! ([`Surface::hull_depth`]). Other pieces are split, in space or in time, whichever is longer.
+//! ([`Surface::hull_depth`]). Other pieces are split, in space or in time, whichever is longer; but on a line
+//! in space first, down to triangles: the prism that one of them passes is convex, however long.
 //! Pieces of the smallest size are measured; their size is added.
 //!
 //! Where threads with granted overlap cross each other, and in sight of holes, this may take too long: a

@@ -37,13 +37,15 @@ pub(super) struct Region {
 }
 
 impl Search<'_> {
-    /// Whether some region tells well how deep a piece gets; the bound is raised by that.
+    /// Whether some region tells well how deep a piece gets; the bound is raised by that. `corners` tells all
+    /// those of its hull, unless they are too many.
     pub(super) fn is_settled(
         &mut self,
         swept: &Swept,
         slack: f64,
         hint: &mut Hint,
         fits: impl Fn(&FreeRegion, f64) -> Fit,
+        corners: impl Fn() -> Vec<Point3<f64>>,
     ) -> bool {
         let asked = self.asked;
         let spared = self.spared() - slack;
@@ -90,8 +92,21 @@ impl Search<'_> {
         hint.vain = true;
         self.found.effort += REGION_EFFORT;
         let seen = (&closest, signed);
-        let Some(free) = self.region(swept, seen, most, spared) else { return false };
-        let fit = fits(&free, most);
+        let Some(mut free) = self.region(swept, seen, most, spared) else { return false };
+        let mut fit = fits(&free, most);
+        // Planes that leave most room before a few corners may be askew to a wall along which all others lie, as of
+        // a hole that is round about a pin: one more region takes less time than all the pieces without.
+        if fit.is_none()
+            && let corners = corners()
+            && corners.len() > self.wanted.len()
+        {
+            self.wanted = corners;
+            self.found.effort += REGION_EFFORT;
+            if let Some(fitted) = self.region(swept, seen, most, spared) {
+                fit = fits(&fitted, most);
+                free = fitted;
+            }
+        }
         let id = self.regions.len() as u32;
         let is_outside = free.is_outside(asked.measured);
         self.regions.push(Region { free, is_outside });

@@ -13,6 +13,10 @@ use super::{Found, Precision, Question};
 
 /// Hulls of more corners are not asked about as such.
 const MOST_CORNERS: usize = 64;
+/// For no more corners than this regions are grown.
+const MOST_WANTED: usize = 1024;
+/// What faces along its way, but for so little, has no side to it.
+const ACROSS: f64 = 0.5;
 /// Pieces that might be too deep are split until they are so much smaller than others.
 const DOUBT: f64 = 4.0;
 
@@ -108,8 +112,9 @@ impl<'a> Search<'a> {
                 return Ok(());
             }
             let swept = swept(&centres, ball);
-            // What is beyond the ball is half of the way.
-            in_time = swept.radius - ball > 2.0 * patch.radius;
+            // What is beyond the ball is half of the way. On a line, all that a small piece passes is convex: what
+            // does not fit is as wide on each half of it.
+            in_time = leg.along.is_none() && swept.radius - ball > 2.0 * patch.radius;
             self.wanted.clear();
             self.facing = Vector3::zeros();
             self.wanted.extend(tree.extremes(index).flat_map(|p| leg.maps.iter().map(move |m| m.apply(p))));
@@ -124,7 +129,11 @@ impl<'a> Search<'a> {
                 }
                 furthest(points.iter().flat_map(|p| leg.maps.iter().map(|m| m.apply(p))), region, most)
             };
-            if self.is_settled(&swept, leg.slack, &mut hint, fits) {
+            let corners = || {
+                let few = if points.len() * leg.maps.len() <= MOST_WANTED { points } else { &[] };
+                few.iter().flat_map(|p| leg.maps.iter().map(|m| m.apply(p))).collect()
+            };
+            if self.is_settled(&swept, leg.slack, &mut hint, fits, corners) {
                 return Ok(());
             }
         }
@@ -168,8 +177,13 @@ impl<'a> Search<'a> {
                 self.hull.clone_from(&points);
                 let outward = area_normal(&corners[0], &corners[1], &corners[2]);
                 self.facing = leg.end.rotation * -outward.try_normalize(0.0).unwrap_or_default();
+                if let Some(along) = leg.along {
+                    // A plane that is askew to a long way is far off at its ends.
+                    let across = self.facing - along * self.facing.dot(&along);
+                    self.facing = across.try_normalize(ACROSS).unwrap_or(self.facing);
+                }
                 let fits = |region: &FreeRegion, most: f64| furthest(points.iter().copied(), region, most);
-                if self.is_settled(&swept, leg.slack, &mut hint, fits)
+                if self.is_settled(&swept, leg.slack, &mut hint, fits, Vec::new)
                     || self.is_measured(&corners, &leg, &swept, hint.triangle)
                 {
                     continue;
