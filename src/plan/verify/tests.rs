@@ -100,6 +100,23 @@ fn flush_sliding_is_not_deep() {
 }
 
 #[test]
+fn a_pin_in_a_round_hole_is_told_by_few_regions() {
+    // Facets that do not match, and little play: a plane that leaves most room before a few corners misses others.
+    let turn = Pose::rotation(Vector3::new(0.3, -0.2, 0.1));
+    let meshes = [tube(1.0, 2.0, [-1.0, 1.0], 48), rod(0.99, [-4.0, 4.0], 44)];
+    let (scene, verifier) = scene(meshes.map(|mesh| moved(mesh, &turn)));
+    let start = scene.bodies[1].planning_from_shape;
+    let path = [start, nalgebra::Translation3::from(turn * Vector3::z() * 8.0) * start];
+    let passing = Passing::new(&scene, &scene.allowances, [1, 0], &path);
+    let course = Course::new(&passing.path, passing.centre, passing.reach());
+    let [pin, _] = verifier.bounds(&passing, &course, &Termination::default()).unwrap();
+    let triangles = scene.bodies[1].shape.surface.triangles().len();
+    assert!(pin.bound < LIMIT && pin.open.is_empty());
+    // A piece is one, a region 40.
+    assert!(pin.effort < 4 * triangles, "{} for {triangles} triangles", pin.effort);
+}
+
+#[test]
 fn a_flush_peg_leaves_its_hole_unhindered() {
     let (scene, verifier) = scene(peg_in_hole(0.0));
     assert!(checked(&scene, &verifier, &[Vector3::z() * 4.0]).depth < 1e-9);
