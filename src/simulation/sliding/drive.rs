@@ -175,7 +175,7 @@ impl Drive {
                     Start::Lazy => Known { rows: Vec::new(), working: Vec::new(), rounds: LAZY_ROUNDS },
                 };
                 let is_first = start == Start::Certain && halving == 0;
-                if let Some(longer) = self.stretched(mover, &known).filter(|_| is_first) {
+                if let Some(longer) = is_first.then(|| self.stretched(mover, &known)).flatten() {
                     let attempt = self.attempt(mover, near, (&longer, true), known.clone(), around);
                     if let Attempt::Moved(step) = attempt {
                         return Step::Moved(step);
@@ -210,19 +210,20 @@ impl Drive {
         is_worth_it.then(|| self.wanted * stretch.min(STRETCH.end))
     }
 
-    /// So many times a twist is as long as a step in contact may be: by how far points travel, and by how much the
-    /// arc bulges.
+    /// A step in contact may be so many times as long as a twist: by how far points travel, and by how much the arc
+    /// bulges.
     fn longest(&self, mover: &Mover<'_>, twist: &Vector6<f64>) -> f64 {
         let shape = &mover.body.shape;
         let (v, turn): (Vector3<f64>, Vector3<f64>) =
             (twist.fixed_rows::<3>(0).into(), twist.fixed_rows::<3>(3).into());
-        let axis = mover.pose.rotation.inverse() * turn;
-        let radius =
-            axis.try_normalize(0.0).map_or(0.0, |axis| shape.radius_about(&shape.mass.centre, &axis));
+        let by_travel = |arc: f64| contact_step(shape) / (v.norm() + arc);
+        let Some(axis) = (mover.pose.rotation.inverse() * turn).try_normalize(0.0) else {
+            return by_travel(0.0);
+        };
+        let radius = shape.radius_about(&shape.mass.centre, &axis);
         let arc = turn.norm() * radius;
-        let by_travel = contact_step(shape) / (v.norm() + arc);
         // An arc of length s bulges by s²/8r.
-        by_travel.min((8.0 * radius * LARGEST_BULGE).sqrt() / arc.max(f64::MIN_POSITIVE))
+        by_travel(arc).min((8.0 * radius * LARGEST_BULGE).sqrt() / arc)
     }
 
     /// Projects the wanted twist until the trial pose is free of entry. If it is stretched, the motion is no longer

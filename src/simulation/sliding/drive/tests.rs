@@ -22,3 +22,16 @@ fn a_peg_that_is_pulled_askew_slides_in_steps_as_long_as_those_straight_on() {
     let verdict = verifier.check(&scene, &scene.allowances, &[0], 1, &motion.path, &t).unwrap();
     assert!(verdict.depth < 2e-3, "{}", verdict.depth);
 }
+
+#[test]
+fn a_step_without_a_turn_is_as_long_as_one_with_hardly_any() {
+    let (scene, _) = scene(peg_in_hole(-0.01));
+    let start = scene.bodies[1].planning_from_shape;
+    let drive = Drive::new(&scene, 1, &start, Action::Drag(Axis::Z, true));
+    let mover = Mover::new(&scene, 1, start);
+    let expected = contact_step(&scene.bodies[1].shape) / 0.05;
+    for turn in [0.0, 1e-12] {
+        let longest = drive.longest(&mover, &Vector6::new(0.0, 0.0, 0.05, turn, 0.0, 0.0));
+        assert!((longest - expected).abs() < 1e-6 * expected, "{longest} of {expected}");
+    }
+}
