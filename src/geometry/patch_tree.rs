@@ -1,7 +1,7 @@
 //! A surface's triangles in a tree of bounding spheres: what a branch-and-bound over a surface
 //! walks.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use crate::termination::Poll;
 
@@ -62,8 +62,14 @@ impl PatchTree {
     #[must_use]
     pub fn new(surface: &Surface, poll: &Poll<'_>) -> Self {
         let mut triangles: Vec<u32> = (0..surface.triangles().len() as u32).collect();
-        let mut tree = Self::default();
         let n = triangles.len();
+        // As many as there are of them at most, mostly; what is not used is given back.
+        let mut tree = Self {
+            nodes: Vec::with_capacity(n / 3),
+            triangles: Vec::new(),
+            vertices: Vec::with_capacity(2 * n),
+            extremes: Vec::with_capacity(5 * n),
+        };
         if n > 0 {
             let given = Given::of(surface);
             tree.build(&given, &mut triangles, 0, n, poll);
@@ -122,14 +128,13 @@ impl PatchTree {
             return;
         }
         let slice = &mut triangles[start..end];
-        let corners = || slice.iter().flat_map(|&t| &given.corners[t as usize]);
-        let bounds = corners().fold(Bounds::EMPTY, |b, p| b.with_point(p));
+        let bounds = slice.iter().fold(Bounds::EMPTY, |b, &t| b.union(&given.boxes[t as usize]));
         let centre = bounds.centre();
-        let radius = corners().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
         let me = self.nodes.len();
         self.nodes.push(Patch {
             centre,
-            radius,
+            // Told by its vertices, once they are there: corners of triangles are several times as many.
+            radius: 0.0,
             start: start as u32,
             end: end as u32,
             first_vertex: self.vertices.len() as u32,
@@ -157,17 +162,20 @@ impl PatchTree {
                 return;
             }
         }
-        let node = &mut self.nodes[me];
-        node.last_vertex = self.vertices.len() as u32;
-        let node = &self.nodes[me];
-        let extremes = match node.right {
-            0 => furthest(&self.vertices[node.first_vertex as usize..]),
+        let Patch { first_vertex, right, .. } = self.nodes[me];
+        let vertices = &self.vertices[first_vertex as usize..];
+        let radius = vertices.iter().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
+        let last_vertex = self.vertices.len() as u32;
+        let extremes = match right {
+            0 => furthest(vertices),
             // Who reaches furthest of all does so of one half.
-            right => furthest(
-                &[me as u32 + 1, right].map(|c| self.extremes(c).copied().collect::<Vec<_>>()).concat(),
-            ),
+            right => {
+                let halves = self.extremes(me as u32 + 1).chain(self.extremes(right));
+                furthest(&halves.copied().collect::<Vec<_>>())
+            }
         };
         let node = &mut self.nodes[me];
+        (node.radius, node.last_vertex) = (radius, last_vertex);
         node.first_extreme = self.extremes.len() as u32;
         self.extremes.extend(extremes);
         node.last_extreme = self.extremes.len() as u32;
@@ -177,7 +185,7 @@ impl PatchTree {
 /// What is asked of a surface's triangles at every level of their tree, in one place.
 struct Given<'a> {
     surface: &'a Surface,
-    corners: Vec<[Point3<f64>; 3]>,
+    boxes: Vec<Bounds>,
     /// The sums of their corners.
     middles: Vec<[f64; 3]>,
 }
@@ -187,9 +195,24 @@ impl<'a> Given<'a> {
         let corners: Vec<_> = (0..surface.triangles().len() as u32).map(|t| surface.corners(t)).collect();
         let sum = |corners: &[Point3<f64>; 3]| [0, 1, 2].map(|axis| corners.iter().map(|p| p[axis]).sum());
         let middles = corners.iter().map(sum).collect();
-        Self { surface, corners, middles }
+        Self { surface, boxes: corners.iter().map(Bounds::of).collect(), middles }
     }
 }
+
+/// Pairs of opposite directions.
+const PAIRS: usize = 13;
+/// By axis: one direction of each pair, of all those to the middles of a cube's faces, edges and corners.
+const ALONG: [[f64; PAIRS]; 3] = {
+    let mut along = [[0.0; PAIRS]; 3];
+    let mut code = 0;
+    while code < PAIRS {
+        along[0][code] = (code % 3) as f64 - 1.0;
+        along[1][code] = (code / 3 % 3) as f64 - 1.0;
+        along[2][code] = (code / 9) as f64 - 1.0;
+        code += 1;
+    }
+    along
+};
 
 /// Points that reach furthest, in each of 26 directions: few points are kept as they are.
 fn furthest(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
@@ -197,23 +220,21 @@ fn furthest(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
     if points.len() <= FEW {
         return points.to_vec();
     }
-    let mut is_found = vec![false; points.len()];
-    // Of two opposite directions at once: the last of those that reach as far.
-    for code in 0..27 / 2 {
-        let along = Vector3::new(code % 3, code / 3 % 3, code / 9).map(|x| f64::from(x - 1));
-        let (mut least, mut most) = ((f64::INFINITY, 0), (f64::NEG_INFINITY, 0));
-        for (i, p) in points.iter().enumerate() {
-            let reach = p.coords.dot(&along);
-            if reach <= least.0 {
-                least = (reach, i);
-            }
-            if reach >= most.0 {
-                most = (reach, i);
-            }
+    // Of two opposite directions at once, and of all directions side by side: the last of those that reach as far.
+    let (mut least, mut most) = ([f64::INFINITY; PAIRS], [f64::NEG_INFINITY; PAIRS]);
+    let (mut at_least, mut at_most) = ([0u64; PAIRS], [0u64; PAIRS]);
+    for (i, p) in (0u64..).zip(points) {
+        for k in 0..PAIRS {
+            let reach = p.x * ALONG[0][k] + p.y * ALONG[1][k] + p.z * ALONG[2][k];
+            let (is_least, is_most) = (reach <= least[k], reach >= most[k]);
+            least[k] = if is_least { reach } else { least[k] };
+            at_least[k] = if is_least { i } else { at_least[k] };
+            most[k] = if is_most { reach } else { most[k] };
+            at_most[k] = if is_most { i } else { at_most[k] };
         }
-        is_found[least.1] = true;
-        is_found[most.1] = true;
     }
+    let mut is_found = vec![false; points.len()];
+    at_least.iter().chain(&at_most).for_each(|&i| is_found[i as usize] = true);
     points.iter().zip(is_found).filter(|(_, is_found)| *is_found).map(|(p, _)| *p).collect()
 }
 

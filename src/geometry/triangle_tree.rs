@@ -9,6 +9,7 @@
 
 mod crossings;
 mod nearest_first;
+mod split;
 
 use nalgebra::{Point3, Vector3, center};
 
@@ -16,17 +17,16 @@ use super::triangle::area_normal;
 use super::{Bounds, Closest};
 
 pub(super) use nearest_first::Visitor;
+use split::{Item, split};
 
 /// Boxes in a node, and triangles in a leaf.
 pub(super) const WIDTH: usize = 8;
+/// Most leaves hold more triangles than this.
+const FILLED: usize = 4;
 /// Bits of a child that is a leaf.
 const LEAF: u32 = 1 << 31;
 /// Rounding of coordinates and products, as a share of the coordinates' size.
 const ROUNDING: f64 = 2e-6;
-/// Boxes are split at one of so many places along each axis.
-const BINS: usize = 16;
-/// The smaller side of a split holds at least this share: bounds the depth.
-const LEAST_SHARE: usize = 16;
 
 type Lanes = [f32; WIDTH];
 /// The corners of eight triangles, in double precision: by corner, axis and triangle.
@@ -73,20 +73,22 @@ impl TriangleTree {
 
     /// The tree of some triangles, given by their corners.
     pub(super) fn new(triangles: &[[Point3<f64>; 3]]) -> Self {
-        let items: Vec<Bounds> = triangles.iter().map(Bounds::of).collect();
-        let all = items.iter().fold(Bounds::EMPTY, |a, b| a.union(b));
+        let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
+        let items: Vec<Item> = triangles.iter().map(|corners| Item::new(&Bounds::of(corners))).collect();
+        let all = Item::around(&items, &order).bounds();
         let empty = triangles.is_empty();
         let origin = if empty { Point3::origin() } else { all.centre() };
         let radius = if empty { 0.0 } else { all.extents().max() * 0.5 };
-        let mut tree = Self { origin, radius, root: 0, nodes: Vec::new(), leaves: Vec::new() };
-        let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
+        // Leaves are large: to move them as they become more took a third of the time.
+        let leaves = Vec::with_capacity(triangles.len().div_ceil(FILLED));
+        let mut tree = Self { origin, radius, root: 0, nodes: Vec::new(), leaves };
         tree.root = tree.build(triangles, &items, &mut order);
         tree.nodes.shrink_to_fit();
         tree.leaves.shrink_to_fit();
         tree
     }
 
-    fn build(&mut self, triangles: &[[Point3<f64>; 3]], items: &[Bounds], order: &mut [u32]) -> u32 {
+    fn build(&mut self, triangles: &[[Point3<f64>; 3]], items: &[Item], order: &mut [u32]) -> u32 {
         if order.len() <= WIDTH {
             self.leaves.push(Leaf::new(triangles, order, &self.origin));
             return (self.leaves.len() - 1) as u32 | LEAF;
@@ -107,7 +109,7 @@ impl TriangleTree {
             child: [0; WIDTH],
         };
         for (k, group) in groups.into_iter().enumerate() {
-            let bounds = group.iter().fold(Bounds::EMPTY, |b, &i| b.union(&items[i as usize]));
+            let bounds = Item::around(items, group).bounds();
             for a in 0..3 {
                 node.min[a][k] = (bounds.min[a] - self.origin[a]) as f32;
                 node.max[a][k] = (bounds.max[a] - self.origin[a]) as f32;
@@ -347,84 +349,4 @@ fn above(plane: &[Lanes; 3], limit: &Lanes, q: &[f32; 3]) -> Lanes {
 #[inline]
 fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
-}
-
-/// Splits items in two where the boxes' areas times their counts get smallest (surface area
-/// heuristic), or in the middle if all centres coincide.
-fn split<'a>(items: &[Bounds], order: &'a mut [u32]) -> (&'a mut [u32], &'a mut [u32]) {
-    let centre = |i: u32, a: usize| items[i as usize].min[a] + items[i as usize].max[a];
-    let least = order.len().div_ceil(LEAST_SHARE).max(1);
-    let mut best: Option<(f64, usize, f64)> = None;
-    for axis in 0..3 {
-        let (low, high) = order.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &i| {
-            (l.min(centre(i, axis)), h.max(centre(i, axis)))
-        });
-        let scale = BINS as f64 / (high - low);
-        if !(scale.is_finite() && high > low) {
-            continue;
-        }
-        let bin = |i: u32| (((centre(i, axis) - low) * scale) as usize).min(BINS - 1);
-        let mut bins = [(0usize, Bounds::EMPTY); BINS];
-        for &i in order.iter() {
-            let b = &mut bins[bin(i)];
-            *b = (b.0 + 1, b.1.union(&items[i as usize]));
-        }
-        let mut above = [(0usize, Bounds::EMPTY); BINS + 1];
-        for k in (0..BINS).rev() {
-            above[k] = joined(&above[k + 1], &bins[k]);
-        }
-        let mut below = (0usize, Bounds::EMPTY);
-        for k in 1..BINS {
-            // Behind an empty bin the split is the one before it.
-            if bins[k - 1].0 == 0 {
-                continue;
-            }
-            below = joined(&below, &bins[k - 1]);
-            let (left, right) = (below.0, above[k].0);
-            if left < least || right < least {
-                continue;
-            }
-            let cost = area(&below.1) * left as f64 + area(&above[k].1) * right as f64;
-            if best.is_none_or(|b| cost < b.0) {
-                best = Some((cost, axis, low + k as f64 / scale));
-            }
-        }
-    }
-    let middle = match best {
-        Some((_, axis, at)) => parted(order, |i| centre(i, axis) < at).clamp(least, order.len() - least),
-        None => {
-            let longest =
-                order.iter().fold(Bounds::EMPTY, |b, &i| b.union(&items[i as usize])).extents().imax();
-            order.sort_by(|&i, &j| centre(i, longest).total_cmp(&centre(j, longest)));
-            order.len() / 2
-        }
-    };
-    order.split_at_mut(middle)
-}
-
-/// The items of two bins and the box of both; most bins of small groups are empty.
-fn joined(a: &(usize, Bounds), b: &(usize, Bounds)) -> (usize, Bounds) {
-    if b.0 == 0 { *a } else { (a.0 + b.0, a.1.union(&b.1)) }
-}
-
-/// Brings items that pass a test before those that do not, each in the order that they had; how many pass.
-fn parted(items: &mut [u32], passes: impl Fn(u32) -> bool) -> usize {
-    let mut rest = Vec::with_capacity(items.len());
-    let mut count = 0;
-    for at in 0..items.len() {
-        let item = items[at];
-        if passes(item) {
-            items[count] = item;
-            count += 1;
-        } else {
-            rest.push(item);
-        }
-    }
-    items[count..].copy_from_slice(&rest);
-    count
-}
-
-fn area(b: &Bounds) -> f64 {
-    let e = b.extents();
-    e.x * e.y + e.y * e.z + e.z * e.x
 }
