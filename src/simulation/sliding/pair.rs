@@ -1,14 +1,15 @@
 //! Static analysis by sliding: what contact with one part alone lets another do.
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Shape};
 use crate::termination::{Interrupt, Termination};
 
 use super::super::contact::{Mover, Near};
 use super::super::{Action, Scene};
-use super::cells::Halt;
-use super::drive::{Drive, Moved, Step};
+use super::cells::{Cells, Halt};
+use super::drive::{Drive, FREE_STEP, Moved, Step};
 use super::push::{self, Push};
 
 /// Steps that the static analysis of a pair looks ahead (the paper's five extensions).
@@ -30,6 +31,7 @@ pub fn pair_blocks(
     least: f64,
     termination: &Termination,
 ) -> Result<Vec<bool>, Interrupt> {
+    derived(scene, [part, other], termination)?;
     if actions.iter().all(|a| !a.turns()) {
         match translations_blocked(scene, part, pose, other, actions, least, termination) {
             Ok(blocked) => return Ok(blocked),
@@ -74,6 +76,18 @@ pub fn pair_blocks(
     actions.par_iter().map(blocked).collect()
 }
 
+/// Derives what is asked of the shapes of two parts, if it is not there, side by side: threads that come to one
+/// thing at the same time would wait for each other, or do it twice.
+fn derived(scene: &Scene, parts: [usize; 2], termination: &Termination) -> Result<(), Interrupt> {
+    let [one, other] = parts.map(|part| &scene.bodies[part].shape);
+    let patches = |shape: &Shape| shape.patches(termination).map(|_| ());
+    let (_, (one, other)) = rayon::join(
+        || rayon::join(|| one.surface.prepare(), || other.surface.prepare()),
+        || rayon::join(|| patches(one), || patches(other)),
+    );
+    one.and(other)
+}
+
 /// The same by regions, for translations.
 fn translations_blocked(
     scene: &Scene,
@@ -85,6 +99,11 @@ fn translations_blocked(
     termination: &Termination,
 ) -> Result<Vec<bool>, Halt> {
     let standing = [other];
+    // What all pushes begin with is found once, and not by each thread that comes to it at the same time.
+    let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(FREE_STEP);
+    if !actions.is_empty() && !scene.broad_phase.meeting_of(&standing, &bounds).is_empty() {
+        Cells::new(scene, (part, pose), termination).add(other, &Vector3::zeros())?;
+    }
     let blocked = |action: &Action| {
         let mut push = Push::new(scene, &standing, (part, pose), action.force(), termination).short();
         for _ in 0..PUSHES {
