@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::writer::Writer;
 use super::{Cache, Digest, Key, Kind};
 use crate::geometry::Surface;
 use crate::sdf::{Field, FieldStore, Grid, Mapping, MappingTally};
@@ -51,20 +52,25 @@ impl Cache {
     /// is not there yet. The field counts as used.
     pub fn keep_field(&self, content: &[u8; 32], field: &Arc<Field>) {
         if field.is_built() {
-            self.keep_if(field.is_worth_writing(), content, field);
+            let write = |writer: &Writer, key| {
+                // What is new in it is handed over with what else becomes new.
+                let _waits = writer.write_field(key, field);
+            };
+            self.keep_if(field.is_worth_writing(), content, write);
         }
     }
 
-    /// The same at the end, when little is enough.
+    /// The same at the end, when little is enough: waits until there is room for it.
     pub fn keep_rest_of_field(&self, content: &[u8; 32], field: &Arc<Field>) {
-        self.keep_if(field.unwritten() > 0, content, field);
+        let write = |writer: &Writer, key| writer.write_last_of_field(key, field);
+        self.keep_if(field.unwritten() > 0, content, write);
     }
 
-    fn keep_if(&self, wanted: bool, content: &[u8; 32], field: &Arc<Field>) {
+    fn keep_if(&self, wanted: bool, content: &[u8; 32], write: impl FnOnce(&Writer, Key)) {
         let (Some(disk), Some(writer)) = (&self.disk, &self.writer) else { return };
         let key = key(content);
         if wanted && disk.may_write() && disk.fields.may_write() {
-            writer.write_field(key, Arc::clone(field));
+            write(writer, key);
         } else if disk.fields.has(&key) {
             disk.touch(key);
         }

@@ -1,10 +1,11 @@
 //! The one thread that writes to disk. Whoever has a record or a field to keep leaves it in a bounded channel
-//! and goes on; what does not fit stays in memory only, and is counted.
+//! and goes on; a record that does not fit stays in memory only, and is counted. A field that does not can be
+//! handed over another time, and is at the end.
 
-use std::collections::HashMap;
-use std::sync::Arc;
+use std::collections::{HashMap, HashSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -29,6 +30,15 @@ const GATHER: Duration = Duration::from_millis(20);
 struct Room {
     records: AtomicUsize,
     fields: AtomicUsize,
+    /// The fields that wait: of one that grows, what is known when it is written is enough.
+    keys: Mutex<HashSet<Key>>,
+}
+
+impl Room {
+    /// It holds plain data: it is whole even if a holder panicked.
+    fn keys(&self) -> MutexGuard<'_, HashSet<Key>> {
+        self.keys.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// A record in its envelope.
@@ -64,24 +74,42 @@ impl Writer {
     /// Hands a record over, or drops it if too much waits.
     pub(super) fn write(&self, key: Key, bytes: Vec<u8>) {
         let room = (&self.waiting.records, MOST_BYTES);
-        self.hand_over(room, bytes.len(), Message::Record(key, bytes));
-    }
-
-    /// Hands a field over, of which the thread writes what is known then, or leaves it if too much waits: what
-    /// is new in it can be handed over another time.
-    pub(super) fn write_field(&self, key: Key, field: Arc<Field>) {
-        let bytes = field.memory();
-        let room = (&self.waiting.fields, MOST_FIELD_BYTES);
-        self.hand_over(room, bytes, Message::Field(key, field, bytes));
-    }
-
-    fn hand_over(&self, (waiting, most): (&AtomicUsize, usize), bytes: usize, message: Message) {
-        let full = waiting.fetch_add(bytes, Ordering::Relaxed) > most;
-        let taken = |sender: &SyncSender<Message>| sender.try_send(message).is_ok();
-        if full || !self.sender.as_ref().is_some_and(taken) {
-            waiting.fetch_sub(bytes, Ordering::Relaxed);
+        if !self.hand_over(room, bytes.len(), Message::Record(key, bytes)) {
             self.too_much();
         }
+    }
+
+    /// Hands a field over, of which the thread writes what is known then, unless it waits already. Whether it
+    /// does: not if too much waits.
+    pub(super) fn write_field(&self, key: Key, field: &Arc<Field>) -> bool {
+        if !self.waiting.keys().insert(key) {
+            return true;
+        }
+        let bytes = field.memory();
+        let room = (&self.waiting.fields, MOST_FIELD_BYTES);
+        let taken = self.hand_over(room, bytes, Message::Field(key, Arc::clone(field), bytes));
+        if !taken {
+            self.waiting.keys().remove(&key);
+        }
+        taken
+    }
+
+    /// The same at the end, when there is no other time: waits for room.
+    pub(super) fn write_last_of_field(&self, key: Key, field: &Arc<Field>) {
+        if !self.write_field(key, field) {
+            self.flush();
+            self.write_field(key, field);
+        }
+    }
+
+    fn hand_over(&self, (waiting, most): (&AtomicUsize, usize), bytes: usize, message: Message) -> bool {
+        let full = waiting.fetch_add(bytes, Ordering::Relaxed) > most;
+        let taken = |sender: &SyncSender<Message>| sender.try_send(message).is_ok();
+        let taken = !full && self.sender.as_ref().is_some_and(taken);
+        if !taken {
+            waiting.fetch_sub(bytes, Ordering::Relaxed);
+        }
+        taken
     }
 
     fn too_much(&self) {
@@ -119,6 +147,8 @@ impl Drop for Writer {
 fn run(disk: &Disk, receiver: &Receiver<Message>, waiting: &Room) {
     while let Ok(first) = receiver.recv() {
         let batch = gathered(receiver, first);
+        // What becomes known of them from here on may be too late for this time.
+        waiting.keys().retain(|key| !batch.fields.contains_key(key));
         disk.write(&batch.records, &batch.fields);
         waiting.records.fetch_sub(batch.bytes, Ordering::Relaxed);
         waiting.fields.fetch_sub(batch.field_bytes, Ordering::Relaxed);
@@ -193,17 +223,42 @@ mod tests {
             waiting: Arc::clone(&waiting),
             tally: Arc::clone(&tally),
         };
-        let key = Digest::new().integer(1).key(Kind::Field);
+        let key = |number: usize| Digest::new().integer(number as u64).key(Kind::Field);
         let fit = MOST_FIELD_BYTES / bytes + 1;
-        (0..fit + 5).for_each(|_| writer.write_field(key, Arc::clone(&field)));
-        assert_eq!((Arc::strong_count(&field), tally.overflows.count()), (1 + fit, 5));
+        let taken: Vec<_> = (0..fit + 5).filter(|&i| writer.write_field(key(i), &field)).collect();
+        assert_eq!((taken.len(), taken.last()), (fit, Some(&(fit - 1))));
+        assert!(writer.write_field(key(0), &field), "it waits already");
+        assert_eq!(Arc::strong_count(&field), 1 + fit);
         assert_eq!(waiting.fields.load(Ordering::Relaxed), fit * bytes);
-        writer.write(key, vec![0; 100]);
-        assert_eq!(tally.overflows.count(), 5, "there is room for records all the same");
+        writer.write(key(0), vec![0; 100]);
+        assert_eq!(tally.overflows.count(), 0, "there is room for records all the same");
         let mut taken = 0;
         while taken < fit * bytes {
             taken += gathered(&receiver, receiver.recv().unwrap()).field_bytes;
         }
         assert_eq!((taken, Arc::strong_count(&field)), (fit * bytes, 1));
+    }
+
+    #[test]
+    fn what_comes_last_of_a_field_waits_for_room() {
+        let field = Arc::new(Field::of(&Arc::new(surface(ball(1)))));
+        let (sender, receiver) = sync_channel(MOST_WAITING);
+        let waiting = Arc::<Room>::default();
+        waiting.fields.store(MOST_FIELD_BYTES + 1, Ordering::Relaxed);
+        let left = Arc::clone(&waiting);
+        let thread = std::thread::spawn(move || {
+            let Ok(Message::Flush(done)) = receiver.recv() else {
+                panic!("something was taken without room")
+            };
+            left.fields.store(0, Ordering::Relaxed);
+            done.send(()).unwrap();
+            assert!(matches!(receiver.recv(), Ok(Message::Field(..))));
+            assert!(receiver.recv().is_err(), "it was handed over once");
+        });
+        let tally = Arc::default();
+        let writer = Writer { sender: Some(sender), thread: None, waiting, tally };
+        writer.write_last_of_field(Digest::new().integer(1).key(Kind::Field), &field);
+        drop(writer);
+        thread.join().unwrap();
     }
 }
