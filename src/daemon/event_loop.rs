@@ -21,6 +21,7 @@ use super::intake::ticket;
 use super::lifecycle::{Lease, Place};
 use super::metrics::Metrics;
 use super::ports::{ActiveLink, Ports};
+use super::prefetch::Closing;
 use super::request_queue::Owner;
 use super::resources::{SharedMemory, raise_file_limit};
 use super::shared_queue::Queues;
@@ -66,18 +67,20 @@ pub fn run_reloading<P: Planning>(
     shared_memory.look();
     let place = Place::of(&config.endpoint)?;
     let lease = Lease::take(place.clone())?;
+    let queues = Queues::new(config);
+    // First of all: it makes ready what was asked about last, while ports are opened. Whatever fails ends it.
+    let _closing = Closing(Arc::clone(&queues.prefetch));
+    if config.cache.prefetch {
+        start_prefetch(&queues, &service)
+            .map_err(|source| DaemonError::System { what: "starting workers", source })?;
+    }
     let watchdog = watch(config, &place)?;
     let ports = Ports::open(&lease.instance.iceoryx2_config()?)?;
     lease.instance.close_to_others()?;
     let (sender, inbox) = channel();
     watch_signals(&ports, sender.clone())?;
-    let queues = Queues::new(config);
     start(config.workers.count, &queues, &service, &reporter(&ports, sender))
         .map_err(|source| DaemonError::System { what: "starting workers", source })?;
-    if config.cache.prefetch {
-        start_prefetch(&queues, &service)
-            .map_err(|source| DaemonError::System { what: "starting workers", source })?;
-    }
     for path in &config.preload.assemblies {
         if queues.admissions.push(ticket(Owner::default(), 0), AdmitJob::Preload(path.clone())).is_err() {
             tracing::warn!(path = %path.display(), "not preloaded: the list is too long");

@@ -45,6 +45,16 @@ impl Drop for Busy<'_> {
     }
 }
 
+/// Once this is dropped, nothing is made ready any more.
+#[derive(Debug)]
+pub(super) struct Closing(pub(super) Arc<Prefetch>);
+
+impl Drop for Closing {
+    fn drop(&mut self) {
+        self.0.close();
+    }
+}
+
 impl Prefetch {
     /// A worker works on a request.
     pub(super) fn busy(&self) -> Busy<'_> {
