@@ -49,6 +49,22 @@ struct Wish {
     along: Vector3<f64>,
 }
 
+/// A piece that is to get a cell yet, and what came of looking at it, if somebody had the time.
+struct Waiting {
+    spot: Spot,
+    looked: Option<Looked>,
+}
+
+/// What came of looking for a cell for all of a piece: it depends on the piece and the wish alone.
+struct Looked {
+    /// With the triangle that was nearest.
+    spot: Spot,
+    cell: Option<Cell>,
+    is_smallest: bool,
+    /// How many regions it took.
+    regions: usize,
+}
+
 /// A search for cells of one pair.
 pub(super) struct Finder<'a> {
     termination: &'a Termination,
@@ -64,7 +80,7 @@ pub(super) struct Finder<'a> {
     /// Points that show it.
     pub(super) witnesses: Vec<Witness>,
     /// Pieces that are to get cells yet, of those that are to have some where they are; the next one last.
-    waiting: Vec<Spot>,
+    waiting: Vec<Waiting>,
     /// The piece at hand.
     placed: Placed,
 }
@@ -74,7 +90,7 @@ impl<'a> Finder<'a> {
     pub(super) fn of_all(pair: &'a Facing<'a>, held: f64, termination: &'a Termination) -> Self {
         let mut finder = Self::new(pair, 0, termination);
         let all = pair.root().map(|piece| Spot { piece, guess: 0, level: 0, held });
-        finder.waiting.extend(all);
+        finder.waiting.extend(all.map(|spot| Waiting { spot, looked: None }));
         finder
     }
 
@@ -92,30 +108,54 @@ impl<'a> Finder<'a> {
         }
     }
 
-    /// Goes on to find cells for [all](Self::of_all) pieces at a shift, as free around it as can be, with no more
-    /// than so many regions in all. Whether that was enough.
+    /// Goes on to find cells for [all](Self::of_all) pieces at a shift, always the same one, as free around it as can
+    /// be, with no more than so many regions in all. Whether that was enough.
     pub(super) fn gather(&mut self, at: &Vector3<f64>, budget: usize) -> Result<bool, Halt> {
         let wish = Wish { at: *at, along: Vector3::zeros() };
         self.budget = budget;
-        while let Some(mut spot) = self.waiting.pop() {
+        while let Some(next) = self.waiting.pop() {
             self.termination.check()?;
             if self.regions >= self.budget {
-                self.waiting.push(spot);
+                self.waiting.push(next);
                 return Ok(false);
             }
-            let seen = self.place(&mut spot, &wish);
-            let free = self.free(&spot, &seen, &wish);
-            let cell = free.or_else(|| self.held(&spot, &seen, &wish, &Vector3::zeros()).ok());
+            let looked = next.looked.unwrap_or_else(|| self.looked_beside(&next.spot, &wish));
+            let Looked { spot, cell, is_smallest, regions } = looked;
+            self.regions += regions;
             if let Some(cell) = cell {
                 self.cells.push(cell);
-            } else if self.is_smallest(&spot) {
+            } else if is_smallest {
+                self.pair.place(&spot.piece, &wish.at, &mut self.placed);
                 self.end(&spot, &wish)?;
             } else {
-                let parts = self.pair.parts(&spot.piece);
-                self.waiting.extend(parts.into_iter().rev().map(|piece| Spot { piece, level: 0, ..spot }));
+                let parts = self.pair.parts(&spot.piece).into_iter().rev();
+                let waiting = |piece| Waiting { spot: Spot { piece, level: 0, ..spot }, looked: None };
+                self.waiting.extend(parts.map(waiting));
             }
         }
         Ok(true)
+    }
+
+    /// Looks for a cell for a piece, and, side by side with that, for one for the piece that comes next, most likely:
+    /// where a single pair is new, nobody else has anything to do.
+    fn looked_beside(&mut self, spot: &Spot, wish: &Wish) -> Looked {
+        let (pair, termination) = (self.pair, self.termination);
+        let look = |spot: &Spot| Finder::new(pair, 1, termination).looked(*spot, wish);
+        match self.waiting.last_mut() {
+            Some(next) if next.looked.is_none() && rayon::current_num_threads() > 1 => {
+                let (looked, ahead) = rayon::join(|| look(spot), || look(&next.spot));
+                next.looked = Some(ahead);
+                looked
+            }
+            _ => look(spot),
+        }
+    }
+
+    fn looked(mut self, mut spot: Spot, wish: &Wish) -> Looked {
+        let seen = self.place(&mut spot, wish);
+        let free = self.free(&spot, &seen, wish);
+        let cell = free.or_else(|| self.held(&spot, &seen, wish, &Vector3::zeros()).ok());
+        Looked { spot, cell, is_smallest: self.is_smallest(&spot), regions: self.regions }
     }
 
     /// Finds cells for a piece at a shift, as free along the unit vector `u` as can be.
@@ -342,4 +382,43 @@ impl<'a> Finder<'a> {
 pub(super) fn look(pair: &Facing<'_>, p: &Point3<f64>, guess: u32) -> Seen {
     let closest = pair.measured.closest_from(p, guess);
     Seen { signed: pair.measured.signed(p, &closest), closest }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{peg_in_hole, scene, thread};
+    use crate::geometry::SourceMesh;
+
+    /// All cells of one side of a pair, and how many regions they took, as told after each budget.
+    fn gathered(meshes: [SourceMesh; 2], asks_part: bool, threads: usize) -> Vec<String> {
+        let (scene, _) = scene(meshes);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let termination = Termination::default();
+            let start = scene.bodies[1].planning_from_shape;
+            let facing = Facing::new(&scene, (1, &start), 0, asks_part, &termination).unwrap();
+            let mut finder = Finder::of_all(&facing, HELD_AT_FIRST, &termination);
+            let mut told = Vec::new();
+            for budget in [1, 5, 16, 64, 4096] {
+                let ended = finder.gather(&Vector3::zeros(), budget);
+                told.push(format!("{ended:?} {} {:?}", finder.regions, finder.cells));
+                if ended != Ok(false) {
+                    break;
+                }
+            }
+            told
+        })
+    }
+
+    #[test]
+    fn cells_do_not_depend_on_who_else_looks() {
+        for (meshes, asks_part) in
+            [(peg_in_hole(5e-4), false), (peg_in_hole(0.0), true), (thread(3.0, 0.5), true)]
+        {
+            let alone = gathered(meshes.clone(), asks_part, 1);
+            assert_eq!(alone, gathered(meshes, asks_part, 3));
+        }
+        assert!(gathered(peg_in_hole(5e-4), false, 1).len() > 2, "there was something to look at ahead");
+    }
 }
