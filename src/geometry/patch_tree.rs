@@ -72,7 +72,7 @@ impl PatchTree {
         };
         if n > 0 {
             let given = Given::of(surface);
-            tree.build(&given, &mut triangles, 0, n, poll);
+            tree.build(&given, &mut triangles, (0, n), poll);
         }
         tree.nodes.shrink_to_fit();
         tree.vertices.shrink_to_fit();
@@ -123,9 +123,17 @@ impl PatchTree {
         }
     }
 
-    fn build(&mut self, given: &Given<'_>, triangles: &mut [u32], start: usize, end: usize, poll: &Poll<'_>) {
+    /// Which of the extremes of the node reach furthest.
+    fn build(
+        &mut self,
+        given: &Given<'_>,
+        triangles: &mut [u32],
+        (start, end): (usize, usize),
+        poll: &Poll<'_>,
+    ) -> Furthest {
+        let mut furthest = Furthest::NONE;
         if poll.is_over() {
-            return;
+            return furthest;
         }
         let slice = &mut triangles[start..end];
         let bounds = slice.iter().fold(Bounds::EMPTY, |b, &t| b.union(&given.boxes[t as usize]));
@@ -143,42 +151,43 @@ impl PatchTree {
             last_extreme: 0,
             right: 0,
         });
-        if slice.len() <= LEAF {
+        let extremes = if slice.len() <= LEAF {
             let mut ids: Vec<u32> =
                 slice.iter().flat_map(|&t| given.surface.triangles()[t as usize]).collect();
             ids.sort_unstable();
             ids.dedup();
-            self.vertices.extend(ids.iter().map(|&v| given.surface.vertices()[v as usize]));
+            let vertices: Vec<_> = ids.iter().map(|&v| given.surface.vertices()[v as usize]).collect();
+            self.vertices.extend(&vertices);
+            furthest = Furthest::of(&vertices);
+            vertices
         } else {
             let axis = bounds.extents().imax();
             let middle = |t: u32| given.middles[t as usize][axis];
             let half = slice.len() / 2;
             slice.select_nth_unstable_by(half, |&s, &t| middle(s).total_cmp(&middle(t)).then(s.cmp(&t)));
-            self.build(given, triangles, start, start + half, poll);
-            self.nodes[me].right = self.nodes.len() as u32;
-            self.build(given, triangles, start + half, end, poll);
+            let left = self.build(given, triangles, (start, start + half), poll);
+            let right = self.nodes.len() as u32;
+            self.nodes[me].right = right;
+            let others = self.build(given, triangles, (start + half, end), poll);
             // A half that was left out has no node.
             if poll.is_over() {
-                return;
+                return furthest;
             }
-        }
-        let Patch { first_vertex, right, .. } = self.nodes[me];
-        let vertices = &self.vertices[first_vertex as usize..];
-        let radius = vertices.iter().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
-        let last_vertex = self.vertices.len() as u32;
-        let extremes = match right {
-            0 => furthest(vertices),
             // Who reaches furthest of all does so of one half.
-            right => {
-                let halves = self.extremes(me as u32 + 1).chain(self.extremes(right));
-                furthest(&halves.copied().collect::<Vec<_>>())
-            }
+            let mut extremes: Vec<_> = self.extremes(me as u32 + 1).copied().collect();
+            furthest = left.joined(&others, extremes.len() as u32);
+            extremes.extend(self.extremes(right));
+            if extremes.len() <= FEW { extremes } else { furthest.alone(&extremes) }
         };
+        let first_vertex = self.nodes[me].first_vertex as usize;
+        let reach = self.vertices[first_vertex..].iter().map(|p| (p - centre).norm_squared());
         let node = &mut self.nodes[me];
-        (node.radius, node.last_vertex) = (radius, last_vertex);
+        node.radius = reach.fold(0.0, f64::max).sqrt();
+        node.last_vertex = self.vertices.len() as u32;
         node.first_extreme = self.extremes.len() as u32;
         self.extremes.extend(extremes);
         node.last_extreme = self.extremes.len() as u32;
+        furthest
     }
 }
 
@@ -199,6 +208,8 @@ impl<'a> Given<'a> {
     }
 }
 
+/// So many points are kept as they are.
+const FEW: usize = 26;
 /// Pairs of opposite directions.
 const PAIRS: usize = 13;
 /// By axis: one direction of each pair, of all those to the middles of a cube's faces, edges and corners.
@@ -214,28 +225,72 @@ const ALONG: [[f64; PAIRS]; 3] = {
     along
 };
 
-/// Points that reach furthest, in each of 26 directions: few points are kept as they are.
-fn furthest(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
-    const FEW: usize = 26;
-    if points.len() <= FEW {
-        return points.to_vec();
+/// Of some points, those that reach furthest in each of 26 directions, by their numbers: of those that reach as
+/// far, the last.
+#[derive(Clone, Copy)]
+struct Furthest {
+    least: [f64; PAIRS],
+    most: [f64; PAIRS],
+    at_least: [u32; PAIRS],
+    at_most: [u32; PAIRS],
+}
+
+impl Furthest {
+    const NONE: Self = Self {
+        least: [f64::INFINITY; PAIRS],
+        most: [f64::NEG_INFINITY; PAIRS],
+        at_least: [0; PAIRS],
+        at_most: [0; PAIRS],
+    };
+
+    fn of(points: &[Point3<f64>]) -> Self {
+        let mut all = Self::NONE;
+        for (i, p) in (0u32..).zip(points) {
+            for k in 0..PAIRS {
+                let reach = p.x * ALONG[0][k] + p.y * ALONG[1][k] + p.z * ALONG[2][k];
+                all.take(k, (reach, i), (reach, i));
+            }
+        }
+        all
     }
-    // Of two opposite directions at once, and of all directions side by side: the last of those that reach as far.
-    let (mut least, mut most) = ([f64::INFINITY; PAIRS], [f64::NEG_INFINITY; PAIRS]);
-    let (mut at_least, mut at_most) = ([0u64; PAIRS], [0u64; PAIRS]);
-    for (i, p) in (0u64..).zip(points) {
-        for k in 0..PAIRS {
-            let reach = p.x * ALONG[0][k] + p.y * ALONG[1][k] + p.z * ALONG[2][k];
-            let (is_least, is_most) = (reach <= least[k], reach >= most[k]);
-            least[k] = if is_least { reach } else { least[k] };
-            at_least[k] = if is_least { i } else { at_least[k] };
-            most[k] = if is_most { reach } else { most[k] };
-            at_most[k] = if is_most { i } else { at_most[k] };
+
+    /// Takes points that come behind these, if they reach as far along a pair of directions.
+    #[inline]
+    fn take(&mut self, k: usize, (least, at_least): (f64, u32), (most, at_most): (f64, u32)) {
+        if least <= self.least[k] {
+            (self.least[k], self.at_least[k]) = (least, at_least);
+        }
+        if most >= self.most[k] {
+            (self.most[k], self.at_most[k]) = (most, at_most);
         }
     }
-    let mut is_found = vec![false; points.len()];
-    at_least.iter().chain(&at_most).for_each(|&i| is_found[i as usize] = true);
-    points.iter().zip(is_found).filter(|(_, is_found)| *is_found).map(|(p, _)| *p).collect()
+
+    /// Those of these points and others behind them, the first of which gets a number.
+    fn joined(mut self, others: &Self, first: u32) -> Self {
+        let Self { least, most, at_least, at_most } = others;
+        for k in 0..PAIRS {
+            self.take(k, (least[k], first + at_least[k]), (most[k], first + at_most[k]));
+        }
+        self
+    }
+
+    /// The points that are among those, in their order; from now on, these are the ones that are numbered.
+    fn alone(&mut self, points: &[Point3<f64>]) -> Vec<Point3<f64>> {
+        let mut numbers = vec![None; points.len()];
+        let all = || self.at_least.iter().chain(&self.at_most);
+        all().for_each(|&i| numbers[i as usize] = Some(0));
+        let mut kept = Vec::with_capacity(FEW);
+        for (number, p) in numbers.iter_mut().zip(points) {
+            if let Some(number) = number {
+                *number = kept.len() as u32;
+                kept.push(*p);
+            }
+        }
+        for at in self.at_least.iter_mut().chain(&mut self.at_most) {
+            *at = numbers[*at as usize].unwrap_or_default();
+        }
+        kept
+    }
 }
 
 #[cfg(test)]
@@ -268,6 +323,37 @@ mod tests {
             let poll = Poll::first_after(steps, &termination);
             let tree = PatchTree::new(&surface, &poll);
             assert!(poll.is_over() && tree.nodes.len() <= steps as usize);
+        }
+    }
+
+    /// Whether a node has, of its halves' extremes, those that reach furthest, and so on below.
+    fn has_extremes(tree: &PatchTree, index: u32) -> bool {
+        let Parts::Patches(halves) = tree.parts(index) else {
+            return tree.extremes(index).eq(tree.vertices(index));
+        };
+        let all: Vec<_> = halves.iter().flat_map(|&half| tree.extremes(half).copied()).collect();
+        let mut wanted: Vec<usize> = (0..27)
+            .filter(|code| *code != 13)
+            .filter_map(|code| {
+                let along =
+                    nalgebra::Vector3::new(code % 3, code / 3 % 3, code / 9).map(|x| f64::from(x - 1));
+                let reach = |i: &usize| all[*i].coords.dot(&along);
+                // The last of those that reach as far.
+                (0..all.len()).max_by(|i, j| reach(i).partial_cmp(&reach(j)).unwrap())
+            })
+            .collect();
+        wanted.sort_unstable();
+        wanted.dedup();
+        let wanted: Vec<_> =
+            if all.len() <= FEW { all } else { wanted.into_iter().map(|i| all[i]).collect() };
+        tree.extremes(index).eq(&wanted) && halves.iter().all(|&half| has_extremes(tree, half))
+    }
+
+    #[test]
+    fn extremes_are_those_of_the_halves_that_reach_furthest() {
+        for mesh in [ball(4), l_shape()] {
+            let tree = PatchTree::new(&surface(mesh), &Poll::every(1, None));
+            assert!(has_extremes(&tree, tree.root().unwrap()));
         }
     }
 
