@@ -212,14 +212,12 @@ impl<'a> Given<'a> {
 const FEW: usize = 26;
 /// Pairs of opposite directions.
 const PAIRS: usize = 13;
-/// By axis: one direction of each pair, of all those to the middles of a cube's faces, edges and corners.
-const ALONG: [[f64; PAIRS]; 3] = {
-    let mut along = [[0.0; PAIRS]; 3];
+/// One direction of each pair, of all those to the middles of a cube's faces, edges and corners.
+const ALONG: [[f64; 3]; PAIRS] = {
+    let mut along = [[0.0; 3]; PAIRS];
     let mut code = 0;
     while code < PAIRS {
-        along[0][code] = (code % 3) as f64 - 1.0;
-        along[1][code] = (code / 3 % 3) as f64 - 1.0;
-        along[2][code] = (code / 9) as f64 - 1.0;
+        along[code] = [(code % 3) as f64 - 1.0, (code / 3 % 3) as f64 - 1.0, (code / 9) as f64 - 1.0];
         code += 1;
     }
     along
@@ -246,8 +244,8 @@ impl Furthest {
     fn of(points: &[Point3<f64>]) -> Self {
         let mut all = Self::NONE;
         for (i, p) in (0u32..).zip(points) {
-            for k in 0..PAIRS {
-                let reach = p.x * ALONG[0][k] + p.y * ALONG[1][k] + p.z * ALONG[2][k];
+            for (k, [x, y, z]) in ALONG.iter().enumerate() {
+                let reach = p.x * x + p.y * y + p.z * z;
                 all.take(k, (reach, i), (reach, i));
             }
         }
