@@ -18,9 +18,8 @@ use super::store::SharedShape;
 
 /// Overlaps smaller than this share of the longest side are rounding, not modelling.
 const LEAST_OVERLAP: f64 = 1e-6;
-/// Verification refuses paths deeper than this share of the longest side (0.0019 where it is 10, so that a check
-/// which finds a little less of what overlaps as assembled still finds no more than 0.002).
-const DEPTH_LIMIT: f64 = 1.9e-4;
+/// Verification refuses paths deeper than this share of the longest side (0.002 where it is 10).
+const DEPTH_LIMIT: f64 = 2e-4;
 
 /// An assembly with everything derived from it.
 #[derive(Debug)]

@@ -10,7 +10,7 @@ use sbdp::simulation::{Pair, Scene};
 use sbdp::termination::{Interrupt, Termination};
 
 /// Verification's limit, as a share of the longest side.
-const DEPTH_LIMIT: f64 = 1.9e-4;
+const DEPTH_LIMIT: f64 = 2e-4;
 
 /// The assembly of a folder with its fields and the overlaps it has.
 pub(crate) fn of(folder: &Path, never: &Termination) -> Result<Scene, String> {
