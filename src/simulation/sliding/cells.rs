@@ -10,6 +10,7 @@
 //! vertex that gets inside or a triangle without a region certifies the same. If no surface piece of
 //! the one gets into the other, the two surfaces do not cross, so that one side is enough.
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
@@ -308,24 +309,28 @@ fn gathered(
 ) -> Result<Gathered, Interrupt> {
     let &Place { part, start, other, .. } = place;
     let facing = |asks_part| Facing::new(scene, (part, start), other, asks_part, termination);
-    let sides = Facing::asked_first(scene, part, other).into_iter();
-    let sides: Vec<Facing<'_>> = sides.map(facing).collect::<Result<_, _>>()?;
+    let asked = Facing::asked_first(scene, part, other);
     // On its way nothing gets deeper than the engine may let it.
     let held = if at == &Vector3::zeros() { HELD_AT_FIRST } else { HELD };
-    let of_all = |side| Finder::of_all(side, held, termination);
-    let mut finders: Vec<Finder<'_>> = sides.iter().map(of_all).collect();
+    // The first side mostly suffices: the patches of the other, perhaps of a large part, are made when it is asked.
+    let sides: Vec<OnceCell<Facing<'_>>> = asked.iter().map(|_| OnceCell::new()).collect();
+    let mut finders: Vec<Option<Finder<'_>>> = asked.iter().map(|_| None).collect();
     // The one inside the other, or the plainer one, needs fewer pieces: which, shows in trying.
-    let mut budget = if sides.len() > 1 { FIRST_BUDGET } else { MOST_REGIONS };
+    let mut budget = if asked.len() > 1 { FIRST_BUDGET } else { MOST_REGIONS };
     while budget <= MOST_REGIONS {
-        for i in 0..finders.len() {
-            let found = finders[i].gather(at, budget);
-            let regions = finders.iter().map(|finder| finder.regions).sum();
-            let asks_part = sides[i].asks_part;
-            match found {
-                Ok(true) => {
-                    let cells = Some(Arc::new(std::mem::take(&mut finders[i].cells)));
-                    return Ok(Gathered { asks_part, cells, regions });
+        for (i, &asks_part) in asked.iter().enumerate() {
+            let finder = match &mut finders[i] {
+                Some(finder) => finder,
+                none => {
+                    let side = facing(asks_part)?;
+                    none.insert(Finder::of_all(sides[i].get_or_init(|| side), held, termination))
                 }
+            };
+            let found = finder.gather(at, budget);
+            let cells = if found == Ok(true) { std::mem::take(&mut finder.cells) } else { Vec::new() };
+            let regions = finders.iter().flatten().map(|finder| finder.regions).sum();
+            match found {
+                Ok(true) => return Ok(Gathered { asks_part, cells: Some(Arc::new(cells)), regions }),
                 Ok(false) => {}
                 Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
                 Err(_) => return Ok(Gathered { asks_part, cells: None, regions }),

@@ -3,13 +3,14 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::geometry::{Pose, Shape};
+use crate::geometry::Pose;
 use crate::termination::{Interrupt, Termination};
 
 use super::super::contact::{Mover, Near};
 use super::super::{Action, Scene};
 use super::cells::{Cells, Halt};
 use super::drive::{Drive, FREE_STEP, Moved, Step};
+use super::facing::Facing;
 use super::push::{self, Push};
 
 /// Steps that the static analysis of a pair looks ahead (the paper's five extensions).
@@ -31,7 +32,7 @@ pub fn pair_blocks(
     least: f64,
     termination: &Termination,
 ) -> Result<Vec<bool>, Interrupt> {
-    derived(scene, [part, other], termination)?;
+    derived(scene, part, other, termination)?;
     if actions.iter().all(|a| !a.turns()) {
         match translations_blocked(scene, part, pose, other, actions, least, termination) {
             Ok(blocked) => return Ok(blocked),
@@ -76,16 +77,18 @@ pub fn pair_blocks(
     actions.par_iter().map(blocked).collect()
 }
 
-/// Derives what is asked of the shapes of two parts, if it is not there, side by side: threads that come to one
+/// Derives what is asked of the shapes of two parts first, if it is not there, side by side: threads that come to one
 /// thing at the same time would wait for each other, or do it twice.
-fn derived(scene: &Scene, parts: [usize; 2], termination: &Termination) -> Result<(), Interrupt> {
-    let [one, other] = parts.map(|part| &scene.bodies[part].shape);
-    let patches = |shape: &Shape| shape.patches(termination).map(|_| ());
-    let (_, (one, other)) = rayon::join(
-        || rayon::join(|| one.surface.prepare(), || other.surface.prepare()),
-        || rayon::join(|| patches(one), || patches(other)),
+fn derived(scene: &Scene, part: usize, other: usize, termination: &Termination) -> Result<(), Interrupt> {
+    let [one, two] = [part, other].map(|i| &scene.bodies[i].shape);
+    // The other one's patches are seldom asked.
+    let first =
+        Facing::asked_first(scene, part, other).first().map(|asks_part| if *asks_part { one } else { two });
+    let (_, patches) = rayon::join(
+        || rayon::join(|| one.surface.prepare(), || two.surface.prepare()),
+        || first.map_or(Ok(()), |shape| shape.patches(termination).map(|_| ())),
     );
-    one.and(other)
+    patches
 }
 
 /// The same by regions, for translations.
