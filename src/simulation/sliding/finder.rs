@@ -142,7 +142,7 @@ impl<'a> Finder<'a> {
         let (pair, termination) = (self.pair, self.termination);
         let look = |spot: &Spot| Finder::new(pair, 1, termination).looked(*spot, wish);
         match self.waiting.last_mut() {
-            Some(next) if next.looked.is_none() && rayon::current_num_threads() > 1 => {
+            Some(next) if next.looked.is_none() && other_thread() => {
                 let (looked, ahead) = rayon::join(|| look(spot), || look(&next.spot));
                 next.looked = Some(ahead);
                 looked
@@ -376,6 +376,11 @@ impl<'a> Finder<'a> {
             ahead != Vector3::zeros() && cell.length(&wish.at, &wish.along) < LEAST_LET_GO * shift.norm();
         if too_small { Err(NoRegion::Cramped) } else { Ok(cell) }
     }
+}
+
+/// Whether a pool of threads runs this that has one more: elsewhere, handing work over only costs.
+fn other_thread() -> bool {
+    rayon::current_thread_index().is_some() && rayon::current_num_threads() > 1
 }
 
 /// What a point in the measured surface's frame sees.
