@@ -29,6 +29,16 @@ pub(super) struct Hint {
     pub(super) vain: bool,
 }
 
+/// A triangle, or a piece of one, on a stretch of the way.
+#[derive(Clone, Copy)]
+struct Piece {
+    corners: [Point3<f64>; 3],
+    /// Which corners were not measured yet at the end of the stretch, as those of the piece of which this is one half.
+    is_new: [bool; 3],
+    interval: Interval,
+    hint: Hint,
+}
+
 /// The search for the deepest points: what is asked, what was learnt on the way, the piece in question, and what was
 /// found.
 pub(super) struct Search<'a> {
@@ -157,8 +167,9 @@ impl<'a> Search<'a> {
         interval: Interval,
         hint: Hint,
     ) -> Result<(), Interrupt> {
-        let mut stack = vec![(corners, interval, hint)];
-        while let Some((corners, interval, mut hint)) = stack.pop() {
+        let mut stack = vec![Piece { corners, is_new: [true; 3], interval, hint }];
+        while let Some(piece) = stack.pop() {
+            let Piece { corners, is_new, interval, mut hint } = piece;
             self.termination.check()?;
             self.found.effort += 1;
             if self.is_enough() {
@@ -184,7 +195,7 @@ impl<'a> Search<'a> {
                 }
                 let fits = |region: &FreeRegion, most: f64| furthest(points.iter().copied(), region, most);
                 if self.is_settled(&swept, leg.slack, &mut hint, fits, Vec::new)
-                    || self.is_measured(&corners, &leg, &swept, hint.triangle)
+                    || self.is_measured(&piece, &leg, &swept, hint.triangle)
                 {
                     continue;
                 }
@@ -193,10 +204,17 @@ impl<'a> Search<'a> {
                     .zip(&points[3..])
                     .any(|(a, b)| (b - a).norm() > longest);
             }
+            let was_measured = !leg.maps.is_empty();
             if in_time && leg.length > self.finest() / (2.0 * DOUBT) {
-                stack.extend(interval.halves().map(|half| (corners, half, hint)));
+                // The second half of the way ends where all of it does.
+                let [first, second] = interval.halves();
+                stack.push(Piece { is_new: [true; 3], interval: first, hint, ..piece });
+                stack.push(Piece { is_new: is_new.map(|new| new && !was_measured), interval: second, hint, ..piece });
             } else {
-                stack.extend(halves.map(|half| (half, interval, hint)));
+                stack.extend(halves.map(|half| {
+                    let is_new = half.map(|p| !(was_measured && corners.contains(&p)));
+                    Piece { corners: half, is_new, interval, hint }
+                }));
             }
         }
         Ok(())
@@ -212,12 +230,13 @@ impl<'a> Search<'a> {
     }
 
     /// Measures the corners of a piece at its end; whether that is all that can be said about it.
-    fn is_measured(&mut self, corners: &[Point3<f64>; 3], leg: &Leg, swept: &Swept, guess: u32) -> bool {
+    fn is_measured(&mut self, piece: &Piece, leg: &Leg, swept: &Swept, guess: u32) -> bool {
+        let Piece { corners, is_new, .. } = piece;
         let asked = self.asked;
         let over = |at: &Point3<f64>| {
             -asked.measured.signed(at, &asked.measured.closest_from(at, guess)) - asked.granted
         };
-        for p in corners {
+        for (p, _) in corners.iter().zip(is_new).filter(|(_, new)| **new) {
             let over = over(&(leg.end * p));
             self.found.depth = self.found.depth.max(over);
             if over > asked.precision.deep {

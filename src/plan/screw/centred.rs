@@ -11,14 +11,14 @@ use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::geometry::{Helix, Pose, Surface, interpolate};
 use crate::simulation::Scene;
-use crate::termination::{Interrupt, Poll, Termination};
+use crate::termination::{Interrupt, Termination};
 
 use super::super::course::{Course, Interval};
 use super::super::sampling::turns_far;
 use super::envelope::{Envelope, Zone};
 use super::path::ScrewPath;
 use super::slip::{Facet, slipping};
-use super::{ENVELOPE_POLL, FINEST};
+use super::FINEST;
 
 /// So far from the helix, as a share of the pitch, a path has left it.
 const LEFT: f64 = 0.25;
@@ -47,8 +47,7 @@ pub(in crate::plan) fn centred(
     limit: f64,
     termination: &Termination,
 ) -> Result<Option<Vec<Pose>>, Interrupt> {
-    let poll = Poll::every(ENVELOPE_POLL, Some(termination));
-    let path = proposed(scene, standing, part, path, limit, &poll);
+    let path = proposed(scene, standing, part, path, limit, termination);
     // What profiles tell that were cut short is not to be believed.
     termination.check()?;
     Ok(path)
@@ -60,7 +59,7 @@ fn proposed(
     part: usize,
     path: &[Pose],
     limit: f64,
-    poll: &Poll<'_>,
+    termination: &Termination,
 ) -> Option<Vec<Pose>> {
     if !turns_far(path) {
         return None;
@@ -75,7 +74,7 @@ fn proposed(
     let (_, thread) = standing
         .iter()
         .filter(|&&other| scene.allowances.of(part, other) == 0.0)
-        .filter_map(|&other| Thread::shared(scene, (part, other), &followed, left, poll))
+        .filter_map(|&other| Thread::shared(scene, (part, other), &followed, left, termination))
         .fold(None, |best: Option<(f64, Thread)>, (play, thread)| match best {
             Some(best) if best.0 >= play => Some(best),
             _ => Some((play, thread)),
@@ -119,9 +118,9 @@ impl Thread {
         (part, other): (usize, usize),
         followed: &ScrewPath,
         left: f64,
-        poll: &Poll<'_>,
+        termination: &Termination,
     ) -> Option<(f64, Self)> {
-        if poll.is_over() {
+        if termination.check().is_err() {
             return None;
         }
         let ScrewPath { helix: guess, reference, .. } = followed;
@@ -146,10 +145,11 @@ impl Thread {
         let to_other = onto(&own, &others, f64::midpoint(zone.along()[0], zone.along()[1]));
         let frame = helix.axis_from_frame;
         let envelope = |t: &[[Point3<f64>; 3]], frame: Pose| {
-            let moved = t.iter().map(|c| c.map(|p| frame * p));
-            Envelope::new(moved, &helix, &zone, poll)
+            let moved: Vec<_> = t.iter().map(|c| c.map(|p| frame * p)).collect();
+            Envelope::new(&moved, &helix, &zone, termination)
         };
-        let (one, two) = (envelope(&moving, frame * to_other), envelope(&standing, frame));
+        let (one, two) =
+            rayon::join(|| envelope(&moving, frame * to_other), || envelope(&standing, frame));
         let (play, shift) = two.widest_gap(&one, LEFT * helix.pitch().abs())?;
         let reference = Translation3::from(Vector3::z() * shift) * frame * to_other * reference;
         let helix = Helix { axis_from_frame: frame * guess.axis_from_frame, ..helix };

@@ -9,9 +9,10 @@
 use std::f64::consts::TAU;
 
 use nalgebra::Point3;
+use rayon::prelude::*;
 
 use crate::geometry::{Footprint, Helix, radii};
-use crate::termination::Poll;
+use crate::termination::Termination;
 
 /// Slabs along the axis per pitch: what is elsewhere does not count.
 const SLABS: f64 = 4.0;
@@ -19,6 +20,8 @@ const SLABS: f64 = 4.0;
 const BINS: usize = 300;
 /// Halvings of a triangle until it is taken as it is.
 const MOST_CUTS: u32 = 24;
+/// Triangles between two looks at the termination condition.
+const AT_ONCE: usize = 64;
 /// What is so much further out or in than the other part, in pitches, is not told exactly: more than
 /// any part that is told to be apart strays.
 const BESIDE: f64 = 0.5;
@@ -98,6 +101,13 @@ struct Slab {
     further: [bool; 2],
 }
 
+/// What is left of a triangle that is cut, and where a piece of it reaches: kept from one to the next.
+#[derive(Debug, Default)]
+struct Cut {
+    stack: Vec<([Point3<f64>; 3], u32)>,
+    reaches: Reaches,
+}
+
 /// The profile of a surface.
 pub(super) struct Envelope {
     pitch: f64,
@@ -112,28 +122,47 @@ pub(super) struct Envelope {
 
 impl Envelope {
     /// The profile of triangles (axis frame) along a helix that rises, where another part can be
-    /// near: in `zone`. Once the poll is over the rest is left out.
+    /// near: in `zone`. Once the termination condition is true the rest is left out.
     pub(super) fn new(
-        triangles: impl Iterator<Item = [Point3<f64>; 3]>,
+        triangles: &[[Point3<f64>; 3]],
         helix: &Helix,
         zone: &Zone,
-        poll: &Poll<'_>,
+        termination: &Termination,
     ) -> Self {
         let pitch = helix.pitch().abs();
         let [near, far] = zone.across;
         let zone = Zone { across: [near - BESIDE * pitch, far + BESIDE * pitch], ..*zone };
-        let mut envelope = Self { pitch, finest: pitch / BINS as f64, zone, first: 0, slabs: Vec::new() };
-        for corners in triangles {
-            if poll.is_over() {
-                break;
+        let empty = || Self { pitch, finest: pitch / BINS as f64, zone, first: 0, slabs: Vec::new() };
+        let add = |mut envelope: Self, triangles: &[[Point3<f64>; 3]]| {
+            if termination.check().is_ok() {
+                let mut cut = Cut::default();
+                triangles.iter().for_each(|corners| envelope.add(corners, helix.rise, &mut cut));
             }
-            envelope.add(&corners, helix.rise);
-        }
-        envelope
+            envelope
+        };
+        // The least and the largest are the same, however triangles are dealt out.
+        triangles.par_chunks(AT_ONCE).fold(empty, add).reduce(empty, Self::with)
     }
 
-    fn add(&mut self, corners: &[Point3<f64>; 3], rise: f64) {
-        let mut stack = vec![(*corners, 0)];
+    /// The profile of what either is the profile of.
+    fn with(mut self, mut other: Self) -> Self {
+        if self.slabs.len() < other.slabs.len() {
+            std::mem::swap(&mut self, &mut other);
+        }
+        for (slab, added) in (other.first..).zip(other.slabs) {
+            let own = &mut self.slabs_between(slab, slab)[0];
+            (0..2).for_each(|side| own.further[side] |= added.further[side]);
+            if own.reaches.is_empty() {
+                own.reaches = added.reaches;
+            } else {
+                own.reaches.iter_mut().zip(&added.reaches).for_each(|(own, added)| widen(own, added));
+            }
+        }
+        self
+    }
+
+    fn add(&mut self, corners: &[Point3<f64>; 3], rise: f64, Cut { stack, reaches }: &mut Cut) {
+        stack.push((*corners, 0));
         while let Some((corners, cuts)) = stack.pop() {
             let [low, high] = min_max(corners.iter().map(|p| p.z));
             if low > self.zone.along[1] || high < self.zone.along[0] {
@@ -142,7 +171,7 @@ impl Envelope {
             let [near, far] = radii(&corners);
             let further = [far < self.zone.across[0], near > self.zone.across[1]];
             if further.contains(&true) {
-                for slab in self.slabs_between([low, high]) {
+                for slab in self.slabs_between(self.slab(low), self.slab(high)) {
                     (0..2).for_each(|side| slab.further[side] |= further[side]);
                 }
                 continue;
@@ -150,11 +179,12 @@ impl Envelope {
             match Footprint::of(&corners, rise) {
                 Some(print) if print.error <= self.finest || cuts >= MOST_CUTS => {
                     let heights = print.points.iter().zip(&corners);
-                    self.enter(&print, [low, high], min_max(heights.map(|(p, c)| p.y - c.z)));
+                    let beside = min_max(heights.map(|(p, c)| p.y - c.z));
+                    self.enter(&print, [low, high], beside, reaches);
                 }
                 None if far <= 4.0 * self.finest || cuts >= MOST_CUTS => {
                     let whole = [f64::NEG_INFINITY, f64::INFINITY];
-                    self.enter(&Footprint::at_all_angles(&corners, rise), [low, high], whole);
+                    self.enter(&Footprint::at_all_angles(&corners, rise), [low, high], whole, reaches);
                 }
                 _ => stack.extend(halves(&corners).map(|half| (half, cuts + 1))),
             }
@@ -165,9 +195,8 @@ impl Envelope {
         (z / self.pitch * SLABS).floor() as i64
     }
 
-    /// The slabs between two places, made when there are none.
-    fn slabs_between(&mut self, [low, high]: [f64; 2]) -> &mut [Slab] {
-        let (low, high) = (self.slab(low), self.slab(high));
+    /// The slabs from one to another, made when there are none.
+    fn slabs_between(&mut self, low: i64, high: i64) -> &mut [Slab] {
         let empty = || Slab { reaches: Vec::new(), further: [false; 2] };
         if self.slabs.is_empty() {
             self.first = low;
@@ -184,21 +213,23 @@ impl Envelope {
 
     /// Notes where a footprint reaches. Its heights on the helix are beside those along the axis, from
     /// `along[0]` to `along[1]`, by something in `beside`.
-    fn enter(&mut self, print: &Footprint, along: [f64; 2], beside: [f64; 2]) {
+    fn enter(&mut self, print: &Footprint, along: [f64; 2], beside: [f64; 2], reaches: &mut Reaches) {
         let (size, pitch) = (self.finest, self.pitch);
         let [from, to] = min_max(print.points.iter().map(|p| p.y));
+        let first = reached(print, size, reaches);
         let lowest = self.slab(along[0]);
-        for (low, slab) in (lowest..).zip(self.slabs_between(along)) {
+        for (low, slab) in (lowest..).zip(self.slabs_between(lowest, self.slab(along[1]))) {
             if slab.reaches.is_empty() {
                 slab.reaches.resize(BINS, NOTHING);
             }
             let ends = [low as f64, (low + 1) as f64].map(|z| z / SLABS * pitch);
             let from = ((from.max(ends[0] + beside[0]) - print.error) / size).floor() as i64;
             let to = ((to.min(ends[1] + beside[1]) + print.error) / size).floor() as i64;
-            for bin in from..=to {
-                let [near, far] = reach(print, [bin as f64 * size, (bin + 1) as f64 * size]);
-                let own = &mut slab.reaches[bin.rem_euclid(BINS as i64) as usize];
-                *own = [own[0].min(near), own[1].max(far)];
+            let mut bin = from.rem_euclid(BINS as i64) as usize;
+            let within = reaches.iter().skip((from - first) as usize).take((to - from + 1).max(0) as usize);
+            for reach in within {
+                widen(&mut slab.reaches[bin], reach);
+                bin = if bin + 1 == BINS { 0 } else { bin + 1 };
             }
         }
     }
@@ -212,9 +243,7 @@ impl Envelope {
         for slab in range {
             let slab = &self.slabs[slab as usize];
             (0..2).for_each(|side| further[side] |= slab.further[side]);
-            for (own, [near, far]) in all.iter_mut().zip(&slab.reaches) {
-                *own = [own[0].min(*near), own[1].max(*far)];
-            }
+            all.iter_mut().zip(&slab.reaches).for_each(|(own, reach)| widen(own, reach));
         }
         for own in &mut all {
             *own = [if further[0] { 0.0 } else { own[0] }, if further[1] { f64::INFINITY } else { own[1] }];
@@ -285,23 +314,39 @@ impl Envelope {
     }
 }
 
-/// From where to where a footprint reaches across, between two heights.
-fn reach(print: &Footprint, [low, high]: [f64; 2]) -> [f64; 2] {
-    let (low, high) = (low - print.error, high + print.error);
-    let mut found = NOTHING;
+/// From where to where a footprint reaches across, by bins of heights of some size; the first bin.
+fn reached(print: &Footprint, size: f64, reaches: &mut Reaches) -> i64 {
+    let [low, high] = min_max(print.points.iter().map(|p| p.y));
+    let bins = |low: f64, high: f64| [low - print.error, high + print.error].map(|y| (y / size).floor() as i64);
+    let [first, last] = bins(low, high);
+    reaches.clear();
+    reaches.resize((last - first + 1) as usize, NOTHING);
     for i in 0..3 {
         let (a, b) = (print.points[i], print.points[(i + 1) % 3]);
-        if a.y.min(b.y) > high || a.y.max(b.y) < low {
-            continue;
+        let (a, b) = if a.y <= b.y { (a, b) } else { (b, a) };
+        let [least, most] = min_max([a.x, b.x].into_iter());
+        let slope = (b.x - a.x) / (b.y - a.y);
+        let at = |y: f64| (a.x + slope * (y - a.y)).clamp(least, most);
+        let [from, to] = bins(a.y, b.y);
+        for (bin, reach) in (from..=to).zip(&mut reaches[(from - first) as usize..]) {
+            let low = bin as f64 * size - print.error;
+            let ends = if slope.is_finite() {
+                min_max([at(low), at(low + size + 2.0 * print.error)].into_iter())
+            } else {
+                [least, most]
+            };
+            widen(reach, &ends);
         }
-        let at = |y: f64| {
-            let share = if a.y == b.y { 0.0 } else { ((y - a.y) / (b.y - a.y)).clamp(0.0, 1.0) };
-            a.x + (b.x - a.x) * share
-        };
-        let ends = if a.y == b.y { [a.x, b.x] } else { [at(low), at(high)] };
-        found = [found[0].min(ends[0]).min(ends[1]), found[1].max(ends[0]).max(ends[1])];
     }
-    [found[0] - print.error, found[1] + print.error]
+    for [near, far] in reaches {
+        (*near, *far) = (*near - print.error, *far + print.error);
+    }
+    first
+}
+
+/// Makes a reach hold another.
+fn widen(reach: &mut [f64; 2], other: &[f64; 2]) {
+    *reach = [reach[0].min(other[0]), reach[1].max(other[1])];
 }
 
 fn min_max(values: impl Iterator<Item = f64>) -> [f64; 2] {

@@ -17,7 +17,7 @@ mod tests;
 use nalgebra::Point3;
 
 use crate::geometry::{Bounds, Pose, Surface};
-use crate::termination::{Interrupt, Poll, Termination};
+use crate::termination::{Interrupt, Termination};
 
 pub(super) use centred::centred;
 
@@ -27,8 +27,6 @@ use super::verify::{MOST_EFFORT_IN_DOUBT, Way};
 use envelope::{Envelope, Zone};
 use path::{Boxes, ScrewPath};
 
-/// Triangles of a profile between two looks at the termination condition.
-const ENVELOPE_POLL: u32 = 16;
 /// Stretches that turn by less than this (radians) are not compared any more.
 const LEAST_TURN: f64 = 0.25;
 /// How far a part may stray on a piece of the way that is looked at as one, as a share of the limit.
@@ -64,10 +62,8 @@ fn unsettled(
     let boxes = Boxes { moving: of_moving, standing: of_standing };
     let [one, other] = [&moving, &standing].map(|t| Zone::of(t).everywhere());
     let zone = one.common(&other);
-    let envelope = |triangles: Vec<[Point3<f64>; 3]>| {
-        let poll = Poll::every(ENVELOPE_POLL, Some(termination));
-        Envelope::new(triangles.into_iter(), &screw.helix, &zone, &poll)
-    };
+    let envelope =
+        |triangles: Vec<[Point3<f64>; 3]>| Envelope::new(&triangles, &screw.helix, &zone, termination);
     let (moving, standing) = rayon::join(|| envelope(moving), || envelope(standing));
     termination.check()?;
     let mut open = Vec::new();
