@@ -104,9 +104,9 @@ impl Kind {
             Self::Source | Self::Shape | Self::Hull | Self::Field => 1,
             Self::Healed | Self::Touching | Self::Swept => 2,
             Self::Blocking => 4,
-            Self::Overlap => 6,
-            Self::Witness | Self::Motion | Self::Answer | Self::Verdict => 7,
-            Self::Plan => 8,
+            Self::Overlap | Self::Witness | Self::Motion => 7,
+            Self::Answer | Self::Verdict => 8,
+            Self::Plan => 9,
         }
     }
 

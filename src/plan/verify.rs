@@ -24,7 +24,7 @@ use super::sampling::{Samples, turns_far};
 use super::screw::{centred, depth_on_screw};
 
 /// Depth that is not looked into, as a share of the limit.
-const SPARE: f64 = 1.0 / 16.0;
+const SPARE: f64 = 1.0 / 8.0;
 /// The same where overlap is granted: facets that lie across each other are deep here and there.
 const SPARE_IN_OVERLAP: f64 = 1.0 / 4.0;
 /// The smallest radius of a piece of surface, likewise.

@@ -12,7 +12,7 @@
 //! Pieces of the smallest size are measured; their size is added.
 //!
 //! Where threads with granted overlap cross each other, and in sight of holes, this may take too long: a
-//! count ends it ([`Found::open`]).
+//! count ends it, or that hardly anything was settled by then ([`Found::open`]).
 //!
 //! So for closed surfaces the answer is a bound for all points and all times, not for samples (but
 //! for [`FreeRegion`]'s rounding). Of surfaces with holes that holds where the winding number cannot
@@ -71,7 +71,8 @@ pub(super) struct Found {
     pub(super) deep: Vec<(Point3<f64>, f64)>,
     /// Stretches of the way on which the search was given up: the bound is none there.
     pub(super) open: Vec<Interval>,
-    /// How much was looked at: pieces, and regions that were looked for.
+    /// How much was looked at: pieces (more for each where signs depend on many edges of holes), and regions that
+    /// were looked for.
     pub(super) effort: usize,
 }
 

@@ -2,8 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::geometry::{Closest, FreeRegion, HullDepth, Wanted};
+use crate::geometry::{Closest, FreeRegion, HullDepth, Parts, PatchTree, Wanted};
 
+use super::super::course::Leg;
 use super::Question;
 use super::walk::{Hint, Search};
 
@@ -202,8 +203,73 @@ pub(super) fn furthest(points: impl IntoIterator<Item = Point3<f64>>, region: &F
     })
 }
 
+/// The same for the images of all vertices of a node, of which most lie in balls that the region holds.
+pub(super) fn furthest_of(tree: &PatchTree, index: u32, leg: &Leg, region: &FreeRegion, most: f64) -> Fit {
+    // Who is beyond is so with one of these, mostly.
+    let extremes = || tree.extremes(index).flat_map(|p| leg.maps.iter().map(|m| m.apply(p)));
+    let mut far = furthest(extremes(), region, most)?;
+    for map in &leg.maps {
+        let mut stack = vec![index];
+        while let Some(node) = stack.pop() {
+            let patch = tree.patch(node);
+            if region.holds_ball(&map.apply(&patch.centre), patch.radius * leg.stretch) {
+                continue;
+            }
+            match tree.parts(node) {
+                Parts::Patches([left, right]) => stack.extend([right, left]),
+                Parts::Triangles(_) => {
+                    let images = tree.vertices(node).iter().map(|p| map.apply(p));
+                    let (d, worst) = furthest(images, region, most)?;
+                    if d > far.0 {
+                        far = (d, worst);
+                    }
+                }
+            }
+        }
+    }
+    Some(far)
+}
+
 fn place(swept: &Swept) -> Place {
     let level = swept.radius.max(1e-9).log2().ceil();
     let cell = level.exp2();
     (level as i32, (swept.centre.coords / cell).map(|x| x.floor() as i64).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::fixtures::{ball, surface, tube};
+    use crate::geometry::Pose;
+    use crate::plan::course::{Course, Interval, View};
+    use crate::termination::Poll;
+
+    fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
+        prop::array::uniform3(-size..size).prop_map(Vector3::from)
+    }
+
+    proptest! {
+        #[test]
+        fn the_tree_tells_the_furthest_vertex_as_all_of_them_do(
+            shift in vector(0.4), turn in vector(0.1), centre in vector(2.0), radius in 0.1..4.0f64,
+            most in 0.0..2.0f64,
+        ) {
+            let (moving, standing) = (surface(ball(4)), surface(tube(1.2, 2.0, [-1.0, 1.0], 24)));
+            let tree = PatchTree::new(&moving, &Poll::every(1, None));
+            let path = [Pose::identity(), Pose::new(shift, turn)];
+            let course = Course::new(&path, Point3::origin(), 1.0);
+            let leg = View::new(&course, true, 1e-3).leg(Interval::WHOLE);
+            let wanted = Wanted { points: &[], most: 0.0, from_behind: false, facing: Vector3::zeros() };
+            let centre = Point3::from(centre);
+            let Ok(region) = standing.free_region(&centre, radius, wanted) else { return Ok(()) };
+            for node in [0, 1] {
+                let images = tree.vertices(node).iter().flat_map(|p| leg.maps.iter().map(|m| m.apply(p)));
+                let (all, by_tree) = (furthest(images, &region, most), furthest_of(&tree, node, &leg, &region, most));
+                prop_assert_eq!(all.map(|(far, _)| far), by_tree.map(|(far, _)| far));
+                prop_assert!(tree.vertices(node).len() > 100);
+            }
+        }
+    }
 }

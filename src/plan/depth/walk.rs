@@ -8,17 +8,26 @@ use crate::geometry::{FreeRegion, Parts, area_normal, bisected};
 use crate::termination::{Interrupt, Termination};
 
 use super::super::course::{Interval, Leg, View};
-use super::settle::{Place, Region, Swept, furthest, swept};
+use super::settle::{Place, Region, Swept, furthest, furthest_of, swept};
 use super::{Found, Precision, Question};
 
 /// Hulls of more corners are not asked about as such.
 const MOST_CORNERS: usize = 64;
+/// Of no more vertices each is asked about at once.
+const FEW: usize = 64;
 /// For no more corners than this regions are grown.
 const MOST_WANTED: usize = 1024;
 /// What faces along its way, but for so little, has no side to it.
 const ACROSS: f64 = 0.5;
 /// Pieces that might be too deep are split until they are so much smaller than others.
 const DOUBT: f64 = 4.0;
+
+/// A piece has signs that depend on all edges of holes: so many of them take as long as all else.
+const EDGES_AT_ONCE: usize = 32;
+/// In sight of holes, where after one part in so many of the effort …
+const HOPELESS_AFTER: usize = 10;
+/// … no more than this share is settled, the rest is not looked at.
+const HOPELESS: f64 = 0.02;
 
 /// What is likely to be of use for a piece: a triangle near it, a region around it.
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +45,8 @@ struct Piece {
     /// Which corners were not measured yet at the end of the stretch, as those of the piece of which this is one half.
     is_new: [bool; 3],
     interval: Interval,
+    /// Which share it is of all.
+    share: f64,
     hint: Hint,
 }
 
@@ -46,6 +57,10 @@ pub(super) struct Search<'a> {
     /// Whether the measured surface has holes, so that depth changes its sign off it, too.
     pub(super) has_rim: bool,
     most_effort: usize,
+    /// What a piece costs.
+    price: usize,
+    /// How much of surface and way was settled, as a share of all.
+    done: f64,
     view: View<'a>,
     termination: &'a Termination,
     pub(super) regions: Vec<Region>,
@@ -68,10 +83,13 @@ impl<'a> Search<'a> {
         most_effort: usize,
         termination: &'a Termination,
     ) -> Self {
+        let rim = asked.measured.rim();
         Self {
             asked,
-            has_rim: asked.measured.rim().is_some(),
+            has_rim: rim.is_some(),
             most_effort,
+            price: 1 + rim.map_or(0, |rim| rim.edges().len() / EDGES_AT_ONCE),
+            done: 0.0,
             view,
             termination,
             regions: Vec::new(),
@@ -87,7 +105,7 @@ impl<'a> Search<'a> {
     /// Looks at all of the surface on a stretch of the way.
     pub(super) fn all(&mut self, interval: Interval) -> Result<(), Interrupt> {
         if let Some(root) = self.asked.tree.root() {
-            self.patch(root, interval, Hint { triangle: 0, region: None, vain: false })?;
+            self.patch(root, interval, 1.0, Hint { triangle: 0, region: None, vain: false })?;
         }
         if self.gave_up() {
             self.found.open.push(interval);
@@ -96,7 +114,12 @@ impl<'a> Search<'a> {
     }
 
     fn gave_up(&self) -> bool {
-        self.found.effort > self.most_effort
+        self.found.effort > self.most_effort || self.is_hopeless()
+    }
+
+    /// Whether, in sight of holes, so little is settled after so much effort that most will stay open.
+    fn is_hopeless(&self) -> bool {
+        self.has_rim && self.found.effort > self.most_effort / HOPELESS_AFTER && self.done < HOPELESS
     }
 
     fn is_enough(&self) -> bool {
@@ -104,9 +127,9 @@ impl<'a> Search<'a> {
     }
 
     /// Looks into a node of the tree on a stretch of the way.
-    fn patch(&mut self, index: u32, interval: Interval, hint: Hint) -> Result<(), Interrupt> {
+    fn patch(&mut self, index: u32, interval: Interval, share: f64, hint: Hint) -> Result<(), Interrupt> {
         self.termination.check()?;
-        self.found.effort += 1;
+        self.found.effort += self.price;
         if self.is_enough() {
             return Ok(());
         }
@@ -119,6 +142,7 @@ impl<'a> Search<'a> {
             let centres: Vec<_> = leg.maps.iter().map(|m| m.apply(&patch.centre)).collect();
             let ball = patch.radius * leg.stretch + leg.slack;
             if self.is_apart(&centres, ball) {
+                self.done += share;
                 return Ok(());
             }
             let swept = swept(&centres, ball);
@@ -137,41 +161,48 @@ impl<'a> Search<'a> {
                 if centres.iter().all(|c| region.holds_ball(c, ball)) {
                     return Some((0.0, swept.centre));
                 }
-                furthest(points.iter().flat_map(|p| leg.maps.iter().map(|m| m.apply(p))), region, most)
+                if points.len() <= FEW {
+                    return furthest(
+                        points.iter().flat_map(|p| leg.maps.iter().map(|m| m.apply(p))),
+                        region,
+                        most,
+                    );
+                }
+                furthest_of(tree, index, &leg, region, most)
             };
             let corners = || {
                 let few = if points.len() * leg.maps.len() <= MOST_WANTED { points } else { &[] };
                 few.iter().flat_map(|p| leg.maps.iter().map(|m| m.apply(p))).collect()
             };
             if self.is_settled(&swept, leg.slack, &mut hint, fits, corners) {
+                self.done += share;
                 return Ok(());
             }
         }
         if in_time && leg.length > self.finest() / (2.0 * DOUBT) {
-            return interval.halves().into_iter().try_for_each(|half| self.patch(index, half, hint));
+            return interval
+                .halves()
+                .into_iter()
+                .try_for_each(|half| self.patch(index, half, share / 2.0, hint));
         }
         match tree.parts(index) {
             Parts::Patches(children) => {
-                children.into_iter().try_for_each(|child| self.patch(child, interval, hint))
+                children.into_iter().try_for_each(|child| self.patch(child, interval, share / 2.0, hint))
             }
-            Parts::Triangles(list) => {
-                list.iter().try_for_each(|&t| self.triangle(self.asked.surface.corners(t), interval, hint))
-            }
+            Parts::Triangles(list) => list.iter().try_for_each(|&t| {
+                let (corners, share) = (self.asked.surface.corners(t), share / list.len() as f64);
+                self.triangle(Piece { corners, is_new: [true; 3], interval, share, hint })
+            }),
         }
     }
 
     /// Looks at a triangle, or a piece of one, on a stretch of the way.
-    fn triangle(
-        &mut self,
-        corners: [Point3<f64>; 3],
-        interval: Interval,
-        hint: Hint,
-    ) -> Result<(), Interrupt> {
-        let mut stack = vec![Piece { corners, is_new: [true; 3], interval, hint }];
+    fn triangle(&mut self, whole: Piece) -> Result<(), Interrupt> {
+        let mut stack = vec![whole];
         while let Some(piece) = stack.pop() {
-            let Piece { corners, is_new, interval, mut hint } = piece;
+            let Piece { corners, is_new, interval, mut hint, .. } = piece;
             self.termination.check()?;
-            self.found.effort += 1;
+            self.found.effort += self.price;
             if self.is_enough() {
                 break;
             }
@@ -181,6 +212,7 @@ impl<'a> Search<'a> {
             if !in_time {
                 let points: Vec<_> = leg.maps.iter().flat_map(|m| corners.map(|p| m.apply(&p))).collect();
                 if self.is_apart(&points, leg.slack) {
+                    self.done += piece.share;
                     continue;
                 }
                 let swept = swept(&points, leg.slack);
@@ -197,6 +229,7 @@ impl<'a> Search<'a> {
                 if self.is_settled(&swept, leg.slack, &mut hint, fits, Vec::new)
                     || self.is_measured(&piece, &leg, &swept, hint.triangle)
                 {
+                    self.done += piece.share;
                     continue;
                 }
                 in_time = points[..points.len() - 3]
@@ -205,15 +238,22 @@ impl<'a> Search<'a> {
                     .any(|(a, b)| (b - a).norm() > longest);
             }
             let was_measured = !leg.maps.is_empty();
+            let share = piece.share / 2.0;
             if in_time && leg.length > self.finest() / (2.0 * DOUBT) {
                 // The second half of the way ends where all of it does.
                 let [first, second] = interval.halves();
-                stack.push(Piece { is_new: [true; 3], interval: first, hint, ..piece });
-                stack.push(Piece { is_new: is_new.map(|new| new && !was_measured), interval: second, hint, ..piece });
+                stack.push(Piece { is_new: [true; 3], interval: first, share, hint, ..piece });
+                stack.push(Piece {
+                    is_new: is_new.map(|new| new && !was_measured),
+                    interval: second,
+                    share,
+                    hint,
+                    ..piece
+                });
             } else {
                 stack.extend(halves.map(|half| {
                     let is_new = half.map(|p| !(was_measured && corners.contains(&p)));
-                    Piece { corners: half, is_new, interval, hint }
+                    Piece { corners: half, is_new, interval, share, hint }
                 }));
             }
         }

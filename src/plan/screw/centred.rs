@@ -15,10 +15,10 @@ use crate::termination::{Interrupt, Termination};
 
 use super::super::course::{Course, Interval};
 use super::super::sampling::turns_far;
+use super::FINEST;
 use super::envelope::{Envelope, Zone};
 use super::path::ScrewPath;
 use super::slip::{Facet, slipping};
-use super::FINEST;
 
 /// So far from the helix, as a share of the pitch, a path has left it.
 const LEFT: f64 = 0.25;
@@ -148,8 +148,7 @@ impl Thread {
             let moved: Vec<_> = t.iter().map(|c| c.map(|p| frame * p)).collect();
             Envelope::new(&moved, &helix, &zone, termination)
         };
-        let (one, two) =
-            rayon::join(|| envelope(&moving, frame * to_other), || envelope(&standing, frame));
+        let (one, two) = rayon::join(|| envelope(&moving, frame * to_other), || envelope(&standing, frame));
         let (play, shift) = two.widest_gap(&one, LEFT * helix.pitch().abs())?;
         let reference = Translation3::from(Vector3::z() * shift) * frame * to_other * reference;
         let helix = Helix { axis_from_frame: frame * guess.axis_from_frame, ..helix };

@@ -317,7 +317,8 @@ impl Envelope {
 /// From where to where a footprint reaches across, by bins of heights of some size; the first bin.
 fn reached(print: &Footprint, size: f64, reaches: &mut Reaches) -> i64 {
     let [low, high] = min_max(print.points.iter().map(|p| p.y));
-    let bins = |low: f64, high: f64| [low - print.error, high + print.error].map(|y| (y / size).floor() as i64);
+    let bins =
+        |low: f64, high: f64| [low - print.error, high + print.error].map(|y| (y / size).floor() as i64);
     let [first, last] = bins(low, high);
     reaches.clear();
     reaches.resize((last - first + 1) as usize, NOTHING);

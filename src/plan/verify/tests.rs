@@ -89,6 +89,22 @@ fn what_pokes_into_the_mouth_of_an_open_box_is_found() {
 }
 
 #[test]
+fn where_holes_leave_nothing_to_be_settled_samples_are_asked_soon() {
+    // A basket all of holes: every other facet is missing.
+    let mut basket = ball(4);
+    for vertex in &mut basket.vertices {
+        *vertex = vertex.map(|x| 3.0 * x);
+    }
+    basket.triangles = basket.triangles.into_iter().step_by(2).collect();
+    let (scene, verifier) = scene([basket, cuboid([-2.0, -1.5, 1.0], [1.0, 2.0, 3.5])]);
+    let path = [scene.bodies[1].planning_from_shape; 2];
+    let passing = Passing::new(&scene, &scene.allowances, [1, 0], &path);
+    let course = Course::new(&passing.path, passing.centre, passing.reach());
+    let found = verifier.bounds(&passing, &course, &Termination::default()).unwrap();
+    assert!(found.iter().any(|f| !f.open.is_empty() && f.effort < MOST_EFFORT_IN_DOUBT / 5));
+}
+
+#[test]
 fn flush_sliding_is_not_deep() {
     let turn = Pose::rotation(Vector3::new(0.2, -0.15, 0.1));
     for pose in [Pose::identity(), turn] {
