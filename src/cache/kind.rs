@@ -105,8 +105,8 @@ impl Kind {
             Self::Healed | Self::Touching | Self::Swept => 2,
             Self::Blocking => 4,
             Self::Overlap => 6,
-            Self::Witness | Self::Motion | Self::Answer | Self::Verdict => 7,
-            Self::Plan => 8,
+            Self::Witness | Self::Motion | Self::Verdict => 7,
+            Self::Answer | Self::Plan => 8,
         }
     }
 
