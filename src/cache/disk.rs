@@ -173,7 +173,12 @@ impl Disk {
         if key.kind().is_noted() && !self.contains(key) {
             return None;
         }
-        self.with_free(|database| read(database, key)).flatten()
+        self.get_all(std::slice::from_ref(key))?.pop()?
+    }
+
+    /// The envelopes of keys, as they were written.
+    pub(super) fn get_all(&self, keys: &[Key]) -> Option<Vec<Option<Vec<u8>>>> {
+        self.with_free(|database| read(database, keys))
     }
 
     /// Whether there is an envelope of a key of a kind that is noted.

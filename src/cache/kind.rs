@@ -105,8 +105,8 @@ impl Kind {
             Self::Healed | Self::Touching | Self::Swept => 2,
             Self::Blocking => 4,
             Self::Overlap | Self::Witness | Self::Motion => 7,
-            Self::Answer | Self::Verdict => 8,
-            Self::Plan => 9,
+            Self::Verdict => 8,
+            Self::Answer | Self::Plan => 9,
         }
     }
 

@@ -43,6 +43,7 @@ mod writer;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+pub use answer::AnsweredQuestion;
 pub use disk::DiskError;
 pub use format::Record;
 pub(crate) use hostile::read_as_records;

@@ -223,6 +223,8 @@ pub(super) struct SweptRecord {
 /// A plan in the messages that it was sent in; the last one ends it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct AnswerRecord {
+    /// The request that asked, as it is encoded without what makes no other question.
+    pub(super) question: Vec<u8>,
     pub(super) messages: Vec<Vec<u8>>,
 }
 

@@ -239,10 +239,13 @@ pub(super) fn grew(database: &Database, bytes: u64) -> Result<(), Failure> {
     Ok(transaction.commit()?)
 }
 
-/// The envelope of a key.
-pub(super) fn read(database: &Database, key: &Key) -> Result<Option<Vec<u8>>, Failure> {
+/// The envelopes of keys, in one transaction.
+pub(super) fn read(database: &Database, keys: &[Key]) -> Result<Vec<Option<Vec<u8>>>, Failure> {
     let records = database.begin_read()?.open_table(RECORDS)?;
-    Ok(records.get(&key.to_bytes()[..])?.map(|bytes| bytes.value().to_vec()))
+    let of = |key: &Key| -> Result<Option<Vec<u8>>, Failure> {
+        Ok(records.get(&key.to_bytes()[..])?.map(|bytes| bytes.value().to_vec()))
+    };
+    keys.iter().map(of).collect()
 }
 
 /// The records of a kind, or all, in the order of their keys.

@@ -8,8 +8,14 @@ use sbdp_ipc::plan::PlanRequest;
 use super::convert;
 use super::figures::AnswerFigures;
 use super::outbox::steps_messages;
+use super::workers::Planning;
 use crate::lru::Lru;
 use crate::plan::{Plan, PlanStats, PlanStatus};
+
+/// So many answers of before a restart are there at once …
+const MOST_RECENT: usize = 64;
+/// … of no more than so many bytes in all: it takes a few milliseconds before clients are let in.
+const RECENT_BYTES: u64 = 4 << 20;
 
 /// A whole answer, ready to be sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -72,6 +78,18 @@ pub(crate) struct Answers {
 impl Answers {
     pub(crate) fn new(limit: usize) -> Self {
         Self { limit, ..Self::default() }
+    }
+
+    /// With those that were used last before a restart: whoever asks for one of them first waits neither for
+    /// the disk nor for a worker.
+    pub(crate) fn recent(service: &impl Planning, limit: usize) -> Self {
+        let mut answers = Self::new(limit);
+        for (question, messages) in service.recent_answers(MOST_RECENT, RECENT_BYTES) {
+            if let Some(answer) = Answer::from_messages(messages) {
+                answers.insert(&question, answer);
+            }
+        }
+        answers
     }
 
     pub(crate) fn figures(&self) -> AnswerFigures {

@@ -125,6 +125,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
             queue_limit: config.requests.queue as u32,
             ..StatusHeader::default()
         };
+        let answers = Answers::recent(&*service, config.cache.memory().answers);
         Self {
             service,
             queues,
@@ -133,7 +134,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
             sessions: HashMap::new(),
             uploads: HashMap::new(),
             running: BTreeSet::new(),
-            answers: Answers::new(config.cache.memory().answers),
+            answers,
             next_upload: 0,
             closing: Closing::Open,
             counters,

@@ -9,6 +9,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use sbdp_ipc::headers::RequestKind;
 
 use super::*;
+use crate::cache::AnsweredQuestion;
 use crate::daemon::session::Undelivered;
 use crate::daemon::workers::{Report, start};
 use crate::geometry::{Revision, SourceAssembly};
@@ -34,6 +35,8 @@ struct Scripted {
     let_go: AtomicBool,
     /// Uploads that are being taken in.
     taking_in: AtomicUsize,
+    /// What was answered before a restart.
+    before: Vec<AnsweredQuestion>,
 }
 
 fn plan_with(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
@@ -75,6 +78,11 @@ impl Planning for Scripted {
 
     fn knows(&self, id: AssemblyId) -> bool {
         id.0 == [7; 32]
+    }
+
+    fn recent_answers(&self, most: usize, bytes: u64) -> Vec<AnsweredQuestion> {
+        assert!(most > 0 && bytes > 0);
+        self.before.clone()
     }
 
     fn plan(
@@ -154,11 +162,15 @@ struct Bench {
 
 impl Bench {
     fn new(queue: usize) -> Self {
+        Self::of(queue, Scripted::default())
+    }
+
+    fn of(queue: usize, service: Scripted) -> Self {
         let mut config = Config::default();
         config.workers.count = 1;
         config.requests.queue = queue;
         config.times.grace_s = 0.0;
-        let service = Arc::new(Scripted::default());
+        let service = Arc::new(service);
         config.requests.waiting_per_client = queue;
         let queues = Queues::new(&config);
         let (sender, reports): (Sender<WorkerEvent>, _) = channel();
@@ -239,6 +251,21 @@ fn what_was_answered_before_is_answered_at_once_while_no_worker_is_free() {
     assert!(bench.ask(&unremembered).kinds().is_empty(), "it waits for a worker");
     let error = bench.script(HOLD).error();
     assert_eq!(error, Some(ErrorCode::Busy), "what was not answered is not remembered");
+}
+
+#[test]
+fn what_was_answered_before_a_restart_is_answered_at_once_after_it() {
+    let mut bench = Bench::new(1);
+    let first = bench.script(QUICK);
+    bench.until(|desk| desk.counters.done == 1);
+    let asked = question(&request(QUICK)).unwrap();
+    let before = vec![(asked.clone(), bench.desk.answers.get(&asked).unwrap().messages())];
+    let mut bench = Bench::of(1, Scripted { before, ..Scripted::default() });
+    bench.script(HOLD);
+    bench.until_running();
+    let again = bench.script(QUICK);
+    assert_eq!((again.kinds(), again.summary_status()), (first.kinds(), Some("complete")));
+    assert_eq!(bench.desk.counters.remembered, 1);
 }
 
 #[test]

@@ -90,6 +90,7 @@ pub fn run_reloading<P: Planning>(
     let metrics = metrics
         .transpose()
         .map_err(|source| DaemonError::System { what: "opening the metrics socket", source })?;
+    let desk = Desk::new(service, queues, config);
     lease.publish()?;
     let supervisor = Supervisor::of_this_process();
     supervisor.ready();
@@ -99,7 +100,6 @@ pub fn run_reloading<P: Planning>(
         prefix = lease.instance.prefix,
         "sbdpd is ready"
     );
-    let desk = Desk::new(service, queues, config);
     let limits = ReceiveLimits::of(config);
     let tick = seconds(config.times.tick_s);
     let config = config.clone();

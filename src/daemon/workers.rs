@@ -14,6 +14,7 @@ use super::answers::Answer;
 use super::convert;
 use super::request_queue::Owner;
 use super::shared_queue::Queues;
+use crate::cache::AnsweredQuestion;
 use crate::geometry::{Pose, Revision, SourceAssembly, load_assembly};
 use crate::plan::{Plan, PlanStep};
 use crate::search::{PlanRequest, PlanSink, Progress, Termination};
@@ -68,6 +69,10 @@ pub trait Planning: Send + Sync + 'static {
     /// The messages that answered a question before, also before a restart.
     fn answered(&self, _question: &[u8]) -> Option<Vec<Vec<u8>>> {
         None
+    }
+    /// See [`Cache::recent_answers`](crate::cache::Cache::recent_answers).
+    fn recent_answers(&self, _most: usize, _bytes: u64) -> Vec<AnsweredQuestion> {
+        Vec::new()
     }
     /// Remembers the messages that answered a question.
     fn remember(&self, _question: &[u8], _messages: Vec<Vec<u8>>) {}
@@ -133,6 +138,10 @@ impl Planning for Service {
 
     fn answered(&self, question: &[u8]) -> Option<Vec<Vec<u8>>> {
         self.cache().answer(question)
+    }
+
+    fn recent_answers(&self, most: usize, bytes: u64) -> Vec<AnsweredQuestion> {
+        self.cache().recent_answers(most, bytes)
     }
 
     fn remember(&self, question: &[u8], messages: Vec<Vec<u8>>) {

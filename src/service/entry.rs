@@ -13,9 +13,7 @@ use crate::plan::{Plan, PlanStatus, Verifier};
 use crate::search::{
     Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_blockages, search,
 };
-use crate::simulation::{
-    HullTree, JoinedHulls, PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction,
-};
+use crate::simulation::{JoinedHulls, PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
 use super::ServiceError;
@@ -149,7 +147,8 @@ impl Entry {
         }
         let fresh = |shape: &Arc<Shape>| Arc::new(SharedShape::new(Arc::clone(shape)));
         let fresh: Vec<_> = self.assembly.shapes.iter().map(fresh).collect();
-        Ok((Arc::new(Prepared::new(&self.assembly, &fresh, termination, recall)?), false))
+        let prepared = Prepared::new(&self.assembly, &fresh, &Arc::default(), termination, recall)?;
+        Ok((Arc::new(prepared), false))
     }
 
     /// An answer that was found before, told as if it were found now.
@@ -250,8 +249,6 @@ impl Entry {
             return;
         }
         let Ok((prepared, _)) = self.prepared(termination, recall) else { return };
-        // Joined hulls are known to all scenes then.
-        drop(HullTree::new(&prepared.scene, (0..self.assembly.parts.len()).collect(), termination));
         let request = PlanRequest::default();
         let question = PlanQuestion { assembly: &self.assembly, request: &request, fixed: &[], removed: &[] };
         let engine = engine_of(request.engine, request.penalty);
@@ -290,8 +287,7 @@ impl Entry {
             if let Some(prepared) = &*slot {
                 return Ok((Arc::clone(prepared), true));
             }
-            let mut prepared = Prepared::new(&self.assembly, &self.shapes, termination, recall)?;
-            prepared.scene.hulls = Arc::clone(&self.hulls);
+            let prepared = Prepared::new(&self.assembly, &self.shapes, &self.hulls, termination, recall)?;
             let prepared = Arc::new(prepared);
             *slot = Some(Arc::clone(&prepared));
             return Ok((prepared, false));

@@ -11,7 +11,7 @@ use crate::geometry::Assembly;
 use crate::plan::Verifier;
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
-use crate::simulation::{Pair, Scene, grouped, resolution};
+use crate::simulation::{HullTree, JoinedHulls, Pair, Scene, grouped, resolution};
 use crate::termination::{Interrupt, Termination};
 
 use super::store::SharedShape;
@@ -37,23 +37,28 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// Measures all overlaps, in parallel on the current rayon pool. Fields are built when they are looked at.
+    /// Measures all overlaps, in parallel on the current rayon pool, and joins hulls beside that. Fields are built
+    /// when they are looked at.
     pub(super) fn new(
         assembly: &Assembly,
         shapes: &[Arc<SharedShape>],
+        hulls: &Arc<JoinedHulls>,
         termination: &Termination,
         recall: &Recall,
     ) -> Result<Self, Interrupt> {
         let fields: Vec<_> = shapes.iter().map(|shape| Arc::clone(&shape.field)).collect();
         let started = Instant::now();
-        let mut scene = Scene::assembled(assembly, &fields);
+        let mut scene = Scene { hulls: Arc::clone(hulls), ..Scene::assembled(assembly, &fields) };
         let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
         let verifier = Verifier::new(&assembly.shapes, shape_of, depth_limit(assembly));
-        let overlaps = measure_overlaps(&scene, &verifier, termination, recall)?;
+        // All hulls are joined before anything is searched, those above a part that changed one after the other:
+        // where a single pair is new, whoever does not measure it has nothing else to do.
+        let hulls = || drop(HullTree::new(&scene, (0..scene.bodies.len()).collect(), termination));
+        let overlaps = || measure_overlaps(&scene, &verifier, termination, recall);
+        let mut overlaps = rayon::join(overlaps, hulls).0?;
         for &(a, b, depth) in &overlaps {
             scene.allowances.grant(a, b, depth);
         }
-        let mut overlaps = overlaps;
         overlaps.extend(coincident_pairs(&scene, &verifier, termination)?);
         overlaps.sort_by_key(|&(a, b, _)| (a, b));
         Ok(Self { scene, verifier, overlaps, fields, overlap_time: started.elapsed() })

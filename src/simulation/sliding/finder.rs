@@ -1,6 +1,7 @@
 //! Finds regions for the pieces of one surface that another may not be entered by.
 
 use nalgebra::{Point3, Vector3};
+use rayon::prelude::*;
 
 use crate::geometry::{Closest, NoRegion, Wanted};
 use crate::termination::Termination;
@@ -34,6 +35,9 @@ pub(super) const HELD: f64 = DEPTH_TOLERANCE / 2.0;
 const SMALL: f64 = 0.3;
 /// … and is lost if it has none at all and is smaller than this.
 pub(super) const SMALLEST: f64 = 0.02;
+
+/// So many pieces that come next are looked at beside one.
+const BESIDE: usize = 3;
 
 /// What of the measured surface is nearest to a point, and how near.
 pub(super) struct Seen {
@@ -136,19 +140,19 @@ impl<'a> Finder<'a> {
         Ok(true)
     }
 
-    /// Looks for a cell for a piece, and, side by side with that, for one for the piece that comes next, most likely:
-    /// where a single pair is new, nobody else has anything to do.
+    /// Looks for a cell for a piece, and, side by side with that, for those for the pieces that come next, most
+    /// likely: where a single pair is new, nobody else has anything to do. They take unequally long.
     fn looked_beside(&mut self, spot: &Spot, wish: &Wish) -> Looked {
         let (pair, termination) = (self.pair, self.termination);
         let look = |spot: &Spot| Finder::new(pair, 1, termination).looked(*spot, wish);
-        match self.waiting.last_mut() {
-            Some(next) if next.looked.is_none() && other_thread() => {
-                let (looked, ahead) = rayon::join(|| look(spot), || look(&next.spot));
-                next.looked = Some(ahead);
-                looked
-            }
-            _ => look(spot),
+        if !other_thread() {
+            return look(spot);
         }
+        let from = self.waiting.len().saturating_sub(BESIDE);
+        let not_yet = self.waiting[from..].iter_mut().filter(|waiting| waiting.looked.is_none());
+        let beside: Vec<&mut Waiting> = not_yet.collect();
+        let look_at = |waiting: &mut Waiting| waiting.looked = Some(look(&waiting.spot));
+        rayon::join(|| look(spot), || beside.into_par_iter().for_each(look_at)).0
     }
 
     fn looked(mut self, mut spot: Spot, wish: &Wish) -> Looked {
