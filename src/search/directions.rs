@@ -89,6 +89,11 @@ impl Directions {
         Self { axes: axes.into_iter().map(Axis::along).collect(), own }
     }
 
+    /// Whether a part is made along one of the axes.
+    pub(super) fn has_own(&self, part: usize) -> bool {
+        self.own[part].is_some()
+    }
+
     /// Whether an action is along or about the axis that a part is made along.
     pub(super) fn is_own(&self, part: usize, axis: Axis) -> bool {
         self.own[part].is_some_and(|i| self.axes[i] == axis)

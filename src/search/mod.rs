@@ -25,6 +25,7 @@ mod straight;
 #[cfg(test)]
 mod tests;
 mod trace;
+mod twists;
 
 pub use crate::termination::{Interrupt, Termination};
 pub use begun::initial_blockages;

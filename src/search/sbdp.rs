@@ -33,6 +33,7 @@ use super::round::is_ball;
 use super::state::{Node, Phase, least_travel};
 use super::straight::Swept;
 use super::trace::TraceEvent;
+use super::twists::Twists;
 
 /// Translational passes in a row before turning is tried, if they only find new states.
 const TRANSLATION_PASSES: usize = 6;
@@ -69,8 +70,11 @@ pub(super) struct Search<'a, 'o> {
     pub(super) directions: Directions,
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
+    /// So many of these, the first ones, are open to all parts.
+    pub(super) common_rotations: usize,
     pub(super) swept: Swept,
     pub(super) rays: Rays,
+    pub(super) twists: Twists,
     ahead: Ahead,
     /// Of a node and a push: how long a stretch of others is in its way (powers of two), and as of when.
     pub(super) in_the_way: HashMap<(usize, usize), ((usize, usize), i32)>,
@@ -118,9 +122,11 @@ impl<'a, 'o> Search<'a, 'o> {
             known: (0..scene.bodies.len()).map(|p| KnownStates::new(scene, p)).collect(),
             directions,
             translations,
+            common_rotations: rotations.len(),
             rotations,
             swept: Swept::default(),
             rays: Rays::default(),
+            twists: Twists::default(),
             ahead: Ahead::default(),
             in_the_way: HashMap::new(),
             coarsest: 1.0,
@@ -154,7 +160,7 @@ impl<'a, 'o> Search<'a, 'o> {
             if self.disassembly.is_done() {
                 return Ok(());
             }
-            if gain.any() || turned.any() || self.simulate_rays() {
+            if gain.any() || turned.any() || self.simulate_rays() || self.ask_for_all_twists() {
                 continue;
             }
             if !self.guided {
@@ -176,7 +182,7 @@ impl<'a, 'o> Search<'a, 'o> {
                     part,
                     path: vec![self.disassembly.assembled(part)],
                     translation: Some(blockage),
-                    rotation: Blockage::open(self.rotations.len()),
+                    rotation: self.unturned(part),
                     origin: None,
                     novelty: 0.0,
                     alive: true,
@@ -213,7 +219,7 @@ impl<'a, 'o> Search<'a, 'o> {
                 open = self.expandable(phase);
                 continue;
             }
-            if self.offer_rays(phase, &open)? {
+            if self.offer_rays(phase, &open)? || self.offer_twists(phase, &open)? {
                 continue;
             }
             // Before the first simulation: what leaves straight is out.
@@ -395,7 +401,7 @@ impl<'a, 'o> Search<'a, 'o> {
         if is_new {
             gain.new_states = true;
             let path = joined(&self.nodes[job.node].path, &path);
-            let rotation = Blockage::open(self.rotations.len());
+            let rotation = self.unturned(run.part);
             let origin = Some((job.node, phase, job.action));
             let novelty = self.known[run.part].novelty(&path[path.len() - 1]);
             let (part, translation) = (run.part, None);

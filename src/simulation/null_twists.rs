@@ -1,0 +1,190 @@
+//! The twists that the contacts of a part hardly resist: the joint that it makes with what it lies in.
+//!
+//! Where two surfaces lie close at a point p, with normal n, the twist (v, ω) about a centre c parts or presses
+//! them at the speed n·(v + ω × (p − c)). Taken as equations in both senses, with lengths as shares of the points'
+//! own spread, these rows make up the contact matrix. Right singular vectors whose singular values are small are
+//! motions along which the surfaces slip on each other (N. Gelfand and L. Guibas 2004, Shape segmentation using
+//! local slippage analysis; SVD by faer): a thread shows its own helix there, however it stands and whatever the
+//! rest of the part looks like.
+
+use faer::Mat;
+use nalgebra::{Matrix3, Matrix3x2, Matrix6, Point3, Unit, Vector3, Vector6};
+
+use crate::geometry::{Bounds, Feature, Pose};
+use crate::termination::{Interrupt, Poll, Termination};
+
+use super::{Body, Scene, Touching};
+
+/// Singular values below this share of the largest are near null: facets of a round fit lean so much.
+const NEAR_NULL: f64 = 0.1;
+/// What turns less than this, as a share of a unit twist, only shifts.
+const TURNS: f64 = 0.25;
+/// So many points of a side tell enough.
+const MOST_POINTS: usize = 2000;
+/// Fewer contacts tell nothing.
+const FEWEST: usize = 12;
+/// Points between two looks at the termination condition.
+const POINTS_POLL: u32 = 64;
+
+/// An axis about which contact lets a part turn, and along which, maybe.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NullTwist {
+    /// Its direction, in the planning frame.
+    pub axis: Unit<Vector3<f64>>,
+    /// About how far the part moves along it per radian: facets that lean against the flanks they stand for tell it
+    /// wrong by up to a third, its sense right. `None` if the part may turn and shift as it likes.
+    pub rise: Option<f64>,
+}
+
+/// A contact: a point and the normal of the surface near it.
+type Contact = (Point3<f64>, Vector3<f64>);
+
+impl NullTwist {
+    /// That of a part at a pose among those that stand (ascending), if contact leaves it one axis to turn about;
+    /// and the parts that were looked at. What is within `reach` (planning frame) is in contact.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn of(
+        scene: &Scene,
+        part: usize,
+        pose: &Pose,
+        standing: &[usize],
+        reach: f64,
+        termination: &Termination,
+    ) -> Result<(Option<Self>, Vec<usize>), Interrupt> {
+        let poll = Poll::every(POINTS_POLL, Some(termination));
+        let body = &scene.bodies[part];
+        let parts = Touching::near(scene, part, pose, standing, reach);
+        let mut contacts = Vec::new();
+        for &other in &parts {
+            let still = &scene.bodies[other];
+            let place = &still.planning_from_shape;
+            let within = reach + scene.allowances.of(part, other);
+            contacts_of((body, pose), (still, place), within, &poll, &mut contacts);
+            contacts_of((still, place), (body, pose), within, &poll, &mut contacts);
+        }
+        // What was found of points that were cut short is not to be believed.
+        termination.check()?;
+        Ok((Self::left_by(&contacts), parts))
+    }
+
+    /// The axis that contacts leave.
+    fn left_by(contacts: &[Contact]) -> Option<Self> {
+        if contacts.len() < FEWEST {
+            return None;
+        }
+        let count = contacts.len() as f64;
+        let centre = contacts.iter().map(|(p, _)| p.coords).sum::<Vector3<f64>>() / count;
+        let spread =
+            (contacts.iter().map(|(p, _)| (p.coords - centre).norm_squared()).sum::<f64>() / count).sqrt();
+        // The Gram matrix of the contact matrix: its singular values are the squares.
+        let mut gram = Matrix6::zeros();
+        for (p, n) in contacts {
+            let lever = (p.coords - centre).cross(n) / spread;
+            let row = Vector6::new(n.x, n.y, n.z, lever.x, lever.y, lever.z);
+            gram += row * row.transpose();
+        }
+        let svd = Mat::from_fn(6, 6, |i, j| gram[(i, j)]).thin_svd().ok()?;
+        let values = svd.S().column_vector();
+        let near_null = (0..6).filter(|&i| values[i] < values[0] * NEAR_NULL * NEAR_NULL).count();
+        let vector = |i: usize, from: usize| Vector3::from_fn(|k, _| svd.V()[(from + k, i)]);
+        match near_null {
+            1 => {
+                let (shift, turn) = (vector(5, 0), vector(5, 3));
+                let axis = Unit::try_new(turn, TURNS)?;
+                // Turning is told in units of the spread.
+                Some(Self { axis, rise: Some(axis.dot(&shift) * spread / turn.norm()) })
+            }
+            2 => {
+                let turns = Matrix3x2::from_columns(&[vector(4, 3), vector(5, 3)]);
+                let common: Matrix3<f64> = turns * turns.transpose();
+                let eigen = common.symmetric_eigen();
+                let order = {
+                    let mut order = [0, 1, 2];
+                    order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
+                    order
+                };
+                let [most, next] = [order[0], order[1]].map(|i| eigen.eigenvalues[i].max(0.0).sqrt());
+                let axis = Unit::new_normalize(eigen.eigenvectors.column(order[0]).into_owned());
+                (most > TURNS && next < TURNS * most).then_some(Self { axis, rise: None })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Adds the contacts at the samples of one body with another, each at its place, in the planning frame.
+fn contacts_of(
+    (asked, at): (&Body, &Pose),
+    (measured, stands): (&Body, &Pose),
+    within: f64,
+    poll: &Poll<'_>,
+    contacts: &mut Vec<Contact>,
+) {
+    let to_measured = stands.inverse() * at;
+    let near = measured.shape.bounds().grown(within);
+    let points: Vec<Point3<f64>> = asked
+        .shape
+        .samples()
+        .points()
+        .iter()
+        .map(|p| to_measured * p)
+        .filter(|p| Bounds::contains(&near, p))
+        .collect();
+    let surface = &measured.shape.surface;
+    for p in points.iter().step_by(points.len().div_ceil(MOST_POINTS).max(1)) {
+        if poll.is_over() {
+            return;
+        }
+        // At an edge there is a choice of normals.
+        if let Some(closest) = surface.closest(p, within).filter(|c| c.feature == Feature::Face) {
+            contacts.push((stands * closest.point, stands.rotation * surface.face_normal(closest.triangle)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{block_on_plate, moved, peg_in_hole, rod, scene, thread, tube};
+    use crate::geometry::SourceMesh;
+
+    const TURN: Vector3<f64> = Vector3::new(0.4, -0.7, 0.3);
+
+    /// What contact leaves part 1, when both are turned.
+    fn left(meshes: [SourceMesh; 2]) -> Option<NullTwist> {
+        let (scene, _) = scene(meshes.map(|mesh| moved(mesh, &Pose::rotation(TURN))));
+        let pose = scene.bodies[1].planning_from_shape;
+        let found = NullTwist::of(&scene, 1, &pose, &[0], 0.05, &Termination::default()).unwrap();
+        assert_eq!(found.1, [0]);
+        found.0
+    }
+
+    fn along_z(twist: &NullTwist) -> f64 {
+        twist.axis.dot(&(Pose::rotation(TURN) * Vector3::z())).abs()
+    }
+
+    #[test]
+    fn a_thread_leaves_its_own_helix() {
+        for pitch in [0.5, 0.8] {
+            let twist = left(thread(3.0, pitch)).unwrap();
+            assert!(along_z(&twist) > 0.9999, "{twist:?}");
+            let found = twist.rise.unwrap() * std::f64::consts::TAU;
+            // Facets on a grid lean all the same way against the flank, and tell a false rise.
+            assert!((found / pitch - 1.0).abs() < 0.3, "{found} of {pitch}");
+        }
+    }
+
+    #[test]
+    fn a_pin_in_a_round_hole_turns_and_shifts_as_it_likes() {
+        let twist = left([tube(1.0, 2.0, [-1.0, 1.0], 48), rod(0.98, [-3.0, 3.0], 48)]).unwrap();
+        assert!(along_z(&twist) > 0.9999 && twist.rise.is_none(), "{twist:?}");
+    }
+
+    #[test]
+    fn what_cannot_turn_or_shifts_two_ways_has_no_twist() {
+        assert_eq!(left(peg_in_hole(-0.01)), None, "a square peg on the ground of its hole");
+        assert_eq!(left(block_on_plate()), None, "turns about one axis, and shifts along two");
+    }
+}
