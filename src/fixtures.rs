@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
+use proptest::prelude::*;
 
 use crate::geometry::{
     Assembly, Mesh, Pose, Shape, Solidity, SourceAssembly, SourceMesh, SourcePart, Surface, heal,
@@ -159,6 +160,11 @@ pub(crate) fn healed(mesh: SourceMesh) -> Mesh {
 /// The shape of a healed mesh.
 pub(crate) fn shape_of(mesh: &Mesh) -> Shape {
     Shape::of(mesh, &Termination::default()).unwrap()
+}
+
+/// Vectors of no more than some size along each axis.
+pub(crate) fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
+    prop::array::uniform3(-size..size).prop_map(Vector3::from)
 }
 
 /// A mesh, healed and prepared.

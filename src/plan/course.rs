@@ -162,6 +162,16 @@ pub(super) struct Leg {
     pub(super) along: Option<Vector3<f64>>,
 }
 
+impl Leg {
+    /// The images of points, point by point: they pass through the hull of these, but for the slack.
+    pub(super) fn images<'l>(
+        &'l self,
+        points: impl IntoIterator<Item = &'l Point3<f64>> + 'l,
+    ) -> impl Iterator<Item = Point3<f64>> + 'l {
+        points.into_iter().flat_map(|p| self.maps.iter().map(|m| m.apply(p)))
+    }
+}
+
 /// A course seen from one of the two parts: of points of the moving part in the frame of the
 /// standing one, or the other way round.
 pub(super) struct View<'a> {
@@ -268,10 +278,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-
-    fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
-        prop::array::uniform3(-size..size).prop_map(Vector3::from)
-    }
+    use crate::fixtures::vector;
 
     proptest! {
         #[test]

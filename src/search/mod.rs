@@ -12,6 +12,7 @@ mod known_states;
 mod linked;
 mod order;
 mod outcome;
+mod own_actions;
 mod pdp;
 mod problem;
 mod rays;

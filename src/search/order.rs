@@ -151,11 +151,15 @@ impl Search<'_, '_> {
         self.translations.iter().position(pulls)
     }
 
-    /// Of actions that may turn a part, those first that pull it along its own axis, over all parts;
+    /// Of actions that may turn a part, those first that pull it along its own axis, or that it alone has, over
+    /// all parts;
     /// of these, those that fewer parts stand against, as far as pushes tell, and then those in whose way
     /// less stands: a nut is not turned towards the head of its bolt. Smaller is better.
     pub(super) fn promise(&self, job: Job) -> (bool, usize, i32) {
-        let Some(push) = self.pull(job) else { return (!self.is_twist(job), 0, 0) };
+        let Some(push) = self.pull(job) else {
+            let is_own = self.twists.own.has(self.nodes[job.node].part, job.action);
+            return (!is_own, 0, 0);
+        };
         let against = self.nodes[job.node].translation.as_ref().map_or(0, |b| b.blockers(push).len());
         (false, against, self.in_the_way.get(&(job.node, push)).map_or(0, |(_, way)| *way))
     }

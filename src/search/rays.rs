@@ -9,19 +9,15 @@
 //! the translations, each for the parts whose contacts leave it. They are swept at
 //! once; simulated they are only when everything else has been tried, for they seldom lead to what
 //! bent forces do not. Cones with many rays are wide, and no ray of them is better than others;
-//! these are left out. The evaluation f_a does not count rays: parts are compared by what is open to all.
-
-use std::collections::{HashMap, HashSet};
-use std::time::Instant;
+//! these are left out.
 
 use nalgebra::{Unit, Vector3};
-use rayon::prelude::*;
 
 use crate::geometry::extreme_rays;
 use crate::simulation::{Action, Axis, Touching};
-use crate::termination::Interrupt;
 
 use super::disassembly::Stop;
+use super::own_actions::OwnActions;
 use super::request::ActionSet;
 use super::sbdp::Search;
 use super::state::{Phase, least_travel};
@@ -34,96 +30,55 @@ const MOST_ACTIONS: usize = 32;
 const ALIKE: f64 = 0.999_99;
 
 /// Which rays are known, and whose they are.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Rays {
-    /// Per part: what it touched when its rays were looked for.
-    touched: HashMap<usize, Vec<usize>>,
-    /// Parts with the translations that are rays of theirs.
-    offered: HashSet<(usize, usize)>,
+    pub(super) own: OwnActions,
     /// Whether they are simulated, too.
     pub(super) simulated: bool,
 }
 
+impl Rays {
+    /// None yet, beside the translations along axes.
+    pub(super) fn beside(translations: &[Action]) -> Self {
+        Self { own: OwnActions::new(translations.len(), MOST_ACTIONS, ALIKE), simulated: false }
+    }
+}
+
 impl Search<'_, '_> {
     /// Adds the extreme rays of open parts as assembled to the translations, unless they are known; true
-    /// if anything was added. Looked for again when a part that they came from is gone.
+    /// if anything was added.
     pub(super) fn offer_rays(&mut self, phase: Phase, open: &[usize]) -> Result<bool, Stop> {
-        let problem = &self.disassembly.problem;
-        if phase != Phase::Translation || problem.actions != ActionSet::Extended {
+        if phase != Phase::Translation || self.disassembly.problem.actions != ActionSet::Extended {
             return Ok(false);
         }
-        let started = Instant::now();
-        let standing = self.disassembly.everything.standing();
-        let stands = |part: &usize| standing.binary_search(part).is_ok();
-        let is_known = |part: &usize| self.rays.touched.get(part).is_some_and(|t| t.iter().all(stands));
-        let roots = open.iter().map(|&i| &self.nodes[i]).filter(|n| n.is_root());
-        let parts: Vec<usize> = roots.map(|n| n.part).filter(|p| !is_known(p)).collect();
-        let (scene, termination) = (&problem.scene, &problem.termination);
-        let touching = |&part: &usize| {
-            termination.check()?;
-            let others: Vec<usize> = standing.iter().copied().filter(|&p| p != part).collect();
-            let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
-            problem.recall.touching(scene, part, &pose, &others, reach, termination)
-        };
-        let found = parts.par_iter().map(touching).collect::<Result<Vec<_>, Interrupt>>()?;
-        let before = self.rays.offered.len();
-        for (part, Touching { normals, parts: touched }) in parts.into_iter().zip(found) {
-            self.rays.touched.insert(part, touched);
-            let rays = extreme_rays(&normals.unwrap_or_default());
-            if rays.len() <= MOST_RAYS {
-                rays.iter().for_each(|ray| self.offer(part, ray));
-            }
-        }
-        self.disassembly.counters.static_analysis += started.elapsed();
-        Ok(self.rays.offered.len() > before)
-    }
-
-    /// Makes a ray an action of a part's, unless it is along one of the axes.
-    fn offer(&mut self, part: usize, ray: &Unit<Vector3<f64>>) {
-        let like = |a: &Action| a.force().dot(ray) > ALIKE;
-        let action = match self.translations.iter().position(like) {
-            Some(along_axis) if along_axis < self.along_axes() => return,
-            Some(ray) => ray,
-            None if self.translations.len() - self.along_axes() == MOST_ACTIONS => return,
-            None => {
-                let axis = Axis::along(if ray[ray.iamax()] < 0.0 { -*ray } else { *ray });
-                self.translations.push(Action::Push(axis, axis.unit().dot(ray) > 0.0));
-                for b in self.nodes.iter_mut().filter_map(|n| n.translation.as_mut()) {
-                    b.add_withheld();
-                }
-                self.translations.len() - 1
-            }
-        };
-        if self.rays.offered.insert((part, action)) {
-            tracing::debug!(part, action = %self.translations[action], "ray");
-            let nodes = self.nodes.iter_mut().filter(|n| n.part == part);
-            nodes.filter_map(|n| n.translation.as_mut()).for_each(|b| b.reopen(action));
-        }
-    }
-
-    /// How many of the translations are along axes: the first ones.
-    pub(super) fn along_axes(&self) -> usize {
-        2 * self.directions.axes.len()
-    }
-
-    /// Completes the blockage of a new state, which knows of translations along axes only.
-    pub(super) fn add_rays(&mut self, node: usize) {
-        let (rays, part) = (self.along_axes()..self.translations.len(), self.nodes[node].part);
-        let Some(b) = &mut self.nodes[node].translation else { return };
-        for action in rays {
-            b.add_withheld();
-            if self.rays.offered.contains(&(part, action)) {
-                b.reopen(action);
-            }
-        }
+        self.offer_own(
+            phase,
+            open,
+            |_| true,
+            |problem, part, others| {
+                let scene = &problem.scene;
+                let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
+                let Touching { normals, parts } =
+                    problem.recall.touching(scene, part, &pose, others, reach, &problem.termination)?;
+                let rays = extreme_rays(&normals.unwrap_or_default());
+                let few = if rays.len() <= MOST_RAYS { &rays[..] } else { &[] };
+                Ok((few.iter().map(push_along).collect(), parts))
+            },
+        )
     }
 
     /// Lets the rays be simulated; true if there are any and they were not before.
     pub(super) fn simulate_rays(&mut self) -> bool {
-        let late = !self.rays.simulated && self.translations.len() > self.along_axes();
+        let late = !self.rays.simulated && self.translations.len() > self.rays.own.common;
         self.rays.simulated = late || self.rays.simulated;
         late
     }
+}
+
+/// The push along a ray.
+fn push_along(ray: &Unit<Vector3<f64>>) -> Action {
+    let axis = Axis::along(if ray[ray.iamax()] < 0.0 { -*ray } else { *ray });
+    Action::Push(axis, axis.unit().dot(ray) > 0.0)
 }
 
 #[cfg(test)]

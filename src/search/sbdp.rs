@@ -70,8 +70,6 @@ pub(super) struct Search<'a, 'o> {
     pub(super) directions: Directions,
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
-    /// So many of these, the first ones, are open to all parts.
-    pub(super) common_rotations: usize,
     pub(super) swept: Swept,
     pub(super) rays: Rays,
     pub(super) twists: Twists,
@@ -121,12 +119,11 @@ impl<'a, 'o> Search<'a, 'o> {
             roots: 0,
             known: (0..scene.bodies.len()).map(|p| KnownStates::new(scene, p)).collect(),
             directions,
+            rays: Rays::beside(&translations),
+            twists: Twists::beside(&rotations),
             translations,
-            common_rotations: rotations.len(),
             rotations,
             swept: Swept::default(),
-            rays: Rays::default(),
-            twists: Twists::default(),
             ahead: Ahead::default(),
             in_the_way: HashMap::new(),
             coarsest: 1.0,
@@ -182,7 +179,7 @@ impl<'a, 'o> Search<'a, 'o> {
                     part,
                     path: vec![self.disassembly.assembled(part)],
                     translation: Some(blockage),
-                    rotation: self.unturned(part),
+                    rotation: Blockage::open(self.rotations.len()),
                     origin: None,
                     novelty: 0.0,
                     alive: true,
@@ -253,8 +250,8 @@ impl<'a, 'o> Search<'a, 'o> {
         let todo: Vec<_> = open.iter().copied().filter(|&i| self.nodes[i].translation.is_none()).collect();
         if !self.guided {
             for i in todo {
-                self.nodes[i].translation = Some(Blockage::open(self.along_axes()));
-                self.add_rays(i);
+                let blockage = Blockage::open(self.rays.own.common);
+                self.nodes[i].translation = Some(self.with_own(phase, self.nodes[i].part, blockage));
             }
             return Ok(());
         }
@@ -262,7 +259,7 @@ impl<'a, 'o> Search<'a, 'o> {
         let (problem, nodes) = (&self.disassembly.problem, &self.nodes);
         let Problem { scene, static_analysis, termination, recall, .. } = problem;
         let standing: Vec<_> = todo.iter().map(|&i| self.disassembly.standing(nodes[i].part)).collect();
-        let translations = &self.translations[..self.along_axes()];
+        let translations = &self.translations[..self.rays.own.common];
         let analysis = Analysis { rule: *static_analysis, scene, translations, recall };
         let found = todo
             .par_iter()
@@ -275,8 +272,7 @@ impl<'a, 'o> Search<'a, 'o> {
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
         for (&i, blockage) in todo.iter().zip(found) {
-            self.nodes[i].translation = Some(blockage);
-            self.add_rays(i);
+            self.nodes[i].translation = Some(self.with_own(phase, self.nodes[i].part, blockage));
         }
         self.disassembly.counters.static_analysis += started.elapsed();
         for i in todo {
@@ -288,7 +284,7 @@ impl<'a, 'o> Search<'a, 'o> {
     /// Simulates the open actions of some states of one priority, in order.
     fn expand(&mut self, phase: Phase, batch: &[usize]) -> Result<Gain, Stop> {
         let count = match phase {
-            Phase::Translation if !self.rays.simulated => self.along_axes(),
+            Phase::Translation if !self.rays.simulated => self.rays.own.common,
             _ => self.actions(phase).len(),
         };
         let mut jobs: Vec<Job> =
@@ -401,7 +397,8 @@ impl<'a, 'o> Search<'a, 'o> {
         if is_new {
             gain.new_states = true;
             let path = joined(&self.nodes[job.node].path, &path);
-            let rotation = self.unturned(run.part);
+            let unturned = Blockage::open(self.twists.own.common);
+            let rotation = self.with_own(Phase::Rotation, run.part, unturned);
             let origin = Some((job.node, phase, job.action));
             let novelty = self.known[run.part].novelty(&path[path.len() - 1]);
             let (part, translation) = (run.part, None);

@@ -5,20 +5,14 @@
 //! of these axes are asked which twist they hardly resist ([`NullTwist`]); pulling and turning at once about that
 //! axis, in the sense of its helix, join the actions with rotational freedom, for this part alone, and are tried
 //! first. When everything else has been tried, all other parts are asked, too: a part's largest faces need not
-//! know of its thread. As with [rays](super::rays), f_a does not count what others do not have.
+//! know of its thread.
 
-use std::collections::{HashMap, HashSet};
-use std::time::Instant;
-
-use rayon::prelude::*;
-
-use crate::blocking_graph::Blockage;
 use crate::simulation::{Action, Axis, NullTwist};
-use crate::termination::Interrupt;
 
 use super::disassembly::Stop;
+use super::own_actions::OwnActions;
 use super::request::ActionSet;
-use super::sbdp::{Job, Search};
+use super::sbdp::Search;
 use super::state::{Phase, least_travel};
 
 /// Twists of all parts together, at most.
@@ -27,92 +21,50 @@ const MOST_ACTIONS: usize = 64;
 const ALIKE: f64 = 0.9994;
 
 /// Which twists are known, and whose they are.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Twists {
-    /// Per part: what it touched when its twist was looked for.
-    touched: HashMap<usize, Vec<usize>>,
-    /// Parts with the rotations that are twists of theirs.
-    offered: HashSet<(usize, usize)>,
+    pub(super) own: OwnActions,
     /// Whether parts are asked that are made along an axis of all, too.
     of_all: bool,
 }
 
+impl Twists {
+    /// None yet, beside the actions with rotational freedom about axes.
+    pub(super) fn beside(rotations: &[Action]) -> Self {
+        Self { own: OwnActions::new(rotations.len(), MOST_ACTIONS, ALIKE), of_all: false }
+    }
+}
+
 impl Search<'_, '_> {
     /// Adds the near-null twists of open parts as assembled to the rotations, unless they are known; true if
-    /// anything was added. Looked for again when a part that they came from is gone.
+    /// anything was added.
     pub(super) fn offer_twists(&mut self, phase: Phase, open: &[usize]) -> Result<bool, Stop> {
-        let problem = &self.disassembly.problem;
-        if phase != Phase::Rotation || !self.guided || problem.actions != ActionSet::Extended {
+        if phase != Phase::Rotation || !self.follows_twists() {
             return Ok(false);
         }
-        let started = Instant::now();
-        let standing = self.disassembly.everything.standing();
-        let stands = |part: &usize| standing.binary_search(part).is_ok();
-        let is_known = |part: &usize| self.twists.touched.get(part).is_some_and(|t| t.iter().all(stands));
-        let is_asked = |part: &usize| self.twists.of_all || !self.directions.has_own(*part);
-        let roots = open.iter().map(|&i| &self.nodes[i]).filter(|n| n.is_root());
-        let parts: Vec<usize> = roots.map(|n| n.part).filter(|p| is_asked(p) && !is_known(p)).collect();
-        let (scene, termination) = (&problem.scene, &problem.termination);
-        let twist = |&part: &usize| {
-            let others: Vec<usize> = standing.iter().copied().filter(|&p| p != part).collect();
-            let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
-            NullTwist::of(scene, part, &pose, &others, reach, termination)
-        };
-        let found = parts.par_iter().map(twist).collect::<Result<Vec<_>, Interrupt>>()?;
-        let before = self.twists.offered.len();
-        for (part, (twist, touched)) in parts.into_iter().zip(found) {
-            self.twists.touched.insert(part, touched);
-            for action in twist.iter().flat_map(along) {
-                self.offer_twist(part, action);
-            }
-        }
-        self.disassembly.counters.static_analysis += started.elapsed();
-        Ok(self.twists.offered.len() > before)
-    }
-
-    /// Makes a twist an action of a part's, unless there is one as good.
-    fn offer_twist(&mut self, part: usize, twist: Action) {
-        let like = |a: &Action| {
-            let [force, torque] = [a.force().dot(&twist.force()), a.torque().dot(&twist.torque())];
-            matches!(a, Action::Screw(..)) && force > ALIKE && torque > ALIKE
-        };
-        let action = match self.rotations.iter().position(like) {
-            Some(common) if common < self.common_rotations => return,
-            Some(known) => known,
-            None if self.rotations.len() - self.common_rotations == MOST_ACTIONS => return,
-            None => {
-                self.rotations.push(twist);
-                self.nodes.iter_mut().for_each(|n| n.rotation.add_withheld());
-                self.rotations.len() - 1
-            }
-        };
-        if self.twists.offered.insert((part, action)) {
-            tracing::debug!(part, action = %self.rotations[action], "twist");
-            self.nodes.iter_mut().filter(|n| n.part == part).for_each(|n| n.rotation.reopen(action));
-        }
-    }
-
-    /// Whether an action is a twist of a part's.
-    pub(super) fn is_twist(&self, job: Job) -> bool {
-        self.twists.offered.contains(&(self.nodes[job.node].part, job.action))
-    }
-
-    /// What is known of a new state of a part under rotations: nothing.
-    pub(super) fn unturned(&self, part: usize) -> Blockage {
-        let mut blockage = Blockage::open(self.common_rotations);
-        for action in self.common_rotations..self.rotations.len() {
-            blockage.add_withheld();
-            if self.twists.offered.contains(&(part, action)) {
-                blockage.reopen(action);
-            }
-        }
-        blockage
+        let of_all = self.twists.of_all;
+        let without: Vec<bool> = (0..self.known.len()).map(|part| !self.directions.has_own(part)).collect();
+        self.offer_own(
+            phase,
+            open,
+            |part| of_all || without[part],
+            |problem, part, others| {
+                let scene = &problem.scene;
+                let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
+                let (twist, touched) =
+                    NullTwist::of(scene, part, &pose, others, reach, &problem.termination)?;
+                Ok((twist.iter().flat_map(along).collect(), touched))
+            },
+        )
     }
 
     /// Lets all parts be asked for their twists; true if they were not before.
     pub(super) fn ask_for_all_twists(&mut self) -> bool {
-        let asks = self.guided && self.disassembly.problem.actions == ActionSet::Extended;
-        asks && !std::mem::replace(&mut self.twists.of_all, true)
+        self.follows_twists() && !std::mem::replace(&mut self.twists.of_all, true)
+    }
+
+    fn follows_twists(&self) -> bool {
+        self.guided && self.disassembly.problem.actions == ActionSet::Extended
     }
 }
 

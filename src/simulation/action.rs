@@ -104,6 +104,16 @@ impl Action {
         }
     }
 
+    /// Whether it is of the same kind as another, with force and torque within an angle, given by its cos, of the
+    /// other's.
+    #[must_use]
+    pub fn is_like(&self, other: &Self, cos: f64) -> bool {
+        let alike = |a: Vector3<f64>, b: Vector3<f64>| a == b || a.dot(&b) > cos;
+        std::mem::discriminant(self) == std::mem::discriminant(other)
+            && alike(self.force(), other.force())
+            && alike(self.torque(), other.torque())
+    }
+
     /// Whether the part may turn.
     #[must_use]
     pub fn turns(self) -> bool {
@@ -139,6 +149,19 @@ mod tests {
         let slanted = Axis::along(Unit::new_normalize(Vector3::new(0.6, 0.0, -0.8)));
         assert_eq!(Action::Screw(slanted, true, false).to_string(), "+[0.60,0.00,-0.80]-r[0.60,0.00,-0.80]");
         assert_eq!(Action::Drag(slanted, false).force(), Vector3::new(-0.6, 0.0, 0.8));
+    }
+
+    #[test]
+    fn likeness_is_of_kind_and_senses_however_the_axis_is_told() {
+        let [axis, back] = [1.0, -1.0].map(|s| Axis(Unit::new_normalize(Vector3::new(0.6, 0.01, -0.8) * s)));
+        let near = Axis(Unit::new_normalize(Vector3::new(0.6, 0.0, -0.8)));
+        let screw = Action::Screw(axis, true, false);
+        assert!(screw.is_like(&Action::Screw(back, false, true), 0.9999));
+        assert!(screw.is_like(&Action::Screw(near, true, false), 0.9999));
+        assert!(!screw.is_like(&Action::Screw(near, true, false), 0.999_99), "half a degree");
+        assert!(!screw.is_like(&Action::Screw(axis, true, true), 0.9));
+        assert!(!Action::Push(axis, true).is_like(&Action::Drag(axis, true), 0.9), "a drag may turn");
+        assert!(Action::Push(axis, true).is_like(&Action::Push(back, false), 0.9));
     }
 
     #[test]

@@ -7,6 +7,8 @@
 //! follows `projection` (the nearest twist that contact allows). The paper's own
 //! simulation stands beside it: [`PenaltyEngine`], with forces and time steps, on the fields alone.
 //! So does [`straight_sweep`], which tells of a part that leaves along a line without simulating.
+//! What a part lies against tells ways out beside the axes: the planes that it touches (`touching`), and the twist
+//! that its contacts hardly resist (`null_twists`).
 //! Everything here is in the planning frame and knows nothing of search.
 
 mod action;

@@ -8,9 +8,9 @@
 //! rest of the part looks like.
 
 use faer::Mat;
-use nalgebra::{Matrix3, Matrix3x2, Matrix6, Point3, Unit, Vector3, Vector6};
+use nalgebra::{Matrix3x2, Matrix6, Point3, Unit, Vector3, Vector6};
 
-use crate::geometry::{Bounds, Feature, Pose};
+use crate::geometry::{Feature, Pose};
 use crate::termination::{Interrupt, Poll, Termination};
 
 use super::{Body, Scene, Touching};
@@ -98,15 +98,10 @@ impl NullTwist {
             }
             2 => {
                 let turns = Matrix3x2::from_columns(&[vector(4, 3), vector(5, 3)]);
-                let common: Matrix3<f64> = turns * turns.transpose();
-                let eigen = common.symmetric_eigen();
-                let order = {
-                    let mut order = [0, 1, 2];
-                    order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
-                    order
-                };
-                let [most, next] = [order[0], order[1]].map(|i| eigen.eigenvalues[i].max(0.0).sqrt());
-                let axis = Unit::new_normalize(eigen.eigenvectors.column(order[0]).into_owned());
+                // The directions about which both turn, the largest share first.
+                let svd = turns.svd(true, false);
+                let (axis, [most, next]) = (svd.u?.column(0).into_owned(), svd.singular_values.into());
+                let axis = Unit::new_normalize(axis);
                 (most > TURNS && next < TURNS * most).then_some(Self { axis, rise: None })
             }
             _ => None,
@@ -124,14 +119,8 @@ fn contacts_of(
 ) {
     let to_measured = stands.inverse() * at;
     let near = measured.shape.bounds().grown(within);
-    let points: Vec<Point3<f64>> = asked
-        .shape
-        .samples()
-        .points()
-        .iter()
-        .map(|p| to_measured * p)
-        .filter(|p| Bounds::contains(&near, p))
-        .collect();
+    let points: Vec<Point3<f64>> =
+        asked.shape.samples().points().iter().map(|p| to_measured * p).filter(|p| near.contains(p)).collect();
     let surface = &measured.shape.surface;
     for p in points.iter().step_by(points.len().div_ceil(MOST_POINTS).max(1)) {
         if poll.is_over() {
@@ -173,6 +162,22 @@ mod tests {
             let found = twist.rise.unwrap() * std::f64::consts::TAU;
             // Facets on a grid lean all the same way against the flank, and tell a false rise.
             assert!((found / pitch - 1.0).abs() < 0.3, "{found} of {pitch}");
+        }
+    }
+
+    #[test]
+    fn the_sense_of_a_fine_thread_is_told_of_either_hand() {
+        let mirrored = |mut mesh: SourceMesh| {
+            mesh.vertices.iter_mut().for_each(|v| v[0] = -v[0]);
+            mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+            mesh
+        };
+        for pitch in [0.3, 0.4, 0.5] {
+            assert!(left(thread(2.0, pitch)).unwrap().rise.unwrap() > 0.0, "{pitch}");
+            assert!(
+                left(thread(2.0, pitch).map(mirrored)).unwrap().rise.unwrap() < 0.0,
+                "{pitch}, left-handed"
+            );
         }
     }
 

@@ -17,6 +17,9 @@ const TRIED: usize = 3;
 /// … and so many of those that held a piece last: the next one lies beside that, mostly.
 const RECENT: usize = 4;
 
+/// Of no more vertices each is asked about at once.
+const FEW: usize = 64;
+
 /// Where a piece passes: a ball that holds the hull.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Swept {
@@ -205,9 +208,11 @@ pub(super) fn furthest(points: impl IntoIterator<Item = Point3<f64>>, region: &F
 
 /// The same for the images of all vertices of a node, of which most lie in balls that the region holds.
 pub(super) fn furthest_of(tree: &PatchTree, index: u32, leg: &Leg, region: &FreeRegion, most: f64) -> Fit {
+    if tree.vertices(index).len() <= FEW {
+        return furthest(leg.images(tree.vertices(index)), region, most);
+    }
     // Who is beyond is so with one of these, mostly.
-    let extremes = || tree.extremes(index).flat_map(|p| leg.maps.iter().map(|m| m.apply(p)));
-    let mut far = furthest(extremes(), region, most)?;
+    let mut far = furthest(leg.images(tree.extremes(index)), region, most)?;
     for map in &leg.maps {
         let mut stack = vec![index];
         while let Some(node) = stack.pop() {
@@ -241,14 +246,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::fixtures::{ball, surface, tube};
+    use crate::fixtures::{ball, surface, tube, vector};
     use crate::geometry::Pose;
     use crate::plan::course::{Course, Interval, View};
     use crate::termination::Poll;
-
-    fn vector(size: f64) -> impl Strategy<Value = Vector3<f64>> {
-        prop::array::uniform3(-size..size).prop_map(Vector3::from)
-    }
 
     proptest! {
         #[test]
@@ -265,7 +266,7 @@ mod tests {
             let centre = Point3::from(centre);
             let Ok(region) = standing.free_region(&centre, radius, wanted) else { return Ok(()) };
             for node in [0, 1] {
-                let images = tree.vertices(node).iter().flat_map(|p| leg.maps.iter().map(|m| m.apply(p)));
+                let images = leg.images(tree.vertices(node));
                 let (all, by_tree) = (furthest(images, &region, most), furthest_of(&tree, node, &leg, &region, most));
                 prop_assert_eq!(all.map(|(far, _)| far), by_tree.map(|(far, _)| far));
                 prop_assert!(tree.vertices(node).len() > 100);

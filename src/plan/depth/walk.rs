@@ -13,8 +13,6 @@ use super::{Found, Precision, Question};
 
 /// Hulls of more corners are not asked about as such.
 const MOST_CORNERS: usize = 64;
-/// Of no more vertices each is asked about at once.
-const FEW: usize = 64;
 /// For no more corners than this regions are grown.
 const MOST_WANTED: usize = 1024;
 /// What faces along its way, but for so little, has no side to it.
@@ -151,28 +149,21 @@ impl<'a> Search<'a> {
             in_time = leg.along.is_none() && swept.radius - ball > 2.0 * patch.radius;
             self.wanted.clear();
             self.facing = Vector3::zeros();
-            self.wanted.extend(tree.extremes(index).flat_map(|p| leg.maps.iter().map(move |m| m.apply(p))));
+            self.wanted.extend(leg.images(tree.extremes(index)));
             let points = tree.vertices(index);
             self.hull.clear();
             if points.len() * leg.maps.len() <= MOST_CORNERS {
-                self.hull.extend(points.iter().flat_map(|p| leg.maps.iter().map(move |m| m.apply(p))));
+                self.hull.extend(leg.images(points));
             }
             let fits = |region: &FreeRegion, most: f64| {
                 if centres.iter().all(|c| region.holds_ball(c, ball)) {
                     return Some((0.0, swept.centre));
                 }
-                if points.len() <= FEW {
-                    return furthest(
-                        points.iter().flat_map(|p| leg.maps.iter().map(|m| m.apply(p))),
-                        region,
-                        most,
-                    );
-                }
                 furthest_of(tree, index, &leg, region, most)
             };
             let corners = || {
                 let few = if points.len() * leg.maps.len() <= MOST_WANTED { points } else { &[] };
-                few.iter().flat_map(|p| leg.maps.iter().map(|m| m.apply(p))).collect()
+                leg.images(few).collect()
             };
             if self.is_settled(&swept, leg.slack, &mut hint, fits, corners) {
                 self.done += share;
