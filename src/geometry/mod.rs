@@ -70,7 +70,7 @@ pub use pose::{Pose, Waypoint, interpolate, pose_from_waypoint, waypoint_from_po
 pub use random::Uniform;
 pub use revision::Revision;
 pub use rim::{Rim, RimEdge, WINDING_DOUBT};
-pub use samples::{Node as SampleNode, SampleTree, Spacing};
+pub use samples::{Ball, Look, Node as SampleNode, SampleTree, Spacing};
 pub use screw::Screw;
 pub use shape::Shape;
 pub use source::{SourceAssembly, SourceMesh, SourcePart};

@@ -6,6 +6,7 @@
 //! samples that enter by less than half the spacing.
 
 use std::collections::HashSet;
+use std::ops::Range;
 
 use nalgebra::Point3;
 
@@ -35,6 +36,24 @@ pub struct Node {
     right: u32,
     /// Index of the node after this subtree.
     after: u32,
+}
+
+/// Some samples: those in a sphere of the tree, or a single one.
+#[derive(Debug, Clone, Copy)]
+pub struct Ball<'a> {
+    /// Centre of the sphere that holds them.
+    pub centre: &'a Point3<f64>,
+    /// Its radius.
+    pub radius: f64,
+    /// Of a single sample, its index among [`SampleTree::points`].
+    pub sample: Option<usize>,
+}
+
+/// A node or a sample, by its index.
+#[derive(Debug, Clone, Copy)]
+enum Held {
+    Node(usize),
+    Sample(usize),
 }
 
 /// Where on its surface a sample lies.
@@ -134,7 +153,59 @@ impl SampleTree {
     }
 }
 
+/// What becomes of samples over some moments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Look<T> {
+    /// They are left out.
+    Out,
+    /// They are looked at in the earlier and in the later half of the moments, with what is known.
+    Halve(T),
+    /// They are looked at one by one; of a single sample at a single moment, that is all.
+    In(T),
+}
+
 impl SampleTree {
+    /// Walks the tree over some moments of a motion at once. `look` gets a sphere, the moments, and what was learnt
+    /// about what holds both; a single sample is a sphere without a radius, and comes with its index.
+    /// Of no single moment it may ask for halves.
+    pub fn walk_through<T: Copy>(
+        &self,
+        moments: Range<usize>,
+        root: T,
+        mut look: impl FnMut(Ball<'_>, &Range<usize>, T) -> Look<T>,
+    ) {
+        let mut stack = Vec::with_capacity(64);
+        if !self.nodes.is_empty() && !moments.is_empty() {
+            stack.push((Held::Node(0), moments, root));
+        }
+        while let Some((held, moments, known)) = stack.pop() {
+            let ball = match held {
+                Held::Node(i) => {
+                    Ball { centre: &self.nodes[i].centre, radius: self.nodes[i].radius, sample: None }
+                }
+                Held::Sample(i) => Ball { centre: &self.points[i], radius: 0.0, sample: Some(i) },
+            };
+            match (look(ball, &moments, known), held) {
+                (Look::Out, _) | (Look::In(_), Held::Sample(_)) => {}
+                (Look::Halve(known), _) => {
+                    let middle = moments.start.midpoint(moments.end);
+                    stack.push((held, middle..moments.end, known));
+                    stack.push((held, moments.start..middle, known));
+                }
+                (Look::In(known), Held::Node(i)) => {
+                    let node = &self.nodes[i];
+                    if node.right == 0 {
+                        let samples = (node.start as usize..node.end as usize).rev();
+                        stack.extend(samples.map(|s| (Held::Sample(s), moments.clone(), known)));
+                    } else {
+                        stack.push((Held::Node(node.right as usize), moments.clone(), known));
+                        stack.push((Held::Node(i + 1), moments, known));
+                    }
+                }
+            }
+        }
+    }
+
     /// Whether any sample passes a test, of the nodes that are entered.
     #[must_use]
     pub fn any(&self, enter: impl Fn(&Node) -> bool, test: impl Fn(&Point3<f64>) -> bool) -> bool {

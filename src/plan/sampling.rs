@@ -10,12 +10,13 @@
 //! [`depth`](super::depth) has no such misses, but looks at every facet that passes every other: on
 //! a thread of ten turns, millions.
 
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use crate::geometry::{Bounds, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
+use crate::geometry::{Ball, Bounds, Look, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
 use crate::termination::{Interrupt, Poll, Termination};
 
 use super::passing::Passing;
@@ -27,6 +28,8 @@ const DENSITY: f64 = 0.004;
 const SAMPLES_POLL: u32 = 1;
 /// A path that turns further than this (radians) is a screw.
 const FAR: f64 = 4.0;
+/// So many poses are looked at together at first.
+const AT_ONCE: usize = 32;
 
 /// Whether a path turns so far that it may be a screw of many turns.
 pub(super) fn turns_far(path: &[Pose]) -> bool {
@@ -45,14 +48,6 @@ pub(super) struct Samples {
 struct Sampled {
     shape: Arc<Shape>,
     shares: OnceLock<[SampleTree; SHARES]>,
-}
-
-/// A moment of a path: which samples are looked at there, and of these which count.
-struct Moment<'a> {
-    pose: &'a Pose,
-    turn: Turn,
-    /// Deeper than this beyond what is granted, a sample helps in refining a motion.
-    deep: f64,
 }
 
 impl Samples {
@@ -93,48 +88,119 @@ impl Samples {
         termination: &Termination,
     ) -> Result<Vec<Entry>, Interrupt> {
         let poses = dense(passing, stretch);
-        let found = poses
+        let back: Vec<Pose> = poses.iter().map(Pose::inverse).collect();
+        let [moving, standing] = passing.surfaces();
+        let [part, other] = passing.parts.map(|part| self.of(part));
+        let sides = [
+            Side { samples: part, to_measured: &poses, measured: standing, granted: passing.granted },
+            Side { samples: other, to_measured: &back, measured: moving, granted: passing.granted },
+        ];
+        let mut asked: Vec<Asked> = Vec::new();
+        for (side, share) in (0..sides.len()).flat_map(|side| (0..SHARES).map(move |share| (side, share))) {
+            let takes = |i: &usize| Turn::of(*i, poses.len()).takes(share);
+            let moments: Vec<usize> = (0..poses.len()).filter(takes).collect();
+            let stretches = moments.chunks(AT_ONCE).map(<[usize]>::to_vec);
+            asked.extend(stretches.map(|moments| Asked { side, share, moments }));
+        }
+        let found = asked
             .par_iter()
-            .enumerate()
-            .map(|(i, pose)| {
+            .map(|asked| {
                 termination.check()?;
-                let moment = Moment { pose, turn: Turn::of(i, poses.len()), deep: limit * HELPFUL };
-                let entries = self.entries(passing, &moment, termination);
+                let poll = Poll::every(SAMPLES_POLL, Some(termination));
+                let entered = sides[asked.side].entered(asked, &poll);
                 // What was found of samples that were cut short is not to be believed.
-                termination.check().map(|()| entries)
+                termination.check().map(|()| entered)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
-        Ok(found.into_iter().flatten().collect())
+        let mut entered: Vec<Entered> = found.into_iter().flatten().collect();
+        entered.sort_unstable_by_key(|e| (e.moment, e.side, e.share, e.sample));
+        let of_side = entered.chunk_by(|a, b| (a.moment, a.side) == (b.moment, b.side));
+        Ok(of_side.flat_map(|entered| worth_telling(entered, limit * HELPFUL, passing, &sides)).collect())
     }
+}
 
-    /// The samples deeper than granted, on either side: the deepest of each side, and all that are deep
-    /// enough to help in refining a motion.
-    fn entries(&self, passing: &Passing<'_>, moment: &Moment<'_>, termination: &Termination) -> Vec<Entry> {
-        let [moving, standing] = passing.surfaces();
-        let (to_standing, mut out) = (moment.pose, Vec::new());
-        if !standing.bounds().meets(&moving.bounds().transformed(to_standing)) {
-            return out;
-        }
-        let poll = Poll::every(SAMPLES_POLL, Some(termination));
-        let Passing { parts: [part, other], granted, .. } = *passing;
-        for (on_moving, sampled, to_measured, measured) in
-            [(true, part, to_standing, standing), (false, other, &to_standing.inverse(), moving)]
-        {
-            let mut worst: Option<Entry> = None;
-            let trees = self.of(sampled).iter().enumerate();
-            for tree in trees.filter(|(i, _)| moment.turn.takes(*i)).map(|(_, t)| t) {
-                entered(tree, to_measured, measured, granted, &poll, |point, over| {
-                    let entry = Entry { other, on_moving, point, over };
-                    if over > moment.deep {
-                        out.push(entry.clone());
-                    }
-                    if worst.as_ref().is_none_or(|w| over > w.over) {
-                        worst = Some(entry);
-                    }
-                });
+/// Of the samples of one side that are too deep at one moment, the deepest and all deeper than `deep`.
+fn worth_telling(entered: &[Entered], deep: f64, passing: &Passing<'_>, sides: &[Side<'_>; 2]) -> Vec<Entry> {
+    let worst = entered.iter().map(|e| e.over).fold(0.0, f64::max);
+    let entry = |e: &Entered| Entry {
+        other: passing.parts[1],
+        on_moving: e.side == 0,
+        point: sides[e.side].samples[e.share].points()[e.sample],
+        over: e.over,
+    };
+    entered.iter().filter(|e| e.over > deep || e.over == worst).map(entry).collect()
+}
+
+/// The samples of one part of a pair, and what they are measured against.
+struct Side<'a> {
+    samples: &'a [SampleTree; SHARES],
+    /// The way from the samples' frame to the measured surface's, at all poses.
+    to_measured: &'a [Pose],
+    measured: &'a Surface,
+    granted: f64,
+}
+
+/// A share of a side's samples, and the poses at which they are measured.
+struct Asked {
+    side: usize,
+    share: usize,
+    moments: Vec<usize>,
+}
+
+/// A sample that is deeper than granted.
+struct Entered {
+    moment: usize,
+    side: usize,
+    share: usize,
+    sample: usize,
+    /// By so much.
+    over: f64,
+}
+
+/// What is known of where samples are: a triangle of the measured surface that was near, a point in its frame, and how
+/// far outside that lies.
+type Known = (u32, Point3<f64>, f64);
+
+impl Side<'_> {
+    /// The samples that are deeper than granted. Those in a sphere are settled for all poses at which it stays out of
+    /// the measured surface: from one pose to the next most travel less than they are off.
+    fn entered(&self, asked: &Asked, poll: &Poll<'_>) -> Vec<Entered> {
+        let Self { measured, granted, .. } = *self;
+        let inner = measured.bounds().grown(-granted);
+        let pose = |moment: usize| &self.to_measured[asked.moments[moment]];
+        let mut out = Vec::new();
+        let look = |ball: Ball<'_>, moments: &Range<usize>, (guess, c, known): Known| {
+            let middle = moments.start.midpoint(moments.end);
+            let at = pose(middle) * ball.centre;
+            let ways = moments.clone().map(|moment| (pose(moment) * ball.centre - at).norm_squared());
+            let travel = ways.fold(0.0, f64::max).sqrt();
+            let (reach, off) = (ball.radius + travel, (at - c).norm());
+            let is_outside = |distance: f64| distance > 0.0 && distance > reach - granted;
+            if poll.is_over() || measured.bounds().distance(&at) > reach || is_outside(known - off) {
+                return Look::Out;
             }
-            out.extend(worst.filter(|w| w.over <= moment.deep));
-        }
+            let split = if travel > ball.radius { Look::Halve } else { Look::In };
+            let is_single = ball.sample.is_some() && travel == 0.0;
+            // Where all of it can certainly not be far enough off, nothing is measured yet.
+            if !is_single && known.abs() + off <= reach - granted {
+                return split((guess, c, known));
+            }
+            if is_single && !inner.contains(&at) {
+                return Look::Out;
+            }
+            let closest = measured.closest_from(&at, guess);
+            let distance = measured.signed(&at, &closest);
+            if is_outside(distance) {
+                return Look::Out;
+            }
+            if let Some(sample) = ball.sample.filter(|_| is_single && -distance > granted) {
+                let (moment, &Asked { side, share, .. }) = (asked.moments[middle], asked);
+                out.push(Entered { moment, side, share, sample, over: -distance - granted });
+            }
+            split((closest.triangle, at, distance))
+        };
+        let root = (0, Point3::origin(), f64::NEG_INFINITY);
+        self.samples[asked.share].walk_through(0..asked.moments.len(), root, look);
         out
     }
 }
@@ -180,48 +246,6 @@ fn spacing(bounds: &Bounds) -> Spacing {
     let size = bounds.extents().max();
     let edge = (size / 63.0).clamp(0.015, 0.07);
     Spacing { edge, blunt_edge: edge * 3.0, face: edge * 4.0 }
-}
-
-/// Visits the samples inside `surface` by more than `granted`: the sample in its own shape's frame,
-/// and its depth beyond.
-fn entered(
-    samples: &SampleTree,
-    to_measured: &Pose,
-    surface: &Surface,
-    granted: f64,
-    poll: &Poll<'_>,
-    mut visit: impl FnMut(Point3<f64>, f64),
-) {
-    let inner = surface.bounds().grown(-granted);
-    // What is known about a sphere: a triangle near it, its centre, how far outside that lies.
-    let root = (0, Point3::origin(), f64::NEG_INFINITY);
-    samples.walk(
-        root,
-        |node, (guess, _, _)| {
-            if poll.is_over() {
-                return None;
-            }
-            let c = to_measured * node.centre;
-            if surface.bounds().distance(&c) > node.radius {
-                return None;
-            }
-            let closest = surface.closest_from(&c, guess);
-            let distance = surface.signed(&c, &closest);
-            let outside = distance > 0.0 && distance > node.radius - granted;
-            (!outside).then_some((closest.triangle, c, distance))
-        },
-        |sample, (guess, centre, distance)| {
-            let p = to_measured * sample;
-            let outside = distance > 0.0 && distance > (p - centre).norm() - granted;
-            if poll.is_over() || outside || !inner.contains(&p) {
-                return;
-            }
-            let over = -surface.signed(&p, &surface.closest_from(&p, guess)) - granted;
-            if over > 0.0 {
-                visit(*sample, over);
-            }
-        },
-    );
 }
 
 /// The poses of a stretch of the way and as many between them as the density asks for.

@@ -128,15 +128,43 @@ impl<'a> Mover<'a> {
 
     /// Gathers the contacts with one standing part.
     pub(super) fn near_pair(&self, other: usize, reach: f64, near: &mut Near) {
+        // One after the other: several motions are simulated at a time, and one that waited for its half
+        // would begin with another motion meanwhile, and come back to its own only at the end of that.
+        let [mine, theirs] = self.sides(other, reach, near.clearance, |mine, theirs| [mine(), theirs()]);
+        near.clearance = mine.clearance.min(theirs.clearance);
+        near.contacts.extend(mine.contacts);
+        near.contacts.extend(theirs.contacts);
+    }
+
+    /// The same for those with this part alone, both surfaces side by side: where fields are asked for the first time,
+    /// the cells that they fill take most of the time.
+    pub(super) fn near_first(&self, other: usize, reach: f64) -> Near {
+        let [mut mine, theirs] = self.sides(other, reach, f64::INFINITY, |mine, theirs| {
+            let (mine, theirs) = rayon::join(mine, theirs);
+            [mine, theirs]
+        });
+        mine.contacts.extend(theirs.contacts);
+        Near { clearance: mine.clearance.min(theirs.clearance), ..mine }
+    }
+
+    /// What is near of the samples of either surface; `both` gathers both.
+    fn sides(
+        &self,
+        other: usize,
+        reach: f64,
+        clearance: f64,
+        both: impl FnOnce(&(dyn Fn() -> Near + Sync), &(dyn Fn() -> Near + Sync)) -> [Near; 2],
+    ) -> [Near; 2] {
+        let none = || Near { contacts: Vec::new(), clearance };
         let standing = &self.scene.bodies[other];
         if !self.fields_are_ready(standing) {
-            return;
+            return [none(), none()];
         }
         let allowance = self.scene.allowances.of(self.part, other);
         let standing_from_moving = standing.planning_from_shape.inverse() * self.pose;
         let moving_from_standing = standing_from_moving.inverse();
         let side = |side, sampled: &Body, measured: &Body, to_measured: &Pose| {
-            let mut found = Near { contacts: Vec::new(), clearance: near.clearance };
+            let mut found = none();
             for tree in [sampled.shape.samples(), &sampled.extra_samples] {
                 let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
                 let measured = Measured { body: measured, to_measured, allowance, reach };
@@ -144,13 +172,9 @@ impl<'a> Mover<'a> {
             }
             found
         };
-        // One after the other: several motions are simulated at a time, and one that waited for its half
-        // would begin with another motion meanwhile, and come back to its own only at the end of that.
-        let mut mine = side(Side::Moving, self.body, standing, &standing_from_moving);
-        let theirs = side(Side::Standing, standing, self.body, &moving_from_standing);
-        near.clearance = mine.clearance.min(theirs.clearance);
-        near.contacts.append(&mut mine.contacts);
-        near.contacts.extend(theirs.contacts);
+        both(&|| side(Side::Moving, self.body, standing, &standing_from_moving), &|| {
+            side(Side::Standing, standing, self.body, &moving_from_standing)
+        })
     }
 
     /// Builds the fields of a pair that are not there yet; not to the end once the condition is true.

@@ -33,6 +33,9 @@ const FIRST_BUDGET: usize = 16;
 /// convex region: of a screw whose head reaches 0.02 into its lid, 20,000 were looked for in vain, in several
 /// times what samples take. (With planes of faces, as verification takes them, it was lost sooner, but lost.)
 pub(super) const MOST_GRANTED: f64 = 1e-3;
+/// A surface in more pieces than this is not looked at to the end: in the play of a thread, which has thousands, each
+/// step ends at the next of them, and samples tell in a fraction of the time.
+const MOST_CELLS: usize = 1000;
 /// So many pieces in succession may get regions that lead nowhere.
 pub(super) const MOST_STALLS: usize = 16;
 /// Shifts that are shorter lead nowhere.
@@ -100,9 +103,10 @@ impl<'a> Cells<'a> {
             return Err(Halt::Lost);
         }
         let gathered = if at == &Vector3::zeros() {
-            starting(scene, (self.part, &self.start), other, true, termination)?
+            starting(scene, (self.part, &self.start), other, (true, MOST_CELLS), termination)?
         } else {
-            Arc::new(gathered(scene, &Place::new(self.part, &self.start, other), at, termination)?)
+            let place = Place::new(self.part, &self.start, other);
+            Arc::new(gathered(scene, &place, at, MOST_CELLS, termination)?)
         };
         let facing = Facing::new(scene, (self.part, &self.start), other, gathered.asks_part, termination)?;
         let cells = gathered.cells.clone().ok_or(Halt::Lost)?;
@@ -230,25 +234,27 @@ impl<'a> Cells<'a> {
     }
 }
 
-/// Cells for all of a pair's surface with the part at a pose; kept if a motion begins there.
+/// Cells for all of a pair's surface with the part at a pose; kept if a motion begins there, else no more than `most`.
 pub(super) fn starting(
     scene: &Scene,
     (part, pose): (usize, &Pose),
     other: usize,
-    is_start: bool,
+    (is_start, most): (bool, usize),
     termination: &Termination,
 ) -> Result<Arc<Gathered>, Interrupt> {
     let place = Place::new(part, pose, other);
     if is_start {
         kept(scene, &place, termination)
     } else {
-        gathered(scene, &place, &Vector3::zeros(), termination).map(Arc::new)
+        gathered(scene, &place, &Vector3::zeros(), most, termination).map(Arc::new)
     }
 }
 
 /// Cells for all of a pair's surface where a motion begins.
 fn kept(scene: &Scene, place: &Place<'_>, termination: &Termination) -> Result<Arc<Gathered>, Interrupt> {
-    scene.kept.gathered(scene, place, |scene, place| gathered(scene, place, &Vector3::zeros(), termination))
+    let find =
+        |scene: &Scene, place: &Place<'_>| gathered(scene, place, &Vector3::zeros(), MOST_CELLS, termination);
+    scene.kept.gathered(scene, place, find)
 }
 
 /// The way of a pair from where a motion begins.
@@ -303,11 +309,12 @@ fn long_way(
     Ok(Way { blocked: Vec::new(), cells: cells.map(Arc::new), found: 0, regions: finder.regions })
 }
 
-/// Cells for all of a pair's surface, at a shift.
+/// Cells for all of a pair's surface, at a shift; none if it takes more than `most`.
 fn gathered(
     scene: &Scene,
     place: &Place<'_>,
     at: &Vector3<f64>,
+    most: usize,
     termination: &Termination,
 ) -> Result<Gathered, Interrupt> {
     let &Place { part, start, other, .. } = place;
@@ -320,7 +327,8 @@ fn gathered(
     let mut finders: Vec<Option<Finder<'_>>> = asked.iter().map(|_| None).collect();
     // The one inside the other, or the plainer one, needs fewer pieces: which, shows in trying.
     let mut budget = if asked.len() > 1 { FIRST_BUDGET } else { MOST_REGIONS };
-    while budget <= MOST_REGIONS {
+    let mut is_told = true;
+    while is_told && budget <= MOST_REGIONS {
         for (i, &asks_part) in asked.iter().enumerate() {
             let finder = match &mut finders[i] {
                 Some(finder) => finder,
@@ -329,10 +337,12 @@ fn gathered(
                     none.insert(Finder::of_all(sides[i].get_or_init(|| side), held, termination))
                 }
             };
-            let found = finder.gather(at, budget);
+            let found = finder.gather(at, budget, most);
+            is_told &= finder.cells.len() <= most;
             let cells = if found == Ok(true) { std::mem::take(&mut finder.cells) } else { Vec::new() };
             let regions = finders.iter().flatten().map(|finder| finder.regions).sum();
             match found {
+                Ok(true) if cells.len() > most => {}
                 Ok(true) => return Ok(Gathered { asks_part, cells: Some(Arc::new(cells)), regions }),
                 Ok(false) => {}
                 Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
@@ -341,7 +351,8 @@ fn gathered(
         }
         budget *= 2;
     }
-    Ok(Gathered { asks_part: true, cells: None, regions: MOST_REGIONS })
+    let regions = finders.iter().flatten().map(|finder| finder.regions).sum();
+    Ok(Gathered { asks_part: true, cells: None, regions })
 }
 
 /// What became of making way.

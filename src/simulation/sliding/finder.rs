@@ -113,13 +113,13 @@ impl<'a> Finder<'a> {
     }
 
     /// Goes on to find cells for [all](Self::of_all) pieces at a shift, always the same one, as free around it as can
-    /// be, with no more than so many regions in all. Whether that was enough.
-    pub(super) fn gather(&mut self, at: &Vector3<f64>, budget: usize) -> Result<bool, Halt> {
+    /// be, with no more than so many regions in all and not many more cells than `most`. Whether that was enough.
+    pub(super) fn gather(&mut self, at: &Vector3<f64>, budget: usize, most: usize) -> Result<bool, Halt> {
         let wish = Wish { at: *at, along: Vector3::zeros() };
         self.budget = budget;
         while let Some(next) = self.waiting.pop() {
             self.termination.check()?;
-            if self.regions >= self.budget {
+            if self.regions >= self.budget || self.cells.len() > most {
                 self.waiting.push(next);
                 return Ok(false);
             }
@@ -410,7 +410,7 @@ mod tests {
             let mut finder = Finder::of_all(&facing, HELD_AT_FIRST, &termination);
             let mut told = Vec::new();
             for budget in [1, 5, 16, 64, 4096] {
-                let ended = finder.gather(&Vector3::zeros(), budget);
+                let ended = finder.gather(&Vector3::zeros(), budget, usize::MAX);
                 told.push(format!("{ended:?} {} {:?}", finder.regions, finder.cells));
                 if ended != Ok(false) {
                     break;

@@ -42,15 +42,15 @@ pub fn pair_blocks(
     }
     let start = Mover::new(scene, part, *pose).until(termination);
     let Some(first) = actions.first() else { return Ok(Vec::new()) };
-    let reach = Drive::new(scene, part, pose, *first).step();
+    let reach = Drive::new(scene, part, pose, *first).reach();
     let within = |reach: f64, mover: &Mover<'_>| {
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
         mover.near_pair(other, reach, &mut near);
         near
     };
-    let near = within(reach, &start);
+    let near = start.near_first(other, reach);
     termination.check()?;
-    if near.contacts.is_empty() {
+    if near.contacts.is_empty() && near.clearance > least {
         return Ok(vec![false; actions.len()]);
     }
     // Whether a step can be made is told by what enters at its end alone; what is merely near there

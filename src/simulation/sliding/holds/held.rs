@@ -86,7 +86,7 @@ impl<'a> Held<'a> {
         if scene.allowances.of(part, other) > MOST_GRANTED {
             return None;
         }
-        let gathered = starting(scene, (part, pose), other, is_start, termination).ok()?;
+        let gathered = starting(scene, (part, pose), other, (is_start, MOST_PIECES), termination).ok()?;
         let cells = gathered.cells.as_ref().filter(|cells| cells.len() <= MOST_PIECES)?;
         let facing = Facing::new(scene, (part, pose), other, gathered.asks_part, termination).ok()?;
         let mut placed = Placed::default();
