@@ -103,10 +103,10 @@ impl Kind {
         match self {
             Self::Source | Self::Shape | Self::Hull | Self::Field => 1,
             Self::Healed | Self::Touching | Self::Swept => 2,
-            Self::Blocking => 4,
-            Self::Overlap | Self::Witness | Self::Motion => 7,
-            Self::Verdict => 8,
-            Self::Answer | Self::Plan => 9,
+            Self::Blocking => 5,
+            Self::Overlap | Self::Witness | Self::Motion => 8,
+            Self::Verdict => 9,
+            Self::Answer | Self::Plan => 10,
         }
     }
 

@@ -474,6 +474,35 @@ mod tests {
     }
 
     #[test]
+    fn a_walk_through_time_looks_at_each_sample_at_each_moment_that_is_not_left_out() {
+        let samples = SampleTree::new(&surface(l_shape()), &SPACING);
+        let (n, times) = (samples.points().len(), 11);
+        // Something that passes along x leaves a wake: which samples it is near, and when.
+        let is_near = |p: &Point3<f64>, time: usize, off: f64| (p.x - 0.2 * time as f64).abs() <= 0.15 + off;
+        let expected: Vec<(usize, usize)> = (0..n)
+            .flat_map(|i| (0..times).map(move |time| (i, time)))
+            .filter(|&(i, time)| is_near(&samples.points()[i], time, 0.0))
+            .collect();
+        let (mut seen, mut looks) = (Vec::new(), 0);
+        samples.walk_through(0..times, (), |ball, moments, ()| {
+            looks += 1;
+            assert!(ball.sample.is_none_or(|i| samples.points()[i] == *ball.centre));
+            if !moments.clone().any(|time| is_near(ball.centre, time, ball.radius)) {
+                return Look::Out;
+            }
+            if moments.len() > 1 && ball.radius < 0.2 * moments.len() as f64 {
+                return Look::Halve(());
+            }
+            seen.extend(ball.sample.map(|i| (i, moments.start)));
+            Look::In(())
+        });
+        seen.sort_unstable();
+        assert_eq!(seen, expected);
+        assert!(!seen.is_empty() && looks < n * times, "{looks} of {}", n * times);
+        samples.walk_through(0..0, (), |_, _, ()| panic!("there is no moment"));
+    }
+
+    #[test]
     fn the_order_of_points_does_not_shape_the_tree() {
         let points: Vec<_> = crate::fixtures::spread([0.0; 3], [1.0; 3], 40).collect();
         let mut reversed = points.clone();

@@ -258,7 +258,10 @@ impl<'a> View<'a> {
             }
             leg.slack = leg.slack.max(slack);
         }
-        leg.maps.push(self.map(last, (start + shift).coords));
+        // What stands still has one.
+        if a != b {
+            leg.maps.push(self.map(last, (start + shift).coords));
+        }
     }
 
     /// The map for a part turned by `rotation` (or what stands for it) with its centre at `at`.

@@ -9,7 +9,8 @@
 //! of it here and to another there, is bounded by the triangles about it
 //! ([`Surface::hull_depth`]). Other pieces are split, in space or in time, whichever is longer; but on a line
 //! in space first, down to triangles: the prism that one of them passes is convex, however long.
-//! Pieces of the smallest size are measured; their size is added.
+//! Pieces of the smallest size are measured; their size is added. Of a long piece only what is within the box of
+//! the other surface is asked about: a region need not hold what is outside by far ([`slab`]).
 //!
 //! Where threads with granted overlap cross each other, and in sight of holes, this may take too long: a
 //! count ends it, or that hardly anything was settled by then ([`Found::open`]).
@@ -20,6 +21,7 @@
 //! inside, and only small pieces are settled, by their corners.
 
 mod settle;
+mod slab;
 mod walk;
 
 use nalgebra::Point3;

@@ -9,6 +9,7 @@ use crate::termination::{Interrupt, Termination};
 
 use super::super::course::{Interval, Leg, View};
 use super::settle::{Place, Region, Swept, furthest, furthest_of, swept};
+use super::slab::cut;
 use super::{Found, Precision, Question};
 
 /// Hulls of more corners are not asked about as such.
@@ -19,6 +20,12 @@ const MOST_WANTED: usize = 1024;
 const ACROSS: f64 = 0.5;
 /// Pieces that might be too deep are split until they are so much smaller than others.
 const DOUBT: f64 = 4.0;
+
+/// Corners of what a triangle passes on a straight way.
+const OF_STRAIGHT_WAY: usize = 6;
+/// What is no further beyond a box than this, in the planning frame, is left: of what only just enters, a sliver would
+/// find regions with planes that are askew to it.
+const BESIDE: f64 = 4e-3;
 
 /// A piece has signs that depend on all edges of holes: so many of them take as long as all else.
 const EDGES_AT_ONCE: usize = 32;
@@ -206,9 +213,12 @@ impl<'a> Search<'a> {
                     self.done += piece.share;
                     continue;
                 }
-                let swept = swept(&points, leg.slack);
-                self.wanted.clone_from(&points);
-                self.hull.clone_from(&points);
+                let cut = self.cut(&points, leg.slack);
+                let seen = cut.as_deref().unwrap_or(&points);
+                let within = swept(seen, leg.slack);
+                self.wanted.clear();
+                self.wanted.extend_from_slice(seen);
+                self.hull.clone_from(&self.wanted);
                 let outward = area_normal(&corners[0], &corners[1], &corners[2]);
                 self.facing = leg.end.rotation * -outward.try_normalize(0.0).unwrap_or_default();
                 if let Some(along) = leg.along {
@@ -216,9 +226,9 @@ impl<'a> Search<'a> {
                     let across = self.facing - along * self.facing.dot(&along);
                     self.facing = across.try_normalize(ACROSS).unwrap_or(self.facing);
                 }
-                let fits = |region: &FreeRegion, most: f64| furthest(points.iter().copied(), region, most);
-                if self.is_settled(&swept, leg.slack, &mut hint, fits, Vec::new)
-                    || self.is_measured(&piece, &leg, &swept, hint.triangle)
+                let fits = |region: &FreeRegion, most: f64| furthest(seen.iter().copied(), region, most);
+                if self.is_settled(&within, leg.slack, &mut hint, fits, Vec::new)
+                    || self.is_measured(&piece, &leg, &swept(&points, leg.slack), hint.triangle)
                 {
                     self.done += piece.share;
                     continue;
@@ -249,6 +259,15 @@ impl<'a> Search<'a> {
             }
         }
         Ok(())
+    }
+
+    /// What of a hull may be in the measured surface, if that is little of it: what is beyond its box is outside,
+    /// unless it has holes. Of a way with bends there are too many lines to be cut.
+    fn cut(&self, points: &[Point3<f64>], slack: f64) -> Option<Vec<Point3<f64>>> {
+        if self.has_rim || points.len() > OF_STRAIGHT_WAY {
+            return None;
+        }
+        cut(points, &self.asked.measured.bounds().grown(slack + BESIDE))
     }
 
     /// Whether the box of the measured surface lies beside a hull, given by balls.
