@@ -36,6 +36,7 @@ mod random;
 mod ray;
 mod revision;
 mod rim;
+mod sample_tree;
 mod samples;
 mod screw;
 mod shape;
@@ -70,7 +71,8 @@ pub use pose::{Pose, Waypoint, interpolate, pose_from_waypoint, waypoint_from_po
 pub use random::Uniform;
 pub use revision::Revision;
 pub use rim::{Rim, RimEdge, WINDING_DOUBT};
-pub use samples::{Ball, Look, Node as SampleNode, SampleTree, Spacing};
+pub use sample_tree::{Ball, Look, Node as SampleNode, SampleTree};
+pub use samples::Spacing;
 pub use screw::Screw;
 pub use shape::Shape;
 pub use source::{SourceAssembly, SourceMesh, SourcePart};
