@@ -104,9 +104,10 @@ impl Kind {
             Self::Source | Self::Shape | Self::Hull | Self::Field => 1,
             Self::Healed | Self::Touching | Self::Swept => 2,
             Self::Blocking => 5,
-            Self::Overlap | Self::Witness | Self::Motion => 8,
-            Self::Verdict => 9,
-            Self::Answer | Self::Plan => 10,
+            Self::Witness | Self::Motion => 8,
+            Self::Overlap => 9,
+            Self::Verdict => 10,
+            Self::Answer | Self::Plan => 11,
         }
     }
 

@@ -218,7 +218,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{ball, l_shape, surface};
 
-    const SPACING: Spacing = Spacing { edge: 0.1, blunt_edge: 0.3, face: 0.4 };
+    const SPACING: Spacing = Spacing { vertex: Some(0.1), edge: 0.1, blunt_edge: 0.3, face: 0.4 };
 
     #[test]
     fn a_walk_visits_every_sample_within_its_spheres() {

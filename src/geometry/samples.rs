@@ -14,6 +14,8 @@ use super::surface::{NO_TRIANGLE, Surface};
 /// How densely a surface is sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spacing {
+    /// Between vertices at blunt edges; without one, every vertex of the surface is a sample.
+    pub vertex: Option<f64>,
     /// Along convex edges.
     pub edge: f64,
     /// Along convex edges so blunt that a straight chord is close to the surface.
@@ -46,7 +48,6 @@ pub(super) fn sited(surface: &Surface, spacing: &Spacing) -> Vec<Sited> {
     out
 }
 
-/// Samples of one surface.
 /// Sharp vertices closer than this, in units of the planning frame, are one sample.
 const THINNEST: f64 = 0.005;
 /// cos of the dihedral deviation below which an edge counts as blunt (about 20 degrees).
@@ -90,9 +91,11 @@ pub(super) fn convex_edges(surface: &Surface) -> impl Iterator<Item = (u32, u8)>
 
 /// The vertices at convex edges. On finely tessellated surfaces they stand much closer than any
 /// contact needs: blunt ones are thinned to the edge spacing, sharp ones only where they nearly
-/// coincide (the crest of a thread is narrow). All of
-/// them are still measured when the path is verified with a closer spacing.
+/// coincide (the crest of a thread is narrow). Without a spacing none is left out.
 fn sample_vertices(surface: &Surface, spacing: &Spacing) -> Vec<Sited> {
+    let Some(blunt) = spacing.vertex else {
+        return (0..).zip(surface.vertices()).map(|(v, p)| (*p, Site::Vertex(v))).collect();
+    };
     let mut bends = vec![Bend::Inward; surface.vertices().len()];
     for (i, t) in surface.triangles().iter().enumerate() {
         for e in 0..3u8 {
@@ -104,7 +107,7 @@ fn sample_vertices(surface: &Surface, spacing: &Spacing) -> Vec<Sited> {
     }
     let mut taken = HashSet::new();
     let mut out = Vec::new();
-    for (cell, wanted) in [(THINNEST, Bend::Sharp), (spacing.edge, Bend::Blunt)] {
+    for (cell, wanted) in [(THINNEST, Bend::Sharp), (blunt, Bend::Blunt)] {
         for (v, (p, _)) in
             (0..).zip(surface.vertices().iter().zip(&bends)).filter(|(_, (_, b))| **b == wanted)
         {
@@ -164,7 +167,7 @@ mod tests {
     use crate::fixtures::{ball, cuboid, l_shape, moved, open_box, surface};
     use crate::geometry::{Pose, SampleTree};
 
-    const SPACING: Spacing = Spacing { edge: 0.1, blunt_edge: 0.3, face: 0.4 };
+    const SPACING: Spacing = Spacing { vertex: Some(0.1), edge: 0.1, blunt_edge: 0.3, face: 0.4 };
 
     /// The largest gap between samples along a segment, its ends counted as places to reach.
     fn widest_gap(samples: &SampleTree, a: Point3<f64>, b: Point3<f64>) -> f64 {

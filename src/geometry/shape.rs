@@ -181,7 +181,7 @@ impl Shape {
 fn spacing(bounds: &Bounds) -> Spacing {
     let size = bounds.extents().max();
     let edge = (size / 40.0).clamp(0.02, 0.1);
-    Spacing { edge, blunt_edge: edge * 3.0, face: edge * 4.0 }
+    Spacing { vertex: Some(edge), edge, blunt_edge: edge * 3.0, face: edge * 4.0 }
 }
 
 #[cfg(test)]

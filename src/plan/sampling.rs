@@ -241,11 +241,12 @@ fn dealt(surface: &Surface) -> [SampleTree; SHARES] {
     std::array::from_fn(|i| SampleTree::over(all.points().iter().skip(i).step_by(SHARES).copied().collect()))
 }
 
-/// Denser than the engine's samples, and not a multiple of their spacing.
+/// Denser than the engine's samples, and not a multiple of their spacing. Every vertex is one: the crest of a small
+/// rounded thread is told by vertices at blunt edges, closer together than any spacing.
 fn spacing(bounds: &Bounds) -> Spacing {
     let size = bounds.extents().max();
     let edge = (size / 63.0).clamp(0.015, 0.07);
-    Spacing { edge, blunt_edge: edge * 3.0, face: edge * 4.0 }
+    Spacing { vertex: None, edge, blunt_edge: edge * 3.0, face: edge * 4.0 }
 }
 
 /// The poses of a stretch of the way and as many between them as the density asks for.
@@ -266,10 +267,27 @@ fn dense(passing: &Passing<'_>, path: &[Pose]) -> Vec<Pose> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::HashSet;
+
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::fixtures::{block_on_plate, scene};
+    use crate::fixtures::{ball, block_on_plate, scene, surface};
+
+    fn bits(p: &Point3<f64>) -> [u64; 3] {
+        p.coords.map(f64::to_bits).into()
+    }
+
+    #[test]
+    fn every_vertex_is_checked_however_blunt_and_close_to_others() {
+        let surface = surface(ball(6));
+        let samples = dealt(&surface);
+        let taken: HashSet<_> = samples.iter().flat_map(|s| s.points().iter().map(bits)).collect();
+        let close = spacing(surface.bounds()).edge;
+        let [a, b, _] = surface.corners(0);
+        assert!((b - a).norm() < close, "vertices that would be thinned");
+        assert!(surface.vertices().iter().all(|v| taken.contains(&bits(v))));
+    }
 
     #[test]
     fn checked_poses_are_dense_and_keep_the_waypoints() {
