@@ -1,10 +1,11 @@
 //! Verification by samples, for what bounds do not settle.
 //!
 //! At poses so dense that no vertex of the moving part travels further than [`DENSITY`] of the
-//! longest side between two of them, samples of both surfaces (denser ones than the engine's)
-//! are measured exactly against the other's triangles through a bounding-volume hierarchy. Known
-//! miss: features that enter only between two samples or two poses. On long paths the poses take
-//! turns in checking a half or a quarter of the samples each, so that a sample is still checked
+//! longest side between two of them, samples of both surfaces are measured exactly against the other's
+//! triangles through a bounding-volume hierarchy: all vertices, points of convex edges and of faces, closer
+//! together than the engine's. Of a path that passes these, edges are looked at again by points four times
+//! as close. Known miss: features that enter only between two samples or two poses. On long paths the poses
+//! take turns in checking a half or a quarter of the samples each, so that a sample is still checked
 //! every other or every fourth pose.
 //!
 //! [`depth`](super::depth) has no such misses, but looks at every facet that passes every other: on
@@ -47,13 +48,24 @@ pub(super) struct Samples {
 #[derive(Debug)]
 struct Sampled {
     shape: Arc<Shape>,
-    shares: OnceLock<[SampleTree; SHARES]>,
+    shares: [OnceLock<[SampleTree; SHARES]>; Closeness::ALL.len()],
+}
+
+/// How closely samples stand. Most paths that are refused are so by the few.
+#[derive(Debug, Clone, Copy)]
+enum Closeness {
+    Sparse,
+    Dense,
+}
+
+impl Closeness {
+    const ALL: [Self; 2] = [Self::Sparse, Self::Dense];
 }
 
 impl Samples {
     /// For parts of which `shape_of` gives each one's shape.
     pub(super) fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>) -> Self {
-        let sampled = |s: &Arc<Shape>| Arc::new(Sampled { shape: Arc::clone(s), shares: OnceLock::new() });
+        let sampled = |s: &Arc<Shape>| Arc::new(Sampled { shape: Arc::clone(s), shares: Default::default() });
         let shapes: Vec<_> = shapes.iter().map(sampled).collect();
         Self { parts: Arc::new(shape_of.into_iter().map(|s| Arc::clone(&shapes[s])).collect()) }
     }
@@ -63,7 +75,7 @@ impl Samples {
         let mut shapes: Vec<&Arc<Sampled>> = self.parts.iter().collect();
         shapes.sort_unstable_by_key(|s| Arc::as_ptr(s));
         shapes.dedup_by_key(|s| Arc::as_ptr(s));
-        let taken = shapes.iter().filter_map(|s| s.shares.get()).flatten();
+        let taken = shapes.iter().flat_map(|s| &s.shares).filter_map(OnceLock::get).flatten();
         taken.map(SampleTree::memory).sum()
     }
 
@@ -72,9 +84,9 @@ impl Samples {
         Self { parts: Arc::new([&self.parts[..], &self.parts[..]].concat()) }
     }
 
-    fn of(&self, part: usize) -> &[SampleTree; SHARES] {
+    fn of(&self, part: usize, closeness: Closeness) -> &[SampleTree; SHARES] {
         let Sampled { shape, shares } = &*self.parts[part];
-        shares.get_or_init(|| dealt(&shape.surface))
+        shares[closeness as usize].get_or_init(|| dealt(&shape.surface, closeness))
     }
 
     /// The samples that get deeper than granted along a stretch of a way past a part: of every pose and side
@@ -88,11 +100,27 @@ impl Samples {
         termination: &Termination,
     ) -> Result<Vec<Entry>, Interrupt> {
         let poses = dense(passing, stretch);
+        let mut entries = self.entries_at(passing, &poses, limit, Closeness::Sparse, termination)?;
+        if entries.iter().all(|e| e.over <= limit) {
+            entries.extend(self.entries_at(passing, &poses, limit, Closeness::Dense, termination)?);
+        }
+        Ok(entries)
+    }
+
+    /// The same at some poses, by samples that stand so closely.
+    fn entries_at(
+        &self,
+        passing: &Passing<'_>,
+        poses: &[Pose],
+        limit: f64,
+        closeness: Closeness,
+        termination: &Termination,
+    ) -> Result<Vec<Entry>, Interrupt> {
         let back: Vec<Pose> = poses.iter().map(Pose::inverse).collect();
         let [moving, standing] = passing.surfaces();
-        let [part, other] = passing.parts.map(|part| self.of(part));
+        let [part, other] = passing.parts.map(|part| self.of(part, closeness));
         let sides = [
-            Side { samples: part, to_measured: &poses, measured: standing, granted: passing.granted },
+            Side { samples: part, to_measured: poses, measured: standing, granted: passing.granted },
             Side { samples: other, to_measured: &back, measured: moving, granted: passing.granted },
         ];
         let mut asked: Vec<Asked> = Vec::new();
@@ -236,17 +264,20 @@ impl Turn {
 }
 
 /// The samples of a surface, dealt out in the order of a tree, so that each share covers all of it.
-fn dealt(surface: &Surface) -> [SampleTree; SHARES] {
-    let all = SampleTree::new(surface, &spacing(surface.bounds()));
+fn dealt(surface: &Surface, closeness: Closeness) -> [SampleTree; SHARES] {
+    let all = SampleTree::new(surface, &spacing(surface.bounds(), closeness));
     std::array::from_fn(|i| SampleTree::over(all.points().iter().skip(i).step_by(SHARES).copied().collect()))
 }
 
 /// Denser than the engine's samples, and not a multiple of their spacing. Every vertex is one: the crest of a small
 /// rounded thread is told by vertices at blunt edges, closer together than any spacing.
-fn spacing(bounds: &Bounds) -> Spacing {
-    let size = bounds.extents().max();
-    let edge = (size / 63.0).clamp(0.015, 0.07);
-    Spacing { vertex: None, edge, blunt_edge: edge * 3.0, face: edge * 4.0 }
+fn spacing(bounds: &Bounds, closeness: Closeness) -> Spacing {
+    let face = (bounds.extents().max() / 16.0).clamp(0.06, 0.28);
+    match closeness {
+        Closeness::Sparse => Spacing { vertex: None, edge: face / 4.0, blunt_edge: face, face },
+        // Crests of overlapping threads are deepest between vertices.
+        Closeness::Dense => Spacing { vertex: None, edge: face / 16.0, blunt_edge: face / 16.0, face },
+    }
 }
 
 /// The poses of a stretch of the way and as many between them as the density asks for.
@@ -268,11 +299,13 @@ fn dense(passing: &Passing<'_>, path: &[Pose]) -> Vec<Pose> {
 #[cfg(test)]
 mod tests {
     use std::collections::HashSet;
+    use std::f64::consts::{FRAC_PI_2, PI};
 
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::fixtures::{ball, block_on_plate, scene, surface};
+    use crate::fixtures::{ball, block_on_plate, moved, rod, scene, surface};
+    use crate::simulation::Pair;
 
     fn bits(p: &Point3<f64>) -> [u64; 3] {
         p.coords.map(f64::to_bits).into()
@@ -281,12 +314,40 @@ mod tests {
     #[test]
     fn every_vertex_is_checked_however_blunt_and_close_to_others() {
         let surface = surface(ball(6));
-        let samples = dealt(&surface);
+        let samples = dealt(&surface, Closeness::Sparse);
         let taken: HashSet<_> = samples.iter().flat_map(|s| s.points().iter().map(bits)).collect();
-        let close = spacing(surface.bounds()).edge;
+        let close = spacing(surface.bounds(), Closeness::Sparse).edge;
         let [a, b, _] = surface.corners(0);
         assert!((b - a).norm() < close, "vertices that would be thinned");
         assert!(surface.vertices().iter().all(|v| taken.contains(&bits(v))));
+    }
+
+    #[test]
+    fn edges_that_cross_between_sparse_samples_are_seen_by_dense_ones() {
+        // Two rods of three sides, the edge of one across the edge of the other.
+        let long = [-4.0, 4.0];
+        let closest =
+            spacing(&Bounds::of(&surface(rod(1.0, long, 3)).vertices().to_vec()), Closeness::Sparse);
+        let apart = 8.0 / (8.0 / closest.edge).ceil();
+        // Half-way between samples of both.
+        let at = -4.0 + 60.5 * apart;
+        let lying = Pose::rotation(Vector3::x() * FRAC_PI_2) * Pose::rotation(Vector3::z() * PI);
+        let across = |depth: f64| {
+            let place = Pose::translation(2.0 - depth, at, at) * lying;
+            scene([rod(1.0, long, 3), moved(rod(1.0, long, 3), &place)])
+        };
+        let t = Termination::default();
+        let entries = |depth: f64| {
+            let (scene, _) = across(depth);
+            let passing = Passing::standing(&scene, &Pair::turned(&scene, 1, 0));
+            let assembled: Vec<Arc<Shape>> = scene.bodies.iter().map(|b| Arc::clone(&b.shape)).collect();
+            let samples = Samples::new(&assembled, vec![0, 1]);
+            let sparse = samples.entries_at(&passing, &passing.path, 1.0, Closeness::Sparse, &t).unwrap();
+            (sparse.len(), samples.entries_along(&passing, &passing.path, 1.0, &t).unwrap().len())
+        };
+        assert_eq!(entries(-0.01), (0, 0));
+        let (sparse, all) = entries(0.02);
+        assert!(sparse == 0 && all > 0, "{sparse} of {all}");
     }
 
     #[test]
