@@ -104,8 +104,7 @@ impl Kind {
             Self::Source | Self::Shape | Self::Hull | Self::Field => 1,
             Self::Healed | Self::Touching | Self::Swept => 2,
             Self::Blocking => 5,
-            Self::Witness | Self::Motion => 8,
-            Self::Overlap => 9,
+            Self::Overlap | Self::Witness | Self::Motion => 9,
             Self::Verdict => 10,
             Self::Answer | Self::Plan => 11,
         }

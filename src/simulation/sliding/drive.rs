@@ -103,8 +103,9 @@ pub(super) struct Drive {
     gyration: f64,
     step: f64,
     turns: bool,
-    /// Whether it is pulled: along what it is pressed to it slides in steps as long as they may be.
-    is_pulled: bool,
+    /// Whether it slides along what it is pressed to in steps as long as they may be. What is pulled and turned
+    /// at once finds its thread by short ones.
+    takes_long_steps: bool,
 }
 
 impl Drive {
@@ -133,7 +134,7 @@ impl Drive {
             gyration,
             step,
             turns: action.turns(),
-            is_pulled: matches!(action, Action::Drag(..)),
+            takes_long_steps: matches!(action, Action::Drag(..) | Action::Turn(..)),
         }
     }
 
@@ -199,7 +200,7 @@ impl Drive {
     /// So much more of what is wanted that the motion, as contacts let it, is as long as a step in contact may be;
     /// none if it nearly is already. Without inertia the same way is gone, in fewer steps.
     fn stretched(&self, mover: &Mover<'_>, known: &Known) -> Option<Vector6<f64>> {
-        if !self.is_pulled || known.rows.is_empty() {
+        if !self.takes_long_steps || known.rows.is_empty() {
             return None;
         }
         let target = self.wanted.component_mul(&self.metric);

@@ -1,7 +1,7 @@
 use std::f64::consts::FRAC_PI_3;
 
 use super::*;
-use crate::fixtures::{moved, peg_in_hole, scene};
+use crate::fixtures::{moved, peg_in_hole, rod, scene, tube};
 use crate::simulation::sliding::SlidingEngine;
 use crate::simulation::{Axis, Surroundings, TransitionFunction};
 use crate::termination::Termination;
@@ -21,6 +21,25 @@ fn a_peg_that_is_pulled_askew_slides_in_steps_as_long_as_those_straight_on() {
     assert!((within as f64) < 1.3 * straight && within > 8, "{within} steps, {straight} straight on");
     let verdict = verifier.check(&scene, &scene.allowances, &[0], 1, &motion.path, &t).unwrap();
     assert!(verdict.depth < 2e-3, "{}", verdict.depth);
+}
+
+#[test]
+fn a_pin_that_is_turned_askew_takes_hardly_shorter_steps_than_one_turned_straight_on() {
+    let pin = || [tube(1.1, 2.0, [-1.0, 1.0], 24), rod(1.0, [-3.0, 3.0], 24)];
+    let poses_per_turn = |tilt: f64| {
+        let pose = Pose::new(Vector3::zeros(), Vector3::x() * tilt);
+        let (scene, _) = scene(pin().map(|mesh| moved(mesh, &pose)));
+        let around = Surroundings::new(&scene, vec![0]);
+        let (start, t) = (scene.bodies[1].planning_from_shape, Termination::default());
+        let action = Action::Turn(Axis::Z, true);
+        let motion = SlidingEngine.simulate(&scene, &around, 1, &start, action, &t).unwrap();
+        let turned: f64 = motion.path.windows(2).map(|w| w[0].rotation.angle_to(&w[1].rotation)).sum();
+        assert!(turned > std::f64::consts::TAU, "{turned}");
+        motion.path.len() as f64 / turned
+    };
+    let (straight, askew) = (poses_per_turn(0.0), poses_per_turn(FRAC_PI_3));
+    // At the speed about the pin's axis that the torque has by itself it takes five times as many.
+    assert!(askew < 2.5 * straight, "{askew} poses for each radian, {straight} straight on");
 }
 
 #[test]
