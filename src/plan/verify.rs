@@ -39,9 +39,10 @@ const OVERLAP_FINEST: f64 = 1e-4;
 /// Large ones are told more closely than to a tenth, as a share of the limit: what keeps its overlap on its
 /// way is to pass.
 const OVERLAP_MARGIN: f64 = 1.0 / 8.0;
-/// So much effort ([`Found::effort`]) is spent on each surface before the way is left to samples: less than
-/// a second. What is no screw, and sees no holes, has not been seen to need it all.
-const MOST_EFFORT: usize = 5_000_000;
+/// So much effort ([`Found::effort`]) is spent on each surface before the way is left to samples: some seconds,
+/// for samples promise less. What is no screw, and sees no holes, has been seen to need a third (a bayonet that
+/// turns askew to all axes).
+const MOST_EFFORT: usize = 20_000_000;
 /// The same where holes are in sight, or threads cross: most stays open, however much is spent.
 pub(super) const MOST_EFFORT_IN_DOUBT: usize = 200_000;
 
