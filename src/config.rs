@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use sbdp_ipc::polling;
 use serde::Deserialize;
 
 use crate::cache::CacheSettings;
@@ -128,6 +129,8 @@ pub struct TimesConfig {
     pub drain_s: f64,
     /// Seconds after which a daemon ends that serves nobody any more.
     pub hang_s: f64,
+    /// Microseconds for which the daemon looks for the next request before it sleeps; 0 for not at all.
+    pub poll_us: u64,
 }
 
 /// What is remembered.
@@ -218,7 +221,21 @@ impl Default for RequestsConfig {
 
 impl Default for TimesConfig {
     fn default() -> Self {
-        Self { tick_s: 1.0, grace_s: 2.0, drain_s: 10.0, hang_s: 30.0 }
+        Self {
+            tick_s: 1.0,
+            grace_s: 2.0,
+            drain_s: 10.0,
+            hang_s: 30.0,
+            poll_us: polling::USUAL.as_micros() as u64,
+        }
+    }
+}
+
+impl TimesConfig {
+    /// For how long the daemon looks for the next request before it sleeps.
+    #[must_use]
+    pub fn poll(&self) -> Duration {
+        Duration::from_micros(self.poll_us)
     }
 }
 
@@ -313,6 +330,7 @@ impl Config {
         within("times.tick_s", self.times.tick_s, 0.05..=60.0, "0.05 to 60")?;
         within("times.grace_s", self.times.grace_s, 0.0..=3600.0, "0 to 3600")?;
         within("times.drain_s", self.times.drain_s, 0.1..=3600.0, "0.1 to 3600")?;
+        within("times.poll_us", self.times.poll_us, 0..=10_000, "0 to 10000")?;
         within("times.hang_s", self.times.hang_s, 1.0..=3600.0, "1 to 3600")?;
         let least = 2.0 * self.times.tick_s;
         within("times.hang_s", self.times.hang_s, least..=f64::MAX, "at least twice `times.tick_s`")

@@ -12,6 +12,7 @@ pub mod geometry;
 pub mod headers;
 pub mod layout;
 pub mod plan;
+pub mod polling;
 pub mod progress;
 pub mod revision;
 pub mod services;

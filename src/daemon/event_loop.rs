@@ -10,6 +10,7 @@ use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::RequestKind;
 use sbdp_ipc::layout::{MAX_CLIENTS, PLAN_ACTIVE_REQUESTS, PLAN_REQUEST};
+use sbdp_ipc::polling::Polling;
 use sbdp_ipc::services::{Active, ServerPort};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
@@ -102,6 +103,7 @@ pub fn run_reloading<P: Planning>(
     );
     let limits = ReceiveLimits::of(config);
     let tick = seconds(config.times.tick_s);
+    let polling = Polling::new(config.times.poll());
     let config = config.clone();
     let next_sweep = Instant::now() + SWEEP;
     let event_loop = EventLoop {
@@ -109,6 +111,7 @@ pub fn run_reloading<P: Planning>(
         desk,
         inbox,
         tick,
+        polling,
         limits,
         config,
         reload,
@@ -184,6 +187,17 @@ impl ReceiveLimits {
     }
 }
 
+/// What was taken of the requests that were there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Received {
+    /// There were none.
+    Nothing,
+    /// All.
+    All,
+    /// As many as are taken at once; there may be more.
+    Some,
+}
+
 struct EventLoop<'l, P> {
     lease: &'l Lease,
     next_sweep: Instant,
@@ -193,6 +207,7 @@ struct EventLoop<'l, P> {
     desk: Desk<ActiveLink, P>,
     inbox: Receiver<Inbound>,
     tick: Duration,
+    polling: Polling,
     limits: ReceiveLimits,
     config: Config,
     reload: Reload,
@@ -204,7 +219,7 @@ impl<P: Planning> EventLoop<'_, P> {
     fn run(mut self) {
         let mut next_tick = Instant::now() + self.tick;
         loop {
-            let more = self.receive_all();
+            let received = self.receive_all();
             self.read_inbox();
             self.desk.settle(Instant::now());
             self.deliver();
@@ -219,8 +234,11 @@ impl<P: Planning> EventLoop<'_, P> {
                 next_tick = Instant::now() + tick;
                 continue;
             }
-            if !more {
-                self.wait(next_tick);
+            match received {
+                Received::Nothing => self.wait(next_tick),
+                // Whoever was answered may ask again at once.
+                Received::All if !self.is_asked_again() => self.wait(next_tick),
+                Received::All | Received::Some => {}
             }
         }
     }
@@ -244,6 +262,12 @@ impl<P: Planning> EventLoop<'_, P> {
         let (connections, clients) = self.ports.clients();
         let shared_memory_free = self.shared_memory.look();
         self.desk.surroundings = Surroundings { connections, clients, shared_memory_free };
+    }
+
+    /// Looks for the next request for a moment.
+    fn is_asked_again(&mut self) -> bool {
+        // A port that is out of order says so when it is asked for the request.
+        self.polling.look(|| self.ports.plan.has_requests().unwrap_or(true))
     }
 
     fn wait(&self, next_tick: Instant) {
@@ -283,6 +307,7 @@ impl<P: Planning> EventLoop<'_, P> {
                 }
                 self.desk.reload(&config);
                 self.tick = seconds(config.times.tick_s);
+                self.polling = Polling::new(config.times.poll());
                 self.limits = ReceiveLimits::of(&config);
                 tracing::info!("the configuration was read again");
             }
@@ -291,14 +316,17 @@ impl<P: Planning> EventLoop<'_, P> {
         self.supervisor.reloading(true);
     }
 
-    /// True if there may be more.
-    fn receive_all(&mut self) -> bool {
-        let mut more = false;
+    fn receive_all(&mut self) -> Received {
+        let mut received = Received::Nothing;
         for geometry in [false, true] {
             let port = if geometry { &self.ports.geometry } else { &self.ports.plan };
             // Those that are here now come before what those ask next who are answered first.
             let taken: Vec<Active> = std::iter::from_fn(|| receive(port)).take(RECEIVE_AT_ONCE).collect();
-            more |= taken.len() == RECEIVE_AT_ONCE;
+            received = received.max(match taken.len() {
+                0 => Received::Nothing,
+                RECEIVE_AT_ONCE => Received::Some,
+                _ => Received::All,
+            });
             for active in taken {
                 let owner = self.ports.owner_of(active.origin().value(), geometry);
                 let refuse = |length| self.desk.refuses_upload(owner, length);
@@ -311,7 +339,7 @@ impl<P: Planning> EventLoop<'_, P> {
                 self.deliver();
             }
         }
-        more
+        received
     }
 
     fn deliver(&mut self) {

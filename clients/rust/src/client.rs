@@ -39,7 +39,7 @@ impl Client {
     /// No daemon runs, it speaks another version, or it serves too many clients.
     pub fn connect_with(options: ConnectOptions) -> Result<Self, ClientError> {
         let runtime_dir = options.runtime_dir.clone().unwrap_or_else(default_runtime_dir);
-        let connection = Connection::open(&runtime_dir)?;
+        let connection = Connection::open(&runtime_dir, options.poll)?;
         Ok(Self {
             options,
             runtime_dir,
@@ -101,7 +101,7 @@ impl Client {
         if known.is_alive() {
             return Ok(known);
         }
-        let found = Arc::new(Connection::open(&self.runtime_dir)?);
+        let found = Arc::new(Connection::open(&self.runtime_dir, self.options.poll)?);
         self.restarts.set(self.restarts.get() + 1);
         *self.connection.borrow_mut() = Arc::clone(&found);
         Ok(found)

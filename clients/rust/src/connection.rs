@@ -3,6 +3,7 @@
 use std::ops::Deref;
 use std::os::fd::OwnedFd;
 use std::path::Path;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use iceoryx2::node::Node;
@@ -16,8 +17,9 @@ use rustix::process::{Pid, PidfdFlags, pidfd_open};
 use sbdp_ipc::Transport;
 use sbdp_ipc::endpoint::Endpoint;
 use sbdp_ipc::layout::{self, WAKE_CLIENT_SERVICE, WAKE_SERVER_SERVICE};
+use sbdp_ipc::polling::Polling;
 use sbdp_ipc::progress::ProgressSample;
-use sbdp_ipc::services::{self, ClientPort, ExchangeService, SetupError};
+use sbdp_ipc::services::{self, ClientPort, ExchangeService, Pending, SetupError};
 
 use crate::error::ClientError;
 
@@ -56,6 +58,7 @@ impl Watched {
 #[derive(Debug)]
 pub(crate) struct Connection {
     daemon: Watched,
+    polling: Mutex<Polling>,
     pub(crate) plan: ClientPort,
     ask: ClientPort,
     geometry: ExchangeService,
@@ -99,17 +102,17 @@ impl Connection {
     ///
     /// # Errors
     /// There is none, it ends meanwhile, it speaks another version, or it serves too many clients.
-    pub(crate) fn open(runtime_dir: &Path) -> Result<Self, ClientError> {
+    pub(crate) fn open(runtime_dir: &Path, poll: Duration) -> Result<Self, ClientError> {
         let endpoint = Endpoint::find(runtime_dir)?;
         let pid = endpoint.pid;
-        Self::to(endpoint.clone()).map_err(|error| {
+        Self::to(endpoint.clone(), poll).map_err(|error| {
             // A daemon that leaves takes its files along, at any moment of this.
             let is_there = Endpoint::find(runtime_dir).is_ok_and(|found| found == endpoint);
             if is_there { error } else { ClientError::DaemonDied { pid } }
         })
     }
 
-    fn to(endpoint: Endpoint) -> Result<Self, ClientError> {
+    fn to(endpoint: Endpoint, poll: Duration) -> Result<Self, ClientError> {
         let mut config = layout::iceoryx2_config(&endpoint.prefix, &endpoint.root)?;
         // The daemon looks after the dead; what a dead one left in a bad state is not to stop a client.
         config.global.node.cleanup_dead_nodes_on_creation = false;
@@ -142,6 +145,7 @@ impl Connection {
                 .create()
                 .map_err(SetupError::at("creating the notifier"))?,
             daemon: Watched::new(endpoint),
+            polling: Mutex::new(Polling::new(poll)),
             _node: node,
         })
     }
@@ -179,6 +183,12 @@ impl Connection {
     pub(crate) fn wake_daemon(&self) {
         // A failed wake-up costs one tick of the daemon, no more.
         let _ = self.notifier.notify();
+    }
+
+    /// Whether the answer to what was asked just now comes within the moment that it is looked for.
+    pub(crate) fn comes_at_once(&self, pending: &Pending) -> bool {
+        // Of two threads that wait, one looks.
+        self.polling.try_lock().is_ok_and(|mut polling| polling.look(|| pending.has_response()))
     }
 
     /// Sleeps until the daemon wakes this client, at most until `until`.

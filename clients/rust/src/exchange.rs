@@ -126,6 +126,9 @@ impl Connection {
             if let Some(answer) = self.try_receive(pending, slept)? {
                 return open(&answer);
             }
+            if !slept && self.comes_at_once(pending) {
+                continue;
+            }
             if Instant::now() >= deadline {
                 return Err(ClientError::Timeout { what, after: timeout });
             }

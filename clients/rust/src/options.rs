@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use sbdp_ipc::clock;
 use sbdp_ipc::plan::{self, MovedPart, PlanRequest, Waypoint};
+use sbdp_ipc::polling;
 
 /// The name of an assembly: the hash of its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -35,6 +36,10 @@ pub struct ConnectOptions {
     /// Zero (the default) reports `busy` at once; [`ClientError::retry_after`](crate::ClientError::retry_after)
     /// then tells when to come again.
     pub busy_wait: Duration,
+    /// How long to look for an answer before going to sleep until the daemon wakes this process: an answer
+    /// from memory comes sooner than a process wakes. Where that is in vain, or others need the processors,
+    /// it is left out by itself ([`sbdp_ipc::polling`]). Zero for never.
+    pub poll: Duration,
 }
 
 impl Default for ConnectOptions {
@@ -45,6 +50,7 @@ impl Default for ConnectOptions {
             upload_timeout: Duration::from_secs(300),
             reconnect: Duration::from_secs(10),
             busy_wait: Duration::ZERO,
+            poll: polling::USUAL,
         }
     }
 }

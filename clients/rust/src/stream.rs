@@ -319,6 +319,9 @@ impl PlanStream<'_> {
                 }
                 continue;
             }
+            if !slept && self.connection.comes_at_once(pending) {
+                continue;
+            }
             self.send_control();
             if let Some(progress) = self.progress() {
                 return Ok(Some(Found::Progress(progress)));

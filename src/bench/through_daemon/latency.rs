@@ -54,13 +54,18 @@ pub struct Latency {
     pub raw_event_rtt_us: Percentiles,
     /// A plan that was made before.
     pub repeat_plan_us: Percentiles,
+    /// Of the former, those that came after the other peer's turn, when processes and processors had slept.
+    pub raw_after_pause_us: Percentiles,
+    /// The same of the latter.
+    pub plan_after_pause_us: Percentiles,
 }
 
 /// Rounds before the measurement.
-const WARM_UP: usize = 50;
+const WARM_UP: usize = ALTERNATION;
 /// So many rounds all clients ask the one peer, then as many the other. Were each to change over by itself,
-/// nearly all would wait at the slower one, and the faster would be measured with hardly any client.
-const ALTERNATION: usize = 25;
+/// nearly all would wait at the slower one, and the faster would be measured with hardly any client. So many
+/// that what it takes to wake a peer from its pause, which is told apart, is not the 99th percentile of both.
+const ALTERNATION: usize = 250;
 
 /// Measures, with raw and planned rounds in turn.
 ///
@@ -86,8 +91,10 @@ pub fn latency(request: &LatencyRequest) -> Result<Latency, BenchError> {
         rounds: request.rounds,
         payload_bytes: chunks.iter().sum(),
         first_plan_us,
-        raw_event_rtt_us: percentiles(raw),
-        repeat_plan_us: percentiles(repeated),
+        raw_after_pause_us: percentiles(first_of_each_turn(&raw)),
+        plan_after_pause_us: percentiles(first_of_each_turn(&repeated)),
+        raw_event_rtt_us: percentiles(raw.concat()),
+        repeat_plan_us: percentiles(repeated.concat()),
     })
 }
 
@@ -100,8 +107,12 @@ fn raw_peer(program: &Path, chunks: &[usize]) -> Result<Server, BenchError> {
     Server::start(place, command)
 }
 
-/// Times of all rounds: with the raw peer, and of plans.
-type Times = (Vec<Duration>, Vec<Duration>);
+/// Times of the rounds of each turn of each client: with the raw peer, and of plans.
+type Times = (Vec<Vec<Duration>>, Vec<Vec<Duration>>);
+
+fn first_of_each_turn(turns: &[Vec<Duration>]) -> Vec<Duration> {
+    turns.iter().filter_map(|turn| turn.first().copied()).collect()
+}
 
 /// All clients at the same time; the times of all rounds.
 fn rounds(
@@ -124,7 +135,7 @@ fn rounds(
                 barrier.wait();
                 let took = asking.as_ref().map(|asking| (0..count).map(|_| ask(asking)).collect());
                 match took {
-                    Ok(Ok(took)) if measured => times.extend::<Vec<_>>(took),
+                    Ok(Ok(took)) if measured => times.push(took),
                     Ok(Err(error)) => asking = Err(error),
                     _ => {}
                 }

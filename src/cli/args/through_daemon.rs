@@ -14,7 +14,7 @@ pub(in crate::cli) struct BenchLatency {
     #[arg(long, value_name = "N", default_value = "1")]
     pub(in crate::cli) clients: NonZeroUsize,
     /// How often each asks
-    #[arg(long, value_name = "N", default_value = "2000")]
+    #[arg(long, value_name = "N", default_value = "5000")]
     pub(in crate::cli) rounds: NonZeroUsize,
     /// Write the figures there as JSON
     #[arg(long, value_name = "FILE")]

@@ -26,9 +26,10 @@ pub(super) fn latency(arguments: &BenchLatency) -> Result<ExitCode, CliError> {
     };
     let latency = bench::latency(&request)?;
     let (raw, repeated) = (latency.raw_event_rtt_us, latency.repeat_plan_us);
+    let (raw_woken, woken) = (latency.raw_after_pause_us, latency.plan_after_pause_us);
     print(&format!(
         "{} clients, {} rounds each, {} bytes an answer; planned first in {:.1} ms\n\
-         {:<22}{:>10}{:>10}\n{}{}{:<22}{:>10.2}{:>10.2}\n",
+         {:<22}{:>10}{:>10}\n{}{}{:<22}{:>10.2}{:>10.2}\nafter a pause\n{}{}",
         latency.clients,
         latency.rounds,
         latency.payload_bytes,
@@ -41,6 +42,8 @@ pub(super) fn latency(arguments: &BenchLatency) -> Result<ExitCode, CliError> {
         "ratio",
         repeated.p50 / raw.p50,
         repeated.p99 / raw.p99,
+        row("raw round trip", 22, raw_woken),
+        row("the same plan again", 22, woken),
     ))?;
     written(arguments.json.as_deref(), &latency)
 }
