@@ -12,7 +12,39 @@ use crate::termination::{Interrupt, Termination};
 /// Of the parts that one passed along a line, so many are remembered.
 const MOST_PAST: usize = 256;
 
+/// Why a sweep is not told from memory.
+enum Untold {
+    /// Something on the way is not remembered.
+    Unknown,
+    Interrupted(Interrupt),
+}
+
+impl From<Interrupt> for Untold {
+    fn from(interrupt: Interrupt) -> Self {
+        Self::Interrupted(interrupt)
+    }
+}
+
 impl Recall {
+    /// What a straight sweep tells, if all that is on its way is remembered: in less time than it takes to have
+    /// another thread tell it.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn known_sweep(
+        &self,
+        question: &SweepQuestion<'_>,
+        termination: &Termination,
+    ) -> Result<Option<Option<Sweep>>, Interrupt> {
+        let Some(known) = self.get::<SweptRecord>(&key(question)) else { return Ok(None) };
+        let enters = |crossing: &Crossing<'_>| known.of(&place(question, crossing)).ok_or(Untold::Unknown);
+        match straight_sweep_past(question, termination, enters) {
+            Ok(swept) => Ok(Some(swept)),
+            Err(Untold::Unknown) => Ok(None),
+            Err(Untold::Interrupted(interrupt)) => Err(interrupt),
+        }
+    }
+
     /// What a straight sweep tells ([`straight_sweep`](crate::simulation::straight_sweep)), with what is
     /// remembered of the parts on the way; what is not is looked at, and remembered then.
     ///
@@ -30,8 +62,8 @@ impl Recall {
         let enters = |crossing: &Crossing<'_>| {
             let known = known.get_or_insert_with(|| self.get(&key).unwrap_or_default());
             let place = place(question, crossing);
-            if let Some((_, entered)) = known.past.iter().find(|(of, _)| *of == place) {
-                return Ok(*entered);
+            if let Some(entered) = known.of(&place) {
+                return Ok(entered);
             }
             let entered = crossing.enters()?;
             known.past.push((place, entered));
@@ -45,6 +77,12 @@ impl Recall {
             self.put(key, &known);
         }
         swept
+    }
+}
+
+impl SweptRecord {
+    fn of(&self, place: &[u8; 16]) -> Option<bool> {
+        self.past.iter().find(|(of, _)| of == place).map(|(_, entered)| *entered)
     }
 }
 
@@ -96,8 +134,11 @@ mod tests {
         let (start, direction) = (&scene.bodies[1].planning_from_shape, &Vector3::z());
         let question = SweepQuestion { scene: &scene, surroundings: &around, part: 1, start, direction };
         let never = Termination::default();
+        let known = recall.known_sweep(&question, &never).unwrap();
         let warm = recall.sweep(&question, &never).unwrap();
         assert_eq!(warm, straight_sweep(&question, &never).unwrap());
+        assert!(known.is_none_or(|known| known == warm));
+        assert_eq!(recall.known_sweep(&question, &never).unwrap().as_ref(), Some(&warm), "now it is known");
         (warm, recall.get::<SweptRecord>(&key(&question)).map_or(0, |known| known.past.len()))
     }
 

@@ -248,15 +248,23 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         let started = Instant::now();
         let around = self.all_surroundings(runs)?;
         let Problem { scene, termination, recall, .. } = &self.problem;
-        let swept = |(run, around): (&Run, &Arc<Surroundings>)| {
-            let Run { part, start, action } = run;
-            let direction = &action.force();
-            let question = SweepQuestion { scene, surroundings: around, part: *part, start, direction };
-            recall.sweep(&question, termination)
-        };
-        let mut results: Vec<_> =
-            runs.par_iter().zip(&around).map(swept).collect::<Result<_, Interrupt>>()?;
         let clear = |s: &Option<Sweep>| matches!(s, Some(Sweep::Clear { .. }));
+        let forces: Vec<_> = runs.iter().map(|run| run.action.force()).collect();
+        let question = |i: usize| {
+            let Run { part, start, .. } = &runs[i];
+            SweepQuestion { scene, surroundings: &around[i], part: *part, start, direction: &forces[i] }
+        };
+        // What is remembered is told one after the other: to share it with other threads would take longer.
+        let mut results = Vec::new();
+        while results.len() < runs.len() && !results.last().is_some_and(clear) {
+            let Some(known) = recall.known_sweep(&question(results.len()), termination)? else { break };
+            results.push(known);
+        }
+        if !results.last().is_some_and(clear) {
+            let swept = |i: usize| recall.sweep(&question(i), termination);
+            let new = (results.len()..runs.len()).into_par_iter().map(swept);
+            results.extend(new.collect::<Result<Vec<_>, Interrupt>>()?);
+        }
         if let Some(first) = results.iter().position(clear) {
             results.truncate(first + 1);
         }

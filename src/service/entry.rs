@@ -18,6 +18,7 @@ use crate::termination::{Interrupt, Termination};
 
 use super::ServiceError;
 use super::answer::{self, Answer, Found, Frame, Times};
+use super::pools::Pools;
 use super::prepared::{self, Prepared};
 use super::putting_back::PuttingBack;
 use super::relay::{Quiet, Relay, Silent};
@@ -62,6 +63,7 @@ impl Entry {
         termination: &Termination,
         sink: &mut dyn PlanSink,
         recall: &Recall,
+        pools: &Pools,
     ) -> Result<Plan, ServiceError> {
         let started = Instant::now();
         let mut fixed = request.fixed.clone();
@@ -91,10 +93,8 @@ impl Entry {
             }
             known => known,
         };
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(request.threads).build();
-        let pool = pool.map_err(|e| ServiceError::Threads(e.to_string()))?;
         let time = Time { started, termination };
-        Ok(pool.install(|| self.made(frame, &question, known, time, sink, recall)))
+        pools.on(request.threads, || self.made(frame, &question, known, time, sink, recall))
     }
 
     /// A plan of which at most the search is known.

@@ -10,6 +10,7 @@
 
 mod answer;
 mod entry;
+mod pools;
 mod prepared;
 mod putting_back;
 mod relay;
@@ -31,6 +32,7 @@ use crate::simulation::{Action, Axis, HullStore, JoinedHulls, PenaltyParameters}
 use crate::termination::Termination;
 
 use entry::{Entry, engine_of};
+use pools::Pools;
 use store::Store;
 pub use store::StoreStatistics;
 
@@ -87,6 +89,7 @@ pub enum ServiceError {
 pub struct Service {
     store: Store,
     cache: Arc<Cache>,
+    pools: Pools,
 }
 
 /// Bytes of records that a service remembers which was given no cache.
@@ -113,7 +116,7 @@ impl Service {
     pub fn new(cache: Arc<Cache>, budget: usize) -> Self {
         let hulls = JoinedHulls::stored(Arc::clone(&cache) as Arc<dyn HullStore>);
         let fields = Arc::downgrade(&cache) as Weak<dyn FieldStore>;
-        Self { store: Store::new(budget, hulls, fields), cache }
+        Self { store: Store::new(budget, hulls, fields), cache, pools: Pools::default() }
     }
 
     /// How many assemblies it knows, and what they take.
@@ -254,7 +257,7 @@ impl Service {
         let entry = self.entry(id, termination)?;
         check_parts(&named_parts(request), entry.assembly.parts.len())?;
         let recall = if request.no_cache { Recall::default() } else { Recall::of(Arc::clone(&self.cache)) };
-        let plan = entry.plan(request, termination, sink, &recall);
+        let plan = entry.plan(request, termination, sink, &recall, &self.pools);
         self.settle(id, &entry);
         plan
     }

@@ -71,11 +71,11 @@ pub fn straight_sweep(
 ///
 /// # Errors
 /// The termination condition became true, or what `enters` returns.
-pub fn straight_sweep_past(
+pub fn straight_sweep_past<E: From<Interrupt>>(
     question: &SweepQuestion<'_>,
     termination: &Termination,
-    mut enters: impl FnMut(&Crossing<'_>) -> Result<bool, Interrupt>,
-) -> Result<Option<Sweep>, Interrupt> {
+    mut enters: impl FnMut(&Crossing<'_>) -> Result<bool, E>,
+) -> Result<Option<Sweep>, E> {
     let SweepQuestion { scene, surroundings, part, start, direction } = *question;
     termination.check()?;
     if let Some(exit) = exit_direction(scene, surroundings, part, start, Some(-direction)) {
