@@ -139,6 +139,8 @@ impl<'a> Mover<'a> {
     /// The same for those with this part alone, both surfaces side by side: where fields are asked for the first time,
     /// the cells that they fill take most of the time.
     pub(super) fn near_first(&self, other: usize, reach: f64) -> Near {
+        let standing = &self.scene.bodies[other];
+        rayon::join(|| self.field_is_ready(self.body), || self.field_is_ready(standing));
         let [mut mine, theirs] = self.sides(other, reach, f64::INFINITY, |mine, theirs| {
             let (mine, theirs) = rayon::join(mine, theirs);
             [mine, theirs]
@@ -179,8 +181,11 @@ impl<'a> Mover<'a> {
 
     /// Builds the fields of a pair that are not there yet; not to the end once the condition is true.
     fn fields_are_ready(&self, standing: &Body) -> bool {
-        let ready = |body: &Body| self.termination.is_none_or(|t| body.field.prepare_here(t).is_ok());
-        ready(self.body) && ready(standing)
+        self.field_is_ready(self.body) && self.field_is_ready(standing)
+    }
+
+    fn field_is_ready(&self, body: &Body) -> bool {
+        self.termination.is_none_or(|t| body.field.prepare_here(t).is_ok())
     }
 
     /// Whether the fields alone show that a sample of either surface is deeper than granted: deeper

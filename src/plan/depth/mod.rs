@@ -118,8 +118,6 @@ impl Question<'_> {
         most_effort: usize,
         termination: &Termination,
     ) -> Result<Found, Interrupt> {
-        let mut search = Search::new(self, view, most_effort, termination);
-        search.all(interval)?;
-        Ok(search.found)
+        Search::new(self, view, most_effort, termination).all(interval)
     }
 }
