@@ -1,45 +1,69 @@
 //! Values by key in the order of their last use, from which those that nobody uses leave first.
+//!
+//! There may be some hundred thousand small ones, so what an entry takes beside its value counts: entries stand
+//! in one list, linked in the order of use by their places, and the table by key holds nothing but places.
 
 use std::borrow::Borrow;
-use std::collections::{BTreeMap, HashMap};
-use std::hash::Hash;
+use std::hash::{BuildHasher, Hash, RandomState};
 use std::sync::Arc;
+
+use hashbrown::HashTable;
 
 /// Values by key. How much of what they take is too much is for their owner to say.
 #[derive(Debug)]
 pub(crate) struct Lru<K, V: ?Sized> {
-    /// Counts uses.
-    clock: u64,
-    entries: HashMap<K, Entry<V>>,
-    /// By the use that was the last.
-    order: BTreeMap<u64, K>,
+    hasher: RandomState,
+    /// By the hash of the key.
+    places: HashTable<u32>,
+    slots: Vec<Slot<K, V>>,
+    /// Slots without an entry.
+    free: Vec<u32>,
+    oldest: u32,
+    newest: u32,
 }
 
 #[derive(Debug)]
-struct Entry<V: ?Sized> {
-    value: Arc<V>,
-    used: u64,
+struct Slot<K, V: ?Sized> {
+    entry: Option<(K, Arc<V>)>,
+    /// The one that was used before this one, and the one that was used after it.
+    older: u32,
+    newer: u32,
+}
+
+/// No slot.
+const NONE: u32 = u32::MAX;
+
+/// What a place takes in a table that has just grown: its own bytes and one to find it by, 7 of 16 in use.
+const IN_TABLE: usize = (size_of::<u32>() + 1) * 16 / 7;
+
+/// Bytes that the allocator takes, about, for so many behind an [`Arc`]: with its two counts, in steps of 16.
+pub(crate) const fn shared(bytes: usize) -> usize {
+    (bytes + 2 * size_of::<usize>()).next_multiple_of(16)
 }
 
 impl<K, V: ?Sized> Default for Lru<K, V> {
     fn default() -> Self {
-        Self { clock: 0, entries: HashMap::new(), order: BTreeMap::new() }
+        let (hasher, places) = (RandomState::new(), HashTable::new());
+        Self { hasher, places, slots: Vec::new(), free: Vec::new(), oldest: NONE, newest: NONE }
     }
 }
 
 impl<K: Clone + Eq + Hash, V: ?Sized> Lru<K, V> {
+    /// Bytes that an entry takes beside its value, about, and beside what its key points at. Those that the list
+    /// has in reserve were never touched, and take none.
+    pub(crate) const OVERHEAD: usize = size_of::<Slot<K, V>>() + IN_TABLE;
+
     /// The value of a key, which is used by this.
     pub(crate) fn get<Q: Eq + Hash + ?Sized>(&mut self, key: &Q) -> Option<Arc<V>>
     where
         K: Borrow<Q>,
     {
-        let entry = self.entries.get_mut(key)?;
-        self.clock += 1;
-        if let Some(key) = self.order.remove(&entry.used) {
-            self.order.insert(self.clock, key);
+        let place = self.place(key)?;
+        if place != self.newest {
+            self.unlink(place);
+            self.link_newest(place);
         }
-        entry.used = self.clock;
-        Some(Arc::clone(&entry.value))
+        self.value(place).cloned()
     }
 
     /// The value of a key, which is not used by this.
@@ -47,15 +71,24 @@ impl<K: Clone + Eq + Hash, V: ?Sized> Lru<K, V> {
     where
         K: Borrow<Q>,
     {
-        self.entries.get(key).map(|entry| &entry.value)
+        self.value(self.place(key)?)
     }
 
     /// Keeps a value; the one that it takes the place of.
     pub(crate) fn insert(&mut self, key: K, value: Arc<V>) -> Option<Arc<V>> {
         let before = self.remove(&key);
-        self.clock += 1;
-        self.order.insert(self.clock, key.clone());
-        self.entries.insert(key, Entry { value, used: self.clock });
+        let hash = self.hasher.hash_one(&key);
+        let slot = Slot { entry: Some((key, value)), older: NONE, newer: NONE };
+        let place = if let Some(place) = self.free.pop() {
+            self.slots[place as usize] = slot;
+            place
+        } else {
+            self.slots.push(slot);
+            (self.slots.len() - 1) as u32
+        };
+        self.link_newest(place);
+        let Self { hasher, places, slots, .. } = self;
+        places.insert_unique(hash, place, |&at| hash_at(hasher, slots, at));
         before
     }
 
@@ -63,22 +96,25 @@ impl<K: Clone + Eq + Hash, V: ?Sized> Lru<K, V> {
     where
         K: Borrow<Q>,
     {
-        let entry = self.entries.remove(key)?;
-        self.order.remove(&entry.used);
-        Some(entry.value)
+        let Self { hasher, places, slots, .. } = self;
+        let found = places.find_entry(hasher.hash_one(key), |&at| has_key(slots, at, key)).ok()?;
+        let place = found.remove().0;
+        self.unlink(place);
+        self.free.push(place);
+        self.slots[place as usize].entry.take().map(|(_, value)| value)
     }
 
     /// Lets values go, the least recently used first, for as long as `more` says so when it is given
     /// the last one. What somebody else holds stays.
     pub(crate) fn evict(&mut self, mut more: impl FnMut(K, Arc<V>) -> bool) {
-        let mut from = 0;
-        while let Some((&used, key)) = self.order.range(from..).next() {
-            from = used + 1;
-            let key = key.clone();
-            let in_use = self.entries.get(&key).is_some_and(|e| Arc::strong_count(&e.value) > 1);
-            if in_use {
+        let mut next = self.oldest;
+        while let Some(slot) = self.slots.get(next as usize) {
+            next = slot.newer;
+            let Some((key, value)) = &slot.entry else { continue };
+            if Arc::strong_count(value) > 1 {
                 continue;
             }
+            let key = key.clone();
             let Some(value) = self.remove(&key) else { continue };
             if !more(key, value) {
                 return;
@@ -88,12 +124,54 @@ impl<K: Clone + Eq + Hash, V: ?Sized> Lru<K, V> {
 
     #[cfg(test)]
     pub(crate) fn iter(&self) -> impl Iterator<Item = (&K, &Arc<V>)> {
-        self.entries.iter().map(|(key, entry)| (key, &entry.value))
+        self.slots.iter().filter_map(|slot| slot.entry.as_ref()).map(|(key, value)| (key, value))
     }
 
     pub(crate) fn len(&self) -> usize {
-        self.entries.len()
+        self.places.len()
     }
+
+    fn place<Q: Eq + Hash + ?Sized>(&self, key: &Q) -> Option<u32>
+    where
+        K: Borrow<Q>,
+    {
+        self.places.find(self.hasher.hash_one(key), |&at| has_key(&self.slots, at, key)).copied()
+    }
+
+    fn value(&self, place: u32) -> Option<&Arc<V>> {
+        self.slots[place as usize].entry.as_ref().map(|(_, value)| value)
+    }
+
+    fn unlink(&mut self, place: u32) {
+        let Slot { older, newer, .. } = self.slots[place as usize];
+        match self.slots.get_mut(older as usize) {
+            Some(slot) => slot.newer = newer,
+            None => self.oldest = newer,
+        }
+        match self.slots.get_mut(newer as usize) {
+            Some(slot) => slot.older = older,
+            None => self.newest = older,
+        }
+    }
+
+    fn link_newest(&mut self, place: u32) {
+        let older = std::mem::replace(&mut self.newest, place);
+        match self.slots.get_mut(older as usize) {
+            Some(slot) => slot.newer = place,
+            None => self.oldest = place,
+        }
+        let slot = &mut self.slots[place as usize];
+        (slot.older, slot.newer) = (older, NONE);
+    }
+}
+
+fn has_key<Q: Eq + ?Sized, K: Borrow<Q>, V: ?Sized>(slots: &[Slot<K, V>], place: u32, key: &Q) -> bool {
+    slots[place as usize].entry.as_ref().is_some_and(|(at, _)| at.borrow() == key)
+}
+
+/// Of the key at a place; those in the table have one.
+fn hash_at<K: Hash, V: ?Sized>(hasher: &RandomState, slots: &[Slot<K, V>], place: u32) -> u64 {
+    slots[place as usize].entry.as_ref().map_or(0, |(key, _)| hasher.hash_one(key))
 }
 
 #[cfg(test)]
@@ -123,7 +201,7 @@ mod tests {
         assert_eq!(lru.get(&1).as_deref(), Some(&1));
         assert!(lru.insert(2, Arc::new(9)).is_some_and(|before| *before == 2));
         assert_eq!(evicted(&mut lru, 3), [3, 4, 1]);
-        assert!(lru.peek(&2).is_some() && lru.len() == 1 && lru.order.len() == 1);
+        assert!(lru.peek(&2).is_some() && lru.len() == 1 && lru.iter().count() == 1);
     }
 
     #[test]
@@ -134,5 +212,45 @@ mod tests {
         drop(held);
         assert_eq!(evicted(&mut lru, 9), [1, 2]);
         assert!(lru.iter().next().is_none());
+    }
+
+    #[test]
+    fn what_comes_takes_the_place_of_what_left() {
+        let mut lru = of(&[1, 2, 3]);
+        for key in 4..=250 {
+            assert!(lru.remove(&(key - 2)).is_some() && lru.remove(&(key - 2)).is_none());
+            lru.insert(key, Arc::new(key));
+        }
+        assert_eq!(lru.slots.len(), 3);
+        assert!(lru.peek(&249).is_some() && lru.peek(&248).is_none());
+        assert_eq!(evicted(&mut lru, 9), [1, 249, 250]);
+        assert_eq!((lru.oldest, lru.newest, lru.len()), (NONE, NONE, 0));
+    }
+
+    proptest::proptest! {
+        /// Against a list in order of use.
+        #[test]
+        fn it_holds_what_a_plain_list_would(
+            steps in proptest::collection::vec((0u8..3, 0u8..24), 1..300),
+        ) {
+            let (mut lru, mut model) = (of(&[]), Vec::new());
+            for (step, key) in steps {
+                let known = model.iter().position(|k| *k == key);
+                let found = match step {
+                    0 => lru.get(&key),
+                    1 => lru.insert(key, Arc::new(key)),
+                    _ => lru.remove(&key),
+                };
+                proptest::prop_assert_eq!(found.as_deref().copied(), known.map(|at| model[at]));
+                if let Some(at) = known {
+                    model.remove(at);
+                }
+                if step == 1 || step == 0 && known.is_some() {
+                    model.push(key);
+                }
+                proptest::prop_assert_eq!(lru.len(), model.len());
+            }
+            proptest::prop_assert_eq!(evicted(&mut lru, 99), model);
+        }
     }
 }

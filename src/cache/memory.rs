@@ -3,10 +3,7 @@
 use std::sync::Arc;
 
 use super::kind::{Key, Kind};
-use crate::lru::Lru;
-
-/// What an entry takes beside its payload, about.
-const OVERHEAD: usize = 192;
+use crate::lru::{self, Lru};
 
 /// Payloads by key. What somebody still holds is never evicted.
 #[derive(Debug)]
@@ -95,8 +92,13 @@ impl Memory {
     }
 }
 
+/// Most payloads are a few bytes: what is kept beside them is the larger share.
 fn cost(payload: &[u8]) -> usize {
-    payload.len() + OVERHEAD
+    cost_of(payload.len())
+}
+
+const fn cost_of(length: usize) -> usize {
+    Lru::<Key, [u8]>::OVERHEAD + lru::shared(length)
 }
 
 #[cfg(test)]
@@ -115,7 +117,7 @@ mod tests {
 
     #[test]
     fn the_least_recently_used_leave() {
-        let mut memory = Memory::new(3 * (100 + OVERHEAD));
+        let mut memory = Memory::new(3 * cost_of(100));
         for n in 0..3 {
             assert!(memory.put(key(n), payload(100)).is_empty());
         }
@@ -127,7 +129,7 @@ mod tests {
 
     #[test]
     fn what_is_in_use_stays() {
-        let mut memory = Memory::new(2 * (100 + OVERHEAD));
+        let mut memory = Memory::new(2 * cost_of(100));
         memory.put(key(0), payload(100));
         let held = memory.get(&key(0));
         memory.put(key(1), payload(100));
@@ -137,9 +139,9 @@ mod tests {
 
     #[test]
     fn what_is_larger_than_the_budget_is_not_kept() {
-        let mut memory = Memory::new(100 + OVERHEAD);
+        let mut memory = Memory::new(cost_of(100));
         memory.put(key(0), payload(10));
-        assert!(memory.put(key(1), payload(101)).is_empty());
+        assert!(memory.put(key(1), payload(113)).is_empty());
         assert!(memory.get(&key(1)).is_none() && memory.get(&key(0)).is_some());
     }
 
@@ -147,16 +149,16 @@ mod tests {
         /// Against a list in order of use.
         #[test]
         fn it_holds_what_a_plain_list_would(steps in prop::collection::vec((0u8..12, 0usize..400, any::<bool>()), 1..200)) {
-            let budget = 5 * (200 + OVERHEAD);
+            let budget = 5 * cost_of(200);
             let mut memory = Memory::new(budget);
             let mut model: Vec<(Key, usize)> = Vec::new();
             for (n, length, put) in steps {
                 let known = model.iter().position(|(k, _)| *k == key(n));
                 if put {
                     known.map(|at| model.remove(at));
-                    let used = |m: &[(Key, usize)]| m.iter().map(|(_, l)| l + OVERHEAD).sum::<usize>();
-                    if length + OVERHEAD <= budget {
-                        while used(&model) + length + OVERHEAD > budget {
+                    let used = |m: &[(Key, usize)]| m.iter().map(|(_, l)| cost_of(*l)).sum::<usize>();
+                    if cost_of(length) <= budget {
+                        while used(&model) + cost_of(length) > budget {
                             model.remove(0);
                         }
                         model.push((key(n), length));

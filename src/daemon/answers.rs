@@ -9,7 +9,7 @@ use super::convert;
 use super::figures::AnswerFigures;
 use super::outbox::steps_messages;
 use super::workers::Planning;
-use crate::lru::Lru;
+use crate::lru::{self, Lru};
 use crate::plan::{Plan, PlanStats, PlanStatus};
 
 /// So many answers of before a restart are there at once …
@@ -37,10 +37,11 @@ impl Answer {
         let PlanStats { simulations, sweeps, states, .. } = plan.stats;
         let stats = PlanStats { simulations, sweeps, states, plan_hit: true, ..PlanStats::default() };
         let summary = convert::summary(plan, &stats);
-        Some(Self {
-            steps: steps_messages(&steps).into_iter().map(Arc::new).collect(),
-            summary: Arc::new(summary),
-        })
+        let mut messages = steps_messages(&steps);
+        messages.push(summary);
+        // They stay, and what they have in reserve with them: as much again, from where it is doubled.
+        messages.iter_mut().for_each(Vec::shrink_to_fit);
+        Self::from_messages(messages)
     }
 
     /// From its messages in order; the last one ends the plan.
@@ -54,8 +55,11 @@ impl Answer {
         self.steps.iter().chain([&self.summary]).map(|message| (**message).clone()).collect()
     }
 
-    fn bytes(&self) -> usize {
-        self.summary.len() + self.steps.iter().map(|message| message.len()).sum::<usize>()
+    /// Bytes in memory, about.
+    fn memory(&self) -> usize {
+        let message = |message: &Arc<Vec<u8>>| lru::shared(size_of::<Vec<u8>>()) + message.capacity();
+        let steps = self.steps.iter().map(|step| size_of_val(step) + message(step));
+        lru::shared(size_of::<Self>()) + message(&self.summary) + steps.sum::<usize>()
     }
 }
 
@@ -123,7 +127,7 @@ impl Answers {
 }
 
 fn cost(question: &[u8], answer: &Answer) -> usize {
-    answer.bytes() + question.len()
+    Lru::<Arc<[u8]>, Answer>::OVERHEAD + lru::shared(question.len()) + answer.memory()
 }
 
 #[cfg(test)]
@@ -136,27 +140,38 @@ mod tests {
 
     #[test]
     fn those_not_asked_for_the_longest_are_forgotten_first() {
-        let mut answers = Answers::new(3 * 101);
+        let one = cost(b"a", &answer(10_000));
+        let mut answers = Answers::new(3 * one);
         for question in [b"a", b"b", b"c"] {
-            answers.insert(question, answer(100));
+            answers.insert(question, answer(10_000));
         }
-        assert_eq!(*answers.get(b"a").unwrap(), answer(100));
-        answers.insert(b"d", answer(100));
+        assert_eq!(*answers.get(b"a").unwrap(), answer(10_000));
+        answers.insert(b"d", answer(10_000));
         let known: Vec<bool> = [b"a", b"b", b"c", b"d"].map(|q| answers.get(q).is_some()).into();
         assert_eq!(known, [true, false, true, true]);
-        answers.insert(b"e", answer(250));
-        assert!(answers.get(b"e").is_some() && answers.bytes == 251 && answers.by_question.len() == 1);
-        answers.insert(b"f", answer(400));
+        answers.insert(b"e", answer(25_000));
+        assert!(answers.get(b"e").is_some() && answers.bytes == one + 15_000);
+        assert_eq!(answers.by_question.len(), 1);
+        answers.insert(b"f", answer(40_000));
         assert!(answers.get(b"f").is_none() && answers.get(b"e").is_some(), "what never fits takes no room");
     }
 
     #[test]
     fn an_answer_given_anew_takes_the_place_of_the_old_one() {
-        let mut answers = Answers::new(1000);
+        let mut answers = Answers::new(1 << 20);
         answers.insert(b"a", answer(100));
         answers.insert(b"a", answer(200));
-        assert_eq!((answers.bytes, answers.by_question.len()), (201, 1));
+        assert_eq!((answers.bytes, answers.by_question.len()), (cost(b"a", &answer(200)), 1));
         assert_eq!(*answers.get(b"a").unwrap(), answer(200));
+    }
+
+    #[test]
+    fn what_an_answer_has_in_reserve_counts() {
+        let mut roomy = Vec::with_capacity(5_000);
+        roomy.push(0);
+        let costs =
+            [vec![0], roomy].map(|message| cost(b"a", &Answer::from_messages(vec![message]).unwrap()));
+        assert!(costs[1] > 4_900 + costs[0], "{costs:?}");
     }
 
     #[test]
