@@ -152,11 +152,12 @@ pub struct CacheConfig {
 /// What of the memory is for what, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MemoryBudget {
-    /// Assemblies, with their distance fields and what else is derived from them.
-    pub assemblies: usize,
-    /// Records: pairs, motions, verified paths, plans.
+    /// All that is remembered. Assemblies, with their distance fields and what else is derived from them, have
+    /// what the others leave.
+    pub all: usize,
+    /// Of these, at most for records: pairs, motions, verified paths, plans.
     pub records: usize,
-    /// Answers, as they were sent.
+    /// Of these, at most for answers, as they were sent.
     pub answers: usize,
 }
 
@@ -246,12 +247,13 @@ impl Default for CacheConfig {
 }
 
 impl CacheConfig {
-    /// Of the memory, five sixteenths are for assemblies, two for records and one for answers. The rest
-    /// is for requests under way, for the pages of the store, and for what the allocator cannot give back.
+    /// Of the memory, half is for what is remembered: at most two sixteenths for records and one for answers,
+    /// what these leave for assemblies, which come back from disk most easily. The rest is for requests under
+    /// way, for the pages of the store, and for what the allocator cannot give back.
     #[must_use]
     pub fn memory(&self) -> MemoryBudget {
         let all = usize::try_from(self.memory_mb.saturating_mul(1 << 20)).unwrap_or(usize::MAX);
-        MemoryBudget { assemblies: all / 16 * 5, records: all / 16 * 2, answers: all / 16 }
+        MemoryBudget { all: all / 2, records: all / 16 * 2, answers: all / 16 }
     }
 
     /// The same for the cache.
@@ -400,8 +402,8 @@ mod tests {
 
     #[test]
     fn the_memory_is_shared_out_with_some_to_spare() {
-        let MemoryBudget { assemblies, records, answers } = CacheConfig::default().memory();
-        assert_eq!([assemblies, records, answers].map(|bytes| bytes >> 20), [80, 32, 16]);
+        let MemoryBudget { all, records, answers } = CacheConfig::default().memory();
+        assert_eq!([all, records, answers].map(|bytes| bytes >> 20), [128, 32, 16]);
     }
 
     #[test]

@@ -87,8 +87,52 @@ fn what_assemblies_are_said_to_take_is_what_they_take() {
         let ratio = said as f64 / real as f64;
         assert!((0.75..1.25).contains(&ratio), "{name}: {said} said, {real} taken");
     }
+    what_records_are_said_to_take_is_what_they_take();
     the_budget_is_kept_whatever_comes();
+    assemblies_leave_what_records_and_answers_take();
     equal_shapes_of_different_assemblies_are_one();
+}
+
+/// Of small ones, nearly all is what they are kept in.
+fn what_records_are_said_to_take_is_what_they_take() {
+    let base = assembly("bolted-bracket-20");
+    let before = taken();
+    let cache = Arc::new(Cache::in_memory(usize::MAX));
+    let service = Service::new(Arc::clone(&cache), 0);
+    for i in 0..60 {
+        plan(&service, &grown(&base, 1.0 + f64::from(i) / 100.0));
+    }
+    drop(service);
+    let said = cache.counters();
+    let entries: u64 = said.kinds.iter().map(|kind| kind.entries).sum();
+    let (real, said) = (taken() - before, said.memory_bytes);
+    let ratio = said as f64 / real as f64;
+    assert!((0.75..1.25).contains(&ratio), "{said} said, {real} taken by {entries} records");
+    assert!(real < 180 * entries as isize, "{real} taken by {entries} records of a few bytes");
+}
+
+fn assemblies_leave_what_records_and_answers_take() {
+    let base = assembly("pin-bolt-cover");
+    let measuring = service(usize::MAX);
+    plan(&measuring, &base);
+    let one = measuring.store_statistics().bytes as usize;
+    let (budget, answers) = (one * 13 / 2, one * 2);
+    let service = Service::new(Arc::new(Cache::in_memory(one)), budget);
+    let held = |service: &Service| {
+        let remembered = service.remembered();
+        let (assemblies, records) = (remembered.assemblies, remembered.records.memory_bytes);
+        (assemblies.assemblies, (assemblies.bytes + records) as usize)
+    };
+    for i in 0..12 {
+        plan(&service, &grown(&base, 1.0 + f64::from(i) / 100.0));
+        assert!(held(&service).1 <= budget, "{:?} of {budget} after {i}", held(&service));
+    }
+    let (before, _) = held(&service);
+    service.answers_take(answers);
+    plan(&service, &grown(&base, 2.0));
+    let (after, bytes) = held(&service);
+    assert!(bytes <= budget - answers, "{bytes} beside {answers} of {budget}");
+    assert!(before > after && after > 1, "{before} assemblies, then {after}");
 }
 
 fn the_budget_is_kept_whatever_comes() {

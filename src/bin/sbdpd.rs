@@ -48,7 +48,7 @@ fn main() -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let cache = Arc::new(cache(&config));
-    let service = Arc::new(Service::new(Arc::clone(&cache), config.cache.memory().assemblies));
+    let service = Arc::new(Service::new(Arc::clone(&cache), config.cache.memory().all));
     let ended = daemon::run_reloading(&config, service, Box::new(move || read(&arguments)));
     // A worker that does not end in time still holds the service.
     cache.flush();

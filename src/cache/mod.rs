@@ -165,6 +165,11 @@ impl Cache {
         }
     }
 
+    /// Bytes of the records in memory.
+    pub(crate) fn memory_bytes(&self) -> usize {
+        self.memory().bytes()
+    }
+
     /// Waits until everything remembered so far is on disk, if there is one.
     pub fn flush(&self) {
         if let Some(writer) = &self.writer {

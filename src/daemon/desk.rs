@@ -126,6 +126,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
             ..StatusHeader::default()
         };
         let answers = Answers::recent(&*service, config.cache.memory().answers);
+        service.answers_take(answers.figures().bytes);
         Self {
             service,
             queues,
@@ -207,6 +208,11 @@ impl<L: Link, P: Planning> Desk<L, P> {
         } else {
             self.sessions.insert(key, session);
         }
+    }
+
+    fn keep(&mut self, question: &[u8], answer: Answer) {
+        self.answers.insert(question, answer);
+        self.service.answers_take(self.answers.figures().bytes);
     }
 
     /// The answer to a request whose bytes are those of a question that was answered before: then all that
@@ -310,7 +316,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
             WorkerEvent::Planned(key, summary, again) => {
                 self.running.remove(&(key.client, key.request));
                 if let Some((question, answer)) = again {
-                    self.answers.insert(&question, answer);
+                    self.keep(&question, answer);
                 }
                 self.with_session(key, |s| s.finish(summary));
             }
@@ -318,7 +324,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
                 self.running.remove(&(key.client, key.request));
                 self.counters.remembered += 1;
                 self.with_session(key, |s| s.answer_running(&answer));
-                self.answers.insert(&question, answer);
+                self.keep(&question, answer);
             }
             WorkerEvent::Unplanned(key, error) => {
                 self.running.remove(&(key.client, key.request));

@@ -66,6 +66,8 @@ pub trait Planning: Send + Sync + 'static {
     fn remembered(&self) -> Option<Remembered> {
         None
     }
+    /// See [`Service::answers_take`]. Called on the port thread: it must not block.
+    fn answers_take(&self, _bytes: usize) {}
     /// The messages that answered a question before, also before a restart.
     fn answered(&self, _question: &[u8]) -> Option<Vec<Vec<u8>>> {
         None
@@ -134,6 +136,10 @@ impl Planning for Service {
 
     fn remembered(&self) -> Option<Remembered> {
         Some(Self::remembered(self))
+    }
+
+    fn answers_take(&self, bytes: usize) {
+        Self::answers_take(self, bytes);
     }
 
     fn answered(&self, question: &[u8]) -> Option<Vec<Vec<u8>>> {

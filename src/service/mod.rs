@@ -18,6 +18,7 @@ mod store;
 #[cfg(test)]
 mod tests;
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Weak};
 
 use serde::Serialize;
@@ -90,11 +91,13 @@ pub struct Service {
     store: Store,
     cache: Arc<Cache>,
     pools: Pools,
+    /// Bytes of answers that whoever asks keeps.
+    answers: AtomicUsize,
 }
 
 /// Bytes of records that a service remembers which was given no cache.
 const RECORDS: usize = 64 << 20;
-/// Bytes of assemblies that a service knows which was given no budget.
+/// Bytes of records and assemblies in a service which was given no budget.
 const ASSEMBLIES: usize = 1 << 30;
 
 impl Default for Service {
@@ -111,12 +114,20 @@ impl Service {
         Self::new(cache, ASSEMBLIES)
     }
 
-    /// A service that remembers in a cache, and knows assemblies up to so many bytes of memory.
+    /// A service that remembers in a cache, and knows assemblies up to so many bytes of memory together with
+    /// the records that the cache has in memory and the answers of [`Service::answers_take`]: so it takes as much
+    /// while there are few of these as when there are many.
     #[must_use]
     pub fn new(cache: Arc<Cache>, budget: usize) -> Self {
         let hulls = JoinedHulls::stored(Arc::clone(&cache) as Arc<dyn HullStore>);
         let fields = Arc::downgrade(&cache) as Weak<dyn FieldStore>;
-        Self { store: Store::new(budget, hulls, fields), cache, pools: Pools::default() }
+        let store = Store::new(budget, hulls, fields);
+        Self { store, cache, pools: Pools::default(), answers: AtomicUsize::new(0) }
+    }
+
+    /// Assemblies leave so many bytes of the budget for answers that whoever asks keeps. Told at once.
+    pub fn answers_take(&self, bytes: usize) {
+        self.answers.store(bytes, Ordering::Relaxed);
     }
 
     /// How many assemblies it knows, and what they take.
@@ -264,6 +275,7 @@ impl Service {
 
     /// After an assembly was asked about: measures what it takes, and keeps what was seen of its fields.
     fn settle(&self, id: AssemblyId, entry: &Entry) {
+        self.store.leave(self.cache.memory_bytes() + self.answers.load(Ordering::Relaxed));
         self.store.settle(id, entry);
         for shared in &entry.shapes {
             self.cache.keep_field(shared.shape.content(), &shared.field);

@@ -3,6 +3,7 @@
 //! hulls.
 
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use serde::Serialize;
@@ -56,6 +57,8 @@ pub struct StoreStatistics {
 #[derive(Debug)]
 pub(super) struct Store {
     budget: usize,
+    /// Bytes of the budget that others take.
+    left: AtomicUsize,
     hulls: Arc<JoinedHulls>,
     fields: Weak<dyn FieldStore>,
     held: Mutex<Held>,
@@ -84,7 +87,7 @@ struct Counted {
 impl Store {
     /// Nothing yet; `budget` in bytes.
     pub(super) fn new(budget: usize, hulls: JoinedHulls, fields: Weak<dyn FieldStore>) -> Self {
-        Self { budget, hulls: Arc::new(hulls), fields, held: Mutex::default() }
+        Self { budget, left: AtomicUsize::new(0), hulls: Arc::new(hulls), fields, held: Mutex::default() }
     }
 
     /// An assembly, which is used by this.
@@ -121,6 +124,11 @@ impl Store {
         entry
     }
 
+    /// Has assemblies leave so many bytes of the budget, from the next time on that one is measured.
+    pub(super) fn leave(&self, bytes: usize) {
+        self.left.store(bytes, Ordering::Relaxed);
+    }
+
     /// Measures what an assembly takes, when it came and after it was asked about, and lets others go for it.
     pub(super) fn settle(&self, id: AssemblyId, entry: &Entry) {
         // Whoever asks whether an assembly is known does not wait for this.
@@ -128,7 +136,7 @@ impl Store {
         let shapes: Vec<usize> = entry.shapes.iter().map(|shape| shape.memory()).collect();
         let mut held = self.held();
         held.note(id, entry, own, &shapes);
-        held.make_room(self.budget);
+        held.make_room(self.budget.saturating_sub(self.left.load(Ordering::Relaxed)));
     }
 
     /// All shapes, by their contents.
