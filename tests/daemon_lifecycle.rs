@@ -256,3 +256,15 @@ fn a_bad_configuration_is_refused_with_its_key() {
     let mut check = Command::new(env!("CARGO_BIN_EXE_sbdpd"));
     assert!(check.args(["--config", explained, "--check-config"]).status().unwrap().success());
 }
+
+/// A name or a text that jemalloc does not know would leave it as it is by default.
+#[test]
+fn the_allocator_gives_back_what_is_free() {
+    let mut check = Command::new(env!("CARGO_BIN_EXE_sbdpd"));
+    let output = check.arg("--check-config").env("_RJEM_MALLOC_CONF", "stats_print:true").output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    for option in ["opt.narenas: 4", "opt.dirty_decay_ms: 500 ", "opt.muzzy_decay_ms: 0 "] {
+        assert!(told.contains(option), "{option}: {told}");
+    }
+    assert!(!told.contains("Invalid"), "{told}");
+}

@@ -1,5 +1,8 @@
 //! The command line.
 
+#[path = "../allocator.rs"]
+mod allocator;
+
 use std::process::ExitCode;
 
 fn main() -> ExitCode {

@@ -1,5 +1,8 @@
 //! The daemon.
 
+#[path = "../allocator.rs"]
+mod allocator;
+
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
