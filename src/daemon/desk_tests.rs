@@ -37,6 +37,8 @@ struct Scripted {
     taking_in: AtomicUsize,
     /// What was answered before a restart.
     before: Vec<AnsweredQuestion>,
+    /// Bytes that it was told answers take.
+    answers: AtomicUsize,
 }
 
 fn plan_with(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
@@ -78,6 +80,10 @@ impl Planning for Scripted {
 
     fn knows(&self, id: AssemblyId) -> bool {
         id.0 == [7; 32]
+    }
+
+    fn answers_take(&self, bytes: usize) {
+        self.answers.store(bytes, Ordering::Relaxed);
     }
 
     fn recent_answers(&self, most: usize, bytes: u64) -> Vec<AnsweredQuestion> {
@@ -266,6 +272,22 @@ fn what_was_answered_before_a_restart_is_answered_at_once_after_it() {
     let again = bench.script(QUICK);
     assert_eq!((again.kinds(), again.summary_status()), (first.kinds(), Some("complete")));
     assert_eq!(bench.desk.counters.remembered, 1);
+}
+
+#[test]
+fn the_service_is_told_what_answers_take_also_after_a_restart() {
+    let told =
+        |bench: &Bench| (bench.service.answers.load(Ordering::Relaxed), bench.desk.answers.figures().bytes);
+    let mut bench = Bench::new(4);
+    assert_eq!(told(&bench), (0, 0));
+    bench.script(QUICK);
+    bench.until(|desk| desk.counters.done == 1);
+    let (bytes, held) = told(&bench);
+    assert!(bytes > 0 && bytes == held, "{bytes} told, {held} held");
+    let asked = question(&request(QUICK)).unwrap();
+    let before = vec![(asked.clone(), bench.desk.answers.get(&asked).unwrap().messages())];
+    let bench = Bench::of(1, Scripted { before, ..Scripted::default() });
+    assert_eq!(told(&bench), (bytes, bytes));
 }
 
 #[test]
