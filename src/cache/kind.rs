@@ -105,8 +105,8 @@ impl Kind {
             Self::Healed | Self::Touching | Self::Swept => 2,
             Self::Blocking => 5,
             Self::Overlap | Self::Witness | Self::Motion => 9,
-            Self::Verdict => 11,
-            Self::Answer | Self::Plan => 12,
+            Self::Verdict => 10,
+            Self::Answer | Self::Plan => 11,
         }
     }
 

@@ -188,12 +188,6 @@ impl<'a> View<'a> {
         Self { course, on_moving, shortest, legs: HashMap::new() }
     }
 
-    /// Makes more of the same, also for other threads.
-    pub(super) fn again(&self) -> impl Fn() -> Self + Sync + use<'a> {
-        let Self { course, on_moving, shortest, .. } = *self;
-        move || Self::new(course, on_moving, shortest)
-    }
-
     pub(super) fn leg(&mut self, interval: Interval) -> Rc<Leg> {
         if let Some(leg) = self.legs.get(&interval) {
             return Rc::clone(leg);

@@ -118,6 +118,8 @@ impl Question<'_> {
         most_effort: usize,
         termination: &Termination,
     ) -> Result<Found, Interrupt> {
-        Search::new(self, view, most_effort, termination).all(interval)
+        let mut search = Search::new(self, view, most_effort, termination);
+        search.all(interval)?;
+        Ok(search.found)
     }
 }

@@ -66,9 +66,6 @@ pub(super) struct Search<'a> {
     price: usize,
     /// How much of surface and way was settled, as a share of all.
     done: f64,
-    /// Whether halves are looked into side by side, as nothing was split yet: of paths, that is. Where overlaps are
-    /// measured, the two surfaces of a pair take about as long, so that both threads have their work.
-    forks: bool,
     view: View<'a>,
     termination: &'a Termination,
     pub(super) regions: Vec<Region>,
@@ -98,7 +95,6 @@ impl<'a> Search<'a> {
             most_effort,
             price: 1 + rim.map_or(0, |rim| rim.edges().len() / EDGES_AT_ONCE),
             done: 0.0,
-            forks: asked.precision.deep.is_finite(),
             view,
             termination,
             regions: Vec::new(),
@@ -111,19 +107,15 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// What is found on all of the surface on a stretch of the way.
-    pub(super) fn all(mut self, interval: Interval) -> Result<Found, Interrupt> {
+    /// Looks at all of the surface on a stretch of the way.
+    pub(super) fn all(&mut self, interval: Interval) -> Result<(), Interrupt> {
         if let Some(root) = self.asked.tree.root() {
             self.patch(root, interval, 1.0, Hint { triangle: 0, region: None, vain: false })?;
         }
-        Ok(self.ended(interval))
-    }
-
-    fn ended(mut self, interval: Interval) -> Found {
-        if self.gave_up() && self.found.open.is_empty() {
+        if self.gave_up() {
             self.found.open.push(interval);
         }
-        self.found
+        Ok(())
     }
 
     fn gave_up(&self) -> bool {
@@ -192,7 +184,6 @@ impl<'a> Search<'a> {
                 .try_for_each(|half| self.patch(index, half, share / 2.0, hint));
         }
         match tree.parts(index) {
-            Parts::Patches(children) if self.forks && !self.has_rim => self.fork(children, interval, hint),
             Parts::Patches(children) => {
                 children.into_iter().try_for_each(|child| self.patch(child, interval, share / 2.0, hint))
             }
@@ -201,23 +192,6 @@ impl<'a> Search<'a> {
                 self.triangle(Piece { corners, is_new: [true; 3], interval, share, hint })
             }),
         }
-    }
-
-    /// Looks into both halves of a surface, side by side: where a single pair is new, that is all there is to do.
-    /// They learn nothing from each other, whoever looks into them: what is found is the same on one thread.
-    fn fork(&mut self, children: [u32; 2], interval: Interval, hint: Hint) -> Result<(), Interrupt> {
-        let left = self.most_effort.saturating_sub(self.found.effort) / 2;
-        let (asked, view, termination) = (self.asked, self.view.again(), self.termination);
-        let half = |child| {
-            let mut search = Search::new(asked, view(), left, termination);
-            search.forks = false;
-            search.patch(child, interval, 1.0, Hint { region: None, ..hint })?;
-            Ok(search.ended(interval))
-        };
-        let (one, other) = rayon::join(|| half(children[0]), || half(children[1]));
-        self.found.add(one?);
-        self.found.add(other?);
-        Ok(())
     }
 
     /// Looks at a triangle, or a piece of one, on a stretch of the way.
