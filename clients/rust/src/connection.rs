@@ -25,6 +25,9 @@ use crate::error::ClientError;
 
 /// Longest sleep between two looks at the port: a lost wake-up costs at most this.
 pub(crate) const SLICE: Duration = Duration::from_millis(200);
+/// Bytes of the longest request through the port of short questions: a part with another mesh is mostly smaller, and
+/// to make a port takes as long as to take in such a mesh. Of memory that was never written to, there is none.
+const ASKED: usize = 256 * 1024;
 /// Pause before something is tried again that could not be done.
 pub(crate) const RETRY: Duration = Duration::from_millis(2);
 
@@ -73,9 +76,10 @@ pub(crate) struct Connection {
 pub(crate) enum Through {
     /// The one of plans.
     Plan,
-    /// The one of short questions about meshes.
+    /// The one of short questions and small meshes.
     Ask,
-    /// One of its own for so many bytes: its memory goes back to the system when the request is over.
+    /// For so many bytes of meshes. If they are many, one of its own, whose memory goes back to the system when the
+    /// request is over.
     Upload(usize),
 }
 
@@ -130,7 +134,7 @@ impl Connection {
 
         Ok(Self {
             plan: client_port(&plan, layout::PLAN_REQUEST)?,
-            ask: client_port(&geometry, 64)?,
+            ask: client_port(&geometry, ASKED)?,
             geometry,
             progress: progress.subscriber_builder().create().map_err(|e| match e {
                 SubscriberCreateError::ExceedsMaxSupportedSubscribers => ClientError::TooManyClients,
@@ -176,6 +180,7 @@ impl Connection {
         Ok(match through {
             Through::Plan => Port::Kept(&self.plan),
             Through::Ask => Port::Kept(&self.ask),
+            Through::Upload(length) if length <= ASKED => Port::Kept(&self.ask),
             Through::Upload(length) => Port::Own(client_port(&self.geometry, length)?),
         })
     }
