@@ -52,6 +52,9 @@ fn main() -> ExitCode {
     }
     let cache = Arc::new(cache(&config));
     let service = Arc::new(Service::new(Arc::clone(&cache), config.cache.memory().all));
+    if let Err(error) = service.start_threads(config.workers.threads_per_request) {
+        tracing::warn!(%error, "the first request will start its threads itself");
+    }
     let ended = daemon::run_reloading(&config, service, Box::new(move || read(&arguments)));
     // A worker that does not end in time still holds the service.
     cache.flush();

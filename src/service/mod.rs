@@ -125,6 +125,14 @@ impl Service {
         Self { store, cache, pools: Pools::default(), answers: AtomicUsize::new(0) }
     }
 
+    /// Starts the threads that the first request will be answered on, if it is given so many (0: all processors).
+    ///
+    /// # Errors
+    /// They could not be started.
+    pub fn start_threads(&self, threads: usize) -> Result<(), ServiceError> {
+        self.pools.on(threads, || ())
+    }
+
     /// Assemblies leave so many bytes of the budget for answers that whoever asks keeps. Told at once.
     pub fn answers_take(&self, bytes: usize) {
         self.answers.store(bytes, Ordering::Relaxed);
