@@ -195,7 +195,7 @@ enum Received {
     /// All.
     All,
     /// As many as are taken at once; there may be more.
-    Some,
+    Batch,
 }
 
 struct EventLoop<'l, P> {
@@ -238,7 +238,7 @@ impl<P: Planning> EventLoop<'_, P> {
                 Received::Nothing => self.wait(next_tick),
                 // Whoever was answered may ask again at once.
                 Received::All if !self.is_asked_again() => self.wait(next_tick),
-                Received::All | Received::Some => {}
+                Received::All | Received::Batch => {}
             }
         }
     }
@@ -324,7 +324,7 @@ impl<P: Planning> EventLoop<'_, P> {
             let taken: Vec<Active> = std::iter::from_fn(|| receive(port)).take(RECEIVE_AT_ONCE).collect();
             received = received.max(match taken.len() {
                 0 => Received::Nothing,
-                RECEIVE_AT_ONCE => Received::Some,
+                RECEIVE_AT_ONCE => Received::Batch,
                 _ => Received::All,
             });
             for active in taken {

@@ -335,9 +335,9 @@ mod tests {
             let (shifts, stopped) = pushed(&scene, force, 40);
             let got = depth(&scene, &verifier, &shifts);
             // Of 11,000 cases the worst were 0.00047 deep, where the engine declares 0.0006. One seen since gets
-            // 0.0013 deep for a moment, where edges pass each other: no plan is refused for it, but it is more than
-            // declared.
-            prop_assert!(got < LIMIT, "{got}");
+            // 0.0013 deep for a moment, where edges pass each other: that is a defect of the engine, and this fails for
+            // it.
+            prop_assert!(got < 1e-3, "{got}");
             if let Some(with) = stopped {
                 prop_assert!(!with.is_empty());
                 let last = shifts[shifts.len() - 1];
