@@ -162,7 +162,7 @@ pub struct Phase {
     pub lost_because: Vec<String>,
     /// Plans that differed from another answer to the same question: there may be none.
     pub differing: u64,
-    /// Plan requests that the daemon counted meanwhile, those of disturbers included.
+    /// Plan requests that the daemon counted meanwhile, and those of disturbers since they began.
     pub plans_received: u64,
     /// From the first request to the last answer.
     pub wall_s: f64,

@@ -75,6 +75,8 @@ pub struct Load {
 
 /// How often the daemon is looked at.
 const LOOK: Duration = Duration::from_millis(20);
+/// So many requests of one that floods come before the others begin.
+const FLOODED: u64 = 100;
 
 /// Puts the daemon under load.
 ///
@@ -166,14 +168,24 @@ impl<'r> Start<'r> {
     /// All clients at the same time, beside disturbers.
     fn phase(&self, disturbers: &[Role]) -> Result<Phase, BenchError> {
         let ended = Arc::new(AtomicU64::new(0));
+        let plans =
+            || Ok::<_, BenchError>(self.observer.status().map_err(BenchError::failed)?.numbers.requests);
+        let before = plans()?;
         let (disturbing, disturber_said) = mpsc::channel();
         let mut around = Vec::new();
         for &role in disturbers {
             around.push((role, self.process(role, 0, 0, &disturbing, &ended)?));
             expect_ready(disturber_said.recv().ok(), "a disturber")?;
         }
-        let plans =
-            || Ok::<_, BenchError>(self.observer.status().map_err(BenchError::failed)?.numbers.requests);
+        if disturbers.contains(&Role::Flooding) {
+            // Else a short phase may be over before the flood has begun.
+            while plans()? < before + FLOODED {
+                match disturber_said.recv_timeout(LOOK) {
+                    Err(mpsc::RecvTimeoutError::Timeout) => {}
+                    _ => return Err(BenchError::Failed("a disturber ended".to_owned())),
+                }
+            }
+        }
         let (sender, said) = mpsc::channel();
         let mut clients = Vec::new();
         for number in 0..self.request.clients {
@@ -191,7 +203,7 @@ impl<'r> Start<'r> {
                     .map_err(BenchError::failed)?;
             }
         }
-        let (started, before) = (Instant::now(), plans()?);
+        let started = Instant::now();
         clients.iter_mut().for_each(|c| c.say("go"));
         let mut watch = Watch::new(self.pid);
         let mut figures = ClientFigures::default();
