@@ -104,9 +104,9 @@ impl Kind {
             Self::Source | Self::Shape | Self::Hull | Self::Field => 1,
             Self::Healed | Self::Touching | Self::Swept => 2,
             Self::Blocking => 5,
-            Self::Overlap | Self::Witness | Self::Motion => 9,
-            Self::Verdict => 10,
-            Self::Answer | Self::Plan => 11,
+            Self::Overlap => 9,
+            Self::Verdict | Self::Witness | Self::Motion => 10,
+            Self::Answer | Self::Plan => 12,
         }
     }
 

@@ -31,8 +31,9 @@ pub(super) struct Flights<'a> {
     standing: &'a [usize],
     part: usize,
     termination: &'a Termination,
-    /// How much further it flies.
+    /// How much further it flies, and whether something is met there.
     left: f64,
+    is_met: bool,
     state: State,
     /// Whether there was one.
     pub(super) any: bool,
@@ -60,12 +61,12 @@ impl<'a> Flights<'a> {
         part: usize,
         termination: &'a Termination,
     ) -> Self {
-        Self { scene, standing, part, termination, left: 0.0, state: State::Ready, any: false }
+        Self { scene, standing, part, termination, left: 0.0, is_met: false, state: State::Ready, any: false }
     }
 
     /// The same of a push that is not to fly.
     pub(super) fn never(self) -> Self {
-        Self { left: 0.0, state: State::Never, any: false, ..self }
+        Self { left: 0.0, is_met: false, state: State::Never, any: false, ..self }
     }
 
     /// A step by regions was bent, or was not: where nothing bends a push any more that something did bend, it may
@@ -90,7 +91,9 @@ impl<'a> Flights<'a> {
             return Ok(None);
         }
         if self.left == 0.0 {
-            self.left = self.length(from, bounds, u)?;
+            // What is met at a small angle may have been entered a little: to another flight that is granted.
+            let lands = std::mem::take(&mut self.is_met);
+            (self.left, self.is_met) = if lands { (0.0, false) } else { self.length(from, bounds, u)? };
         }
         let step = self.left.min(FREE_STEP);
         self.left -= step;
@@ -104,13 +107,13 @@ impl<'a> Flights<'a> {
         self.state == State::Aloft
     }
 
-    /// How far it gets before it meets anything, up to a [`STRETCH`]; 0 where that is hardly worth anything. It
-    /// depends on nothing but what the box meets on this stretch.
-    fn length(&self, from: &Pose, bounds: &Bounds, u: &Vector3<f64>) -> Result<f64, Interrupt> {
+    /// How far it gets before it meets anything, up to a [`STRETCH`], and whether it meets anything; 0 where that is
+    /// hardly worth anything. It depends on nothing but what the box meets on this stretch.
+    fn length(&self, from: &Pose, bounds: &Bounds, u: &Vector3<f64>) -> Result<(f64, bool), Interrupt> {
         let Self { scene, standing, part, termination, .. } = *self;
         let end = u * (STRETCH + LANDING);
         let swept = bounds.union(&Bounds { min: bounds.min + end, max: bounds.max + end });
-        let mut length = STRETCH;
+        let (mut length, mut is_met) = (STRETCH, false);
         for other in scene.broad_phase.meeting_of(standing, &swept) {
             let granted = scene.allowances.of(part, other) + LEAST;
             // As deep as it may be before.
@@ -122,13 +125,13 @@ impl<'a> Flights<'a> {
             let crossing = Crossing { scene, part, start, direction, travel, other, margins, termination };
             let way = crossing.way(SHORTEST + LANDING)?;
             if way < travel {
-                length = way - LANDING;
+                (length, is_met) = (way - LANDING, true);
             }
             if length < SHORTEST {
-                return Ok(0.0);
+                return Ok((0.0, false));
             }
         }
-        Ok(length)
+        Ok((length, is_met))
     }
 }
 
@@ -142,7 +145,7 @@ mod tests {
         let body = &scene.bodies[1];
         let termination = Termination::default();
         let flights = Flights::new(scene, &standing, 1, &termination);
-        flights.length(&body.planning_from_shape, &body.bounds, &u).unwrap()
+        flights.length(&body.planning_from_shape, &body.bounds, &u).unwrap().0
     }
 
     #[test]
