@@ -5,15 +5,24 @@
 //! plane of the closest feature, of which any one is enough where the feature is convex; where it
 //! is not, the check at the trial pose finds what is missing.
 
+mod gather;
+mod planes;
+
 use nalgebra::{Point3, Vector3, Vector6};
 
-use crate::geometry::{Bounds, Closest, Pose, SampleTree};
+use crate::geometry::{Bounds, Closest, Pose};
 use crate::sdf::Grid;
 use crate::termination::{Poll, Termination};
+
+use gather::{Measured, gather, gather_exactly};
+use planes::{ON_SURFACE, Planes, Sample};
 
 use super::projection::Row;
 use super::sliding::FREE_STEP;
 use super::{Body, Scene, Surroundings};
+
+/// Samples or nodes of these between two looks at the termination condition.
+const ENTER_POLL: u32 = 64;
 
 /// Whose surface the sample lies on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,6 +74,16 @@ pub(super) struct Near {
     pub(super) clearance: f64,
 }
 
+impl Near {
+    /// Takes in what else is near.
+    fn add(&mut self, other: Option<Self>) {
+        if let Some(Self { contacts, clearance }) = other {
+            self.clearance = self.clearance.min(clearance);
+            self.contacts.extend(contacts);
+        }
+    }
+}
+
 /// The moving body at a pose.
 #[derive(Clone, Copy)]
 pub(super) struct Mover<'a> {
@@ -74,11 +93,13 @@ pub(super) struct Mover<'a> {
     pub(super) pose: Pose,
     /// See [`Self::until`].
     pub(super) termination: Option<&'a Termination>,
+    /// See [`Self::exactly`].
+    pub(super) is_exact: bool,
 }
 
 impl<'a> Mover<'a> {
     pub(super) fn new(scene: &'a Scene, part: usize, pose: Pose) -> Self {
-        Self { scene, body: &scene.bodies[part], part, pose, termination: None }
+        Self { scene, body: &scene.bodies[part], part, pose, termination: None, is_exact: false }
     }
 
     /// The same, but once the condition is true it finds only part of its contacts, and that it enters
@@ -86,6 +107,12 @@ impl<'a> Mover<'a> {
     /// their fields, which takes longer than a cancelled request may.
     pub(super) fn until(self, termination: &'a Termination) -> Self {
         Self { termination: Some(termination), ..self }
+    }
+
+    /// The same that gathers and measures without fields, among surfaces that are closed: of a pair that is looked at
+    /// a few times, to fill them takes several times as long.
+    pub(super) fn exactly(self) -> Self {
+        Self { is_exact: true, ..self }
     }
 
     /// Whether the condition is true.
@@ -130,10 +157,9 @@ impl<'a> Mover<'a> {
     pub(super) fn near_pair(&self, other: usize, reach: f64, near: &mut Near) {
         // One after the other: several motions are simulated at a time, and one that waited for its half
         // would begin with another motion meanwhile, and come back to its own only at the end of that.
-        let [mine, theirs] = self.sides(other, reach, near.clearance, |mine, theirs| [mine(), theirs()]);
-        near.clearance = mine.clearance.min(theirs.clearance);
-        near.contacts.extend(mine.contacts);
-        near.contacts.extend(theirs.contacts);
+        for side in [Side::Moving, Side::Standing] {
+            near.add(self.side(side, other, (reach, usize::MAX), near.clearance));
+        }
     }
 
     /// The same for those with this part alone, both surfaces side by side: where fields are asked for the first time,
@@ -141,42 +167,53 @@ impl<'a> Mover<'a> {
     pub(super) fn near_first(&self, other: usize, reach: f64) -> Near {
         let standing = &self.scene.bodies[other];
         rayon::join(|| self.field_is_ready(self.body), || self.field_is_ready(standing));
-        let [mut mine, theirs] = self.sides(other, reach, f64::INFINITY, |mine, theirs| {
-            let (mine, theirs) = rayon::join(mine, theirs);
-            [mine, theirs]
-        });
-        mine.contacts.extend(theirs.contacts);
-        Near { clearance: mine.clearance.min(theirs.clearance), ..mine }
+        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+        self.both_sides(other, (reach, usize::MAX)).into_iter().for_each(|found| near.add(found));
+        near
     }
 
-    /// What is near of the samples of either surface; `both` gathers both.
-    fn sides(
+    /// The same [exactly](Self::exactly), if that takes no more than `most` looks at either surface.
+    pub(super) fn near_in_few_looks(&self, other: usize, reach: f64, most: usize) -> Option<Near> {
+        let [mine, theirs] = self.both_sides(other, (reach, most));
+        let mut near = mine?;
+        near.add(Some(theirs?));
+        Some(near)
+    }
+
+    fn both_sides(&self, other: usize, look: (f64, usize)) -> [Option<Near>; 2] {
+        let side = |side| self.side(side, other, look, f64::INFINITY);
+        rayon::join(|| side(Side::Moving), || side(Side::Standing)).into()
+    }
+
+    /// What is near of the samples of one surface of a pair; without fields, none if it takes more looks than `most`.
+    fn side(
         &self,
+        side: Side,
         other: usize,
-        reach: f64,
+        (reach, most): (f64, usize),
         clearance: f64,
-        both: impl FnOnce(&(dyn Fn() -> Near + Sync), &(dyn Fn() -> Near + Sync)) -> [Near; 2],
-    ) -> [Near; 2] {
-        let none = || Near { contacts: Vec::new(), clearance };
+    ) -> Option<Near> {
+        let mut found = Near { contacts: Vec::new(), clearance };
         let standing = &self.scene.bodies[other];
-        if !self.fields_are_ready(standing) {
-            return [none(), none()];
+        if !self.is_exact && !self.fields_are_ready(standing) {
+            return Some(found);
         }
         let allowance = self.scene.allowances.of(self.part, other);
         let standing_from_moving = standing.planning_from_shape.inverse() * self.pose;
-        let moving_from_standing = standing_from_moving.inverse();
-        let side = |side, sampled: &Body, measured: &Body, to_measured: &Pose| {
-            let mut found = none();
-            for tree in [sampled.shape.samples(), &sampled.extra_samples] {
-                let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
-                let measured = Measured { body: measured, to_measured, allowance, reach };
+        let (sampled, body, to_measured) = match side {
+            Side::Moving => (self.body, standing, standing_from_moving),
+            Side::Standing => (standing, self.body, standing_from_moving.inverse()),
+        };
+        let measured = Measured { body, to_measured: &to_measured, allowance, reach };
+        for tree in [sampled.shape.samples(), &sampled.extra_samples] {
+            let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
+            if self.is_exact {
+                gather_exactly(tree, &measured, (most, self.termination), &mut found, tag)?;
+            } else {
                 gather(tree, &measured, self.termination, &mut found, tag);
             }
-            found
-        };
-        both(&|| side(Side::Moving, self.body, standing, &standing_from_moving), &|| {
-            side(Side::Standing, standing, self.body, &moving_from_standing)
-        })
+        }
+        Some(found)
     }
 
     /// Builds the fields of a pair that are not there yet; not to the end once the condition is true.
@@ -267,7 +304,11 @@ impl<'a> Mover<'a> {
                 (self.body, self.pose.inverse_transform_point(&world))
             }
         };
-        let (closest, distance) = measured.closest(&p, (reach - contact.allowance).max(0.0))?;
+        let (closest, distance) = if self.is_exact {
+            measured.closest_from(&p, contact.closest.triangle)
+        } else {
+            measured.closest(&p, (reach - contact.allowance).max(0.0))?
+        };
         Some(Contact { gap: distance + contact.allowance, closest, ..*contact })
     }
 
@@ -309,7 +350,14 @@ impl<'a> Mover<'a> {
             below: contact.allowance + ON_SURFACE,
         };
         let mut planes = Planes::default();
-        sample.planes(measured, &mut planes);
+        let closest_to = |p: &Point3<f64>, reach: f64| {
+            if !self.is_exact {
+                return measured.closest(p, reach).map(|(closest, _)| closest);
+            }
+            let (closest, _) = measured.closest_from(p, contact.closest.triangle);
+            (closest.distance < reach).then_some(closest)
+        };
+        sample.planes(&measured.shape.surface, closest_to, &mut planes);
         for plane in planes.iter() {
             let n = frame.rotation * plane.normal * sense;
             let moment = arm.cross(&n);
@@ -324,169 +372,6 @@ impl<'a> Mover<'a> {
         self.options(contact, &Vector6::zeros(), rows);
         rows.first().copied()
     }
-}
-
-/// A sample seen from the surface that it is near to.
-struct Sample {
-    point: Point3<f64>,
-    /// The displacement that is wanted.
-    motion: Vector3<f64>,
-    closest: Closest,
-    distance: f64,
-    /// How far below a plane the sample may be and still count as separated by it.
-    below: f64,
-}
-
-/// Samples no deeper than this count as on the surface: coordinates in files are rounded, and poses
-/// drift by a part of the depth tolerance.
-const ON_SURFACE: f64 = 1e-4;
-
-/// A plane that a sample may be asked to stay above.
-#[derive(Clone, Copy)]
-struct Plane {
-    normal: Vector3<f64>,
-    /// Height of the sample above it.
-    height: f64,
-}
-
-/// A few planes with different normals.
-#[derive(Default)]
-struct Planes {
-    list: [Option<Plane>; 6],
-}
-
-impl Planes {
-    fn iter(&self) -> impl Iterator<Item = &Plane> {
-        self.list.iter().flatten()
-    }
-
-    /// Adds a plane, or keeps the higher of two that are nearly parallel.
-    fn add(&mut self, plane: Plane) {
-        for slot in &mut self.list {
-            match slot {
-                Some(p) if p.normal.dot(&plane.normal) > PARALLEL => {
-                    p.height = p.height.max(plane.height);
-                    return;
-                }
-                Some(_) => {}
-                None => {
-                    *slot = Some(plane);
-                    return;
-                }
-            }
-        }
-    }
-}
-
-/// cos of the angle below which two planes are one (about half a degree).
-const PARALLEL: f64 = 0.99996;
-
-impl Sample {
-    /// The planes of which the sample must stay above one: those of the closest feature, and, if
-    /// the wanted motion goes below all of them, those of the feature that is closest ahead. The
-    /// solid near a convex feature lies below all its planes, so to stay above any is enough.
-    fn planes(&self, measured: &Body, out: &mut Planes) {
-        let surface = &measured.shape.surface;
-        let away = self.point - self.closest.point;
-        // The direction to the closest point: good unless the two coincide.
-        let radial = away.try_normalize(1e-7).map(|d| if self.distance < 0.0 { -d } else { d });
-        let above = |normal: Vector3<f64>, foot: &Point3<f64>| {
-            let height = normal.dot(&(self.point - foot));
-            (height >= -self.below).then_some(Plane { normal, height })
-        };
-        // Too deep, the way out is the shortest one.
-        if let (Some(normal), true) = (radial, self.distance < -self.below) {
-            return out.add(Plane { normal, height: self.distance });
-        }
-        surface.feature_normals(&self.closest, |n| {
-            if let Some(p) = above(n, &self.closest.point) {
-                out.add(p);
-            }
-        });
-        if let Some(p) = radial.and_then(|d| above(d, &self.closest.point)) {
-            out.add(p);
-        }
-        let stopped = out.iter().all(|p| p.height + p.normal.dot(&self.motion) < 0.0);
-        if stopped && let Some((ahead, _)) = measured.closest(&(self.point + self.motion), self.motion.norm())
-        {
-            surface.feature_normals(&ahead, |n| {
-                if let Some(p) = above(n, &ahead.point) {
-                    out.add(p);
-                }
-            });
-        }
-        if out.iter().next().is_none() {
-            let normal = surface.pseudo_normal(&self.closest);
-            out.add(Plane {
-                normal: normal.try_normalize(0.0).unwrap_or_else(Vector3::x),
-                height: self.distance,
-            });
-        }
-    }
-}
-
-/// What samples are measured against.
-struct Measured<'m> {
-    body: &'m Body,
-    to_measured: &'m Pose,
-    allowance: f64,
-    reach: f64,
-}
-
-/// Nodes of samples between two looks at the condition: the first samples that come near a large surface
-/// fill its field.
-const GATHER_POLL: u32 = 1;
-/// The same for the samples of a node.
-const SAMPLE_POLL: u32 = 4;
-/// The same where the surface is only looked up.
-const ENTER_POLL: u32 = 64;
-
-fn gather(
-    tree: &SampleTree,
-    measured: &Measured<'_>,
-    termination: Option<&Termination>,
-    near: &mut Near,
-    tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
-) {
-    let Measured { body, to_measured, allowance, reach } = *measured;
-    // Deeper than nothing cannot be excluded by a bound that is only sure outside.
-    let limit = (reach - allowance).max(0.0);
-    let field: &Grid = &body.field;
-    let clearance = std::cell::Cell::new(near.clearance);
-    let keep = |bound: f64| clearance.set(clearance.get().min(bound + allowance));
-    let poll = Poll::every(GATHER_POLL, termination);
-    let sample_poll = Poll::every(SAMPLE_POLL, termination);
-    tree.walk(
-        (),
-        |node, ()| {
-            if poll.is_over() {
-                return None;
-            }
-            let bound = field.estimate(&(to_measured * node.centre)).lower_bound - node.radius;
-            if bound > limit {
-                keep(bound);
-            }
-            (bound <= limit).then_some(())
-        },
-        |sample, ()| {
-            if sample_poll.is_over() {
-                return;
-            }
-            let p = to_measured * sample;
-            let bound = field.estimate(&p).lower_bound;
-            if bound > limit {
-                return keep(bound);
-            }
-            match body.closest(&p, limit) {
-                Some((closest, distance)) if distance + allowance < reach => {
-                    near.contacts.push(tag(*sample, distance + allowance, closest));
-                }
-                Some((_, distance)) => keep(distance),
-                None => keep(limit),
-            }
-        },
-    );
-    near.clearance = clearance.get();
 }
 
 fn box_distance(a: &Bounds, b: &Bounds) -> f64 {

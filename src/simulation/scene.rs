@@ -43,6 +43,13 @@ impl Body {
         };
         Some((closest, surface.signed(p, &closest)))
     }
+
+    /// The same however far, without the field, given any triangle that is likely to be near.
+    #[must_use]
+    pub fn closest_from(&self, p: &Point3<f64>, guess: u32) -> (Closest, f64) {
+        let closest = self.shape.surface.closest_from(p, guess);
+        (closest, self.shape.surface.signed(p, &closest))
+    }
 }
 
 /// For each pair, how deep the two overlap at the assembled pose: that much is granted.

@@ -18,6 +18,9 @@ const STATIC_STEPS: usize = 5;
 /// The same in steps that end where the next obstacle begins.
 const PUSHES: usize = 32;
 
+/// With more looks at either surface than this, fields are quicker: in the play of a thread nearly all samples are near.
+const MOST_LOOKS: usize = 2000;
+
 /// For each action, whether `other` alone keeps `part` at `pose` from following it by more than
 /// `least`: the static analysis that suits this engine, which excludes nothing that could slide.
 ///
@@ -48,7 +51,7 @@ pub fn pair_blocks(
         mover.near_pair(other, reach, &mut near);
         near
     };
-    let near = start.near_first(other, reach);
+    let (start, near) = first_look(&start, other, reach);
     termination.check()?;
     if near.contacts.is_empty() && near.clearance > least {
         return Ok(vec![false; actions.len()]);
@@ -63,7 +66,7 @@ pub fn pair_blocks(
         for _ in 1..STATIC_STEPS {
             termination.check()?;
             let Step::Moved(Moved { pose: there, .. }) = step else { return Ok(true) };
-            let mover = Mover::new(scene, part, there).until(termination);
+            let mover = Mover { pose: there, ..start };
             if (mover.centre() - start.centre()).norm() > least {
                 return Ok(false);
             }
@@ -75,6 +78,18 @@ pub fn pair_blocks(
     };
     // Side by side: two parts alone are but one pair.
     actions.par_iter().map(blocked).collect()
+}
+
+/// What is near, and the mover that goes on to look as this did: without fields if that took few looks, which depends
+/// on the question alone.
+fn first_look<'a>(start: &Mover<'a>, other: usize, reach: f64) -> (Mover<'a>, Near) {
+    let exact = start.exactly();
+    let is_open = [start.body, &start.scene.bodies[other]].iter().any(|body| body.shape.surface.is_open());
+    let near = if is_open { None } else { exact.near_in_few_looks(other, reach, MOST_LOOKS) };
+    match near {
+        Some(near) => (exact, near),
+        None => (*start, start.near_first(other, reach)),
+    }
 }
 
 /// Derives what is asked of the shapes of two parts first, if it is not there, side by side: threads that come to one

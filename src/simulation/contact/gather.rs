@@ -1,0 +1,132 @@
+//! Gathers the samples of one surface that are near another, by the other's field or without one.
+
+use std::cell::Cell;
+
+use nalgebra::Point3;
+
+use crate::geometry::{Closest, Pose, SampleTree};
+use crate::sdf::Grid;
+use crate::termination::{Poll, Termination};
+
+use super::super::Body;
+use super::{Contact, ENTER_POLL, Near};
+
+/// What samples are measured against.
+pub(super) struct Measured<'m> {
+    pub(super) body: &'m Body,
+    pub(super) to_measured: &'m Pose,
+    pub(super) allowance: f64,
+    pub(super) reach: f64,
+}
+
+/// Nodes of samples between two looks at the condition: the first samples that come near a large surface
+/// fill its field.
+const GATHER_POLL: u32 = 1;
+/// The same for the samples of a node.
+const SAMPLE_POLL: u32 = 4;
+/// By the other's field.
+pub(super) fn gather(
+    tree: &SampleTree,
+    measured: &Measured<'_>,
+    termination: Option<&Termination>,
+    near: &mut Near,
+    tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
+) {
+    let Measured { body, to_measured, allowance, reach } = *measured;
+    // Deeper than nothing cannot be excluded by a bound that is only sure outside.
+    let limit = (reach - allowance).max(0.0);
+    let field: &Grid = &body.field;
+    let clearance = Cell::new(near.clearance);
+    let keep = |bound: f64| clearance.set(clearance.get().min(bound + allowance));
+    let poll = Poll::every(GATHER_POLL, termination);
+    let sample_poll = Poll::every(SAMPLE_POLL, termination);
+    tree.walk(
+        (),
+        |node, ()| {
+            if poll.is_over() {
+                return None;
+            }
+            let bound = field.estimate(&(to_measured * node.centre)).lower_bound - node.radius;
+            if bound > limit {
+                keep(bound);
+            }
+            (bound <= limit).then_some(())
+        },
+        |sample, ()| {
+            if sample_poll.is_over() {
+                return;
+            }
+            let p = to_measured * sample;
+            let bound = field.estimate(&p).lower_bound;
+            if bound > limit {
+                return keep(bound);
+            }
+            match body.closest(&p, limit) {
+                Some((closest, distance)) if distance + allowance < reach => {
+                    near.contacts.push(tag(*sample, distance + allowance, closest));
+                }
+                Some((_, distance)) => keep(distance),
+                None => keep(limit),
+            }
+        },
+    );
+    near.clearance = clearance.get();
+}
+
+/// Without a field, with no more than `most` looks at the other surface, which is closed; none if there are more to
+/// be. Signed distances vary by no more than the way between points, also inside: of what is deeper than nothing, far
+/// less is looked at than by fields, whose bounds are sure outside alone.
+pub(super) fn gather_exactly(
+    tree: &SampleTree,
+    measured: &Measured<'_>,
+    (most, termination): (usize, Option<&Termination>),
+    near: &mut Near,
+    tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
+) -> Option<()> {
+    let Measured { body, to_measured, allowance, reach } = *measured;
+    let surface = &body.shape.surface;
+    let clearance = Cell::new(near.clearance);
+    let keep = |gap: f64| clearance.set(clearance.get().min(gap));
+    let looks = Cell::new(0);
+    let poll = Poll::every(ENTER_POLL, termination);
+    let look = |p: &Point3<f64>, guess: u32| {
+        looks.set(looks.get() + 1);
+        let closest = surface.closest_from(p, guess);
+        (surface.signed(p, &closest) + allowance, closest)
+    };
+    let is_over = || looks.get() > most || poll.is_over();
+    tree.walk(
+        0,
+        |node, guess| {
+            if is_over() {
+                return None;
+            }
+            let p = to_measured * node.centre;
+            let apart = surface.bounds().distance(&p) + allowance - node.radius;
+            if apart >= reach {
+                keep(apart);
+                return None;
+            }
+            let (gap, closest) = look(&p, guess);
+            let least = gap - node.radius;
+            if least >= reach {
+                keep(least);
+                return None;
+            }
+            Some(closest.triangle)
+        },
+        |sample, guess| {
+            if is_over() {
+                return;
+            }
+            let (gap, closest) = look(&(to_measured * sample), guess);
+            if gap < reach {
+                near.contacts.push(tag(*sample, gap, closest));
+            } else {
+                keep(gap);
+            }
+        },
+    );
+    near.clearance = clearance.get();
+    (looks.get() <= most).then_some(())
+}
