@@ -19,7 +19,7 @@ const STATIC_STEPS: usize = 5;
 const PUSHES: usize = 32;
 
 /// With more looks at either surface than this, fields are quicker: in the play of a thread nearly all samples are near.
-const MOST_LOOKS: usize = 2000;
+const MOST_LOOKS: usize = 1200;
 
 /// For each action, whether `other` alone keeps `part` at `pose` from following it by more than
 /// `least`: the static analysis that suits this engine, which excludes nothing that could slide.
