@@ -9,7 +9,7 @@ use crate::termination::{Interrupt, Poll, Termination};
 use super::content_hash::mesh_hash;
 use super::hull::hull_vertices;
 use super::own_frame::OwnFrame;
-use super::samples::sited;
+use super::samples::{Sited, sited};
 use super::{
     Bounds, ConvexEdges, Faces, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Spacing,
     Surface,
@@ -110,11 +110,7 @@ impl Shape {
 
     /// Where contact is looked for, with the faces that meet there.
     pub fn oriented(&self) -> &OrientedSamples {
-        let derive = || {
-            let sited = sited(&self.surface, &spacing(self.surface.bounds()));
-            OrientedSamples::new(&self.surface, &sited)
-        };
-        self.oriented.get_or_init(derive)
+        self.oriented.get_or_init(|| OrientedSamples::new(&self.surface, &self.sited()))
     }
 
     /// Where it first touches what it is moved against.
@@ -124,7 +120,16 @@ impl Shape {
 
     /// The same points in a tree.
     pub fn samples(&self) -> &SampleTree {
-        self.samples.get_or_init(|| SampleTree::over(self.oriented().iter().map(|(p, _)| *p).collect()))
+        let derive = || match self.oriented.get() {
+            Some(oriented) => oriented.iter().map(|(p, _)| *p).collect(),
+            // Which way the surface faces there takes longer, and is seldom asked of what is new.
+            None => self.sited().into_iter().map(|(p, _)| p).collect(),
+        };
+        self.samples.get_or_init(|| SampleTree::over(derive()))
+    }
+
+    fn sited(&self) -> Vec<Sited> {
+        sited(&self.surface, &spacing(self.surface.bounds()))
     }
 
     /// The triangles in a tree of patches.

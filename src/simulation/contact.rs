@@ -186,13 +186,7 @@ impl<'a> Mover<'a> {
     }
 
     /// What is near of the samples of one surface of a pair; without fields, none if it takes more looks than `most`.
-    fn side(
-        &self,
-        side: Side,
-        other: usize,
-        (reach, most): (f64, usize),
-        clearance: f64,
-    ) -> Option<Near> {
+    fn side(&self, side: Side, other: usize, (reach, most): (f64, usize), clearance: f64) -> Option<Near> {
         let mut found = Near { contacts: Vec::new(), clearance };
         let standing = &self.scene.bodies[other];
         if !self.is_exact && !self.fields_are_ready(standing) {
