@@ -103,7 +103,7 @@ impl Kind {
         match self {
             Self::Source | Self::Shape | Self::Hull | Self::Field => 1,
             Self::Healed | Self::Touching | Self::Swept => 2,
-            Self::Blocking => 5,
+            Self::Blocking => 6,
             Self::Overlap => 9,
             Self::Verdict | Self::Witness | Self::Motion => 10,
             Self::Answer | Self::Plan => 12,

@@ -7,6 +7,8 @@
 
 mod gather;
 mod planes;
+#[cfg(test)]
+mod tests;
 
 use nalgebra::{Point3, Vector3, Vector6};
 

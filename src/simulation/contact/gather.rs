@@ -102,9 +102,9 @@ pub(super) fn gather_exactly(
                 return None;
             }
             let p = to_measured * node.centre;
-            let apart = surface.bounds().distance(&p) + allowance - node.radius;
-            if apart >= reach {
-                keep(apart);
+            let apart = surface.bounds().distance(&p);
+            if apart > 0.0 && apart + allowance - node.radius >= reach {
+                keep(apart + allowance - node.radius);
                 return None;
             }
             let (gap, closest) = look(&p, guess);

@@ -25,9 +25,11 @@ use super::facing::{Facing, Obstacle, Placed, Witness};
 use super::finder::{Finder, HELD, HELD_AT_FIRST};
 use super::kept::{Gathered, Place, Way};
 
-/// So many regions are looked for on one side of a pair before as many are on the other; then twice as
-/// many, and so on.
+/// So many regions are looked for on one side of a pair before as many are on the other; then twice as many, and so
+/// on …
 const FIRST_BUDGET: usize = 16;
+/// … up to this: from fewer, how many a side needs in all is guessed badly.
+const IN_TURN: usize = 64;
 /// Where more overlap than this is granted, facets lie across each other, and regions tell little. What overlaps
 /// with one face may be pushed into walls by as much, too, and around the rims of these its pieces are in no
 /// convex region: of a screw whose head reaches 0.02 into its lid, 20,000 were looked for in vain, in several
@@ -325,31 +327,39 @@ fn gathered(
     // The first side mostly suffices: the patches of the other, perhaps of a large part, are made when it is asked.
     let sides: Vec<OnceCell<Facing<'_>>> = asked.iter().map(|_| OnceCell::new()).collect();
     let mut finders: Vec<Option<Finder<'_>>> = asked.iter().map(|_| None).collect();
-    // The one inside the other, or the plainer one, needs fewer pieces: which, shows in trying.
-    let mut budget = if asked.len() > 1 { FIRST_BUDGET } else { MOST_REGIONS };
-    let mut is_told = true;
-    while is_told && budget <= MOST_REGIONS {
-        for (i, &asks_part) in asked.iter().enumerate() {
-            let finder = match &mut finders[i] {
-                Some(finder) => finder,
-                none => {
-                    let side = facing(asks_part)?;
-                    none.insert(Finder::of_all(sides[i].get_or_init(|| side), held, termination))
-                }
-            };
-            let found = finder.gather(at, budget, most);
-            is_told &= finder.cells.len() <= most;
-            let cells = if found == Ok(true) { std::mem::take(&mut finder.cells) } else { Vec::new() };
-            let regions = finders.iter().flatten().map(|finder| finder.regions).sum();
-            match found {
-                Ok(true) if cells.len() > most => {}
-                Ok(true) => return Ok(Gathered { asks_part, cells: Some(Arc::new(cells)), regions }),
-                Ok(false) => {}
-                Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
-                Err(_) => return Ok(Gathered { asks_part, cells: None, regions }),
-            }
+    // The one inside the other, or the plainer one, needs fewer pieces: which, shows in trying, at first of both in
+    // turn. Then the one that seems to need fewer is asked on, twice as far.
+    let mut budgets = vec![if asked.len() > 1 { FIRST_BUDGET } else { MOST_REGIONS }; asked.len()];
+    let mut is_told = !asked.is_empty();
+    while is_told {
+        let needed = |i: usize| finders[i].as_ref().map_or(0.0, |finder| finder.needed);
+        let rank = |i: usize| {
+            if budgets[i] <= IN_TURN { budgets[i] as f64 } else { MOST_REGIONS as f64 + needed(i) }
+        };
+        let Some(i) = (0..asked.len()).min_by(|&i, &k| rank(i).total_cmp(&rank(k))) else { break };
+        if budgets[i] > MOST_REGIONS {
+            break;
         }
-        budget *= 2;
+        let asks_part = asked[i];
+        let finder = match &mut finders[i] {
+            Some(finder) => finder,
+            none => {
+                let side = facing(asks_part)?;
+                none.insert(Finder::of_all(sides[i].get_or_init(|| side), held, termination))
+            }
+        };
+        let found = finder.gather(at, budgets[i], most);
+        budgets[i] *= 2;
+        is_told = finder.cells.len() <= most;
+        let cells = if found == Ok(true) { std::mem::take(&mut finder.cells) } else { Vec::new() };
+        let regions = finders.iter().flatten().map(|finder| finder.regions).sum();
+        match found {
+            Ok(true) if cells.len() > most => {}
+            Ok(true) => return Ok(Gathered { asks_part, cells: Some(Arc::new(cells)), regions }),
+            Ok(false) => {}
+            Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
+            Err(_) => return Ok(Gathered { asks_part, cells: None, regions }),
+        }
     }
     let regions = finders.iter().flatten().map(|finder| finder.regions).sum();
     Ok(Gathered { asks_part: true, cells: None, regions })

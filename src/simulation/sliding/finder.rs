@@ -56,6 +56,8 @@ struct Wish {
 /// A piece that is to get a cell yet, and what came of looking at it, if somebody had the time.
 struct Waiting {
     spot: Spot,
+    /// Which share it is of all: halves of a piece count as much as each other.
+    share: f64,
     looked: Option<Looked>,
 }
 
@@ -83,6 +85,10 @@ pub(super) struct Finder<'a> {
     pub(super) obstacles: Vec<Vector3<f64>>,
     /// Points that show it.
     pub(super) witnesses: Vec<Witness>,
+    /// The share of all pieces that has cells, of those that are to have some where they are.
+    done: f64,
+    /// How many regions they seem to need.
+    pub(super) needed: f64,
     /// Pieces that are to get cells yet, of those that are to have some where they are; the next one last.
     waiting: Vec<Waiting>,
     /// The piece at hand.
@@ -94,7 +100,7 @@ impl<'a> Finder<'a> {
     pub(super) fn of_all(pair: &'a Facing<'a>, held: f64, termination: &'a Termination) -> Self {
         let mut finder = Self::new(pair, 0, termination);
         let all = pair.root().map(|piece| Spot { piece, guess: 0, level: 0, held });
-        finder.waiting.extend(all.map(|spot| Waiting { spot, looked: None }));
+        finder.waiting.extend(all.map(|spot| Waiting { spot, share: 1.0, looked: None }));
         finder
     }
 
@@ -107,6 +113,8 @@ impl<'a> Finder<'a> {
             cells: Vec::new(),
             obstacles: Vec::new(),
             witnesses: Vec::new(),
+            done: 0.0,
+            needed: 0.0,
             waiting: Vec::new(),
             placed: Placed::default(),
         }
@@ -117,10 +125,14 @@ impl<'a> Finder<'a> {
     pub(super) fn gather(&mut self, at: &Vector3<f64>, budget: usize, most: usize) -> Result<bool, Halt> {
         let wish = Wish { at: *at, along: Vector3::zeros() };
         self.budget = budget;
+        let (regions, done) = (self.regions, self.done);
         while let Some(next) = self.waiting.pop() {
             self.termination.check()?;
             if self.regions >= self.budget || self.cells.len() > most {
                 self.waiting.push(next);
+                // If the rest goes on as this did: before may have been what lies free.
+                let pace = (self.regions - regions) as f64 / (self.done - done).max(f64::MIN_POSITIVE);
+                self.needed = self.regions as f64 + pace * (1.0 - self.done);
                 return Ok(false);
             }
             let looked = next.looked.unwrap_or_else(|| self.looked_beside(&next.spot, &wish));
@@ -128,13 +140,16 @@ impl<'a> Finder<'a> {
             self.regions += regions;
             if let Some(cell) = cell {
                 self.cells.push(cell);
+                self.done += next.share;
             } else if is_smallest {
                 self.pair.place(&spot.piece, &wish.at, &mut self.placed);
                 self.end(&spot, &wish)?;
+                self.done += next.share;
             } else {
-                let parts = self.pair.parts(&spot.piece).into_iter().rev();
-                let waiting = |piece| Waiting { spot: Spot { piece, level: 0, ..spot }, looked: None };
-                self.waiting.extend(parts.map(waiting));
+                let parts = self.pair.parts(&spot.piece);
+                let share = next.share / parts.len() as f64;
+                let waiting = |piece| Waiting { spot: Spot { piece, level: 0, ..spot }, share, looked: None };
+                self.waiting.extend(parts.into_iter().rev().map(waiting));
             }
         }
         Ok(true)
@@ -411,10 +426,11 @@ mod tests {
             let mut told = Vec::new();
             for budget in [1, 5, 16, 64, 4096] {
                 let ended = finder.gather(&Vector3::zeros(), budget, usize::MAX);
-                told.push(format!("{ended:?} {} {:?}", finder.regions, finder.cells));
+                told.push(format!("{ended:?} {} {} {:?}", finder.regions, finder.needed, finder.cells));
                 if ended != Ok(false) {
                     break;
                 }
+                assert!(finder.needed > finder.regions as f64, "there is more to come");
             }
             told
         })
