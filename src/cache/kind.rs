@@ -106,7 +106,7 @@ impl Kind {
             Self::Blocking => 6,
             Self::Overlap => 9,
             Self::Verdict | Self::Witness | Self::Motion => 10,
-            Self::Answer | Self::Plan => 12,
+            Self::Answer | Self::Plan => 13,
         }
     }
 

@@ -24,6 +24,7 @@ pub(super) struct Measured<'m> {
 const GATHER_POLL: u32 = 1;
 /// The same for the samples of a node.
 const SAMPLE_POLL: u32 = 4;
+
 /// By the other's field.
 pub(super) fn gather(
     tree: &SampleTree,
@@ -84,15 +85,15 @@ pub(super) fn gather_exactly(
     tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
 ) -> Option<()> {
     let Measured { body, to_measured, allowance, reach } = *measured;
-    let surface = &body.shape.surface;
+    let bounds = body.shape.surface.bounds();
     let clearance = Cell::new(near.clearance);
     let keep = |gap: f64| clearance.set(clearance.get().min(gap));
     let looks = Cell::new(0);
     let poll = Poll::every(ENTER_POLL, termination);
     let look = |p: &Point3<f64>, guess: u32| {
         looks.set(looks.get() + 1);
-        let closest = surface.closest_from(p, guess);
-        (surface.signed(p, &closest) + allowance, closest)
+        let (closest, distance) = body.closest_from(p, guess);
+        (distance + allowance, closest)
     };
     let is_over = || looks.get() > most || poll.is_over();
     tree.walk(
@@ -102,7 +103,7 @@ pub(super) fn gather_exactly(
                 return None;
             }
             let p = to_measured * node.centre;
-            let apart = surface.bounds().distance(&p);
+            let apart = bounds.distance(&p);
             if apart > 0.0 && apart + allowance - node.radius >= reach {
                 keep(apart + allowance - node.radius);
                 return None;

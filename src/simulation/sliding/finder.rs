@@ -85,9 +85,7 @@ pub(super) struct Finder<'a> {
     pub(super) obstacles: Vec<Vector3<f64>>,
     /// Points that show it.
     pub(super) witnesses: Vec<Witness>,
-    /// The share of all pieces that has cells, of those that are to have some where they are.
-    done: f64,
-    /// How many regions they seem to need.
+    /// How many regions all of those pieces seem to need that are to have cells where they are.
     pub(super) needed: f64,
     /// Pieces that are to get cells yet, of those that are to have some where they are; the next one last.
     waiting: Vec<Waiting>,
@@ -113,7 +111,6 @@ impl<'a> Finder<'a> {
             cells: Vec::new(),
             obstacles: Vec::new(),
             witnesses: Vec::new(),
-            done: 0.0,
             needed: 0.0,
             waiting: Vec::new(),
             placed: Placed::default(),
@@ -125,14 +122,14 @@ impl<'a> Finder<'a> {
     pub(super) fn gather(&mut self, at: &Vector3<f64>, budget: usize, most: usize) -> Result<bool, Halt> {
         let wish = Wish { at: *at, along: Vector3::zeros() };
         self.budget = budget;
-        let (regions, done) = (self.regions, self.done);
+        let (regions, left) = (self.regions, self.left());
         while let Some(next) = self.waiting.pop() {
             self.termination.check()?;
             if self.regions >= self.budget || self.cells.len() > most {
                 self.waiting.push(next);
                 // If the rest goes on as this did: before may have been what lies free.
-                let pace = (self.regions - regions) as f64 / (self.done - done).max(f64::MIN_POSITIVE);
-                self.needed = self.regions as f64 + pace * (1.0 - self.done);
+                let pace = (self.regions - regions) as f64 / (left - self.left()).max(f64::MIN_POSITIVE);
+                self.needed = self.regions as f64 + pace * self.left();
                 return Ok(false);
             }
             let looked = next.looked.unwrap_or_else(|| self.looked_beside(&next.spot, &wish));
@@ -140,11 +137,9 @@ impl<'a> Finder<'a> {
             self.regions += regions;
             if let Some(cell) = cell {
                 self.cells.push(cell);
-                self.done += next.share;
             } else if is_smallest {
                 self.pair.place(&spot.piece, &wish.at, &mut self.placed);
                 self.end(&spot, &wish)?;
-                self.done += next.share;
             } else {
                 let parts = self.pair.parts(&spot.piece);
                 let share = next.share / parts.len() as f64;
@@ -153,6 +148,11 @@ impl<'a> Finder<'a> {
             }
         }
         Ok(true)
+    }
+
+    /// The share of pieces that wait.
+    fn left(&self) -> f64 {
+        self.waiting.iter().map(|waiting| waiting.share).sum()
     }
 
     /// Looks for a cell for a piece, and, side by side with that, for those for the pieces that come next, most
