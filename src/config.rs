@@ -147,6 +147,8 @@ pub struct CacheConfig {
     pub memory_mb: u64,
     /// Whether assemblies are made ready while nothing is asked.
     pub prefetch: bool,
+    /// Seconds of such time for what may be asked after a plan.
+    pub foresight_s: u64,
 }
 
 /// What of the memory is for what, in bytes.
@@ -242,7 +244,7 @@ impl TimesConfig {
 
 impl Default for CacheConfig {
     fn default() -> Self {
-        Self { disk: true, dir: None, disk_mb: 1024, memory_mb: 256, prefetch: true }
+        Self { disk: true, dir: None, disk_mb: 1024, memory_mb: 256, prefetch: true, foresight_s: 10 }
     }
 }
 
@@ -256,7 +258,13 @@ impl CacheConfig {
         MemoryBudget { all: all / 2, records: all / 16 * 2, answers: all / 16 }
     }
 
-    /// The same for the cache.
+    /// How much time may go into what may be asked after a plan.
+    #[must_use]
+    pub fn foresight(&self) -> Duration {
+        Duration::from_secs(if self.prefetch { self.foresight_s } else { 0 })
+    }
+
+    /// What the cache is to keep to.
     #[must_use]
     pub fn settings(&self) -> CacheSettings {
         let folder = self.dir.clone().or_else(CacheSettings::default_folder).filter(|_| self.disk);
@@ -329,6 +337,7 @@ impl Config {
         within("requests.slow_reader_s", self.requests.slow_reader_s, 0.1..=86_400.0, "0.1 to 86400")?;
         within("cache.disk_mb", self.cache.disk_mb, 16..=1_048_576, "16 to 1048576")?;
         within("cache.memory_mb", self.cache.memory_mb, 0..=1_048_576, "0 to 1048576")?;
+        within("cache.foresight_s", self.cache.foresight_s, 0..=86_400, "0 to 86400")?;
         within("times.tick_s", self.times.tick_s, 0.05..=60.0, "0.05 to 60")?;
         within("times.grace_s", self.times.grace_s, 0.0..=3600.0, "0 to 3600")?;
         within("times.drain_s", self.times.drain_s, 0.1..=3600.0, "0.1 to 3600")?;

@@ -16,7 +16,7 @@ use sbdp_ipc::status::{Status, StatusHeader};
 use super::answers::{Answer, Answers, question};
 use super::closing::Closing;
 use super::convert;
-use super::figures::{Figures, Latencies, Surroundings};
+use super::figures::{AtHand, Figures, Latencies, Surroundings};
 use super::intake::Upload;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::resources;
@@ -225,6 +225,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
     }
 
     fn answer_again(&mut self, session: &mut Session<L>, answer: &Answer) {
+        self.queues.prefetch.answered();
         session.answer(answer);
         self.counters.remembered += 1;
     }
@@ -426,8 +427,11 @@ impl<L: Link, P: Planning> Desk<L, P> {
             self.surroundings,
             &self.latencies,
             &self.preloaded,
-            self.answers.figures(),
-            self.service.remembered(),
+            AtHand {
+                answers: self.answers.figures(),
+                remembered: self.service.remembered(),
+                ahead: self.queues.prefetch.ahead(),
+            },
         )
     }
 

@@ -7,6 +7,7 @@ use std::time::Duration;
 use sbdp_ipc::status::StatusHeader;
 use serde::Serialize;
 
+use super::prefetch::Ahead;
 use crate::cache::KindStatistics;
 use crate::service::Remembered;
 
@@ -137,10 +138,19 @@ pub(crate) struct Figures {
     uploads: u64,
     latency: BTreeMap<&'static str, LatencyFigures>,
     preloaded: Vec<String>,
+    #[serde(flatten)]
+    at_hand: AtHand,
+}
+
+/// What is there before it is asked for, and what is becoming so.
+#[derive(Debug, Default, Serialize)]
+pub(crate) struct AtHand {
     /// Answers in memory, as they were sent.
-    answers: AnswerFigures,
+    pub(crate) answers: AnswerFigures,
     /// Assemblies and records; what is on disk is not counted.
-    remembered: Option<Remembered>,
+    pub(crate) remembered: Option<Remembered>,
+    /// What is made ready while nothing is asked.
+    pub(crate) ahead: Ahead,
 }
 
 /// Answers in memory.
@@ -157,8 +167,7 @@ impl Figures {
         surroundings: Surroundings,
         latencies: &Latencies,
         preloaded: &[(String, [u8; 32])],
-        answers: AnswerFigures,
-        remembered: Option<Remembered>,
+        at_hand: AtHand,
     ) -> Self {
         let latency = |(kind, h): (&Timed, &Histogram)| {
             let figures = LatencyFigures {
@@ -193,8 +202,7 @@ impl Figures {
             uploads: n.uploads,
             latency: latencies.by_kind.iter().map(latency).collect(),
             preloaded: preloaded.iter().map(|(name, _)| name.clone()).collect(),
-            answers,
-            remembered,
+            at_hand,
         }
     }
 
@@ -216,6 +224,8 @@ impl Figures {
             ("requests_open", self.open_requests as f64),
             ("clients", self.clients as f64),
             ("connections", self.connections as f64),
+            ("ahead_assemblies", self.at_hand.ahead.assemblies as f64),
+            ("ahead_questions", self.at_hand.ahead.questions as f64),
         ];
         let free = self.shared_memory_free_bytes.map(|free| ("shared_memory_free_bytes", free as f64));
         for (name, value) in gauges.into_iter().chain(free) {
@@ -234,7 +244,10 @@ impl Figures {
         for (end, count) in ends {
             let _ = writeln!(text, "sbdp_plan_requests_ended_total{{end=\"{end}\"}} {count}");
         }
-        for (name, count) in [("plans_remembered", self.plans_remembered), ("uploads", self.uploads)] {
+        let (remembered, foreseen) = (self.plans_remembered, self.at_hand.ahead.foreseen);
+        for (name, count) in
+            [("plans_remembered", remembered), ("questions_foreseen", foreseen), ("uploads", self.uploads)]
+        {
             let _ = writeln!(text, "# TYPE sbdp_{name}_total counter\nsbdp_{name}_total {count}");
         }
         let _ = writeln!(text, "# TYPE sbdp_request_seconds summary");
@@ -246,8 +259,12 @@ impl Figures {
             let _ = writeln!(text, "sbdp_request_seconds_sum{{kind=\"{kind}\"}} {}", l.sum_s);
             let _ = writeln!(text, "sbdp_request_seconds_count{{kind=\"{kind}\"}} {}", l.count);
         }
-        let _ = writeln!(text, "# TYPE sbdp_answers_bytes gauge\nsbdp_answers_bytes {}", self.answers.bytes);
-        self.remembered.iter().for_each(|remembered| cache_metrics(&mut text, remembered));
+        let _ = writeln!(
+            text,
+            "# TYPE sbdp_answers_bytes gauge\nsbdp_answers_bytes {}",
+            self.at_hand.answers.bytes
+        );
+        self.at_hand.remembered.iter().for_each(|remembered| cache_metrics(&mut text, remembered));
         text
     }
 }
@@ -309,12 +326,16 @@ mod tests {
             Surroundings { connections: 3, clients: 2, shared_memory_free: Some(1 << 20) },
             &latencies,
             &[("frame".to_owned(), [0; 32])],
-            AnswerFigures::default(),
-            Some(Service::default().remembered()),
+            AtHand {
+                remembered: Some(Service::default().remembered()),
+                ahead: Ahead { assemblies: 1, questions: 3, foreseen: 8 },
+                ..AtHand::default()
+            },
         );
         let json: serde_json::Value = serde_json::from_str(&figures.json()).unwrap();
         assert_eq!((json["pid"].as_u64(), json["latency"]["plan"]["count"].as_u64()), (Some(7), Some(1)));
         assert_eq!(json["preloaded"][0], "frame");
+        assert_eq!(json["ahead"]["questions"], 3);
         let text = figures.prometheus();
         for line in [
             "sbdp_plan_requests_total 5",
@@ -323,6 +344,8 @@ mod tests {
             "sbdp_cache_hits_total{kind=\"motion\"} 0",
             "sbdp_assemblies 0",
             "sbdp_clients 2",
+            "sbdp_ahead_questions 3",
+            "sbdp_questions_foreseen_total 8",
             "sbdp_cache_mapped_bytes 0",
             "sbdp_shared_memory_free_bytes 1048576",
         ] {

@@ -14,6 +14,7 @@ mod convert;
 mod desk;
 mod event_loop;
 mod figures;
+mod foresight;
 mod instance;
 mod intake;
 mod lifecycle;

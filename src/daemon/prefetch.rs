@@ -1,11 +1,15 @@
 //! What workers make ready while nothing is asked: fields, overlaps and blocking graphs of assemblies that
-//! just came, or were asked about before a restart. Whatever is asked stops it.
+//! just came, or were asked about before a restart; then what may be asked next about those that were
+//! planned ([`foresight`](super::foresight)). Whatever is asked stops it.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use serde::Serialize;
+
+use super::foresight::Foresight;
 use crate::service::AssemblyId;
 use crate::termination::Termination;
 
@@ -13,6 +17,8 @@ use crate::termination::Termination;
 const QUIET: Duration = Duration::from_millis(50);
 /// So many assemblies may wait; those that came first are left out.
 const MOST_WAITING: usize = 256;
+/// So many plans may wait for what may be asked after them; those made first are left out.
+const MOST_FORESIGHTS: usize = 16;
 
 /// What is to be made ready, and whether there is time for it. Shared by all threads.
 #[derive(Debug, Default)]
@@ -24,12 +30,51 @@ pub(super) struct Prefetch {
 #[derive(Debug, Default)]
 struct State {
     waiting: VecDeque<AssemblyId>,
+    /// The newest first: that plan is the one that is carried out.
+    foresights: VecDeque<Foresight>,
+    /// Questions that were planned ahead.
+    foreseen: u64,
     /// Requests that workers work on.
     busy: usize,
     quiet_since: Option<Instant>,
-    /// Stops what is being made ready.
-    stop: Option<Arc<AtomicBool>>,
+    /// What is being made ready.
+    at_work: Option<AtWork>,
     closed: bool,
+}
+
+/// Something that is being made ready.
+#[derive(Debug)]
+struct AtWork {
+    /// Stops it.
+    stop: Arc<AtomicBool>,
+    /// It is questions, so many.
+    questions: Option<usize>,
+}
+
+impl AtWork {
+    fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Something to make ready.
+#[derive(Debug)]
+pub(super) enum Work {
+    /// What any plan of an assembly needs.
+    Assembly(AssemblyId),
+    /// The next of the questions that may be asked after a plan.
+    Question(Box<Foresight>),
+}
+
+/// What is made ready, in figures.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub(crate) struct Ahead {
+    /// Assemblies that wait, with the one at work.
+    pub(crate) assemblies: usize,
+    /// Questions that may be asked and wait to be planned, with the one at work.
+    pub(crate) questions: usize,
+    /// Questions that were planned ahead, since the daemon started.
+    pub(crate) foreseen: u64,
 }
 
 /// As long as this lives, nothing is made ready.
@@ -60,10 +105,16 @@ impl Prefetch {
     pub(super) fn busy(&self) -> Busy<'_> {
         let mut state = self.state();
         state.busy += 1;
-        if let Some(stop) = &state.stop {
-            stop.store(true, Ordering::Relaxed);
-        }
+        state.at_work.iter().for_each(AtWork::stop);
         Busy(self)
+    }
+
+    /// A request was answered without a worker: whoever asked may ask again at once, and is not to wait for
+    /// a processor. Assemblies that just came are made ready nevertheless: somebody is about to ask.
+    pub(super) fn answered(&self) {
+        let mut state = self.state();
+        state.quiet_since = Some(Instant::now());
+        state.at_work.iter().filter(|work| work.questions.is_some()).for_each(AtWork::stop);
     }
 
     /// Wants an assembly made ready, after those that wait.
@@ -77,45 +128,69 @@ impl Prefetch {
         self.changed.notify_all();
     }
 
+    /// Wants that planned which may be asked after a plan, before what may be asked after others.
+    pub(super) fn foresee(&self, foresight: Foresight) {
+        let mut state = self.state();
+        state.foresights.retain(|waiting| !waiting.is_as(&foresight));
+        state.foresights.push_front(foresight);
+        state.foresights.truncate(MOST_FORESIGHTS);
+        self.changed.notify_all();
+    }
+
+    /// What waits, and what was done.
+    pub(super) fn ahead(&self) -> Ahead {
+        let state = self.state();
+        let at_work = state.at_work.as_ref();
+        let assembly = at_work.is_some_and(|work| work.questions.is_none());
+        let questions = at_work.and_then(|work| work.questions).unwrap_or(0);
+        Ahead {
+            assemblies: state.waiting.len() + usize::from(assembly),
+            questions: state.foresights.iter().map(Foresight::left).sum::<usize>() + questions,
+            foreseen: state.foreseen,
+        }
+    }
+
     /// Nothing is made ready any more.
     pub(super) fn close(&self) {
         let mut state = self.state();
         state.closed = true;
-        if let Some(stop) = &state.stop {
-            stop.store(true, Ordering::Relaxed);
-        }
+        state.at_work.iter().for_each(AtWork::stop);
         self.changed.notify_all();
     }
 
-    /// Makes ready what is wanted, as long as it is quiet, until it is closed.
-    pub(super) fn run(&self, prepare: impl Fn(AssemblyId, &Termination)) {
-        while let Some((id, termination)) = self.next() {
-            prepare(id, &termination);
+    /// Makes ready what is wanted, as long as it is quiet, until it is closed. `prepare` is given what is next, and
+    /// tells whether that was a question that it planned.
+    pub(super) fn run(&self, prepare: impl Fn(&mut Work, &Termination) -> bool) {
+        while let Some((mut work, termination)) = self.next() {
+            let foresaw = prepare(&mut work, &termination);
             let mut state = self.state();
-            let stopped = state.stop.take().is_some_and(|stop| stop.load(Ordering::Relaxed));
-            if stopped && !state.closed && !state.waiting.contains(&id) {
-                state.waiting.push_front(id);
-            }
+            state.at_work = None;
+            state.foreseen += u64::from(foresaw);
+            state.put_back(work, termination.check().is_err());
         }
     }
 
     /// Waits until it is quiet and something is wanted.
-    fn next(&self) -> Option<(AssemblyId, Termination)> {
+    fn next(&self) -> Option<(Work, Termination)> {
         let mut state = self.state();
         loop {
             if state.closed {
                 return None;
             }
             let quiet = state.quiet_since.map_or(Duration::MAX, |since| since.elapsed());
-            if state.busy > 0 || state.waiting.is_empty() {
+            if state.busy > 0 || state.is_idle() {
                 state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
             } else if quiet < QUIET {
                 let waited = self.changed.wait_timeout(state, QUIET - quiet);
                 state = waited.unwrap_or_else(PoisonError::into_inner).0;
-            } else if let Some(id) = state.waiting.pop_front() {
+            } else if let Some(work) = state.take() {
                 let termination = Termination::default();
-                state.stop = Some(termination.cancel_flag());
-                return Some((id, termination));
+                let questions = match &work {
+                    Work::Assembly(_) => None,
+                    Work::Question(foresight) => Some(foresight.left()),
+                };
+                state.at_work = Some(AtWork { stop: termination.cancel_flag(), questions });
+                return Some((work, termination));
             }
         }
     }
@@ -123,6 +198,36 @@ impl Prefetch {
     /// It holds plain data: it is whole even if a holder panicked.
     fn state(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn is_idle(&self) -> bool {
+        self.waiting.is_empty() && self.foresights.is_empty()
+    }
+
+    fn take(&mut self) -> Option<Work> {
+        let assembly = self.waiting.pop_front().map(Work::Assembly);
+        assembly.or_else(|| self.foresights.pop_front().map(|f| Work::Question(Box::new(f))))
+    }
+
+    /// What was stopped is the next, and so are the questions that are left of a plan.
+    fn put_back(&mut self, work: Work, was_stopped: bool) {
+        match work {
+            _ if self.closed => {}
+            Work::Assembly(id) => {
+                if was_stopped && !self.waiting.contains(&id) {
+                    self.waiting.push_front(id);
+                }
+            }
+            Work::Question(foresight) => {
+                let is_there = self.foresights.iter().any(|waiting| waiting.is_as(&foresight));
+                if foresight.left() > 0 && !is_there {
+                    self.foresights.push_front(*foresight);
+                    self.foresights.truncate(MOST_FORESIGHTS);
+                }
+            }
+        }
     }
 }
 
@@ -144,7 +249,8 @@ mod tests {
             let prefetch = Arc::clone(&prefetch);
             std::thread::spawn(move || {
                 let tries = Mutex::new(0);
-                prefetch.run(|id, termination| {
+                prefetch.run(|work, termination| {
+                    let Work::Assembly(id) = *work else { panic!("{work:?}") };
                     let mut tries = tries.lock().unwrap();
                     *tries += 1;
                     begun.send(id).unwrap();
@@ -152,6 +258,7 @@ mod tests {
                     while *tries == 1 && termination.check().is_ok() {
                         std::thread::yield_now();
                     }
+                    false
                 });
             })
         };

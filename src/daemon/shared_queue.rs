@@ -1,7 +1,7 @@
 //! The queues that feed the threads.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::prefetch::Prefetch;
 use super::request_queue::{Bounds, Owner, Rejected, RequestQueue, Ticket};
@@ -110,6 +110,8 @@ pub(crate) struct Queues {
     pub(crate) admissions: Arc<SharedQueue<AdmitJob>>,
     /// What is made ready while nothing is asked, if anything is.
     pub(super) prefetch: Arc<Prefetch>,
+    /// How much time may go into what may be asked after a plan.
+    pub(super) foresight: Duration,
 }
 
 /// The bounds of plans, and of assemblies to take in.
@@ -151,6 +153,7 @@ impl Queues {
             plans: Arc::new(SharedQueue::new(plans)),
             admissions: Arc::new(SharedQueue::new(admissions)),
             prefetch: Arc::default(),
+            foresight: config.cache.foresight(),
         }
     }
 

@@ -12,6 +12,8 @@ use sbdp_ipc::plan::Step;
 
 use super::answers::Answer;
 use super::convert;
+use super::foresight::Foresight;
+use super::prefetch::Work;
 use super::request_queue::Owner;
 use super::shared_queue::Queues;
 use crate::cache::AnsweredQuestion;
@@ -57,6 +59,13 @@ pub trait Planning: Send + Sync + 'static {
     /// The id is unknown.
     fn prepare(&self, _: AssemblyId, _: &Termination) -> Result<(), ServiceError> {
         Ok(())
+    }
+    /// See [`Service::foresee`].
+    ///
+    /// # Errors
+    /// Nothing could be planned.
+    fn foresee(&self, _: AssemblyId, _: &PlanRequest, _: &Termination) -> Result<Plan, ServiceError> {
+        Err(ServiceError::UnknownAssembly)
     }
     /// See [`Service::recent`].
     fn recent(&self, _: usize) -> Vec<AssemblyId> {
@@ -128,6 +137,15 @@ impl Planning for Service {
 
     fn prepare(&self, id: AssemblyId, termination: &Termination) -> Result<(), ServiceError> {
         Self::prepare(self, id, termination)
+    }
+
+    fn foresee(
+        &self,
+        id: AssemblyId,
+        request: &PlanRequest,
+        termination: &Termination,
+    ) -> Result<Plan, ServiceError> {
+        Self::foresee(self, id, request, termination)
     }
 
     fn recent(&self, most: usize) -> Vec<AssemblyId> {
@@ -245,7 +263,7 @@ pub(crate) fn start<P: Planning>(
         thread::Builder::new().name(format!("sbdp-plan-{number}")).spawn(move || {
             while let Some((job, _working)) = queues.plans.pop() {
                 let _busy = queues.prefetch.busy();
-                plan(&*service, &job, &report);
+                plan(&*service, &job, &queues, &report);
             }
         })?;
     }
@@ -277,9 +295,13 @@ pub(crate) fn start_prefetch<P: Planning>(queues: &Queues, service: &Arc<P>) -> 
         for id in service.recent(MOST_RECENT) {
             queues.prefetch.want(id);
         }
-        queues.prefetch.run(|id, termination| {
-            // Whoever asks will be told what is wrong.
-            let _ = contained(|| pool.install(|| service.prepare(id, termination)));
+        queues.prefetch.run(|work, termination| match work {
+            Work::Assembly(id) => {
+                // Whoever asks will be told what is wrong.
+                let _ = contained(|| pool.install(|| service.prepare(*id, termination)));
+                false
+            }
+            Work::Question(foresight) => pool.install(|| foresight.plan_next(&*service, termination)),
         });
     };
     thread::Builder::new().name("sbdp-prefetch".to_owned()).spawn(prepare)?;
@@ -344,7 +366,7 @@ fn log_plan(plan: &Plan) {
     );
 }
 
-fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
+fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Report) {
     let _span = span(job).entered();
     report(WorkerEvent::Started(job.key));
     let before = job.question.as_ref().and_then(|q| Some((q, Answer::from_messages(service.answered(q)?)?)));
@@ -353,16 +375,16 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
     }
     let mut sink = Sink { key: job.key, report, last_progress: None };
     let planned = contained(|| {
-        let mut assembly = job.assembly;
-        if !job.moved.is_empty() {
-            let revision = Revision { moved: job.moved.clone(), ..Revision::default() };
-            assembly = service.revise_for_now(assembly, &revision, &job.termination)?.id;
-        }
+        let assembly = with_moved(service, job.assembly, &job.moved, &job.termination)?;
         service.plan(assembly, &job.request, &job.termination, &mut sink)
     });
     report(match planned {
         Ok(Ok(plan)) => {
             log_plan(&plan);
+            // Before whoever asked is told, and may ask what is foreseen.
+            if let Some(foresight) = Foresight::after(job, &plan, queues.foresight) {
+                queues.prefetch.foresee(foresight);
+            }
             let again = job.question.clone().zip(Answer::of(&plan));
             if let Some((question, answer)) = &again {
                 service.remember(question, answer.messages());
@@ -375,6 +397,20 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, report: &Report) {
         }
         Err(panic) => WorkerEvent::Unplanned(job.key, panic),
     });
+}
+
+/// An assembly with some parts elsewhere.
+pub(super) fn with_moved<P: Planning>(
+    service: &P,
+    assembly: AssemblyId,
+    moved: &[(usize, Pose)],
+    termination: &Termination,
+) -> Result<AssemblyId, ServiceError> {
+    if moved.is_empty() {
+        return Ok(assembly);
+    }
+    let revision = Revision { moved: moved.to_vec(), ..Revision::default() };
+    Ok(service.revise_for_now(assembly, &revision, termination)?.id)
 }
 
 /// Which assembly was taken in, if it was.
@@ -437,7 +473,7 @@ fn admit_revision<P: Planning>(
 
 /// Runs one request's work; a panic becomes an answer. The service must stay usable after one:
 /// it holds no lock across planning.
-fn contained<T>(work: impl FnOnce() -> T) -> Result<T, WireError> {
+pub(super) fn contained<T>(work: impl FnOnce() -> T) -> Result<T, WireError> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
         let reason = panic
             .downcast_ref::<&str>()

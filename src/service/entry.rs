@@ -53,7 +53,8 @@ impl Entry {
         size_of::<Self>() + parts.sum::<usize>() + self.at_hand().map_or(0, |prepared| prepared.memory())
     }
 
-    /// Plans, on as many threads as the request has, unless it was planned before.
+    /// Plans, on as many threads of the pools as the request has, or on those of whoever calls, unless it was
+    /// planned before.
     ///
     /// # Errors
     /// The threads could not be started.
@@ -63,7 +64,7 @@ impl Entry {
         termination: &Termination,
         sink: &mut dyn PlanSink,
         recall: &Recall,
-        pools: &Pools,
+        pools: Option<&Pools>,
     ) -> Result<Plan, ServiceError> {
         let started = Instant::now();
         let mut fixed = request.fixed.clone();
@@ -94,7 +95,11 @@ impl Entry {
             known => known,
         };
         let time = Time { started, termination };
-        pools.on(request.threads, || self.made(frame, &question, known, time, sink, recall))
+        let make = || self.made(frame, &question, known, time, sink, recall);
+        match pools {
+            Some(pools) => pools.on(request.threads, make),
+            None => Ok(make()),
+        }
     }
 
     /// A plan of which at most the search is known.

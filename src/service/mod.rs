@@ -34,6 +34,7 @@ use crate::termination::Termination;
 
 use entry::{Entry, engine_of};
 use pools::Pools;
+use relay::Silent;
 use store::Store;
 pub use store::StoreStatistics;
 
@@ -273,10 +274,34 @@ impl Service {
         termination: &Termination,
         sink: &mut dyn PlanSink,
     ) -> Result<Plan, ServiceError> {
+        self.planned(id, request, termination, sink, Some(&self.pools))
+    }
+
+    /// Plans what may be asked later, on the threads of whoever calls: the plan is remembered.
+    ///
+    /// # Errors
+    /// As [`Service::plan`].
+    pub fn foresee(
+        &self,
+        id: AssemblyId,
+        request: &PlanRequest,
+        termination: &Termination,
+    ) -> Result<Plan, ServiceError> {
+        self.planned(id, request, termination, &mut Silent, None)
+    }
+
+    fn planned(
+        &self,
+        id: AssemblyId,
+        request: &PlanRequest,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+        pools: Option<&Pools>,
+    ) -> Result<Plan, ServiceError> {
         let entry = self.entry(id, termination)?;
         check_parts(&named_parts(request), entry.assembly.parts.len())?;
         let recall = if request.no_cache { Recall::default() } else { Recall::of(Arc::clone(&self.cache)) };
-        let plan = entry.plan(request, termination, sink, &recall, &self.pools);
+        let plan = entry.plan(request, termination, sink, &recall, pools);
         self.settle(id, &entry);
         plan
     }

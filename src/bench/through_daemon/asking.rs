@@ -1,5 +1,7 @@
 //! Plans asked of a daemon, to the end.
 
+use std::time::Duration;
+
 use nalgebra::Point3;
 use sbdp_client::{Client, Event, Handle, PlanOptions, PlanStatus, Summary};
 
@@ -47,6 +49,25 @@ fn follow(
         }
     }
     Err(BenchError::Failed("a plan ended without its summary".to_owned()))
+}
+
+/// All that the daemon tells of itself.
+pub(super) fn figures(client: &Client) -> Result<serde_json::Value, BenchError> {
+    let figures = client.figures().map_err(BenchError::failed)?;
+    serde_json::from_str(&figures).map_err(BenchError::failed)
+}
+
+/// Between two looks at whether the daemon makes anything ready.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Waits until the daemon has made ready all that it wants to.
+pub(super) fn leave_alone(client: &Client) -> Result<(), BenchError> {
+    let waits = |ahead: &serde_json::Value| ["assemblies", "questions"].iter().any(|what| ahead[what] != 0);
+    // One of an older build tells nothing of it.
+    while figures(client)?.get("ahead").is_some_and(waits) {
+        std::thread::sleep(LOOK);
+    }
+    Ok(())
 }
 
 impl Answered {

@@ -1,5 +1,5 @@
 //! `sbdp bench replan`: what it costs to plan again when one part of an assembly changed, through the
-//! daemon, beside the same question asked of a daemon that knows nothing.
+//! daemon, at once and after it was left alone, beside the same question asked of a daemon that knows nothing.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -8,7 +8,7 @@ use sbdp_client::{Change, Client, Handle, PlanOptions};
 use serde::Serialize;
 
 use super::BenchError;
-use super::asking::{Answered, plan};
+use super::asking::{Answered, leave_alone, plan};
 use super::server::{Place, Server};
 use crate::geometry::{SourceAssembly, SourceMesh, load_assembly};
 use crate::upload::{wire_assembly, wire_part};
@@ -33,9 +33,11 @@ pub struct ReplanRecord {
     pub change: &'static str,
     /// Asked of a daemon that knows the assembly but planned nothing.
     pub cold: Cost,
-    /// Asked of a daemon that planned the assembly as it was.
+    /// Asked at once of a daemon that planned the assembly as it was.
     pub changed: Cost,
-    /// Whether both gave the same plan to the bit, which the cold daemon verified path by path.
+    /// Asked of one that had time to foresee what may be asked then.
+    pub foreseen: Cost,
+    /// Whether all gave the same plan to the bit, which the cold daemon verified path by path.
     pub verified: bool,
 }
 
@@ -81,14 +83,20 @@ fn compared(source: &SourceAssembly, part: usize, change: &Changed) -> Result<Re
     let (cold_plan, cold) = Asked::of(source, "cold")?.changed(source, part, change)?;
     let warm = Asked::of(source, "warm")?;
     plan(&warm.client, warm.handle, &PlanOptions::default())?;
-    let (plan, changed) = warm.changed(source, part, change)?;
+    let (changed_plan, changed) = warm.changed(source, part, change)?;
+    drop(warm);
+    let ready = Asked::of(source, "ready")?;
+    plan(&ready.client, ready.handle, &PlanOptions::default())?;
+    leave_alone(&ready.client)?;
+    let (foreseen_plan, foreseen) = ready.changed(source, part, change)?;
     Ok(ReplanRecord {
         assembly: source.name.clone(),
         part: source.parts[part].name.clone(),
         change: change.name,
         cold,
         changed,
-        verified: plan == cold_plan,
+        foreseen,
+        verified: changed_plan == cold_plan && foreseen_plan == cold_plan,
     })
 }
 

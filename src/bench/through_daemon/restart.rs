@@ -8,7 +8,7 @@ use sbdp_client::{Client, Handle, PlanOptions};
 use serde::Serialize;
 
 use super::BenchError;
-use super::asking::{plan, summary};
+use super::asking::{figures, plan, summary};
 use super::latency::{Percentiles, percentiles};
 use super::replan::fastener;
 use super::server::{Place, Server};
@@ -98,8 +98,7 @@ pub fn restart(assembly: &SourceAssembly, rounds: usize) -> Result<Restart, Benc
 
 /// Distance fields that the daemon found on disk, and that it asked for and did not.
 fn fields(client: &Client) -> Result<(u64, u64), BenchError> {
-    let figures = client.figures().map_err(BenchError::failed)?;
-    let figures: serde_json::Value = serde_json::from_str(&figures).map_err(BenchError::failed)?;
+    let figures = figures(client)?;
     let kinds = figures["remembered"]["records"]["kinds"].as_array().cloned().unwrap_or_default();
     let of = |count: &str| kinds.iter().find(|k| k["kind"] == "field").and_then(|k| k[count].as_u64());
     // A daemon of an older build keeps none.

@@ -11,7 +11,7 @@ use super::super::args::{BenchChurn, BenchLatency, BenchRawPeer, BenchReplan, Be
 use super::super::error::CliError;
 use super::super::print;
 use super::THIS_PROGRAM;
-use crate::bench::{self, ChurnRequest, Family, LatencyRequest, Percentiles, ReplanRecord};
+use crate::bench::{self, ChurnRequest, Cost, Family, LatencyRequest, Percentiles, ReplanRecord};
 use crate::geometry::{SourceAssembly, SourcePart, load_assembly};
 
 /// Parts of the assembly that is planned by default.
@@ -49,23 +49,33 @@ pub(super) fn latency(arguments: &BenchLatency) -> Result<ExitCode, CliError> {
 }
 
 pub(super) fn replan(arguments: &BenchReplan) -> Result<ExitCode, CliError> {
-    eprintln!("assembly, part, change: cold s (simulations), changed s (simulations), shares, same plan");
+    eprintln!(
+        "assembly, part, change: cold s (simulations); changed, and changed after the daemon was left alone, s \
+         (simulations, share of the time, share of the simulations); same plan"
+    );
     let records = bench::replan(&arguments.assemblies, |r| eprintln!("{}", line(r)))?;
     written(arguments.json.as_deref(), &records)
 }
 
 fn line(r: &ReplanRecord) -> String {
+    let shares = |cost: Cost| {
+        format!(
+            "{:.4} ({}, {:.1} %, {:.1} %)",
+            cost.time_s,
+            cost.simulations,
+            100.0 * cost.time_s / r.cold.time_s,
+            100.0 * cost.simulations as f64 / r.cold.simulations.max(1) as f64
+        )
+    };
     format!(
-        "{}, {}, {}: {:.4} ({}), {:.4} ({}), {:.1} % of the time, {:.1} % of the simulations, {}",
+        "{}, {}, {}: {:.4} ({}); {}; {}; {}",
         r.assembly,
         r.part,
         r.change,
         r.cold.time_s,
         r.cold.simulations,
-        r.changed.time_s,
-        r.changed.simulations,
-        100.0 * r.changed.time_s / r.cold.time_s,
-        100.0 * r.changed.simulations as f64 / r.cold.simulations.max(1) as f64,
+        shares(r.changed),
+        shares(r.foreseen),
         if r.verified { "the same plan" } else { "NOT the same plan" }
     )
 }
