@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use crate::geometry::{
     Assembly, Mesh, Pose, Shape, Solidity, SourceAssembly, SourceMesh, SourcePart, Surface, heal,
 };
-use crate::plan::Verifier;
+use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Verifier};
 use crate::sdf::Field;
 use crate::simulation::{Pair, Scene};
 use crate::termination::Termination;
@@ -234,4 +234,38 @@ pub(crate) fn spread(lo: [f64; 3], hi: [f64; 3], count: usize) -> impl Iterator<
             lo[a] + (hi[a] - lo[a]) * (i as f64 * STEPS[a]).fract()
         }))
     })
+}
+
+/// A plan of a single part as a scripted planner answers it.
+pub(crate) fn plan_of(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
+    Plan {
+        kind: PlanKind::default(),
+        status,
+        reason: None,
+        planner: "sbdp-star".into(),
+        engine: "sliding".into(),
+        units: None,
+        parts: vec!["0".into()],
+        removed: vec![],
+        poses: vec![],
+        targets: None,
+        fixed: vec![],
+        steps,
+        remaining: vec![],
+        blocked: vec![],
+        overlaps: vec![],
+        warnings: vec![],
+        stats: PlanStats::default(),
+    }
+}
+
+/// A step of such a plan.
+pub(crate) fn step_of(part: usize) -> PlanStep {
+    PlanStep {
+        part,
+        motion: MotionKind::Translation,
+        path: vec![[0.0; 7]],
+        verified_depth: 0.0,
+        waited_for: vec![],
+    }
 }

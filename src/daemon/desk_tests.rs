@@ -12,8 +12,9 @@ use super::*;
 use crate::cache::AnsweredQuestion;
 use crate::daemon::session::Undelivered;
 use crate::daemon::workers::{Report, start};
+use crate::fixtures::{plan_of, step_of};
 use crate::geometry::{Revision, SourceAssembly};
-use crate::plan::{MotionKind, Plan, PlanStats, PlanStatus, PlanStep};
+use crate::plan::{Plan, PlanStatus};
 use crate::search::{Interrupt, PlanSink};
 use crate::service::{Admission, ServiceError};
 use crate::termination::Termination;
@@ -39,28 +40,6 @@ struct Scripted {
     before: Vec<AnsweredQuestion>,
     /// Bytes that it was told answers take.
     answers: AtomicUsize,
-}
-
-fn plan_with(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
-    Plan {
-        kind: crate::plan::PlanKind::default(),
-        status,
-        reason: None,
-        planner: "sbdp-star".into(),
-        engine: "sliding".into(),
-        units: None,
-        parts: vec!["0".into()],
-        removed: vec![],
-        poses: vec![],
-        targets: None,
-        fixed: vec![],
-        steps,
-        remaining: vec![],
-        blocked: vec![],
-        overlaps: vec![],
-        warnings: vec![],
-        stats: PlanStats::default(),
-    }
 }
 
 impl Planning for Scripted {
@@ -98,19 +77,13 @@ impl Planning for Scripted {
         termination: &Termination,
         sink: &mut dyn PlanSink,
     ) -> Result<Plan, ServiceError> {
-        let step = PlanStep {
-            part: 0,
-            motion: MotionKind::Translation,
-            path: vec![[0.0; 7]],
-            verified_depth: 0.0,
-            waited_for: vec![],
-        };
+        let step = step_of(0);
         match request.max_simulations {
             Some(PANIC) => panic!("scripted panic"),
             Some(HOLD) => loop {
                 match termination.check() {
-                    Err(Interrupt::Cancelled) => return Ok(plan_with(PlanStatus::Cancelled, vec![])),
-                    Err(Interrupt::DeadlinePassed) => return Ok(plan_with(PlanStatus::Timeout, vec![])),
+                    Err(Interrupt::Cancelled) => return Ok(plan_of(PlanStatus::Cancelled, vec![])),
+                    Err(Interrupt::DeadlinePassed) => return Ok(plan_of(PlanStatus::Timeout, vec![])),
                     Ok(()) if self.let_go.load(Ordering::Relaxed) => break,
                     Ok(()) => std::thread::sleep(Duration::from_millis(1)),
                 }
@@ -118,7 +91,7 @@ impl Planning for Scripted {
             _ => {}
         }
         sink.step(&step);
-        Ok(plan_with(PlanStatus::Complete, vec![step]))
+        Ok(plan_of(PlanStatus::Complete, vec![step]))
     }
 }
 

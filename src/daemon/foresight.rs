@@ -95,3 +95,174 @@ impl Foresight {
         is_done
     }
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::sync::Mutex;
+    use std::sync::atomic::Ordering;
+
+    use super::super::request_queue::Owner;
+    use super::super::workers::SessionKey;
+    use super::*;
+    use crate::fixtures::{plan_of, step_of};
+    use crate::geometry::{Revision, SourceAssembly};
+    use crate::search::{PlanSink, Staging};
+    use crate::service::{Admission, ServiceError};
+
+    const TIME: Duration = Duration::from_secs(1000);
+
+    /// Of which assembly, with which parts stuck, and with which gone.
+    type Asked = (AssemblyId, Vec<usize>, Vec<usize>);
+
+    /// Writes down what it is asked to foresee.
+    #[derive(Default)]
+    struct Scripted {
+        asked: Mutex<Vec<Asked>>,
+        /// What the first of the questions ends as.
+        first: Option<fn(&Termination) -> PlanStatus>,
+    }
+
+    impl Planning for Scripted {
+        fn admit(&self, _: &SourceAssembly, _: &Termination) -> Result<Admission, ServiceError> {
+            Err(ServiceError::UnknownAssembly)
+        }
+
+        fn revise(
+            &self,
+            base: AssemblyId,
+            revision: &Revision,
+            _: &Termination,
+        ) -> Result<Admission, ServiceError> {
+            let id = AssemblyId([base.0[0] + revision.moved.len() as u8; 32]);
+            Ok(Admission { id, known: false, warnings: vec![] })
+        }
+
+        fn knows(&self, _: AssemblyId) -> bool {
+            true
+        }
+
+        fn plan(
+            &self,
+            _: AssemblyId,
+            _: &PlanRequest,
+            _: &Termination,
+            _: &mut dyn PlanSink,
+        ) -> Result<Plan, ServiceError> {
+            Err(ServiceError::UnknownAssembly)
+        }
+
+        fn foresee(
+            &self,
+            id: AssemblyId,
+            request: &PlanRequest,
+            termination: &Termination,
+        ) -> Result<Plan, ServiceError> {
+            let mut asked = self.asked.lock().unwrap();
+            asked.push((id, request.fixed.clone(), request.removed.clone()));
+            let first = self.first.filter(|_| asked.len() == 1);
+            drop(asked);
+            Ok(plan_of(first.map_or(PlanStatus::Infeasible, |status| status(termination)), vec![]))
+        }
+    }
+
+    impl Scripted {
+        fn asked(&self) -> Vec<Asked> {
+            self.asked.lock().unwrap().clone()
+        }
+    }
+
+    /// A request about an assembly that is called by a number.
+    pub(in super::super) fn job_about(assembly: u8, request: PlanRequest) -> PlanJob {
+        PlanJob {
+            key: SessionKey { client: 0, request: 0 },
+            owner: Owner::default(),
+            received: Instant::now(),
+            assembly: AssemblyId([assembly; 32]),
+            question: None,
+            moved: vec![],
+            request,
+            termination: Termination::default(),
+        }
+    }
+
+    fn job(request: PlanRequest) -> PlanJob {
+        job_about(1, request)
+    }
+
+    fn plan() -> Plan {
+        plan_of(PlanStatus::Complete, vec![step_of(2), step_of(0)])
+    }
+
+    fn foresight(request: PlanRequest) -> Foresight {
+        Foresight::after(&job(request), &plan(), TIME).unwrap()
+    }
+
+    #[test]
+    fn each_part_is_stuck_and_gone_in_the_order_of_the_plan() {
+        let (service, t) = (Scripted::default(), Termination::default());
+        let mut foresight =
+            foresight(PlanRequest { fixed: vec![7], removed: vec![5], ..PlanRequest::default() });
+        let mut planned = 0;
+        while foresight.plan_next(&service, &t) {
+            planned += 1;
+        }
+        let id = AssemblyId([1; 32]);
+        let of = |fixed: &[usize], removed: &[usize]| (id, fixed.to_vec(), removed.to_vec());
+        let expected = [of(&[7, 2], &[5]), of(&[7], &[5, 2]), of(&[7, 0], &[5]), of(&[7], &[5, 0])];
+        assert_eq!((service.asked(), planned, foresight.left()), (expected.to_vec(), 4, 0));
+    }
+
+    #[test]
+    fn parts_that_stood_elsewhere_do_so_there_too() {
+        let service = Scripted::default();
+        let job = PlanJob { moved: vec![(0, Pose::identity())], ..job(PlanRequest::default()) };
+        let mut foresight = Foresight::after(&job, &plan(), TIME).unwrap();
+        assert!(foresight.plan_next(&service, &Termination::default()));
+        assert_eq!(service.asked()[0].0, AssemblyId([2; 32]));
+    }
+
+    #[test]
+    fn what_was_stopped_is_the_next_again() {
+        let stopped = |t: &Termination| {
+            t.cancel_flag().store(true, Ordering::Relaxed);
+            PlanStatus::Cancelled
+        };
+        let service = Scripted { first: Some(stopped), ..Scripted::default() };
+        let mut foresight = foresight(PlanRequest::default());
+        assert!(!foresight.plan_next(&service, &Termination::default()));
+        assert_eq!(foresight.left(), 4);
+        assert!(foresight.plan_next(&service, &Termination::default()));
+        let asked = service.asked();
+        assert_eq!((asked[0] == asked[1], foresight.left()), (true, 3));
+    }
+
+    #[test]
+    fn what_took_all_the_time_or_cannot_be_planned_is_the_last() {
+        let endings: [fn(&Termination) -> PlanStatus; 2] =
+            [|_| PlanStatus::Timeout, |_| panic!("scripted panic")];
+        for first in endings {
+            let service = Scripted { first: Some(first), ..Scripted::default() };
+            let mut foresight = foresight(PlanRequest::default());
+            assert!(!foresight.plan_next(&service, &Termination::default()));
+            assert_eq!((foresight.left(), service.asked().len()), (0, 1));
+        }
+        let mut foresight = Foresight { time: Duration::from_nanos(1), ..foresight(PlanRequest::default()) };
+        assert!(foresight.plan_next(&Scripted::default(), &Termination::default()));
+        assert_eq!(foresight.left(), 0, "the time is over");
+    }
+
+    #[test]
+    fn nothing_is_foreseen_where_nobody_carries_a_plan_out() {
+        let none = |request: PlanRequest, plan: &Plan, time| {
+            assert!(Foresight::after(&job(request), plan, time).is_none());
+        };
+        let default = PlanRequest::default;
+        none(default(), &plan_of(PlanStatus::Infeasible, vec![]), TIME);
+        none(default(), &plan(), Duration::ZERO);
+        none(PlanRequest { planner: Planner::Sbdp, ..default() }, &plan(), TIME);
+        none(PlanRequest { assembly: Some(Staging::None), ..default() }, &plan(), TIME);
+        none(PlanRequest { no_cache: true, ..default() }, &plan(), TIME);
+        assert!(foresight(default()).is_as(&foresight(default())));
+        assert!(!foresight(default()).is_as(&foresight(PlanRequest { fixed: vec![1], ..default() })));
+    }
+}

@@ -235,7 +235,11 @@ impl State {
 mod tests {
     use std::sync::mpsc::channel;
 
+    use super::super::foresight::tests::job_about;
     use super::*;
+    use crate::fixtures::{plan_of, step_of};
+    use crate::plan::PlanStatus;
+    use crate::search::PlanRequest;
 
     fn id(n: u8) -> AssemblyId {
         AssemblyId([n; 32])
@@ -285,5 +289,67 @@ mod tests {
         let state = prefetch.state();
         assert_eq!((state.waiting.len(), state.waiting[0]), (MOST_WAITING, id(1)));
         assert_eq!(state.waiting.iter().filter(|w| **w == id(7)).count(), 1);
+    }
+
+    fn questions(assembly: u8, parts: usize) -> Foresight {
+        let job = job_about(assembly, PlanRequest::default());
+        let plan = plan_of(PlanStatus::Complete, (0..parts).map(step_of).collect());
+        Foresight::after(&job, &plan, Duration::from_secs(1000)).unwrap()
+    }
+
+    #[test]
+    fn assemblies_come_before_questions_and_the_newest_plan_before_others() {
+        let prefetch = Prefetch::default();
+        prefetch.foresee(questions(1, 1));
+        prefetch.foresee(questions(2, 2));
+        prefetch.want(id(3));
+        prefetch.foresee(questions(1, 3));
+        assert_eq!(prefetch.ahead(), Ahead { assemblies: 1, questions: 10, foreseen: 0 });
+        let mut taken = Vec::new();
+        while let Some((work, _)) = (prefetch.ahead().questions > 0).then(|| prefetch.next()).flatten() {
+            taken.push(match work {
+                Work::Assembly(_) => 0,
+                Work::Question(foresight) => foresight.left(),
+            });
+            prefetch.state().at_work = None;
+        }
+        assert_eq!(taken, [0, 6, 4], "of plans that were made twice, what comes after the later one");
+    }
+
+    #[test]
+    fn a_request_that_was_answered_at_once_stops_questions_alone() {
+        let prefetch = Prefetch::default();
+        prefetch.want(id(1));
+        let (_, termination) = prefetch.next().unwrap();
+        prefetch.answered();
+        assert!(termination.check().is_ok());
+        prefetch.state().at_work = None;
+        prefetch.foresee(questions(1, 1));
+        let (work, termination) = prefetch.next().unwrap();
+        assert_eq!(
+            prefetch.ahead(),
+            Ahead { assemblies: 0, questions: 2, foreseen: 0 },
+            "with what is at work"
+        );
+        prefetch.answered();
+        assert!(termination.check().is_err());
+        let mut state = prefetch.state();
+        state.at_work = None;
+        state.put_back(work, true);
+        drop(state);
+        assert_eq!(prefetch.ahead().questions, 2, "they are left");
+    }
+
+    #[test]
+    fn only_so_many_plans_wait() {
+        let prefetch = Prefetch::default();
+        for n in 0..=MOST_FORESIGHTS as u8 {
+            prefetch.foresee(questions(n, 1));
+        }
+        assert_eq!(prefetch.ahead().questions, 2 * MOST_FORESIGHTS);
+        prefetch.close();
+        prefetch.state().foresights.clear();
+        prefetch.state().put_back(Work::Question(Box::new(questions(1, 1))), true);
+        assert_eq!(prefetch.ahead().questions, 0, "nothing waits once it is closed");
     }
 }

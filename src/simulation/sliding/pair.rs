@@ -76,8 +76,8 @@ pub fn pair_blocks(
         termination.check()?;
         Ok(matches!(step, Step::Stuck { .. }))
     };
-    // Side by side: two parts alone are but one pair.
-    actions.par_iter().map(blocked).collect()
+    // Side by side, one by one: two parts alone are but one pair, and some take several times as long as others.
+    actions.par_iter().with_max_len(1).map(blocked).collect()
 }
 
 /// What is near, and the mover that goes on to look as this did: without fields if that took few looks, which depends

@@ -1,0 +1,78 @@
+//! What is planned ahead while nothing is asked, by the real daemon: whoever finds a part stuck or gone in the
+//! middle of a plan is answered from memory, and as if nothing had been foreseen.
+
+mod common;
+
+use std::time::{Duration, Instant};
+
+use common::{Boxes, Daemon, HANG, plan};
+use sbdp_client::{Client, Handle, PlanOptions, PlanStatus};
+
+/// Questions that wait, with the one at work, and those that were planned ahead.
+fn ahead(client: &Client) -> (u64, u64) {
+    let figures: serde_json::Value = serde_json::from_str(&client.figures().unwrap()).unwrap();
+    let of = |what: &str| figures["ahead"][what].as_u64().unwrap();
+    (of("questions") + of("assemblies"), of("foreseen"))
+}
+
+fn left_alone(client: &Client) -> u64 {
+    let began = Instant::now();
+    loop {
+        let (waiting, foreseen) = ahead(client);
+        if waiting == 0 {
+            return foreseen;
+        }
+        assert!(began.elapsed() < HANG, "{waiting} questions wait");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+fn contingencies(parts: &[u32]) -> Vec<PlanOptions> {
+    let becomes = |part: &u32| {
+        let stuck = PlanOptions { fixed: vec![*part], ..PlanOptions::default() };
+        [stuck, PlanOptions { removed: vec![*part], ..PlanOptions::default() }]
+    };
+    parts.iter().flat_map(becomes).collect()
+}
+
+fn upload(daemon: &Daemon) -> (Client, Handle) {
+    let client = daemon.connect();
+    let handle = client.upload(&Boxes::lattice(2).assembly()).unwrap();
+    (client, handle)
+}
+
+#[test]
+fn what_may_be_asked_after_a_plan_is_answered_from_memory_and_no_otherwise() {
+    let (foreseeing, other) = (Daemon::start(), Daemon::start_with("[cache]\nforesight_s = 0\n"));
+    let ((client, handle), (cold, same)) = (upload(&foreseeing), upload(&other));
+    let (parts, _) = plan(&client, handle, &PlanOptions::default());
+    assert_eq!(plan(&cold, same, &PlanOptions::default()).0, parts);
+    assert_eq!(left_alone(&client), 2 * parts.len() as u64);
+    assert_eq!(left_alone(&cold), 0);
+    for options in contingencies(&parts) {
+        let (foreseen, found) = plan(&client, handle, &options);
+        let (expected, made) = plan(&cold, same, &options);
+        assert_eq!((foreseen, found.status), (expected, made.status), "{options:?}");
+        assert_eq!((found.stats.plan_hit, made.stats.plan_hit), (1, 0), "{options:?}");
+    }
+}
+
+#[test]
+fn what_was_foreseen_outlives_the_daemon_and_leads_on() {
+    let mut daemon = Daemon::start();
+    let (client, handle) = upload(&daemon);
+    let (parts, _) = plan(&client, handle, &PlanOptions::default());
+    left_alone(&client);
+    drop(client);
+    daemon.signal(rustix::process::Signal::TERM);
+    daemon.wait();
+    daemon.kill_and_restart();
+    let client = daemon.connect();
+    let gone = PlanOptions { removed: vec![parts[0]], ..PlanOptions::default() };
+    let (left, found) = plan(&client, handle, &gone);
+    assert_eq!((found.status, found.stats.plan_hit), (PlanStatus::Complete, 1));
+    // Then the next part may be gone, too.
+    assert_eq!(left_alone(&client), 2 * left.len() as u64);
+    let both = PlanOptions { removed: vec![parts[0], left[0]], ..PlanOptions::default() };
+    assert_eq!(plan(&client, handle, &both).1.stats.plan_hit, 1);
+}
