@@ -12,6 +12,9 @@ use crate::search::{PlanRequest, Planner};
 use crate::service::AssemblyId;
 use crate::termination::Termination;
 
+/// In less time than this, no question is planned.
+const LEAST_TIME: Duration = Duration::from_millis(1);
+
 /// What may become of a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Contingency {
@@ -69,12 +72,13 @@ impl Foresight {
         self.left.len()
     }
 
-    /// Plans the next question; true if that was done. One that was stopped stays the next.
+    /// Plans the next question; true if that was done. One that was stopped stays the next; one that takes more than
+    /// half of the time is left out, though what was found for it is remembered.
     pub(super) fn plan_next<P: Planning>(&mut self, service: &P, termination: &Termination) -> bool {
         let Some(next) = self.left.pop_front() else { return false };
         let began = Instant::now();
         let request = next.of(&self.request);
-        let within = termination.within(self.time);
+        let within = termination.within(self.time / 2);
         // Whoever asks will be told what is wrong.
         let planned = contained(|| {
             let assembly = with_moved(service, self.assembly, &self.moved, &within)?;
@@ -85,14 +89,12 @@ impl Foresight {
             self.left.push_front(next);
             return false;
         }
-        let is_done = planned.is_ok_and(|planned| {
-            planned.is_ok_and(|plan| !matches!(plan.status, PlanStatus::Timeout | PlanStatus::Cancelled))
-        });
-        if !is_done || self.time.is_zero() {
+        let plan = planned.ok().and_then(Result::ok);
+        if plan.is_none() || self.time < LEAST_TIME {
             // Another would fail as this one did, or there is no time for it.
             self.left.clear();
         }
-        is_done
+        plan.is_some_and(|plan| !matches!(plan.status, PlanStatus::Timeout | PlanStatus::Cancelled))
     }
 }
 
@@ -237,15 +239,24 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_took_all_the_time_or_cannot_be_planned_is_the_last() {
-        let endings: [fn(&Termination) -> PlanStatus; 2] =
-            [|_| PlanStatus::Timeout, |_| panic!("scripted panic")];
-        for first in endings {
-            let service = Scripted { first: Some(first), ..Scripted::default() };
-            let mut foresight = foresight(PlanRequest::default());
-            assert!(!foresight.plan_next(&service, &Termination::default()));
-            assert_eq!((foresight.left(), service.asked().len()), (0, 1));
-        }
+    fn what_takes_too_long_is_left_out() {
+        let out_of_time = |t: &Termination| {
+            assert!(t.has_deadline());
+            PlanStatus::Timeout
+        };
+        let service = Scripted { first: Some(out_of_time), ..Scripted::default() };
+        let mut foresight = foresight(PlanRequest::default());
+        assert!(!foresight.plan_next(&service, &Termination::default()));
+        assert!(foresight.plan_next(&service, &Termination::default()));
+        assert_eq!((foresight.left(), service.asked().len()), (2, 2));
+    }
+
+    #[test]
+    fn what_cannot_be_planned_or_took_all_the_time_is_the_last() {
+        let service = Scripted { first: Some(|_| panic!("scripted panic")), ..Scripted::default() };
+        let mut failing = foresight(PlanRequest::default());
+        assert!(!failing.plan_next(&service, &Termination::default()));
+        assert_eq!((failing.left(), service.asked().len()), (0, 1));
         let mut foresight = Foresight { time: Duration::from_nanos(1), ..foresight(PlanRequest::default()) };
         assert!(foresight.plan_next(&Scripted::default(), &Termination::default()));
         assert_eq!(foresight.left(), 0, "the time is over");
