@@ -22,13 +22,13 @@ use super::intake::ticket;
 use super::lifecycle::{Lease, Place};
 use super::metrics::Metrics;
 use super::ports::{ActiveLink, Ports};
-use super::prefetch::Closing;
+use super::prefetch::{self, Closing};
 use super::request_queue::Owner;
 use super::resources::{SharedMemory, raise_file_limit};
 use super::shared_queue::Queues;
 use super::supervisor::Supervisor;
 use super::watchdog::{Watchdog, give_up};
-use super::workers::{AdmitJob, Planning, Report, WorkerEvent, start, start_prefetch};
+use super::workers::{AdmitJob, Planning, Report, WorkerEvent, start};
 use crate::config::{Config, seconds};
 
 /// Requests taken from one port before workers' reports are looked at again.
@@ -72,7 +72,7 @@ pub fn run_reloading<P: Planning>(
     // First of all: it makes ready what was asked about last, while ports are opened. Whatever fails ends it.
     let _closing = Closing(Arc::clone(&queues.prefetch));
     if config.cache.prefetch {
-        start_prefetch(&queues, &service)
+        prefetch::start(&queues, &service)
             .map_err(|source| DaemonError::System { what: "starting workers", source })?;
     }
     let watchdog = watch(config, &place)?;

@@ -5,11 +5,15 @@
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
 use std::time::{Duration, Instant};
 
+use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 
 use super::foresight::Foresight;
+use super::shared_queue::Queues;
+use super::workers::{Planning, contained};
 use crate::service::AssemblyId;
 use crate::termination::Termination;
 
@@ -19,6 +23,57 @@ const QUIET: Duration = Duration::from_millis(50);
 const MOST_WAITING: usize = 256;
 /// So many plans may wait for what may be asked after them; those made first are left out.
 const MOST_FORESIGHTS: usize = 16;
+
+/// Assemblies that were asked about before a restart are made ready, up to so many.
+const MOST_RECENT: usize = 8;
+/// How much less the processor is for assemblies that nobody asked about yet (Unix niceness) …
+const NICE: i32 = 10;
+/// … and for questions that perhaps nobody will ask.
+const NICEST: i32 = 19;
+
+/// Starts the thread that makes ready what is wanted.
+///
+/// # Errors
+/// The system has no thread for it.
+pub(super) fn start<P: Planning>(queues: &Queues, service: &Arc<P>) -> std::io::Result<()> {
+    let (queues, service) = (queues.clone(), Arc::clone(service));
+    let prepare = move || {
+        // Questions leave half of the processors to whoever else works on this machine: what shares a core with
+        // others slows them down, however nice it is.
+        let all = thread::available_parallelism().map_or(1, usize::from);
+        let pools = [(all, NICE), (all.div_ceil(2), NICEST)].map(|(threads, niceness)| {
+            let pool = ThreadPoolBuilder::new().num_threads(threads);
+            pool.start_handler(move |_| yield_to_others(niceness)).build()
+        });
+        let [Ok(for_assemblies), Ok(for_questions)] = pools else {
+            tracing::warn!("nothing is made ready ahead: there are no threads for it");
+            return;
+        };
+        for id in service.recent(MOST_RECENT) {
+            queues.prefetch.want(id);
+        }
+        queues.prefetch.run(|work, termination| match work {
+            Work::Assembly(id) => {
+                // Whoever asks will be told what is wrong.
+                let _ = contained(|| for_assemblies.install(|| service.prepare(*id, termination)));
+                false
+            }
+            Work::Question(foresight) => {
+                for_questions.install(|| foresight.plan_next(&*service, termination))
+            }
+        });
+    };
+    thread::Builder::new().name("sbdp-prefetch".to_owned()).spawn(prepare)?;
+    Ok(())
+}
+
+/// Makes this thread wait for all others of the machine. On Linux niceness is a thread's own.
+fn yield_to_others(niceness: i32) {
+    let this = rustix::thread::gettid();
+    if let Err(error) = rustix::process::setpriority_process(Some(this), niceness) {
+        tracing::debug!(%error, "no lower priority for what is not asked");
+    }
+}
 
 /// What is to be made ready, and whether there is time for it. Shared by all threads.
 #[derive(Debug, Default)]

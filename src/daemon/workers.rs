@@ -13,7 +13,6 @@ use sbdp_ipc::plan::Step;
 use super::answers::Answer;
 use super::convert;
 use super::foresight::Foresight;
-use super::prefetch::Work;
 use super::request_queue::Owner;
 use super::shared_queue::Queues;
 use crate::cache::AnsweredQuestion;
@@ -277,43 +276,6 @@ pub(crate) fn start<P: Planning>(
         }
     })?;
     Ok(())
-}
-
-/// Assemblies that were asked about before a restart are made ready, up to so many.
-const MOST_RECENT: usize = 8;
-/// How much less the processor is for what is not asked (Unix niceness).
-const NICENESS: i32 = 10;
-
-/// Starts the thread that makes assemblies ready while nothing is asked.
-pub(crate) fn start_prefetch<P: Planning>(queues: &Queues, service: &Arc<P>) -> std::io::Result<()> {
-    let (queues, service) = (queues.clone(), Arc::clone(service));
-    let prepare = move || {
-        let pool = rayon::ThreadPoolBuilder::new().start_handler(|_| yield_to_requests()).build();
-        let Ok(pool) = pool.inspect_err(|error| tracing::warn!(%error, "nothing is made ready ahead")) else {
-            return;
-        };
-        for id in service.recent(MOST_RECENT) {
-            queues.prefetch.want(id);
-        }
-        queues.prefetch.run(|work, termination| match work {
-            Work::Assembly(id) => {
-                // Whoever asks will be told what is wrong.
-                let _ = contained(|| pool.install(|| service.prepare(*id, termination)));
-                false
-            }
-            Work::Question(foresight) => pool.install(|| foresight.plan_next(&*service, termination)),
-        });
-    };
-    thread::Builder::new().name("sbdp-prefetch".to_owned()).spawn(prepare)?;
-    Ok(())
-}
-
-/// Makes this thread wait for all others of the machine. On Linux niceness is a thread's own.
-fn yield_to_requests() {
-    let this = rustix::thread::gettid();
-    if let Err(error) = rustix::process::setpriority_process(Some(this), NICENESS) {
-        tracing::debug!(%error, "no lower priority for what is not asked");
-    }
 }
 
 /// Streams what a plan yields to the port thread.
