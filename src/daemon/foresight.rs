@@ -1,5 +1,5 @@
-//! What may be asked next about an assembly that was planned: a part did not come off where the plan has it leave,
-//! or is gone already. Whoever carries a plan out asks that in the middle of it, and has no time; so such questions
+//! What may be asked next about an assembly that was planned: a part does not come off where the plan has it leave,
+//! may not move at all, or is gone already. Whoever carries a plan out asks that in the middle of it, and has no time; so such questions
 //! are planned while nothing is asked, in the order of the plan, and what was found is remembered.
 
 use std::collections::VecDeque;
@@ -15,9 +15,11 @@ use crate::termination::Termination;
 /// In less time than this, no question is planned.
 const LEAST_TIME: Duration = Duration::from_millis(1);
 
-/// What may become of a part.
+/// What may become of a part, by its place in the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Contingency {
+    /// It may not move any more when its turn comes: those before it are gone.
+    StuckInTurn(usize),
     /// It may not move any more.
     Stuck(usize),
     /// It is not there any more.
@@ -25,11 +27,23 @@ enum Contingency {
 }
 
 impl Contingency {
-    fn of(self, request: &PlanRequest) -> PlanRequest {
+    /// All that may become of one: in the order in which it may be asked about while the plan is carried out.
+    fn all(place: usize) -> impl Iterator<Item = Self> {
+        // Nothing is before the first.
+        let in_turn = (place > 0).then_some(Self::StuckInTurn(place));
+        in_turn.into_iter().chain([Self::Stuck(place), Self::Gone(place)])
+    }
+
+    /// The question about it, after a request whose plan takes parts out in some order.
+    fn question(self, request: &PlanRequest, order: &[usize]) -> PlanRequest {
         let mut request = request.clone();
         match self {
-            Self::Stuck(part) => request.fixed.push(part),
-            Self::Gone(part) => request.removed.push(part),
+            Self::StuckInTurn(place) => {
+                request.removed.extend(&order[..place]);
+                request.fixed.push(order[place]);
+            }
+            Self::Stuck(place) => request.fixed.push(order[place]),
+            Self::Gone(place) => request.removed.push(order[place]),
         }
         request
     }
@@ -42,6 +56,8 @@ pub(super) struct Foresight {
     /// Parts that stand elsewhere than in it.
     moved: Vec<(usize, Pose)>,
     request: PlanRequest,
+    /// The parts that its plan takes out, in order.
+    order: Vec<usize>,
     left: VecDeque<Contingency>,
     /// So much time may go into it yet.
     time: Duration,
@@ -56,10 +72,10 @@ impl Foresight {
         if !is_for_use || plan.steps.is_empty() || time.is_zero() {
             return None;
         }
-        let becomes = |part| [Contingency::Stuck(part), Contingency::Gone(part)];
-        let left = plan.steps.iter().flat_map(|step| becomes(step.part)).collect();
+        let order: Vec<usize> = plan.steps.iter().map(|step| step.part).collect();
+        let left = (0..order.len()).flat_map(Contingency::all).collect();
         let (moved, request) = (job.moved.clone(), job.request.clone());
-        Some(Self { assembly: job.assembly, moved, request, left, time })
+        Some(Self { assembly: job.assembly, moved, request, order, left, time })
     }
 
     /// Whether both come after the same question.
@@ -77,7 +93,7 @@ impl Foresight {
     pub(super) fn plan_next<P: Planning>(&mut self, service: &P, termination: &Termination) -> bool {
         let Some(next) = self.left.pop_front() else { return false };
         let began = Instant::now();
-        let request = next.of(&self.request);
+        let request = next.question(&self.request, &self.order);
         let within = termination.within(self.time / 2);
         // Whoever asks will be told what is wrong.
         let planned = contained(|| {
@@ -200,7 +216,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn each_part_is_stuck_and_gone_in_the_order_of_the_plan() {
+    fn each_part_is_stuck_in_its_turn_or_before_and_gone_in_the_order_of_the_plan() {
         let (service, t) = (Scripted::default(), Termination::default());
         let mut foresight =
             foresight(PlanRequest { fixed: vec![7], removed: vec![5], ..PlanRequest::default() });
@@ -210,8 +226,9 @@ pub(super) mod tests {
         }
         let id = AssemblyId([1; 32]);
         let of = |fixed: &[usize], removed: &[usize]| (id, fixed.to_vec(), removed.to_vec());
-        let expected = [of(&[7, 2], &[5]), of(&[7], &[5, 2]), of(&[7, 0], &[5]), of(&[7], &[5, 0])];
-        assert_eq!((service.asked(), planned, foresight.left()), (expected.to_vec(), 4, 0));
+        let first = [of(&[7, 2], &[5]), of(&[7], &[5, 2])];
+        let second = [of(&[7, 0], &[5, 2]), of(&[7, 0], &[5]), of(&[7], &[5, 0])];
+        assert_eq!((service.asked(), planned, foresight.left()), ([&first[..], &second].concat(), 5, 0));
     }
 
     #[test]
@@ -232,10 +249,10 @@ pub(super) mod tests {
         let service = Scripted { first: Some(stopped), ..Scripted::default() };
         let mut foresight = foresight(PlanRequest::default());
         assert!(!foresight.plan_next(&service, &Termination::default()));
-        assert_eq!(foresight.left(), 4);
+        assert_eq!(foresight.left(), 5);
         assert!(foresight.plan_next(&service, &Termination::default()));
         let asked = service.asked();
-        assert_eq!((asked[0] == asked[1], foresight.left()), (true, 3));
+        assert_eq!((asked[0] == asked[1], foresight.left()), (true, 4));
     }
 
     #[test]
@@ -248,7 +265,7 @@ pub(super) mod tests {
         let mut foresight = foresight(PlanRequest::default());
         assert!(!foresight.plan_next(&service, &Termination::default()));
         assert!(foresight.plan_next(&service, &Termination::default()));
-        assert_eq!((foresight.left(), service.asked().len()), (2, 2));
+        assert_eq!((foresight.left(), service.asked().len()), (3, 2));
     }
 
     #[test]
