@@ -13,7 +13,9 @@ use crate::plan::{Plan, PlanStatus, Verifier};
 use crate::search::{
     Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_blockages, search,
 };
-use crate::simulation::{JoinedHulls, PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
+use crate::simulation::{
+    HullTree, JoinedHulls, PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction,
+};
 use crate::termination::{Interrupt, Termination};
 
 use super::ServiceError;
@@ -260,6 +262,8 @@ impl Entry {
         let asked = Asked { question: &question, engine: &*engine, verifier: &prepared.verifier };
         // Interrupted, they have kept what they found.
         let _ = initial_blockages(&self.problem(&prepared, &asked, termination, recall));
+        let all = (0..self.assembly.parts.len()).collect();
+        drop(HullTree::new(&prepared.scene, all, termination));
         let _ = prepared.build_fields(termination, &mut Silent);
     }
 

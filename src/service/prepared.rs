@@ -11,7 +11,7 @@ use crate::geometry::Assembly;
 use crate::plan::Verifier;
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
-use crate::simulation::{HullTree, JoinedHulls, Pair, Scene, grouped, resolution};
+use crate::simulation::{JoinedHulls, Pair, Scene, grouped, resolution};
 use crate::termination::{Interrupt, Termination};
 
 use super::store::SharedShape;
@@ -37,8 +37,7 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// Measures all overlaps, in parallel on the current rayon pool, and joins hulls beside that. Fields are built
-    /// when they are looked at.
+    /// Measures all overlaps, in parallel on the current rayon pool. Fields are built when they are looked at.
     pub(super) fn new(
         assembly: &Assembly,
         shapes: &[Arc<SharedShape>],
@@ -51,11 +50,7 @@ impl Prepared {
         let mut scene = Scene { hulls: Arc::clone(hulls), ..Scene::assembled(assembly, &fields) };
         let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
         let verifier = Verifier::new(&assembly.shapes, shape_of, depth_limit(assembly));
-        // All hulls are joined before anything is searched, those above a part that changed one after the other:
-        // where a single pair is new, whoever does not measure it has nothing else to do.
-        let hulls = || drop(HullTree::new(&scene, (0..scene.bodies.len()).collect(), termination));
-        let overlaps = || measure_overlaps(&scene, &verifier, termination, recall);
-        let mut overlaps = rayon::join(overlaps, hulls).0?;
+        let mut overlaps = measure_overlaps(&scene, &verifier, termination, recall)?;
         for &(a, b, depth) in &overlaps {
             scene.allowances.grant(a, b, depth);
         }
