@@ -115,12 +115,10 @@ impl Foresight {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use std::sync::Mutex;
     use std::sync::atomic::Ordering;
 
-    use super::super::request_queue::Owner;
-    use super::super::workers::SessionKey;
     use super::*;
     use crate::fixtures::{plan_of, step_of};
     use crate::geometry::{Revision, SourceAssembly};
@@ -189,22 +187,8 @@ pub(super) mod tests {
         }
     }
 
-    /// A request about an assembly that is called by a number.
-    pub(in super::super) fn job_about(assembly: u8, request: PlanRequest) -> PlanJob {
-        PlanJob {
-            key: SessionKey { client: 0, request: 0 },
-            owner: Owner::default(),
-            received: Instant::now(),
-            assembly: AssemblyId([assembly; 32]),
-            question: None,
-            moved: vec![],
-            request,
-            termination: Termination::default(),
-        }
-    }
-
     fn job(request: PlanRequest) -> PlanJob {
-        job_about(1, request)
+        PlanJob::about(AssemblyId([1; 32]), request)
     }
 
     fn plan() -> Plan {

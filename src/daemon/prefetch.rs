@@ -290,7 +290,7 @@ impl State {
 mod tests {
     use std::sync::mpsc::channel;
 
-    use super::super::foresight::tests::job_about;
+    use super::super::workers::PlanJob;
     use super::*;
     use crate::fixtures::{plan_of, step_of};
     use crate::plan::PlanStatus;
@@ -347,7 +347,7 @@ mod tests {
     }
 
     fn questions(assembly: u8, parts: usize) -> Foresight {
-        let job = job_about(assembly, PlanRequest::default());
+        let job = PlanJob::about(id(assembly), PlanRequest::default());
         let plan = plan_of(PlanStatus::Complete, (0..parts).map(step_of).collect());
         Foresight::after(&job, &plan, Duration::from_secs(1000)).unwrap()
     }

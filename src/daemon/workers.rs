@@ -204,6 +204,23 @@ pub(crate) struct PlanJob {
     pub(crate) termination: Termination,
 }
 
+#[cfg(test)]
+impl PlanJob {
+    /// A request about an assembly by nobody in particular.
+    pub(super) fn about(assembly: AssemblyId, request: PlanRequest) -> Self {
+        Self {
+            key: SessionKey { client: 0, request: 0 },
+            owner: Owner::default(),
+            received: Instant::now(),
+            assembly,
+            question: None,
+            moved: vec![],
+            request,
+            termination: Termination::default(),
+        }
+    }
+}
+
 /// What was received with an upload.
 #[derive(Debug)]
 pub(crate) struct Received {
