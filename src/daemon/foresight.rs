@@ -65,11 +65,13 @@ pub(super) struct Foresight {
 
 impl Foresight {
     /// What may be asked after a question that was answered by a plan, with so much time for it; none if nothing
-    /// comes off, or if it was asked by a planner that is there to be compared with.
+    /// comes off, if whoever asked does not want it any more, or if it was asked by a planner that is there to be
+    /// compared with.
     pub(super) fn after(job: &PlanJob, plan: &Plan, time: Duration) -> Option<Self> {
         let PlanRequest { planner, assembly, no_cache, .. } = &job.request;
         let is_for_use = *planner == Planner::SbdpStar && assembly.is_none() && !no_cache;
-        if !is_for_use || plan.steps.is_empty() || time.is_zero() {
+        let is_wanted = plan.status != PlanStatus::Cancelled;
+        if !is_for_use || !is_wanted || plan.steps.is_empty() || time.is_zero() {
             return None;
         }
         let order: Vec<usize> = plan.steps.iter().map(|step| step.part).collect();
@@ -270,6 +272,7 @@ mod tests {
         };
         let default = PlanRequest::default;
         none(default(), &plan_of(PlanStatus::Infeasible, vec![]), TIME);
+        none(default(), &plan_of(PlanStatus::Cancelled, vec![step_of(2)]), TIME);
         none(default(), &plan(), Duration::ZERO);
         none(PlanRequest { planner: Planner::Sbdp, ..default() }, &plan(), TIME);
         none(PlanRequest { assembly: Some(Staging::None), ..default() }, &plan(), TIME);

@@ -237,7 +237,7 @@ impl Service {
         self.cache.recent_sources(most).into_iter().map(AssemblyId).collect()
     }
 
-    /// Makes ready what any plan of an assembly needs: fields, overlaps, and the blocking graph of the
+    /// Makes ready what any plan of an assembly needs: fields, overlaps, hulls, and the blocking graph of the
     /// assembled state, for questions with the options as they are by default.
     ///
     /// # Errors
