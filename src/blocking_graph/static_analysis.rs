@@ -75,8 +75,10 @@ impl Analysis<'_> {
         let pairs: Vec<(Key, Pair)> = pairs.par_iter().map(placed).collect();
         // What holds for one bolt in its nut holds for all that stand alike.
         let (first, group_of) = grouped(pairs.iter().map(|(key, _)| *key));
+        // One by one: most are remembered, and two that are not must not come after one another on one thread.
         let relations = first
             .par_iter()
+            .with_max_len(1)
             .map(|&i| {
                 termination.check()?;
                 let (key, pair) = &pairs[i];

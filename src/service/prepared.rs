@@ -107,8 +107,10 @@ fn measure_overlaps(
     };
     let keyed: Vec<_> = pairs.par_iter().map(placed).collect();
     let (first, group_of) = grouped(keyed.iter().map(|(key, _)| *key));
+    // One by one: most are remembered, and two that are not must not come after one another on one thread.
     let depths = first
         .par_iter()
+        .with_max_len(1)
         .map(|&i| {
             let (key, pair) = &keyed[i];
             recall.overlap(*key, || verifier.assembled_depth(scene, pair, termination))

@@ -9,7 +9,7 @@ use crate::termination::{Interrupt, Termination};
 use super::super::contact::{Mover, Near};
 use super::super::{Action, Scene};
 use super::cells::{Cells, Halt};
-use super::drive::{Drive, FREE_STEP, Moved, Step};
+use super::drive::{Around, Drive, FREE_STEP, Moved, Step};
 use super::facing::Facing;
 use super::push::{self, Push};
 
@@ -46,23 +46,15 @@ pub fn pair_blocks(
     let start = Mover::new(scene, part, *pose).until(termination);
     let Some(first) = actions.first() else { return Ok(Vec::new()) };
     let reach = Drive::new(scene, part, pose, *first).reach();
-    let within = |reach: f64, mover: &Mover<'_>| {
-        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
-        mover.near_pair(other, reach, &mut near);
-        near
-    };
     let (start, near) = first_look(&start, other, reach);
     termination.check()?;
     if near.contacts.is_empty() && near.clearance > least {
         return Ok(vec![false; actions.len()]);
     }
-    // Whether a step can be made is told by what enters at its end alone; what is merely near there
-    // matters only if another step follows.
-    let entering = |mover: &Mover<'_>| within(0.0, mover);
     let blocked = |action: &Action| {
         let drive = Drive::new(scene, part, pose, *action);
-        let mut entering = entering;
-        let mut step = drive.advance(&start, &mut near.clone(), &mut entering);
+        let mut looks = Looks { other, reach, seen: Vec::new() };
+        let mut step = drive.advance(&start, &mut near.clone(), &mut looks);
         for _ in 1..STATIC_STEPS {
             termination.check()?;
             let Step::Moved(Moved { pose: there, .. }) = step else { return Ok(true) };
@@ -70,7 +62,8 @@ pub fn pair_blocks(
             if (mover.centre() - start.centre()).norm() > least {
                 return Ok(false);
             }
-            step = drive.advance(&mover, &mut within(reach, &mover), &mut entering);
+            let mut near = looks.from(&mover);
+            step = drive.advance(&mover, &mut near, &mut looks);
         }
         // What was found of a cut walk is not to be believed.
         termination.check()?;
@@ -78,6 +71,43 @@ pub fn pair_blocks(
     };
     // Side by side, one by one: two parts alone are but one pair, and some take several times as long as others.
     actions.par_iter().with_max_len(1).map(blocked).collect()
+}
+
+/// What is near some poses beside one part, each looked at once: a step that is stuck asks about the pose that is wanted
+/// with constraints and without, and the next step begins where one ended.
+struct Looks {
+    other: usize,
+    reach: f64,
+    /// In the step that is being made: where, how far was looked, and what is there.
+    seen: Vec<(Pose, f64, Near)>,
+}
+
+impl Looks {
+    /// What a step from a pose begins with.
+    fn from(&mut self, mover: &Mover<'_>) -> Near {
+        let near = self.within(self.reach, mover);
+        self.seen.clear();
+        near
+    }
+
+    fn within(&mut self, reach: f64, mover: &Mover<'_>) -> Near {
+        let is_seen = |(pose, by, _): &&(Pose, f64, Near)| *pose == mover.pose && *by == reach;
+        if let Some((.., near)) = self.seen.iter().find(is_seen) {
+            return near.clone();
+        }
+        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+        mover.near_pair(self.other, reach, &mut near);
+        self.seen.push((mover.pose, reach, near.clone()));
+        near
+    }
+}
+
+impl Around for Looks {
+    /// Whether a step can be made is told by what enters at its end alone; what is merely near there matters only if
+    /// another step follows, and without fields costs next to nothing.
+    fn near(&mut self, mover: &Mover<'_>) -> Near {
+        self.within(if mover.is_exact { self.reach } else { 0.0 }, mover)
+    }
 }
 
 /// What is near, and the mover that goes on to look as this did: without fields if that took few looks, which depends
