@@ -1,15 +1,15 @@
 //! Static analysis by sliding: what contact with one part alone lets another do.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::geometry::Pose;
 use crate::termination::{Interrupt, Termination};
 
-use super::super::contact::{Mover, Near};
+use super::super::contact::{Contact, Mover, Near};
 use super::super::{Action, Scene};
 use super::cells::{Cells, Halt};
-use super::drive::{Around, Drive, FREE_STEP, Moved, Step};
+use super::drive::{self, Drive, FREE_STEP, Moved, Step, contact_step};
 use super::facing::Facing;
 use super::push::{self, Push};
 
@@ -20,6 +20,9 @@ const PUSHES: usize = 32;
 
 /// With more looks at either surface than this, fields are quicker: in the play of a thread nearly all samples are near.
 const MOST_LOOKS: usize = 1200;
+
+/// Around the start, samples are known as far as so many steps lead.
+const START_STEPS: f64 = 2.0;
 
 /// For each action, whether `other` alone keeps `part` at `pose` from following it by more than
 /// `least`: the static analysis that suits this engine, which excludes nothing that could slide.
@@ -51,9 +54,11 @@ pub fn pair_blocks(
     if near.contacts.is_empty() && near.clearance > least {
         return Ok(vec![false; actions.len()]);
     }
+    let is_shifted = start.is_exact && actions.iter().all(|a| !a.turns());
+    let around = is_shifted.then(|| Around::of(&start, other)).flatten();
     let blocked = |action: &Action| {
         let drive = Drive::new(scene, part, pose, *action);
-        let mut looks = Looks { other, reach, seen: Vec::new() };
+        let mut looks = Looks { other, reach, around: around.as_ref(), seen: Vec::new() };
         let mut step = drive.advance(&start, &mut near.clone(), &mut looks);
         for _ in 1..STATIC_STEPS {
             termination.check()?;
@@ -75,17 +80,22 @@ pub fn pair_blocks(
 
 /// What is near some poses beside one part, each looked at once: a step that is stuck asks about the pose that is wanted
 /// with constraints and without, and the next step begins where one ended.
-struct Looks {
+struct Looks<'a> {
     other: usize,
     reach: f64,
+    around: Option<&'a Around>,
     /// In the step that is being made: where, how far was looked, and what is there.
     seen: Vec<(Pose, f64, Near)>,
 }
 
-impl Looks {
+impl Looks<'_> {
     /// What a step from a pose begins with.
     fn from(&mut self, mover: &Mover<'_>) -> Near {
-        let near = self.within(self.reach, mover);
+        let mut near = self.within(self.reach, mover);
+        if near.contacts.is_empty() {
+            // How long the step may be is told by the clearance, which samples around the start tell less well.
+            near = self.looked(self.reach, mover);
+        }
         self.seen.clear();
         near
     }
@@ -95,18 +105,64 @@ impl Looks {
         if let Some((.., near)) = self.seen.iter().find(is_seen) {
             return near.clone();
         }
+        let known = self.around.and_then(|around| around.near(mover, reach));
+        let near = known.unwrap_or_else(|| self.looked(reach, mover));
+        self.seen.push((mover.pose, reach, near.clone()));
+        near
+    }
+
+    fn looked(&self, reach: f64, mover: &Mover<'_>) -> Near {
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
         mover.near_pair(self.other, reach, &mut near);
-        self.seen.push((mover.pose, reach, near.clone()));
         near
     }
 }
 
-impl Around for Looks {
+impl drive::Around for Looks<'_> {
     /// Whether a step can be made is told by what enters at its end alone; what is merely near there matters only if
     /// another step follows, and without fields costs next to nothing.
     fn near(&mut self, mover: &Mover<'_>) -> Near {
         self.within(if mover.is_exact { self.reach } else { 0.0 }, mover)
+    }
+}
+
+/// The samples around a start, with their gaps there, which translations change by no more than their length: what is
+/// near a pose not far away is among those that may be, and each is nearest to much the same triangle as before.
+struct Around {
+    from: Point3<f64>,
+    /// All with a gap below this.
+    radius: f64,
+    contacts: Vec<Contact>,
+}
+
+impl Around {
+    /// As far as steps of a part may lead.
+    fn of(start: &Mover<'_>, other: usize) -> Option<Self> {
+        let radius = START_STEPS * contact_step(&start.body.shape);
+        let Near { contacts, .. } = start.near_in_few_looks(other, radius, usize::MAX)?;
+        Some(Self { from: start.centre(), radius, contacts })
+    }
+
+    /// What is near a pose that is a translation away; none if that is too far.
+    fn near(&self, mover: &Mover<'_>, reach: f64) -> Option<Near> {
+        let way = (mover.centre() - self.from).norm() * (1.0 + 1e-9);
+        let mut near = Near { contacts: Vec::new(), clearance: self.radius - way };
+        if near.clearance < reach {
+            return None;
+        }
+        for contact in &self.contacts {
+            let mut gap = contact.gap - way;
+            if gap < reach {
+                let there = mover.remeasured(contact, f64::INFINITY)?;
+                if there.gap < reach {
+                    near.contacts.push(there);
+                    continue;
+                }
+                gap = there.gap;
+            }
+            near.clearance = near.clearance.min(gap);
+        }
+        Some(near)
     }
 }
 
