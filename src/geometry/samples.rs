@@ -9,6 +9,7 @@ use std::collections::HashSet;
 
 use nalgebra::Point3;
 
+use super::Bounds;
 use super::surface::{NO_TRIANGLE, Surface};
 
 /// How densely a surface is sampled.
@@ -40,8 +41,29 @@ pub(super) type Sited = (Point3<f64>, Site);
 
 /// The samples of a surface, in the order of its triangles.
 pub(super) fn sited(surface: &Surface, spacing: &Spacing) -> Vec<Sited> {
-    let mut out = sample_vertices(surface, spacing);
-    for t in 0..surface.triangles().len() as u32 {
+    sited_on(surface, spacing, 0..surface.triangles().len() as u32, |_| true)
+}
+
+/// The same of those within a box.
+pub(super) fn sited_within(surface: &Surface, spacing: &Spacing, bounds: &Bounds) -> Vec<Sited> {
+    // Vertices are thinned among those beside them.
+    let around = bounds.grown(spacing.vertex.unwrap_or(0.0).max(THINNEST));
+    let reaches = |t: &u32| Bounds::of(&surface.corners(*t)).meets(&around);
+    let triangles = (0..surface.triangles().len() as u32).filter(reaches);
+    let mut out = sited_on(surface, spacing, triangles, |p| around.contains(p));
+    out.retain(|(p, _)| bounds.contains(p));
+    out
+}
+
+/// The same on some triangles, ascending, and at those of their vertices that are wanted, around which all must be.
+fn sited_on(
+    surface: &Surface,
+    spacing: &Spacing,
+    triangles: impl Iterator<Item = u32> + Clone,
+    is_wanted: impl Fn(&Point3<f64>) -> bool,
+) -> Vec<Sited> {
+    let mut out = sample_vertices(surface, spacing, triangles.clone(), is_wanted);
+    for t in triangles {
         sample_edges(surface, t, spacing, &mut out);
         sample_face(surface, t, spacing.face, &mut out);
     }
@@ -92,14 +114,21 @@ pub(super) fn convex_edges(surface: &Surface) -> impl Iterator<Item = (u32, u8)>
 /// The vertices at convex edges. On finely tessellated surfaces they stand much closer than any
 /// contact needs: blunt ones are thinned to the edge spacing, sharp ones only where they nearly
 /// coincide (the crest of a thread is narrow). Without a spacing none is left out.
-fn sample_vertices(surface: &Surface, spacing: &Spacing) -> Vec<Sited> {
+fn sample_vertices(
+    surface: &Surface,
+    spacing: &Spacing,
+    triangles: impl Iterator<Item = u32>,
+    is_wanted: impl Fn(&Point3<f64>) -> bool,
+) -> Vec<Sited> {
+    let vertices = (0..).zip(surface.vertices()).filter(|(_, p)| is_wanted(p));
     let Some(blunt) = spacing.vertex else {
-        return (0..).zip(surface.vertices()).map(|(v, p)| (*p, Site::Vertex(v))).collect();
+        return vertices.map(|(v, p)| (*p, Site::Vertex(v))).collect();
     };
     let mut bends = vec![Bend::Inward; surface.vertices().len()];
-    for (i, t) in surface.triangles().iter().enumerate() {
+    for i in triangles {
+        let t = surface.triangles()[i as usize];
         for e in 0..3u8 {
-            let bend = bend(surface, i as u32, e);
+            let bend = bend(surface, i, e);
             for v in [t[e as usize], t[(e as usize + 1) % 3]] {
                 bends[v as usize] = bends[v as usize].max(bend);
             }
@@ -108,9 +137,7 @@ fn sample_vertices(surface: &Surface, spacing: &Spacing) -> Vec<Sited> {
     let mut taken = HashSet::new();
     let mut out = Vec::new();
     for (cell, wanted) in [(THINNEST, Bend::Sharp), (blunt, Bend::Blunt)] {
-        for (v, (p, _)) in
-            (0..).zip(surface.vertices().iter().zip(&bends)).filter(|(_, (_, b))| **b == wanted)
-        {
+        for (v, p) in vertices.clone().filter(|(v, _)| bends[*v as usize] == wanted) {
             if taken.insert((wanted == Bend::Sharp, p.coords.map(|x| (x / cell).floor() as i64))) {
                 out.push((*p, Site::Vertex(v)));
             }

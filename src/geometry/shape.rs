@@ -9,7 +9,7 @@ use crate::termination::{Interrupt, Poll, Termination};
 use super::content_hash::mesh_hash;
 use super::hull::hull_vertices;
 use super::own_frame::OwnFrame;
-use super::samples::{Sited, sited};
+use super::samples::{Sited, sited, sited_within};
 use super::{
     Bounds, ConvexEdges, Faces, MassProperties, Mesh, OrientedSamples, PatchTree, SampleTree, Spacing,
     Surface,
@@ -126,6 +126,13 @@ impl Shape {
             None => self.sited().into_iter().map(|(p, _)| p).collect(),
         };
         self.samples.get_or_init(|| SampleTree::over(derive()))
+    }
+
+    /// The same of those within a box alone, found without the others.
+    #[must_use]
+    pub fn samples_within(&self, bounds: &Bounds) -> SampleTree {
+        let within = sited_within(&self.surface, &spacing(self.surface.bounds()), bounds);
+        SampleTree::over(within.into_iter().map(|(p, _)| p).collect())
     }
 
     fn sited(&self) -> Vec<Sited> {

@@ -7,6 +7,7 @@
 
 mod gather;
 mod planes;
+mod vicinity;
 #[cfg(test)]
 mod tests;
 
@@ -16,8 +17,9 @@ use crate::geometry::{Bounds, Closest, Pose};
 use crate::sdf::Grid;
 use crate::termination::{Poll, Termination};
 
-use gather::{Measured, gather, gather_exactly};
+use gather::{Measured, gather};
 use planes::{ON_SURFACE, Planes, Sample};
+pub(super) use vicinity::{Extent, Vicinity};
 
 use super::projection::Row;
 use super::sliding::FREE_STEP;
@@ -78,11 +80,16 @@ pub(super) struct Near {
 
 impl Near {
     /// Takes in what else is near.
-    fn add(&mut self, other: Option<Self>) {
-        if let Some(Self { contacts, clearance }) = other {
-            self.clearance = self.clearance.min(clearance);
-            self.contacts.extend(contacts);
-        }
+    fn add(&mut self, Self { contacts, clearance }: Self) {
+        self.clearance = self.clearance.min(clearance);
+        self.contacts.extend(contacts);
+    }
+
+    /// The same of what is nearer than some reach alone.
+    pub(super) fn within(&self, reach: f64) -> Self {
+        let (contacts, others) = self.contacts.iter().partition::<Vec<Contact>, _>(|c| c.gap < reach);
+        let clearance = others.iter().map(|c| c.gap).fold(self.clearance, f64::min);
+        Self { contacts, clearance }
     }
 }
 
@@ -111,8 +118,7 @@ impl<'a> Mover<'a> {
         Self { termination: Some(termination), ..self }
     }
 
-    /// The same that gathers and measures without fields, among surfaces that are closed: of a pair that is looked at
-    /// a few times, to fill them takes several times as long.
+    /// The same that measures without fields, among surfaces that are closed.
     pub(super) fn exactly(self) -> Self {
         Self { is_exact: true, ..self }
     }
@@ -160,7 +166,7 @@ impl<'a> Mover<'a> {
         // One after the other: several motions are simulated at a time, and one that waited for its half
         // would begin with another motion meanwhile, and come back to its own only at the end of that.
         for side in [Side::Moving, Side::Standing] {
-            near.add(self.side(side, other, (reach, usize::MAX), near.clearance));
+            near.add(self.side(side, other, reach, near.clearance));
         }
     }
 
@@ -170,46 +176,38 @@ impl<'a> Mover<'a> {
         let standing = &self.scene.bodies[other];
         rayon::join(|| self.field_is_ready(self.body), || self.field_is_ready(standing));
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
-        self.both_sides(other, (reach, usize::MAX)).into_iter().for_each(|found| near.add(found));
+        let side = |side| self.side(side, other, reach, f64::INFINITY);
+        let (mine, theirs) = rayon::join(|| side(Side::Moving), || side(Side::Standing));
+        near.add(mine);
+        near.add(theirs);
         near
     }
 
-    /// The same [exactly](Self::exactly), if that takes no more than `most` looks at either surface.
-    pub(super) fn near_in_few_looks(&self, other: usize, reach: f64, most: usize) -> Option<Near> {
-        let [mine, theirs] = self.both_sides(other, (reach, most));
-        let mut near = mine?;
-        near.add(Some(theirs?));
-        Some(near)
-    }
-
-    fn both_sides(&self, other: usize, look: (f64, usize)) -> [Option<Near>; 2] {
-        let side = |side| self.side(side, other, look, f64::INFINITY);
-        rayon::join(|| side(Side::Moving), || side(Side::Standing)).into()
-    }
-
-    /// What is near of the samples of one surface of a pair; without fields, none if it takes more looks than `most`.
-    fn side(&self, side: Side, other: usize, (reach, most): (f64, usize), clearance: f64) -> Option<Near> {
+    /// What is near of the samples of one surface of a pair.
+    fn side(&self, side: Side, other: usize, reach: f64, clearance: f64) -> Near {
         let mut found = Near { contacts: Vec::new(), clearance };
-        let standing = &self.scene.bodies[other];
-        if !self.is_exact && !self.fields_are_ready(standing) {
-            return Some(found);
+        if !self.fields_are_ready(&self.scene.bodies[other]) {
+            return found;
         }
+        let (sampled, body, to_measured, allowance) = self.sides(side, other);
+        let measured = Measured { body, to_measured: &to_measured, allowance, reach };
+        let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
+        for tree in [sampled.shape.samples(), &sampled.extra_samples] {
+            gather(tree, &measured, self.termination, &mut found, tag);
+        }
+        found
+    }
+
+    /// Whose samples are asked for, what they are measured against, the way from the one's frame to the other's, and
+    /// the pair's allowance.
+    fn sides(&self, side: Side, other: usize) -> (&'a Body, &'a Body, Pose, f64) {
+        let standing = &self.scene.bodies[other];
         let allowance = self.scene.allowances.of(self.part, other);
         let standing_from_moving = standing.planning_from_shape.inverse() * self.pose;
-        let (sampled, body, to_measured) = match side {
-            Side::Moving => (self.body, standing, standing_from_moving),
-            Side::Standing => (standing, self.body, standing_from_moving.inverse()),
-        };
-        let measured = Measured { body, to_measured: &to_measured, allowance, reach };
-        for tree in [sampled.shape.samples(), &sampled.extra_samples] {
-            let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
-            if self.is_exact {
-                gather_exactly(tree, &measured, (most, self.termination), &mut found, tag)?;
-            } else {
-                gather(tree, &measured, self.termination, &mut found, tag);
-            }
+        match side {
+            Side::Moving => (self.body, standing, standing_from_moving, allowance),
+            Side::Standing => (standing, self.body, standing_from_moving.inverse(), allowance),
         }
-        Some(found)
     }
 
     /// Builds the fields of a pair that are not there yet; not to the end once the condition is true.

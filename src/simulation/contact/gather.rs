@@ -74,13 +74,22 @@ pub(super) fn gather(
     near.clearance = clearance.get();
 }
 
-/// Without a field, with no more than `most` looks at the other surface, which is closed; none if there are more to
-/// be. Signed distances vary by no more than the way between points, also inside: of what is deeper than nothing, far
+/// How long to look.
+#[derive(Clone, Copy)]
+pub(super) struct Few<'t> {
+    /// No more often, …
+    pub(super) most: usize,
+    /// … where what is nearer than this alone is looked for.
+    pub(super) within: f64,
+    pub(super) termination: Option<&'t Termination>,
+}
+
+/// Without a field, in few looks at the other surface, which is closed; none if there are more to be. Signed distances vary by no more than the way between points, also inside: of what is deeper than nothing, far
 /// less is looked at than by fields, whose bounds are sure outside alone.
 pub(super) fn gather_exactly(
     tree: &SampleTree,
     measured: &Measured<'_>,
-    (most, termination): (usize, Option<&Termination>),
+    Few { most, within, termination }: Few<'_>,
     near: &mut Near,
     tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
 ) -> Option<()> {
@@ -90,15 +99,15 @@ pub(super) fn gather_exactly(
     let keep = |gap: f64| clearance.set(clearance.get().min(gap));
     let looks = Cell::new(0);
     let poll = Poll::every(ENTER_POLL, termination);
-    let look = |p: &Point3<f64>, guess: u32| {
-        looks.set(looks.get() + 1);
+    let look = |p: &Point3<f64>, guess: u32, counts: bool| {
+        looks.set(looks.get() + usize::from(counts));
         let (closest, distance) = body.closest_from(p, guess);
         (distance + allowance, closest)
     };
     let is_over = || looks.get() > most || poll.is_over();
     tree.walk(
-        0,
-        |node, guess| {
+        (0, true),
+        |node, (guess, counts)| {
             if is_over() {
                 return None;
             }
@@ -108,19 +117,19 @@ pub(super) fn gather_exactly(
                 keep(apart + allowance - node.radius);
                 return None;
             }
-            let (gap, closest) = look(&p, guess);
+            let (gap, closest) = look(&p, guess, counts);
             let least = gap - node.radius;
             if least >= reach {
                 keep(least);
                 return None;
             }
-            Some(closest.triangle)
+            Some((closest.triangle, least < within))
         },
-        |sample, guess| {
+        |sample, (guess, counts)| {
             if is_over() {
                 return;
             }
-            let (gap, closest) = look(&(to_measured * sample), guess);
+            let (gap, closest) = look(&(to_measured * sample), guess, counts);
             if gap < reach {
                 near.contacts.push(tag(*sample, gap, closest));
             } else {

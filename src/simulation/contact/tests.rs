@@ -25,10 +25,17 @@ fn without_fields_the_same_contacts_are_found() {
             pose.translation.vector += shift;
             let mover = Mover::new(&scene, 1, pose);
             let by_fields = mover.near_first(0, REACH);
-            let exact = mover.exactly().near_in_few_looks(0, REACH, usize::MAX).unwrap();
+            let extent = Extent { radius: REACH, reach: REACH, most: usize::MAX };
+            let exact = Vicinity::new(&mover.exactly(), 0, REACH).near(&mover.exactly(), extent).unwrap();
+            // Which trees they are in decides on their order.
             let told = |near: &Near| {
-                let told = |c: &Contact| (c.side == Side::Moving, c.sample, (c.gap * 1e9).round());
-                near.contacts.iter().map(told).collect::<Vec<_>>()
+                let told = |c: &Contact| {
+                    let sample = c.sample.coords.map(f64::to_bits).data.0;
+                    (c.side == Side::Moving, sample, (c.gap * 1e9).round() as i64)
+                };
+                let mut told: Vec<_> = near.contacts.iter().map(told).collect();
+                told.sort_unstable();
+                told
             };
             assert_eq!(told(&by_fields), told(&exact), "{shift}");
             // What is no contact is no nearer than the clearance that either tells; fields tell less.
@@ -50,6 +57,7 @@ fn without_fields_the_same_contacts_are_found() {
 fn many_looks_are_refused() {
     let (scene, _) = scene(peg_in_hole(0.0));
     let mover = Mover::new(&scene, 1, scene.bodies[1].planning_from_shape).exactly();
-    let looked = |most: usize| mover.near_in_few_looks(0, REACH, most).is_some();
+    let vicinity = Vicinity::new(&mover, 0, REACH);
+    let looked = |most| vicinity.near(&mover, Extent { radius: REACH, reach: REACH, most }).is_some();
     assert!(!looked(10) && looked(100_000));
 }

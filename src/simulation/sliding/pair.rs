@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use crate::geometry::Pose;
 use crate::termination::{Interrupt, Termination};
 
-use super::super::contact::{Contact, Mover, Near};
+use super::super::contact::{Extent, Mover, Near, Vicinity};
 use super::super::{Action, Scene};
 use super::cells::{Cells, Halt};
 use super::drive::{self, Drive, FREE_STEP, Moved, Step, contact_step};
@@ -23,6 +23,8 @@ const MOST_LOOKS: usize = 1200;
 
 /// Around the start, samples are known as far as so many steps lead.
 const START_STEPS: f64 = 2.0;
+/// Of lengths, as a share of these.
+const ROUNDING: f64 = 1e-9;
 
 /// For each action, whether `other` alone keeps `part` at `pose` from following it by more than
 /// `least`: the static analysis that suits this engine, which excludes nothing that could slide.
@@ -46,19 +48,28 @@ pub fn pair_blocks(
             Err(Halt::Lost | Halt::Blocked) => {}
         }
     }
-    let start = Mover::new(scene, part, *pose).until(termination);
     let Some(first) = actions.first() else { return Ok(Vec::new()) };
     let reach = Drive::new(scene, part, pose, *first).reach();
-    let (start, near) = first_look(&start, other, reach);
+    let mut start = Mover::new(scene, part, *pose).until(termination);
+    let is_open = [start.body, &scene.bodies[other]].iter().any(|body| body.shape.surface.is_open());
+    let is_exact = !is_open && actions.iter().all(|a| !a.turns());
+    let around = if is_exact { Around::of(&start.exactly(), other, (least, reach)) } else { None };
+    termination.check()?;
+    let near = match &around {
+        Some(around) => {
+            start = start.exactly();
+            around.at_start.within(reach)
+        }
+        None => start.near_first(other, reach),
+    };
     termination.check()?;
     if near.contacts.is_empty() && near.clearance > least {
         return Ok(vec![false; actions.len()]);
     }
-    let is_shifted = start.is_exact && actions.iter().all(|a| !a.turns());
-    let around = is_shifted.then(|| Around::of(&start, other)).flatten();
     let blocked = |action: &Action| {
         let drive = Drive::new(scene, part, pose, *action);
-        let mut looks = Looks { other, reach, around: around.as_ref(), seen: Vec::new() };
+        let shifted = around.as_ref().map(Shifted::new);
+        let mut looks = Looks { other, reach, shifted, seen: Vec::new() };
         let mut step = drive.advance(&start, &mut near.clone(), &mut looks);
         for _ in 1..STATIC_STEPS {
             termination.check()?;
@@ -83,7 +94,7 @@ pub fn pair_blocks(
 struct Looks<'a> {
     other: usize,
     reach: f64,
-    around: Option<&'a Around>,
+    shifted: Option<Shifted<'a>>,
     /// In the step that is being made: where, how far was looked, and what is there.
     seen: Vec<(Pose, f64, Near)>,
 }
@@ -105,16 +116,21 @@ impl Looks<'_> {
         if let Some((.., near)) = self.seen.iter().find(is_seen) {
             return near.clone();
         }
-        let known = self.around.and_then(|around| around.near(mover, reach));
+        let known = self.shifted.as_mut().and_then(|shifted| shifted.near(mover, reach));
         let near = known.unwrap_or_else(|| self.looked(reach, mover));
         self.seen.push((mover.pose, reach, near.clone()));
         near
     }
 
     fn looked(&self, reach: f64, mover: &Mover<'_>) -> Near {
-        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
-        mover.near_pair(self.other, reach, &mut near);
-        near
+        match &self.shifted {
+            Some(shifted) => shifted.around.looked(mover, reach),
+            None => {
+                let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+                mover.near_pair(self.other, reach, &mut near);
+                near
+            }
+        }
     }
 }
 
@@ -122,38 +138,66 @@ impl drive::Around for Looks<'_> {
     /// Whether a step can be made is told by what enters at its end alone; what is merely near there matters only if
     /// another step follows, and without fields costs next to nothing.
     fn near(&mut self, mover: &Mover<'_>) -> Near {
-        self.within(if mover.is_exact { self.reach } else { 0.0 }, mover)
+        self.within(if self.shifted.is_some() { self.reach } else { 0.0 }, mover)
     }
 }
 
-/// The samples around a start, with their gaps there, which translations change by no more than their length: what is
-/// near a pose not far away is among those that may be, and each is nearest to much the same triangle as before.
+/// What is around the start of translations, told without fields.
 struct Around {
+    vicinity: Vicinity,
     from: Point3<f64>,
-    /// All with a gap below this.
+    /// All with a gap below this, …
     radius: f64,
-    contacts: Vec<Contact>,
+    /// … as they are at the start.
+    at_start: Near,
 }
 
 impl Around {
-    /// As far as steps of a part may lead.
-    fn of(start: &Mover<'_>, other: usize) -> Option<Self> {
-        let radius = START_STEPS * contact_step(&start.body.shape);
-        let Near { contacts, .. } = start.near_in_few_looks(other, radius, usize::MAX)?;
-        Some(Self { from: start.centre(), radius, contacts })
+    /// Of a part that is moved by no more than a step further than `least`, and what is to be found is within `reach`;
+    /// none if that takes many looks, which depends on the question alone.
+    fn of(start: &Mover<'_>, other: usize, (least, reach): (f64, f64)) -> Option<Self> {
+        let radius = START_STEPS * contact_step(&start.body.shape) + reach;
+        let vicinity = Vicinity::new(start, other, least + FREE_STEP + reach);
+        let at_start = vicinity.near(start, Extent { radius, reach, most: MOST_LOOKS })?;
+        Some(Self { vicinity, from: start.centre(), radius, at_start })
     }
 
-    /// What is near a pose that is a translation away; none if that is too far.
-    fn near(&self, mover: &Mover<'_>, reach: f64) -> Option<Near> {
-        let way = (mover.centre() - self.from).norm() * (1.0 + 1e-9);
-        let mut near = Near { contacts: Vec::new(), clearance: self.radius - way };
+    fn looked(&self, mover: &Mover<'_>, reach: f64) -> Near {
+        let extent = Extent { radius: reach, reach, most: usize::MAX };
+        self.vicinity.near(mover, extent).unwrap_or_else(|| self.at_start.clone())
+    }
+}
+
+/// What was around the start of a part that is shifted. Shifts change gaps by no more than their length: what is near a
+/// pose not far away is among what may be, and nearest to much the same triangles as before.
+struct Shifted<'a> {
+    around: &'a Around,
+    /// Where it was looked, by the part's centre.
+    at: Vec<Point3<f64>>,
+    /// Of each contact around the start, the gap as measured last, and at which of these.
+    last: Vec<(f64, u32)>,
+}
+
+impl<'a> Shifted<'a> {
+    fn new(around: &'a Around) -> Self {
+        let last = around.at_start.contacts.iter().map(|c| (c.gap, 0)).collect();
+        Self { around, at: vec![around.from], last }
+    }
+
+    /// What is near a pose, of what was around the start; none if that is too far.
+    fn near(&mut self, mover: &Mover<'_>, reach: f64) -> Option<Near> {
+        let Around { at_start, radius, .. } = self.around;
+        let here = mover.centre();
+        let ways: Vec<f64> = self.at.iter().map(|there| (here - there).norm() * (1.0 + ROUNDING)).collect();
+        let mut near = Near { contacts: Vec::new(), clearance: at_start.clearance.min(*radius) - ways[0] };
         if near.clearance < reach {
             return None;
         }
-        for contact in &self.contacts {
-            let mut gap = contact.gap - way;
+        for (contact, last) in at_start.contacts.iter().zip(&mut self.last) {
+            let mut gap = last.0 - ways[last.1 as usize];
             if gap < reach {
                 let there = mover.remeasured(contact, f64::INFINITY)?;
+                *last = (there.gap, self.at.len() as u32);
                 if there.gap < reach {
                     near.contacts.push(there);
                     continue;
@@ -162,19 +206,8 @@ impl Around {
             }
             near.clearance = near.clearance.min(gap);
         }
+        self.at.push(here);
         Some(near)
-    }
-}
-
-/// What is near, and the mover that goes on to look as this did: without fields if that took few looks, which depends
-/// on the question alone.
-fn first_look<'a>(start: &Mover<'a>, other: usize, reach: f64) -> (Mover<'a>, Near) {
-    let exact = start.exactly();
-    let is_open = [start.body, &start.scene.bodies[other]].iter().any(|body| body.shape.surface.is_open());
-    let near = if is_open { None } else { exact.near_in_few_looks(other, reach, MOST_LOOKS) };
-    match near {
-        Some(near) => (exact, near),
-        None => (*start, start.near_first(other, reach)),
     }
 }
 

@@ -1,0 +1,63 @@
+//! Contacts of a pair that is looked at a few times, without fields: to fill these, and to sample all of two surfaces,
+//! takes several times as long as what is asked.
+
+use crate::geometry::{Pose, SampleTree};
+
+use super::gather::{Few, Measured, gather_exactly};
+use super::{Contact, Mover, Near, Side};
+
+/// How much to look for.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::simulation) struct Extent {
+    /// What is gathered has a smaller gap.
+    pub(in crate::simulation) radius: f64,
+    /// What has a smaller gap than this is to be found in …
+    pub(in crate::simulation) reach: f64,
+    /// … no more looks at either surface.
+    pub(in crate::simulation) most: usize,
+}
+
+/// Of the samples of a moving part and one that stands, both closed, those that may come near each other.
+pub(in crate::simulation) struct Vicinity {
+    other: usize,
+    mine: SampleTree,
+    theirs: SampleTree,
+}
+
+impl Vicinity {
+    /// Near each other while the mover is shifted from its pose by no more than `way`: nearer than that, too.
+    pub(in crate::simulation) fn new(mover: &Mover<'_>, other: usize, way: f64) -> Self {
+        let standing = &mover.scene.bodies[other];
+        let (mine, theirs) = (&mover.body.shape, &standing.shape);
+        let bounds = mine.bounds().transformed(&mover.pose);
+        let within = |frame: &Pose, bounds: &crate::geometry::Bounds| bounds.grown(2.0 * way).transformed(&frame.inverse());
+        let (mine, theirs) = rayon::join(
+            || mine.samples_within(&within(&mover.pose, &standing.bounds)),
+            || theirs.samples_within(&within(&standing.planning_from_shape, &bounds)),
+        );
+        Self { other, mine, theirs }
+    }
+
+    /// What is near at a pose, if that is told by few looks.
+    pub(in crate::simulation) fn near(&self, mover: &Mover<'_>, extent: Extent) -> Option<Near> {
+        let side = |side| self.side(mover, side, extent);
+        let (mine, theirs) = rayon::join(|| side(Side::Moving), || side(Side::Standing));
+        let mut near = mine?;
+        near.add(theirs?);
+        Some(near)
+    }
+
+    fn side(&self, mover: &Mover<'_>, side: Side, extent: Extent) -> Option<Near> {
+        let other = self.other;
+        let (sampled, body, to_measured, allowance) = mover.sides(side, other);
+        let measured = Measured { body, to_measured: &to_measured, allowance, reach: extent.radius };
+        let few = Few { most: extent.most, within: extent.reach, termination: mover.termination };
+        let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
+        let tree = if side == Side::Moving { &self.mine } else { &self.theirs };
+        let mut found = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+        for tree in [tree, &sampled.extra_samples] {
+            gather_exactly(tree, &measured, few, &mut found, tag)?;
+        }
+        Some(found)
+    }
+}
