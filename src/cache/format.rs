@@ -96,8 +96,8 @@ mod tests {
         let payload = encode(&record).unwrap();
         assert_eq!(hex(&payload), "0300000000000000010001");
         let bytes = sealed(&key(), &payload).unwrap();
-        assert_eq!(hex(&bytes[..16]), "5342444301000200060000000b000000");
-        assert_eq!(hex(&bytes[16..32]), "f5016c0b0635269afabe8edeb61fe355");
+        assert_eq!(hex(&bytes[..16]), "5342444301000200070000000b000000");
+        assert_eq!(hex(&bytes[16..32]), "ca24fa0228df66e7716870575bb05707");
         assert_eq!(bytes[32..], payload);
         let motion = MotionRecord {
             path: vec![[1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]],

@@ -103,10 +103,10 @@ impl Kind {
         match self {
             Self::Source | Self::Shape | Self::Hull | Self::Field => 1,
             Self::Healed | Self::Touching | Self::Swept => 2,
-            Self::Blocking => 6,
+            Self::Blocking => 7,
             Self::Overlap => 9,
             Self::Verdict | Self::Witness | Self::Motion => 10,
-            Self::Answer | Self::Plan => 13,
+            Self::Answer | Self::Plan => 14,
         }
     }
 

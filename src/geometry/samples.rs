@@ -227,6 +227,22 @@ mod tests {
     }
 
     #[test]
+    fn samples_within_a_box_are_those_of_all_that_are_there() {
+        let turn = Pose::new(Vector3::new(0.3, 0.1, -0.2), Vector3::new(0.3, -0.5, 0.2));
+        for mesh in [ball(4), moved(l_shape(), &turn), open_box([0.0; 3], [1.0; 3])] {
+            let s = surface(mesh);
+            let all = sited(&s, &SPACING);
+            for corner in [Point3::origin(), Point3::new(0.2, -0.4, 0.1), Point3::new(9.0, 9.0, 9.0)] {
+                for side in [0.05, 0.4, 1.5] {
+                    let bounds = Bounds { min: corner, max: corner + Vector3::repeat(side) };
+                    let within: Vec<_> = all.iter().filter(|(p, _)| bounds.contains(p)).copied().collect();
+                    assert_eq!(sited_within(&s, &SPACING, &bounds), within, "{bounds:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn convex_edges_of_a_box_are_sampled_at_the_spacing() {
         let size = [1.0, 2.33, 0.57];
         let samples = SampleTree::new(&surface(cuboid([0.0; 3], size)), &SPACING);

@@ -7,9 +7,9 @@
 
 mod gather;
 mod planes;
-mod vicinity;
 #[cfg(test)]
 mod tests;
+mod vicinity;
 
 use nalgebra::{Point3, Vector3, Vector6};
 

@@ -1,7 +1,7 @@
 //! Contacts of a pair that is looked at a few times, without fields: to fill these, and to sample all of two surfaces,
 //! takes several times as long as what is asked.
 
-use crate::geometry::{Pose, SampleTree};
+use crate::geometry::{Bounds, Pose, SampleTree};
 
 use super::gather::{Few, Measured, gather_exactly};
 use super::{Contact, Mover, Near, Side};
@@ -30,7 +30,7 @@ impl Vicinity {
         let standing = &mover.scene.bodies[other];
         let (mine, theirs) = (&mover.body.shape, &standing.shape);
         let bounds = mine.bounds().transformed(&mover.pose);
-        let within = |frame: &Pose, bounds: &crate::geometry::Bounds| bounds.grown(2.0 * way).transformed(&frame.inverse());
+        let within = |frame: &Pose, bounds: &Bounds| bounds.grown(2.0 * way).transformed(&frame.inverse());
         let (mine, theirs) = rayon::join(
             || mine.samples_within(&within(&mover.pose, &standing.bounds)),
             || theirs.samples_within(&within(&standing.planning_from_shape, &bounds)),

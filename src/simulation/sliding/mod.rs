@@ -21,6 +21,7 @@ mod flight;
 mod holds;
 mod kept;
 mod leap;
+mod looks;
 mod pair;
 mod push;
 mod stages;
