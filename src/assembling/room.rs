@@ -6,7 +6,7 @@ use nalgebra::Point3;
 
 use crate::geometry::{Bounds, Pose, interpolate, separating_direction, transformed};
 use crate::plan::{Verdict, Verifier};
-use crate::simulation::{Allowances, BroadPhase, Scene, seems_clear};
+use crate::simulation::{Scene, seems_clear};
 use crate::termination::{Interrupt, Termination};
 
 /// Turns between two waypoints stay below this, so that the slerp is unambiguous.
@@ -42,21 +42,14 @@ impl Room {
             body.bounds = Bounds::of(&transformed(&body.shape.hull, pose));
         }
         let hulls = bodies.iter().map(|b| transformed(&b.shape.hull, &b.planning_from_shape)).collect();
-        let boxes: Vec<Bounds> = bodies.iter().map(|b| b.bounds).collect();
+        let all = bodies.iter().fold(Bounds::EMPTY, |all, b| all.union(&b.bounds));
         Self {
-            scene: Scene {
-                bodies: Arc::new(bodies),
-                allowances: Allowances::none(),
-                longest_side: scene.longest_side,
-                broad_phase: Arc::new(BroadPhase::new(&boxes)),
-                kept: Arc::default(),
-                hulls: Arc::clone(&scene.hulls),
-            },
+            scene: Scene { hulls: Arc::clone(&scene.hulls), ..Scene::of(bodies, scene.longest_side) },
             verifier: verifier.twice(),
             parts,
             hulls,
             reach: (0..parts).map(|part| scene.reach(part)).collect(),
-            bounds: boxes.iter().fold(Bounds::EMPTY, |all, b| all.union(b)),
+            bounds: all,
         }
     }
 

@@ -11,7 +11,7 @@ use crate::geometry::Assembly;
 use crate::plan::Verifier;
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
-use crate::simulation::{JoinedHulls, Pair, Scene, grouped, resolution};
+use crate::simulation::{HullTree, JoinedHulls, Pair, Scene, grouped, resolution};
 use crate::termination::{Interrupt, Termination};
 
 use super::store::SharedShape;
@@ -85,7 +85,12 @@ impl Prepared {
     /// Bytes in memory beside the shapes and their fields, about.
     pub(super) fn memory(&self) -> usize {
         let Self { scene, verifier, overlaps, .. } = self;
-        size_of_val(&**scene.bodies) + scene.kept.memory() + verifier.memory() + size_of_val(&**overlaps)
+        let hulls = scene.whole.get().map_or(0, HullTree::memory);
+        size_of_val(&**scene.bodies)
+            + scene.kept.memory()
+            + hulls
+            + verifier.memory()
+            + size_of_val(&**overlaps)
     }
 }
 

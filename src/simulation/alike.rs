@@ -7,13 +7,12 @@
 
 use std::collections::HashMap;
 use std::hash::Hash;
-use std::sync::Arc;
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 use crate::geometry::{Bounds, Pose};
 
-use super::{BroadPhase, Scene};
+use super::Scene;
 
 /// Two parts with rounded poses of their shapes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,9 +67,7 @@ impl Pair {
             let hull: Vec<Point3<f64>> = body.shape.hull.iter().map(|p| pose * p).collect();
             (body.planning_from_shape, body.bounds) = (*pose, Bounds::of(&hull));
         }
-        let broad_phase = Arc::new(BroadPhase::new(&[bodies[0].bounds, bodies[1].bounds]));
-        let mut pair =
-            Scene { bodies: Arc::new(bodies.into()), broad_phase, ..Scene::empty(scene.longest_side) };
+        let mut pair = Scene::of(bodies.into(), scene.longest_side);
         let granted = scene.allowances.of(a, b);
         if granted > 0.0 {
             pair.allowances.grant(0, 1, granted);

@@ -1,14 +1,14 @@
 //! The bodies of a problem, and how deep each pair may overlap.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::Point3;
 
 use crate::geometry::{Assembly, Bounds, Closest, Part, Pose, SampleTree, Shape};
 use crate::sdf::Field;
 
-use super::{BroadPhase, JoinedHulls, KeptCells};
+use super::{BroadPhase, HullTree, JoinedHulls, KeptCells};
 
 /// A part with its field, at its place.
 #[derive(Debug, Clone)]
@@ -94,6 +94,8 @@ pub struct Scene {
     pub kept: Arc<KeptCells>,
     /// Hulls joined so far, also in other scenes.
     pub hulls: Arc<JoinedHulls>,
+    /// Those of all bodies in a tree, once they were asked for.
+    pub(crate) whole: Arc<OnceLock<HullTree>>,
 }
 
 impl Scene {
@@ -107,27 +109,21 @@ impl Scene {
             bounds: part.bounds,
             extra_samples: SampleTree::default(),
         };
-        let boxes: Vec<Bounds> = assembly.parts.iter().map(|p| p.bounds).collect();
+        Self::of(assembly.parts.iter().map(body).collect(), resolution(assembly))
+    }
+
+    /// Some bodies, no overlap granted, and the resolution of a scene with a longest side.
+    #[must_use]
+    pub(crate) fn of(bodies: Vec<Body>, longest_side: f64) -> Self {
+        let boxes: Vec<Bounds> = bodies.iter().map(|b| b.bounds).collect();
         Self {
-            bodies: Arc::new(assembly.parts.iter().map(body).collect()),
+            bodies: Arc::new(bodies),
             allowances: Allowances::none(),
-            longest_side: resolution(assembly),
+            longest_side,
             broad_phase: Arc::new(BroadPhase::new(&boxes)),
             kept: Arc::default(),
             hulls: Arc::default(),
-        }
-    }
-
-    /// No bodies, and the resolution of a scene with a longest side.
-    #[must_use]
-    pub(super) fn empty(longest_side: f64) -> Self {
-        Self {
-            bodies: Arc::default(),
-            allowances: Allowances::none(),
-            longest_side,
-            broad_phase: Arc::new(BroadPhase::new(&[])),
-            kept: Arc::default(),
-            hulls: Arc::default(),
+            whole: Arc::default(),
         }
     }
 
