@@ -1,23 +1,20 @@
 //! The port thread: waits, receives, copies, hands to the desk, sends. It never plans.
 
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use iceoryx2::port::notifier::Notifier;
-use sbdp_ipc::Transport;
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::RequestKind;
 use sbdp_ipc::layout::{MAX_CLIENTS, PLAN_ACTIVE_REQUESTS, PLAN_REQUEST};
 use sbdp_ipc::polling::Polling;
 use sbdp_ipc::services::{Active, ServerPort};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::iterator::Signals;
 
 use super::DaemonError;
 use super::desk::{Desk, Event, Incoming};
 use super::figures::Surroundings;
+use super::inbox::{Inbound, Recently, reporter, watch_signals};
 use super::intake::ticket;
 use super::lifecycle::{Lease, Place};
 use super::metrics::Metrics;
@@ -28,7 +25,7 @@ use super::resources::{SharedMemory, raise_file_limit};
 use super::shared_queue::Queues;
 use super::supervisor::Supervisor;
 use super::watchdog::{Watchdog, give_up};
-use super::workers::{AdmitJob, Planning, Report, WorkerEvent, start};
+use super::workers::{AdmitJob, Planning, start};
 use crate::config::{Config, seconds};
 
 /// Requests taken from one port before workers' reports are looked at again.
@@ -110,6 +107,7 @@ pub fn run_reloading<P: Planning>(
         ports,
         desk,
         inbox,
+        recently: Recently::default(),
         tick,
         polling,
         limits,
@@ -133,46 +131,6 @@ fn watch(config: &Config, place: &Place) -> Result<Watchdog, DaemonError> {
     let place = place.runtime_dir.display().to_string();
     Watchdog::start(limit, move || give_up(limit, &place))
         .map_err(|source| DaemonError::System { what: "starting the watchdog", source })
-}
-
-/// What comes from other threads of this process.
-enum Inbound {
-    Worker(WorkerEvent),
-    Terminate,
-    Reload,
-}
-
-/// Other threads hold the notifier weakly: one that is still busy when the daemon leaves must
-/// not keep the service's files alive.
-fn wake(notifier: &Weak<Notifier<Transport>>) {
-    if let Some(notifier) = notifier.upgrade() {
-        // A failed wake-up costs one tick, no more.
-        let _ = notifier.notify();
-    }
-}
-
-fn reporter(ports: &Ports, sender: Sender<Inbound>) -> Report {
-    let notifier = Arc::downgrade(&ports.wake_self);
-    let sender = Mutex::new(sender);
-    Arc::new(move |event| {
-        // A send fails only when the port thread has left; then nobody is interested.
-        let _ = sender.lock().unwrap_or_else(PoisonError::into_inner).send(Inbound::Worker(event));
-        wake(&notifier);
-    })
-}
-
-fn watch_signals(ports: &Ports, sender: Sender<Inbound>) -> Result<(), DaemonError> {
-    let system = |source| DaemonError::System { what: "watching signals", source };
-    let notifier = Arc::downgrade(&ports.wake_self);
-    let mut signals = Signals::new([SIGTERM, SIGINT, SIGHUP]).map_err(system)?;
-    let watch = move || {
-        for signal in signals.forever() {
-            let _ = sender.send(if signal == SIGHUP { Inbound::Reload } else { Inbound::Terminate });
-            wake(&notifier);
-        }
-    };
-    std::thread::Builder::new().name("sbdp-signals".to_owned()).spawn(watch).map_err(system)?;
-    Ok(())
 }
 
 /// The longest payloads that are copied at all.
@@ -206,6 +164,7 @@ struct EventLoop<'l, P> {
     ports: Ports,
     desk: Desk<ActiveLink, P>,
     inbox: Receiver<Inbound>,
+    recently: Recently,
     tick: Duration,
     polling: Polling,
     limits: ReceiveLimits,
@@ -273,7 +232,7 @@ impl<P: Planning> EventLoop<'_, P> {
     fn wait(&self, next_tick: Instant) {
         let now = Instant::now();
         let until = self.desk.next_deadline(now).map_or(next_tick, |d| d.min(next_tick));
-        let timeout = until.saturating_duration_since(now);
+        let timeout = self.recently.patience(now, until.saturating_duration_since(now));
         if let Err(error) = self.ports.listener.timed_wait(|_| {}, timeout) {
             // A signal, or a listener out of order: never spin on it.
             tracing::debug!(%error, "waiting was interrupted");
@@ -284,7 +243,10 @@ impl<P: Planning> EventLoop<'_, P> {
     fn read_inbox(&mut self) {
         while let Ok(inbound) = self.inbox.try_recv() {
             let event = match inbound {
-                Inbound::Worker(event) => Event::Worker(event),
+                Inbound::Worker(event) => {
+                    self.recently.heard(Instant::now());
+                    Event::Worker(event)
+                }
                 Inbound::Terminate => {
                     self.supervisor.stopping();
                     Event::Terminate

@@ -15,6 +15,7 @@ mod desk;
 mod event_loop;
 mod figures;
 mod foresight;
+mod inbox;
 mod instance;
 mod intake;
 mod lifecycle;

@@ -1,0 +1,139 @@
+//! What comes to the port thread from other threads of this process, and how these wake it.
+//!
+//! Where much is remembered, a plan's steps follow each other within microseconds; on few processors the thread that
+//! makes them would be held up by those that it wakes. So steps that come soon after a wake-up wake nobody: the port
+//! thread, woken by that, looks again by itself for as long ([`Recently`]).
+
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::time::{Duration, Instant};
+
+use iceoryx2::port::notifier::Notifier;
+use sbdp_ipc::Transport;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+
+use super::DaemonError;
+use super::ports::Ports;
+use super::workers::{Report, WorkerEvent};
+
+/// What comes from other threads of this process.
+pub(super) enum Inbound {
+    Worker(WorkerEvent),
+    Terminate,
+    Reload,
+}
+
+/// Steps that follow within this time are told together.
+const TOGETHER: Duration = Duration::from_millis(1);
+
+/// Other threads hold the notifier weakly: one that is still busy when the daemon leaves must
+/// not keep the service's files alive.
+fn wake(notifier: &Weak<Notifier<Transport>>) {
+    if let Some(notifier) = notifier.upgrade() {
+        // A failed wake-up costs one tick, no more.
+        let _ = notifier.notify();
+    }
+}
+
+/// When the port thread was woken last.
+#[derive(Debug, Default)]
+struct Wakes(Option<Instant>);
+
+impl Wakes {
+    /// Whether a report wakes it.
+    fn is_due(&mut self, event: &WorkerEvent, now: Instant) -> bool {
+        let is_seen_soon = self.0.is_some_and(|last| now.saturating_duration_since(last) < TOGETHER);
+        let is_due = !(matches!(event, WorkerEvent::Step(..)) && is_seen_soon);
+        if is_due {
+            self.0 = Some(now);
+        }
+        is_due
+    }
+}
+
+/// Takes workers' reports to the port thread.
+pub(super) fn reporter(ports: &Ports, sender: Sender<Inbound>) -> Report {
+    let notifier = Arc::downgrade(&ports.wake_self);
+    let told = Mutex::new((sender, Wakes::default()));
+    Arc::new(move |event| {
+        let is_due = {
+            let (sender, wakes) = &mut *told.lock().unwrap_or_else(PoisonError::into_inner);
+            // The time before it is sent: it is read later than that.
+            let is_due = wakes.is_due(&event, Instant::now());
+            // A send fails only when the port thread has left; then nobody is interested.
+            let _ = sender.send(Inbound::Worker(event));
+            is_due
+        };
+        if is_due {
+            wake(&notifier);
+        }
+    })
+}
+
+/// Takes signals to the port thread.
+pub(super) fn watch_signals(ports: &Ports, sender: Sender<Inbound>) -> Result<(), DaemonError> {
+    let system = |source| DaemonError::System { what: "watching signals", source };
+    let notifier = Arc::downgrade(&ports.wake_self);
+    let mut signals = Signals::new([SIGTERM, SIGINT, SIGHUP]).map_err(system)?;
+    let watch = move || {
+        for signal in signals.forever() {
+            let _ = sender.send(if signal == SIGHUP { Inbound::Reload } else { Inbound::Terminate });
+            wake(&notifier);
+        }
+    };
+    std::thread::Builder::new().name("sbdp-signals".to_owned()).spawn(watch).map_err(system)?;
+    Ok(())
+}
+
+/// Whether a report came so recently that others may come that wake nobody.
+#[derive(Debug, Default)]
+pub(super) struct Recently(Option<Instant>);
+
+impl Recently {
+    /// A report was read.
+    pub(super) fn heard(&mut self, now: Instant) {
+        self.0 = Some(now);
+    }
+
+    /// How long to wait for the next event, if there is `timeout` for it.
+    pub(super) fn patience(&self, now: Instant, timeout: Duration) -> Duration {
+        // Twice: who waits for as long, once that is nearly over, waits beyond it.
+        let may_follow = self.0.is_some_and(|last| now.saturating_duration_since(last) < 2 * TOGETHER);
+        if may_follow { timeout.min(TOGETHER) } else { timeout }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::daemon::workers::SessionKey;
+
+    #[test]
+    fn a_step_that_wakes_nobody_is_read_soon() {
+        let start = Instant::now();
+        let at = |us: u64| start + Duration::from_micros(us);
+        let key = SessionKey { client: 1, request: 1 };
+        let step = || WorkerEvent::Step(key, Default::default());
+        let tick = Duration::from_secs(1);
+        let (mut wakes, mut recently) = (Wakes::default(), Recently::default());
+        assert!(wakes.is_due(&WorkerEvent::Started(key), at(0)), "all but steps wake");
+        assert_eq!(recently.patience(at(0), tick), tick);
+        // What woke the port thread is read some time later.
+        recently.heard(at(300));
+        let mut seen_by = at(300);
+        for us in (0..1000).step_by(50) {
+            assert!(!wakes.is_due(&step(), at(us)), "{us}");
+            // Read by the look before, or by one that comes within the time.
+            while seen_by < at(us) {
+                let patience = recently.patience(seen_by, tick);
+                assert!(patience <= TOGETHER, "{us}");
+                seen_by += patience;
+            }
+        }
+        assert!(wakes.is_due(&step(), at(1000)), "so late it wakes again");
+        assert!(wakes.is_due(&WorkerEvent::Started(key), at(1001)), "and so does what is no step");
+        assert_eq!(recently.patience(at(2300), tick), tick, "then it sleeps");
+        assert_eq!(recently.patience(at(400), Duration::from_micros(7)), Duration::from_micros(7));
+    }
+}
