@@ -49,10 +49,7 @@ impl HullTree {
             Some(whole) => whole.clone(),
             None => {
                 let whole = Self::joined(scene, all.clone().collect(), termination);
-                if termination.check().is_err() {
-                    return whole;
-                }
-                scene.whole.get_or_init(|| whole).clone()
+                if termination.check().is_ok() { scene.whole.get_or_init(|| whole).clone() } else { whole }
             }
         };
         for gone in all.filter(|part| standing.binary_search(part).is_err()) {
@@ -223,6 +220,21 @@ mod tests {
         }
         assert!(tree.remove(&scene, left[0]) && tree.hull().is_empty());
         assert!(!tree.remove(&scene, left[0]), "it is gone");
+    }
+
+    #[test]
+    fn who_stands_is_told_also_of_a_tree_that_was_cut_short() {
+        let cubes =
+            spread([-4.0; 3], [3.0; 3], 8).map(|p| cuboid(p.into(), (p.coords.add_scalar(0.5)).into()));
+        let (scene, _) = scene(cubes);
+        let over = Termination::default();
+        over.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
+        for standing in [vec![0, 1, 3, 4, 5, 6, 7], vec![2, 5]] {
+            assert_eq!(HullTree::new(&scene, standing.clone(), &over).standing(), standing);
+        }
+        // Nobody is given what was cut short.
+        let whole = HullTree::new(&scene, (0..8).collect(), &Termination::default());
+        assert!(!whole.hull().is_empty());
     }
 
     #[test]

@@ -84,8 +84,9 @@ pub(super) struct Few<'t> {
     pub(super) termination: Option<&'t Termination>,
 }
 
-/// Without a field, in few looks at the other surface, which is closed; none if there are more to be. Signed distances vary by no more than the way between points, also inside: of what is deeper than nothing, far
-/// less is looked at than by fields, whose bounds are sure outside alone.
+/// Without a field, in few looks at the other surface, which is closed; none if there are more to be. Signed
+/// distances vary by no more than the way between points, also inside: of what is deeper than nothing, far less is
+/// looked at than by fields, whose bounds are sure outside alone.
 pub(super) fn gather_exactly(
     tree: &SampleTree,
     measured: &Measured<'_>,
