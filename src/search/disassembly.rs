@@ -21,7 +21,7 @@ use super::problem::{Observer, Problem};
 use super::trace::TraceEvent;
 
 /// How often a motion is simulated again with the points at which verification refuted it.
-const REFINEMENTS: usize = 4;
+pub(super) const REFINEMENTS: usize = 4;
 
 /// Why a motion is given up that took too long.
 const NO_TIME: &str = "the time for one path is used up";
@@ -288,7 +288,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         tracing::debug!(part, action = %run.action, over = refuted.first().map(|e| e.over), "sweep refuted");
         self.trace_refutation(run, &refuted);
         self.problem.add_samples(part, &refuted);
-        let prefix = prefix.len() > 1 && self.checked(part, prefix)?.is_err();
+        let prefix = prefix.len() > 1 && !self.holds(part, prefix)?;
         Ok(Err(Refuted { prefix }))
     }
 
@@ -314,7 +314,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             };
             tracing::debug!(part, refinement, over = refuted.first().map(|e| e.over), "path refuted");
             self.problem.add_samples(part, &refuted);
-            if prefix.len() > 1 && self.checked(part, prefix)?.is_err() {
+            if prefix.len() > 1 && !self.holds(part, prefix)? {
                 return Ok(Proof::PrefixRefuted);
             }
             let by = self.trace_refutation(&run, &refuted);
@@ -330,6 +330,11 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             motion = again.path;
         }
         Ok(Proof::Refuted { by: Vec::new() })
+    }
+
+    /// Whether a path of a part, with all others as they stand, is verified.
+    pub(super) fn holds(&mut self, part: usize, path: &[Pose]) -> Result<bool, Stop> {
+        Ok(self.checked(part, path)?.is_ok())
     }
 
     fn checked(&mut self, part: usize, path: &[Pose]) -> Result<super::Checked, Stop> {

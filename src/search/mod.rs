@@ -18,6 +18,7 @@ mod problem;
 mod rays;
 mod report;
 mod request;
+mod retraction;
 mod rooms;
 mod round;
 mod sbdp;

@@ -29,6 +29,7 @@ use super::outcome::Outcome;
 use super::problem::{Observer, Problem};
 use super::rays::Rays;
 use super::request::ActionSet;
+use super::retraction::Origin;
 use super::round::is_ball;
 use super::state::{Node, Phase, least_travel};
 use super::straight::Swept;
@@ -74,6 +75,8 @@ pub(super) struct Search<'a, 'o> {
     pub(super) rays: Rays,
     pub(super) twists: Twists,
     ahead: Ahead,
+    /// How often what an action led to was refuted.
+    pub(super) retracted: HashMap<Origin, usize>,
     /// Of a node and a push: how long a stretch of others is in its way (powers of two), and as of when.
     pub(super) in_the_way: HashMap<(usize, usize), ((usize, usize), i32)>,
     /// How coarsely two states were taken for one, at most.
@@ -125,6 +128,7 @@ impl<'a, 'o> Search<'a, 'o> {
             rotations,
             swept: Swept::default(),
             ahead: Ahead::default(),
+            retracted: HashMap::new(),
             in_the_way: HashMap::new(),
             coarsest: 1.0,
             balls,
@@ -421,7 +425,7 @@ impl<'a, 'o> Search<'a, 'o> {
                 self.remove(run.part, path, depth);
                 gain.removed = true;
             }
-            Proof::PrefixRefuted => self.drop_state(job.node),
+            Proof::PrefixRefuted => self.drop_state(job.node)?,
             Proof::Refuted { by } => {
                 // Nothing that another part's leaving changes: never again from here.
                 let by = if self.guided { by } else { Vec::new() };
@@ -432,16 +436,6 @@ impl<'a, 'o> Search<'a, 'o> {
             }
         }
         Ok(())
-    }
-
-    /// A state whose own path was refuted is dropped, and the action that led to it is open again.
-    pub(super) fn drop_state(&mut self, node: usize) {
-        self.nodes[node].alive = false;
-        if let Some((parent, phase, action)) = self.nodes[node].origin
-            && let Some(b) = self.nodes[parent].blockage_mut(phase)
-        {
-            b.reopen(action);
-        }
     }
 
     /// Parts whose hull is apart from all others' need no motion.

@@ -4,6 +4,7 @@ use crate::blocking_graph::Blockage;
 use crate::geometry::Pose;
 use crate::simulation::Scene;
 
+use super::retraction::Origin;
 use super::trace::TracePhase;
 
 /// The travel at which two states of a part count as the same (the paper's rmd).
@@ -39,7 +40,7 @@ pub(super) struct Node {
     /// Blockage under actions with rotational freedom; starts empty.
     pub(super) rotation: Blockage,
     /// Parent node and action, unless assembled.
-    pub(super) origin: Option<(usize, Phase, usize)>,
+    pub(super) origin: Option<Origin>,
     /// How far it is from the part's states known before, in units of the resolution; 0 assembled.
     pub(super) novelty: f64,
     /// False once its part is gone or its path was refuted.

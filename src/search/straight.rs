@@ -120,7 +120,7 @@ impl Search<'_, '_> {
             }
             Err(refuted) => {
                 if refuted.prefix {
-                    self.drop_state(job.node);
+                    self.drop_state(job.node)?;
                 }
                 Ok(false)
             }

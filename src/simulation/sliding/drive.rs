@@ -6,6 +6,7 @@
 //! programming); a step that still enters is halved.
 
 mod lift;
+mod release;
 #[cfg(test)]
 mod tests;
 
@@ -19,6 +20,7 @@ use super::super::projection::{Projected, Row, project};
 use super::super::reduction::reduced;
 use super::super::{Action, Scene};
 use super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
+use release::Taken;
 
 /// A motion that follows less than this share of the action (cos² of the angle between them) is
 /// stuck.
@@ -92,6 +94,8 @@ pub(super) struct Moved {
     pub(super) near: Near,
     /// Twists against what holds the part back, of any length.
     pub(super) pressing: Vec<Vector6<f64>>,
+    /// Whether what held the pull back has let go here: the next step is to be a pull alone.
+    pub(super) is_released: bool,
 }
 
 /// The wanted twist of an action for one part, and the metric.
@@ -270,6 +274,13 @@ impl Drive {
                     if self.turns && !self.is_clear_between((mover, near), (&trial, &there), &twist, around) {
                         return Attempt::Entered(touching);
                     }
+                    let taken = Taken { mover, twist: &twist, result: &result, rows: &rows, contacts: &working };
+                    if let Some((twist, trial, there)) = self.released(&taken, around)
+                        && self.is_clear_between((mover, near), (&trial, &there), &twist, around)
+                    {
+                        let step = Self::moved(&trial, there, &twist, touching, Vec::new());
+                        return Attempt::Moved(Moved { is_released: true, ..step });
+                    }
                     let pressing = self.pressing(&target, &result, &rows);
                     return Attempt::Moved(Self::moved(&trial, there, &twist, touching, pressing));
                 }
@@ -422,7 +433,7 @@ impl Drive {
         pressing: Vec<Vector6<f64>>,
     ) -> Moved {
         let turned = twist.fixed_rows::<3>(3).norm();
-        Moved { pose: there.pose, turned, touching, near, pressing }
+        Moved { pose: there.pose, turned, touching, near, pressing, is_released: false }
     }
 
     /// The pose after a twist about the centre of mass.
