@@ -94,8 +94,8 @@ pub(super) struct Moved {
     pub(super) near: Near,
     /// Twists against what holds the part back, of any length.
     pub(super) pressing: Vec<Vector6<f64>>,
-    /// Whether what held the pull back has let go here: the next step is to be a pull alone.
-    pub(super) is_released: bool,
+    /// Where it passed, if it did not go straight there.
+    pub(super) via: Option<Pose>,
 }
 
 /// The wanted twist of an action for one part, and the metric.
@@ -274,12 +274,16 @@ impl Drive {
                     if self.turns && !self.is_clear_between((mover, near), (&trial, &there), &twist, around) {
                         return Attempt::Entered(touching);
                     }
-                    let taken = Taken { mover, twist: &twist, result: &result, rows: &rows, contacts: &working };
-                    if let Some((twist, trial, there)) = self.released(&taken, around)
-                        && self.is_clear_between((mover, near), (&trial, &there), &twist, around)
-                    {
-                        let step = Self::moved(&trial, there, &twist, touching, Vec::new());
-                        return Attempt::Moved(Moved { is_released: true, ..step });
+                    let taken = Taken {
+                        mover,
+                        near,
+                        twist: &twist,
+                        result: &result,
+                        rows: &rows,
+                        contacts: &working,
+                    };
+                    if let Some(released) = self.released(&taken, around) {
+                        return Attempt::Moved(released);
                     }
                     let pressing = self.pressing(&target, &result, &rows);
                     return Attempt::Moved(Self::moved(&trial, there, &twist, touching, pressing));
@@ -433,7 +437,7 @@ impl Drive {
         pressing: Vec<Vector6<f64>>,
     ) -> Moved {
         let turned = twist.fixed_rows::<3>(3).norm();
-        Moved { pose: there.pose, turned, touching, near, pressing, is_released: false }
+        Moved { pose: there.pose, turned, touching, near, pressing, via: None }
     }
 
     /// The pose after a twist about the centre of mass.

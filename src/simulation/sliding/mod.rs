@@ -95,18 +95,13 @@ impl TransitionFunction for SlidingEngine {
             Holds::new(scene, surroundings, (part, start), drive.reach(), by_samples, termination);
         let mut leaper = Leaper::new(scene, surroundings, part, &drive);
         let mut near = None;
-        let mut is_released = false;
         while path.len() < MOST_POSES {
             termination.check()?;
             let (mut turned, mut touching) = (0.0, Vec::new());
             let mut leap = leaper.follow(&mover);
             if leap.is_none() {
                 let mut here = around.settle(&mover, near.take());
-                let pulled = is_released.then(|| drive.pulling().advance(&mover, &mut here, &mut around));
-                let step = match pulled {
-                    Some(step @ Step::Moved(_)) => step,
-                    _ => drive.advance(&mover, &mut here, &mut around),
-                };
+                let step = drive.advance(&mover, &mut here, &mut around);
                 // What was found of contacts that were cut short is not to be believed.
                 termination.check()?;
                 let step = match step {
@@ -115,11 +110,11 @@ impl TransitionFunction for SlidingEngine {
                     }
                     Step::Moved(step) => step,
                 };
-                is_released = step.is_released;
                 let from = std::mem::replace(&mut mover.pose, step.pose);
+                path.extend(step.via);
                 path.push(step.pose);
                 // Where regions tell, ordinary steps cost less than looking where a long one may lead.
-                if !here.contacts.is_empty() && around.samples() {
+                if step.via.is_none() && !here.contacts.is_empty() && around.samples() {
                     leap = leaper.leap(&from, &mover, step.pressing, &mut around);
                 }
                 (turned, touching, near) = (step.turned, step.touching, Some(step.near));

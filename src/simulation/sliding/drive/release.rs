@@ -2,15 +2,17 @@
 //!
 //! Of a part that is pulled and turned at once, a lug that comes before its slot stops the pull until it is in
 //! line, and a step may well turn it from one rim of the slot to the other. Without inertia the part goes in
-//! where it first can; so a step is looked through for the places where nothing that is known to hold the pull
-//! back does so, and ends in the middle of those.
+//! where it first can: so a step is looked through for places where nothing that is known to hold the pull back
+//! does so, and the part is pulled from the middle of these.
 
 use nalgebra::{Translation3, Unit, Vector3, Vector6};
+
+use crate::geometry::Pose;
 
 use super::super::super::contact::{Contact, Mover, Near};
 use super::super::super::projection::{Projected, Row};
 use super::super::DEPTH_TOLERANCE;
-use super::{Around, Drive};
+use super::{Around, Drive, Moved, Step};
 
 /// A contact holds a pull back if the part, moved so far along it, is too deep there. In a slot nothing is, whatever
 /// its play.
@@ -25,6 +27,7 @@ const MOST_LOOKS: usize = 8;
 /// A step that was found free of entry.
 pub(super) struct Taken<'a> {
     pub(super) mover: &'a Mover<'a>,
+    pub(super) near: &'a Near,
     pub(super) twist: &'a Vector6<f64>,
     pub(super) result: &'a Projected,
     /// Its constraints, and the contacts that they come from.
@@ -33,61 +36,75 @@ pub(super) struct Taken<'a> {
 }
 
 impl Drive {
-    /// The same without turning: what a part that was let go does next.
-    pub(in super::super) fn pulling(&self) -> Self {
-        let pull = self.pull().map_or(Vector3::zeros(), |pull| *pull * self.step);
-        Self { wanted: Vector6::new(pull.x, pull.y, pull.z, 0.0, 0.0, 0.0), takes_long_steps: false, ..*self }
-    }
-
     /// Which way it is pulled, if it is pulled and turned at once.
     fn pull(&self) -> Option<Unit<Vector3<f64>>> {
         let (pull, turn) = (self.wanted.fixed_rows::<3>(0), self.wanted.fixed_rows::<3>(3));
         if turn == Vector3::zeros() { None } else { Unit::try_new(pull.into_owned(), 0.0) }
     }
 
-    /// The twist after which what held the pull back at the start of a step has let go, for a part of the step at
-    /// least, and what is near there.
-    pub(super) fn released<'m>(
+    /// The same without turning: what a part does that was let go.
+    fn pulling(&self, pull: &Vector3<f64>) -> Self {
+        let pull = pull * self.step;
+        Self { wanted: Vector6::new(pull.x, pull.y, pull.z, 0.0, 0.0, 0.0), takes_long_steps: false, ..*self }
+    }
+
+    /// The step that pulls the part out of another one that would turn it past where it can be pulled: part of the way
+    /// like that other one, then like a pull.
+    pub(super) fn released(&self, step: &Taken<'_>, around: &mut dyn Around) -> Option<Moved> {
+        let pull = self.pull()?;
+        let (place, twist) = self.let_go(step, &pull, around)?;
+        let mut near = around.near(&place);
+        let from = (step.mover, step.near);
+        let is_clear = near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE)
+            && self.is_clear_between(from, (&place, &near), &twist, around);
+        let is_up = |pose: &Pose| (pose * place.body.shape.mass.centre - place.centre()).dot(&pull) > LIFT;
+        let Some(Step::Moved(pulled)) =
+            is_clear.then(|| self.pulling(&pull).advance(&place, &mut near, around))
+        else {
+            return None;
+        };
+        let turned = pulled.turned + twist.fixed_rows::<3>(3).norm();
+        is_up(&pulled.pose).then(|| Moved { turned, via: Some(place.pose), ..pulled })
+    }
+
+    /// Where on the way of a step, and after which twist, what held the pull back at its start does so no more; the
+    /// start itself where nothing did.
+    fn let_go<'m>(
         &self,
         step: &Taken<'m>,
+        pull: &Vector3<f64>,
         around: &mut dyn Around,
-    ) -> Option<(Vector6<f64>, Mover<'m>, Near)> {
-        let pull = self.pull()?;
-        let opposes = |row: &Row| row.a.fixed_rows::<3>(0).dot(&pull) < -LEAST_OPPOSED;
+    ) -> Option<(Mover<'m>, Vector6<f64>)> {
+        let opposes = |row: &Row| row.a.fixed_rows::<3>(0).dot(pull) < -LEAST_OPPOSED;
         if !step.result.active.iter().any(|(i, _)| opposes(&step.rows[*i])) {
             return None;
         }
         let at = |place: u32| {
             let twist = step.twist * (f64::from(place) / f64::from(PLACES));
-            (twist, Mover { pose: self.displaced(step.mover, &twist), ..*step.mover })
+            (Mover { pose: self.displaced(step.mover, &twist), ..*step.mover }, twist)
         };
-        let lifted =
-            |mover: &Mover<'m>| Mover { pose: Translation3::from(*pull * LIFT) * mover.pose, ..*mover };
-        let lifted_at: Vec<Mover<'m>> = (0..=PLACES).map(|place| lifted(&at(place).1)).collect();
+        let lifted = |place: u32| {
+            let (mover, _) = at(place);
+            Mover { pose: Translation3::from(pull * LIFT) * mover.pose, ..mover }
+        };
+        let lifted: Vec<Mover<'m>> = (0..=PLACES).map(lifted).collect();
         let holds = |contact: &Contact, place: u32| {
-            let there = lifted_at[place as usize].remeasured(contact, 0.0);
+            let there = lifted[place as usize].remeasured(contact, 0.0);
             there.is_some_and(|c| c.gap < -DEPTH_TOLERANCE)
         };
         let known = step.rows.iter().zip(step.contacts).filter(|(row, _)| opposes(row)).map(|(_, c)| *c);
         let mut holding: Vec<Contact> = known.collect();
-        if !holding.iter().any(|c| holds(c, 0)) {
-            return None;
-        }
-        let mut open: Vec<u32> = (1..=PLACES).collect();
+        let mut open: Vec<u32> = (0..=PLACES).collect();
         for _ in 0..MOST_LOOKS {
             for contact in holding.drain(..) {
                 open.retain(|&place| !holds(&contact, place));
             }
             let place = middle_of_longest(&open)?;
-            let there = around.near(&lifted_at[place as usize]);
+            let there = around.near(&lifted[place as usize]);
             holding.extend(there.contacts.iter().filter(|c| c.gap < -DEPTH_TOLERANCE));
             if holding.is_empty() {
-                let (twist, mover) = at(place);
-                let near = around.near(&mover);
-                let is_clear = near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE);
-                return is_clear.then_some((twist, mover, near));
+                return Some(at(place));
             }
-            // What regions tell of a pose may be gone at a place beside it.
             open.retain(|&other| other != place);
         }
         None
