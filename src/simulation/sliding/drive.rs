@@ -95,7 +95,7 @@ pub(super) struct Moved {
     /// Twists against what holds the part back, of any length.
     pub(super) pressing: Vec<Vector6<f64>>,
     /// Where it passed, if it did not go straight there.
-    pub(super) via: Option<Pose>,
+    pub(super) via: Vec<Pose>,
 }
 
 /// The wanted twist of an action for one part, and the metric.
@@ -437,7 +437,7 @@ impl Drive {
         pressing: Vec<Vector6<f64>>,
     ) -> Moved {
         let turned = twist.fixed_rows::<3>(3).norm();
-        Moved { pose: there.pose, turned, touching, near, pressing, via: None }
+        Moved { pose: there.pose, turned, touching, near, pressing, via: Vec::new() }
     }
 
     /// The pose after a twist about the centre of mass.

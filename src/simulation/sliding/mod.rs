@@ -111,10 +111,11 @@ impl TransitionFunction for SlidingEngine {
                     Step::Moved(step) => step,
                 };
                 let from = std::mem::replace(&mut mover.pose, step.pose);
+                let is_straight = step.via.is_empty();
                 path.extend(step.via);
                 path.push(step.pose);
                 // Where regions tell, ordinary steps cost less than looking where a long one may lead.
-                if step.via.is_none() && !here.contacts.is_empty() && around.samples() {
+                if is_straight && !here.contacts.is_empty() && around.samples() {
                     leap = leaper.leap(&from, &mover, step.pressing, &mut around);
                 }
                 (turned, touching, near) = (step.turned, step.touching, Some(step.near));

@@ -7,8 +7,6 @@
 
 use nalgebra::{Translation3, Unit, Vector3, Vector6};
 
-use crate::geometry::Pose;
-
 use super::super::super::contact::{Contact, Mover, Near};
 use super::super::super::projection::{Projected, Row};
 use super::super::DEPTH_TOLERANCE;
@@ -22,7 +20,7 @@ const LEAST_OPPOSED: f64 = 0.3;
 /// Places of a step that are looked at: no slot with less play than an eighth of a step is found.
 const PLACES: u32 = 16;
 /// Looks at the surroundings before a step is made as it is.
-const MOST_LOOKS: usize = 8;
+const MOST_LOOKS: usize = 4;
 
 /// A step that was found free of entry.
 pub(super) struct Taken<'a> {
@@ -52,62 +50,66 @@ impl Drive {
     /// like that other one, then like a pull.
     pub(super) fn released(&self, step: &Taken<'_>, around: &mut dyn Around) -> Option<Moved> {
         let pull = self.pull()?;
-        let (place, twist) = self.let_go(step, &pull, around)?;
-        let mut near = around.near(&place);
-        let from = (step.mover, step.near);
-        let is_clear = near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE)
-            && self.is_clear_between(from, (&place, &near), &twist, around);
-        let is_up = |pose: &Pose| (pose * place.body.shape.mass.centre - place.centre()).dot(&pull) > LIFT;
-        let Some(Step::Moved(pulled)) =
-            is_clear.then(|| self.pulling(&pull).advance(&place, &mut near, around))
-        else {
-            return None;
-        };
-        let turned = pulled.turned + twist.fixed_rows::<3>(3).norm();
-        is_up(&pulled.pose).then(|| Moved { turned, via: Some(place.pose), ..pulled })
-    }
-
-    /// Where on the way of a step, and after which twist, what held the pull back at its start does so no more; the
-    /// start itself where nothing did.
-    fn let_go<'m>(
-        &self,
-        step: &Taken<'m>,
-        pull: &Vector3<f64>,
-        around: &mut dyn Around,
-    ) -> Option<(Mover<'m>, Vector6<f64>)> {
-        let opposes = |row: &Row| row.a.fixed_rows::<3>(0).dot(pull) < -LEAST_OPPOSED;
+        let opposes = |row: &Row| row.a.fixed_rows::<3>(0).dot(&pull) < -LEAST_OPPOSED;
         if !step.result.active.iter().any(|(i, _)| opposes(&step.rows[*i])) {
             return None;
         }
-        let at = |place: u32| {
-            let twist = step.twist * (f64::from(place) / f64::from(PLACES));
-            (Mover { pose: self.displaced(step.mover, &twist), ..*step.mover }, twist)
-        };
-        let lifted = |place: u32| {
-            let (mover, _) = at(place);
-            Mover { pose: Translation3::from(pull * LIFT) * mover.pose, ..mover }
-        };
-        let lifted: Vec<Mover<'m>> = (0..=PLACES).map(lifted).collect();
-        let holds = |contact: &Contact, place: u32| {
-            let there = lifted[place as usize].remeasured(contact, 0.0);
-            there.is_some_and(|c| c.gap < -DEPTH_TOLERANCE)
-        };
+        let lift = Translation3::from(*pull * LIFT);
+        let lifted = |place| Mover { pose: lift * self.at(step, place).0.pose, ..*step.mover };
+        let lifted: Vec<Mover<'_>> = (0..=PLACES).map(lifted).collect();
         let known = step.rows.iter().zip(step.contacts).filter(|(row, _)| opposes(row)).map(|(_, c)| *c);
         let mut holding: Vec<Contact> = known.collect();
         let mut open: Vec<u32> = (0..=PLACES).collect();
         for _ in 0..MOST_LOOKS {
             for contact in holding.drain(..) {
-                open.retain(|&place| !holds(&contact, place));
+                close(&mut open, &contact, &lifted, step.twist);
             }
             let place = middle_of_longest(&open)?;
-            let there = around.near(&lifted[place as usize]);
-            holding.extend(there.contacts.iter().filter(|c| c.gap < -DEPTH_TOLERANCE));
-            if holding.is_empty() {
-                return Some(at(place));
+            let up = &lifted[place as usize];
+            let mut near = around.near(up);
+            holding.extend(near.contacts.iter().filter(|c| c.gap < -DEPTH_TOLERANCE));
+            if holding.is_empty()
+                && let Step::Moved(pulled) = self.pulling(&pull).advance(up, &mut near, around)
+                && let Some(turned) = self.turned_to(step, place, around)
+            {
+                let start = (place > 0).then(|| self.at(step, place).0.pose);
+                let via = start.into_iter().chain([up.pose]).collect();
+                return Some(Moved { turned: turned + pulled.turned, via, ..pulled });
             }
             open.retain(|&other| other != place);
         }
         None
+    }
+
+    /// Where a step has got to at one of its places, and after which twist.
+    fn at<'m>(&self, step: &Taken<'m>, place: u32) -> (Mover<'m>, Vector6<f64>) {
+        let twist = step.twist * (f64::from(place) / f64::from(PLACES));
+        (Mover { pose: self.displaced(step.mover, &twist), ..*step.mover }, twist)
+    }
+
+    /// By which angle a step turns the part up to one of its places, if the way there is clear.
+    fn turned_to(&self, step: &Taken<'_>, place: u32, around: &mut dyn Around) -> Option<f64> {
+        let (mover, twist) = self.at(step, place);
+        let near = around.near(&mover);
+        let is_clear = near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE)
+            && self.is_clear_between((step.mover, step.near), (&mover, &near), &twist, around);
+        is_clear.then(|| twist.fixed_rows::<3>(3).norm())
+    }
+}
+
+/// Takes out of some places, ascending, those where a contact holds a lifted part.
+fn close(open: &mut Vec<u32>, contact: &Contact, lifted: &[Mover<'_>], twist: &Vector6<f64>) {
+    let mut next = 0;
+    while let Some(&place) = open.get(next) {
+        let there = &lifted[place as usize];
+        let depth = there.remeasured(contact, 0.0).map_or(0.0, |c| -c.gap) - DEPTH_TOLERANCE;
+        if depth > 0.0 {
+            // As deep as it is, it holds as far as it moves by less than that.
+            let travel = there.displacement(contact, twist) / f64::from(PLACES);
+            let held = (depth / travel) as u32;
+            open.retain(|other| other.abs_diff(place) > held);
+        }
+        next = open.partition_point(|&other| other <= place);
     }
 }
 
