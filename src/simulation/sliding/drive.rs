@@ -198,7 +198,8 @@ impl Drive {
                 around.add_known(mover, near);
             }
         }
-        Step::Stuck { with }
+        // A slot's wall may be taken for one that stops the pull as well: then nothing does.
+        self.pulled_free(mover, near, around).map_or(Step::Stuck { with }, Step::Moved)
     }
 
     /// So much more of what is wanted that the motion, as contacts let it, is as long as a step in contact may be;

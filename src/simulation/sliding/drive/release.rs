@@ -10,17 +10,19 @@ use nalgebra::{Translation3, Unit, Vector3, Vector6};
 use super::super::super::contact::{Contact, Mover, Near};
 use super::super::super::projection::{Projected, Row};
 use super::super::DEPTH_TOLERANCE;
-use super::{Around, Drive, Moved, Step};
+use super::{Around, Attempt, Drive, Moved, Step};
 
 /// A contact holds a pull back if the part, moved so far along it, is too deep there. In a slot nothing is, whatever
 /// its play.
 const LIFT: f64 = 0.01;
 /// What opposes a pull by less than this share does not hold it back: the part slides along it.
 const LEAST_OPPOSED: f64 = 0.3;
+/// What nothing holds back gets this share of a pull.
+pub(super) const FREE_PULL: f64 = 0.9;
 /// Places of a step that are looked at: no slot with less play than an eighth of a step is found.
 const PLACES: u32 = 16;
 /// Looks at the surroundings before a step is made as it is.
-const MOST_LOOKS: usize = 4;
+const MOST_LOOKS: usize = 8;
 
 /// A step that was found free of entry.
 pub(super) struct Taken<'a> {
@@ -41,9 +43,28 @@ impl Drive {
     }
 
     /// The same without turning: what a part does that was let go.
-    fn pulling(&self, pull: &Vector3<f64>) -> Self {
-        let pull = pull * self.step;
+    fn pulling(&self, pull: Unit<Vector3<f64>>) -> Self {
+        let pull = *pull * self.step;
         Self { wanted: Vector6::new(pull.x, pull.y, pull.z, 0.0, 0.0, 0.0), takes_long_steps: false, ..*self }
+    }
+
+    /// One step that pulls alone what is pulled and turned at once, if nothing that is near stops it.
+    pub(super) fn pulled_free(
+        &self,
+        mover: &Mover<'_>,
+        near: &Near,
+        around: &mut dyn Around,
+    ) -> Option<Moved> {
+        let pulling = self.pulling(self.pull()?);
+        let known = pulling.constraints(mover, near);
+        let got = pulling.solved(&known)?.w.dot(&pulling.wanted);
+        if got < FREE_PULL * pulling.wanted.norm_squared() {
+            return None;
+        }
+        match pulling.attempt(mover, near, (&pulling.wanted, false), known, around) {
+            Attempt::Moved(pulled) => Some(pulled),
+            Attempt::Stuck(_) | Attempt::Entered(_) => None,
+        }
     }
 
     /// The step that pulls the part out of another one that would turn it past where it can be pulled: part of the way
@@ -69,7 +90,7 @@ impl Drive {
             let mut near = around.near(up);
             holding.extend(near.contacts.iter().filter(|c| c.gap < -DEPTH_TOLERANCE));
             if holding.is_empty()
-                && let Step::Moved(pulled) = self.pulling(&pull).advance(up, &mut near, around)
+                && let Step::Moved(pulled) = self.pulling(pull).advance(up, &mut near, around)
                 && let Some(turned) = self.turned_to(step, place, around)
             {
                 let start = (place > 0).then(|| self.at(step, place).0.pose);
@@ -119,4 +140,56 @@ fn middle_of_longest(places: &[u32]) -> Option<u32> {
     // The first of those that are as long: where the part comes first.
     let longest = rows.reduce(|longest, row| if row.len() > longest.len() { row } else { longest })?;
     Some(longest[longest.len() / 2])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{cells, cuboid, moved, scene};
+    use crate::geometry::Pose;
+    use crate::simulation::sliding::SlidingEngine;
+    use crate::simulation::{Action, Axis, End, Surroundings, TransitionFunction};
+    use crate::termination::Termination;
+
+    /// A bar in a box, under a lid with a slot that leaves it so much play on either side, turned out of line by
+    /// an angle.
+    fn bar_under_slot(play: f64, angle: f64) -> [crate::geometry::SourceMesh; 2] {
+        let (length, width) = (1.5 + play, 0.3 + play);
+        let x = [-3.0, -2.0, -length, length, 2.0, 3.0];
+        let y = [-3.0, -2.0, -width, width, 2.0, 3.0];
+        let is_solid = |[x, y, z]: [usize; 3]| {
+            let (is_inside, is_slot) = ((1..4).contains(&x) && (1..4).contains(&y), x == 2 && y == 2);
+            z == 0 || z == 1 && !is_inside || z == 2 && !is_slot
+        };
+        let bar = cuboid([-1.5, -0.3, 0.0], [1.5, 0.3, 0.4]);
+        [cells([&x, &y, &[-0.5, 0.0, 0.5, 1.0]], is_solid), moved(bar, &Pose::rotation(Vector3::z() * angle))]
+    }
+
+    #[test]
+    fn a_bar_that_is_pulled_and_turned_goes_into_a_slot_that_one_step_turns_it_past() {
+        for play in [0.02, 0.005] {
+            for degrees in [-20.0, -20.7, -21.4, -60.0] {
+                let (scene, verifier) = scene(bar_under_slot(play, f64::to_radians(degrees)));
+                let around = Surroundings::new(&scene, vec![0]);
+                let (start, t) = (scene.bodies[1].planning_from_shape, Termination::default());
+                let action = Action::Screw(Axis::Z, true, true);
+                let drive = Drive::new(&scene, 1, &start, action);
+                // Either way until the bar touches the slot's wall.
+                let in_line = 2.0 * play / 1.5;
+                let turn = drive.wanted.fixed_rows::<3>(3).norm();
+                assert!(in_line < 0.9 * turn, "in line for {in_line}, and a step turns by {turn}");
+                let motion = SlidingEngine.simulate(&scene, &around, 1, &start, action, &t).unwrap();
+                assert!(matches!(motion.end, End::Disassembled(_)), "{play} at {degrees}: {:?}", motion.end);
+                let verdict = verifier.check(&scene, &scene.allowances, &[0], 1, &motion.path, &t).unwrap();
+                assert!(verdict.depth < 2e-3, "{play} at {degrees}: {}", verdict.depth);
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_of_the_longest_rows_of_places_is_the_one_whose_middle_is_taken() {
+        assert_eq!(middle_of_longest(&[]), None);
+        assert_eq!(middle_of_longest(&[4]), Some(4));
+        assert_eq!(middle_of_longest(&[0, 2, 3, 4, 7, 8, 9]), Some(3));
+    }
 }
