@@ -105,8 +105,9 @@ impl Kind {
             Self::Healed | Self::Touching | Self::Swept => 2,
             Self::Blocking => 7,
             Self::Overlap => 9,
-            Self::Verdict | Self::Witness | Self::Motion => 10,
-            Self::Answer | Self::Plan => 14,
+            Self::Verdict | Self::Witness => 10,
+            Self::Motion => 11,
+            Self::Answer | Self::Plan => 15,
         }
     }
 

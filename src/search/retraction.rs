@@ -42,3 +42,53 @@ impl Search<'_, '_> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Problem;
+    use super::super::state::Node;
+    use super::super::tests::{Recorder, problem};
+    use super::*;
+    use crate::blocking_graph::Blockage;
+    use crate::fixtures::{block_on_plate, scene};
+    use crate::geometry::Pose;
+
+    #[test]
+    fn what_began_on_a_refuted_way_goes_with_it_and_its_action_is_made_again_for_some_times() {
+        let (scene, verifier) = scene(block_on_plate());
+        let mut recorder = Recorder::default();
+        let problem = Problem { present: vec![0, 1], fixed: vec![0], ..problem(scene, &verifier) };
+        let (mut search, blockages) = Search::new(problem, &mut recorder, true);
+        search.make_roots(blockages.unwrap());
+        let root = search.nodes.len() - 1;
+        let start = *search.nodes[root].pose();
+        let at = |x: f64, z: f64| Pose::translation(x, 0.0, z) * start;
+        let add = |search: &mut Search<'_, '_>, parent: usize, end: Pose| {
+            let (translation, rotation) = (None, Blockage::open(search.rotations.len()));
+            let path = [&search.nodes[parent].path[..], &[end]].concat();
+            let origin = Some((parent, Phase::Rotation, 0));
+            search.add_node(Node { part: 1, path, translation, rotation, origin, novelty: 1.0, alive: true });
+            search.nodes.len() - 1
+        };
+        for time in 1..=REFINEMENTS + 1 {
+            search.nodes[root].rotation.block_jointly(0, vec![0]);
+            let beside = add(&mut search, root, at(1.0, 0.5));
+            // Through the plate and up again: what is refuted lies two motions before the state that is dropped.
+            let under = add(&mut search, beside, at(1.0, -0.5));
+            let up = add(&mut search, under, at(1.0, 1.0));
+            let last = add(&mut search, up, at(2.0, 1.0));
+            let sibling = add(&mut search, under, at(0.0, 1.0));
+            search.nodes[beside].rotation.block_jointly(0, vec![0]);
+            assert!(search.drop_state(up).is_ok());
+            let alive = [beside, under, up, last, sibling].map(|node| search.nodes[node].alive);
+            assert_eq!(alive, [true, false, false, false, false]);
+            assert!(search.nodes[beside].rotation.is_open(0) && !search.nodes[root].rotation.is_open(0));
+            // The same action from the same state, as it is made again.
+            let origin = search.nodes[under].origin.unwrap();
+            assert_eq!(search.retracted.remove(&origin), Some(1));
+            search.retracted.insert((root, Phase::Rotation, 0), time - 1);
+            assert!(search.drop_state(beside).is_ok());
+            assert_eq!(search.nodes[root].rotation.is_open(0), time <= REFINEMENTS, "{time}");
+        }
+    }
+}

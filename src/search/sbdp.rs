@@ -102,7 +102,7 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
 
 impl<'a, 'o> Search<'a, 'o> {
     /// A search, and the blockages of all parts as assembled.
-    fn new(
+    pub(super) fn new(
         problem: Problem<'a>,
         observer: &'o mut dyn Observer,
         guided: bool,
@@ -176,7 +176,7 @@ impl<'a, 'o> Search<'a, 'o> {
         }
     }
 
-    fn make_roots(&mut self, blockages: Vec<Blockage>) {
+    pub(super) fn make_roots(&mut self, blockages: Vec<Blockage>) {
         for (part, blockage) in blockages.into_iter().enumerate() {
             if self.disassembly.problem.may_move(part) {
                 self.add_node(Node {
@@ -194,7 +194,7 @@ impl<'a, 'o> Search<'a, 'o> {
         self.roots = self.nodes.len();
     }
 
-    fn add_node(&mut self, node: Node) {
+    pub(super) fn add_node(&mut self, node: Node) {
         self.known[node.part].add(self.nodes.len(), *node.pose());
         self.disassembly.counters.states += 1;
         self.nodes.push(node);
