@@ -22,6 +22,18 @@ pub(super) struct Projected {
     pub(super) active: Vec<(usize, f64)>,
 }
 
+impl Projected {
+    /// The parts behind the rows that hold it, ascending; those that hardly push are left out.
+    pub(super) fn others(&self, rows: &[Row]) -> Vec<usize> {
+        let strongest = self.active.iter().map(|(_, m)| *m).fold(0.0, f64::max);
+        let pushing = self.active.iter().filter(|(_, m)| *m > 1e-6 * strongest);
+        let mut out: Vec<_> = pushing.map(|(i, _)| rows[*i].other).collect();
+        out.sort_unstable();
+        out.dedup();
+        out
+    }
+}
+
 const FEASIBLE: f64 = 1e-10;
 const MOST_ITERATIONS: usize = 400;
 

@@ -252,7 +252,7 @@ impl Drive {
             // Rows that nearly contradict each other meet far away: nothing on the way there is looked at.
             let is_near = |p: &Projected| p.w.norm_squared() <= FARTHEST * target.norm_squared();
             let Some(result) = self.projected(&target, &rows, round == 0).filter(is_near) else { break };
-            let touching = others(&result.active, &rows);
+            let touching = result.others(&rows);
             let share = result.w.dot(&target) / target.norm_squared();
             if share < LEAST_SHARE {
                 return Attempt::Stuck(touching);
@@ -491,14 +491,4 @@ enum Attempt {
     Stuck(Vec<usize>),
     /// No allowed pose was found at this length of step.
     Entered(Vec<usize>),
-}
-
-/// The parts behind active rows, ascending; rows that hardly push are left out.
-pub(super) fn others(active: &[(usize, f64)], rows: &[Row]) -> Vec<usize> {
-    let strongest = active.iter().map(|(_, m)| *m).fold(0.0, f64::max);
-    let mut out: Vec<_> =
-        active.iter().filter(|(_, m)| *m > 1e-6 * strongest).map(|(i, _)| rows[*i].other).collect();
-    out.sort_unstable();
-    out.dedup();
-    out
 }

@@ -13,7 +13,7 @@ use crate::termination::Termination;
 use super::super::Scene;
 use super::super::projection::{Row, project};
 use super::cells::{Cells, Halt, MOST_STALLS, STALL};
-use super::drive::{FREE_STEP, LEAST_SHARE, contact_step, others};
+use super::drive::{FREE_STEP, LEAST_SHARE, contact_step};
 use super::facing::Obstacle;
 use super::flight::Flights;
 
@@ -188,7 +188,7 @@ pub(super) fn projected(force: &Vector3<f64>, obstacles: &[Obstacle]) -> Option<
     };
     let rows: Vec<Row> = obstacles.iter().map(row).collect();
     let result = project(&Vector6::new(force.x, force.y, force.z, 0.0, 0.0, 0.0), &rows)?;
-    Some((result.w.fixed_rows::<3>(0).into(), others(&result.active, &rows)))
+    Some((result.w.fixed_rows::<3>(0).into(), result.others(&rows)))
 }
 
 #[cfg(test)]

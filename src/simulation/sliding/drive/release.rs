@@ -18,7 +18,7 @@ const LIFT: f64 = 0.01;
 /// What opposes a pull by less than this share does not hold it back: the part slides along it.
 const LEAST_OPPOSED: f64 = 0.3;
 /// What nothing holds back gets this share of a pull.
-pub(super) const FREE_PULL: f64 = 0.9;
+const FREE_PULL: f64 = 0.9;
 /// Places of a step that are looked at: no slot with less play than an eighth of a step is found.
 const PLACES: u32 = 16;
 /// Looks at the surroundings before a step is made as it is.
