@@ -323,7 +323,8 @@ impl Drive {
     }
 
     /// Whether a turn that is clear at both ends is so on the way: points move on arcs, which
-    /// bulge. Contacts further off at both ends than twice the bulge are not asked.
+    /// bulge, and what is pulled as well may turn before it is out. Contacts further off at both ends than twice the
+    /// bulge are not asked.
     fn is_clear_between(
         &self,
         (from, near): (&Mover<'_>, &Near),
@@ -332,12 +333,15 @@ impl Drive {
         around: &mut dyn Around,
     ) -> bool {
         let centre = from.scene.centre_in_shape(from.part);
-        let middle = Mover { pose: interpolate(&from.pose, &to.pose, &centre, 0.5), ..*from };
         let turn = twist.fixed_rows::<3>(3).norm();
         let close = |c: &&Contact| c.gap < 0.25 * turn * turn * from.arm(c).norm();
-        let mut closest = near.contacts.iter().chain(&there.contacts).filter(close);
-        closest.all(|c| middle.remeasured(c, 0.0).is_none_or(|c| c.gap >= -BULGE_TOLERANCE))
-            && around.is_clear_at(&middle)
+        let places: &[f64] = if self.pull().is_some() { &[0.5, 0.25, 0.75] } else { &[0.5] };
+        places.iter().all(|&place| {
+            let between = Mover { pose: interpolate(&from.pose, &to.pose, &centre, place), ..*from };
+            let mut closest = near.contacts.iter().chain(&there.contacts).filter(close);
+            closest.all(|c| between.remeasured(c, 0.0).is_none_or(|c| c.gap >= -BULGE_TOLERANCE))
+                && around.is_clear_at(&between)
+        })
     }
 
     /// One constraint per contact, reduced, and which contacts they come from. Where a contact

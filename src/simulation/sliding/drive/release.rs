@@ -37,7 +37,7 @@ pub(super) struct Taken<'a> {
 
 impl Drive {
     /// Which way it is pulled, if it is pulled and turned at once.
-    fn pull(&self) -> Option<Unit<Vector3<f64>>> {
+    pub(super) fn pull(&self) -> Option<Unit<Vector3<f64>>> {
         let (pull, turn) = (self.wanted.fixed_rows::<3>(0), self.wanted.fixed_rows::<3>(3));
         if turn == Vector3::zeros() { None } else { Unit::try_new(pull.into_owned(), 0.0) }
     }
