@@ -335,7 +335,7 @@ impl Drive {
         let centre = from.scene.centre_in_shape(from.part);
         let turn = twist.fixed_rows::<3>(3).norm();
         let close = |c: &&Contact| c.gap < 0.25 * turn * turn * from.arm(c).norm();
-        let places: &[f64] = if self.pull().is_some() { &[0.5, 0.25, 0.75] } else { &[0.5] };
+        let places: &[f64] = if self.is_pulled(twist) { &[0.5, 0.25, 0.75] } else { &[0.5] };
         places.iter().all(|&place| {
             let between = Mover { pose: interpolate(&from.pose, &to.pose, &centre, place), ..*from };
             let mut closest = near.contacts.iter().chain(&there.contacts).filter(close);

@@ -37,9 +37,16 @@ pub(super) struct Taken<'a> {
 
 impl Drive {
     /// Which way it is pulled, if it is pulled and turned at once.
-    pub(super) fn pull(&self) -> Option<Unit<Vector3<f64>>> {
+    fn pull(&self) -> Option<Unit<Vector3<f64>>> {
         let (pull, turn) = (self.wanted.fixed_rows::<3>(0), self.wanted.fixed_rows::<3>(3));
         if turn == Vector3::zeros() { None } else { Unit::try_new(pull.into_owned(), 0.0) }
+    }
+
+    /// Whether a twist is one of what is pulled and turned at once that goes half as far along the pull as is wanted,
+    /// at least.
+    pub(super) fn is_pulled(&self, twist: &Vector6<f64>) -> bool {
+        let along = |twist: &Vector6<f64>, pull: &Vector3<f64>| twist.fixed_rows::<3>(0).dot(pull);
+        self.pull().is_some_and(|pull| along(twist, &pull) > 0.5 * along(&self.wanted, &pull))
     }
 
     /// The same without turning: what a part does that was let go.
