@@ -26,28 +26,15 @@ impl Cache {
     /// all; the last one used comes last. They count as used.
     #[must_use]
     pub fn recent_answers(&self, most: usize, bytes: u64) -> Vec<AnsweredQuestion> {
-        let Some(disk) = &self.disk else { return Vec::new() };
-        let mut listed = disk.list(Some(Kind::Answer)).unwrap_or_default();
-        listed.sort_by_key(|l| std::cmp::Reverse(l.used));
-        let mut left = bytes;
-        let fits = |bytes: u64| {
-            left = left.saturating_sub(bytes);
-            left > 0
-        };
-        let bytes_of = listed.iter().take(most).map(|l| l.bytes);
-        let count = bytes_of.map(fits).take_while(|fits| *fits).count();
-        let keys: Vec<Key> = listed[..count].iter().rev().map(|l| l.key).collect();
-        let envelopes = disk.get_all(&keys).unwrap_or_default();
-        let read = keys.iter().zip(envelopes).filter_map(|(listed, envelope)| {
-            let record: AnswerRecord = format::decode(format::opened(listed, &envelope?)?)?;
-            let AnswerRecord { question, messages } = record;
+        let read = |(listed, payload): (Key, Vec<u8>)| {
+            let AnswerRecord { question, messages } = format::decode(&payload)?;
             // Another build's answers lie under other keys.
-            (key(&question) == *listed && !messages.is_empty()).then(|| {
-                disk.touch(*listed);
+            (key(&question) == listed && !messages.is_empty()).then(|| {
+                self.touch(listed);
                 (question, messages)
             })
-        });
-        read.collect()
+        };
+        self.recent(Kind::Answer, most, bytes).into_iter().filter_map(read).collect()
     }
 }
 

@@ -101,8 +101,8 @@ impl Kind {
     #[must_use]
     pub fn algorithm(self) -> u32 {
         match self {
-            Self::Source | Self::Shape | Self::Hull | Self::Field => 1,
-            Self::Healed | Self::Touching | Self::Swept => 2,
+            Self::Source | Self::Shape | Self::Field => 1,
+            Self::Healed | Self::Touching | Self::Hull | Self::Swept => 2,
             Self::Blocking => 7,
             Self::Overlap => 9,
             Self::Verdict | Self::Witness => 10,

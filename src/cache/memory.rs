@@ -57,6 +57,11 @@ impl Memory {
         evicted
     }
 
+    /// Whether there is a payload, which is not used by this.
+    pub(super) fn has(&self, key: &Key) -> bool {
+        self.payloads.peek(key).is_some()
+    }
+
     pub(super) fn remove(&mut self, key: &Key) {
         if let Some(payload) = self.payloads.remove(key) {
             self.bytes -= cost(&payload);
@@ -80,6 +85,11 @@ impl Memory {
 
     pub(super) fn held(&self, kind: Kind) -> Held {
         self.held[kind.index()]
+    }
+
+    /// What they may take.
+    pub(super) fn budget(&self) -> usize {
+        self.budget
     }
 
     /// Of payloads and of what is kept beside them.

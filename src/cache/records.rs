@@ -206,9 +206,10 @@ pub(super) struct HealedPartRecord {
     pub(super) moved: PoseRecord,
 }
 
-/// Vertices of a convex hull.
+/// Vertices of a convex hull, and the hash of the points that it is of.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct HullRecord {
+    pub(super) points: [u8; 32],
     pub(super) vertices: Vec<[f64; 3]>,
 }
 

@@ -49,6 +49,7 @@ pub(super) fn start<P: Planning>(queues: &Queues, service: &Arc<P>) -> std::io::
             tracing::warn!("nothing is made ready ahead: there are no threads for it");
             return;
         };
+        for_assemblies.install(|| service.recall_recent());
         for id in service.recent(MOST_RECENT) {
             queues.prefetch.want(id);
         }

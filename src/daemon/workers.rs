@@ -66,6 +66,8 @@ pub trait Planning: Send + Sync + 'static {
     fn foresee(&self, _: AssemblyId, _: &PlanRequest, _: &Termination) -> Result<Plan, ServiceError> {
         Err(ServiceError::UnknownAssembly)
     }
+    /// See [`Service::recall_recent`].
+    fn recall_recent(&self) {}
     /// See [`Service::recent`].
     fn recent(&self, _: usize) -> Vec<AssemblyId> {
         Vec::new()
@@ -145,6 +147,10 @@ impl Planning for Service {
         termination: &Termination,
     ) -> Result<Plan, ServiceError> {
         Self::foresee(self, id, request, termination)
+    }
+
+    fn recall_recent(&self) {
+        Self::recall_recent(self);
     }
 
     fn recent(&self, most: usize) -> Vec<AssemblyId> {

@@ -237,6 +237,12 @@ impl Service {
         self.cache.recent_sources(most).into_iter().map(AssemblyId).collect()
     }
 
+    /// Reads into memory what was used last before this process began, if there is a store on disk.
+    pub fn recall_recent(&self) {
+        self.store.recall_hulls();
+        self.cache.recall_recent();
+    }
+
     /// Makes ready what any plan of an assembly needs: fields, overlaps, hulls, and the blocking graph of the
     /// assembled state, for questions with the options as they are by default.
     ///

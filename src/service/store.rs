@@ -124,6 +124,11 @@ impl Store {
         entry
     }
 
+    /// Reads the joined hulls that were used last before this process began.
+    pub(super) fn recall_hulls(&self) {
+        self.hulls.recall_recent();
+    }
+
     /// Has assemblies leave so many bytes of the budget, from the next time on that one is measured.
     pub(super) fn leave(&self, bytes: usize) {
         self.left.store(bytes, Ordering::Relaxed);

@@ -18,6 +18,9 @@ const FEWEST_STORED: usize = 12;
 pub trait HullStore: std::fmt::Debug + Send + Sync {
     /// The vertices of the hull of points with a hash, if they are there.
     fn hull(&self, points: &[u8; 32]) -> Option<Vec<Point3<f64>>>;
+    /// Those used last before this process began, with the hashes of their points, of no more than so many vertices
+    /// in all; the last one used comes last.
+    fn recent_hulls(&self, most: usize) -> Vec<([u8; 32], Vec<Point3<f64>>)>;
     /// Remembers them.
     fn remember_hull(&self, points: &[u8; 32], vertices: &[Point3<f64>]);
 }
@@ -40,6 +43,18 @@ impl JoinedHulls {
     #[must_use]
     pub fn stored(store: Arc<dyn HullStore>) -> Self {
         Self { held: Mutex::default(), store: Some(store) }
+    }
+
+    /// Reads what was used last from the store: read one by one, as they are asked for, hulls take longer.
+    pub fn recall_recent(&self) {
+        let store = self.store.as_ref();
+        let recent = store.map_or_else(Vec::new, |store| store.recent_hulls(MOST_POINTS / 2));
+        for (key, joined) in recent {
+            let mut held = self.held();
+            if held.joined.peek(&key).is_none() {
+                held.keep(key, joined.into());
+            }
+        }
     }
 
     /// Vertices of the convex hull of the points of two hulls.
@@ -132,6 +147,9 @@ mod tests {
             fn hull(&self, points: &[u8; 32]) -> Option<Vec<Point3<f64>>> {
                 self.0.lock().unwrap().get(points).cloned()
             }
+            fn recent_hulls(&self, _: usize) -> Vec<([u8; 32], Vec<Point3<f64>>)> {
+                self.0.lock().unwrap().iter().map(|(key, hull)| (*key, hull.clone())).collect()
+            }
             fn remember_hull(&self, points: &[u8; 32], vertices: &[Point3<f64>]) {
                 self.0.lock().unwrap().insert(*points, vertices.to_vec());
             }
@@ -148,6 +166,10 @@ mod tests {
         store.0.lock().unwrap().values_mut().for_each(|hull| hull.truncate(4));
         let told = JoinedHulls::stored(store.clone()).of(&large, &small);
         assert_eq!(*told, joined[..4], "nothing was joined");
+        let recalled = JoinedHulls::stored(store.clone());
+        recalled.recall_recent();
+        store.0.lock().unwrap().clear();
+        assert_eq!(*recalled.of(&large, &small), joined[..4], "it was read ahead");
     }
 
     #[test]
