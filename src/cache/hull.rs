@@ -23,6 +23,10 @@ impl HullStore for Cache {
         self.recent(Kind::Hull, most, bytes as u64).into_iter().filter_map(read).collect()
     }
 
+    fn hull_used(&self, points: &[u8; 32]) {
+        self.touch(key(points));
+    }
+
     fn remember_hull(&self, points: &[u8; 32], vertices: &[Point3<f64>]) {
         if self.is_on_disk() {
             let vertices = vertices.iter().map(|v| v.coords.into()).collect();
@@ -58,6 +62,12 @@ mod tests {
         assert_eq!(cache.recent_hulls(1000), [1, 2, 3].map(|n| ([n; 32], hull(n))));
         assert_eq!(cache.recent_hulls(40), [([3; 32], hull(3))], "points are counted");
         assert_eq!(cache.hull(&[1; 32]), Some(hull(1)));
+        cache.hull_used(&[2; 32]);
+        cache.flush();
+        drop(cache);
+        let cache = Cache::open(&settings).unwrap();
+        let recent = cache.recent_hulls(1000).into_iter().map(|(points, _)| points[0]);
+        assert_eq!(recent.collect::<Vec<_>>()[0], 3, "the others were used later");
         assert!(Cache::in_memory(1 << 20).recent_hulls(9).is_empty());
     }
 }

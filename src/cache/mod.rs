@@ -5,8 +5,8 @@
 //! file that one process holds, with its `tables`; `writer`, the one thread that writes to it) → bytes
 //! (`format`, drawn in `FORMAT.md`; `records`, what is in them). Distance fields have a file each (`fields`),
 //! which is mapped. A process that begins reads what was used last ahead (`recent`). What is asked, under which
-//! key, and when an old answer still holds, is said once for each kind: `pair`, `touching`, `motion`, `swept`, `verdict`,
-//! `plan`, `hull`, `source`, `healed`, `answer`.
+//! key, and when an old answer still holds, is said once for each kind: `pair`, `touching`, `motion`, `swept`,
+//! `verdict`, `plan`, `hull`, `source`, `healed`, `answer`.
 //! A request sees it all through its [`Recall`], which counts what was reused; with none of it, it
 //! remembers nothing.
 //!

@@ -201,6 +201,7 @@ proptest! {
         request in requests(),
         meshes in prop::sample::select(vec![machine(), posts()]),
         edits in prop::collection::vec(edit(), 1..4),
+        reads_ahead in any::<bool>(),
     ) {
         let folder = tempfile::tempdir().unwrap();
         let mut question = Question { meshes, request };
@@ -214,6 +215,10 @@ proptest! {
             };
             let service = on_disk(folder.path());
             prop_assert!(service.cache().source(&id.0).is_none(), "there is nothing to heal it from");
+            if reads_ahead {
+                service.recall_recent();
+                prop_assert!(service.remembered().records.memory_bytes > 0);
+            }
             let cold = told(question.ask(&Service::default(), true, &mut Told { all: false }));
             let kept = service.plan(id, &question.request, &Termination::default(), &mut Told { all: true });
             prop_assert_eq!(told(kept.unwrap()), cold);

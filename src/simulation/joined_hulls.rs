@@ -1,6 +1,7 @@
 //! Hulls of two hulls, remembered by their points: planning again what changed a little joins the same ones
 //! again. The larger ones are in a store as well, if there is one.
 
+use std::collections::HashSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Point3;
@@ -19,8 +20,10 @@ pub trait HullStore: std::fmt::Debug + Send + Sync {
     /// The vertices of the hull of points with a hash, if they are there.
     fn hull(&self, points: &[u8; 32]) -> Option<Vec<Point3<f64>>>;
     /// Those used last before this process began, with the hashes of their points, of no more than so many vertices
-    /// in all; the last one used comes last.
+    /// in all; the last one used comes last. They do not count as used by this.
     fn recent_hulls(&self, most: usize) -> Vec<([u8; 32], Vec<Point3<f64>>)>;
+    /// Notes that one of these was used.
+    fn hull_used(&self, points: &[u8; 32]);
     /// Remembers them.
     fn remember_hull(&self, points: &[u8; 32], vertices: &[Point3<f64>]);
 }
@@ -36,6 +39,8 @@ pub struct JoinedHulls {
 struct Held {
     joined: Lru<[u8; 32], [Point3<f64>]>,
     points: usize,
+    /// Those that were read ahead and that nobody has asked for yet.
+    unused: HashSet<[u8; 32]>,
 }
 
 impl JoinedHulls {
@@ -53,6 +58,7 @@ impl JoinedHulls {
             let mut held = self.held();
             if held.joined.peek(&key).is_none() {
                 held.keep(key, joined.into());
+                held.unused.insert(key);
             }
         }
     }
@@ -63,7 +69,9 @@ impl JoinedHulls {
             return Arc::clone(if a.is_empty() { b } else { a });
         }
         let key = key(a, b);
-        if let Some(known) = self.held().joined.get(&key) {
+        if let Some((known, is_first_use)) = self.held().known(&key) {
+            // Else those that every process uses would be the first to leave the store.
+            self.store.iter().filter(|_| is_first_use).for_each(|store| store.hull_used(&key));
             return known;
         }
         let store = self.store.as_ref().filter(|_| a.len() + b.len() >= FEWEST_STORED);
@@ -93,12 +101,18 @@ impl JoinedHulls {
 }
 
 impl Held {
+    /// What is remembered of some points, and whether that was read ahead and is asked for the first time.
+    fn known(&mut self, key: &[u8; 32]) -> Option<(Arc<[Point3<f64>]>, bool)> {
+        Some((self.joined.get(key)?, self.unused.remove(key)))
+    }
+
     fn keep(&mut self, key: [u8; 32], joined: Arc<[Point3<f64>]>) {
         self.points += joined.len();
         self.points -= self.joined.insert(key, joined).map_or(0, |before| before.len());
-        let Self { joined, points } = self;
+        let Self { joined, points, unused } = self;
         if *points > MOST_POINTS {
-            joined.evict(|_, gone| {
+            joined.evict(|key, gone| {
+                unused.remove(&key);
                 *points -= gone.len();
                 *points > MOST_POINTS / 2
             });
@@ -142,13 +156,16 @@ mod tests {
     #[test]
     fn what_a_store_has_is_not_joined_again() {
         #[derive(Debug, Default)]
-        struct Stored(Mutex<HashMap<[u8; 32], Vec<Point3<f64>>>>);
+        struct Stored(Mutex<HashMap<[u8; 32], Vec<Point3<f64>>>>, Mutex<Vec<[u8; 32]>>);
         impl HullStore for Stored {
             fn hull(&self, points: &[u8; 32]) -> Option<Vec<Point3<f64>>> {
                 self.0.lock().unwrap().get(points).cloned()
             }
             fn recent_hulls(&self, _: usize) -> Vec<([u8; 32], Vec<Point3<f64>>)> {
                 self.0.lock().unwrap().iter().map(|(key, hull)| (*key, hull.clone())).collect()
+            }
+            fn hull_used(&self, points: &[u8; 32]) {
+                self.1.lock().unwrap().push(*points);
             }
             fn remember_hull(&self, points: &[u8; 32], vertices: &[Point3<f64>]) {
                 self.0.lock().unwrap().insert(*points, vertices.to_vec());
@@ -169,7 +186,11 @@ mod tests {
         let recalled = JoinedHulls::stored(store.clone());
         recalled.recall_recent();
         store.0.lock().unwrap().clear();
-        assert_eq!(*recalled.of(&large, &small), joined[..4], "it was read ahead");
+        assert!(store.1.lock().unwrap().is_empty());
+        for _ in 0..2 {
+            assert_eq!(*recalled.of(&large, &small), joined[..4], "it was read ahead");
+        }
+        assert_eq!(*store.1.lock().unwrap(), [key(&large, &small)], "its first use is noted");
     }
 
     #[test]
