@@ -145,7 +145,7 @@ pub struct CacheConfig {
     pub disk_mb: u64,
     /// Megabytes of memory for all that is remembered; see [`CacheConfig::memory`].
     pub memory_mb: u64,
-    /// Whether assemblies are made ready while nothing is asked.
+    /// Whether assemblies are made ready while nothing is asked, and what was remembered last is read ahead.
     pub prefetch: bool,
     /// Seconds of such time for what may be asked after a plan.
     pub foresight_s: u64,

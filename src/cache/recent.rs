@@ -1,7 +1,7 @@
 //! What was used last before this process began, read in one look at the disk for each kind: one by one, as they
 //! are asked for, records take several times as long.
 
-use super::{Cache, Key, Kind, format};
+use super::{Cache, Key, Kind, Listed, format};
 
 /// Records of a kind that are read into memory.
 const MOST: usize = 4096;
@@ -22,12 +22,19 @@ impl Cache {
         }
     }
 
+    /// The records of a kind on disk, those used last first.
+    pub(super) fn last_used_first(&self, kind: Kind) -> Vec<Listed> {
+        let listed = self.disk.as_ref().and_then(|disk| disk.list(Some(kind)));
+        let mut listed = listed.unwrap_or_default();
+        listed.sort_by_key(|l| std::cmp::Reverse(l.used));
+        listed
+    }
+
     /// The payloads of a kind on disk that were used last, no more than so many with so many bytes in all; the
     /// last one used comes last.
     pub(super) fn recent(&self, kind: Kind, most: usize, bytes: u64) -> Vec<(Key, Vec<u8>)> {
         let Some(disk) = &self.disk else { return Vec::new() };
-        let mut listed = disk.list(Some(kind)).unwrap_or_default();
-        listed.sort_by_key(|l| std::cmp::Reverse(l.used));
+        let listed = self.last_used_first(kind);
         let mut left = bytes;
         let fits = |bytes: u64| {
             left = left.saturating_sub(bytes);

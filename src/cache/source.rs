@@ -49,10 +49,7 @@ impl Cache {
     /// The handles of the assemblies on disk, those used last first.
     #[must_use]
     pub fn recent_sources(&self, most: usize) -> Vec<[u8; 32]> {
-        let listed = self.disk.as_ref().and_then(|d| d.list(Some(Kind::Source)));
-        let mut listed = listed.unwrap_or_default();
-        listed.sort_by_key(|l| std::cmp::Reverse(l.used));
-        listed.iter().take(most).map(|l| *l.key.hash()).collect()
+        self.last_used_first(Kind::Source).iter().take(most).map(|l| *l.key.hash()).collect()
     }
 }
 

@@ -1,5 +1,5 @@
-//! What workers make ready while nothing is asked: fields, overlaps and blocking graphs of assemblies that
-//! just came, or were asked about before a restart; then what may be asked next about those that were
+//! What workers make ready while nothing is asked: what was remembered last before a restart, read ahead; fields,
+//! overlaps and blocking graphs of assemblies that just came, or were asked about before a restart; then what may be asked next about those that were
 //! planned ([`foresight`](super::foresight)). Whatever is asked stops it.
 
 use std::collections::VecDeque;

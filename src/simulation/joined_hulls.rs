@@ -69,9 +69,13 @@ impl JoinedHulls {
             return Arc::clone(if a.is_empty() { b } else { a });
         }
         let key = key(a, b);
-        if let Some((known, is_first_use)) = self.held().known(&key) {
-            // Else those that every process uses would be the first to leave the store.
-            self.store.iter().filter(|_| is_first_use).for_each(|store| store.hull_used(&key));
+        // Nobody else waits while the store is told.
+        let known = self.held().known(&key);
+        if let Some((known, is_first_use)) = known {
+            if is_first_use && let Some(store) = &self.store {
+                // Else those that every process uses would be the first to leave it.
+                store.hull_used(&key);
+            }
             return known;
         }
         let store = self.store.as_ref().filter(|_| a.len() + b.len() >= FEWEST_STORED);
