@@ -10,8 +10,8 @@ use crate::geometry::{
     Assembly, Mesh, Pose, Shape, Solidity, SourceAssembly, SourceMesh, SourcePart, Surface, heal,
 };
 use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Verifier};
+use crate::scene::{Pair, Scene};
 use crate::sdf::Field;
-use crate::simulation::{Pair, Scene};
 use crate::termination::Termination;
 
 pub(crate) use crate::bench::families::cells;

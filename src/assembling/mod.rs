@@ -22,8 +22,8 @@ use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Pose};
 use crate::plan::{Verdict, Verifier};
+use crate::scene::{Scene, Surroundings, exit_direction};
 use crate::search::Removal;
-use crate::simulation::{Scene, Surroundings, exit_direction};
 use crate::termination::{Interrupt, Termination};
 
 use room::Room;

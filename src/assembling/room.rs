@@ -6,7 +6,8 @@ use nalgebra::Point3;
 
 use crate::geometry::{Bounds, Pose, interpolate, separating_direction, transformed};
 use crate::plan::{Verdict, Verifier};
-use crate::simulation::{Scene, seems_clear};
+use crate::scene::Scene;
+use crate::simulation::seems_clear;
 use crate::termination::{Interrupt, Termination};
 
 /// Turns between two waypoints stay below this, so that the slerp is unambiguous.

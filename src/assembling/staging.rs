@@ -3,7 +3,7 @@
 use nalgebra::{Translation3, Vector3};
 
 use crate::geometry::{Bounds, Pose};
-use crate::simulation::Scene;
+use crate::scene::Scene;
 
 /// Between boxes of parts, and between them and all that moves, as a share of the longest side.
 const GAP: f64 = 0.03;

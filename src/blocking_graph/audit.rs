@@ -3,7 +3,8 @@
 
 use rayon::prelude::*;
 
-use crate::simulation::{Action, End, HullTree, Scene, TransitionFunction};
+use crate::scene::{HullTree, Scene};
+use crate::simulation::{Action, End, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
 use super::{Analysis, StaticAnalysis};

@@ -7,7 +7,8 @@
 use nalgebra::Vector3;
 
 use crate::geometry::{Bounds, Pose};
-use crate::simulation::{Action, Body, Scene};
+use crate::scene::{Body, Scene};
+use crate::simulation::Action;
 use crate::termination::{Interrupt, Termination};
 
 /// How often a contacting point is extended.

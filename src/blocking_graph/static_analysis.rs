@@ -10,7 +10,8 @@ use rayon::prelude::*;
 
 use crate::cache::{Key, Recall, blocking_key};
 use crate::geometry::Pose;
-use crate::simulation::{Action, Pair, Scene, grouped, pair_blocks};
+use crate::scene::{Pair, Scene, grouped};
+use crate::simulation::{Action, pair_blocks};
 use crate::termination::{Interrupt, Termination};
 
 use super::{Blockage, literal};

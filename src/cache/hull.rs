@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::records::HullRecord;
 use super::{Cache, Digest, Key, Kind, format};
-use crate::simulation::HullStore;
+use crate::scene::HullStore;
 
 impl HullStore for Cache {
     fn hull(&self, points: &[u8; 32]) -> Option<Vec<Point3<f64>>> {

@@ -20,9 +20,8 @@ use super::recall::About;
 use super::records::{MotionEnd, MotionRecord, WitnessRecord, WitnessVariant, pose_of, pose_record};
 use super::{Digest, Kind, Recall};
 use crate::geometry::{Bounds, Pose};
-use crate::simulation::{
-    Action, End, Motion, Scene, Surroundings, TransitionFunction, asked_again, exit_direction,
-};
+use crate::scene::{Scene, Surroundings, exit_direction};
+use crate::simulation::{Action, End, Motion, TransitionFunction, asked_again};
 use crate::termination::{Interrupt, Termination};
 
 /// Of so many motions that start alike, each among other parts, the last ones are kept.

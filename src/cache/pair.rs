@@ -9,7 +9,8 @@ use super::recall::About;
 use super::records::{BlockingRecord, OverlapRecord};
 use super::{Digest, Key, Kind, Recall};
 use crate::geometry::Pose;
-use crate::simulation::{Action, Body, Pair, Scene};
+use crate::scene::{Body, Pair, Scene};
+use crate::simulation::Action;
 use crate::termination::Interrupt;
 
 impl Recall {

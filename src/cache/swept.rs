@@ -6,7 +6,8 @@ use super::motion::add_standing;
 use super::pair::add_pose;
 use super::records::SweptRecord;
 use super::{Digest, Key, Kind, Recall};
-use crate::simulation::{Crossing, Sweep, SweepQuestion, straight_sweep_past};
+use crate::contact::Crossing;
+use crate::simulation::{Sweep, SweepQuestion, straight_sweep_past};
 use crate::termination::{Interrupt, Termination};
 
 /// Of the parts that one passed along a line, so many are remembered.
@@ -112,7 +113,8 @@ mod tests {
     use crate::cache::Cache;
     use crate::fixtures::{cuboid, moved, peg_in_hole, scene};
     use crate::geometry::{Pose, SourceMesh};
-    use crate::simulation::{Surroundings, straight_sweep};
+    use crate::scene::Surroundings;
+    use crate::simulation::straight_sweep;
 
     /// A peg in a blind hole, a post that makes its way out longer than the hole is deep, and a lid over it at
     /// some height.

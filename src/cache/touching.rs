@@ -9,7 +9,8 @@ use super::recall::About;
 use super::records::TouchingRecord;
 use super::{Digest, Kind, Recall};
 use crate::geometry::Pose;
-use crate::simulation::{Scene, Touching};
+use crate::scene::Scene;
+use crate::simulation::Touching;
 use crate::termination::{Interrupt, Termination};
 
 impl Recall {

@@ -11,7 +11,9 @@ use super::pair::add_pose;
 use super::recall::About;
 use super::records::{EntryRecord, VerdictRecord};
 use super::{Digest, Key, Kind, Recall};
-use crate::plan::{Entry, Passing, Verdict};
+use crate::contact::Passing;
+use crate::contact::sampled::along_path::Entry;
+use crate::plan::Verdict;
 use crate::termination::Interrupt;
 
 /// The check of a path past a part that stands, to be refused at some depth.

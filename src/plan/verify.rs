@@ -13,15 +13,16 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use rayon::prelude::*;
 
+use crate::contact::Passing;
+use crate::contact::course::Interval;
+use crate::contact::course::{Course, turns_far};
+use crate::contact::helix_profile::{centred, depth_on_screw};
+use crate::contact::region_cover::depth::{Found, Precision, Way};
+use crate::contact::sampled::along_path::{Entry, Samples};
 use crate::geometry::{Pose, Shape, Surface, area_normal};
-use crate::simulation::{Allowances, Pair, Scene};
+use crate::scene::{Allowances, Pair, Scene};
 use crate::termination::{Interrupt, Termination};
-
-use super::course::{Course, Interval, View};
-use super::depth::{Found, Precision, Question};
-use super::passing::Passing;
-use super::sampling::{Samples, turns_far};
-use super::screw::{centred, depth_on_screw};
+use crate::tolerances::HELPFUL;
 
 /// Depth that is not looked into, as a share of the limit.
 const SPARE: f64 = 1.0 / 8.0;
@@ -39,29 +40,6 @@ const OVERLAP_FINEST: f64 = 1e-4;
 /// Large ones are told more closely than to a tenth, as a share of the limit: what keeps its overlap on its
 /// way is to pass.
 const OVERLAP_MARGIN: f64 = 1.0 / 8.0;
-/// So much effort ([`Found::effort`]) is spent on each surface before the way is left to samples: some seconds,
-/// for samples promise less. What is no screw, and sees no holes, has been seen to need a third (a bayonet that
-/// turns askew to all axes).
-const MOST_EFFORT: usize = 20_000_000;
-/// The same where holes are in sight, or threads cross: most stays open, however much is spent.
-pub(super) const MOST_EFFORT_IN_DOUBT: usize = 200_000;
-
-/// Deeper than this, as a share of the limit, points help in refining a motion that is refused.
-pub(super) const HELPFUL: f64 = 1.0 / 2.0;
-
-/// A point that got too deep.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
-    /// The standing part of the pair.
-    pub other: usize,
-    /// Whether the point is one of the moving part.
-    pub on_moving: bool,
-    /// The point in the frame of the shape that it lies on.
-    pub point: Point3<f64>,
-    /// Depth beyond the allowance.
-    pub over: f64,
-}
-
 /// What the check of a path found.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
@@ -243,7 +221,7 @@ impl Verifier {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub(super) fn bounds(
+    pub(crate) fn bounds(
         &self,
         passing: &Passing<'_>,
         course: &Course,
@@ -260,50 +238,6 @@ impl Verifier {
         };
         let way = Way { passing, course, precision, termination };
         if turns_far(&passing.path) { depth_on_screw(&way, limit) } else { way.depth() }
-    }
-}
-
-/// The way of a part past one that stands.
-pub(super) struct Way<'a> {
-    pub(super) passing: &'a Passing<'a>,
-    pub(super) course: &'a Course,
-    precision: Precision,
-    pub(super) termination: &'a Termination,
-}
-
-impl Way<'_> {
-    /// How deep the moving part gets into the standing one, and the other way round.
-    fn depth(&self) -> Result<[Found; 2], Interrupt> {
-        let [moving, standing] = self.passing.surfaces();
-        let side = |on_moving| {
-            let measured = if on_moving { standing } else { moving };
-            let most_effort = if measured.rim().is_some() { MOST_EFFORT_IN_DOUBT } else { MOST_EFFORT };
-            self.depth_of_side(on_moving, Interval::WHOLE, most_effort)
-        };
-        let (one, other) = rayon::join(|| side(true), || side(false));
-        Ok([one?, other?])
-    }
-
-    /// How deep the moving part gets into the standing one on a stretch of the way, or the other way
-    /// round, looked at with no more than some effort.
-    pub(super) fn depth_of_side(
-        &self,
-        on_moving: bool,
-        interval: Interval,
-        most_effort: usize,
-    ) -> Result<Found, Interrupt> {
-        let Self { passing, course, precision, termination } = *self;
-        let [moving, standing] = passing.shapes;
-        let (looked_at, measured) = if on_moving { (moving, standing) } else { (standing, moving) };
-        let question = Question {
-            surface: &looked_at.surface,
-            tree: looked_at.patches(termination)?,
-            measured: &measured.surface,
-            granted: passing.granted,
-            precision,
-        };
-        let view = View::new(course, on_moving, precision.finest / 16.0);
-        question.answer(view, interval, most_effort, termination)
     }
 }
 

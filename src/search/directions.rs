@@ -11,7 +11,8 @@ use std::sync::Arc;
 use nalgebra::{Unit, Vector3};
 
 use crate::geometry::{Facing, NEAR_AXIS, SQUARE, Shape, oriented};
-use crate::simulation::{Axis, Scene};
+use crate::scene::Scene;
+use crate::simulation::Axis;
 use crate::termination::{Interrupt, Termination};
 
 /// How much more an axis of the world counts.

@@ -9,11 +9,11 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::cache::MotionQuestion;
+use crate::contact::sampled::along_path::Entry;
 use crate::geometry::{Pose, separating_direction, transformed};
-use crate::plan::{Entry, PlanStatus};
-use crate::simulation::{
-    Action, End, HULL_MARGIN, HullTree, Motion, Surroundings, Sweep, SweepQuestion, exit_direction,
-};
+use crate::plan::PlanStatus;
+use crate::scene::{HULL_MARGIN, HullTree, Surroundings, exit_direction};
+use crate::simulation::{Action, End, Motion, Sweep, SweepQuestion};
 use crate::termination::Interrupt;
 
 use super::outcome::{BlockedAction, Counters, Outcome, Removal};

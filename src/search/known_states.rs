@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use nalgebra::Point3;
 
 use crate::geometry::Pose;
-use crate::simulation::Scene;
+use crate::scene::Scene;
 
 use super::state::{coarseness, least_travel};
 

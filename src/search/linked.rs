@@ -11,7 +11,7 @@ use std::cell::OnceCell;
 use nalgebra::Point3;
 
 use crate::geometry::{linking_number, surface_loops};
-use crate::simulation::Scene;
+use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll, Termination};
 
 use super::sbdp::Search;

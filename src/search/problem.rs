@@ -9,9 +9,12 @@ use rayon::prelude::*;
 
 use crate::blocking_graph::StaticAnalysis;
 use crate::cache::{Recall, VerdictQuestion};
+use crate::contact::Passing;
+use crate::contact::sampled::along_path::Entry;
 use crate::geometry::{Pose, SampleTree};
-use crate::plan::{Entry, Passing, Verdict, Verifier, thinned};
-use crate::simulation::{Action, Scene, TransitionFunction};
+use crate::plan::{Verdict, Verifier, thinned};
+use crate::scene::Scene;
+use crate::simulation::{Action, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
 use super::directions::Directions;

@@ -2,7 +2,7 @@
 
 use crate::blocking_graph::Blockage;
 use crate::geometry::Pose;
-use crate::simulation::Scene;
+use crate::scene::Scene;
 
 use super::retraction::Origin;
 use super::trace::TracePhase;

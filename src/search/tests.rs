@@ -8,7 +8,8 @@ use crate::cache::Recall;
 use crate::fixtures::{cells, cuboid, moved, rod, scene, tube};
 use crate::geometry::SourceMesh;
 use crate::plan::{PlanStatus, Verifier};
-use crate::simulation::{Scene, SlidingEngine};
+use crate::scene::Scene;
+use crate::simulation::SlidingEngine;
 
 const PIN: usize = 0;
 const BOLT: usize = 1;

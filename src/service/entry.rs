@@ -10,12 +10,11 @@ use crate::blocking_graph::StaticAnalysis;
 use crate::cache::{Answered, PlanQuestion, Recall};
 use crate::geometry::{Assembly, Shape};
 use crate::plan::{Plan, PlanStatus, Verifier};
+use crate::scene::{HullTree, JoinedHulls};
 use crate::search::{
     Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_blockages, search,
 };
-use crate::simulation::{
-    HullTree, JoinedHulls, PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction,
-};
+use crate::simulation::{PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
 use super::ServiceError;

@@ -27,9 +27,10 @@ use crate::blocking_graph::{Analysis, Audit, DirectionalGraph, StaticAnalysis, a
 use crate::cache::{Cache, CacheStatistics, Recall, Source};
 use crate::geometry::{Assembly, GeometryError, Revision, SourceAssembly, content_hash};
 use crate::plan::{Overlap, Plan, Warning};
+use crate::scene::{HullStore, JoinedHulls};
 use crate::sdf::FieldStore;
 use crate::search::{Engine, PlanRequest, PlanSink, Staging, axes_of, least_travel};
-use crate::simulation::{Action, Axis, HullStore, JoinedHulls, PenaltyParameters};
+use crate::simulation::{Action, Axis, PenaltyParameters};
 use crate::termination::Termination;
 
 use entry::{Entry, engine_of};

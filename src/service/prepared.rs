@@ -7,11 +7,12 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use crate::cache::{Recall, overlap_key};
+use crate::contact::KeptCells;
 use crate::geometry::Assembly;
 use crate::plan::Verifier;
+use crate::scene::{HullTree, JoinedHulls, Pair, Scene, grouped, resolution};
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
-use crate::simulation::{HullTree, JoinedHulls, Pair, Scene, grouped, resolution};
 use crate::termination::{Interrupt, Termination};
 
 use super::store::SharedShape;
@@ -87,7 +88,7 @@ impl Prepared {
         let Self { scene, verifier, overlaps, .. } = self;
         let hulls = scene.whole.get().map_or(0, HullTree::memory);
         size_of_val(&**scene.bodies)
-            + scene.kept.memory()
+            + KeptCells::of(scene).memory()
             + hulls
             + verifier.memory()
             + size_of_val(&**overlaps)

@@ -12,8 +12,8 @@ use super::AssemblyId;
 use super::entry::Entry;
 use crate::geometry::{Assembly, Shape};
 use crate::lru::Lru;
+use crate::scene::JoinedHulls;
 use crate::sdf::{Field, FieldStore};
-use crate::simulation::JoinedHulls;
 
 /// A shape and its field, for all assemblies that have it.
 #[derive(Debug)]

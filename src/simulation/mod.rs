@@ -12,20 +12,12 @@
 //! Everything here is in the planning frame and knows nothing of search.
 
 mod action;
-mod alike;
-mod broad_phase;
-mod contact;
-mod crossing;
-mod disassembled;
-mod hull_tree;
-mod joined_hulls;
 mod null_twists;
 mod obstruction;
 mod passage;
 mod penalty;
 mod projection;
 mod reduction;
-mod scene;
 mod sliding;
 mod sweep;
 #[cfg(test)]
@@ -34,18 +26,11 @@ mod touching;
 mod transition;
 
 pub use action::{Action, Axis};
-pub use alike::{Pair, grouped, rounded, rounded_pose};
-pub use broad_phase::BroadPhase;
-pub use crossing::Crossing;
-pub use disassembled::{HULL_MARGIN, Surroundings, exit_direction};
-pub use hull_tree::HullTree;
-pub use joined_hulls::{HullStore, JoinedHulls};
 pub use null_twists::NullTwist;
 pub use obstruction::obstruction;
 pub use passage::{passes_straight, seems_clear};
 pub use penalty::{PenaltyEngine, PenaltyParameters};
-pub use scene::{Allowances, Body, Scene, resolution};
-pub use sliding::{KeptCells, SlidingEngine, StepCost, Telling, pair_blocks, step_costs};
+pub use sliding::{SlidingEngine, StepCost, Telling, pair_blocks, step_costs};
 pub use sweep::{Sweep, SweepQuestion, straight_sweep, straight_sweep_past};
 pub use touching::Touching;
 pub use transition::{End, Motion, TransitionFunction, asked_again};

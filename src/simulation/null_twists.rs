@@ -11,9 +11,10 @@ use faer::Mat;
 use nalgebra::{Matrix3x2, Matrix6, Point3, Unit, Vector3, Vector6};
 
 use crate::geometry::{Feature, Pose};
+use crate::scene::{Body, Scene};
 use crate::termination::{Interrupt, Poll, Termination};
 
-use super::{Body, Scene, Touching};
+use super::Touching;
 
 /// Singular values below this share of the largest are near null: facets of a round fit lean so much.
 const NEAR_NULL: f64 = 0.1;

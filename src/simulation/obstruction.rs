@@ -4,9 +4,8 @@
 use nalgebra::{Point3, Translation3, Vector3};
 
 use crate::geometry::{Bounds, OrientedSamples, Pose, Surface};
+use crate::scene::Scene;
 use crate::termination::Poll;
-
-use super::Scene;
 
 /// Of the samples of a surface, about so many are looked at.
 const RAYS: usize = 128;

@@ -1,10 +1,9 @@
 //! Whether a part gets straight from one pose to another, at a glance: for telling rooms apart and for
 //! trying ways, not for plans.
 
+use crate::contact::sampled::Mover;
 use crate::geometry::{Pose, interpolate};
-
-use super::Scene;
-use super::contact::Mover;
+use crate::scene::Scene;
 
 /// Poses looked at on one way, at most.
 const MOST_POSES: usize = 64;

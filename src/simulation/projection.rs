@@ -6,14 +6,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-/// One constraint a·w ≥ −b.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Row {
-    pub(super) a: Vector6<f64>,
-    pub(super) b: f64,
-    /// The part that the constraint comes from.
-    pub(super) other: usize,
-}
+use crate::contact::constraint::Row;
 
 /// The nearest allowed point and the rows that hold it, with their multipliers.
 #[derive(Debug, Clone, PartialEq)]

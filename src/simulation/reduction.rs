@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use super::projection::Row;
+use crate::contact::constraint::Row;
 
 /// Keeps, of rows that point nearly the same way, the tightest; also returns which they were.
 /// `lever` is the length that makes moments comparable with forces.

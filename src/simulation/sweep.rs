@@ -7,12 +7,11 @@
 
 use nalgebra::{Point3, Translation3, Vector3};
 
+use crate::contact::{Crossing, Margins};
 use crate::geometry::{Pose, Support, separating, transformed};
+use crate::scene::{HULL_MARGIN, Scene, Surroundings, exit_direction};
 use crate::termination::{Interrupt, Termination};
-
-use super::crossing::{Crossing, Margins};
-use super::sliding::DEPTH_TOLERANCE;
-use super::{HULL_MARGIN, Scene, Surroundings, exit_direction};
+use crate::tolerances::DEPTH_TOLERANCE;
 
 /// Faces that look along the direction, or against it, by less than this count as walls.
 const STEEPNESS: f64 = 1e-3;

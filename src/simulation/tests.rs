@@ -5,13 +5,11 @@ use std::sync::atomic::Ordering;
 
 use nalgebra::{Point3, Vector3};
 
-use super::{
-    Action, Axis, End, HULL_MARGIN, Motion, PenaltyEngine, Scene, SlidingEngine, Surroundings,
-    TransitionFunction,
-};
+use super::{Action, Axis, End, Motion, PenaltyEngine, SlidingEngine, TransitionFunction};
 use crate::fixtures::{block_on_plate, cells, cuboid, moved, peg_in_hole, rod, scene, tube};
 use crate::geometry::{Pose, SourceMesh};
 use crate::plan::Verifier;
+use crate::scene::{HULL_MARGIN, Scene, Surroundings};
 use crate::termination::{Interrupt, Termination};
 
 static PENALTY: LazyLock<PenaltyEngine> = LazyLock::new(PenaltyEngine::default);

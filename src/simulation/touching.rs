@@ -8,9 +8,8 @@
 use nalgebra::{Point3, Unit, Vector3};
 
 use crate::geometry::{Bounds, Pose, Surface, bisected};
+use crate::scene::{Body, Scene};
 use crate::termination::{Interrupt, Poll, Termination};
-
-use super::{Body, Scene};
 
 /// cos of the angle within which two planes are one (a quarter of a degree).
 const ALIKE: f64 = 0.999_99;

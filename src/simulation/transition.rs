@@ -5,9 +5,10 @@ use std::borrow::Cow;
 use nalgebra::Vector3;
 
 use crate::geometry::Pose;
+use crate::scene::{Scene, Surroundings};
 use crate::termination::{Interrupt, Termination};
 
-use super::{Action, Scene, Surroundings};
+use super::Action;
 
 /// How a motion ended.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use sbdp::geometry::{Assembly, load_assembly};
 use sbdp::plan::Verifier;
+use sbdp::scene::{Pair, Scene};
 use sbdp::sdf::Field;
-use sbdp::simulation::{Pair, Scene};
 use sbdp::termination::{Interrupt, Termination};
 
 /// Verification's limit, as a share of the longest side.

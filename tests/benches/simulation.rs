@@ -16,9 +16,9 @@ mod scenes;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use sbdp::scene::Surroundings;
 use sbdp::simulation::{
-    Action, Axis, Motion, SlidingEngine, Surroundings, SweepQuestion, TransitionFunction, pair_blocks,
-    straight_sweep,
+    Action, Axis, Motion, SlidingEngine, SweepQuestion, TransitionFunction, pair_blocks, straight_sweep,
 };
 use sbdp::termination::Termination;
 

@@ -13,9 +13,8 @@ mod scenes;
 use std::path::{Path, PathBuf};
 
 use sbdp::geometry::Pose;
-use sbdp::simulation::{
-    Action, Axis, SlidingEngine, StepCost, Surroundings, Telling, TransitionFunction, step_costs,
-};
+use sbdp::scene::Surroundings;
+use sbdp::simulation::{Action, Axis, SlidingEngine, StepCost, Telling, TransitionFunction, step_costs};
 use sbdp::termination::Termination;
 
 /// Poses of a motion that are looked at.

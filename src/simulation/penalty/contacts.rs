@@ -13,8 +13,8 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::geometry::{Pose, SampleTree};
+use crate::scene::{Body, Scene, Surroundings};
 use crate::sdf::{FieldSample, Grid};
-use crate::simulation::{Body, Scene, Surroundings};
 
 use super::parameters::PenaltyParameters;
 use super::points::PointCache;

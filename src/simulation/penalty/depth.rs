@@ -5,8 +5,8 @@
 //! `sliding` uses, against the triangles. The field only tells which samples need not be asked.
 
 use crate::geometry::{Pose, SampleTree, interpolate};
+use crate::scene::Body;
 use crate::sdf::Grid;
-use crate::simulation::Body;
 
 use super::contacts::Contacts;
 use super::parameters::PenaltyParameters;

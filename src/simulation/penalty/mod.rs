@@ -25,9 +25,10 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::geometry::{Pose, SampleTree, Shape};
+use crate::scene::{Scene, Surroundings, exit_direction};
 use crate::termination::{Interrupt, Termination};
 
-use super::{Action, End, Motion, Scene, Surroundings, TransitionFunction, exit_direction};
+use super::{Action, End, Motion, TransitionFunction};
 use contacts::Contacts;
 pub use parameters::PenaltyParameters;
 use points::PointCache;

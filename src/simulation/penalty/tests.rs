@@ -10,7 +10,8 @@ use super::step::{Drive, Rigid, Stepper, Tally, placement};
 use super::{PenaltyEngine, PenaltyParameters};
 use crate::fixtures::{ball, block_on_plate, cells, cuboid, moved, peg_in_hole, rod, scene, tube};
 use crate::geometry::{Pose, SourceMesh};
-use crate::simulation::{Action, Axis, End, Motion, Scene, Surroundings, TransitionFunction};
+use crate::scene::{Scene, Surroundings};
+use crate::simulation::{Action, Axis, End, Motion, TransitionFunction};
 use crate::termination::Termination;
 
 const UP: Action = Action::Push(Axis::Z, true);

@@ -12,22 +12,23 @@ mod tests;
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 
+use crate::contact::constraint::Row;
+use crate::contact::sampled::{Around, Contact, Mover, Near};
 use crate::geometry::{Pose, Shape, interpolate};
+use crate::scene::Scene;
 use crate::termination::Poll;
+use crate::tolerances::{BULGE_TOLERANCE, DEPTH_TOLERANCE, FREE_STEP};
 
-use super::super::contact::{Contact, Mover, Near};
-use super::super::projection::{Projected, Row, project};
+use super::super::Action;
+use super::super::projection::{Projected, project};
 use super::super::reduction::reduced;
-use super::super::{Action, Scene};
-use super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
 use release::Taken;
 
 /// A motion that follows less than this share of the action (cos² of the angle between them) is
 /// stuck.
 pub(super) const LEAST_SHARE: f64 = 0.05;
-/// Longest contact step and longest step in free space, in the planning frame.
+/// Longest contact step, in the planning frame.
 const CONTACT_STEP: f64 = 0.12;
-pub(in crate::simulation) const FREE_STEP: f64 = 0.5;
 /// How far the arc of one turning step may bulge from its chord.
 const LARGEST_BULGE: f64 = 1e-3;
 /// A free turn is at most so many contact steps long: exits show only at the ends of steps.
@@ -51,32 +52,6 @@ const LEAST_PRESSURE: f64 = 1e-4;
 /// Contacts between two looks at the termination condition: large surfaces that lie on each other have tens
 /// of thousands.
 const ROWS_POLL: u32 = 16;
-
-/// What a step asks about its surroundings.
-pub(super) trait Around {
-    /// What is near a mover's pose: if any contacts are deeper than the engine lets them, some of these at
-    /// least.
-    fn near(&mut self, mover: &Mover<'_>) -> Near;
-
-    /// Takes contacts in that were found at other poses and may matter at the mover's, too.
-    fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) {
-        let _ = (mover, near);
-    }
-
-    /// Whether nothing is too deep at a pose between the last one that was looked at and the one before the
-    /// step, but for what the contacts near these tell.
-    fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
-        let _ = between;
-        true
-    }
-}
-
-/// What a function gathers.
-impl<F: Fn(&Mover<'_>) -> Near> Around for F {
-    fn near(&mut self, mover: &Mover<'_>) -> Near {
-        self(mover)
-    }
-}
 
 /// What a step came to.
 pub(super) enum Step {

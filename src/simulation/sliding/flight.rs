@@ -6,14 +6,12 @@
 
 use nalgebra::Vector3;
 
+use crate::contact::region_cover::facing::TILT;
+use crate::contact::{Crossing, Margins};
 use crate::geometry::{Bounds, Pose};
+use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
-
-use super::super::Scene;
-use super::super::crossing::{Crossing, Margins};
-use super::drive::FREE_STEP;
-use super::facing::TILT;
-use super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
+use crate::tolerances::{BULGE_TOLERANCE, DEPTH_TOLERANCE, FREE_STEP};
 
 /// So far ahead is looked at once, in the planning frame.
 const STRETCH: f64 = 4.0;

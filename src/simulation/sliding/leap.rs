@@ -11,12 +11,12 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 
+use crate::contact::sampled::{Around, Mover, Near};
 use crate::geometry::{Pose, Screw};
+use crate::scene::{Scene, Surroundings};
+use crate::tolerances::DEPTH_TOLERANCE;
 
-use super::super::contact::{Mover, Near};
-use super::super::{Scene, Surroundings};
-use super::DEPTH_TOLERANCE;
-use super::drive::{Around, Drive};
+use super::drive::Drive;
 
 /// Two steps are one motion if no point of the part differs by more than this share of a step …
 const SAME: f64 = 0.02;

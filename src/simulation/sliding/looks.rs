@@ -8,10 +8,11 @@
 
 use nalgebra::Point3;
 
+use crate::contact::sampled::{Around, Extent, Mover, Near, Vicinity};
 use crate::geometry::Pose;
+use crate::tolerances::FREE_STEP;
 
-use super::super::contact::{Extent, Mover, Near, Vicinity};
-use super::drive::{Around, FREE_STEP, contact_step};
+use super::drive::contact_step;
 
 /// With more looks at either surface than this, fields are quicker: in the play of a thread nearly all samples are near.
 const MOST_LOOKS: usize = 1200;

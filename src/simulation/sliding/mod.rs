@@ -12,14 +12,8 @@
 //! clearance; where samples tell and the projected twist stays the same, along a wall or a thread, it
 //! is followed in long steps (`leap`).
 
-mod cell;
-mod cells;
 mod drive;
-mod facing;
-mod finder;
 mod flight;
-mod holds;
-mod kept;
 mod leap;
 mod looks;
 mod pair;
@@ -27,27 +21,23 @@ mod push;
 mod stages;
 mod turning;
 
+use crate::contact::region_cover::Halt;
+use crate::contact::region_cover::holds::Holds;
+use crate::contact::sampled::Mover;
 use crate::geometry::Pose;
+use crate::scene::{Scene, Surroundings, exit_direction};
 use crate::termination::{Interrupt, Termination};
+use crate::tolerances::BULGE_TOLERANCE;
 
-use super::contact::Mover;
-use super::{Action, End, Motion, Scene, Surroundings, TransitionFunction, asked_again, exit_direction};
-use cells::Halt;
+use super::{Action, End, Motion, TransitionFunction, asked_again};
 use drive::{Drive, Step};
-use holds::Holds;
 use leap::Leaper;
 use push::Push;
 use turning::Turning;
 
-pub(super) use drive::FREE_STEP;
-pub use kept::KeptCells;
 pub use pair::pair_blocks;
 pub use stages::{StepCost, Telling, step_costs};
 
-/// A pair may get this much deeper than its allowance, in the planning frame.
-pub(super) const DEPTH_TOLERANCE: f64 = 3e-4;
-/// The same half-way between two poses of a motion that turns.
-const BULGE_TOLERANCE: f64 = 2.0 * DEPTH_TOLERANCE;
 /// A motion that is not done after so many poses turns without end.
 const MOST_POSES: usize = 8000;
 

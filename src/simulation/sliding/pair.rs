@@ -3,14 +3,17 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use crate::contact::region_cover::Halt;
+use crate::contact::region_cover::cells::Cells;
+use crate::contact::region_cover::facing::Facing;
+use crate::contact::sampled::Mover;
 use crate::geometry::Pose;
+use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
+use crate::tolerances::FREE_STEP;
 
-use super::super::contact::Mover;
-use super::super::{Action, Scene};
-use super::cells::{Cells, Halt};
-use super::drive::{Drive, FREE_STEP, Moved, Step};
-use super::facing::Facing;
+use super::super::Action;
+use super::drive::{Drive, Moved, Step};
 use super::looks::{Looks, Start};
 use super::push::{self, Push};
 

@@ -7,14 +7,17 @@
 
 use nalgebra::{Vector3, Vector6};
 
+use crate::contact::constraint::Row;
+use crate::contact::region_cover::Halt;
+use crate::contact::region_cover::cells::{Cells, MOST_STALLS, STALL};
+use crate::contact::region_cover::facing::Obstacle;
 use crate::geometry::{Bounds, Pose};
+use crate::scene::Scene;
 use crate::termination::Termination;
+use crate::tolerances::FREE_STEP;
 
-use super::super::Scene;
-use super::super::projection::{Row, project};
-use super::cells::{Cells, Halt, MOST_STALLS, STALL};
-use super::drive::{FREE_STEP, LEAST_SHARE, contact_step};
-use super::facing::Obstacle;
+use super::super::projection::project;
+use super::drive::{LEAST_SHARE, contact_step};
 use super::flight::Flights;
 
 /// So many times the direction is bent at one place.
@@ -198,10 +201,10 @@ mod tests {
     use nalgebra::{Translation3, Unit};
     use proptest::prelude::*;
 
-    use super::super::BULGE_TOLERANCE;
     use super::*;
     use crate::fixtures::{LIMIT, block_on_plate, cuboid, l_shape, moved, peg_in_hole, scene};
     use crate::plan::Verifier;
+    use crate::tolerances::BULGE_TOLERANCE;
 
     /// Pushes part 1 with all others standing: its shifts, and what stopped it within some steps.
     fn pushed(scene: &Scene, force: Vector3<f64>, steps: usize) -> (Vec<Vector3<f64>>, Option<Vec<usize>>) {

@@ -3,19 +3,21 @@
 //! All three ways to see contact have the same stages: contacts are gathered, reduced to what matters, the wanted
 //! motion is projected onto what they allow, and the pose advances.
 
-use std::sync::Arc;
 use std::time::Instant;
 
 use nalgebra::Vector3;
 
+use crate::contact::region_cover::Halt;
+use crate::contact::region_cover::cells::Cells;
+use crate::contact::region_cover::holds::Holds;
+use crate::contact::sampled::Mover;
 use crate::geometry::Pose;
+use crate::scene::{Memo, Scene, Surroundings};
 use crate::termination::{Interrupt, Termination};
+use crate::tolerances::FREE_STEP;
 
-use super::super::contact::Mover;
-use super::super::{Action, Scene, Surroundings};
-use super::cells::{Cells, Halt};
-use super::drive::{Drive, FREE_STEP};
-use super::holds::Holds;
+use super::super::Action;
+use super::drive::Drive;
 use super::push::projected;
 
 /// What tells of contact.
@@ -97,7 +99,7 @@ fn of_shift(
     force: Vector3<f64>,
     termination: &Termination,
 ) -> Result<Option<StepCost>, Interrupt> {
-    let scene = Scene { kept: Arc::default(), ..scene.clone() };
+    let scene = Scene { memo: Memo::default(), ..scene.clone() };
     let bounds = scene.bodies[part].shape.bounds().transformed(start).grown(FREE_STEP);
     let near = scene.broad_phase.meeting_of(&surroundings.standing, &bounds);
     if near.is_empty() {

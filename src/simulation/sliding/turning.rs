@@ -1,6 +1,6 @@
 //! The end of endless turning.
 
-use super::super::contact::Mover;
+use crate::contact::sampled::Mover;
 
 /// Travel per turn below which a turning part is going nowhere.
 const LEAST_TRAVEL: f64 = 0.01;

@@ -2,12 +2,13 @@
 
 use nalgebra::{Vector3, Vector6};
 
+use crate::contact::constraint::Row;
+use crate::contact::sampled::Mover;
 use crate::geometry::Pose;
+use crate::scene::Surroundings;
+use crate::tolerances::DEPTH_TOLERANCE;
 
-use super::super::super::Surroundings;
-use super::super::super::contact::Mover;
-use super::super::super::projection::{Row, project};
-use super::super::DEPTH_TOLERANCE;
+use super::super::super::projection::project;
 use super::{Drive, Known};
 
 /// The gap at which a part in the middle of its play is left alone, and the corrections that bring

@@ -7,10 +7,12 @@
 
 use nalgebra::{Translation3, Unit, Vector3, Vector6};
 
-use super::super::super::contact::{Contact, Mover, Near};
-use super::super::super::projection::{Projected, Row};
-use super::super::DEPTH_TOLERANCE;
-use super::{Around, Attempt, Drive, Moved, Step};
+use crate::contact::constraint::Row;
+use crate::contact::sampled::{Around, Contact, Mover, Near};
+use crate::tolerances::DEPTH_TOLERANCE;
+
+use super::super::super::projection::Projected;
+use super::{Attempt, Drive, Moved, Step};
 
 /// A contact holds a pull back if the part, moved so far along it, is too deep there. In a slot nothing is, whatever
 /// its play.
@@ -154,8 +156,9 @@ mod tests {
     use super::*;
     use crate::fixtures::{cells, cuboid, moved, scene};
     use crate::geometry::Pose;
+    use crate::scene::Surroundings;
     use crate::simulation::sliding::SlidingEngine;
-    use crate::simulation::{Action, Axis, End, Surroundings, TransitionFunction};
+    use crate::simulation::{Action, Axis, End, TransitionFunction};
     use crate::termination::Termination;
 
     /// A bar in a box, under a lid with a slot that leaves it so much play on either side, turned out of line by

@@ -2,8 +2,9 @@ use std::f64::consts::FRAC_PI_3;
 
 use super::*;
 use crate::fixtures::{moved, peg_in_hole, rod, scene, tube};
+use crate::scene::Surroundings;
 use crate::simulation::sliding::SlidingEngine;
-use crate::simulation::{Axis, Surroundings, TransitionFunction};
+use crate::simulation::{Axis, TransitionFunction};
 use crate::termination::Termination;
 
 #[test]

@@ -5,44 +5,38 @@ use rayon::prelude::*;
 
 use crate::geometry::{Closest, NoRegion, Wanted};
 use crate::termination::Termination;
+use crate::tolerances::{HELD, HELD_AT_FIRST};
 
-use super::DEPTH_TOLERANCE;
+use super::Halt;
 use super::cell::{Cell, Limit, Spot};
-use super::cells::Halt;
 use super::facing::{Facing, Obstacle, Piece, Placed, Slope, Witness};
 
 /// Pieces this far off need no region, in the planning frame.
-pub(super) const FAR: f64 = 0.12;
+pub(crate) const FAR: f64 = 0.12;
 /// Shifts that a region is asked to allow: the longest that works.
 const AHEAD: [f64; 5] = [4.0, 0.5, 0.06, 0.012, 2e-3];
 /// Which of these is asked for first; the shorter ones only where something is near ahead.
 const SHORT: usize = 2;
 /// Regions without a wanted shift are asked for so much around a piece.
-pub(super) const AROUND: f64 = 0.12;
+pub(crate) const AROUND: f64 = 0.12;
 /// A region that lets a piece go by less than this share of what was asked is too small.
 const LEAST_LET_GO: f64 = 0.25;
 /// Steps that are shorter lead nowhere.
 const LEAST_STEP: f64 = 1e-5;
 /// Regions are asked for so much larger than the piece.
-pub(super) const ROOM: f64 = 1.25;
-/// So far outside its region, beyond what is granted, a piece may be where it begins: flat sides leave
-/// out a little of what is free, and where parts stand assembled nothing is entered.
-pub(super) const HELD_AT_FIRST: f64 = 1e-3;
-/// The same for what was not as far outside before. A corner of the measured surface gets deeper into a face
-/// than that gets into the corner, a few times: still within what the engine declares.
-pub(super) const HELD: f64 = DEPTH_TOLERANCE / 2.0;
+pub(crate) const ROOM: f64 = 1.25;
 /// A bit of a triangle that is smaller than this and has no region ahead is in the way …
 const SMALL: f64 = 0.3;
 /// … and is lost if it has none at all and is smaller than this.
-pub(super) const SMALLEST: f64 = 0.02;
+pub(crate) const SMALLEST: f64 = 0.02;
 
 /// So many pieces that come next are looked at beside one.
 const BESIDE: usize = 3;
 
 /// What of the measured surface is nearest to a point, and how near.
-pub(super) struct Seen {
-    pub(super) closest: Closest,
-    pub(super) signed: f64,
+pub(crate) struct Seen {
+    pub(crate) closest: Closest,
+    pub(crate) signed: f64,
 }
 
 /// A question about a piece: from which shift on, and which way it is to go on.
@@ -72,21 +66,21 @@ struct Looked {
 }
 
 /// A search for cells of one pair.
-pub(super) struct Finder<'a> {
+pub(crate) struct Finder<'a> {
     termination: &'a Termination,
     pair: &'a Facing<'a>,
     /// How many regions were looked for.
-    pub(super) regions: usize,
+    pub(crate) regions: usize,
     /// No more than this.
-    pub(super) budget: usize,
+    pub(crate) budget: usize,
     /// What was found.
-    pub(super) cells: Vec<Cell>,
+    pub(crate) cells: Vec<Cell>,
     /// Normals of what is certainly in the way.
-    pub(super) obstacles: Vec<Vector3<f64>>,
+    pub(crate) obstacles: Vec<Vector3<f64>>,
     /// Points that show it.
-    pub(super) witnesses: Vec<Witness>,
+    pub(crate) witnesses: Vec<Witness>,
     /// How many regions all of those pieces seem to need that are to have cells where they are.
-    pub(super) needed: f64,
+    pub(crate) needed: f64,
     /// Pieces that are to get cells yet, of those that are to have some where they are; the next one last.
     waiting: Vec<Waiting>,
     /// The piece at hand.
@@ -95,14 +89,14 @@ pub(super) struct Finder<'a> {
 
 impl<'a> Finder<'a> {
     /// A search for cells of all of the asked surface, of which no piece may be further outside than `held`.
-    pub(super) fn of_all(pair: &'a Facing<'a>, held: f64, termination: &'a Termination) -> Self {
+    pub(crate) fn of_all(pair: &'a Facing<'a>, held: f64, termination: &'a Termination) -> Self {
         let mut finder = Self::new(pair, 0, termination);
         let all = pair.root().map(|piece| Spot { piece, guess: 0, level: 0, held });
         finder.waiting.extend(all.map(|spot| Waiting { spot, share: 1.0, looked: None }));
         finder
     }
 
-    pub(super) fn new(pair: &'a Facing<'a>, budget: usize, termination: &'a Termination) -> Self {
+    pub(crate) fn new(pair: &'a Facing<'a>, budget: usize, termination: &'a Termination) -> Self {
         Self {
             termination,
             pair,
@@ -119,7 +113,7 @@ impl<'a> Finder<'a> {
 
     /// Goes on to find cells for [all](Self::of_all) pieces at a shift, always the same one, as free around it as can
     /// be, with no more than so many regions in all and not many more cells than `most`. Whether that was enough.
-    pub(super) fn gather(&mut self, at: &Vector3<f64>, budget: usize, most: usize) -> Result<bool, Halt> {
+    pub(crate) fn gather(&mut self, at: &Vector3<f64>, budget: usize, most: usize) -> Result<bool, Halt> {
         let wish = Wish { at: *at, along: Vector3::zeros() };
         self.budget = budget;
         let (regions, left) = (self.regions, self.left());
@@ -178,13 +172,13 @@ impl<'a> Finder<'a> {
     }
 
     /// Finds cells for a piece at a shift, as free along the unit vector `u` as can be.
-    pub(super) fn find(&mut self, spot: Spot, at: &Vector3<f64>, u: &Vector3<f64>) -> Result<(), Halt> {
+    pub(crate) fn find(&mut self, spot: Spot, at: &Vector3<f64>, u: &Vector3<f64>) -> Result<(), Halt> {
         self.renew(spot, &Wish { at: *at, along: *u })
     }
 
     /// A cell for all of a piece that lets it go further than `least` along the unit vector `u`, if there
     /// is one.
-    pub(super) fn far(&mut self, mut spot: Spot, u: &Vector3<f64>, least: f64) -> Option<Cell> {
+    pub(crate) fn far(&mut self, mut spot: Spot, u: &Vector3<f64>, least: f64) -> Option<Cell> {
         let wish = Wish { at: Vector3::zeros(), along: *u };
         let seen = self.place(&mut spot, &wish);
         let let_go =
@@ -403,7 +397,7 @@ fn other_thread() -> bool {
 }
 
 /// What a point in the measured surface's frame sees.
-pub(super) fn look(pair: &Facing<'_>, p: &Point3<f64>, guess: u32) -> Seen {
+pub(crate) fn look(pair: &Facing<'_>, p: &Point3<f64>, guess: u32) -> Seen {
     let closest = pair.measured.closest_from(p, guess);
     Seen { signed: pair.measured.signed(p, &closest), closest }
 }

@@ -19,28 +19,33 @@ use rayon::prelude::*;
 
 use crate::geometry::{Ball, Bounds, Look, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
 use crate::termination::{Interrupt, Poll, Termination};
+use crate::tolerances::HELPFUL;
 
-use super::passing::Passing;
-use super::verify::{Entry, HELPFUL};
+use super::super::passing::Passing;
 
 /// Largest travel of a vertex between two checked poses, as a share of the longest side.
 const DENSITY: f64 = 0.004;
 /// Samples and nodes between two looks at the termination condition: on open surfaces each takes long.
 const SAMPLES_POLL: u32 = 1;
-/// A path that turns further than this (radians) is a screw.
-const FAR: f64 = 4.0;
 /// So many poses are looked at together at first.
 const AT_ONCE: usize = 32;
 
-/// Whether a path turns so far that it may be a screw of many turns.
-pub(super) fn turns_far(path: &[Pose]) -> bool {
-    let turns = path.iter().zip(path.iter().skip(1)).map(|(a, b)| a.rotation.angle_to(&b.rotation));
-    turns.sum::<f64>() > FAR
+/// A point that got too deep.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// The standing part of the pair.
+    pub other: usize,
+    /// Whether the point is one of the moving part.
+    pub on_moving: bool,
+    /// The point in the frame of the shape that it lies on.
+    pub point: Point3<f64>,
+    /// Depth beyond the allowance.
+    pub over: f64,
 }
 
 /// The samples of all parts, taken when they are needed.
 #[derive(Debug, Clone)]
-pub(super) struct Samples {
+pub(crate) struct Samples {
     /// Per part: those of its shape, which equal parts share.
     parts: Arc<Vec<Arc<Sampled>>>,
 }
@@ -64,14 +69,14 @@ impl Closeness {
 
 impl Samples {
     /// For parts of which `shape_of` gives each one's shape.
-    pub(super) fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>) -> Self {
+    pub(crate) fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>) -> Self {
         let sampled = |s: &Arc<Shape>| Arc::new(Sampled { shape: Arc::clone(s), shares: Default::default() });
         let shapes: Vec<_> = shapes.iter().map(sampled).collect();
         Self { parts: Arc::new(shape_of.into_iter().map(|s| Arc::clone(&shapes[s])).collect()) }
     }
 
     /// Bytes in memory, of what was sampled so far; equal parts count once.
-    pub(super) fn memory(&self) -> usize {
+    pub(crate) fn memory(&self) -> usize {
         let mut shapes: Vec<&Arc<Sampled>> = self.parts.iter().collect();
         shapes.sort_unstable_by_key(|s| Arc::as_ptr(s));
         shapes.dedup_by_key(|s| Arc::as_ptr(s));
@@ -80,7 +85,7 @@ impl Samples {
     }
 
     /// Those of all parts, and of all parts again.
-    pub(super) fn twice(&self) -> Self {
+    pub(crate) fn twice(&self) -> Self {
         Self { parts: Arc::new([&self.parts[..], &self.parts[..]].concat()) }
     }
 
@@ -92,7 +97,7 @@ impl Samples {
     /// The samples that get deeper than granted along a stretch of a way past a part: of every pose and side
     /// the deepest, and all that are deep enough, for a path that is refused beyond `limit`, to help in
     /// refining a motion.
-    pub(super) fn entries_along(
+    pub(crate) fn entries_along(
         &self,
         passing: &Passing<'_>,
         stretch: &[Pose],
@@ -305,7 +310,7 @@ mod tests {
 
     use super::*;
     use crate::fixtures::{ball, block_on_plate, moved, rod, scene, surface};
-    use crate::simulation::Pair;
+    use crate::scene::Pair;
 
     fn bits(p: &Point3<f64>) -> [u64; 3] {
         p.coords.map(f64::to_bits).into()

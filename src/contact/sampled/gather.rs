@@ -5,10 +5,10 @@ use std::cell::Cell;
 use nalgebra::Point3;
 
 use crate::geometry::{Closest, Pose, SampleTree};
+use crate::scene::Body;
 use crate::sdf::Grid;
 use crate::termination::{Poll, Termination};
 
-use super::super::Body;
 use super::{Contact, ENTER_POLL, Near};
 
 /// What samples are measured against.

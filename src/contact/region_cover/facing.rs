@@ -3,20 +3,17 @@
 use nalgebra::{Matrix3, Point3, Translation3, Vector3};
 
 use crate::geometry::{Cloud, Parts, PatchTree, Pose, Surface, bisected, separating_direction};
+use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
-
-use super::super::Scene;
-use super::DEPTH_TOLERANCE;
-use super::cell::TOUCHED;
-use super::finder::HELD;
+use crate::tolerances::{DEPTH_TOLERANCE, HELD, TOUCHED};
 
 /// Pieces are drawn together by this share to see whether they only touch.
 const INSET: f64 = 0.02;
 /// Shifts that lead into a plane by less than this share go along it: coordinates in files are
 /// rounded, and so are planes.
-pub(super) const TILT: f64 = 1e-5;
+pub(crate) const TILT: f64 = 1e-5;
 /// What such shifts may come to.
-pub(super) const SUNK: f64 = 0.3 * DEPTH_TOLERANCE;
+pub(crate) const SUNK: f64 = 0.3 * DEPTH_TOLERANCE;
 /// Points are moved so far to see whether they get inside …
 const PROBE: f64 = 2e-3;
 /// … by more than this share of it.
@@ -28,9 +25,9 @@ const PARALLEL: f64 = 0.9999;
 
 /// A plane that a part is kept from passing, by its normal in the planning frame, and whose it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Obstacle {
-    pub(super) normal: Vector3<f64>,
-    pub(super) other: usize,
+pub(crate) struct Obstacle {
+    pub(crate) normal: Vector3<f64>,
+    pub(crate) other: usize,
 }
 
 impl Obstacle {
@@ -41,7 +38,7 @@ impl Obstacle {
 
 /// At which angles what enters a face is in the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Slope {
+pub(crate) enum Slope {
     /// However small: where regions did not let it go.
     Any,
     /// At those at which it soon gets deeper than any tolerance, and where it is the only face that the point may be
@@ -51,7 +48,7 @@ pub(super) enum Slope {
 
 /// A point of the asked surface that got into the measured one.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Witness {
+pub(crate) struct Witness {
     /// Without a shift, in the measured surface's frame.
     point: Point3<f64>,
     /// The triangle that it was nearest to.
@@ -60,20 +57,20 @@ pub(super) struct Witness {
 
 /// A moving and a standing part: the surface that is asked, and that into which it may not get.
 #[derive(Clone)]
-pub(super) struct Facing<'a> {
-    pub(super) other: usize,
-    pub(super) asked: &'a Surface,
+pub(crate) struct Facing<'a> {
+    pub(crate) other: usize,
+    pub(crate) asked: &'a Surface,
     tree: &'a PatchTree,
-    pub(super) measured: &'a Surface,
+    pub(crate) measured: &'a Surface,
     /// Whether the moving part's surface is the one that is asked.
-    pub(super) asks_part: bool,
+    pub(crate) asks_part: bool,
     /// Where the standing part stands.
     stand: Pose,
     /// Without a shift.
     measured_from_asked: Pose,
     /// From shifts of the part to shifts of the asked surface against the measured one: orthogonal.
-    pub(super) shifted: Matrix3<f64>,
-    pub(super) allowance: f64,
+    pub(crate) shifted: Matrix3<f64>,
+    pub(crate) allowance: f64,
 }
 
 impl<'a> Facing<'a> {
@@ -81,7 +78,7 @@ impl<'a> Facing<'a> {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub(super) fn new(
+    pub(crate) fn new(
         scene: &'a Scene,
         (part, start): (usize, &Pose),
         other: usize,
@@ -112,7 +109,7 @@ impl<'a> Facing<'a> {
 
     /// Which sides of a pair can be asked, as what is closed can be measured: whether it is the
     /// part's. The smaller surface is the first.
-    pub(super) fn asked_first(scene: &Scene, part: usize, other: usize) -> Vec<bool> {
+    pub(crate) fn asked_first(scene: &Scene, part: usize, other: usize) -> Vec<bool> {
         let surface = |i: usize| &scene.bodies[i].shape.surface;
         let size = |i: usize| surface(i).bounds().extents().product();
         let mine_first = size(part) <= size(other);
@@ -122,12 +119,12 @@ impl<'a> Facing<'a> {
     }
 
     /// From the asked surface's frame to the measured one's with the part at a pose.
-    pub(super) fn with_part_at(&self, pose: &Pose) -> Pose {
+    pub(crate) fn with_part_at(&self, pose: &Pose) -> Pose {
         measured_from_asked(&self.stand, pose, self.asks_part)
     }
 
     /// A corner of a piece, in the asked surface's frame, by its number in [`Placed::points`].
-    pub(super) fn corner(&self, piece: &Piece, number: usize) -> Point3<f64> {
+    pub(crate) fn corner(&self, piece: &Piece, number: usize) -> Point3<f64> {
         match piece {
             Piece::Patch(index) => self.tree.vertices(*index)[number],
             Piece::Bit(corners) => corners[number],
@@ -135,7 +132,7 @@ impl<'a> Facing<'a> {
     }
 
     /// A ball that holds a piece, in the asked surface's frame.
-    pub(super) fn ball(&self, piece: &Piece) -> (Point3<f64>, f64) {
+    pub(crate) fn ball(&self, piece: &Piece) -> (Point3<f64>, f64) {
         match piece {
             Piece::Patch(index) => {
                 let patch = self.tree.patch(*index);
@@ -146,7 +143,7 @@ impl<'a> Facing<'a> {
     }
 
     /// A triangle of a piece's, if it is a patch.
-    pub(super) fn triangle_of(&self, piece: &Piece) -> Option<u32> {
+    pub(crate) fn triangle_of(&self, piece: &Piece) -> Option<u32> {
         match piece {
             Piece::Patch(index) => self.tree.triangles(*index).first().copied(),
             Piece::Bit(_) => None,
@@ -154,12 +151,12 @@ impl<'a> Facing<'a> {
     }
 
     /// The whole asked surface, unless it has no triangles.
-    pub(super) fn root(&self) -> Option<Piece> {
+    pub(crate) fn root(&self) -> Option<Piece> {
         self.tree.root().map(Piece::Patch)
     }
 
     /// The parts of a piece.
-    pub(super) fn parts(&self, piece: &Piece) -> Vec<Piece> {
+    pub(crate) fn parts(&self, piece: &Piece) -> Vec<Piece> {
         match piece {
             Piece::Bit(corners) => bisected(corners).1.map(Piece::Bit).to_vec(),
             Piece::Patch(index) => match self.tree.parts(*index) {
@@ -170,13 +167,13 @@ impl<'a> Facing<'a> {
     }
 
     /// Where a piece is against the measured surface when the part is shifted.
-    pub(super) fn place(&self, piece: &Piece, at: &Vector3<f64>, placed: &mut Placed) {
+    pub(crate) fn place(&self, piece: &Piece, at: &Vector3<f64>, placed: &mut Placed) {
         let shift = Translation3::from(self.shifted * at);
         self.place_at(piece, &(shift * self.measured_from_asked), placed);
     }
 
     /// Where a piece is when the asked surface stands so against the measured one.
-    pub(super) fn place_at(&self, piece: &Piece, measured_from_asked: &Pose, placed: &mut Placed) {
+    pub(crate) fn place_at(&self, piece: &Piece, measured_from_asked: &Pose, placed: &mut Placed) {
         let place = |p: &Point3<f64>| measured_from_asked * p;
         placed.points.clear();
         placed.extremes.clear();
@@ -198,7 +195,7 @@ impl<'a> Facing<'a> {
     }
 
     /// Whether a triangle of the measured surface may lie beside a piece where it is.
-    pub(super) fn is_beside(&self, piece: &Placed, triangle: u32, most: f64) -> bool {
+    pub(crate) fn is_beside(&self, piece: &Placed, triangle: u32, most: f64) -> bool {
         let corners = self.measured.corners(triangle);
         // What touches is beside, too.
         let centre = piece.centre;
@@ -210,7 +207,7 @@ impl<'a> Facing<'a> {
     /// The faces that some points of the asked surface (measured surface's frame) get into when the part
     /// moves along a unit vector: what is certainly in the way. Points that show it are added to
     /// `witnesses`.
-    pub(super) fn obstacles(
+    pub(crate) fn obstacles(
         &self,
         probes: &[Point3<f64>],
         (at, along): (&Vector3<f64>, &Vector3<f64>),
@@ -231,7 +228,7 @@ impl<'a> Facing<'a> {
 
     /// What points that showed obstacles before still get into, at another shift or along another unit
     /// vector.
-    pub(super) fn obstacles_seen_by(
+    pub(crate) fn obstacles_seen_by(
         &self,
         witnesses: &[Witness],
         (at, along): (&Vector3<f64>, &Vector3<f64>),
@@ -261,7 +258,7 @@ impl<'a> Facing<'a> {
 
     /// The face of the asked surface that gets over a corner of a measured triangle, or the middle of one of its
     /// sides, steeply: a long face may have its own corners far from where it touches.
-    pub(super) fn obstacle_of_triangle(
+    pub(crate) fn obstacle_of_triangle(
         &self,
         triangle: u32,
         (at, along): (&Vector3<f64>, &Vector3<f64>),
@@ -281,7 +278,7 @@ impl<'a> Facing<'a> {
 
     /// Points of a piece that are likely to get inside first: corners in front, and the
     /// middles of the largest faces that look ahead (corners may be at the rims of holes).
-    pub(super) fn probes_ahead(
+    pub(crate) fn probes_ahead(
         &self,
         piece: &Piece,
         placed: &Placed,
@@ -365,7 +362,7 @@ fn measured_from_asked(stand: &Pose, part: &Pose, asks_part: bool) -> Pose {
 
 /// A piece of the asked surface.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Piece {
+pub(crate) enum Piece {
     /// A node of the tree.
     Patch(u32),
     /// A triangle, or a bit of one, by its corners.
@@ -374,16 +371,16 @@ pub(super) enum Piece {
 
 /// A piece against the measured surface.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Placed {
+pub(crate) struct Placed {
     /// Its corners.
-    pub(super) points: Vec<Point3<f64>>,
+    pub(crate) points: Vec<Point3<f64>>,
     /// The same, four by four.
-    pub(super) cloud: Cloud,
+    pub(crate) cloud: Cloud,
     /// Those that reach furthest.
-    pub(super) extremes: Vec<Point3<f64>>,
+    pub(crate) extremes: Vec<Point3<f64>>,
     /// A ball that holds it.
-    pub(super) centre: Point3<f64>,
-    pub(super) radius: f64,
+    pub(crate) centre: Point3<f64>,
+    pub(crate) radius: f64,
 }
 
 #[cfg(test)]

@@ -19,11 +19,10 @@ use nalgebra::Point3;
 use crate::geometry::{Bounds, Pose, Surface};
 use crate::termination::{Interrupt, Termination};
 
-pub(super) use centred::centred;
+pub(crate) use centred::centred;
 
 use super::course::{Course, Interval};
-use super::depth::Found;
-use super::verify::{MOST_EFFORT_IN_DOUBT, Way};
+use super::region_cover::depth::{Found, MOST_EFFORT_IN_DOUBT, Way};
 use envelope::{Envelope, Zone};
 use path::{Boxes, ScrewPath};
 
@@ -91,7 +90,7 @@ fn unsettled(
 ///
 /// # Errors
 /// The termination condition became true.
-pub(super) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], Interrupt> {
+pub(crate) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], Interrupt> {
     let surfaces = way.passing.surfaces();
     // Depth changes its sign in mid-air where there are holes, and there alone.
     if surfaces.iter().any(|surface| surface.rim().is_some()) {

@@ -29,53 +29,105 @@ use nalgebra::Point3;
 use crate::geometry::{PatchTree, Surface};
 use crate::termination::{Interrupt, Termination};
 
-use super::course::{Interval, View};
+use super::super::course::{Course, Interval, View};
+use super::super::passing::Passing;
 use walk::Search;
+
+/// So much effort ([`Found::effort`]) is spent on each surface before the way is left to samples: some seconds,
+/// for samples promise less. What is no screw, and sees no holes, has been seen to need a third (a bayonet that
+/// turns askew to all axes).
+const MOST_EFFORT: usize = 20_000_000;
+/// The same where holes are in sight, or threads cross: most stays open, however much is spent.
+pub(crate) const MOST_EFFORT_IN_DOUBT: usize = 200_000;
 
 /// How finely depth is told, in the planning frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Precision {
+pub(crate) struct Precision {
     /// Depth beyond what is granted that is not looked into.
-    pub(super) spare: f64,
+    pub(crate) spare: f64,
     /// Depth beyond what is granted from which on points are recorded, but not looked for any
     /// closer.
-    pub(super) deep: f64,
+    pub(crate) deep: f64,
     /// Depth is told to a tenth, and as closely as this.
-    pub(super) margin: f64,
+    pub(crate) margin: f64,
     /// Pieces of a smaller radius are not split.
-    pub(super) finest: f64,
+    pub(crate) finest: f64,
     /// The same once something deep was found.
-    pub(super) coarse: f64,
+    pub(crate) coarse: f64,
+}
+
+/// The way of a part past one that stands.
+pub(crate) struct Way<'a> {
+    pub(crate) passing: &'a Passing<'a>,
+    pub(crate) course: &'a Course,
+    pub(crate) precision: Precision,
+    pub(crate) termination: &'a Termination,
+}
+
+impl Way<'_> {
+    /// How deep the moving part gets into the standing one, and the other way round.
+    pub(crate) fn depth(&self) -> Result<[Found; 2], Interrupt> {
+        let [moving, standing] = self.passing.surfaces();
+        let side = |on_moving| {
+            let measured = if on_moving { standing } else { moving };
+            let most_effort = if measured.rim().is_some() { MOST_EFFORT_IN_DOUBT } else { MOST_EFFORT };
+            self.depth_of_side(on_moving, Interval::WHOLE, most_effort)
+        };
+        let (one, other) = rayon::join(|| side(true), || side(false));
+        Ok([one?, other?])
+    }
+
+    /// How deep the moving part gets into the standing one on a stretch of the way, or the other way
+    /// round, looked at with no more than some effort.
+    pub(crate) fn depth_of_side(
+        &self,
+        on_moving: bool,
+        interval: Interval,
+        most_effort: usize,
+    ) -> Result<Found, Interrupt> {
+        let Self { passing, course, precision, termination } = *self;
+        let [moving, standing] = passing.shapes;
+        let (looked_at, measured) = if on_moving { (moving, standing) } else { (standing, moving) };
+        let question = Question {
+            surface: &looked_at.surface,
+            tree: looked_at.patches(termination)?,
+            measured: &measured.surface,
+            granted: passing.granted,
+            precision,
+        };
+        let view = View::new(course, on_moving, precision.finest / 16.0);
+        question.answer(view, interval, most_effort, termination)
+    }
 }
 
 /// One surface that is measured against another.
-pub(super) struct Question<'a> {
+pub(crate) struct Question<'a> {
     /// The surface whose points are asked for, and its triangles' tree.
-    pub(super) surface: &'a Surface,
-    pub(super) tree: &'a PatchTree,
+    pub(crate) surface: &'a Surface,
+    pub(crate) tree: &'a PatchTree,
     /// The surface into which they may get.
-    pub(super) measured: &'a Surface,
+    pub(crate) measured: &'a Surface,
     /// The depth that counts as none.
-    pub(super) granted: f64,
-    pub(super) precision: Precision,
+    pub(crate) granted: f64,
+    pub(crate) precision: Precision,
 }
 
 /// What was found.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Found {
+pub(crate) struct Found {
     /// No point gets deeper than this beyond what is granted.
-    pub(super) bound: f64,
+    pub(crate) bound: f64,
     /// The largest depth that was measured beyond what is granted.
-    pub(super) depth: f64,
+    pub(crate) depth: f64,
     /// Points (frame of the surface asked about) that were measured deeper than
     /// [`Precision::deep`], or of which no less can be told: a good path has none, of a bad one these
     /// are the first found.
-    pub(super) deep: Vec<(Point3<f64>, f64)>,
+    pub(crate) deep: Vec<(Point3<f64>, f64)>,
     /// Stretches of the way on which the search was given up: the bound is none there.
-    pub(super) open: Vec<Interval>,
+    pub(crate) open: Vec<Interval>,
     /// How much was looked at: pieces (more for each where signs depend on many edges of holes), and regions that
     /// were looked for.
-    pub(super) effort: usize,
+    pub(crate) effort: usize,
 }
 
 /// After so many deep points, a path is bad enough.
@@ -92,7 +144,7 @@ impl Precision {
 
 impl Found {
     /// Adds what was found elsewhere.
-    pub(super) fn add(&mut self, other: Self) {
+    pub(crate) fn add(&mut self, other: Self) {
         self.bound = self.bound.max(other.bound);
         self.depth = self.depth.max(other.depth);
         self.deep.extend(other.deep);
@@ -101,7 +153,7 @@ impl Found {
     }
 
     /// Whether so much is deep that more would not change the answer.
-    pub(super) fn is_enough(&self) -> bool {
+    pub(crate) fn is_enough(&self) -> bool {
         self.deep.len() >= ENOUGH
     }
 }
@@ -111,7 +163,7 @@ impl Question<'_> {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub(super) fn answer(
+    pub(crate) fn answer(
         &self,
         view: View<'_>,
         interval: Interval,

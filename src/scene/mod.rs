@@ -1,4 +1,19 @@
-//! The bodies of a problem, and how deep each pair may overlap.
+//! The scene: bodies at their assembled poses, how deep each pair may overlap, and what follows from where they stand.
+//!
+//! - [`BroadPhase`]: which bodies' boxes meet a box (parry's bounding-volume hierarchy);
+//! - [`CongruentPair`](Pair): two bodies up to a motion of both, so that equal pairs are asked about once;
+//! - [`HullTree`]: the convex hull of all bodies that stand, kept up while they leave one by one;
+//! - [`exit_direction`]: hull separation, the paper's test for a part that is disassembled.
+//!
+//! Everything is in the planning frame. The scene knows nothing of contact, simulation and search; what these derive
+//! from a scene, they keep in its [`Memo`].
+
+mod broad_phase;
+mod congruent_pairs;
+mod hull_separation;
+mod hull_tree;
+mod joined_hulls;
+mod memo;
 
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
@@ -8,7 +23,12 @@ use nalgebra::Point3;
 use crate::geometry::{Assembly, Bounds, Closest, Part, Pose, SampleTree, Shape};
 use crate::sdf::Field;
 
-use super::{BroadPhase, HullTree, JoinedHulls, KeptCells};
+pub use broad_phase::BroadPhase;
+pub use congruent_pairs::{Pair, grouped, rounded, rounded_pose};
+pub use hull_separation::{HULL_MARGIN, Surroundings, exit_direction};
+pub use hull_tree::HullTree;
+pub use joined_hulls::{HullStore, JoinedHulls};
+pub use memo::Memo;
 
 /// A part with its field, at its place.
 #[derive(Debug, Clone)]
@@ -90,8 +110,8 @@ pub struct Scene {
     pub longest_side: f64,
     /// Their boxes, to be asked which are near.
     pub broad_phase: Arc<BroadPhase>,
-    /// What the engine keeps of pairs where motions begin.
-    pub kept: Arc<KeptCells>,
+    /// What other modules derive from the scene.
+    pub memo: Memo,
     /// Hulls joined so far, also in other scenes.
     pub hulls: Arc<JoinedHulls>,
     /// Those of all bodies in a tree, once they were asked for.
@@ -121,7 +141,7 @@ impl Scene {
             allowances: Allowances::none(),
             longest_side,
             broad_phase: Arc::new(BroadPhase::new(&boxes)),
-            kept: Arc::default(),
+            memo: Memo::default(),
             hulls: Arc::default(),
             whole: Arc::default(),
         }

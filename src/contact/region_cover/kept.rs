@@ -12,9 +12,9 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use nalgebra::Vector3;
 
 use crate::geometry::{Pose, Shape};
+use crate::scene::{Pair, Scene, grouped};
 use crate::termination::Interrupt;
 
-use super::super::{Pair, Scene, grouped};
 use super::cell::Cell;
 
 /// So many cells are kept besides those of assembled pairs without a wish; then they are forgotten.
@@ -24,29 +24,29 @@ const NEAR: f64 = 0.2;
 
 /// A pair of a part that begins to move and one that stands.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place<'a> {
-    pub(super) part: usize,
-    pub(super) start: &'a Pose,
-    pub(super) other: usize,
+pub(crate) struct Place<'a> {
+    pub(crate) part: usize,
+    pub(crate) start: &'a Pose,
+    pub(crate) other: usize,
     /// Under which key it is kept, if it is one that is.
     kept_as: Option<Key>,
 }
 
 impl<'a> Place<'a> {
-    pub(super) fn new(part: usize, start: &'a Pose, other: usize) -> Self {
+    pub(crate) fn new(part: usize, start: &'a Pose, other: usize) -> Self {
         Self { part, start, other, kept_as: None }
     }
 }
 
 /// All of one side of a pair in cells without a shift.
 #[derive(Debug, Clone)]
-pub(super) struct Gathered {
+pub(crate) struct Gathered {
     /// Whether the moving part's surface is the one that is in cells.
-    pub(super) asks_part: bool,
+    pub(crate) asks_part: bool,
     /// None where regions cannot tell.
-    pub(super) cells: Option<Arc<Vec<Cell>>>,
+    pub(crate) cells: Option<Arc<Vec<Cell>>>,
     /// How many regions it took.
-    pub(super) regions: usize,
+    pub(crate) regions: usize,
 }
 
 impl Gathered {
@@ -59,16 +59,16 @@ impl Gathered {
 
 /// What becomes of a pair's cells when the part is to go somewhere from where it begins.
 #[derive(Debug, Clone)]
-pub(super) struct Way {
+pub(crate) struct Way {
     /// Normals (planning frame) of what stops it; free where there are none.
-    pub(super) blocked: Vec<Vector3<f64>>,
+    pub(crate) blocked: Vec<Vector3<f64>>,
     /// The cells that let it go; those that it had where it is stopped; none where regions cannot
     /// tell.
-    pub(super) cells: Option<Arc<Vec<Cell>>>,
+    pub(crate) cells: Option<Arc<Vec<Cell>>>,
     /// How many of them were found for this way: the last ones.
-    pub(super) found: usize,
+    pub(crate) found: usize,
     /// How many regions it took.
-    pub(super) regions: usize,
+    pub(crate) regions: usize,
 }
 
 impl Way {
@@ -137,6 +137,12 @@ struct Canonical {
 }
 
 impl KeptCells {
+    /// Those of a scene.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Arc<Self> {
+        scene.memo.of()
+    }
+
     /// Bytes in memory.
     #[must_use]
     pub fn memory(&self) -> usize {
@@ -147,7 +153,7 @@ impl KeptCells {
     }
 
     /// The cells of a pair; `find` finds them.
-    pub(super) fn gathered(
+    pub(crate) fn gathered(
         &self,
         scene: &Scene,
         place: &Place<'_>,
@@ -168,7 +174,7 @@ impl KeptCells {
     }
 
     /// The way of a pair along a unit vector, the next step or far; `find` finds it.
-    pub(super) fn way(
+    pub(crate) fn way(
         &self,
         scene: &Scene,
         place: &Place<'_>,
@@ -236,7 +242,7 @@ fn at_place<T>(
 ) -> Result<T, Interrupt> {
     let Some(pair) = alone else { return find(scene, place) };
     // What is found on the way is kept here, too.
-    let alone = Scene { kept: Arc::clone(&scene.kept), ..pair.scene(scene) };
+    let alone = Scene { memo: scene.memo.clone(), ..pair.scene(scene) };
     find(&alone, &Place { part: 0, start: &pair.poses[0], other: 1, kept_as: Some(key) })
 }
 
@@ -263,7 +269,8 @@ mod tests {
     use super::*;
     use crate::fixtures::{cuboid, moved, scene};
     use crate::geometry::SourceMesh;
-    use crate::simulation::{Action, Axis, End, Motion, SlidingEngine, Surroundings, TransitionFunction};
+    use crate::scene::Surroundings;
+    use crate::simulation::{Action, Axis, End, Motion, SlidingEngine, TransitionFunction};
     use crate::termination::Termination;
 
     /// Three posts, each on its foot, alike but for rounding, and a wall beside.
@@ -308,7 +315,8 @@ mod tests {
             let with = vec![part ^ 1];
             assert_eq!((path.len(), end), (1, End::Collision { with }), "{part} {action}");
         }
-        let kept = scene.kept.lock();
+        let kept = KeptCells::of(&scene);
+        let kept = kept.lock();
         assert_eq!(kept.gathered.iter().filter(|(key, _)| key.part ^ 1 == key.other).count(), 1);
     }
 }

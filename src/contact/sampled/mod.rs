@@ -5,6 +5,7 @@
 //! plane of the closest feature, of which any one is enough where the feature is convex; where it
 //! is not, the check at the trial pose finds what is missing.
 
+pub(crate) mod along_path;
 mod gather;
 mod planes;
 #[cfg(test)]
@@ -14,16 +15,16 @@ mod vicinity;
 use nalgebra::{Point3, Vector3, Vector6};
 
 use crate::geometry::{Bounds, Closest, Pose};
+use crate::scene::{Body, Scene, Surroundings};
 use crate::sdf::Grid;
 use crate::termination::{Poll, Termination};
+use crate::tolerances::FREE_STEP;
 
 use gather::{Measured, gather};
 use planes::{ON_SURFACE, Planes, Sample};
-pub(super) use vicinity::{Extent, Vicinity};
+pub(crate) use vicinity::{Extent, Vicinity};
 
-use super::projection::Row;
-use super::sliding::FREE_STEP;
-use super::{Body, Scene, Surroundings};
+use super::constraint::Row;
 
 /// Samples or nodes of these between two looks at the termination condition.
 const ENTER_POLL: u32 = 64;
@@ -37,14 +38,14 @@ enum Side {
 
 /// A sample near the other body's surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Contact {
+pub(crate) struct Contact {
     /// The standing part of the pair.
-    pub(super) other: usize,
+    pub(crate) other: usize,
     side: Side,
     /// The sample in the frame of the shape it lies on.
     sample: Point3<f64>,
     /// Signed distance plus the pair's allowance: negative is deeper than granted.
-    pub(super) gap: f64,
+    pub(crate) gap: f64,
     closest: Closest,
     allowance: f64,
 }
@@ -52,7 +53,7 @@ pub(super) struct Contact {
 impl Contact {
     /// A point on the moving part's surface, or on the standing one's (in its shape's frame), that was
     /// measured against the other: its gap, negative where it is deeper than granted.
-    pub(super) fn measured(
+    pub(crate) fn measured(
         other: usize,
         is_moving: bool,
         sample: Point3<f64>,
@@ -64,18 +65,18 @@ impl Contact {
     }
 
     /// Whether both are of one point of a pair.
-    pub(super) fn is_of_same_point(&self, other: &Self) -> bool {
+    pub(crate) fn is_of_same_point(&self, other: &Self) -> bool {
         (self.other, self.side, self.sample) == (other.other, other.side, other.sample)
     }
 }
 
 /// What is near a pose.
 #[derive(Debug, Clone)]
-pub(super) struct Near {
+pub(crate) struct Near {
     /// All samples with a gap below the reach that was asked for.
-    pub(super) contacts: Vec<Contact>,
+    pub(crate) contacts: Vec<Contact>,
     /// No other sample has a smaller gap than this.
-    pub(super) clearance: f64,
+    pub(crate) clearance: f64,
 }
 
 impl Near {
@@ -86,60 +87,86 @@ impl Near {
     }
 
     /// The same of what is nearer than some reach alone.
-    pub(super) fn within(&self, reach: f64) -> Self {
+    pub(crate) fn within(&self, reach: f64) -> Self {
         let (contacts, others) = self.contacts.iter().partition::<Vec<Contact>, _>(|c| c.gap < reach);
         let clearance = others.iter().map(|c| c.gap).fold(self.clearance, f64::min);
         Self { contacts, clearance }
     }
 }
 
+/// What a step asks about its surroundings.
+pub(crate) trait Around {
+    /// What is near a mover's pose: if any contacts are deeper than the engine lets them, some of these at
+    /// least.
+    fn near(&mut self, mover: &Mover<'_>) -> Near;
+
+    /// Takes contacts in that were found at other poses and may matter at the mover's, too.
+    fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) {
+        let _ = (mover, near);
+    }
+
+    /// Whether nothing is too deep at a pose between the last one that was looked at and the one before the
+    /// step, but for what the contacts near these tell.
+    fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
+        let _ = between;
+        true
+    }
+}
+
+/// What a function gathers.
+impl<F: Fn(&Mover<'_>) -> Near> Around for F {
+    fn near(&mut self, mover: &Mover<'_>) -> Near {
+        self(mover)
+    }
+}
+
 /// The moving body at a pose.
 #[derive(Clone, Copy)]
-pub(super) struct Mover<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) body: &'a Body,
-    pub(super) part: usize,
-    pub(super) pose: Pose,
+pub(crate) struct Mover<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) body: &'a Body,
+    pub(crate) part: usize,
+    pub(crate) pose: Pose,
     /// See [`Self::until`].
-    pub(super) termination: Option<&'a Termination>,
+    pub(crate) termination: Option<&'a Termination>,
     /// See [`Self::exactly`].
-    pub(super) is_exact: bool,
+    pub(crate) is_exact: bool,
 }
 
 impl<'a> Mover<'a> {
-    pub(super) fn new(scene: &'a Scene, part: usize, pose: Pose) -> Self {
+    pub(crate) fn new(scene: &'a Scene, part: usize, pose: Pose) -> Self {
         Self { scene, body: &scene.bodies[part], part, pose, termination: None, is_exact: false }
     }
 
     /// The same, but once the condition is true it finds only part of its contacts, and that it enters
     /// whatever it is asked about: whoever asks must look at the condition before believing what was found. The first look at two large surfaces fills
     /// their fields, which takes longer than a cancelled request may.
-    pub(super) fn until(self, termination: &'a Termination) -> Self {
+    pub(crate) fn until(self, termination: &'a Termination) -> Self {
         Self { termination: Some(termination), ..self }
     }
 
     /// The same that measures without fields, among surfaces that are closed.
-    pub(super) fn exactly(self) -> Self {
+    pub(crate) fn exactly(self) -> Self {
         Self { is_exact: true, ..self }
     }
 
     /// Whether the condition is true.
-    pub(super) fn is_over(&self) -> bool {
+    pub(crate) fn is_over(&self) -> bool {
         self.termination.is_some_and(|t| t.check().is_err())
     }
 
     /// The centre of mass, about which twists turn.
-    pub(super) fn centre(&self) -> Point3<f64> {
+    pub(crate) fn centre(&self) -> Point3<f64> {
         self.pose * self.body.shape.mass.centre
     }
 
     /// Gathers all contacts with a gap below `reach`.
-    pub(super) fn near(&self, surroundings: &Surroundings, reach: f64) -> Near {
+    pub(crate) fn near(&self, surroundings: &Surroundings, reach: f64) -> Near {
         self.near_by(surroundings, reach, |other, near| self.near_pair(other, reach, near))
     }
 
     /// The same; `gather` takes in what is near a standing part that may be within reach.
-    pub(super) fn near_by(
+    pub(crate) fn near_by(
         &self,
         surroundings: &Surroundings,
         reach: f64,
@@ -162,7 +189,7 @@ impl<'a> Mover<'a> {
     }
 
     /// Gathers the contacts with one standing part.
-    pub(super) fn near_pair(&self, other: usize, reach: f64, near: &mut Near) {
+    pub(crate) fn near_pair(&self, other: usize, reach: f64, near: &mut Near) {
         // One after the other: several motions are simulated at a time, and one that waited for its half
         // would begin with another motion meanwhile, and come back to its own only at the end of that.
         for side in [Side::Moving, Side::Standing] {
@@ -172,7 +199,7 @@ impl<'a> Mover<'a> {
 
     /// The same for those with this part alone, both surfaces side by side: where fields are asked for the first time,
     /// the cells that they fill take most of the time.
-    pub(super) fn near_first(&self, other: usize, reach: f64) -> Near {
+    pub(crate) fn near_first(&self, other: usize, reach: f64) -> Near {
         let standing = &self.scene.bodies[other];
         rayon::join(|| self.field_is_ready(self.body), || self.field_is_ready(standing));
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
@@ -221,7 +248,7 @@ impl<'a> Mover<'a> {
 
     /// Whether the fields alone show that a sample of either surface is deeper than granted: deeper
     /// than they can be wrong by. Measures nothing exactly, so it is quick.
-    pub(super) fn clearly_enters(&self, standing: &[usize]) -> bool {
+    pub(crate) fn clearly_enters(&self, standing: &[usize]) -> bool {
         let poll = Poll::every(ENTER_POLL, self.termination);
         self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
             let field: &Grid = &measured.field;
@@ -234,7 +261,7 @@ impl<'a> Mover<'a> {
     }
 
     /// Whether the fields alone show that no sample of either surface is within some distance of the other.
-    pub(super) fn seems_clear(&self, standing: &[usize], by: f64) -> bool {
+    pub(crate) fn seems_clear(&self, standing: &[usize], by: f64) -> bool {
         !self.any_pair(standing, by, |sampled, measured, to_measured, _| {
             let field: &Grid = &measured.field;
             let limit = by + field.error_bound();
@@ -246,7 +273,7 @@ impl<'a> Mover<'a> {
     }
 
     /// Whether a sample of either surface is deeper by `depth` than granted: quick where many are.
-    pub(super) fn enters_by(&self, depth: f64, standing: &[usize]) -> bool {
+    pub(crate) fn enters_by(&self, depth: f64, standing: &[usize]) -> bool {
         let poll = Poll::every(ENTER_POLL, self.termination);
         self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
             let (field, limit): (&Grid, f64) = (&measured.field, -allowance - depth);
@@ -286,7 +313,7 @@ impl<'a> Mover<'a> {
     }
 
     /// The gap of a contact's sample with the mover at its pose, if still below `reach`.
-    pub(super) fn remeasured(&self, contact: &Contact, reach: f64) -> Option<Contact> {
+    pub(crate) fn remeasured(&self, contact: &Contact, reach: f64) -> Option<Contact> {
         let standing = &self.scene.bodies[contact.other];
         let (measured, p) = match contact.side {
             Side::Moving => (
@@ -308,7 +335,7 @@ impl<'a> Mover<'a> {
 
     /// How far a twist that ended at this pose moved a contact's sample against the other surface,
     /// at most: the arc is bounded by its chord and what a turn adds to second order.
-    pub(super) fn displacement(&self, contact: &Contact, twist: &Vector6<f64>) -> f64 {
+    pub(crate) fn displacement(&self, contact: &Contact, twist: &Vector6<f64>) -> f64 {
         let arm = self.arm(contact);
         let turn: Vector3<f64> = twist.fixed_rows::<3>(3).into();
         let linear = twist.fixed_rows::<3>(0) + turn.cross(&arm);
@@ -316,7 +343,7 @@ impl<'a> Mover<'a> {
     }
 
     /// From the centre of mass to a contact's sample.
-    pub(super) fn arm(&self, contact: &Contact) -> Vector3<f64> {
+    pub(crate) fn arm(&self, contact: &Contact) -> Vector3<f64> {
         let world = match contact.side {
             Side::Moving => self.pose * contact.sample,
             Side::Standing => self.scene.bodies[contact.other].planning_from_shape * contact.sample,
@@ -326,7 +353,7 @@ impl<'a> Mover<'a> {
 
     /// The constraints on twists (linear part first) about the centre of mass of which a contact
     /// demands any one, given the twist that is wanted. Appended to `out`; at least one.
-    pub(super) fn options(&self, contact: &Contact, wanted: &Vector6<f64>, out: &mut Vec<Row>) {
+    pub(crate) fn options(&self, contact: &Contact, wanted: &Vector6<f64>, out: &mut Vec<Row>) {
         let standing = &self.scene.bodies[contact.other];
         let (world, measured, frame, sense) = match contact.side {
             Side::Moving => (self.pose * contact.sample, standing, &standing.planning_from_shape, 1.0),
@@ -361,7 +388,7 @@ impl<'a> Mover<'a> {
     }
 
     /// The constraint that leads a sample that is too deep out the shortest way.
-    pub(super) fn way_out(&self, contact: &Contact, rows: &mut Vec<Row>) -> Option<Row> {
+    pub(crate) fn way_out(&self, contact: &Contact, rows: &mut Vec<Row>) -> Option<Row> {
         rows.clear();
         self.options(contact, &Vector6::zeros(), rows);
         rows.first().copied()

@@ -7,11 +7,12 @@ use proptest::prelude::*;
 
 use crate::fixtures::{LIMIT, cuboid, joined, open_box, scene, thread};
 use crate::geometry::{Bounds, Pose, SourceMesh, interpolate};
-use crate::simulation::Scene;
+use crate::plan::Verifier;
+use crate::scene::Scene;
 use crate::termination::Termination;
 
+use super::super::Passing;
 use super::super::course::{Course, Interval};
-use super::super::{Passing, Verifier};
 use super::unsettled;
 
 const TURNS: f64 = 3.0;

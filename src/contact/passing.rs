@@ -7,7 +7,7 @@
 use nalgebra::{Point3, Translation3};
 
 use crate::geometry::{Pose, Shape, Surface};
-use crate::simulation::{Allowances, Pair, Scene, rounded, rounded_pose};
+use crate::scene::{Allowances, Pair, Scene, rounded, rounded_pose};
 
 /// Directions are alike within this.
 const ALIKE: f64 = 1.0 / (1u64 << 40) as f64;

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 
 use crate::geometry::{FreeRegion, Pose, Screw};
+use crate::tolerances::DEPTH_TOLERANCE;
 
-use super::super::DEPTH_TOLERANCE;
 use super::super::cell::{Cell, Spot};
 use super::super::facing::{Facing, Placed};
 
@@ -17,34 +17,34 @@ const BETWEEN: usize = 4;
 
 /// A piece in its region.
 #[derive(Clone)]
-pub(super) struct Hold {
-    pub(super) spot: Spot,
+pub(crate) struct Hold {
+    pub(crate) spot: Spot,
     /// In the measured surface's frame.
-    pub(super) region: Arc<FreeRegion>,
+    pub(crate) region: Arc<FreeRegion>,
     /// A ball that holds the piece, in the asked surface's frame, …
-    pub(super) centre: Point3<f64>,
-    pub(super) radius: f64,
+    pub(crate) centre: Point3<f64>,
+    pub(crate) radius: f64,
     /// … and where its centre is at the base, in the measured surface's.
-    pub(super) stands: Point3<f64>,
+    pub(crate) stands: Point3<f64>,
     /// How far inside its region all of it is there.
-    pub(super) slack: f64,
+    pub(crate) slack: f64,
     /// The same at the pose that was looked at last; none if it was not in its region there.
-    pub(super) next: Option<f64>,
+    pub(crate) next: Option<f64>,
 }
 
 /// From the asked surface's frame to the measured one's at the base and at another pose.
 #[derive(Clone, Copy)]
-pub(super) struct Ends {
-    pub(super) here: Pose,
-    pub(super) there: Pose,
+pub(crate) struct Ends {
+    pub(crate) here: Pose,
+    pub(crate) there: Pose,
     /// Between the two, if they differ.
-    pub(super) between: [Pose; BETWEEN],
+    pub(crate) between: [Pose; BETWEEN],
     /// Where the motion from the one to the other leads.
-    pub(super) ahead: Pose,
+    pub(crate) ahead: Pose,
 }
 
 impl Ends {
-    pub(super) fn of(facing: &Facing<'_>, base: &Pose, there: &Pose) -> Self {
+    pub(crate) fn of(facing: &Facing<'_>, base: &Pose, there: &Pose) -> Self {
         let screw = Screw::between(base, there, 1);
         let after = |share: f64| facing.with_part_at(&(screw.times(share) * base));
         let between = std::array::from_fn(|i| after((i + 1) as f64 / (BETWEEN + 1) as f64));
@@ -53,20 +53,20 @@ impl Ends {
     }
 
     /// A pose alone.
-    pub(super) fn at(there: Pose) -> Self {
+    pub(crate) fn at(there: Pose) -> Self {
         Self { here: there, there, between: [there; BETWEEN], ahead: there }
     }
 }
 
 impl Hold {
-    pub(super) fn new(spot: Spot, region: Arc<FreeRegion>, facing: &Facing<'_>, here: &Pose) -> Self {
+    pub(crate) fn new(spot: Spot, region: Arc<FreeRegion>, facing: &Facing<'_>, here: &Pose) -> Self {
         let (centre, radius) = facing.ball(&spot.piece);
         let stands = here * centre;
         Self { spot, region, centre, radius, stands, slack: f64::NEG_INFINITY, next: None }
     }
 
     /// A piece that is free in a cell for shifts, without a shift.
-    pub(super) fn of_cell(cell: &Cell, facing: &Facing<'_>, here: &Pose, placed: &mut Placed) -> Self {
+    pub(crate) fn of_cell(cell: &Cell, facing: &Facing<'_>, here: &Pose, placed: &mut Placed) -> Self {
         facing.place_at(&cell.spot.piece, here, placed);
         let sides = cell.limits.iter().map(|limit| {
             let normal = facing.shifted * limit.normal;
@@ -78,13 +78,13 @@ impl Hold {
     }
 
     /// How far outside its region it may be.
-    pub(super) fn most(&self, facing: &Facing<'_>) -> f64 {
+    pub(crate) fn most(&self, facing: &Facing<'_>) -> f64 {
         facing.allowance + self.spot.held.max(DEPTH_TOLERANCE)
     }
 
     /// How far inside its region all of it is at a pose, negative where it is outside by no more than it
     /// may be and `more`; none where it is further.
-    pub(super) fn slack_at(
+    pub(crate) fn slack_at(
         &self,
         facing: &Facing<'_>,
         there: &Pose,
@@ -101,7 +101,7 @@ impl Hold {
 }
 
 /// How far inside a region a piece is, at least; negative where it is outside by no more than `most`.
-pub(super) fn slack_within(region: &FreeRegion, placed: &Placed, most: f64) -> Option<f64> {
+pub(crate) fn slack_within(region: &FreeRegion, placed: &Placed, most: f64) -> Option<f64> {
     let Placed { points, cloud, .. } = placed;
     let gaps = region.gaps(cloud);
     let farthest = points.iter().map(|p| (p - region.centre()).norm_squared()).fold(0.0, f64::max).sqrt();

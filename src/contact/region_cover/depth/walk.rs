@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 use crate::geometry::{FreeRegion, Parts, area_normal, bisected};
 use crate::termination::{Interrupt, Termination};
 
-use super::super::course::{Interval, Leg, View};
+use super::super::super::course::{Interval, Leg, View};
 use super::settle::{Place, Region, Swept, furthest, furthest_of, swept};
 use super::slab::cut;
 use super::{Found, Precision, Question};

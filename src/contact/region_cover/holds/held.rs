@@ -5,15 +5,15 @@ use std::sync::Arc;
 use nalgebra::{Point3, Vector3};
 
 use crate::geometry::{Bounds, FreeRegion, NoRegion, Pose, Wanted};
+use crate::scene::Scene;
 use crate::termination::Termination;
+use crate::tolerances::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
 
-use super::super::super::Scene;
-use super::super::super::contact::{Contact, Mover, Near};
+use super::super::super::sampled::{Contact, Mover, Near};
 use super::super::cell::Spot;
 use super::super::cells::{MOST_GRANTED, starting};
 use super::super::facing::{Facing, Piece, Placed};
 use super::super::finder::{AROUND, ROOM, SMALLEST, look};
-use super::super::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
 use super::hold::{Ends, Hold, slack_within};
 
 /// Surfaces in more pieces than this are quicker told by samples.
@@ -43,15 +43,15 @@ const MOST_PROBED: usize = 24;
 const MOST_PASSED: usize = 12;
 
 /// A pair, one of whose surfaces is in pieces.
-pub(super) struct Held<'a> {
-    pub(super) facing: Facing<'a>,
+pub(crate) struct Held<'a> {
+    pub(crate) facing: Facing<'a>,
     pieces: Vec<Hold>,
     /// Contacts that mattered.
-    pub(super) known: Vec<Contact>,
+    pub(crate) known: Vec<Contact>,
     /// Whether it was looked at there.
-    pub(super) is_near: bool,
+    pub(crate) is_near: bool,
     /// Whether regions could not tell: from the base on samples do.
-    pub(super) is_left_to_samples: bool,
+    pub(crate) is_left_to_samples: bool,
     /// How many steps were made, and how many regions were looked for.
     steps: usize,
     regions: usize,
@@ -59,7 +59,7 @@ pub(super) struct Held<'a> {
 }
 
 /// Pieces that have left their regions.
-pub(super) struct Left {
+pub(crate) struct Left {
     outside: Vec<usize>,
     ends: Ends,
 }
@@ -76,7 +76,7 @@ enum Unheld {
 
 impl<'a> Held<'a> {
     /// A pair with the part at a pose, if regions tell of it.
-    pub(super) fn new(
+    pub(crate) fn new(
         scene: &'a Scene,
         (part, pose): (usize, &Pose),
         other: usize,
@@ -108,7 +108,7 @@ impl<'a> Held<'a> {
     /// What is known to be near with the part at the mover's pose; it was free at `base`. Tells which pieces
     /// have left their regions, if none of them is known to enter anything: of these it is
     /// [not yet known](Self::renewed).
-    pub(super) fn near(
+    pub(crate) fn near(
         &mut self,
         base: &Pose,
         mover: &Mover<'_>,
@@ -137,7 +137,7 @@ impl<'a> Held<'a> {
     }
 
     /// Finds regions for pieces that have left theirs, or what they enter.
-    pub(super) fn renewed(&mut self, left: &Left, mover: &Mover<'_>, reach: f64, near: &mut Near) {
+    pub(crate) fn renewed(&mut self, left: &Left, mover: &Mover<'_>, reach: f64, near: &mut Near) {
         let found = self.renew(&left.outside, &left.ends);
         if self.is_left_to_samples {
             return mover.near_pair(self.facing.other, reach, near);
@@ -396,7 +396,7 @@ impl<'a> Held<'a> {
     }
 
     /// Goes on from the pose that was looked at last; false where regions do not tell any more.
-    pub(super) fn settle(&mut self, mover: &Mover<'_>, reach: f64, termination: &Termination) -> bool {
+    pub(crate) fn settle(&mut self, mover: &Mover<'_>, reach: f64, termination: &Termination) -> bool {
         let there = self.facing.with_part_at(&mover.pose);
         let again = self.known.iter().filter_map(|c| mover.remeasured(c, reach));
         self.known = again.filter(|c| c.gap < reach).collect();
@@ -419,7 +419,7 @@ impl<'a> Held<'a> {
     }
 
     /// Whether nothing is too deep between the base and the pose that was looked at last.
-    pub(super) fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
+    pub(crate) fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
         if self.is_left_to_samples || !self.is_near {
             return !self.is_left_to_samples;
         }

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::*;
 use crate::fixtures::{cells, cuboid, l_shape, moved, peg_in_hole, scene, spread};
 use crate::geometry::interpolate;
-use crate::simulation::sliding::DEPTH_TOLERANCE;
+use crate::tolerances::DEPTH_TOLERANCE;
 
 #[test]
 fn a_loose_peg_turns_and_is_told_by_regions_all_the_way() {

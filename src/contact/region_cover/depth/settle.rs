@@ -4,7 +4,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::geometry::{Closest, FreeRegion, HullDepth, Parts, PatchTree, Wanted};
 
-use super::super::course::Leg;
+use super::super::super::course::Leg;
 use super::Question;
 use super::walk::{Hint, Search};
 
@@ -246,9 +246,9 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::contact::course::{Course, Interval, View};
     use crate::fixtures::{ball, surface, tube, vector};
     use crate::geometry::Pose;
-    use crate::plan::course::{Course, Interval, View};
     use crate::termination::Poll;
 
     proptest! {

@@ -20,31 +20,40 @@ const REMEMBERED: u32 = 12;
 /// Legs of more bends than this likewise.
 const MOST_BENDS: usize = 12;
 
+/// A path that turns further than this (radians) is a screw.
+const FAR: f64 = 4.0;
+
+/// Whether a path turns so far that it may be a screw of many turns.
+pub(crate) fn turns_far(path: &[Pose]) -> bool {
+    let turns = path.iter().zip(path.iter().skip(1)).map(|(a, b)| a.rotation.angle_to(&b.rotation));
+    turns.sum::<f64>() > FAR
+}
+
 /// The path of a part, in the frame of the one that it passes.
 #[derive(Debug)]
-pub(super) struct Course {
-    pub(super) segments: Vec<Segment>,
+pub(crate) struct Course {
+    pub(crate) segments: Vec<Segment>,
     /// The point of the shape that moves on lines.
-    pub(super) centre: Point3<f64>,
+    pub(crate) centre: Point3<f64>,
     /// No point of the shape is further from it.
-    pub(super) reach: f64,
-    pub(super) length: f64,
+    pub(crate) reach: f64,
+    pub(crate) length: f64,
 }
 
 #[derive(Debug)]
-pub(super) struct Segment {
-    pub(super) from: Pose,
-    pub(super) to: Pose,
+pub(crate) struct Segment {
+    pub(crate) from: Pose,
+    pub(crate) to: Pose,
     /// Way from the path's start to this segment's.
-    pub(super) before: f64,
+    pub(crate) before: f64,
     /// No point moves further on it.
-    pub(super) length: f64,
+    pub(crate) length: f64,
 }
 
 impl Course {
     /// The path through some poses of a shape whose point `centre` moves on lines; no point of the
     /// shape is further than `reach` from it.
-    pub(super) fn new(path: &[Pose], centre: Point3<f64>, reach: f64) -> Self {
+    pub(crate) fn new(path: &[Pose], centre: Point3<f64>, reach: f64) -> Self {
         let mut course = Self { segments: Vec::new(), centre, reach, length: 0.0 };
         for (from, to) in path.iter().zip(path.iter().skip(1).chain(path.last())) {
             let shift = (to * centre - from * centre).norm();
@@ -81,14 +90,14 @@ impl Course {
     }
 
     /// By how many radians the part turns on a stretch.
-    pub(super) fn turn(&self, interval: Interval) -> f64 {
+    pub(crate) fn turn(&self, interval: Interval) -> f64 {
         let [from, to] = interval.of(self.length);
         let turn = |(s, a, b): &(&Segment, f64, f64)| s.from.rotation.angle_to(&s.to.rotation) * (b - a);
         self.bends(from, to).iter().map(turn).sum()
     }
 
     /// The path from one place on the way to another.
-    pub(super) fn path_between(&self, [from, to]: [f64; 2]) -> Vec<Pose> {
+    pub(crate) fn path_between(&self, [from, to]: [f64; 2]) -> Vec<Pose> {
         let bends = self.bends(from, to);
         let at = |(s, a, _): &(&Segment, f64, f64)| interpolate(&s.from, &s.to, &self.centre, *a);
         let last = bends.last().map(|(s, _, b)| interpolate(&s.from, &s.to, &self.centre, *b));
@@ -103,68 +112,68 @@ impl Course {
 
 /// A piece `index` of `2^level` of the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) struct Interval {
+pub(crate) struct Interval {
     level: u32,
     index: u64,
 }
 
 impl Interval {
-    pub(super) const WHOLE: Self = Self { level: 0, index: 0 };
+    pub(crate) const WHOLE: Self = Self { level: 0, index: 0 };
 
-    pub(super) fn halves(self) -> [Self; 2] {
+    pub(crate) fn halves(self) -> [Self; 2] {
         [0, 1].map(|k| Self { level: self.level + 1, index: 2 * self.index + k })
     }
 
     /// Whether another is a piece of it.
-    pub(super) fn holds(self, other: Self) -> bool {
+    pub(crate) fn holds(self, other: Self) -> bool {
         other.level >= self.level && other.index >> (other.level - self.level) == self.index
     }
 
     /// From where to where it reaches on a way of some length.
-    pub(super) fn of(self, length: f64) -> [f64; 2] {
+    pub(crate) fn of(self, length: f64) -> [f64; 2] {
         let own = length * self.share();
         [own * self.index as f64, own * (self.index + 1) as f64]
     }
 
     /// Its part of the whole.
-    pub(super) fn share(self) -> f64 {
+    pub(crate) fn share(self) -> f64 {
         0.5f64.powi(self.level as i32)
     }
 }
 
 /// x ↦ linear · x + shift.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Affine {
+pub(crate) struct Affine {
     linear: Matrix3<f64>,
     shift: Vector3<f64>,
 }
 
 impl Affine {
-    pub(super) fn apply(&self, p: &Point3<f64>) -> Point3<f64> {
+    pub(crate) fn apply(&self, p: &Point3<f64>) -> Point3<f64> {
         Point3::from(self.linear * p.coords + self.shift)
     }
 }
 
 /// A stretch of the way.
 #[derive(Debug)]
-pub(super) struct Leg {
+pub(crate) struct Leg {
     /// Where a point passes is in the hull of its images; empty if the stretch is too bent.
-    pub(super) maps: Vec<Affine>,
+    pub(crate) maps: Vec<Affine>,
     /// But for so much.
-    pub(super) slack: f64,
+    pub(crate) slack: f64,
     /// The largest factor by which a map stretches.
-    pub(super) stretch: f64,
+    pub(crate) stretch: f64,
     /// At its end.
-    pub(super) end: Pose,
+    pub(crate) end: Pose,
     /// No point moves further.
-    pub(super) length: f64,
+    pub(crate) length: f64,
     /// The direction in which all points move, if they move alike.
-    pub(super) along: Option<Vector3<f64>>,
+    pub(crate) along: Option<Vector3<f64>>,
 }
 
 impl Leg {
     /// The images of points, point by point: they pass through the hull of these, but for the slack.
-    pub(super) fn images<'l>(
+    pub(crate) fn images<'l>(
         &'l self,
         points: impl IntoIterator<Item = &'l Point3<f64>> + 'l,
     ) -> impl Iterator<Item = Point3<f64>> + 'l {
@@ -174,7 +183,7 @@ impl Leg {
 
 /// A course seen from one of the two parts: of points of the moving part in the frame of the
 /// standing one, or the other way round.
-pub(super) struct View<'a> {
+pub(crate) struct View<'a> {
     course: &'a Course,
     /// Whether points of the moving part are looked at.
     on_moving: bool,
@@ -184,11 +193,11 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    pub(super) fn new(course: &'a Course, on_moving: bool, shortest: f64) -> Self {
+    pub(crate) fn new(course: &'a Course, on_moving: bool, shortest: f64) -> Self {
         Self { course, on_moving, shortest, legs: HashMap::new() }
     }
 
-    pub(super) fn leg(&mut self, interval: Interval) -> Rc<Leg> {
+    pub(crate) fn leg(&mut self, interval: Interval) -> Rc<Leg> {
         if let Some(leg) = self.legs.get(&interval) {
             return Rc::clone(leg);
         }

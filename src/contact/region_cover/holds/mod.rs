@@ -15,16 +15,15 @@ mod hold;
 mod tests;
 
 use crate::geometry::Pose;
+use crate::scene::{Scene, Surroundings};
 use crate::termination::Termination;
+use crate::tolerances::DEPTH_TOLERANCE;
 
-use super::super::contact::{Mover, Near};
-use super::super::{Scene, Surroundings};
-use super::DEPTH_TOLERANCE;
-use super::drive::Around;
+use super::super::sampled::{Around, Mover, Near};
 use held::Held;
 
 /// What is around a moving part.
-pub(super) struct Holds<'a> {
+pub(crate) struct Holds<'a> {
     scene: &'a Scene,
     surroundings: &'a Surroundings,
     part: usize,
@@ -44,7 +43,7 @@ pub(super) struct Holds<'a> {
 
 impl<'a> Holds<'a> {
     /// With samples alone, or with regions where these tell.
-    pub(super) fn new(
+    pub(crate) fn new(
         scene: &'a Scene,
         surroundings: &'a Surroundings,
         (part, start): (usize, &Pose),
@@ -68,12 +67,12 @@ impl<'a> Holds<'a> {
     }
 
     /// Whether samples tell of some part that is near or was.
-    pub(super) fn samples(&self) -> bool {
+    pub(crate) fn samples(&self) -> bool {
         self.all_sampled || !self.sampled.is_empty()
     }
 
     /// Goes on from a pose: what is near it, if that is not known yet.
-    pub(super) fn settle(&mut self, mover: &Mover<'_>, near: Option<Near>) -> Near {
+    pub(crate) fn settle(&mut self, mover: &Mover<'_>, near: Option<Near>) -> Near {
         let mut near = match near {
             Some(near) if self.looked_at == Some(mover.pose) => near,
             _ => self.near(mover),

@@ -8,17 +8,17 @@ use super::{Contact, Mover, Near, Side};
 
 /// How much to look for.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::simulation) struct Extent {
+pub(crate) struct Extent {
     /// What is gathered has a smaller gap.
-    pub(in crate::simulation) radius: f64,
+    pub(crate) radius: f64,
     /// What has a smaller gap than this is to be found in …
-    pub(in crate::simulation) reach: f64,
+    pub(crate) reach: f64,
     /// … no more looks at either surface.
-    pub(in crate::simulation) most: usize,
+    pub(crate) most: usize,
 }
 
 /// Of the samples of a moving part and one that stands, both closed, those that may come near each other.
-pub(in crate::simulation) struct Vicinity {
+pub(crate) struct Vicinity {
     other: usize,
     mine: SampleTree,
     theirs: SampleTree,
@@ -26,7 +26,7 @@ pub(in crate::simulation) struct Vicinity {
 
 impl Vicinity {
     /// Near each other while the mover is shifted from its pose by no more than `way`: nearer than that, too.
-    pub(in crate::simulation) fn new(mover: &Mover<'_>, other: usize, way: f64) -> Self {
+    pub(crate) fn new(mover: &Mover<'_>, other: usize, way: f64) -> Self {
         let standing = &mover.scene.bodies[other];
         let (mine, theirs) = (&mover.body.shape, &standing.shape);
         let bounds = mine.bounds().transformed(&mover.pose);
@@ -39,7 +39,7 @@ impl Vicinity {
     }
 
     /// What is near at a pose, if that is told by few looks.
-    pub(in crate::simulation) fn near(&self, mover: &Mover<'_>, extent: Extent) -> Option<Near> {
+    pub(crate) fn near(&self, mover: &Mover<'_>, extent: Extent) -> Option<Near> {
         let side = |side| self.side(mover, side, extent);
         let (mine, theirs) = rayon::join(|| side(Side::Moving), || side(Side::Standing));
         let mut near = mine?;

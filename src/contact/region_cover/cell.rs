@@ -2,10 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::facing::{Facing, Obstacle, Piece, Placed, SUNK, Slope, TILT};
+use crate::tolerances::TOUCHED;
 
-/// A plane nearer than this is touched.
-pub(super) const TOUCHED: f64 = 1e-6;
+use super::facing::{Facing, Obstacle, Piece, Placed, SUNK, Slope, TILT};
 
 /// So many points of a piece are looked at before each plane that it touches.
 const MOST_LOWEST: usize = 8;
@@ -14,51 +13,51 @@ const AGREED: f64 = 0.9;
 
 /// What a cell is asked for.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Spot {
-    pub(super) piece: Piece,
+pub(crate) struct Spot {
+    pub(crate) piece: Piece,
     /// A triangle of the measured surface near it.
-    pub(super) guess: u32,
+    pub(crate) guess: u32,
     /// Which of [`AHEAD`] it was let go by last.
-    pub(super) level: usize,
+    pub(crate) level: usize,
     /// How far outside its region it may be, beyond what is granted.
-    pub(super) held: f64,
+    pub(crate) held: f64,
 }
 
 /// A piece that is free while the shift stays within limits.
 #[derive(Debug, Clone)]
-pub(super) struct Cell {
-    pub(super) spot: Spot,
-    pub(super) limits: Vec<Limit>,
+pub(crate) struct Cell {
+    pub(crate) spot: Spot,
+    pub(crate) limits: Vec<Limit>,
     /// The shift must stay in this ball, too.
-    pub(super) middle: Vector3<f64>,
-    pub(super) room: f64,
+    pub(crate) middle: Vector3<f64>,
+    pub(crate) room: f64,
     /// The ball that holds the region, in the measured surface's frame.
-    pub(super) ball: (Point3<f64>, f64),
+    pub(crate) ball: (Point3<f64>, f64),
 }
 
 /// normal · shift ≥ height.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Limit {
-    pub(super) normal: Vector3<f64>,
-    pub(super) height: f64,
+pub(crate) struct Limit {
+    pub(crate) normal: Vector3<f64>,
+    pub(crate) height: f64,
     /// The triangle of the measured surface that it keeps the piece in front of.
-    pub(super) triangle: u32,
+    pub(crate) triangle: u32,
 }
 
 impl Cell {
     /// Bytes in memory.
-    pub(super) fn memory(&self) -> usize {
+    pub(crate) fn memory(&self) -> usize {
         size_of::<Self>() + size_of_val(&*self.limits)
     }
 
     /// The same with the other part of the pair moving instead.
-    pub(super) fn mirrored(&self) -> Self {
+    pub(crate) fn mirrored(&self) -> Self {
         let limits = self.limits.iter().map(|l| Limit { normal: -l.normal, ..*l }).collect();
         Self { limits, middle: -self.middle, ..*self }
     }
 
     /// How far the shift may go from `at` along the unit vector `u`.
-    pub(super) fn length(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> f64 {
+    pub(crate) fn length(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> f64 {
         let from = at - self.middle;
         let along = from.dot(u);
         let chord = along * along - from.norm_squared() + self.room * self.room;
@@ -70,19 +69,19 @@ impl Cell {
         })
     }
 
-    pub(super) fn blocks(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> bool {
+    pub(crate) fn blocks(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> bool {
         self.limits.iter().any(|limit| limit.blocks(at, u))
     }
 
     /// What of it is in the way of a shift from `at` along `u`.
-    pub(super) fn obstacles(&self, pair: &Facing<'_>, at: &Vector3<f64>, u: &Vector3<f64>) -> Vec<Obstacle> {
+    pub(crate) fn obstacles(&self, pair: &Facing<'_>, at: &Vector3<f64>, u: &Vector3<f64>) -> Vec<Obstacle> {
         let blocking = self.limits.iter().filter(|l| l.blocks(at, u));
         blocking.map(|l| Obstacle { normal: l.normal, other: pair.other }).collect()
     }
 
     /// What is certainly and steeply in the way of a shift from `at` along `u`: what the points of the piece enter
     /// that are lowest before limits no further off than `reach`, or what gets over the triangles of these.
-    pub(super) fn touched(
+    pub(crate) fn touched(
         &self,
         pair: &Facing<'_>,
         (at, u): (&Vector3<f64>, &Vector3<f64>),
@@ -119,7 +118,7 @@ impl Cell {
     }
 
     /// Whether there is nothing left to go on `u`.
-    pub(super) fn is_exhausted(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> bool {
+    pub(crate) fn is_exhausted(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> bool {
         let from = at - self.middle;
         (from + u * TOUCHED).norm() >= self.room
     }
@@ -135,7 +134,7 @@ impl Limit {
     }
 
     /// Whether a shift along the unit vector `u` ends there, no further off than `reach`.
-    pub(super) fn is_ahead(&self, at: &Vector3<f64>, u: &Vector3<f64>, reach: f64) -> bool {
+    pub(crate) fn is_ahead(&self, at: &Vector3<f64>, u: &Vector3<f64>, reach: f64) -> bool {
         self.normal.dot(u) < -TILT && self.gap(at) <= reach
     }
 }

@@ -10,11 +10,11 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::geometry::{Helix, Pose, Surface, interpolate};
-use crate::simulation::Scene;
+use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
 
+use super::super::course::turns_far;
 use super::super::course::{Course, Interval};
-use super::super::sampling::turns_far;
 use super::FINEST;
 use super::envelope::{Envelope, Zone};
 use super::path::ScrewPath;
@@ -39,7 +39,7 @@ const MOST_FURTHER: f64 = 2.0 * TAU;
 ///
 /// # Errors
 /// The termination condition became true.
-pub(in crate::plan) fn centred(
+pub(crate) fn centred(
     scene: &Scene,
     standing: &[usize],
     part: usize,

@@ -15,8 +15,8 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::Scene;
 use crate::geometry::{Bounds, ConvexEdges, Pose, Surface};
+use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll, Termination};
 
 /// Edges or corners between two looks at the termination condition.
@@ -39,17 +39,17 @@ pub struct Margins {
 /// A part that goes straight past one that stands.
 #[derive(Debug)]
 pub struct Crossing<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) part: usize,
-    pub(super) start: &'a Pose,
-    pub(super) direction: &'a Vector3<f64>,
+    pub(crate) scene: &'a Scene,
+    pub(crate) part: usize,
+    pub(crate) start: &'a Pose,
+    pub(crate) direction: &'a Vector3<f64>,
     /// What stands.
     pub other: usize,
     /// How far the part goes, until it is past the other or out of them all.
     pub travel: f64,
     /// What is let pass.
     pub margins: Margins,
-    pub(super) termination: &'a Termination,
+    pub(crate) termination: &'a Termination,
 }
 
 impl Crossing<'_> {
@@ -67,7 +67,7 @@ impl Crossing<'_> {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub(super) fn way(&self, least: f64) -> Result<f64, Interrupt> {
+    pub(crate) fn way(&self, least: f64) -> Result<f64, Interrupt> {
         let Self { scene, part, start, direction, other, travel, margins, termination } = *self;
         let poll = &Poll::every(CAST_POLL, Some(termination));
         let [mine, theirs] = [part, other].map(|i| &scene.bodies[i].shape);
@@ -196,9 +196,9 @@ fn inward(normals: &[Vector3<f64>], along: &Vector3<f64>, depth: f64) -> Vector3
 mod tests {
     use std::f64::consts::{FRAC_PI_4, TAU};
 
-    use super::super::sliding::DEPTH_TOLERANCE;
     use super::*;
     use crate::fixtures::{block_on_plate, cuboid, moved, scene};
+    use crate::tolerances::DEPTH_TOLERANCE;
 
     /// How far part 1 gets along a direction, of `travel`, until it meets part 0.
     fn way(scene: &Scene, direction: Vector3<f64>, travel: f64) -> f64 {

@@ -16,14 +16,15 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::geometry::Pose;
+use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
+use crate::tolerances::{FREE_STEP, HELD, HELD_AT_FIRST, TOUCHED};
 
-use super::super::Scene;
-use super::cell::{Cell, TOUCHED};
-use super::drive::FREE_STEP;
+use super::Halt;
+use super::cell::Cell;
 use super::facing::{Facing, Obstacle, Placed, Witness};
-use super::finder::{Finder, HELD, HELD_AT_FIRST};
-use super::kept::{Gathered, Place, Way};
+use super::finder::Finder;
+use super::kept::{Gathered, KeptCells, Place, Way};
 
 /// So many regions are looked for on one side of a pair before as many are on the other; then twice as many, and so
 /// on …
@@ -34,38 +35,21 @@ const IN_TURN: usize = 64;
 /// with one face may be pushed into walls by as much, too, and around the rims of these its pieces are in no
 /// convex region: of a screw whose head reaches 0.02 into its lid, 20,000 were looked for in vain, in several
 /// times what samples take. (With planes of faces, as verification takes them, it was lost sooner, but lost.)
-pub(super) const MOST_GRANTED: f64 = 1e-3;
+pub(crate) const MOST_GRANTED: f64 = 1e-3;
 /// A surface in more pieces than this is not looked at to the end: in the play of a thread, which has thousands, each
 /// step ends at the next of them, and samples tell in a fraction of the time.
 const MOST_CELLS: usize = 1000;
 /// So many pieces in succession may get regions that lead nowhere.
-pub(super) const MOST_STALLS: usize = 16;
+pub(crate) const MOST_STALLS: usize = 16;
 /// Shifts that are shorter lead nowhere.
-pub(super) const STALL: f64 = 1e-7;
+pub(crate) const STALL: f64 = 1e-7;
 /// So many points that showed obstacles are remembered of a pair.
 const MOST_WITNESSES: usize = 8;
 /// So many regions are looked for before a motion is given up.
 const MOST_REGIONS: usize = 20_000;
 
-/// Why no answer can be given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Halt {
-    /// The termination condition became true.
-    Interrupted(Interrupt),
-    /// A piece is in no region, deeper than granted, or the surfaces are too complicated.
-    Lost,
-    /// Something is in the way of what was wished.
-    Blocked,
-}
-
-impl From<Interrupt> for Halt {
-    fn from(interrupt: Interrupt) -> Self {
-        Self::Interrupted(interrupt)
-    }
-}
-
 /// All pieces of all pairs of a part with what is near it.
-pub(super) struct Cells<'a> {
+pub(crate) struct Cells<'a> {
     scene: &'a Scene,
     part: usize,
     /// Shifts are from here.
@@ -84,22 +68,22 @@ struct Pair<'a> {
 }
 
 impl<'a> Cells<'a> {
-    pub(super) fn new(scene: &'a Scene, (part, start): (usize, &Pose), termination: &'a Termination) -> Self {
+    pub(crate) fn new(scene: &'a Scene, (part, start): (usize, &Pose), termination: &'a Termination) -> Self {
         Self { scene, part, start: *start, termination, pairs: Vec::new(), regions: 0 }
     }
 
     /// None of any pair yet.
-    pub(super) fn anew(&self) -> Self {
+    pub(crate) fn anew(&self) -> Self {
         Self::new(self.scene, (self.part, &self.start), self.termination)
     }
 
     /// Whether a standing part is among the pairs.
-    pub(super) fn knows(&self, other: usize) -> bool {
+    pub(crate) fn knows(&self, other: usize) -> bool {
         self.pairs.iter().any(|p| p.facing.other == other)
     }
 
     /// Takes a pair in, at a shift of the part.
-    pub(super) fn add(&mut self, other: usize, at: &Vector3<f64>) -> Result<(), Halt> {
+    pub(crate) fn add(&mut self, other: usize, at: &Vector3<f64>) -> Result<(), Halt> {
         let (scene, termination) = (self.scene, self.termination);
         if scene.allowances.of(self.part, other) > MOST_GRANTED {
             return Err(Halt::Lost);
@@ -117,14 +101,14 @@ impl<'a> Cells<'a> {
     }
 
     /// How far the part may be shifted from `at` along the unit vector `u` with all pieces in their regions.
-    pub(super) fn length(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> f64 {
+    pub(crate) fn length(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> f64 {
         let cells = self.pairs.iter().flat_map(|pair| pair.cells.iter());
         cells.map(|cell| cell.length(at, u)).fold(f64::INFINITY, f64::min)
     }
 
     /// How far the part may be shifted from `at` along the unit vector `u`, for which way was made, up to
     /// `most`. Pieces whose region ends before that get another where it ends.
-    pub(super) fn advance(&mut self, at: &Vector3<f64>, u: &Vector3<f64>, most: f64) -> Result<f64, Halt> {
+    pub(crate) fn advance(&mut self, at: &Vector3<f64>, u: &Vector3<f64>, most: f64) -> Result<f64, Halt> {
         // In the order in which they end, so that at each shift all pieces are in their regions.
         let ends_of = |pair: &Pair<'_>| pair.cells.iter().map(|cell| cell.length(at, u)).collect();
         let mut ends: Vec<Vec<f64>> = self.pairs.iter().map(ends_of).collect();
@@ -166,7 +150,7 @@ impl<'a> Cells<'a> {
     /// Makes way for a shift from `at` along the unit vector `u`: pieces whose region does not let
     /// them go there get others. Ends at the first that cannot: what is in its way is added to
     /// `obstacles`.
-    pub(super) fn make_way(
+    pub(crate) fn make_way(
         &mut self,
         at: &Vector3<f64>,
         u: &Vector3<f64>,
@@ -191,20 +175,20 @@ impl<'a> Cells<'a> {
         let pair = &mut self.pairs[i];
         let place = Place::new(self.part, &self.start, pair.facing.other);
         let find = |scene: &Scene, place: &Place<'_>, u: &Vector3<f64>| way(scene, place, u, termination);
-        let way = scene.kept.way(scene, &place, (u, false), find)?;
+        let way = KeptCells::of(scene).way(scene, &place, (u, false), find)?;
         pair.cells = Arc::clone(way.cells.as_ref().ok_or(Halt::Lost)?);
         Ok((way.blocked.clone(), way.regions))
     }
 
     /// Makes the way along `u`, from where the motion begins, as long as regions allow, where
     /// nothing is in it.
-    pub(super) fn lengthen(&mut self, u: &Vector3<f64>) -> Result<(), Halt> {
+    pub(crate) fn lengthen(&mut self, u: &Vector3<f64>) -> Result<(), Halt> {
         let (scene, termination) = (self.scene, self.termination);
         let find =
             |scene: &Scene, place: &Place<'_>, u: &Vector3<f64>| long_way(scene, place, u, termination);
         for i in 0..self.pairs.len() {
             let place = Place::new(self.part, &self.start, self.pairs[i].facing.other);
-            let way = scene.kept.way(scene, &place, (u, true), find)?;
+            let way = KeptCells::of(scene).way(scene, &place, (u, true), find)?;
             self.pairs[i].cells = Arc::clone(way.cells.as_ref().ok_or(Halt::Lost)?);
             self.count(way.regions)?;
         }
@@ -237,7 +221,7 @@ impl<'a> Cells<'a> {
 }
 
 /// Cells for all of a pair's surface with the part at a pose; kept if a motion begins there, else no more than `most`.
-pub(super) fn starting(
+pub(crate) fn starting(
     scene: &Scene,
     (part, pose): (usize, &Pose),
     other: usize,
@@ -256,7 +240,7 @@ pub(super) fn starting(
 fn kept(scene: &Scene, place: &Place<'_>, termination: &Termination) -> Result<Arc<Gathered>, Interrupt> {
     let find =
         |scene: &Scene, place: &Place<'_>| gathered(scene, place, &Vector3::zeros(), MOST_CELLS, termination);
-    scene.kept.gathered(scene, place, find)
+    KeptCells::of(scene).gathered(scene, place, find)
 }
 
 /// The way of a pair from where a motion begins.
@@ -289,8 +273,8 @@ fn long_way(
     u: &Vector3<f64>,
     termination: &Termination,
 ) -> Result<Way, Interrupt> {
-    let short =
-        scene.kept.way(scene, place, (u, false), |scene, place, u| way(scene, place, u, termination))?;
+    let short = KeptCells::of(scene)
+        .way(scene, place, (u, false), |scene, place, u| way(scene, place, u, termination))?;
     let base = kept(scene, place, termination)?;
     let facing = Facing::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
     let mut finder = Finder::new(&facing, MOST_REGIONS, termination);
