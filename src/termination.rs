@@ -99,21 +99,37 @@ impl Termination {
     }
 }
 
-/// Polls a condition now and then, for work of many short steps: once it has become true it stays so. The
-/// clock is not asked at each step: that takes as long as many a step.
+/// Whether a test that may be interrupted holds for all items: [`Iterator::all`] for such tests.
+///
+/// # Errors
+/// The first error of the test, unless an item before failed it.
+pub fn try_all<T, E>(
+    items: impl IntoIterator<Item = T>,
+    mut test: impl FnMut(T) -> Result<bool, E>,
+) -> Result<bool, E> {
+    for item in items {
+        if !test(item)? {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Checks a condition now and then, for work of many short steps: reading the clock at each step would take as long as
+/// the step. Once the condition was seen to be true, it stays so.
 #[derive(Debug)]
 pub struct Poll<'t> {
     termination: Option<&'t Termination>,
     every: u32,
     steps: Cell<u32>,
-    over: Cell<bool>,
+    interrupt: Cell<Option<Interrupt>>,
 }
 
 impl<'t> Poll<'t> {
     /// Looks at the condition, if there is one, at the first step and at every so many.
     #[must_use]
     pub fn every(every: u32, termination: Option<&'t Termination>) -> Self {
-        Self { termination, every, steps: Cell::new(0), over: Cell::new(false) }
+        Self { termination, every, steps: Cell::new(0), interrupt: Cell::new(None) }
     }
 
     /// The same, but the first look is after so many steps.
@@ -122,16 +138,19 @@ impl<'t> Poll<'t> {
         Self { steps: Cell::new(1), ..Self::every(steps + 1, Some(termination)) }
     }
 
-    /// To be called at each step: whether the condition was seen to be true.
+    /// To be called at each step.
+    ///
+    /// # Errors
+    /// The condition was seen to be true.
     #[track_caller]
-    pub fn is_over(&self) -> bool {
-        let Some(termination) = self.termination else { return false };
+    pub fn check(&self) -> Result<(), Interrupt> {
+        let Some(termination) = self.termination else { return Ok(()) };
         let steps = self.steps.get();
-        if steps == 0 && termination.check().is_err() {
-            self.over.set(true);
+        if steps == 0 && self.interrupt.get().is_none() {
+            self.interrupt.set(termination.check().err());
         }
         self.steps.set(if steps + 1 < self.every { steps + 1 } else { 0 });
-        self.over.get()
+        self.interrupt.get().map_or(Ok(()), Err)
     }
 }
 
@@ -143,12 +162,12 @@ mod tests {
     fn a_poll_looks_now_and_then_and_stays_over() {
         let termination = Termination::new(None);
         let poll = Poll::every(4, Some(&termination));
-        assert!((0..5).all(|_| !poll.is_over()));
+        assert!((0..5).all(|_| poll.check().is_ok()));
         termination.cancel_flag().store(true, Ordering::Relaxed);
-        assert!((5..8).all(|_| !poll.is_over()), "not looked at");
-        assert!(poll.is_over());
+        assert!((5..8).all(|_| poll.check().is_ok()), "not looked at");
+        assert_eq!(poll.check(), Err(Interrupt::Cancelled));
         termination.cancel_flag().store(false, Ordering::Relaxed);
-        assert!((0..9).all(|_| poll.is_over()));
-        assert!(!Poll::every(1, None).is_over());
+        assert!((0..9).all(|_| poll.check().is_err()));
+        assert_eq!(Poll::every(1, None).check(), Ok(()));
     }
 }

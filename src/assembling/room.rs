@@ -8,7 +8,7 @@ use crate::geometry::{Bounds, Pose, interpolate, separating_direction, transform
 use crate::plan::{Verdict, Verifier};
 use crate::scene::Scene;
 use crate::simulation::seems_clear;
-use crate::termination::{Interrupt, Termination};
+use crate::termination::{Interrupt, Termination, try_all};
 
 /// Turns between two waypoints stay below this, so that the slerp is unambiguous.
 const MOST_TURN: f64 = 1.5;
@@ -121,15 +121,17 @@ impl Room {
         let clear = |glance: &[Pose; 2]| {
             let near = self.near(among, part, glance);
             if near.is_empty() {
-                return true;
+                return Ok(true);
             }
             let count = (self.travel(part, glance) / step).ceil().max(1.0);
             let at = |i: usize| self.between(part, glance, i as f64 / count);
-            (0..=count as usize).all(|i| seems_clear(&self.scene, &near, part, &at(i), step / 2.0))
+            try_all(0..=count as usize, |i| {
+                seems_clear(&self.scene, &near, (part, &at(i)), step / 2.0, termination)
+            })
         };
         for glance in self.glances(part, piece) {
             termination.check()?;
-            if !clear(&glance) {
+            if !clear(&glance)? {
                 return Ok(false);
             }
         }

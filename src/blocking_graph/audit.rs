@@ -41,8 +41,7 @@ pub fn audit(
     let recall = Recall::default();
     let analysis = Analysis { rule, scene, translations: &translations, recall: &recall };
     let blockages = analysis.initial_blockages(present, least, termination)?;
-    let everything = HullTree::new(scene, present.to_vec(), termination);
-    termination.check()?;
+    let everything = HullTree::new(scene, present.to_vec(), termination)?;
     let questions: Vec<_> =
         present.iter().flat_map(|&p| (0..translations.len()).map(move |a| (p, a))).collect();
     let moves = questions

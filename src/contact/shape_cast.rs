@@ -84,14 +84,11 @@ impl Crossing<'_> {
             Cast { edges, target, to_target, along, travel, margins, least, poll }
         });
         // Edges cost more than corners.
-        let way = if forward.edges.count() <= backward.edges.count() {
-            backward.corners(forward.edges(travel))
+        if forward.edges.count() <= backward.edges.count() {
+            backward.corners(forward.edges(travel)?)
         } else {
-            forward.corners(backward.edges(travel))
-        };
-        // What was found of casts that were cut short is not to be believed.
-        termination.check()?;
-        Ok(way)
+            forward.corners(backward.edges(travel)?)
+        }
     }
 }
 
@@ -111,7 +108,7 @@ struct Cast<'a> {
 
 impl Cast<'_> {
     /// How far of `travel` the edges go until they meet a face.
-    fn edges(&self, travel: f64) -> f64 {
+    fn edges(&self, travel: f64) -> Result<f64, Interrupt> {
         let (along, corridor) = (self.along_here(), self.corridor());
         let leading = self
             .edges
@@ -128,7 +125,7 @@ impl Cast<'_> {
     }
 
     /// How far of `travel` their ends go.
-    fn corners(&self, travel: f64) -> f64 {
+    fn corners(&self, travel: f64) -> Result<f64, Interrupt> {
         let (along, corridor) = (self.along_here(), self.corridor());
         let ends = self.edges.ends().leading(&self.to_target, &corridor, &along, self.margins.steepness);
         let leading = ends.filter_map(|(p, normals)| {
@@ -145,16 +142,17 @@ impl Cast<'_> {
         travel: f64,
         leading: impl Iterator<Item = T>,
         met: impl Fn(&T, f64) -> Option<f64>,
-    ) -> f64 {
+    ) -> Result<f64, Interrupt> {
         let mut way = travel;
         for item in leading {
-            if way < self.least || self.poll.is_over() {
+            self.poll.check()?;
+            if way < self.least {
                 break;
             }
             // All of the way is told to the bit where nothing is met.
             way = met(&item, way + self.margins.back).map_or(way, |at| way.min(at - self.margins.back));
         }
-        way
+        Ok(way)
     }
 
     fn leads(&self, normals: &[Vector3<f64>], along: &Vector3<f64>) -> bool {

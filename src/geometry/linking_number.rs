@@ -9,22 +9,27 @@ use std::f64::consts::PI;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::termination::Poll;
+use crate::termination::{Interrupt, Poll};
 
 /// The linking number of two closed polygons, which come no nearer to each other than
-/// `clearance`; `None` if they do, for then it means nothing, or if `poll` is over.
-#[must_use]
-pub fn linking_number(a: &[Point3<f64>], b: &[Point3<f64>], clearance: f64, poll: &Poll<'_>) -> Option<i64> {
+/// `clearance`; `None` if they do, for then it means nothing.
+///
+/// # Errors
+/// The termination condition became true.
+pub fn linking_number(
+    a: &[Point3<f64>],
+    b: &[Point3<f64>],
+    clearance: f64,
+    poll: &Poll<'_>,
+) -> Result<Option<i64>, Interrupt> {
     let mut solid_angle = 0.0;
     for (a0, a1) in sides(a) {
-        if poll.is_over() {
-            return None;
-        }
+        poll.check()?;
         for (b0, b1) in sides(b) {
             let corner = a0 - b0;
             let (along, across) = (a1 - a0, b0 - b1);
             if nearest_to_origin(&corner, &along, &across) < clearance {
-                return None;
+                return Ok(None);
             }
             let opposite = corner + along + across;
             solid_angle += triangle(&corner, &(corner + along), &opposite)
@@ -32,7 +37,7 @@ pub fn linking_number(a: &[Point3<f64>], b: &[Point3<f64>], clearance: f64, poll
         }
     }
     let windings = solid_angle / (4.0 * PI);
-    Some(windings.round() as i64)
+    Ok(Some(windings.round() as i64))
 }
 
 fn sides(polygon: &[Point3<f64>]) -> impl Iterator<Item = (&Point3<f64>, &Point3<f64>)> {
@@ -74,7 +79,7 @@ mod tests {
     use super::*;
 
     fn linking_number(a: &[Point3<f64>], b: &[Point3<f64>], clearance: f64) -> Option<i64> {
-        super::linking_number(a, b, clearance, &Poll::every(1, None))
+        super::linking_number(a, b, clearance, &Poll::every(1, None)).unwrap()
     }
 
     /// A circle about `centre`, of radius 1, at right angles to an axis, run through `turns` times.

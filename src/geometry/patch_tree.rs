@@ -3,7 +3,7 @@
 
 use nalgebra::Point3;
 
-use crate::termination::Poll;
+use crate::termination::{Interrupt, Poll};
 
 use super::{Bounds, Surface};
 
@@ -58,9 +58,11 @@ impl PatchTree {
             + size_of_val(&**extremes)
     }
 
-    /// The tree of all triangles of a surface; once the poll is over, no tree to be used.
-    #[must_use]
-    pub fn new(surface: &Surface, poll: &Poll<'_>) -> Self {
+    /// The tree of all triangles of a surface.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn new(surface: &Surface, poll: &Poll<'_>) -> Result<Self, Interrupt> {
         let mut triangles: Vec<u32> = (0..surface.triangles().len() as u32).collect();
         let n = triangles.len();
         // As many as there are of them at most, mostly; what is not used is given back.
@@ -72,12 +74,12 @@ impl PatchTree {
         };
         if n > 0 {
             let given = Given::of(surface);
-            tree.build(&given, &mut triangles, (0, n), poll);
+            tree.build(&given, &mut triangles, (0, n), poll)?;
         }
         tree.nodes.shrink_to_fit();
         tree.vertices.shrink_to_fit();
         tree.extremes.shrink_to_fit();
-        Self { triangles, ..tree }
+        Ok(Self { triangles, ..tree })
     }
 
     /// The whole surface, unless it has no triangles.
@@ -130,11 +132,9 @@ impl PatchTree {
         triangles: &mut [u32],
         (start, end): (usize, usize),
         poll: &Poll<'_>,
-    ) -> Furthest {
-        let mut furthest = Furthest::NONE;
-        if poll.is_over() {
-            return furthest;
-        }
+    ) -> Result<Furthest, Interrupt> {
+        poll.check()?;
+        let mut furthest;
         let slice = &mut triangles[start..end];
         let bounds = slice.iter().fold(Bounds::EMPTY, |b, &t| b.union(&given.boxes[t as usize]));
         let centre = bounds.centre();
@@ -165,14 +165,10 @@ impl PatchTree {
             let middle = |t: u32| given.middles[t as usize][axis];
             let half = slice.len() / 2;
             slice.select_nth_unstable_by(half, |&s, &t| middle(s).total_cmp(&middle(t)).then(s.cmp(&t)));
-            let left = self.build(given, triangles, (start, start + half), poll);
+            let left = self.build(given, triangles, (start, start + half), poll)?;
             let right = self.nodes.len() as u32;
             self.nodes[me].right = right;
-            let others = self.build(given, triangles, (start + half, end), poll);
-            // A half that was left out has no node.
-            if poll.is_over() {
-                return furthest;
-            }
+            let others = self.build(given, triangles, (start + half, end), poll)?;
             // Who reaches furthest of all does so of one half.
             let mut extremes: Vec<_> = self.extremes(me as u32 + 1).copied().collect();
             furthest = left.joined(&others, extremes.len() as u32);
@@ -187,7 +183,7 @@ impl PatchTree {
         node.first_extreme = self.extremes.len() as u32;
         self.extremes.extend(extremes);
         node.last_extreme = self.extremes.len() as u32;
-        furthest
+        Ok(furthest)
     }
 }
 
@@ -315,12 +311,11 @@ mod tests {
     fn a_tree_may_be_cut_short_anywhere() {
         let surface = surface(ball(3));
         let termination = Termination::default();
-        let whole = PatchTree::new(&surface, &Poll::every(1, Some(&termination))).nodes.len();
+        let whole = PatchTree::new(&surface, &Poll::every(1, Some(&termination))).unwrap().nodes.len();
         termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
         for steps in 1..whole as u32 {
             let poll = Poll::first_after(steps, &termination);
-            let tree = PatchTree::new(&surface, &poll);
-            assert!(poll.is_over() && tree.nodes.len() <= steps as usize);
+            assert!(PatchTree::new(&surface, &poll).is_err());
         }
     }
 
@@ -350,7 +345,7 @@ mod tests {
     #[test]
     fn extremes_are_those_of_the_halves_that_reach_furthest() {
         for mesh in [ball(4), l_shape()] {
-            let tree = PatchTree::new(&surface(mesh), &Poll::every(1, None));
+            let tree = PatchTree::new(&surface(mesh), &Poll::every(1, None)).unwrap();
             assert!(has_extremes(&tree, tree.root().unwrap()));
         }
     }
@@ -359,7 +354,7 @@ mod tests {
     fn every_triangle_is_in_one_leaf_and_in_all_spheres_above() {
         for mesh in [ball(3), l_shape(), open_box([0.0; 3], [1.0; 3])] {
             let s = surface(mesh);
-            let tree = PatchTree::new(&s, &Poll::every(1, None));
+            let tree = PatchTree::new(&s, &Poll::every(1, None)).unwrap();
             let mut all = held(&tree, &s, tree.root().unwrap());
             all.sort_unstable();
             assert_eq!(all, (0..s.triangles().len() as u32).collect::<Vec<_>>());

@@ -84,28 +84,32 @@ impl SampleTree {
     /// Walks the tree. `enter` gets a sphere and what was learnt about the sphere around it, and
     /// returns what is known now, or `None` to leave the subtree out; `visit` gets the samples of
     /// all leaves entered, with what is known about the leaf.
-    pub fn walk<T: Copy>(
+    ///
+    /// # Errors
+    /// The first error of `enter` or `visit` ends the walk.
+    pub fn walk<T: Copy, E>(
         &self,
         root: T,
-        mut enter: impl FnMut(&Node, T) -> Option<T>,
-        mut visit: impl FnMut(&Point3<f64>, T),
-    ) {
+        mut enter: impl FnMut(&Node, T) -> Result<Option<T>, E>,
+        mut visit: impl FnMut(&Point3<f64>, T) -> Result<(), E>,
+    ) -> Result<(), E> {
         let mut stack = Vec::with_capacity(48);
         if !self.nodes.is_empty() {
             stack.push((0usize, root));
         }
         while let Some((i, known)) = stack.pop() {
             let node = &self.nodes[i];
-            let Some(known) = enter(node, known) else { continue };
+            let Some(known) = enter(node, known)? else { continue };
             if node.right == 0 {
                 for p in &self.points[node.start as usize..node.end as usize] {
-                    visit(p, known);
+                    visit(p, known)?;
                 }
             } else {
                 stack.push((node.right as usize, known));
                 stack.push((i + 1, known));
             }
         }
+        Ok(())
     }
 }
 
@@ -124,12 +128,15 @@ impl SampleTree {
     /// Walks the tree over some moments of a motion at once. `look` gets a sphere, the moments, and what was learnt
     /// about what holds both; a single sample is a sphere without a radius, and comes with its index.
     /// Of no single moment it may ask for halves.
-    pub fn walk_through<T: Copy>(
+    ///
+    /// # Errors
+    /// The first error of `look` ends the walk.
+    pub fn walk_through<T: Copy, E>(
         &self,
         moments: Range<usize>,
         root: T,
-        mut look: impl FnMut(Ball<'_>, &Range<usize>, T) -> Look<T>,
-    ) {
+        mut look: impl FnMut(Ball<'_>, &Range<usize>, T) -> Result<Look<T>, E>,
+    ) -> Result<(), E> {
         let mut stack = Vec::with_capacity(64);
         if !self.nodes.is_empty() && !moments.is_empty() {
             stack.push((Held::Node(0), moments, root));
@@ -141,7 +148,7 @@ impl SampleTree {
                 }
                 Held::Sample(i) => Ball { centre: &self.points[i], radius: 0.0, sample: Some(i) },
             };
-            match (look(ball, &moments, known), held) {
+            match (look(ball, &moments, known)?, held) {
                 (Look::Out, _) | (Look::In(_), Held::Sample(_)) => {}
                 (Look::Halve(known), _) => {
                     let middle = moments.start.midpoint(moments.end);
@@ -160,24 +167,31 @@ impl SampleTree {
                 }
             }
         }
+        Ok(())
     }
 
     /// Whether any sample passes a test, of the nodes that are entered.
-    #[must_use]
-    pub fn any(&self, enter: impl Fn(&Node) -> bool, test: impl Fn(&Point3<f64>) -> bool) -> bool {
+    ///
+    /// # Errors
+    /// The first error of `enter` ends the walk.
+    pub fn any<E>(
+        &self,
+        enter: impl Fn(&Node) -> Result<bool, E>,
+        test: impl Fn(&Point3<f64>) -> bool,
+    ) -> Result<bool, E> {
         let mut next = 0;
         while next < self.nodes.len() {
             let node = &self.nodes[next];
-            if !enter(node) {
+            if !enter(node)? {
                 next = node.after as usize;
                 continue;
             }
             if node.right == 0 && self.points[node.start as usize..node.end as usize].iter().any(&test) {
-                return true;
+                return Ok(true);
             }
             next += 1;
         }
-        false
+        Ok(false)
     }
 }
 
@@ -215,6 +229,8 @@ fn build(points: &mut [Point3<f64>], offset: usize, end: usize, nodes: &mut Vec<
 
 #[cfg(test)]
 mod tests {
+    use std::convert::Infallible;
+
     use super::*;
     use crate::fixtures::{ball, l_shape, surface};
 
@@ -224,15 +240,16 @@ mod tests {
     fn a_walk_visits_every_sample_within_its_spheres() {
         let samples = SampleTree::new(&surface(ball(3)), &SPACING);
         let mut visited = Vec::new();
-        samples.walk(
+        let Ok::<(), Infallible>(()) = samples.walk(
             Vec::<(Point3<f64>, f64)>::new().len(),
             |node, depth| {
                 assert!(node.radius.is_finite());
-                Some(depth + 1)
+                Ok(Some(depth + 1))
             },
             |p, depth| {
                 assert!(depth > 1);
                 visited.push(*p);
+                Ok(())
             },
         );
         visited.sort_by_key(|p| p.coords.map(f64::to_bits).data.0);
@@ -240,12 +257,16 @@ mod tests {
         all.sort_by_key(|p| p.coords.map(f64::to_bits).data.0);
         assert_eq!(visited, all);
         // A leaf that is entered holds its samples; one that is not visits none.
-        samples.walk(
+        let Ok::<(), Infallible>(()) = samples.walk(
             (Point3::origin(), 2.0),
-            |node, _| Some((node.centre, node.radius)),
-            |p, (c, r)| assert!((p - c).norm() <= r * (1.0 + 1e-12)),
+            |node, _| Ok(Some((node.centre, node.radius))),
+            |p, (c, r)| {
+                assert!((p - c).norm() <= r * (1.0 + 1e-12));
+                Ok(())
+            },
         );
-        samples.walk((), |_, ()| None, |_, ()| panic!("left out"));
+        let Ok::<(), Infallible>(()) = samples.walk((), |_, ()| Ok(None), |_, ()| panic!("left out"));
+        assert_eq!(samples.walk((), |_, ()| Err("ended"), |_, ()| Ok(())), Err("ended"));
     }
 
     #[test]
@@ -259,22 +280,23 @@ mod tests {
             .filter(|&(i, time)| is_near(&samples.points()[i], time, 0.0))
             .collect();
         let (mut seen, mut looks) = (Vec::new(), 0);
-        samples.walk_through(0..times, (), |ball, moments, ()| {
+        let Ok::<(), Infallible>(()) = samples.walk_through(0..times, (), |ball, moments, ()| {
             looks += 1;
             assert!(ball.sample.is_none_or(|i| samples.points()[i] == *ball.centre));
             if !moments.clone().any(|time| is_near(ball.centre, time, ball.radius)) {
-                return Look::Out;
+                return Ok(Look::Out);
             }
             if moments.len() > 1 && ball.radius < 0.2 * moments.len() as f64 {
-                return Look::Halve(());
+                return Ok(Look::Halve(()));
             }
             seen.extend(ball.sample.map(|i| (i, moments.start)));
-            Look::In(())
+            Ok(Look::In(()))
         });
         seen.sort_unstable();
         assert_eq!(seen, expected);
         assert!(!seen.is_empty() && looks < n * times, "{looks} of {}", n * times);
-        samples.walk_through(0..0, (), |_, _, ()| panic!("there is no moment"));
+        let Ok::<(), Infallible>(()) =
+            samples.walk_through(0..0, (), |_, _, ()| panic!("there is no moment"));
     }
 
     #[test]

@@ -147,8 +147,7 @@ impl Shape {
         if let Some(tree) = self.patches.get() {
             return Ok(tree);
         }
-        let tree = PatchTree::new(&self.surface, &Poll::every(PATCH_POLL, Some(termination)));
-        termination.check()?;
+        let tree = PatchTree::new(&self.surface, &Poll::every(PATCH_POLL, Some(termination)))?;
         Ok(self.patches.get_or_init(|| tree))
     }
 

@@ -13,7 +13,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::geometry::{Bounds, transformed};
-use crate::termination::Termination;
+use crate::termination::{Interrupt, Termination};
 
 use super::{Scene, Surroundings};
 
@@ -37,10 +37,11 @@ pub struct HullTree {
 }
 
 impl HullTree {
-    /// Of some parts (ascending) at their assembled poses. Once the condition is true hulls are left out:
-    /// whoever asks must look at it before using them.
-    #[must_use]
-    pub fn new(scene: &Scene, standing: Vec<usize>, termination: &Termination) -> Self {
+    /// Of some parts (ascending) at their assembled poses.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn new(scene: &Scene, standing: Vec<usize>, termination: &Termination) -> Result<Self, Interrupt> {
         let all = 0..scene.bodies.len();
         if MOSTLY * (all.len() - standing.len()) > all.len() {
             return Self::joined(scene, standing, termination);
@@ -48,27 +49,30 @@ impl HullTree {
         let mut tree = match scene.whole.get() {
             Some(whole) => whole.clone(),
             None => {
-                let whole = Self::joined(scene, all.clone().collect(), termination);
-                if termination.check().is_ok() { scene.whole.get_or_init(|| whole).clone() } else { whole }
+                let whole = Self::joined(scene, all.clone().collect(), termination)?;
+                scene.whole.get_or_init(|| whole).clone()
             }
         };
         for gone in all.filter(|part| standing.binary_search(part).is_err()) {
             tree.remove(scene, gone);
         }
-        tree
+        Ok(tree)
+    }
+
+    /// The parts that stand, without any hull: of a search that was interrupted before it began.
+    #[must_use]
+    pub fn without_hulls(scene: &Scene, standing: Vec<usize>) -> Self {
+        let count = scene.bodies.len();
+        let nodes = 2 * count.next_power_of_two();
+        Self { standing, hulls: vec![Arc::default(); nodes], joined: vec![0; nodes], leaf: vec![0; count] }
     }
 
     /// The same, each hull joined of two.
-    fn joined(scene: &Scene, standing: Vec<usize>, termination: &Termination) -> Self {
+    fn joined(scene: &Scene, standing: Vec<usize>, termination: &Termination) -> Result<Self, Interrupt> {
         let mut order: Vec<usize> = (0..scene.bodies.len()).collect();
         let leaves = order.len().next_power_of_two();
         group(scene, &mut order);
-        let mut tree = Self {
-            hulls: vec![Arc::default(); 2 * leaves],
-            joined: Vec::new(),
-            leaf: vec![0; scene.bodies.len()],
-            standing,
-        };
+        let mut tree = Self::without_hulls(scene, standing);
         for (k, &part) in order.iter().enumerate() {
             if tree.standing.binary_search(&part).is_err() {
                 continue;
@@ -79,17 +83,19 @@ impl HullTree {
         }
         // Level by level: the hulls of one do not depend on each other.
         let mut level = leaves / 2;
-        while level > 0 && termination.check().is_ok() {
+        while level > 0 {
             let (above, below) = tree.hulls.split_at_mut(2 * level);
-            above[level..].par_iter_mut().zip(below.par_chunks_exact(2)).for_each(|(hull, children)| {
-                if termination.check().is_ok() {
+            above[level..].par_iter_mut().zip(below.par_chunks_exact(2)).try_for_each(
+                |(hull, children)| {
+                    termination.check()?;
                     *hull = scene.hulls.of(&children[0], &children[1]);
-                }
-            });
+                    Ok(())
+                },
+            )?;
             level /= 2;
         }
         tree.joined = tree.hulls.iter().map(|hull| hull.len()).collect();
-        tree
+        Ok(tree)
     }
 
     /// Bytes in memory, about.
@@ -196,7 +202,7 @@ mod tests {
             .map(|p| cuboid([p.x, p.y, p.z], [p.x + 0.6, p.y + 0.5, p.z + 0.7]));
         let (scene, _) = scene(cubes.chain([cuboid([-4.0; 3], [-3.9; 3]), cuboid([3.9; 3], [4.0; 3])]));
         let mut left: Vec<usize> = (0..scene.bodies.len()).collect();
-        let mut tree = HullTree::new(&scene, left.clone(), &Termination::default());
+        let mut tree = HullTree::new(&scene, left.clone(), &Termination::default()).unwrap();
         let same = |hull: &[Point3<f64>], parts: Vec<usize>| {
             let all = Surroundings::new(&scene, parts).hull;
             for d in spread([-1.0; 3], [1.0; 3], 40) {
@@ -223,17 +229,17 @@ mod tests {
     }
 
     #[test]
-    fn who_stands_is_told_also_of_a_tree_that_was_cut_short() {
+    fn an_interrupted_tree_is_an_error_and_leaves_nothing_behind() {
         let cubes =
             spread([-4.0; 3], [3.0; 3], 8).map(|p| cuboid(p.into(), (p.coords.add_scalar(0.5)).into()));
         let (scene, _) = scene(cubes);
         let over = Termination::default();
         over.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
         for standing in [vec![0, 1, 3, 4, 5, 6, 7], vec![2, 5]] {
-            assert_eq!(HullTree::new(&scene, standing.clone(), &over).standing(), standing);
+            assert_eq!(HullTree::new(&scene, standing.clone(), &over).err(), Some(Interrupt::Cancelled));
+            assert_eq!(HullTree::without_hulls(&scene, standing.clone()).standing(), standing);
         }
-        // Nobody is given what was cut short.
-        let whole = HullTree::new(&scene, (0..8).collect(), &Termination::default());
+        let whole = HullTree::new(&scene, (0..8).collect(), &Termination::default()).unwrap();
         assert!(!whole.hull().is_empty());
     }
 
@@ -243,7 +249,7 @@ mod tests {
             spread([-4.0; 3], [3.0; 3], 32).map(|p| cuboid(p.into(), (p.coords.add_scalar(0.5)).into()));
         let (scene, _) = scene(cubes.chain([cuboid([-4.0; 3], [-3.9; 3]), cuboid([3.9; 3], [4.0; 3])]));
         let all: Vec<usize> = (0..scene.bodies.len()).collect();
-        let mut whole = HullTree::new(&scene, all.clone(), &Termination::default());
+        let mut whole = HullTree::new(&scene, all.clone(), &Termination::default()).unwrap();
         let joined = scene.hulls.count();
         for gone in [0, 7, 33] {
             let before = scene.hulls.count();
@@ -251,7 +257,8 @@ mod tests {
                 &scene,
                 all.iter().copied().filter(|&part| part != gone).collect(),
                 &Termination::default(),
-            );
+            )
+            .unwrap();
             assert_eq!(scene.hulls.count(), before, "{joined}");
             let mut whole = whole.clone();
             whole.remove(&scene, gone);
@@ -264,7 +271,7 @@ mod tests {
         assert!(joined >= 31 && whole.remove(&scene, 33));
         // Of few parts, theirs alone are joined, and hold the same.
         let few = vec![1, 5, 9, 13];
-        let tree = HullTree::new(&scene, few.clone(), &Termination::default());
+        let tree = HullTree::new(&scene, few.clone(), &Termination::default()).unwrap();
         assert_eq!(tree.standing(), few);
         let alone = Surroundings::new(&scene, few).hull;
         for d in spread([-1.0; 3], [1.0; 3], 40).map(|d| d.coords.normalize()) {

@@ -133,9 +133,7 @@ fn brick_triangles(
         let poll = Poll::every(BAND_POLL, Some(termination));
         let mut pairs = Vec::new();
         for t in task * SHARE..count.min((task + 1) * SHARE) {
-            if poll.is_over() {
-                break;
-            }
+            poll.check()?;
             let fits = bricks_near(field, surface, t, |brick| {
                 pairs.push((brick, t));
                 let is_new = !known[brick as usize].swap(true, Ordering::Relaxed);
@@ -145,8 +143,7 @@ fn brick_triangles(
                 break;
             }
         }
-        // What was found of triangles that were cut short is not to be believed.
-        termination.check().map(|()| pairs)
+        Ok(pairs)
     };
     let tasks = 0..count.div_ceil(SHARE);
     let shares: Vec<Vec<(u32, u32)>> = match threads {

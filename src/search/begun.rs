@@ -15,7 +15,7 @@ use super::state::least_travel;
 /// # Errors
 /// The termination condition became true.
 pub fn initial_blockages(problem: &Problem<'_>) -> Result<Vec<Blockage>, Interrupt> {
-    let (translations, _) = problem.action_lists(&problem.directions());
+    let (translations, _) = problem.action_lists(&problem.directions()?);
     assembled_blockages(problem, &translations)
 }
 
@@ -32,21 +32,23 @@ pub(super) struct Begun {
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
     /// Of all parts as assembled.
-    pub(super) blockages: Result<Vec<Blockage>, Interrupt>,
+    pub(super) blockages: Vec<Blockage>,
     /// How long these took.
     pub(super) took: Duration,
 }
 
 impl Begun {
-    pub(super) fn of(problem: &Problem<'_>, guided: bool) -> Self {
-        let directions = problem.directions();
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn of(problem: &Problem<'_>, guided: bool) -> Result<Self, Interrupt> {
+        let directions = problem.directions()?;
         let (translations, rotations) = problem.action_lists(&directions);
         let started = Instant::now();
         let blockages = if guided {
-            assembled_blockages(problem, &translations)
+            assembled_blockages(problem, &translations)?
         } else {
-            Ok(vec![Blockage::open(translations.len()); problem.scene.bodies.len()])
+            vec![Blockage::open(translations.len()); problem.scene.bodies.len()]
         };
-        Self { directions, translations, rotations, blockages, took: started.elapsed() }
+        Ok(Self { directions, translations, rotations, blockages, took: started.elapsed() })
     }
 }

@@ -26,9 +26,7 @@ const MOST_EXTRA: usize = 3;
 /// # Errors
 /// The termination condition became true.
 pub fn axes_of(scene: &Scene, present: &[usize], termination: &Termination) -> Result<Vec<Axis>, Interrupt> {
-    let directions = Directions::of(scene, present, termination);
-    termination.check()?;
-    Ok(directions.axes)
+    Ok(Directions::of(scene, present, termination)?.axes)
 }
 
 /// The directions that a search draws from the geometry.
@@ -46,18 +44,17 @@ impl Directions {
         Self { axes: Axis::WORLD.to_vec(), own: vec![None; scene.bodies.len()] }
     }
 
-    /// Those of the present parts; the world's axes where surfaces do not agree on any. Once the condition is
-    /// true parts are left out: whoever asks must look at it before using them.
-    #[must_use]
-    pub(super) fn of(scene: &Scene, present: &[usize], termination: &Termination) -> Self {
+    /// Those of the present parts; the world's axes where surfaces do not agree on any.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn of(scene: &Scene, present: &[usize], termination: &Termination) -> Result<Self, Interrupt> {
         let mut votes = Axis::WORLD.map(|a| Facing { direction: a.unit(), weight: 0.0 }).to_vec();
         let mut own: Vec<Option<Facing>> = vec![None; scene.bodies.len()];
         let mut principal: Vec<Facing> = Vec::new();
         let mut spoken: HashMap<(*const Shape, [u64; 4]), [f64; 3]> = HashMap::new();
         for &part in present {
-            if termination.check().is_err() {
-                break;
-            }
+            termination.check()?;
             let body = &scene.bodies[part];
             let faces = body.shape.faces();
             let rotation = body.planning_from_shape.rotation;
@@ -87,7 +84,7 @@ impl Directions {
         best_first(&mut extra);
         axes.extend(extra.into_iter().take(MOST_EXTRA).map(|c| c.direction));
         let own = own.iter().map(|c| nearest(&axes, &c.as_ref()?.direction)).collect();
-        Self { axes: axes.into_iter().map(Axis::along).collect(), own }
+        Ok(Self { axes: axes.into_iter().map(Axis::along).collect(), own })
     }
 
     /// Whether a part is made along one of the axes.
@@ -145,7 +142,7 @@ mod tests {
     fn axes_of(meshes: impl IntoIterator<Item = SourceMesh>) -> Vec<Axis> {
         let (scene, _) = scene(meshes);
         let present: Vec<_> = (0..scene.bodies.len()).collect();
-        Directions::of(&scene, &present, &Termination::default()).axes
+        Directions::of(&scene, &present, &Termination::default()).unwrap().axes
     }
 
     #[test]
@@ -185,7 +182,7 @@ mod tests {
     fn a_nut_and_its_bolt_are_made_along_the_thread() {
         let turn = Pose::rotation(Vector3::new(0.3, -0.5, 0.2));
         let (scene, _) = scene(crate::fixtures::thread(3.0, 0.5).map(|m| moved(m, &turn)));
-        let directions = Directions::of(&scene, &[0, 1], &Termination::default());
+        let directions = Directions::of(&scene, &[0, 1], &Termination::default()).unwrap();
         let along =
             directions.axes.iter().position(|a| a.unit().dot(&(turn * Vector3::z())).abs() > 0.999_999);
         assert!(along.is_some() && directions.own == [along, along], "{directions:?}");

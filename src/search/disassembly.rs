@@ -84,19 +84,20 @@ pub(super) struct Disassembly<'a, 'o> {
 }
 
 impl<'a, 'o> Disassembly<'a, 'o> {
-    pub(super) fn new(problem: Problem<'a>, observer: &'o mut dyn Observer) -> Self {
-        Self::beside(problem, observer, |_| ()).0
-    }
-
-    /// The same, with something else that depends on the problem alone: worked out while hulls are joined.
+    /// A disassembly, with something else that depends on the problem alone: computed while hulls are joined. If either
+    /// is interrupted, the disassembly has no hulls: all it can do is to give its [outcome](Self::outcome).
     pub(super) fn beside<T: Send>(
         problem: Problem<'a>,
         observer: &'o mut dyn Observer,
-        other: impl FnOnce(&Problem<'a>) -> T + Send,
-    ) -> (Self, T) {
+        other: impl FnOnce(&Problem<'a>) -> Result<T, Interrupt> + Send,
+    ) -> (Self, Result<T, Interrupt>) {
         let Problem { scene, present, termination, .. } = &problem;
         let (everything, other) =
             rayon::join(|| HullTree::new(scene, present.clone(), termination), || other(&problem));
+        let (everything, other) = match everything {
+            Ok(tree) => (tree, other),
+            Err(interrupt) => (HullTree::without_hulls(scene, present.clone()), Err(interrupt)),
+        };
         let count = scene.bodies.len();
         let disassembly = Self {
             observer,

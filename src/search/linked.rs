@@ -12,7 +12,7 @@ use nalgebra::Point3;
 
 use crate::geometry::{linking_number, surface_loops};
 use crate::scene::Scene;
-use crate::termination::{Interrupt, Poll, Termination};
+use crate::termination::{Interrupt, Poll, Termination, try_all};
 
 use super::sbdp::Search;
 
@@ -46,11 +46,10 @@ impl Links {
         for &a in parts {
             let near = scene.broad_phase.meeting_of(parts, &scene.bodies[a].bounds);
             for b in near.into_iter().filter(|&b| b > a && scene.allowances.of(a, b) == 0.0) {
-                if are_linked(loops(a), loops(b), &poll) {
+                if are_linked(loops(a), loops(b), &poll)? {
                     links[a].push(b);
                     links[b].push(a);
                 }
-                termination.check()?;
             }
         }
         Ok(Self(links))
@@ -94,12 +93,14 @@ fn loops(scene: &Scene, part: usize) -> Vec<Loop> {
     loops
 }
 
-/// Not once `poll` is over.
-fn are_linked(a: &[Loop], b: &[Loop], poll: &Poll<'_>) -> bool {
+fn are_linked(a: &[Loop], b: &[Loop], poll: &Poll<'_>) -> Result<bool, Interrupt> {
     let segments = |loops: &[Loop]| loops.iter().map(Vec::len).sum::<usize>();
-    let linked = |(a, b): (&Loop, &Loop)| linking_number(a, b, CLEARANCE, poll).is_some_and(|n| n != 0);
-    segments(a) * segments(b) <= MOST_SEGMENT_PAIRS
-        && a.iter().flat_map(|a| b.iter().map(move |b| (a, b))).any(linked)
+    if segments(a) * segments(b) > MOST_SEGMENT_PAIRS {
+        return Ok(false);
+    }
+    let are_apart =
+        |(a, b): (&Loop, &Loop)| Ok(linking_number(a, b, CLEARANCE, poll)?.is_none_or(|n| n == 0));
+    Ok(!try_all(a.iter().flat_map(|a| b.iter().map(move |b| (a, b))), are_apart)?)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::blocking_graph::{Blockage, Evaluation};
 use crate::simulation::{Action, obstruction};
-use crate::termination::Poll;
+use crate::termination::{Interrupt, Poll};
 
 use super::disassembly::Stop;
 use super::sbdp::{Job, Search};
@@ -133,8 +133,7 @@ impl Search<'_, '_> {
             let poll = Poll::every(RAY_POLL, Some(&problem.termination));
             obstruction(&problem.scene, standing, node.part, node.pose(), &force, &poll)
         });
-        let found: Vec<f64> = found.collect();
-        problem.termination.check()?;
+        let found: Vec<f64> = found.collect::<Result<_, Interrupt>>()?;
         for ((key, _), way) in asked.into_iter().zip(found) {
             let doublings = if way > 0.0 { way.log2().floor() as i32 } else { i32::MIN };
             self.in_the_way.insert(key, (version, doublings));

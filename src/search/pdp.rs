@@ -27,13 +27,18 @@ pub(super) enum Mode {
 
 /// PDP_t or PDP_r.
 pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: Mode) -> Outcome {
-    let (translations, rotations) = problem.action_lists(&problem.directions());
-    let actions = match mode {
-        Mode::Translation => translations,
-        Mode::Rotation => rotations,
-    };
     let count = problem.scene.bodies.len();
-    let disassembly = Disassembly::new(problem, observer);
+    let (disassembly, actions) = Disassembly::beside(problem, observer, |problem| {
+        let (translations, rotations) = problem.action_lists(&problem.directions()?);
+        Ok(match mode {
+            Mode::Translation => translations,
+            Mode::Rotation => rotations,
+        })
+    });
+    let actions = match actions {
+        Ok(actions) => actions,
+        Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), String::new(), Vec::new()),
+    };
     let mut search = Search { disassembly, mode, actions, stopped_by: vec![Vec::new(); count], states: 0 };
     let stop = search.run().err();
     let (evidence, blocked) = (search.evidence(), search.blocked());

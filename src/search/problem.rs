@@ -76,9 +76,12 @@ pub struct Problem<'a> {
 
 impl Problem<'_> {
     /// The axes of the actions: the paper's are the world's, ours the assembly's own.
-    pub(super) fn directions(&self) -> Directions {
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn directions(&self) -> Result<Directions, Interrupt> {
         match self.actions {
-            ActionSet::Paper => Directions::of_world(&self.scene),
+            ActionSet::Paper => Ok(Directions::of_world(&self.scene)),
             ActionSet::Extended => Directions::of(&self.scene, &self.present, &self.termination),
         }
     }

@@ -46,6 +46,8 @@ impl Search<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::super::Problem;
+    use super::super::begun::Begun;
+    use super::super::disassembly::Disassembly;
     use super::super::state::Node;
     use super::super::tests::{Recorder, problem};
     use super::*;
@@ -58,8 +60,8 @@ mod tests {
         let (scene, verifier) = scene(block_on_plate());
         let mut recorder = Recorder::default();
         let problem = Problem { present: vec![0, 1], fixed: vec![0], ..problem(scene, &verifier) };
-        let (mut search, blockages) = Search::new(problem, &mut recorder, true);
-        search.make_roots(blockages.unwrap());
+        let (disassembly, begun) = Disassembly::beside(problem, &mut recorder, |p| Begun::of(p, true));
+        let mut search = Search::new(disassembly, begun.unwrap(), true);
         let root = search.nodes.len() - 1;
         let start = *search.nodes[root].pose();
         let at = |x: f64, z: f64| Pose::translation(x, 0.0, z) * start;

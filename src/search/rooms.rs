@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use crate::geometry::Pose;
 use crate::simulation::passes_straight;
+use crate::termination::Interrupt;
 
 use super::sbdp::Search;
 use super::state::{Phase, coarseness};
@@ -21,34 +22,43 @@ const TURNED: f64 = 0.05;
 
 impl Search<'_, '_> {
     /// Whether no state of this part is like a pose.
-    pub(super) fn is_new_state(&mut self, phase: Phase, part: usize, pose: &Pose) -> bool {
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn is_new_state(&mut self, phase: Phase, part: usize, pose: &Pose) -> Result<bool, Interrupt> {
         let counts = |node: usize| self.nodes[node].alive && self.lists(phase, &self.nodes[node]);
         let known = &self.known[part];
         // As coarse as so many states could ever be told apart.
         if !known.has_like(pose, counts) {
-            return true;
+            return Ok(true);
         }
         if self.separate_lists || !self.guided {
-            return false;
+            return Ok(false);
         }
         let states: Vec<Pose> = known.poses(counts).collect();
         if states.iter().any(|state| known.alike(state, pose, 1.0)) {
-            return false;
+            return Ok(false);
         }
         let assembled = self.disassembly.assembled(part).rotation;
         let is_turned = |state: &Pose| state.rotation.angle_to(&assembled) > TURNED;
         let (scene, standing) = (&self.disassembly.problem.scene, self.disassembly.standing(part));
-        let is_near = |state: &Pose| passes_straight(scene, &standing, part, state, pose);
+        let termination = &self.disassembly.problem.termination;
         let turned = is_turned(pose);
-        let (near, far): (Vec<&Pose>, Vec<&Pose>) =
-            states.par_iter().partition(|s| if turned { is_turned(s) } else { is_near(s) });
+        let is_near = |state: &Pose| match turned {
+            true => Ok(is_turned(state)),
+            false => passes_straight(scene, &standing, part, [state, pose], termination),
+        };
+        let kinds: Vec<bool> = states.par_iter().map(is_near).collect::<Result<_, Interrupt>>()?;
+        let of_kind =
+            |wanted: bool| states.iter().zip(&kinds).filter(move |(_, is)| **is == wanted).map(|(s, _)| s);
+        let (near, far): (Vec<&Pose>, Vec<&Pose>) = (of_kind(true).collect(), of_kind(false).collect());
         let coarse = coarseness(near.len() + far.len() / ELSEWHERE);
         let hides = |state: &&Pose| known.alike(state, pose, coarse);
         let hidden = near.iter().any(hides) || (turned && far.iter().any(hides));
         if hidden {
             self.coarsest = self.coarsest.max(coarse);
         }
-        !hidden
+        Ok(!hidden)
     }
 
     /// How coarsely states were told apart at most, as a multiple of the paper's resolution.

@@ -94,20 +94,19 @@ pub(super) struct Search<'a, 'o> {
 
 /// Searches until everything asked for is out, nothing more can be found, or a limit is met.
 pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bool) -> Outcome {
-    let (mut search, blockages) = Search::new(problem, observer, guided);
-    let stop = search.run(blockages).err();
+    let (disassembly, begun) = Disassembly::beside(problem, observer, |p| Begun::of(p, guided));
+    let begun = match begun {
+        Ok(begun) => begun,
+        Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), String::new(), Vec::new()),
+    };
+    let mut search = Search::new(disassembly, begun, guided);
+    let stop = search.run().err();
     let (evidence, blocked) = (search.evidence(), search.blocked());
     search.disassembly.outcome(stop, evidence, blocked)
 }
 
 impl<'a, 'o> Search<'a, 'o> {
-    /// A search, and the blockages of all parts as assembled.
-    pub(super) fn new(
-        problem: Problem<'a>,
-        observer: &'o mut dyn Observer,
-        guided: bool,
-    ) -> (Self, Result<Vec<Blockage>, Interrupt>) {
-        let (mut disassembly, begun) = Disassembly::beside(problem, observer, |p| Begun::of(p, guided));
+    pub(super) fn new(mut disassembly: Disassembly<'a, 'o>, begun: Begun, guided: bool) -> Self {
         let Begun { directions, translations, rotations, blockages, took } = begun;
         disassembly.counters.static_analysis += took;
         let problem = &disassembly.problem;
@@ -116,7 +115,7 @@ impl<'a, 'o> Search<'a, 'o> {
         let bodies = scene.bodies.iter().enumerate();
         let balls =
             bodies.map(|(p, b)| guided && !as_paper && is_ball(&b.shape, least_travel(scene, p))).collect();
-        let search = Self {
+        let mut search = Self {
             guided,
             nodes: Vec::new(),
             roots: 0,
@@ -138,11 +137,11 @@ impl<'a, 'o> Search<'a, 'o> {
             distrust_static: false,
             disassembly,
         };
-        (search, blockages)
+        search.make_roots(blockages);
+        search
     }
 
-    fn run(&mut self, blockages: Result<Vec<Blockage>, Interrupt>) -> Result<(), Stop> {
-        self.make_roots(blockages?);
+    fn run(&mut self) -> Result<(), Stop> {
         self.take_free_parts()?;
         loop {
             let mut gain = Gain::default();
@@ -176,7 +175,7 @@ impl<'a, 'o> Search<'a, 'o> {
         }
     }
 
-    pub(super) fn make_roots(&mut self, blockages: Vec<Blockage>) {
+    fn make_roots(&mut self, blockages: Vec<Blockage>) {
         for (part, blockage) in blockages.into_iter().enumerate() {
             if self.disassembly.problem.may_move(part) {
                 self.add_node(Node {
@@ -393,7 +392,10 @@ impl<'a, 'o> Search<'a, 'o> {
             End::Collision { with } => ("collision", with),
             End::Undecided { touched, .. } => ("undecided", touched),
         };
-        let is_new = path.last().copied().is_some_and(|end| self.is_new_state(phase, run.part, &end));
+        let is_new = match path.last().copied() {
+            Some(end) => self.is_new_state(phase, run.part, &end)?,
+            None => false,
+        };
         let leads_to = is_new.then_some(self.nodes.len() + 1 - self.roots);
         let from = self.state(job.node);
         self.disassembly.trace_simulation(from, &run, word, &by, path.len(), leads_to);

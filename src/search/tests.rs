@@ -307,7 +307,8 @@ fn a_sweep_that_the_triangles_refute_takes_nothing_out_and_leaves_its_points_for
     let start = scene.bodies[1].planning_from_shape;
     let mut recorder = Recorder::default();
     let present = (0..scene.bodies.len()).collect();
-    let mut disassembly = Disassembly::new(Problem { present, ..problem(scene, &verifier) }, &mut recorder);
+    let problem = Problem { present, ..problem(scene, &verifier) };
+    let (mut disassembly, _) = Disassembly::beside(problem, &mut recorder, |_| Ok(()));
     let run = Run { part: 1, start, action: Action::translations()[0] };
     let through = [start, Pose::translation(9.0, 0.0, 0.0) * start];
     let Ok(Err(refuted)) = disassembly.prove_sweep(&run, &[start], &through) else { panic!("not refuted") };

@@ -262,7 +262,7 @@ impl Entry {
         // Interrupted, they have kept what they found.
         let _ = initial_blockages(&self.problem(&prepared, &asked, termination, recall));
         let all = (0..self.assembly.parts.len()).collect();
-        drop(HullTree::new(&prepared.scene, all, termination));
+        let _ = HullTree::new(&prepared.scene, all, termination);
         let _ = prepared.build_fields(termination, &mut Silent);
     }
 

@@ -62,11 +62,9 @@ impl NullTwist {
             let still = &scene.bodies[other];
             let place = &still.planning_from_shape;
             let within = reach + scene.allowances.of(part, other);
-            contacts_of((body, pose), (still, place), within, &poll, &mut contacts);
-            contacts_of((still, place), (body, pose), within, &poll, &mut contacts);
+            contacts_of((body, pose), (still, place), within, &poll, &mut contacts)?;
+            contacts_of((still, place), (body, pose), within, &poll, &mut contacts)?;
         }
-        // What was found of points that were cut short is not to be believed.
-        termination.check()?;
         Ok((Self::left_by(&contacts), parts))
     }
 
@@ -117,21 +115,20 @@ fn contacts_of(
     within: f64,
     poll: &Poll<'_>,
     contacts: &mut Vec<Contact>,
-) {
+) -> Result<(), Interrupt> {
     let to_measured = stands.inverse() * at;
     let near = measured.shape.bounds().grown(within);
     let points: Vec<Point3<f64>> =
         asked.shape.samples().points().iter().map(|p| to_measured * p).filter(|p| near.contains(p)).collect();
     let surface = &measured.shape.surface;
     for p in points.iter().step_by(points.len().div_ceil(MOST_POINTS).max(1)) {
-        if poll.is_over() {
-            return;
-        }
+        poll.check()?;
         // At an edge there is a choice of normals.
         if let Some(closest) = surface.closest(p, within).filter(|c| c.feature == Feature::Face) {
             contacts.push((stands * closest.point, stands.rotation * surface.face_normal(closest.triangle)));
         }
     }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Translation3, Vector3};
 
 use crate::geometry::{Bounds, OrientedSamples, Pose, Surface};
 use crate::scene::Scene;
-use crate::termination::Poll;
+use crate::termination::{Interrupt, Poll};
 
 /// Of the samples of a surface, about so many are looked at.
 const RAYS: usize = 128;
@@ -15,7 +15,9 @@ const STEEPNESS: f64 = 1e-3;
 /// The longest stretch that a point of a part, going from `start` along the unit vector `direction` until it
 /// is past all that stands, is inside of another part, or a point of another inside of it. Told by some of
 /// their samples: what is small may go unseen.
-#[must_use]
+///
+/// # Errors
+/// The termination condition became true.
 pub fn obstruction(
     scene: &Scene,
     standing: &[usize],
@@ -23,13 +25,13 @@ pub fn obstruction(
     start: &Pose,
     direction: &Vector3<f64>,
     poll: &Poll<'_>,
-) -> f64 {
+) -> Result<f64, Interrupt> {
     let moving = &scene.bodies[part];
     let bounds = moving.shape.bounds().transformed(start);
     let furthest = standing.iter().map(|&s| scene.bodies[s].bounds.support(direction));
     let travel = furthest.fold(f64::NEG_INFINITY, f64::max) + bounds.support(&-direction);
     if travel <= 0.0 {
-        return 0.0;
+        return Ok(0.0);
     }
     let end = Translation3::from(direction * travel);
     let swept = bounds.union(&bounds.transformed(&Pose::from_parts(end, Default::default())));
@@ -41,10 +43,15 @@ pub fn obstruction(
         let one = Rays { target: &standing.shape.surface, to_target: standing_from_moving, along: forward };
         let to_moving = standing_from_moving.inverse();
         let other = Rays { target: &moving.shape.surface, to_target: to_moving, along: backward };
-        let one = one.longest(moving.shape.oriented(), travel, poll);
-        one.max(other.longest(standing.shape.oriented(), travel, poll))
+        let one = one.longest(moving.shape.oriented(), travel, poll)?;
+        Ok(one.max(other.longest(standing.shape.oriented(), travel, poll)?))
     };
-    scene.broad_phase.meeting_of(standing, &swept).into_iter().map(past).fold(0.0, f64::max)
+    scene
+        .broad_phase
+        .meeting_of(standing, &swept)
+        .into_iter()
+        .map(past)
+        .try_fold(0.0, |longest: f64, way| Ok(longest.max(way?)))
 }
 
 /// Segments from samples of one surface through another.
@@ -56,16 +63,21 @@ struct Rays<'a> {
 }
 
 impl Rays<'_> {
-    fn longest(&self, samples: &OrientedSamples, travel: f64, poll: &Poll<'_>) -> f64 {
+    fn longest(&self, samples: &OrientedSamples, travel: f64, poll: &Poll<'_>) -> Result<f64, Interrupt> {
         let corridor = self.corridor(travel);
         let inside = |p: Point3<f64>| {
-            if !corridor.contains(&p) || poll.is_over() {
-                return 0.0;
+            poll.check()?;
+            if !corridor.contains(&p) {
+                return Ok(0.0);
             }
-            self.target.longest_inside_along(&p, &self.along, travel, STEEPNESS)
+            Ok(self.target.longest_inside_along(&p, &self.along, travel, STEEPNESS))
         };
         let every = samples.iter().count().div_ceil(RAYS).max(1);
-        samples.iter().step_by(every).map(|(p, _)| inside(self.to_target * p)).fold(0.0, f64::max)
+        samples
+            .iter()
+            .step_by(every)
+            .map(|(p, _)| inside(self.to_target * p))
+            .try_fold(0.0, |longest: f64, way| Ok(longest.max(way?)))
     }
 
     /// From where the target is met.
@@ -84,7 +96,7 @@ mod tests {
     fn along(scene: &Scene, part: usize, direction: Vector3<f64>) -> f64 {
         let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != part).collect();
         let start = &scene.bodies[part].planning_from_shape;
-        obstruction(scene, &standing, part, start, &direction, &Poll::every(1, None))
+        obstruction(scene, &standing, part, start, &direction, &Poll::every(1, None)).unwrap()
     }
 
     #[test]

@@ -71,10 +71,7 @@ impl Touching {
                 let bits = Vec::new();
                 let mut faces =
                     Faces { asked, at, measured, stands, within, reach, deepest, bits, poll: &poll };
-                let told = faces.planes(sense, &mut normals);
-                // What was found of faces that were cut short is not to be believed.
-                termination.check()?;
-                if !told {
+                if !faces.planes(sense, &mut normals)? {
                     return Ok(Self { normals: None, parts });
                 }
             }
@@ -106,16 +103,14 @@ struct Faces<'a> {
 impl Faces<'_> {
     /// Adds the planes of the measured body, or of the asked one if `sense` is negative: faces that
     /// are in contact look against each other. False if they are too many.
-    fn planes(&mut self, sense: f64, normals: &mut Vec<Unit<Vector3<f64>>>) -> bool {
+    fn planes(&mut self, sense: f64, normals: &mut Vec<Unit<Vector3<f64>>>) -> Result<bool, Interrupt> {
         let surface: &Surface = &self.asked.shape.surface;
         let finest = self.within.extents().max() * FINENESS;
         for t in 0..surface.triangles().len() as u32 {
             let looks = self.at.rotation * surface.face_normal(t);
             self.bits.push(surface.corners(t).map(|p| self.at * p));
             while let Some(bit) = self.bits.pop() {
-                if self.poll.is_over() {
-                    return false;
-                }
+                self.poll.check()?;
                 if !Bounds::of(&bit).meets(&self.within) {
                     continue;
                 }
@@ -131,12 +126,12 @@ impl Faces<'_> {
                 if !normals.iter().any(|n| n.dot(&normal) > ALIKE) {
                     normals.push(normal);
                     if normals.len() > MOST_PLANES {
-                        return false;
+                        return Ok(false);
                     }
                 }
             }
         }
-        true
+        Ok(true)
     }
 
     /// The normal of the measured body's face at a point near it, if one face alone is nearest.

@@ -9,10 +9,9 @@ use std::sync::Arc;
 
 use divan::counter::ItemsCount;
 use sbdp::geometry::{Assembly, SourceAssembly, SourceMesh, SourcePart};
+use sbdp::scene::{Scene, Surroundings};
 use sbdp::sdf::Field;
-use sbdp::simulation::{
-    Action, Axis, PenaltyEngine, PenaltyParameters, Scene, Surroundings, TransitionFunction,
-};
+use sbdp::simulation::{Action, Axis, PenaltyEngine, PenaltyParameters, TransitionFunction};
 use sbdp::termination::Termination;
 
 fn main() {

@@ -47,38 +47,28 @@ pub(crate) fn centred(
     limit: f64,
     termination: &Termination,
 ) -> Result<Option<Vec<Pose>>, Interrupt> {
-    let path = proposed(scene, standing, part, path, limit, termination);
-    // What profiles tell that were cut short is not to be believed.
-    termination.check()?;
-    Ok(path)
+    if !turns_far(path) {
+        return Ok(None);
+    }
+    let course = Course::new(path, scene.centre_in_shape(part), scene.bodies[part].shape.reach);
+    let followed = ScrewPath::new(&course, &[Interval::WHOLE], limit * FINEST);
+    let Some(followed) = followed.filter(|followed| followed.helix.rise != 0.0) else { return Ok(None) };
+    let Some((left, way)) = followed.leaves(followed.helix.pitch().abs() * LEFT) else { return Ok(None) };
+    let mut widest: Option<(f64, Thread)> = None;
+    for &other in standing.iter().filter(|&&other| scene.allowances.of(part, other) == 0.0) {
+        let shared = Thread::shared(scene, (part, other), &followed, left, termination)?;
+        if let Some((play, thread)) = shared
+            && widest.as_ref().is_none_or(|(most, _)| *most < play)
+        {
+            widest = Some((play, thread));
+        }
+    }
+    Ok(widest.and_then(|(_, thread)| along(&thread, (left, way), path, &course)))
 }
 
-fn proposed(
-    scene: &Scene,
-    standing: &[usize],
-    part: usize,
-    path: &[Pose],
-    limit: f64,
-    termination: &Termination,
-) -> Option<Vec<Pose>> {
-    if !turns_far(path) {
-        return None;
-    }
-    let finest = limit * FINEST;
-    let course = Course::new(path, scene.centre_in_shape(part), scene.bodies[part].shape.reach);
-    let followed = ScrewPath::new(&course, &[Interval::WHOLE], finest)?;
-    if followed.helix.rise == 0.0 {
-        return None;
-    }
-    let (left, way) = followed.leaves(followed.helix.pitch().abs() * LEFT)?;
-    let (_, thread) = standing
-        .iter()
-        .filter(|&&other| scene.allowances.of(part, other) == 0.0)
-        .filter_map(|&other| Thread::shared(scene, (part, other), &followed, left, termination))
-        .fold(None, |best: Option<(f64, Thread)>, (play, thread)| match best {
-            Some(best) if best.0 >= play => Some(best),
-            _ => Some((play, thread)),
-        })?;
+/// The path that turns along a thread up to where the given one leaves it (angle, and way there), and from there on
+/// beside the given one to its end.
+fn along(thread: &Thread, (left, way): (f64, f64), path: &[Pose], course: &Course) -> Option<Vec<Pose>> {
     // What is nearly off the thread is turned off it.
     let is_near = (thread.off - left).abs() < MOST_FURTHER;
     let angle = if is_near { thread.off.abs().max(left.abs()).copysign(left) } else { left };
@@ -119,10 +109,8 @@ impl Thread {
         followed: &ScrewPath,
         left: f64,
         termination: &Termination,
-    ) -> Option<(f64, Self)> {
-        if termination.check().is_err() {
-            return None;
-        }
+    ) -> Result<Option<(f64, Self)>, Interrupt> {
+        termination.check()?;
         let ScrewPath { helix: guess, reference, .. } = followed;
         let (moving, standing) = (&scene.bodies[part].shape.surface, &scene.bodies[other].shape.surface);
         let guess_from_standing = guess.axis_from_frame * scene.bodies[other].planning_from_shape;
@@ -133,13 +121,13 @@ impl Thread {
         let zones = [Zone::of(&moving), Zone::of(&standing)];
         let zone = zones[0].common(&zones[1]).trimmed(ENDS * guess.pitch().abs());
         if zone.is_empty() {
-            return None;
+            return Ok(None);
         }
         let [own, others] = [&moving, &standing].map(|t| {
             let facets: Vec<Facet> = t.iter().filter(|c| zone.meets(c)).filter_map(Facet::of).collect();
             slipping(&facets, guess.rise)
         });
-        let (own, others) = (own?, others?);
+        let (Some(own), Some(others)) = (own, others) else { return Ok(None) };
         let helix = Helix { rise: guess.rise, ..others };
         // The moving part's axis onto the standing one's.
         let to_other = onto(&own, &others, f64::midpoint(zone.along()[0], zone.along()[1]));
@@ -149,13 +137,14 @@ impl Thread {
             Envelope::new(&moved, &helix, &zone, termination)
         };
         let (one, two) = rayon::join(|| envelope(&moving, frame * to_other), || envelope(&standing, frame));
-        let (play, shift) = two.widest_gap(&one, LEFT * helix.pitch().abs())?;
+        let gap = two?.widest_gap(&one?, LEFT * helix.pitch().abs());
+        let Some((play, shift)) = gap else { return Ok(None) };
         let reference = Translation3::from(Vector3::z() * shift) * frame * to_other * reference;
         let helix = Helix { axis_from_frame: frame * guess.axis_from_frame, ..helix };
         let [own, others] = zones.map(|zone| zone.along());
         let travel = if helix.rise * left > 0.0 { others[1] - own[0] } else { others[0] - own[1] };
         let off = travel / helix.rise;
-        Some((play, Self { helix, reference, off }))
+        Ok(Some((play, Self { helix, reference, off })))
     }
 }
 

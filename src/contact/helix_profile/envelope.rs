@@ -12,7 +12,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::geometry::{Footprint, Helix, radii};
-use crate::termination::Termination;
+use crate::termination::{Interrupt, Termination};
 
 /// Slabs along the axis per pitch: what is elsewhere does not count.
 const SLABS: f64 = 4.0;
@@ -122,26 +122,28 @@ pub(super) struct Envelope {
 
 impl Envelope {
     /// The profile of triangles (axis frame) along a helix that rises, where another part can be
-    /// near: in `zone`. Once the termination condition is true the rest is left out.
+    /// near: in `zone`.
+    ///
+    /// # Errors
+    /// The termination condition became true.
     pub(super) fn new(
         triangles: &[[Point3<f64>; 3]],
         helix: &Helix,
         zone: &Zone,
         termination: &Termination,
-    ) -> Self {
+    ) -> Result<Self, Interrupt> {
         let pitch = helix.pitch().abs();
         let [near, far] = zone.across;
         let zone = Zone { across: [near - BESIDE * pitch, far + BESIDE * pitch], ..*zone };
         let empty = || Self { pitch, finest: pitch / BINS as f64, zone, first: 0, slabs: Vec::new() };
         let add = |mut envelope: Self, triangles: &[[Point3<f64>; 3]]| {
-            if termination.check().is_ok() {
-                let mut cut = Cut::default();
-                triangles.iter().for_each(|corners| envelope.add(corners, helix.rise, &mut cut));
-            }
-            envelope
+            termination.check()?;
+            let mut cut = Cut::default();
+            triangles.iter().for_each(|corners| envelope.add(corners, helix.rise, &mut cut));
+            Ok(envelope)
         };
         // The least and the largest are the same, however triangles are dealt out.
-        triangles.par_chunks(AT_ONCE).fold(empty, add).reduce(empty, Self::with)
+        triangles.par_chunks(AT_ONCE).try_fold(empty, add).try_reduce(empty, |one, other| Ok(one.with(other)))
     }
 
     /// The profile of what either is the profile of.

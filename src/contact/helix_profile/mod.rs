@@ -64,7 +64,7 @@ fn unsettled(
     let envelope =
         |triangles: Vec<[Point3<f64>; 3]>| Envelope::new(&triangles, &screw.helix, &zone, termination);
     let (moving, standing) = rayon::join(|| envelope(moving), || envelope(standing));
-    termination.check()?;
+    let (moving, standing) = (moving?, standing?);
     let mut open = Vec::new();
     let mut stack = stretches;
     while let Some(interval) = stack.pop() {

@@ -140,9 +140,7 @@ impl Samples {
             .map(|asked| {
                 termination.check()?;
                 let poll = Poll::every(SAMPLES_POLL, Some(termination));
-                let entered = sides[asked.side].entered(asked, &poll);
-                // What was found of samples that were cut short is not to be believed.
-                termination.check().map(|()| entered)
+                sides[asked.side].entered(asked, &poll)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
         let mut entered: Vec<Entered> = found.into_iter().flatten().collect();
@@ -197,7 +195,7 @@ type Known = (u32, Point3<f64>, f64);
 impl Side<'_> {
     /// The samples that are deeper than granted. Those in a sphere are settled for all poses at which it stays out of
     /// the measured surface: from one pose to the next most travel less than they are off.
-    fn entered(&self, asked: &Asked, poll: &Poll<'_>) -> Vec<Entered> {
+    fn entered(&self, asked: &Asked, poll: &Poll<'_>) -> Result<Vec<Entered>, Interrupt> {
         let Self { measured, granted, .. } = *self;
         let inner = measured.bounds().grown(-granted);
         let pose = |moment: usize| &self.to_measured[asked.moments[moment]];
@@ -209,32 +207,33 @@ impl Side<'_> {
             let travel = ways.fold(0.0, f64::max).sqrt();
             let (reach, off) = (ball.radius + travel, (at - c).norm());
             let is_outside = |distance: f64| distance > 0.0 && distance > reach - granted;
-            if poll.is_over() || measured.bounds().distance(&at) > reach || is_outside(known - off) {
-                return Look::Out;
+            poll.check()?;
+            if measured.bounds().distance(&at) > reach || is_outside(known - off) {
+                return Ok(Look::Out);
             }
             let split = if travel > ball.radius { Look::Halve } else { Look::In };
             let is_single = ball.sample.is_some() && travel == 0.0;
             // Where all of it can certainly not be far enough off, nothing is measured yet.
             if !is_single && known.abs() + off <= reach - granted {
-                return split((guess, c, known));
+                return Ok(split((guess, c, known)));
             }
             if is_single && !inner.contains(&at) {
-                return Look::Out;
+                return Ok(Look::Out);
             }
             let closest = measured.closest_from(&at, guess);
             let distance = measured.signed(&at, &closest);
             if is_outside(distance) {
-                return Look::Out;
+                return Ok(Look::Out);
             }
             if let Some(sample) = ball.sample.filter(|_| is_single && -distance > granted) {
                 let (moment, &Asked { side, share, .. }) = (asked.moments[middle], asked);
                 out.push(Entered { moment, side, share, sample, over: -distance - granted });
             }
-            split((closest.triangle, at, distance))
+            Ok(split((closest.triangle, at, distance)))
         };
         let root = (0, Point3::origin(), f64::NEG_INFINITY);
-        self.samples[asked.share].walk_through(0..asked.moments.len(), root, look);
-        out
+        self.samples[asked.share].walk_through(0..asked.moments.len(), root, look)?;
+        Ok(out)
     }
 }
 

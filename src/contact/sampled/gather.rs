@@ -7,7 +7,7 @@ use nalgebra::Point3;
 use crate::geometry::{Closest, Pose, SampleTree};
 use crate::scene::Body;
 use crate::sdf::Grid;
-use crate::termination::{Poll, Termination};
+use crate::termination::{Interrupt, Poll, Termination};
 
 use super::{Contact, ENTER_POLL, Near};
 
@@ -32,7 +32,7 @@ pub(super) fn gather(
     termination: Option<&Termination>,
     near: &mut Near,
     tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
-) {
+) -> Result<(), Interrupt> {
     let Measured { body, to_measured, allowance, reach } = *measured;
     // Deeper than nothing cannot be excluded by a bound that is only sure outside.
     let limit = (reach - allowance).max(0.0);
@@ -44,23 +44,20 @@ pub(super) fn gather(
     tree.walk(
         (),
         |node, ()| {
-            if poll.is_over() {
-                return None;
-            }
+            poll.check()?;
             let bound = field.estimate(&(to_measured * node.centre)).lower_bound - node.radius;
             if bound > limit {
                 keep(bound);
             }
-            (bound <= limit).then_some(())
+            Ok((bound <= limit).then_some(()))
         },
         |sample, ()| {
-            if sample_poll.is_over() {
-                return;
-            }
+            sample_poll.check()?;
             let p = to_measured * sample;
             let bound = field.estimate(&p).lower_bound;
             if bound > limit {
-                return keep(bound);
+                keep(bound);
+                return Ok(());
             }
             match body.closest(&p, limit) {
                 Some((closest, distance)) if distance + allowance < reach => {
@@ -69,9 +66,11 @@ pub(super) fn gather(
                 Some((_, distance)) => keep(distance),
                 None => keep(limit),
             }
+            Ok(())
         },
-    );
+    )?;
     near.clearance = clearance.get();
+    Ok(())
 }
 
 /// How long to look.
@@ -93,7 +92,7 @@ pub(super) fn gather_exactly(
     Few { most, within, termination }: Few<'_>,
     near: &mut Near,
     tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
-) -> Option<()> {
+) -> Result<Option<()>, Interrupt> {
     let Measured { body, to_measured, allowance, reach } = *measured;
     let bounds = body.shape.surface.bounds();
     let clearance = Cell::new(near.clearance);
@@ -105,30 +104,32 @@ pub(super) fn gather_exactly(
         let (closest, distance) = body.closest_from(p, guess);
         (distance + allowance, closest)
     };
-    let is_over = || looks.get() > most || poll.is_over();
+    let is_too_many = || looks.get() > most;
     tree.walk(
         (0, true),
         |node, (guess, counts)| {
-            if is_over() {
-                return None;
+            poll.check()?;
+            if is_too_many() {
+                return Ok(None);
             }
             let p = to_measured * node.centre;
             let apart = bounds.distance(&p);
             if apart > 0.0 && apart + allowance - node.radius >= reach {
                 keep(apart + allowance - node.radius);
-                return None;
+                return Ok(None);
             }
             let (gap, closest) = look(&p, guess, counts);
             let least = gap - node.radius;
             if least >= reach {
                 keep(least);
-                return None;
+                return Ok(None);
             }
-            Some((closest.triangle, least < within))
+            Ok(Some((closest.triangle, least < within)))
         },
         |sample, (guess, counts)| {
-            if is_over() {
-                return;
+            poll.check()?;
+            if is_too_many() {
+                return Ok(());
             }
             let (gap, closest) = look(&(to_measured * sample), guess, counts);
             if gap < reach {
@@ -136,8 +137,9 @@ pub(super) fn gather_exactly(
             } else {
                 keep(gap);
             }
+            Ok(())
         },
-    );
+    )?;
     near.clearance = clearance.get();
-    (looks.get() <= most).then_some(())
+    Ok((looks.get() <= most).then_some(()))
 }

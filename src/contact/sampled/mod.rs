@@ -17,7 +17,7 @@ use nalgebra::{Point3, Vector3, Vector6};
 use crate::geometry::{Bounds, Closest, Pose};
 use crate::scene::{Body, Scene, Surroundings};
 use crate::sdf::Grid;
-use crate::termination::{Poll, Termination};
+use crate::termination::{Interrupt, Poll, Termination};
 use crate::tolerances::FREE_STEP;
 
 use gather::{Measured, gather};
@@ -98,24 +98,25 @@ impl Near {
 pub(crate) trait Around {
     /// What is near a mover's pose: if any contacts are deeper than the engine lets them, some of these at
     /// least.
-    fn near(&mut self, mover: &Mover<'_>) -> Near;
+    fn near(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt>;
 
     /// Takes contacts in that were found at other poses and may matter at the mover's, too.
-    fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) {
+    fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) -> Result<(), Interrupt> {
         let _ = (mover, near);
+        Ok(())
     }
 
     /// Whether nothing is too deep at a pose between the last one that was looked at and the one before the
     /// step, but for what the contacts near these tell.
-    fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
+    fn is_clear_at(&mut self, between: &Mover<'_>) -> Result<bool, Interrupt> {
         let _ = between;
-        true
+        Ok(true)
     }
 }
 
 /// What a function gathers.
-impl<F: Fn(&Mover<'_>) -> Near> Around for F {
-    fn near(&mut self, mover: &Mover<'_>) -> Near {
+impl<F: Fn(&Mover<'_>) -> Result<Near, Interrupt>> Around for F {
+    fn near(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt> {
         self(mover)
     }
 }
@@ -138,9 +139,7 @@ impl<'a> Mover<'a> {
         Self { scene, body: &scene.bodies[part], part, pose, termination: None, is_exact: false }
     }
 
-    /// The same, but once the condition is true it finds only part of its contacts, and that it enters
-    /// whatever it is asked about: whoever asks must look at the condition before believing what was found. The first look at two large surfaces fills
-    /// their fields, which takes longer than a cancelled request may.
+    /// The same with a condition that ends every question as an error.
     pub(crate) fn until(self, termination: &'a Termination) -> Self {
         Self { termination: Some(termination), ..self }
     }
@@ -150,9 +149,10 @@ impl<'a> Mover<'a> {
         Self { is_exact: true, ..self }
     }
 
-    /// Whether the condition is true.
-    pub(crate) fn is_over(&self) -> bool {
-        self.termination.is_some_and(|t| t.check().is_err())
+    /// # Errors
+    /// The termination condition is true.
+    pub(crate) fn check(&self) -> Result<(), Interrupt> {
+        self.termination.map_or(Ok(()), Termination::check)
     }
 
     /// The centre of mass, about which twists turn.
@@ -161,7 +161,10 @@ impl<'a> Mover<'a> {
     }
 
     /// Gathers all contacts with a gap below `reach`.
-    pub(crate) fn near(&self, surroundings: &Surroundings, reach: f64) -> Near {
+    ///
+    /// # Errors
+    /// The termination condition became true; so of all questions below.
+    pub(crate) fn near(&self, surroundings: &Surroundings, reach: f64) -> Result<Near, Interrupt> {
         self.near_by(surroundings, reach, |other, near| self.near_pair(other, reach, near))
     }
 
@@ -170,8 +173,8 @@ impl<'a> Mover<'a> {
         &self,
         surroundings: &Surroundings,
         reach: f64,
-        mut gather: impl FnMut(usize, &mut Near),
-    ) -> Near {
+        mut gather: impl FnMut(usize, &mut Near) -> Result<(), Interrupt>,
+    ) -> Result<Near, Interrupt> {
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
         let bounds = self.body.shape.bounds().transformed(&self.pose);
         // What is further off than any step is long need not be known.
@@ -182,47 +185,47 @@ impl<'a> Mover<'a> {
             if apart > reach {
                 near.clearance = near.clearance.min(apart);
             } else {
-                gather(other, &mut near);
+                gather(other, &mut near)?;
             }
         }
-        near
+        Ok(near)
     }
 
     /// Gathers the contacts with one standing part.
-    pub(crate) fn near_pair(&self, other: usize, reach: f64, near: &mut Near) {
+    pub(crate) fn near_pair(&self, other: usize, reach: f64, near: &mut Near) -> Result<(), Interrupt> {
         // One after the other: several motions are simulated at a time, and one that waited for its half
         // would begin with another motion meanwhile, and come back to its own only at the end of that.
         for side in [Side::Moving, Side::Standing] {
-            near.add(self.side(side, other, reach, near.clearance));
+            near.add(self.side(side, other, reach, near.clearance)?);
         }
+        Ok(())
     }
 
     /// The same for those with this part alone, both surfaces side by side: where fields are asked for the first time,
     /// the cells that they fill take most of the time.
-    pub(crate) fn near_first(&self, other: usize, reach: f64) -> Near {
+    pub(crate) fn near_first(&self, other: usize, reach: f64) -> Result<Near, Interrupt> {
         let standing = &self.scene.bodies[other];
-        rayon::join(|| self.field_is_ready(self.body), || self.field_is_ready(standing));
+        let (mine, theirs) = rayon::join(|| self.prepare_field(self.body), || self.prepare_field(standing));
+        mine.and(theirs)?;
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
         let side = |side| self.side(side, other, reach, f64::INFINITY);
         let (mine, theirs) = rayon::join(|| side(Side::Moving), || side(Side::Standing));
-        near.add(mine);
-        near.add(theirs);
-        near
+        near.add(mine?);
+        near.add(theirs?);
+        Ok(near)
     }
 
     /// What is near of the samples of one surface of a pair.
-    fn side(&self, side: Side, other: usize, reach: f64, clearance: f64) -> Near {
+    fn side(&self, side: Side, other: usize, reach: f64, clearance: f64) -> Result<Near, Interrupt> {
         let mut found = Near { contacts: Vec::new(), clearance };
-        if !self.fields_are_ready(&self.scene.bodies[other]) {
-            return found;
-        }
+        self.prepare_fields(&self.scene.bodies[other])?;
         let (sampled, body, to_measured, allowance) = self.sides(side, other);
         let measured = Measured { body, to_measured: &to_measured, allowance, reach };
         let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
         for tree in [sampled.shape.samples(), &sampled.extra_samples] {
-            gather(tree, &measured, self.termination, &mut found, tag);
+            gather(tree, &measured, self.termination, &mut found, tag)?;
         }
-        found
+        Ok(found)
     }
 
     /// Whose samples are asked for, what they are measured against, the way from the one's frame to the other's, and
@@ -237,54 +240,65 @@ impl<'a> Mover<'a> {
         }
     }
 
-    /// Builds the fields of a pair that are not there yet; not to the end once the condition is true.
-    fn fields_are_ready(&self, standing: &Body) -> bool {
-        self.field_is_ready(self.body) && self.field_is_ready(standing)
+    /// Builds the fields of a pair that are not there yet.
+    fn prepare_fields(&self, standing: &Body) -> Result<(), Interrupt> {
+        self.prepare_field(self.body)?;
+        self.prepare_field(standing)
     }
 
-    fn field_is_ready(&self, body: &Body) -> bool {
-        self.termination.is_none_or(|t| body.field.prepare_here(t).is_ok())
+    fn prepare_field(&self, body: &Body) -> Result<(), Interrupt> {
+        self.termination.map_or(Ok(()), |t| body.field.prepare_here(t))
     }
 
     /// Whether the fields alone show that a sample of either surface is deeper than granted: deeper
     /// than they can be wrong by. Measures nothing exactly, so it is quick.
-    pub(crate) fn clearly_enters(&self, standing: &[usize]) -> bool {
+    pub(crate) fn clearly_enters(&self, standing: &[usize]) -> Result<bool, Interrupt> {
         let poll = Poll::every(ENTER_POLL, self.termination);
         self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
             let field: &Grid = &measured.field;
             let limit = -allowance - field.error_bound();
             sampled.shape.samples().any(
-                |node| poll.is_over() || field.value(&(to_measured * node.centre)) - node.radius < limit,
-                |sample| poll.is_over() || field.value(&(to_measured * sample)) < limit,
-            )
-        })
-    }
-
-    /// Whether the fields alone show that no sample of either surface is within some distance of the other.
-    pub(crate) fn seems_clear(&self, standing: &[usize], by: f64) -> bool {
-        !self.any_pair(standing, by, |sampled, measured, to_measured, _| {
-            let field: &Grid = &measured.field;
-            let limit = by + field.error_bound();
-            sampled.shape.samples().any(
-                |node| field.value(&(to_measured * node.centre)) - node.radius < limit,
+                |node| {
+                    poll.check()?;
+                    Ok(field.value(&(to_measured * node.centre)) - node.radius < limit)
+                },
                 |sample| field.value(&(to_measured * sample)) < limit,
             )
         })
     }
 
+    /// Whether the fields alone show that no sample of either surface is within some distance of the other.
+    pub(crate) fn seems_clear(&self, standing: &[usize], by: f64) -> Result<bool, Interrupt> {
+        let poll = Poll::every(ENTER_POLL, self.termination);
+        let is_near = self.any_pair(standing, by, |sampled, measured, to_measured, _| {
+            let field: &Grid = &measured.field;
+            let limit = by + field.error_bound();
+            sampled.shape.samples().any(
+                |node| {
+                    poll.check()?;
+                    Ok(field.value(&(to_measured * node.centre)) - node.radius < limit)
+                },
+                |sample| field.value(&(to_measured * sample)) < limit,
+            )
+        })?;
+        Ok(!is_near)
+    }
+
     /// Whether a sample of either surface is deeper by `depth` than granted: quick where many are.
-    pub(crate) fn enters_by(&self, depth: f64, standing: &[usize]) -> bool {
+    pub(crate) fn enters_by(&self, depth: f64, standing: &[usize]) -> Result<bool, Interrupt> {
         let poll = Poll::every(ENTER_POLL, self.termination);
         self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
             let (field, limit): (&Grid, f64) = (&measured.field, -allowance - depth);
             let least = |p: &Point3<f64>| field.value(p) - field.error_bound();
             sampled.shape.samples().any(
-                |node| poll.is_over() || least(&(to_measured * node.centre)) - node.radius < limit,
+                |node| {
+                    poll.check()?;
+                    Ok(least(&(to_measured * node.centre)) - node.radius < limit)
+                },
                 |sample| {
                     let p = to_measured * sample;
-                    poll.is_over()
-                        || least(&p) < limit
-                            && measured.closest(&p, 0.0).is_some_and(|(_, distance)| distance < limit)
+                    least(&p) < limit
+                        && measured.closest(&p, 0.0).is_some_and(|(_, distance)| distance < limit)
                 },
             )
         })
@@ -297,19 +311,21 @@ impl<'a> Mover<'a> {
         &self,
         standing: &[usize],
         margin: f64,
-        test: impl Fn(&Body, &Body, &Pose, f64) -> bool,
-    ) -> bool {
+        test: impl Fn(&Body, &Body, &Pose, f64) -> Result<bool, Interrupt>,
+    ) -> Result<bool, Interrupt> {
         let bounds = self.body.shape.bounds().transformed(&self.pose).grown(margin);
-        self.scene.broad_phase.meeting_of(standing, &bounds).into_iter().any(|other| {
+        for other in self.scene.broad_phase.meeting_of(standing, &bounds) {
             let still = &self.scene.bodies[other];
-            if !self.fields_are_ready(still) {
-                return true;
-            }
+            self.prepare_fields(still)?;
             let allowance = self.scene.allowances.of(self.part, other);
             let to_still = still.planning_from_shape.inverse() * self.pose;
-            test(self.body, still, &to_still, allowance)
-                || test(still, self.body, &to_still.inverse(), allowance)
-        })
+            if test(self.body, still, &to_still, allowance)?
+                || test(still, self.body, &to_still.inverse(), allowance)?
+            {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// The gap of a contact's sample with the mover at its pose, if still below `reach`.

@@ -24,9 +24,10 @@ fn without_fields_the_same_contacts_are_found() {
             let mut pose = start;
             pose.translation.vector += shift;
             let mover = Mover::new(&scene, 1, pose);
-            let by_fields = mover.near_first(0, REACH);
+            let by_fields = mover.near_first(0, REACH).unwrap();
             let extent = Extent { radius: REACH, reach: REACH, most: usize::MAX };
-            let exact = Vicinity::new(&mover.exactly(), 0, REACH).near(&mover.exactly(), extent).unwrap();
+            let exact =
+                Vicinity::new(&mover.exactly(), 0, REACH).near(&mover.exactly(), extent).unwrap().unwrap();
             // Which trees they are in decides on their order.
             let told = |near: &Near| {
                 let told = |c: &Contact| {
@@ -58,6 +59,7 @@ fn many_looks_are_refused() {
     let (scene, _) = scene(peg_in_hole(0.0));
     let mover = Mover::new(&scene, 1, scene.bodies[1].planning_from_shape).exactly();
     let vicinity = Vicinity::new(&mover, 0, REACH);
-    let looked = |most| vicinity.near(&mover, Extent { radius: REACH, reach: REACH, most }).is_some();
+    let looked =
+        |most| vicinity.near(&mover, Extent { radius: REACH, reach: REACH, most }).unwrap().is_some();
     assert!(!looked(10) && looked(100_000));
 }

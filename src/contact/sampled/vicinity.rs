@@ -3,6 +3,8 @@
 
 use crate::geometry::{Bounds, Pose, SampleTree};
 
+use crate::termination::Interrupt;
+
 use super::gather::{Few, Measured, gather_exactly};
 use super::{Contact, Mover, Near, Side};
 
@@ -39,15 +41,18 @@ impl Vicinity {
     }
 
     /// What is near at a pose, if that is told by few looks.
-    pub(crate) fn near(&self, mover: &Mover<'_>, extent: Extent) -> Option<Near> {
+    ///
+    /// # Errors
+    /// The mover's termination condition became true.
+    pub(crate) fn near(&self, mover: &Mover<'_>, extent: Extent) -> Result<Option<Near>, Interrupt> {
         let side = |side| self.side(mover, side, extent);
         let (mine, theirs) = rayon::join(|| side(Side::Moving), || side(Side::Standing));
-        let mut near = mine?;
-        near.add(theirs?);
-        Some(near)
+        let (Some(mut near), Some(theirs)) = (mine?, theirs?) else { return Ok(None) };
+        near.add(theirs);
+        Ok(Some(near))
     }
 
-    fn side(&self, mover: &Mover<'_>, side: Side, extent: Extent) -> Option<Near> {
+    fn side(&self, mover: &Mover<'_>, side: Side, extent: Extent) -> Result<Option<Near>, Interrupt> {
         let other = self.other;
         let (sampled, body, to_measured, allowance) = mover.sides(side, other);
         let measured = Measured { body, to_measured: &to_measured, allowance, reach: extent.radius };
@@ -56,8 +61,10 @@ impl Vicinity {
         let tree = if side == Side::Moving { &self.mine } else { &self.theirs };
         let mut found = Near { contacts: Vec::new(), clearance: f64::INFINITY };
         for tree in [tree, &sampled.extra_samples] {
-            gather_exactly(tree, &measured, few, &mut found, tag)?;
+            if gather_exactly(tree, &measured, few, &mut found, tag)?.is_none() {
+                return Ok(None);
+            }
         }
-        Some(found)
+        Ok(Some(found))
     }
 }

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::Draft;
 use crate::geometry::mesh;
-use crate::termination::{Poll, Termination};
+use crate::termination::{Interrupt, Poll, Termination, try_all};
 
 /// Surfaces nearer than this (of the part's size) touch: their nearest points could be
 /// confused.
@@ -27,8 +27,7 @@ const FEW: usize = 512;
 /// Triangles between two looks at the termination condition.
 const CROSSING_POLL: u32 = 256;
 
-/// The shells of a part, scaled to unit size, in trees that are built when first asked. Once the condition is
-/// true triangles are left out: whoever asks must look at it before believing what was found.
+/// The shells of a part, scaled to unit size, in trees that are built when first asked.
 pub(super) struct Surfaces<'a> {
     termination: &'a Termination,
     shells: &'a [Vec<u32>],
@@ -51,28 +50,40 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Whether two shells cross or touch.
-    pub(super) fn meet(&self, a: usize, b: usize) -> bool {
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn meet(&self, a: usize, b: usize) -> Result<bool, Interrupt> {
         let (few, many) = if self.shells[a].len() <= self.shells[b].len() { (a, b) } else { (b, a) };
         let poll = Poll::every(CROSSING_POLL, Some(self.termination));
-        self.shells[few].iter().take_while(|_| !poll.is_over()).any(|&t| {
+        let are_apart = try_all(&self.shells[few], |&t| {
+            poll.check()?;
             let region = self.aabb(t).loosened(TOUCH);
-            self.within(many, &region).any(|u| self.touch(t, u))
-        })
+            Ok(!self.within(many, &region).any(|u| self.touch(t, u)))
+        })?;
+        Ok(!are_apart)
     }
 
     /// Whether a shell crosses itself. Triangles with a common vertex are taken on trust.
-    pub(super) fn crosses_itself(&self, shell: usize) -> bool {
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn crosses_itself(&self, shell: usize) -> Result<bool, Interrupt> {
         let apart = |t: u32, u: u32| {
             let (t, u) = (&self.indices[t as usize], &self.indices[u as usize]);
             !t.iter().any(|v| u.contains(v))
         };
-        self.shells[shell].par_chunks(FEW).any(|some| {
+        let is_free = |some: &[u32]| {
             let poll = Poll::every(CROSSING_POLL, Some(self.termination));
-            some.iter().take_while(|_| !poll.is_over()).any(|&t| {
+            try_all(some, |&t| {
+                poll.check()?;
                 let region = self.aabb(t);
-                self.within(shell, &region).any(|u| u > t && apart(t, u) && self.cross(t, u))
+                Ok(!self.within(shell, &region).any(|u| u > t && apart(t, u) && self.cross(t, u)))
             })
-        })
+        };
+        // The first chunk that crosses, or was interrupted, ends the search.
+        let ended = self.shells[shell].par_chunks(FEW).map(is_free).find_any(|free| *free != Ok(true));
+        Ok(!ended.unwrap_or(Ok(true))?)
     }
 
     /// A shell's triangles whose boxes meet a region.

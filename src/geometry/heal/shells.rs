@@ -212,7 +212,7 @@ impl Shells {
                 continue;
             }
             termination.check()?;
-            if surfaces.meet(i, j) {
+            if surfaces.meet(i, j)? {
                 (meet[i], meet[j]) = (true, true);
             } else if self.contains(draft, i, j) {
                 depth[j] += 1;
@@ -226,9 +226,10 @@ impl Shells {
         findings.add(self.turned(draft, given), "shell", "turned, for it was inside out");
         let meeting = meet.iter().filter(|m| **m).count();
         findings.add(meeting, "shell", "that cross or touch; inside and outside by winding number");
-        let crossing = (0..count).filter(|&i| surfaces.crosses_itself(i)).count();
-        // What was found of surfaces that were looked at in part is not to be believed.
-        termination.check()?;
+        let mut crossing = 0;
+        for shell in 0..count {
+            crossing += usize::from(surfaces.crosses_itself(shell)?);
+        }
         if crossing > 0 {
             let shells = plural(crossing, "shell");
             let verb = if crossing == 1 { "crosses itself" } else { "cross themselves" };

@@ -6,6 +6,8 @@
 //! with respect to a displacement δx of the centre of mass and a turn δ (rotation vector) about it,
 //! both in planning axes: x ↦ c + δx + exp(δ) r for a point at r from the centre of mass c.
 
+use std::convert::Infallible;
+
 use std::cell::OnceCell;
 use std::ops::Range;
 use std::sync::Arc;
@@ -397,13 +399,14 @@ fn points_near(
 ) {
     let bound = |p: &Point3<f64>| field.estimate(&(to_measured * p)).lower_bound;
     for tree in trees {
-        tree.walk(
+        let Ok::<(), Infallible>(()) = tree.walk(
             (),
-            |node, ()| (bound(&node.centre) - node.radius <= reach).then_some(()),
+            |node, ()| Ok((bound(&node.centre) - node.radius <= reach).then_some(())),
             |point, ()| {
                 if bound(point) <= reach {
                     visit(*point);
                 }
+                Ok(())
             },
         );
     }

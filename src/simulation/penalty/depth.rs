@@ -4,6 +4,8 @@
 //! points are far apart; so what a motion claims is checked by other means: the samples that
 //! `sliding` uses, against the triangles. The field only tells which samples need not be asked.
 
+use std::convert::Infallible;
+
 use crate::geometry::{Pose, SampleTree, interpolate};
 use crate::scene::Body;
 use crate::sdf::Grid;
@@ -65,7 +67,7 @@ fn is_deeper(sampled: &Body, measured: &Body, to_measured: &Pose, limit: f64) ->
     let found = std::cell::Cell::new(false);
     let field: &Grid = &measured.field;
     for tree in trees {
-        tree.walk(
+        let Ok::<(), Infallible>(()) = tree.walk(
             (),
             |node, ()| {
                 let p = to_measured * node.centre;
@@ -75,12 +77,13 @@ fn is_deeper(sampled: &Body, measured: &Body, to_measured: &Pose, limit: f64) ->
                 } else {
                     field.deepest(&p) + node.radius <= limit
                 };
-                (!found.get() && !is_left_out).then_some(())
+                Ok((!found.get() && !is_left_out).then_some(()))
             },
             |sample, ()| {
                 if !found.get() {
                     found.set(is_point_deeper(measured, &(to_measured * sample), limit));
                 }
+                Ok(())
             },
         );
     }

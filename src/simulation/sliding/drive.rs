@@ -16,7 +16,7 @@ use crate::contact::constraint::Row;
 use crate::contact::sampled::{Around, Contact, Mover, Near};
 use crate::geometry::{Pose, Shape, interpolate};
 use crate::scene::Scene;
-use crate::termination::Poll;
+use crate::termination::{Interrupt, Poll, try_all};
 use crate::tolerances::{BULGE_TOLERANCE, DEPTH_TOLERANCE, FREE_STEP};
 
 use super::super::Action;
@@ -128,7 +128,7 @@ impl Drive {
     }
 
     /// What a step begins with, as [`Self::advance`] does.
-    pub(super) fn constraints(&self, mover: &Mover<'_>, near: &Near) -> Known {
+    pub(super) fn constraints(&self, mover: &Mover<'_>, near: &Near) -> Result<Known, Interrupt> {
         self.chosen(mover, near, &self.wanted)
     }
 
@@ -138,31 +138,36 @@ impl Drive {
     }
 
     /// One step from the mover's pose.
-    pub(super) fn advance(&self, mover: &Mover<'_>, near: &mut Near, around: &mut dyn Around) -> Step {
+    pub(super) fn advance(
+        &self,
+        mover: &Mover<'_>,
+        near: &mut Near,
+        around: &mut dyn Around,
+    ) -> Result<Step, Interrupt> {
         if near.contacts.is_empty() && near.clearance >= self.step {
             let factor = (near.clearance.min(FREE_STEP) / self.step).max(1.0);
             let twist = self.wanted * if self.turns { factor.min(LONGEST_FREE_TURN) } else { factor };
             let there = Mover { pose: self.displaced(mover, &twist), ..*mover };
-            let near = around.near(&there);
-            return Step::Moved(Self::moved(&there, near, &twist, Vec::new(), Vec::new()));
+            let near = around.near(&there)?;
+            return Ok(Step::Moved(Self::moved(&there, near, &twist, Vec::new(), Vec::new())));
         }
         let mut with = Vec::new();
         for start in [Start::Certain, Start::Lazy] {
             for halving in 0..=HALVINGS {
                 let wanted = self.wanted / f64::from(1u32 << halving);
                 let known = match start {
-                    Start::Certain => self.chosen(mover, near, &wanted),
+                    Start::Certain => self.chosen(mover, near, &wanted)?,
                     Start::Lazy => Known { rows: Vec::new(), working: Vec::new(), rounds: LAZY_ROUNDS },
                 };
                 let is_first = start == Start::Certain && halving == 0;
                 if let Some(longer) = is_first.then(|| self.stretched(mover, &known)).flatten() {
-                    let attempt = self.attempt(mover, near, (&longer, true), known.clone(), around);
+                    let attempt = self.attempt(mover, near, (&longer, true), known.clone(), around)?;
                     if let Attempt::Moved(step) = attempt {
-                        return Step::Moved(step);
+                        return Ok(Step::Moved(step));
                     }
                 }
-                match self.attempt(mover, near, (&wanted, false), known, around) {
-                    Attempt::Moved(step) => return Step::Moved(step),
+                match self.attempt(mover, near, (&wanted, false), known, around)? {
+                    Attempt::Moved(step) => return Ok(Step::Moved(step)),
                     Attempt::Stuck(by) => {
                         with = by;
                         // A shorter step would be stopped by the same constraints.
@@ -170,11 +175,11 @@ impl Drive {
                     }
                     Attempt::Entered(by) => with = by,
                 }
-                around.add_known(mover, near);
+                around.add_known(mover, near)?;
             }
         }
         // A slot's wall may be taken for one that stops the pull as well: then nothing does.
-        self.pulled_free(mover, near, around).map_or(Step::Stuck { with }, Step::Moved)
+        Ok(self.pulled_free(mover, near, around)?.map_or(Step::Stuck { with }, Step::Moved))
     }
 
     /// So much more of what is wanted that the motion, as contacts let it, is as long as a step in contact may be;
@@ -216,21 +221,19 @@ impl Drive {
         (wanted, is_stretched): (&Vector6<f64>, bool),
         known: Known,
         around: &mut dyn Around,
-    ) -> Attempt {
+    ) -> Result<Attempt, Interrupt> {
         let target = wanted.component_mul(&self.metric);
         let Known { mut rows, mut working, rounds } = known;
         let mut entered = Vec::new();
         for round in 0..rounds {
-            if mover.is_over() {
-                break;
-            }
+            mover.check()?;
             // Rows that nearly contradict each other meet far away: nothing on the way there is looked at.
             let is_near = |p: &Projected| p.w.norm_squared() <= FARTHEST * target.norm_squared();
             let Some(result) = self.projected(&target, &rows, round == 0).filter(is_near) else { break };
             let touching = result.others(&rows);
             let share = result.w.dot(&target) / target.norm_squared();
             if share < LEAST_SHARE {
-                return Attempt::Stuck(touching);
+                return Ok(Attempt::Stuck(touching));
             }
             let mut twist = result.w.component_div(&self.metric);
             if is_stretched {
@@ -244,11 +247,13 @@ impl Drive {
                 violated = self.violations(&trial, &working, &twist);
             }
             if violated.is_empty() {
-                let there = around.near(&trial);
+                let there = around.near(&trial)?;
                 violated = there.contacts.iter().filter(|c| c.gap < -DEPTH_TOLERANCE).copied().collect();
                 if violated.is_empty() {
-                    if self.turns && !self.is_clear_between((mover, near), (&trial, &there), &twist, around) {
-                        return Attempt::Entered(touching);
+                    if self.turns
+                        && !self.is_clear_between((mover, near), (&trial, &there), &twist, around)?
+                    {
+                        return Ok(Attempt::Entered(touching));
                     }
                     let taken = Taken {
                         mover,
@@ -258,11 +263,11 @@ impl Drive {
                         rows: &rows,
                         contacts: &working,
                     };
-                    if let Some(released) = self.released(&taken, around) {
-                        return Attempt::Moved(released);
+                    if let Some(released) = self.released(&taken, around)? {
+                        return Ok(Attempt::Moved(released));
                     }
                     let pressing = self.pressing(&target, &result, &rows);
-                    return Attempt::Moved(Self::moved(&trial, there, &twist, touching, pressing));
+                    return Ok(Attempt::Moved(Self::moved(&trial, there, &twist, touching, pressing)));
                 }
             }
             tracing::trace!(
@@ -294,7 +299,7 @@ impl Drive {
             rows.extend(worst);
             working.extend(kept.into_iter().map(|i| violated[i]));
         }
-        Attempt::Entered(entered)
+        Ok(Attempt::Entered(entered))
     }
 
     /// Whether a turn that is clear at both ends is so on the way: points move on arcs, which
@@ -306,28 +311,28 @@ impl Drive {
         (to, there): (&Mover<'_>, &Near),
         twist: &Vector6<f64>,
         around: &mut dyn Around,
-    ) -> bool {
+    ) -> Result<bool, Interrupt> {
         let centre = from.scene.centre_in_shape(from.part);
         let turn = twist.fixed_rows::<3>(3).norm();
         let close = |c: &&Contact| c.gap < 0.25 * turn * turn * from.arm(c).norm();
         let places: &[f64] = if self.is_pulled(twist) { &[0.5, 0.25, 0.75] } else { &[0.5] };
-        places.iter().all(|&place| {
+        try_all(places, |&place| {
             let between = Mover { pose: interpolate(&from.pose, &to.pose, &centre, place), ..*from };
             let mut closest = near.contacts.iter().chain(&there.contacts).filter(close);
-            closest.all(|c| between.remeasured(c, 0.0).is_none_or(|c| c.gap >= -BULGE_TOLERANCE))
-                && around.is_clear_at(&between)
+            Ok(closest.all(|c| between.remeasured(c, 0.0).is_none_or(|c| c.gap >= -BULGE_TOLERANCE))
+                && around.is_clear_at(&between)?)
         })
     }
 
     /// One constraint per contact, reduced, and which contacts they come from. Where a contact
     /// leaves a choice of planes, the one is taken along which the motion gets furthest that the
-    /// contacts without a choice allow: at the rim of a hole, that is the hole's wall. Once the condition is
-    /// true contacts are left out: whoever asks must look at it before believing what was chosen.
-    fn chosen(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>) -> Known {
+    /// contacts without a choice allow: at the rim of a hole, that is the hole's wall.
+    fn chosen(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>) -> Result<Known, Interrupt> {
         let poll = Poll::every(ROWS_POLL, mover.termination);
         let mut options = Vec::with_capacity(near.contacts.len() * 2);
         let mut ends = Vec::with_capacity(near.contacts.len());
-        for contact in near.contacts.iter().take_while(|_| !poll.is_over()) {
+        for contact in &near.contacts {
+            poll.check()?;
             mover.options(contact, wanted, &mut options);
             ends.push(options.len());
         }
@@ -336,7 +341,7 @@ impl Drive {
         }
         let starts = std::iter::once(&0).chain(&ends);
         let groups: Vec<&[Row]> = starts.zip(&ends).map(|(a, b)| &options[*a..*b]).collect();
-        let certain = groups.iter().filter(|g| g.len() == 1 && !poll.is_over()).map(|g| g[0]);
+        let certain = groups.iter().filter(|g| g.len() == 1).map(|g| g[0]);
         let (certain, _) = reduced(certain, self.gyration);
         let likely = self.projected(&wanted.component_mul(&self.metric), &certain, true);
         let motion = likely.map_or(*wanted, |p| p.w.component_div(&self.metric));
@@ -349,10 +354,10 @@ impl Drive {
             }
             best
         };
-        let groups = groups.iter().take_while(|_| !poll.is_over());
-        let (rows, kept) = reduced(groups.map(best), self.gyration);
+        mover.check()?;
+        let (rows, kept) = reduced(groups.iter().map(best), self.gyration);
         let working = kept.into_iter().map(|i| near.contacts[i]).collect();
-        Known { rows, working, rounds: EAGER_ROUNDS }
+        Ok(Known { rows, working, rounds: EAGER_ROUNDS })
     }
 
     /// A row without the freedoms that the action does not give.

@@ -14,6 +14,7 @@ use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 use crate::contact::sampled::{Around, Mover, Near};
 use crate::geometry::{Pose, Screw};
 use crate::scene::{Scene, Surroundings};
+use crate::termination::{Interrupt, try_all};
 use crate::tolerances::DEPTH_TOLERANCE;
 
 use super::drive::Drive;
@@ -111,9 +112,9 @@ impl<'a> Leaper<'a> {
         mover: &Mover<'_>,
         pressing: Vec<Vector6<f64>>,
         around: &mut dyn Around,
-    ) -> Option<Leap> {
+    ) -> Result<Option<Leap>, Interrupt> {
         if self.disabled {
-            return None;
+            return Ok(None);
         }
         let now = Screw::between(from, &mover.pose, 1);
         let apart = self.last.replace(now).map_or(f64::INFINITY, |before| self.apart(&before, &now, from));
@@ -128,20 +129,20 @@ impl<'a> Leaper<'a> {
             return self.follow(mover);
         }
         let wanted = self.length.min(longest(&now));
-        let holds = |there: &Mover<'_>| pressing.iter().all(|push| self.is_pressed(there, push));
-        let mut steps = self.free_steps(mover, &now, wanted, &holds);
+        let holds = |there: &Mover<'_>| try_all(&pressing, |push| self.is_pressed(there, push));
+        let mut steps = self.free_steps(mover, &now, wanted, &holds)?;
         while steps > 1 {
             let there = Mover { pose: now.times(steps as f64) * mover.pose, ..*mover };
-            let near = around.near(&there);
+            let near = around.near(&there)?;
             if near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE) {
                 self.length = if steps == wanted { steps * 2 } else { steps };
                 self.alike = self.alike.map(|(begin, count)| (begin, count + steps));
-                return Some(leapt(mover, &now, steps, Some(near)));
+                return Ok(Some(leapt(mover, &now, steps, Some(near))));
             }
             steps /= 2;
         }
         self.length = 2;
-        None
+        Ok(None)
     }
 
     /// Starts to follow a helix, if the steps so far show one.
@@ -158,23 +159,23 @@ impl<'a> Leaper<'a> {
     }
 
     /// The next leap along a helix that is followed.
-    pub(super) fn follow(&mut self, mover: &Mover<'_>) -> Option<Leap> {
-        let Helix { screw, length, pressing } = self.helix.take()?;
+    pub(super) fn follow(&mut self, mover: &Mover<'_>) -> Result<Option<Leap>, Interrupt> {
+        let Some(Helix { screw, length, pressing }) = self.helix.take() else { return Ok(None) };
         let wanted = telling(&screw, length.min(LONGEST_ON_HELIX));
-        let mut steps = telling(&screw, self.free_on_helix(mover, &screw, wanted, &pressing));
+        let mut steps = telling(&screw, self.free_on_helix(mover, &screw, wanted, &pressing)?);
         while steps >= SHORTEST_ON_HELIX {
             let there = Mover { pose: screw.times(steps as f64) * mover.pose, ..*mover };
-            if let Some(pose) = self.drive.lifted(&there, &screw.axis(), self.surroundings) {
+            if let Some(pose) = self.drive.lifted(&there, &screw.axis(), self.surroundings)? {
                 let angle = screw.angle() * steps as f64;
                 let screw = Screw::between_turning(&mover.pose, &pose, steps, &screw, angle);
                 let length = if steps == wanted { steps * 2 } else { steps };
                 self.helix = Some(Helix { screw, length, pressing });
-                return Some(leapt(mover, &screw, steps, None));
+                return Ok(Some(leapt(mover, &screw, steps, None)));
             }
             steps = telling(&screw, steps / 2);
         }
         self.alike = None;
-        None
+        Ok(None)
     }
 
     /// How many steps along a helix, of those wanted, are on the thread and free.
@@ -184,11 +185,11 @@ impl<'a> Leaper<'a> {
         screw: &Screw,
         wanted: usize,
         pressing: &[Vector6<f64>],
-    ) -> usize {
+    ) -> Result<usize, Interrupt> {
         let after = |k: usize| Mover { pose: screw.times(k as f64) * mover.pose, ..*mover };
-        let is_held = |k: usize| pressing.iter().all(|push| self.is_on_thread(&after(k), push));
-        let is_free = |k: usize| !after(k).clearly_enters(&self.surroundings.standing);
-        let held = good_until(wanted, &HELD_STATIONS, &is_held);
+        let is_held = |k: usize| try_all(pressing, |push| self.is_on_thread(&after(k), push));
+        let is_free = |k: usize| Ok(!after(k).clearly_enters(&self.surroundings.standing)?);
+        let held = good_until(wanted, &HELD_STATIONS, &is_held)?;
         good_until(held, &FREE_STATIONS, &is_free)
     }
 
@@ -204,18 +205,17 @@ impl<'a> Leaper<'a> {
         mover: &Mover<'_>,
         screw: &Screw,
         wanted: usize,
-        holds: &dyn Fn(&Mover<'_>) -> bool,
-    ) -> usize {
-        let is_free = |k: &usize| {
-            let there = Mover { pose: screw.times(*k as f64) * mover.pose, ..*mover };
-            !there.clearly_enters(&self.surroundings.standing) && holds(&there)
-        };
-        (1..=wanted).take_while(is_free).count()
+        holds: &dyn Fn(&Mover<'_>) -> Result<bool, Interrupt>,
+    ) -> Result<usize, Interrupt> {
+        good_until(wanted, &[1], &|k: usize| {
+            let there = Mover { pose: screw.times(k as f64) * mover.pose, ..*mover };
+            Ok(!there.clearly_enters(&self.surroundings.standing)? && holds(&there)?)
+        })
     }
 
     /// Whether the fields show that a push still meets what it met: not beside a slot's rim, where
     /// short steps are needed.
-    fn is_pressed(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> bool {
+    fn is_pressed(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> Result<bool, Interrupt> {
         let (v, w): (Vector3<f64>, Vector3<f64>) =
             (push.fixed_rows::<3>(0).into(), push.fixed_rows::<3>(3).into());
         let scale = PROBE * self.drive.step() / (v.norm() + w.norm() * self.radius);
@@ -227,9 +227,9 @@ impl<'a> Leaper<'a> {
     }
 
     /// Whether a short pull, as far as a push has one, still enters a thread: finer than fields show.
-    fn is_on_thread(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> bool {
+    fn is_on_thread(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> Result<bool, Interrupt> {
         let pull: Vector3<f64> = push.fixed_rows::<3>(0).into();
-        let Some(direction) = pull.try_normalize(0.0) else { return false };
+        let Some(direction) = pull.try_normalize(0.0) else { return Ok(false) };
         let step = direction * (PROBE_ON_HELIX * self.drive.step());
         let pose = Translation3::from(step) * mover.pose;
         Mover { pose, ..*mover }.enters_by(PRESSED, &self.surroundings.standing)
@@ -244,11 +244,18 @@ fn longest(screw: &Screw) -> usize {
 
 /// Up to which step all that are looked at are good: every so many of them, and beyond the last good one
 /// every so many again, down to every one.
-fn good_until(last: usize, every: &[usize], is_good: &dyn Fn(usize) -> bool) -> usize {
-    every.iter().fold(0, |from, every| {
-        let stations = (1..=(last - from) / every).map(|i| from + i * every);
-        from + every * stations.take_while(|&k| is_good(k)).count()
-    })
+fn good_until(
+    last: usize,
+    every: &[usize],
+    is_good: &dyn Fn(usize) -> Result<bool, Interrupt>,
+) -> Result<usize, Interrupt> {
+    let mut good = 0;
+    for every in every {
+        while good + every <= last && is_good(good + every)? {
+            good += every;
+        }
+    }
+    Ok(good)
 }
 
 /// The most steps of a leap along a helix, of those wanted, that tell its screw.
@@ -278,7 +285,7 @@ mod tests {
         for last in 0..70 {
             for good in 0..=last {
                 for every in [&HELD_STATIONS[..], &FREE_STATIONS] {
-                    assert_eq!(good_until(last, every, &|k| k <= good), good, "of {last}");
+                    assert_eq!(good_until(last, every, &|k| Ok(k <= good)), Ok(good), "of {last}");
                 }
             }
         }

@@ -10,6 +10,7 @@ use nalgebra::Point3;
 
 use crate::contact::sampled::{Around, Extent, Mover, Near, Vicinity};
 use crate::geometry::Pose;
+use crate::termination::Interrupt;
 use crate::tolerances::FREE_STEP;
 
 use super::drive::contact_step;
@@ -34,11 +35,15 @@ pub(super) struct Start {
 impl Start {
     /// Of a part that is moved by no more than a step further than `least`, of which is asked what is within `reach`;
     /// none if that takes many looks, which depends on the question alone.
-    pub(super) fn looked_at(mover: &Mover<'_>, other: usize, (least, reach): (f64, f64)) -> Option<Self> {
+    pub(super) fn looked_at(
+        mover: &Mover<'_>,
+        other: usize,
+        (least, reach): (f64, f64),
+    ) -> Result<Option<Self>, Interrupt> {
         let radius = STEPS * contact_step(&mover.body.shape) + reach;
         let vicinity = Vicinity::new(mover, other, least + FREE_STEP + radius);
         let near = vicinity.near(mover, Extent { radius, reach, most: MOST_LOOKS })?;
-        Some(Self { vicinity, centre: mover.centre(), radius, near })
+        Ok(near.map(|near| Self { vicinity, centre: mover.centre(), radius, near }))
     }
 }
 
@@ -58,44 +63,44 @@ impl<'a> Looks<'a> {
     }
 
     /// What a step from a pose begins with, that the one before may have ended at.
-    pub(super) fn from(&mut self, mover: &Mover<'_>) -> Near {
-        let mut near = self.within(self.reach, mover);
+    pub(super) fn from(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt> {
+        let mut near = self.within(self.reach, mover)?;
         if near.contacts.is_empty() {
             // How long the step may be is told by the clearance, which is told less well by samples that are passed by.
-            near = self.all_within(self.reach, mover);
+            near = self.all_within(self.reach, mover)?;
         }
         self.seen.clear();
-        near
+        Ok(near)
     }
 
-    fn within(&mut self, reach: f64, mover: &Mover<'_>) -> Near {
+    fn within(&mut self, reach: f64, mover: &Mover<'_>) -> Result<Near, Interrupt> {
         let is_seen = |(pose, by, _): &&(Pose, f64, Near)| *pose == mover.pose && *by == reach;
         if let Some((.., near)) = self.seen.iter().find(is_seen) {
-            return near.clone();
+            return Ok(near.clone());
         }
         let known = self.shifted.as_mut().and_then(|shifted| shifted.near(mover, reach));
-        let near = known.unwrap_or_else(|| self.all_within(reach, mover));
+        let near = known.map_or_else(|| self.all_within(reach, mover), Ok)?;
         self.seen.push((mover.pose, reach, near.clone()));
-        near
+        Ok(near)
     }
 
-    fn all_within(&self, reach: f64, mover: &Mover<'_>) -> Near {
+    fn all_within(&self, reach: f64, mover: &Mover<'_>) -> Result<Near, Interrupt> {
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
         match &self.shifted {
             Some(shifted) => {
                 let all = Extent { radius: reach, reach, most: usize::MAX };
-                near = shifted.start.vicinity.near(mover, all).unwrap_or(near);
+                near = shifted.start.vicinity.near(mover, all)?.unwrap_or(near);
             }
-            None => mover.near_pair(self.other, reach, &mut near),
+            None => mover.near_pair(self.other, reach, &mut near)?,
         }
-        near
+        Ok(near)
     }
 }
 
 impl Around for Looks<'_> {
     /// Whether a step can be made is told by what enters at its end alone. What is merely near there matters only if
     /// another step follows: without fields it costs next to nothing.
-    fn near(&mut self, mover: &Mover<'_>) -> Near {
+    fn near(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt> {
         self.within(if self.shifted.is_some() { self.reach } else { 0.0 }, mover)
     }
 }
@@ -165,7 +170,7 @@ mod tests {
         ) {
             let (scene, _) = scene(peg_in_hole(excess));
             let start = Mover::new(&scene, 1, scene.bodies[1].planning_from_shape);
-            let around = Start::looked_at(&start.exactly(), 0, (LEAST, REACH)).unwrap();
+            let around = Start::looked_at(&start.exactly(), 0, (LEAST, REACH)).unwrap().unwrap();
             let mut looks = Looks::new(0, REACH, Some(&around));
             for shift in [Vector3::zeros()].into_iter().chain(shifts) {
                 let mut mover = start;
@@ -176,20 +181,20 @@ mod tests {
                     told
                 };
                 let mut by_fields = Near { contacts: Vec::new(), clearance: f64::INFINITY };
-                mover.near_pair(0, REACH, &mut by_fields);
-                let remembered = looks.near(&mover.exactly());
-                let all = looks.all_within(REACH, &mover.exactly());
+                mover.near_pair(0, REACH, &mut by_fields).unwrap();
+                let remembered = looks.near(&mover.exactly()).unwrap();
+                let all = looks.all_within(REACH, &mover.exactly()).unwrap();
                 prop_assert_eq!(told(&remembered), told(&by_fields));
                 prop_assert_eq!(told(&all), told(&by_fields));
                 // No other sample is nearer than they say.
                 let everything = Vicinity::new(&mover.exactly(), 0, FAR);
                 let all_of_all = Extent { radius: FAR, reach: REACH, most: usize::MAX };
-                let everything = everything.near(&mover.exactly(), all_of_all).unwrap();
+                let everything = everything.near(&mover.exactly(), all_of_all).unwrap().unwrap();
                 let others = everything.contacts.iter().map(|c| c.gap).filter(|gap| *gap >= REACH);
                 let nearest = others.fold(f64::INFINITY, f64::min);
                 prop_assert!(remembered.clearance <= nearest + 1e-9 && all.clearance <= nearest + 1e-9);
                 // Twice at one pose is the same.
-                prop_assert_eq!(told(&looks.near(&mover.exactly())), told(&remembered));
+                prop_assert_eq!(told(&looks.near(&mover.exactly()).unwrap()), told(&remembered));
             }
         }
     }

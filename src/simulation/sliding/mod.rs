@@ -88,13 +88,10 @@ impl TransitionFunction for SlidingEngine {
         while path.len() < MOST_POSES {
             termination.check()?;
             let (mut turned, mut touching) = (0.0, Vec::new());
-            let mut leap = leaper.follow(&mover);
+            let mut leap = leaper.follow(&mover)?;
             if leap.is_none() {
-                let mut here = around.settle(&mover, near.take());
-                let step = drive.advance(&mover, &mut here, &mut around);
-                // What was found of contacts that were cut short is not to be believed.
-                termination.check()?;
-                let step = match step {
+                let mut here = around.settle(&mover, near.take())?;
+                let step = match drive.advance(&mover, &mut here, &mut around)? {
                     Step::Stuck { with } => {
                         return Ok(Motion::simulated(path, asked, End::Collision { with }));
                     }
@@ -106,7 +103,7 @@ impl TransitionFunction for SlidingEngine {
                 path.push(step.pose);
                 // Where regions tell, ordinary steps cost less than looking where a long one may lead.
                 if is_straight && !here.contacts.is_empty() && around.samples() {
-                    leap = leaper.leap(&from, &mover, step.pressing, &mut around);
+                    leap = leaper.leap(&from, &mover, step.pressing, &mut around)?;
                 }
                 (turned, touching, near) = (step.turned, step.touching, Some(step.near));
             }

@@ -49,22 +49,21 @@ pub fn pair_blocks(
     let mut start = Mover::new(scene, part, *pose).until(termination);
     let is_open = [start.body, &scene.bodies[other]].iter().any(|body| body.shape.surface.is_open());
     let is_exact = !is_open && actions.iter().all(|a| !a.turns());
-    let around = if is_exact { Start::looked_at(&start.exactly(), other, (least, reach)) } else { None };
+    let around = if is_exact { Start::looked_at(&start.exactly(), other, (least, reach))? } else { None };
     let near = match &around {
         Some(around) => {
             start = start.exactly();
             around.near.within(reach)
         }
-        None => start.near_first(other, reach),
+        None => start.near_first(other, reach)?,
     };
-    termination.check()?;
     if near.contacts.is_empty() && near.clearance > least {
         return Ok(vec![false; actions.len()]);
     }
     let blocked = |action: &Action| {
         let drive = Drive::new(scene, part, pose, *action);
         let mut looks = Looks::new(other, reach, around.as_ref());
-        let mut step = drive.advance(&start, &mut near.clone(), &mut looks);
+        let mut step = drive.advance(&start, &mut near.clone(), &mut looks)?;
         for _ in 1..STATIC_STEPS {
             termination.check()?;
             let Step::Moved(Moved { pose: there, .. }) = step else { return Ok(true) };
@@ -72,11 +71,9 @@ pub fn pair_blocks(
             if (mover.centre() - start.centre()).norm() > least {
                 return Ok(false);
             }
-            let mut near = looks.from(&mover);
-            step = drive.advance(&mover, &mut near, &mut looks);
+            let mut near = looks.from(&mover)?;
+            step = drive.advance(&mover, &mut near, &mut looks)?;
         }
-        // What was found of a cut walk is not to be believed.
-        termination.check()?;
         Ok(matches!(step, Step::Stuck { .. }))
     };
     // Side by side, one by one: two parts alone are but one pair, and some take several times as long as others.

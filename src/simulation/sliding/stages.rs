@@ -77,13 +77,16 @@ pub fn step_costs(
                 break;
             }
             let mover = Mover::new(scene, part, *pose).until(termination);
-            let (mut near, gather) = timed(|| around.settle(&mover, None));
+            let (near, gather) = timed(|| around.settle(&mover, None));
+            let mut near = near?;
             if near.contacts.is_empty() && near.clearance >= drive.step() {
                 continue;
             }
             let (known, reduce) = timed(|| drive.constraints(&mover, &near));
+            let known = known?;
             let (_, solve) = timed(|| drive.solved(&known));
-            let (_, advance) = timed(|| drive.advance(&mover, &mut near, &mut around));
+            let (step, advance) = timed(|| drive.advance(&mover, &mut near, &mut around));
+            step?;
             let telling = if around.samples() { Telling::Samples } else { Telling::Regions };
             costs.push(StepCost { telling, gather, reduce, solve, advance });
         }

@@ -258,7 +258,7 @@ mod tests {
             most in 0.0..2.0f64,
         ) {
             let (moving, standing) = (surface(ball(4)), surface(tube(1.2, 2.0, [-1.0, 1.0], 24)));
-            let tree = PatchTree::new(&moving, &Poll::every(1, None));
+            let tree = PatchTree::new(&moving, &Poll::every(1, None)).unwrap();
             let path = [Pose::identity(), Pose::new(shift, turn)];
             let course = Course::new(&path, Point3::origin(), 1.0);
             let leg = View::new(&course, true, 1e-3).leg(Interval::WHOLE);

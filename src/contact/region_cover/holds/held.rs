@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::geometry::{Bounds, FreeRegion, NoRegion, Pose, Wanted};
 use crate::scene::Scene;
-use crate::termination::Termination;
+use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
 
 use super::super::super::sampled::{Contact, Mover, Near};
@@ -82,18 +82,19 @@ impl<'a> Held<'a> {
         other: usize,
         is_start: bool,
         termination: &Termination,
-    ) -> Option<Self> {
+    ) -> Result<Option<Self>, Interrupt> {
         if scene.allowances.of(part, other) > MOST_GRANTED {
-            return None;
+            return Ok(None);
         }
-        let gathered = starting(scene, (part, pose), other, (is_start, MOST_PIECES), termination).ok()?;
-        let cells = gathered.cells.as_ref().filter(|cells| cells.len() <= MOST_PIECES)?;
-        let facing = Facing::new(scene, (part, pose), other, gathered.asks_part, termination).ok()?;
+        let gathered = starting(scene, (part, pose), other, (is_start, MOST_PIECES), termination)?;
+        let cells = gathered.cells.as_ref().filter(|cells| cells.len() <= MOST_PIECES);
+        let Some(cells) = cells else { return Ok(None) };
+        let facing = Facing::new(scene, (part, pose), other, gathered.asks_part, termination)?;
         let mut placed = Placed::default();
         let here = facing.with_part_at(pose);
         let pieces = cells.iter().map(|cell| Hold::of_cell(cell, &facing, &here, &mut placed)).collect();
         let known = Vec::new();
-        Some(Self {
+        Ok(Some(Self {
             facing,
             pieces,
             known,
@@ -102,7 +103,7 @@ impl<'a> Held<'a> {
             steps: 0,
             regions: 0,
             placed,
-        })
+        }))
     }
 
     /// What is known to be near with the part at the mover's pose; it was free at `base`. Tells which pieces
@@ -137,13 +138,20 @@ impl<'a> Held<'a> {
     }
 
     /// Finds regions for pieces that have left theirs, or what they enter.
-    pub(crate) fn renewed(&mut self, left: &Left, mover: &Mover<'_>, reach: f64, near: &mut Near) {
+    pub(crate) fn renewed(
+        &mut self,
+        left: &Left,
+        mover: &Mover<'_>,
+        reach: f64,
+        near: &mut Near,
+    ) -> Result<(), Interrupt> {
         let found = self.renew(&left.outside, &left.ends);
         if self.is_left_to_samples {
             return mover.near_pair(self.facing.other, reach, near);
         }
         self.learn(&found);
         near.contacts.extend(found);
+        Ok(())
     }
 
     /// The pieces that are not in their regions at the other end. Tells of all what there is left for
@@ -396,7 +404,12 @@ impl<'a> Held<'a> {
     }
 
     /// Goes on from the pose that was looked at last; false where regions do not tell any more.
-    pub(crate) fn settle(&mut self, mover: &Mover<'_>, reach: f64, termination: &Termination) -> bool {
+    pub(crate) fn settle(
+        &mut self,
+        mover: &Mover<'_>,
+        reach: f64,
+        termination: &Termination,
+    ) -> Result<bool, Interrupt> {
         let there = self.facing.with_part_at(&mover.pose);
         let again = self.known.iter().filter_map(|c| mover.remeasured(c, reach));
         self.known = again.filter(|c| c.gap < reach).collect();
@@ -405,8 +418,9 @@ impl<'a> Held<'a> {
         for &i in outside.iter().rev() {
             let ends = Ends::at(there);
             let hold = self.pieces.swap_remove(i);
-            if termination.check().is_err() || self.held(&hold, &ends, &mut left, &mut found).is_err() {
-                return false;
+            termination.check()?;
+            if self.held(&hold, &ends, &mut left, &mut found).is_err() {
+                return Ok(false);
             }
         }
         self.pieces.extend(found);
@@ -415,7 +429,7 @@ impl<'a> Held<'a> {
             hold.slack = hold.next.unwrap_or(0.0);
         }
         self.steps += 1;
-        self.regions <= MOST_IN_ALL + MOST_PER_STEP * self.steps
+        Ok(self.regions <= MOST_IN_ALL + MOST_PER_STEP * self.steps)
     }
 
     /// Whether nothing is too deep between the base and the pose that was looked at last.

@@ -16,7 +16,7 @@ mod tests;
 
 use crate::geometry::Pose;
 use crate::scene::{Scene, Surroundings};
-use crate::termination::Termination;
+use crate::termination::{Interrupt, Termination};
 use crate::tolerances::DEPTH_TOLERANCE;
 
 use super::super::sampled::{Around, Mover, Near};
@@ -72,79 +72,81 @@ impl<'a> Holds<'a> {
     }
 
     /// Goes on from a pose: what is near it, if that is not known yet.
-    pub(crate) fn settle(&mut self, mover: &Mover<'_>, near: Option<Near>) -> Near {
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(crate) fn settle(&mut self, mover: &Mover<'_>, near: Option<Near>) -> Result<Near, Interrupt> {
         let mut near = match near {
             Some(near) if self.looked_at == Some(mover.pose) => near,
-            _ => self.near(mover),
+            _ => self.near(mover)?,
         };
         self.base = mover.pose;
-        let (reach, sampled) = (self.reach, &mut self.sampled);
+        let mut told = Vec::with_capacity(self.pairs.len());
         // What is out of reach is found anew when it comes near.
-        self.pairs.retain_mut(|pair| {
-            let is_told =
-                pair.is_near && !pair.is_left_to_samples && pair.settle(mover, reach, self.termination);
-            if pair.is_near && !is_told {
-                sampled.push(pair.facing.other);
+        for mut pair in self.pairs.drain(..).filter(|pair| pair.is_near) {
+            if !pair.is_left_to_samples && pair.settle(mover, self.reach, self.termination)? {
+                told.push(pair);
+            } else {
+                self.sampled.push(pair.facing.other);
             }
-            is_told
-        });
+        }
+        self.pairs = told;
         for contact in self.pairs.iter().flat_map(|pair| &pair.known) {
             if !near.contacts.iter().any(|c| c.is_of_same_point(contact)) {
                 near.contacts.push(*contact);
             }
         }
-        near
+        Ok(near)
     }
 
     /// Whether a standing part's pair is told by regions; takes it in if it is new.
-    fn pair_of(&mut self, other: usize) -> Option<usize> {
+    fn pair_of(&mut self, other: usize) -> Result<Option<usize>, Interrupt> {
         if self.all_sampled || self.sampled.contains(&other) {
-            return None;
+            return Ok(None);
         }
-        let known = self.pairs.iter().position(|pair| pair.facing.other == other);
-        known.or_else(|| {
-            let pair = Held::new(
-                self.scene,
-                (self.part, &self.base),
-                other,
-                self.base == self.start,
-                self.termination,
-            );
-            if let Some(pair) = pair {
+        if let Some(known) = self.pairs.iter().position(|pair| pair.facing.other == other) {
+            return Ok(Some(known));
+        }
+        let is_start = self.base == self.start;
+        match Held::new(self.scene, (self.part, &self.base), other, is_start, self.termination)? {
+            Some(pair) => {
                 self.pairs.push(pair);
-                return Some(self.pairs.len() - 1);
+                Ok(Some(self.pairs.len() - 1))
             }
-            self.sampled.push(other);
-            None
-        })
+            None => {
+                self.sampled.push(other);
+                Ok(None)
+            }
+        }
     }
 }
 
 impl Around for Holds<'_> {
-    fn near(&mut self, mover: &Mover<'_>) -> Near {
+    fn near(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt> {
         self.pairs.iter_mut().for_each(|pair| pair.is_near = false);
         self.looked_at = Some(mover.pose);
         let (surroundings, reach, base) = (self.surroundings, self.reach, self.base);
         let mut left = Vec::new();
-        let mut near = mover.near_by(surroundings, reach, |other, near| match self.pair_of(other) {
-            Some(pair) => left.extend(self.pairs[pair].near(&base, mover, reach, near).map(|l| (pair, l))),
-            None => mover.near_pair(other, reach, near),
-        });
+        let mut near = mover.near_by(surroundings, reach, |other, near| {
+            let Some(pair) = self.pair_of(other)? else { return mover.near_pair(other, reach, near) };
+            left.extend(self.pairs[pair].near(&base, mover, reach, near).map(|l| (pair, l)));
+            Ok(())
+        })?;
         // Of a pose that is refused already it does not matter what else may be entered.
         if near.contacts.iter().any(|c| c.gap < -DEPTH_TOLERANCE) {
-            return near;
+            return Ok(near);
         }
         for (pair, left) in left {
-            self.pairs[pair].renewed(&left, mover, reach, &mut near);
+            self.pairs[pair].renewed(&left, mover, reach, &mut near)?;
         }
-        near
+        Ok(near)
     }
 
-    fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) {
+    fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) -> Result<(), Interrupt> {
         for pair in self.pairs.extract_if(.., |pair| pair.is_left_to_samples) {
             let other = pair.facing.other;
             near.contacts.retain(|c| c.other != other);
-            mover.near_pair(other, self.reach, near);
+            mover.near_pair(other, self.reach, near)?;
             self.sampled.push(other);
         }
         for contact in self.pairs.iter().flat_map(|pair| &pair.known) {
@@ -153,9 +155,10 @@ impl Around for Holds<'_> {
                 near.contacts.extend(here);
             }
         }
+        Ok(())
     }
 
-    fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
-        self.pairs.iter_mut().all(|pair| pair.is_clear_at(between))
+    fn is_clear_at(&mut self, between: &Mover<'_>) -> Result<bool, Interrupt> {
+        Ok(self.pairs.iter_mut().all(|pair| pair.is_clear_at(between)))
     }
 }

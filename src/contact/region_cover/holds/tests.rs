@@ -17,13 +17,16 @@ fn a_loose_peg_turns_and_is_told_by_regions_all_the_way() {
     let termination = Termination::default();
     let mut holds = Holds::new(&scene, &around, (1, &start), 0.1, false, &termination);
     let mover = Mover::new(&scene, 1, start);
-    let near = holds.settle(&mover, None);
+    let near = holds.settle(&mover, None).unwrap();
     assert!(near.contacts.iter().all(|c| c.gap >= 0.0) && !holds.samples());
     let turned = Mover { pose: start * Pose::rotation(Vector3::z() * 0.3), ..mover };
-    assert!(holds.near(&turned).contacts.iter().any(|c| c.gap < -0.01), "its corners are in the walls");
+    assert!(
+        holds.near(&turned).unwrap().contacts.iter().any(|c| c.gap < -0.01),
+        "its corners are in the walls"
+    );
     let lifted = Mover { pose: Pose::translation(0.0, 0.0, 0.1) * start, ..mover };
-    assert!(holds.near(&lifted).contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE));
-    assert!(!holds.settle(&lifted, None).contacts.is_empty(), "what was found of the walls is kept");
+    assert!(holds.near(&lifted).unwrap().contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE));
+    assert!(!holds.settle(&lifted, None).unwrap().contacts.is_empty(), "what was found of the walls is kept");
     assert!(!holds.samples());
 }
 
@@ -36,7 +39,7 @@ fn a_long_pin_is_stopped_by_what_its_faces_get_over_without_another_region() {
     let start = scene.bodies[1].planning_from_shape;
     let termination = Termination::default();
     let mover = Mover::new(&scene, 1, start);
-    let mut pair = Held::new(&scene, (1, &start), 0, true, &termination).unwrap();
+    let mut pair = Held::new(&scene, (1, &start), 0, true, &termination).unwrap().unwrap();
     let mut looked = |pose: Pose| {
         let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
         let left = pair.near(&start, &Mover { pose, ..mover }, 0.1, &mut near);
@@ -76,7 +79,7 @@ fn what_regions_let_pass_enters_nothing() {
         let mover = Mover::new(&scene, 1, start);
         for direction in spread([-1.0; 3], [1.0; 3], 12) {
             let mut holds = Holds::new(&scene, &around, (1, &start), 0.12, false, &termination);
-            holds.settle(&mover, None);
+            holds.settle(&mover, None).unwrap();
             // The way to the other solid, with a turn about another axis.
             let step = Pose::new(
                 (scene.bodies[0].bounds.centre() - mover.centre()).normalize() * 0.05
@@ -87,14 +90,16 @@ fn what_regions_let_pass_enters_nothing() {
             for _ in 0..12 {
                 let from = there.pose;
                 let next = Mover { pose: step * from, ..mover };
-                let near = holds.near(&next);
+                let near = holds.near(&next).unwrap();
                 let middle =
                     Mover { pose: interpolate(&from, &next.pose, &scene.centre_in_shape(1), 0.5), ..mover };
-                if near.contacts.iter().any(|c| c.gap < -DEPTH_TOLERANCE) || !holds.is_clear_at(&middle) {
+                if near.contacts.iter().any(|c| c.gap < -DEPTH_TOLERANCE)
+                    || !holds.is_clear_at(&middle).unwrap()
+                {
                     stopped += 1;
                     break;
                 }
-                holds.settle(&next, Some(near));
+                holds.settle(&next, Some(near)).unwrap();
                 if holds.samples() {
                     break;
                 }

@@ -6,6 +6,7 @@ use crate::contact::constraint::Row;
 use crate::contact::sampled::Mover;
 use crate::geometry::Pose;
 use crate::scene::Surroundings;
+use crate::termination::Interrupt;
 use crate::tolerances::DEPTH_TOLERANCE;
 
 use super::super::super::projection::project;
@@ -28,15 +29,16 @@ impl Drive {
         mover: &Mover<'_>,
         axis: &Vector3<f64>,
         surroundings: &Surroundings,
-    ) -> Option<Pose> {
+    ) -> Result<Option<Pose>, Interrupt> {
         let mut here = *mover;
-        let mut close = here.near(surroundings, LIFT_REACH);
+        let mut close = here.near(surroundings, LIFT_REACH)?;
         for round in 0..LIFT_ROUNDS {
             let least = close.contacts.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
-            if mover.is_over() || round > 0 && least >= LIFT * 0.5 {
+            mover.check()?;
+            if round > 0 && least >= LIFT * 0.5 {
                 break;
             }
-            let Known { rows, .. } = self.chosen(&here, &close, &Vector6::zeros());
+            let Known { rows, .. } = self.chosen(&here, &close, &Vector6::zeros())?;
             let margins = (0..5).map(|halving| LIFT / f64::from(1 << halving)).chain([0.0]);
             let correction = margins.filter(|m| *m > least).find_map(|margin| {
                 let scale = |r: &Row| Row { a: r.a.component_div(&self.metric), b: r.b - margin, ..*r };
@@ -51,9 +53,9 @@ impl Drive {
                 break;
             }
             here.pose = self.displaced(&here, &twist);
-            close = here.near(surroundings, LIFT_REACH);
+            close = here.near(surroundings, LIFT_REACH)?;
         }
-        close.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE).then_some(here.pose)
+        Ok(close.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE).then_some(here.pose))
     }
 }
 

@@ -9,6 +9,7 @@ use nalgebra::{Translation3, Unit, Vector3, Vector6};
 
 use crate::contact::constraint::Row;
 use crate::contact::sampled::{Around, Contact, Mover, Near};
+use crate::termination::Interrupt;
 use crate::tolerances::DEPTH_TOLERANCE;
 
 use super::super::super::projection::Projected;
@@ -63,26 +64,31 @@ impl Drive {
         mover: &Mover<'_>,
         near: &Near,
         around: &mut dyn Around,
-    ) -> Option<Moved> {
-        let pulling = self.pulling(self.pull()?);
-        let known = pulling.constraints(mover, near);
-        let got = pulling.solved(&known)?.w.dot(&pulling.wanted);
-        if got < FREE_PULL * pulling.wanted.norm_squared() {
-            return None;
+    ) -> Result<Option<Moved>, Interrupt> {
+        let Some(pull) = self.pull() else { return Ok(None) };
+        let pulling = self.pulling(pull);
+        let known = pulling.constraints(mover, near)?;
+        let got = pulling.solved(&known).map(|solved| solved.w.dot(&pulling.wanted));
+        if got.is_none_or(|got| got < FREE_PULL * pulling.wanted.norm_squared()) {
+            return Ok(None);
         }
-        match pulling.attempt(mover, near, (&pulling.wanted, false), known, around) {
+        Ok(match pulling.attempt(mover, near, (&pulling.wanted, false), known, around)? {
             Attempt::Moved(pulled) => Some(pulled),
             Attempt::Stuck(_) | Attempt::Entered(_) => None,
-        }
+        })
     }
 
     /// The step that pulls the part out of another one that would turn it past where it can be pulled: part of the way
     /// like that other one, then like a pull.
-    pub(super) fn released(&self, step: &Taken<'_>, around: &mut dyn Around) -> Option<Moved> {
-        let pull = self.pull()?;
+    pub(super) fn released(
+        &self,
+        step: &Taken<'_>,
+        around: &mut dyn Around,
+    ) -> Result<Option<Moved>, Interrupt> {
+        let Some(pull) = self.pull() else { return Ok(None) };
         let opposes = |row: &Row| row.a.fixed_rows::<3>(0).dot(&pull) < -LEAST_OPPOSED;
         if !step.result.active.iter().any(|(i, _)| opposes(&step.rows[*i])) {
-            return None;
+            return Ok(None);
         }
         let lift = Translation3::from(*pull * LIFT);
         let lifted = |place| Mover { pose: lift * self.at(step, place).0.pose, ..*step.mover };
@@ -94,21 +100,21 @@ impl Drive {
             for contact in holding.drain(..) {
                 close(&mut open, &contact, &lifted, step.twist);
             }
-            let place = middle_of_longest(&open)?;
+            let Some(place) = middle_of_longest(&open) else { return Ok(None) };
             let up = &lifted[place as usize];
-            let mut near = around.near(up);
+            let mut near = around.near(up)?;
             holding.extend(near.contacts.iter().filter(|c| c.gap < -DEPTH_TOLERANCE));
             if holding.is_empty()
-                && let Step::Moved(pulled) = self.pulling(pull).advance(up, &mut near, around)
-                && let Some(turned) = self.turned_to(step, place, around)
+                && let Step::Moved(pulled) = self.pulling(pull).advance(up, &mut near, around)?
+                && let Some(turned) = self.turned_to(step, place, around)?
             {
                 let start = (place > 0).then(|| self.at(step, place).0.pose);
                 let via = start.into_iter().chain([up.pose]).collect();
-                return Some(Moved { turned: turned + pulled.turned, via, ..pulled });
+                return Ok(Some(Moved { turned: turned + pulled.turned, via, ..pulled }));
             }
             open.retain(|&other| other != place);
         }
-        None
+        Ok(None)
     }
 
     /// Where a step has got to at one of its places, and after which twist.
@@ -118,12 +124,17 @@ impl Drive {
     }
 
     /// By which angle a step turns the part up to one of its places, if the way there is clear.
-    fn turned_to(&self, step: &Taken<'_>, place: u32, around: &mut dyn Around) -> Option<f64> {
+    fn turned_to(
+        &self,
+        step: &Taken<'_>,
+        place: u32,
+        around: &mut dyn Around,
+    ) -> Result<Option<f64>, Interrupt> {
         let (mover, twist) = self.at(step, place);
-        let near = around.near(&mover);
+        let near = around.near(&mover)?;
         let is_clear = near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE)
-            && self.is_clear_between((step.mover, step.near), (&mover, &near), &twist, around);
-        is_clear.then(|| twist.fixed_rows::<3>(3).norm())
+            && self.is_clear_between((step.mover, step.near), (&mover, &near), &twist, around)?;
+        Ok(is_clear.then(|| twist.fixed_rows::<3>(3).norm()))
     }
 }
 
