@@ -6,10 +6,13 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
-const SOURCES: [&str; 12] = [
+const SOURCES: [&str; 15] = [
     "Cargo.lock",
     "src/geometry",
     "src/sdf",
+    "src/scene",
+    "src/contact",
+    "src/tolerances.rs",
     "src/simulation",
     "src/blocking_graph",
     "src/search",

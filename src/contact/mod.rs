@@ -1,14 +1,16 @@
 //! Contact: every question that the planner asks about two bodies that may touch.
 //!
-//! | question | entry | result |
+//! | question | entry | answer |
 //! |---|---|---|
-//! | how far a body goes along a line until it meets another (shape cast) | [`Crossing::way`] | length |
-//! | bounds that hold for all points of a surface (region cover): for shifts, turns, and paths | [`region_cover`] | cells, holds, [`Found`](region_cover::depth::Found) |
-//! | contacts at samples of both surfaces (open surfaces and fallbacks) | [`sampled`] | `Near` |
-//! | whether two threads pass each other along their helix | [`helix_profile`] | open stretches |
-//! | whether the hulls of a body and of all others are apart | [`exit_direction`](crate::scene::exit_direction) | direction |
+//! | how far a body goes along a line until it meets another (shape cast) | `shape_cast`: [`Crossing`] | a length |
+//! | bounds that hold for all points of a surface (region cover), for shifts, for turns and for paths | `region_cover`: `cells`, `holds`, `depth` | regions and what leaves them; a depth |
+//! | contacts at samples of both surfaces, for open surfaces and as a fallback | `sampled` | contacts |
+//! | whether two threads pass each other along their helix | `helix_profile` | the stretches left open |
+//! | whether the hulls of a body and of all others are apart | [`exit_direction`](crate::scene::exit_direction) | a direction |
+//!
+//! `course` says how points move along a path, [`Passing`] which way a body takes past another. Contact knows the scene
+//! and nothing of simulation, plans and search.
 
-pub(crate) mod constraint;
 pub(crate) mod course;
 pub(crate) mod helix_profile;
 mod passing;

@@ -1,15 +1,12 @@
 //! The transition function f(s, a, p): where a part gets to when it is pushed, pulled or turned.
 //!
-//! Data flow: [`Scene`] (bodies and what each pair may overlap) → broad phase → `sliding` (steps
-//! until the part is out or stuck) → [`Motion`]. `sliding` has two ways to see contact: convex regions around
-//! the part's surface, exact for shifts of any length and good while a part turns, too; and, where
-//! these would be too many, `contact` (samples near the other surface, measured exactly). What may turn
-//! follows `projection` (the nearest twist that contact allows). The paper's own
-//! simulation stands beside it: [`PenaltyEngine`], with forces and time steps, on the fields alone.
-//! So does [`straight_sweep`], which tells of a part that leaves along a line without simulating.
-//! What a part lies against tells ways out beside the axes: the planes that it touches (`touching`), and the twist
-//! that its contacts hardly resist (`null_twists`).
-//! Everything here is in the planning frame and knows nothing of search.
+//! Data flow: [`Scene`](crate::scene::Scene) → `sliding` (steps until the part is out or stuck) → [`Motion`]. All
+//! questions about contact are asked in [`contact`](crate::contact): of translations, region covers; of what may turn,
+//! region covers and, where these would be too many pieces, samples. What may turn follows `projection` (the nearest
+//! twist that contact allows). The paper's own simulation stands beside it: [`PenaltyEngine`], with forces and time
+//! steps, on the distance fields alone. [`straight_sweep`] finds parts that leave along a line, without simulation.
+//! Contact suggests directions beside the axes: the planes that a part touches (`touching`), and the twist that its
+//! contacts hardly resist (`null_twists`). Everything here is in the planning frame and knows nothing of search.
 
 mod action;
 mod null_twists;

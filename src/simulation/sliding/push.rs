@@ -1,5 +1,5 @@
 //! Translations: a shift that follows a force as far as contact lets it, in steps as long as the
-//! regions around the part's surface allow ([`cells`](super::cells)), or in flight ([`flight`](super::flight)).
+//! regions around the part's surface allow ([`cells`](crate::contact::region_cover::cells)), or in flight ([`flight`](super::flight)).
 //!
 //! At each shift the force is projected onto the cone that the obstacles leave. Along an obstacle
 //! steps are short, and each begins with the force as it is: where the obstacle ends, the part

@@ -1,7 +1,7 @@
 //! How deep one surface gets into another on the way of a part: an upper bound, by branch and bound
 //! over surface and way.
 //!
-//! A piece of surface on a stretch of the way lies in the hull of a few points ([`super::course`]).
+//! A piece of surface on a stretch of the way lies in the hull of a few points (`contact/course`).
 //! If all of these are within some distance of one convex region that the other surface does not
 //! enter ([`FreeRegion`]), so is the whole piece all the way, and it gets no deeper than that: what
 //! slides along a face, in a hole or in a groove is settled at once, and remembered by its place, for
