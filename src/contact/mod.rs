@@ -11,6 +11,7 @@
 //! `course` says how points move along a path, [`Passing`] which way a body takes past another. Contact knows the scene
 //! and nothing of simulation, plans and search.
 
+pub(crate) mod constraint;
 pub(crate) mod course;
 pub(crate) mod helix_profile;
 mod passing;
