@@ -69,6 +69,7 @@ impl Crossing<'_> {
     /// The termination condition became true.
     pub(crate) fn way(&self, least: f64) -> Result<f64, Interrupt> {
         let Self { scene, part, start, direction, other, travel, margins, termination } = *self;
+        termination.check()?;
         let poll = &Poll::every(CAST_POLL, Some(termination));
         let [mine, theirs] = [part, other].map(|i| &scene.bodies[i].shape);
         let standing = &scene.bodies[other].planning_from_shape;
