@@ -6,7 +6,7 @@ use super::motion::add_standing;
 use super::pair::add_pose;
 use super::records::SweptRecord;
 use super::{Digest, Key, Kind, Recall};
-use crate::contact::Crossing;
+use crate::contact::ShapeCast;
 use crate::simulation::{Sweep, SweepQuestion, straight_sweep_past};
 use crate::termination::{Interrupt, Termination};
 
@@ -38,7 +38,7 @@ impl Recall {
         termination: &Termination,
     ) -> Result<Option<Option<Sweep>>, Interrupt> {
         let Some(known) = self.get::<SweptRecord>(&key(question)) else { return Ok(None) };
-        let enters = |crossing: &Crossing<'_>| known.of(&place(question, crossing)).ok_or(Untold::Unknown);
+        let enters = |cast: &ShapeCast<'_>| known.of(&place(question, cast)).ok_or(Untold::Unknown);
         match straight_sweep_past(question, termination, enters) {
             Ok(swept) => Ok(Some(swept)),
             Err(Untold::Unknown) => Ok(None),
@@ -60,13 +60,13 @@ impl Recall {
         // Read where there is something to ask: mostly a part is out, or blocked by the first one.
         let mut known: Option<SweptRecord> = None;
         let mut is_new = false;
-        let enters = |crossing: &Crossing<'_>| {
+        let enters = |cast: &ShapeCast<'_>| {
             let known = known.get_or_insert_with(|| self.get(&key).unwrap_or_default());
-            let place = place(question, crossing);
+            let place = place(question, cast);
             if let Some(entered) = known.of(&place) {
                 return Ok(entered);
             }
-            let entered = crossing.enters()?;
+            let entered = cast.enters()?;
             known.past.push((place, entered));
             is_new = true;
             Ok(entered)
@@ -95,10 +95,10 @@ fn key(question: &SweepQuestion<'_>) -> Key {
 }
 
 /// How a part on the way stands, and how far the way past it goes.
-fn place(question: &SweepQuestion<'_>, crossing: &Crossing<'_>) -> [u8; 16] {
+fn place(question: &SweepQuestion<'_>, cast: &ShapeCast<'_>) -> [u8; 16] {
     let mut digest = Digest::new();
-    digest.numbers([crossing.travel, crossing.margins.granted]);
-    add_standing(&mut digest, question.scene, question.part, crossing.other);
+    digest.numbers([cast.travel, cast.margins.granted]);
+    add_standing(&mut digest, question.scene, question.part, cast.other);
     let [first, _]: [[u8; 16]; 2] = bytemuck::cast(digest.finish());
     first
 }

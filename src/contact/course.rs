@@ -20,7 +20,8 @@ const REMEMBERED: u32 = 12;
 /// Legs of more bends than this likewise.
 const MOST_BENDS: usize = 12;
 
-/// A path that turns further than this (radians) is a screw.
+/// A path that turns further than this (radians, two thirds of a turn) may be a screw: its profile is compared before
+/// its surfaces are.
 const FAR: f64 = 4.0;
 
 /// Whether a path turns so far that it may be a screw of many turns.

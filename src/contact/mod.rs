@@ -2,7 +2,7 @@
 //!
 //! | question | entry | answer |
 //! |---|---|---|
-//! | how far a body goes along a line until it meets another (shape cast) | `shape_cast`: [`Crossing`] | a length |
+//! | how far a body goes along a line until it meets another (shape cast) | `shape_cast`: [`ShapeCast`] | a length |
 //! | bounds that hold for all points of a surface (region cover), for shifts, for turns and for paths | `region_cover`: `cells`, `holds`, `depth` | regions and what leaves them; a depth |
 //! | contacts at samples of both surfaces, for open surfaces and as a fallback | `sampled` | contacts |
 //! | whether two threads pass each other along their helix | `helix_profile` | the stretches left open |
@@ -21,4 +21,4 @@ mod shape_cast;
 
 pub use passing::Passing;
 pub use region_cover::KeptCells;
-pub use shape_cast::{Crossing, Margins};
+pub use shape_cast::{CastMargins, ShapeCast};

@@ -1,4 +1,4 @@
-//! Crossings: a part that goes straight past one that stands, told by the edges and corners of both.
+//! Shape casts: a part that goes straight past one that stands, by the edges and corners of both.
 //!
 //! A solid that is moved along `d` comes to overlap another exactly if on some line along `d` a
 //! point of its surface that faces `d` passes a point of the other's that faces against it. Walls along the
@@ -22,9 +22,9 @@ use crate::termination::{Interrupt, Poll, Termination};
 /// Edges or corners between two looks at the termination condition.
 const CAST_POLL: u32 = 64;
 
-/// What a crossing lets pass.
+/// What a shape cast lets pass.
 #[derive(Debug, Clone, Copy)]
-pub struct Margins {
+pub struct CastMargins {
     /// How deep the part may get into the other across the direction.
     pub granted: f64,
     /// How far before the start it may have met the other: what it meets there, it meets at once.
@@ -38,7 +38,7 @@ pub struct Margins {
 
 /// A part that goes straight past one that stands.
 #[derive(Debug)]
-pub struct Crossing<'a> {
+pub struct ShapeCast<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) part: usize,
     pub(crate) start: &'a Pose,
@@ -48,11 +48,11 @@ pub struct Crossing<'a> {
     /// How far the part goes, until it is past the other or out of them all.
     pub travel: f64,
     /// What is let pass.
-    pub margins: Margins,
+    pub margins: CastMargins,
     pub(crate) termination: &'a Termination,
 }
 
-impl Crossing<'_> {
+impl ShapeCast<'_> {
     /// Whether the part enters the other on the way. That depends on nothing but what is in here, and on the
     /// shapes of both and where the other stands.
     ///
@@ -101,7 +101,7 @@ struct Cast<'a> {
     /// How the edges move against the target, in its frame.
     along: Vector3<f64>,
     travel: f64,
-    margins: Margins,
+    margins: CastMargins,
     /// Nobody asks how much shorter a way is than this.
     least: f64,
     poll: &'a Poll<'a>,
@@ -203,13 +203,13 @@ mod tests {
     fn way(scene: &Scene, direction: Vector3<f64>, travel: f64) -> f64 {
         let start = &scene.bodies[1].planning_from_shape;
         let granted = scene.allowances.of(0, 1) + DEPTH_TOLERANCE;
-        let margins = Margins { granted, back: granted, steepness: 1e-3, sunk: 0.2 * DEPTH_TOLERANCE };
+        let margins = CastMargins { granted, back: granted, steepness: 1e-3, sunk: 0.2 * DEPTH_TOLERANCE };
         let direction = &direction;
         let termination = &Termination::default();
         let (part, other) = (1, 0);
-        let crossing = Crossing { scene, part, start, direction, travel, other, margins, termination };
-        assert_eq!(crossing.enters().unwrap(), crossing.way(travel).unwrap() < travel);
-        crossing.way(0.0).unwrap()
+        let cast = ShapeCast { scene, part, start, direction, travel, other, margins, termination };
+        assert_eq!(cast.enters().unwrap(), cast.way(travel).unwrap() < travel);
+        cast.way(0.0).unwrap()
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Verification of a path on the triangles, independent of distance fields and engines.
 //!
 //! For every standing part that the moving one comes near ([`Passing`]), both surfaces are bounded against
-//! each other all along the way ([`depth`](crate::contact::region_cover::depth) says how, and what that guarantees): what counts
-//! is depth beyond that of the pair at the assembled pose, which is measured with the same search.
+//! each other all along the way ([`depth`](crate::contact::region_cover::depth) says how, and what that
+//! guarantees): what counts is depth beyond that of the pair at the assembled pose, which is measured with the same search.
 //! Screws of many turns are bounded by their profiles, too ([`helix_profile`](crate::contact::helix_profile)), and what
 //! neither settles is checked at samples ([`along_path`](crate::contact::sampled::along_path)).
 
@@ -14,8 +14,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::contact::Passing;
-use crate::contact::course::Interval;
-use crate::contact::course::{Course, turns_far};
+use crate::contact::course::{Course, Interval, turns_far};
 use crate::contact::helix_profile::{centred, depth_on_screw};
 use crate::contact::region_cover::depth::{Found, Precision, Way};
 use crate::contact::sampled::along_path::{Entry, Samples};

@@ -2,12 +2,12 @@
 //! told without simulating.
 //!
 //! The way out ends where the part's hull is apart from that of all others; each part on the way is asked
-//! whether it is entered ([`Crossing`], with what that may miss). So "clear" is a claim to be verified like
+//! whether it is entered ([`ShapeCast`], with what that may miss). So "clear" is a claim to be verified like
 //! every path, and "blocked" leaves the question to simulation.
 
 use nalgebra::{Point3, Translation3, Vector3};
 
-use crate::contact::{Crossing, Margins};
+use crate::contact::{CastMargins, ShapeCast};
 use crate::geometry::{Pose, Support, separating, transformed};
 use crate::scene::{HULL_MARGIN, Scene, Surroundings, exit_direction};
 use crate::termination::{Interrupt, Termination};
@@ -63,7 +63,7 @@ pub fn straight_sweep(
     question: &SweepQuestion<'_>,
     termination: &Termination,
 ) -> Result<Option<Sweep>, Interrupt> {
-    straight_sweep_past(question, termination, |crossing| crossing.enters())
+    straight_sweep_past(question, termination, |cast| cast.enters())
 }
 
 /// The same, with somebody who tells of each part on the way whether the sweep enters it.
@@ -73,7 +73,7 @@ pub fn straight_sweep(
 pub fn straight_sweep_past<E: From<Interrupt>>(
     question: &SweepQuestion<'_>,
     termination: &Termination,
-    mut enters: impl FnMut(&Crossing<'_>) -> Result<bool, E>,
+    mut enters: impl FnMut(&ShapeCast<'_>) -> Result<bool, E>,
 ) -> Result<Option<Sweep>, E> {
     let SweepQuestion { scene, surroundings, part, start, direction } = *question;
     termination.check()?;
@@ -90,9 +90,9 @@ pub fn straight_sweep_past<E: From<Interrupt>>(
         // Beyond, it has passed the other for good: so what is found does not depend on how far others reach.
         let passed = here.grown(granted).way_past(&scene.bodies[other].bounds, direction);
         let travel = travel.min(passed);
-        let margins = Margins { granted, back: granted, steepness: STEEPNESS, sunk: SUNK };
-        let crossing = Crossing { scene, part, start, direction, travel, other, margins, termination };
-        if enters(&crossing)? {
+        let margins = CastMargins { granted, back: granted, steepness: STEEPNESS, sunk: SUNK };
+        let cast = ShapeCast { scene, part, start, direction, travel, other, margins, termination };
+        if enters(&cast)? {
             return Ok(Some(Sweep::Blocked { by: other }));
         }
     }
@@ -168,9 +168,9 @@ mod tests {
         let question = SweepQuestion { scene, surroundings: &around, part: 1, start, direction };
         assert_eq!(straight_sweep(&question, &termination), Err(Interrupt::Cancelled));
         let termination = Termination::default();
-        let swept = straight_sweep_past(&question, &termination, |crossing| {
+        let swept = straight_sweep_past(&question, &termination, |cast| {
             termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
-            crossing.enters()
+            cast.enters()
         });
         assert_eq!(swept, Err(Interrupt::Cancelled), "a cast that was cut short");
     }

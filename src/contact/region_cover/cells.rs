@@ -31,7 +31,7 @@ use super::kept::{Gathered, KeptCells, Place, Way};
 const FIRST_BUDGET: usize = 16;
 /// … up to this: from fewer, how many a side needs in all is guessed badly.
 const IN_TURN: usize = 64;
-/// Where more overlap than this is granted, facets lie across each other, and regions tell little. What overlaps
+/// Where more overlap than this is granted, in the planning frame, facets lie across each other, and regions tell little. What overlaps
 /// with one face may be pushed into walls by as much, too, and around the rims of these its pieces are in no
 /// convex region: of a screw whose head reaches 0.02 into its lid, 20,000 were looked for in vain, in several
 /// times what samples take. (With planes of faces, as verification takes them, it was lost sooner, but lost.)
@@ -39,9 +39,10 @@ pub(crate) const MOST_GRANTED: f64 = 1e-3;
 /// A surface in more pieces than this is not looked at to the end: in the play of a thread, which has thousands, each
 /// step ends at the next of them, and samples tell in a fraction of the time.
 const MOST_CELLS: usize = 1000;
-/// So many pieces in succession may get regions that lead nowhere.
+/// Pieces in succession whose new region lets the part go no further than [`STALL`], after which a shift ends: a count.
+/// A corner where many pieces touch needs one each.
 pub(crate) const MOST_STALLS: usize = 16;
-/// Shifts that are shorter lead nowhere.
+/// A shift shorter than this counts as none, in the planning frame: a tenth of `TOUCHED`.
 pub(crate) const STALL: f64 = 1e-7;
 /// So many points that showed obstacles are remembered of a pair.
 const MOST_WITNESSES: usize = 8;

@@ -9,10 +9,10 @@ use crate::tolerances::{DEPTH_TOLERANCE, HELD, TOUCHED};
 
 /// Pieces are drawn together by this share to see whether they only touch.
 const INSET: f64 = 0.02;
-/// Shifts that lead into a plane by less than this share go along it: coordinates in files are
-/// rounded, and so are planes.
+/// A shift that leads into a plane by less than this share of its length (the sine of the angle) goes along it:
+/// coordinates in files are rounded, and so are planes.
 pub(crate) const TILT: f64 = 1e-5;
-/// What such shifts may come to.
+/// How deep shifts along a plane, tilted by less than [`TILT`], may get into it in all, in the planning frame.
 pub(crate) const SUNK: f64 = 0.3 * DEPTH_TOLERANCE;
 /// Points are moved so far to see whether they get inside …
 const PROBE: f64 = 2e-3;

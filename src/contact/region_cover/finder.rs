@@ -11,19 +11,21 @@ use super::Halt;
 use super::cell::{Cell, Limit, Spot};
 use super::facing::{Facing, Obstacle, Piece, Placed, Slope, Witness};
 
-/// Pieces this far off need no region, in the planning frame.
+/// A piece further than this from the other surface needs no region, in the planning frame: as long as the longest
+/// step in contact.
 pub(crate) const FAR: f64 = 0.12;
 /// Shifts that a region is asked to allow: the longest that works.
 const AHEAD: [f64; 5] = [4.0, 0.5, 0.06, 0.012, 2e-3];
 /// Which of these is asked for first; the shorter ones only where something is near ahead.
 const SHORT: usize = 2;
-/// Regions without a wanted shift are asked for so much around a piece.
+/// A region without a wanted shift reaches this far beyond its piece, in the planning frame: as long as the longest step
+/// in contact.
 pub(crate) const AROUND: f64 = 0.12;
 /// A region that lets a piece go by less than this share of what was asked is too small.
 const LEAST_LET_GO: f64 = 0.25;
 /// Steps that are shorter lead nowhere.
 const LEAST_STEP: f64 = 1e-5;
-/// Regions are asked for so much larger than the piece.
+/// The radius asked of a region, as a multiple of what it must hold.
 pub(crate) const ROOM: f64 = 1.25;
 /// A bit of a triangle that is smaller than this and has no region ahead is in the way …
 const SMALL: f64 = 0.3;

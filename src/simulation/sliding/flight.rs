@@ -1,13 +1,13 @@
 //! Free flight: how far a push goes before it meets anything.
 //!
 //! Where nothing bends a push, regions further on along its line would only tell that nothing is there. So the
-//! way to where it meets something is told by the edges and corners that lead ([`Crossing`]), in stretches as
+//! way to where it meets something is told by the edges and corners that lead ([`ShapeCast`]), in stretches as
 //! long as the longest regions. There, and wherever the push is bent, regions tell.
 
 use nalgebra::Vector3;
 
 use crate::contact::region_cover::facing::TILT;
-use crate::contact::{Crossing, Margins};
+use crate::contact::{CastMargins, ShapeCast};
 use crate::geometry::{Bounds, Pose};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
@@ -116,12 +116,12 @@ impl<'a> Flights<'a> {
             let granted = scene.allowances.of(part, other) + LEAST;
             // As deep as it may be before.
             let back = granted + BULGE_TOLERANCE;
-            let margins = Margins { granted, back, steepness: TILT, sunk: LEAST };
+            let margins = CastMargins { granted, back, steepness: TILT, sunk: LEAST };
             let passed = bounds.grown(granted).way_past(&scene.bodies[other].bounds, u);
             let travel = passed.min(length + LANDING);
             let (start, direction) = (from, u);
-            let crossing = Crossing { scene, part, start, direction, travel, other, margins, termination };
-            let way = crossing.way(SHORTEST + LANDING)?;
+            let cast = ShapeCast { scene, part, start, direction, travel, other, margins, termination };
+            let way = cast.way(SHORTEST + LANDING)?;
             if way < travel {
                 (length, is_met) = (way - LANDING, true);
             }

@@ -1,16 +1,13 @@
 //! The engine `sliding`: motion in the limit of no inertia.
 //!
-//! A translation (`push`) is a shift: pieces of surface, each in a convex region that the other
-//! surface does not enter (`cells` of pairs that face each other: `facing`), tell how far it may go,
-//! and what is in the way. A `finder` finds the cells of a pair; those where motions begin are `kept`
-//! for all motions from there. Where nothing bends a push it flies to what it meets (`flight`). Of what may
-//! turn, and where regions cannot tell of a push (open surfaces facing each other, deep granted overlap,
-//! points that verification found missing), the wanted twist is projected at each step onto what contact allows, in the metric of the part's mass
-//! (rotation weighed by the squared radius of gyration), and the pose advances by the result
-//! (`drive`). Contacts are told by pieces of surface that leave their regions (`holds`), or, where
-//! surfaces are too complicated for that, by samples. In free space the step is the certified
-//! clearance; where samples tell and the projected twist stays the same, along a wall or a thread, it
-//! is followed in long steps (`leap`).
+//! A translation (`push`) is a shift: the [region cover](crate::contact::region_cover) of the surfaces bounds how far it
+//! may go, and names what is in the way. Where nothing bends a push, a shape cast finds what it meets (`flight`). For
+//! what may turn, and where a region cover cannot answer for a push (open surfaces, deep allowed overlap, points that
+//! verification found missing), each step projects the wanted twist onto what contact allows, in the metric of the
+//! part's mass (rotation weighed by the squared radius of gyration), and advances the pose by the result (`drive`).
+//! Contacts come from the pieces of surface that leave their regions, or, where surfaces are too complicated for that,
+//! from samples. In free space the step is the certified clearance; where samples answer and the projected twist stays
+//! the same, along a wall or a thread, long steps follow it (`leap`).
 
 mod drive;
 mod flight;

@@ -33,7 +33,7 @@ use super::super::course::{Course, Interval, View};
 use super::super::passing::Passing;
 use walk::Search;
 
-/// So much effort ([`Found::effort`]) is spent on each surface before the way is left to samples: some seconds,
+/// Effort ([`Found::effort`], a count of pieces and regions) spent on each surface before the way is left to samples: some seconds,
 /// for samples promise less. What is no screw, and sees no holes, has been seen to need a third (a bayonet that
 /// turns askew to all axes).
 const MOST_EFFORT: usize = 20_000_000;
