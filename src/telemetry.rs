@@ -2,7 +2,8 @@
 
 use std::io::IsTerminal;
 
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::{ParseError, Targets};
+use tracing_subscriber::prelude::*;
 
 use crate::config::{LogConfig, LogFormat};
 
@@ -29,9 +30,9 @@ pub enum TelemetryError {
 ///
 /// # Errors
 /// It cannot be parsed.
-pub fn filter(config: &LogConfig) -> Result<EnvFilter, TelemetryError> {
+pub fn filter(config: &LogConfig) -> Result<Targets, TelemetryError> {
     let text = std::env::var(FILTER_VARIABLE).unwrap_or_else(|_| config.filter.clone());
-    EnvFilter::try_new(&text).map_err(|e| TelemetryError::Filter { filter: text, reason: e.to_string() })
+    text.parse().map_err(|e: ParseError| TelemetryError::Filter { filter: text, reason: e.to_string() })
 }
 
 /// Starts logging for this process.
@@ -39,13 +40,13 @@ pub fn filter(config: &LogConfig) -> Result<EnvFilter, TelemetryError> {
 /// # Errors
 /// The filter cannot be parsed, or logging was started before.
 pub fn start(config: &LogConfig) -> Result<(), TelemetryError> {
-    let builder = tracing_subscriber::fmt()
-        .with_env_filter(filter(config)?)
+    let lines = tracing_subscriber::fmt::layer()
         .with_ansi(std::io::stderr().is_terminal())
         .with_writer(std::io::stderr);
-    let started = match config.format {
-        LogFormat::Text => builder.try_init(),
-        LogFormat::Json => builder.json().try_init(),
+    let lines = match config.format {
+        LogFormat::Text => lines.boxed(),
+        LogFormat::Json => lines.json().boxed(),
     };
+    let started = tracing_subscriber::registry().with(filter(config)?).with(lines).try_init();
     started.map_err(|_| TelemetryError::Twice)
 }

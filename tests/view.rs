@@ -51,8 +51,8 @@ struct Played {
 
 impl Played {
     fn new(glb: &[u8]) -> Self {
-        let (document, mut buffers, _) = gltf::import_slice(glb).unwrap();
-        Self { document, bytes: buffers.remove(0).0 }
+        let gltf = gltf::Gltf::from_slice(glb).unwrap();
+        Self { document: gltf.document, bytes: gltf.blob.unwrap() }
     }
 
     fn node(&self, name: &str) -> gltf::Node<'_> {

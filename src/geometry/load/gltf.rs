@@ -1,13 +1,18 @@
 //! glTF and GLB scenes: every node with a mesh is a part, its pose that of the node.
 //!
-//! The crate `gltf` parses and validates the JSON. Accessors are read here, with checked
-//! offsets: its own readers trust the counts and offsets of the file and may panic on them.
+//! The crate `gltf` parses and validates the JSON. Buffers are read here, as its feature `import`
+//! brings image decoders along, and accessors, with checked offsets: its own readers trust the
+//! counts and offsets of the file and may panic on them.
 
 use std::collections::HashSet;
-use std::path::Path;
+use std::fs;
+use std::path::{Path, PathBuf};
 
+use base64::engine::DecodePaddingMode;
+use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
+use base64::{Engine, alphabet};
 use gltf::accessor::{DataType, Dimensions};
-use gltf::buffer::{Data, Source};
+use gltf::buffer::Source;
 use gltf::mesh::Mode;
 use nalgebra::{Matrix4, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
@@ -67,28 +72,44 @@ fn read_buffers(
     folder: &Path,
 ) -> Result<Vec<Vec<u8>>, String> {
     let read = |buffer: gltf::Buffer<'_>| {
-        if let Source::Uri(uri) = buffer.source() {
-            check_uri(uri)?;
-        }
-        let data = Data::from_source_and_blob(buffer.source(), Some(folder), &mut blob)
-            .map_err(|e| format!("buffer {}: {e}", buffer.index()))?;
+        let data = match buffer.source() {
+            Source::Bin => blob.take().ok_or_else(|| "missing binary portion of binary glTF".to_owned()),
+            Source::Uri(uri) => read_uri(uri, folder),
+        };
+        let mut data = data.map_err(|e| format!("buffer {}: {e}", buffer.index()))?;
+        // As the crate's own reader does it: announced lengths may be rounded up to whole words.
+        data.resize(data.len().next_multiple_of(4), 0);
         if data.len() < buffer.length() {
             return Err(format!("buffer {} is truncated; export the scene again", buffer.index()));
         }
-        Ok(data.0)
+        Ok(data)
     };
     document.buffers().map(read).collect()
 }
 
-/// The crate unwraps the decoded name.
-fn check_uri(uri: &str) -> Result<(), String> {
-    let escaped = uri.split('%').skip(1);
-    let plain = escaped.into_iter().all(|s| {
-        let byte = s.get(..2).and_then(|hex| u8::from_str_radix(hex, 16).ok());
-        byte.is_none_or(|b| b.is_ascii())
-    });
-    if plain { Ok(()) } else { Err(format!("buffer `{uri}`: rename it to ASCII characters")) }
+/// The data in a `data:` URI, or of the file that the URI names.
+fn read_uri(uri: &str, folder: &Path) -> Result<Vec<u8>, String> {
+    let path = match uri.split_once(':') {
+        Some(("data", rest)) => {
+            let data = rest.split(";base64,").nth(1).unwrap_or(rest);
+            return BASE64.decode(data).map_err(|e| e.to_string());
+        }
+        Some(("file", rest)) => PathBuf::from(rest.strip_prefix("//").unwrap_or(rest)),
+        Some(_) => return Err("unsupported URI scheme".into()),
+        None => {
+            let name =
+                urlencoding::decode(uri).map_err(|_| format!("`{uri}`: rename it to ASCII characters"))?;
+            folder.join(&*name)
+        }
+    };
+    fs::read(path).map_err(|e| e.to_string())
 }
+
+/// Padding may be missing.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent),
+);
 
 struct SceneReader {
     buffers: Vec<Vec<u8>>,
@@ -271,6 +292,27 @@ mod tests {
     }
 
     #[test]
+    fn buffers_are_read_from_files_and_the_binary_chunk() {
+        let folder = tempfile::tempdir().unwrap();
+        let start = "data:application/octet-stream;base64,";
+        let (data, uri) = (42, &scene()[scene().find(start).unwrap()..][..start.len() + 56]);
+        let bytes = super::read_uri(uri, folder.path()).unwrap();
+        assert_eq!(bytes.len(), data);
+        std::fs::write(folder.path().join("sc ne é.bin"), &bytes).unwrap();
+        let whole = parse(&scene()).unwrap();
+        let absolute = format!("file://{}/sc ne é.bin", folder.path().display());
+        for other in ["sc ne é.bin", "sc%20ne%20%C3%A9.bin", &absolute] {
+            let parts = parse_gltf(scene().replace(uri, other).as_bytes(), folder.path()).unwrap();
+            assert_eq!(parts, whole, "{other}");
+        }
+        let mut glb = glb(&scene().replace(&format!(",\"uri\":\"{uri}\""), ""));
+        glb.extend([44, 0, 0, 0].iter().chain(b"BIN\0").chain(&bytes).chain(&[0; 2]));
+        let length = glb.len() as u32;
+        glb[8..12].copy_from_slice(&length.to_le_bytes());
+        assert_eq!(parse_gltf(&glb, folder.path()).unwrap(), whole);
+    }
+
+    #[test]
     fn damage_is_refused() {
         for (damage, expected) in [
             (scene().replace("\"byteLength\":36", "\"byteLength\":35"), "truncated"),
@@ -283,7 +325,10 @@ mod tests {
                 "two parents",
             ),
             (scene().replace("data:application/octet-stream;base64,", "a%ff"), "rename"),
-            (scene().replace("data:application/octet-stream;base64,", "absent"), "buffer 0"),
+            (scene().replace("data:application/octet-stream;base64,", "absent"), "buffer 0: No such file"),
+            (scene().replace("data:application/octet-stream;base64,", "http://"), "unsupported URI scheme"),
+            (scene().replace(";base64,", ";base64,!"), "buffer 0: Invalid symbol 33, offset 0."),
+            (scene().replace("\"uri\"", "\"x\""), "buffer 0: missing binary portion"),
             (scene().replace("\"mesh\":0,", ""), "no node"),
             (scene().replace("\"scenes\"", "\"x\"").replace("\"scene\":0,", ""), "no scene"),
             ("{".into(), "export the scene again"),
