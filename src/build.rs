@@ -1,60 +1,77 @@
-//! Hashes what answers depend on: the sources of the planning modules, and the versions of all crates.
+//! Hashes the sources that the answers of each stage depend on.
 //!
-//! Remembered answers carry the hash in their keys, so that another build never takes an answer for its own
-//! that it would not give: a raised version number alone is forgotten too easily.
+//! A stage's hash is part of the keys of what the stage remembers (`src/cache/FORMAT.md`), so no build finds an answer
+//! of other sources. It covers `Cargo.lock` (all of it: answers depend on numerical crates), the stage's own sources,
+//! and the hashes of the stages that it depends on. Files that have only tests do not count.
 
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
-const SOURCES: [&str; 15] = [
-    "Cargo.lock",
-    "src/geometry",
-    "src/sdf",
-    "src/scene",
-    "src/contact",
-    "src/tolerances.rs",
-    "src/simulation",
-    "src/blocking_graph",
-    "src/search",
-    "src/plan",
-    "src/assembling",
-    "src/service",
-    "src/cache",
-    "src/daemon",
-    "ipc/src",
+/// Every stage, and the stages that its code imports. A stage comes after all that it depends on.
+/// `.ci/structure` compares this table with the imports.
+const STAGES: [(&str, &str); 17] = [
+    ("lru", ""),
+    ("termination", ""),
+    ("tolerances", ""),
+    ("ipc", ""),
+    ("cache", "lru"),
+    ("config", "cache ipc"),
+    ("geometry", "cache termination"),
+    ("sdf", "cache geometry termination"),
+    ("scene", "cache geometry lru sdf termination"),
+    ("contact", "geometry scene sdf termination tolerances"),
+    ("simulation", "cache contact geometry scene sdf termination tolerances"),
+    ("blocking_graph", "cache geometry scene simulation termination"),
+    ("plan", "cache contact geometry scene termination tolerances"),
+    ("search", "blocking_graph cache contact geometry plan scene simulation termination"),
+    ("assembling", "geometry plan scene search simulation termination"),
+    (
+        "service",
+        "assembling blocking_graph cache contact geometry lru plan scene sdf search simulation termination",
+    ),
+    ("daemon", "blocking_graph cache config geometry ipc lru plan search service simulation termination"),
 ];
 
 fn main() -> io::Result<()> {
     let root = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
-    let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
-    for source in SOURCES {
-        println!("cargo:rerun-if-changed={source}");
-        add(&mut hash, &root.join(source))?;
+    println!("cargo:rerun-if-changed=Cargo.lock");
+    let lock = fs::read(root.join("Cargo.lock"))?;
+    let mut hashes: HashMap<&str, u64> = HashMap::new();
+    for (stage, dependencies) in STAGES {
+        let mut hasher = DefaultHasher::new();
+        lock.hash(&mut hasher);
+        for dependency in dependencies.split_whitespace() {
+            let undeclared = || io::Error::other(format!("{stage} comes before {dependency}"));
+            hashes.get(dependency).ok_or_else(undeclared)?.hash(&mut hasher);
+        }
+        let places = [format!("src/{stage}"), format!("src/{stage}.rs"), format!("{stage}/src")];
+        let place = places.iter().find(|place| root.join(place).exists());
+        let place = place.ok_or_else(|| io::Error::other(format!("{stage} has no sources")))?;
+        println!("cargo:rerun-if-changed={place}");
+        add(&mut hasher, &root, Path::new(place))?;
+        let hash = hasher.finish();
+        println!("cargo:rustc-env=SBDP_SOURCES_{}={hash:016x}", stage.to_uppercase());
+        hashes.insert(stage, hash);
     }
-    println!("cargo:rustc-env=SBDP_SOURCES={:016x}", hash.0);
     Ok(())
 }
 
-/// A file's name and content, or all files of a folder in the order of their names.
-fn add(hash: &mut Fnv, path: &Path) -> io::Result<()> {
-    if path.is_dir() {
-        let entries = fs::read_dir(path)?.map(|entry| entry.map(|e| e.path()));
+/// Adds a source file's name and content, or the files of a folder in the order of their names.
+fn add(hasher: &mut DefaultHasher, root: &Path, path: &Path) -> io::Result<()> {
+    let file = root.join(path);
+    if file.is_dir() {
+        let entries = fs::read_dir(file)?.map(|entry| entry.map(|e| path.join(e.file_name())));
         let mut entries = entries.collect::<io::Result<Vec<_>>>()?;
         entries.sort();
-        return entries.iter().try_for_each(|entry| add(hash, entry));
+        return entries.iter().try_for_each(|entry| add(hasher, root, entry));
     }
-    hash.add(path.file_name().map(|name| name.as_encoded_bytes()).unwrap_or_default());
-    hash.add(&fs::read(path)?);
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default();
+    let is_source = path.extension().is_some_and(|extension| extension == "rs");
+    if is_source && stem != "tests" && !stem.ends_with("_tests") {
+        path.hash(hasher);
+        fs::read(file)?.hash(hasher);
+    }
     Ok(())
-}
-
-/// FNV-1a with 64 bits: enough to tell builds apart.
-struct Fnv(u64);
-
-impl Fnv {
-    fn add(&mut self, bytes: &[u8]) {
-        for byte in bytes.iter().chain(&(bytes.len() as u64).to_le_bytes()) {
-            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
-    }
 }

@@ -11,10 +11,12 @@ use sbdp_ipc::revision;
 use sbdp_ipc::status::Status;
 use sbdp_ipc::summary::SummaryView;
 
+use crate::cache::can_be_read;
 use crate::config::Config;
 use crate::daemon::uploaded_assembly;
 use crate::geometry::{self, Assembly, SourceAssembly, SourceMesh, SourcePart, Surface};
 use crate::sdf;
+use crate::service::RECORD_KINDS;
 use crate::view::{self, Scene, Up, read_plan};
 
 /// A reader.
@@ -87,7 +89,7 @@ impl Reader {
             Self::Manifest => String::from_utf8(bytes.to_vec())
                 .map_or_else(|e| e.to_string(), |t| geometry::parse_notes(&t)),
             Self::Config => String::from_utf8(bytes.to_vec()).map_or_else(|e| e.to_string(), |t| config(&t)),
-            Self::Records => format!("{:?}", crate::cache::read_as_records(bytes)),
+            Self::Records => records(bytes),
             Self::Fields => SOLID.as_ref().map_or_else(String::new, |solid| sdf::read_as_field(solid, bytes)),
             Self::Endpoint => {
                 said(serde_json::from_slice::<sbdp_ipc::endpoint::Endpoint>(bytes).map_err(|e| e.to_string()))
@@ -107,6 +109,12 @@ static SOLID: LazyLock<Option<Arc<Surface>>> = LazyLock::new(|| {
 #[must_use]
 pub fn field_file() -> Vec<u8> {
     SOLID.as_ref().map_or_else(Vec::new, sdf::a_field_file)
+}
+
+/// The kinds of records that bytes can be read as.
+fn records(bytes: &[u8]) -> String {
+    let kinds = RECORD_KINDS.into_iter().filter(|kind| can_be_read(kind, bytes));
+    format!("{:?}", kinds.collect::<Vec<_>>())
 }
 
 fn said<T>(result: Result<T, String>) -> String {

@@ -1,7 +1,7 @@
-//! Values by key in the order of their last use, from which those that nobody uses leave first.
+//! A map that evicts the values that were used least recently.
 //!
-//! There may be some hundred thousand small ones, so what an entry takes beside its value counts: entries stand
-//! in one list, linked in the order of use by their places, and the table by key holds nothing but places.
+//! There may be some hundred thousand small values, so the overhead of an entry counts: entries are in one vector, linked
+//! in the order of use by their indices (*places*), and the hash table has nothing but places.
 
 use std::borrow::Borrow;
 use std::hash::{BuildHasher, Hash, RandomState};
@@ -9,11 +9,11 @@ use std::sync::Arc;
 
 use hashbrown::HashTable;
 
-/// Values by key. How much of what they take is too much is for their owner to say.
+/// Values by key. The owner decides when to evict.
 #[derive(Debug)]
 pub(crate) struct Lru<K, V: ?Sized> {
     hasher: RandomState,
-    /// By the hash of the key.
+    /// Places by the hash of the key.
     places: HashTable<u32>,
     slots: Vec<Slot<K, V>>,
     /// Slots without an entry.
@@ -25,7 +25,7 @@ pub(crate) struct Lru<K, V: ?Sized> {
 #[derive(Debug)]
 struct Slot<K, V: ?Sized> {
     entry: Option<(K, Arc<V>)>,
-    /// The one that was used before this one, and the one that was used after it.
+    /// The places of the entries that were used before and after this one.
     older: u32,
     newer: u32,
 }
@@ -33,10 +33,10 @@ struct Slot<K, V: ?Sized> {
 /// No slot.
 const NONE: u32 = u32::MAX;
 
-/// What a place takes in a table that has just grown: its own bytes and one to find it by, 7 of 16 in use.
+/// Bytes of a place in a hash table that has just grown: its own and a control byte, with 7 of 16 buckets in use.
 const IN_TABLE: usize = (size_of::<u32>() + 1) * 16 / 7;
 
-/// Bytes that the allocator takes, about, for so many behind an [`Arc`]: with its two counts, in steps of 16.
+/// Bytes that the allocator takes, about, for `bytes` behind an [`Arc`]: with its two counts, in steps of 16.
 pub(crate) const fn shared(bytes: usize) -> usize {
     (bytes + 2 * size_of::<usize>()).next_multiple_of(16)
 }
@@ -49,11 +49,11 @@ impl<K, V: ?Sized> Default for Lru<K, V> {
 }
 
 impl<K: Clone + Eq + Hash, V: ?Sized> Lru<K, V> {
-    /// Bytes that an entry takes beside its value, about, and beside what its key points at. Those that the list
-    /// has in reserve were never touched, and take none.
+    /// Bytes that an entry takes, about, without its value and without what its key points at. Unused capacity of the
+    /// vector was never touched, so it takes no memory.
     pub(crate) const OVERHEAD: usize = size_of::<Slot<K, V>>() + IN_TABLE;
 
-    /// The value of a key, which is used by this.
+    /// The value of a key. This is a use of it.
     pub(crate) fn get<Q: Eq + Hash + ?Sized>(&mut self, key: &Q) -> Option<Arc<V>>
     where
         K: Borrow<Q>,
@@ -66,7 +66,7 @@ impl<K: Clone + Eq + Hash, V: ?Sized> Lru<K, V> {
         self.value(place).cloned()
     }
 
-    /// The value of a key, which is not used by this.
+    /// The value of a key. This is no use of it.
     pub(crate) fn peek<Q: Eq + Hash + ?Sized>(&self, key: &Q) -> Option<&Arc<V>>
     where
         K: Borrow<Q>,
@@ -74,7 +74,7 @@ impl<K: Clone + Eq + Hash, V: ?Sized> Lru<K, V> {
         self.value(self.place(key)?)
     }
 
-    /// Keeps a value; the one that it takes the place of.
+    /// Keeps a value; the one that it replaces.
     pub(crate) fn insert(&mut self, key: K, value: Arc<V>) -> Option<Arc<V>> {
         let before = self.remove(&key);
         let hash = self.hasher.hash_one(&key);
@@ -104,8 +104,8 @@ impl<K: Clone + Eq + Hash, V: ?Sized> Lru<K, V> {
         self.slots[place as usize].entry.take().map(|(_, value)| value)
     }
 
-    /// Lets values go, the least recently used first, for as long as `more` says so when it is given
-    /// the last one. What somebody else holds stays.
+    /// Evicts values, the least recently used first, while `more` returns true for the one just evicted. Values that
+    /// are in use elsewhere stay.
     pub(crate) fn evict(&mut self, mut more: impl FnMut(K, Arc<V>) -> bool) {
         let mut next = self.oldest;
         while let Some(slot) = self.slots.get(next as usize) {
@@ -169,7 +169,7 @@ fn has_key<Q: Eq + ?Sized, K: Borrow<Q>, V: ?Sized>(slots: &[Slot<K, V>], place:
     slots[place as usize].entry.as_ref().is_some_and(|(at, _)| at.borrow() == key)
 }
 
-/// Of the key at a place; those in the table have one.
+/// The hash of the key at a place; all places in the table have one.
 fn hash_at<K: Hash, V: ?Sized>(hasher: &RandomState, slots: &[Slot<K, V>], place: u32) -> u64 {
     slots[place as usize].entry.as_ref().map_or(0, |(key, _)| hasher.hash_one(key))
 }
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_takes_the_place_of_what_left() {
+    fn a_new_entry_takes_a_free_place() {
         let mut lru = of(&[1, 2, 3]);
         for key in 4..=250 {
             assert!(lru.remove(&(key - 2)).is_some() && lru.remove(&(key - 2)).is_none());

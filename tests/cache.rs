@@ -10,6 +10,7 @@ use common::{Boxes, Daemon};
 use rustix::process::Signal;
 use sbdp::cache::{Cache, CacheSettings};
 use sbdp::plan::export::{PlanDocument, StatsDocument};
+use sbdp::service::RECORD_KINDS;
 use sbdp_client::{Change, Handle, PlanOptions, PlanStatus};
 
 fn assembly() -> PathBuf {
@@ -113,7 +114,7 @@ fn a_second_process_plans_from_memory_and_says_so() {
     let folder = tempfile::tempdir().unwrap();
     let alone = plan(folder.path(), &["--no-cache"]);
     let settings = CacheSettings { folder: Some(folder.path().to_owned()), ..CacheSettings::default() };
-    let held = Cache::open(&settings).unwrap();
+    let held = Cache::open(&settings, &RECORD_KINDS).unwrap();
     let output = sbdp(folder.path()).arg("plan").arg(assembly()).args(["--json", "-"]).output().unwrap();
     let second = document(&output);
     assert!(text(&output.stderr).contains("in use by another process"), "{}", text(&output.stderr));

@@ -11,7 +11,7 @@ use sbdp::cache::Cache;
 use sbdp::geometry::{SourceAssembly, load_assembly};
 use sbdp::plan::{Plan, PlanStatus, PlanStep};
 use sbdp::search::{PlanRequest, PlanSink, Progress, Termination};
-use sbdp::service::{AssemblyId, Service, ServiceError};
+use sbdp::service::{AssemblyId, RECORD_KINDS, Service, ServiceError};
 
 /// The system's, counting what is taken and not given back.
 struct Counting;
@@ -50,7 +50,7 @@ fn assembly(name: &str) -> SourceAssembly {
 
 /// A service that keeps nothing but assemblies.
 fn service(budget: usize) -> Service {
-    Service::new(Arc::new(Cache::in_memory(0)), budget)
+    Service::new(Arc::new(Cache::in_memory(0, &RECORD_KINDS)), budget)
 }
 
 fn plan(service: &Service, assembly: &SourceAssembly) -> (AssemblyId, Plan) {
@@ -97,7 +97,7 @@ fn what_assemblies_are_said_to_take_is_what_they_take() {
 fn what_records_are_said_to_take_is_what_they_take() {
     let base = assembly("bolted-bracket-20");
     let before = taken();
-    let cache = Arc::new(Cache::in_memory(usize::MAX));
+    let cache = Arc::new(Cache::in_memory(usize::MAX, &RECORD_KINDS));
     let service = Service::new(Arc::clone(&cache), 0);
     for i in 0..60 {
         plan(&service, &grown(&base, 1.0 + f64::from(i) / 100.0));
@@ -117,7 +117,7 @@ fn assemblies_leave_what_records_and_answers_take() {
     plan(&measuring, &base);
     let one = measuring.store_statistics().bytes as usize;
     let (budget, answers) = (one * 13 / 2, one * 2);
-    let service = Service::new(Arc::new(Cache::in_memory(one)), budget);
+    let service = Service::new(Arc::new(Cache::in_memory(one, &RECORD_KINDS)), budget);
     let held = |service: &Service| {
         let remembered = service.remembered();
         let (assemblies, records) = (remembered.assemblies, remembered.records.memory_bytes);

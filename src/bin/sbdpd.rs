@@ -10,7 +10,7 @@ use std::sync::Arc;
 use clap::Parser;
 use sbdp::cache::Cache;
 use sbdp::config::Config;
-use sbdp::service::Service;
+use sbdp::service::{RECORD_KINDS, Service};
 use sbdp::{daemon, telemetry};
 
 /// Plans how assemblies come apart, for clients on this machine.
@@ -70,9 +70,9 @@ fn main() -> ExitCode {
 /// The store on disk, or memory if that cannot be had: a daemon without is better than none.
 fn cache(config: &Config) -> Cache {
     let settings = config.cache.settings();
-    Cache::open(&settings).unwrap_or_else(|error| {
+    Cache::open(&settings, &RECORD_KINDS).unwrap_or_else(|error| {
         tracing::warn!(%error, "no cache on disk: nothing is remembered beyond this process");
-        Cache::in_memory(settings.memory_bytes)
+        Cache::in_memory(settings.memory_bytes, &RECORD_KINDS)
     })
 }
 

@@ -8,7 +8,7 @@ use crate::simulation::{Action, End, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
 use super::{Analysis, StaticAnalysis};
-use crate::cache::Recall;
+use crate::cache::RequestCache;
 
 /// What came of simulating excluded actions.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -38,8 +38,8 @@ pub fn audit(
 ) -> Result<Audit, Interrupt> {
     let translations = Action::translations();
     // Asked about what is computed, not about what is remembered.
-    let recall = Recall::default();
-    let analysis = Analysis { rule, scene, translations: &translations, recall: &recall };
+    let cache = RequestCache::default();
+    let analysis = Analysis { rule, scene, translations: &translations, cache: &cache };
     let blockages = analysis.initial_blockages(present, least, termination)?;
     let everything = HullTree::new(scene, present.to_vec(), termination)?;
     let questions: Vec<_> =

@@ -8,9 +8,11 @@ mod audit;
 mod blockage;
 mod graph;
 mod literal;
+mod records;
 mod static_analysis;
 
 pub use audit::{Audit, audit};
 pub use blockage::{Blockage, Evaluation};
 pub use graph::DirectionalGraph;
+pub(crate) use records::BLOCKING;
 pub use static_analysis::{Analysis, StaticAnalysis};

@@ -8,12 +8,13 @@
 
 use rayon::prelude::*;
 
-use crate::cache::{Key, Recall, blocking_key};
+use crate::cache::{RecordKey, RequestCache};
 use crate::geometry::Pose;
 use crate::scene::{Pair, Scene, grouped};
 use crate::simulation::{Action, pair_blocks};
 use crate::termination::{Interrupt, Termination};
 
+use super::records::blocking_key;
 use super::{Blockage, literal};
 
 /// When one part counts as blocked by another, before anything is simulated.
@@ -48,7 +49,7 @@ pub struct Analysis<'a> {
     /// The actions.
     pub translations: &'a [Action],
     /// What is remembered.
-    pub recall: &'a Recall,
+    pub cache: &'a RequestCache,
 }
 
 impl Analysis<'_> {
@@ -73,7 +74,7 @@ impl Analysis<'_> {
             let (mover, other) = if extent(p) <= extent(o) { (p, o) } else { (o, p) };
             self.keyed(mover, &scene.bodies[mover].planning_from_shape, other, least(mover))
         };
-        let pairs: Vec<(Key, Pair)> = pairs.par_iter().map(placed).collect();
+        let pairs: Vec<(RecordKey, Pair)> = pairs.par_iter().map(placed).collect();
         // What holds for one bolt in its nut holds for all that stand alike.
         let (first, group_of) = grouped(pairs.iter().map(|(key, _)| *key));
         // One by one: most are remembered, and two that are not must not come after one another on one thread.
@@ -88,7 +89,7 @@ impl Analysis<'_> {
             .collect::<Result<Vec<_>, Interrupt>>()?;
         let mut out = vec![Blockage::open(translations.len()); scene.bodies.len()];
         for ((_, Pair { parts: [mover, other], .. }), group) in pairs.into_iter().zip(group_of) {
-            for a in (0..translations.len()).filter(|&a| relations[group][a]) {
+            for a in (0..translations.len()).filter(|&a| relations[group].get(a) == Some(&true)) {
                 out[mover].block_single(a, other);
                 out[other].block_single(a ^ 1, mover);
             }
@@ -114,14 +115,14 @@ impl Analysis<'_> {
         for other in scene.broad_phase.meeting_of(standing, &bounds) {
             let (key, pair) = self.keyed(part, pose, other, least);
             let blocked = self.pair_blocks(key, &pair, least, termination)?;
-            for a in (0..translations.len()).filter(|&a| blocked[a]) {
+            for a in (0..translations.len()).filter(|&a| blocked.get(a) == Some(&true)) {
                 out.block_single(a, other);
             }
         }
         Ok(out)
     }
 
-    fn keyed(&self, part: usize, pose: &Pose, other: usize, least: f64) -> (Key, Pair) {
+    fn keyed(&self, part: usize, pose: &Pose, other: usize, least: f64) -> (RecordKey, Pair) {
         let pair = Pair::shifted(self.scene, part, pose, other);
         (blocking_key(self.scene, &pair, self.rule.name(), self.translations, least), pair)
     }
@@ -129,12 +130,12 @@ impl Analysis<'_> {
     /// For each translation, whether the second part of a pair blocks the first.
     fn pair_blocks(
         &self,
-        key: Key,
+        key: RecordKey,
         pair: &Pair,
         least: f64,
         termination: &Termination,
     ) -> Result<Vec<bool>, Interrupt> {
-        self.recall.blocking(key, self.translations.len(), || {
+        self.cache.get_or(key, || {
             let (alone, pose) = (pair.scene(self.scene), &pair.poses[0]);
             match self.rule {
                 StaticAnalysis::Sliding => {
@@ -170,8 +171,8 @@ mod tests {
         present: &[usize],
         termination: &Termination,
     ) -> Result<Vec<Blockage>, Interrupt> {
-        let (translations, recall) = (Action::translations(), Recall::default());
-        let analysis = Analysis { rule: RULE, scene, translations: &translations, recall: &recall };
+        let (translations, cache) = (Action::translations(), RequestCache::default());
+        let analysis = Analysis { rule: RULE, scene, translations: &translations, cache: &cache };
         analysis.initial_blockages(present, &|_| LEAST, termination)
     }
 
@@ -181,8 +182,8 @@ mod tests {
     }
 
     fn from(scene: &Scene, standing: &[usize], part: usize, pose: &Pose) -> Blockage {
-        let (translations, recall) = (Action::translations(), Recall::default());
-        let analysis = Analysis { rule: RULE, scene, translations: &translations, recall: &recall };
+        let (translations, cache) = (Action::translations(), RequestCache::default());
+        let analysis = Analysis { rule: RULE, scene, translations: &translations, cache: &cache };
         analysis.blocked_from(standing, part, pose, LEAST, &Termination::default()).unwrap()
     }
 

@@ -1,9 +1,9 @@
-//! The tier on disk: one redb file, which one process holds, and the files of fields beside it.
+//! The tier on disk: one redb file, which one process holds, and the records that are files beside it.
 //!
-//! redb may panic or fail on a file that was damaged from outside, so everything that touches it is
-//! contained: such a file is set aside and another begun. A file that cannot be written (a full disk)
-//! is closed, and the process goes on in memory; it is opened again after a while, if there is something to
-//! write. Only the writer's thread ([`super::writer`]) writes.
+//! redb may panic or fail on a file that was damaged from outside, so every use of it is contained: such a file is set
+//! aside and another begun. A file that cannot be written (a full disk) is closed, and the process goes on in memory;
+//! it opens the file again after a while, if there is something to write. Only the writer's thread
+//! ([`super::writer`]) writes.
 
 use std::collections::{HashMap, HashSet};
 use std::os::unix::fs::DirBuilderExt;
@@ -15,24 +15,24 @@ use std::time::{Duration, Instant};
 
 use redb::Database;
 
-use super::fields::FieldFiles;
-use super::file;
-use super::kind::{Key, Kind};
-use super::tables::{Failure, Listed, Tables, agree, grew, listed, make_tables, read, write};
-use super::tally::Tally;
-use crate::sdf::Field;
+use super::database_file;
+use super::files::{FileSource, RecordFiles};
+use super::key::RecordKey;
+use super::kind::RecordKind;
+use super::tables::{DiskFailure, Listed, StoreTables, agree, grew, listed, make_tables, read, write};
+use super::tally::CacheTally;
 
 const FILE: &str = "records.redb";
 const DAMAGED: &str = "records.redb.damaged";
-/// Of the budget, what the files of fields may take: the rest is for the file of records.
-const FOR_FIELDS: f64 = 0.25;
-/// Of a file that has become too large all the same, so much of what records may take is left.
+/// The share of the budget for records that are files; the rest is for the file of records.
+const FOR_FILES: f64 = 0.25;
+/// When the file exceeds its budget all the same, records are evicted down to this share of their bytes.
 const AFTER_OVERGROWTH: f64 = 0.5;
-/// Evicting goes on down to this share of what records may take, so that it is not done all the time.
+/// Records are evicted down to this share of what they may take. Nearer to 1, transactions evict more often.
 const AFTER_EVICTION: f64 = 0.9;
-/// A file that could not be read or written is left alone for so long.
+/// After it could not be read or written, the file is left alone for this long.
 const PAUSE: Duration = Duration::from_secs(30);
-/// So many records are remembered as used until the next transaction notes it.
+/// Keys that are noted as used until the next transaction writes that down; more are not.
 const MOST_TOUCHED: usize = 1 << 16;
 
 /// Why a store cannot be opened.
@@ -55,49 +55,55 @@ pub enum DiskError {
 #[derive(Debug)]
 pub(super) struct Disk {
     folder: PathBuf,
-    /// Bytes that the file may take.
+    kinds: Arc<[&'static RecordKind]>,
+    /// Bytes that the file of records may take.
     budget: u64,
-    /// Bytes that the files of fields may take.
-    for_fields: u64,
-    pub(super) fields: FieldFiles,
+    /// Bytes that the records that are files may take.
+    for_files: u64,
+    pub(super) files: RecordFiles,
     database: RwLock<Option<Database>>,
-    /// Counts the files that were opened: who failed on one must not set the next one aside.
+    /// Counts the files that were opened: a failure on one must not set the next one aside.
     generation: AtomicU64,
-    /// When the file failed that is closed for this.
+    /// When the file failed, if it is closed because of that.
     failed_at: Mutex<Option<Instant>>,
     pause: Duration,
-    touched: Mutex<HashSet<Key>>,
-    /// The records in the file of kinds that are noted: whoever asks for one that is not there does not wait
-    /// for the disk to hear so.
-    noted: Mutex<HashSet<Key>>,
-    tally: Arc<Tally>,
+    touched: Mutex<HashSet<RecordKey>>,
+    /// All keys in the file of the kinds with an index.
+    index: Mutex<HashSet<RecordKey>>,
+    tally: Arc<CacheTally>,
 }
 
 impl Disk {
     /// Opens the store of a folder, or makes one; `budget` is for all of it, in bytes.
-    pub(super) fn open(folder: &Path, budget: u64, tally: Arc<Tally>) -> Result<Self, DiskError> {
+    pub(super) fn open(
+        folder: &Path,
+        kinds: Arc<[&'static RecordKind]>,
+        budget: u64,
+        tally: Arc<CacheTally>,
+    ) -> Result<Self, DiskError> {
         let unusable = |reason: String| DiskError::Unusable { path: folder.to_owned(), reason };
         let mut builder = std::fs::DirBuilder::new();
         builder.recursive(true).mode(0o700).create(folder).map_err(|e| unusable(e.to_string()))?;
-        let for_fields = (budget as f64 * FOR_FIELDS) as u64;
+        let for_files = (budget as f64 * FOR_FILES) as u64;
         let disk = Self {
             folder: folder.to_owned(),
-            budget: budget - for_fields,
-            for_fields,
-            fields: FieldFiles::beside(folder),
+            files: RecordFiles::of(folder, &kinds),
+            kinds,
+            budget: budget - for_files,
+            for_files,
             database: RwLock::new(None),
             generation: AtomicU64::new(0),
             failed_at: Mutex::default(),
             pause: PAUSE,
             touched: Mutex::default(),
-            noted: Mutex::default(),
+            index: Mutex::default(),
             tally,
         };
         let database = match disk.database_or_new() {
             Ok(database) => database,
-            Err(Failure::InUse) => return Err(DiskError::InUse(folder.join(FILE))),
-            Err(Failure::Io(reason)) => return Err(unusable(reason)),
-            Err(Failure::Damaged(reason)) => {
+            Err(DiskFailure::InUse) => return Err(DiskError::InUse(folder.join(FILE))),
+            Err(DiskFailure::Io(reason)) => return Err(unusable(reason)),
+            Err(DiskFailure::Damaged(reason)) => {
                 return Err(unusable(format!("cannot begin anew after: {reason}")));
             }
         };
@@ -105,19 +111,19 @@ impl Disk {
         Ok(disk)
     }
 
-    /// Works with a file from now on.
+    /// Uses a file from now on.
     fn begin(&self, database: Database) {
         *self.database.write().unwrap_or_else(PoisonError::into_inner) = Some(database);
-        for kind in Kind::ALL.into_iter().filter(|kind| kind.is_noted()) {
+        for kind in self.kinds.iter().filter(|kind| kind.is_indexed()) {
             let listed = self.list(Some(kind)).unwrap_or_default();
-            self.noted().extend(listed.iter().map(|l| l.key));
+            self.index().extend(listed.iter().map(|l| l.key));
         }
     }
 
     /// The file; another one, if it is damaged.
-    fn database_or_new(&self) -> Result<Database, Failure> {
+    fn database_or_new(&self) -> Result<Database, DiskFailure> {
         match self.database_at() {
-            Err(Failure::Damaged(reason)) => {
+            Err(DiskFailure::Damaged(reason)) => {
                 self.rename(&reason);
                 self.database_at()
             }
@@ -125,22 +131,22 @@ impl Disk {
         }
     }
 
-    fn database_at(&self) -> Result<Database, Failure> {
+    fn database_at(&self) -> Result<Database, DiskFailure> {
         contained(|| {
-            let database = file::database_at(&self.folder.join(FILE))?;
+            let database = database_file::database_at(&self.folder.join(FILE))?;
             // Nobody else writes to the folder from here on.
-            let files = self.fields.look().map_err(|e| Failure::Io(e.to_string()))?;
-            make_tables(&database, &files)?;
+            let files = self.files.look().map_err(|e| DiskFailure::Io(e.to_string()))?;
+            make_tables(&database, &self.kinds, &files)?;
             Ok(database)
         })
     }
 
-    /// Whether there is a file to work with.
+    /// Whether there is a file to use.
     pub(super) fn is_open(&self) -> bool {
         self.database.read().unwrap_or_else(PoisonError::into_inner).is_some()
     }
 
-    /// Whether something may be written: to the open file, or to one that is worth another try.
+    /// Whether something may be written: the file is open, or worth another try.
     pub(super) fn may_write(&self) -> bool {
         self.is_open() || self.is_due()
     }
@@ -153,7 +159,7 @@ impl Disk {
         self.failed_at.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Opens a file that failed a while ago. Only the writer's thread does: nobody else opens or closes it then.
+    /// Opens a file that failed a while ago. Only the writer's thread does this.
     fn try_again(&self) {
         if self.is_open() || !self.is_due() {
             return;
@@ -169,46 +175,50 @@ impl Disk {
     }
 
     /// The envelope of a key, as it was written.
-    pub(super) fn get(&self, key: &Key) -> Option<Vec<u8>> {
-        if key.kind().is_noted() && !self.contains(key) {
+    pub(super) fn get(&self, key: &RecordKey) -> Option<Vec<u8>> {
+        if key.kind().is_indexed() && !self.contains(key) {
             return None;
         }
         self.get_all(std::slice::from_ref(key))?.pop()?
     }
 
     /// The envelopes of keys, as they were written.
-    pub(super) fn get_all(&self, keys: &[Key]) -> Option<Vec<Option<Vec<u8>>>> {
+    pub(super) fn get_all(&self, keys: &[RecordKey]) -> Option<Vec<Option<Vec<u8>>>> {
         self.with_free(|database| read(database, keys))
     }
 
-    /// Whether there is an envelope of a key of a kind that is noted.
-    pub(super) fn contains(&self, key: &Key) -> bool {
-        self.noted().contains(key)
+    /// Whether the index has a key.
+    pub(super) fn contains(&self, key: &RecordKey) -> bool {
+        self.index().contains(key)
     }
 
     /// A holder that panicked cannot have left it half-changed.
-    fn noted(&self) -> MutexGuard<'_, HashSet<Key>> {
-        self.noted.lock().unwrap_or_else(PoisonError::into_inner)
+    fn index(&self) -> MutexGuard<'_, HashSet<RecordKey>> {
+        self.index.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes that a record was used; the next transaction writes it down.
-    pub(super) fn touch(&self, key: Key) {
+    /// Notes that a record was used; the next transaction writes that down.
+    pub(super) fn touch(&self, key: RecordKey) {
         let mut touched = self.touched.lock().unwrap_or_else(PoisonError::into_inner);
         if touched.len() < MOST_TOUCHED {
             touched.insert(key);
         }
     }
 
-    /// Writes envelopes in one transaction, with what was used since the last one and the files of fields.
-    pub(super) fn write(&self, records: &[(Key, Vec<u8>)], fields: &HashMap<Key, Arc<Field>>) {
+    /// Writes files, and in one transaction envelopes, the files' bytes and what was used since the last one.
+    pub(super) fn write(
+        &self,
+        records: &[(RecordKey, Vec<u8>)],
+        files: &HashMap<RecordKey, Arc<dyn FileSource>>,
+    ) {
         self.try_again();
-        let files = self.written(fields);
+        let files = self.written(files);
         let touched = std::mem::take(&mut *self.touched.lock().unwrap_or_else(PoisonError::into_inner));
         let before = self.file_bytes();
         let written = self.with(|database| {
             let transaction = write(database)?;
             let (evicted, bytes) = {
-                let mut tables = Tables::of(&transaction)?;
+                let mut tables = StoreTables::of(&transaction, &self.kinds)?;
                 for (key, bytes) in records {
                     tables.insert(key, bytes)?;
                 }
@@ -220,7 +230,7 @@ impl Disk {
                 }
                 let limit = tables.limit(self.budget, before)?;
                 let mut evicted = tables.evict_above(limit, (limit as f64 * AFTER_EVICTION) as u64)?;
-                evicted.extend(tables.evict_files_above(self.for_fields)?);
+                evicted.extend(tables.evict_files_above(self.for_files)?);
                 tables.finish()?;
                 (evicted, tables.bytes)
             };
@@ -228,9 +238,9 @@ impl Disk {
             Ok((evicted, bytes))
         });
         let Some((evicted, bytes)) = written else { return };
-        self.fields.remove(&evicted);
-        let new = records.iter().map(|(key, _)| *key).filter(|key| key.kind().is_noted());
-        self.noted().extend(new);
+        self.files.remove(&evicted);
+        let new = records.iter().map(|(key, _)| *key).filter(|key| key.kind().is_indexed());
+        self.index().extend(new);
         self.count(&evicted);
         let after = self.file_bytes();
         if after > before {
@@ -242,18 +252,19 @@ impl Disk {
         }
     }
 
-    /// Writes the files of fields; those that were written, with their bytes.
-    fn written(&self, fields: &HashMap<Key, Arc<Field>>) -> Vec<(Key, u64)> {
+    /// Writes files; those that were written, with their bytes.
+    fn written(&self, sources: &HashMap<RecordKey, Arc<dyn FileSource>>) -> Vec<(RecordKey, u64)> {
         let mut files = Vec::new();
-        for (key, field) in fields {
-            if !self.is_open() || !self.fields.may_write() || field.unwritten() == 0 {
+        for (key, source) in sources {
+            if !self.is_open() || !self.files.may_write() || !source.is_unwritten() {
                 continue;
             }
-            match self.fields.write(key, field) {
+            match self.files.write(key, &**source) {
                 Ok(bytes) => files.push((*key, bytes)),
                 Err(error) => {
                     self.tally.write_failures.one_more();
-                    tracing::warn!(folder = %self.folder.display(), %error, "a distance field is not written");
+                    let kind = key.kind().name;
+                    tracing::warn!(folder = %self.folder.display(), kind, %error, "a file is not written");
                 }
             }
         }
@@ -265,12 +276,12 @@ impl Disk {
     }
 
     /// Takes records out; whether that was done.
-    pub(super) fn remove(&self, keys: &[Key]) -> bool {
+    pub(super) fn remove(&self, keys: &[RecordKey]) -> bool {
         let done = self.with(|database| {
             let transaction = write(database)?;
-            let mut tables = Tables::of(&transaction)?;
+            let mut tables = StoreTables::of(&transaction, &self.kinds)?;
             for key in keys {
-                if key.kind().is_file() {
+                if key.kind().files().is_some() {
                     tables.remove_file(key)?;
                 } else {
                     tables.remove(&key.to_bytes())?;
@@ -280,37 +291,36 @@ impl Disk {
             drop(tables);
             Ok(transaction.commit()?)
         });
-        self.fields.remove(keys);
-        let mut noted = self.noted();
+        self.files.remove(keys);
+        let mut index = self.index();
         keys.iter().for_each(|key| {
-            noted.remove(key);
+            index.remove(key);
         });
         done.is_some()
     }
 
-    /// Takes out what was used least recently, records and files alike, until so many bytes are left; how
-    /// much left.
+    /// Evicts the least recently used records and files until no more than `bytes` are left; how many were evicted.
     pub(super) fn evict_all_above(&self, bytes: u64) -> Option<usize> {
         let mut list = self.list(None)?;
-        list.sort_by_key(|listed| (listed.used, listed.key));
+        list.sort_by_key(|listed| (listed.used, listed.key.to_bytes()));
         let mut left: u64 = list.iter().map(Listed::cost).sum();
         let surplus = |listed: &&Listed| {
             let more = left > bytes;
             left -= listed.cost();
             more
         };
-        let evicted: Vec<Key> = list.iter().take_while(surplus).map(|listed| listed.key).collect();
+        let evicted: Vec<RecordKey> = list.iter().take_while(surplus).map(|listed| listed.key).collect();
         if !evicted.is_empty() && self.remove(&evicted) {
             self.count(&evicted);
         }
         Some(evicted.len())
     }
 
-    /// Evicts down to so many bytes of records; how many left.
+    /// Evicts records until no more than `budget` bytes are left; how many were evicted.
     fn evict(&self, budget: u64) -> Option<usize> {
         let evicted = self.with(|database| {
             let transaction = write(database)?;
-            let mut tables = Tables::of(&transaction)?;
+            let mut tables = StoreTables::of(&transaction, &self.kinds)?;
             let evicted = tables.evict_above(budget, budget)?;
             tables.finish()?;
             drop(tables);
@@ -321,18 +331,18 @@ impl Disk {
         Some(evicted.len())
     }
 
-    /// Notes what left the file for others.
-    fn count(&self, evicted: &[Key]) {
-        let mut noted = self.noted();
+    /// Counts what was evicted.
+    fn count(&self, evicted: &[RecordKey]) {
+        let mut index = self.index();
         for key in evicted {
-            noted.remove(key);
-            self.tally.of(key.kind()).disk_evictions.one_more();
+            index.remove(key);
+            self.tally.kinds[key.kind()].disk_evictions.one_more();
         }
     }
 
-    /// The records of a kind, or all, in the order of their keys.
-    pub(super) fn list(&self, kind: Option<Kind>) -> Option<Vec<Listed>> {
-        self.with(|database| listed(database, kind))
+    /// The records of one kind, or of all, in the order of their keys.
+    pub(super) fn list(&self, kind: Option<&RecordKind>) -> Option<Vec<Listed>> {
+        self.with(|database| listed(database, &self.kinds, kind))
     }
 
     /// Bytes of the file.
@@ -363,21 +373,21 @@ impl Disk {
     pub(super) fn holds_together(&self) -> bool {
         let agrees = self.with(|database| {
             let reason = "its tables contradict each other";
-            if agree(database)? { Ok(()) } else { Err(Failure::Damaged(reason.to_owned())) }
+            if agree(database)? { Ok(()) } else { Err(DiskFailure::Damaged(reason.to_owned())) }
         });
         agrees.is_some()
     }
 
-    /// As [`Disk::with`], unless the file is being looked after: nobody waits for that.
-    fn with_free<T>(&self, work: impl FnOnce(&Database) -> Result<T, Failure>) -> Option<T> {
+    /// As [`Disk::with`], but does not wait while the file is checked or replaced: then it does nothing.
+    fn with_free<T>(&self, work: impl FnOnce(&Database) -> Result<T, DiskFailure>) -> Option<T> {
         if matches!(self.database.try_read(), Err(TryLockError::WouldBlock)) {
             return None;
         }
         self.with(work)
     }
 
-    /// Something with the open file, if it is open; what fails closes the file or sets it aside.
-    fn with<T>(&self, work: impl FnOnce(&Database) -> Result<T, Failure>) -> Option<T> {
+    /// Does something with the file, if it is open. A failure closes the file or sets it aside.
+    fn with<T>(&self, work: impl FnOnce(&Database) -> Result<T, DiskFailure>) -> Option<T> {
         let slot = self.database.read().unwrap_or_else(PoisonError::into_inner);
         let database = slot.as_ref()?;
         let done = contained(|| work(database));
@@ -386,15 +396,14 @@ impl Disk {
         done.map_err(|failure| self.failed(failure, generation)).ok()
     }
 
-    /// Closes the file that failed, unless somebody did; a damaged one is kept for whoever wants to look at
-    /// it, and another begun.
-    fn failed(&self, failure: Failure, generation: u64) {
+    /// Closes the file that failed, unless another thread did; a damaged one is set aside, and another begun.
+    fn failed(&self, failure: DiskFailure, generation: u64) {
         let mut slot = self.database.write().unwrap_or_else(PoisonError::into_inner);
         if self.generation.load(Ordering::Relaxed) != generation {
             return;
         }
         self.generation.store(generation + 1, Ordering::Relaxed);
-        self.noted().clear();
+        self.index().clear();
         let database = slot.take();
         // redb writes when it is dropped.
         let closed = contained(|| {
@@ -405,17 +414,17 @@ impl Disk {
             tracing::warn!(folder = %self.folder.display(), "the store on disk was not closed cleanly");
         }
         match failure {
-            Failure::Damaged(reason) => {
+            DiskFailure::Damaged(reason) => {
                 self.rename(&reason);
                 *slot = self.database_at().ok();
             }
-            Failure::Io(reason) => {
+            DiskFailure::Io(reason) => {
                 self.tally.write_failures.one_more();
                 *self.failed_at() = Some(Instant::now());
                 tracing::warn!(folder = %self.folder.display(), reason, "the store on disk fails: on in memory");
             }
-            // Not of an open file.
-            Failure::InUse => {}
+            // An open file does not fail so.
+            DiskFailure::InUse => {}
         }
     }
 
@@ -430,31 +439,23 @@ impl Disk {
 }
 
 /// A panic of the database is a damaged file.
-fn contained<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(Failure::Damaged("redb panicked".into())))
-}
-
-/// How many bytes of records there are of each kind, in the order of [`Kind::ALL`].
-pub(super) fn by_kind(list: &[Listed]) -> Vec<(u64, u64)> {
-    let of = |kind: Kind| {
-        let listed = list.iter().filter(|l| l.key.kind() == kind);
-        listed.fold((0, 0), |(entries, bytes), l| (entries + 1, bytes + l.bytes))
-    };
-    Kind::ALL.into_iter().map(of).collect()
+fn contained<T>(work: impl FnOnce() -> Result<T, DiskFailure>) -> Result<T, DiskFailure> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| Err(DiskFailure::Damaged("redb panicked".into())))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::kind::Digest;
+    use super::super::key::Digest;
+    use super::super::tests::{INDEXED, KINDS};
     use super::*;
 
     #[test]
     fn a_file_that_failed_is_opened_again_after_a_while() {
         let folder = tempfile::tempdir().unwrap();
-        let mut disk = Disk::open(folder.path(), 64 << 20, Arc::default()).unwrap();
-        let key = |n: u64| Digest::new().integer(n).key(Kind::Source);
+        let mut disk = Disk::open(folder.path(), Arc::new(KINDS), 64 << 20, Arc::default()).unwrap();
+        let key = |n: u64| Digest::new().integer(n).key(&INDEXED);
         let fail = |disk: &Disk| {
-            disk.failed(Failure::Io("no space left".into()), disk.generation.load(Ordering::Relaxed));
+            disk.failed(DiskFailure::Io("no space left".into()), disk.generation.load(Ordering::Relaxed));
         };
         disk.write(&[(key(1), vec![1; 9])], &HashMap::new());
         fail(&disk);

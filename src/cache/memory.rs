@@ -1,28 +1,29 @@
-//! The tier in memory: payloads up to a budget in bytes, the least recently used leave.
+//! The tier in memory: payloads up to a budget in bytes; the least recently used are evicted.
 
 use std::sync::Arc;
 
-use super::kind::{Key, Kind};
+use super::key::RecordKey;
+use super::kind::{ByKind, RecordKind};
 use crate::lru::{self, Lru};
 
-/// Payloads by key. What somebody still holds is never evicted.
+/// Payloads by key. A payload that is in use is never evicted.
 #[derive(Debug)]
 pub(super) struct Memory {
     budget: usize,
     bytes: usize,
-    /// By kind.
-    held: [Held; Kind::ALL.len()],
-    payloads: Lru<Key, [u8]>,
+    usage: ByKind<KindUsage>,
+    payloads: Lru<RecordKey, [u8]>,
 }
 
-/// How much of a kind is held.
+/// How much there is of a kind.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Held {
+pub(super) struct KindUsage {
     pub(super) entries: u64,
+    /// Of payloads.
     pub(super) bytes: u64,
 }
 
-impl Held {
+impl KindUsage {
     fn add(&mut self, payload: &[u8]) {
         self.entries += 1;
         self.bytes += payload.len() as u64;
@@ -36,15 +37,15 @@ impl Held {
 
 impl Memory {
     pub(super) fn new(budget: usize) -> Self {
-        Self { budget, bytes: 0, held: Default::default(), payloads: Lru::default() }
+        Self { budget, bytes: 0, usage: ByKind::default(), payloads: Lru::default() }
     }
 
-    pub(super) fn get(&mut self, key: &Key) -> Option<Arc<[u8]>> {
+    pub(super) fn get(&mut self, key: &RecordKey) -> Option<Arc<[u8]>> {
         self.payloads.get(key)
     }
 
-    /// Keeps a payload, in place of one with the same key; what had to leave for it, by kind.
-    pub(super) fn put(&mut self, key: Key, payload: Arc<[u8]>) -> Vec<Kind> {
+    /// Keeps a payload, in place of one with the same key; the kinds of the payloads that were evicted for it.
+    pub(super) fn put(&mut self, key: RecordKey, payload: Arc<[u8]>) -> Vec<&'static RecordKind> {
         self.remove(&key);
         let cost = cost(&payload);
         if cost > self.budget {
@@ -52,30 +53,30 @@ impl Memory {
         }
         let evicted = self.make_room(cost);
         self.bytes += cost;
-        self.held[key.kind().index()].add(&payload);
+        self.usage[key.kind()].add(&payload);
         self.payloads.insert(key, payload);
         evicted
     }
 
-    /// Whether there is a payload, which is not used by this.
-    pub(super) fn has(&self, key: &Key) -> bool {
+    /// Whether there is a payload. This is no use of it.
+    pub(super) fn has(&self, key: &RecordKey) -> bool {
         self.payloads.peek(key).is_some()
     }
 
-    pub(super) fn remove(&mut self, key: &Key) {
+    pub(super) fn remove(&mut self, key: &RecordKey) {
         if let Some(payload) = self.payloads.remove(key) {
             self.bytes -= cost(&payload);
-            self.held[key.kind().index()].take(&payload);
+            self.usage[key.kind()].take(&payload);
         }
     }
 
-    fn make_room(&mut self, needed: usize) -> Vec<Kind> {
-        let Self { budget, bytes, held, payloads } = self;
+    fn make_room(&mut self, needed: usize) -> Vec<&'static RecordKind> {
+        let Self { budget, bytes, usage, payloads } = self;
         let mut evicted = Vec::new();
         if *bytes + needed > *budget {
             payloads.evict(|key, payload| {
                 *bytes -= cost(&payload);
-                held[key.kind().index()].take(&payload);
+                usage[key.kind()].take(&payload);
                 evicted.push(key.kind());
                 *bytes + needed > *budget
             });
@@ -83,16 +84,16 @@ impl Memory {
         evicted
     }
 
-    pub(super) fn held(&self, kind: Kind) -> Held {
-        self.held[kind.index()]
+    pub(super) fn usage(&self, kind: &RecordKind) -> KindUsage {
+        self.usage[kind]
     }
 
-    /// What they may take.
+    /// In bytes.
     pub(super) fn budget(&self) -> usize {
         self.budget
     }
 
-    /// Of payloads and of what is kept beside them.
+    /// Bytes of the payloads, with keys and overhead.
     pub(super) fn bytes(&self) -> usize {
         self.bytes
     }
@@ -102,23 +103,24 @@ impl Memory {
     }
 }
 
-/// Most payloads are a few bytes: what is kept beside them is the larger share.
+/// Bytes that a payload takes, with its key and the overhead, which is the larger share for most.
 fn cost(payload: &[u8]) -> usize {
     cost_of(payload.len())
 }
 
 const fn cost_of(length: usize) -> usize {
-    Lru::<Key, [u8]>::OVERHEAD + lru::shared(length)
+    Lru::<RecordKey, [u8]>::OVERHEAD + lru::shared(length)
 }
 
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::tests::KINDS;
     use super::*;
 
-    fn key(n: u8) -> Key {
-        Key::new(Kind::ALL[usize::from(n) % 2], [n; 32])
+    fn key(n: u8) -> RecordKey {
+        RecordKey::new(KINDS[usize::from(n) % 2], [n; 32])
     }
 
     fn payload(length: usize) -> Arc<[u8]> {
@@ -161,12 +163,12 @@ mod tests {
         fn it_holds_what_a_plain_list_would(steps in prop::collection::vec((0u8..12, 0usize..400, any::<bool>()), 1..200)) {
             let budget = 5 * cost_of(200);
             let mut memory = Memory::new(budget);
-            let mut model: Vec<(Key, usize)> = Vec::new();
+            let mut model: Vec<(RecordKey, usize)> = Vec::new();
             for (n, length, put) in steps {
                 let known = model.iter().position(|(k, _)| *k == key(n));
                 if put {
                     known.map(|at| model.remove(at));
-                    let used = |m: &[(Key, usize)]| m.iter().map(|(_, l)| cost_of(*l)).sum::<usize>();
+                    let used = |m: &[(RecordKey, usize)]| m.iter().map(|(_, l)| cost_of(*l)).sum::<usize>();
                     if cost_of(length) <= budget {
                         while used(&model) + cost_of(length) > budget {
                             model.remove(0);
@@ -184,7 +186,7 @@ mod tests {
                     }
                 }
                 prop_assert!(memory.bytes() <= budget);
-                let held = Kind::ALL.map(|kind| memory.held(kind));
+                let held = KINDS.map(|kind| memory.usage(kind));
                 let (entries, bytes) = held.iter().fold((0, 0), |(n, b), h| (n + h.entries, b + h.bytes));
                 prop_assert_eq!(entries as usize, model.len());
                 prop_assert_eq!(bytes as usize, model.iter().map(|(_, l)| l).sum::<usize>());

@@ -7,14 +7,14 @@ use std::path::PathBuf;
 pub struct CacheSettings {
     /// The folder of the files on disk; `None` for memory alone.
     pub folder: Option<PathBuf>,
-    /// The budget in memory, in bytes: payloads and what is kept beside them.
+    /// The budget in memory, in bytes: payloads, keys and overhead.
     pub memory_bytes: usize,
     /// The budget of all files, in bytes.
     pub disk_bytes: u64,
 }
 
 impl Default for CacheSettings {
-    /// 256 MB of memory and 1 GB of disk, where the user's caches are.
+    /// 256 MB of memory, and 1 GB of disk in the user's folder for caches.
     fn default() -> Self {
         Self { folder: Self::default_folder(), memory_bytes: 256 << 20, disk_bytes: 1 << 30 }
     }

@@ -1,26 +1,25 @@
-//! What the store holds and how it did; looking after it from outside (`sbdp cache`).
+//! What the store holds and counts, and maintenance from outside (`sbdp cache`).
 
 use serde::Serialize;
 
-use super::disk::by_kind;
-use super::{Cache, Kind, Listed, format};
+use super::{Cache, Listed, RecordKind, envelope};
 
-/// How the store does.
+/// What the store holds and counts.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct CacheStatistics {
-    /// Whether there is a file that works.
+    /// Whether there is a store on disk that works.
     pub on_disk: bool,
-    /// Bytes of the file.
+    /// Bytes of the file of records.
     pub file_bytes: u64,
-    /// Bytes of the files of distance fields.
+    /// Bytes of the records that are files: distance fields, hence the name.
     pub field_file_bytes: u64,
-    /// Bytes of such files that are mapped: the system's, no memory of this process.
+    /// Bytes of such files that are mapped. They are no memory of this process.
     pub mapped_bytes: u64,
-    /// Bytes in memory: payloads and what is kept beside them.
+    /// Bytes in memory: payloads, keys and overhead.
     pub memory_bytes: u64,
     /// Records that were not written because too many waited, since the start.
     pub overflows: u64,
-    /// Times that the file could not be written, since the start.
+    /// Failures to write a file, since the start.
     pub write_failures: u64,
     /// Files that were set aside as damaged, since the start.
     pub set_aside: u64,
@@ -28,10 +27,10 @@ pub struct CacheStatistics {
     pub kinds: Vec<KindStatistics>,
 }
 
-/// How one kind does; counts since the start.
+/// What the store holds and counts of one kind, since the start.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct KindStatistics {
-    /// Its name.
+    /// The name of the kind.
     pub kind: &'static str,
     /// Records found.
     pub hits: u64,
@@ -41,28 +40,28 @@ pub struct KindStatistics {
     pub entries: u64,
     /// Bytes of their payloads.
     pub bytes: u64,
-    /// Records that left memory for others.
+    /// Records that were evicted from memory.
     pub evictions: u64,
-    /// Records on disk, where they were counted.
+    /// Records on disk, if they were counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub disk_entries: Option<u64>,
-    /// Their bytes, likewise.
+    /// Bytes of the records on disk, if they were counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub disk_bytes: Option<u64>,
-    /// Records that left the disk for others.
+    /// Records that were evicted from disk.
     pub disk_evictions: u64,
     /// Records found damaged, or of another version.
     pub damaged: u64,
 }
 
-/// What a check of the file found.
+/// What a check of the store found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Verified {
-    /// Records and files of fields that were looked at.
+    /// Records that were checked.
     pub records: usize,
-    /// Of them, damaged or of another version, and taken out.
+    /// Those that were damaged or of another version, and were taken out.
     pub damaged: usize,
-    /// Whether the file itself was as its transactions left it.
+    /// Whether the file of records was as its transactions left it.
     pub clean: bool,
 }
 
@@ -70,26 +69,28 @@ impl Cache {
     /// Counts what there is; looks at every record's entry on disk.
     #[must_use]
     pub fn statistics(&self) -> CacheStatistics {
-        let on_disk = by_kind(&self.list());
+        let list = self.list();
         let mut counters = self.counters();
-        for (kind, (entries, bytes)) in counters.kinds.iter_mut().zip(on_disk) {
-            (kind.disk_entries, kind.disk_bytes) = (Some(entries), Some(bytes));
+        for (statistics, kind) in counters.kinds.iter_mut().zip(self.kinds.iter()) {
+            let bytes = list.iter().filter(|l| l.key.kind() == *kind).map(|l| l.bytes);
+            statistics.disk_entries = Some(bytes.clone().count() as u64);
+            statistics.disk_bytes = Some(bytes.sum());
         }
         counters
     }
 
-    /// The same without counting what is on disk: at any time, at once.
+    /// The same without what is on disk, which takes no time.
     #[must_use]
     pub fn counters(&self) -> CacheStatistics {
         let memory = self.memory();
-        let kind = |kind: Kind| {
-            let (tally, held) = (self.tally.of(kind), memory.held(kind));
+        let kind = |kind: &&'static RecordKind| {
+            let (tally, usage) = (&self.tally.kinds[*kind], memory.usage(kind));
             KindStatistics {
-                kind: kind.name(),
+                kind: kind.name,
                 hits: tally.hits.count(),
                 misses: tally.misses.count(),
-                entries: held.entries,
-                bytes: held.bytes,
+                entries: usage.entries,
+                bytes: usage.bytes,
                 evictions: tally.evictions.count(),
                 disk_entries: None,
                 disk_bytes: None,
@@ -100,29 +101,29 @@ impl Cache {
         CacheStatistics {
             on_disk: self.is_on_disk(),
             file_bytes: self.disk.as_ref().map_or(0, |d| d.file_bytes()),
-            field_file_bytes: self.disk.as_ref().map_or(0, |d| d.fields.bytes()),
-            mapped_bytes: self.disk.as_ref().map_or(0, |d| d.fields.mapped().bytes()),
+            field_file_bytes: self.disk.as_ref().map_or(0, |d| d.files.bytes()),
+            mapped_bytes: self.disk.as_ref().map_or(0, |d| d.files.mapped().bytes()),
             memory_bytes: memory.bytes() as u64,
             overflows: self.tally.overflows.count(),
             write_failures: self.tally.write_failures.count(),
             set_aside: self.tally.set_aside.count(),
-            kinds: Kind::ALL.into_iter().map(kind).collect(),
+            kinds: self.kinds.iter().map(kind).collect(),
         }
     }
 
-    /// Files of a kind that were found damaged when they were used.
-    fn damaged_files(&self, kind: Kind) -> u64 {
-        let disk = self.disk.as_ref().filter(|_| kind.is_file());
-        disk.map_or(0, |disk| disk.fields.mapped().damaged())
+    /// If records of a kind are files: those that were found damaged when they were used.
+    fn damaged_files(&self, kind: &RecordKind) -> u64 {
+        let disk = self.disk.as_ref().filter(|_| kind.files().is_some());
+        disk.map_or(0, |disk| disk.files.mapped().damaged())
     }
 
-    /// All records and files of fields on disk.
+    /// All records on disk.
     #[must_use]
     pub fn list(&self) -> Vec<Listed> {
         self.disk.as_ref().and_then(|d| d.list(None)).unwrap_or_default()
     }
 
-    /// Checks the file, every record in it and every file of a field, and takes damaged ones out.
+    /// Checks the file of records, each record in it and each record that is a file, and takes damaged ones out.
     #[must_use]
     pub fn verify(&self) -> Verified {
         self.flush();
@@ -130,13 +131,13 @@ impl Cache {
         let checked = disk.check(false).unwrap_or(false);
         let clean = disk.holds_together() && checked;
         let list = self.list();
-        let intact = |l: &&Listed| match l.key.kind().is_file() {
-            true => disk.fields.is_intact(&l.key),
-            false => disk.get(&l.key).is_some_and(|bytes| format::opened(&l.key, &bytes).is_some()),
+        let intact = |l: &&Listed| match l.key.kind().files() {
+            Some(_) => disk.files.is_intact(&l.key),
+            None => disk.get(&l.key).is_some_and(|bytes| envelope::opened(&l.key, &bytes).is_some()),
         };
         let damaged: Vec<_> = list.iter().filter(|l| !intact(l)).map(|l| l.key).collect();
         for key in &damaged {
-            self.tally.of(key.kind()).damaged.one_more();
+            self.tally.kinds[key.kind()].damaged.one_more();
         }
         if !damaged.is_empty() {
             disk.remove(&damaged);
@@ -144,8 +145,8 @@ impl Cache {
         Verified { records: list.len(), damaged: damaged.len(), clean }
     }
 
-    /// Takes out the records and files of fields used least recently until so many bytes are left, and gives
-    /// unused space back; how many left.
+    /// Evicts the least recently used records until no more than `bytes` are left, and gives unused space back; how many
+    /// were evicted.
     #[must_use]
     pub fn evict(&self, bytes: u64) -> usize {
         self.flush();

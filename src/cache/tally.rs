@@ -2,15 +2,15 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::kind::Kind;
+use super::kind::ByKind;
 
 /// Counters since the start, for all threads.
 #[derive(Debug, Default)]
-pub(super) struct Tally {
-    kinds: [KindTally; Kind::ALL.len()],
+pub(super) struct CacheTally {
+    pub(super) kinds: ByKind<KindTally>,
     /// Records that were not written because too many waited.
     pub(super) overflows: Counter,
-    /// Times that the file could not be written, and the store went on in memory.
+    /// Failures to write a file.
     pub(super) write_failures: Counter,
     /// Files that were set aside as damaged.
     pub(super) set_aside: Counter,
@@ -26,9 +26,10 @@ pub(super) struct KindTally {
     pub(super) damaged: Counter,
 }
 
-impl Tally {
-    pub(super) fn of(&self, kind: Kind) -> &KindTally {
-        &self.kinds[kind.index()]
+impl KindTally {
+    /// Counts a hit or a miss.
+    pub(super) fn looked_up(&self, is_hit: bool) {
+        if is_hit { &self.hits } else { &self.misses }.one_more();
     }
 }
 

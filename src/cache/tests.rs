@@ -1,50 +1,100 @@
 //! The store from outside: it comes back after being closed, killed, or damaged, and keeps its budgets.
 
 use std::collections::HashMap;
+use std::io::{self, Write};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use nalgebra::Point3;
-
-use super::records::BlockingRecord;
 use super::*;
-use crate::fixtures::{ball, surface};
-use crate::geometry::Surface;
-use crate::sdf::{Estimate, Field, FieldStore};
+
+const SOURCES: Validity = Validity::Sources("these");
+pub(super) static RECORDS: RecordKind =
+    RecordKind::of::<Vec<bool>>(1, "records", Storage::MemoryAndDisk, SOURCES);
+pub(super) static OTHER: RecordKind = RecordKind::of::<u8>(2, "other", Storage::MemoryAndDisk, SOURCES);
+pub(super) static INDEXED: RecordKind = RecordKind::of::<u8>(3, "indexed", Storage::IndexedDisk, SOURCES);
+static ON_DISK: RecordKind = RecordKind::of::<u8>(4, "on disk", Storage::Disk, SOURCES);
+pub(super) static VERSIONED: RecordKind =
+    RecordKind::of::<u8>(5, "versioned", Storage::MemoryAndDisk, Validity::Format(3));
+pub(super) static FILES: RecordKind = RecordKind {
+    number: 6,
+    name: "files",
+    storage: Storage::Files { folder: "blobs", extension: "blob" },
+    validity: SOURCES,
+    is_content: is_blob,
+};
+pub(super) static KINDS: [&RecordKind; 6] = [&RECORDS, &OTHER, &INDEXED, &ON_DISK, &VERSIONED, &FILES];
+
+/// Bytes that are all as the first of the hash, after their number. It grows.
+pub(super) struct Blob {
+    length: AtomicUsize,
+    written: AtomicUsize,
+}
+
+impl Blob {
+    pub(super) fn of(length: usize) -> Arc<Self> {
+        Arc::new(Self { length: AtomicUsize::new(length), written: AtomicUsize::new(0) })
+    }
+}
+
+impl FileSource for Blob {
+    fn memory(&self) -> usize {
+        self.length.load(Ordering::Relaxed)
+    }
+
+    fn is_unwritten(&self) -> bool {
+        self.written.load(Ordering::Relaxed) < self.memory()
+    }
+
+    fn write(&self, hash: &[u8; 32], out: &mut dyn Write) -> io::Result<usize> {
+        let length = self.memory();
+        out.write_all(&length.to_le_bytes())?;
+        out.write_all(&vec![hash[0]; length])?;
+        Ok(length)
+    }
+
+    fn is_written(&self, amount: usize) {
+        self.written.fetch_max(amount, Ordering::Relaxed);
+    }
+}
+
+fn is_blob(hash: &[u8; 32], bytes: &[u8]) -> bool {
+    bytes.split_first_chunk().is_some_and(|(length, blob)| {
+        usize::from_le_bytes(*length) == blob.len() && blob.iter().all(|byte| *byte == hash[0])
+    })
+}
 
 /// Set for a process that a test starts to be killed: the folder that it writes to.
 const VICTIM: &str = "SBDP_TEST_CACHE_VICTIM";
 /// How often the kill test kills.
 const KILLS: &str = "SBDP_TEST_KILLS";
 
-/// Of what is a record: the last of all kinds is a file.
-const KINDS: &[Kind] = Kind::ALL.split_last().unwrap().1;
-
 fn settings(folder: &Path) -> CacheSettings {
     CacheSettings { folder: Some(folder.to_owned()), memory_bytes: 1 << 20, disk_bytes: 64 << 20 }
 }
 
-fn open(folder: &Path) -> Cache {
-    Cache::open(&settings(folder)).unwrap()
+fn open_as(settings: &CacheSettings) -> Result<Cache, DiskError> {
+    Cache::open(settings, &KINDS)
 }
 
-fn key(n: u64) -> Key {
-    Digest::new().integer(n).key(KINDS[n as usize % KINDS.len()])
+fn open(folder: &Path) -> Cache {
+    open_as(&settings(folder)).unwrap()
+}
+
+/// A key of any kind but the last, which has files.
+fn key(n: u64) -> RecordKey {
+    Digest::new().integer(n).key(KINDS[n as usize % (KINDS.len() - 1)])
 }
 
 /// Some record that only `n` has.
-fn record(n: u64, length: usize) -> BlockingRecord {
-    BlockingRecord {
-        blocked: (0..length as u64 + n % 7)
-            .map(|i| (n.wrapping_mul(i + 11) >> 3).is_multiple_of(2))
-            .collect(),
-    }
+fn record(n: u64, length: usize) -> Vec<bool> {
+    (0..length as u64 + n % 7).map(|i| (n.wrapping_mul(i + 11) >> 3).is_multiple_of(2)).collect()
 }
 
 fn has(cache: &Cache, n: u64, length: usize) -> bool {
-    let found = cache.get::<BlockingRecord>(&key(n));
+    let found = cache.get::<Vec<bool>>(&key(n));
     assert!(found.as_ref().is_none_or(|r| *r == record(n, length)), "another record than was written");
     found.is_some()
 }
@@ -79,18 +129,18 @@ fn a_record_may_be_larger_than_all_that_may_wait() {
     let folder = tempfile::tempdir().unwrap();
     let settings = CacheSettings { disk_bytes: 1 << 30, ..settings(folder.path()) };
     let large = 80 << 20;
-    let cache = Cache::open(&settings).unwrap();
+    let cache = open_as(&settings).unwrap();
     cache.put(key(0), &record(0, large));
     drop(cache);
-    let cache = Cache::open(&settings).unwrap();
+    let cache = open_as(&settings).unwrap();
     assert!(has(&cache, 0, large), "nothing had waited before it");
 }
 
 #[test]
-fn a_second_process_is_told_that_the_store_is_in_use() {
+fn a_second_process_gets_the_error_that_the_store_is_in_use() {
     let folder = tempfile::tempdir().unwrap();
     let first = open(folder.path());
-    assert!(matches!(Cache::open(&settings(folder.path())), Err(DiskError::InUse(_))));
+    assert!(matches!(open_as(&settings(folder.path())), Err(DiskError::InUse(_))));
     drop(first);
     assert!(open(folder.path()).is_on_disk());
 }
@@ -100,14 +150,14 @@ fn a_folder_that_cannot_be_made_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("file"), "").unwrap();
     let below = settings(&folder.path().join("file/below"));
-    assert!(matches!(Cache::open(&below), Err(DiskError::Unusable { .. })));
+    assert!(matches!(open_as(&below), Err(DiskError::Unusable { .. })));
 }
 
 /// Bytes of a record change where the database does not look: it is a miss and replaced.
 #[test]
 fn a_damaged_record_is_a_counted_miss_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
-    let n = Kind::Blocking as u64 - 1;
+    let n = 0;
     let cache = open(folder.path());
     cache.put(key(n), &record(n, 30));
     cache.flush();
@@ -117,7 +167,7 @@ fn a_damaged_record_is_a_counted_miss_and_replaced() {
     disk.write(&[(key(n), bytes)], &HashMap::new());
     cache.memory().clear();
     assert!(!has(&cache, n, 30));
-    assert_eq!(cache.statistics().kinds[Kind::Blocking.index()].damaged, 1);
+    assert_eq!(cache.statistics().kinds[0].damaged, 1);
     cache.put(key(n), &record(n, 30));
     cache.flush();
     cache.memory().clear();
@@ -172,7 +222,7 @@ fn a_file_damaged_anywhere_gives_no_wrong_record() {
             }
         }
         drop(damaged);
-        let cache = Cache::open(&settings(folder.path())).unwrap_or_else(|e| panic!("round {round}: {e}"));
+        let cache = open_as(&settings(folder.path())).unwrap_or_else(|e| panic!("round {round}: {e}"));
         for n in 0..300 {
             has(&cache, n, 100);
             cache.put(key(n), &record(n, 100));
@@ -192,7 +242,7 @@ fn a_file_damaged_anywhere_gives_no_wrong_record() {
 fn memory_and_disk_keep_their_budgets() {
     let folder = tempfile::tempdir().unwrap();
     let budget = 32 << 20;
-    let cache = Cache::open(&CacheSettings { disk_bytes: budget, ..settings(folder.path()) }).unwrap();
+    let cache = open_as(&CacheSettings { disk_bytes: budget, ..settings(folder.path()) }).unwrap();
     let mut largest = 0;
     for n in 0..20_000u64 {
         let length = 100 + (n as usize * 37) % 8000;
@@ -206,12 +256,12 @@ fn memory_and_disk_keep_their_budgets() {
     }
     assert!(largest <= budget, "the file had {largest} bytes");
     let s = cache.statistics();
-    let left = |(kind, k): (&Kind, &KindStatistics)| {
-        k.disk_evictions > 0 && (k.evictions > 0 || !kind.stays_in_memory())
+    let left = |(kind, k): (&&RecordKind, &KindStatistics)| {
+        k.disk_evictions > 0 && (k.evictions > 0 || !kind.stays_in_memory()) || kind.files().is_some()
     };
     assert!(KINDS.iter().zip(&s.kinds).all(left), "{s:?}");
     assert_eq!(s.overflows, 0);
-    // What came last is there.
+    // The last one is there.
     assert!(has(&cache, 19_999, 100 + (19_999 * 37) % 8000));
     assert!(cache.verify().clean);
 }
@@ -219,10 +269,10 @@ fn memory_and_disk_keep_their_budgets() {
 #[test]
 fn what_is_used_stays_on_disk_while_others_come_and_go() {
     let folder = tempfile::tempdir().unwrap();
-    let cache = Cache::open(&CacheSettings { disk_bytes: 16 << 20, ..settings(folder.path()) }).unwrap();
+    let cache = open_as(&CacheSettings { disk_bytes: 16 << 20, ..settings(folder.path()) }).unwrap();
     for n in 0..8000 {
         cache.put(key(n), &record(n, 2000));
-        // From memory: the disk is to hear of it all the same.
+        // From memory, but it counts as used on disk, too.
         assert!(has(&cache, 0, 2000));
         if n % 100 == 0 {
             cache.flush();
@@ -256,9 +306,7 @@ fn a_store_survives_being_killed() {
     }
     let folder = tempfile::tempdir().unwrap();
     let kills: u64 = std::env::var(KILLS).ok().and_then(|n| n.parse().ok()).unwrap_or(10);
-    let (mut most, mut most_files) = (0, 0);
-    let surface = Arc::new(surface(ball(3)));
-    let truth = said(&Field::of(&surface), 1.0);
+    let (mut most, mut most_files, mut most_blobs) = (0, 0, [false; BLOBS as usize]);
     for kill in 0..kills {
         let mut victim = Command::new(std::env::current_exe().unwrap())
             .args(["--exact", "cache::tests::a_store_survives_being_killed", "--nocapture"])
@@ -271,55 +319,53 @@ fn a_store_survives_being_killed() {
         std::thread::sleep(Duration::from_millis(20 + kill.wrapping_mul(7919) % 400));
         victim.kill().unwrap();
         victim.wait().unwrap();
-        let cache = Arc::new(open(folder.path()));
+        let cache = open(folder.path());
         let verified = cache.verify();
         assert!(verified.clean && verified.damaged == 0, "kill {kill}: {verified:?}");
         assert_eq!(cache.statistics().set_aside, 0, "kill {kill}");
         assert!(verified.records >= most, "kill {kill}: committed records are gone");
         most = verified.records;
         let found = (0..WRITTEN).filter(|&n| has(&cache, n, 50)).count();
-        let files = cache.list().iter().filter(|l| l.key.kind() == Kind::Field).count();
+        let files = cache.list().iter().filter(|l| *l.key.kind() == FILES).count();
         assert_eq!(found + files, verified.records, "kill {kill}");
         assert!(files >= most_files, "kill {kill}: files are gone");
         most_files = files;
-        for n in 0..FIELDS {
-            let field = field(&cache, n, &surface);
-            assert_eq!(said(&field, 1.0), truth, "kill {kill}: field {n}");
+        for n in 0..BLOBS {
+            let whole = cache.mapped(&blob_key(n), |mapping| is_blob(&[n; 32], &mapping).then_some(()));
+            most_blobs[usize::from(n)] |= whole.is_some();
+            assert_eq!(
+                whole.is_some(),
+                most_blobs[usize::from(n)],
+                "kill {kill}: file {n} is gone or damaged"
+            );
         }
-        assert_eq!(cache.counters().kinds[Kind::Field.index()].hits, files as u64, "kill {kill}");
+        assert_eq!(cache.counters().kinds[KINDS.len() - 1].hits, files as u64, "kill {kill}");
     }
     assert!(most > 0 && most_files > 0, "none lived long enough to write");
 }
 
-/// Of so many different records.
+/// Different records that the killed process writes.
 const WRITTEN: u64 = 2000;
 
-/// Of so many shapes.
-const FIELDS: u8 = 20;
+/// Different files that it writes.
+const BLOBS: u8 = 20;
 
-fn field(cache: &Arc<Cache>, n: u8, surface: &Arc<Surface>) -> Arc<Field> {
-    let store = Arc::downgrade(cache) as std::sync::Weak<dyn FieldStore>;
-    Arc::new(Field::stored(surface, store, [n; 32]))
-}
-
-/// What a field says along a diagonal of its box, up to a share of it.
-fn said(field: &Field, share: f64) -> Vec<Estimate> {
-    let at = |i: u32| Point3::from([-1.1 + 2.2 * share * f64::from(i) / 500.0; 3]);
-    (0..500).map(|i| field.estimate(&at(i))).collect()
+fn blob_key(n: u8) -> RecordKey {
+    RecordKey::new(&FILES, [n; 32])
 }
 
 /// Files are made, and grow, beside the records.
 fn write_for_ever(folder: &Path) -> ! {
-    let cache = Arc::new(open(folder));
-    let surface = Arc::new(surface(ball(3)));
-    let fields: Vec<_> = (0..FIELDS).map(|n| field(&cache, n, &surface)).collect();
+    let cache = open(folder);
+    let blobs: Vec<_> = (0..BLOBS).map(|_| Blob::of(100_000)).collect();
     loop {
         for n in 0..WRITTEN {
             cache.put(key(n), &record(n, 50));
             if n % 20 == 0 {
-                let which = n / 20 % u64::from(FIELDS);
-                drop(said(&fields[which as usize], 0.2 + n as f64 / WRITTEN as f64));
-                cache.keep_rest_of_field(&[which as u8; 32], &fields[which as usize]);
+                let which = (n / 20 % u64::from(BLOBS)) as u8;
+                let blob = &blobs[usize::from(which)];
+                blob.length.fetch_add(1000, Ordering::Relaxed);
+                cache.keep_file_at_end(blob_key(which), blob.clone(), true);
                 cache.flush();
             }
         }

@@ -1,6 +1,6 @@
-//! The one thread that writes to disk. Whoever has a record or a field to keep leaves it in a bounded channel
-//! and goes on; a record that does not fit stays in memory only, and is counted. A field that does not can be
-//! handed over another time, and is at the end.
+//! The one thread that writes to disk. It takes records and files from a bounded channel, so no request waits for the
+//! disk. A record that does not fit in the channel stays in memory only, and is counted; a file can be handed over
+//! again later.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -10,61 +10,60 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::disk::Disk;
-use super::kind::Key;
-use super::tally::Tally;
-use crate::sdf::Field;
+use super::files::FileSource;
+use super::key::RecordKey;
+use super::tally::CacheTally;
 
-/// So many records may wait …
+/// Messages that may wait.
 const MOST_WAITING: usize = 16_384;
-/// … of so many bytes in all, and one more: a large mesh is one record.
+/// Bytes of records that may wait, and one more record: a large mesh is one record.
 const MOST_BYTES: usize = 64 << 20;
-/// And fields of so many, and one more: who evicted one has not freed its memory as long as it waits here.
-const MOST_FIELD_BYTES: usize = 32 << 20;
-/// A transaction has at most so many bytes, so that a crash costs little.
+/// Bytes of the sources of files that may wait, and one more: a source that its owner evicted stays in memory while it
+/// waits here.
+const MOST_SOURCE_BYTES: usize = 32 << 20;
+/// Bytes after which a transaction begins: a crash loses about so much.
 const BATCH: usize = 4 << 20;
-/// So long is waited for more, because each transaction waits for the disk.
+/// The wait for more records after a first: each transaction waits for the disk.
 const GATHER: Duration = Duration::from_millis(20);
 
-/// Bytes of what waits. Fields, which can be handed over another time, take no room from records.
+/// Bytes of what waits. Files, which can be handed over again, take no room from records.
 #[derive(Debug, Default)]
-struct Room {
+struct WaitingBytes {
     records: AtomicUsize,
-    fields: AtomicUsize,
-    /// The fields that wait: of one that grows, what is known when it is written is enough.
-    keys: Mutex<HashSet<Key>>,
+    sources: AtomicUsize,
+    /// The files that wait. One that is handed over again meanwhile need not wait twice.
+    files: Mutex<HashSet<RecordKey>>,
 }
 
-impl Room {
+impl WaitingBytes {
     /// It holds plain data: it is whole even if a holder panicked.
-    fn keys(&self) -> MutexGuard<'_, HashSet<Key>> {
-        self.keys.lock().unwrap_or_else(PoisonError::into_inner)
+    fn files(&self) -> MutexGuard<'_, HashSet<RecordKey>> {
+        self.files.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// A record in its envelope.
-type Waiting = (Key, Vec<u8>);
-
-enum Message {
-    Record(Key, Vec<u8>),
-    /// With the bytes that it had when it was handed over.
-    Field(Key, Arc<Field>, usize),
+enum WriteMessage {
+    /// A record in its envelope.
+    Record(RecordKey, Vec<u8>),
+    /// With the bytes of the source when it was handed over.
+    File(RecordKey, Arc<dyn FileSource>, usize),
     Flush(SyncSender<()>),
 }
 
-/// The thread and the way to it.
+/// The thread and the channel to it.
 #[derive(Debug)]
-pub(super) struct Writer {
-    sender: Option<SyncSender<Message>>,
+pub(super) struct DiskWriter {
+    sender: Option<SyncSender<WriteMessage>>,
     thread: Option<JoinHandle<()>>,
-    waiting: Arc<Room>,
-    tally: Arc<Tally>,
+    waiting: Arc<WaitingBytes>,
+    tally: Arc<CacheTally>,
 }
 
-impl Writer {
+impl DiskWriter {
     /// Starts the thread.
-    pub(super) fn start(disk: Arc<Disk>, tally: Arc<Tally>) -> std::io::Result<Self> {
+    pub(super) fn start(disk: Arc<Disk>, tally: Arc<CacheTally>) -> std::io::Result<Self> {
         let (sender, receiver) = sync_channel(MOST_WAITING);
-        let waiting = Arc::<Room>::default();
+        let waiting = Arc::<WaitingBytes>::default();
         let left = Arc::clone(&waiting);
         let work = move || run(&disk, &receiver, &left);
         let thread = std::thread::Builder::new().name("sbdp-cache".into()).spawn(work)?;
@@ -72,39 +71,39 @@ impl Writer {
     }
 
     /// Hands a record over, or drops it if too much waits.
-    pub(super) fn write(&self, key: Key, bytes: Vec<u8>) {
+    pub(super) fn write(&self, key: RecordKey, bytes: Vec<u8>) {
         let room = (&self.waiting.records, MOST_BYTES);
-        if !self.hand_over(room, bytes.len(), Message::Record(key, bytes)) {
+        if !self.hand_over(room, bytes.len(), WriteMessage::Record(key, bytes)) {
             self.too_much();
         }
     }
 
-    /// Hands a field over, of which the thread writes what is known then, unless it waits already. Whether it
-    /// does: not if too much waits.
-    pub(super) fn write_field(&self, key: Key, field: &Arc<Field>) -> bool {
-        if !self.waiting.keys().insert(key) {
+    /// Hands the source of a file over, unless the file waits already; false if too much waits. The thread writes what
+    /// the source has by then.
+    pub(super) fn write_file(&self, key: RecordKey, source: &Arc<dyn FileSource>) -> bool {
+        if !self.waiting.files().insert(key) {
             return true;
         }
-        let bytes = field.memory();
-        let room = (&self.waiting.fields, MOST_FIELD_BYTES);
-        let taken = self.hand_over(room, bytes, Message::Field(key, Arc::clone(field), bytes));
+        let bytes = source.memory();
+        let room = (&self.waiting.sources, MOST_SOURCE_BYTES);
+        let taken = self.hand_over(room, bytes, WriteMessage::File(key, Arc::clone(source), bytes));
         if !taken {
-            self.waiting.keys().remove(&key);
+            self.waiting.files().remove(&key);
         }
         taken
     }
 
-    /// The same at the end, when there is no other time: waits for room.
-    pub(super) fn write_last_of_field(&self, key: Key, field: &Arc<Field>) {
-        if !self.write_field(key, field) {
+    /// The same, but waits for room: for the last time that a source can be handed over.
+    pub(super) fn write_last_of_file(&self, key: RecordKey, source: &Arc<dyn FileSource>) {
+        if !self.write_file(key, source) {
             self.flush();
-            self.write_field(key, field);
+            self.write_file(key, source);
         }
     }
 
-    fn hand_over(&self, (waiting, most): (&AtomicUsize, usize), bytes: usize, message: Message) -> bool {
+    fn hand_over(&self, (waiting, most): (&AtomicUsize, usize), bytes: usize, message: WriteMessage) -> bool {
         let full = waiting.fetch_add(bytes, Ordering::Relaxed) > most;
-        let taken = |sender: &SyncSender<Message>| sender.try_send(message).is_ok();
+        let taken = |sender: &SyncSender<WriteMessage>| sender.try_send(message).is_ok();
         let taken = !full && self.sender.as_ref().is_some_and(taken);
         if !taken {
             waiting.fetch_sub(bytes, Ordering::Relaxed);
@@ -114,7 +113,7 @@ impl Writer {
 
     fn too_much(&self) {
         let count = self.tally.overflows.one_more();
-        // One line for every doubling: whoever writes too much does so often.
+        // One line for every doubling: too much is written often, if at all.
         if count.is_power_of_two() {
             tracing::warn!(count, "more to remember than the disk takes: kept in memory only");
         }
@@ -124,7 +123,7 @@ impl Writer {
     pub(super) fn flush(&self) {
         let (done, wait) = sync_channel(1);
         if let Some(sender) = &self.sender
-            && sender.send(Message::Flush(done)).is_ok()
+            && sender.send(WriteMessage::Flush(done)).is_ok()
         {
             // A thread that is gone has dropped its end.
             let _gone = wait.recv();
@@ -132,7 +131,7 @@ impl Writer {
     }
 }
 
-impl Drop for Writer {
+impl Drop for DiskWriter {
     /// Writes what waits.
     fn drop(&mut self) {
         self.sender = None;
@@ -144,16 +143,16 @@ impl Drop for Writer {
     }
 }
 
-fn run(disk: &Disk, receiver: &Receiver<Message>, waiting: &Room) {
+fn run(disk: &Disk, receiver: &Receiver<WriteMessage>, waiting: &WaitingBytes) {
     while let Ok(first) = receiver.recv() {
         let batch = gathered(receiver, first);
-        // What becomes known of them from here on may be too late for this time.
-        waiting.keys().retain(|key| !batch.fields.contains_key(key));
-        disk.write(&batch.records, &batch.fields);
+        // Sources that grow from now on have to be handed over again.
+        waiting.files().retain(|key| !batch.files.contains_key(key));
+        disk.write(&batch.records, &batch.files);
         waiting.records.fetch_sub(batch.bytes, Ordering::Relaxed);
-        waiting.fields.fetch_sub(batch.field_bytes, Ordering::Relaxed);
+        waiting.sources.fetch_sub(batch.source_bytes, Ordering::Relaxed);
         if let Some(flushed) = batch.flushed {
-            // Whoever asked may have given up waiting.
+            // The one that waits may have given up.
             let _gone = flushed.send(());
         }
     }
@@ -163,32 +162,32 @@ fn run(disk: &Disk, receiver: &Receiver<Message>, waiting: &Room) {
 /// What is written together.
 #[derive(Default)]
 struct Batch {
-    records: Vec<Waiting>,
+    records: Vec<(RecordKey, Vec<u8>)>,
     /// Bytes of these.
     bytes: usize,
-    fields: HashMap<Key, Arc<Field>>,
-    /// Bytes of these, one that came twice counted twice.
-    field_bytes: usize,
-    /// Who waits for it.
+    files: HashMap<RecordKey, Arc<dyn FileSource>>,
+    /// Bytes of their sources; one that came twice counts twice.
+    source_bytes: usize,
+    /// The channel of the one that waits for it.
     flushed: Option<SyncSender<()>>,
 }
 
-/// What comes within a short while of a first message.
-fn gathered(receiver: &Receiver<Message>, first: Message) -> Batch {
+/// The messages that come within [`GATHER`] of a first one.
+fn gathered(receiver: &Receiver<WriteMessage>, first: WriteMessage) -> Batch {
     let until = Instant::now() + GATHER;
     let mut batch = Batch::default();
     let mut next = Some(first);
     loop {
         match next.take() {
-            Some(Message::Record(key, payload)) => {
+            Some(WriteMessage::Record(key, payload)) => {
                 batch.bytes += payload.len();
                 batch.records.push((key, payload));
             }
-            Some(Message::Field(key, field, bytes)) => {
-                batch.field_bytes += bytes;
-                batch.fields.insert(key, field);
+            Some(WriteMessage::File(key, source, bytes)) => {
+                batch.source_bytes += bytes;
+                batch.files.insert(key, source);
             }
-            Some(Message::Flush(done)) => return Batch { flushed: Some(done), ..batch },
+            Some(WriteMessage::Flush(done)) => return Batch { flushed: Some(done), ..batch },
             None => {}
         }
         if batch.bytes >= BATCH {
@@ -203,61 +202,57 @@ fn gathered(receiver: &Receiver<Message>, first: Message) -> Batch {
 
 #[cfg(test)]
 mod tests {
-    use super::super::kind::{Digest, Kind};
+    use super::super::key::Digest;
+    use super::super::tests::{Blob, FILES, RECORDS};
     use super::*;
-    use crate::fixtures::{ball, surface};
 
     #[test]
-    fn fields_that_wait_count_as_what_they_keep_in_memory() {
-        let field = Arc::new(Field::of(&Arc::new(surface(ball(3)))));
-        // Looking at it builds it.
-        assert!(field.bricks() > 0);
-        let bytes = field.memory();
-        assert!(bytes * MOST_WAITING > 2 * MOST_FIELD_BYTES, "{bytes}");
+    fn files_that_wait_count_as_what_their_sources_keep_in_memory() {
+        let blob = Blob::of(1 << 20);
+        let (source, bytes) = (Arc::clone(&blob) as Arc<dyn FileSource>, blob.memory());
         // Nobody takes anything out.
         let (sender, receiver) = sync_channel(MOST_WAITING);
-        let (waiting, tally) = (Arc::<Room>::default(), Arc::<Tally>::default());
-        let writer = Writer {
+        let (waiting, tally) = (Arc::<WaitingBytes>::default(), Arc::<CacheTally>::default());
+        let writer = DiskWriter {
             sender: Some(sender),
             thread: None,
             waiting: Arc::clone(&waiting),
             tally: Arc::clone(&tally),
         };
-        let key = |number: usize| Digest::new().integer(number as u64).key(Kind::Field);
-        let fit = MOST_FIELD_BYTES / bytes + 1;
-        let taken: Vec<_> = (0..fit + 5).filter(|&i| writer.write_field(key(i), &field)).collect();
+        let key = |number: usize| Digest::new().integer(number as u64).key(&FILES);
+        let fit = MOST_SOURCE_BYTES / bytes + 1;
+        let taken: Vec<_> = (0..fit + 5).filter(|&i| writer.write_file(key(i), &source)).collect();
         assert_eq!((taken.len(), taken.last()), (fit, Some(&(fit - 1))));
-        assert!(writer.write_field(key(0), &field), "it waits already");
-        assert_eq!(Arc::strong_count(&field), 1 + fit);
-        assert_eq!(waiting.fields.load(Ordering::Relaxed), fit * bytes);
-        writer.write(key(0), vec![0; 100]);
+        assert!(writer.write_file(key(0), &source), "it waits already");
+        assert_eq!(Arc::strong_count(&blob), 2 + fit);
+        assert_eq!(waiting.sources.load(Ordering::Relaxed), fit * bytes);
+        writer.write(RecordKey::new(&RECORDS, [0; 32]), vec![0; 100]);
         assert_eq!(tally.overflows.count(), 0, "there is room for records all the same");
         let mut taken = 0;
         while taken < fit * bytes {
-            taken += gathered(&receiver, receiver.recv().unwrap()).field_bytes;
+            taken += gathered(&receiver, receiver.recv().unwrap()).source_bytes;
         }
-        assert_eq!((taken, Arc::strong_count(&field)), (fit * bytes, 1));
+        assert_eq!((taken, Arc::strong_count(&blob)), (fit * bytes, 2));
     }
 
     #[test]
-    fn what_comes_last_of_a_field_waits_for_room() {
-        let field = Arc::new(Field::of(&Arc::new(surface(ball(1)))));
+    fn what_comes_last_of_a_file_waits_for_room() {
+        let source: Arc<dyn FileSource> = Blob::of(9);
         let (sender, receiver) = sync_channel(MOST_WAITING);
-        let waiting = Arc::<Room>::default();
-        waiting.fields.store(MOST_FIELD_BYTES + 1, Ordering::Relaxed);
+        let waiting = Arc::<WaitingBytes>::default();
+        waiting.sources.store(MOST_SOURCE_BYTES + 1, Ordering::Relaxed);
         let left = Arc::clone(&waiting);
         let thread = std::thread::spawn(move || {
-            let Ok(Message::Flush(done)) = receiver.recv() else {
+            let Ok(WriteMessage::Flush(done)) = receiver.recv() else {
                 panic!("something was taken without room")
             };
-            left.fields.store(0, Ordering::Relaxed);
+            left.sources.store(0, Ordering::Relaxed);
             done.send(()).unwrap();
-            assert!(matches!(receiver.recv(), Ok(Message::Field(..))));
+            assert!(matches!(receiver.recv(), Ok(WriteMessage::File(..))));
             assert!(receiver.recv().is_err(), "it was handed over once");
         });
-        let tally = Arc::default();
-        let writer = Writer { sender: Some(sender), thread: None, waiting, tally };
-        writer.write_last_of_field(Digest::new().integer(1).key(Kind::Field), &field);
+        let writer = DiskWriter { sender: Some(sender), thread: None, waiting, tally: Arc::default() };
+        writer.write_last_of_file(RecordKey::new(&FILES, [1; 32]), &source);
         drop(writer);
         thread.join().unwrap();
     }

@@ -10,6 +10,7 @@ use super::error::CliError;
 use super::print;
 use super::table::Table;
 use crate::cache::{Cache, CacheSettings, CacheStatistics, DiskError};
+use crate::service::RECORD_KINDS;
 
 /// Arguments of `sbdp cache`.
 #[derive(Debug, Args)]
@@ -51,13 +52,13 @@ const MEGABYTE: u64 = 1 << 20;
 /// memory has to do.
 pub(super) fn embedded(folder: Option<&Path>) -> Arc<Cache> {
     let settings = settings(folder);
-    let cache = Cache::open(&settings).unwrap_or_else(|error| {
+    let cache = Cache::open(&settings, &RECORD_KINDS).unwrap_or_else(|error| {
         let why = match error {
             DiskError::InUse(_) => "note",
             DiskError::Unusable { .. } => "warning",
         };
         eprintln!("{why}: cache {error}; nothing is remembered beyond this process");
-        Cache::in_memory(settings.memory_bytes)
+        Cache::in_memory(settings.memory_bytes, &RECORD_KINDS)
     });
     Arc::new(cache)
 }
@@ -78,7 +79,7 @@ pub(super) fn run(arguments: &CacheArguments) -> Result<ExitCode, CliError> {
     if !folder.is_dir() {
         return Err(CliError::Refused(format!("{}: there is no cache", folder.display())));
     }
-    let cache = Cache::open(&settings).map_err(|e| CliError::Failed(e.to_string()))?;
+    let cache = Cache::open(&settings, &RECORD_KINDS).map_err(|e| CliError::Failed(e.to_string()))?;
     match &arguments.command {
         CacheCommand::Ls => print(&listed(&cache))?,
         CacheCommand::Stats { json } => stats(&cache, json.as_deref())?,
@@ -93,7 +94,7 @@ fn listed(cache: &Cache) -> String {
     let mut table = Table::new(&["kind", "key", "bytes", "used"]);
     for record in cache.list() {
         let hash: String = record.key.hash().iter().map(|b| format!("{b:02x}")).collect();
-        let kind = record.key.kind().name().to_owned();
+        let kind = record.key.kind().name.to_owned();
         table.row([kind, hash, record.bytes.to_string(), record.used.to_string()]);
     }
     table.render()

@@ -9,14 +9,13 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use sbdp_ipc::headers::RequestKind;
 
 use super::*;
-use crate::cache::AnsweredQuestion;
 use crate::daemon::session::Undelivered;
 use crate::daemon::workers::{Report, start};
 use crate::fixtures::{plan_of, step_of};
 use crate::geometry::{Revision, SourceAssembly};
 use crate::plan::{Plan, PlanStatus};
 use crate::search::{Interrupt, PlanSink};
-use crate::service::{Admission, ServiceError};
+use crate::service::{Admission, AnsweredQuestion, ServiceError};
 use crate::termination::Termination;
 
 /// No test waits longer than this for what must happen.

@@ -15,11 +15,13 @@ use super::convert;
 use super::foresight::Foresight;
 use super::request_queue::Owner;
 use super::shared_queue::Queues;
-use crate::cache::AnsweredQuestion;
-use crate::geometry::{Pose, Revision, SourceAssembly, load_assembly};
+use crate::geometry::{Pose, Revision, SourceAssembly, load_assembly, remember_given, remember_revised};
 use crate::plan::{Plan, PlanStep};
 use crate::search::{PlanRequest, PlanSink, Progress, Termination};
-use crate::service::{Admission, AssemblyId, Remembered, Service, ServiceError};
+use crate::service::{
+    Admission, AnsweredQuestion, AssemblyId, Remembered, Service, ServiceError, recent_answers,
+    remember_answer, remembered_answer,
+};
 
 /// What the workers ask of the planning service; tests script it.
 pub trait Planning: Send + Sync + 'static {
@@ -82,7 +84,7 @@ pub trait Planning: Send + Sync + 'static {
     fn answered(&self, _question: &[u8]) -> Option<Vec<Vec<u8>>> {
         None
     }
-    /// See [`Cache::recent_answers`](crate::cache::Cache::recent_answers).
+    /// The answers that were used last before this process began, with their questions; the last one used comes last.
     fn recent_answers(&self, _most: usize, _bytes: u64) -> Vec<AnsweredQuestion> {
         Vec::new()
     }
@@ -104,7 +106,7 @@ pub trait Planning: Send + Sync + 'static {
 impl Planning for Service {
     fn admit(&self, source: &SourceAssembly, termination: &Termination) -> Result<Admission, ServiceError> {
         let admission = self.admit_until(source, termination)?;
-        self.cache().remember_given(&admission.id.0, source);
+        remember_given(self.cache(), &admission.id.0, source);
         self.keep(admission.id)?;
         Ok(admission)
     }
@@ -117,7 +119,7 @@ impl Planning for Service {
     ) -> Result<Admission, ServiceError> {
         let admission = self.revise_until(base, revision, termination)?;
         if admission.id != base {
-            self.cache().remember_revised(&admission.id.0, &base.0, revision);
+            remember_revised(self.cache(), &admission.id.0, &base.0, revision);
             self.keep(admission.id)?;
         }
         Ok(admission)
@@ -166,15 +168,15 @@ impl Planning for Service {
     }
 
     fn answered(&self, question: &[u8]) -> Option<Vec<Vec<u8>>> {
-        self.cache().answer(question)
+        remembered_answer(self.cache(), question)
     }
 
     fn recent_answers(&self, most: usize, bytes: u64) -> Vec<AnsweredQuestion> {
-        self.cache().recent_answers(most, bytes)
+        recent_answers(self.cache(), most, bytes)
     }
 
     fn remember(&self, question: &[u8], messages: Vec<Vec<u8>>) {
-        self.cache().remember_answer(question, messages);
+        remember_answer(self.cache(), question, messages);
     }
 
     fn plan(

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::congruence::congruence;
 use super::heal::heal_until;
@@ -12,7 +13,7 @@ use super::{Bounds, GeometryError, Mesh, Pose, Shape, SourceAssembly};
 use crate::termination::{Interrupt, Termination};
 
 /// A part of an assembly.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Part {
     /// Its name.
     pub name: String,
@@ -27,7 +28,7 @@ pub struct Part {
 }
 
 /// Parts in the planning frame.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Assembly {
     /// A name for people.
     pub name: String,
@@ -38,6 +39,7 @@ pub struct Assembly {
     /// The parts, in natural order of their names.
     pub parts: Vec<Part>,
     /// The distinct shapes.
+    #[serde(skip)]
     pub shapes: Vec<Arc<Shape>>,
     /// Indices of parts that the input declares fixed.
     pub fixed: Vec<usize>,

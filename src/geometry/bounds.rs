@@ -1,6 +1,7 @@
 //! Axis-aligned boxes.
 
 use nalgebra::{Point3, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::Pose;
 
@@ -10,7 +11,7 @@ const STEEP: f64 = 1e-3;
 const CLEAR: f64 = 1e-6;
 
 /// An axis-aligned box; `min` > `max` on some axis means empty.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Bounds {
     /// Smallest coordinates.
     pub min: Point3<f64>,

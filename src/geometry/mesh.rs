@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
+use serde::{Deserialize, Serialize};
 
 /// How inside and outside of a mesh are told apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Solidity {
     /// One or more closed shells, each a manifold with vertices of its own, outward oriented
     /// (voids inward), that neither cross nor touch: the pseudo-normal at the nearest point of
@@ -26,7 +27,7 @@ pub struct Edge {
 
 /// A triangle mesh after healing: indices in range, coordinates finite, no vertex unused, no
 /// triangle degenerate or given twice.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mesh {
     /// Vertex positions.
     pub vertices: Vec<Point3<f64>>,

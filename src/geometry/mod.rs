@@ -34,6 +34,7 @@ mod patch_tree;
 mod pose;
 mod random;
 mod ray;
+mod records;
 mod revision;
 mod rim;
 mod sample_tree;
@@ -69,6 +70,10 @@ pub use oriented::OrientedSamples;
 pub use patch_tree::{Parts, PatchTree};
 pub use pose::{Pose, Waypoint, interpolate, pose_from_waypoint, waypoint_from_pose};
 pub use random::Uniform;
+pub(crate) use records::{
+    AssemblySource, HEALED, SHAPE, SOURCE, add_bounds, add_pose, has_source, healed_assembly, recent_sources,
+    remember_given, remember_healed, remember_revised, source_of,
+};
 pub use revision::Revision;
 pub use rim::{Rim, RimEdge, WINDING_DOUBT};
 pub use sample_tree::{Ball, Look, Node as SampleNode, SampleTree};

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use nalgebra::Point3;
+use serde::{Deserialize, Serialize};
 
 use super::congruence::congruence;
 use super::own_frame::OwnFrame;
@@ -19,7 +20,7 @@ const TAG: &[u8] = b"sbdp-revision/1";
 const LONGEST_SIDE: std::ops::RangeInclusive<f64> = 1.25..=40.0;
 
 /// What differs. Parts are named by their places in the assembly.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Revision {
     /// Parts with another mesh, given where it stands assembled (input units and frame).
     pub replaced: Vec<(usize, SourceMesh)>,

@@ -1,9 +1,10 @@
 //! An assembly as it came in, before anything was healed or scaled.
 
 use nalgebra::{Point3, UnitQuaternion};
+use serde::{Deserialize, Serialize};
 
 /// A triangle mesh as given: nothing is known to be valid yet.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SourceMesh {
     /// Vertex positions in the input's units and frame, at the assembled pose.
     pub vertices: Vec<[f64; 3]>,
@@ -12,7 +13,7 @@ pub struct SourceMesh {
 }
 
 /// One part as given.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourcePart {
     /// The part's name: the file stem, or the node's name in a scene. Unique in its assembly.
     pub name: String,
@@ -23,7 +24,7 @@ pub struct SourcePart {
 }
 
 /// An assembly as given. Parts stand in natural order of their names ("2" before "10").
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SourceAssembly {
     /// A name for people.
     pub name: String,

@@ -2,9 +2,12 @@
 
 pub mod export;
 mod model;
+mod records;
 mod shorten;
 mod verify;
 
 pub use model::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
+pub use records::{KnownVerdicts, VerdictQuestion};
+pub(crate) use records::{OVERLAP, VERDICT, overlap_key};
 pub use shorten::thinned;
 pub use verify::{Verdict, Verifier};

@@ -1,5 +1,7 @@
 //! What a planning request returns. All lengths and poses in the input's units and frame.
 
+use serde::{Deserialize, Serialize};
+
 use crate::geometry::Waypoint;
 
 /// What a plan does with the parts.
@@ -13,7 +15,7 @@ pub enum PlanKind {
 }
 
 /// How planning ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PlanStatus {
     /// Every part that was asked for is out (of an assembly plan: in place), or was from the start.
     Complete,

@@ -12,6 +12,7 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::contact::Passing;
 use crate::contact::course::{Course, Interval, turns_far};
@@ -40,7 +41,7 @@ const OVERLAP_FINEST: f64 = 1e-4;
 /// way is to pass.
 const OVERLAP_MARGIN: f64 = 1.0 / 8.0;
 /// What the check of a path found.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// Nothing gets deeper than this beyond the allowances along a good path; 0 if nothing does. Of a
     /// refused one, the deepest that was found before it was given up: it may get deeper.

@@ -14,6 +14,7 @@ mod hull_separation;
 mod hull_tree;
 mod joined_hulls;
 mod memo;
+mod records;
 
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
@@ -29,6 +30,7 @@ pub use hull_separation::{HULL_MARGIN, Surroundings, exit_direction};
 pub use hull_tree::HullTree;
 pub use joined_hulls::{HullStore, JoinedHulls};
 pub use memo::Memo;
+pub(crate) use records::{HULL, add_pair, add_samples, add_standing};
 
 /// A part with its field, at its place.
 #[derive(Debug, Clone)]

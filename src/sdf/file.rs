@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 
 use super::build::MOST_SLOTS;
 use super::grid::{FAR_NODE, Grid, Held, NearBrick, Nodes};
-use super::mapping::Mapping;
+use crate::cache::Mapping;
 use crate::geometry::Surface;
 
 const MAGIC: [u8; 4] = *b"SBDF";

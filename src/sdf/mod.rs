@@ -1,7 +1,7 @@
 //! Signed distance fields: sparse bricks near the surface, conservative bounds elsewhere.
 //!
 //! A field is made per distinct mesh, in the shape's own frame, when it is first looked at (`field`), from its
-//! file (`file`, mapped by `mapping`) as far as that has it. Values are negative inside.
+//! file (`file`; `field_files` keeps them) as far as that has it. Values are negative inside.
 //! Guarantees: at nodes of the narrow band the stored distance is that of the nearest triangle
 //! (exact, then rounded to f32), and that triangle's index is kept, so that whoever needs an exact
 //! distance measures against a few triangles instead of interpolating. Everywhere else a field
@@ -12,15 +12,15 @@ mod build;
 mod facet;
 mod far_field;
 mod field;
+mod field_files;
 mod file;
 mod grid;
-mod mapping;
 mod rim;
 #[cfg(test)]
 mod tests;
 
 pub use field::{Field, FieldStore};
+pub(crate) use field_files::{FIELD, keep_field, keep_rest_of_field};
 pub(crate) use file::hostile::{a_field_file, read_as_field};
 pub use file::is_intact;
 pub use grid::{Estimate, FieldSample, Grid};
-pub use mapping::{Mapping, MappingTally};

@@ -20,9 +20,9 @@ pub fn initial_blockages(problem: &Problem<'_>) -> Result<Vec<Blockage>, Interru
 }
 
 fn assembled_blockages(problem: &Problem<'_>, translations: &[Action]) -> Result<Vec<Blockage>, Interrupt> {
-    let Problem { scene, present, static_analysis, termination, recall, .. } = problem;
+    let Problem { scene, present, static_analysis, termination, cache, .. } = problem;
     let least = |part| least_travel(scene, part);
-    let analysis = Analysis { rule: *static_analysis, scene, translations, recall };
+    let analysis = Analysis { rule: *static_analysis, scene, translations, cache };
     analysis.initial_blockages(present, &least, termination)
 }
 

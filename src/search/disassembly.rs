@@ -8,12 +8,13 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::cache::MotionQuestion;
 use crate::contact::sampled::along_path::Entry;
 use crate::geometry::{Pose, separating_direction, transformed};
 use crate::plan::PlanStatus;
 use crate::scene::{HULL_MARGIN, HullTree, Surroundings, exit_direction};
-use crate::simulation::{Action, End, Motion, Sweep, SweepQuestion};
+use crate::simulation::{
+    Action, End, Motion, MotionQuestion, Sweep, SweepQuestion, known_sweep, remembered_sweep,
+};
 use crate::termination::Interrupt;
 
 use super::outcome::{BlockedAction, Counters, Outcome, Removal};
@@ -219,7 +220,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
                 start: *start,
                 action: *action,
             };
-            let mut motion = problem.recall.motion(&question, poll);
+            let mut motion = question.answer(&problem.cache, poll);
             if motion.is_err() && termination.check().is_ok() {
                 let touched = around.standing.clone();
                 let end = End::Undecided { reason: NO_TIME.into(), touched };
@@ -248,7 +249,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.problem.termination.check()?;
         let started = Instant::now();
         let around = self.all_surroundings(runs)?;
-        let Problem { scene, termination, recall, .. } = &self.problem;
+        let Problem { scene, termination, cache, .. } = &self.problem;
         let clear = |s: &Option<Sweep>| matches!(s, Some(Sweep::Clear { .. }));
         let forces: Vec<_> = runs.iter().map(|run| run.action.force()).collect();
         let question = |i: usize| {
@@ -258,11 +259,11 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         // What is remembered is told one after the other: to share it with other threads would take longer.
         let mut results = Vec::new();
         while results.len() < runs.len() && !results.last().is_some_and(clear) {
-            let Some(known) = recall.known_sweep(&question(results.len()), termination)? else { break };
+            let Some(known) = known_sweep(cache, &question(results.len()), termination)? else { break };
             results.push(known);
         }
         if !results.last().is_some_and(clear) {
-            let swept = |i: usize| recall.sweep(&question(i), termination);
+            let swept = |i: usize| remembered_sweep(cache, &question(i), termination);
             let new = (results.len()..runs.len()).into_par_iter().map(swept);
             results.extend(new.collect::<Result<Vec<_>, Interrupt>>()?);
         }

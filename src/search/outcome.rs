@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use crate::geometry::Pose;
 use crate::plan::PlanStatus;
 
 /// One part taken out.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Removal {
     /// The part.
     pub part: usize,
@@ -19,7 +21,7 @@ pub struct Removal {
 }
 
 /// An action of a part that remains, and who blocks it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BlockedAction {
     /// The part.
     pub part: usize,
@@ -30,7 +32,7 @@ pub struct BlockedAction {
 }
 
 /// Counts and times of a search.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
     /// Transition functions used.
     pub simulations: u64,
@@ -41,15 +43,18 @@ pub struct Counters {
     /// States kept.
     pub states: u64,
     /// Time in static analysis.
+    #[serde(skip)]
     pub static_analysis: Duration,
     /// Time in simulation and sweeps.
+    #[serde(skip)]
     pub simulation: Duration,
     /// Time in thinning and verification.
+    #[serde(skip)]
     pub verification: Duration,
 }
 
 /// How a search ended.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Its status.
     pub status: PlanStatus,

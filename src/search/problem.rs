@@ -8,11 +8,11 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 use crate::blocking_graph::StaticAnalysis;
-use crate::cache::{Recall, VerdictQuestion};
+use crate::cache::RequestCache;
 use crate::contact::Passing;
 use crate::contact::sampled::along_path::Entry;
 use crate::geometry::{Pose, SampleTree};
-use crate::plan::{Verdict, Verifier, thinned};
+use crate::plan::{KnownVerdicts, Verdict, VerdictQuestion, Verifier, thinned};
 use crate::scene::Scene;
 use crate::simulation::{Action, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
@@ -69,7 +69,9 @@ pub struct Problem<'a> {
     /// Ends the search early.
     pub termination: Termination,
     /// What is remembered.
-    pub recall: Recall,
+    pub cache: RequestCache,
+    /// The verdicts of this request.
+    pub verdicts: Arc<KnownVerdicts>,
     /// Points added so far, per part.
     pub extra_points: HashMap<usize, Vec<Point3<f64>>>,
 }
@@ -155,12 +157,11 @@ impl Problem<'_> {
 
     /// Verifies a path past all that it may meet.
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
-        let Self { scene, verifier, termination, recall, .. } = self;
+        let Self { scene, verifier, termination, cache, verdicts, .. } = self;
         let past = |&other: &usize| {
             let passing = &Passing::new(scene, &scene.allowances, [part, other], path);
-            recall.verdict(&VerdictQuestion { passing, limit: verifier.limit() }, || {
-                verifier.past(passing, termination)
-            })
+            let question = &VerdictQuestion { passing, limit: verifier.limit() };
+            verdicts.verdict(question, cache, || verifier.past(passing, termination))
         };
         let past: Vec<_> = near.par_iter().map(past).collect::<Result<_, _>>()?;
         Ok(Verdict::of_all(past, verifier.limit()))

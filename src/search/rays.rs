@@ -14,7 +14,7 @@
 use nalgebra::{Unit, Vector3};
 
 use crate::geometry::extreme_rays;
-use crate::simulation::{Action, Axis, Touching};
+use crate::simulation::{Action, Axis, Touching, remembered_touching};
 
 use super::disassembly::Stop;
 use super::own_actions::OwnActions;
@@ -58,8 +58,15 @@ impl Search<'_, '_> {
             |problem, part, others| {
                 let scene = &problem.scene;
                 let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
-                let Touching { normals, parts } =
-                    problem.recall.touching(scene, part, &pose, others, reach, &problem.termination)?;
+                let Touching { normals, parts } = remembered_touching(
+                    &problem.cache,
+                    scene,
+                    part,
+                    &pose,
+                    others,
+                    reach,
+                    &problem.termination,
+                )?;
                 let rays = extreme_rays(&normals.unwrap_or_default());
                 let few = if rays.len() <= MOST_RAYS { &rays[..] } else { &[] };
                 Ok((few.iter().map(push_along).collect(), parts))

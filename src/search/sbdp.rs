@@ -260,10 +260,10 @@ impl<'a, 'o> Search<'a, 'o> {
         }
         let started = Instant::now();
         let (problem, nodes) = (&self.disassembly.problem, &self.nodes);
-        let Problem { scene, static_analysis, termination, recall, .. } = problem;
+        let Problem { scene, static_analysis, termination, cache, .. } = problem;
         let standing: Vec<_> = todo.iter().map(|&i| self.disassembly.standing(nodes[i].part)).collect();
         let translations = &self.translations[..self.rays.own.common];
-        let analysis = Analysis { rule: *static_analysis, scene, translations, recall };
+        let analysis = Analysis { rule: *static_analysis, scene, translations, cache };
         let found = todo
             .par_iter()
             .zip(standing)

@@ -1,10 +1,11 @@
 //! The paper's worked example (its figure of the process): a pin, a bolt and a cover.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use super::*;
 use crate::blocking_graph::StaticAnalysis;
-use crate::cache::Recall;
+use crate::cache::RequestCache;
 use crate::fixtures::{cells, cuboid, moved, rod, scene, tube};
 use crate::geometry::SourceMesh;
 use crate::plan::{PlanStatus, Verifier};
@@ -73,7 +74,8 @@ pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
         spent: 0,
         path_timeout: None,
         termination: Termination::default(),
-        recall: Recall::default(),
+        cache: RequestCache::default(),
+        verdicts: Arc::default(),
         extra_points: HashMap::new(),
     }
 }

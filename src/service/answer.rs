@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use crate::assembling::Insertion;
-use crate::cache::Reused;
 use crate::geometry::{Assembly, Pose, Waypoint, pose_from_waypoint, waypoint_from_pose};
 use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
 use crate::search::{BlockedAction, Outcome, PlanRequest, Removal};
@@ -93,7 +92,10 @@ pub(super) struct Frame<'a> {
 pub(super) struct Found {
     /// Distance fields.
     pub(super) fields: u64,
-    pub(super) pieces: Reused,
+    /// Overlaps and blocking relations of pairs, and planes that parts touch.
+    pub(super) blocking: u64,
+    pub(super) motions: u64,
+    pub(super) verdicts: u64,
     /// The whole.
     pub(super) plan: bool,
 }
@@ -131,9 +133,9 @@ impl Frame<'_> {
             verify_time_s: c.verification.as_secs_f64(),
             total_time_s: times.total.as_secs_f64(),
             sdf_hits: found.fields,
-            blocking_hits: found.pieces.overlaps + found.pieces.blocking,
-            motion_hits: found.pieces.motions,
-            verdict_hits: Some(found.pieces.verdicts),
+            blocking_hits: found.blocking,
+            motion_hits: found.motions,
+            verdict_hits: Some(found.verdicts),
             plan_hit: found.plan,
             ..PlanStats::default()
         };

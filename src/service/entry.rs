@@ -6,15 +6,17 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use crate::blocking_graph::StaticAnalysis;
-use crate::cache::{Answered, PlanQuestion, Recall};
+use crate::blocking_graph::{BLOCKING, StaticAnalysis};
+use crate::cache::{RecordKind, RequestCache};
 use crate::geometry::{Assembly, Shape};
-use crate::plan::{Plan, PlanStatus, Verifier};
+use crate::plan::{OVERLAP, Plan, PlanStatus, VERDICT, Verifier};
 use crate::scene::{HullTree, JoinedHulls};
 use crate::search::{
     Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_blockages, search,
 };
-use crate::simulation::{PenaltyEngine, PenaltyParameters, SlidingEngine, TransitionFunction};
+use crate::simulation::{
+    MOTION, PenaltyEngine, PenaltyParameters, SlidingEngine, TOUCHING, TransitionFunction,
+};
 use crate::termination::{Interrupt, Termination};
 
 use super::ServiceError;
@@ -22,6 +24,7 @@ use super::answer::{self, Answer, Found, Frame, Times};
 use super::pools::Pools;
 use super::prepared::{self, Prepared};
 use super::putting_back::PuttingBack;
+use super::records::{Answered, PlanQuestion, remember_plan, remembered_plan};
 use super::relay::{Quiet, Relay, Silent};
 use super::store::SharedShape;
 
@@ -64,7 +67,7 @@ impl Entry {
         request: &PlanRequest,
         termination: &Termination,
         sink: &mut dyn PlanSink,
-        recall: &Recall,
+        cache: &RequestCache,
         pools: Option<&Pools>,
     ) -> Result<Plan, ServiceError> {
         let started = Instant::now();
@@ -87,7 +90,7 @@ impl Entry {
         let (fixed, removed) = (frame.fixed.clone(), frame.removed.clone());
         let question = PlanQuestion { assembly: &self.assembly, request, fixed: &fixed, removed: &removed };
         // Whoever wants to be told what the search does wants it done.
-        let known = if sink.traces() { None } else { recall.plan(&question) };
+        let known = if sink.traces() { None } else { remembered_plan(cache, &question) };
         let known = match known {
             Some(answered) if request.assembly.is_none() => {
                 let (frame, answer) = self.remembered(frame, answered, sink, started);
@@ -96,7 +99,7 @@ impl Entry {
             known => known,
         };
         let time = Time { started, termination };
-        let make = || self.made(frame, &question, known, time, sink, recall);
+        let make = || self.made(frame, &question, known, time, sink, cache);
         match pools {
             Some(pools) => pools.on(request.threads, make),
             None => Ok(make()),
@@ -111,9 +114,9 @@ impl Entry {
         known: Option<Answered>,
         time: Time<'_>,
         sink: &mut dyn PlanSink,
-        recall: &Recall,
+        cache: &RequestCache,
     ) -> Plan {
-        let (prepared, hit) = match self.ready(question.request, time.termination, recall) {
+        let (prepared, hit) = match self.ready(question.request, time.termination, cache) {
             Ok(prepared) => prepared,
             Err(interrupt) => return ended_before(frame, interrupt, "overlaps were measured"),
         };
@@ -123,7 +126,7 @@ impl Entry {
         {
             return ended_before(frame, interrupt, "fields were built");
         }
-        let ready = Ready { prepared: &prepared, hit, fields: started.elapsed(), recall, question };
+        let ready = Ready { prepared: &prepared, hit, fields: started.elapsed(), cache, question };
         let Some(staging) = &question.request.assembly else {
             let (frame, answer) = self.searched(frame, &ready, time, sink);
             return frame.plan(answer);
@@ -146,14 +149,14 @@ impl Entry {
         &self,
         request: &PlanRequest,
         termination: &Termination,
-        recall: &Recall,
+        cache: &RequestCache,
     ) -> Result<(Arc<Prepared>, bool), Interrupt> {
         if !request.no_cache {
-            return self.prepared(termination, recall);
+            return self.prepared(termination, cache);
         }
         let fresh = |shape: &Arc<Shape>| Arc::new(SharedShape::new(Arc::clone(shape)));
         let fresh: Vec<_> = self.assembly.shapes.iter().map(fresh).collect();
-        let prepared = Prepared::new(&self.assembly, &fresh, &Arc::default(), termination, recall)?;
+        let prepared = Prepared::new(&self.assembly, &fresh, &Arc::default(), termination, cache)?;
         Ok((Arc::new(prepared), false))
     }
 
@@ -185,14 +188,14 @@ impl Entry {
     ) -> (Frame<'f>, Answer) {
         let request = frame.request;
         let Time { started, termination } = time;
-        let Ready { prepared, hit, fields, recall, question } = *ready;
+        let Ready { prepared, hit, fields, cache, question } = *ready;
         frame.overlaps = answer::overlaps(&self.assembly, &prepared.overlaps);
         let engine = engine_of(request.engine, request.penalty);
         let (limit, note) = accepted(&*engine, prepared.verifier.limit(), &self.assembly);
         let verifier = prepared.verifier.with_limit(limit);
         frame.notes.extend(note);
         let asked = Asked { question, engine: &*engine, verifier: &verifier };
-        let problem = self.problem(prepared, &asked, termination, recall);
+        let problem = self.problem(prepared, &asked, termination, cache);
         let total = problem.present.len() as u32;
         let mut relay = Relay { assembly: &self.assembly, sink, total };
         if relay.traces() {
@@ -203,8 +206,15 @@ impl Entry {
             });
         }
         let outcome = search(request.planner, problem, &mut relay);
-        recall.remember_plan(question, termination, &outcome, &prepared.overlaps);
-        let found = Found { fields: self.shapes_reused(request, hit), pieces: recall.reused(), plan: false };
+        remember_plan(cache, question, termination, &outcome, &prepared.overlaps);
+        let reused = |kinds: &[&RecordKind]| kinds.iter().map(|kind| cache.reused(kind)).sum();
+        let found = Found {
+            fields: self.shapes_reused(request, hit),
+            blocking: reused(&[&OVERLAP, &BLOCKING, &TOUCHING]),
+            motions: reused(&[&MOTION]),
+            verdicts: reused(&[&VERDICT]),
+            plan: false,
+        };
         let overlaps = if hit { Duration::ZERO } else { prepared.overlap_time };
         let times = Times { fields, overlaps, total: started.elapsed() };
         (frame, Answer { outcome, times, found })
@@ -225,7 +235,7 @@ impl Entry {
         prepared: &Prepared,
         asked: &Asked<'a>,
         termination: &Termination,
-        recall: &Recall,
+        cache: &RequestCache,
     ) -> Problem<'a> {
         let PlanQuestion { request, fixed, removed, .. } = *asked.question;
         let is_there = |part: &usize| removed.binary_search(part).is_err();
@@ -243,24 +253,25 @@ impl Entry {
             spent: 0,
             path_timeout: request.path_timeout,
             termination: termination.clone(),
-            recall: recall.clone(),
+            cache: cache.clone(),
+            verdicts: Arc::default(),
             extra_points: HashMap::new(),
         }
     }
 
     /// Makes ready what any plan needs, as far as `termination` lets it.
-    pub(super) fn prepare(&self, termination: &Termination, recall: &Recall) {
+    pub(super) fn prepare(&self, termination: &Termination, cache: &RequestCache) {
         // First what no record holds: after a restart, whoever asks at once waits for this.
         if self.shapes.par_iter().try_for_each(|shape| shape.shape.derive(termination)).is_err() {
             return;
         }
-        let Ok((prepared, _)) = self.prepared(termination, recall) else { return };
+        let Ok((prepared, _)) = self.prepared(termination, cache) else { return };
         let request = PlanRequest::default();
         let question = PlanQuestion { assembly: &self.assembly, request: &request, fixed: &[], removed: &[] };
         let engine = engine_of(request.engine, request.penalty);
         let asked = Asked { question: &question, engine: &*engine, verifier: &prepared.verifier };
         // Interrupted, they have kept what they found.
-        let _ = initial_blockages(&self.problem(&prepared, &asked, termination, recall));
+        let _ = initial_blockages(&self.problem(&prepared, &asked, termination, cache));
         let all = (0..self.assembly.parts.len()).collect();
         let _ = HullTree::new(&prepared.scene, all, termination);
         let _ = prepared.build_fields(termination, &mut Silent);
@@ -280,7 +291,7 @@ impl Entry {
     pub(super) fn prepared(
         &self,
         termination: &Termination,
-        recall: &Recall,
+        cache: &RequestCache,
     ) -> Result<(Arc<Prepared>, bool), Interrupt> {
         loop {
             let mut slot = match self.prepared.try_lock() {
@@ -295,7 +306,7 @@ impl Entry {
             if let Some(prepared) = &*slot {
                 return Ok((Arc::clone(prepared), true));
             }
-            let prepared = Prepared::new(&self.assembly, &self.shapes, &self.hulls, termination, recall)?;
+            let prepared = Prepared::new(&self.assembly, &self.shapes, &self.hulls, termination, cache)?;
             let prepared = Arc::new(prepared);
             *slot = Some(Arc::clone(&prepared));
             return Ok((prepared, false));
@@ -325,7 +336,7 @@ struct Ready<'a> {
     hit: bool,
     /// How long fields took that were built before the search.
     fields: Duration,
-    recall: &'a Recall,
+    cache: &'a RequestCache,
     question: &'a PlanQuestion<'a>,
 }
 

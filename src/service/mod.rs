@@ -13,6 +13,7 @@ mod entry;
 mod pools;
 mod prepared;
 mod putting_back;
+mod records;
 mod relay;
 mod store;
 #[cfg(test)]
@@ -24,17 +25,22 @@ use std::sync::{Arc, Weak};
 use serde::Serialize;
 
 use crate::blocking_graph::{Analysis, Audit, DirectionalGraph, StaticAnalysis, audit};
-use crate::cache::{Cache, CacheStatistics, Recall, Source};
-use crate::geometry::{Assembly, GeometryError, Revision, SourceAssembly, content_hash};
+use crate::cache::{Cache, CacheStatistics, RequestCache};
+use crate::geometry::{
+    Assembly, AssemblySource, GeometryError, Revision, SourceAssembly, content_hash, has_source,
+    healed_assembly, recent_sources, remember_healed, source_of,
+};
 use crate::plan::{Overlap, Plan, Warning};
 use crate::scene::{HullStore, JoinedHulls};
-use crate::sdf::FieldStore;
+use crate::sdf::{FieldStore, keep_field, keep_rest_of_field};
 use crate::search::{Engine, PlanRequest, PlanSink, Staging, axes_of, least_travel};
 use crate::simulation::{Action, Axis, PenaltyParameters};
 use crate::termination::Termination;
 
 use entry::{Entry, engine_of};
 use pools::Pools;
+pub use records::RECORD_KINDS;
+pub(crate) use records::{AnsweredQuestion, recent_answers, remember_answer, remembered_answer};
 use relay::Silent;
 use store::Store;
 pub use store::StoreStatistics;
@@ -105,7 +111,7 @@ const ASSEMBLIES: usize = 1 << 30;
 impl Default for Service {
     /// Remembers in memory, for as long as it lives.
     fn default() -> Self {
-        Self::new(Arc::new(Cache::in_memory(RECORDS)), ASSEMBLIES)
+        Self::new(Arc::new(Cache::in_memory(RECORDS, &RECORD_KINDS)), ASSEMBLIES)
     }
 }
 
@@ -220,7 +226,7 @@ impl Service {
     /// # Errors
     /// The id is unknown.
     pub fn keep(&self, id: AssemblyId) -> Result<(), ServiceError> {
-        self.cache.remember_healed(&id.0, &self.entry(id, &Termination::default())?.assembly);
+        remember_healed(&self.cache, &id.0, &self.entry(id, &Termination::default())?.assembly);
         Ok(())
     }
 
@@ -228,14 +234,14 @@ impl Service {
     /// to.
     #[must_use]
     pub fn knows(&self, id: AssemblyId) -> bool {
-        self.store.get(id).is_some() || self.cache.has_source(&id.0)
+        self.store.get(id).is_some() || has_source(&self.cache, &id.0)
     }
 
     /// The handles of the assemblies that were asked about last before this process began, if there is a
     /// store on disk.
     #[must_use]
     pub fn recent(&self, most: usize) -> Vec<AssemblyId> {
-        self.cache.recent_sources(most).into_iter().map(AssemblyId).collect()
+        recent_sources(&self.cache, most).into_iter().map(AssemblyId).collect()
     }
 
     /// Reads into memory what was used last before this process began, if there is a store on disk.
@@ -251,11 +257,11 @@ impl Service {
     /// The id is unknown.
     pub fn prepare(&self, id: AssemblyId, termination: &Termination) -> Result<(), ServiceError> {
         let entry = self.entry(id, termination)?;
-        let recall = Recall::of(Arc::clone(&self.cache));
-        entry.prepare(termination, &recall);
+        let cache = RequestCache::of(Arc::clone(&self.cache));
+        entry.prepare(termination, &cache);
         self.settle(id, &entry);
         // One that was loaded from what it was made of, because another build had taken it in.
-        self.cache.remember_healed(&id.0, &entry.assembly);
+        remember_healed(&self.cache, &id.0, &entry.assembly);
         Ok(())
     }
 
@@ -265,8 +271,8 @@ impl Service {
     /// The id is unknown.
     pub fn overlaps(&self, id: AssemblyId) -> Result<Vec<Overlap>, ServiceError> {
         let entry = self.entry(id, &Termination::default())?;
-        let recall = Recall::of(Arc::clone(&self.cache));
-        let found = entry.prepared(&Termination::default(), &recall);
+        let cache = RequestCache::of(Arc::clone(&self.cache));
+        let found = entry.prepared(&Termination::default(), &cache);
         Ok(found.map_or_else(|_| Vec::new(), |(p, _)| answer::overlaps(&entry.assembly, &p.overlaps)))
     }
 
@@ -307,8 +313,12 @@ impl Service {
     ) -> Result<Plan, ServiceError> {
         let entry = self.entry(id, termination)?;
         check_parts(&named_parts(request), entry.assembly.parts.len())?;
-        let recall = if request.no_cache { Recall::default() } else { Recall::of(Arc::clone(&self.cache)) };
-        let plan = entry.plan(request, termination, sink, &recall, pools);
+        let cache = if request.no_cache {
+            RequestCache::default()
+        } else {
+            RequestCache::of(Arc::clone(&self.cache))
+        };
+        let plan = entry.plan(request, termination, sink, &cache, pools);
         self.settle(id, &entry);
         plan
     }
@@ -318,7 +328,7 @@ impl Service {
         self.store.leave(self.cache.memory_bytes() + self.answers.load(Ordering::Relaxed));
         self.store.settle(id, entry);
         for shared in &entry.shapes {
-            self.cache.keep_field(shared.shape.content(), &shared.field);
+            keep_field(&self.cache, shared.shape.content(), &shared.field);
         }
     }
 
@@ -334,8 +344,8 @@ impl Service {
         termination: &Termination,
     ) -> Result<Option<Audit>, ServiceError> {
         let entry = self.entry(id, termination)?;
-        let recall = Recall::of(Arc::clone(&self.cache));
-        let Ok((prepared, _)) = entry.prepared(termination, &recall) else { return Ok(None) };
+        let cache = RequestCache::of(Arc::clone(&self.cache));
+        let Ok((prepared, _)) = entry.prepared(termination, &cache) else { return Ok(None) };
         let scene = &prepared.scene;
         let present: Vec<usize> = (0..scene.bodies.len()).collect();
         let least = |part| least_travel(scene, part);
@@ -357,15 +367,15 @@ impl Service {
     ) -> Result<Option<Vec<DirectionalGraph>>, ServiceError> {
         let entry = self.entry(id, termination)?;
         check_parts(&[("removed", removed.to_vec())], entry.assembly.parts.len())?;
-        let recall = Recall::of(Arc::clone(&self.cache));
-        let Ok((prepared, _)) = entry.prepared(termination, &recall) else { return Ok(None) };
+        let cache = RequestCache::of(Arc::clone(&self.cache));
+        let Ok((prepared, _)) = entry.prepared(termination, &cache) else { return Ok(None) };
         let scene = &prepared.scene;
         let there = |part: &usize| removed.binary_search(part).is_err();
         let present: Vec<usize> = (0..scene.bodies.len()).filter(there).collect();
         let found = axes.map_or_else(|| axes_of(scene, &present, termination), |axes| Ok(axes.to_vec()));
         let Ok(axes) = found else { return Ok(None) };
         let translations = &Action::translations_along(&axes);
-        let analysis = Analysis { rule: StaticAnalysis::default(), scene, translations, recall: &recall };
+        let analysis = Analysis { rule: StaticAnalysis::default(), scene, translations, cache: &cache };
         let blockages = analysis.initial_blockages(&present, &|part| least_travel(scene, part), termination);
         Ok(blockages.ok().map(|b| DirectionalGraph::of(&b, translations)))
     }
@@ -384,7 +394,7 @@ impl Service {
 
     /// An assembly that is in memory, or on disk as it was taken in.
     fn kept(&self, id: AssemblyId) -> Option<Arc<Entry>> {
-        let on_disk = || self.cache.healed(&id.0, |content| self.store.shape(content));
+        let on_disk = || healed_assembly(&self.cache, &id.0, |content| self.store.shape(content));
         self.store.get(id).or_else(|| Some(self.store.insert(id, on_disk()?)))
     }
 
@@ -395,11 +405,11 @@ impl Service {
             if let Some(entry) = self.kept(at) {
                 break entry;
             }
-            match self.cache.source(&at.0).ok_or(ServiceError::UnknownAssembly)? {
-                Source::Given(source) => {
+            match source_of(&self.cache, &at.0).ok_or(ServiceError::UnknownAssembly)? {
+                AssemblySource::Given(source) => {
                     break self.store.insert(at, Assembly::new_until(&source, termination)?);
                 }
-                Source::Revised(base, revision) => {
+                AssemblySource::Revised(base, revision) => {
                     revisions.push((at, revision));
                     at = AssemblyId(base);
                 }
@@ -416,7 +426,7 @@ impl Drop for Service {
     /// Keeps what is left of the fields.
     fn drop(&mut self) {
         for shared in self.store.shapes() {
-            self.cache.keep_rest_of_field(shared.shape.content(), &shared.field);
+            keep_rest_of_field(&self.cache, shared.shape.content(), &shared.field);
         }
     }
 }

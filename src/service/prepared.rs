@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use crate::cache::{Recall, overlap_key};
+use crate::cache::RequestCache;
 use crate::contact::KeptCells;
 use crate::geometry::Assembly;
-use crate::plan::Verifier;
+use crate::plan::{Verifier, overlap_key};
 use crate::scene::{HullTree, JoinedHulls, Pair, Scene, grouped, resolution};
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
@@ -44,14 +44,14 @@ impl Prepared {
         shapes: &[Arc<SharedShape>],
         hulls: &Arc<JoinedHulls>,
         termination: &Termination,
-        recall: &Recall,
+        cache: &RequestCache,
     ) -> Result<Self, Interrupt> {
         let fields: Vec<_> = shapes.iter().map(|shape| Arc::clone(&shape.field)).collect();
         let started = Instant::now();
         let mut scene = Scene { hulls: Arc::clone(hulls), ..Scene::assembled(assembly, &fields) };
         let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
         let verifier = Verifier::new(&assembly.shapes, shape_of, depth_limit(assembly));
-        let mut overlaps = measure_overlaps(&scene, &verifier, termination, recall)?;
+        let mut overlaps = measure_overlaps(&scene, &verifier, termination, cache)?;
         for &(a, b, depth) in &overlaps {
             scene.allowances.grant(a, b, depth);
         }
@@ -104,7 +104,7 @@ fn measure_overlaps(
     scene: &Scene,
     verifier: &Verifier,
     termination: &Termination,
-    recall: &Recall,
+    cache: &RequestCache,
 ) -> Result<Vec<(usize, usize, f64)>, Interrupt> {
     let pairs = scene.broad_phase.pairs(0.0);
     let placed = |&(a, b): &(usize, usize)| {
@@ -119,7 +119,7 @@ fn measure_overlaps(
         .with_max_len(1)
         .map(|&i| {
             let (key, pair) = &keyed[i];
-            recall.overlap(*key, || verifier.assembled_depth(scene, pair, termination))
+            cache.get_or(*key, || verifier.assembled_depth(scene, pair, termination))
         })
         .collect::<Result<Vec<_>, Interrupt>>()?;
     let overlaps = pairs.into_iter().zip(group_of).map(|((a, b), group)| (a, b, depths[group]));

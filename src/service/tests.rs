@@ -188,7 +188,7 @@ proptest! {
 /// A service that remembers in a folder as well.
 fn on_disk(folder: &std::path::Path) -> Service {
     let settings = CacheSettings { folder: Some(folder.to_owned()), ..CacheSettings::default() };
-    Service::remembering(Arc::new(Cache::open(&settings).unwrap()))
+    Service::remembering(Arc::new(Cache::open(&settings, &RECORD_KINDS).unwrap()))
 }
 
 proptest! {
@@ -214,7 +214,7 @@ proptest! {
                 id
             };
             let service = on_disk(folder.path());
-            prop_assert!(service.cache().source(&id.0).is_none(), "there is nothing to heal it from");
+            prop_assert!(source_of(service.cache(), &id.0).is_none(), "there is nothing to heal it from");
             if reads_ahead {
                 service.recall_recent();
                 prop_assert!(service.remembered().records.memory_bytes > 0);

@@ -14,6 +14,7 @@ mod obstruction;
 mod passage;
 mod penalty;
 mod projection;
+mod records;
 mod reduction;
 mod sliding;
 mod sweep;
@@ -27,6 +28,10 @@ pub use null_twists::NullTwist;
 pub use obstruction::obstruction;
 pub use passage::{passes_straight, seems_clear};
 pub use penalty::{PenaltyEngine, PenaltyParameters};
+pub use records::MotionQuestion;
+pub(crate) use records::{
+    MOTION, SWEPT, TOUCHING, WITNESS, add_action, known_sweep, remembered_sweep, remembered_touching,
+};
 pub use sliding::{SlidingEngine, StepCost, Telling, pair_blocks, step_costs};
 pub use sweep::{Sweep, SweepQuestion, straight_sweep, straight_sweep_past};
 pub use touching::Touching;

@@ -16,6 +16,7 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::Point3;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Ball, Bounds, Look, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
 use crate::termination::{Interrupt, Poll, Termination};
@@ -31,7 +32,7 @@ const SAMPLES_POLL: u32 = 1;
 const AT_ONCE: usize = 32;
 
 /// A point that got too deep.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// The standing part of the pair.
     pub other: usize,

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
-use super::super::mapping::Mapping;
 use super::{Bricks, CHECKSUM_AT, Checksum, Grid, HEADER, Range, Tables, checksum};
+use crate::cache::Mapping;
 use crate::geometry::Surface;
 use crate::sdf::Field;
 

@@ -1,8 +1,8 @@
 //! What is written is read, and nothing else is believed.
 
 use super::super::build::Threads;
-use super::super::mapping::MappingTally;
 use super::*;
+use crate::cache::MappingTally;
 use crate::fixtures::{ball, cuboid, l_shape, open_box, spread, surface};
 use crate::termination::Termination;
 

@@ -7,35 +7,35 @@ use std::path::Path;
 use redb::Database;
 use redb::backends::FileBackend;
 
-use super::tables::Failure;
+use super::tables::DiskFailure;
 
-/// redb's own cache of pages.
+/// Bytes of redb's own cache of pages.
 const PAGE_CACHE: usize = 16 << 20;
-/// redb begins its file with these, of whatever value, and gives them theirs last.
+/// Bytes at the beginning of redb's file that get their values last.
 const MAGIC: usize = 9;
-/// Nothing but a header, which is shorter, stands in a file when its beginning gets its value.
+/// Bytes: when the beginning gets its values, the file has nothing but a header, which is shorter than this.
 const FIRST_PAGE: usize = 4096;
 const BUFFER: usize = 1 << 16;
 
 /// Opens the file of records for this process alone, or makes it.
-pub(super) fn database_at(path: &Path) -> Result<Database, Failure> {
+pub(super) fn database_at(path: &Path) -> Result<Database, DiskFailure> {
     let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
     match file.try_lock() {
-        // redb locks the same way: whoever has this lock is not in the middle of making the file.
+        // redb locks the same way: nobody is making the file now.
         Ok(()) => {
             if was_never_made(&mut file)? {
                 file.set_len(0)?;
             }
         }
-        Err(TryLockError::WouldBlock) => return Err(Failure::InUse),
-        // Whether it can do without is for redb to say.
+        Err(TryLockError::WouldBlock) => return Err(DiskFailure::InUse),
+        // redb decides whether it can do without a lock.
         Err(TryLockError::Error(_)) => {}
     }
     Ok(Database::builder().set_cache_size(PAGE_CACHE).create_with_backend(FileBackend::new(file)?)?)
 }
 
-/// Whether somebody was killed who was making the file: redb gives it its length first, and refuses a file
-/// that has one and does not begin as it should. Nothing was ever written to such a file.
+/// Whether a process was killed while it made the file. redb sets the length first and the beginning last, and refuses
+/// a file without the beginning. Nothing was ever written to such a file.
 fn was_never_made(file: &mut File) -> io::Result<bool> {
     file.rewind()?;
     let mut page = Vec::with_capacity(FIRST_PAGE);
@@ -56,6 +56,7 @@ fn was_never_made(file: &mut File) -> io::Result<bool> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::KINDS;
     use super::super::{Cache, CacheSettings};
 
     /// Opens a store with a file of records; how many files were set aside for it.
@@ -63,7 +64,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("records.redb"), content).unwrap();
         let settings = CacheSettings { folder: Some(folder.path().to_owned()), ..CacheSettings::default() };
-        let cache = Cache::open(&settings).unwrap();
+        let cache = Cache::open(&settings, &KINDS).unwrap();
         assert!(cache.verify().clean && cache.is_on_disk());
         cache.statistics().set_aside
     }

@@ -1,6 +1,6 @@
-//! A file that is mapped to be read. The one place of the planning modules that the compiler does not check.
+//! A file that is mapped to be read: the one unsafe operation of the planning modules.
 
-#![allow(unsafe_code, reason = "only whoever maps a file knows that nobody writes to it")]
+#![allow(unsafe_code, reason = "the compiler cannot know that nobody writes to a mapped file")]
 
 use std::fs::File;
 use std::io;
@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use memmap2::{Mmap, MmapMut};
 
-/// What a process has mapped, and what it found damaged in it.
+/// What a process has mapped, and how much of it was damaged.
 #[derive(Debug, Default)]
 pub struct MappingTally {
     bytes: AtomicU64,
@@ -19,7 +19,7 @@ pub struct MappingTally {
 }
 
 impl MappingTally {
-    /// Bytes of all files that are mapped now. They are the system's, which takes them back when it wants to.
+    /// Bytes of all files that are mapped now. They are no memory of this process: the system can take them back.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         self.bytes.load(Ordering::Relaxed)
@@ -46,9 +46,9 @@ impl Mapping {
     /// The file is not there, or cannot be mapped.
     pub fn of(path: &Path, tally: &Arc<MappingTally>) -> io::Result<Self> {
         let file = File::open(path)?;
-        // SAFETY: nobody writes to what is mapped. The one writer (`cache/fields.rs`) makes every file under a
-        // name of its own and renames it when it is complete; a file that has its name is only ever replaced
-        // or removed as a whole, which leaves the mapped one as it is. The folder is open to its owner alone.
+        // SAFETY: nobody writes to a mapped file. The one writer (`files.rs`) makes each file under another name and
+        // renames it when it is complete; a file with its final name is only replaced or removed as a whole, which
+        // does not change what is mapped. Only the owner can open the folder.
         let bytes = unsafe { Mmap::map(&file) }?;
         tally.bytes.fetch_add(bytes.len() as u64, Ordering::Relaxed);
         Ok(Self { bytes, tally: Arc::clone(tally) })
@@ -58,7 +58,7 @@ impl Mapping {
     ///
     /// # Errors
     /// There is no memory for it, or there are no bytes.
-    pub(super) fn of_copy(bytes: &[u8]) -> io::Result<Self> {
+    pub(crate) fn of_copy(bytes: &[u8]) -> io::Result<Self> {
         let mut copy = MmapMut::map_anon(bytes.len())?;
         copy.copy_from_slice(bytes);
         let tally = Arc::<MappingTally>::default();
@@ -66,8 +66,8 @@ impl Mapping {
         Ok(Self { bytes: copy.make_read_only()?, tally })
     }
 
-    /// Something in it is not what was written.
-    pub(super) fn is_damaged(&self) {
+    /// Counts a piece of the file that is not as it was written.
+    pub(crate) fn is_damaged(&self) {
         self.tally.damaged.fetch_add(1, Ordering::Relaxed);
     }
 }

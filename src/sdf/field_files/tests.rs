@@ -1,15 +1,20 @@
 //! Fields come back after a restart as they were, and what is damaged, half-written or too much does not.
 
+use std::fs;
+use std::path::{Path, PathBuf};
+
 use nalgebra::Point3;
 
-use super::super::CacheSettings;
 use super::*;
+use crate::cache::CacheSettings;
 use crate::fixtures::{ball, cuboid, l_shape, open_box, spread, surface};
 use crate::sdf::Estimate;
 
+const FOLDER: &str = "fields";
+
 fn open_with(folder: &Path, disk_bytes: u64) -> Arc<Cache> {
     let settings = CacheSettings { folder: Some(folder.to_owned()), disk_bytes, ..CacheSettings::default() };
-    Arc::new(Cache::open(&settings).unwrap())
+    Arc::new(Cache::open(&settings, &[&FIELD]).unwrap())
 }
 
 fn open(folder: &Path) -> Arc<Cache> {
@@ -36,7 +41,7 @@ impl Solid {
         Arc::new(Field::stored(&self.surface, store, self.content))
     }
 
-    fn key(&self) -> Key {
+    fn key(&self) -> RecordKey {
         key(&self.content)
     }
 
@@ -57,7 +62,7 @@ impl Solid {
     fn kept(&self, cache: &Arc<Cache>, part: f64) -> Arc<Field> {
         let field = self.field(cache);
         drop(self.told(&field, part));
-        cache.keep_field(&self.content, &field);
+        keep_field(cache, &self.content, &field);
         cache.flush();
         field
     }
@@ -66,12 +71,13 @@ impl Solid {
 /// Hits, misses, damaged, evicted.
 fn counts(cache: &Cache) -> [u64; 4] {
     let counts = cache.counters();
-    let field = &counts.kinds[Kind::Field.index()];
+    let field = &counts.kinds[0];
     [field.hits, field.misses, field.damaged, field.disk_evictions]
 }
 
-fn file_of(cache: &Cache, solid: &Solid) -> PathBuf {
-    cache.disk.as_ref().unwrap().fields.path(&solid.key())
+fn file_of(store: &Path, solid: &Solid) -> PathBuf {
+    let hash = blake3::Hash::from_bytes(*solid.key().hash()).to_hex();
+    store.join(FOLDER).join(hash.as_str()).with_extension("sdf")
 }
 
 /// In place of a file, as its writer would: what is mapped stays.
@@ -112,7 +118,7 @@ fn what_is_filled_later_joins_what_is_in_the_file() {
     let field = solid.field(&cache);
     assert_eq!(solid.told(&field, 1.0), solid.truth());
     assert!(first > 0 && field.filled() > 0 && field.in_its_file().0 == first);
-    cache.keep_field(&solid.content, &field);
+    keep_field(&cache, &solid.content, &field);
     cache.flush();
     assert_eq!(field.unwritten(), 0);
     drop((field, cache));
@@ -131,10 +137,10 @@ fn little_that_is_new_waits_for_the_end() {
     drop(solid.told(&field, 1.0));
     let new = field.unwritten();
     assert!(new > 0 && new < before / 8, "{new} of {before}");
-    cache.keep_field(&solid.content, &field);
+    keep_field(&cache, &solid.content, &field);
     cache.flush();
     assert_eq!(field.unwritten(), new);
-    cache.keep_rest_of_field(&solid.content, &field);
+    keep_rest_of_field(&cache, &solid.content, &field);
     cache.flush();
     assert_eq!(field.unwritten(), 0);
 }
@@ -146,7 +152,7 @@ fn a_damaged_file_is_a_counted_miss_and_replaced() {
     let whole = {
         let cache = open(folder.path());
         drop(solid.kept(&cache, 1.0));
-        fs::read(file_of(&cache, solid)).unwrap()
+        fs::read(file_of(folder.path(), solid)).unwrap()
     };
     let changed = |at: usize| {
         let mut bytes = whole.clone();
@@ -157,11 +163,14 @@ fn a_damaged_file_is_a_counted_miss_and_replaced() {
     let none = [changed(4), changed(200), whole[..whole.len() - 5832].to_vec(), Vec::new()];
     for (bytes, hit) in none.into_iter().map(|bytes| (bytes, 0)).chain([(changed(whole.len() - 9), 1)]) {
         let cache = open(folder.path());
-        replace(&file_of(&cache, solid), &bytes);
+        replace(&file_of(folder.path(), solid), &bytes);
         let field = solid.kept(&cache, 1.0);
         assert_eq!(solid.told(&field, 1.0), solid.truth());
         assert_eq!(counts(&cache), [hit, 1 - hit, 1, 0]);
-        assert!(cache.verify().clean && fs::read(file_of(&cache, solid)).unwrap() == whole, "replaced");
+        assert!(
+            cache.verify().clean && fs::read(file_of(folder.path(), solid)).unwrap() == whole,
+            "replaced"
+        );
         drop((field, cache));
         let cache = open(folder.path());
         assert_eq!(solid.field(&cache).filled(), 0);
@@ -178,7 +187,7 @@ fn verify_takes_damaged_files_out() {
     }
     assert_eq!((cache.verify().records, cache.verify().damaged), (4, 0));
     for (solid, at) in solids.iter().zip([0, 300, usize::MAX]) {
-        let path = file_of(&cache, solid);
+        let path = file_of(folder.path(), solid);
         let mut bytes = fs::read(&path).unwrap();
         let at = at.min(bytes.len() - 1);
         bytes[at] ^= 1;
@@ -188,7 +197,7 @@ fn verify_takes_damaged_files_out() {
     assert_eq!((verified.records, verified.damaged, verified.clean), (4, 3, true));
     assert_eq!(cache.list().iter().map(|l| l.key).collect::<Vec<_>>(), [solids[3].key()]);
     assert_eq!((cache.verify().records, cache.verify().damaged), (1, 0));
-    assert!(!file_of(&cache, &solids[0]).exists() && file_of(&cache, &solids[3]).exists());
+    assert!(!file_of(folder.path(), &solids[0]).exists() && file_of(folder.path(), &solids[3]).exists());
 }
 
 /// A writer may be killed while it writes, and between a file and its note.
@@ -199,12 +208,12 @@ fn what_a_killed_writer_left_is_removed_or_taken_up() {
     let (whole, half) = {
         let cache = open(folder.path());
         solids.iter().for_each(|solid| drop(solid.kept(&cache, 1.0)));
-        let path = file_of(&cache, &solids[0]);
-        (fs::read(&path).unwrap(), path.with_extension(UNFINISHED))
+        let path = file_of(folder.path(), &solids[0]);
+        (fs::read(&path).unwrap(), path.with_extension("unfinished"))
     };
     fs::write(&half, &whole[..whole.len() / 2]).unwrap();
     fs::write(fields.join("README"), "of somebody").unwrap();
-    fs::remove_file(half.with_extension(EXTENSION)).unwrap();
+    fs::remove_file(half.with_extension("sdf")).unwrap();
     let note = folder.path().join("records.redb");
     for without_notes in [false, true] {
         if without_notes {
@@ -227,7 +236,7 @@ fn files_keep_their_share_of_the_budget_and_the_least_recently_used_leave() {
     let cache = open_with(folder.path(), budget);
     let of = |n: u8| Solid { content: [n; 32], surface: Arc::clone(&solids()[1].surface) };
     let used = of(0).kept(&cache, 1.0);
-    let bytes = fs::metadata(file_of(&cache, &of(0))).unwrap().len();
+    let bytes = fs::metadata(file_of(folder.path(), &of(0))).unwrap().len();
     let count = (budget / 4 / bytes + 8) as u8;
     assert!(count > 10, "{bytes} bytes each");
     let reader = of(1);
@@ -237,14 +246,14 @@ fn files_keep_their_share_of_the_budget_and_the_least_recently_used_leave() {
     for n in 2..count {
         drop(of(n).kept(&cache, 1.0));
         // Nothing of it is new: it counts as used, and is not written.
-        cache.keep_field(&[0; 32], &used);
+        keep_field(&cache, &[0; 32], &used);
         let files: u64 = fs::read_dir(folder.path().join(FOLDER))
             .unwrap()
             .map(|file| file.unwrap().metadata().unwrap().len())
             .sum();
         assert!(files <= budget / 4 && files == cache.counters().field_file_bytes, "{files}");
     }
-    let there = |n: u8| file_of(&cache, &of(n)).exists();
+    let there = |n: u8| file_of(folder.path(), &of(n)).exists();
     assert!(there(0) && !there(1) && !there(2) && there(count - 1));
     assert!(counts(&cache)[3] >= 8);
     assert_eq!(reader.told(&mapped, 1.0), reader.truth(), "what left is still mapped");
@@ -259,9 +268,9 @@ fn evicting_and_clearing_take_files_with_them() {
         drop(solid.kept(&cache, 1.0));
     }
     let statistics = cache.statistics();
-    let field = &statistics.kinds[Kind::Field.index()];
+    let field = &statistics.kinds[0];
     assert_eq!((field.disk_entries, field.disk_bytes), (Some(4), Some(statistics.field_file_bytes)));
-    let last = fs::metadata(file_of(&cache, &solids[3])).unwrap().len();
+    let last = fs::metadata(file_of(folder.path(), &solids[3])).unwrap().len();
     assert_eq!(cache.evict(last + 1000), 3);
     assert_eq!(cache.list().iter().map(|l| (l.key, l.bytes)).collect::<Vec<_>>(), [(solids[3].key(), last)]);
     assert_eq!((cache.evict(0), cache.list().len(), cache.counters().field_file_bytes), (1, 0, 0));
@@ -278,7 +287,7 @@ fn a_folder_that_takes_no_file_costs_no_more_than_the_files() {
     let field = solid.kept(&cache, 1.0);
     assert!(field.unwritten() > 0 && cache.counters().write_failures == 1);
     assert_eq!(solid.told(&field, 1.0), solid.truth());
-    cache.keep_field(&solid.content, &field);
+    keep_field(&cache, &solid.content, &field);
     cache.flush();
     assert_eq!(cache.counters().write_failures, 1, "it is left alone for a while");
     assert!(cache.is_on_disk());

@@ -1,0 +1,126 @@
+//! Verification: what the check of a path found past one part that stands. It depends only on the two shapes and on how one
+//! passes the other ([`Passing`]). So a change costs only the checks of the paths that come near it, and parts that leave
+//! alike are checked once.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::SOURCES;
+use crate::cache::{Digest, RecordKey, RecordKind, RequestCache, Storage};
+use crate::contact::Passing;
+use crate::geometry::add_pose;
+use crate::plan::Verdict;
+use crate::termination::Interrupt;
+
+/// What verification found along a path past one part.
+pub(crate) static VERDICT: RecordKind =
+    RecordKind::of::<Verdict>(5, "verdict", Storage::MemoryAndDisk, SOURCES);
+
+/// The check of a path past a part that stands.
+#[derive(Debug, Clone, Copy)]
+pub struct VerdictQuestion<'a> {
+    /// The moving part, the standing part, and the path.
+    pub passing: &'a Passing<'a>,
+    /// The depth at which the path is refused, in the planning frame.
+    pub limit: f64,
+}
+
+/// What one request found, which serves the request without a cache, too.
+#[derive(Debug, Default)]
+pub struct KnownVerdicts(Mutex<HashMap<RecordKey, Verdict>>);
+
+/// Verdicts that a request keeps. Of more, all are forgotten: a few kB each at most, and a part is checked again soon or
+/// not at all.
+const MOST_KNOWN: usize = 4096;
+
+impl KnownVerdicts {
+    /// The verdict on a question, as known or remembered, or else as checked, which is then remembered.
+    ///
+    /// # Errors
+    /// Those of `check`.
+    pub fn verdict(
+        &self,
+        question: &VerdictQuestion<'_>,
+        cache: &RequestCache,
+        check: impl FnOnce() -> Result<Verdict, Interrupt>,
+    ) -> Result<Verdict, Interrupt> {
+        let key = question.key();
+        let known = self.lock().get(&key).cloned();
+        let mut verdict = match known {
+            Some(verdict) => verdict,
+            None => {
+                let found = cache.get_or(key, check)?;
+                let mut known = self.lock();
+                if known.len() >= MOST_KNOWN {
+                    known.clear();
+                }
+                known.insert(key, found.clone());
+                found
+            }
+        };
+        // It may have been found past a part that stands alike.
+        let [_, other] = question.passing.parts;
+        verdict.entries.iter_mut().for_each(|entry| entry.other = other);
+        Ok(verdict)
+    }
+
+    /// It holds plain data: it is whole even if a holder panicked.
+    fn lock(&self) -> MutexGuard<'_, HashMap<RecordKey, Verdict>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl VerdictQuestion<'_> {
+    fn key(&self) -> RecordKey {
+        let Passing { shapes, path, centre, granted, longest_side, .. } = self.passing;
+        let mut digest = Digest::new();
+        shapes.iter().for_each(|shape| {
+            digest.hash(shape.content());
+        });
+        digest.numbers([self.limit, *granted, *longest_side]).numbers(centre.iter().copied());
+        digest.integer(path.len() as u64);
+        path.iter().for_each(|pose| add_pose(&mut digest, pose));
+        digest.key(&VERDICT)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use nalgebra::Point3;
+
+    use super::*;
+    use crate::contact::sampled::along_path::Entry;
+    use crate::fixtures::{cuboid, moved, scene};
+    use crate::geometry::Pose;
+
+    #[test]
+    fn parts_that_leave_alike_are_checked_once() {
+        let place = Pose::translation(4.0, 1.0, 0.0) * Pose::rotation(nalgebra::Vector3::z() * 0.7);
+        let foot = || cuboid([-1.0, -1.5, 0.0], [2.0, 1.0, 0.5]);
+        let post = || cuboid([0.0, 0.0, 0.5], [1.0, 0.75, 3.0]);
+        let (scene, _) = scene([foot(), post(), moved(foot(), &place), moved(post(), &place)]);
+        let (cache, known, checks) = (RequestCache::default(), KnownVerdicts::default(), Cell::new(0));
+        let verdict_on = |parts: [usize; 2], height: f64, aside: f64| {
+            let start = scene.bodies[parts[0]].planning_from_shape;
+            let path = [start, Pose::translation(aside, 0.0, height) * start];
+            let passing = &Passing::new(&scene, &scene.allowances, parts, &path);
+            let check = || {
+                checks.set(checks.get() + 1);
+                let point = Point3::new(0.5, 0.0, height);
+                let entry = Entry { other: parts[1], on_moving: true, point, over: 0.5 };
+                Ok(Verdict { depth: 0.5, entries: vec![entry] })
+            };
+            known.verdict(&VerdictQuestion { passing, limit: 2e-3 }, &cache, check).unwrap()
+        };
+        let (one, other) = (verdict_on([1, 0], 0.25, 0.0), verdict_on([3, 2], 0.5, 0.0));
+        assert_eq!((checks.get(), one.depth, other.depth), (1, 0.5, 0.5));
+        assert_eq!((one.entries[0].other, other.entries[0].other), (0, 2));
+        assert_eq!(one.entries[0].point, other.entries[0].point, "past the foot, both are out of its sight");
+        verdict_on([1, 0], 0.0, 0.25);
+        verdict_on([1, 2], 0.25, 0.0);
+        assert_eq!(checks.get(), 3, "another way, and past another part");
+        assert_eq!(cache.reused(&VERDICT), 0, "nothing was there before the request");
+    }
+}
