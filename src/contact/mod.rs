@@ -3,7 +3,7 @@
 //! | question | entry | answer |
 //! |---|---|---|
 //! | how far a body goes along a line until it meets another (shape cast) | `shape_cast`: [`ShapeCast`] | a length |
-//! | bounds that hold for all points of a surface (region cover), for shifts, for turns and for paths | `region_cover`: `cells`, `holds`, `depth` | regions and what leaves them; a depth |
+//! | bounds that hold for all points of a surface (region cover), for shifts, for turns and for paths | `region_cover`: `shift`, `rigid`, `path` | regions and what leaves them; a depth |
 //! | contacts at samples of both surfaces, for open surfaces and as a fallback | `sampled` | contacts |
 //! | whether two threads pass each other along their helix | `helix_profile` | the stretches left open |
 //! | whether the hulls of a body and of all others are apart | [`exit_direction`](crate::scene::exit_direction) | a direction |

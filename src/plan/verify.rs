@@ -1,7 +1,7 @@
 //! Verification of a path on the triangles, independent of distance fields and engines.
 //!
 //! For every standing part that the moving one comes near ([`Passing`]), both surfaces are bounded against
-//! each other all along the way ([`depth`](crate::contact::region_cover::depth) says how, and what that
+//! each other all along the way ([`path`](crate::contact::region_cover::path) says how, and what that
 //! guarantees): what counts is depth beyond that of the pair at the assembled pose, which is measured with the same search.
 //! Screws of many turns are bounded by their profiles, too ([`helix_profile`](crate::contact::helix_profile)), and what
 //! neither settles is checked at samples ([`along_path`](crate::contact::sampled::along_path)).
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::contact::Passing;
 use crate::contact::course::{Course, Interval, turns_far};
 use crate::contact::helix_profile::{centred, depth_on_screw};
-use crate::contact::region_cover::depth::{Found, Precision, Way};
+use crate::contact::region_cover::path::{Found, Precision, Way};
 use crate::contact::sampled::along_path::{Entry, Samples};
 use crate::geometry::{Pose, Shape, Surface, area_normal};
 use crate::scene::{Allowances, Pair, Scene};
@@ -33,7 +33,7 @@ const FINEST: f64 = 1.0 / 4.0;
 /// Entries are no closer to each other than this, as a share of the longest side.
 const COARSE: f64 = 4e-3;
 /// The same for the overlap of assembled parts. No more is granted than is measured at some point, and
-/// no less than nine tenths of what there is ([`depth`](crate::contact::region_cover::depth) tells depths to a tenth), but for
+/// no less than nine tenths of what there is ([`path`](crate::contact::region_cover::path) tells depths to a tenth), but for
 /// what is between the corners of the smallest pieces, which are no larger than this.
 const OVERLAP_SPARE: f64 = 2e-6;
 const OVERLAP_FINEST: f64 = 1e-4;

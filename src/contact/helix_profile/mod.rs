@@ -3,7 +3,7 @@
 //! Along a helix, surfaces keep their profile (`envelope`; the helix that a path follows, and how far it
 //! strays from it: `path`): one comparison settles ten turns. Where it does not, because the part strays
 //! too far, or a head meets its seat, it is made on each half of the way, where the part strays less.
-//! What short stretches leave open is left to [`depth`](super::region_cover::depth), as far as that gets, and to
+//! What short stretches leave open is left to [`path`](super::region_cover::path), as far as that gets, and to
 //! samples: but for these the answer is the same kind of bound. A path in the middle of a thread's play
 //! (`centred`, from the flanks that face each other: `slip`) has the room that such a bound needs.
 
@@ -22,7 +22,7 @@ use crate::termination::{Interrupt, Termination};
 pub(crate) use centred::centred;
 
 use super::course::{Course, Interval};
-use super::region_cover::depth::{Found, MOST_EFFORT_IN_DOUBT, Way};
+use super::region_cover::path::{Found, MOST_EFFORT_IN_DOUBT, Way};
 use envelope::{Envelope, Zone};
 use path::{Boxes, ScrewPath};
 

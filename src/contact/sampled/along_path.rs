@@ -8,7 +8,7 @@
 //! take turns in checking a half or a quarter of the samples each, so that a sample is still checked
 //! every other or every fourth pose.
 //!
-//! [`depth`](super::super::region_cover::depth) has no such misses, but looks at every facet that passes every other: on
+//! [`path`](super::super::region_cover::path) has no such misses, but looks at every facet that passes every other: on
 //! a thread of ten turns, millions.
 
 use std::ops::Range;

@@ -6,11 +6,11 @@
 //! is not, the check at the trial pose finds what is missing.
 
 pub(crate) mod along_path;
-mod gather;
+mod nearby_samples;
+mod pair_samples;
 mod planes;
 #[cfg(test)]
 mod tests;
-mod vicinity;
 
 use nalgebra::{Point3, Vector3, Vector6};
 
@@ -20,9 +20,9 @@ use crate::sdf::Grid;
 use crate::termination::{Interrupt, Poll, Termination};
 use crate::tolerances::FREE_STEP;
 
-use gather::{Measured, gather};
+use nearby_samples::{Measured, gather};
+pub(crate) use pair_samples::{Extent, Vicinity};
 use planes::{ON_SURFACE, Planes, Sample};
-pub(crate) use vicinity::{Extent, Vicinity};
 
 use super::constraint::Row;
 

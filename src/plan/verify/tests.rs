@@ -2,7 +2,7 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 
 use super::*;
-use crate::contact::region_cover::depth::MOST_EFFORT_IN_DOUBT;
+use crate::contact::region_cover::path::MOST_EFFORT_IN_DOUBT;
 use crate::fixtures::{
     LIMIT, ball, block_on_plate, cells, cuboid, l_shape, moved, open_box, peg_in_hole, rod, scene, tube,
 };

@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use crate::contact::region_cover::facing::TILT;
+use crate::contact::region_cover::surface_pair::TILT;
 use crate::contact::{CastMargins, ShapeCast};
 use crate::geometry::{Bounds, Pose};
 use crate::scene::Scene;

@@ -19,7 +19,7 @@ mod stages;
 mod turning;
 
 use crate::contact::region_cover::Halt;
-use crate::contact::region_cover::holds::Holds;
+use crate::contact::region_cover::rigid::Holds;
 use crate::contact::sampled::Mover;
 use crate::geometry::Pose;
 use crate::scene::{Scene, Surroundings, exit_direction};

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::contact::region_cover::Halt;
-use crate::contact::region_cover::cells::Cells;
-use crate::contact::region_cover::facing::Facing;
+use crate::contact::region_cover::shift::Cells;
+use crate::contact::region_cover::surface_pair::Facing;
 use crate::contact::sampled::Mover;
 use crate::geometry::Pose;
 use crate::scene::Scene;

@@ -1,5 +1,5 @@
 //! Translations: a shift that follows a force as far as contact lets it, in steps as long as the
-//! regions around the part's surface allow ([`cells`](crate::contact::region_cover::cells)), or in flight ([`flight`](super::flight)).
+//! regions around the part's surface allow ([`shift`](crate::contact::region_cover::shift)), or in flight ([`flight`](super::flight)).
 //!
 //! At each shift the force is projected onto the cone that the obstacles leave. Along an obstacle
 //! steps are short, and each begins with the force as it is: where the obstacle ends, the part
@@ -9,8 +9,8 @@ use nalgebra::{Vector3, Vector6};
 
 use crate::contact::constraint::Row;
 use crate::contact::region_cover::Halt;
-use crate::contact::region_cover::cells::{Cells, MOST_STALLS, STALL};
-use crate::contact::region_cover::facing::Obstacle;
+use crate::contact::region_cover::shift::{Cells, MOST_STALLS, STALL};
+use crate::contact::region_cover::surface_pair::Obstacle;
 use crate::geometry::{Bounds, Pose};
 use crate::scene::Scene;
 use crate::termination::Termination;

@@ -8,8 +8,8 @@ use std::time::Instant;
 use nalgebra::Vector3;
 
 use crate::contact::region_cover::Halt;
-use crate::contact::region_cover::cells::Cells;
-use crate::contact::region_cover::holds::Holds;
+use crate::contact::region_cover::rigid::Holds;
+use crate::contact::region_cover::shift::Cells;
 use crate::contact::sampled::Mover;
 use crate::geometry::Pose;
 use crate::scene::{Memo, Scene, Surroundings};

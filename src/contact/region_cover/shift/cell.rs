@@ -4,24 +4,12 @@ use nalgebra::{Point3, Vector3};
 
 use crate::tolerances::TOUCHED;
 
-use super::facing::{Facing, Obstacle, Piece, Placed, SUNK, Slope, TILT};
+use super::super::surface_pair::{Facing, Obstacle, Placed, SUNK, Slope, Spot, TILT};
 
 /// So many points of a piece are looked at before each plane that it touches.
 const MOST_LOWEST: usize = 8;
 /// Cosine of the angle up to which the face that is entered is the one that a plane keeps a piece before.
 const AGREED: f64 = 0.9;
-
-/// What a cell is asked for.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Spot {
-    pub(crate) piece: Piece,
-    /// A triangle of the measured surface near it.
-    pub(crate) guess: u32,
-    /// Which of [`AHEAD`] it was let go by last.
-    pub(crate) level: usize,
-    /// How far outside its region it may be, beyond what is granted.
-    pub(crate) held: f64,
-}
 
 /// A piece that is free while the shift stays within limits.
 #[derive(Debug, Clone)]

@@ -10,10 +10,9 @@ use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
 
 use super::super::super::sampled::{Contact, Mover, Near};
-use super::super::cell::Spot;
-use super::super::cells::{MOST_GRANTED, starting};
-use super::super::facing::{Facing, Piece, Placed};
-use super::super::finder::{AROUND, ROOM, SMALLEST, look};
+use super::super::cover;
+use super::super::shift::{AROUND, MOST_GRANTED, ROOM, SMALLEST, starting};
+use super::super::surface_pair::{Facing, Piece, Placed, Spot};
 use super::hold::{Ends, Hold, slack_within};
 
 /// Surfaces in more pieces than this are quicker told by samples.
@@ -188,7 +187,7 @@ impl<'a> Held<'a> {
             let mut out: Vec<(usize, f64)> = slacks.filter(|(_, slack)| *slack < -most).collect();
             out.sort_by(|a, b| a.1.total_cmp(&b.1));
             for (k, _) in out.into_iter().take(MOST_PROBED) {
-                let seen = look(facing, &placed.points[k], hold.spot.guess);
+                let seen = facing.look(&placed.points[k], hold.spot.guess);
                 hold.spot.guess = seen.closest.triangle;
                 let gap = seen.signed + facing.allowance;
                 if gap < -most {
@@ -256,24 +255,47 @@ impl<'a> Held<'a> {
         left: &mut usize,
         out: &mut Vec<Hold>,
     ) -> Result<(), Unheld> {
-        if *left == 0 {
-            return Err(Unheld::Unsure);
-        }
-        *left -= 1;
+        let mut is_whole = true;
+        cover(hold.clone(), |mut hold, rest| {
+            // A part may be in the region that it came with.
+            if !std::mem::take(&mut is_whole) {
+                let at_here = hold.slack_at(&self.facing, &ends.here, 0.0, &mut self.placed);
+                hold.next = hold.slack_at(&self.facing, &ends.there, 0.0, &mut self.placed);
+                if let (Some(slack), Some(_)) = (at_here, hold.next) {
+                    out.push(Hold { slack, ..hold });
+                    return Ok(());
+                }
+            }
+            if *left == 0 {
+                return Err(Unheld::Unsure);
+            }
+            *left -= 1;
+            if let Some(held) = self.held_whole(&hold, ends)? {
+                out.push(held);
+                return Ok(());
+            }
+            let part = |piece| {
+                Hold::new(Spot { piece, ..hold.spot }, Arc::clone(&hold.region), &self.facing, &ends.here)
+            };
+            rest.extend(self.facing.parts(&hold.spot.piece).into_iter().rev().map(part));
+            Ok(())
+        })
+    }
+
+    /// All of a piece in a region that holds it at both ends; none if it is to be split.
+    fn held_whole(&mut self, hold: &Hold, ends: &Ends) -> Result<Option<Hold>, Unheld> {
         self.regions += 1;
         // What could not be held further ahead the last time is not tried at once again.
         let goes_far = hold.spot.level == 0 && ends.here != ends.there;
         let far = if goes_far { self.region(hold, &[ends.here, ends.there, ends.ahead]).ok() } else { None };
         let level = usize::from(goes_far && far.is_none());
-        let found = far.map_or_else(|| self.region(hold, &[ends.here, ends.there]), Ok);
-        match found {
+        match far.map_or_else(|| self.region(hold, &[ends.here, ends.there]), Ok) {
             Ok(region) => {
                 let mut hold = Hold { region: Arc::new(region), ..hold.clone() };
                 hold.spot.level = level;
                 hold.slack = hold.slack_at(&self.facing, &ends.here, 0.0, &mut self.placed).unwrap_or(0.0);
                 hold.next = hold.slack_at(&self.facing, &ends.there, 0.0, &mut self.placed).or(Some(0.0));
-                out.push(hold);
-                return Ok(());
+                return Ok(Some(hold));
             }
             Err(NoRegion::Amid(triangle)) => {
                 if let Some(contact) = pierced(&self.facing, hold, triangle, &ends.there) {
@@ -282,34 +304,21 @@ impl<'a> Held<'a> {
             }
             Err(NoRegion::Cramped) => {}
         }
-        if let Piece::Bit(corners) = &hold.spot.piece
-            && hold.radius < SMALL
-        {
-            if let Some(contact) = self.deepest_on_edges(corners, hold.spot.guess, &ends.there) {
-                return Err(Unheld::Entered(contact));
-            }
-            if hold.radius < SMALLEST {
-                let enters = |at: &Pose| self.deepest_on_edges(corners, hold.spot.guess, at).is_some();
-                if ends.here != ends.there && ends.between.iter().any(enters) {
-                    return Err(Unheld::Crossed);
-                }
-                out.push(self.before_face(hold, ends));
-                return Ok(());
-            }
+        let Piece::Bit(corners) = &hold.spot.piece else { return Ok(None) };
+        if hold.radius >= SMALL {
+            return Ok(None);
         }
-        for piece in self.facing.parts(&hold.spot.piece) {
-            let mut part =
-                Hold::new(Spot { piece, ..hold.spot }, Arc::clone(&hold.region), &self.facing, &ends.here);
-            let at_here = part.slack_at(&self.facing, &ends.here, 0.0, &mut self.placed);
-            part.next = part.slack_at(&self.facing, &ends.there, 0.0, &mut self.placed);
-            if let (Some(slack), Some(_)) = (at_here, part.next) {
-                part.slack = slack;
-                out.push(part);
-            } else {
-                self.held(&part, ends, left, out)?;
-            }
+        if let Some(contact) = self.deepest_on_edges(corners, hold.spot.guess, &ends.there) {
+            return Err(Unheld::Entered(contact));
         }
-        Ok(())
+        if hold.radius >= SMALLEST {
+            return Ok(None);
+        }
+        let enters = |at: &Pose| self.deepest_on_edges(corners, hold.spot.guess, at).is_some();
+        if ends.here != ends.there && ends.between.iter().any(enters) {
+            return Err(Unheld::Crossed);
+        }
+        Ok(Some(self.before_face(hold, ends)))
     }
 
     /// A region that holds a piece at some poses.
@@ -325,7 +334,7 @@ impl<'a> Held<'a> {
         let around = (placed.radius + (centres.max - middle).norm() + AROUND) * ROOM;
         let most = hold.most(facing);
         let wanted = Wanted { points: &wanted, most, from_behind: true, facing: Vector3::zeros() };
-        let seen = look(facing, &middle, hold.spot.guess);
+        let seen = facing.look(&middle, hold.spot.guess);
         let region =
             facing.measured.free_region_around(&middle, around, (&seen.closest, seen.signed), wanted)?;
         for pose in at {
@@ -341,7 +350,7 @@ impl<'a> Held<'a> {
     fn deepest_on_edges(&self, corners: &[Point3<f64>; 3], guess: u32, there: &Pose) -> Option<Contact> {
         let facing = &self.facing;
         let gap = |p: &Point3<f64>| {
-            let seen = look(facing, &(there * p), guess);
+            let seen = facing.look(&(there * p), guess);
             (seen.signed + facing.allowance, seen.closest)
         };
         let at_corners = corners.map(|p| gap(&p).0);
@@ -385,7 +394,7 @@ impl<'a> Held<'a> {
     fn before_face(&mut self, hold: &Hold, ends: &Ends) -> Hold {
         let (facing, placed) = (&self.facing, &mut self.placed);
         facing.place_at(&hold.spot.piece, &ends.there, placed);
-        let closest = look(facing, &placed.centre, hold.spot.guess).closest;
+        let closest = facing.look(&placed.centre, hold.spot.guess).closest;
         let normal = facing.measured.pseudo_normal(&closest).normalize();
         let height = placed.points.iter().map(|p| normal.dot(&p.coords)).fold(f64::INFINITY, f64::min);
         let ball = (placed.centre, AROUND_SMALLEST);

@@ -1,7 +1,7 @@
 //! What is near a part that may turn.
 //!
 //! Of each pair one surface is in pieces, each with a convex region that the other surface does not
-//! enter (those of [`cells`](super::cells) to begin with). A piece whose corners are in its region is
+//! enter (those of [`shift`](super::shift) to begin with). A piece whose corners are in its region is
 //! outside the other solid, however it came there: a few planes tell what hundreds of samples would have
 //! to be measured for. Of what leaves its region, corners that are inside the other solid are contacts, or else
 //! points inside it of the triangles whose planes it has passed. Where there are none in any pair, another
@@ -9,8 +9,8 @@
 //! many regions, samples tell of the pair from there on. Of contacts, those that were found to matter are kept
 //! from step to step and measured again.
 
-mod held;
 mod hold;
+mod pair_cover;
 #[cfg(test)]
 mod tests;
 
@@ -20,7 +20,7 @@ use crate::termination::{Interrupt, Termination};
 use crate::tolerances::DEPTH_TOLERANCE;
 
 use super::super::sampled::{Around, Mover, Near};
-use held::Held;
+use pair_cover::Held;
 
 /// What is around a moving part.
 pub(crate) struct Holds<'a> {

@@ -10,7 +10,7 @@
 //! ([`Surface::hull_depth`]). Other pieces are split, in space or in time, whichever is longer; but on a line
 //! in space first, down to triangles: the prism that one of them passes is convex, however long.
 //! Pieces of the smallest size are measured; their size is added. Of a long piece only what is within the box of
-//! the other surface is asked about: a region need not hold what is outside by far ([`slab`]).
+//! the other surface is asked about: a region need not hold what is outside by far ([`clip`]).
 //!
 //! Where threads with granted overlap cross each other, and in sight of holes, this may take too long: a
 //! count ends it, or that hardly anything was settled by then ([`Found::open`]).
@@ -20,18 +20,19 @@
 //! come near one half in a region ([`Rim`](crate::geometry::Rim)); in sight of holes a region may be partly
 //! inside, and only small pieces are settled, by their corners.
 
+mod clip;
 mod settle;
-mod slab;
 mod walk;
 
-use nalgebra::Point3;
+use std::collections::HashMap;
 
-use crate::geometry::{PatchTree, Surface};
+use nalgebra::{Point3, Vector3};
+
+use crate::geometry::{FreeRegion, PatchTree, Surface};
 use crate::termination::{Interrupt, Termination};
 
 use super::super::course::{Course, Interval, View};
 use super::super::passing::Passing;
-use walk::Search;
 
 /// Effort ([`Found::effort`], a count of pieces and regions) spent on each surface before the way is left to samples: some seconds,
 /// for samples promise less. What is no screw, and sees no holes, has been seen to need a third (a bayonet that
@@ -158,6 +159,87 @@ impl Found {
     }
 }
 
+/// Where to begin with a piece: a triangle near it, a region around it.
+#[derive(Debug, Clone, Copy)]
+struct SearchHint {
+    triangle: u32,
+    region: Option<u32>,
+    /// No region was found for the piece of which this is one half.
+    is_vain: bool,
+}
+
+/// A ball that holds the hull of what a piece passes.
+#[derive(Debug, Clone, Copy)]
+struct SweptBall {
+    centre: Point3<f64>,
+    radius: f64,
+}
+
+/// A cell of a grid, by the binary logarithm of its size and its indices.
+type GridCell = (i32, [i64; 3]);
+
+/// A region, and whether all of it is outside the surface that is measured: of one with holes, part of it may be
+/// inside.
+struct KnownRegion {
+    free: FreeRegion,
+    is_outside: bool,
+}
+
+/// The search for the deepest points: the question, the regions found so far, the hull of the piece in question, and
+/// the answer so far.
+struct PathSearch<'a> {
+    asked: &'a Question<'a>,
+    /// Whether the measured surface has holes, so that depth changes its sign off it, too.
+    has_rim: bool,
+    most_effort: usize,
+    /// What a piece costs.
+    price: usize,
+    /// How much of surface and way was settled, as a share of all.
+    done: f64,
+    view: View<'a>,
+    termination: &'a Termination,
+    regions: Vec<KnownRegion>,
+    /// Regions in the order in which they held a piece.
+    held: Vec<u32>,
+    /// The same by the places of the pieces.
+    places: HashMap<GridCell, Vec<u32>>,
+    /// The corners of the hull in question, or those that say most about where it reaches.
+    wanted: Vec<Point3<f64>>,
+    /// All of them, unless they are too many.
+    hull: Vec<Point3<f64>>,
+    facing: Vector3<f64>,
+    found: Found,
+}
+
+/// A piece has signs that depend on all edges of holes: so many of them take as long as all else.
+const EDGES_AT_ONCE: usize = 32;
+impl<'a> PathSearch<'a> {
+    fn new(
+        asked: &'a Question<'a>,
+        view: View<'a>,
+        most_effort: usize,
+        termination: &'a Termination,
+    ) -> Self {
+        let rim = asked.measured.rim();
+        Self {
+            asked,
+            has_rim: rim.is_some(),
+            most_effort,
+            price: 1 + rim.map_or(0, |rim| rim.edges().len() / EDGES_AT_ONCE),
+            done: 0.0,
+            view,
+            termination,
+            regions: Vec::new(),
+            held: Vec::new(),
+            places: HashMap::new(),
+            wanted: Vec::new(),
+            hull: Vec::new(),
+            facing: Vector3::zeros(),
+            found: Found::default(),
+        }
+    }
+}
+
 impl Question<'_> {
     /// Looks for the deepest points on a stretch of the way, with no more than some effort.
     ///
@@ -170,7 +252,7 @@ impl Question<'_> {
         most_effort: usize,
         termination: &Termination,
     ) -> Result<Found, Interrupt> {
-        let mut search = Search::new(self, view, most_effort, termination);
+        let mut search = PathSearch::new(self, view, most_effort, termination);
         search.all(interval)?;
         Ok(search.found)
     }

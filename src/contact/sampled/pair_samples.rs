@@ -5,7 +5,7 @@ use crate::geometry::{Bounds, Pose, SampleTree};
 
 use crate::termination::Interrupt;
 
-use super::gather::{Few, Measured, gather_exactly};
+use super::nearby_samples::{Few, Measured, gather_exactly};
 use super::{Contact, Mover, Near, Side};
 
 /// How much to look for.

@@ -7,8 +7,8 @@ use nalgebra::{Point3, Vector3};
 use crate::geometry::{FreeRegion, Pose, Screw};
 use crate::tolerances::DEPTH_TOLERANCE;
 
-use super::super::cell::{Cell, Spot};
-use super::super::facing::{Facing, Placed};
+use super::super::shift::Cell;
+use super::super::surface_pair::{Facing, Placed, Spot};
 
 /// So many times the displacement of a step regions are asked to allow, if they can.
 const AHEAD: f64 = 4.0;

@@ -20,11 +20,19 @@ use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{FREE_STEP, HELD, HELD_AT_FIRST, TOUCHED};
 
+mod cache;
+mod cell;
+mod finder;
+
 use super::Halt;
-use super::cell::Cell;
-use super::facing::{Facing, Obstacle, Placed, Witness};
-use super::finder::Finder;
-use super::kept::{Gathered, KeptCells, Place, Way};
+use super::surface_pair::{Facing, Obstacle, Placed, Witness};
+use cache::{Gathered, Place, Way};
+use finder::Finder;
+
+pub(crate) use cell::Cell;
+pub(crate) use finder::{AROUND, ROOM, SMALLEST};
+
+pub use cache::KeptCells;
 
 /// So many regions are looked for on one side of a pair before as many are on the other; then twice as many, and so
 /// on …

@@ -1,15 +1,15 @@
 //! Finds regions for the pieces of one surface that another may not be entered by.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::geometry::{Closest, NoRegion, Wanted};
+use crate::geometry::{NoRegion, Wanted};
 use crate::termination::Termination;
 use crate::tolerances::{HELD, HELD_AT_FIRST};
 
-use super::Halt;
-use super::cell::{Cell, Limit, Spot};
-use super::facing::{Facing, Obstacle, Piece, Placed, Slope, Witness};
+use super::super::surface_pair::{Facing, Obstacle, Piece, Placed, Seen, Slope, Spot, Witness};
+use super::super::{Halt, cover};
+use super::cell::{Cell, Limit};
 
 /// A piece further than this from the other surface needs no region, in the planning frame: as long as the longest
 /// step in contact.
@@ -34,12 +34,6 @@ pub(crate) const SMALLEST: f64 = 0.02;
 
 /// So many pieces that come next are looked at beside one.
 const BESIDE: usize = 3;
-
-/// What of the measured surface is nearest to a point, and how near.
-pub(crate) struct Seen {
-    pub(crate) closest: Closest,
-    pub(crate) signed: f64,
-}
 
 /// A question about a piece: from which shift on, and which way it is to go on.
 #[derive(Clone, Copy)]
@@ -175,7 +169,8 @@ impl<'a> Finder<'a> {
 
     /// Finds cells for a piece at a shift, as free along the unit vector `u` as can be.
     pub(crate) fn find(&mut self, spot: Spot, at: &Vector3<f64>, u: &Vector3<f64>) -> Result<(), Halt> {
-        self.renew(spot, &Wish { at: *at, along: *u })
+        let wish = Wish { at: *at, along: *u };
+        cover(spot, |spot, parts| self.renew(spot, &wish, parts))
     }
 
     /// A cell for all of a piece that lets it go further than `least` along the unit vector `u`, if there
@@ -191,7 +186,7 @@ impl<'a> Finder<'a> {
     /// Takes a piece in hand: what its middle sees.
     fn place(&mut self, spot: &mut Spot, wish: &Wish) -> Seen {
         self.pair.place(&spot.piece, &wish.at, &mut self.placed);
-        let seen = look(self.pair, &self.placed.centre, spot.guess);
+        let seen = self.pair.look(&self.placed.centre, spot.guess);
         spot.guess = seen.closest.triangle;
         seen
     }
@@ -209,8 +204,8 @@ impl<'a> Finder<'a> {
         self.obstacles.extend(by.iter().map(|o| o.normal));
     }
 
-    /// Finds cells for a piece, as free along the wish as can be.
-    fn renew(&mut self, mut spot: Spot, wish: &Wish) -> Result<(), Halt> {
+    /// Finds a cell for a piece, as free along the wish as can be, or pushes its parts.
+    fn renew(&mut self, mut spot: Spot, wish: &Wish, parts: &mut Vec<Spot>) -> Result<(), Halt> {
         self.termination.check()?;
         if self.regions >= self.budget {
             return Err(Halt::Lost);
@@ -230,13 +225,13 @@ impl<'a> Finder<'a> {
                 let cell = further.unwrap_or(short);
                 // What gets no further the second time may do so in pieces.
                 if !small && cell.spot.level > 0 && cell.spot.level == spot.level {
-                    return self.split(&spot, wish);
+                    return self.split(&spot, wish, parts);
                 }
                 self.cells.push(cell);
                 return Ok(());
             }
             Err(NoRegion::Amid(t)) if !small && !self.is_beside(&spot, t) => {
-                return self.split(&spot, wish);
+                return self.split(&spot, wish, parts);
             }
             Err(_) => {}
         }
@@ -251,7 +246,7 @@ impl<'a> Finder<'a> {
         let nearer = (SHORT + 1..AHEAD.len()).find_map(|level| let_go(self, level).ok());
         if let Some(cell) = nearer {
             if !small && cell.spot.level == spot.level {
-                return self.split(&spot, wish);
+                return self.split(&spot, wish, parts);
             }
             self.cells.push(cell);
             return Ok(());
@@ -267,7 +262,7 @@ impl<'a> Finder<'a> {
                 return Err(Halt::Blocked);
             }
         }
-        self.split(&spot, wish)
+        self.split(&spot, wish, parts)
     }
 
     /// Whether a triangle may lie beside the piece at hand.
@@ -293,13 +288,14 @@ impl<'a> Finder<'a> {
         Ok(())
     }
 
-    /// Finds cells for the parts of a piece.
-    fn split(&mut self, spot: &Spot, wish: &Wish) -> Result<(), Halt> {
+    /// Pushes the parts of the piece at hand, or ends with it if it is too small.
+    fn split(&mut self, spot: &Spot, wish: &Wish, parts: &mut Vec<Spot>) -> Result<(), Halt> {
         if self.is_smallest(spot) {
             return self.end(spot, wish);
         }
-        let parts = self.pair.parts(&spot.piece);
-        parts.into_iter().try_for_each(|piece| self.renew(Spot { piece, level: 0, ..*spot }, wish))
+        let pieces = self.pair.parts(&spot.piece);
+        parts.extend(pieces.into_iter().rev().map(|piece| Spot { piece, level: 0, ..*spot }));
+        Ok(())
     }
 
     /// The piece at hand, a small bit no deeper than it may be, before the face that it is nearest
@@ -311,11 +307,11 @@ impl<'a> Finder<'a> {
             return None;
         }
         let held = pair.allowance + spot.held;
-        let depth = points.iter().map(|p| -look(pair, p, spot.guess).signed).fold(0.0, f64::max);
+        let depth = points.iter().map(|p| -pair.look(p, spot.guess).signed).fold(0.0, f64::max);
         if depth > held {
             return None;
         }
-        let closest = look(pair, centre, spot.guess).closest;
+        let closest = pair.look(centre, spot.guess).closest;
         let ahead = pair.shifted * wish.along * AHEAD[SHORT];
         let mut best: Option<(f64, Vector3<f64>)> = None;
         pair.measured.feature_normals(&closest, |n| {
@@ -358,7 +354,7 @@ impl<'a> Finder<'a> {
             let wanted: Vec<_> = extremes.iter().copied().chain(extremes.iter().map(|p| p + ahead)).collect();
             let middle = centre + ahead / 2.0;
             let around = (radius + ahead.norm() / 2.0) * ROOM;
-            let seen = look(pair, &middle, spot.guess);
+            let seen = pair.look(&middle, spot.guess);
             pair.measured.free_region_around(&middle, around, (&seen.closest, seen.signed), of(&wanted))
         }?;
         let gaps = region.gaps(cloud);
@@ -396,12 +392,6 @@ impl<'a> Finder<'a> {
 /// Whether a pool of threads runs this that has one more: elsewhere, handing work over only costs.
 fn other_thread() -> bool {
     rayon::current_thread_index().is_some() && rayon::current_num_threads() > 1
-}
-
-/// What a point in the measured surface's frame sees.
-pub(crate) fn look(pair: &Facing<'_>, p: &Point3<f64>, guess: u32) -> Seen {
-    let closest = pair.measured.closest_from(p, guess);
-    Seen { signed: pair.measured.signed(p, &closest), closest }
 }
 
 #[cfg(test)]

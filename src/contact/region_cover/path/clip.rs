@@ -1,16 +1,16 @@
-//! What of a long hull is where another surface can be.
+//! Clipping of long hulls to the box of another surface.
 
 use nalgebra::Point3;
 
 use crate::geometry::Bounds;
 
-/// Cut is what reaches so many times as far beyond a box as the rest is long.
+/// Clip a hull only if the part outside the box is longer than `LONG` times the part inside.
 const LONG: f64 = 1.0;
 
-/// Points whose hull holds all that the hull of some points has in a box, and nothing that theirs does not: cut by the
-/// two sides of the box past which they reach furthest. Of a bolt's long triangles, a thin plate about it sees
-/// little; the rest would be split off piece by piece. None if there is not much to cut off.
-pub(super) fn cut(points: &[Point3<f64>], bounds: &Bounds) -> Option<Vec<Point3<f64>>> {
+/// Points whose hull is the part of the hull of `points` between the two sides of a box past which they reach furthest.
+/// A thin plate sees little of a bolt's long triangles; without clipping the rest is split off piece by piece. `None` if
+/// there is not much to clip.
+pub(super) fn clipped(points: &[Point3<f64>], bounds: &Bounds) -> Option<Vec<Point3<f64>>> {
     let all = Bounds::of(points);
     let beyond = |axis: usize| {
         (bounds.min[axis] - all.min[axis]).max(0.0) + (all.max[axis] - bounds.max[axis]).max(0.0)
@@ -57,7 +57,7 @@ mod tests {
             let points: Vec<Point3<f64>> =
                 base.iter().flat_map(|p| [Point3::from(*p), Point3::from(p + long)]).collect();
             let bounds = Bounds::of([&Point3::from(middle)]).grown(0.5);
-            let Some(left) = cut(&points, &bounds) else { return Ok(()) };
+            let Some(left) = clipped(&points, &bounds) else { return Ok(()) };
             let reach = |d: &Vector3<f64>, points: &[Point3<f64>]| {
                 points.iter().map(|p| d.dot(&p.coords)).fold(f64::NEG_INFINITY, f64::max)
             };
@@ -80,11 +80,11 @@ mod tests {
     }
 
     #[test]
-    fn a_long_needle_is_cut_to_its_middle_and_a_short_one_left_alone() {
+    fn a_long_needle_is_clipped_to_its_middle_and_a_short_one_left_alone() {
         let needle = [[0.0, 0.0, -9.0], [1.0, 0.0, -9.0], [0.5, 0.0, 9.0]].map(Point3::from);
         let bounds = Bounds { min: Point3::new(-1.0, -1.0, -1.0), max: Point3::new(1.0, 1.0, 1.0) };
-        let left = Bounds::of(&cut(&needle, &bounds).unwrap());
+        let left = Bounds::of(&clipped(&needle, &bounds).unwrap());
         assert_eq!((left.min.z, left.max.z), (-1.0, 1.0));
-        assert_eq!(cut(&needle.map(|p| Point3::new(p.x, p.y, p.z / 9.0)), &bounds), None);
+        assert_eq!(clipped(&needle.map(|p| Point3::new(p.x, p.y, p.z / 9.0)), &bounds), None);
     }
 }

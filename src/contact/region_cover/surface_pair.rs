@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, Translation3, Vector3};
 
-use crate::geometry::{Cloud, Parts, PatchTree, Pose, Surface, bisected, separating_direction};
+use crate::geometry::{Closest, Cloud, Parts, PatchTree, Pose, Surface, bisected, separating_direction};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{DEPTH_TOLERANCE, HELD, TOUCHED};
@@ -129,6 +129,12 @@ impl<'a> Facing<'a> {
             Piece::Patch(index) => self.tree.vertices(*index)[number],
             Piece::Bit(corners) => corners[number],
         }
+    }
+
+    /// What of the measured surface is nearest to a point in its frame; `guess` is a triangle near it.
+    pub(crate) fn look(&self, p: &Point3<f64>, guess: u32) -> Seen {
+        let closest = self.measured.closest_from(p, guess);
+        Seen { signed: self.measured.signed(p, &closest), closest }
     }
 
     /// A ball that holds a piece, in the asked surface's frame.
@@ -367,6 +373,24 @@ pub(crate) enum Piece {
     Patch(u32),
     /// A triangle, or a bit of one, by its corners.
     Bit([Point3<f64>; 3]),
+}
+
+/// A piece that is to be covered, and what helps to find its region.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Spot {
+    pub(crate) piece: Piece,
+    /// A triangle of the measured surface near it.
+    pub(crate) guess: u32,
+    /// Which of the lengths ahead its last region allowed: 0 is the longest.
+    pub(crate) level: usize,
+    /// How far outside its region it may be beyond the allowed penetration, in the planning frame.
+    pub(crate) held: f64,
+}
+
+/// What of the measured surface is nearest to a point, and its signed distance (negative inside).
+pub(crate) struct Seen {
+    pub(crate) closest: Closest,
+    pub(crate) signed: f64,
 }
 
 /// A piece against the measured surface.

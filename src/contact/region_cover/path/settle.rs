@@ -5,8 +5,7 @@ use nalgebra::{Point3, Vector3};
 use crate::geometry::{Closest, FreeRegion, HullDepth, Parts, PatchTree, Wanted};
 
 use super::super::super::course::Leg;
-use super::Question;
-use super::walk::{Hint, Search};
+use super::{GridCell, KnownRegion, PathSearch, Question, SearchHint, SweptBall};
 
 /// What a region costs, in pieces.
 const REGION_EFFORT: usize = 40;
@@ -20,34 +19,17 @@ const RECENT: usize = 4;
 /// Of no more vertices each is asked about at once.
 const FEW: usize = 64;
 
-/// Where a piece passes: a ball that holds the hull.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Swept {
-    pub(super) centre: Point3<f64>,
-    pub(super) radius: f64,
-}
-
-/// Size and cell of a place.
-pub(super) type Place = (i32, [i64; 3]);
-
 /// How far a piece is from a region: the distance of its worst corner, and that.
 pub(super) type Fit = Option<(f64, Point3<f64>)>;
 
-/// A region, and whether all of it is outside the surface that is measured: of one with holes, part of it may be
-/// inside.
-pub(super) struct Region {
-    free: FreeRegion,
-    is_outside: bool,
-}
-
-impl Search<'_> {
+impl PathSearch<'_> {
     /// Whether some region tells well how deep a piece gets; the bound is raised by that. `corners` tells all
     /// those of its hull, unless they are too many.
     pub(super) fn is_settled(
         &mut self,
-        swept: &Swept,
+        swept: &SweptBall,
         slack: f64,
-        hint: &mut Hint,
+        hint: &mut SearchHint,
         fits: impl Fn(&FreeRegion, f64) -> Fit,
         corners: impl Fn() -> Vec<Point3<f64>>,
     ) -> bool {
@@ -61,7 +43,7 @@ impl Search<'_> {
         let of_place = known.iter().rev().take(TRIED);
         let recent = self.held.iter().rev().take(RECENT);
         for region in of_place.chain(&hint.region).chain(recent).copied() {
-            let Region { free, is_outside } = &self.regions[region as usize];
+            let KnownRegion { free, is_outside } = &self.regions[region as usize];
             if let Some((depth, _)) = fits(free, spared) {
                 hint.region = Some(region);
                 return (*is_outside || self.is_outside(swept, spared, hint.triangle))
@@ -90,10 +72,10 @@ impl Search<'_> {
         if -signed > most {
             return false;
         }
-        if std::mem::take(&mut hint.vain) {
+        if std::mem::take(&mut hint.is_vain) {
             return false;
         }
-        hint.vain = true;
+        hint.is_vain = true;
         self.found.effort += REGION_EFFORT;
         let seen = (&closest, signed);
         let Some(mut free) = self.region(swept, seen, most, spared) else { return false };
@@ -113,9 +95,9 @@ impl Search<'_> {
         }
         let id = self.regions.len() as u32;
         let is_outside = free.is_outside(asked.measured);
-        self.regions.push(Region { free, is_outside });
+        self.regions.push(KnownRegion { free, is_outside });
         hint.region = Some(id);
-        hint.vain = false;
+        hint.is_vain = false;
         let Some((depth, worst)) = fit else { return false };
         self.places.entry(place).or_default().push(id);
         self.held.push(id);
@@ -126,7 +108,7 @@ impl Search<'_> {
     }
 
     /// Whether the triangles about a piece tell well how deep it gets; the bound is raised by that.
-    fn is_bounded(&mut self, swept: &Swept, signed: f64, slack: f64, guess: u32) -> bool {
+    fn is_bounded(&mut self, swept: &SweptBall, signed: f64, slack: f64, guess: u32) -> bool {
         let spared = self.spared() - slack;
         let Question { measured, granted, precision, .. } = self.asked;
         // What is deeper is to be recorded.
@@ -145,15 +127,15 @@ impl Search<'_> {
     }
 
     /// A region for a piece, around its middle or what is outside nearest to that.
-    fn region(&self, swept: &Swept, seen: (&Closest, f64), most: f64, spared: f64) -> Option<FreeRegion> {
-        let Swept { centre, radius, .. } = swept;
+    fn region(&self, swept: &SweptBall, seen: (&Closest, f64), most: f64, spared: f64) -> Option<FreeRegion> {
+        let SweptBall { centre, radius, .. } = swept;
         let wanted = Wanted { points: &self.wanted, most, from_behind: false, facing: self.facing };
         self.asked.measured.free_region_sparing(centre, radius * ROOM, seen, wanted, spared).ok()
     }
 
     /// Whether a depth is what it is, as measured at the worst corner, or small enough not to matter:
     /// not only that of a region which is too narrow.
-    fn is_told(&mut self, swept: &Swept, depth: f64, worst: &Point3<f64>, guess: u32) -> bool {
+    fn is_told(&mut self, swept: &SweptBall, depth: f64, worst: &Point3<f64>, guess: u32) -> bool {
         let Question { measured, granted, precision, .. } = self.asked;
         let real = -measured.signed(worst, &measured.closest_from(worst, guess));
         let beyond = depth - granted;
@@ -174,7 +156,7 @@ impl Search<'_> {
     }
 
     /// Whether holes are so near that no sign would hold for all of a piece.
-    fn is_beside_rim(&self, swept: &Swept) -> bool {
+    fn is_beside_rim(&self, swept: &SweptBall) -> bool {
         self.asked
             .measured
             .rim()
@@ -183,7 +165,7 @@ impl Search<'_> {
 
     /// Whether a piece is small, and its corners no deeper than `most`: a region beside a surface with holes
     /// may be inside.
-    fn is_outside(&self, swept: &Swept, most: f64, guess: u32) -> bool {
+    fn is_outside(&self, swept: &SweptBall, most: f64, guess: u32) -> bool {
         let Question { measured, precision, .. } = self.asked;
         let depth = |p: &Point3<f64>| -measured.signed(p, &measured.closest_from(p, guess));
         swept.radius <= precision.coarse && self.wanted.iter().all(|p| depth(p) <= most)
@@ -191,11 +173,11 @@ impl Search<'_> {
 }
 
 /// The ball that holds balls around the corners of a hull.
-pub(super) fn swept(points: &[Point3<f64>], ball: f64) -> Swept {
+pub(super) fn swept(points: &[Point3<f64>], ball: f64) -> SweptBall {
     let sum: Vector3<f64> = points.iter().map(|p| p.coords).sum();
     let centre = Point3::from(sum / points.len().max(1) as f64);
     let reach = points.iter().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
-    Swept { centre, radius: reach + ball }
+    SweptBall { centre, radius: reach + ball }
 }
 
 /// How far the furthest of some points is from a region, and which, unless it is beyond `most`.
@@ -235,7 +217,7 @@ pub(super) fn furthest_of(tree: &PatchTree, index: u32, leg: &Leg, region: &Free
     Some(far)
 }
 
-fn place(swept: &Swept) -> Place {
+fn place(swept: &SweptBall) -> GridCell {
     let level = swept.radius.max(1e-9).log2().ceil();
     let cell = level.exp2();
     (level as i32, (swept.centre.coords / cell).map(|x| x.floor() as i64).into())

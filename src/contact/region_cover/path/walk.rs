@@ -1,0 +1,283 @@
+//! The walk through pieces of a surface and stretches of the way: what no bound settles is split.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::geometry::{FreeRegion, Parts, area_normal, bisected};
+use crate::termination::Interrupt;
+
+use super::super::super::course::{Interval, Leg};
+use super::super::cover;
+use super::clip::clipped;
+use super::settle::{furthest, furthest_of, swept};
+use super::{PathSearch, Precision, SearchHint, SweptBall};
+
+/// Hulls of more corners are not asked about as such.
+const MOST_CORNERS: usize = 64;
+/// For no more corners than this regions are grown.
+const MOST_WANTED: usize = 1024;
+/// What faces along its way, but for so little, has no side to it.
+const ACROSS: f64 = 0.5;
+/// Pieces that might be too deep are split until they are so much smaller than others.
+const DOUBT: f64 = 4.0;
+
+/// Corners of what a triangle passes on a straight way.
+const OF_STRAIGHT_WAY: usize = 6;
+/// What is no further beyond a box than this, in the planning frame, is left: of what only just enters, a sliver would
+/// find regions with planes that are askew to it.
+const BESIDE: f64 = 4e-3;
+
+/// In sight of holes, where after one part in so many of the effort …
+const HOPELESS_AFTER: usize = 10;
+/// … no more than this share is settled, the rest is not looked at.
+const HOPELESS: f64 = 0.02;
+
+/// A piece of the surface on a stretch of the way.
+#[derive(Clone, Copy)]
+enum SweptPiece {
+    Patch(PatchPiece),
+    Triangle(TrianglePiece),
+}
+
+/// A node of the tree on a stretch of the way.
+#[derive(Clone, Copy)]
+struct PatchPiece {
+    node: u32,
+    interval: Interval,
+    /// Which share it is of all.
+    share: f64,
+    hint: SearchHint,
+}
+
+/// A triangle, or a piece of one, on a stretch of the way.
+#[derive(Clone, Copy)]
+struct TrianglePiece {
+    corners: [Point3<f64>; 3],
+    /// Which corners were not measured yet at the end of the stretch, as those of the piece of which this is one half.
+    is_new: [bool; 3],
+    interval: Interval,
+    /// Which share it is of all.
+    share: f64,
+    hint: SearchHint,
+}
+
+impl PathSearch<'_> {
+    /// Looks at all of the surface on a stretch of the way.
+    pub(super) fn all(&mut self, interval: Interval) -> Result<(), Interrupt> {
+        if let Some(node) = self.asked.tree.root() {
+            let hint = SearchHint { triangle: 0, region: None, is_vain: false };
+            let root = SweptPiece::Patch(PatchPiece { node, interval, share: 1.0, hint });
+            cover(root, |piece, rest| {
+                self.termination.check()?;
+                self.found.effort += self.price;
+                if self.is_enough() {
+                    rest.clear();
+                    return Ok(());
+                }
+                match piece {
+                    SweptPiece::Patch(piece) => self.patch(piece, rest),
+                    SweptPiece::Triangle(piece) => self.triangle(piece, rest),
+                }
+                Ok(())
+            })?;
+        }
+        if self.gave_up() {
+            self.found.open.push(interval);
+        }
+        Ok(())
+    }
+
+    fn gave_up(&self) -> bool {
+        self.found.effort > self.most_effort || self.is_hopeless()
+    }
+
+    /// Whether, in sight of holes, so little is settled after so much effort that most will stay open.
+    fn is_hopeless(&self) -> bool {
+        self.has_rim && self.found.effort > self.most_effort / HOPELESS_AFTER && self.done < HOPELESS
+    }
+
+    fn is_enough(&self) -> bool {
+        self.gave_up() || self.found.is_enough()
+    }
+
+    /// Looks into a node of the tree on a stretch of the way.
+    fn patch(&mut self, piece: PatchPiece, rest: &mut Vec<SweptPiece>) {
+        let PatchPiece { node: index, interval, share, mut hint } = piece;
+        let tree = self.asked.tree;
+        let patch = tree.patch(index);
+        let leg = self.view.leg(interval);
+        let mut in_time = leg.maps.is_empty();
+        if !in_time {
+            let centres: Vec<_> = leg.maps.iter().map(|m| m.apply(&patch.centre)).collect();
+            let ball = patch.radius * leg.stretch + leg.slack;
+            if self.is_apart(&centres, ball) {
+                self.done += share;
+                return;
+            }
+            let swept = swept(&centres, ball);
+            // What is beyond the ball is half of the way. On a line, all that a small piece passes is convex: what
+            // does not fit is as wide on each half of it.
+            in_time = leg.along.is_none() && swept.radius - ball > 2.0 * patch.radius;
+            self.wanted.clear();
+            self.facing = Vector3::zeros();
+            self.wanted.extend(leg.images(tree.extremes(index)));
+            let points = tree.vertices(index);
+            self.hull.clear();
+            if points.len() * leg.maps.len() <= MOST_CORNERS {
+                self.hull.extend(leg.images(points));
+            }
+            let fits = |region: &FreeRegion, most: f64| {
+                if centres.iter().all(|c| region.holds_ball(c, ball)) {
+                    return Some((0.0, swept.centre));
+                }
+                furthest_of(tree, index, &leg, region, most)
+            };
+            let corners = || {
+                let few = if points.len() * leg.maps.len() <= MOST_WANTED { points } else { &[] };
+                leg.images(few).collect()
+            };
+            if self.is_settled(&swept, leg.slack, &mut hint, fits, corners) {
+                self.done += share;
+                return;
+            }
+        }
+        let share = share / 2.0;
+        if in_time && leg.length > self.finest() / (2.0 * DOUBT) {
+            let [first, second] = interval.halves();
+            let half = |interval| SweptPiece::Patch(PatchPiece { interval, share, hint, ..piece });
+            rest.extend([second, first].map(half));
+            return;
+        }
+        match tree.parts(index) {
+            Parts::Patches([left, right]) => {
+                let child = |node| SweptPiece::Patch(PatchPiece { node, share, hint, ..piece });
+                rest.extend([right, left].map(child));
+            }
+            Parts::Triangles(list) => {
+                let share = piece.share / list.len() as f64;
+                rest.extend(list.iter().rev().map(|&t| {
+                    let corners = self.asked.surface.corners(t);
+                    SweptPiece::Triangle(TrianglePiece { corners, is_new: [true; 3], interval, share, hint })
+                }));
+            }
+        }
+    }
+
+    /// Looks at a triangle, or a piece of one, on a stretch of the way.
+    fn triangle(&mut self, piece: TrianglePiece, rest: &mut Vec<SweptPiece>) {
+        let TrianglePiece { corners, is_new, interval, mut hint, .. } = piece;
+        let leg = self.view.leg(interval);
+        let (longest, halves) = bisected(&corners);
+        let mut in_time = leg.maps.is_empty();
+        if !in_time {
+            let points: Vec<_> = leg.maps.iter().flat_map(|m| corners.map(|p| m.apply(&p))).collect();
+            if self.is_apart(&points, leg.slack) {
+                self.done += piece.share;
+                return;
+            }
+            let clipped = self.clipped(&points, leg.slack);
+            let seen = clipped.as_deref().unwrap_or(&points);
+            let within = swept(seen, leg.slack);
+            self.wanted.clear();
+            self.wanted.extend_from_slice(seen);
+            self.hull.clone_from(&self.wanted);
+            let outward = area_normal(&corners[0], &corners[1], &corners[2]);
+            self.facing = leg.end.rotation * -outward.try_normalize(0.0).unwrap_or_default();
+            if let Some(along) = leg.along {
+                // A plane that is askew to a long way is far off at its ends.
+                let across = self.facing - along * self.facing.dot(&along);
+                self.facing = across.try_normalize(ACROSS).unwrap_or(self.facing);
+            }
+            let fits = |region: &FreeRegion, most: f64| furthest(seen.iter().copied(), region, most);
+            if self.is_settled(&within, leg.slack, &mut hint, fits, Vec::new)
+                || self.is_measured(&piece, &leg, &swept(&points, leg.slack), hint.triangle)
+            {
+                self.done += piece.share;
+                return;
+            }
+            in_time =
+                points[..points.len() - 3].iter().zip(&points[3..]).any(|(a, b)| (b - a).norm() > longest);
+        }
+        let was_measured = !leg.maps.is_empty();
+        let share = piece.share / 2.0;
+        if in_time && leg.length > self.finest() / (2.0 * DOUBT) {
+            // The second half of the way ends where all of it does.
+            let [first, second] = interval.halves();
+            let half = |is_new, interval| {
+                SweptPiece::Triangle(TrianglePiece { is_new, interval, share, hint, ..piece })
+            };
+            rest.push(half([true; 3], first));
+            rest.push(half(is_new.map(|new| new && !was_measured), second));
+        } else {
+            rest.extend(halves.map(|half| {
+                let is_new = half.map(|p| !(was_measured && corners.contains(&p)));
+                SweptPiece::Triangle(TrianglePiece { corners: half, is_new, interval, share, hint })
+            }));
+        }
+    }
+
+    /// What of a hull may be in the measured surface, if that is little of it: what is beyond its box is outside,
+    /// unless it has holes. Of a way with bends there are too many lines to be cut.
+    fn clipped(&self, points: &[Point3<f64>], slack: f64) -> Option<Vec<Point3<f64>>> {
+        if self.has_rim || points.len() > OF_STRAIGHT_WAY {
+            return None;
+        }
+        clipped(points, &self.asked.measured.bounds().grown(slack + BESIDE))
+    }
+
+    /// Whether the box of the measured surface lies beside a hull, given by balls.
+    fn is_apart(&self, centres: &[Point3<f64>], radius: f64) -> bool {
+        let bounds = self.asked.measured.bounds();
+        (0..3).any(|a| {
+            centres.iter().all(|c| c[a] - radius >= bounds.max[a])
+                || centres.iter().all(|c| c[a] + radius <= bounds.min[a])
+        })
+    }
+
+    /// Measures the corners of a piece at its end; whether that is all that can be said about it.
+    fn is_measured(&mut self, piece: &TrianglePiece, leg: &Leg, swept: &SweptBall, guess: u32) -> bool {
+        let TrianglePiece { corners, is_new, .. } = piece;
+        let asked = self.asked;
+        let over = |at: &Point3<f64>| {
+            -asked.measured.signed(at, &asked.measured.closest_from(at, guess)) - asked.granted
+        };
+        for (p, _) in corners.iter().zip(is_new).filter(|(_, new)| **new) {
+            let over = over(&(leg.end * p));
+            self.found.depth = self.found.depth.max(over);
+            if over > asked.precision.deep {
+                self.found.deep.push((*p, over));
+            }
+        }
+        self.found.bound = self.found.bound.max(self.found.depth);
+        if swept.radius > self.finest() {
+            return self.is_enough();
+        }
+        if !self.found.deep.is_empty() {
+            return true;
+        }
+        // As in `is_settled`: depth changes by no more than the distance, but for surfaces with holes.
+        let mut bound = over(&swept.centre) + swept.radius;
+        if self.has_rim {
+            bound = self.wanted.iter().map(over).fold(bound, f64::max);
+        }
+        if bound > asked.precision.deep {
+            if swept.radius > self.finest() / DOUBT {
+                return false;
+            }
+            self.found.deep.push((corners[0], bound));
+        }
+        self.settled(asked.granted + bound)
+    }
+
+    /// The depth up to which nothing is looked into: it is granted, spared, or as good as found.
+    pub(super) fn spared(&self) -> f64 {
+        let precision = self.asked.precision;
+        let found = self.found.depth + precision.margin_of(self.found.depth);
+        self.asked.granted + found.min(precision.deep).max(precision.spare)
+    }
+
+    /// The smallest size of pieces, for now.
+    fn finest(&self) -> f64 {
+        let Precision { deep, finest, coarse, .. } = self.asked.precision;
+        if self.found.depth > deep { coarse } else { finest }
+    }
+}
