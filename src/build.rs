@@ -11,21 +11,22 @@ use std::{env, fs, io};
 
 /// Every stage, and the stages that its code imports. A stage comes after all that it depends on.
 /// `.ci/structure` compares this table with the imports.
-const STAGES: [(&str, &str); 17] = [
+const STAGES: [(&str, &str); 18] = [
     ("lru", ""),
     ("termination", ""),
     ("tolerances", ""),
+    ("budgets", ""),
     ("ipc", ""),
     ("cache", "lru"),
     ("config", "cache ipc"),
     ("geometry", "cache termination"),
     ("sdf", "cache geometry termination"),
-    ("scene", "cache geometry lru sdf termination"),
-    ("contact", "geometry scene sdf termination tolerances"),
-    ("simulation", "cache contact geometry scene sdf termination tolerances"),
+    ("scene", "budgets cache geometry lru sdf termination tolerances"),
+    ("contact", "budgets geometry scene sdf termination tolerances"),
+    ("simulation", "budgets cache contact geometry scene sdf termination tolerances"),
     ("blocking_graph", "cache geometry scene simulation termination"),
-    ("plan", "cache contact geometry scene termination tolerances"),
-    ("search", "blocking_graph cache contact geometry plan scene simulation termination"),
+    ("plan", "budgets cache contact geometry scene termination tolerances"),
+    ("search", "blocking_graph cache contact geometry plan scene simulation termination tolerances"),
     ("assembling", "geometry plan scene search simulation termination"),
     (
         "service",

@@ -3,6 +3,7 @@
 pub mod assembling;
 pub mod bench;
 pub mod blocking_graph;
+mod budgets;
 pub mod cache;
 pub mod cli;
 pub mod config;

@@ -11,23 +11,14 @@ use std::rc::Rc;
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use crate::budgets::{LEG_BENDS, REMEMBERED_LEG_LEVELS};
 use crate::geometry::{Pose, interpolate};
-
-/// Legs that turn further than this have no hull: they must be split.
-const MOST_TURN: f64 = 0.8;
-/// Legs up to this level are remembered: some thousands.
-const REMEMBERED: u32 = 12;
-/// Legs of more bends than this likewise.
-const MOST_BENDS: usize = 12;
-
-/// A path that turns further than this (radians, two thirds of a turn) may be a screw: its profile is compared before
-/// its surfaces are.
-const FAR: f64 = 4.0;
+use crate::tolerances::{LEG_TURN, SCREW_TURN};
 
 /// Whether a path turns so far that it may be a screw of many turns.
 pub(crate) fn turns_far(path: &[Pose]) -> bool {
     let turns = path.iter().zip(path.iter().skip(1)).map(|(a, b)| a.rotation.angle_to(&b.rotation));
-    turns.sum::<f64>() > FAR
+    turns.sum::<f64>() > SCREW_TURN
 }
 
 /// The path of a part, in the frame of the one that it passes.
@@ -203,7 +194,7 @@ impl<'a> View<'a> {
             return Rc::clone(leg);
         }
         let leg = Rc::new(self.measured(interval));
-        if interval.level <= REMEMBERED {
+        if interval.level <= REMEMBERED_LEG_LEVELS {
             self.legs.insert(interval, Rc::clone(&leg));
         }
         leg
@@ -225,7 +216,7 @@ impl<'a> View<'a> {
         let turns = |(segment, a, b): &(&Segment, f64, f64)| {
             segment.from.rotation.angle_to(&segment.to.rotation) * (b - a)
         };
-        if bends.len() > MOST_BENDS || bends.iter().any(|bend| turns(bend) > MOST_TURN) {
+        if bends.len() > LEG_BENDS || bends.iter().any(|bend| turns(bend) > LEG_TURN) {
             if length <= self.shortest {
                 let linear = *leg.end.rotation.to_rotation_matrix().matrix();
                 leg.maps.push(Affine { linear, shift: leg.end.translation.vector });

@@ -2,16 +2,12 @@
 //!
 //! A path is a polyline in the space of poses. Waypoints are dropped by the scheme of D. Douglas
 //! and T. Peucker (1973): a stretch is replaced by its ends if every pose between lies within
-//! [`TOLERANCE`] of the interpolation between them, measured at the corners of the part's box.
+//! [`PATH_TOLERANCE`] of the interpolation between them, measured at the corners of the part's box.
 
 use nalgebra::Point3;
 
 use crate::geometry::{Bounds, Pose, interpolate};
-
-/// How far any point of the part may lie from the dense path, in the planning frame.
-const TOLERANCE: f64 = 2e-5;
-/// Rotation between two waypoints stays below this, so that the slerp is unambiguous.
-const MOST_TURN: f64 = 2.0;
+use crate::tolerances::{PATH_TOLERANCE, WAYPOINT_TURN};
 
 /// Thins a path. `centre` (shape frame) is the point that moves on a line between waypoints.
 #[must_use]
@@ -37,10 +33,10 @@ pub fn thinned(path: &[Pose], bounds: &Bounds, centre: &Point3<f64>) -> Vec<Pose
 /// Where to split the stretch a..b, if it cannot be replaced by its ends.
 fn worst_between(path: &[Pose], a: usize, b: usize, bounds: &Bounds, centre: &Point3<f64>) -> Option<usize> {
     let turned: f64 = (a..b).map(|i| path[i].rotation.angle_to(&path[i + 1].rotation)).sum();
-    if turned > MOST_TURN {
+    if turned > WAYPOINT_TURN {
         return Some(usize::midpoint(a, b));
     }
-    let mut worst = (TOLERANCE, None);
+    let mut worst = (PATH_TOLERANCE, None);
     for i in a + 1..b {
         let off = deviation(&path[a], &path[b], &path[i], bounds, centre);
         if off > worst.0 {

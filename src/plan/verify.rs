@@ -22,24 +22,11 @@ use crate::contact::sampled::along_path::{Entry, Samples};
 use crate::geometry::{Pose, Shape, Surface, area_normal};
 use crate::scene::{Allowances, Pair, Scene};
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::HELPFUL;
+use crate::tolerances::{
+    COARSE_SHARE, FINEST_SHARE, HELPFUL, OVERLAP_FINEST, OVERLAP_MARGIN, OVERLAP_SPARED, SPARED_SHARE,
+    SPARED_SHARE_IN_OVERLAP,
+};
 
-/// Depth that is not looked into, as a share of the limit.
-const SPARE: f64 = 1.0 / 8.0;
-/// The same where overlap is granted: facets that lie across each other are deep here and there.
-const SPARE_IN_OVERLAP: f64 = 1.0 / 4.0;
-/// The smallest radius of a piece of surface, likewise.
-const FINEST: f64 = 1.0 / 4.0;
-/// Entries are no closer to each other than this, as a share of the longest side.
-const COARSE: f64 = 4e-3;
-/// The same for the overlap of assembled parts. No more is granted than is measured at some point, and
-/// no less than nine tenths of what there is ([`path`](crate::contact::region_cover::path) tells depths to a tenth), but for
-/// what is between the corners of the smallest pieces, which are no larger than this.
-const OVERLAP_SPARE: f64 = 2e-6;
-const OVERLAP_FINEST: f64 = 1e-4;
-/// Large ones are told more closely than to a tenth, as a share of the limit: what keeps its overlap on its
-/// way is to pass.
-const OVERLAP_MARGIN: f64 = 1.0 / 8.0;
 /// What the check of a path found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
@@ -125,11 +112,11 @@ impl Verifier {
         termination: &Termination,
     ) -> Result<f64, Interrupt> {
         let precision = Precision {
-            spare: OVERLAP_SPARE * scene.longest_side,
+            spare: OVERLAP_SPARED * scene.longest_side,
             deep: f64::INFINITY,
             margin: OVERLAP_MARGIN * self.limit,
             finest: OVERLAP_FINEST * scene.longest_side,
-            coarse: COARSE * scene.longest_side,
+            coarse: COARSE_SHARE * scene.longest_side,
         };
         let passing = Passing::standing(scene, pair);
         let course = Course::new(&passing.path, passing.centre, 0.0);
@@ -228,13 +215,13 @@ impl Verifier {
         termination: &Termination,
     ) -> Result<[Found; 2], Interrupt> {
         let limit = self.limit;
-        let share = if passing.granted > 0.0 { SPARE_IN_OVERLAP } else { SPARE };
+        let share = if passing.granted > 0.0 { SPARED_SHARE_IN_OVERLAP } else { SPARED_SHARE };
         let precision = Precision {
             spare: limit * share,
             deep: limit,
             margin: limit,
-            finest: limit * FINEST,
-            coarse: COARSE * passing.longest_side,
+            finest: limit * FINEST_SHARE,
+            coarse: COARSE_SHARE * passing.longest_side,
         };
         let way = Way { passing, course, precision, termination };
         if turns_far(&passing.path) { depth_on_screw(&way, limit) } else { way.depth() }
@@ -256,7 +243,7 @@ fn joined<'i>(course: &Course, intervals: impl Iterator<Item = &'i Interval>) ->
 /// The points that help in refining a motion: of those that are near each other, the deepest.
 fn deepest_entries(passing: &Passing<'_>, [moving, standing]: &[Found; 2]) -> Vec<Entry> {
     let Passing { parts: [_, other], longest_side, .. } = *passing;
-    let cell = COARSE * longest_side;
+    let cell = COARSE_SHARE * longest_side;
     let mut taken: BTreeMap<(bool, [i64; 3]), Entry> = BTreeMap::new();
     for (on_moving, side) in [(true, moving), (false, standing)] {
         for &(point, over) in &side.deep {

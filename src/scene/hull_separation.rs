@@ -4,11 +4,9 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::geometry::{Pose, Support, gap_along, hull_vertices, separating, transformed};
+use crate::tolerances::HULL_MARGIN;
 
 use super::Scene;
-
-/// Hulls count as apart from this gap on, in units of the planning frame.
-pub const HULL_MARGIN: f64 = 1e-3;
 
 /// What stands still while one part moves.
 #[derive(Debug, Clone)]

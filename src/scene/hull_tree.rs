@@ -12,17 +12,11 @@ use std::sync::Arc;
 use nalgebra::Point3;
 use rayon::prelude::*;
 
+use crate::budgets::{LOOSE_HULL, MOSTLY_STANDING};
 use crate::geometry::{Bounds, transformed};
 use crate::termination::{Interrupt, Termination};
 
 use super::{Scene, Surroundings};
-
-/// So many times as many points as it had when it was last joined stand for a hull. What is asked of it until the
-/// next part leaves costs less with them all than joining does: a join takes as long as some hundred tests.
-const LOOSE: usize = 32;
-
-/// If no more than one part in so many is gone, the tree of all parts is made: the next question may be about others.
-const MOSTLY: usize = 2;
 
 /// The parts that stand, with the hulls of groups of them.
 #[derive(Debug, Clone)]
@@ -43,7 +37,7 @@ impl HullTree {
     /// The termination condition became true.
     pub fn new(scene: &Scene, standing: Vec<usize>, termination: &Termination) -> Result<Self, Interrupt> {
         let all = 0..scene.bodies.len();
-        if MOSTLY * (all.len() - standing.len()) > all.len() {
+        if MOSTLY_STANDING * (all.len() - standing.len()) > all.len() {
             return Self::joined(scene, standing, termination);
         }
         let mut tree = match scene.whole.get() {
@@ -161,7 +155,7 @@ impl HullTree {
             let [one, other] = [2 * node, 2 * node + 1].map(|child| &self.hulls[child]);
             // The points of both hold no more than their hull does: some that are inside cost less than to
             // find them out at every step.
-            self.hulls[node] = if one.len() + other.len() <= LOOSE * self.joined[node] {
+            self.hulls[node] = if one.len() + other.len() <= LOOSE_HULL * self.joined[node] {
                 [&**one, &**other].concat().into()
             } else {
                 let joined = scene.hulls.of(one, other);

@@ -6,14 +6,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Point3;
 
+use crate::budgets::{FEWEST_STORED_POINTS, REMEMBERED_HULL_POINTS};
 use crate::geometry::hull_vertices;
 use crate::lru::Lru;
-
-/// Points that are remembered, of some hundred joined hulls.
-const MOST_POINTS: usize = 200_000;
-
-/// Of fewer points, joining takes no longer than finding it in a store.
-const FEWEST_STORED: usize = 12;
 
 /// Where hulls are found that were joined before this process began.
 pub trait HullStore: std::fmt::Debug + Send + Sync {
@@ -53,7 +48,7 @@ impl JoinedHulls {
     /// Reads what was used last from the store: read one by one, as they are asked for, hulls take longer.
     pub fn recall_recent(&self) {
         let store = self.store.as_ref();
-        let recent = store.map_or_else(Vec::new, |store| store.recent_hulls(MOST_POINTS / 2));
+        let recent = store.map_or_else(Vec::new, |store| store.recent_hulls(REMEMBERED_HULL_POINTS / 2));
         for (key, joined) in recent {
             let mut held = self.held();
             if held.joined.peek(&key).is_none() {
@@ -78,7 +73,7 @@ impl JoinedHulls {
             }
             return known;
         }
-        let store = self.store.as_ref().filter(|_| a.len() + b.len() >= FEWEST_STORED);
+        let store = self.store.as_ref().filter(|_| a.len() + b.len() >= FEWEST_STORED_POINTS);
         let stored = store.and_then(|store| store.hull(&key));
         let join = || {
             let joined = hull_vertices(&[&**a, &**b].concat());
@@ -114,11 +109,11 @@ impl Held {
         self.points += joined.len();
         self.points -= self.joined.insert(key, joined).map_or(0, |before| before.len());
         let Self { joined, points, unused } = self;
-        if *points > MOST_POINTS {
+        if *points > REMEMBERED_HULL_POINTS {
             joined.evict(|key, gone| {
                 unused.remove(&key);
                 *points -= gone.len();
-                *points > MOST_POINTS / 2
+                *points > REMEMBERED_HULL_POINTS / 2
             });
         }
     }
@@ -153,7 +148,7 @@ mod tests {
             assert_eq!(*joined, *hull_vertices(&[&*a, &*b].concat()));
         }
         let held = hulls.held();
-        assert!((1..=MOST_POINTS).contains(&held.points));
+        assert!((1..=REMEMBERED_HULL_POINTS).contains(&held.points));
         assert_eq!(held.points, held.joined.iter().map(|(_, h)| h.len()).sum::<usize>());
     }
 
@@ -176,7 +171,7 @@ mod tests {
             }
         }
         let cloud = |count: usize| -> Arc<[Point3<f64>]> { spread([0.0; 3], [1.0; 3], count).collect() };
-        let (large, small) = (cloud(FEWEST_STORED), cloud(9));
+        let (large, small) = (cloud(FEWEST_STORED_POINTS), cloud(9));
         let store = Arc::new(Stored::default());
         let first = JoinedHulls::stored(store.clone());
         let joined = first.of(&large, &small);

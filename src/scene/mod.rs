@@ -26,7 +26,7 @@ use crate::sdf::Field;
 
 pub use broad_phase::BroadPhase;
 pub use congruent_pairs::{Pair, grouped, rounded, rounded_pose};
-pub use hull_separation::{HULL_MARGIN, Surroundings, exit_direction};
+pub use hull_separation::{Surroundings, exit_direction};
 pub use hull_tree::HullTree;
 pub use joined_hulls::{HullStore, JoinedHulls};
 pub use memo::Memo;

@@ -11,11 +11,12 @@ use rayon::prelude::*;
 use crate::contact::sampled::along_path::Entry;
 use crate::geometry::{Pose, separating_direction, transformed};
 use crate::plan::PlanStatus;
-use crate::scene::{HULL_MARGIN, HullTree, Surroundings, exit_direction};
+use crate::scene::{HullTree, Surroundings, exit_direction};
 use crate::simulation::{
     Action, End, Motion, MotionQuestion, Sweep, SweepQuestion, known_sweep, remembered_sweep,
 };
 use crate::termination::Interrupt;
+use crate::tolerances::HULL_MARGIN;
 
 use super::outcome::{BlockedAction, Counters, Outcome, Removal};
 use super::problem::{Observer, Problem};

@@ -2,6 +2,8 @@
 
 use nalgebra::{Unit, Vector3};
 
+use crate::tolerances::AXIS_SNAP;
+
 /// An axis through space, of the world or of the geometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Axis(Unit<Vector3<f64>>);
@@ -20,7 +22,7 @@ impl Axis {
     /// that.
     #[must_use]
     pub fn along(direction: Unit<Vector3<f64>>) -> Self {
-        let alike = |a: &Self| a.0.dot(&direction).abs() > 1.0 - SNAP;
+        let alike = |a: &Self| a.0.dot(&direction).abs() > 1.0 - AXIS_SNAP;
         Self::WORLD.into_iter().find(alike).unwrap_or(Self(direction))
     }
 
@@ -30,9 +32,6 @@ impl Axis {
         self.0
     }
 }
-
-/// 1 − cos of the angle below which an axis is one of the world's (about 0.03 degrees).
-const SNAP: f64 = 1e-7;
 
 impl std::fmt::Display for Axis {
     /// `x`, `y`, `z`, or the direction as `[0.31,0.00,0.95]`.

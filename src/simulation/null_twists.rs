@@ -10,20 +10,14 @@
 use faer::Mat;
 use nalgebra::{Matrix3x2, Matrix6, Point3, Unit, Vector3, Vector6};
 
+use crate::budgets::{FEWEST_NULL_CONTACTS, NULL_TWIST_POINTS};
 use crate::geometry::{Feature, Pose};
 use crate::scene::{Body, Scene};
 use crate::termination::{Interrupt, Poll, Termination};
+use crate::tolerances::{NEAR_NULL, NULL_TURN};
 
 use super::Touching;
 
-/// Singular values below this share of the largest are near null: facets of a round fit lean so much.
-const NEAR_NULL: f64 = 0.1;
-/// What turns less than this, as a share of a unit twist, only shifts.
-const TURNS: f64 = 0.25;
-/// So many points of a side tell enough.
-const MOST_POINTS: usize = 2000;
-/// Fewer contacts tell nothing.
-const FEWEST: usize = 12;
 /// Points between two looks at the termination condition.
 const POINTS_POLL: u32 = 64;
 
@@ -70,7 +64,7 @@ impl NullTwist {
 
     /// The axis that contacts leave.
     fn left_by(contacts: &[Contact]) -> Option<Self> {
-        if contacts.len() < FEWEST {
+        if contacts.len() < FEWEST_NULL_CONTACTS {
             return None;
         }
         let count = contacts.len() as f64;
@@ -91,7 +85,7 @@ impl NullTwist {
         match near_null {
             1 => {
                 let (shift, turn) = (vector(5, 0), vector(5, 3));
-                let axis = Unit::try_new(turn, TURNS)?;
+                let axis = Unit::try_new(turn, NULL_TURN)?;
                 // Turning is told in units of the spread.
                 Some(Self { axis, rise: Some(axis.dot(&shift) * spread / turn.norm()) })
             }
@@ -101,7 +95,7 @@ impl NullTwist {
                 let svd = turns.svd(true, false);
                 let (axis, [most, next]) = (svd.u?.column(0).into_owned(), svd.singular_values.into());
                 let axis = Unit::new_normalize(axis);
-                (most > TURNS && next < TURNS * most).then_some(Self { axis, rise: None })
+                (most > NULL_TURN && next < NULL_TURN * most).then_some(Self { axis, rise: None })
             }
             _ => None,
         }
@@ -121,7 +115,7 @@ fn contacts_of(
     let points: Vec<Point3<f64>> =
         asked.shape.samples().points().iter().map(|p| to_measured * p).filter(|p| near.contains(p)).collect();
     let surface = &measured.shape.surface;
-    for p in points.iter().step_by(points.len().div_ceil(MOST_POINTS).max(1)) {
+    for p in points.iter().step_by(points.len().div_ceil(NULL_TWIST_POINTS).max(1)) {
         poll.check()?;
         // At an edge there is a choice of normals.
         if let Some(closest) = surface.closest(p, within).filter(|c| c.feature == Feature::Face) {

@@ -3,14 +3,11 @@
 
 use nalgebra::{Point3, Translation3, Vector3};
 
+use crate::budgets::OBSTRUCTION_RAYS;
 use crate::geometry::{Bounds, OrientedSamples, Pose, Surface};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll};
-
-/// Of the samples of a surface, about so many are looked at.
-const RAYS: usize = 128;
-/// Faces that look along the direction, or against it, by less than this count as walls.
-const STEEPNESS: f64 = 1e-3;
+use crate::tolerances::WALL_STEEPNESS;
 
 /// The longest stretch that a point of a part, going from `start` along the unit vector `direction` until it
 /// is past all that stands, is inside of another part, or a point of another inside of it. Told by some of
@@ -70,9 +67,9 @@ impl Rays<'_> {
             if !corridor.contains(&p) {
                 return Ok(0.0);
             }
-            Ok(self.target.longest_inside_along(&p, &self.along, travel, STEEPNESS))
+            Ok(self.target.longest_inside_along(&p, &self.along, travel, WALL_STEEPNESS))
         };
-        let every = samples.iter().count().div_ceil(RAYS).max(1);
+        let every = samples.iter().count().div_ceil(OBSTRUCTION_RAYS).max(1);
         samples
             .iter()
             .step_by(every)

@@ -1,13 +1,11 @@
 //! Whether a part gets straight from one pose to another, at a glance: for telling rooms apart and for
 //! trying ways, not for plans.
 
+use crate::budgets::PASSAGE_POSES;
 use crate::contact::sampled::Mover;
 use crate::geometry::{Pose, interpolate};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination, try_all};
-
-/// Poses looked at on one way, at most.
-const MOST_POSES: usize = 64;
 
 /// Whether a part, moved straight from one pose to another (its centre of mass on a line, its
 /// rotation slerped), is seen to enter none of the parts that stand. It is looked at half its
@@ -27,7 +25,8 @@ pub fn passes_straight(
     let centre = shape.mass.centre;
     let travel = (to * centre - from * centre).norm() + from.rotation.angle_to(&to.rotation) * shape.reach;
     let step = shape.bounds().extents().min() / 2.0;
-    let count = if step > 0.0 { (travel / step).ceil().min(MOST_POSES as f64) as usize } else { MOST_POSES };
+    let count =
+        if step > 0.0 { (travel / step).ceil().min(PASSAGE_POSES as f64) as usize } else { PASSAGE_POSES };
     try_all(1..count, |i| {
         let pose = interpolate(from, to, &centre, i as f64 / count as f64);
         Ok(!Mover::new(scene, part, pose).until(termination).clearly_enters(standing)?)

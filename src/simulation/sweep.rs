@@ -9,19 +9,11 @@ use nalgebra::{Point3, Translation3, Vector3};
 
 use crate::contact::{CastMargins, ShapeCast};
 use crate::geometry::{Pose, Support, separating, transformed};
-use crate::scene::{HULL_MARGIN, Scene, Surroundings, exit_direction};
+use crate::scene::{Scene, Surroundings, exit_direction};
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::DEPTH_TOLERANCE;
-
-/// Faces that look along the direction, or against it, by less than this count as walls.
-const STEEPNESS: f64 = 1e-3;
-/// So deep a face may be entered before it stops anything.
-const SUNK: f64 = 0.2 * DEPTH_TOLERANCE;
-/// The way out is found to this share of the way beyond everything.
-const FINENESS: f64 = 1.0 / 256.0;
-/// Where a part is taken to be out along a direction, the hulls are apart by so much more than asked for, as a share:
-/// it is not to hang on rounding.
-const ASSURED: f64 = 0.01;
+use crate::tolerances::{
+    ASSURED_GAP, DEPTH_TOLERANCE, HULL_MARGIN, SWEEP_SUNK, WALL_STEEPNESS, WAY_OUT_FINENESS,
+};
 
 /// What a straight sweep told.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,7 +82,7 @@ pub fn straight_sweep_past<E: From<Interrupt>>(
         // Beyond, it has passed the other for good: so what is found does not depend on how far others reach.
         let passed = here.grown(granted).way_past(&scene.bodies[other].bounds, direction);
         let travel = travel.min(passed);
-        let margins = CastMargins { granted, back: granted, steepness: STEEPNESS, sunk: SUNK };
+        let margins = CastMargins { granted, back: granted, steepness: WALL_STEEPNESS, sunk: SWEEP_SUNK };
         let cast = ShapeCast { scene, part, start, direction, travel, other, margins, termination };
         if enters(&cast)? {
             return Ok(Some(Sweep::Blocked { by: other }));
@@ -120,13 +112,13 @@ fn way_out(
     };
     let beyond = along(&surroundings.hull, 1.0) + along(&hull, -1.0) + 1.5 * HULL_MARGIN;
     let (mine, around) = (Support::of(&hull), Support::of(&surroundings.hull));
-    let margin = HULL_MARGIN * (1.0 + ASSURED);
+    let margin = HULL_MARGIN * (1.0 + ASSURED_GAP);
     // From where on they are apart along a direction, if they are where it was found.
     let since = |d: &Vector3<f64>| {
         let speed = -d.dot(direction);
         (speed > 0.0).then(|| (margin - mine.gap_along(d, &around)) / speed)
     };
-    let finest = FINENESS * beyond;
+    let finest = WAY_OUT_FINENESS * beyond;
     let (mut near, mut far, mut exit, mut step) = (0.0, beyond, -direction, finest);
     while far - near > finest {
         let at = (far - step).max(0.5 * (near + far));

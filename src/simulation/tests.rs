@@ -9,8 +9,9 @@ use super::{Action, Axis, End, Motion, PenaltyEngine, SlidingEngine, TransitionF
 use crate::fixtures::{block_on_plate, cells, cuboid, moved, peg_in_hole, rod, scene, tube};
 use crate::geometry::{Pose, SourceMesh};
 use crate::plan::Verifier;
-use crate::scene::{HULL_MARGIN, Scene, Surroundings};
+use crate::scene::{Scene, Surroundings};
 use crate::termination::{Interrupt, Termination};
+use crate::tolerances::HULL_MARGIN;
 
 static PENALTY: LazyLock<PenaltyEngine> = LazyLock::new(PenaltyEngine::default);
 static ENGINES: LazyLock<[&dyn TransitionFunction; 2]> = LazyLock::new(|| [&SlidingEngine, &*PENALTY]);

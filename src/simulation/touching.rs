@@ -7,20 +7,14 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
+use crate::budgets::TOUCHED_PLANES;
 use crate::geometry::{Bounds, Pose, Surface, bisected};
 use crate::scene::{Body, Scene};
 use crate::termination::{Interrupt, Poll, Termination};
+use crate::tolerances::{ONE_DIRECTION_COSINE, OPPOSED_COSINE, TOUCHING_BIT};
 
-/// cos of the angle within which two planes are one (a quarter of a degree).
-const ALIKE: f64 = 0.999_99;
-/// Bits are no longer than this share of the longest side of what two boxes have in common.
-const FINENESS: f64 = 0.125;
-/// cos of the angle within which faces in contact look against each other (8 degrees).
-const OPPOSED: f64 = 0.99;
 /// Bits between two looks at the termination condition.
 const BITS_POLL: u32 = 4;
-/// Planes after which the search for more is given up: round fits have many, and threads more.
-const MOST_PLANES: usize = 64;
 
 /// What a part touches.
 #[derive(Debug, Clone, Default)]
@@ -105,7 +99,7 @@ impl Faces<'_> {
     /// are in contact look against each other. False if they are too many.
     fn planes(&mut self, sense: f64, normals: &mut Vec<Unit<Vector3<f64>>>) -> Result<bool, Interrupt> {
         let surface: &Surface = &self.asked.shape.surface;
-        let finest = self.within.extents().max() * FINENESS;
+        let finest = self.within.extents().max() * TOUCHING_BIT;
         for t in 0..surface.triangles().len() as u32 {
             let looks = self.at.rotation * surface.face_normal(t);
             self.bits.push(surface.corners(t).map(|p| self.at * p));
@@ -120,12 +114,12 @@ impl Faces<'_> {
                     continue;
                 }
                 // A wall that leans over the part's top ends near it, and does not hold it there.
-                let is_faced = |n: &Vector3<f64>| n.dot(&looks) < -OPPOSED;
+                let is_faced = |n: &Vector3<f64>| n.dot(&looks) < -OPPOSED_COSINE;
                 let Some(normal) = self.plane_at(&middle(&bit)).filter(is_faced) else { continue };
                 let normal = Unit::new_normalize(normal * sense);
-                if !normals.iter().any(|n| n.dot(&normal) > ALIKE) {
+                if !normals.iter().any(|n| n.dot(&normal) > ONE_DIRECTION_COSINE) {
                     normals.push(normal);
-                    if normals.len() > MOST_PLANES {
+                    if normals.len() > TOUCHED_PLANES {
                         return Ok(false);
                     }
                 }
@@ -144,7 +138,7 @@ impl Faces<'_> {
         let (mut found, mut alone) = (None, true);
         self.measured.shape.surface.feature_normals(&closest, |n| match found {
             None => found = Some(n),
-            Some(m) => alone &= n.dot(&m) > ALIKE,
+            Some(m) => alone &= n.dot(&m) > ONE_DIRECTION_COSINE,
         });
         found.filter(|_| alone).map(|n| self.stands.rotation * n)
     }

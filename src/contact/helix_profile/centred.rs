@@ -5,33 +5,19 @@
 //! better one ([`slip`](super::slip)): both axes as one, the profiles as far apart as they can be, and
 //! nothing but turning along the helix. It is a proposal, to be verified like any path.
 
-use std::f64::consts::TAU;
-
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 
+use crate::budgets::CENTRING_PIECES;
 use crate::geometry::{Helix, Pose, Surface, interpolate};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
+use crate::tolerances::{OFF_HELIX, SCREW_POSE_ANGLE, STRAY_SHARE, THREAD_ENDS, UNSCREWING_ANGLE};
 
 use super::super::course::turns_far;
 use super::super::course::{Course, Interval};
-use super::FINEST;
 use super::envelope::{Envelope, Zone};
 use super::path::ScrewPath;
 use super::slip::{Facet, slipping};
-
-/// So far from the helix, as a share of the pitch, a path has left it.
-const LEFT: f64 = 0.25;
-/// What is no further from the end of the thread, in pitches, does not count: seats and the bottoms
-/// of holes are there.
-const ENDS: f64 = 0.3;
-/// The angle between two poses, before thinning, in radians.
-const STEP: f64 = 0.1;
-/// Pieces of the way from there to where the given path ends.
-const PIECES: u32 = 4;
-/// A part that is off the thread after so much more (radians) is turned off it, where the given path
-/// only draws it off: chamfers end threads early.
-const MOST_FURTHER: f64 = 2.0 * TAU;
 
 /// A path with the same start and end as a given one that turns along the thread which a part shares
 /// with one of those standing; `None` if there is no such thread, or no play in it. `limit` is the depth
@@ -51,9 +37,11 @@ pub(crate) fn centred(
         return Ok(None);
     }
     let course = Course::new(path, scene.centre_in_shape(part), scene.bodies[part].shape.reach);
-    let followed = ScrewPath::new(&course, &[Interval::WHOLE], limit * FINEST);
+    let followed = ScrewPath::new(&course, &[Interval::WHOLE], limit * STRAY_SHARE);
     let Some(followed) = followed.filter(|followed| followed.helix.rise != 0.0) else { return Ok(None) };
-    let Some((left, way)) = followed.leaves(followed.helix.pitch().abs() * LEFT) else { return Ok(None) };
+    let Some((left, way)) = followed.leaves(followed.helix.pitch().abs() * OFF_HELIX) else {
+        return Ok(None);
+    };
     let mut widest: Option<(f64, Thread)> = None;
     for &other in standing.iter().filter(|&&other| scene.allowances.of(part, other) == 0.0) {
         let shared = Thread::shared(scene, (part, other), &followed, left, termination)?;
@@ -70,9 +58,9 @@ pub(crate) fn centred(
 /// beside the given one to its end.
 fn along(thread: &Thread, (left, way): (f64, f64), path: &[Pose], course: &Course) -> Option<Vec<Pose>> {
     // What is nearly off the thread is turned off it.
-    let is_near = (thread.off - left).abs() < MOST_FURTHER;
+    let is_near = (thread.off - left).abs() < UNSCREWING_ANGLE;
     let angle = if is_near { thread.off.abs().max(left.abs()).copysign(left) } else { left };
-    let count = (angle / STEP).abs().ceil().max(1.0);
+    let count = (angle / SCREW_POSE_ANGLE).abs().ceil().max(1.0);
     let on_thread = (0..=count as usize).map(|k| thread.pose(angle * k as f64 / count));
     let rest = course.path_between([way, course.length]);
     // From there on as the given path, at the same distance from it, and at its end on it.
@@ -81,8 +69,8 @@ fn along(thread: &Thread, (left, way): (f64, f64), path: &[Pose], course: &Cours
     let mut poses: Vec<Pose> = path.first().copied().into_iter().chain(on_thread).chain(rest).collect();
     // In small pieces, so that it is clear which way round it turns.
     let (from, to) = (*poses.last()?, *path.last()?);
-    let share = |k: u32| f64::from(k) / f64::from(PIECES);
-    poses.extend((1..PIECES).map(|k| interpolate(&from, &to, &course.centre, share(k))));
+    let share = |k: u32| f64::from(k) / f64::from(CENTRING_PIECES);
+    poses.extend((1..CENTRING_PIECES).map(|k| interpolate(&from, &to, &course.centre, share(k))));
     poses.push(to);
     Some(poses)
 }
@@ -119,7 +107,7 @@ impl Thread {
         };
         let (moving, standing) = (triangles(moving, *reference), triangles(standing, guess_from_standing));
         let zones = [Zone::of(&moving), Zone::of(&standing)];
-        let zone = zones[0].common(&zones[1]).trimmed(ENDS * guess.pitch().abs());
+        let zone = zones[0].common(&zones[1]).trimmed(THREAD_ENDS * guess.pitch().abs());
         if zone.is_empty() {
             return Ok(None);
         }
@@ -137,7 +125,7 @@ impl Thread {
             Envelope::new(&moved, &helix, &zone, termination)
         };
         let (one, two) = rayon::join(|| envelope(&moving, frame * to_other), || envelope(&standing, frame));
-        let gap = two?.widest_gap(&one?, LEFT * helix.pitch().abs());
+        let gap = two?.widest_gap(&one?, OFF_HELIX * helix.pitch().abs());
         let Some((play, shift)) = gap else { return Ok(None) };
         let reference = Translation3::from(Vector3::z() * shift) * frame * to_other * reference;
         let helix = Helix { axis_from_frame: frame * guess.axis_from_frame, ..helix };

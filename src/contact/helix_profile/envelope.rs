@@ -11,22 +11,13 @@ use std::f64::consts::TAU;
 use nalgebra::Point3;
 use rayon::prelude::*;
 
+use crate::budgets::{HEIGHTS_PER_PITCH, SLABS_PER_PITCH, TRIANGLE_HALVINGS};
 use crate::geometry::{Footprint, Helix, radii};
 use crate::termination::{Interrupt, Termination};
+use crate::tolerances::{EQUAL_GAP, PROFILE_MARGIN};
 
-/// Slabs along the axis per pitch: what is elsewhere does not count.
-const SLABS: f64 = 4.0;
-/// Heights that are told apart within a pitch; errors of footprints below one are not worth cuts.
-const BINS: usize = 300;
-/// Halvings of a triangle until it is taken as it is.
-const MOST_CUTS: u32 = 24;
 /// Triangles between two looks at the termination condition.
 const AT_ONCE: usize = 64;
-/// What is so much further out or in than the other part, in pitches, is not told exactly: more than
-/// any part that is told to be apart strays.
-const BESIDE: f64 = 0.5;
-/// Of the shifts with the widest gap, those within this share of it count as equal.
-const AS_WIDE: f64 = 0.02;
 
 /// Where a surface is along an axis and how far from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -134,8 +125,9 @@ impl Envelope {
     ) -> Result<Self, Interrupt> {
         let pitch = helix.pitch().abs();
         let [near, far] = zone.across;
-        let zone = Zone { across: [near - BESIDE * pitch, far + BESIDE * pitch], ..*zone };
-        let empty = || Self { pitch, finest: pitch / BINS as f64, zone, first: 0, slabs: Vec::new() };
+        let zone = Zone { across: [near - PROFILE_MARGIN * pitch, far + PROFILE_MARGIN * pitch], ..*zone };
+        let empty =
+            || Self { pitch, finest: pitch / HEIGHTS_PER_PITCH as f64, zone, first: 0, slabs: Vec::new() };
         let add = |mut envelope: Self, triangles: &[[Point3<f64>; 3]]| {
             termination.check()?;
             let mut cut = Cut::default();
@@ -179,12 +171,12 @@ impl Envelope {
                 continue;
             }
             match Footprint::of(&corners, rise) {
-                Some(print) if print.error <= self.finest || cuts >= MOST_CUTS => {
+                Some(print) if print.error <= self.finest || cuts >= TRIANGLE_HALVINGS => {
                     let heights = print.points.iter().zip(&corners);
                     let beside = min_max(heights.map(|(p, c)| p.y - c.z));
                     self.enter(&print, [low, high], beside, reaches);
                 }
-                None if far <= 4.0 * self.finest || cuts >= MOST_CUTS => {
+                None if far <= 4.0 * self.finest || cuts >= TRIANGLE_HALVINGS => {
                     let whole = [f64::NEG_INFINITY, f64::INFINITY];
                     self.enter(&Footprint::at_all_angles(&corners, rise), [low, high], whole, reaches);
                 }
@@ -194,7 +186,7 @@ impl Envelope {
     }
 
     fn slab(&self, z: f64) -> i64 {
-        (z / self.pitch * SLABS).floor() as i64
+        (z / self.pitch * SLABS_PER_PITCH).floor() as i64
     }
 
     /// The slabs from one to another, made when there are none.
@@ -222,16 +214,16 @@ impl Envelope {
         let lowest = self.slab(along[0]);
         for (low, slab) in (lowest..).zip(self.slabs_between(lowest, self.slab(along[1]))) {
             if slab.reaches.is_empty() {
-                slab.reaches.resize(BINS, NOTHING);
+                slab.reaches.resize(HEIGHTS_PER_PITCH, NOTHING);
             }
-            let ends = [low as f64, (low + 1) as f64].map(|z| z / SLABS * pitch);
+            let ends = [low as f64, (low + 1) as f64].map(|z| z / SLABS_PER_PITCH * pitch);
             let from = ((from.max(ends[0] + beside[0]) - print.error) / size).floor() as i64;
             let to = ((to.min(ends[1] + beside[1]) + print.error) / size).floor() as i64;
-            let mut bin = from.rem_euclid(BINS as i64) as usize;
+            let mut bin = from.rem_euclid(HEIGHTS_PER_PITCH as i64) as usize;
             let within = reaches.iter().skip((from - first) as usize).take((to - from + 1).max(0) as usize);
             for reach in within {
                 widen(&mut slab.reaches[bin], reach);
-                bin = if bin + 1 == BINS { 0 } else { bin + 1 };
+                bin = if bin + 1 == HEIGHTS_PER_PITCH { 0 } else { bin + 1 };
             }
         }
     }
@@ -240,7 +232,7 @@ impl Envelope {
     fn between(&self, [from, to]: [f64; 2]) -> Reaches {
         let within = |z: f64| self.slab(z).saturating_sub(self.first).clamp(-1, self.slabs.len() as i64);
         let range = within(from).max(0)..=within(to).min(self.slabs.len() as i64 - 1);
-        let mut all = vec![NOTHING; BINS];
+        let mut all = vec![NOTHING; HEIGHTS_PER_PITCH];
         let mut further = [false; 2];
         for slab in range {
             let slab = &self.slabs[slab as usize];
@@ -275,9 +267,9 @@ impl Envelope {
         }
         // A way in space is a little longer in the half plane.
         let margin = stray * 1.0f64.hypot(2.0 * self.pitch / TAU / inner);
-        let (size, bins) = (self.finest, BINS as i64);
+        let (size, bins) = (self.finest, HEIGHTS_PER_PITCH as i64);
         let moved = (shift / size).floor() as i64;
-        if margin >= BESIDE * self.pitch {
+        if margin >= PROFILE_MARGIN * self.pitch {
             return false;
         }
         let wide = (margin / size).ceil() as i64 + 2;
@@ -300,7 +292,7 @@ impl Envelope {
     pub(super) fn widest_gap(&self, other: &Self, most: f64) -> Option<(f64, f64)> {
         let everywhere = [f64::NEG_INFINITY, f64::INFINITY];
         let (one, other) = (self.between(everywhere), other.between(everywhere));
-        let (bins, size) = (BINS as i64, self.finest);
+        let (bins, size) = (HEIGHTS_PER_PITCH as i64, self.finest);
         let gap = |inner: &Reaches, outer: &Reaches, shift: i64| {
             let at = |i: i64| outer[(i + shift).rem_euclid(bins) as usize][0] - inner[i as usize][1];
             (0..bins).map(at).fold(f64::INFINITY, f64::min)
@@ -310,7 +302,7 @@ impl Envelope {
             .map(|shift| (gap(&one, &other, -shift).max(gap(&other, &one, shift)), shift))
             .collect();
         let widest = gaps.iter().map(|(gap, _)| *gap).fold(f64::NEG_INFINITY, f64::max);
-        let as_wide = || gaps.iter().filter(|(gap, _)| *gap >= widest * (1.0 - AS_WIDE));
+        let as_wide = || gaps.iter().filter(|(gap, _)| *gap >= widest * (1.0 - EQUAL_GAP));
         let middle = as_wide().map(|(_, shift)| *shift as f64).sum::<f64>() / as_wide().count() as f64;
         (widest > 0.0 && widest.is_finite()).then_some((widest, middle * size))
     }

@@ -7,6 +7,9 @@
 //! samples: but for these the answer is the same kind of bound. A path in the middle of a thread's play
 //! (`centred`, from the flanks that face each other: `slip`) has the room that such a bound needs.
 
+use crate::budgets::{EFFORT_BEFORE_PROFILES, PATH_EFFORT_IN_DOUBT};
+use crate::tolerances::{SCREW_TURN, SHORTEST_SCREW_STRETCH, STRAY_SHARE};
+
 mod centred;
 mod envelope;
 mod path;
@@ -22,18 +25,9 @@ use crate::termination::{Interrupt, Termination};
 pub(crate) use centred::centred;
 
 use super::course::{Course, Interval};
-use super::region_cover::path::{Found, MOST_EFFORT_IN_DOUBT, Way};
+use super::region_cover::path::{Found, Way};
 use envelope::{Envelope, Zone};
 use path::{Boxes, ScrewPath};
-
-/// Stretches that turn by less than this (radians) are not compared any more.
-const LEAST_TURN: f64 = 0.25;
-/// How far a part may stray on a piece of the way that is looked at as one, as a share of the limit.
-const FINEST: f64 = 1.0 / 2.0;
-/// So much effort is spent on a side before profiles are asked.
-const FIRST_EFFORT: usize = 8_000;
-/// Stretches that turn further (radians) are bounded in pieces.
-const LONGEST: f64 = 4.0;
 
 /// The stretches of the way on which the profiles of two surfaces, one of which is screwed past the other,
 /// do not show that they are apart.
@@ -47,7 +41,7 @@ fn unsettled(
     limit: f64,
     termination: &Termination,
 ) -> Result<Vec<Interval>, Interrupt> {
-    let Some(screw) = ScrewPath::new(course, &stretches, limit * FINEST) else { return Ok(stretches) };
+    let Some(screw) = ScrewPath::new(course, &stretches, limit * STRAY_SHARE) else { return Ok(stretches) };
     if screw.helix.rise == 0.0 {
         return Ok(stretches);
     }
@@ -75,7 +69,7 @@ fn unsettled(
         if standing.is_apart(places[0], &moving, places[1], stretch.shift, stray) {
             continue;
         }
-        if course.turn(interval) < LEAST_TURN {
+        if course.turn(interval) < SHORTEST_SCREW_STRETCH {
             open.push(interval);
         } else {
             let [first, second] = interval.halves();
@@ -98,7 +92,7 @@ pub(crate) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], In
         return Ok([unknown(), unknown()]);
     }
     // A part that shares no thread with the moving one is soon told to be apart.
-    let mut found = bounded(way, vec![Interval::WHOLE], FIRST_EFFORT)?;
+    let mut found = bounded(way, vec![Interval::WHOLE], EFFORT_BEFORE_PROFILES)?;
     if way.passing.granted > 0.0 {
         // One part lies in the other: surfaces cross, and no more effort would tell how deep.
         return Ok(found);
@@ -109,7 +103,7 @@ pub(crate) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], In
     }
     // They do not overlap at the start: where neither surface meets the other, they stay apart.
     let open = unsettled(way.course, surfaces, open, limit, way.termination)?;
-    let [more, others] = bounded(way, open, MOST_EFFORT_IN_DOUBT)?;
+    let [more, others] = bounded(way, open, PATH_EFFORT_IN_DOUBT)?;
     let [mut one, mut other] = found;
     one.add(more);
     other.add(others);
@@ -126,7 +120,7 @@ fn bounded(way: &Way<'_>, stretches: Vec<Interval>, most_effort: usize) -> Resul
             let left = most_effort.saturating_sub(all.effort);
             if left == 0 || all.is_enough() {
                 all.open.push(interval);
-            } else if way.course.turn(interval) > LONGEST {
+            } else if way.course.turn(interval) > SCREW_TURN {
                 stack.extend(interval.halves());
             } else {
                 all.add(way.depth_of_side(on_moving, interval, left)?);

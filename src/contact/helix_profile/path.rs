@@ -7,18 +7,11 @@
 
 use nalgebra::{Matrix3, Point3, Quaternion, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
 
+use crate::budgets::{KNOTS_PER_SEGMENT, OUTLIER_ROUNDS};
 use crate::geometry::{Bounds, Helix, Pose, interpolate};
+use crate::tolerances::{LEAST_PITCH, OUTLIER};
 
 use super::super::course::{Course, Interval, Segment};
-
-/// A helix gets at least so much further with every turn, in the planning frame; others do not rise.
-const LEAST_PITCH: f64 = 0.02;
-/// Rounds of leaving out what lies off.
-const ROUNDS: usize = 4;
-/// What is so many times further off than most is left out.
-const OFF: f64 = 3.0;
-/// Knots on a segment at most.
-const MOST_KNOTS: f64 = 64.0;
 
 /// A short piece of the way.
 #[derive(Debug, Clone)]
@@ -106,7 +99,7 @@ impl ScrewPath {
         let weight = |k: &Knot| if is_in(k) { (k.angles[1] - k.angles[0]).abs() } else { 0.0 };
         let mut weights: Vec<f64> = self.knots.iter().map(weight).collect();
         let mut mean = None;
-        for _ in 0..ROUNDS {
+        for _ in 0..OUTLIER_ROUNDS {
             let first = self.knots.iter().zip(&weights).find(|(_, w)| **w > 0.0)?.0.unscrewed.rotation;
             let (mut rotation, mut middle) = (Quaternion::from_imag(Vector3::zeros()), Vector3::zeros());
             for (k, &w) in self.knots.iter().zip(&weights) {
@@ -201,7 +194,7 @@ fn turn(segment: &Segment) -> Vector3<f64> {
 fn fit(samples: &[Sample], centre: &Point3<f64>) -> Option<Helix> {
     let mut weights: Vec<f64> = samples.iter().map(|s| s.turn.norm()).collect();
     let mut found = None;
-    for _ in 0..ROUNDS {
+    for _ in 0..OUTLIER_ROUNDS {
         let weighted = || samples.iter().zip(weights.iter().copied());
         let rotations: Matrix3<f64> =
             weighted().map(|(s, w)| *s.pose.rotation.to_rotation_matrix().matrix() * w).sum();
@@ -272,7 +265,7 @@ fn leave_out(weights: &mut [f64], off: &[f64]) {
         passed >= half
     });
     let Some(&median) = median else { return };
-    let most = off[median] * OFF + 1e-9;
+    let most = off[median] * OUTLIER + 1e-9;
     weights.iter_mut().zip(off).filter(|(_, off)| **off > most).for_each(|(w, _)| *w = 0.0);
 }
 
@@ -290,7 +283,7 @@ fn knots(course: &Course, helix: &Helix, finest: f64) -> Vec<Knot> {
         let along = |p: &Point3<f64>| (b - a) - Vector3::new(-p.y, p.x, helix.rise) * by;
         let speed = along(&a).norm().max(along(&b).norm());
         let turning = (turn - Vector3::z() * by).norm();
-        let count = ((speed + turning * course.reach) / (2.0 * finest)).ceil().clamp(1.0, MOST_KNOTS);
+        let count = ((speed + turning * course.reach) / (2.0 * finest)).ceil().clamp(1.0, KNOTS_PER_SEGMENT);
         for i in 0..count as usize {
             let share = |k: f64| (i as f64 + k) / count;
             let pose = interpolate(&s.from, &s.to, &course.centre, share(0.5));

@@ -9,16 +9,9 @@
 
 use nalgebra::{Point3, SMatrix, SVector, Vector3};
 
+use crate::budgets::{FEWEST_FLANK_FACETS, FLANK_ROUNDS};
 use crate::geometry::Helix;
-
-/// Flanks lean towards the axis and along it: their normals have at least and at most so much along it.
-const LEAN: [f64; 2] = [0.15, 0.97];
-/// Facets that slip worse than this, as a share of the turning speed, are none of a thread.
-const WORST: f64 = 0.15;
-/// Rounds of weighing.
-const ROUNDS: usize = 6;
-/// Fewer facets make no thread.
-const FEWEST: usize = 24;
+use crate::tolerances::{FLANK_LEAN, FLANK_SLIP};
 
 /// A facet of a surface.
 #[derive(Debug, Clone, Copy)]
@@ -56,12 +49,14 @@ pub(super) fn slipping(facets: &[Facet], rise: f64) -> Option<Helix> {
     };
     let flanks: Vec<&Facet> = facets
         .iter()
-        .filter(|f| (LEAN[0]..LEAN[1]).contains(&f.normal.z.abs()) && share(f, &twist).abs() < WORST)
+        .filter(|f| {
+            (FLANK_LEAN[0]..FLANK_LEAN[1]).contains(&f.normal.z.abs()) && share(f, &twist).abs() < FLANK_SLIP
+        })
         .collect();
-    if flanks.len() < FEWEST {
+    if flanks.len() < FEWEST_FLANK_FACETS {
         return None;
     }
-    for _ in 0..ROUNDS {
+    for _ in 0..FLANK_ROUNDS {
         let shares: Vec<f64> = flanks.iter().map(|f| share(f, &twist).abs()).collect();
         let mut sorted = shares.clone();
         sorted.sort_by(f64::total_cmp);

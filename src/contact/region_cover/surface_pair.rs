@@ -2,26 +2,11 @@
 
 use nalgebra::{Matrix3, Point3, Translation3, Vector3};
 
+use crate::budgets::PROBES;
 use crate::geometry::{Closest, Cloud, Parts, PatchTree, Pose, Surface, bisected, separating_direction};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{DEPTH_TOLERANCE, HELD, TOUCHED};
-
-/// Pieces are drawn together by this share to see whether they only touch.
-const INSET: f64 = 0.02;
-/// A shift that leads into a plane by less than this share of its length (the sine of the angle) goes along it:
-/// coordinates in files are rounded, and so are planes.
-pub(crate) const TILT: f64 = 1e-5;
-/// How deep shifts along a plane, tilted by less than [`TILT`], may get into it in all, in the planning frame.
-pub(crate) const SUNK: f64 = 0.3 * DEPTH_TOLERANCE;
-/// Points are moved so far to see whether they get inside …
-const PROBE: f64 = 2e-3;
-/// … by more than this share of it.
-const INSIDE: f64 = 0.125;
-/// So many corners of a piece, and so many faces, are probed.
-const PROBED: usize = 16;
-/// Cosine of the angle below which two planes are one.
-const PARALLEL: f64 = 0.9999;
+use crate::tolerances::{ENTRY_PROBE, ENTRY_SHARE, HELD, STEEP_COSINE, TILT, TOUCH_INSET, TOUCHED};
 
 /// A plane that a part is kept from passing, by its normal in the planning frame, and whose it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +17,7 @@ pub(crate) struct Obstacle {
 
 impl Obstacle {
     fn is_like(&self, other: &Self) -> bool {
-        self.other == other.other && self.normal.dot(&other.normal) > PARALLEL
+        self.other == other.other && self.normal.dot(&other.normal) > STEEP_COSINE
     }
 }
 
@@ -205,7 +190,7 @@ impl<'a> Facing<'a> {
         let corners = self.measured.corners(triangle);
         // What touches is beside, too.
         let centre = piece.centre;
-        let inset = |p: &Point3<f64>| p + (centre - p) * (most / (centre - p).norm()).clamp(INSET, 1.0);
+        let inset = |p: &Point3<f64>| p + (centre - p) * (most / (centre - p).norm()).clamp(TOUCH_INSET, 1.0);
         let within: Vec<_> = piece.extremes.iter().map(inset).collect();
         separating_direction(&corners, &within, 0.0, None).is_some()
     }
@@ -293,11 +278,11 @@ impl<'a> Facing<'a> {
         let Self { asked, tree, measured_from_asked, shifted, .. } = self;
         let ahead = &(shifted * along);
         let mut probes = placed.points.clone();
-        if probes.len() > PROBED {
+        if probes.len() > PROBES {
             let front =
                 |p: &Point3<f64>, q: &Point3<f64>| ahead.dot(&q.coords).total_cmp(&ahead.dot(&p.coords));
-            probes.select_nth_unstable_by(PROBED, front);
-            probes.truncate(PROBED);
+            probes.select_nth_unstable_by(PROBES, front);
+            probes.truncate(PROBES);
         }
         let shift = shifted * at;
         let mut middles = Vec::new();
@@ -312,7 +297,7 @@ impl<'a> Facing<'a> {
             Piece::Bit(corners) => middle(corners),
         }
         middles.sort_by(|a, b| b.0.total_cmp(&a.0));
-        probes.extend(middles.into_iter().take(PROBED).map(|(_, p)| measured_from_asked * p + shift));
+        probes.extend(middles.into_iter().take(PROBES).map(|(_, p)| measured_from_asked * p + shift));
         probes
     }
 }
@@ -341,15 +326,15 @@ fn entered(
         }
     });
     let blocking = |n: &Vector3<f64>| n.dot(ahead) < -TILT;
-    if slope == Slope::Steep && least?.dot(&most?) < PARALLEL {
+    if slope == Slope::Steep && least?.dot(&most?) < STEEP_COSINE {
         return None;
     }
     // What touches enters below all faces that it touches, at however small an angle.
     let touches = (-TOUCHED..=HELD).contains(&(now - allowance));
     let is_flat = slope == Slope::Any && touches && least.as_ref().is_some_and(blocking);
     let is_certain = is_flat || {
-        let (then, _) = depth(&(p + ahead * PROBE), closest.triangle);
-        then > now.max(allowance) + INSIDE * PROBE
+        let (then, _) = depth(&(p + ahead * ENTRY_PROBE), closest.triangle);
+        then > now.max(allowance) + ENTRY_SHARE * ENTRY_PROBE
     };
     // Before a convex edge either face is enough to stay above; if that does not help, it is
     // a reentrant one.

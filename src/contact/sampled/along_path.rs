@@ -1,6 +1,6 @@
 //! Verification by samples, for what bounds do not settle.
 //!
-//! At poses so dense that no vertex of the moving part travels further than [`DENSITY`] of the
+//! At poses so dense that no vertex of the moving part travels further than [`PATH_DENSITY`] of the
 //! longest side between two of them, samples of both surfaces are measured exactly against the other's
 //! triangles through a bounding-volume hierarchy: all vertices, points of convex edges and of faces, closer
 //! together than the engine's. Of a path that passes these, edges are looked at again by points four times
@@ -18,18 +18,15 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::budgets::{LONG_PATH, POSES_AT_ONCE, SAMPLE_SHARES};
 use crate::geometry::{Ball, Bounds, Look, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
 use crate::termination::{Interrupt, Poll, Termination};
-use crate::tolerances::HELPFUL;
+use crate::tolerances::{HELPFUL, PATH_DENSITY};
 
 use super::super::passing::Passing;
 
-/// Largest travel of a vertex between two checked poses, as a share of the longest side.
-const DENSITY: f64 = 0.004;
 /// Samples and nodes between two looks at the termination condition: on open surfaces each takes long.
 const SAMPLES_POLL: u32 = 1;
-/// So many poses are looked at together at first.
-const AT_ONCE: usize = 32;
 
 /// A point that got too deep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,7 +51,7 @@ pub(crate) struct Samples {
 #[derive(Debug)]
 struct Sampled {
     shape: Arc<Shape>,
-    shares: [OnceLock<[SampleTree; SHARES]>; Closeness::ALL.len()],
+    shares: [OnceLock<[SampleTree; SAMPLE_SHARES]>; Closeness::ALL.len()],
 }
 
 /// How closely samples stand. Most paths that are refused are so by the few.
@@ -90,7 +87,7 @@ impl Samples {
         Self { parts: Arc::new([&self.parts[..], &self.parts[..]].concat()) }
     }
 
-    fn of(&self, part: usize, closeness: Closeness) -> &[SampleTree; SHARES] {
+    fn of(&self, part: usize, closeness: Closeness) -> &[SampleTree; SAMPLE_SHARES] {
         let Sampled { shape, shares } = &*self.parts[part];
         shares[closeness as usize].get_or_init(|| dealt(&shape.surface, closeness))
     }
@@ -130,10 +127,12 @@ impl Samples {
             Side { samples: other, to_measured: &back, measured: moving, granted: passing.granted },
         ];
         let mut asked: Vec<Asked> = Vec::new();
-        for (side, share) in (0..sides.len()).flat_map(|side| (0..SHARES).map(move |share| (side, share))) {
+        for (side, share) in
+            (0..sides.len()).flat_map(|side| (0..SAMPLE_SHARES).map(move |share| (side, share)))
+        {
             let takes = |i: &usize| Turn::of(*i, poses.len()).takes(share);
             let moments: Vec<usize> = (0..poses.len()).filter(takes).collect();
-            let stretches = moments.chunks(AT_ONCE).map(<[usize]>::to_vec);
+            let stretches = moments.chunks(POSES_AT_ONCE).map(<[usize]>::to_vec);
             asked.extend(stretches.map(|moments| Asked { side, share, moments }));
         }
         let found = asked
@@ -165,7 +164,7 @@ fn worth_telling(entered: &[Entered], deep: f64, passing: &Passing<'_>, sides: &
 
 /// The samples of one part of a pair, and what they are measured against.
 struct Side<'a> {
-    samples: &'a [SampleTree; SHARES],
+    samples: &'a [SampleTree; SAMPLE_SHARES],
     /// The way from the samples' frame to the measured surface's, at all poses.
     to_measured: &'a [Pose],
     measured: &'a Surface,
@@ -238,11 +237,6 @@ impl Side<'_> {
     }
 }
 
-/// Into so many shares the samples of a shape are dealt.
-const SHARES: usize = 4;
-/// Paths of more poses than this are long.
-const LONG: usize = 400;
-
 /// Which shares a pose checks.
 #[derive(Debug, Clone, Copy)]
 struct Turn {
@@ -257,9 +251,9 @@ impl Turn {
     fn of(index: usize, poses: usize) -> Self {
         match poses {
             _ if index == 0 || index + 1 == poses => Self::ALL,
-            0..=LONG => Self::ALL,
-            _ if poses <= 2 * LONG => Self { index, of: 2 },
-            _ => Self { index, of: SHARES },
+            0..=LONG_PATH => Self::ALL,
+            _ if poses <= 2 * LONG_PATH => Self { index, of: 2 },
+            _ => Self { index, of: SAMPLE_SHARES },
         }
     }
 
@@ -269,9 +263,11 @@ impl Turn {
 }
 
 /// The samples of a surface, dealt out in the order of a tree, so that each share covers all of it.
-fn dealt(surface: &Surface, closeness: Closeness) -> [SampleTree; SHARES] {
+fn dealt(surface: &Surface, closeness: Closeness) -> [SampleTree; SAMPLE_SHARES] {
     let all = SampleTree::new(surface, &spacing(surface.bounds(), closeness));
-    std::array::from_fn(|i| SampleTree::over(all.points().iter().skip(i).step_by(SHARES).copied().collect()))
+    std::array::from_fn(|i| {
+        SampleTree::over(all.points().iter().skip(i).step_by(SAMPLE_SHARES).copied().collect())
+    })
 }
 
 /// Denser than the engine's samples, and not a multiple of their spacing. Every vertex is one: the crest of a small
@@ -288,7 +284,7 @@ fn spacing(bounds: &Bounds, closeness: Closeness) -> Spacing {
 /// The poses of a stretch of the way and as many between them as the density asks for.
 fn dense(passing: &Passing<'_>, path: &[Pose]) -> Vec<Pose> {
     let Passing { shapes: [shape, _], centre, longest_side, .. } = passing;
-    let step = DENSITY * longest_side;
+    let step = PATH_DENSITY * longest_side;
     let mut out = Vec::new();
     for (a, b) in path.iter().zip(path.iter().skip(1)) {
         let turn = (a.rotation.inverse() * b.rotation).scaled_axis();
@@ -370,7 +366,7 @@ mod tests {
         for w in poses.windows(2) {
             for v in scene.bodies[1].shape.surface.vertices() {
                 let travel = (w[1] * v - w[0] * v).norm();
-                assert!(travel <= DENSITY * scene.longest_side + 1e-9, "{travel}");
+                assert!(travel <= PATH_DENSITY * scene.longest_side + 1e-9, "{travel}");
             }
         }
     }

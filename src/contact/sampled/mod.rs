@@ -18,11 +18,11 @@ use crate::geometry::{Bounds, Closest, Pose};
 use crate::scene::{Body, Scene, Surroundings};
 use crate::sdf::Grid;
 use crate::termination::{Interrupt, Poll, Termination};
-use crate::tolerances::FREE_STEP;
+use crate::tolerances::{FREE_STEP, ON_SURFACE};
 
 use nearby_samples::{Measured, gather};
 pub(crate) use pair_samples::{Extent, Vicinity};
-use planes::{ON_SURFACE, Planes, Sample};
+use planes::{Planes, Sample};
 
 use super::constraint::Row;
 

@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::geometry::{Closest, Surface};
+use crate::tolerances::ONE_PLANE_COSINE;
 
 /// A sample seen from the surface that it is near to.
 pub(super) struct Sample {
@@ -14,10 +15,6 @@ pub(super) struct Sample {
     /// How far below a plane the sample may be and still count as separated by it.
     pub(super) below: f64,
 }
-
-/// Samples no deeper than this count as on the surface: coordinates in files are rounded, and poses
-/// drift by a part of the depth tolerance.
-pub(super) const ON_SURFACE: f64 = 1e-4;
 
 /// A plane that a sample may be asked to stay above.
 #[derive(Clone, Copy)]
@@ -42,7 +39,7 @@ impl Planes {
     fn add(&mut self, plane: Plane) {
         for slot in &mut self.list {
             match slot {
-                Some(p) if p.normal.dot(&plane.normal) > PARALLEL => {
+                Some(p) if p.normal.dot(&plane.normal) > ONE_PLANE_COSINE => {
                     p.height = p.height.max(plane.height);
                     return;
                 }
@@ -55,9 +52,6 @@ impl Planes {
         }
     }
 }
-
-/// cos of the angle below which two planes are one (about half a degree).
-const PARALLEL: f64 = 0.99996;
 
 impl Sample {
     /// The planes of which the sample must stay above one: those of the closest feature, and, if

@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::SOURCES;
+use crate::budgets::KEPT_VERDICTS;
 use crate::cache::{Digest, RecordKey, RecordKind, RequestCache, Storage};
 use crate::contact::Passing;
 use crate::geometry::add_pose;
@@ -29,10 +30,6 @@ pub struct VerdictQuestion<'a> {
 #[derive(Debug, Default)]
 pub struct KnownVerdicts(Mutex<HashMap<RecordKey, Verdict>>);
 
-/// Verdicts that a request keeps. Of more, all are forgotten: a few kB each at most, and a part is checked again soon or
-/// not at all.
-const MOST_KNOWN: usize = 4096;
-
 impl KnownVerdicts {
     /// The verdict on a question, as known or remembered, or else as checked, which is then remembered.
     ///
@@ -51,7 +48,7 @@ impl KnownVerdicts {
             None => {
                 let found = cache.get_or(key, check)?;
                 let mut known = self.lock();
-                if known.len() >= MOST_KNOWN {
+                if known.len() >= KEPT_VERDICTS {
                     known.clear();
                 }
                 known.insert(key, found.clone());

@@ -2,7 +2,7 @@ use nalgebra::Vector3;
 use proptest::prelude::*;
 
 use super::*;
-use crate::contact::region_cover::path::MOST_EFFORT_IN_DOUBT;
+use crate::budgets::PATH_EFFORT_IN_DOUBT;
 use crate::fixtures::{
     LIMIT, ball, block_on_plate, cells, cuboid, l_shape, moved, open_box, peg_in_hole, rod, scene, tube,
 };
@@ -102,7 +102,7 @@ fn where_holes_leave_nothing_to_be_settled_samples_are_asked_soon() {
     let passing = Passing::new(&scene, &scene.allowances, [1, 0], &path);
     let course = Course::new(&passing.path, passing.centre, passing.reach());
     let found = verifier.bounds(&passing, &course, &Termination::default()).unwrap();
-    assert!(found.iter().any(|f| !f.open.is_empty() && f.effort < MOST_EFFORT_IN_DOUBT / 5));
+    assert!(found.iter().any(|f| !f.open.is_empty() && f.effort < PATH_EFFORT_IN_DOUBT / 5));
 }
 
 #[test]

@@ -9,14 +9,10 @@ use std::convert::Infallible;
 use crate::geometry::{Pose, SampleTree, interpolate};
 use crate::scene::Body;
 use crate::sdf::Grid;
+use crate::tolerances::{PENALTY_TRAVEL, SAMPLED_DEPTH_SHARE};
 
 use super::contacts::Contacts;
 use super::parameters::PenaltyParameters;
-
-/// Share of the tolerance that samples may use up; the rest is for what lies between them.
-const SHARE: f64 = 0.9;
-/// No point travels further between two poses that are checked, in the planning frame.
-const DENSITY: f64 = 0.06;
 
 /// Whether all pairs keep to their depth between two poses, the first one excluded. Puts the
 /// indices of pairs that do not in `deep`.
@@ -32,7 +28,7 @@ pub(super) fn holds_between(
     let turn = from.rotation.angle_to(&to.rotation);
     let radius = body.shape.reach + (centre - body.shape.mass.centre).norm();
     let travel = (to * centre - from * centre).norm() + turn * radius;
-    let count = (travel / DENSITY).ceil().max(1.0) as u32;
+    let count = (travel / PENALTY_TRAVEL).ceil().max(1.0) as u32;
     (1..=count).all(|k| {
         let between = || interpolate(from, to, &centre, f64::from(k) / f64::from(count));
         let pose = if k == count { *to } else { between() };
@@ -50,7 +46,7 @@ fn holds(
     let before = deep.len();
     for (i, pair) in contacts.pairs.iter().enumerate().filter(|(_, p)| p.standing.bounds.meets(&bounds)) {
         let allowance = contacts.scene.allowances.of(contacts.part, pair.other);
-        let limit = allowance + parameters.depth_tolerance() * pair.scale * SHARE;
+        let limit = allowance + parameters.depth_tolerance() * pair.scale * SAMPLED_DEPTH_SHARE;
         let to_standing = pair.standing.planning_from_shape.inverse() * pose;
         let is_deep = is_deeper(contacts.body, pair.standing, &to_standing, limit)
             || is_deeper(pair.standing, contacts.body, &to_standing.inverse(), limit);

@@ -11,6 +11,8 @@
 //! the next begins there at rest. Known misses: features that enter only between two samples; parts
 //! that turn so fast that a thin one is crossed within a single step.
 
+use crate::tolerances::{PENALTY_REACH, PENALTY_TRAVEL, TOUCHED};
+
 mod contacts;
 mod depth;
 mod parameters;
@@ -33,13 +35,6 @@ use contacts::Contacts;
 pub use parameters::PenaltyParameters;
 use points::PointCache;
 use step::{Drive, Rigid, State, Stepper};
-
-/// Contact points are gathered this far ahead, in the planning frame: about ten steps at full speed.
-const GATHERED: f64 = 0.1;
-/// A waypoint follows when a point may have travelled this far since the last one.
-const LONGEST_TRAVEL: f64 = 0.06;
-/// Poses closer than this are one waypoint.
-const LEAST_TRAVEL: f64 = 1e-6;
 
 /// The engine. It remembers the contact points of shapes that it met; clones share them.
 #[derive(Debug, Clone, Default)]
@@ -227,11 +222,11 @@ impl Run<'_> {
             state = next;
             since += 1;
             travelled += travel;
-            if since < self.parameters.steps_per_waypoint && travelled < LONGEST_TRAVEL && step < steps {
+            if since < self.parameters.steps_per_waypoint && travelled < PENALTY_TRAVEL && step < steps {
                 continue;
             }
             // The path ends where the part does.
-            let least = if step < steps { LEAST_TRAVEL } else { f64::MIN_POSITIVE };
+            let least = if step < steps { TOUCHED } else { f64::MIN_POSITIVE };
             match self.waypoint(&state, travelled, least) {
                 Waypoint::Deep => return Ok(Block::Cut(held)),
                 Waypoint::Out(direction) => return Ok(Block::Out(direction)),
@@ -267,7 +262,7 @@ impl Run<'_> {
     }
 
     fn gather(&mut self, state: &State, reach: f64) {
-        self.slack = reach.max(GATHERED);
+        self.slack = reach.max(PENALTY_REACH);
         self.contacts.gather(&self.stepper.rigid.pose(state), self.slack);
     }
 

@@ -7,8 +7,8 @@
 
 use nalgebra::{Cholesky, Matrix6, SMatrix, SVector, U6, Vector6};
 
-/// Slopes that are kept at one point.
-pub(super) const MOST: usize = 8;
+use crate::budgets::SLOPES_PER_POINT;
+
 /// Relative to squared lengths, what counts as no difference.
 const EQUAL: f64 = 1e-13;
 
@@ -38,23 +38,23 @@ impl Metric {
 
 /// A few scaled slopes.
 pub(super) struct Slopes {
-    list: [Vector6<f64>; MOST],
+    list: [Vector6<f64>; SLOPES_PER_POINT],
     count: usize,
 }
 
 /// Shares of slopes; 0 for those that have none.
-type Shares = [f64; MOST];
+type Shares = [f64; SLOPES_PER_POINT];
 
 impl Slopes {
     pub(super) fn new(first: Vector6<f64>) -> Self {
-        let mut list = [Vector6::zeros(); MOST];
+        let mut list = [Vector6::zeros(); SLOPES_PER_POINT];
         list[0] = first;
         Self { list, count: 1 }
     }
 
     /// Keeps another one; false if there is no room.
     pub(super) fn add(&mut self, slope: Vector6<f64>) -> bool {
-        let has_room = self.count < MOST;
+        let has_room = self.count < SLOPES_PER_POINT;
         if has_room {
             self.list[self.count] = slope;
             self.count += 1;
@@ -67,13 +67,13 @@ impl Slopes {
         let all = &self.list[..self.count];
         let shortest =
             (1..all.len()).fold(0, |b, i| if all[i].norm_squared() < all[b].norm_squared() { i } else { b });
-        let mut shares = [0.0; MOST];
+        let mut shares = [0.0; SLOPES_PER_POINT];
         shares[shortest] = 1.0;
-        let mut active = [false; MOST];
+        let mut active = [false; SLOPES_PER_POINT];
         active[shortest] = true;
         let mut x = all[shortest];
         // Each round ends at a shorter vector than the one before.
-        for _ in 0..4 * MOST {
+        for _ in 0..4 * SLOPES_PER_POINT {
             let along = |i: usize| x.dot(&all[i]);
             let next = (1..all.len()).fold(0, |b, i| if along(i) < along(b) { i } else { b });
             let largest = all.iter().map(Vector6::norm_squared).fold(0.0, f64::max);
@@ -95,11 +95,11 @@ impl Slopes {
 
     /// Moves the shares to the shortest vector of the active slopes' hull, leaving out those that
     /// it does not need. False if they are too much alike to tell.
-    fn settle(&self, shares: &mut Shares, active: &mut [bool; MOST]) -> bool {
-        for _ in 0..MOST {
+    fn settle(&self, shares: &mut Shares, active: &mut [bool; SLOPES_PER_POINT]) -> bool {
+        for _ in 0..SLOPES_PER_POINT {
             let Some(wanted) = self.shortest_of_plane(active) else { return false };
             let negative = |i: &usize| active[*i] && wanted[*i] <= 0.0;
-            let Some(way) = (0..MOST)
+            let Some(way) = (0..SLOPES_PER_POINT)
                 .filter(negative)
                 .map(|i| shares[i] / (shares[i] - wanted[i]).max(f64::MIN_POSITIVE))
                 .reduce(f64::min)
@@ -107,7 +107,7 @@ impl Slopes {
                 *shares = wanted;
                 return true;
             };
-            for i in 0..MOST {
+            for i in 0..SLOPES_PER_POINT {
                 shares[i] += way * (wanted[i] - shares[i]);
                 if shares[i] <= EQUAL {
                     shares[i] = 0.0;
@@ -119,13 +119,18 @@ impl Slopes {
     }
 
     /// The shares of the shortest vector of the plane through the active slopes.
-    fn shortest_of_plane(&self, active: &[bool; MOST]) -> Option<Shares> {
-        let size = (0..MOST).filter(|i| active[*i]).map(|i| self.list[i].norm_squared()).fold(0.0, f64::max);
-        let gram = SMatrix::<f64, MOST, MOST>::from_fn(|i, j| match (active[i] && active[j], i == j) {
-            (true, _) => self.list[i].dot(&self.list[j]) / size + 1.0,
-            (false, same) => f64::from(u8::from(same)),
+    fn shortest_of_plane(&self, active: &[bool; SLOPES_PER_POINT]) -> Option<Shares> {
+        let size = (0..SLOPES_PER_POINT)
+            .filter(|i| active[*i])
+            .map(|i| self.list[i].norm_squared())
+            .fold(0.0, f64::max);
+        let gram = SMatrix::<f64, SLOPES_PER_POINT, SLOPES_PER_POINT>::from_fn(|i, j| {
+            match (active[i] && active[j], i == j) {
+                (true, _) => self.list[i].dot(&self.list[j]) / size + 1.0,
+                (false, same) => f64::from(u8::from(same)),
+            }
         });
-        let ones = SVector::<f64, MOST>::from_fn(|i, _| f64::from(u8::from(active[i])));
+        let ones = SVector::<f64, SLOPES_PER_POINT>::from_fn(|i, _| f64::from(u8::from(active[i])));
         let shares = Cholesky::new(gram)?.solve(&ones);
         let sum = shares.sum();
         (sum > 0.0 && sum.is_finite()).then(|| std::array::from_fn(|i| shares[i] / sum))
@@ -153,7 +158,7 @@ mod tests {
 
     #[test]
     fn the_shortest_vector_makes_no_slope_longer_to_follow() {
-        for (count, seed) in (1..=MOST).flat_map(|c| (0..60).map(move |s| (c, 7 * s))) {
+        for (count, seed) in (1..=SLOPES_PER_POINT).flat_map(|c| (0..60).map(move |s| (c, 7 * s))) {
             for distance in [0.0, 0.7, 3.0] {
                 let slopes = slopes(count, seed, distance);
                 let x = slopes.least();

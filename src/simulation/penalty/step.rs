@@ -10,7 +10,9 @@
 
 use nalgebra::{Cholesky, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6};
 
+use crate::budgets::{BACKTRACKS, EVALUATIONS_PER_ITERATION};
 use crate::geometry::{Pose, Shape};
+use crate::tolerances::{ARMIJO, BACKTRACK_SHARE, BARRED_SHARE};
 
 use super::contacts::{Contacts, Evaluation, Placement};
 use super::parameters::PenaltyParameters;
@@ -19,17 +21,6 @@ use super::slopes::{Metric, Slopes};
 /// Added to the squared lengths in inertia tensors: bodies without extent across an axis have none.
 const LEAST_INERTIA: f64 = 1e-8;
 const LEAST_MASS: f64 = 1e-9;
-/// A Newton step that does not lead down is shortened to this share, so many times at most.
-const BACK: f64 = 0.25;
-const BACKTRACKS: u32 = 6;
-/// Evaluations of a step, per Newton iteration that it may take. Smooth contact needs one each; a
-/// part that is wedged between points whose slopes all jump could go on for hundreds, and gain
-/// millionths.
-const EVALUATIONS: u64 = 2;
-/// A way shorter than this share is barred.
-const LEAST_SHARE: f64 = 0.01;
-/// Share of the linear forecast by which the energy must fall (Armijo).
-const ENOUGH: f64 = 1e-4;
 
 /// A body at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -195,7 +186,8 @@ impl<'a> Stepper<'a> {
         let at = Problem { state, goal, contacts };
         self.tally.evaluations += 1;
         contacts.evaluate(&placement(state, z), self.drive.turns, &mut self.current);
-        let most = self.tally.evaluations + EVALUATIONS * u64::from(self.parameters.newton_iterations);
+        let most =
+            self.tally.evaluations + EVALUATIONS_PER_ITERATION * u64::from(self.parameters.newton_iterations);
         for _ in 0..self.parameters.newton_iterations {
             if self.tally.evaluations >= most {
                 break;
@@ -235,7 +227,7 @@ impl<'a> Stepper<'a> {
                 return self.taken(at, next);
             }
             let found = self.search(at, z, local.energy, slope.norm_squared(), &up);
-            if found.share >= LEAST_SHARE {
+            if found.share >= BARRED_SHARE {
                 return Descent::Lower(z - up * found.share);
             }
             if found.share > 0.0 {
@@ -268,12 +260,12 @@ impl<'a> Stepper<'a> {
         for _ in 0..=BACKTRACKS {
             let next = z - up * share;
             self.evaluate(at, &next);
-            if at.goal.energy(&next, &self.trial) <= energy - ENOUGH * share * slope {
+            if at.goal.energy(&next, &self.trial) <= energy - ARMIJO * share * slope {
                 found.share = share;
                 break;
             }
             found.barred = at.goal.gradient(&next, &self.trial);
-            share *= BACK;
+            share *= BACKTRACK_SHARE;
         }
         found
     }

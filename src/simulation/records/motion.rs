@@ -15,6 +15,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use serde::{Deserialize, Serialize};
 
 use super::{SOURCES, add_action};
+use crate::budgets::MOTION_VARIANTS;
 use crate::cache::{Digest, RecordKey, RecordKind, RequestCache, Storage};
 use crate::geometry::{Bounds, Pose, add_bounds, add_pose};
 use crate::scene::{Scene, Surroundings, add_samples, add_standing, exit_direction};
@@ -27,9 +28,6 @@ pub(crate) static WITNESS: RecordKind =
 /// A motion of the transition function.
 pub(crate) static MOTION: RecordKind =
     RecordKind::of::<MotionRecord>(4, "motion", Storage::MemoryAndDisk, SOURCES);
-
-/// Motions with one start, each among other parts, that are remembered; of more, the last ones.
-const MOST_VARIANTS: usize = 8;
 
 /// The surroundings of one motion. In a record, the ones used last come last.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -107,7 +105,7 @@ impl MotionQuestion<'_> {
             cache.put(variant.key(&digest), &record);
             known.retain(|v| *v != variant);
             known.push(variant);
-            known.drain(..known.len().saturating_sub(MOST_VARIANTS));
+            known.drain(..known.len().saturating_sub(MOTION_VARIANTS));
             cache.put(digest.key(&WITNESS), &known);
         }
         Ok(motion)

@@ -3,6 +3,7 @@
 //! on it, is computed again.
 
 use super::SOURCES;
+use crate::budgets::PARTS_PER_LINE;
 use crate::cache::{Digest, RecordKey, RecordKind, RequestCache, Storage};
 use crate::contact::ShapeCast;
 use crate::geometry::add_pose;
@@ -17,9 +18,6 @@ pub(crate) static SWEPT: RecordKind =
 /// By hashes of how a part on the way stands and how far the way past it goes: whether it is entered. The last ones that
 /// were cast at come last.
 type SweptPast = Vec<([u8; 16], bool)>;
-
-/// Parts along one line that are remembered; of more, the last ones.
-const MOST_PAST: usize = 256;
 
 /// Why the cache does not answer a sweep.
 enum UnknownSweep {
@@ -81,7 +79,7 @@ pub(crate) fn remembered_sweep(
     let swept = straight_sweep_past(question, termination, enters);
     // Also of an interrupted sweep: each cast that ended holds.
     if let Some(mut known) = known.filter(|_| is_new) {
-        known.drain(..known.len().saturating_sub(MOST_PAST));
+        known.drain(..known.len().saturating_sub(PARTS_PER_LINE));
         cache.put(key, &known);
     }
     swept

@@ -5,6 +5,8 @@
 //! constraints linearised at that pose, and the step is projected again (sequential quadratic
 //! programming); a step that still enters is halved.
 
+use crate::budgets::{EAGER_ROUNDS, LAZY_ROUNDS, STEP_HALVINGS};
+
 mod lift;
 mod release;
 #[cfg(test)]
@@ -17,37 +19,15 @@ use crate::contact::sampled::{Around, Contact, Mover, Near};
 use crate::geometry::{Pose, Shape, interpolate};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll, try_all};
-use crate::tolerances::{BULGE_TOLERANCE, DEPTH_TOLERANCE, FREE_STEP};
+use crate::tolerances::{
+    BULGE_TOLERANCE, CONTACT_REACH, CONTACT_STEP, DEPTH_TOLERANCE, FREE_STEP, FREE_TURN_STEPS, PRESSED_SHARE,
+    STEP_BULGE, STEP_OVERSHOOT, STEP_STRETCH, STUCK_SHARE,
+};
 
 use super::super::Action;
 use super::super::projection::{Projected, project};
 use super::super::reduction::reduced;
 use release::Taken;
-
-/// A motion that follows less than this share of the action (cos² of the angle between them) is
-/// stuck.
-pub(super) const LEAST_SHARE: f64 = 0.05;
-/// Longest contact step, in the planning frame.
-const CONTACT_STEP: f64 = 0.12;
-/// How far the arc of one turning step may bulge from its chord.
-const LARGEST_BULGE: f64 = 1e-3;
-/// A free turn is at most so many contact steps long: exits show only at the ends of steps.
-const LONGEST_FREE_TURN: f64 = 4.0;
-/// Where contact takes most of a motion away, so many times as much is asked for, at least and at most.
-const STRETCH: std::ops::Range<f64> = 1.25..8.0;
-/// Contacts are looked for as near as this share of a step: most steps go along what is that near, and what
-/// is further off and matters nevertheless is found where the step leads. In tight fits all of the wall is near,
-/// and contacts take the most time: with a quarter of a step turning there takes a fifth longer, with less than
-/// this what is found only where steps lead takes what that saves.
-const REACH: f64 = 0.06;
-const EAGER_ROUNDS: usize = 6;
-const LAZY_ROUNDS: usize = 12;
-const HALVINGS: usize = 3;
-/// A step is no longer than what was wanted by more than this (in its square): contacts that are left make it
-/// a little longer.
-const FARTHEST: f64 = 4.0;
-/// Pressed is what holds back more than this share of the wanted motion (in its square).
-const LEAST_PRESSURE: f64 = 1e-4;
 
 /// Contacts between two looks at the termination condition: large surfaces that lie on each other have tens
 /// of thousands.
@@ -98,7 +78,7 @@ impl Drive {
         let mut step = contact_step(shape);
         if action.turns() && radius > 0.0 {
             // An arc of this length bulges by s²/8r.
-            step = step.min((8.0 * radius * LARGEST_BULGE).sqrt());
+            step = step.min((8.0 * radius * STEP_BULGE).sqrt());
         }
         // A force of half the torque over the part's radius, without inertia: v/ω = ρ²/(2r).
         let (v, turn) = match action {
@@ -124,7 +104,7 @@ impl Drive {
 
     /// How far contacts are looked for.
     pub(super) fn reach(&self) -> f64 {
-        self.step * REACH
+        self.step * CONTACT_REACH
     }
 
     /// What a step begins with, as [`Self::advance`] does.
@@ -146,14 +126,14 @@ impl Drive {
     ) -> Result<Step, Interrupt> {
         if near.contacts.is_empty() && near.clearance >= self.step {
             let factor = (near.clearance.min(FREE_STEP) / self.step).max(1.0);
-            let twist = self.wanted * if self.turns { factor.min(LONGEST_FREE_TURN) } else { factor };
+            let twist = self.wanted * if self.turns { factor.min(FREE_TURN_STEPS) } else { factor };
             let there = Mover { pose: self.displaced(mover, &twist), ..*mover };
             let near = around.near(&there)?;
             return Ok(Step::Moved(Self::moved(&there, near, &twist, Vec::new(), Vec::new())));
         }
         let mut with = Vec::new();
         for start in [Start::Certain, Start::Lazy] {
-            for halving in 0..=HALVINGS {
+            for halving in 0..=STEP_HALVINGS {
                 let wanted = self.wanted / f64::from(1u32 << halving);
                 let known = match start {
                     Start::Certain => self.chosen(mover, near, &wanted)?,
@@ -192,8 +172,8 @@ impl Drive {
         let result = self.solved(known)?;
         let share = result.w.dot(&target) / target.norm_squared();
         let stretch = self.longest(mover, &result.w.component_div(&self.metric));
-        let is_worth_it = share >= LEAST_SHARE && stretch >= STRETCH.start;
-        is_worth_it.then(|| self.wanted * stretch.min(STRETCH.end))
+        let is_worth_it = share >= STUCK_SHARE && stretch >= STEP_STRETCH.start;
+        is_worth_it.then(|| self.wanted * stretch.min(STEP_STRETCH.end))
     }
 
     /// A step in contact may be so many times as long as a twist: by how far points travel, and by how much the arc
@@ -209,7 +189,7 @@ impl Drive {
         let radius = shape.radius_about(&shape.mass.centre, &axis);
         let arc = turn.norm() * radius;
         // An arc of length s bulges by s²/8r.
-        by_travel(arc).min((8.0 * radius * LARGEST_BULGE).sqrt() / arc)
+        by_travel(arc).min((8.0 * radius * STEP_BULGE).sqrt() / arc)
     }
 
     /// Projects the wanted twist until the trial pose is free of entry. If it is stretched, the motion is no longer
@@ -228,11 +208,11 @@ impl Drive {
         for round in 0..rounds {
             mover.check()?;
             // Rows that nearly contradict each other meet far away: nothing on the way there is looked at.
-            let is_near = |p: &Projected| p.w.norm_squared() <= FARTHEST * target.norm_squared();
+            let is_near = |p: &Projected| p.w.norm_squared() <= STEP_OVERSHOOT * target.norm_squared();
             let Some(result) = self.projected(&target, &rows, round == 0).filter(is_near) else { break };
             let touching = result.others(&rows);
             let share = result.w.dot(&target) / target.norm_squared();
-            if share < LEAST_SHARE {
+            if share < STUCK_SHARE {
                 return Ok(Attempt::Stuck(touching));
             }
             let mut twist = result.w.component_div(&self.metric);
@@ -394,7 +374,7 @@ impl Drive {
     /// of contact change all the time.
     fn pressing(&self, target: &Vector6<f64>, result: &Projected, rows: &[Row]) -> Vec<Vector6<f64>> {
         let lost = target - result.w;
-        if lost.norm_squared() < LEAST_PRESSURE * target.norm_squared() {
+        if lost.norm_squared() < PRESSED_SHARE * target.norm_squared() {
             return Vec::new();
         }
         if self.turns {

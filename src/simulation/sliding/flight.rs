@@ -6,21 +6,13 @@
 
 use nalgebra::Vector3;
 
-use crate::contact::region_cover::surface_pair::TILT;
 use crate::contact::{CastMargins, ShapeCast};
 use crate::geometry::{Bounds, Pose};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{BULGE_TOLERANCE, DEPTH_TOLERANCE, FREE_STEP};
-
-/// So far ahead is looked at once, in the planning frame.
-const STRETCH: f64 = 4.0;
-/// Flights that are shorter cost more than regions, which have to be found anew where one ends.
-const SHORTEST: f64 = FREE_STEP / 2.0;
-/// A flight ends so far before what is met: regions lead on to it.
-const LANDING: f64 = 4.0 * DEPTH_TOLERANCE;
-/// So deep a flight may enter anything: what is rounded in files, and little enough for regions to go on from there.
-const LEAST: f64 = 1e-5;
+use crate::tolerances::{
+    BULGE_TOLERANCE, FLIGHT_STRETCH, FREE_STEP, LANDING, ROUNDED, SHORTEST_FLIGHT, TILT,
+};
 
 /// The flights of a push.
 #[derive(Clone, Copy)]
@@ -105,27 +97,27 @@ impl<'a> Flights<'a> {
         self.state == State::Aloft
     }
 
-    /// How far it gets before it meets anything, up to a [`STRETCH`], and whether it meets anything; 0 where that is
+    /// How far it gets before it meets anything, up to a [`FLIGHT_STRETCH`], and whether it meets anything; 0 where that is
     /// hardly worth anything. It depends on nothing but what the box meets on this stretch.
     fn length(&self, from: &Pose, bounds: &Bounds, u: &Vector3<f64>) -> Result<(f64, bool), Interrupt> {
         let Self { scene, standing, part, termination, .. } = *self;
-        let end = u * (STRETCH + LANDING);
+        let end = u * (FLIGHT_STRETCH + LANDING);
         let swept = bounds.union(&Bounds { min: bounds.min + end, max: bounds.max + end });
-        let (mut length, mut is_met) = (STRETCH, false);
+        let (mut length, mut is_met) = (FLIGHT_STRETCH, false);
         for other in scene.broad_phase.meeting_of(standing, &swept) {
-            let granted = scene.allowances.of(part, other) + LEAST;
+            let granted = scene.allowances.of(part, other) + ROUNDED;
             // As deep as it may be before.
             let back = granted + BULGE_TOLERANCE;
-            let margins = CastMargins { granted, back, steepness: TILT, sunk: LEAST };
+            let margins = CastMargins { granted, back, steepness: TILT, sunk: ROUNDED };
             let passed = bounds.grown(granted).way_past(&scene.bodies[other].bounds, u);
             let travel = passed.min(length + LANDING);
             let (start, direction) = (from, u);
             let cast = ShapeCast { scene, part, start, direction, travel, other, margins, termination };
-            let way = cast.way(SHORTEST + LANDING)?;
+            let way = cast.way(SHORTEST_FLIGHT + LANDING)?;
             if way < travel {
                 (length, is_met) = (way - LANDING, true);
             }
-            if length < SHORTEST {
+            if length < SHORTEST_FLIGHT {
                 return Ok((0.0, false));
             }
         }
@@ -154,11 +146,11 @@ mod tests {
         let (scene, _) = scene([plate, block, far, near]);
         let to_wall = length(&scene, Vector3::x());
         // The bound is that of a face that is met squarely.
-        assert!((1.0 - LANDING..1.0 - LANDING + 2.0 * LEAST).contains(&to_wall), "{to_wall}");
+        assert!((1.0 - LANDING..1.0 - LANDING + 2.0 * ROUNDED).contains(&to_wall), "{to_wall}");
         assert_eq!(length(&scene, Vector3::y()), 0.0);
         assert_eq!(length(&scene, -Vector3::z()), 0.0, "onto the plate");
-        assert_eq!(length(&scene, Vector3::z()), STRETCH);
-        assert_eq!(length(&scene, -Vector3::x()), STRETCH, "along the plate, and off it");
+        assert_eq!(length(&scene, Vector3::z()), FLIGHT_STRETCH);
+        assert_eq!(length(&scene, -Vector3::x()), FLIGHT_STRETCH, "along the plate, and off it");
     }
 
     #[test]

@@ -11,42 +11,17 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 
+use crate::budgets::{FREE_STATIONS, HELD_STATIONS, HELIX_LEAP_STEPS, LEAP_STEPS, SHORTEST_HELIX_LEAP};
 use crate::contact::sampled::{Around, Mover, Near};
 use crate::geometry::{Pose, Screw};
 use crate::scene::{Scene, Surroundings};
 use crate::termination::{Interrupt, try_all};
-use crate::tolerances::DEPTH_TOLERANCE;
+use crate::tolerances::{
+    DEPTH_TOLERANCE, LEAP_ANGLE, LEAST_PITCH, PRESSED_DEPTH, PRESSED_PROBE, PRESSED_PROBE_ON_HELIX,
+    SAME_HELIX, SAME_STEP, SCREW_FROM_POSES_ANGLE, SEEN_HELIX_ANGLE,
+};
 
 use super::drive::Drive;
-
-/// Two steps are one motion if no point of the part differs by more than this share of a step …
-const SAME: f64 = 0.02;
-/// … and belong to one helix up to this share.
-const ALIKE: f64 = 0.15;
-/// A helix is seen once so much of it, in radians, was passed in steps that are alike.
-const LEAST_HELIX: f64 = 0.4;
-/// A leap is at most so many steps long …
-const LONGEST: usize = 32;
-/// … and turns by at most this angle: less than half a turn, so that it tells its screw.
-const WIDEST: f64 = 2.4;
-/// The same for leaps along a helix. They may be many turns long, if what is left beyond whole turns is
-/// from `TELLING` to as much less than a turn: near whole turns, nothing tells the axis.
-const LONGEST_ON_HELIX: usize = 512;
-const TELLING: f64 = 0.25 * TAU;
-/// Every so many steps it is looked whether the part is still on the thread, and every so many, whether
-/// it clearly enters anything; then more closely where that ends.
-const HELD_STATIONS: [usize; 2] = [4, 1];
-const FREE_STATIONS: [usize; 3] = [16, 4, 1];
-/// Shorter leaps along a helix gain nothing over steps.
-const SHORTEST_ON_HELIX: usize = 4;
-/// A helix gets at least so much further with every turn, in the planning frame.
-const LEAST_LEAD: f64 = 0.02;
-/// How far a part is moved against what it is pressed to, to see whether that is still there, in
-/// steps; and on a thread, where it is less than the pitch.
-const PROBE: f64 = 1.0;
-const PROBE_ON_HELIX: f64 = 0.25;
-/// How deep the probe must enter a thread, in the planning frame.
-const PRESSED: f64 = 2e-3;
 
 /// What a leap came to.
 pub(super) struct Leap {
@@ -120,10 +95,10 @@ impl<'a> Leaper<'a> {
         let apart = self.last.replace(now).map_or(f64::INFINITY, |before| self.apart(&before, &now, from));
         let step = self.drive.step();
         self.alike = match self.alike {
-            Some((begin, count)) if apart < ALIKE * step => Some((begin, count + 1)),
+            Some((begin, count)) if apart < SAME_HELIX * step => Some((begin, count + 1)),
             _ => Some((*from, 1)),
         };
-        if apart >= SAME * step {
+        if apart >= SAME_STEP * step {
             self.length = 2;
             self.begin_helix(mover, &now, pressing);
             return self.follow(mover);
@@ -148,11 +123,11 @@ impl<'a> Leaper<'a> {
     /// Starts to follow a helix, if the steps so far show one.
     fn begin_helix(&mut self, mover: &Mover<'_>, now: &Screw, pressing: Vec<Vector6<f64>>) {
         let Some((begin, count)) = self.alike else { return };
-        if pressing.is_empty() || now.angle() * (count as f64) < LEAST_HELIX {
+        if pressing.is_empty() || now.angle() * (count as f64) < SEEN_HELIX_ANGLE {
             return;
         }
         let screw = Screw::between(&begin, &mover.pose, count);
-        if screw.lead() < LEAST_LEAD {
+        if screw.lead() < LEAST_PITCH {
             return;
         }
         self.helix = Some(Helix { screw, length: count, pressing });
@@ -161,9 +136,9 @@ impl<'a> Leaper<'a> {
     /// The next leap along a helix that is followed.
     pub(super) fn follow(&mut self, mover: &Mover<'_>) -> Result<Option<Leap>, Interrupt> {
         let Some(Helix { screw, length, pressing }) = self.helix.take() else { return Ok(None) };
-        let wanted = telling(&screw, length.min(LONGEST_ON_HELIX));
+        let wanted = telling(&screw, length.min(HELIX_LEAP_STEPS));
         let mut steps = telling(&screw, self.free_on_helix(mover, &screw, wanted, &pressing)?);
-        while steps >= SHORTEST_ON_HELIX {
+        while steps >= SHORTEST_HELIX_LEAP {
             let there = Mover { pose: screw.times(steps as f64) * mover.pose, ..*mover };
             if let Some(pose) = self.drive.lifted(&there, &screw.axis(), self.surroundings)? {
                 let angle = screw.angle() * steps as f64;
@@ -218,7 +193,7 @@ impl<'a> Leaper<'a> {
     fn is_pressed(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> Result<bool, Interrupt> {
         let (v, w): (Vector3<f64>, Vector3<f64>) =
             (push.fixed_rows::<3>(0).into(), push.fixed_rows::<3>(3).into());
-        let scale = PROBE * self.drive.step() / (v.norm() + w.norm() * self.radius);
+        let scale = PRESSED_PROBE * self.drive.step() / (v.norm() + w.norm() * self.radius);
         let mut pose = mover.pose;
         let turn = UnitQuaternion::from_scaled_axis(w * scale);
         pose.append_rotation_wrt_point_mut(&turn, &mover.centre());
@@ -230,16 +205,16 @@ impl<'a> Leaper<'a> {
     fn is_on_thread(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> Result<bool, Interrupt> {
         let pull: Vector3<f64> = push.fixed_rows::<3>(0).into();
         let Some(direction) = pull.try_normalize(0.0) else { return Ok(false) };
-        let step = direction * (PROBE_ON_HELIX * self.drive.step());
+        let step = direction * (PRESSED_PROBE_ON_HELIX * self.drive.step());
         let pose = Translation3::from(step) * mover.pose;
-        Mover { pose, ..*mover }.enters_by(PRESSED, &self.surroundings.standing)
+        Mover { pose, ..*mover }.enters_by(PRESSED_DEPTH, &self.surroundings.standing)
     }
 }
 
 /// The most steps of a leap along a screw.
 fn longest(screw: &Screw) -> usize {
-    let most = if screw.angle() > 0.0 { (WIDEST / screw.angle()) as usize } else { LONGEST };
-    most.min(LONGEST)
+    let most = if screw.angle() > 0.0 { (LEAP_ANGLE / screw.angle()) as usize } else { LEAP_STEPS };
+    most.min(LEAP_STEPS)
 }
 
 /// Up to which step all that are looked at are good: every so many of them, and beyond the last good one
@@ -262,7 +237,8 @@ fn good_until(
 fn telling(screw: &Screw, wanted: usize) -> usize {
     let tells = |steps: &usize| {
         let angle = screw.angle() * *steps as f64;
-        angle < WIDEST || (TELLING..=TAU - TELLING).contains(&angle.rem_euclid(TAU))
+        angle < LEAP_ANGLE
+            || (SCREW_FROM_POSES_ANGLE..=TAU - SCREW_FROM_POSES_ANGLE).contains(&angle.rem_euclid(TAU))
     };
     (1..=wanted).rev().find(tells).unwrap_or(0)
 }
@@ -299,7 +275,10 @@ mod tests {
         for wanted in 30..400 {
             let steps = telling(&screw, wanted);
             let left = (0.1 * steps as f64).rem_euclid(TAU);
-            assert!((TELLING..=TAU - TELLING).contains(&left) || steps < 24, "{steps} of {wanted}");
+            assert!(
+                (SCREW_FROM_POSES_ANGLE..=TAU - SCREW_FROM_POSES_ANGLE).contains(&left) || steps < 24,
+                "{steps} of {wanted}"
+            );
             assert!(steps <= wanted && wanted - steps < 33, "{steps} of {wanted}");
         }
     }

@@ -8,17 +8,14 @@
 
 use nalgebra::Point3;
 
+use crate::budgets::LOOKS_BY_SAMPLES;
 use crate::contact::sampled::{Around, Extent, Mover, Near, Vicinity};
 use crate::geometry::Pose;
 use crate::termination::Interrupt;
-use crate::tolerances::FREE_STEP;
+use crate::tolerances::{FREE_STEP, KNOWN_SAMPLE_STEPS};
 
 use super::drive::contact_step;
 
-/// With more looks at either surface than this, fields are quicker: in the play of a thread nearly all samples are near.
-const MOST_LOOKS: usize = 1200;
-/// Around the start, samples are known as far as so many steps lead.
-const STEPS: f64 = 2.0;
 /// Of lengths, as a share of these.
 const ROUNDING: f64 = 1e-9;
 
@@ -40,9 +37,9 @@ impl Start {
         other: usize,
         (least, reach): (f64, f64),
     ) -> Result<Option<Self>, Interrupt> {
-        let radius = STEPS * contact_step(&mover.body.shape) + reach;
+        let radius = KNOWN_SAMPLE_STEPS * contact_step(&mover.body.shape) + reach;
         let vicinity = Vicinity::new(mover, other, least + FREE_STEP + radius);
-        let near = vicinity.near(mover, Extent { radius, reach, most: MOST_LOOKS })?;
+        let near = vicinity.near(mover, Extent { radius, reach, most: LOOKS_BY_SAMPLES })?;
         Ok(near.map(|near| Self { vicinity, centre: mover.centre(), radius, near }))
     }
 }

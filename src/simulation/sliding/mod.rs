@@ -18,6 +18,7 @@ mod push;
 mod stages;
 mod turning;
 
+use crate::budgets::MOTION_POSES;
 use crate::contact::region_cover::Halt;
 use crate::contact::region_cover::rigid::Holds;
 use crate::contact::sampled::Mover;
@@ -34,9 +35,6 @@ use turning::Turning;
 
 pub use pair::pair_blocks;
 pub use stages::{StepCost, Telling, step_costs};
-
-/// A motion that is not done after so many poses turns without end.
-const MOST_POSES: usize = 8000;
 
 /// The engine.
 #[derive(Debug, Clone, Copy, Default)]
@@ -82,7 +80,7 @@ impl TransitionFunction for SlidingEngine {
             Holds::new(scene, surroundings, (part, start), drive.reach(), by_samples, termination);
         let mut leaper = Leaper::new(scene, surroundings, part, &drive);
         let mut near = None;
-        while path.len() < MOST_POSES {
+        while path.len() < MOTION_POSES {
             termination.check()?;
             let (mut turned, mut touching) = (0.0, Vec::new());
             let mut leap = leaper.follow(&mover)?;
@@ -144,7 +142,7 @@ fn pushed(
 ) -> Result<Motion, Halt> {
     let mut push = Push::new(scene, &surroundings.standing, (part, start), action.force(), termination);
     let (mut path, mut asked) = (vec![*start], Vec::new());
-    while path.len() < MOST_POSES {
+    while path.len() < MOTION_POSES {
         let step = match push.step() {
             // Where it landed regions cannot tell: they are to tell all the way.
             Err(Halt::Lost) if push.begins_on_foot() => {

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use crate::budgets::{STATIC_PUSHES, STATIC_STEPS};
 use crate::contact::region_cover::Halt;
 use crate::contact::region_cover::shift::Cells;
 use crate::contact::region_cover::surface_pair::Facing;
@@ -16,11 +17,6 @@ use super::super::Action;
 use super::drive::{Drive, Moved, Step};
 use super::looks::{Looks, Start};
 use super::push::{self, Push};
-
-/// Steps that the static analysis of a pair looks ahead (the paper's five extensions).
-const STATIC_STEPS: usize = 5;
-/// The same in steps that end where the next obstacle begins.
-const PUSHES: usize = 32;
 
 /// For each action, whether `other` alone keeps `part` at `pose` from following it by more than
 /// `least`: the static analysis that suits this engine, which excludes nothing that could slide.
@@ -112,7 +108,7 @@ fn translations_blocked(
     }
     let blocked = |action: &Action| {
         let mut push = Push::new(scene, &standing, (part, pose), action.force(), termination).short();
-        for _ in 0..PUSHES {
+        for _ in 0..STATIC_PUSHES {
             if let push::Step::Stuck { .. } = push.step()? {
                 return Ok(true);
             }

@@ -7,21 +7,19 @@
 
 use nalgebra::{Vector3, Vector6};
 
+use crate::budgets::{PUSH_BENDS, STALLS};
 use crate::contact::constraint::Row;
 use crate::contact::region_cover::Halt;
-use crate::contact::region_cover::shift::{Cells, MOST_STALLS, STALL};
+use crate::contact::region_cover::shift::Cells;
 use crate::contact::region_cover::surface_pair::Obstacle;
 use crate::geometry::{Bounds, Pose};
 use crate::scene::Scene;
 use crate::termination::Termination;
-use crate::tolerances::FREE_STEP;
+use crate::tolerances::{FREE_STEP, STALL, STUCK_SHARE};
 
 use super::super::projection::project;
-use super::drive::{LEAST_SHARE, contact_step};
+use super::drive::contact_step;
 use super::flight::Flights;
-
-/// So many times the direction is bent at one place.
-const MOST_BENDS: usize = 64;
 
 /// A part that is pushed.
 pub(super) struct Push<'a> {
@@ -109,10 +107,10 @@ impl<'a> Push<'a> {
             if obstacles.len() == known {
                 break;
             }
-            let Some((along, by)) = projected(&self.force, &obstacles).filter(|_| bends < MOST_BENDS) else {
+            let Some((along, by)) = projected(&self.force, &obstacles).filter(|_| bends < PUSH_BENDS) else {
                 return Err(Halt::Lost);
             };
-            if along.norm_squared() < LEAST_SHARE {
+            if along.norm_squared() < STUCK_SHARE {
                 return Ok(Step::Stuck { with: by });
             }
             u = along.normalize();
@@ -130,7 +128,7 @@ impl<'a> Push<'a> {
             false => self.cells.length(&self.shift, &u).min(most),
         };
         self.stalls = if length < STALL { self.stalls + 1 } else { 0 };
-        if self.stalls > MOST_STALLS {
+        if self.stalls > STALLS {
             return Err(Halt::Lost);
         }
         self.shift += u * length;

@@ -1,9 +1,7 @@
 //! The end of endless turning.
 
 use crate::contact::sampled::Mover;
-
-/// Travel per turn below which a turning part is going nowhere.
-const LEAST_TRAVEL: f64 = 0.01;
+use crate::tolerances::LEAST_TURNING_TRAVEL;
 
 /// Sees when a part turns for ever: a whole turn that took it no further from where it started
 /// than it had been, and brought no new contact. A thread gets further with every turn.
@@ -41,7 +39,7 @@ impl Turning {
         if self.angle < std::f64::consts::TAU {
             return false;
         }
-        let idle = self.farthest - self.farthest_before < LEAST_TRAVEL && !self.new_contact;
+        let idle = self.farthest - self.farthest_before < LEAST_TURNING_TRAVEL && !self.new_contact;
         self.angle = 0.0;
         self.farthest_before = self.farthest;
         self.new_contact = false;

@@ -3,9 +3,7 @@
 use nalgebra::Point3;
 
 use crate::geometry::Bounds;
-
-/// Clip a hull only if the part outside the box is longer than `LONG` times the part inside.
-const LONG: f64 = 1.0;
+use crate::tolerances::CLIPPED_LENGTH;
 
 /// Points whose hull is the part of the hull of `points` between the two sides of a box past which they reach furthest.
 /// A thin plate sees little of a bolt's long triangles; without clipping the rest is split off piece by piece. `None` if
@@ -17,7 +15,7 @@ pub(super) fn clipped(points: &[Point3<f64>], bounds: &Bounds) -> Option<Vec<Poi
     };
     let axis = (0..3).max_by(|&a, &b| beyond(a).total_cmp(&beyond(b)))?;
     let within = all.extents()[axis] - beyond(axis);
-    if beyond(axis) <= LONG * within || within < 0.0 {
+    if beyond(axis) <= CLIPPED_LENGTH * within || within < 0.0 {
         return None;
     }
     let sides = [bounds.min[axis], bounds.max[axis]];

@@ -28,18 +28,13 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
 
+use crate::budgets::{DEEP_POINTS, PATH_EFFORT, PATH_EFFORT_IN_DOUBT, RIM_EDGES_PER_EFFORT};
 use crate::geometry::{FreeRegion, PatchTree, Surface};
 use crate::termination::{Interrupt, Termination};
+use crate::tolerances::DEPTH_SHARE;
 
 use super::super::course::{Course, Interval, View};
 use super::super::passing::Passing;
-
-/// Effort ([`Found::effort`], a count of pieces and regions) spent on each surface before the way is left to samples: some seconds,
-/// for samples promise less. What is no screw, and sees no holes, has been seen to need a third (a bayonet that
-/// turns askew to all axes).
-const MOST_EFFORT: usize = 20_000_000;
-/// The same where holes are in sight, or threads cross: most stays open, however much is spent.
-pub(crate) const MOST_EFFORT_IN_DOUBT: usize = 200_000;
 
 /// How finely depth is told, in the planning frame.
 #[derive(Debug, Clone, Copy)]
@@ -71,7 +66,7 @@ impl Way<'_> {
         let [moving, standing] = self.passing.surfaces();
         let side = |on_moving| {
             let measured = if on_moving { standing } else { moving };
-            let most_effort = if measured.rim().is_some() { MOST_EFFORT_IN_DOUBT } else { MOST_EFFORT };
+            let most_effort = if measured.rim().is_some() { PATH_EFFORT_IN_DOUBT } else { PATH_EFFORT };
             self.depth_of_side(on_moving, Interval::WHOLE, most_effort)
         };
         let (one, other) = rayon::join(|| side(true), || side(false));
@@ -131,15 +126,10 @@ pub(crate) struct Found {
     pub(crate) effort: usize,
 }
 
-/// After so many deep points, a path is bad enough.
-const ENOUGH: usize = 400;
-/// Depths are told to this share.
-const NEARLY: f64 = 0.1;
-
 impl Precision {
     /// How closely some depth is told.
     fn margin_of(&self, depth: f64) -> f64 {
-        (NEARLY * depth).min(self.margin)
+        (DEPTH_SHARE * depth).min(self.margin)
     }
 }
 
@@ -155,7 +145,7 @@ impl Found {
 
     /// Whether so much is deep that more would not change the answer.
     pub(crate) fn is_enough(&self) -> bool {
-        self.deep.len() >= ENOUGH
+        self.deep.len() >= DEEP_POINTS
     }
 }
 
@@ -211,8 +201,6 @@ struct PathSearch<'a> {
     found: Found,
 }
 
-/// A piece has signs that depend on all edges of holes: so many of them take as long as all else.
-const EDGES_AT_ONCE: usize = 32;
 impl<'a> PathSearch<'a> {
     fn new(
         asked: &'a Question<'a>,
@@ -225,7 +213,7 @@ impl<'a> PathSearch<'a> {
             asked,
             has_rim: rim.is_some(),
             most_effort,
-            price: 1 + rim.map_or(0, |rim| rim.edges().len() / EDGES_AT_ONCE),
+            price: 1 + rim.map_or(0, |rim| rim.edges().len() / RIM_EDGES_PER_EFFORT),
             done: 0.0,
             view,
             termination,

@@ -2,22 +2,12 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::budgets::{HULL_CORNERS, RECENT_REGIONS, REGION_EFFORT, REGIONS_OF_PLACE};
 use crate::geometry::{Closest, FreeRegion, HullDepth, Parts, PatchTree, Wanted};
+use crate::tolerances::SWEPT_ROOM;
 
 use super::super::super::course::Leg;
 use super::{GridCell, KnownRegion, PathSearch, Question, SearchHint, SweptBall};
-
-/// What a region costs, in pieces.
-const REGION_EFFORT: usize = 40;
-/// Regions are asked for so much larger than the piece, that others find room.
-const ROOM: f64 = 3.0;
-/// So many regions of a place are tried …
-const TRIED: usize = 3;
-/// … and so many of those that held a piece last: the next one lies beside that, mostly.
-const RECENT: usize = 4;
-
-/// Of no more vertices each is asked about at once.
-const FEW: usize = 64;
 
 /// How far a piece is from a region: the distance of its worst corner, and that.
 pub(super) type Fit = Option<(f64, Point3<f64>)>;
@@ -40,8 +30,8 @@ impl PathSearch<'_> {
         }
         let place = place(swept);
         let known = self.places.get(&place).map_or(&[][..], Vec::as_slice);
-        let of_place = known.iter().rev().take(TRIED);
-        let recent = self.held.iter().rev().take(RECENT);
+        let of_place = known.iter().rev().take(REGIONS_OF_PLACE);
+        let recent = self.held.iter().rev().take(RECENT_REGIONS);
         for region in of_place.chain(&hint.region).chain(recent).copied() {
             let KnownRegion { free, is_outside } = &self.regions[region as usize];
             if let Some((depth, _)) = fits(free, spared) {
@@ -130,7 +120,7 @@ impl PathSearch<'_> {
     fn region(&self, swept: &SweptBall, seen: (&Closest, f64), most: f64, spared: f64) -> Option<FreeRegion> {
         let SweptBall { centre, radius, .. } = swept;
         let wanted = Wanted { points: &self.wanted, most, from_behind: false, facing: self.facing };
-        self.asked.measured.free_region_sparing(centre, radius * ROOM, seen, wanted, spared).ok()
+        self.asked.measured.free_region_sparing(centre, radius * SWEPT_ROOM, seen, wanted, spared).ok()
     }
 
     /// Whether a depth is what it is, as measured at the worst corner, or small enough not to matter:
@@ -190,7 +180,7 @@ pub(super) fn furthest(points: impl IntoIterator<Item = Point3<f64>>, region: &F
 
 /// The same for the images of all vertices of a node, of which most lie in balls that the region holds.
 pub(super) fn furthest_of(tree: &PatchTree, index: u32, leg: &Leg, region: &FreeRegion, most: f64) -> Fit {
-    if tree.vertices(index).len() <= FEW {
+    if tree.vertices(index).len() <= HULL_CORNERS {
         return furthest(leg.images(tree.vertices(index)), region, most);
     }
     // Who is beyond is so with one of these, mostly.

@@ -2,8 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::budgets::{HOPELESS_AFTER, HOPELESS_SHARE, HULL_CORNERS, WANTED_CORNERS};
 use crate::geometry::{FreeRegion, Parts, area_normal, bisected};
 use crate::termination::Interrupt;
+use crate::tolerances::{CLIP_MARGIN, DOUBTED_SIZE, FACING_ACROSS};
 
 use super::super::super::course::{Interval, Leg};
 use super::super::cover;
@@ -11,25 +13,8 @@ use super::clip::clipped;
 use super::settle::{furthest, furthest_of, swept};
 use super::{PathSearch, Precision, SearchHint, SweptBall};
 
-/// Hulls of more corners are not asked about as such.
-const MOST_CORNERS: usize = 64;
-/// For no more corners than this regions are grown.
-const MOST_WANTED: usize = 1024;
-/// What faces along its way, but for so little, has no side to it.
-const ACROSS: f64 = 0.5;
-/// Pieces that might be too deep are split until they are so much smaller than others.
-const DOUBT: f64 = 4.0;
-
 /// Corners of what a triangle passes on a straight way.
 const OF_STRAIGHT_WAY: usize = 6;
-/// What is no further beyond a box than this, in the planning frame, is left: of what only just enters, a sliver would
-/// find regions with planes that are askew to it.
-const BESIDE: f64 = 4e-3;
-
-/// In sight of holes, where after one part in so many of the effort …
-const HOPELESS_AFTER: usize = 10;
-/// … no more than this share is settled, the rest is not looked at.
-const HOPELESS: f64 = 0.02;
 
 /// A piece of the surface on a stretch of the way.
 #[derive(Clone, Copy)]
@@ -92,7 +77,7 @@ impl PathSearch<'_> {
 
     /// Whether, in sight of holes, so little is settled after so much effort that most will stay open.
     fn is_hopeless(&self) -> bool {
-        self.has_rim && self.found.effort > self.most_effort / HOPELESS_AFTER && self.done < HOPELESS
+        self.has_rim && self.found.effort > self.most_effort / HOPELESS_AFTER && self.done < HOPELESS_SHARE
     }
 
     fn is_enough(&self) -> bool {
@@ -122,7 +107,7 @@ impl PathSearch<'_> {
             self.wanted.extend(leg.images(tree.extremes(index)));
             let points = tree.vertices(index);
             self.hull.clear();
-            if points.len() * leg.maps.len() <= MOST_CORNERS {
+            if points.len() * leg.maps.len() <= HULL_CORNERS {
                 self.hull.extend(leg.images(points));
             }
             let fits = |region: &FreeRegion, most: f64| {
@@ -132,7 +117,7 @@ impl PathSearch<'_> {
                 furthest_of(tree, index, &leg, region, most)
             };
             let corners = || {
-                let few = if points.len() * leg.maps.len() <= MOST_WANTED { points } else { &[] };
+                let few = if points.len() * leg.maps.len() <= WANTED_CORNERS { points } else { &[] };
                 leg.images(few).collect()
             };
             if self.is_settled(&swept, leg.slack, &mut hint, fits, corners) {
@@ -141,7 +126,7 @@ impl PathSearch<'_> {
             }
         }
         let share = share / 2.0;
-        if in_time && leg.length > self.finest() / (2.0 * DOUBT) {
+        if in_time && leg.length > self.finest() / (2.0 * DOUBTED_SIZE) {
             let [first, second] = interval.halves();
             let half = |interval| SweptPiece::Patch(PatchPiece { interval, share, hint, ..piece });
             rest.extend([second, first].map(half));
@@ -185,7 +170,7 @@ impl PathSearch<'_> {
             if let Some(along) = leg.along {
                 // A plane that is askew to a long way is far off at its ends.
                 let across = self.facing - along * self.facing.dot(&along);
-                self.facing = across.try_normalize(ACROSS).unwrap_or(self.facing);
+                self.facing = across.try_normalize(FACING_ACROSS).unwrap_or(self.facing);
             }
             let fits = |region: &FreeRegion, most: f64| furthest(seen.iter().copied(), region, most);
             if self.is_settled(&within, leg.slack, &mut hint, fits, Vec::new)
@@ -199,7 +184,7 @@ impl PathSearch<'_> {
         }
         let was_measured = !leg.maps.is_empty();
         let share = piece.share / 2.0;
-        if in_time && leg.length > self.finest() / (2.0 * DOUBT) {
+        if in_time && leg.length > self.finest() / (2.0 * DOUBTED_SIZE) {
             // The second half of the way ends where all of it does.
             let [first, second] = interval.halves();
             let half = |is_new, interval| {
@@ -221,7 +206,7 @@ impl PathSearch<'_> {
         if self.has_rim || points.len() > OF_STRAIGHT_WAY {
             return None;
         }
-        clipped(points, &self.asked.measured.bounds().grown(slack + BESIDE))
+        clipped(points, &self.asked.measured.bounds().grown(slack + CLIP_MARGIN))
     }
 
     /// Whether the box of the measured surface lies beside a hull, given by balls.
@@ -260,7 +245,7 @@ impl PathSearch<'_> {
             bound = self.wanted.iter().map(over).fold(bound, f64::max);
         }
         if bound > asked.precision.deep {
-            if swept.radius > self.finest() / DOUBT {
+            if swept.radius > self.finest() / DOUBTED_SIZE {
                 return false;
             }
             self.found.deep.push((corners[0], bound));

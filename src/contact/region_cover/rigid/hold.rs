@@ -4,16 +4,12 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
 
+use crate::budgets::POSES_BETWEEN;
 use crate::geometry::{FreeRegion, Pose, Screw};
-use crate::tolerances::DEPTH_TOLERANCE;
+use crate::tolerances::{DEPTH_TOLERANCE, STEPS_AHEAD};
 
 use super::super::shift::Cell;
 use super::super::surface_pair::{Facing, Placed, Spot};
-
-/// So many times the displacement of a step regions are asked to allow, if they can.
-const AHEAD: f64 = 4.0;
-/// Poses of a step at which small bits are measured that no region holds at both ends.
-const BETWEEN: usize = 4;
 
 /// A piece in its region.
 #[derive(Clone)]
@@ -38,7 +34,7 @@ pub(crate) struct Ends {
     pub(crate) here: Pose,
     pub(crate) there: Pose,
     /// Between the two, if they differ.
-    pub(crate) between: [Pose; BETWEEN],
+    pub(crate) between: [Pose; POSES_BETWEEN],
     /// Where the motion from the one to the other leads.
     pub(crate) ahead: Pose,
 }
@@ -47,14 +43,14 @@ impl Ends {
     pub(crate) fn of(facing: &Facing<'_>, base: &Pose, there: &Pose) -> Self {
         let screw = Screw::between(base, there, 1);
         let after = |share: f64| facing.with_part_at(&(screw.times(share) * base));
-        let between = std::array::from_fn(|i| after((i + 1) as f64 / (BETWEEN + 1) as f64));
+        let between = std::array::from_fn(|i| after((i + 1) as f64 / (POSES_BETWEEN + 1) as f64));
         let [here, there] = [base, there].map(|pose| facing.with_part_at(pose));
-        Self { here, there, between, ahead: after(AHEAD) }
+        Self { here, there, between, ahead: after(STEPS_AHEAD) }
     }
 
     /// A pose alone.
     pub(crate) fn at(there: Pose) -> Self {
-        Self { here: there, there, between: [there; BETWEEN], ahead: there }
+        Self { here: there, there, between: [there; POSES_BETWEEN], ahead: there }
     }
 }
 

@@ -4,42 +4,28 @@ use std::sync::Arc;
 
 use nalgebra::{Point3, Vector3};
 
+use crate::budgets::{
+    CONTACTS_PER_LOOK, EDGE_SECTIONS, KEPT_CONTACTS, PASSED_TRIANGLES, PROBED_CORNERS, REGIONS_ON_APPROACH,
+    REGIONS_PER_LOOK, REGIONS_PER_MOTION, REGIONS_PER_STEP, RIGID_PIECES,
+};
 use crate::geometry::{Bounds, FreeRegion, NoRegion, Pose, Wanted};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{BULGE_TOLERANCE, DEPTH_TOLERANCE};
+use crate::tolerances::{
+    BULGE_TOLERANCE, CONTACT_STEP, COVERED_OVERLAP, DEPTH_TOLERANCE, REGION_ROOM, SMALL_BIT_ENTERED,
+    SMALLEST_BIT,
+};
 
 use super::super::super::sampled::{Contact, Mover, Near};
 use super::super::cover;
-use super::super::shift::{AROUND, MOST_GRANTED, ROOM, SMALLEST, starting};
+use super::super::shift::starting;
 use super::super::surface_pair::{Facing, Piece, Placed, Spot};
 use super::hold::{Ends, Hold, slack_within};
 
-/// Surfaces in more pieces than this are quicker told by samples.
-const MOST_PIECES: usize = 600;
-/// So many regions are looked for during one look at a pair …
-const MOST_RENEWED: usize = 100;
-/// … and so many where a pair comes near and a piece is outside the region that it came with.
-const MOST_FOUND_AGAIN: usize = 200;
-/// Where a motion takes more regions than so many, and so many for each step, samples cost less.
-const MOST_IN_ALL: usize = 400;
-const MOST_PER_STEP: usize = 40;
-/// Where a bit of a triangle that is smaller than this has no region, its deepest point is looked for.
-const SMALL: f64 = 0.1;
-/// Steps of that search along an edge.
-const DEEPEST_STEPS: usize = 10;
 /// The inverse of the golden ratio.
 const GOLDEN: f64 = 0.618_033_988_749_895;
 /// A bit that is as small as can be is told by the face before it, so far around.
-const AROUND_SMALLEST: f64 = 4.0 * SMALLEST;
-/// So many contacts of a pair are kept from step to step.
-const MOST_KNOWN: usize = 128;
-/// So many contacts are looked for by pieces that have no region.
-const MOST_FOUND: usize = 4;
-/// So many corners of a piece are measured, …
-const MOST_PROBED: usize = 24;
-/// … and so many triangles whose planes it has passed.
-const MOST_PASSED: usize = 12;
+const AROUND_SMALLEST: f64 = 4.0 * SMALLEST_BIT;
 
 /// A pair, one of whose surfaces is in pieces.
 pub(crate) struct Held<'a> {
@@ -82,11 +68,11 @@ impl<'a> Held<'a> {
         is_start: bool,
         termination: &Termination,
     ) -> Result<Option<Self>, Interrupt> {
-        if scene.allowances.of(part, other) > MOST_GRANTED {
+        if scene.allowances.of(part, other) > COVERED_OVERLAP {
             return Ok(None);
         }
-        let gathered = starting(scene, (part, pose), other, (is_start, MOST_PIECES), termination)?;
-        let cells = gathered.cells.as_ref().filter(|cells| cells.len() <= MOST_PIECES);
+        let gathered = starting(scene, (part, pose), other, (is_start, RIGID_PIECES), termination)?;
+        let cells = gathered.cells.as_ref().filter(|cells| cells.len() <= RIGID_PIECES);
         let Some(cells) = cells else { return Ok(None) };
         let facing = Facing::new(scene, (part, pose), other, gathered.asks_part, termination)?;
         let mut placed = Placed::default();
@@ -186,7 +172,7 @@ impl<'a> Held<'a> {
             let slacks = placed.points.iter().map(|p| hold.region.slack(p)).enumerate();
             let mut out: Vec<(usize, f64)> = slacks.filter(|(_, slack)| *slack < -most).collect();
             out.sort_by(|a, b| a.1.total_cmp(&b.1));
-            for (k, _) in out.into_iter().take(MOST_PROBED) {
+            for (k, _) in out.into_iter().take(PROBED_CORNERS) {
                 let seen = facing.look(&placed.points[k], hold.spot.guess);
                 hold.spot.guess = seen.closest.triangle;
                 let gap = seen.signed + facing.allowance;
@@ -208,7 +194,7 @@ impl<'a> Held<'a> {
             let Self { facing, pieces: all, placed, .. } = self;
             let hold = &all[i];
             facing.place_at(&hold.spot.piece, there, placed);
-            let passed = hold.region.passed(&placed.cloud, DEPTH_TOLERANCE).take(MOST_PASSED);
+            let passed = hold.region.passed(&placed.cloud, DEPTH_TOLERANCE).take(PASSED_TRIANGLES);
             for contact in passed.filter_map(|triangle| pierced(facing, hold, triangle, there)) {
                 if !inside.iter().any(|c: &Contact| c.is_of_same_point(&contact)) {
                     inside.push(contact);
@@ -220,7 +206,7 @@ impl<'a> Held<'a> {
 
     /// Finds regions that hold these pieces at both ends, or contacts that are too deep at the other one.
     fn renew(&mut self, outside: &[usize], ends: &Ends) -> Vec<Contact> {
-        let mut left = MOST_RENEWED;
+        let mut left = REGIONS_PER_LOOK;
         let (mut found, mut entered) = (Vec::new(), Vec::new());
         for &i in outside {
             let hold = self.pieces[i].clone();
@@ -228,7 +214,7 @@ impl<'a> Held<'a> {
                 Ok(()) => {}
                 Err(Unheld::Entered(contact)) => {
                     entered.push(contact);
-                    if entered.len() >= MOST_FOUND {
+                    if entered.len() >= CONTACTS_PER_LOOK {
                         break;
                     }
                 }
@@ -305,13 +291,13 @@ impl<'a> Held<'a> {
             Err(NoRegion::Cramped) => {}
         }
         let Piece::Bit(corners) = &hold.spot.piece else { return Ok(None) };
-        if hold.radius >= SMALL {
+        if hold.radius >= SMALL_BIT_ENTERED {
             return Ok(None);
         }
         if let Some(contact) = self.deepest_on_edges(corners, hold.spot.guess, &ends.there) {
             return Err(Unheld::Entered(contact));
         }
-        if hold.radius >= SMALLEST {
+        if hold.radius >= SMALLEST_BIT {
             return Ok(None);
         }
         let enters = |at: &Pose| self.deepest_on_edges(corners, hold.spot.guess, at).is_some();
@@ -331,7 +317,7 @@ impl<'a> Held<'a> {
             centres = centres.with_point(&placed.centre);
         }
         let middle = centres.centre();
-        let around = (placed.radius + (centres.max - middle).norm() + AROUND) * ROOM;
+        let around = (placed.radius + (centres.max - middle).norm() + CONTACT_STEP) * REGION_ROOM;
         let most = hold.most(facing);
         let wanted = Wanted { points: &wanted, most, from_behind: true, facing: Vector3::zeros() };
         let seen = facing.look(&middle, hold.spot.guess);
@@ -365,7 +351,7 @@ impl<'a> Held<'a> {
             let at = |u: f64| a + (b - a) * u;
             let (mut u, mut v) = (1.0 - GOLDEN, GOLDEN);
             let (mut of_u, mut of_v) = (gap(&at(u)).0, gap(&at(v)).0);
-            for _ in 0..DEEPEST_STEPS {
+            for _ in 0..EDGE_SECTIONS {
                 if of_u < of_v {
                     (high, v, of_v) = (v, u, of_u);
                     u = high - GOLDEN * (high - low);
@@ -409,7 +395,7 @@ impl<'a> Held<'a> {
                 self.known.push(*contact);
             }
         }
-        self.known.drain(..self.known.len().saturating_sub(MOST_KNOWN));
+        self.known.drain(..self.known.len().saturating_sub(KEPT_CONTACTS));
     }
 
     /// Goes on from the pose that was looked at last; false where regions do not tell any more.
@@ -423,7 +409,7 @@ impl<'a> Held<'a> {
         let again = self.known.iter().filter_map(|c| mover.remeasured(c, reach));
         self.known = again.filter(|c| c.gap < reach).collect();
         let outside: Vec<usize> = (0..self.pieces.len()).filter(|&i| self.pieces[i].next.is_none()).collect();
-        let (mut left, mut found) = (MOST_FOUND_AGAIN, Vec::new());
+        let (mut left, mut found) = (REGIONS_ON_APPROACH, Vec::new());
         for &i in outside.iter().rev() {
             let ends = Ends::at(there);
             let hold = self.pieces.swap_remove(i);
@@ -438,7 +424,7 @@ impl<'a> Held<'a> {
             hold.slack = hold.next.unwrap_or(0.0);
         }
         self.steps += 1;
-        Ok(self.regions <= MOST_IN_ALL + MOST_PER_STEP * self.steps)
+        Ok(self.regions <= REGIONS_PER_MOTION + REGIONS_PER_STEP * self.steps)
     }
 
     /// Whether nothing is too deep between the base and the pose that was looked at last.

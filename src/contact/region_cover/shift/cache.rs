@@ -11,16 +11,13 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use nalgebra::Vector3;
 
+use crate::budgets::REMEMBERED_SHIFT_PIECES;
 use crate::geometry::{Pose, Shape};
 use crate::scene::{Pair, Scene, grouped};
 use crate::termination::Interrupt;
+use crate::tolerances::CONGRUENT_PAIR_DISTANCE;
 
 use super::cell::Cell;
-
-/// So many cells are kept besides those of assembled pairs without a wish; then they are forgotten.
-const MOST_CELLS: usize = 40_000;
-/// Boxes further apart than this are not looked at for pairs that stand alike.
-const NEAR: f64 = 0.2;
 
 /// A pair of a part that begins to move and one that stands.
 #[derive(Debug, Clone, Copy)]
@@ -111,7 +108,7 @@ impl Kept {
     /// Makes room for so many cells: displaced pairs and ways may be forgotten.
     fn make_room(&mut self, cells: usize) {
         self.count += cells;
-        if self.count > MOST_CELLS {
+        if self.count > REMEMBERED_SHIFT_PIECES {
             self.gathered.retain(|key, _| key.start.is_none());
             self.ways.clear();
             self.count = cells;
@@ -217,7 +214,7 @@ impl KeptCells {
 
     fn first_alike(&self, scene: &Scene, pair: (usize, usize)) -> (usize, usize) {
         let firsts = self.firsts.get_or_init(|| {
-            let pairs = scene.broad_phase.pairs(NEAR);
+            let pairs = scene.broad_phase.pairs(CONGRUENT_PAIR_DISTANCE);
             let pairs: Vec<_> = pairs.into_iter().map(|(a, b)| ordered(scene, a, b)).collect();
             let (first, group_of) = grouped(pairs.iter().map(|&(a, b)| alike(scene, a, b)));
             let first_of: Vec<_> = group_of.into_iter().map(|group| pairs[first[group]]).collect();

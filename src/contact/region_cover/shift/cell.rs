@@ -2,14 +2,10 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::tolerances::TOUCHED;
+use crate::budgets::LOWEST_POINTS;
+use crate::tolerances::{SAME_FACE, SHIFT_SUNK, TILT, TOUCHED};
 
-use super::super::surface_pair::{Facing, Obstacle, Placed, SUNK, Slope, Spot, TILT};
-
-/// So many points of a piece are looked at before each plane that it touches.
-const MOST_LOWEST: usize = 8;
-/// Cosine of the angle up to which the face that is entered is the one that a plane keeps a piece before.
-const AGREED: f64 = 0.9;
+use super::super::surface_pair::{Facing, Obstacle, Placed, Slope, Spot};
 
 /// A piece that is free while the shift stays within limits.
 #[derive(Debug, Clone)]
@@ -52,7 +48,7 @@ impl Cell {
         let ball = if chord > 0.0 { (chord.sqrt() - along).max(0.0) } else { 0.0 };
         self.limits.iter().fold(ball, |length, limit| {
             let speed = -limit.normal.dot(u);
-            let gap = limit.gap(at) + if speed <= TILT { SUNK } else { 0.0 };
+            let gap = limit.gap(at) + if speed <= TILT { SHIFT_SUNK } else { 0.0 };
             if speed > 0.0 { length.min(gap.max(0.0) / speed) } else { length }
         })
     }
@@ -88,10 +84,10 @@ impl Cell {
             let heights = placed.points.iter().map(|p| (inward.dot(&p.coords), p));
             let lowest = heights.clone().map(|(height, _)| height).fold(f64::INFINITY, f64::min);
             let touching = heights.filter(|(height, _)| *height <= lowest + TOUCHED);
-            probes.extend(touching.take(MOST_LOWEST).map(|(_, p)| *p));
+            probes.extend(touching.take(LOWEST_POINTS).map(|(_, p)| *p));
         }
         // A point beside an edge enters a face that need not be passed: the plane lies before the other one.
-        let agrees = |limit: &Limit, o: &Obstacle| limit.normal.dot(&o.normal) > AGREED;
+        let agrees = |limit: &Limit, o: &Obstacle| limit.normal.dot(&o.normal) > SAME_FACE;
         // Where it touches now it is seen again at the next step: no witnesses are kept of that.
         let mut by_points = pair.obstacles(&probes, (at, u), (*guess, Slope::Steep), &mut Vec::new());
         by_points.retain(|o| ahead().any(|limit| agrees(limit, o)));

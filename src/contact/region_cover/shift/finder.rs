@@ -5,32 +5,17 @@ use rayon::prelude::*;
 
 use crate::geometry::{NoRegion, Wanted};
 use crate::termination::Termination;
-use crate::tolerances::{HELD, HELD_AT_FIRST};
+use crate::tolerances::{
+    CONTACT_STEP, HELD, HELD_AT_FIRST, LEAST_SHARE_AHEAD, REGION_ROOM, ROUNDED, SHIFTS_AHEAD,
+    SMALL_BIT_AHEAD, SMALLEST_BIT,
+};
 
 use super::super::surface_pair::{Facing, Obstacle, Piece, Placed, Seen, Slope, Spot, Witness};
 use super::super::{Halt, cover};
 use super::cell::{Cell, Limit};
 
-/// A piece further than this from the other surface needs no region, in the planning frame: as long as the longest
-/// step in contact.
-pub(crate) const FAR: f64 = 0.12;
-/// Shifts that a region is asked to allow: the longest that works.
-const AHEAD: [f64; 5] = [4.0, 0.5, 0.06, 0.012, 2e-3];
 /// Which of these is asked for first; the shorter ones only where something is near ahead.
 const SHORT: usize = 2;
-/// A region without a wanted shift reaches this far beyond its piece, in the planning frame: as long as the longest step
-/// in contact.
-pub(crate) const AROUND: f64 = 0.12;
-/// A region that lets a piece go by less than this share of what was asked is too small.
-const LEAST_LET_GO: f64 = 0.25;
-/// Steps that are shorter lead nowhere.
-const LEAST_STEP: f64 = 1e-5;
-/// The radius asked of a region, as a multiple of what it must hold.
-pub(crate) const ROOM: f64 = 1.25;
-/// A bit of a triangle that is smaller than this and has no region ahead is in the way …
-const SMALL: f64 = 0.3;
-/// … and is lost if it has none at all and is smaller than this.
-pub(crate) const SMALLEST: f64 = 0.02;
 
 /// So many pieces that come next are looked at beside one.
 const BESIDE: usize = 3;
@@ -179,7 +164,7 @@ impl<'a> Finder<'a> {
         let wish = Wish { at: Vector3::zeros(), along: *u };
         let seen = self.place(&mut spot, &wish);
         let let_go =
-            |level: usize| self.held(&Spot { level, ..spot }, &seen, &wish, &(u * AHEAD[level])).ok();
+            |level: usize| self.held(&Spot { level, ..spot }, &seen, &wish, &(u * SHIFTS_AHEAD[level])).ok();
         (0..SHORT).find_map(let_go).filter(|cell| cell.length(&wish.at, u) > least)
     }
 
@@ -197,7 +182,7 @@ impl<'a> Finder<'a> {
         let held = if self.pair.allowance > 0.0 { spot.held } else { HELD };
         let ball = (self.placed.centre, seen.signed);
         let spot = Spot { held, ..*spot };
-        (room >= FAR).then(|| Cell { spot, limits: Vec::new(), middle: wish.at, room, ball })
+        (room >= CONTACT_STEP).then(|| Cell { spot, limits: Vec::new(), middle: wish.at, room, ball })
     }
 
     fn block(&mut self, by: &[Obstacle]) {
@@ -215,9 +200,9 @@ impl<'a> Finder<'a> {
             self.cells.push(cell);
             return Ok(());
         }
-        let small = matches!(spot.piece, Piece::Bit(_)) && self.placed.radius < SMALL;
+        let small = matches!(spot.piece, Piece::Bit(_)) && self.placed.radius < SMALL_BIT_AHEAD;
         let let_go = |cells: &mut Self, level: usize| {
-            cells.held(&Spot { level, ..spot }, &seen, wish, &(wish.along * AHEAD[level]))
+            cells.held(&Spot { level, ..spot }, &seen, wish, &(wish.along * SHIFTS_AHEAD[level]))
         };
         match let_go(self, SHORT) {
             Ok(short) => {
@@ -243,7 +228,7 @@ impl<'a> Finder<'a> {
             self.block(&certain);
             return Err(Halt::Blocked);
         }
-        let nearer = (SHORT + 1..AHEAD.len()).find_map(|level| let_go(self, level).ok());
+        let nearer = (SHORT + 1..SHIFTS_AHEAD.len()).find_map(|level| let_go(self, level).ok());
         if let Some(cell) = nearer {
             if !small && cell.spot.level == spot.level {
                 return self.split(&spot, wish, parts);
@@ -252,7 +237,7 @@ impl<'a> Finder<'a> {
             return Ok(());
         }
         if let Ok(cell) = self.held(&Spot { level: 0, ..spot }, &seen, wish, &Vector3::zeros()) {
-            if cell.length(&wish.at, &wish.along) > LEAST_STEP {
+            if cell.length(&wish.at, &wish.along) > ROUNDED {
                 self.cells.push(cell);
                 return Ok(());
             }
@@ -273,7 +258,7 @@ impl<'a> Finder<'a> {
 
     /// Whether the piece at hand, without a region, is too small to be split.
     fn is_smallest(&self, spot: &Spot) -> bool {
-        matches!(spot.piece, Piece::Bit(_)) && self.placed.radius < SMALLEST
+        matches!(spot.piece, Piece::Bit(_)) && self.placed.radius < SMALLEST_BIT
     }
 
     /// The piece at hand, too small to be split, gets a cell before a face, or is lost.
@@ -312,7 +297,7 @@ impl<'a> Finder<'a> {
             return None;
         }
         let closest = pair.look(centre, spot.guess).closest;
-        let ahead = pair.shifted * wish.along * AHEAD[SHORT];
+        let ahead = pair.shifted * wish.along * SHIFTS_AHEAD[SHORT];
         let mut best: Option<(f64, Vector3<f64>)> = None;
         pair.measured.feature_normals(&closest, |n| {
             let ends = n.dot(&(centre + ahead - closest.point));
@@ -328,8 +313,8 @@ impl<'a> Finder<'a> {
             spot: *spot,
             limits: vec![Limit { normal, height, triangle: closest.triangle }],
             middle: wish.at,
-            room: AHEAD[SHORT],
-            ball: (*centre, self.placed.radius + AHEAD[SHORT]),
+            room: SHIFTS_AHEAD[SHORT],
+            ball: (*centre, self.placed.radius + SHIFTS_AHEAD[SHORT]),
         })
     }
 
@@ -348,12 +333,12 @@ impl<'a> Finder<'a> {
         let Placed { points, cloud, extremes, centre, radius } = &self.placed;
         let of = |points| Wanted { points, most, from_behind: true, facing: Vector3::zeros() };
         let region = if ahead == Vector3::zeros() {
-            let around = (radius + AROUND) * ROOM;
+            let around = (radius + CONTACT_STEP) * REGION_ROOM;
             pair.measured.free_region_around(centre, around, (&seen.closest, seen.signed), of(extremes))
         } else {
             let wanted: Vec<_> = extremes.iter().copied().chain(extremes.iter().map(|p| p + ahead)).collect();
             let middle = centre + ahead / 2.0;
-            let around = (radius + ahead.norm() / 2.0) * ROOM;
+            let around = (radius + ahead.norm() / 2.0) * REGION_ROOM;
             let seen = pair.look(&middle, spot.guess);
             pair.measured.free_region_around(&middle, around, (&seen.closest, seen.signed), of(&wanted))
         }?;
@@ -383,8 +368,8 @@ impl<'a> Finder<'a> {
         let held = held.min(spot.held);
         let ball = (region.centre(), region.radius());
         let cell = Cell { spot: Spot { held, ..*spot }, limits, middle, room, ball };
-        let too_small =
-            ahead != Vector3::zeros() && cell.length(&wish.at, &wish.along) < LEAST_LET_GO * shift.norm();
+        let too_small = ahead != Vector3::zeros()
+            && cell.length(&wish.at, &wish.along) < LEAST_SHARE_AHEAD * shift.norm();
         if too_small { Err(NoRegion::Cramped) } else { Ok(cell) }
     }
 }

@@ -15,10 +15,11 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use crate::budgets::{FIRST_SIDE_REGIONS, REGIONS_PER_SHIFT, SHIFT_PIECES, SIDE_REGIONS, STALLS, WITNESSES};
 use crate::geometry::Pose;
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{FREE_STEP, HELD, HELD_AT_FIRST, TOUCHED};
+use crate::tolerances::{COVERED_OVERLAP, FREE_STEP, HELD, HELD_AT_FIRST, STALL, TOUCHED};
 
 mod cache;
 mod cell;
@@ -30,32 +31,8 @@ use cache::{Gathered, Place, Way};
 use finder::Finder;
 
 pub(crate) use cell::Cell;
-pub(crate) use finder::{AROUND, ROOM, SMALLEST};
 
 pub use cache::KeptCells;
-
-/// So many regions are looked for on one side of a pair before as many are on the other; then twice as many, and so
-/// on …
-const FIRST_BUDGET: usize = 16;
-/// … up to this: from fewer, how many a side needs in all is guessed badly.
-const IN_TURN: usize = 64;
-/// Where more overlap than this is granted, in the planning frame, facets lie across each other, and regions tell little. What overlaps
-/// with one face may be pushed into walls by as much, too, and around the rims of these its pieces are in no
-/// convex region: of a screw whose head reaches 0.02 into its lid, 20,000 were looked for in vain, in several
-/// times what samples take. (With planes of faces, as verification takes them, it was lost sooner, but lost.)
-pub(crate) const MOST_GRANTED: f64 = 1e-3;
-/// A surface in more pieces than this is not looked at to the end: in the play of a thread, which has thousands, each
-/// step ends at the next of them, and samples tell in a fraction of the time.
-const MOST_CELLS: usize = 1000;
-/// Pieces in succession whose new region lets the part go no further than [`STALL`], after which a shift ends: a count.
-/// A corner where many pieces touch needs one each.
-pub(crate) const MOST_STALLS: usize = 16;
-/// A shift shorter than this counts as none, in the planning frame: a tenth of `TOUCHED`.
-pub(crate) const STALL: f64 = 1e-7;
-/// So many points that showed obstacles are remembered of a pair.
-const MOST_WITNESSES: usize = 8;
-/// So many regions are looked for before a motion is given up.
-const MOST_REGIONS: usize = 20_000;
 
 /// All pieces of all pairs of a part with what is near it.
 pub(crate) struct Cells<'a> {
@@ -94,14 +71,14 @@ impl<'a> Cells<'a> {
     /// Takes a pair in, at a shift of the part.
     pub(crate) fn add(&mut self, other: usize, at: &Vector3<f64>) -> Result<(), Halt> {
         let (scene, termination) = (self.scene, self.termination);
-        if scene.allowances.of(self.part, other) > MOST_GRANTED {
+        if scene.allowances.of(self.part, other) > COVERED_OVERLAP {
             return Err(Halt::Lost);
         }
         let gathered = if at == &Vector3::zeros() {
-            starting(scene, (self.part, &self.start), other, (true, MOST_CELLS), termination)?
+            starting(scene, (self.part, &self.start), other, (true, SHIFT_PIECES), termination)?
         } else {
             let place = Place::new(self.part, &self.start, other);
-            Arc::new(gathered(scene, &place, at, MOST_CELLS, termination)?)
+            Arc::new(gathered(scene, &place, at, SHIFT_PIECES, termination)?)
         };
         let facing = Facing::new(scene, (self.part, &self.start), other, gathered.asks_part, termination)?;
         let cells = gathered.cells.clone().ok_or(Halt::Lost)?;
@@ -131,12 +108,12 @@ impl<'a> Cells<'a> {
             let Some((end, i, k)) = first.filter(|(end, ..)| *end < most) else { return Ok(most) };
             stalls = if end - reached < STALL { stalls + 1 } else { 0 };
             reached = end;
-            if stalls > MOST_STALLS {
+            if stalls > STALLS {
                 return Ok(reached);
             }
             let there = at + u * reached;
             let pair = &mut self.pairs[i];
-            let left = MOST_REGIONS - self.regions;
+            let left = REGIONS_PER_SHIFT - self.regions;
             let mut finder = Finder::new(&pair.facing, left, self.termination);
             let found = finder.find(pair.cells[k].spot, &there, u);
             let (mut cells, regions) = (finder.cells, finder.regions);
@@ -211,7 +188,7 @@ impl<'a> Cells<'a> {
         at: &Vector3<f64>,
         u: &Vector3<f64>,
     ) -> Result<(Vec<Vector3<f64>>, usize), Halt> {
-        let left = MOST_REGIONS - self.regions;
+        let left = REGIONS_PER_SHIFT - self.regions;
         let Pair { facing, cells, witnesses } = &mut self.pairs[i];
         let seen = facing.obstacles_seen_by(witnesses, (at, u));
         if !seen.is_empty() {
@@ -219,13 +196,13 @@ impl<'a> Cells<'a> {
         }
         let mut made = make_way(facing, cells, (at, u), left, self.termination)?;
         witnesses.append(&mut made.witnesses);
-        witnesses.drain(..witnesses.len().saturating_sub(MOST_WITNESSES));
+        witnesses.drain(..witnesses.len().saturating_sub(WITNESSES));
         Ok((made.blocked, made.regions))
     }
 
     fn count(&mut self, regions: usize) -> Result<(), Halt> {
         self.regions += regions;
-        if self.regions >= MOST_REGIONS { Err(Halt::Lost) } else { Ok(()) }
+        if self.regions >= REGIONS_PER_SHIFT { Err(Halt::Lost) } else { Ok(()) }
     }
 }
 
@@ -247,8 +224,9 @@ pub(crate) fn starting(
 
 /// Cells for all of a pair's surface where a motion begins.
 fn kept(scene: &Scene, place: &Place<'_>, termination: &Termination) -> Result<Arc<Gathered>, Interrupt> {
-    let find =
-        |scene: &Scene, place: &Place<'_>| gathered(scene, place, &Vector3::zeros(), MOST_CELLS, termination);
+    let find = |scene: &Scene, place: &Place<'_>| {
+        gathered(scene, place, &Vector3::zeros(), SHIFT_PIECES, termination)
+    };
     KeptCells::of(scene).gathered(scene, place, find)
 }
 
@@ -261,10 +239,10 @@ fn way(
 ) -> Result<Way, Interrupt> {
     let base = kept(scene, place, termination)?;
     let facing = Facing::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
-    let lost = Way { blocked: Vec::new(), cells: None, found: 0, regions: MOST_REGIONS };
+    let lost = Way { blocked: Vec::new(), cells: None, found: 0, regions: REGIONS_PER_SHIFT };
     let Some(base) = &base.cells else { return Ok(lost) };
     let mut cells = Arc::clone(base);
-    match make_way(&facing, &mut cells, (&Vector3::zeros(), u), MOST_REGIONS, termination) {
+    match make_way(&facing, &mut cells, (&Vector3::zeros(), u), REGIONS_PER_SHIFT, termination) {
         Ok(Made { blocked, found, regions, .. }) => {
             // Whoever is stopped goes another way from the same cells.
             let (cells, found) = if blocked.is_empty() { (cells, found) } else { (Arc::clone(base), 0) };
@@ -286,7 +264,7 @@ fn long_way(
         .way(scene, place, (u, false), |scene, place, u| way(scene, place, u, termination))?;
     let base = kept(scene, place, termination)?;
     let facing = Facing::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
-    let mut finder = Finder::new(&facing, MOST_REGIONS, termination);
+    let mut finder = Finder::new(&facing, REGIONS_PER_SHIFT, termination);
     let mut lengthened = |cell: &Cell| {
         termination.check()?;
         let length = cell.length(&Vector3::zeros(), u);
@@ -322,15 +300,15 @@ fn gathered(
     let mut finders: Vec<Option<Finder<'_>>> = asked.iter().map(|_| None).collect();
     // The one inside the other, or the plainer one, needs fewer pieces: which, shows in trying, at first of both in
     // turn. Then the one that seems to need fewer is asked on, twice as far.
-    let mut budgets = vec![if asked.len() > 1 { FIRST_BUDGET } else { MOST_REGIONS }; asked.len()];
+    let mut budgets = vec![if asked.len() > 1 { FIRST_SIDE_REGIONS } else { REGIONS_PER_SHIFT }; asked.len()];
     let mut is_told = !asked.is_empty();
     while is_told {
         let needed = |i: usize| finders[i].as_ref().map_or(0.0, |finder| finder.needed);
         let rank = |i: usize| {
-            if budgets[i] <= IN_TURN { budgets[i] as f64 } else { MOST_REGIONS as f64 + needed(i) }
+            if budgets[i] <= SIDE_REGIONS { budgets[i] as f64 } else { REGIONS_PER_SHIFT as f64 + needed(i) }
         };
         let Some(i) = (0..asked.len()).min_by(|&i, &k| rank(i).total_cmp(&rank(k))) else { break };
-        if budgets[i] > MOST_REGIONS {
+        if budgets[i] > REGIONS_PER_SHIFT {
             break;
         }
         let asks_part = asked[i];

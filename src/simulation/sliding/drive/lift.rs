@@ -2,23 +2,16 @@
 
 use nalgebra::{Vector3, Vector6};
 
+use crate::budgets::LIFT_ROUNDS;
 use crate::contact::constraint::Row;
 use crate::contact::sampled::Mover;
 use crate::geometry::Pose;
 use crate::scene::Surroundings;
 use crate::termination::Interrupt;
-use crate::tolerances::DEPTH_TOLERANCE;
+use crate::tolerances::{DEPTH_TOLERANCE, LIFT, LIFT_REACH, LIFT_SPEED};
 
 use super::super::super::projection::project;
 use super::{Drive, Known};
-
-/// The gap at which a part in the middle of its play is left alone, and the corrections that bring
-/// it there.
-const LIFT: f64 = 0.01;
-const LIFT_REACH: f64 = 0.04;
-const LIFT_ROUNDS: usize = 3;
-/// What is along an axis by less than this share does not hold a part there.
-const LEAST_SPEED: f64 = 0.1;
 
 impl Drive {
     /// The pose in the middle of the play around the mover's: the smallest correction that gives all
@@ -65,9 +58,9 @@ fn middle(rows: &[Row], twist: &Vector6<f64>, axis: &Vector3<f64>) -> Option<f64
     let (mut back, mut forth) = (f64::NEG_INFINITY, f64::INFINITY);
     for row in rows {
         let (gap, speed) = (row.a.dot(twist) + row.b, row.a.fixed_rows::<3>(0).dot(axis));
-        if speed > LEAST_SPEED {
+        if speed > LIFT_SPEED {
             back = back.max(-gap / speed);
-        } else if speed < -LEAST_SPEED {
+        } else if speed < -LIFT_SPEED {
             forth = forth.min(-gap / speed);
         }
     }

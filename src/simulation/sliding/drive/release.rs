@@ -7,25 +7,14 @@
 
 use nalgebra::{Translation3, Unit, Vector3, Vector6};
 
+use crate::budgets::{RELEASE_LOOKS, RELEASE_PLACES};
 use crate::contact::constraint::Row;
 use crate::contact::sampled::{Around, Contact, Mover, Near};
 use crate::termination::Interrupt;
-use crate::tolerances::DEPTH_TOLERANCE;
+use crate::tolerances::{DEPTH_TOLERANCE, FREE_PULL, LIFT, OPPOSED_PULL};
 
 use super::super::super::projection::Projected;
 use super::{Attempt, Drive, Moved, Step};
-
-/// A contact holds a pull back if the part, moved so far along it, is too deep there. In a slot nothing is, whatever
-/// its play.
-const LIFT: f64 = 0.01;
-/// What opposes a pull by less than this share does not hold it back: the part slides along it.
-const LEAST_OPPOSED: f64 = 0.3;
-/// What nothing holds back gets this share of a pull.
-const FREE_PULL: f64 = 0.9;
-/// Places of a step that are looked at: no slot with less play than an eighth of a step is found.
-const PLACES: u32 = 16;
-/// Looks at the surroundings before a step is made as it is.
-const MOST_LOOKS: usize = 8;
 
 /// A step that was found free of entry.
 pub(super) struct Taken<'a> {
@@ -86,17 +75,17 @@ impl Drive {
         around: &mut dyn Around,
     ) -> Result<Option<Moved>, Interrupt> {
         let Some(pull) = self.pull() else { return Ok(None) };
-        let opposes = |row: &Row| row.a.fixed_rows::<3>(0).dot(&pull) < -LEAST_OPPOSED;
+        let opposes = |row: &Row| row.a.fixed_rows::<3>(0).dot(&pull) < -OPPOSED_PULL;
         if !step.result.active.iter().any(|(i, _)| opposes(&step.rows[*i])) {
             return Ok(None);
         }
         let lift = Translation3::from(*pull * LIFT);
         let lifted = |place| Mover { pose: lift * self.at(step, place).0.pose, ..*step.mover };
-        let lifted: Vec<Mover<'_>> = (0..=PLACES).map(lifted).collect();
+        let lifted: Vec<Mover<'_>> = (0..=RELEASE_PLACES).map(lifted).collect();
         let known = step.rows.iter().zip(step.contacts).filter(|(row, _)| opposes(row)).map(|(_, c)| *c);
         let mut holding: Vec<Contact> = known.collect();
-        let mut open: Vec<u32> = (0..=PLACES).collect();
-        for _ in 0..MOST_LOOKS {
+        let mut open: Vec<u32> = (0..=RELEASE_PLACES).collect();
+        for _ in 0..RELEASE_LOOKS {
             for contact in holding.drain(..) {
                 close(&mut open, &contact, &lifted, step.twist);
             }
@@ -119,7 +108,7 @@ impl Drive {
 
     /// Where a step has got to at one of its places, and after which twist.
     fn at<'m>(&self, step: &Taken<'m>, place: u32) -> (Mover<'m>, Vector6<f64>) {
-        let twist = step.twist * (f64::from(place) / f64::from(PLACES));
+        let twist = step.twist * (f64::from(place) / f64::from(RELEASE_PLACES));
         (Mover { pose: self.displaced(step.mover, &twist), ..*step.mover }, twist)
     }
 
@@ -146,7 +135,7 @@ fn close(open: &mut Vec<u32>, contact: &Contact, lifted: &[Mover<'_>], twist: &V
         let depth = there.remeasured(contact, 0.0).map_or(0.0, |c| -c.gap) - DEPTH_TOLERANCE;
         if depth > 0.0 {
             // As deep as it is, it holds as far as it moves by less than that.
-            let travel = there.displacement(contact, twist) / f64::from(PLACES);
+            let travel = there.displacement(contact, twist) / f64::from(RELEASE_PLACES);
             let held = (depth / travel) as u32;
             open.retain(|other| other.abs_diff(place) > held);
         }

@@ -1,0 +1,178 @@
+//! The table of budgets: every count that bounds work, memory or a number of attempts.
+//!
+//! A motion or path that exceeds a budget is never taken to be free or blocked by that: it goes on with a slower way to
+//! tell (regions → samples, profiles → surfaces), or ends as undecided. Halving a budget makes that happen sooner,
+//! doubling it later.
+
+// Region covers: pieces and regions.
+
+/// Regions per shift before a motion is given up as lost.
+pub(crate) const REGIONS_PER_SHIFT: usize = 20_000;
+/// Pieces of one surface per cover for shifts; with more, samples tell. In the play of a thread, which has thousands,
+/// each step ends at the next of them, and samples take a fraction of the time.
+pub(crate) const SHIFT_PIECES: usize = 1000;
+/// The same for motions that turn.
+pub(crate) const RIGID_PIECES: usize = 600;
+/// Regions on one side of a pair before as many are looked for on the other; doubled each time …
+pub(crate) const FIRST_SIDE_REGIONS: usize = 16;
+/// … up to this: from fewer, the number that a side needs in all is guessed badly.
+pub(crate) const SIDE_REGIONS: usize = 64;
+/// Pieces in a row whose new region allows no further shift, after which a shift ends. A corner where many pieces touch
+/// needs one each.
+pub(crate) const STALLS: usize = 16;
+/// Regions during one look at a pair while turning …
+pub(crate) const REGIONS_PER_LOOK: usize = 100;
+/// … and where a pair comes near and a piece is outside the region that it came with.
+pub(crate) const REGIONS_ON_APPROACH: usize = 200;
+/// Regions of one motion, …
+pub(crate) const REGIONS_PER_MOTION: usize = 400;
+/// … and more for each of its steps: beyond, samples cost less.
+pub(crate) const REGIONS_PER_STEP: usize = 40;
+/// Poses between the ends of a step at which small bits without a region are measured.
+pub(crate) const POSES_BETWEEN: usize = 4;
+/// Golden sections along an edge to find its deepest point.
+pub(crate) const EDGE_SECTIONS: usize = 10;
+/// Contacts of a pair that are kept from step to step.
+pub(crate) const KEPT_CONTACTS: usize = 128;
+/// Contacts that are looked for by pieces without a region.
+pub(crate) const CONTACTS_PER_LOOK: usize = 4;
+/// Corners of a piece that are measured, …
+pub(crate) const PROBED_CORNERS: usize = 24;
+/// … and triangles whose planes it has passed.
+pub(crate) const PASSED_TRIANGLES: usize = 12;
+/// Corners, and faces, of a piece that are probed ahead.
+pub(crate) const PROBES: usize = 16;
+/// Points of a piece that are looked at before each plane that it touches.
+pub(crate) const LOWEST_POINTS: usize = 8;
+/// Points that showed obstacles of a pair and are remembered.
+pub(crate) const WITNESSES: usize = 8;
+/// Effort (pieces, and [`REGION_EFFORT`] for each region) on each surface of a path before it is left to samples: some
+/// seconds, for samples promise less. A bayonet that turns askew to all axes needs a third.
+pub(crate) const PATH_EFFORT: usize = 20_000_000;
+/// The same where holes are in sight or threads cross: most stays open, whatever is spent.
+pub(crate) const PATH_EFFORT_IN_DOUBT: usize = 200_000;
+/// In sight of holes, after this part of the effort (a divisor) …
+pub(crate) const HOPELESS_AFTER: usize = 10;
+/// … the rest is not looked at if no more than this share is settled.
+pub(crate) const HOPELESS_SHARE: f64 = 0.02;
+/// The effort of a region, in pieces.
+pub(crate) const REGION_EFFORT: usize = 40;
+/// Edges of holes that take as long to ask as a piece without holes.
+pub(crate) const RIM_EDGES_PER_EFFORT: usize = 32;
+/// Deep points after which a path is refuted.
+pub(crate) const DEEP_POINTS: usize = 400;
+/// Regions of a place that are tried, …
+pub(crate) const REGIONS_OF_PLACE: usize = 3;
+/// … and of those that held a piece last: the next piece lies beside it, mostly.
+pub(crate) const RECENT_REGIONS: usize = 4;
+/// Hulls of more corners are not asked about corner by corner.
+pub(crate) const HULL_CORNERS: usize = 64;
+/// Regions are grown around no more corners than this.
+pub(crate) const WANTED_CORNERS: usize = 1024;
+/// Legs of a path with more bends have no hull.
+pub(crate) const LEG_BENDS: usize = 12;
+
+// Motions.
+
+/// Poses of a motion, after which it turns without end.
+pub(crate) const MOTION_POSES: usize = 8000;
+/// Corrections of a step that is likely to hold, …
+pub(crate) const EAGER_ROUNDS: usize = 6;
+/// … and of one that is not.
+pub(crate) const LAZY_ROUNDS: usize = 12;
+/// Halvings of a step before it is stuck.
+pub(crate) const STEP_HALVINGS: usize = 3;
+/// Bends of a push at one place.
+pub(crate) const PUSH_BENDS: usize = 64;
+/// Corrections that bring a part to the middle of its play.
+pub(crate) const LIFT_ROUNDS: usize = 3;
+/// Places of a step that are looked at for a release: no slot with less play than an eighth of a step is found.
+pub(crate) const RELEASE_PLACES: u32 = 16;
+/// Looks at the surroundings before a step is made without release.
+pub(crate) const RELEASE_LOOKS: usize = 8;
+/// Steps that the static analysis of a pair looks ahead (the paper's five extensions), …
+pub(crate) const STATIC_STEPS: usize = 5;
+/// … and pushes, which end where the next obstacle begins.
+pub(crate) const STATIC_PUSHES: usize = 32;
+/// Steps of an extrapolation.
+pub(crate) const LEAP_STEPS: usize = 32;
+/// The same along a helix.
+pub(crate) const HELIX_LEAP_STEPS: usize = 512;
+/// A shorter extrapolation along a helix gains nothing over steps.
+pub(crate) const SHORTEST_HELIX_LEAP: usize = 4;
+/// Steps between two looks whether a part is still held by its thread, coarse and fine, …
+pub(crate) const HELD_STATIONS: [usize; 2] = [4, 1];
+/// … and whether it clearly enters anything.
+pub(crate) const FREE_STATIONS: [usize; 3] = [16, 4, 1];
+/// Looks at samples of either surface; with more, distance fields are quicker: in the play of a thread nearly all
+/// samples are near.
+pub(crate) const LOOKS_BY_SAMPLES: usize = 1200;
+/// Poses looked at on the way through a passage.
+pub(crate) const PASSAGE_POSES: usize = 64;
+/// Rays that measure what is in a part's way.
+pub(crate) const OBSTRUCTION_RAYS: usize = 128;
+/// Points of a side from which null twists are computed, …
+pub(crate) const NULL_TWIST_POINTS: usize = 2000;
+/// … and the fewest contacts.
+pub(crate) const FEWEST_NULL_CONTACTS: usize = 12;
+/// Planes of touching faces: round fits have many, threads more.
+pub(crate) const TOUCHED_PLANES: usize = 64;
+/// Evaluations of a penalty step, per Newton iteration. Smooth contact needs one each; a part wedged between points
+/// whose slopes all jump could go on for hundreds, and gain millionths.
+pub(crate) const EVALUATIONS_PER_ITERATION: u64 = 2;
+/// Times that a Newton step is shortened.
+pub(crate) const BACKTRACKS: u32 = 6;
+/// Slopes that are kept at one contact point.
+pub(crate) const SLOPES_PER_POINT: usize = 8;
+
+// Helices and threads.
+
+/// Slabs along the axis per pitch: a profile is told in these alone.
+pub(crate) const SLABS_PER_PITCH: f64 = 4.0;
+/// Heights of a profile within a pitch.
+pub(crate) const HEIGHTS_PER_PITCH: usize = 300;
+/// Halvings of a triangle until its profile is taken as it is.
+pub(crate) const TRIANGLE_HALVINGS: u32 = 24;
+/// Effort on a side before profiles are asked.
+pub(crate) const EFFORT_BEFORE_PROFILES: usize = 8_000;
+/// Pieces of the way from the middle of a thread's play to where the given path ends.
+pub(crate) const CENTRING_PIECES: u32 = 4;
+/// Rounds of leaving out what lies off a helix.
+pub(crate) const OUTLIER_ROUNDS: usize = 4;
+/// Knots of a helix on one segment of a path.
+pub(crate) const KNOTS_PER_SEGMENT: f64 = 64.0;
+/// Rounds of weighing facets when the axis of flanks is fitted.
+pub(crate) const FLANK_ROUNDS: usize = 6;
+/// Facets that make a thread.
+pub(crate) const FEWEST_FLANK_FACETS: usize = 24;
+
+// Paths by samples.
+
+/// Poses that are looked at together at first.
+pub(crate) const POSES_AT_ONCE: usize = 32;
+/// Shares into which the samples of a shape are dealt, …
+pub(crate) const SAMPLE_SHARES: usize = 4;
+/// … on paths of more poses than this.
+pub(crate) const LONG_PATH: usize = 400;
+
+// Memory.
+
+/// Levels of the legs of a path that are remembered: some thousands.
+pub(crate) const REMEMBERED_LEG_LEVELS: u32 = 12;
+/// Pieces for shifts that are kept besides those of assembled pairs; then they are forgotten.
+pub(crate) const REMEMBERED_SHIFT_PIECES: usize = 40_000;
+/// Motions with one start, each among other parts; of more, the last ones.
+pub(crate) const MOTION_VARIANTS: usize = 8;
+/// Parts along one line; of more, the last ones.
+pub(crate) const PARTS_PER_LINE: usize = 256;
+/// Verdicts that a request keeps; of more, all are forgotten. A few kB each.
+pub(crate) const KEPT_VERDICTS: usize = 4096;
+/// Points of joined hulls, of some hundred hulls.
+pub(crate) const REMEMBERED_HULL_POINTS: usize = 200_000;
+/// A hull of fewer points is joined as fast as it is found in a store.
+pub(crate) const FEWEST_STORED_POINTS: usize = 12;
+/// A hull of more points than this times those that it had when it was last joined is joined again: a join takes as
+/// long as some hundred tests.
+pub(crate) const LOOSE_HULL: usize = 32;
+/// If no more than one part in this many is gone, the tree of all parts is made: the next question may be about others.
+pub(crate) const MOSTLY_STANDING: usize = 2;
