@@ -155,6 +155,15 @@ pub(crate) const SAMPLE_SHARES: usize = 4;
 /// … on paths of more poses than this.
 pub(crate) const LONG_PATH: usize = 400;
 
+// Steps of a walk between two checks of the termination condition: reading the clock takes as long as a short step.
+
+/// A sample, an edge, a corner or a triangle.
+pub(crate) const SHORT_STEPS_PER_POLL: u32 = 64;
+/// A contact with its planes: large surfaces that lie on each other have tens of thousands.
+pub(crate) const STEPS_PER_POLL: u32 = 16;
+/// A piece of surface.
+pub(crate) const LONG_STEPS_PER_POLL: u32 = 4;
+
 // Memory.
 
 /// Levels of the legs of a path that are remembered: some thousands.

@@ -15,12 +15,10 @@
 
 use nalgebra::{Point3, Vector3};
 
+use crate::budgets::SHORT_STEPS_PER_POLL;
 use crate::geometry::{Bounds, ConvexEdges, Pose, Surface};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll, Termination};
-
-/// Edges or corners between two looks at the termination condition.
-const CAST_POLL: u32 = 64;
 
 /// What a shape cast lets pass.
 #[derive(Debug, Clone, Copy)]
@@ -70,7 +68,7 @@ impl ShapeCast<'_> {
     pub(crate) fn way(&self, least: f64) -> Result<f64, Interrupt> {
         let Self { scene, part, start, direction, other, travel, margins, termination } = *self;
         termination.check()?;
-        let poll = &Poll::every(CAST_POLL, Some(termination));
+        let poll = &Poll::every(SHORT_STEPS_PER_POLL, Some(termination));
         let [mine, theirs] = [part, other].map(|i| &scene.bodies[i].shape);
         let standing = &scene.bodies[other].planning_from_shape;
         let standing_from_moving = standing.inverse() * start;

@@ -10,16 +10,13 @@
 use faer::Mat;
 use nalgebra::{Matrix3x2, Matrix6, Point3, Unit, Vector3, Vector6};
 
-use crate::budgets::{FEWEST_NULL_CONTACTS, NULL_TWIST_POINTS};
+use crate::budgets::{FEWEST_NULL_CONTACTS, NULL_TWIST_POINTS, SHORT_STEPS_PER_POLL};
 use crate::geometry::{Feature, Pose};
 use crate::scene::{Body, Scene};
 use crate::termination::{Interrupt, Poll, Termination};
 use crate::tolerances::{NEAR_NULL, NULL_TURN};
 
 use super::Touching;
-
-/// Points between two looks at the termination condition.
-const POINTS_POLL: u32 = 64;
 
 /// An axis about which contact lets a part turn, and along which, maybe.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,7 +45,7 @@ impl NullTwist {
         reach: f64,
         termination: &Termination,
     ) -> Result<(Option<Self>, Vec<usize>), Interrupt> {
-        let poll = Poll::every(POINTS_POLL, Some(termination));
+        let poll = Poll::every(SHORT_STEPS_PER_POLL, Some(termination));
         let body = &scene.bodies[part];
         let parts = Touching::near(scene, part, pose, standing, reach);
         let mut contacts = Vec::new();

@@ -7,14 +7,11 @@
 
 use nalgebra::{Point3, Unit, Vector3};
 
-use crate::budgets::TOUCHED_PLANES;
+use crate::budgets::{LONG_STEPS_PER_POLL, TOUCHED_PLANES};
 use crate::geometry::{Bounds, Pose, Surface, bisected};
 use crate::scene::{Body, Scene};
 use crate::termination::{Interrupt, Poll, Termination};
 use crate::tolerances::{ONE_DIRECTION_COSINE, OPPOSED_COSINE, TOUCHING_BIT};
-
-/// Bits between two looks at the termination condition.
-const BITS_POLL: u32 = 4;
 
 /// What a part touches.
 #[derive(Debug, Clone, Default)]
@@ -47,7 +44,7 @@ impl Touching {
         reach: f64,
         termination: &Termination,
     ) -> Result<Self, Interrupt> {
-        let poll = Poll::every(BITS_POLL, Some(termination));
+        let poll = Poll::every(LONG_STEPS_PER_POLL, Some(termination));
         let body = &scene.bodies[part];
         let bounds = body.shape.bounds().transformed(pose).grown(reach);
         let parts = Self::near(scene, part, pose, standing, reach);

@@ -11,13 +11,10 @@ use std::f64::consts::TAU;
 use nalgebra::Point3;
 use rayon::prelude::*;
 
-use crate::budgets::{HEIGHTS_PER_PITCH, SLABS_PER_PITCH, TRIANGLE_HALVINGS};
+use crate::budgets::{HEIGHTS_PER_PITCH, SHORT_STEPS_PER_POLL, SLABS_PER_PITCH, TRIANGLE_HALVINGS};
 use crate::geometry::{Footprint, Helix, radii};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{EQUAL_GAP, PROFILE_MARGIN};
-
-/// Triangles between two looks at the termination condition.
-const AT_ONCE: usize = 64;
 
 /// Where a surface is along an axis and how far from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -135,7 +132,10 @@ impl Envelope {
             Ok(envelope)
         };
         // The least and the largest are the same, however triangles are dealt out.
-        triangles.par_chunks(AT_ONCE).try_fold(empty, add).try_reduce(empty, |one, other| Ok(one.with(other)))
+        triangles
+            .par_chunks(SHORT_STEPS_PER_POLL as usize)
+            .try_fold(empty, add)
+            .try_reduce(empty, |one, other| Ok(one.with(other)))
     }
 
     /// The profile of what either is the profile of.

@@ -25,9 +25,6 @@ use crate::tolerances::{HELPFUL, PATH_DENSITY};
 
 use super::super::passing::Passing;
 
-/// Samples and nodes between two looks at the termination condition: on open surfaces each takes long.
-const SAMPLES_POLL: u32 = 1;
-
 /// A point that got too deep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
@@ -139,7 +136,8 @@ impl Samples {
             .par_iter()
             .map(|asked| {
                 termination.check()?;
-                let poll = Poll::every(SAMPLES_POLL, Some(termination));
+                // Samples of open surfaces take long.
+                let poll = Poll::every(1, Some(termination));
                 sides[asked.side].entered(asked, &poll)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;

@@ -5,6 +5,8 @@
 //! plane of the closest feature, of which any one is enough where the feature is convex; where it
 //! is not, the check at the trial pose finds what is missing.
 
+use crate::budgets::SHORT_STEPS_PER_POLL;
+
 pub(crate) mod along_path;
 mod nearby_samples;
 mod pair_samples;
@@ -25,9 +27,6 @@ pub(crate) use pair_samples::{Extent, Vicinity};
 use planes::{Planes, Sample};
 
 use super::constraint::Row;
-
-/// Samples or nodes of these between two looks at the termination condition.
-const ENTER_POLL: u32 = 64;
 
 /// Whose surface the sample lies on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -253,7 +252,7 @@ impl<'a> Mover<'a> {
     /// Whether the fields alone show that a sample of either surface is deeper than granted: deeper
     /// than they can be wrong by. Measures nothing exactly, so it is quick.
     pub(crate) fn clearly_enters(&self, standing: &[usize]) -> Result<bool, Interrupt> {
-        let poll = Poll::every(ENTER_POLL, self.termination);
+        let poll = Poll::every(SHORT_STEPS_PER_POLL, self.termination);
         self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
             let field: &Grid = &measured.field;
             let limit = -allowance - field.error_bound();
@@ -269,7 +268,7 @@ impl<'a> Mover<'a> {
 
     /// Whether the fields alone show that no sample of either surface is within some distance of the other.
     pub(crate) fn seems_clear(&self, standing: &[usize], by: f64) -> Result<bool, Interrupt> {
-        let poll = Poll::every(ENTER_POLL, self.termination);
+        let poll = Poll::every(SHORT_STEPS_PER_POLL, self.termination);
         let is_near = self.any_pair(standing, by, |sampled, measured, to_measured, _| {
             let field: &Grid = &measured.field;
             let limit = by + field.error_bound();
@@ -286,7 +285,7 @@ impl<'a> Mover<'a> {
 
     /// Whether a sample of either surface is deeper by `depth` than granted: quick where many are.
     pub(crate) fn enters_by(&self, depth: f64, standing: &[usize]) -> Result<bool, Interrupt> {
-        let poll = Poll::every(ENTER_POLL, self.termination);
+        let poll = Poll::every(SHORT_STEPS_PER_POLL, self.termination);
         self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
             let (field, limit): (&Grid, f64) = (&measured.field, -allowance - depth);
             let least = |p: &Point3<f64>| field.value(p) - field.error_bound();

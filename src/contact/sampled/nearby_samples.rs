@@ -4,12 +4,13 @@ use std::cell::Cell;
 
 use nalgebra::Point3;
 
+use crate::budgets::{LONG_STEPS_PER_POLL, SHORT_STEPS_PER_POLL};
 use crate::geometry::{Closest, Pose, SampleTree};
 use crate::scene::Body;
 use crate::sdf::Grid;
 use crate::termination::{Interrupt, Poll, Termination};
 
-use super::{Contact, ENTER_POLL, Near};
+use super::{Contact, Near};
 
 /// What samples are measured against.
 pub(super) struct Measured<'m> {
@@ -18,12 +19,6 @@ pub(super) struct Measured<'m> {
     pub(super) allowance: f64,
     pub(super) reach: f64,
 }
-
-/// Nodes of samples between two looks at the condition: the first samples that come near a large surface
-/// fill its field.
-const GATHER_POLL: u32 = 1;
-/// The same for the samples of a node.
-const SAMPLE_POLL: u32 = 4;
 
 /// By the other's field.
 pub(super) fn gather(
@@ -39,8 +34,9 @@ pub(super) fn gather(
     let field: &Grid = &body.field;
     let clearance = Cell::new(near.clearance);
     let keep = |bound: f64| clearance.set(clearance.get().min(bound + allowance));
-    let poll = Poll::every(GATHER_POLL, termination);
-    let sample_poll = Poll::every(SAMPLE_POLL, termination);
+    // The first node of samples that comes near a large surface fills that surface's field.
+    let poll = Poll::every(1, termination);
+    let sample_poll = Poll::every(LONG_STEPS_PER_POLL, termination);
     tree.walk(
         (),
         |node, ()| {
@@ -98,7 +94,7 @@ pub(super) fn gather_exactly(
     let clearance = Cell::new(near.clearance);
     let keep = |gap: f64| clearance.set(clearance.get().min(gap));
     let looks = Cell::new(0);
-    let poll = Poll::every(ENTER_POLL, termination);
+    let poll = Poll::every(SHORT_STEPS_PER_POLL, termination);
     let look = |p: &Point3<f64>, guess: u32, counts: bool| {
         looks.set(looks.get() + usize::from(counts));
         let (closest, distance) = body.closest_from(p, guess);

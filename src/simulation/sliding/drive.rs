@@ -5,7 +5,7 @@
 //! constraints linearised at that pose, and the step is projected again (sequential quadratic
 //! programming); a step that still enters is halved.
 
-use crate::budgets::{EAGER_ROUNDS, LAZY_ROUNDS, STEP_HALVINGS};
+use crate::budgets::{EAGER_ROUNDS, LAZY_ROUNDS, STEP_HALVINGS, STEPS_PER_POLL};
 
 mod lift;
 mod release;
@@ -28,10 +28,6 @@ use super::super::Action;
 use super::super::projection::{Projected, project};
 use super::super::reduction::reduced;
 use release::Taken;
-
-/// Contacts between two looks at the termination condition: large surfaces that lie on each other have tens
-/// of thousands.
-const ROWS_POLL: u32 = 16;
 
 /// What a step came to.
 pub(super) enum Step {
@@ -308,7 +304,7 @@ impl Drive {
     /// leaves a choice of planes, the one is taken along which the motion gets furthest that the
     /// contacts without a choice allow: at the rim of a hole, that is the hole's wall.
     fn chosen(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>) -> Result<Known, Interrupt> {
-        let poll = Poll::every(ROWS_POLL, mover.termination);
+        let poll = Poll::every(STEPS_PER_POLL, mover.termination);
         let mut options = Vec::with_capacity(near.contacts.len() * 2);
         let mut ends = Vec::with_capacity(near.contacts.len());
         for contact in &near.contacts {
