@@ -27,7 +27,7 @@ const STAGES: [(&str, &str); 18] = [
     ("blocking_graph", "cache geometry scene simulation termination"),
     ("plan", "budgets cache contact geometry scene termination tolerances"),
     ("search", "blocking_graph cache contact geometry plan scene simulation termination tolerances"),
-    ("assembling", "geometry plan scene search simulation termination"),
+    ("assembling", "contact geometry plan scene search termination"),
     (
         "service",
         "assembling blocking_graph cache contact geometry lru plan scene sdf search simulation termination",

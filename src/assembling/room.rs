@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
+use crate::contact::seems_clear;
 use crate::geometry::{Bounds, Pose, interpolate, separating_direction, transformed};
 use crate::plan::{Verdict, Verifier};
 use crate::scene::Scene;
-use crate::simulation::seems_clear;
 use crate::termination::{Interrupt, Termination, try_all};
 
 /// Turns between two waypoints stay below this, so that the slerp is unambiguous.

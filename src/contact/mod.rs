@@ -5,6 +5,8 @@
 //! | how far a body goes along a line until it meets another (shape cast) | `shape_cast`: [`ShapeCast`] | a length |
 //! | bounds that hold for all points of a surface (region cover), for shifts, for turns and for paths | `region_cover`: `shift`, `rigid`, `path` | regions and what leaves them; a depth |
 //! | contacts at samples of both surfaces, for open surfaces and as a fallback | `sampled` | contacts |
+//! | whether a sample is deeper than a limit, at a pose or on a way that is only tried | `sampled::penetration` | yes or no |
+//! | how long a stretch of others is in the way of a direction (to order turns) | [`obstruction`] | a length |
 //! | whether two threads pass each other along their helix | `helix_profile` | the stretches left open |
 //! | whether the hulls of a body and of all others are apart | [`exit_direction`](crate::scene::exit_direction) | a direction |
 //!
@@ -14,11 +16,14 @@
 pub(crate) mod constraint;
 pub(crate) mod course;
 pub(crate) mod helix_profile;
+mod obstruction;
 mod passing;
 pub(crate) mod region_cover;
 pub(crate) mod sampled;
 mod shape_cast;
 
+pub use obstruction::obstruction;
 pub use passing::Passing;
 pub use region_cover::KeptCells;
+pub use sampled::{passes_straight, seems_clear};
 pub use shape_cast::{CastMargins, ShapeCast};

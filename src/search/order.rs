@@ -6,7 +6,8 @@ use std::collections::BTreeSet;
 use rayon::prelude::*;
 
 use crate::blocking_graph::{Blockage, Evaluation};
-use crate::simulation::{Action, obstruction};
+use crate::contact::obstruction;
+use crate::simulation::Action;
 use crate::termination::{Interrupt, Poll};
 
 use super::disassembly::Stop;

@@ -8,8 +8,8 @@
 
 use rayon::prelude::*;
 
+use crate::contact::passes_straight;
 use crate::geometry::Pose;
-use crate::simulation::passes_straight;
 use crate::termination::Interrupt;
 
 use super::sbdp::Search;

@@ -10,8 +10,6 @@
 
 mod action;
 mod null_twists;
-mod obstruction;
-mod passage;
 mod penalty;
 mod projection;
 mod records;
@@ -25,8 +23,6 @@ mod transition;
 
 pub use action::{Action, Axis};
 pub use null_twists::NullTwist;
-pub use obstruction::obstruction;
-pub use passage::{passes_straight, seems_clear};
 pub use penalty::{PenaltyEngine, PenaltyParameters};
 pub use records::MotionQuestion;
 pub(crate) use records::{

@@ -5,11 +5,10 @@
 //! plane of the closest feature, of which any one is enough where the feature is convex; where it
 //! is not, the check at the trial pose finds what is missing.
 
-use crate::budgets::SHORT_STEPS_PER_POLL;
-
 pub(crate) mod along_path;
 mod nearby_samples;
 mod pair_samples;
+mod penetration;
 mod planes;
 #[cfg(test)]
 mod tests;
@@ -18,12 +17,13 @@ use nalgebra::{Point3, Vector3, Vector6};
 
 use crate::geometry::{Bounds, Closest, Pose};
 use crate::scene::{Body, Scene, Surroundings};
-use crate::sdf::Grid;
-use crate::termination::{Interrupt, Poll, Termination};
+use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{FREE_STEP, ON_SURFACE};
 
 use nearby_samples::{Measured, gather};
 pub(crate) use pair_samples::{Extent, Vicinity};
+pub(crate) use penetration::is_deeper;
+pub use penetration::{passes_straight, seems_clear};
 use planes::{Planes, Sample};
 
 use super::constraint::Row;
@@ -247,84 +247,6 @@ impl<'a> Mover<'a> {
 
     fn prepare_field(&self, body: &Body) -> Result<(), Interrupt> {
         self.termination.map_or(Ok(()), |t| body.field.prepare_here(t))
-    }
-
-    /// Whether the fields alone show that a sample of either surface is deeper than granted: deeper
-    /// than they can be wrong by. Measures nothing exactly, so it is quick.
-    pub(crate) fn clearly_enters(&self, standing: &[usize]) -> Result<bool, Interrupt> {
-        let poll = Poll::every(SHORT_STEPS_PER_POLL, self.termination);
-        self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
-            let field: &Grid = &measured.field;
-            let limit = -allowance - field.error_bound();
-            sampled.shape.samples().any(
-                |node| {
-                    poll.check()?;
-                    Ok(field.value(&(to_measured * node.centre)) - node.radius < limit)
-                },
-                |sample| field.value(&(to_measured * sample)) < limit,
-            )
-        })
-    }
-
-    /// Whether the fields alone show that no sample of either surface is within some distance of the other.
-    pub(crate) fn seems_clear(&self, standing: &[usize], by: f64) -> Result<bool, Interrupt> {
-        let poll = Poll::every(SHORT_STEPS_PER_POLL, self.termination);
-        let is_near = self.any_pair(standing, by, |sampled, measured, to_measured, _| {
-            let field: &Grid = &measured.field;
-            let limit = by + field.error_bound();
-            sampled.shape.samples().any(
-                |node| {
-                    poll.check()?;
-                    Ok(field.value(&(to_measured * node.centre)) - node.radius < limit)
-                },
-                |sample| field.value(&(to_measured * sample)) < limit,
-            )
-        })?;
-        Ok(!is_near)
-    }
-
-    /// Whether a sample of either surface is deeper by `depth` than granted: quick where many are.
-    pub(crate) fn enters_by(&self, depth: f64, standing: &[usize]) -> Result<bool, Interrupt> {
-        let poll = Poll::every(SHORT_STEPS_PER_POLL, self.termination);
-        self.any_pair(standing, 0.0, |sampled, measured, to_measured, allowance| {
-            let (field, limit): (&Grid, f64) = (&measured.field, -allowance - depth);
-            let least = |p: &Point3<f64>| field.value(p) - field.error_bound();
-            sampled.shape.samples().any(
-                |node| {
-                    poll.check()?;
-                    Ok(least(&(to_measured * node.centre)) - node.radius < limit)
-                },
-                |sample| {
-                    let p = to_measured * sample;
-                    least(&p) < limit
-                        && measured.closest(&p, 0.0).is_some_and(|(_, distance)| distance < limit)
-                },
-            )
-        })
-    }
-
-    /// Whether a test of one surface's samples against the other's body holds for any pair that may
-    /// come as close as `margin`, given the sampled and the measured body, the way from one's frame to the
-    /// other's, and the pair's allowance.
-    fn any_pair(
-        &self,
-        standing: &[usize],
-        margin: f64,
-        test: impl Fn(&Body, &Body, &Pose, f64) -> Result<bool, Interrupt>,
-    ) -> Result<bool, Interrupt> {
-        let bounds = self.body.shape.bounds().transformed(&self.pose).grown(margin);
-        for other in self.scene.broad_phase.meeting_of(standing, &bounds) {
-            let still = &self.scene.bodies[other];
-            self.prepare_fields(still)?;
-            let allowance = self.scene.allowances.of(self.part, other);
-            let to_still = still.planning_from_shape.inverse() * self.pose;
-            if test(self.body, still, &to_still, allowance)?
-                || test(still, self.body, &to_still.inverse(), allowance)?
-            {
-                return Ok(true);
-            }
-        }
-        Ok(false)
     }
 
     /// The gap of a contact's sample with the mover at its pose, if still below `reach`.

@@ -4,11 +4,11 @@
 //! points are far apart; so what a motion claims is checked by other means: the samples that
 //! `sliding` uses, against the triangles. The field only tells which samples need not be asked.
 
-use std::convert::Infallible;
-
-use crate::geometry::{Pose, SampleTree, interpolate};
+use crate::budgets::SHORT_STEPS_PER_POLL;
+use crate::contact::sampled;
+use crate::geometry::{Pose, interpolate};
 use crate::scene::Body;
-use crate::sdf::Grid;
+use crate::termination::Poll;
 use crate::tolerances::{PENALTY_TRAVEL, SAMPLED_DEPTH_SHARE};
 
 use super::contacts::Contacts;
@@ -59,42 +59,8 @@ fn holds(
 
 /// Whether a sample of one body is deeper than `limit` in the other.
 fn is_deeper(sampled: &Body, measured: &Body, to_measured: &Pose, limit: f64) -> bool {
-    let trees: [&SampleTree; 2] = [sampled.shape.samples(), &sampled.extra_samples];
-    let found = std::cell::Cell::new(false);
-    let field: &Grid = &measured.field;
-    for tree in trees {
-        let Ok::<(), Infallible>(()) = tree.walk(
-            (),
-            |node, ()| {
-                let p = to_measured * node.centre;
-                // Spheres no larger than the limit are left out by their depth: outside it is 0.
-                let is_left_out = if node.radius > limit {
-                    field.estimate(&p).lower_bound > node.radius
-                } else {
-                    field.deepest(&p) + node.radius <= limit
-                };
-                Ok((!found.get() && !is_left_out).then_some(()))
-            },
-            |sample, ()| {
-                if !found.get() {
-                    found.set(is_point_deeper(measured, &(to_measured * sample), limit));
-                }
-                Ok(())
-            },
-        );
-    }
-    found.get()
-}
-
-fn is_point_deeper(measured: &Body, p: &nalgebra::Point3<f64>, limit: f64) -> bool {
-    if measured.field.deepest(p) <= limit {
-        return false;
-    }
-    let surface = &measured.shape.surface;
-    // No point is deeper than it is far from any one triangle.
-    let near = |t| surface.closest_on(t, p).distance <= limit;
-    if measured.field.likely_nearest(p).is_some_and(near) {
-        return false;
-    }
-    measured.closest(p, 0.0).is_some_and(|(_, distance)| -distance > limit)
+    // Without a condition nothing interrupts.
+    let poll = Poll::every(SHORT_STEPS_PER_POLL, None);
+    let is_deeper = |samples| sampled::is_deeper(samples, measured, to_measured, limit, &poll) == Ok(true);
+    is_deeper(sampled.shape.samples()) || is_deeper(&sampled.extra_samples)
 }
