@@ -53,6 +53,8 @@ pub(crate) const ENTRY_SHARE: f64 = 0.125;
 pub(crate) const FREE_STEP: f64 = 0.5;
 /// Length. The longest step in contact; what is further off needs no region, and regions reach as far.
 pub(crate) const CONTACT_STEP: f64 = 0.12;
+/// Length. A contact step is half as long as the part is thin, but no shorter than this.
+pub(crate) const SHORTEST_CONTACT_STEP: f64 = 0.03;
 /// Length. How far the arc of one turning step may bulge from its chord.
 pub(crate) const STEP_BULGE: f64 = 1e-3;
 /// Multiple of a contact step. The longest free turn: exits show at the ends of steps alone.

@@ -6,6 +6,7 @@
 //! is not, the check at the trial pose finds what is missing.
 
 pub(crate) mod along_path;
+mod contact_cache;
 mod nearby_samples;
 mod pair_samples;
 mod penetration;
@@ -20,8 +21,8 @@ use crate::scene::{Body, Scene, Surroundings};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{FREE_STEP, ON_SURFACE};
 
+pub(crate) use contact_cache::{ContactCache, StartContacts};
 use nearby_samples::{Measured, gather};
-pub(crate) use pair_samples::{Extent, Vicinity};
 pub(crate) use penetration::is_deeper;
 pub use penetration::{passes_straight, seems_clear};
 use planes::{Planes, Sample};

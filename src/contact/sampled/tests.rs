@@ -1,5 +1,6 @@
 use nalgebra::Vector3;
 
+use super::pair_samples::{Extent, Vicinity};
 use super::*;
 use crate::fixtures::{ball, block_on_plate, cuboid, l_shape, moved, peg_in_hole, scene};
 

@@ -21,7 +21,7 @@ use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll, try_all};
 use crate::tolerances::{
     BULGE_TOLERANCE, CONTACT_REACH, CONTACT_STEP, DEPTH_TOLERANCE, FREE_STEP, FREE_TURN_STEPS, PRESSED_SHARE,
-    STEP_BULGE, STEP_OVERSHOOT, STEP_STRETCH, STUCK_SHARE,
+    SHORTEST_CONTACT_STEP, STEP_BULGE, STEP_OVERSHOOT, STEP_STRETCH, STUCK_SHARE,
 };
 
 use super::super::Action;
@@ -420,7 +420,7 @@ impl Drive {
 
 /// The longest step of a shape in contact.
 pub(super) fn contact_step(shape: &Shape) -> f64 {
-    (shape.bounds().extents().min() * 0.5).clamp(0.03, CONTACT_STEP)
+    (shape.bounds().extents().min() * 0.5).clamp(SHORTEST_CONTACT_STEP, CONTACT_STEP)
 }
 
 /// What the first projection of a step knows of the contacts; tried in this order.

@@ -12,7 +12,6 @@
 mod drive;
 mod flight;
 mod leap;
-mod looks;
 mod pair;
 mod push;
 mod stages;

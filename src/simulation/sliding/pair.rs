@@ -7,15 +7,14 @@ use crate::budgets::{STATIC_PUSHES, STATIC_STEPS};
 use crate::contact::region_cover::Halt;
 use crate::contact::region_cover::shift::Cells;
 use crate::contact::region_cover::surface_pair::Facing;
-use crate::contact::sampled::Mover;
+use crate::contact::sampled::{ContactCache, Mover, StartContacts};
 use crate::geometry::Pose;
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::FREE_STEP;
 
 use super::super::Action;
-use super::drive::{Drive, Moved, Step};
-use super::looks::{Looks, Start};
+use super::drive::{Drive, Moved, Step, contact_step};
 use super::push::{self, Push};
 
 /// For each action, whether `other` alone keeps `part` at `pose` from following it by more than
@@ -45,7 +44,11 @@ pub fn pair_blocks(
     let mut start = Mover::new(scene, part, *pose).until(termination);
     let is_open = [start.body, &scene.bodies[other]].iter().any(|body| body.shape.surface.is_open());
     let is_exact = !is_open && actions.iter().all(|a| !a.turns());
-    let around = if is_exact { Start::looked_at(&start.exactly(), other, (least, reach))? } else { None };
+    let around = if is_exact {
+        StartContacts::gather(&start.exactly(), other, contact_step(&start.body.shape), (least, reach))?
+    } else {
+        None
+    };
     let near = match &around {
         Some(around) => {
             start = start.exactly();
@@ -58,8 +61,8 @@ pub fn pair_blocks(
     }
     let blocked = |action: &Action| {
         let drive = Drive::new(scene, part, pose, *action);
-        let mut looks = Looks::new(other, reach, around.as_ref());
-        let mut step = drive.advance(&start, &mut near.clone(), &mut looks)?;
+        let mut contacts = ContactCache::new(other, reach, around.as_ref());
+        let mut step = drive.advance(&start, &mut near.clone(), &mut contacts)?;
         for _ in 1..STATIC_STEPS {
             termination.check()?;
             let Step::Moved(Moved { pose: there, .. }) = step else { return Ok(true) };
@@ -67,8 +70,8 @@ pub fn pair_blocks(
             if (mover.centre() - start.centre()).norm() > least {
                 return Ok(false);
             }
-            let mut near = looks.from(&mover)?;
-            step = drive.advance(&mover, &mut near, &mut looks)?;
+            let mut near = contacts.at_start_of_step(&mover)?;
+            step = drive.advance(&mover, &mut near, &mut contacts)?;
         }
         Ok(matches!(step, Step::Stuck { .. }))
     };

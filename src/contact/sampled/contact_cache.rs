@@ -1,69 +1,73 @@
-//! What the steps of a pair alone look at: each pose once, and, of translations, without fields and only at what may be
-//! near.
+//! Contacts of one pair that are kept from pose to pose: each pose is measured once and, of translations, without
+//! distance fields.
 //!
-//! A pair is new in most changed questions, and is asked for a few short steps in six directions. Its surfaces are
-//! sampled where they face each other alone, and all samples around the start are measured there once. Shifts change
-//! signed distances by no more than their length: at each pose those are measured again that may have come near since
-//! they were measured last.
+//! A pair is new in most changed requests, and a few short steps in six directions are asked of it. Its surfaces are
+//! sampled only where they face each other, and all samples around the start are measured there once. A shift changes a
+//! signed distance by no more than its length: at each pose, only those samples are measured again that may have come
+//! near since.
 
 use nalgebra::Point3;
 
 use crate::budgets::LOOKS_BY_SAMPLES;
-use crate::contact::sampled::{Around, Extent, Mover, Near, Vicinity};
 use crate::geometry::Pose;
 use crate::termination::Interrupt;
 use crate::tolerances::{FREE_STEP, KNOWN_SAMPLE_STEPS};
 
-use super::drive::contact_step;
+use super::pair_samples::{Extent, Vicinity};
+use super::{Around, Mover, Near};
 
-/// Of lengths, as a share of these.
+/// The rounding error of a length, as a share of it.
 const ROUNDING: f64 = 1e-9;
 
-/// What is around a part where its translations start, told without fields.
-pub(super) struct Start {
+/// The contacts around a part where its translations start.
+pub(crate) struct StartContacts {
     vicinity: Vicinity,
     centre: Point3<f64>,
-    /// All with a gap below this are …
+    /// `near` has all contacts with a smaller gap.
     radius: f64,
-    /// … here.
-    pub(super) near: Near,
+    pub(crate) near: Near,
 }
 
-impl Start {
-    /// Of a part that is moved by no more than a step further than `least`, of which is asked what is within `reach`;
-    /// none if that takes many looks, which depends on the question alone.
-    pub(super) fn looked_at(
+impl StartContacts {
+    /// Contacts of a part that is moved in steps of length `step`, and no further than `least` and one free step, as
+    /// far as needed to know all within `reach`. `None` if that takes many measurements; this depends on the arguments
+    /// alone.
+    ///
+    /// # Errors
+    /// The mover's termination condition became true.
+    pub(crate) fn gather(
         mover: &Mover<'_>,
         other: usize,
+        step: f64,
         (least, reach): (f64, f64),
     ) -> Result<Option<Self>, Interrupt> {
-        let radius = KNOWN_SAMPLE_STEPS * contact_step(&mover.body.shape) + reach;
+        let radius = KNOWN_SAMPLE_STEPS * step + reach;
         let vicinity = Vicinity::new(mover, other, least + FREE_STEP + radius);
         let near = vicinity.near(mover, Extent { radius, reach, most: LOOKS_BY_SAMPLES })?;
         Ok(near.map(|near| Self { vicinity, centre: mover.centre(), radius, near }))
     }
 }
 
-/// What is near a part at the poses of one motion, beside another.
-pub(super) struct Looks<'a> {
+/// The contacts of a part with one other at the poses of a motion.
+pub(crate) struct ContactCache<'a> {
     other: usize,
     reach: f64,
     shifted: Option<Shifted<'a>>,
-    /// In the step that is being made: where, how far was looked, and what is there.
+    /// In the current step: the pose, the reach, and the contacts.
     seen: Vec<(Pose, f64, Near)>,
 }
 
-impl<'a> Looks<'a> {
-    /// Of a translation, if there is a start; else by fields.
-    pub(super) fn new(other: usize, reach: f64, start: Option<&'a Start>) -> Self {
+impl<'a> ContactCache<'a> {
+    /// With the contacts around the start of a translation; without them, by fields.
+    pub(crate) fn new(other: usize, reach: f64, start: Option<&'a StartContacts>) -> Self {
         Self { other, reach, shifted: start.map(Shifted::from), seen: Vec::new() }
     }
 
-    /// What a step from a pose begins with, that the one before may have ended at.
-    pub(super) fn from(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt> {
+    /// The contacts from which a step starts; the last step may have ended there.
+    pub(crate) fn at_start_of_step(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt> {
         let mut near = self.within(self.reach, mover)?;
         if near.contacts.is_empty() {
-            // How long the step may be is told by the clearance, which is told less well by samples that are passed by.
+            // The clearance bounds the step, and samples that were passed over tell it less well.
             near = self.all_within(self.reach, mover)?;
         }
         self.seen.clear();
@@ -94,32 +98,32 @@ impl<'a> Looks<'a> {
     }
 }
 
-impl Around for Looks<'_> {
-    /// Whether a step can be made is told by what enters at its end alone. What is merely near there matters only if
-    /// another step follows: without fields it costs next to nothing.
+impl Around for ContactCache<'_> {
+    /// Only what enters at the end of a step decides whether it can be made. What is merely near there matters only if
+    /// another step follows; without fields it costs next to nothing.
     fn near(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt> {
         self.within(if self.shifted.is_some() { self.reach } else { 0.0 }, mover)
     }
 }
 
-/// What was around the start of a part that is shifted.
+/// The contacts around the start, for a part that was shifted from there.
 struct Shifted<'a> {
-    start: &'a Start,
-    /// Where it was looked, by the part's centre.
+    start: &'a StartContacts,
+    /// The part's centre at each pose that was measured.
     at: Vec<Point3<f64>>,
-    /// Of each contact around the start, the gap as measured last, and at which of these.
+    /// Of each contact around the start, the gap as measured last, and the pose (in `at`) of that.
     last: Vec<(f64, u32)>,
 }
 
 impl<'a> Shifted<'a> {
-    fn from(start: &'a Start) -> Self {
+    fn from(start: &'a StartContacts) -> Self {
         let last = start.near.contacts.iter().map(|contact| (contact.gap, 0)).collect();
         Self { start, at: vec![start.centre], last }
     }
 
-    /// What is near a pose, of what was around the start; none if that is too far away.
+    /// The contacts at a pose; `None` if it is too far from the start.
     fn near(&mut self, mover: &Mover<'_>, reach: f64) -> Option<Near> {
-        let Start { near: around, radius, .. } = self.start;
+        let StartContacts { near: around, radius, .. } = self.start;
         let here = mover.centre();
         let ways: Vec<f64> = self.at.iter().map(|there| (here - there).norm() * (1.0 + ROUNDING)).collect();
         let mut near = Near { contacts: Vec::new(), clearance: around.clearance.min(*radius) - ways[0] };
@@ -152,6 +156,7 @@ mod tests {
 
     use super::*;
     use crate::fixtures::{peg_in_hole, scene, vector};
+    use crate::tolerances::CONTACT_STEP;
 
     const REACH: f64 = 0.01;
     const LEAST: f64 = 0.1;
@@ -159,16 +164,16 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
-        /// What is near, as told by looks that remember, by a look at all samples around the start, and by fields.
+        /// The same contacts are found by the cache, by all samples around the start, and by fields.
         #[test]
-        fn looks_that_remember_see_what_is_there(
+        fn kept_contacts_are_those_that_are_there(
             excess in prop_oneof![Just(-0.01), Just(0.0), Just(5e-4)],
             shifts in prop::collection::vec(vector(0.2), 1..6),
         ) {
             let (scene, _) = scene(peg_in_hole(excess));
             let start = Mover::new(&scene, 1, scene.bodies[1].planning_from_shape);
-            let around = Start::looked_at(&start.exactly(), 0, (LEAST, REACH)).unwrap().unwrap();
-            let mut looks = Looks::new(0, REACH, Some(&around));
+            let around = StartContacts::gather(&start.exactly(), 0, CONTACT_STEP, (LEAST, REACH)).unwrap().unwrap();
+            let mut cache = ContactCache::new(0, REACH, Some(&around));
             for shift in [Vector3::zeros()].into_iter().chain(shifts) {
                 let mut mover = start;
                 mover.pose.translation.vector += shift;
@@ -179,8 +184,8 @@ mod tests {
                 };
                 let mut by_fields = Near { contacts: Vec::new(), clearance: f64::INFINITY };
                 mover.near_pair(0, REACH, &mut by_fields).unwrap();
-                let remembered = looks.near(&mover.exactly()).unwrap();
-                let all = looks.all_within(REACH, &mover.exactly()).unwrap();
+                let remembered = cache.near(&mover.exactly()).unwrap();
+                let all = cache.all_within(REACH, &mover.exactly()).unwrap();
                 prop_assert_eq!(told(&remembered), told(&by_fields));
                 prop_assert_eq!(told(&all), told(&by_fields));
                 // No other sample is nearer than they say.
@@ -191,7 +196,7 @@ mod tests {
                 let nearest = others.fold(f64::INFINITY, f64::min);
                 prop_assert!(remembered.clearance <= nearest + 1e-9 && all.clearance <= nearest + 1e-9);
                 // Twice at one pose is the same.
-                prop_assert_eq!(told(&looks.near(&mover.exactly()).unwrap()), told(&remembered));
+                prop_assert_eq!(told(&cache.near(&mover.exactly()).unwrap()), told(&remembered));
             }
         }
     }
