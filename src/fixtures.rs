@@ -10,7 +10,7 @@ use crate::geometry::{
     Assembly, Mesh, Pose, Shape, Solidity, SourceAssembly, SourceMesh, SourcePart, Surface, heal,
 };
 use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Verifier};
-use crate::scene::{Pair, Scene};
+use crate::scene::{CongruentPair, Scene};
 use crate::sdf::Field;
 use crate::termination::Termination;
 
@@ -203,8 +203,9 @@ pub(crate) fn scene(meshes: impl IntoIterator<Item = SourceMesh>) -> (Scene, Ver
     let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
     let verifier = Verifier::new(&assembly.shapes, shape_of, LIMIT);
     for (a, b) in (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))) {
-        let depth =
-            verifier.assembled_depth(&scene, &Pair::turned(&scene, a, b), &Termination::default()).unwrap();
+        let depth = verifier
+            .assembled_depth(&scene, &CongruentPair::turned(&scene, a, b), &Termination::default())
+            .unwrap();
         if depth > 1e-6 * scene.longest_side {
             scene.allowances.grant(a, b, depth);
         }

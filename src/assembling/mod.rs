@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Pose};
 use crate::plan::{Verdict, Verifier};
-use crate::scene::{Scene, Surroundings, exit_direction};
+use crate::scene::{Scene, StandingParts, exit_direction};
 use crate::search::Removal;
 use crate::termination::{Interrupt, Termination};
 
@@ -205,7 +205,7 @@ impl<'a> Assembling<'a> {
         }
         let stands = |number: &usize| self.room.part(*number) == *number;
         let standing = among.iter().copied().filter(stands).collect();
-        let around = Surroundings::new(&self.room.scene, standing);
+        let around = StandingParts::new(&self.room.scene, standing);
         let pose = removal.path.last().copied().unwrap_or_default();
         let out = exit_direction(&self.room.scene, &around, removal.part, &pose, None);
         // It tells where the others lie.

@@ -1,9 +1,9 @@
 //! What is remembered of pairs of parts: along which translations one keeps the other from moving. That depends on the
-//! two shapes, on how they stand to each other (rounded: see [`Pair`]), and on the question, so a pair analysed once
+//! two shapes, on how they stand to each other (rounded: see [`CongruentPair`]), and on the question, so a pair analysed once
 //! serves each state, request and assembly that has it.
 
 use crate::cache::{Digest, RecordKey, RecordKind, Storage, Validity};
-use crate::scene::{Pair, Scene, add_pair, add_samples};
+use crate::scene::{CongruentPair, Scene, add_pair, add_samples};
 use crate::simulation::{Action, add_action};
 
 const SOURCES: Validity = Validity::Sources(env!("SBDP_SOURCES_BLOCKING_GRAPH"));
@@ -14,7 +14,7 @@ pub(crate) static BLOCKING: RecordKind =
 /// The key of what one part of a pair keeps the other from, by a rule; `least` is the travel that counts as motion.
 pub(super) fn blocking_key(
     scene: &Scene,
-    pair: &Pair,
+    pair: &CongruentPair,
     rule: &str,
     translations: &[Action],
     least: f64,
@@ -40,7 +40,7 @@ mod tests {
 
     fn keys(scene: &Scene) -> Vec<RecordKey> {
         let translations = Action::translations();
-        let pair = Pair::shifted(scene, 1, &scene.bodies[1].planning_from_shape, 0);
+        let pair = CongruentPair::shifted(scene, 1, &scene.bodies[1].planning_from_shape, 0);
         let key = |rule, translations, least| blocking_key(scene, &pair, rule, translations, least);
         vec![
             key("sliding", &translations, 0.05),

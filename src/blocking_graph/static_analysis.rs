@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::cache::{RecordKey, RequestCache};
 use crate::geometry::Pose;
-use crate::scene::{Pair, Scene, grouped};
+use crate::scene::{CongruentPair, Scene, grouped};
 use crate::simulation::{Action, pair_blocks};
 use crate::termination::{Interrupt, Termination};
 
@@ -74,7 +74,7 @@ impl Analysis<'_> {
             let (mover, other) = if extent(p) <= extent(o) { (p, o) } else { (o, p) };
             self.keyed(mover, &scene.bodies[mover].planning_from_shape, other, least(mover))
         };
-        let pairs: Vec<(RecordKey, Pair)> = pairs.par_iter().map(placed).collect();
+        let pairs: Vec<(RecordKey, CongruentPair)> = pairs.par_iter().map(placed).collect();
         // What holds for one bolt in its nut holds for all that stand alike.
         let (first, group_of) = grouped(pairs.iter().map(|(key, _)| *key));
         // One by one: most are remembered, and two that are not must not come after one another on one thread.
@@ -88,7 +88,7 @@ impl Analysis<'_> {
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
         let mut out = vec![Blockage::open(translations.len()); scene.bodies.len()];
-        for ((_, Pair { parts: [mover, other], .. }), group) in pairs.into_iter().zip(group_of) {
+        for ((_, CongruentPair { parts: [mover, other], .. }), group) in pairs.into_iter().zip(group_of) {
             for a in (0..translations.len()).filter(|&a| relations[group].get(a) == Some(&true)) {
                 out[mover].block_single(a, other);
                 out[other].block_single(a ^ 1, mover);
@@ -122,8 +122,8 @@ impl Analysis<'_> {
         Ok(out)
     }
 
-    fn keyed(&self, part: usize, pose: &Pose, other: usize, least: f64) -> (RecordKey, Pair) {
-        let pair = Pair::shifted(self.scene, part, pose, other);
+    fn keyed(&self, part: usize, pose: &Pose, other: usize, least: f64) -> (RecordKey, CongruentPair) {
+        let pair = CongruentPair::shifted(self.scene, part, pose, other);
         (blocking_key(self.scene, &pair, self.rule.name(), self.translations, least), pair)
     }
 
@@ -131,7 +131,7 @@ impl Analysis<'_> {
     fn pair_blocks(
         &self,
         key: RecordKey,
-        pair: &Pair,
+        pair: &CongruentPair,
         least: f64,
         termination: &Termination,
     ) -> Result<Vec<bool>, Interrupt> {

@@ -4,7 +4,7 @@ use nalgebra::Vector6;
 
 /// One constraint a·w ≥ −b.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Row {
+pub(crate) struct VelocityConstraint {
     pub(crate) a: Vector6<f64>,
     pub(crate) b: f64,
     /// The part that the constraint comes from.

@@ -24,7 +24,7 @@ pub(crate) fn turns_far(path: &[Pose]) -> bool {
 /// The path of a part, in the frame of the one that it passes.
 #[derive(Debug)]
 pub(crate) struct Course {
-    pub(crate) segments: Vec<Segment>,
+    pub(crate) segments: Vec<PathSegment>,
     /// The point of the shape that moves on lines.
     pub(crate) centre: Point3<f64>,
     /// No point of the shape is further from it.
@@ -33,7 +33,7 @@ pub(crate) struct Course {
 }
 
 #[derive(Debug)]
-pub(crate) struct Segment {
+pub(crate) struct PathSegment {
     pub(crate) from: Pose,
     pub(crate) to: Pose,
     /// Way from the path's start to this segment's.
@@ -51,20 +51,20 @@ impl Course {
             let shift = (to * centre - from * centre).norm();
             let length = shift + reach * from.rotation.angle_to(&to.rotation);
             if length > 0.0 || path.len() == 1 {
-                course.segments.push(Segment { from: *from, to: *to, before: course.length, length });
+                course.segments.push(PathSegment { from: *from, to: *to, before: course.length, length });
                 course.length += length;
             }
         }
         if let (true, Some(only)) = (course.segments.is_empty(), path.first()) {
-            course.segments.push(Segment { from: *only, to: *only, before: 0.0, length: 0.0 });
+            course.segments.push(PathSegment { from: *only, to: *only, before: 0.0, length: 0.0 });
         }
         course
     }
 
     /// The bends of a stretch of the way: segments with the shares at which they begin and end.
-    fn bends(&self, from: f64, to: f64) -> Vec<(&Segment, f64, f64)> {
+    fn bends(&self, from: f64, to: f64) -> Vec<(&PathSegment, f64, f64)> {
         let first = self.segments.partition_point(|s| s.before + s.length < from);
-        let share = |s: &Segment, at: f64| {
+        let share = |s: &PathSegment, at: f64| {
             if s.length > 0.0 { ((at - s.before) / s.length).clamp(0.0, 1.0) } else { 0.0 }
         };
         let mut bends: Vec<_> = self.segments[first.min(self.segments.len().saturating_sub(1))..]
@@ -84,14 +84,14 @@ impl Course {
     /// By how many radians the part turns on a stretch.
     pub(crate) fn turn(&self, interval: Interval) -> f64 {
         let [from, to] = interval.of(self.length);
-        let turn = |(s, a, b): &(&Segment, f64, f64)| s.from.rotation.angle_to(&s.to.rotation) * (b - a);
+        let turn = |(s, a, b): &(&PathSegment, f64, f64)| s.from.rotation.angle_to(&s.to.rotation) * (b - a);
         self.bends(from, to).iter().map(turn).sum()
     }
 
     /// The path from one place on the way to another.
     pub(crate) fn path_between(&self, [from, to]: [f64; 2]) -> Vec<Pose> {
         let bends = self.bends(from, to);
-        let at = |(s, a, _): &(&Segment, f64, f64)| interpolate(&s.from, &s.to, &self.centre, *a);
+        let at = |(s, a, _): &(&PathSegment, f64, f64)| interpolate(&s.from, &s.to, &self.centre, *a);
         let last = bends.last().map(|(s, _, b)| interpolate(&s.from, &s.to, &self.centre, *b));
         bends.iter().map(at).chain(last).collect()
     }
@@ -175,7 +175,7 @@ impl Leg {
 
 /// A course seen from one of the two parts: of points of the moving part in the frame of the
 /// standing one, or the other way round.
-pub(crate) struct View<'a> {
+pub(crate) struct CourseView<'a> {
     course: &'a Course,
     /// Whether points of the moving part are looked at.
     on_moving: bool,
@@ -184,7 +184,7 @@ pub(crate) struct View<'a> {
     legs: HashMap<Interval, Rc<Leg>>,
 }
 
-impl<'a> View<'a> {
+impl<'a> CourseView<'a> {
     pub(crate) fn new(course: &'a Course, on_moving: bool, shortest: f64) -> Self {
         Self { course, on_moving, shortest, legs: HashMap::new() }
     }
@@ -213,7 +213,7 @@ impl<'a> View<'a> {
             along: None,
         };
         let bends = self.course.bends(from, from + length);
-        let turns = |(segment, a, b): &(&Segment, f64, f64)| {
+        let turns = |(segment, a, b): &(&PathSegment, f64, f64)| {
             segment.from.rotation.angle_to(&segment.to.rotation) * (b - a)
         };
         if bends.len() > LEG_BENDS || bends.iter().any(|bend| turns(bend) > LEG_TURN) {
@@ -298,7 +298,7 @@ mod tests {
             let course = Course::new(&path, centre, 4.0);
             let point = Point3::from(point);
             for on_moving in [true, false] {
-                let mut view = View::new(&course, on_moving, 1e-3);
+                let mut view = CourseView::new(&course, on_moving, 1e-3);
                 let mut interval = Interval::WHOLE;
                 for _ in 0..7 {
                     let leg = view.leg(interval);
@@ -323,7 +323,7 @@ mod tests {
         let turned = to * Pose::rotation(Vector3::z() * 0.5);
         let course = Course::new(&[Pose::identity(), to, turned], Point3::origin(), 1.0);
         assert!((course.length - 2.5).abs() < 1e-12);
-        let mut view = View::new(&course, true, 1e-3);
+        let mut view = CourseView::new(&course, true, 1e-3);
         let whole = view.leg(Interval::WHOLE);
         assert_eq!((whole.maps.len(), whole.slack), (4, 0.0));
         let [first, second] = Interval::WHOLE.halves();
@@ -337,7 +337,7 @@ mod tests {
     #[test]
     fn a_path_of_one_pose_is_a_point() {
         let course = Course::new(&[Pose::translation(1.0, 2.0, 3.0)], Point3::origin(), 1.0);
-        let leg = View::new(&course, true, 1e-3).leg(Interval::WHOLE);
+        let leg = CourseView::new(&course, true, 1e-3).leg(Interval::WHOLE);
         assert!(course.length == 0.0 && leg.length == 0.0);
         for m in &leg.maps {
             assert_eq!(m.apply(&Point3::origin()), Point3::new(1.0, 2.0, 3.0));

@@ -10,7 +10,7 @@
 //! | whether two threads pass each other along their helix | `helix_profile` | the stretches left open |
 //! | whether the hulls of a body and of all others are apart | [`exit_direction`](crate::scene::exit_direction) | a direction |
 //!
-//! `course` says how points move along a path, [`Passing`] which way a body takes past another. Contact knows the scene
+//! `course` says how points move along a path, [`PairPath`] which way a body takes past another. Contact knows the scene
 //! and nothing of simulation, plans and search.
 
 pub(crate) mod constraint;
@@ -23,7 +23,7 @@ pub(crate) mod sampled;
 mod shape_cast;
 
 pub use obstruction::obstruction;
-pub use passing::Passing;
-pub use region_cover::KeptCells;
+pub use passing::PairPath;
+pub use region_cover::ShiftCoverCache;
 pub use sampled::{passes_straight, seems_clear};
 pub use shape_cast::{CastMargins, ShapeCast};

@@ -7,14 +7,14 @@
 use nalgebra::{Point3, Translation3};
 
 use crate::geometry::{Pose, Shape, Surface};
-use crate::scene::{Allowances, Pair, Scene, rounded, rounded_pose};
+use crate::scene::{Allowances, CongruentPair, Scene, rounded, rounded_pose};
 
 /// Directions are alike within this.
 const ALIKE: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// A part on its way past one that stands.
 #[derive(Debug, Clone)]
-pub struct Passing<'a> {
+pub struct PairPath<'a> {
     /// The numbers of the moving and of the standing part.
     pub parts: [usize; 2],
     /// Their shapes.
@@ -29,7 +29,7 @@ pub struct Passing<'a> {
     pub longest_side: f64,
 }
 
-impl<'a> Passing<'a> {
+impl<'a> PairPath<'a> {
     /// Of a path (poses of the moving shape in the planning frame), what passes the standing part.
     #[must_use]
     pub fn new(scene: &'a Scene, allowances: &Allowances, parts: [usize; 2], path: &[Pose]) -> Self {
@@ -51,7 +51,7 @@ impl<'a> Passing<'a> {
 
     /// A pair that does not move, with nothing granted.
     #[must_use]
-    pub fn standing(scene: &'a Scene, pair: &Pair) -> Self {
+    pub fn standing(scene: &'a Scene, pair: &CongruentPair) -> Self {
         let [one, other] = pair.poses;
         let shapes = shapes(scene, pair.parts);
         Self {
@@ -124,7 +124,7 @@ mod tests {
         let start = scene.bodies[1].planning_from_shape;
         let direction = Vector3::new(2.0, 0.3, 0.5).normalize();
         let way = |travel: f64, other| {
-            Passing::new(&scene, &scene.allowances, [1, other], &straight(&start, direction * travel)).path
+            PairPath::new(&scene, &scene.allowances, [1, other], &straight(&start, direction * travel)).path
         };
         // Past the wall and past the plate, from which it rises slowly.
         for other in [0, 2] {
@@ -154,7 +154,8 @@ mod tests {
         let way = |parts: [usize; 2], direction: Vector3<f64>, travel: f64| {
             let start = &scene.bodies[parts[0]].planning_from_shape;
             let path = straight(start, direction * travel);
-            let Passing { path, centre, shapes, .. } = Passing::new(&scene, &scene.allowances, parts, &path);
+            let PairPath { path, centre, shapes, .. } =
+                PairPath::new(&scene, &scene.allowances, parts, &path);
             (path, centre, shapes.map(Shape::content))
         };
         let up = Vector3::z();

@@ -1,6 +1,6 @@
 //! Verification of a path on the triangles, independent of distance fields and engines.
 //!
-//! For every standing part that the moving one comes near ([`Passing`]), both surfaces are bounded against
+//! For every standing part that the moving one comes near ([`PairPath`]), both surfaces are bounded against
 //! each other all along the way ([`path`](crate::contact::region_cover::path) says how, and what that
 //! guarantees): what counts is depth beyond that of the pair at the assembled pose, which is measured with the same search.
 //! Screws of many turns are bounded by their profiles, too ([`helix_profile`](crate::contact::helix_profile)), and what
@@ -14,13 +14,13 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::contact::Passing;
+use crate::contact::PairPath;
 use crate::contact::course::{Course, Interval, turns_far};
 use crate::contact::helix_profile::{centred, depth_on_screw};
-use crate::contact::region_cover::path::{Found, Precision, Way};
-use crate::contact::sampled::along_path::{Entry, Samples};
+use crate::contact::region_cover::path::{DepthPrecision, PathDepth, PathQuestion};
+use crate::contact::sampled::along_path::{Entry, PathSamples};
 use crate::geometry::{Pose, Shape, Surface, area_normal};
-use crate::scene::{Allowances, Pair, Scene};
+use crate::scene::{Allowances, CongruentPair, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
     COARSE_SHARE, FINEST_SHARE, HELPFUL, OVERLAP_FINEST, OVERLAP_MARGIN, OVERLAP_SPARED, SPARED_SHARE,
@@ -65,7 +65,7 @@ fn deepest(depth: f64, entries: &[Entry]) -> f64 {
 #[derive(Debug, Clone)]
 pub struct Verifier {
     /// For what turns far.
-    samples: Samples,
+    samples: PathSamples,
     /// Depth beyond the allowance that is still accepted, in the planning frame.
     limit: f64,
 }
@@ -80,7 +80,7 @@ impl Verifier {
     /// Prepares the check for shapes; `shape_of` gives each part's shape.
     #[must_use]
     pub fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>, limit: f64) -> Self {
-        Self { samples: Samples::new(shapes, shape_of), limit }
+        Self { samples: PathSamples::new(shapes, shape_of), limit }
     }
 
     /// The same check for an engine that declares another depth.
@@ -108,19 +108,19 @@ impl Verifier {
     pub fn assembled_depth(
         &self,
         scene: &Scene,
-        pair: &Pair,
+        pair: &CongruentPair,
         termination: &Termination,
     ) -> Result<f64, Interrupt> {
-        let precision = Precision {
+        let precision = DepthPrecision {
             spare: OVERLAP_SPARED * scene.longest_side,
             deep: f64::INFINITY,
             margin: OVERLAP_MARGIN * self.limit,
             finest: OVERLAP_FINEST * scene.longest_side,
             coarse: COARSE_SHARE * scene.longest_side,
         };
-        let passing = Passing::standing(scene, pair);
+        let passing = PairPath::standing(scene, pair);
         let course = Course::new(&passing.path, passing.centre, 0.0);
-        let way = Way { passing: &passing, course: &course, precision, termination };
+        let way = PathQuestion { passing: &passing, course: &course, precision, termination };
         let [one, other] = way.depth()?;
         let depth = one.depth.max(other.depth);
         let effort = [one.effort, other.effort];
@@ -175,7 +175,7 @@ impl Verifier {
     ) -> Result<Verdict, Interrupt> {
         let swept = scene.swept_bounds(part, path);
         let near = standing.iter().filter(|&&other| scene.bodies[other].bounds.meets(&swept));
-        let passing = |&other: &usize| Passing::new(scene, allowances, [part, other], path);
+        let passing = |&other: &usize| PairPath::new(scene, allowances, [part, other], path);
         let passing: Vec<_> = near.map(passing).collect();
         let past: Vec<_> = passing.par_iter().map(|p| self.past(p, termination)).collect::<Result<_, _>>()?;
         Ok(Verdict::of_all(past, self.limit))
@@ -185,7 +185,7 @@ impl Verifier {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub fn past(&self, passing: &Passing<'_>, termination: &Termination) -> Result<Verdict, Interrupt> {
+    pub fn past(&self, passing: &PairPath<'_>, termination: &Termination) -> Result<Verdict, Interrupt> {
         let Self { limit, samples } = self;
         let course = &Course::new(&passing.path, passing.centre, passing.reach());
         let found = self.bounds(passing, course, termination)?;
@@ -210,20 +210,20 @@ impl Verifier {
     /// The termination condition became true.
     pub(crate) fn bounds(
         &self,
-        passing: &Passing<'_>,
+        passing: &PairPath<'_>,
         course: &Course,
         termination: &Termination,
-    ) -> Result<[Found; 2], Interrupt> {
+    ) -> Result<[PathDepth; 2], Interrupt> {
         let limit = self.limit;
         let share = if passing.granted > 0.0 { SPARED_SHARE_IN_OVERLAP } else { SPARED_SHARE };
-        let precision = Precision {
+        let precision = DepthPrecision {
             spare: limit * share,
             deep: limit,
             margin: limit,
             finest: limit * FINEST_SHARE,
             coarse: COARSE_SHARE * passing.longest_side,
         };
-        let way = Way { passing, course, precision, termination };
+        let way = PathQuestion { passing, course, precision, termination };
         if turns_far(&passing.path) { depth_on_screw(&way, limit) } else { way.depth() }
     }
 }
@@ -241,8 +241,8 @@ fn joined<'i>(course: &Course, intervals: impl Iterator<Item = &'i Interval>) ->
 }
 
 /// The points that help in refining a motion: of those that are near each other, the deepest.
-fn deepest_entries(passing: &Passing<'_>, [moving, standing]: &[Found; 2]) -> Vec<Entry> {
-    let Passing { parts: [_, other], longest_side, .. } = *passing;
+fn deepest_entries(passing: &PairPath<'_>, [moving, standing]: &[PathDepth; 2]) -> Vec<Entry> {
+    let PairPath { parts: [_, other], longest_side, .. } = *passing;
     let cell = COARSE_SHARE * longest_side;
     let mut taken: BTreeMap<(bool, [i64; 3]), Entry> = BTreeMap::new();
     for (on_moving, side) in [(true, moving), (false, standing)] {

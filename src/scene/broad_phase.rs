@@ -11,13 +11,13 @@ use crate::geometry::Bounds;
 /// The boxes of all parts, in a tree.
 #[derive(Debug, Clone)]
 pub struct BroadPhase {
-    boxes: Arc<Boxes>,
+    boxes: Arc<PartBoxes>,
     /// Takes in every box that is asked about.
     watched: Option<Arc<Mutex<Bounds>>>,
 }
 
 #[derive(Debug)]
-struct Boxes {
+struct PartBoxes {
     tree: Bvh,
     list: Vec<Bounds>,
 }
@@ -32,7 +32,7 @@ impl BroadPhase {
     pub fn new(boxes: &[Bounds]) -> Self {
         let leaves: Vec<Aabb> = boxes.iter().map(|b| aabb(b, 0.0)).collect();
         let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &leaves);
-        Self { boxes: Arc::new(Boxes { tree, list: boxes.to_vec() }), watched: None }
+        Self { boxes: Arc::new(PartBoxes { tree, list: boxes.to_vec() }), watched: None }
     }
 
     /// The same boxes; `looked_at` grows to hold every box that is asked about.

@@ -16,14 +16,14 @@ use super::Scene;
 
 /// Two parts with rounded poses of their shapes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pair {
+pub struct CongruentPair {
     /// The parts' numbers.
     pub parts: [usize; 2],
     /// Where they stand, up to a motion of both together.
     pub poses: [Pose; 2],
 }
 
-impl Pair {
+impl CongruentPair {
     /// A part at a pose and another as assembled, shifted together: for questions that depend on how
     /// they are turned against the axes of the world.
     #[must_use]
@@ -126,8 +126,9 @@ mod tests {
         let post = |x: f64| cuboid([x, 0.0, 1.0], [x + 1.0, 1.0, 3.0]);
         let foot = |x: f64| cuboid([x - 1.0, -1.0, 0.0], [x + 2.0, 2.0, 1.0]);
         let (scene, _) = scene([foot(0.0), post(0.0), foot(5.1), post(5.1)]);
-        let pair =
-            |a: usize, b: usize| Pair::shifted(&scene, a, &scene.bodies[a].planning_from_shape, b).poses;
+        let pair = |a: usize, b: usize| {
+            CongruentPair::shifted(&scene, a, &scene.bodies[a].planning_from_shape, b).poses
+        };
         assert_eq!(pair(0, 1), pair(2, 3));
         assert_ne!(pair(0, 1), pair(0, 3));
         assert_ne!(pair(0, 1), pair(1, 0));
@@ -141,14 +142,15 @@ mod tests {
         let turned = |mesh| moved(moved(mesh, &quarter), &Pose::translation(6.0, 0.0, 0.0));
         let (scene, _) = scene([foot(), post(), turned(post()), turned(foot())]);
         let pair = |a: usize, b: usize| {
-            let pair = Pair::turned(&scene, a, b);
+            let pair = CongruentPair::turned(&scene, a, b);
             (pair.parts.map(|p| scene.bodies[p].shape.content()), pair.poses)
         };
         assert_eq!(pair(0, 1), pair(2, 3));
         assert_eq!(pair(0, 1), pair(1, 0));
         assert_ne!(pair(0, 1), pair(0, 2));
-        let shifted =
-            |a: usize, b: usize| Pair::shifted(&scene, a, &scene.bodies[a].planning_from_shape, b).poses;
+        let shifted = |a: usize, b: usize| {
+            CongruentPair::shifted(&scene, a, &scene.bodies[a].planning_from_shape, b).poses
+        };
         assert_ne!(shifted(0, 1), shifted(3, 2));
     }
 
@@ -157,9 +159,10 @@ mod tests {
         let turn = Pose::new(Vector3::new(3.0, -1.0, 0.5), Vector3::new(0.2, -0.4, 1.0));
         let (scene, _) =
             scene([cuboid([-4.0; 3], [0.0; 3]), moved(cuboid([0.0; 3], [1.0, 2.0, 3.0]), &turn)]);
-        for pair in
-            [Pair::turned(&scene, 0, 1), Pair::shifted(&scene, 1, &scene.bodies[1].planning_from_shape, 0)]
-        {
+        for pair in [
+            CongruentPair::turned(&scene, 0, 1),
+            CongruentPair::shifted(&scene, 1, &scene.bodies[1].planning_from_shape, 0),
+        ] {
             let alone = pair.scene(&scene);
             let between = |s: &Scene, a: usize, b: usize| {
                 s.bodies[a].planning_from_shape.inverse() * s.bodies[b].planning_from_shape

@@ -10,14 +10,14 @@ use super::Scene;
 
 /// What stands still while one part moves.
 #[derive(Debug, Clone)]
-pub struct Surroundings {
+pub struct StandingParts {
     /// The parts that stand, ascending.
     pub standing: Vec<usize>,
     /// Points with the same convex hull as them all: its vertices, and perhaps some inside.
     pub hull: Vec<Point3<f64>>,
 }
 
-impl Surroundings {
+impl StandingParts {
     /// The surroundings made of some parts at their assembled poses.
     #[must_use]
     pub fn new(scene: &Scene, standing: Vec<usize>) -> Self {
@@ -35,7 +35,7 @@ impl Surroundings {
 #[must_use]
 pub fn exit_direction(
     scene: &Scene,
-    surroundings: &Surroundings,
+    surroundings: &StandingParts,
     part: usize,
     pose: &Pose,
     hint: Option<Vector3<f64>>,

@@ -16,7 +16,7 @@ use crate::budgets::{LOOSE_HULL, MOSTLY_STANDING};
 use crate::geometry::{Bounds, transformed};
 use crate::termination::{Interrupt, Termination};
 
-use super::{Scene, Surroundings};
+use super::{Scene, StandingParts};
 
 /// The parts that stand, with the hulls of groups of them.
 #[derive(Debug, Clone)]
@@ -114,10 +114,10 @@ impl HullTree {
 
     /// All that stands but one part.
     #[must_use]
-    pub fn without(&self, scene: &Scene, part: usize) -> Surroundings {
+    pub fn without(&self, scene: &Scene, part: usize) -> StandingParts {
         let standing = self.standing.iter().copied().filter(|&i| i != part).collect();
         if !self.shapes_hull(scene, part) {
-            return Surroundings { standing, hull: self.hull().to_vec() };
+            return StandingParts { standing, hull: self.hull().to_vec() };
         }
         // The hulls beside its way to the root hold all others. To join them would cost more than
         // the few inner points that they have too many.
@@ -127,7 +127,7 @@ impl HullTree {
             hull.extend_from_slice(&self.hulls[node ^ 1]);
             node /= 2;
         }
-        Surroundings { standing, hull }
+        StandingParts { standing, hull }
     }
 
     /// Whether the hull may be another one without a part.
@@ -198,7 +198,7 @@ mod tests {
         let mut left: Vec<usize> = (0..scene.bodies.len()).collect();
         let mut tree = HullTree::new(&scene, left.clone(), &Termination::default()).unwrap();
         let same = |hull: &[Point3<f64>], parts: Vec<usize>| {
-            let all = Surroundings::new(&scene, parts).hull;
+            let all = StandingParts::new(&scene, parts).hull;
             for d in spread([-1.0; 3], [1.0; 3], 40) {
                 let d: Vector3<f64> = d.coords.normalize();
                 let reach = |points: &[Point3<f64>]| gap_along(&d, points, &[Point3::origin()]);
@@ -267,7 +267,7 @@ mod tests {
         let few = vec![1, 5, 9, 13];
         let tree = HullTree::new(&scene, few.clone(), &Termination::default()).unwrap();
         assert_eq!(tree.standing(), few);
-        let alone = Surroundings::new(&scene, few).hull;
+        let alone = StandingParts::new(&scene, few).hull;
         for d in spread([-1.0; 3], [1.0; 3], 40).map(|d| d.coords.normalize()) {
             let reach = |hull: &[Point3<f64>]| gap_along(&d, hull, &[Point3::origin()]);
             assert!((reach(tree.hull()) - reach(&alone)).abs() < 1e-9);

@@ -26,12 +26,12 @@ pub trait HullStore: std::fmt::Debug + Send + Sync {
 /// What is remembered. The result is a function of the points alone, so it may be shared by all scenes.
 #[derive(Debug, Default)]
 pub struct JoinedHulls {
-    held: Mutex<Held>,
+    held: Mutex<JoinedHull>,
     store: Option<Arc<dyn HullStore>>,
 }
 
 #[derive(Debug, Default)]
-struct Held {
+struct JoinedHull {
     joined: Lru<[u8; 32], [Point3<f64>]>,
     points: usize,
     /// Those that were read ahead and that nobody has asked for yet.
@@ -94,12 +94,12 @@ impl JoinedHulls {
     }
 
     /// A holder that panicked cannot have left more than the sum wrong.
-    fn held(&self) -> std::sync::MutexGuard<'_, Held> {
+    fn held(&self) -> std::sync::MutexGuard<'_, JoinedHull> {
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Held {
+impl JoinedHull {
     /// What is remembered of some points, and whether that was read ahead and is asked for the first time.
     fn known(&mut self, key: &[u8; 32]) -> Option<(Arc<[Point3<f64>]>, bool)> {
         Some((self.joined.get(key)?, self.unused.remove(key)))

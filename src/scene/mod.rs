@@ -25,8 +25,8 @@ use crate::geometry::{Assembly, Bounds, Closest, Part, Pose, SampleTree, Shape};
 use crate::sdf::Field;
 
 pub use broad_phase::BroadPhase;
-pub use congruent_pairs::{Pair, grouped, rounded, rounded_pose};
-pub use hull_separation::{Surroundings, exit_direction};
+pub use congruent_pairs::{CongruentPair, grouped, rounded, rounded_pose};
+pub use hull_separation::{StandingParts, exit_direction};
 pub use hull_tree::HullTree;
 pub use joined_hulls::{HullStore, JoinedHulls};
 pub use memo::Memo;

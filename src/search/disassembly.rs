@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::contact::sampled::along_path::Entry;
 use crate::geometry::{Pose, separating_direction, transformed};
 use crate::plan::PlanStatus;
-use crate::scene::{HullTree, Surroundings, exit_direction};
+use crate::scene::{HullTree, StandingParts, exit_direction};
 use crate::simulation::{
     Action, End, Motion, MotionQuestion, Sweep, SweepQuestion, known_sweep, remembered_sweep,
 };
@@ -73,7 +73,7 @@ pub(super) struct Disassembly<'a, 'o> {
     /// All present parts that have not been taken out.
     pub(super) everything: HullTree,
     /// What stands around some parts, until the next removal.
-    around: HashMap<usize, Arc<Surroundings>>,
+    around: HashMap<usize, Arc<StandingParts>>,
     /// A part whose hull meets this part's, both assembled: proof that it is not free.
     entangled: Vec<Option<usize>>,
     /// At which change of the hull a part that does not shape it was found not to be free.
@@ -126,7 +126,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     }
 
     /// All that stands but one part. A few are remembered: all would be the square of their number.
-    fn surroundings(&mut self, part: usize) -> Arc<Surroundings> {
+    fn surroundings(&mut self, part: usize) -> Arc<StandingParts> {
         const REMEMBERED: usize = 64;
         if self.around.len() >= REMEMBERED && !self.around.contains_key(&part) {
             self.around.clear();
@@ -136,7 +136,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     }
 
     /// Those of all runs; hulls of many parts take long.
-    fn all_surroundings(&mut self, runs: &[Run]) -> Result<Vec<Arc<Surroundings>>, Stop> {
+    fn all_surroundings(&mut self, runs: &[Run]) -> Result<Vec<Arc<StandingParts>>, Stop> {
         let around = |run: &Run| {
             self.problem.termination.check()?;
             Ok(self.surroundings(run.part))

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use crate::blocking_graph::StaticAnalysis;
 use crate::cache::RequestCache;
-use crate::contact::Passing;
+use crate::contact::PairPath;
 use crate::contact::sampled::along_path::Entry;
 use crate::geometry::{Pose, SampleTree};
 use crate::plan::{KnownVerdicts, Verdict, VerdictQuestion, Verifier, thinned};
@@ -159,7 +159,7 @@ impl Problem<'_> {
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
         let Self { scene, verifier, termination, cache, verdicts, .. } = self;
         let past = |&other: &usize| {
-            let passing = &Passing::new(scene, &scene.allowances, [part, other], path);
+            let passing = &PairPath::new(scene, &scene.allowances, [part, other], path);
             let question = &VerdictQuestion { passing, limit: verifier.limit() };
             verdicts.verdict(question, cache, || verifier.past(passing, termination))
         };

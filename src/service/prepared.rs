@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use crate::cache::RequestCache;
-use crate::contact::KeptCells;
+use crate::contact::ShiftCoverCache;
 use crate::geometry::Assembly;
 use crate::plan::{Verifier, overlap_key};
-use crate::scene::{HullTree, JoinedHulls, Pair, Scene, grouped, resolution};
+use crate::scene::{CongruentPair, HullTree, JoinedHulls, Scene, grouped, resolution};
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
 use crate::termination::{Interrupt, Termination};
@@ -88,7 +88,7 @@ impl Prepared {
         let Self { scene, verifier, overlaps, .. } = self;
         let hulls = scene.whole.get().map_or(0, HullTree::memory);
         size_of_val(&**scene.bodies)
-            + KeptCells::of(scene).memory()
+            + ShiftCoverCache::of(scene).memory()
             + hulls
             + verifier.memory()
             + size_of_val(&**overlaps)
@@ -108,7 +108,7 @@ fn measure_overlaps(
 ) -> Result<Vec<(usize, usize, f64)>, Interrupt> {
     let pairs = scene.broad_phase.pairs(0.0);
     let placed = |&(a, b): &(usize, usize)| {
-        let pair = Pair::turned(scene, a, b);
+        let pair = CongruentPair::turned(scene, a, b);
         (overlap_key(scene, &pair), pair)
     };
     let keyed: Vec<_> = pairs.par_iter().map(placed).collect();

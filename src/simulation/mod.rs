@@ -28,7 +28,7 @@ pub use records::MotionQuestion;
 pub(crate) use records::{
     MOTION, SWEPT, TOUCHING, WITNESS, add_action, known_sweep, remembered_sweep, remembered_touching,
 };
-pub use sliding::{SlidingEngine, StepCost, Telling, pair_blocks, step_costs};
+pub use sliding::{PairMethod, SlidingEngine, StepCost, pair_blocks, step_costs};
 pub use sweep::{Sweep, SweepQuestion, straight_sweep, straight_sweep_past};
 pub use touching::Touching;
 pub use transition::{End, Motion, TransitionFunction, asked_again};

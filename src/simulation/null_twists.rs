@@ -29,7 +29,7 @@ pub struct NullTwist {
 }
 
 /// A contact: a point and the normal of the surface near it.
-type Contact = (Point3<f64>, Vector3<f64>);
+type TwistContact = (Point3<f64>, Vector3<f64>);
 
 impl NullTwist {
     /// That of a part at a pose among those that stand (ascending), if contact leaves it one axis to turn about;
@@ -60,7 +60,7 @@ impl NullTwist {
     }
 
     /// The axis that contacts leave.
-    fn left_by(contacts: &[Contact]) -> Option<Self> {
+    fn left_by(contacts: &[TwistContact]) -> Option<Self> {
         if contacts.len() < FEWEST_NULL_CONTACTS {
             return None;
         }
@@ -105,7 +105,7 @@ fn contacts_of(
     (measured, stands): (&Body, &Pose),
     within: f64,
     poll: &Poll<'_>,
-    contacts: &mut Vec<Contact>,
+    contacts: &mut Vec<TwistContact>,
 ) -> Result<(), Interrupt> {
     let to_measured = stands.inverse() * at;
     let near = measured.shape.bounds().grown(within);

@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use crate::contact::constraint::Row;
+use crate::contact::constraint::VelocityConstraint;
 
 /// The nearest allowed point and the rows that hold it, with their multipliers.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,7 +17,7 @@ pub(super) struct Projected {
 
 impl Projected {
     /// The parts behind the rows that hold it, ascending; those that hardly push are left out.
-    pub(super) fn others(&self, rows: &[Row]) -> Vec<usize> {
+    pub(super) fn others(&self, rows: &[VelocityConstraint]) -> Vec<usize> {
         let strongest = self.active.iter().map(|(_, m)| *m).fold(0.0, f64::max);
         let pushing = self.active.iter().filter(|(_, m)| *m > 1e-6 * strongest);
         let mut out: Vec<_> = pushing.map(|(i, _)| rows[*i].other).collect();
@@ -31,7 +31,7 @@ const FEASIBLE: f64 = 1e-10;
 const MOST_ITERATIONS: usize = 400;
 
 /// Projects `wanted`; `None` if no point satisfies all rows (or numbers degenerate).
-pub(super) fn project(wanted: &Vector6<f64>, rows: &[Row]) -> Option<Projected> {
+pub(super) fn project(wanted: &Vector6<f64>, rows: &[VelocityConstraint]) -> Option<Projected> {
     let mut w = *wanted;
     let mut active: Vec<(usize, f64)> = Vec::with_capacity(6);
     for _ in 0..MOST_ITERATIONS {
@@ -78,7 +78,7 @@ pub(super) fn project(wanted: &Vector6<f64>, rows: &[Row]) -> Option<Projected> 
     None
 }
 
-fn most_violated(w: &Vector6<f64>, rows: &[Row]) -> Option<usize> {
+fn most_violated(w: &Vector6<f64>, rows: &[VelocityConstraint]) -> Option<usize> {
     let mut worst = (-FEASIBLE, None);
     for (i, row) in rows.iter().enumerate() {
         let slack = row.a.dot(w) + row.b;
@@ -90,7 +90,11 @@ fn most_violated(w: &Vector6<f64>, rows: &[Row]) -> Option<usize> {
 }
 
 /// r = (NᵀN)⁻¹ Nᵀ n over the active rows N; entries beyond them are zero.
-fn dual_direction(rows: &[Row], active: &[(usize, f64)], n: &Vector6<f64>) -> Option<Vector6<f64>> {
+fn dual_direction(
+    rows: &[VelocityConstraint],
+    active: &[(usize, f64)],
+    n: &Vector6<f64>,
+) -> Option<Vector6<f64>> {
     if active.len() > 6 {
         return None;
     }
@@ -113,8 +117,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn row(a: [f64; 6], b: f64) -> Row {
-        Row { a: Vector6::from(a), b, other: 0 }
+    fn row(a: [f64; 6], b: f64) -> VelocityConstraint {
+        VelocityConstraint { a: Vector6::from(a), b, other: 0 }
     }
 
     #[test]

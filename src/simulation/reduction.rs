@@ -3,14 +3,17 @@
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-use crate::contact::constraint::Row;
+use crate::contact::constraint::VelocityConstraint;
 
 /// Keeps, of rows that point nearly the same way, the tightest; also returns which they were.
 /// `lever` is the length that makes moments comparable with forces.
-pub(super) fn reduced(rows: impl IntoIterator<Item = Row>, lever: f64) -> (Vec<Row>, Vec<usize>) {
+pub(super) fn reduced(
+    rows: impl IntoIterator<Item = VelocityConstraint>,
+    lever: f64,
+) -> (Vec<VelocityConstraint>, Vec<usize>) {
     const BINS: f64 = 16.0;
     let mut index: HashMap<u128, usize, BuildHasherDefault<BinHasher>> = HashMap::default();
-    let (mut out, mut kept): (Vec<Row>, Vec<usize>) = (Vec::new(), Vec::new());
+    let (mut out, mut kept): (Vec<VelocityConstraint>, Vec<usize>) = (Vec::new(), Vec::new());
     for (i, row) in rows.into_iter().enumerate() {
         let key = (0..6).fold(row.other as u128, |key, i| {
             let x = if i < 3 { row.a[i] } else { row.a[i] / lever };

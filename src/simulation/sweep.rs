@@ -9,7 +9,7 @@ use nalgebra::{Point3, Translation3, Vector3};
 
 use crate::contact::{CastMargins, ShapeCast};
 use crate::geometry::{Pose, Support, separating, transformed};
-use crate::scene::{Scene, Surroundings, exit_direction};
+use crate::scene::{Scene, StandingParts, exit_direction};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
     ASSURED_GAP, DEPTH_TOLERANCE, HULL_MARGIN, SWEEP_SUNK, WALL_STEEPNESS, WAY_OUT_FINENESS,
@@ -38,7 +38,7 @@ pub struct SweepQuestion<'a> {
     /// The bodies.
     pub scene: &'a Scene,
     /// What stands.
-    pub surroundings: &'a Surroundings,
+    pub surroundings: &'a StandingParts,
     /// What moves.
     pub part: usize,
     /// From where.
@@ -101,7 +101,7 @@ fn moved(pose: &Pose, direction: &Vector3<f64>, travel: f64) -> Pose {
 /// travel; further back it is looked again, in steps that double, and halved once they meet.
 fn way_out(
     scene: &Scene,
-    surroundings: &Surroundings,
+    surroundings: &StandingParts,
     part: usize,
     start: &Pose,
     direction: &Vector3<f64>,
@@ -143,7 +143,7 @@ mod tests {
 
     fn swept(scene: &Scene, part: usize, direction: Vector3<f64>) -> Option<Sweep> {
         let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != part).collect();
-        let around = Surroundings::new(scene, standing);
+        let around = StandingParts::new(scene, standing);
         let start = &scene.bodies[part].planning_from_shape;
         let question = SweepQuestion { scene, surroundings: &around, part, start, direction: &direction };
         straight_sweep(&question, &Termination::default()).unwrap()
@@ -152,7 +152,7 @@ mod tests {
     #[test]
     fn a_cancelled_sweep_claims_nothing() {
         let (scene, _) = scene(peg_in_hole(0.0));
-        let around = Surroundings::new(&scene, vec![0]);
+        let around = StandingParts::new(&scene, vec![0]);
         let termination = Termination::default();
         termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
         let start = &scene.bodies[1].planning_from_shape;
@@ -253,7 +253,7 @@ mod tests {
     fn the_path_ends_where_hulls_are_apart_and_not_much_later() {
         let (scene, _) = scene(peg_in_hole(0.0));
         let Some(Sweep::Clear { path, exit }) = swept(&scene, 1, Vector3::z()) else { panic!("not clear") };
-        let around = Surroundings::new(&scene, vec![0]);
+        let around = StandingParts::new(&scene, vec![0]);
         assert_eq!(path[0], scene.bodies[1].planning_from_shape);
         assert!(exit_direction(&scene, &around, 1, &path[1], Some(exit)).is_some());
         let short = Pose::translation(0.0, 0.0, -0.6 * HULL_MARGIN) * path[1];

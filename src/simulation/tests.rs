@@ -9,7 +9,7 @@ use super::{Action, Axis, End, Motion, PenaltyEngine, SlidingEngine, TransitionF
 use crate::fixtures::{block_on_plate, cells, cuboid, moved, peg_in_hole, rod, scene, tube};
 use crate::geometry::{Pose, SourceMesh};
 use crate::plan::Verifier;
-use crate::scene::{Scene, Surroundings};
+use crate::scene::{Scene, StandingParts};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::HULL_MARGIN;
 
@@ -38,13 +38,13 @@ struct Case {
     name: &'static str,
     scene: Scene,
     verifier: Verifier,
-    surroundings: Surroundings,
+    surroundings: StandingParts,
 }
 
 impl Case {
     fn new(name: &'static str, meshes: impl IntoIterator<Item = SourceMesh>) -> Self {
         let (scene, verifier) = scene(meshes);
-        let surroundings = Surroundings::new(&scene, vec![0]);
+        let surroundings = StandingParts::new(&scene, vec![0]);
         Self { name, scene, verifier, surroundings }
     }
 
@@ -358,7 +358,7 @@ fn a_free_part_that_turns_comes_to_an_end() {
 #[test]
 fn with_nothing_around_a_part_is_out_at_once() {
     let case = Case::new("block on plate", block_on_plate());
-    let nothing = Surroundings::new(&case.scene, Vec::new());
+    let nothing = StandingParts::new(&case.scene, Vec::new());
     for engine in *ENGINES {
         let start = case.assembled();
         let motion =

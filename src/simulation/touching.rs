@@ -61,7 +61,7 @@ impl Touching {
             ] {
                 let bits = Vec::new();
                 let mut faces =
-                    Faces { asked, at, measured, stands, within, reach, deepest, bits, poll: &poll };
+                    TouchingFaces { asked, at, measured, stands, within, reach, deepest, bits, poll: &poll };
                 if !faces.planes(sense, &mut normals)? {
                     return Ok(Self { normals: None, parts });
                 }
@@ -77,7 +77,7 @@ fn common(a: &Bounds, b: &Bounds) -> Bounds {
 }
 
 /// A body whose faces are cut into bits, and one that is measured from there.
-struct Faces<'a> {
+struct TouchingFaces<'a> {
     asked: &'a Body,
     at: &'a Pose,
     measured: &'a Body,
@@ -91,7 +91,7 @@ struct Faces<'a> {
     poll: &'a Poll<'a>,
 }
 
-impl Faces<'_> {
+impl TouchingFaces<'_> {
     /// Adds the planes of the measured body, or of the asked one if `sense` is negative: faces that
     /// are in contact look against each other. False if they are too many.
     fn planes(&mut self, sense: f64, normals: &mut Vec<Unit<Vector3<f64>>>) -> Result<bool, Interrupt> {

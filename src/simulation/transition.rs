@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use nalgebra::Vector3;
 
 use crate::geometry::Pose;
-use crate::scene::{Scene, Surroundings};
+use crate::scene::{Scene, StandingParts};
 use crate::termination::{Interrupt, Termination};
 
 use super::Action;
@@ -84,7 +84,7 @@ pub trait TransitionFunction: Sync {
     fn simulate(
         &self,
         scene: &Scene,
-        surroundings: &Surroundings,
+        surroundings: &StandingParts,
         part: usize,
         start: &Pose,
         action: Action,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use divan::counter::ItemsCount;
 use sbdp::geometry::{Assembly, SourceAssembly, SourceMesh, SourcePart};
-use sbdp::scene::{Scene, Surroundings};
+use sbdp::scene::{Scene, StandingParts};
 use sbdp::sdf::Field;
 use sbdp::simulation::{Action, Axis, PenaltyEngine, PenaltyParameters, TransitionFunction};
 use sbdp::termination::Termination;
@@ -68,7 +68,7 @@ fn scene() -> Scene {
 
 fn pushed_down(bencher: divan::Bencher<'_, '_>, density: &Density, action: Action) {
     let (scene, engine) = (scene(), engine(density.longest_edge));
-    let around = Surroundings::new(&scene, vec![0]);
+    let around = StandingParts::new(&scene, vec![0]);
     let start = scene.bodies[1].planning_from_shape;
     bencher
         .counter(ItemsCount::new(engine.parameters().block_steps()))

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use sbdp::geometry::{Assembly, load_assembly};
 use sbdp::plan::Verifier;
-use sbdp::scene::{Pair, Scene};
+use sbdp::scene::{CongruentPair, Scene};
 use sbdp::sdf::Field;
 use sbdp::termination::{Interrupt, Termination};
 
@@ -25,7 +25,7 @@ fn assembled(assembly: &Assembly, never: &Termination) -> Result<Scene, Interrup
     let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
     let verifier = Verifier::new(&assembly.shapes, shape_of, DEPTH_LIMIT * scene.longest_side);
     for (a, b) in scene.broad_phase.pairs(0.0) {
-        let depth = verifier.assembled_depth(&scene, &Pair::turned(&scene, a, b), never)?;
+        let depth = verifier.assembled_depth(&scene, &CongruentPair::turned(&scene, a, b), never)?;
         if depth > 1e-6 * scene.longest_side {
             scene.allowances.grant(a, b, depth);
         }

@@ -16,7 +16,7 @@ mod scenes;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use sbdp::scene::Surroundings;
+use sbdp::scene::StandingParts;
 use sbdp::simulation::{
     Action, Axis, Motion, SlidingEngine, SweepQuestion, TransitionFunction, pair_blocks, straight_sweep,
 };
@@ -69,7 +69,7 @@ fn measure(folder: &std::path::Path) -> Result<[Vec<f64>; 5], String> {
     let tells_each = std::env::var_os("SBDP_MOTIONS").is_some();
     for part in 0..scene.bodies.len() {
         let standing = (0..scene.bodies.len()).filter(|&i| i != part).collect();
-        let around = Surroundings::new(&scene, standing);
+        let around = StandingParts::new(&scene, standing);
         let pose = scene.bodies[part].planning_from_shape;
         for action in &translations {
             let direction = &action.force();

@@ -4,7 +4,7 @@
 //!
 //! All parts stand as assembled, none granted more overlap than it has. Of each part's motions under the
 //! translations and turns of the paper (up to eight poses of each, spread over the way), per assembly and by what
-//! tells of contact (see [`Telling`]), in microseconds, median and ninetieth percentile: `gather`, `reduce`,
+//! tells of contact (see [`PairMethod`]), in microseconds, median and ninetieth percentile: `gather`, `reduce`,
 //! `solve` and `advance` (see [`StepCost`]).
 
 mod folders;
@@ -13,15 +13,15 @@ mod scenes;
 use std::path::{Path, PathBuf};
 
 use sbdp::geometry::Pose;
-use sbdp::scene::Surroundings;
-use sbdp::simulation::{Action, Axis, SlidingEngine, StepCost, Telling, TransitionFunction, step_costs};
+use sbdp::scene::StandingParts;
+use sbdp::simulation::{Action, Axis, PairMethod, SlidingEngine, StepCost, TransitionFunction, step_costs};
 use sbdp::termination::Termination;
 
 /// Poses of a motion that are looked at.
 const POSES: usize = 8;
 /// Those of the tests that are measured if no others are given.
 const OWN: [&str; 4] = ["l-slot", "pin-bolt-cover", "bolted-bracket-20", "threaded-bolt-and-nut"];
-const TELLING: [Telling; 3] = [Telling::Shifts, Telling::Regions, Telling::Samples];
+const TELLING: [PairMethod; 3] = [PairMethod::Shifts, PairMethod::Regions, PairMethod::Samples];
 
 fn main() {
     let mut folders = folders::given();
@@ -55,7 +55,7 @@ fn measured(folder: &Path) -> Result<Vec<StepCost>, String> {
     let mut costs = Vec::new();
     for part in 0..scene.bodies.len() {
         let standing = (0..scene.bodies.len()).filter(|&i| i != part).collect();
-        let around = Surroundings::new(&scene, standing);
+        let around = StandingParts::new(&scene, standing);
         let start = scene.bodies[part].planning_from_shape;
         for &action in &actions {
             let motion = SlidingEngine.simulate(&scene, &around, part, &start, action, &never);

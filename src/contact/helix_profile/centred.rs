@@ -15,9 +15,9 @@ use crate::tolerances::{OFF_HELIX, SCREW_POSE_ANGLE, STRAY_SHARE, THREAD_ENDS, U
 
 use super::super::course::turns_far;
 use super::super::course::{Course, Interval};
-use super::envelope::{Envelope, Zone};
+use super::envelope::{Envelope, ProfileZone};
 use super::path::ScrewPath;
-use super::slip::{Facet, slipping};
+use super::slip::{FlankFacet, slipping};
 
 /// A path with the same start and end as a given one that turns along the thread which a part shares
 /// with one of those standing; `None` if there is no such thread, or no play in it. `limit` is the depth
@@ -42,9 +42,9 @@ pub(crate) fn centred(
     let Some((left, way)) = followed.leaves(followed.helix.pitch().abs() * OFF_HELIX) else {
         return Ok(None);
     };
-    let mut widest: Option<(f64, Thread)> = None;
+    let mut widest: Option<(f64, SharedThread)> = None;
     for &other in standing.iter().filter(|&&other| scene.allowances.of(part, other) == 0.0) {
-        let shared = Thread::shared(scene, (part, other), &followed, left, termination)?;
+        let shared = SharedThread::shared(scene, (part, other), &followed, left, termination)?;
         if let Some((play, thread)) = shared
             && widest.as_ref().is_none_or(|(most, _)| *most < play)
         {
@@ -56,7 +56,12 @@ pub(crate) fn centred(
 
 /// The path that turns along a thread up to where the given one leaves it (angle, and way there), and from there on
 /// beside the given one to its end.
-fn along(thread: &Thread, (left, way): (f64, f64), path: &[Pose], course: &Course) -> Option<Vec<Pose>> {
+fn along(
+    thread: &SharedThread,
+    (left, way): (f64, f64),
+    path: &[Pose],
+    course: &Course,
+) -> Option<Vec<Pose>> {
     // What is nearly off the thread is turned off it.
     let is_near = (thread.off - left).abs() < UNSCREWING_ANGLE;
     let angle = if is_near { thread.off.abs().max(left.abs()).copysign(left) } else { left };
@@ -76,7 +81,7 @@ fn along(thread: &Thread, (left, way): (f64, f64), path: &[Pose], course: &Cours
 }
 
 /// A thread that two parts share.
-struct Thread {
+struct SharedThread {
     helix: Helix,
     /// The moving part in the middle of its play, in the axis frame, at the start.
     reference: Pose,
@@ -84,7 +89,7 @@ struct Thread {
     off: f64,
 }
 
-impl Thread {
+impl SharedThread {
     /// The pose of the moving part after turning by an angle.
     fn pose(&self, angle: f64) -> Pose {
         self.helix.axis_from_frame.inverse() * self.helix.screwed(angle) * self.reference
@@ -106,13 +111,14 @@ impl Thread {
             (0..surface.triangles().len() as u32).map(|t| surface.corners(t).map(|p| frame * p)).collect()
         };
         let (moving, standing) = (triangles(moving, *reference), triangles(standing, guess_from_standing));
-        let zones = [Zone::of(&moving), Zone::of(&standing)];
+        let zones = [ProfileZone::of(&moving), ProfileZone::of(&standing)];
         let zone = zones[0].common(&zones[1]).trimmed(THREAD_ENDS * guess.pitch().abs());
         if zone.is_empty() {
             return Ok(None);
         }
         let [own, others] = [&moving, &standing].map(|t| {
-            let facets: Vec<Facet> = t.iter().filter(|c| zone.meets(c)).filter_map(Facet::of).collect();
+            let facets: Vec<FlankFacet> =
+                t.iter().filter(|c| zone.meets(c)).filter_map(FlankFacet::of).collect();
             slipping(&facets, guess.rise)
         });
         let (Some(own), Some(others)) = (own, others) else { return Ok(None) };

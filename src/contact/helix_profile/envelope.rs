@@ -18,14 +18,14 @@ use crate::tolerances::{EQUAL_GAP, PROFILE_MARGIN};
 
 /// Where a surface is along an axis and how far from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Zone {
+pub(super) struct ProfileZone {
     /// From where to where along the axis.
     along: [f64; 2],
     /// From the least to the largest distance from it.
     across: [f64; 2],
 }
 
-impl Zone {
+impl ProfileZone {
     /// The zone of triangles (axis frame).
     pub(super) fn of(triangles: &[[Point3<f64>; 3]]) -> Self {
         let empty = [f64::INFINITY, f64::NEG_INFINITY];
@@ -91,7 +91,7 @@ struct Slab {
 
 /// What is left of a triangle that is cut, and where a piece of it reaches: kept from one to the next.
 #[derive(Debug, Default)]
-struct Cut {
+struct ProfileCut {
     stack: Vec<([Point3<f64>; 3], u32)>,
     reaches: Reaches,
 }
@@ -102,7 +102,7 @@ pub(super) struct Envelope {
     /// The size of a bin, the error that footprints may have.
     finest: f64,
     /// What is told exactly.
-    zone: Zone,
+    zone: ProfileZone,
     /// Index of the first slab.
     first: i64,
     slabs: Vec<Slab>,
@@ -117,17 +117,18 @@ impl Envelope {
     pub(super) fn new(
         triangles: &[[Point3<f64>; 3]],
         helix: &Helix,
-        zone: &Zone,
+        zone: &ProfileZone,
         termination: &Termination,
     ) -> Result<Self, Interrupt> {
         let pitch = helix.pitch().abs();
         let [near, far] = zone.across;
-        let zone = Zone { across: [near - PROFILE_MARGIN * pitch, far + PROFILE_MARGIN * pitch], ..*zone };
+        let zone =
+            ProfileZone { across: [near - PROFILE_MARGIN * pitch, far + PROFILE_MARGIN * pitch], ..*zone };
         let empty =
             || Self { pitch, finest: pitch / HEIGHTS_PER_PITCH as f64, zone, first: 0, slabs: Vec::new() };
         let add = |mut envelope: Self, triangles: &[[Point3<f64>; 3]]| {
             termination.check()?;
-            let mut cut = Cut::default();
+            let mut cut = ProfileCut::default();
             triangles.iter().for_each(|corners| envelope.add(corners, helix.rise, &mut cut));
             Ok(envelope)
         };
@@ -155,7 +156,7 @@ impl Envelope {
         self
     }
 
-    fn add(&mut self, corners: &[Point3<f64>; 3], rise: f64, Cut { stack, reaches }: &mut Cut) {
+    fn add(&mut self, corners: &[Point3<f64>; 3], rise: f64, ProfileCut { stack, reaches }: &mut ProfileCut) {
         stack.push((*corners, 0));
         while let Some((corners, cuts)) = stack.pop() {
             let [low, high] = min_max(corners.iter().map(|p| p.z));

@@ -25,9 +25,9 @@ use crate::termination::{Interrupt, Termination};
 pub(crate) use centred::centred;
 
 use super::course::{Course, Interval};
-use super::region_cover::path::{Found, Way};
-use envelope::{Envelope, Zone};
-use path::{Boxes, ScrewPath};
+use super::region_cover::path::{PathDepth, PathQuestion};
+use envelope::{Envelope, ProfileZone};
+use path::{AxisBoxes, ScrewPath};
 
 /// The stretches of the way on which the profiles of two surfaces, one of which is screwed past the other,
 /// do not show that they are apart.
@@ -52,8 +52,8 @@ fn unsettled(
     let moving = triangles(moving, &screw.reference);
     let standing = triangles(standing, &screw.helix.axis_from_frame);
     let [of_moving, of_standing] = [&moving, &standing].map(|t| Bounds::of(t.as_flattened()));
-    let boxes = Boxes { moving: of_moving, standing: of_standing };
-    let [one, other] = [&moving, &standing].map(|t| Zone::of(t).everywhere());
+    let boxes = AxisBoxes { moving: of_moving, standing: of_standing };
+    let [one, other] = [&moving, &standing].map(|t| ProfileZone::of(t).everywhere());
     let zone = one.common(&other);
     let envelope =
         |triangles: Vec<[Point3<f64>; 3]>| Envelope::new(&triangles, &screw.helix, &zone, termination);
@@ -84,11 +84,11 @@ fn unsettled(
 ///
 /// # Errors
 /// The termination condition became true.
-pub(crate) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], Interrupt> {
+pub(crate) fn depth_on_screw(way: &PathQuestion<'_>, limit: f64) -> Result<[PathDepth; 2], Interrupt> {
     let surfaces = way.passing.surfaces();
     // Depth changes its sign in mid-air where there are holes, and there alone.
     if surfaces.iter().any(|surface| surface.rim().is_some()) {
-        let unknown = || Found { open: vec![Interval::WHOLE], ..Found::default() };
+        let unknown = || PathDepth { open: vec![Interval::WHOLE], ..PathDepth::default() };
         return Ok([unknown(), unknown()]);
     }
     // A part that shares no thread with the moving one is soon told to be apart.
@@ -112,9 +112,13 @@ pub(crate) fn depth_on_screw(way: &Way<'_>, limit: f64) -> Result<[Found; 2], In
 
 /// Looks for the deepest points of both surfaces on some stretches of the way, with no more than some
 /// effort on each side. Long ones are halved first.
-fn bounded(way: &Way<'_>, stretches: Vec<Interval>, most_effort: usize) -> Result<[Found; 2], Interrupt> {
+fn bounded(
+    way: &PathQuestion<'_>,
+    stretches: Vec<Interval>,
+    most_effort: usize,
+) -> Result<[PathDepth; 2], Interrupt> {
     let side = |on_moving| {
-        let mut all = Found::default();
+        let mut all = PathDepth::default();
         let mut stack = stretches.clone();
         while let Some(interval) = stack.pop() {
             let left = most_effort.saturating_sub(all.effort);
@@ -133,7 +137,7 @@ fn bounded(way: &Way<'_>, stretches: Vec<Interval>, most_effort: usize) -> Resul
 }
 
 /// The stretches that are open on either side, which are none then.
-fn taken_open(found: &mut [Found; 2]) -> Vec<Interval> {
+fn taken_open(found: &mut [PathDepth; 2]) -> Vec<Interval> {
     let open: Vec<Interval> = found.iter_mut().flat_map(|f| std::mem::take(&mut f.open)).collect();
     let mut apart: Vec<Interval> =
         open.iter().filter(|i| !open.iter().any(|o| o != *i && o.holds(**i))).copied().collect();

@@ -11,7 +11,7 @@ use crate::budgets::{KNOTS_PER_SEGMENT, OUTLIER_ROUNDS};
 use crate::geometry::{Bounds, Helix, Pose, interpolate};
 use crate::tolerances::{LEAST_PITCH, OUTLIER};
 
-use super::super::course::{Course, Interval, Segment};
+use super::super::course::{Course, Interval, PathSegment};
 
 /// A short piece of the way.
 #[derive(Debug, Clone)]
@@ -44,14 +44,14 @@ pub(super) struct ScrewPath {
 /// Where two parts are in the axis frame, the moving one at the reference pose: boxes along the axis do not
 /// depend on how the parts lie in the world.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Boxes {
+pub(super) struct AxisBoxes {
     pub(super) moving: Bounds,
     pub(super) standing: Bounds,
 }
 
 /// A stretch of the way, as far as the two parts can meet there.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stretch {
+pub(super) struct ScrewStretch {
     /// How much further along the axis it is than the reference says.
     pub(super) shift: f64,
     /// The middle of where it can meet the other part is no further from where this says.
@@ -66,7 +66,7 @@ pub(super) struct Stretch {
     pub(super) places_of_standing: [f64; 2],
 }
 
-impl Stretch {
+impl ScrewStretch {
     /// How far points so far from the axis may be from where this says, if they can meet the other
     /// part at all.
     pub(super) fn stray(&self, radius: f64) -> f64 {
@@ -79,12 +79,12 @@ impl ScrewPath {
     /// strays much further than `finest`.
     pub(super) fn new(course: &Course, stretches: &[Interval], finest: f64) -> Option<Self> {
         let stretches: Vec<[f64; 2]> = stretches.iter().map(|i| i.of(course.length)).collect();
-        let is_in = |s: &&Segment| {
+        let is_in = |s: &&PathSegment| {
             let way = [s.before, s.before + s.length];
             stretches.iter().any(|[from, to]| way[0] < *to && *from < way[1])
         };
-        let samples: Vec<Sample> =
-            course.segments.iter().filter(is_in).map(|s| Sample::of(s, course)).collect();
+        let samples: Vec<SegmentSample> =
+            course.segments.iter().filter(is_in).map(|s| SegmentSample::of(s, course)).collect();
         let helix = fit(&samples, &course.centre)?;
         let (length, centre) = (course.length, course.centre);
         let knots = knots(course, &helix, finest);
@@ -125,7 +125,11 @@ impl ScrewPath {
     }
 
     /// What is known of a stretch: `None` if the two parts are nowhere near each other.
-    pub(super) fn stretch(&self, interval: Interval, Boxes { moving, standing }: &Boxes) -> Option<Stretch> {
+    pub(super) fn stretch(
+        &self,
+        interval: Interval,
+        AxisBoxes { moving, standing }: &AxisBoxes,
+    ) -> Option<ScrewStretch> {
         let frame_from_axis = self.helix.axis_from_frame.inverse();
         let [from, to] = interval.of(self.length);
         let first = self.knots.partition_point(|k| k.way[1] < from);
@@ -155,7 +159,7 @@ impl ScrewPath {
             tilt = tilt.max(k.unscrewed.rotation.angle_to(&self.reference.rotation) + k.turns);
         }
         let angles = range(knots().flat_map(|k| k.angles));
-        let mut stretch = Stretch {
+        let mut stretch = ScrewStretch {
             shift,
             strays,
             tilt: tilt.min(0.5),
@@ -171,14 +175,14 @@ impl ScrewPath {
 }
 
 /// A segment in its middle, with how far it turns, and how far all before it turned.
-struct Sample {
+struct SegmentSample {
     pose: Pose,
     turn: Vector3<f64>,
     before: Vector3<f64>,
 }
 
-impl Sample {
-    fn of(segment: &Segment, course: &Course) -> Self {
+impl SegmentSample {
+    fn of(segment: &PathSegment, course: &Course) -> Self {
         let pose = interpolate(&segment.from, &segment.to, &course.centre, 0.5);
         let before = course.segments.iter().take_while(|s| s.before < segment.before).map(turn).sum();
         Self { pose, turn: turn(segment), before }
@@ -186,12 +190,12 @@ impl Sample {
 }
 
 /// How a segment turns.
-fn turn(segment: &Segment) -> Vector3<f64> {
+fn turn(segment: &PathSegment) -> Vector3<f64> {
     (segment.to.rotation * segment.from.rotation.inverse()).scaled_axis()
 }
 
 /// The helix that most of some poses are screwed along.
-fn fit(samples: &[Sample], centre: &Point3<f64>) -> Option<Helix> {
+fn fit(samples: &[SegmentSample], centre: &Point3<f64>) -> Option<Helix> {
     let mut weights: Vec<f64> = samples.iter().map(|s| s.turn.norm()).collect();
     let mut found = None;
     for _ in 0..OUTLIER_ROUNDS {
@@ -220,7 +224,7 @@ fn fit(samples: &[Sample], centre: &Point3<f64>) -> Option<Helix> {
         let solved = normal.cholesky()?.solve(&right);
         let point = centre + solved.fixed_rows::<3>(0);
         let through = Point3::from(solved.fixed_rows::<3>(3).into_owned());
-        let angle = |s: &Sample| (s.before + s.turn / 2.0).dot(&axis);
+        let angle = |s: &SegmentSample| (s.before + s.turn / 2.0).dot(&axis);
         let angles: Vec<f64> = samples.iter().map(angle).collect();
         let heights: Vec<f64> = samples.iter().map(|s| axis.dot(&(s.pose * point).coords)).collect();
         let (rise, level) = line(&angles, &heights, &weights)?;

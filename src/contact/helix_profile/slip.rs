@@ -15,13 +15,13 @@ use crate::tolerances::{FLANK_LEAN, FLANK_SLIP};
 
 /// A facet of a surface.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Facet {
+pub(super) struct FlankFacet {
     pub(super) middle: Point3<f64>,
     pub(super) normal: Vector3<f64>,
     pub(super) area: f64,
 }
 
-impl Facet {
+impl FlankFacet {
     pub(super) fn of(corners: &[Point3<f64>; 3]) -> Option<Self> {
         let double = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
         // Right triangles on a curved surface have the normal that it has there.
@@ -36,18 +36,18 @@ impl Facet {
 /// it, in whose frame they are given. `None` if they are too few or tell no axis. (Facets on a grid lean
 /// all the same way against the flank that they stand for, and would tell a false rise; about the axis,
 /// that evens out.)
-pub(super) fn slipping(facets: &[Facet], rise: f64) -> Option<Helix> {
+pub(super) fn slipping(facets: &[FlankFacet], rise: f64) -> Option<Helix> {
     // The speed along the normal is linear in the twist: ω = (a, b, 1), v = (c, d, rise).
-    let row = |f: &Facet| {
+    let row = |f: &FlankFacet| {
         let lever = f.middle.coords.cross(&f.normal);
         SVector::<f64, 4>::new(lever.x, lever.y, f.normal.x, f.normal.y)
     };
-    let turning = |f: &Facet| f.middle.coords.cross(&f.normal).z + rise * f.normal.z;
+    let turning = |f: &FlankFacet| f.middle.coords.cross(&f.normal).z + rise * f.normal.z;
     let mut twist = SVector::<f64, 4>::zeros();
-    let share = |f: &Facet, twist: &SVector<f64, 4>| {
+    let share = |f: &FlankFacet, twist: &SVector<f64, 4>| {
         (row(f).dot(twist) + turning(f)) / f.middle.xy().coords.norm().max(1e-12)
     };
-    let flanks: Vec<&Facet> = facets
+    let flanks: Vec<&FlankFacet> = facets
         .iter()
         .filter(|f| {
             (FLANK_LEAN[0]..FLANK_LEAN[1]).contains(&f.normal.z.abs()) && share(f, &twist).abs() < FLANK_SLIP
@@ -82,9 +82,9 @@ mod tests {
     use crate::fixtures::{ball, surface, thread};
     use crate::geometry::{Pose, Surface};
 
-    fn facets(surface: &Surface, place: &Pose) -> Vec<Facet> {
+    fn facets(surface: &Surface, place: &Pose) -> Vec<FlankFacet> {
         let corners = |t: u32| surface.corners(t).map(|p| place * p);
-        (0..surface.triangles().len() as u32).filter_map(|t| Facet::of(&corners(t))).collect()
+        (0..surface.triangles().len() as u32).filter_map(|t| FlankFacet::of(&corners(t))).collect()
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::plan::Verifier;
 use crate::scene::Scene;
 use crate::termination::Termination;
 
-use super::super::Passing;
+use super::super::PairPath;
 use super::super::course::{Course, Interval};
 use super::unsettled;
 
@@ -59,7 +59,7 @@ fn checked(scene: &Scene, verifier: &Verifier, path: &[Pose]) -> f64 {
 
 /// The share of the way that profiles leave open.
 fn open(scene: &Scene, path: &[Pose]) -> Vec<Interval> {
-    let passing = Passing::new(scene, &scene.allowances, [1, 0], path);
+    let passing = PairPath::new(scene, &scene.allowances, [1, 0], path);
     let course = Course::new(&passing.path, passing.centre, passing.reach());
     unsettled(&course, passing.surfaces(), vec![Interval::WHOLE], LIMIT, &Termination::default()).unwrap()
 }
@@ -86,7 +86,7 @@ fn a_bolt_whose_head_crosses_its_shank_is_settled_as_others_are_and_one_with_hol
         let (scene, verifier) = scene([joined([bolt.clone(), head]), nut.clone()]);
         let bolt = &scene.bodies[0].shape.surface;
         assert!(bolt.is_open() && bolt.rim().is_some() == open);
-        let passing = Passing::new(&scene, &scene.allowances, [1, 0], &path(&scene));
+        let passing = PairPath::new(&scene, &scene.allowances, [1, 0], &path(&scene));
         let course = Course::new(&passing.path, passing.centre, passing.reach());
         let t = Termination::default();
         let found = verifier.bounds(&passing, &course, &t).unwrap();

@@ -18,7 +18,7 @@ pub(crate) mod surface_pair;
 
 use crate::termination::Interrupt;
 
-pub use shift::KeptCells;
+pub use shift::ShiftCoverCache;
 
 /// Covers a piece: `attempt` covers the piece it is given, or pushes the parts to cover instead, the next one last.
 pub(crate) fn cover<P, E>(

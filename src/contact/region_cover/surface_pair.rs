@@ -42,7 +42,7 @@ pub(crate) struct Witness {
 
 /// A moving and a standing part: the surface that is asked, and that into which it may not get.
 #[derive(Clone)]
-pub(crate) struct Facing<'a> {
+pub(crate) struct SurfacePair<'a> {
     pub(crate) other: usize,
     pub(crate) asked: &'a Surface,
     tree: &'a PatchTree,
@@ -58,7 +58,7 @@ pub(crate) struct Facing<'a> {
     pub(crate) allowance: f64,
 }
 
-impl<'a> Facing<'a> {
+impl<'a> SurfacePair<'a> {
     /// With the moving part's surface asked, or the standing one's.
     ///
     /// # Errors
@@ -108,7 +108,7 @@ impl<'a> Facing<'a> {
         measured_from_asked(&self.stand, pose, self.asks_part)
     }
 
-    /// A corner of a piece, in the asked surface's frame, by its number in [`Placed::points`].
+    /// A corner of a piece, in the asked surface's frame, by its number in [`PlacedPiece::points`].
     pub(crate) fn corner(&self, piece: &Piece, number: usize) -> Point3<f64> {
         match piece {
             Piece::Patch(index) => self.tree.vertices(*index)[number],
@@ -117,9 +117,9 @@ impl<'a> Facing<'a> {
     }
 
     /// What of the measured surface is nearest to a point in its frame; `guess` is a triangle near it.
-    pub(crate) fn look(&self, p: &Point3<f64>, guess: u32) -> Seen {
+    pub(crate) fn look(&self, p: &Point3<f64>, guess: u32) -> SignedClosest {
         let closest = self.measured.closest_from(p, guess);
-        Seen { signed: self.measured.signed(p, &closest), closest }
+        SignedClosest { signed: self.measured.signed(p, &closest), closest }
     }
 
     /// A ball that holds a piece, in the asked surface's frame.
@@ -158,13 +158,13 @@ impl<'a> Facing<'a> {
     }
 
     /// Where a piece is against the measured surface when the part is shifted.
-    pub(crate) fn place(&self, piece: &Piece, at: &Vector3<f64>, placed: &mut Placed) {
+    pub(crate) fn place(&self, piece: &Piece, at: &Vector3<f64>, placed: &mut PlacedPiece) {
         let shift = Translation3::from(self.shifted * at);
         self.place_at(piece, &(shift * self.measured_from_asked), placed);
     }
 
     /// Where a piece is when the asked surface stands so against the measured one.
-    pub(crate) fn place_at(&self, piece: &Piece, measured_from_asked: &Pose, placed: &mut Placed) {
+    pub(crate) fn place_at(&self, piece: &Piece, measured_from_asked: &Pose, placed: &mut PlacedPiece) {
         let place = |p: &Point3<f64>| measured_from_asked * p;
         placed.points.clear();
         placed.extremes.clear();
@@ -186,7 +186,7 @@ impl<'a> Facing<'a> {
     }
 
     /// Whether a triangle of the measured surface may lie beside a piece where it is.
-    pub(crate) fn is_beside(&self, piece: &Placed, triangle: u32, most: f64) -> bool {
+    pub(crate) fn is_beside(&self, piece: &PlacedPiece, triangle: u32, most: f64) -> bool {
         let corners = self.measured.corners(triangle);
         // What touches is beside, too.
         let centre = piece.centre;
@@ -272,7 +272,7 @@ impl<'a> Facing<'a> {
     pub(crate) fn probes_ahead(
         &self,
         piece: &Piece,
-        placed: &Placed,
+        placed: &PlacedPiece,
         (at, along): (&Vector3<f64>, &Vector3<f64>),
     ) -> Vec<Point3<f64>> {
         let Self { asked, tree, measured_from_asked, shifted, .. } = self;
@@ -362,7 +362,7 @@ pub(crate) enum Piece {
 
 /// A piece that is to be covered, and what helps to find its region.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Spot {
+pub(crate) struct CoverPiece {
     pub(crate) piece: Piece,
     /// A triangle of the measured surface near it.
     pub(crate) guess: u32,
@@ -373,14 +373,14 @@ pub(crate) struct Spot {
 }
 
 /// What of the measured surface is nearest to a point, and its signed distance (negative inside).
-pub(crate) struct Seen {
+pub(crate) struct SignedClosest {
     pub(crate) closest: Closest,
     pub(crate) signed: f64,
 }
 
 /// A piece against the measured surface.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Placed {
+pub(crate) struct PlacedPiece {
     /// Its corners.
     pub(crate) points: Vec<Point3<f64>>,
     /// The same, four by four.
@@ -406,8 +406,8 @@ mod tests {
         let pin = cuboid([-0.5, -0.5, -4.0], [0.5, 0.5, 4.0]);
         let (scene, _) = scene([plate, pin]);
         let start = scene.bodies[1].planning_from_shape;
-        let pair = Facing::new(&scene, (1, &start), 0, true, &Termination::default()).unwrap();
-        let mut placed = Placed::default();
+        let pair = SurfacePair::new(&scene, (1, &start), 0, true, &Termination::default()).unwrap();
+        let mut placed = PlacedPiece::default();
         let still = Vector3::zeros();
         pair.place(&pair.root().unwrap(), &still, &mut placed);
         for u in [Vector3::x(), -Vector3::y(), Vector3::new(0.6, 0.8, 0.0), Vector3::z(), -Vector3::z()] {

@@ -23,7 +23,7 @@ use crate::geometry::{Ball, Bounds, Look, Pose, SampleTree, Shape, Spacing, Surf
 use crate::termination::{Interrupt, Poll, Termination};
 use crate::tolerances::{HELPFUL, PATH_DENSITY};
 
-use super::super::passing::Passing;
+use super::super::passing::PairPath;
 
 /// A point that got too deep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,13 +40,13 @@ pub struct Entry {
 
 /// The samples of all parts, taken when they are needed.
 #[derive(Debug, Clone)]
-pub(crate) struct Samples {
+pub(crate) struct PathSamples {
     /// Per part: those of its shape, which equal parts share.
-    parts: Arc<Vec<Arc<Sampled>>>,
+    parts: Arc<Vec<Arc<PartSamples>>>,
 }
 
 #[derive(Debug)]
-struct Sampled {
+struct PartSamples {
     shape: Arc<Shape>,
     shares: [OnceLock<[SampleTree; SAMPLE_SHARES]>; Closeness::ALL.len()],
 }
@@ -62,17 +62,18 @@ impl Closeness {
     const ALL: [Self; 2] = [Self::Sparse, Self::Dense];
 }
 
-impl Samples {
+impl PathSamples {
     /// For parts of which `shape_of` gives each one's shape.
     pub(crate) fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>) -> Self {
-        let sampled = |s: &Arc<Shape>| Arc::new(Sampled { shape: Arc::clone(s), shares: Default::default() });
+        let sampled =
+            |s: &Arc<Shape>| Arc::new(PartSamples { shape: Arc::clone(s), shares: Default::default() });
         let shapes: Vec<_> = shapes.iter().map(sampled).collect();
         Self { parts: Arc::new(shape_of.into_iter().map(|s| Arc::clone(&shapes[s])).collect()) }
     }
 
     /// Bytes in memory, of what was sampled so far; equal parts count once.
     pub(crate) fn memory(&self) -> usize {
-        let mut shapes: Vec<&Arc<Sampled>> = self.parts.iter().collect();
+        let mut shapes: Vec<&Arc<PartSamples>> = self.parts.iter().collect();
         shapes.sort_unstable_by_key(|s| Arc::as_ptr(s));
         shapes.dedup_by_key(|s| Arc::as_ptr(s));
         let taken = shapes.iter().flat_map(|s| &s.shares).filter_map(OnceLock::get).flatten();
@@ -85,7 +86,7 @@ impl Samples {
     }
 
     fn of(&self, part: usize, closeness: Closeness) -> &[SampleTree; SAMPLE_SHARES] {
-        let Sampled { shape, shares } = &*self.parts[part];
+        let PartSamples { shape, shares } = &*self.parts[part];
         shares[closeness as usize].get_or_init(|| dealt(&shape.surface, closeness))
     }
 
@@ -94,7 +95,7 @@ impl Samples {
     /// refining a motion.
     pub(crate) fn entries_along(
         &self,
-        passing: &Passing<'_>,
+        passing: &PairPath<'_>,
         stretch: &[Pose],
         limit: f64,
         termination: &Termination,
@@ -110,7 +111,7 @@ impl Samples {
     /// The same at some poses, by samples that stand so closely.
     fn entries_at(
         &self,
-        passing: &Passing<'_>,
+        passing: &PairPath<'_>,
         poses: &[Pose],
         limit: f64,
         closeness: Closeness,
@@ -120,17 +121,17 @@ impl Samples {
         let [moving, standing] = passing.surfaces();
         let [part, other] = passing.parts.map(|part| self.of(part, closeness));
         let sides = [
-            Side { samples: part, to_measured: poses, measured: standing, granted: passing.granted },
-            Side { samples: other, to_measured: &back, measured: moving, granted: passing.granted },
+            PathSide { samples: part, to_measured: poses, measured: standing, granted: passing.granted },
+            PathSide { samples: other, to_measured: &back, measured: moving, granted: passing.granted },
         ];
-        let mut asked: Vec<Asked> = Vec::new();
+        let mut asked: Vec<SampledStretch> = Vec::new();
         for (side, share) in
             (0..sides.len()).flat_map(|side| (0..SAMPLE_SHARES).map(move |share| (side, share)))
         {
-            let takes = |i: &usize| Turn::of(*i, poses.len()).takes(share);
+            let takes = |i: &usize| PoseShares::of(*i, poses.len()).takes(share);
             let moments: Vec<usize> = (0..poses.len()).filter(takes).collect();
             let stretches = moments.chunks(POSES_AT_ONCE).map(<[usize]>::to_vec);
-            asked.extend(stretches.map(|moments| Asked { side, share, moments }));
+            asked.extend(stretches.map(|moments| SampledStretch { side, share, moments }));
         }
         let found = asked
             .par_iter()
@@ -141,7 +142,7 @@ impl Samples {
                 sides[asked.side].entered(asked, &poll)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
-        let mut entered: Vec<Entered> = found.into_iter().flatten().collect();
+        let mut entered: Vec<DeepSample> = found.into_iter().flatten().collect();
         entered.sort_unstable_by_key(|e| (e.moment, e.side, e.share, e.sample));
         let of_side = entered.chunk_by(|a, b| (a.moment, a.side) == (b.moment, b.side));
         Ok(of_side.flat_map(|entered| worth_telling(entered, limit * HELPFUL, passing, &sides)).collect())
@@ -149,9 +150,14 @@ impl Samples {
 }
 
 /// Of the samples of one side that are too deep at one moment, the deepest and all deeper than `deep`.
-fn worth_telling(entered: &[Entered], deep: f64, passing: &Passing<'_>, sides: &[Side<'_>; 2]) -> Vec<Entry> {
+fn worth_telling(
+    entered: &[DeepSample],
+    deep: f64,
+    passing: &PairPath<'_>,
+    sides: &[PathSide<'_>; 2],
+) -> Vec<Entry> {
     let worst = entered.iter().map(|e| e.over).fold(0.0, f64::max);
-    let entry = |e: &Entered| Entry {
+    let entry = |e: &DeepSample| Entry {
         other: passing.parts[1],
         on_moving: e.side == 0,
         point: sides[e.side].samples[e.share].points()[e.sample],
@@ -161,7 +167,7 @@ fn worth_telling(entered: &[Entered], deep: f64, passing: &Passing<'_>, sides: &
 }
 
 /// The samples of one part of a pair, and what they are measured against.
-struct Side<'a> {
+struct PathSide<'a> {
     samples: &'a [SampleTree; SAMPLE_SHARES],
     /// The way from the samples' frame to the measured surface's, at all poses.
     to_measured: &'a [Pose],
@@ -170,14 +176,14 @@ struct Side<'a> {
 }
 
 /// A share of a side's samples, and the poses at which they are measured.
-struct Asked {
+struct SampledStretch {
     side: usize,
     share: usize,
     moments: Vec<usize>,
 }
 
 /// A sample that is deeper than granted.
-struct Entered {
+struct DeepSample {
     moment: usize,
     side: usize,
     share: usize,
@@ -190,10 +196,10 @@ struct Entered {
 /// far outside that lies.
 type Known = (u32, Point3<f64>, f64);
 
-impl Side<'_> {
+impl PathSide<'_> {
     /// The samples that are deeper than granted. Those in a sphere are settled for all poses at which it stays out of
     /// the measured surface: from one pose to the next most travel less than they are off.
-    fn entered(&self, asked: &Asked, poll: &Poll<'_>) -> Result<Vec<Entered>, Interrupt> {
+    fn entered(&self, asked: &SampledStretch, poll: &Poll<'_>) -> Result<Vec<DeepSample>, Interrupt> {
         let Self { measured, granted, .. } = *self;
         let inner = measured.bounds().grown(-granted);
         let pose = |moment: usize| &self.to_measured[asked.moments[moment]];
@@ -224,8 +230,8 @@ impl Side<'_> {
                 return Ok(Look::Out);
             }
             if let Some(sample) = ball.sample.filter(|_| is_single && -distance > granted) {
-                let (moment, &Asked { side, share, .. }) = (asked.moments[middle], asked);
-                out.push(Entered { moment, side, share, sample, over: -distance - granted });
+                let (moment, &SampledStretch { side, share, .. }) = (asked.moments[middle], asked);
+                out.push(DeepSample { moment, side, share, sample, over: -distance - granted });
             }
             Ok(split((closest.triangle, at, distance)))
         };
@@ -237,12 +243,12 @@ impl Side<'_> {
 
 /// Which shares a pose checks.
 #[derive(Debug, Clone, Copy)]
-struct Turn {
+struct PoseShares {
     index: usize,
     of: usize,
 }
 
-impl Turn {
+impl PoseShares {
     const ALL: Self = Self { index: 0, of: 1 };
 
     /// The turn of pose `index` of `poses`; both ends of a path check all.
@@ -280,8 +286,8 @@ fn spacing(bounds: &Bounds, closeness: Closeness) -> Spacing {
 }
 
 /// The poses of a stretch of the way and as many between them as the density asks for.
-fn dense(passing: &Passing<'_>, path: &[Pose]) -> Vec<Pose> {
-    let Passing { shapes: [shape, _], centre, longest_side, .. } = passing;
+fn dense(passing: &PairPath<'_>, path: &[Pose]) -> Vec<Pose> {
+    let PairPath { shapes: [shape, _], centre, longest_side, .. } = passing;
     let step = PATH_DENSITY * longest_side;
     let mut out = Vec::new();
     for (a, b) in path.iter().zip(path.iter().skip(1)) {
@@ -304,7 +310,7 @@ mod tests {
 
     use super::*;
     use crate::fixtures::{ball, block_on_plate, moved, rod, scene, surface};
-    use crate::scene::Pair;
+    use crate::scene::CongruentPair;
 
     fn bits(p: &Point3<f64>) -> [u64; 3] {
         p.coords.map(f64::to_bits).into()
@@ -338,9 +344,9 @@ mod tests {
         let t = Termination::default();
         let entries = |depth: f64| {
             let (scene, _) = across(depth);
-            let passing = Passing::standing(&scene, &Pair::turned(&scene, 1, 0));
+            let passing = PairPath::standing(&scene, &CongruentPair::turned(&scene, 1, 0));
             let assembled: Vec<Arc<Shape>> = scene.bodies.iter().map(|b| Arc::clone(&b.shape)).collect();
-            let samples = Samples::new(&assembled, vec![0, 1]);
+            let samples = PathSamples::new(&assembled, vec![0, 1]);
             let sparse = samples.entries_at(&passing, &passing.path, 1.0, Closeness::Sparse, &t).unwrap();
             (sparse.len(), samples.entries_along(&passing, &passing.path, 1.0, &t).unwrap().len())
         };
@@ -356,7 +362,7 @@ mod tests {
         let turn = Pose::rotation(Vector3::new(0.0, 0.0, 1.0));
         let path =
             [from, Pose::translation(1.0, 0.0, 0.0) * from, Pose::translation(1.0, 0.0, 0.0) * turn * from];
-        let passing = Passing::new(&scene, &scene.allowances, [1, 0], &path);
+        let passing = PairPath::new(&scene, &scene.allowances, [1, 0], &path);
         let path = &passing.path;
         let poses = dense(&passing, path);
         assert_eq!((poses[0], poses[poses.len() - 1]), (path[0], path[2]));

@@ -13,19 +13,19 @@ use crate::geometry::Pose;
 use crate::termination::Interrupt;
 use crate::tolerances::{FREE_STEP, KNOWN_SAMPLE_STEPS};
 
-use super::pair_samples::{Extent, Vicinity};
-use super::{Around, Mover, Near};
+use super::pair_samples::{GatherExtent, PairSamples};
+use super::{ContactSet, ContactSource, MovingBody};
 
 /// The rounding error of a length, as a share of it.
 const ROUNDING: f64 = 1e-9;
 
 /// The contacts around a part where its translations start.
 pub(crate) struct StartContacts {
-    vicinity: Vicinity,
+    vicinity: PairSamples,
     centre: Point3<f64>,
     /// `near` has all contacts with a smaller gap.
     radius: f64,
-    pub(crate) near: Near,
+    pub(crate) near: ContactSet,
 }
 
 impl StartContacts {
@@ -36,14 +36,14 @@ impl StartContacts {
     /// # Errors
     /// The mover's termination condition became true.
     pub(crate) fn gather(
-        mover: &Mover<'_>,
+        mover: &MovingBody<'_>,
         other: usize,
         step: f64,
         (least, reach): (f64, f64),
     ) -> Result<Option<Self>, Interrupt> {
         let radius = KNOWN_SAMPLE_STEPS * step + reach;
-        let vicinity = Vicinity::new(mover, other, least + FREE_STEP + radius);
-        let near = vicinity.near(mover, Extent { radius, reach, most: LOOKS_BY_SAMPLES })?;
+        let vicinity = PairSamples::new(mover, other, least + FREE_STEP + radius);
+        let near = vicinity.near(mover, GatherExtent { radius, reach, most: LOOKS_BY_SAMPLES })?;
         Ok(near.map(|near| Self { vicinity, centre: mover.centre(), radius, near }))
     }
 }
@@ -54,7 +54,7 @@ pub(crate) struct ContactCache<'a> {
     reach: f64,
     shifted: Option<Shifted<'a>>,
     /// In the current step: the pose, the reach, and the contacts.
-    seen: Vec<(Pose, f64, Near)>,
+    seen: Vec<(Pose, f64, ContactSet)>,
 }
 
 impl<'a> ContactCache<'a> {
@@ -64,7 +64,7 @@ impl<'a> ContactCache<'a> {
     }
 
     /// The contacts from which a step starts; the last step may have ended there.
-    pub(crate) fn at_start_of_step(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt> {
+    pub(crate) fn at_start_of_step(&mut self, mover: &MovingBody<'_>) -> Result<ContactSet, Interrupt> {
         let mut near = self.within(self.reach, mover)?;
         if near.contacts.is_empty() {
             // The clearance bounds the step, and samples that were passed over tell it less well.
@@ -74,8 +74,8 @@ impl<'a> ContactCache<'a> {
         Ok(near)
     }
 
-    fn within(&mut self, reach: f64, mover: &Mover<'_>) -> Result<Near, Interrupt> {
-        let is_seen = |(pose, by, _): &&(Pose, f64, Near)| *pose == mover.pose && *by == reach;
+    fn within(&mut self, reach: f64, mover: &MovingBody<'_>) -> Result<ContactSet, Interrupt> {
+        let is_seen = |(pose, by, _): &&(Pose, f64, ContactSet)| *pose == mover.pose && *by == reach;
         if let Some((.., near)) = self.seen.iter().find(is_seen) {
             return Ok(near.clone());
         }
@@ -85,11 +85,11 @@ impl<'a> ContactCache<'a> {
         Ok(near)
     }
 
-    fn all_within(&self, reach: f64, mover: &Mover<'_>) -> Result<Near, Interrupt> {
-        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+    fn all_within(&self, reach: f64, mover: &MovingBody<'_>) -> Result<ContactSet, Interrupt> {
+        let mut near = ContactSet { contacts: Vec::new(), clearance: f64::INFINITY };
         match &self.shifted {
             Some(shifted) => {
-                let all = Extent { radius: reach, reach, most: usize::MAX };
+                let all = GatherExtent { radius: reach, reach, most: usize::MAX };
                 near = shifted.start.vicinity.near(mover, all)?.unwrap_or(near);
             }
             None => mover.near_pair(self.other, reach, &mut near)?,
@@ -98,10 +98,10 @@ impl<'a> ContactCache<'a> {
     }
 }
 
-impl Around for ContactCache<'_> {
+impl ContactSource for ContactCache<'_> {
     /// Only what enters at the end of a step decides whether it can be made. What is merely near there matters only if
     /// another step follows; without fields it costs next to nothing.
-    fn near(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt> {
+    fn near(&mut self, mover: &MovingBody<'_>) -> Result<ContactSet, Interrupt> {
         self.within(if self.shifted.is_some() { self.reach } else { 0.0 }, mover)
     }
 }
@@ -122,11 +122,12 @@ impl<'a> Shifted<'a> {
     }
 
     /// The contacts at a pose; `None` if it is too far from the start.
-    fn near(&mut self, mover: &Mover<'_>, reach: f64) -> Option<Near> {
+    fn near(&mut self, mover: &MovingBody<'_>, reach: f64) -> Option<ContactSet> {
         let StartContacts { near: around, radius, .. } = self.start;
         let here = mover.centre();
         let ways: Vec<f64> = self.at.iter().map(|there| (here - there).norm() * (1.0 + ROUNDING)).collect();
-        let mut near = Near { contacts: Vec::new(), clearance: around.clearance.min(*radius) - ways[0] };
+        let mut near =
+            ContactSet { contacts: Vec::new(), clearance: around.clearance.min(*radius) - ways[0] };
         if near.clearance < reach {
             return None;
         }
@@ -171,26 +172,26 @@ mod tests {
             shifts in prop::collection::vec(vector(0.2), 1..6),
         ) {
             let (scene, _) = scene(peg_in_hole(excess));
-            let start = Mover::new(&scene, 1, scene.bodies[1].planning_from_shape);
+            let start = MovingBody::new(&scene, 1, scene.bodies[1].planning_from_shape);
             let around = StartContacts::gather(&start.exactly(), 0, CONTACT_STEP, (LEAST, REACH)).unwrap().unwrap();
             let mut cache = ContactCache::new(0, REACH, Some(&around));
             for shift in [Vector3::zeros()].into_iter().chain(shifts) {
                 let mut mover = start;
                 mover.pose.translation.vector += shift;
-                let told = |near: &Near| {
+                let told = |near: &ContactSet| {
                     let mut told: Vec<i64> = near.contacts.iter().map(|c| (c.gap * 1e8).round() as i64).collect();
                     told.sort_unstable();
                     told
                 };
-                let mut by_fields = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+                let mut by_fields = ContactSet { contacts: Vec::new(), clearance: f64::INFINITY };
                 mover.near_pair(0, REACH, &mut by_fields).unwrap();
                 let remembered = cache.near(&mover.exactly()).unwrap();
                 let all = cache.all_within(REACH, &mover.exactly()).unwrap();
                 prop_assert_eq!(told(&remembered), told(&by_fields));
                 prop_assert_eq!(told(&all), told(&by_fields));
                 // No other sample is nearer than they say.
-                let everything = Vicinity::new(&mover.exactly(), 0, FAR);
-                let all_of_all = Extent { radius: FAR, reach: REACH, most: usize::MAX };
+                let everything = PairSamples::new(&mover.exactly(), 0, FAR);
+                let all_of_all = GatherExtent { radius: FAR, reach: REACH, most: usize::MAX };
                 let everything = everything.near(&mover.exactly(), all_of_all).unwrap().unwrap();
                 let others = everything.contacts.iter().map(|c| c.gap).filter(|gap| *gap >= REACH);
                 let nearest = others.fold(f64::INFINITY, f64::min);

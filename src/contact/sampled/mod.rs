@@ -17,21 +17,21 @@ mod tests;
 use nalgebra::{Point3, Vector3, Vector6};
 
 use crate::geometry::{Bounds, Closest, Pose};
-use crate::scene::{Body, Scene, Surroundings};
+use crate::scene::{Body, Scene, StandingParts};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{FREE_STEP, ON_SURFACE};
 
 pub(crate) use contact_cache::{ContactCache, StartContacts};
-use nearby_samples::{Measured, gather};
+use nearby_samples::{MeasuredBody, gather};
 pub(crate) use penetration::is_deeper;
 pub use penetration::{passes_straight, seems_clear};
-use planes::{Planes, Sample};
+use planes::{ContactSample, Planes};
 
-use super::constraint::Row;
+use super::constraint::VelocityConstraint;
 
 /// Whose surface the sample lies on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
+enum ContactSide {
     Moving,
     Standing,
 }
@@ -41,7 +41,7 @@ enum Side {
 pub(crate) struct Contact {
     /// The standing part of the pair.
     pub(crate) other: usize,
-    side: Side,
+    side: ContactSide,
     /// The sample in the frame of the shape it lies on.
     sample: Point3<f64>,
     /// Signed distance plus the pair's allowance: negative is deeper than granted.
@@ -60,7 +60,7 @@ impl Contact {
         (gap, closest): (f64, Closest),
         allowance: f64,
     ) -> Self {
-        let side = if is_moving { Side::Moving } else { Side::Standing };
+        let side = if is_moving { ContactSide::Moving } else { ContactSide::Standing };
         Self { other, side, sample, gap, closest, allowance }
     }
 
@@ -72,14 +72,14 @@ impl Contact {
 
 /// What is near a pose.
 #[derive(Debug, Clone)]
-pub(crate) struct Near {
+pub(crate) struct ContactSet {
     /// All samples with a gap below the reach that was asked for.
     pub(crate) contacts: Vec<Contact>,
     /// No other sample has a smaller gap than this.
     pub(crate) clearance: f64,
 }
 
-impl Near {
+impl ContactSet {
     /// Takes in what else is near.
     fn add(&mut self, Self { contacts, clearance }: Self) {
         self.clearance = self.clearance.min(clearance);
@@ -95,35 +95,35 @@ impl Near {
 }
 
 /// What a step asks about its surroundings.
-pub(crate) trait Around {
+pub(crate) trait ContactSource {
     /// What is near a mover's pose: if any contacts are deeper than the engine lets them, some of these at
     /// least.
-    fn near(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt>;
+    fn near(&mut self, mover: &MovingBody<'_>) -> Result<ContactSet, Interrupt>;
 
     /// Takes contacts in that were found at other poses and may matter at the mover's, too.
-    fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) -> Result<(), Interrupt> {
+    fn add_known(&mut self, mover: &MovingBody<'_>, near: &mut ContactSet) -> Result<(), Interrupt> {
         let _ = (mover, near);
         Ok(())
     }
 
     /// Whether nothing is too deep at a pose between the last one that was looked at and the one before the
     /// step, but for what the contacts near these tell.
-    fn is_clear_at(&mut self, between: &Mover<'_>) -> Result<bool, Interrupt> {
+    fn is_clear_at(&mut self, between: &MovingBody<'_>) -> Result<bool, Interrupt> {
         let _ = between;
         Ok(true)
     }
 }
 
 /// What a function gathers.
-impl<F: Fn(&Mover<'_>) -> Result<Near, Interrupt>> Around for F {
-    fn near(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt> {
+impl<F: Fn(&MovingBody<'_>) -> Result<ContactSet, Interrupt>> ContactSource for F {
+    fn near(&mut self, mover: &MovingBody<'_>) -> Result<ContactSet, Interrupt> {
         self(mover)
     }
 }
 
 /// The moving body at a pose.
 #[derive(Clone, Copy)]
-pub(crate) struct Mover<'a> {
+pub(crate) struct MovingBody<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) body: &'a Body,
     pub(crate) part: usize,
@@ -134,7 +134,7 @@ pub(crate) struct Mover<'a> {
     pub(crate) is_exact: bool,
 }
 
-impl<'a> Mover<'a> {
+impl<'a> MovingBody<'a> {
     pub(crate) fn new(scene: &'a Scene, part: usize, pose: Pose) -> Self {
         Self { scene, body: &scene.bodies[part], part, pose, termination: None, is_exact: false }
     }
@@ -164,18 +164,18 @@ impl<'a> Mover<'a> {
     ///
     /// # Errors
     /// The termination condition became true; so of all questions below.
-    pub(crate) fn near(&self, surroundings: &Surroundings, reach: f64) -> Result<Near, Interrupt> {
+    pub(crate) fn near(&self, surroundings: &StandingParts, reach: f64) -> Result<ContactSet, Interrupt> {
         self.near_by(surroundings, reach, |other, near| self.near_pair(other, reach, near))
     }
 
     /// The same; `gather` takes in what is near a standing part that may be within reach.
     pub(crate) fn near_by(
         &self,
-        surroundings: &Surroundings,
+        surroundings: &StandingParts,
         reach: f64,
-        mut gather: impl FnMut(usize, &mut Near) -> Result<(), Interrupt>,
-    ) -> Result<Near, Interrupt> {
-        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+        mut gather: impl FnMut(usize, &mut ContactSet) -> Result<(), Interrupt>,
+    ) -> Result<ContactSet, Interrupt> {
+        let mut near = ContactSet { contacts: Vec::new(), clearance: f64::INFINITY };
         let bounds = self.body.shape.bounds().transformed(&self.pose);
         // What is further off than any step is long need not be known.
         let horizon = reach.max(FREE_STEP);
@@ -192,10 +192,10 @@ impl<'a> Mover<'a> {
     }
 
     /// Gathers the contacts with one standing part.
-    pub(crate) fn near_pair(&self, other: usize, reach: f64, near: &mut Near) -> Result<(), Interrupt> {
+    pub(crate) fn near_pair(&self, other: usize, reach: f64, near: &mut ContactSet) -> Result<(), Interrupt> {
         // One after the other: several motions are simulated at a time, and one that waited for its half
         // would begin with another motion meanwhile, and come back to its own only at the end of that.
-        for side in [Side::Moving, Side::Standing] {
+        for side in [ContactSide::Moving, ContactSide::Standing] {
             near.add(self.side(side, other, reach, near.clearance)?);
         }
         Ok(())
@@ -203,24 +203,30 @@ impl<'a> Mover<'a> {
 
     /// The same for those with this part alone, both surfaces side by side: where fields are asked for the first time,
     /// the cells that they fill take most of the time.
-    pub(crate) fn near_first(&self, other: usize, reach: f64) -> Result<Near, Interrupt> {
+    pub(crate) fn near_first(&self, other: usize, reach: f64) -> Result<ContactSet, Interrupt> {
         let standing = &self.scene.bodies[other];
         let (mine, theirs) = rayon::join(|| self.prepare_field(self.body), || self.prepare_field(standing));
         mine.and(theirs)?;
-        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+        let mut near = ContactSet { contacts: Vec::new(), clearance: f64::INFINITY };
         let side = |side| self.side(side, other, reach, f64::INFINITY);
-        let (mine, theirs) = rayon::join(|| side(Side::Moving), || side(Side::Standing));
+        let (mine, theirs) = rayon::join(|| side(ContactSide::Moving), || side(ContactSide::Standing));
         near.add(mine?);
         near.add(theirs?);
         Ok(near)
     }
 
     /// What is near of the samples of one surface of a pair.
-    fn side(&self, side: Side, other: usize, reach: f64, clearance: f64) -> Result<Near, Interrupt> {
-        let mut found = Near { contacts: Vec::new(), clearance };
+    fn side(
+        &self,
+        side: ContactSide,
+        other: usize,
+        reach: f64,
+        clearance: f64,
+    ) -> Result<ContactSet, Interrupt> {
+        let mut found = ContactSet { contacts: Vec::new(), clearance };
         self.prepare_fields(&self.scene.bodies[other])?;
         let (sampled, body, to_measured, allowance) = self.sides(side, other);
-        let measured = Measured { body, to_measured: &to_measured, allowance, reach };
+        let measured = MeasuredBody { body, to_measured: &to_measured, allowance, reach };
         let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
         for tree in [sampled.shape.samples(), &sampled.extra_samples] {
             gather(tree, &measured, self.termination, &mut found, tag)?;
@@ -230,13 +236,13 @@ impl<'a> Mover<'a> {
 
     /// Whose samples are asked for, what they are measured against, the way from the one's frame to the other's, and
     /// the pair's allowance.
-    fn sides(&self, side: Side, other: usize) -> (&'a Body, &'a Body, Pose, f64) {
+    fn sides(&self, side: ContactSide, other: usize) -> (&'a Body, &'a Body, Pose, f64) {
         let standing = &self.scene.bodies[other];
         let allowance = self.scene.allowances.of(self.part, other);
         let standing_from_moving = standing.planning_from_shape.inverse() * self.pose;
         match side {
-            Side::Moving => (self.body, standing, standing_from_moving, allowance),
-            Side::Standing => (standing, self.body, standing_from_moving.inverse(), allowance),
+            ContactSide::Moving => (self.body, standing, standing_from_moving, allowance),
+            ContactSide::Standing => (standing, self.body, standing_from_moving.inverse(), allowance),
         }
     }
 
@@ -254,11 +260,11 @@ impl<'a> Mover<'a> {
     pub(crate) fn remeasured(&self, contact: &Contact, reach: f64) -> Option<Contact> {
         let standing = &self.scene.bodies[contact.other];
         let (measured, p) = match contact.side {
-            Side::Moving => (
+            ContactSide::Moving => (
                 standing,
                 standing.planning_from_shape.inverse_transform_point(&(self.pose * contact.sample)),
             ),
-            Side::Standing => {
+            ContactSide::Standing => {
                 let world = standing.planning_from_shape * contact.sample;
                 (self.body, self.pose.inverse_transform_point(&world))
             }
@@ -283,25 +289,32 @@ impl<'a> Mover<'a> {
     /// From the centre of mass to a contact's sample.
     pub(crate) fn arm(&self, contact: &Contact) -> Vector3<f64> {
         let world = match contact.side {
-            Side::Moving => self.pose * contact.sample,
-            Side::Standing => self.scene.bodies[contact.other].planning_from_shape * contact.sample,
+            ContactSide::Moving => self.pose * contact.sample,
+            ContactSide::Standing => self.scene.bodies[contact.other].planning_from_shape * contact.sample,
         };
         world - self.centre()
     }
 
     /// The constraints on twists (linear part first) about the centre of mass of which a contact
     /// demands any one, given the twist that is wanted. Appended to `out`; at least one.
-    pub(crate) fn options(&self, contact: &Contact, wanted: &Vector6<f64>, out: &mut Vec<Row>) {
+    pub(crate) fn options(
+        &self,
+        contact: &Contact,
+        wanted: &Vector6<f64>,
+        out: &mut Vec<VelocityConstraint>,
+    ) {
         let standing = &self.scene.bodies[contact.other];
         let (world, measured, frame, sense) = match contact.side {
-            Side::Moving => (self.pose * contact.sample, standing, &standing.planning_from_shape, 1.0),
-            Side::Standing => (standing.planning_from_shape * contact.sample, self.body, &self.pose, -1.0),
+            ContactSide::Moving => (self.pose * contact.sample, standing, &standing.planning_from_shape, 1.0),
+            ContactSide::Standing => {
+                (standing.planning_from_shape * contact.sample, self.body, &self.pose, -1.0)
+            }
         };
         let arm = world - self.centre();
         let (v, turn) = (wanted.fixed_rows::<3>(0), wanted.fixed_rows::<3>(3));
         // How the sample moves against the measured surface.
         let motion: Vector3<f64> = (v + turn.cross(&arm)) * sense;
-        let sample = Sample {
+        let sample = ContactSample {
             point: frame.inverse_transform_point(&world),
             motion: frame.rotation.inverse() * motion,
             closest: contact.closest,
@@ -321,12 +334,16 @@ impl<'a> Mover<'a> {
             let n = frame.rotation * plane.normal * sense;
             let moment = arm.cross(&n);
             let a = Vector6::new(n.x, n.y, n.z, moment.x, moment.y, moment.z);
-            out.push(Row { a, b: plane.height + contact.allowance, other: contact.other });
+            out.push(VelocityConstraint { a, b: plane.height + contact.allowance, other: contact.other });
         }
     }
 
     /// The constraint that leads a sample that is too deep out the shortest way.
-    pub(crate) fn way_out(&self, contact: &Contact, rows: &mut Vec<Row>) -> Option<Row> {
+    pub(crate) fn way_out(
+        &self,
+        contact: &Contact,
+        rows: &mut Vec<VelocityConstraint>,
+    ) -> Option<VelocityConstraint> {
         rows.clear();
         self.options(contact, &Vector6::zeros(), rows);
         rows.first().copied()

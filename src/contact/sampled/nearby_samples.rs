@@ -10,10 +10,10 @@ use crate::scene::Body;
 use crate::sdf::Grid;
 use crate::termination::{Interrupt, Poll, Termination};
 
-use super::{Contact, Near};
+use super::{Contact, ContactSet};
 
 /// What samples are measured against.
-pub(super) struct Measured<'m> {
+pub(super) struct MeasuredBody<'m> {
     pub(super) body: &'m Body,
     pub(super) to_measured: &'m Pose,
     pub(super) allowance: f64,
@@ -23,12 +23,12 @@ pub(super) struct Measured<'m> {
 /// By the other's field.
 pub(super) fn gather(
     tree: &SampleTree,
-    measured: &Measured<'_>,
+    measured: &MeasuredBody<'_>,
     termination: Option<&Termination>,
-    near: &mut Near,
+    near: &mut ContactSet,
     tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
 ) -> Result<(), Interrupt> {
-    let Measured { body, to_measured, allowance, reach } = *measured;
+    let MeasuredBody { body, to_measured, allowance, reach } = *measured;
     // Deeper than nothing cannot be excluded by a bound that is only sure outside.
     let limit = (reach - allowance).max(0.0);
     let field: &Grid = &body.field;
@@ -71,7 +71,7 @@ pub(super) fn gather(
 
 /// How long to look.
 #[derive(Clone, Copy)]
-pub(super) struct Few<'t> {
+pub(super) struct GatherLimits<'t> {
     /// No more often, …
     pub(super) most: usize,
     /// … where what is nearer than this alone is looked for.
@@ -84,12 +84,12 @@ pub(super) struct Few<'t> {
 /// looked at than by fields, whose bounds are sure outside alone.
 pub(super) fn gather_exactly(
     tree: &SampleTree,
-    measured: &Measured<'_>,
-    Few { most, within, termination }: Few<'_>,
-    near: &mut Near,
+    measured: &MeasuredBody<'_>,
+    GatherLimits { most, within, termination }: GatherLimits<'_>,
+    near: &mut ContactSet,
     tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
 ) -> Result<Option<()>, Interrupt> {
-    let Measured { body, to_measured, allowance, reach } = *measured;
+    let MeasuredBody { body, to_measured, allowance, reach } = *measured;
     let bounds = body.shape.surface.bounds();
     let clearance = Cell::new(near.clearance);
     let keep = |gap: f64| clearance.set(clearance.get().min(gap));

@@ -5,12 +5,12 @@ use crate::geometry::{Bounds, Pose, SampleTree};
 
 use crate::termination::Interrupt;
 
-use super::nearby_samples::{Few, Measured, gather_exactly};
-use super::{Contact, Mover, Near, Side};
+use super::nearby_samples::{GatherLimits, MeasuredBody, gather_exactly};
+use super::{Contact, ContactSet, ContactSide, MovingBody};
 
 /// How much to look for.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Extent {
+pub(crate) struct GatherExtent {
     /// What is gathered has a smaller gap.
     pub(crate) radius: f64,
     /// What has a smaller gap than this is to be found in …
@@ -20,15 +20,15 @@ pub(crate) struct Extent {
 }
 
 /// Of the samples of a moving part and one that stands, both closed, those that may come near each other.
-pub(crate) struct Vicinity {
+pub(crate) struct PairSamples {
     other: usize,
     mine: SampleTree,
     theirs: SampleTree,
 }
 
-impl Vicinity {
+impl PairSamples {
     /// Near each other while the mover is shifted from its pose by no more than `way`: nearer than that, too.
-    pub(crate) fn new(mover: &Mover<'_>, other: usize, way: f64) -> Self {
+    pub(crate) fn new(mover: &MovingBody<'_>, other: usize, way: f64) -> Self {
         let standing = &mover.scene.bodies[other];
         let (mine, theirs) = (&mover.body.shape, &standing.shape);
         let bounds = mine.bounds().transformed(&mover.pose);
@@ -44,22 +44,31 @@ impl Vicinity {
     ///
     /// # Errors
     /// The mover's termination condition became true.
-    pub(crate) fn near(&self, mover: &Mover<'_>, extent: Extent) -> Result<Option<Near>, Interrupt> {
+    pub(crate) fn near(
+        &self,
+        mover: &MovingBody<'_>,
+        extent: GatherExtent,
+    ) -> Result<Option<ContactSet>, Interrupt> {
         let side = |side| self.side(mover, side, extent);
-        let (mine, theirs) = rayon::join(|| side(Side::Moving), || side(Side::Standing));
+        let (mine, theirs) = rayon::join(|| side(ContactSide::Moving), || side(ContactSide::Standing));
         let (Some(mut near), Some(theirs)) = (mine?, theirs?) else { return Ok(None) };
         near.add(theirs);
         Ok(Some(near))
     }
 
-    fn side(&self, mover: &Mover<'_>, side: Side, extent: Extent) -> Result<Option<Near>, Interrupt> {
+    fn side(
+        &self,
+        mover: &MovingBody<'_>,
+        side: ContactSide,
+        extent: GatherExtent,
+    ) -> Result<Option<ContactSet>, Interrupt> {
         let other = self.other;
         let (sampled, body, to_measured, allowance) = mover.sides(side, other);
-        let measured = Measured { body, to_measured: &to_measured, allowance, reach: extent.radius };
-        let few = Few { most: extent.most, within: extent.reach, termination: mover.termination };
+        let measured = MeasuredBody { body, to_measured: &to_measured, allowance, reach: extent.radius };
+        let few = GatherLimits { most: extent.most, within: extent.reach, termination: mover.termination };
         let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
-        let tree = if side == Side::Moving { &self.mine } else { &self.theirs };
-        let mut found = Near { contacts: Vec::new(), clearance: f64::INFINITY };
+        let tree = if side == ContactSide::Moving { &self.mine } else { &self.theirs };
+        let mut found = ContactSet { contacts: Vec::new(), clearance: f64::INFINITY };
         for tree in [tree, &sampled.extra_samples] {
             if gather_exactly(tree, &measured, few, &mut found, tag)?.is_none() {
                 return Ok(None);

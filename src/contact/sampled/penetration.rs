@@ -11,9 +11,9 @@ use crate::scene::{Body, Scene};
 use crate::sdf::Grid;
 use crate::termination::{Interrupt, Poll, Termination, try_all};
 
-use super::Mover;
+use super::MovingBody;
 
-impl Mover<'_> {
+impl MovingBody<'_> {
     /// Whether the fields alone show that a sample of either surface is deeper than allowed. Measures nothing exactly,
     /// so it is quick.
     pub(crate) fn clearly_enters(&self, standing: &[usize]) -> Result<bool, Interrupt> {
@@ -145,7 +145,7 @@ pub fn passes_straight(
         if step > 0.0 { (travel / step).ceil().min(PASSAGE_POSES as f64) as usize } else { PASSAGE_POSES };
     try_all(1..count, |i| {
         let pose = interpolate(from, to, &centre, i as f64 / count as f64);
-        Ok(!Mover::new(scene, part, pose).until(termination).clearly_enters(standing)?)
+        Ok(!MovingBody::new(scene, part, pose).until(termination).clearly_enters(standing)?)
     })
 }
 
@@ -161,7 +161,7 @@ pub fn seems_clear(
     by: f64,
     termination: &Termination,
 ) -> Result<bool, Interrupt> {
-    Mover::new(scene, part, *pose).until(termination).seems_clear(standing, by)
+    MovingBody::new(scene, part, *pose).until(termination).seems_clear(standing, by)
 }
 
 #[cfg(test)]

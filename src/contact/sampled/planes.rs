@@ -6,7 +6,7 @@ use crate::geometry::{Closest, Surface};
 use crate::tolerances::ONE_PLANE_COSINE;
 
 /// A sample seen from the surface that it is near to.
-pub(super) struct Sample {
+pub(super) struct ContactSample {
     pub(super) point: Point3<f64>,
     /// The displacement that is wanted.
     pub(super) motion: Vector3<f64>,
@@ -53,7 +53,7 @@ impl Planes {
     }
 }
 
-impl Sample {
+impl ContactSample {
     /// The planes of which the sample must stay above one: those of the closest feature, and, if
     /// the wanted motion goes below all of them, those of the feature that is closest ahead, as `closest_to` tells
     /// of a point if there is one as near. The

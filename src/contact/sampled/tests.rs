@@ -1,6 +1,6 @@
 use nalgebra::Vector3;
 
-use super::pair_samples::{Extent, Vicinity};
+use super::pair_samples::{GatherExtent, PairSamples};
 use super::*;
 use crate::fixtures::{ball, block_on_plate, cuboid, l_shape, moved, peg_in_hole, scene};
 
@@ -24,16 +24,16 @@ fn without_fields_the_same_contacts_are_found() {
         for shift in [Vector3::zeros(), Vector3::new(0.01, -0.02, 0.015), Vector3::z() * 0.5] {
             let mut pose = start;
             pose.translation.vector += shift;
-            let mover = Mover::new(&scene, 1, pose);
+            let mover = MovingBody::new(&scene, 1, pose);
             let by_fields = mover.near_first(0, REACH).unwrap();
-            let extent = Extent { radius: REACH, reach: REACH, most: usize::MAX };
+            let extent = GatherExtent { radius: REACH, reach: REACH, most: usize::MAX };
             let exact =
-                Vicinity::new(&mover.exactly(), 0, REACH).near(&mover.exactly(), extent).unwrap().unwrap();
+                PairSamples::new(&mover.exactly(), 0, REACH).near(&mover.exactly(), extent).unwrap().unwrap();
             // Which trees they are in decides on their order.
-            let told = |near: &Near| {
+            let told = |near: &ContactSet| {
                 let told = |c: &Contact| {
                     let sample = c.sample.coords.map(f64::to_bits).data.0;
-                    (c.side == Side::Moving, sample, (c.gap * 1e9).round() as i64)
+                    (c.side == ContactSide::Moving, sample, (c.gap * 1e9).round() as i64)
                 };
                 let mut told: Vec<_> = near.contacts.iter().map(told).collect();
                 told.sort_unstable();
@@ -44,9 +44,9 @@ fn without_fields_the_same_contacts_are_found() {
             assert!(exact.clearance >= by_fields.clearance - 1e-9);
             contacts += exact.contacts.len();
             // Measured again elsewhere, they are the same, too.
-            let there = Mover { pose: Pose::translation(1e-3, 2e-3, -1e-3) * pose, ..mover };
+            let there = MovingBody { pose: Pose::translation(1e-3, 2e-3, -1e-3) * pose, ..mover };
             for contact in &exact.contacts {
-                let gap = |mover: Mover<'_>| mover.remeasured(contact, f64::INFINITY).map(|c| c.gap);
+                let gap = |mover: MovingBody<'_>| mover.remeasured(contact, f64::INFINITY).map(|c| c.gap);
                 let (one, other) = (gap(there).unwrap(), gap(there.exactly()).unwrap());
                 assert!((one - other).abs() < 1e-9, "{one} or {other}");
             }
@@ -58,9 +58,9 @@ fn without_fields_the_same_contacts_are_found() {
 #[test]
 fn many_looks_are_refused() {
     let (scene, _) = scene(peg_in_hole(0.0));
-    let mover = Mover::new(&scene, 1, scene.bodies[1].planning_from_shape).exactly();
-    let vicinity = Vicinity::new(&mover, 0, REACH);
+    let mover = MovingBody::new(&scene, 1, scene.bodies[1].planning_from_shape).exactly();
+    let vicinity = PairSamples::new(&mover, 0, REACH);
     let looked =
-        |most| vicinity.near(&mover, Extent { radius: REACH, reach: REACH, most }).unwrap().is_some();
+        |most| vicinity.near(&mover, GatherExtent { radius: REACH, reach: REACH, most }).unwrap().is_some();
     assert!(!looked(10) && looked(100_000));
 }

@@ -1,15 +1,15 @@
 //! How deep pairs of parts overlap as assembled. That depends on the two shapes and on how they stand to each other
-//! (rounded: see [`Pair`]), so a pair measured once serves each assembly that has it.
+//! (rounded: see [`CongruentPair`]), so a pair measured once serves each assembly that has it.
 
 use super::SOURCES;
 use crate::cache::{Digest, RecordKey, RecordKind, Storage};
-use crate::scene::{Pair, Scene, add_pair};
+use crate::scene::{CongruentPair, Scene, add_pair};
 
 /// How deep two parts overlap as assembled, in the planning frame.
 pub(crate) static OVERLAP: RecordKind = RecordKind::of::<f64>(1, "overlap", Storage::MemoryAndDisk, SOURCES);
 
 /// The key of how deep a pair overlaps.
-pub(crate) fn overlap_key(scene: &Scene, pair: &Pair) -> RecordKey {
+pub(crate) fn overlap_key(scene: &Scene, pair: &CongruentPair) -> RecordKey {
     let mut digest = Digest::new();
     add_pair(&mut digest, scene, pair);
     digest.numbers([scene.longest_side]).key(&OVERLAP)
@@ -22,7 +22,7 @@ mod tests {
     use crate::geometry::Pose;
 
     fn key(scene: &Scene) -> RecordKey {
-        overlap_key(scene, &Pair::turned(scene, 1, 0))
+        overlap_key(scene, &CongruentPair::turned(scene, 1, 0))
     }
 
     #[test]

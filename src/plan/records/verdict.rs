@@ -1,5 +1,5 @@
 //! Verification: what the check of a path found past one part that stands. It depends only on the two shapes and on how one
-//! passes the other ([`Passing`]). So a change costs only the checks of the paths that come near it, and parts that leave
+//! passes the other ([`PairPath`]). So a change costs only the checks of the paths that come near it, and parts that leave
 //! alike are checked once.
 
 use std::collections::HashMap;
@@ -8,7 +8,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::SOURCES;
 use crate::budgets::KEPT_VERDICTS;
 use crate::cache::{Digest, RecordKey, RecordKind, RequestCache, Storage};
-use crate::contact::Passing;
+use crate::contact::PairPath;
 use crate::geometry::add_pose;
 use crate::plan::Verdict;
 use crate::termination::Interrupt;
@@ -21,7 +21,7 @@ pub(crate) static VERDICT: RecordKind =
 #[derive(Debug, Clone, Copy)]
 pub struct VerdictQuestion<'a> {
     /// The moving part, the standing part, and the path.
-    pub passing: &'a Passing<'a>,
+    pub passing: &'a PairPath<'a>,
     /// The depth at which the path is refused, in the planning frame.
     pub limit: f64,
 }
@@ -69,7 +69,7 @@ impl KnownVerdicts {
 
 impl VerdictQuestion<'_> {
     fn key(&self) -> RecordKey {
-        let Passing { shapes, path, centre, granted, longest_side, .. } = self.passing;
+        let PairPath { shapes, path, centre, granted, longest_side, .. } = self.passing;
         let mut digest = Digest::new();
         shapes.iter().for_each(|shape| {
             digest.hash(shape.content());
@@ -102,7 +102,7 @@ mod tests {
         let verdict_on = |parts: [usize; 2], height: f64, aside: f64| {
             let start = scene.bodies[parts[0]].planning_from_shape;
             let path = [start, Pose::translation(aside, 0.0, height) * start];
-            let passing = &Passing::new(&scene, &scene.allowances, parts, &path);
+            let passing = &PairPath::new(&scene, &scene.allowances, parts, &path);
             let check = || {
                 checks.set(checks.get() + 1);
                 let point = Point3::new(0.5, 0.0, height);

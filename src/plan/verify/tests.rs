@@ -23,7 +23,7 @@ fn checked_path(scene: &Scene, verifier: &Verifier, path: &[Pose]) -> Verdict {
 }
 
 fn overlap(scene: &Scene, verifier: &Verifier, a: usize, b: usize) -> f64 {
-    verifier.assembled_depth(scene, &Pair::turned(scene, a, b), &Termination::default()).unwrap()
+    verifier.assembled_depth(scene, &CongruentPair::turned(scene, a, b), &Termination::default()).unwrap()
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn where_holes_leave_nothing_to_be_settled_samples_are_asked_soon() {
     basket.triangles = basket.triangles.into_iter().step_by(2).collect();
     let (scene, verifier) = scene([basket, cuboid([-2.0, -1.5, 1.0], [1.0, 2.0, 3.5])]);
     let path = [scene.bodies[1].planning_from_shape; 2];
-    let passing = Passing::new(&scene, &scene.allowances, [1, 0], &path);
+    let passing = PairPath::new(&scene, &scene.allowances, [1, 0], &path);
     let course = Course::new(&passing.path, passing.centre, passing.reach());
     let found = verifier.bounds(&passing, &course, &Termination::default()).unwrap();
     assert!(found.iter().any(|f| !f.open.is_empty() && f.effort < PATH_EFFORT_IN_DOUBT / 5));
@@ -124,7 +124,7 @@ fn a_pin_in_a_round_hole_is_told_by_few_regions() {
     let (scene, verifier) = scene(meshes.map(|mesh| moved(mesh, &turn)));
     let start = scene.bodies[1].planning_from_shape;
     let path = [start, nalgebra::Translation3::from(turn * Vector3::z() * 8.0) * start];
-    let passing = Passing::new(&scene, &scene.allowances, [1, 0], &path);
+    let passing = PairPath::new(&scene, &scene.allowances, [1, 0], &path);
     let course = Course::new(&passing.path, passing.centre, passing.reach());
     let [pin, _] = verifier.bounds(&passing, &course, &Termination::default()).unwrap();
     let triangles = scene.bodies[1].shape.surface.triangles().len();
@@ -197,7 +197,7 @@ fn a_nut_a_hair_too_tight_for_its_bolt_is_bounded_as_easily_as_one_that_fits() {
         assert_eq!(scene.allowances.of(1, 0) > 0.0, inner < 0.3);
         let start = scene.bodies[1].planning_from_shape;
         let path = [start, Pose::translation(0.0, 0.0, 1.2) * start];
-        let passing = &Passing::new(&scene, &scene.allowances, [1, 0], &path);
+        let passing = &PairPath::new(&scene, &scene.allowances, [1, 0], &path);
         let course = &Course::new(&passing.path, passing.centre, passing.reach());
         let found = verifier.bounds(passing, course, &Termination::default()).unwrap();
         assert!(found.iter().all(|side| side.bound < LIMIT / 2.0 && side.open.is_empty()));

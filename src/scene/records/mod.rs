@@ -7,10 +7,10 @@ pub(crate) use hull::HULL;
 use crate::cache::Digest;
 use crate::geometry::{add_bounds, add_pose};
 
-use super::{Body, Pair, Scene};
+use super::{Body, CongruentPair, Scene};
 
 /// Adds how two parts stand to each other to a key.
-pub(crate) fn add_pair(digest: &mut Digest, scene: &Scene, pair: &Pair) {
+pub(crate) fn add_pair(digest: &mut Digest, scene: &Scene, pair: &CongruentPair) {
     for (part, pose) in pair.parts.iter().zip(&pair.poses) {
         digest.hash(scene.bodies[*part].shape.content());
         add_pose(digest, pose);

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use crate::geometry::{Pose, SampleTree};
-use crate::scene::{Body, Scene, Surroundings};
+use crate::scene::{Body, Scene, StandingParts};
 use crate::sdf::{FieldSample, Grid};
 
 use super::parameters::PenaltyParameters;
@@ -23,7 +23,7 @@ use super::points::PointCache;
 
 /// Where the moving body is.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Placement {
+pub(super) struct BodyPlacement {
     /// Its centre of mass in the planning frame.
     pub(super) centre: Point3<f64>,
     /// Its axes: planning_from_shape.
@@ -32,7 +32,7 @@ pub(super) struct Placement {
 
 /// The contact energy at a placement and its derivatives; translation first.
 #[derive(Debug, Clone)]
-pub(super) struct Evaluation {
+pub(super) struct ContactEnergy {
     pub(super) energy: f64,
     pub(super) gradient: Vector6<f64>,
     /// The part of the second derivative that is never negative.
@@ -43,7 +43,7 @@ pub(super) struct Evaluation {
     pub(super) touched: Vec<bool>,
 }
 
-impl Evaluation {
+impl ContactEnergy {
     pub(super) fn new(pairs: usize) -> Self {
         Self {
             energy: 0.0,
@@ -65,37 +65,37 @@ impl Evaluation {
 
 /// Whose surface a point lies on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Side {
+pub(super) enum PointSide {
     Moving,
     Standing,
 }
 
 /// The moving body and one that stands.
-pub(super) struct Pair<'a> {
+pub(super) struct PenaltyPair<'a> {
     pub(super) other: usize,
     pub(super) standing: &'a Body,
     /// What tolerances are multiplied with, for thin parts.
     pub(super) scale: f64,
     /// Axes of the standing body: planning_from_shape.
     rotation: Matrix3<f64>,
-    met: OnceCell<Met>,
+    met: OnceCell<NearPair>,
 }
 
 /// What is only worked out for pairs that come near each other.
-struct Met {
+struct NearPair {
     points: Arc<SampleTree>,
     threshold: f64,
 }
 
 /// The near points of one side of a pair.
-struct Group {
+struct PointGroup {
     pair: usize,
-    side: Side,
+    side: PointSide,
     points: Range<usize>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Near {
+struct NearPoint {
     /// In the frame of the shape that it lies on.
     point: Point3<f64>,
     /// How deep it was at the start of the step; only damping asks.
@@ -107,18 +107,18 @@ pub(super) struct Contacts<'a> {
     pub(super) scene: &'a Scene,
     pub(super) part: usize,
     pub(super) body: &'a Body,
-    pub(super) pairs: Vec<Pair<'a>>,
+    pub(super) pairs: Vec<PenaltyPair<'a>>,
     parameters: &'a PenaltyParameters,
     cache: &'a PointCache,
     mine: Arc<SampleTree>,
-    groups: Vec<Group>,
-    near: Vec<Near>,
+    groups: Vec<PointGroup>,
+    near: Vec<NearPoint>,
 }
 
 impl<'a> Contacts<'a> {
     pub(super) fn new(
         scene: &'a Scene,
-        surroundings: &Surroundings,
+        surroundings: &StandingParts,
         part: usize,
         parameters: &'a PenaltyParameters,
         cache: &'a PointCache,
@@ -127,7 +127,7 @@ impl<'a> Contacts<'a> {
         let extent = |body: &Body| body.shape.bounds().extents().min();
         let pair = |&other: &usize| {
             let standing = &scene.bodies[other];
-            Pair {
+            PenaltyPair {
                 other,
                 standing,
                 scale: parameters.scale_for(extent(body).min(extent(standing))),
@@ -154,13 +154,13 @@ impl<'a> Contacts<'a> {
         let bounds = self.body.shape.bounds().transformed(pose).grown(reach);
         for (i, pair) in self.pairs.iter().enumerate().filter(|(_, p)| p.standing.bounds.meets(&bounds)) {
             let to_standing = pair.standing.planning_from_shape.inverse() * pose;
-            for side in [Side::Moving, Side::Standing] {
+            for side in [PointSide::Moving, PointSide::Standing] {
                 let start = near.len();
                 let (trees, measured, to_measured) = self.side(pair, side, &to_standing);
-                let found = |point| near.push(Near { point, before: 0.0 });
+                let found = |point| near.push(NearPoint { point, before: 0.0 });
                 points_near(&trees, &measured.field, &to_measured, reach, found);
                 if near.len() > start {
-                    groups.push(Group { pair: i, side, points: start..near.len() });
+                    groups.push(PointGroup { pair: i, side, points: start..near.len() });
                 }
             }
         }
@@ -170,20 +170,20 @@ impl<'a> Contacts<'a> {
     /// The points of one side of a pair, the body they are measured against, and the way there.
     fn side<'b>(
         &'b self,
-        pair: &'b Pair<'a>,
-        side: Side,
+        pair: &'b PenaltyPair<'a>,
+        side: PointSide,
         to_standing: &Pose,
     ) -> ([&'b SampleTree; 2], &'a Body, Pose) {
         match side {
-            Side::Moving => ([&self.mine, &self.body.extra_samples], pair.standing, *to_standing),
-            Side::Standing => {
+            PointSide::Moving => ([&self.mine, &self.body.extra_samples], pair.standing, *to_standing),
+            PointSide::Standing => {
                 let theirs: &SampleTree = &self.met(pair).points;
                 ([theirs, &pair.standing.extra_samples], self.body, to_standing.inverse())
             }
         }
     }
 
-    fn met<'b>(&self, pair: &'b Pair<'a>) -> &'b Met {
+    fn met<'b>(&self, pair: &'b PenaltyPair<'a>) -> &'b NearPair {
         if let Some(met) = pair.met.get() {
             return met;
         }
@@ -192,11 +192,11 @@ impl<'a> Contacts<'a> {
         // Deeper than its band the field shows no depth, and far inside no way out either.
         let granted = assembled.max(self.scene.allowances.of(self.part, pair.other));
         let threshold = granted + self.parameters.penetration_threshold * pair.scale;
-        pair.met.get_or_init(|| Met { points, threshold })
+        pair.met.get_or_init(|| NearPair { points, threshold })
     }
 
     /// The depth of a pair's contact points at the assembled pose, as the fields show it.
-    fn assembled_penetration(&self, pair: &Pair<'a>, theirs: &SampleTree) -> f64 {
+    fn assembled_penetration(&self, pair: &PenaltyPair<'a>, theirs: &SampleTree) -> f64 {
         if !self.body.bounds.meets(&pair.standing.bounds) {
             return 0.0;
         }
@@ -215,12 +215,12 @@ impl<'a> Contacts<'a> {
     }
 
     /// The depth, by the field, from which contact with a pair acts.
-    pub(super) fn threshold(&self, pair: &Pair<'a>) -> f64 {
+    pub(super) fn threshold(&self, pair: &PenaltyPair<'a>) -> f64 {
         self.met(pair).threshold
     }
 
     /// Notes how deep all near points are at the start of a step. Needed where there is damping.
-    pub(super) fn start_step(&mut self, at: &Placement) {
+    pub(super) fn start_step(&mut self, at: &BodyPlacement) {
         if self.parameters.damping == 0.0 {
             return;
         }
@@ -235,7 +235,7 @@ impl<'a> Contacts<'a> {
     }
 
     /// Energy and derivatives of all near points; those for turns only if the body `turns`.
-    pub(super) fn evaluate(&self, at: &Placement, turns: bool, out: &mut Evaluation) {
+    pub(super) fn evaluate(&self, at: &BodyPlacement, turns: bool, out: &mut ContactEnergy) {
         out.clear();
         for group in &self.groups {
             self.add_group(group, at, turns, out);
@@ -244,14 +244,14 @@ impl<'a> Contacts<'a> {
 
     /// The same for the points of one side alone.
     #[cfg(test)]
-    pub(super) fn evaluate_side(&self, at: &Placement, side: Side, out: &mut Evaluation) {
+    pub(super) fn evaluate_side(&self, at: &BodyPlacement, side: PointSide, out: &mut ContactEnergy) {
         out.clear();
         for group in self.groups.iter().filter(|g| g.side == side) {
             self.add_group(group, at, true, out);
         }
     }
 
-    fn add_group(&self, group: &Group, at: &Placement, turns: bool, out: &mut Evaluation) {
+    fn add_group(&self, group: &PointGroup, at: &BodyPlacement, turns: bool, out: &mut ContactEnergy) {
         let (view, threshold) = (self.view(group, at), self.threshold(&self.pairs[group.pair]));
         for near in &self.near[group.points.clone()] {
             let at = view.measured(&near.point);
@@ -267,55 +267,55 @@ impl<'a> Contacts<'a> {
 
     /// Energy, force and slope at a depth. Damping acts on the rate at which the depth grew over
     /// the step, and in proportion to the depth, so that no force jumps where contact begins.
-    fn law(&self, depth: f64, before: f64) -> Law {
+    fn law(&self, depth: f64, before: f64) -> ContactLaw {
         let (k, d) = (self.parameters.stiffness, self.parameters.damping / self.parameters.time_step);
-        Law {
+        ContactLaw {
             energy: depth * depth * (0.5 * k + d * (depth / 3.0 - before / 2.0)),
             force: depth * (k + d * (depth - before)),
             slope: k + d * (2.0 * depth - before),
         }
     }
 
-    fn view(&self, group: &Group, at: &Placement) -> View<'a> {
+    fn view(&self, group: &PointGroup, at: &BodyPlacement) -> PointView<'a> {
         let pair = &self.pairs[group.pair];
         let mass_centre = self.body.shape.mass.centre.coords;
         let origin = pair.standing.planning_from_shape.translation.vector;
         // From the centre of mass to the standing shape's origin.
         let offset = origin - at.centre.coords;
         match group.side {
-            Side::Moving => {
+            PointSide::Moving => {
                 let to_measured = pair.rotation.transpose() * at.rotation;
-                View {
+                PointView {
                     field: &pair.standing.field,
                     to_measured,
                     measured_offset: -pair.rotation.transpose() * offset - to_measured * mass_centre,
                     axes: pair.rotation,
                     to_arm: at.rotation,
                     arm_offset: -(at.rotation * mass_centre),
-                    side: Side::Moving,
+                    side: PointSide::Moving,
                 }
             }
-            Side::Standing => View {
+            PointSide::Standing => PointView {
                 field: &self.body.field,
                 to_measured: at.rotation.transpose() * pair.rotation,
                 measured_offset: at.rotation.transpose() * offset + mass_centre,
                 axes: at.rotation,
                 to_arm: pair.rotation,
                 arm_offset: offset,
-                side: Side::Standing,
+                side: PointSide::Standing,
             },
         }
     }
 }
 
-struct Law {
+struct ContactLaw {
     energy: f64,
     force: f64,
     slope: f64,
 }
 
 /// How the points of one side of a pair are seen at a placement.
-struct View<'a> {
+struct PointView<'a> {
     field: &'a Grid,
     /// From the frame of the points to that of the field.
     to_measured: Matrix3<f64>,
@@ -325,20 +325,27 @@ struct View<'a> {
     /// From the frame of the points to their arm: planning axes, from the centre of mass.
     to_arm: Matrix3<f64>,
     arm_offset: Vector3<f64>,
-    side: Side,
+    side: PointSide,
 }
 
-impl View<'_> {
+impl PointView<'_> {
     fn measured(&self, point: &Point3<f64>) -> Point3<f64> {
         Point3::from(self.to_measured * point.coords + self.measured_offset)
     }
 
-    fn add(&self, point: &Point3<f64>, sample: &FieldSample, law: &Law, turns: bool, out: &mut Evaluation) {
+    fn add(
+        &self,
+        point: &Point3<f64>,
+        sample: &FieldSample,
+        law: &ContactLaw,
+        turns: bool,
+        out: &mut ContactEnergy,
+    ) {
         let n = self.axes * sample.gradient;
         let arm = self.to_arm * point.coords + self.arm_offset;
         let moment = arm.cross(&n);
         // dφ: a point of the moving body goes with it, one that stands goes the other way against it.
-        let sense = if self.side == Side::Moving { 1.0 } else { -1.0 };
+        let sense = if self.side == PointSide::Moving { 1.0 } else { -1.0 };
         let mut a = Vector6::zeros();
         a.fixed_rows_mut::<3>(0).copy_from(&(n * sense));
         if turns {
@@ -372,7 +379,7 @@ impl View<'_> {
         // dx = δx − arm × δ.
         let lever = -arm.cross_matrix();
         let mut mixed = bend * lever;
-        if self.side == Side::Standing {
+        if self.side == PointSide::Standing {
             // exp(−δ)(r − δx) has the term δ × δx.
             mixed += n.cross_matrix();
         }

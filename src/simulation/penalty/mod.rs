@@ -27,14 +27,14 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::geometry::{Pose, SampleTree, Shape};
-use crate::scene::{Scene, Surroundings, exit_direction};
+use crate::scene::{Scene, StandingParts, exit_direction};
 use crate::termination::{Interrupt, Termination};
 
 use super::{Action, End, Motion, TransitionFunction};
 use contacts::Contacts;
 pub use parameters::PenaltyParameters;
 use points::PointCache;
-use step::{Drive, Rigid, State, Stepper};
+use step::{BodyState, PenaltyDrive, RigidBody, Stepper};
 
 /// The engine. It remembers the contact points of shapes that it met; clones share them.
 #[derive(Debug, Clone, Default)]
@@ -68,7 +68,7 @@ impl PenaltyEngine {
         self.cache.of(shape, self.parameters.longest_edge)
     }
 
-    fn drive(&self, shape: &Shape, action: Action) -> Drive {
+    fn drive(&self, shape: &Shape, action: Action) -> PenaltyDrive {
         let p = &self.parameters;
         let turning = p.force * p.torque_factor;
         let pulling = match action {
@@ -76,7 +76,11 @@ impl PenaltyEngine {
             // A force of half the torque over the part's radius: a/α = ρ²/(2r).
             Action::Screw(..) => turning * shape.mass.gyration_squared / (2.0 * shape.reach),
         };
-        Drive { linear: action.force() * pulling, angular: action.torque() * turning, turns: action.turns() }
+        PenaltyDrive {
+            linear: action.force() * pulling,
+            angular: action.torque() * turning,
+            turns: action.turns(),
+        }
     }
 }
 
@@ -92,7 +96,7 @@ impl TransitionFunction for PenaltyEngine {
     fn simulate(
         &self,
         scene: &Scene,
-        surroundings: &Surroundings,
+        surroundings: &StandingParts,
         part: usize,
         start: &Pose,
         action: Action,
@@ -103,10 +107,10 @@ impl TransitionFunction for PenaltyEngine {
         let contacts = Contacts::new(scene, surroundings, part, parameters, &self.cache);
         let drive = self.drive(shape, action);
         let pairs = contacts.pairs.len();
-        let run = Run {
+        let run = PenaltyRun {
             surroundings,
             parameters,
-            stepper: Stepper::new(Rigid::new(shape), drive, parameters, pairs),
+            stepper: Stepper::new(RigidBody::new(shape), drive, parameters, pairs),
             contacts,
             path: vec![*start],
             slack: f64::NEG_INFINITY,
@@ -118,18 +122,18 @@ impl TransitionFunction for PenaltyEngine {
 }
 
 /// How a block of steps ended.
-enum Block {
+enum BlockedPairs {
     /// The hulls are apart.
     Out(Vector3<f64>),
     /// All its time is over.
-    Over(State),
+    Over(BodyState),
     /// Going on would have been too deep; the state is that of the last waypoint.
-    Cut(State),
+    Cut(BodyState),
 }
 
 /// One motion.
-struct Run<'a> {
-    surroundings: &'a Surroundings,
+struct PenaltyRun<'a> {
+    surroundings: &'a StandingParts,
     parameters: &'a PenaltyParameters,
     stepper: Stepper<'a>,
     contacts: Contacts<'a>,
@@ -141,7 +145,7 @@ struct Run<'a> {
     hint: Option<Vector3<f64>>,
 }
 
-impl Run<'_> {
+impl PenaltyRun<'_> {
     fn simulate(mut self, termination: &Termination) -> Result<Motion, Interrupt> {
         let mut state = self.stepper.rigid.at_rest(&self.path[0]);
         let mut earlier = vec![state];
@@ -151,9 +155,9 @@ impl Run<'_> {
             let block = self.block(state, termination)?;
             ever_touched.iter_mut().zip(&self.touched).for_each(|(ever, now)| *ever |= now);
             let (after, is_cut) = match block {
-                Block::Out(direction) => return Ok(self.ended(End::Disassembled(direction))),
-                Block::Over(after) => (after, false),
-                Block::Cut(after) => (after, true),
+                BlockedPairs::Out(direction) => return Ok(self.ended(End::Disassembled(direction))),
+                BlockedPairs::Over(after) => (after, false),
+                BlockedPairs::Cut(after) => (after, true),
             };
             state = after;
             // What came in too fast is tried once more from rest before it counts as stuck.
@@ -205,13 +209,13 @@ impl Run<'_> {
         out
     }
 
-    fn are_similar(&self, a: &State, b: &State) -> bool {
+    fn are_similar(&self, a: &BodyState, b: &BodyState) -> bool {
         (a.centre - b.centre).norm() < self.parameters.similar_translation
             && a.rotation.angle_to(&b.rotation) < self.parameters.similar_rotation
     }
 
     /// Steps from rest until the velocity is zeroed again.
-    fn block(&mut self, from: State, termination: &Termination) -> Result<Block, Interrupt> {
+    fn block(&mut self, from: BodyState, termination: &Termination) -> Result<BlockedPairs, Interrupt> {
         self.touched.fill(false);
         let steps = self.parameters.block_steps();
         let (mut state, mut held) = (from.at_rest(), from.at_rest());
@@ -228,19 +232,19 @@ impl Run<'_> {
             // The path ends where the part does.
             let least = if step < steps { TOUCHED } else { f64::MIN_POSITIVE };
             match self.waypoint(&state, travelled, least) {
-                Waypoint::Deep => return Ok(Block::Cut(held)),
-                Waypoint::Out(direction) => return Ok(Block::Out(direction)),
-                Waypoint::Held => travelled = 0.0,
-                Waypoint::Same => {}
+                PenaltyWaypoint::Deep => return Ok(BlockedPairs::Cut(held)),
+                PenaltyWaypoint::Out(direction) => return Ok(BlockedPairs::Out(direction)),
+                PenaltyWaypoint::Held => travelled = 0.0,
+                PenaltyWaypoint::Same => {}
             }
             held = state.at_rest();
             since = 0;
         }
-        Ok(Block::Over(held))
+        Ok(BlockedPairs::Over(held))
     }
 
     /// The state after one time step, and how far a point travelled at most.
-    fn step(&mut self, state: &State) -> (State, f64) {
+    fn step(&mut self, state: &BodyState) -> (BodyState, f64) {
         let mut reach = 2.0 * self.stepper.expected_travel(state);
         if self.slack < reach {
             self.gather(state, reach);
@@ -261,34 +265,34 @@ impl Run<'_> {
         (step.state, step.travel)
     }
 
-    fn gather(&mut self, state: &State, reach: f64) {
+    fn gather(&mut self, state: &BodyState, reach: f64) {
         self.slack = reach.max(PENALTY_REACH);
         self.contacts.gather(&self.stepper.rigid.pose(state), self.slack);
     }
 
     /// Checks the pose of a state and adds it to the path, if it is `least` from the last one.
-    fn waypoint(&mut self, state: &State, travelled: f64, least: f64) -> Waypoint {
+    fn waypoint(&mut self, state: &BodyState, travelled: f64, least: f64) -> PenaltyWaypoint {
         let pose = self.stepper.rigid.pose(state);
         let last = self.path[self.path.len() - 1];
         if travelled < least {
-            return Waypoint::Same;
+            return PenaltyWaypoint::Same;
         }
         let mut deep = Vec::new();
         if !depth::holds_between(&self.contacts, self.parameters, &last, &pose, &mut deep) {
             deep.into_iter().for_each(|i| self.touched[i] = true);
-            return Waypoint::Deep;
+            return PenaltyWaypoint::Deep;
         }
         self.path.push(pose);
         let part = self.contacts.part;
         match exit_direction(self.contacts.scene, self.surroundings, part, &pose, self.hint) {
-            Some(direction) => Waypoint::Out(direction),
-            None => Waypoint::Held,
+            Some(direction) => PenaltyWaypoint::Out(direction),
+            None => PenaltyWaypoint::Held,
         }
     }
 }
 
 /// What became of a pose.
-enum Waypoint {
+enum PenaltyWaypoint {
     /// It is the last one of the path.
     Held,
     /// It is too close to the last one to be another.

@@ -16,7 +16,7 @@ use crate::tolerances::SHORTEST_CONTACT_EDGE;
 /// than `longest`. Each point once.
 pub(super) fn contact_points(surface: &Surface, longest: f64) -> Vec<Point3<f64>> {
     let longest = longest.max(SHORTEST_CONTACT_EDGE);
-    let mut points = Points::default();
+    let mut points = ContactPoints::default();
     for v in surface.vertices() {
         points.add(*v);
     }
@@ -40,12 +40,12 @@ pub(super) fn contact_points(surface: &Surface, longest: f64) -> Vec<Point3<f64>
 }
 
 #[derive(Default)]
-struct Points {
+struct ContactPoints {
     list: Vec<Point3<f64>>,
     known: HashSet<[u64; 3]>,
 }
 
-impl Points {
+impl ContactPoints {
     fn add(&mut self, p: Point3<f64>) {
         // Adding zero makes one of the two zeros.
         if self.known.insert([p.x, p.y, p.z].map(|x| (x + 0.0).to_bits())) {
@@ -57,11 +57,11 @@ impl Points {
 /// The contact points of shapes met before, for as long as these live.
 #[derive(Debug, Default)]
 pub(super) struct PointCache {
-    known: Mutex<Vec<Known>>,
+    known: Mutex<Vec<KnownPoints>>,
 }
 
 #[derive(Debug)]
-struct Known {
+struct KnownPoints {
     /// Keeps the address from being given to another shape.
     shape: Weak<Shape>,
     longest: f64,
@@ -78,13 +78,14 @@ impl PointCache {
         let points = Arc::new(SampleTree::over(contact_points(&shape.surface, longest)));
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         known.retain(|k| k.shape.strong_count() > 0);
-        known.push(Known { shape: Arc::downgrade(shape), longest, points: Arc::clone(&points) });
+        known.push(KnownPoints { shape: Arc::downgrade(shape), longest, points: Arc::clone(&points) });
         points
     }
 
     fn find(&self, shape: &Arc<Shape>, longest: f64) -> Option<Arc<SampleTree>> {
         let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = |k: &&Known| std::ptr::eq(k.shape.as_ptr(), Arc::as_ptr(shape)) && k.longest == longest;
+        let same =
+            |k: &&KnownPoints| std::ptr::eq(k.shape.as_ptr(), Arc::as_ptr(shape)) && k.longest == longest;
         known.iter().find(same).map(|k| Arc::clone(&k.points))
     }
 }

@@ -14,7 +14,7 @@ use crate::budgets::{BACKTRACKS, EVALUATIONS_PER_ITERATION};
 use crate::geometry::{Pose, Shape};
 use crate::tolerances::{ARMIJO, BACKTRACK_SHARE, BARRED_SHARE};
 
-use super::contacts::{Contacts, Evaluation, Placement};
+use super::contacts::{BodyPlacement, ContactEnergy, Contacts};
 use super::parameters::PenaltyParameters;
 use super::slopes::{Metric, Slopes};
 
@@ -24,7 +24,7 @@ const LEAST_MASS: f64 = 1e-9;
 
 /// A body at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct State {
+pub(super) struct BodyState {
     /// Centre of mass in the planning frame.
     pub(super) centre: Point3<f64>,
     /// planning_from_shape.
@@ -35,7 +35,7 @@ pub(super) struct State {
     pub(super) spin: Vector3<f64>,
 }
 
-impl State {
+impl BodyState {
     /// The same without velocity.
     pub(super) fn at_rest(self) -> Self {
         Self { velocity: Vector3::zeros(), spin: Vector3::zeros(), ..self }
@@ -44,7 +44,7 @@ impl State {
 
 /// What an action does to a body, as accelerations.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Drive {
+pub(super) struct PenaltyDrive {
     pub(super) linear: Vector3<f64>,
     pub(super) angular: Vector3<f64>,
     /// Whether the body may turn: 6 unknowns instead of 3 (the other 3 are uncoupled then, and 0).
@@ -53,7 +53,7 @@ pub(super) struct Drive {
 
 /// A rigid body of density 1.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rigid {
+pub(super) struct RigidBody {
     pub(super) mass: f64,
     /// About the centre of mass, in the shape's axes.
     inertia: Matrix3<f64>,
@@ -63,7 +63,7 @@ pub(super) struct Rigid {
     pub(super) reach: f64,
 }
 
-impl Rigid {
+impl RigidBody {
     pub(super) fn new(shape: &Shape) -> Self {
         let mass = shape.mass.volume.max(LEAST_MASS);
         let unit = shape.mass.unit_inertia() + Matrix3::from_diagonal_element(LEAST_INERTIA);
@@ -71,12 +71,12 @@ impl Rigid {
     }
 
     /// At rest at a pose.
-    pub(super) fn at_rest(&self, pose: &Pose) -> State {
+    pub(super) fn at_rest(&self, pose: &Pose) -> BodyState {
         let (velocity, spin) = (Vector3::zeros(), Vector3::zeros());
-        State { centre: pose * self.mass_centre, rotation: pose.rotation, velocity, spin }
+        BodyState { centre: pose * self.mass_centre, rotation: pose.rotation, velocity, spin }
     }
 
-    pub(super) fn pose(&self, state: &State) -> Pose {
+    pub(super) fn pose(&self, state: &BodyState) -> Pose {
         let origin = state.centre.coords - state.rotation * self.mass_centre.coords;
         Pose::from_parts(Translation3::from(origin), state.rotation)
     }
@@ -89,16 +89,16 @@ impl Rigid {
 
 /// How a step went.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Step {
+pub(super) struct PenaltyStep {
     /// The body after it.
-    pub(super) state: State,
+    pub(super) state: BodyState,
     /// How far a point of the body can have been displaced.
     pub(super) travel: f64,
 }
 
 /// What steps have cost.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Tally {
+pub(super) struct StepTally {
     pub(super) steps: u64,
     /// Newton iterations; a step with nothing near takes none.
     pub(super) iterations: u64,
@@ -111,18 +111,23 @@ pub(super) struct Tally {
 
 /// Makes steps; holds what they need, so that none is allocated for.
 pub(super) struct Stepper<'a> {
-    pub(super) rigid: Rigid,
-    drive: Drive,
+    pub(super) rigid: RigidBody,
+    drive: PenaltyDrive,
     parameters: &'a PenaltyParameters,
-    current: Evaluation,
-    trial: Evaluation,
-    pub(super) tally: Tally,
+    current: ContactEnergy,
+    trial: ContactEnergy,
+    pub(super) tally: StepTally,
 }
 
 impl<'a> Stepper<'a> {
-    pub(super) fn new(rigid: Rigid, drive: Drive, parameters: &'a PenaltyParameters, pairs: usize) -> Self {
-        let (current, trial) = (Evaluation::new(pairs), Evaluation::new(pairs));
-        Self { rigid, drive, parameters, current, trial, tally: Tally::default() }
+    pub(super) fn new(
+        rigid: RigidBody,
+        drive: PenaltyDrive,
+        parameters: &'a PenaltyParameters,
+        pairs: usize,
+    ) -> Self {
+        let (current, trial) = (ContactEnergy::new(pairs), ContactEnergy::new(pairs));
+        Self { rigid, drive, parameters, current, trial, tally: StepTally::default() }
     }
 
     /// Per pair, whether it was in contact at the end of the last step.
@@ -131,12 +136,12 @@ impl<'a> Stepper<'a> {
     }
 
     /// How far velocity and action alone would move a point of the body, at most.
-    pub(super) fn expected_travel(&self, state: &State) -> f64 {
+    pub(super) fn expected_travel(&self, state: &BodyState) -> f64 {
         self.rigid.travel(&self.goal(state).free)
     }
 
     /// The body after one time step. `contacts` must hold what comes near on the way.
-    pub(super) fn step(&mut self, state: &State, contacts: &Contacts<'_>) -> Step {
+    pub(super) fn step(&mut self, state: &BodyState, contacts: &Contacts<'_>) -> PenaltyStep {
         let goal = self.goal(state);
         let mut z = goal.free;
         self.tally.steps += 1;
@@ -147,16 +152,20 @@ impl<'a> Stepper<'a> {
         }
         let h = self.parameters.time_step;
         let (dx, turn) = (linear(&z), angular(&z));
-        let mut after =
-            State { centre: state.centre + dx, rotation: state.rotation, velocity: dx / h, spin: turn / h };
+        let mut after = BodyState {
+            centre: state.centre + dx,
+            rotation: state.rotation,
+            velocity: dx / h,
+            spin: turn / h,
+        };
         if self.drive.turns {
             after.rotation = UnitQuaternion::from_scaled_axis(turn) * state.rotation;
             after.rotation.renormalize();
         }
-        Step { state: after, travel: self.rigid.travel(&z) }
+        PenaltyStep { state: after, travel: self.rigid.travel(&z) }
     }
 
-    fn goal(&self, state: &State) -> Goal {
+    fn goal(&self, state: &BodyState) -> StepGoal {
         let h = self.parameters.time_step;
         let axes = state.rotation.to_rotation_matrix().into_inner();
         let inertia = axes * self.rigid.inertia * axes.transpose();
@@ -172,18 +181,18 @@ impl<'a> Stepper<'a> {
         let diagonal = Matrix3::from_diagonal_element(self.rigid.mass);
         weight.fixed_view_mut::<3, 3>(0, 0).copy_from(&(diagonal / (h * h)));
         weight.fixed_view_mut::<3, 3>(3, 3).copy_from(&(inertia / (h * h)));
-        Goal { free, weight }
+        StepGoal { free, weight }
     }
 
     /// Newton's method from `z`; returns whether it converged.
     fn minimise(
         &mut self,
-        state: &State,
-        goal: &Goal,
+        state: &BodyState,
+        goal: &StepGoal,
         contacts: &Contacts<'_>,
         z: &mut Vector6<f64>,
     ) -> bool {
-        let at = Problem { state, goal, contacts };
+        let at = StepProblem { state, goal, contacts };
         self.tally.evaluations += 1;
         contacts.evaluate(&placement(state, z), self.drive.turns, &mut self.current);
         let most =
@@ -208,7 +217,7 @@ impl<'a> Stepper<'a> {
 
     /// One Newton step. Where a face of cells bars the way, the slope behind it is kept too, and the
     /// next direction leads down both: along the face, or nowhere if the lowest point is on it.
-    fn descend(&mut self, at: &Problem<'_>, z: &Vector6<f64>) -> Descent {
+    fn descend(&mut self, at: &StepProblem<'_>, z: &Vector6<f64>) -> Descent {
         let local = at.goal.local(z, &self.current);
         let Some(metric) = Metric::new(local.hessian).or_else(|| Metric::new(local.gauss)) else {
             return Descent::Nowhere;
@@ -241,7 +250,7 @@ impl<'a> Stepper<'a> {
     }
 
     /// A step that was found lower before others were tried.
-    fn taken(&mut self, at: &Problem<'_>, next: Vector6<f64>) -> Descent {
+    fn taken(&mut self, at: &StepProblem<'_>, next: Vector6<f64>) -> Descent {
         self.evaluate(at, &next);
         Descent::Lower(next)
     }
@@ -249,13 +258,13 @@ impl<'a> Stepper<'a> {
     /// Backtracks down from `energy` until it is low enough; `trial` belongs to the last try.
     fn search(
         &mut self,
-        at: &Problem<'_>,
+        at: &StepProblem<'_>,
         z: &Vector6<f64>,
         energy: f64,
         slope: f64,
         up: &Vector6<f64>,
-    ) -> Found {
-        let mut found = Found { share: 0.0, barred: Vector6::zeros() };
+    ) -> LineSearch {
+        let mut found = LineSearch { share: 0.0, barred: Vector6::zeros() };
         let mut share = 1.0;
         for _ in 0..=BACKTRACKS {
             let next = z - up * share;
@@ -270,14 +279,14 @@ impl<'a> Stepper<'a> {
         found
     }
 
-    fn evaluate(&mut self, at: &Problem<'_>, z: &Vector6<f64>) {
+    fn evaluate(&mut self, at: &StepProblem<'_>, z: &Vector6<f64>) {
         self.tally.evaluations += 1;
         at.contacts.evaluate(&placement(at.state, z), self.drive.turns, &mut self.trial);
     }
 }
 
 /// What a line search found.
-struct Found {
+struct LineSearch {
     /// The share of the step that leads low enough; 0 if none does.
     share: f64,
     /// The slope at the shortest try that did not.
@@ -285,9 +294,9 @@ struct Found {
 }
 
 /// What a step is to minimise.
-struct Problem<'a> {
-    state: &'a State,
-    goal: &'a Goal,
+struct StepProblem<'a> {
+    state: &'a BodyState,
+    goal: &'a StepGoal,
     contacts: &'a Contacts<'a>,
 }
 
@@ -302,34 +311,34 @@ enum Descent {
 }
 
 /// Where the body would be without contact, and what it costs to be elsewhere.
-struct Goal {
+struct StepGoal {
     free: Vector6<f64>,
     weight: Matrix6<f64>,
 }
 
 /// The energy of a step at some z with its derivatives.
-struct Local {
+struct LocalEnergy {
     energy: f64,
     gradient: Vector6<f64>,
     hessian: Matrix6<f64>,
     gauss: Matrix6<f64>,
 }
 
-impl Goal {
-    fn energy(&self, z: &Vector6<f64>, contact: &Evaluation) -> f64 {
+impl StepGoal {
+    fn energy(&self, z: &Vector6<f64>, contact: &ContactEnergy) -> f64 {
         let off = z - self.free;
         0.5 * off.dot(&(self.weight * off)) + contact.energy
     }
 
-    fn gradient(&self, z: &Vector6<f64>, contact: &Evaluation) -> Vector6<f64> {
+    fn gradient(&self, z: &Vector6<f64>, contact: &ContactEnergy) -> Vector6<f64> {
         self.weight * (z - self.free) + chain(z).transpose() * contact.gradient
     }
 
-    fn local(&self, z: &Vector6<f64>, contact: &Evaluation) -> Local {
+    fn local(&self, z: &Vector6<f64>, contact: &ContactEnergy) -> LocalEnergy {
         let chain = chain(z);
         let back = chain.transpose();
         let gauss = self.weight + back * contact.gauss * chain;
-        Local {
+        LocalEnergy {
             energy: self.energy(z, contact),
             gradient: self.gradient(z, contact),
             hessian: gauss + back * contact.curvature * chain,
@@ -360,9 +369,9 @@ fn turn_jacobian(turn: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// Where a displacement takes a body.
-pub(super) fn placement(state: &State, z: &Vector6<f64>) -> Placement {
+pub(super) fn placement(state: &BodyState, z: &Vector6<f64>) -> BodyPlacement {
     let rotation = UnitQuaternion::from_scaled_axis(angular(z)) * state.rotation;
-    Placement { centre: state.centre + linear(z), rotation: rotation.to_rotation_matrix().into_inner() }
+    BodyPlacement { centre: state.centre + linear(z), rotation: rotation.to_rotation_matrix().into_inner() }
 }
 
 fn linear(z: &Vector6<f64>) -> Vector3<f64> {

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix6, UnitQuaternion, Vector3, Vector6};
 
-use super::contacts::{Contacts, Evaluation, Placement, Side, matrix};
+use super::contacts::{BodyPlacement, ContactEnergy, Contacts, PointSide, matrix};
 use super::points::PointCache;
-use super::step::{Drive, Rigid, Stepper, Tally, placement};
+use super::step::{PenaltyDrive, RigidBody, StepTally, Stepper, placement};
 use super::{PenaltyEngine, PenaltyParameters};
 use crate::fixtures::{ball, block_on_plate, cells, cuboid, moved, peg_in_hole, rod, scene, tube};
 use crate::geometry::{Pose, SourceMesh};
-use crate::scene::{Scene, Surroundings};
+use crate::scene::{Scene, StandingParts};
 use crate::simulation::{Action, Axis, End, Motion, TransitionFunction};
 use crate::termination::Termination;
 
@@ -34,16 +34,16 @@ impl Setup {
     }
 
     fn contacts(&self) -> Contacts<'_> {
-        let around = Surroundings::new(&self.scene, vec![0]);
+        let around = StandingParts::new(&self.scene, vec![0]);
         let mut contacts = Contacts::new(&self.scene, &around, 1, &self.parameters, &self.cache);
         contacts.gather(&self.pose, 0.1);
         contacts
     }
 
     /// Where the body is after a displacement of its centre of mass and a turn about it.
-    fn placement(&self, displacement: &Vector6<f64>) -> Placement {
+    fn placement(&self, displacement: &Vector6<f64>) -> BodyPlacement {
         let turn: Vector3<f64> = displacement.fixed_rows::<3>(3).into();
-        Placement {
+        BodyPlacement {
             centre: self.pose * self.scene.bodies[1].shape.mass.centre + displacement.fixed_rows::<3>(0),
             rotation: UnitQuaternion::from_scaled_axis(turn).to_rotation_matrix().into_inner()
                 * matrix(&self.pose),
@@ -69,10 +69,10 @@ fn setups() -> Vec<Setup> {
 }
 
 /// First differences and second differences of the energy of one side.
-fn differences(setup: &Setup, contacts: &Contacts<'_>, side: Side) -> (Vector6<f64>, Matrix6<f64>) {
+fn differences(setup: &Setup, contacts: &Contacts<'_>, side: PointSide) -> (Vector6<f64>, Matrix6<f64>) {
     const STEP: f64 = 1e-6;
     let energy = |displacement: &Vector6<f64>| {
-        let mut out = Evaluation::new(1);
+        let mut out = ContactEnergy::new(1);
         contacts.evaluate_side(&setup.placement(displacement), side, &mut out);
         out.energy
     };
@@ -87,8 +87,8 @@ fn differences(setup: &Setup, contacts: &Contacts<'_>, side: Side) -> (Vector6<f
 }
 
 #[track_caller]
-fn assert_derivatives(setup: &Setup, contacts: &Contacts<'_>, side: Side) -> Evaluation {
-    let mut out = Evaluation::new(1);
+fn assert_derivatives(setup: &Setup, contacts: &Contacts<'_>, side: PointSide) -> ContactEnergy {
+    let mut out = ContactEnergy::new(1);
     contacts.evaluate_side(&setup.placement(&Vector6::zeros()), side, &mut out);
     assert!(out.energy > 1e-3 && out.touched[0], "{}: no contact on side {side:?}", setup.name);
     let (first, second) = differences(setup, contacts, side);
@@ -104,11 +104,11 @@ fn assert_derivatives(setup: &Setup, contacts: &Contacts<'_>, side: Side) -> Eva
 fn contact_derivatives_are_those_of_finite_differences_on_both_sides() {
     for setup in setups() {
         let contacts = setup.contacts();
-        for side in [Side::Moving, Side::Standing] {
+        for side in [PointSide::Moving, PointSide::Standing] {
             // The plate's own points are 0.5 apart: none is under a small ball, nor at its edge's end.
-            let mut out = Evaluation::new(1);
+            let mut out = ContactEnergy::new(1);
             contacts.evaluate_side(&setup.placement(&Vector6::zeros()), side, &mut out);
-            if out.energy == 0.0 && side == Side::Standing && setup.name == "ball" {
+            if out.energy == 0.0 && side == PointSide::Standing && setup.name == "ball" {
                 continue;
             }
             assert_derivatives(&setup, &contacts, side);
@@ -119,7 +119,9 @@ fn contact_derivatives_are_those_of_finite_differences_on_both_sides() {
 /// Without the terms of curvature the second derivative is a different one: the test above sees them.
 #[test]
 fn curvature_is_a_part_of_the_derivative_that_counts() {
-    for (name, side) in [("edge", Side::Moving), ("edge", Side::Standing), ("bore", Side::Moving)] {
+    for (name, side) in
+        [("edge", PointSide::Moving), ("edge", PointSide::Standing), ("bore", PointSide::Moving)]
+    {
         let setup = setups().into_iter().find(|s| s.name == name).unwrap();
         let out = assert_derivatives(&setup, &setup.contacts(), side);
         let share = out.curvature.norm() / out.gauss.norm();
@@ -134,7 +136,7 @@ fn damping_has_the_derivatives_of_its_energy() {
         let mut contacts = setup.contacts();
         let before = Vector6::new(0.002, 0.001, 0.004, 1e-3, -2e-3, 1e-3);
         contacts.start_step(&setup.placement(&before));
-        assert_derivatives(&setup, &contacts, Side::Moving);
+        assert_derivatives(&setup, &contacts, PointSide::Moving);
     }
 }
 
@@ -144,10 +146,10 @@ fn damping_takes_speed_out_of_an_impact() {
     // Slow steps hide it: they damp by themselves.
     let speed = |damping: f64| {
         let parameters = PenaltyParameters { damping, time_step: 1e-5, ..PenaltyParameters::default() };
-        let (cache, around) = (PointCache::default(), Surroundings::new(&scene, vec![0]));
+        let (cache, around) = (PointCache::default(), StandingParts::new(&scene, vec![0]));
         let mut contacts = Contacts::new(&scene, &around, 1, &parameters, &cache);
-        let drive = Drive { linear: Vector3::zeros(), angular: Vector3::zeros(), turns: false };
-        let mut stepper = Stepper::new(Rigid::new(&scene.bodies[1].shape), drive, &parameters, 1);
+        let drive = PenaltyDrive { linear: Vector3::zeros(), angular: Vector3::zeros(), turns: false };
+        let mut stepper = Stepper::new(RigidBody::new(&scene.bodies[1].shape), drive, &parameters, 1);
         let mut state = stepper.rigid.at_rest(&scene.bodies[1].planning_from_shape);
         state.velocity.z = -1.0;
         contacts.gather(&stepper.rigid.pose(&state), 0.2);
@@ -177,7 +179,7 @@ fn defaults_are_those_of_the_paper() {
 }
 
 fn motion(parameters: PenaltyParameters, scene: &Scene, action: Action) -> Motion {
-    let (engine, around) = (PenaltyEngine::new(parameters), Surroundings::new(scene, vec![0]));
+    let (engine, around) = (PenaltyEngine::new(parameters), StandingParts::new(scene, vec![0]));
     let start = scene.bodies[1].planning_from_shape;
     engine.simulate(scene, &around, 1, &start, action, &Termination::default()).unwrap()
 }
@@ -229,11 +231,11 @@ fn a_body_that_spins_freely_keeps_its_angular_momentum() {
     let drift = |time_step: f64| {
         let parameters = PenaltyParameters { time_step, ..PenaltyParameters::default() };
         let cache = PointCache::default();
-        let around = Surroundings::new(&scene, Vec::new());
+        let around = StandingParts::new(&scene, Vec::new());
         let contacts = Contacts::new(&scene, &around, 1, &parameters, &cache);
-        let drive = Drive { linear: Vector3::zeros(), angular: Vector3::zeros(), turns: true };
-        let mut stepper = Stepper::new(Rigid::new(shape), drive, &parameters, 0);
-        let mut state = Rigid::new(shape).at_rest(&scene.bodies[1].planning_from_shape);
+        let drive = PenaltyDrive { linear: Vector3::zeros(), angular: Vector3::zeros(), turns: true };
+        let mut stepper = Stepper::new(RigidBody::new(shape), drive, &parameters, 0);
+        let mut state = RigidBody::new(shape).at_rest(&scene.bodies[1].planning_from_shape);
         state.spin = Vector3::new(8.0, 6.0, 3.0);
         let momentum = |rotation: &UnitQuaternion<f64>, spin: &Vector3<f64>| {
             rotation * (shape.mass.unit_inertia() * (rotation.inverse() * spin))
@@ -280,17 +282,18 @@ fn a_block_pushed_into_its_plate_sinks_as_the_stiffness_predicts() {
 }
 
 /// What the steps in contact cost of a part that starts at rest, and the most that one took.
-fn tally(scene: &Scene, action: Action) -> (Tally, u64) {
+fn tally(scene: &Scene, action: Action) -> (StepTally, u64) {
     let engine = PenaltyEngine::default();
-    let around = Surroundings::new(scene, vec![0]);
+    let around = StandingParts::new(scene, vec![0]);
     let mut contacts = Contacts::new(scene, &around, 1, engine.parameters(), &engine.cache);
     let shape = &scene.bodies[1].shape;
-    let mut stepper = Stepper::new(Rigid::new(shape), engine.drive(shape, action), engine.parameters(), 1);
+    let mut stepper =
+        Stepper::new(RigidBody::new(shape), engine.drive(shape, action), engine.parameters(), 1);
     let mut state = stepper.rigid.at_rest(&scene.bodies[1].planning_from_shape);
-    let (mut all, mut most) = (Tally::default(), 0);
+    let (mut all, mut most) = (StepTally::default(), 0);
     for _ in 0..100 {
         contacts.gather(&stepper.rigid.pose(&state), 0.3);
-        stepper.tally = Tally::default();
+        stepper.tally = StepTally::default();
         state = stepper.step(&state, &contacts).state;
         if stepper.touched()[0] {
             all.steps += 1;
@@ -369,7 +372,7 @@ fn an_overlap_at_the_assembled_pose_is_granted_to_contact() {
     let contacts = setup.contacts();
     let threshold = contacts.threshold(&contacts.pairs[0]);
     assert!((threshold - 0.03).abs() < 1e-3, "{threshold}");
-    let mut out = Evaluation::new(1);
+    let mut out = ContactEnergy::new(1);
     contacts.evaluate(&setup.placement(&Vector6::zeros()), true, &mut out);
     assert_eq!((out.energy, out.touched[0]), (0.0, false));
 }

@@ -18,7 +18,7 @@ use super::{SOURCES, add_action};
 use crate::budgets::MOTION_VARIANTS;
 use crate::cache::{Digest, RecordKey, RecordKind, RequestCache, Storage};
 use crate::geometry::{Bounds, Pose, add_bounds, add_pose};
-use crate::scene::{Scene, Surroundings, add_samples, add_standing, exit_direction};
+use crate::scene::{Scene, StandingParts, add_samples, add_standing, exit_direction};
 use crate::simulation::{Action, End, Motion, TransitionFunction, asked_again};
 use crate::termination::{Interrupt, Termination};
 
@@ -69,7 +69,7 @@ pub struct MotionQuestion<'a> {
     /// The bodies.
     pub scene: &'a Scene,
     /// What stands.
-    pub surroundings: &'a Surroundings,
+    pub surroundings: &'a StandingParts,
     /// What moves.
     pub part: usize,
     /// From where.

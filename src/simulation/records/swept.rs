@@ -115,7 +115,7 @@ mod tests {
     use crate::cache::Cache;
     use crate::fixtures::{cuboid, moved, peg_in_hole, scene};
     use crate::geometry::{Pose, SourceMesh};
-    use crate::scene::Surroundings;
+    use crate::scene::StandingParts;
     use crate::simulation::straight_sweep;
 
     /// A peg in a blind hole, a post that makes its way out longer than the hole is deep, and a lid over it at
@@ -134,7 +134,7 @@ mod tests {
     /// What a sweep of the peg upwards tells, and how many pairs were cast for it.
     fn swept(cache: &RequestCache, meshes: Vec<SourceMesh>) -> (Option<Sweep>, usize) {
         let (scene, _) = scene(meshes);
-        let around = Surroundings::new(&scene, vec![0, 2, 3]);
+        let around = StandingParts::new(&scene, vec![0, 2, 3]);
         let (start, direction) = (&scene.bodies[1].planning_from_shape, &Vector3::z());
         let question = SweepQuestion { scene: &scene, surroundings: &around, part: 1, start, direction };
         let never = Termination::default();

@@ -14,8 +14,8 @@ mod tests;
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 
-use crate::contact::constraint::Row;
-use crate::contact::sampled::{Around, Contact, Mover, Near};
+use crate::contact::constraint::VelocityConstraint;
+use crate::contact::sampled::{Contact, ContactSet, ContactSource, MovingBody};
 use crate::geometry::{Pose, Shape, interpolate};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll, try_all};
@@ -27,7 +27,7 @@ use crate::tolerances::{
 use super::super::Action;
 use super::super::projection::{Projected, project};
 use super::super::reduction::reduced;
-use release::Taken;
+use release::FreeStep;
 
 /// What a step came to.
 pub(super) enum Step {
@@ -42,7 +42,7 @@ pub(super) struct Moved {
     pub(super) turned: f64,
     pub(super) touching: Vec<usize>,
     /// What is near the new pose comes along: it was gathered to check that pose.
-    pub(super) near: Near,
+    pub(super) near: ContactSet,
     /// Twists against what holds the part back, of any length.
     pub(super) pressing: Vec<Vector6<f64>>,
     /// Where it passed, if it did not go straight there.
@@ -104,38 +104,44 @@ impl Drive {
     }
 
     /// What a step begins with, as [`Self::advance`] does.
-    pub(super) fn constraints(&self, mover: &Mover<'_>, near: &Near) -> Result<Known, Interrupt> {
+    pub(super) fn constraints(
+        &self,
+        mover: &MovingBody<'_>,
+        near: &ContactSet,
+    ) -> Result<KnownConstraints, Interrupt> {
         self.chosen(mover, near, &self.wanted)
     }
 
     /// The first projection of a step.
-    pub(super) fn solved(&self, known: &Known) -> Option<Projected> {
+    pub(super) fn solved(&self, known: &KnownConstraints) -> Option<Projected> {
         self.projected(&self.wanted.component_mul(&self.metric), &known.rows, true)
     }
 
     /// One step from the mover's pose.
     pub(super) fn advance(
         &self,
-        mover: &Mover<'_>,
-        near: &mut Near,
-        around: &mut dyn Around,
+        mover: &MovingBody<'_>,
+        near: &mut ContactSet,
+        around: &mut dyn ContactSource,
     ) -> Result<Step, Interrupt> {
         if near.contacts.is_empty() && near.clearance >= self.step {
             let factor = (near.clearance.min(FREE_STEP) / self.step).max(1.0);
             let twist = self.wanted * if self.turns { factor.min(FREE_TURN_STEPS) } else { factor };
-            let there = Mover { pose: self.displaced(mover, &twist), ..*mover };
+            let there = MovingBody { pose: self.displaced(mover, &twist), ..*mover };
             let near = around.near(&there)?;
             return Ok(Step::Moved(Self::moved(&there, near, &twist, Vec::new(), Vec::new())));
         }
         let mut with = Vec::new();
-        for start in [Start::Certain, Start::Lazy] {
+        for start in [FirstGuess::Certain, FirstGuess::Lazy] {
             for halving in 0..=STEP_HALVINGS {
                 let wanted = self.wanted / f64::from(1u32 << halving);
                 let known = match start {
-                    Start::Certain => self.chosen(mover, near, &wanted)?,
-                    Start::Lazy => Known { rows: Vec::new(), working: Vec::new(), rounds: LAZY_ROUNDS },
+                    FirstGuess::Certain => self.chosen(mover, near, &wanted)?,
+                    FirstGuess::Lazy => {
+                        KnownConstraints { rows: Vec::new(), working: Vec::new(), rounds: LAZY_ROUNDS }
+                    }
                 };
-                let is_first = start == Start::Certain && halving == 0;
+                let is_first = start == FirstGuess::Certain && halving == 0;
                 if let Some(longer) = is_first.then(|| self.stretched(mover, &known)).flatten() {
                     let attempt = self.attempt(mover, near, (&longer, true), known.clone(), around)?;
                     if let Attempt::Moved(step) = attempt {
@@ -160,7 +166,7 @@ impl Drive {
 
     /// So much more of what is wanted that the motion, as contacts let it, is as long as a step in contact may be;
     /// none if it nearly is already. Without inertia the same way is gone, in fewer steps.
-    fn stretched(&self, mover: &Mover<'_>, known: &Known) -> Option<Vector6<f64>> {
+    fn stretched(&self, mover: &MovingBody<'_>, known: &KnownConstraints) -> Option<Vector6<f64>> {
         if !self.takes_long_steps || known.rows.is_empty() {
             return None;
         }
@@ -174,7 +180,7 @@ impl Drive {
 
     /// A step in contact may be so many times as long as a twist: by how far points travel, and by how much the arc
     /// bulges.
-    fn longest(&self, mover: &Mover<'_>, twist: &Vector6<f64>) -> f64 {
+    fn longest(&self, mover: &MovingBody<'_>, twist: &Vector6<f64>) -> f64 {
         let shape = &mover.body.shape;
         let (v, turn): (Vector3<f64>, Vector3<f64>) =
             (twist.fixed_rows::<3>(0).into(), twist.fixed_rows::<3>(3).into());
@@ -192,14 +198,14 @@ impl Drive {
     /// than a step in contact.
     fn attempt(
         &self,
-        mover: &Mover<'_>,
-        near: &Near,
+        mover: &MovingBody<'_>,
+        near: &ContactSet,
         (wanted, is_stretched): (&Vector6<f64>, bool),
-        known: Known,
-        around: &mut dyn Around,
+        known: KnownConstraints,
+        around: &mut dyn ContactSource,
     ) -> Result<Attempt, Interrupt> {
         let target = wanted.component_mul(&self.metric);
-        let Known { mut rows, mut working, rounds } = known;
+        let KnownConstraints { mut rows, mut working, rounds } = known;
         let mut entered = Vec::new();
         for round in 0..rounds {
             mover.check()?;
@@ -215,7 +221,7 @@ impl Drive {
             if is_stretched {
                 twist *= self.longest(mover, &twist).min(1.0);
             }
-            let trial = Mover { pose: self.displaced(mover, &twist), ..*mover };
+            let trial = MovingBody { pose: self.displaced(mover, &twist), ..*mover };
             // From the second round on, those behind the constraints first: most of what enters is
             // among them.
             let mut violated = Vec::new();
@@ -231,7 +237,7 @@ impl Drive {
                     {
                         return Ok(Attempt::Entered(touching));
                     }
-                    let taken = Taken {
+                    let taken = FreeStep {
                         mover,
                         near,
                         twist: &twist,
@@ -262,7 +268,7 @@ impl Drive {
             let deeper = violated.iter().filter_map(|c| {
                 let row = self.freed(trial.way_out(c, &mut options)?);
                 // Linearised at the trial pose: gap(u) ≈ gap(u₀) + a·(u − u₀) ≥ 0.
-                let row = Row { b: row.b - row.a.dot(&twist), ..row };
+                let row = VelocityConstraint { b: row.b - row.a.dot(&twist), ..row };
                 // A plane that the sample was beyond already at the start does not separate it.
                 let separates = row.b >= -2.0 * DEPTH_TOLERANCE;
                 if separates {
@@ -283,17 +289,17 @@ impl Drive {
     /// bulge are not asked.
     fn is_clear_between(
         &self,
-        (from, near): (&Mover<'_>, &Near),
-        (to, there): (&Mover<'_>, &Near),
+        (from, near): (&MovingBody<'_>, &ContactSet),
+        (to, there): (&MovingBody<'_>, &ContactSet),
         twist: &Vector6<f64>,
-        around: &mut dyn Around,
+        around: &mut dyn ContactSource,
     ) -> Result<bool, Interrupt> {
         let centre = from.scene.centre_in_shape(from.part);
         let turn = twist.fixed_rows::<3>(3).norm();
         let close = |c: &&Contact| c.gap < 0.25 * turn * turn * from.arm(c).norm();
         let places: &[f64] = if self.is_pulled(twist) { &[0.5, 0.25, 0.75] } else { &[0.5] };
         try_all(places, |&place| {
-            let between = Mover { pose: interpolate(&from.pose, &to.pose, &centre, place), ..*from };
+            let between = MovingBody { pose: interpolate(&from.pose, &to.pose, &centre, place), ..*from };
             let mut closest = near.contacts.iter().chain(&there.contacts).filter(close);
             Ok(closest.all(|c| between.remeasured(c, 0.0).is_none_or(|c| c.gap >= -BULGE_TOLERANCE))
                 && around.is_clear_at(&between)?)
@@ -303,7 +309,12 @@ impl Drive {
     /// One constraint per contact, reduced, and which contacts they come from. Where a contact
     /// leaves a choice of planes, the one is taken along which the motion gets furthest that the
     /// contacts without a choice allow: at the rim of a hole, that is the hole's wall.
-    fn chosen(&self, mover: &Mover<'_>, near: &Near, wanted: &Vector6<f64>) -> Result<Known, Interrupt> {
+    fn chosen(
+        &self,
+        mover: &MovingBody<'_>,
+        near: &ContactSet,
+        wanted: &Vector6<f64>,
+    ) -> Result<KnownConstraints, Interrupt> {
         let poll = Poll::every(STEPS_PER_POLL, mover.termination);
         let mut options = Vec::with_capacity(near.contacts.len() * 2);
         let mut ends = Vec::with_capacity(near.contacts.len());
@@ -316,12 +327,12 @@ impl Drive {
             *row = self.freed(*row);
         }
         let starts = std::iter::once(&0).chain(&ends);
-        let groups: Vec<&[Row]> = starts.zip(&ends).map(|(a, b)| &options[*a..*b]).collect();
+        let groups: Vec<&[VelocityConstraint]> = starts.zip(&ends).map(|(a, b)| &options[*a..*b]).collect();
         let certain = groups.iter().filter(|g| g.len() == 1).map(|g| g[0]);
         let (certain, _) = reduced(certain, self.gyration);
         let likely = self.projected(&wanted.component_mul(&self.metric), &certain, true);
         let motion = likely.map_or(*wanted, |p| p.w.component_div(&self.metric));
-        let best = |group: &&[Row]| {
+        let best = |group: &&[VelocityConstraint]| {
             let mut best = group[0];
             for row in &group[1..] {
                 if row.b + row.a.dot(&motion) > best.b + best.a.dot(&motion) + 1e-12 {
@@ -333,11 +344,11 @@ impl Drive {
         mover.check()?;
         let (rows, kept) = reduced(groups.iter().map(best), self.gyration);
         let working = kept.into_iter().map(|i| near.contacts[i]).collect();
-        Ok(Known { rows, working, rounds: EAGER_ROUNDS })
+        Ok(KnownConstraints { rows, working, rounds: EAGER_ROUNDS })
     }
 
     /// A row without the freedoms that the action does not give.
-    fn freed(&self, mut row: Row) -> Row {
+    fn freed(&self, mut row: VelocityConstraint) -> VelocityConstraint {
         if !self.turns {
             row.a.fixed_rows_mut::<3>(3).fill(0.0);
         }
@@ -346,9 +357,18 @@ impl Drive {
 
     /// Projects in the metric. Rows that are slightly violated at the start ask to be left; if that
     /// is impossible, they are only kept from getting worse.
-    fn projected(&self, target: &Vector6<f64>, rows: &[Row], first: bool) -> Option<Projected> {
-        let scaled = |floor: f64| -> Vec<Row> {
-            let scale = |r: &Row| Row { a: r.a.component_div(&self.metric), b: r.b.max(floor), ..*r };
+    fn projected(
+        &self,
+        target: &Vector6<f64>,
+        rows: &[VelocityConstraint],
+        first: bool,
+    ) -> Option<Projected> {
+        let scaled = |floor: f64| -> Vec<VelocityConstraint> {
+            let scale = |r: &VelocityConstraint| VelocityConstraint {
+                a: r.a.component_div(&self.metric),
+                b: r.b.max(floor),
+                ..*r
+            };
             rows.iter().map(scale).collect()
         };
         let result = project(target, &scaled(f64::NEG_INFINITY));
@@ -356,7 +376,7 @@ impl Drive {
     }
 
     /// Of some contacts, those that are too deep at the trial pose, measured there.
-    fn violations(&self, trial: &Mover<'_>, contacts: &[Contact], twist: &Vector6<f64>) -> Vec<Contact> {
+    fn violations(&self, trial: &MovingBody<'_>, contacts: &[Contact], twist: &Vector6<f64>) -> Vec<Contact> {
         contacts
             .iter()
             .filter(|c| c.gap - trial.displacement(c, twist) < -DEPTH_TOLERANCE)
@@ -368,7 +388,12 @@ impl Drive {
     /// Against what a projected motion is pressed: each contact that holds a translation back by
     /// itself; of a motion that may turn, the whole that contact takes away, for there the points
     /// of contact change all the time.
-    fn pressing(&self, target: &Vector6<f64>, result: &Projected, rows: &[Row]) -> Vec<Vector6<f64>> {
+    fn pressing(
+        &self,
+        target: &Vector6<f64>,
+        result: &Projected,
+        rows: &[VelocityConstraint],
+    ) -> Vec<Vector6<f64>> {
         let lost = target - result.w;
         if lost.norm_squared() < PRESSED_SHARE * target.norm_squared() {
             return Vec::new();
@@ -391,8 +416,8 @@ impl Drive {
     }
 
     fn moved(
-        there: &Mover<'_>,
-        near: Near,
+        there: &MovingBody<'_>,
+        near: ContactSet,
         twist: &Vector6<f64>,
         touching: Vec<usize>,
         pressing: Vec<Vector6<f64>>,
@@ -402,7 +427,7 @@ impl Drive {
     }
 
     /// The pose after a twist about the centre of mass.
-    fn displaced(&self, mover: &Mover<'_>, twist: &Vector6<f64>) -> Pose {
+    fn displaced(&self, mover: &MovingBody<'_>, twist: &Vector6<f64>) -> Pose {
         let v: Vector3<f64> = twist.fixed_rows::<3>(0).into();
         if !self.turns {
             return Translation3::from(v) * mover.pose;
@@ -425,7 +450,7 @@ pub(super) fn contact_step(shape: &Shape) -> f64 {
 
 /// What the first projection of a step knows of the contacts; tried in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Start {
+enum FirstGuess {
     /// One plane each: the one along which the motion gets furthest that contacts without a choice
     /// allow.
     Certain,
@@ -436,9 +461,9 @@ enum Start {
 
 /// What a step begins with.
 #[derive(Clone)]
-pub(super) struct Known {
+pub(super) struct KnownConstraints {
     /// The constraints, …
-    rows: Vec<Row>,
+    rows: Vec<VelocityConstraint>,
     /// … and the contacts that they come from.
     working: Vec<Contact>,
     /// How many times it is projected at most.

@@ -16,7 +16,7 @@ use crate::tolerances::{
 
 /// The flights of a push.
 #[derive(Clone, Copy)]
-pub(super) struct Flights<'a> {
+pub(super) struct FreeFlight<'a> {
     scene: &'a Scene,
     standing: &'a [usize],
     part: usize,
@@ -24,14 +24,14 @@ pub(super) struct Flights<'a> {
     /// How much further it flies, and whether something is met there.
     left: f64,
     is_met: bool,
-    state: State,
+    state: FlightState,
     /// Whether there was one.
     pub(super) any: bool,
 }
 
 /// What a push is about to do.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum State {
+enum FlightState {
     /// To fly, if nothing is in the way.
     Ready,
     /// To fly on, or to land.
@@ -44,27 +44,36 @@ enum State {
     Never,
 }
 
-impl<'a> Flights<'a> {
+impl<'a> FreeFlight<'a> {
     pub(super) fn new(
         scene: &'a Scene,
         standing: &'a [usize],
         part: usize,
         termination: &'a Termination,
     ) -> Self {
-        Self { scene, standing, part, termination, left: 0.0, is_met: false, state: State::Ready, any: false }
+        Self {
+            scene,
+            standing,
+            part,
+            termination,
+            left: 0.0,
+            is_met: false,
+            state: FlightState::Ready,
+            any: false,
+        }
     }
 
     /// The same of a push that is not to fly.
     pub(super) fn never(self) -> Self {
-        Self { left: 0.0, is_met: false, state: State::Never, any: false, ..self }
+        Self { left: 0.0, is_met: false, state: FlightState::Never, any: false, ..self }
     }
 
     /// A step by regions was bent, or was not: where nothing bends a push any more that something did bend, it may
     /// fly again.
     pub(super) fn stepped(&mut self, is_bent: bool) {
         self.state = match (self.state, is_bent) {
-            (State::Grounded, true) => State::Bent,
-            (State::Bent, false) => State::Ready,
+            (FlightState::Grounded, true) => FlightState::Bent,
+            (FlightState::Bent, false) => FlightState::Ready,
             (state, _) => state,
         };
     }
@@ -77,7 +86,7 @@ impl<'a> Flights<'a> {
         bounds: &Bounds,
         u: &Vector3<f64>,
     ) -> Result<Option<f64>, Interrupt> {
-        if matches!(self.state, State::Grounded | State::Bent | State::Never) {
+        if matches!(self.state, FlightState::Grounded | FlightState::Bent | FlightState::Never) {
             return Ok(None);
         }
         if self.left == 0.0 {
@@ -87,14 +96,14 @@ impl<'a> Flights<'a> {
         }
         let step = self.left.min(FREE_STEP);
         self.left -= step;
-        self.state = if step > 0.0 { State::Aloft } else { State::Grounded };
+        self.state = if step > 0.0 { FlightState::Aloft } else { FlightState::Grounded };
         self.any |= step > 0.0;
         Ok(Some(step).filter(|step| *step > 0.0))
     }
 
     /// Whether it flies.
     pub(super) fn is_aloft(&self) -> bool {
-        self.state == State::Aloft
+        self.state == FlightState::Aloft
     }
 
     /// How far it gets before it meets anything, up to a [`FLIGHT_STRETCH`], and whether it meets anything; 0 where that is
@@ -134,7 +143,7 @@ mod tests {
         let standing: Vec<usize> = (0..scene.bodies.len()).filter(|&i| i != 1).collect();
         let body = &scene.bodies[1];
         let termination = Termination::default();
-        let flights = Flights::new(scene, &standing, 1, &termination);
+        let flights = FreeFlight::new(scene, &standing, 1, &termination);
         flights.length(&body.planning_from_shape, &body.bounds, &u).unwrap().0
     }
 
@@ -159,7 +168,7 @@ mod tests {
         let (scene, _) = scene([plate, block, cuboid([2.0, -4.0, 0.0], [2.5, 4.0, 2.0])]);
         let body = &scene.bodies[1];
         let termination = Termination::default();
-        let mut flights = Flights::new(&scene, &[0, 2], 1, &termination);
+        let mut flights = FreeFlight::new(&scene, &[0, 2], 1, &termination);
         let (mut pose, mut bounds, u) = (body.planning_from_shape, body.bounds, Vector3::x());
         let mut steps = Vec::new();
         while let Some(step) = flights.step(&pose, &bounds, &u).unwrap() {

@@ -12,9 +12,9 @@ use std::f64::consts::TAU;
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::budgets::{FREE_STATIONS, HELD_STATIONS, HELIX_LEAP_STEPS, LEAP_STEPS, SHORTEST_HELIX_LEAP};
-use crate::contact::sampled::{Around, Mover, Near};
+use crate::contact::sampled::{ContactSet, ContactSource, MovingBody};
 use crate::geometry::{Pose, Screw};
-use crate::scene::{Scene, Surroundings};
+use crate::scene::{Scene, StandingParts};
 use crate::termination::{Interrupt, try_all};
 use crate::tolerances::{
     DEPTH_TOLERANCE, LEAP_ANGLE, LEAST_PITCH, PRESSED_DEPTH, PRESSED_PROBE, PRESSED_PROBE_ON_HELIX,
@@ -24,18 +24,18 @@ use crate::tolerances::{
 use super::drive::Drive;
 
 /// What a leap came to.
-pub(super) struct Leap {
+pub(super) struct HelixLeap {
     /// The poses on the way, the last one where it lands.
     pub(super) poses: Vec<Pose>,
     /// What is near there, if that was looked for.
-    pub(super) near: Option<Near>,
+    pub(super) near: Option<ContactSet>,
     /// The angle, in radians.
     pub(super) turned: f64,
 }
 
 /// A helix that is followed.
 #[derive(Clone)]
-struct Helix {
+struct FollowedHelix {
     /// The displacement of one step.
     screw: Screw,
     /// How many steps the next leap is to have.
@@ -44,8 +44,8 @@ struct Helix {
 }
 
 /// Sees when a motion stays the same, and follows it.
-pub(super) struct Leaper<'a> {
-    surroundings: &'a Surroundings,
+pub(super) struct HelixExtrapolation<'a> {
+    surroundings: &'a StandingParts,
     drive: &'a Drive,
     /// How far points of the part are from its centre of mass at most.
     radius: f64,
@@ -54,15 +54,15 @@ pub(super) struct Leaper<'a> {
     length: usize,
     /// Where the steps that are alike began, and how many there are; leaps count as all their steps.
     alike: Option<(Pose, usize)>,
-    helix: Option<Helix>,
+    helix: Option<FollowedHelix>,
     /// Where points were found missing, short steps are the safe ones.
     disabled: bool,
 }
 
-impl<'a> Leaper<'a> {
+impl<'a> HelixExtrapolation<'a> {
     pub(super) fn new(
         scene: &'a Scene,
-        surroundings: &'a Surroundings,
+        surroundings: &'a StandingParts,
         part: usize,
         drive: &'a Drive,
     ) -> Self {
@@ -84,10 +84,10 @@ impl<'a> Leaper<'a> {
     pub(super) fn leap(
         &mut self,
         from: &Pose,
-        mover: &Mover<'_>,
+        mover: &MovingBody<'_>,
         pressing: Vec<Vector6<f64>>,
-        around: &mut dyn Around,
-    ) -> Result<Option<Leap>, Interrupt> {
+        around: &mut dyn ContactSource,
+    ) -> Result<Option<HelixLeap>, Interrupt> {
         if self.disabled {
             return Ok(None);
         }
@@ -104,10 +104,10 @@ impl<'a> Leaper<'a> {
             return self.follow(mover);
         }
         let wanted = self.length.min(longest(&now));
-        let holds = |there: &Mover<'_>| try_all(&pressing, |push| self.is_pressed(there, push));
+        let holds = |there: &MovingBody<'_>| try_all(&pressing, |push| self.is_pressed(there, push));
         let mut steps = self.free_steps(mover, &now, wanted, &holds)?;
         while steps > 1 {
-            let there = Mover { pose: now.times(steps as f64) * mover.pose, ..*mover };
+            let there = MovingBody { pose: now.times(steps as f64) * mover.pose, ..*mover };
             let near = around.near(&there)?;
             if near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE) {
                 self.length = if steps == wanted { steps * 2 } else { steps };
@@ -121,7 +121,7 @@ impl<'a> Leaper<'a> {
     }
 
     /// Starts to follow a helix, if the steps so far show one.
-    fn begin_helix(&mut self, mover: &Mover<'_>, now: &Screw, pressing: Vec<Vector6<f64>>) {
+    fn begin_helix(&mut self, mover: &MovingBody<'_>, now: &Screw, pressing: Vec<Vector6<f64>>) {
         let Some((begin, count)) = self.alike else { return };
         if pressing.is_empty() || now.angle() * (count as f64) < SEEN_HELIX_ANGLE {
             return;
@@ -130,21 +130,21 @@ impl<'a> Leaper<'a> {
         if screw.lead() < LEAST_PITCH {
             return;
         }
-        self.helix = Some(Helix { screw, length: count, pressing });
+        self.helix = Some(FollowedHelix { screw, length: count, pressing });
     }
 
     /// The next leap along a helix that is followed.
-    pub(super) fn follow(&mut self, mover: &Mover<'_>) -> Result<Option<Leap>, Interrupt> {
-        let Some(Helix { screw, length, pressing }) = self.helix.take() else { return Ok(None) };
+    pub(super) fn follow(&mut self, mover: &MovingBody<'_>) -> Result<Option<HelixLeap>, Interrupt> {
+        let Some(FollowedHelix { screw, length, pressing }) = self.helix.take() else { return Ok(None) };
         let wanted = telling(&screw, length.min(HELIX_LEAP_STEPS));
         let mut steps = telling(&screw, self.free_on_helix(mover, &screw, wanted, &pressing)?);
         while steps >= SHORTEST_HELIX_LEAP {
-            let there = Mover { pose: screw.times(steps as f64) * mover.pose, ..*mover };
+            let there = MovingBody { pose: screw.times(steps as f64) * mover.pose, ..*mover };
             if let Some(pose) = self.drive.lifted(&there, &screw.axis(), self.surroundings)? {
                 let angle = screw.angle() * steps as f64;
                 let screw = Screw::between_turning(&mover.pose, &pose, steps, &screw, angle);
                 let length = if steps == wanted { steps * 2 } else { steps };
-                self.helix = Some(Helix { screw, length, pressing });
+                self.helix = Some(FollowedHelix { screw, length, pressing });
                 return Ok(Some(leapt(mover, &screw, steps, None)));
             }
             steps = telling(&screw, steps / 2);
@@ -156,12 +156,12 @@ impl<'a> Leaper<'a> {
     /// How many steps along a helix, of those wanted, are on the thread and free.
     fn free_on_helix(
         &self,
-        mover: &Mover<'_>,
+        mover: &MovingBody<'_>,
         screw: &Screw,
         wanted: usize,
         pressing: &[Vector6<f64>],
     ) -> Result<usize, Interrupt> {
-        let after = |k: usize| Mover { pose: screw.times(k as f64) * mover.pose, ..*mover };
+        let after = |k: usize| MovingBody { pose: screw.times(k as f64) * mover.pose, ..*mover };
         let is_held = |k: usize| try_all(pressing, |push| self.is_on_thread(&after(k), push));
         let is_free = |k: usize| Ok(!after(k).clearly_enters(&self.surroundings.standing)?);
         let held = good_until(wanted, &HELD_STATIONS, &is_held)?;
@@ -177,20 +177,20 @@ impl<'a> Leaper<'a> {
     /// How many steps, of those wanted, enter nothing and leave the part pressed to what it was.
     fn free_steps(
         &self,
-        mover: &Mover<'_>,
+        mover: &MovingBody<'_>,
         screw: &Screw,
         wanted: usize,
-        holds: &dyn Fn(&Mover<'_>) -> Result<bool, Interrupt>,
+        holds: &dyn Fn(&MovingBody<'_>) -> Result<bool, Interrupt>,
     ) -> Result<usize, Interrupt> {
         good_until(wanted, &[1], &|k: usize| {
-            let there = Mover { pose: screw.times(k as f64) * mover.pose, ..*mover };
+            let there = MovingBody { pose: screw.times(k as f64) * mover.pose, ..*mover };
             Ok(!there.clearly_enters(&self.surroundings.standing)? && holds(&there)?)
         })
     }
 
     /// Whether the fields show that a push still meets what it met: not beside a slot's rim, where
     /// short steps are needed.
-    fn is_pressed(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> Result<bool, Interrupt> {
+    fn is_pressed(&self, mover: &MovingBody<'_>, push: &Vector6<f64>) -> Result<bool, Interrupt> {
         let (v, w): (Vector3<f64>, Vector3<f64>) =
             (push.fixed_rows::<3>(0).into(), push.fixed_rows::<3>(3).into());
         let scale = PRESSED_PROBE * self.drive.step() / (v.norm() + w.norm() * self.radius);
@@ -198,16 +198,16 @@ impl<'a> Leaper<'a> {
         let turn = UnitQuaternion::from_scaled_axis(w * scale);
         pose.append_rotation_wrt_point_mut(&turn, &mover.centre());
         pose.append_translation_mut(&Translation3::from(v * scale));
-        Mover { pose, ..*mover }.clearly_enters(&self.surroundings.standing)
+        MovingBody { pose, ..*mover }.clearly_enters(&self.surroundings.standing)
     }
 
     /// Whether a short pull, as far as a push has one, still enters a thread: finer than fields show.
-    fn is_on_thread(&self, mover: &Mover<'_>, push: &Vector6<f64>) -> Result<bool, Interrupt> {
+    fn is_on_thread(&self, mover: &MovingBody<'_>, push: &Vector6<f64>) -> Result<bool, Interrupt> {
         let pull: Vector3<f64> = push.fixed_rows::<3>(0).into();
         let Some(direction) = pull.try_normalize(0.0) else { return Ok(false) };
         let step = direction * (PRESSED_PROBE_ON_HELIX * self.drive.step());
         let pose = Translation3::from(step) * mover.pose;
-        Mover { pose, ..*mover }.enters_by(PRESSED_DEPTH, &self.surroundings.standing)
+        MovingBody { pose, ..*mover }.enters_by(PRESSED_DEPTH, &self.surroundings.standing)
     }
 }
 
@@ -243,9 +243,9 @@ fn telling(screw: &Screw, wanted: usize) -> usize {
     (1..=wanted).rev().find(tells).unwrap_or(0)
 }
 
-fn leapt(mover: &Mover<'_>, screw: &Screw, steps: usize, near: Option<Near>) -> Leap {
+fn leapt(mover: &MovingBody<'_>, screw: &Screw, steps: usize, near: Option<ContactSet>) -> HelixLeap {
     let poses = (1..=steps).map(|k| screw.times(k as f64) * mover.pose).collect();
-    Leap { poses, near, turned: screw.angle() * steps as f64 }
+    HelixLeap { poses, near, turned: screw.angle() * steps as f64 }
 }
 
 #[cfg(test)]
@@ -288,7 +288,7 @@ mod tests {
         let (turns, pitch) = (4.0, 0.5);
         let (scene, verifier) = scene(thread(turns, pitch));
         let start = scene.bodies[1].planning_from_shape;
-        let around = Surroundings::new(&scene, vec![0]);
+        let around = StandingParts::new(&scene, vec![0]);
         let off = Action::Screw(Axis::Z, true, true);
         let t = Termination::default();
         let motion = SlidingEngine.simulate(&scene, &around, 1, &start, off, &t).unwrap();

@@ -19,21 +19,21 @@ mod turning;
 
 use crate::budgets::MOTION_POSES;
 use crate::contact::region_cover::Halt;
-use crate::contact::region_cover::rigid::Holds;
-use crate::contact::sampled::Mover;
+use crate::contact::region_cover::rigid::RigidCover;
+use crate::contact::sampled::MovingBody;
 use crate::geometry::Pose;
-use crate::scene::{Scene, Surroundings, exit_direction};
+use crate::scene::{Scene, StandingParts, exit_direction};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::BULGE_TOLERANCE;
 
 use super::{Action, End, Motion, TransitionFunction, asked_again};
 use drive::{Drive, Step};
-use leap::Leaper;
+use leap::HelixExtrapolation;
 use push::Push;
 use turning::Turning;
 
 pub use pair::pair_blocks;
-pub use stages::{StepCost, Telling, step_costs};
+pub use stages::{PairMethod, StepCost, step_costs};
 
 /// The engine.
 #[derive(Debug, Clone, Copy, Default)]
@@ -55,7 +55,7 @@ impl TransitionFunction for SlidingEngine {
     fn simulate(
         &self,
         scene: &Scene,
-        surroundings: &Surroundings,
+        surroundings: &StandingParts,
         part: usize,
         start: &Pose,
         action: Action,
@@ -70,14 +70,14 @@ impl TransitionFunction for SlidingEngine {
             }
         }
         let drive = Drive::new(scene, part, start, action);
-        let mut mover = Mover::new(scene, part, *start).until(termination);
+        let mut mover = MovingBody::new(scene, part, *start).until(termination);
         let (mut path, mut asked) = (vec![*start], Vec::new());
         let mut turning = Turning::new(&mover);
         // A push that comes here is one that regions could not tell of.
         let by_samples = is_refined || !action.turns();
         let mut around =
-            Holds::new(scene, surroundings, (part, start), drive.reach(), by_samples, termination);
-        let mut leaper = Leaper::new(scene, surroundings, part, &drive);
+            RigidCover::new(scene, surroundings, (part, start), drive.reach(), by_samples, termination);
+        let mut leaper = HelixExtrapolation::new(scene, surroundings, part, &drive);
         let mut near = None;
         while path.len() < MOTION_POSES {
             termination.check()?;
@@ -126,7 +126,7 @@ impl TransitionFunction for SlidingEngine {
 }
 
 /// Whether points were found missing around a part: then short steps are the safe ones.
-fn is_refined(scene: &Scene, surroundings: &Surroundings, part: usize) -> bool {
+fn is_refined(scene: &Scene, surroundings: &StandingParts, part: usize) -> bool {
     let refined = |i: usize| !scene.bodies[i].extra_samples.points().is_empty();
     refined(part) || surroundings.standing.iter().any(|&i| refined(i))
 }
@@ -134,7 +134,7 @@ fn is_refined(scene: &Scene, surroundings: &Surroundings, part: usize) -> bool {
 /// A translation, by regions.
 fn pushed(
     scene: &Scene,
-    surroundings: &Surroundings,
+    surroundings: &StandingParts,
     (part, start): (usize, &Pose),
     action: Action,
     termination: &Termination,
@@ -151,10 +151,10 @@ fn pushed(
             step => step?,
         };
         match step {
-            push::Step::Stuck { with } => {
+            push::PushStep::Stuck { with } => {
                 return Ok(Motion::simulated(path, asked, End::Collision { with }));
             }
-            push::Step::Moved(pose) => path.push(pose),
+            push::PushStep::Moved(pose) => path.push(pose),
         }
         let hint = asked_again(&action, asked.len());
         asked.push(path.len() as u32 - 1);

@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use crate::budgets::{STATIC_PUSHES, STATIC_STEPS};
 use crate::contact::region_cover::Halt;
-use crate::contact::region_cover::shift::Cells;
-use crate::contact::region_cover::surface_pair::Facing;
-use crate::contact::sampled::{ContactCache, Mover, StartContacts};
+use crate::contact::region_cover::shift::ShiftCover;
+use crate::contact::region_cover::surface_pair::SurfacePair;
+use crate::contact::sampled::{ContactCache, MovingBody, StartContacts};
 use crate::geometry::Pose;
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
@@ -41,7 +41,7 @@ pub fn pair_blocks(
     }
     let Some(first) = actions.first() else { return Ok(Vec::new()) };
     let reach = Drive::new(scene, part, pose, *first).reach();
-    let mut start = Mover::new(scene, part, *pose).until(termination);
+    let mut start = MovingBody::new(scene, part, *pose).until(termination);
     let is_open = [start.body, &scene.bodies[other]].iter().any(|body| body.shape.surface.is_open());
     let is_exact = !is_open && actions.iter().all(|a| !a.turns());
     let around = if is_exact {
@@ -66,7 +66,7 @@ pub fn pair_blocks(
         for _ in 1..STATIC_STEPS {
             termination.check()?;
             let Step::Moved(Moved { pose: there, .. }) = step else { return Ok(true) };
-            let mover = Mover { pose: there, ..start };
+            let mover = MovingBody { pose: there, ..start };
             if (mover.centre() - start.centre()).norm() > least {
                 return Ok(false);
             }
@@ -84,8 +84,9 @@ pub fn pair_blocks(
 fn derived(scene: &Scene, part: usize, other: usize, termination: &Termination) -> Result<(), Interrupt> {
     let [one, two] = [part, other].map(|i| &scene.bodies[i].shape);
     // The other one's patches are seldom asked.
-    let first =
-        Facing::asked_first(scene, part, other).first().map(|asks_part| if *asks_part { one } else { two });
+    let first = SurfacePair::asked_first(scene, part, other)
+        .first()
+        .map(|asks_part| if *asks_part { one } else { two });
     let (_, patches) = rayon::join(
         || rayon::join(|| one.surface.prepare(), || two.surface.prepare()),
         || first.map_or(Ok(()), |shape| shape.patches(termination).map(|_| ())),
@@ -107,12 +108,12 @@ fn translations_blocked(
     // What all pushes begin with is found once, and not by each thread that comes to it at the same time.
     let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(FREE_STEP);
     if !actions.is_empty() && !scene.broad_phase.meeting_of(&standing, &bounds).is_empty() {
-        Cells::new(scene, (part, pose), termination).add(other, &Vector3::zeros())?;
+        ShiftCover::new(scene, (part, pose), termination).add(other, &Vector3::zeros())?;
     }
     let blocked = |action: &Action| {
         let mut push = Push::new(scene, &standing, (part, pose), action.force(), termination).short();
         for _ in 0..STATIC_PUSHES {
-            if let push::Step::Stuck { .. } = push.step()? {
+            if let push::PushStep::Stuck { .. } = push.step()? {
                 return Ok(true);
             }
             if push.travel() > least {

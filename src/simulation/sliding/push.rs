@@ -8,9 +8,9 @@
 use nalgebra::{Vector3, Vector6};
 
 use crate::budgets::{PUSH_BENDS, STALLS};
-use crate::contact::constraint::Row;
+use crate::contact::constraint::VelocityConstraint;
 use crate::contact::region_cover::Halt;
-use crate::contact::region_cover::shift::Cells;
+use crate::contact::region_cover::shift::ShiftCover;
 use crate::contact::region_cover::surface_pair::Obstacle;
 use crate::geometry::{Bounds, Pose};
 use crate::scene::Scene;
@@ -19,7 +19,7 @@ use crate::tolerances::{FREE_STEP, STALL, STUCK_SHARE};
 
 use super::super::projection::project;
 use super::drive::contact_step;
-use super::flight::Flights;
+use super::flight::FreeFlight;
 
 /// A part that is pushed.
 pub(super) struct Push<'a> {
@@ -31,18 +31,18 @@ pub(super) struct Push<'a> {
     force: Vector3<f64>,
     /// How far it got.
     shift: Vector3<f64>,
-    cells: Cells<'a>,
+    cells: ShiftCover<'a>,
     /// Where the surroundings were asked last.
     asked_at: Option<Vector3<f64>>,
     stalls: usize,
     contact_step: f64,
     /// Whether it is to get far: the way is then made so from the start.
     is_long: bool,
-    flights: Flights<'a>,
+    flights: FreeFlight<'a>,
 }
 
 /// What a step came to.
-pub(super) enum Step {
+pub(super) enum PushStep {
     Moved(Pose),
     Stuck { with: Vec<usize> },
 }
@@ -63,12 +63,12 @@ impl<'a> Push<'a> {
             bounds: shape.bounds().transformed(start),
             force,
             shift: Vector3::zeros(),
-            cells: Cells::new(scene, (part, start), termination),
+            cells: ShiftCover::new(scene, (part, start), termination),
             asked_at: None,
             stalls: 0,
             contact_step: contact_step(shape),
             is_long: true,
-            flights: Flights::new(scene, standing, part, termination),
+            flights: FreeFlight::new(scene, standing, part, termination),
         }
     }
 
@@ -94,7 +94,7 @@ impl<'a> Push<'a> {
     }
 
     /// One step; `Halt::Lost` where regions cannot tell.
-    pub(super) fn step(&mut self) -> Result<Step, Halt> {
+    pub(super) fn step(&mut self) -> Result<PushStep, Halt> {
         if let Some(step) = self.flown()? {
             return Ok(step);
         }
@@ -111,7 +111,7 @@ impl<'a> Push<'a> {
                 return Err(Halt::Lost);
             };
             if along.norm_squared() < STUCK_SHARE {
-                return Ok(Step::Stuck { with: by });
+                return Ok(PushStep::Stuck { with: by });
             }
             u = along.normalize();
         }
@@ -132,16 +132,16 @@ impl<'a> Push<'a> {
             return Err(Halt::Lost);
         }
         self.shift += u * length;
-        Ok(Step::Moved(self.pose()))
+        Ok(PushStep::Moved(self.pose()))
     }
 
     /// A step of a flight, if it flies.
-    fn flown(&mut self) -> Result<Option<Step>, Halt> {
+    fn flown(&mut self) -> Result<Option<PushStep>, Halt> {
         let was_aloft = self.flights.is_aloft();
         let step = self.flights.step(&self.pose(), &self.here(), &self.force)?;
         if let Some(length) = step {
             self.shift += self.force * length;
-            return Ok(Some(Step::Moved(self.pose())));
+            return Ok(Some(PushStep::Moved(self.pose())));
         }
         if was_aloft {
             self.land();
@@ -185,9 +185,9 @@ impl<'a> Push<'a> {
 pub(super) fn projected(force: &Vector3<f64>, obstacles: &[Obstacle]) -> Option<(Vector3<f64>, Vec<usize>)> {
     let row = |o: &Obstacle| {
         let n = o.normal;
-        Row { a: Vector6::new(n.x, n.y, n.z, 0.0, 0.0, 0.0), b: 0.0, other: o.other }
+        VelocityConstraint { a: Vector6::new(n.x, n.y, n.z, 0.0, 0.0, 0.0), b: 0.0, other: o.other }
     };
-    let rows: Vec<Row> = obstacles.iter().map(row).collect();
+    let rows: Vec<VelocityConstraint> = obstacles.iter().map(row).collect();
     let result = project(&Vector6::new(force.x, force.y, force.z, 0.0, 0.0, 0.0), &rows)?;
     Some((result.w.fixed_rows::<3>(0).into(), result.others(&rows)))
 }
@@ -213,8 +213,8 @@ mod tests {
         let mut shifts = vec![Vector3::zeros()];
         for _ in 0..steps {
             match push.step() {
-                Ok(Step::Stuck { with }) => return (shifts, Some(with)),
-                Ok(Step::Moved(pose)) => {
+                Ok(PushStep::Stuck { with }) => return (shifts, Some(with)),
+                Ok(PushStep::Moved(pose)) => {
                     shifts.push(pose.translation.vector - start.translation.vector);
                 }
                 // Where regions cannot tell, they claim nothing beyond the shifts so far.
@@ -258,7 +258,7 @@ mod tests {
         let start = scene.bodies[1].planning_from_shape;
         let mut push = Push::new(&scene, &[0, 2], (1, &start), Vector3::x(), &termination);
         let stopped = |push: &mut Push<'_>| {
-            while let Step::Moved(_) = push.step().unwrap() {}
+            while let PushStep::Moved(_) = push.step().unwrap() {}
             push.travel()
         };
         assert!((stopped(&mut push) - 2.0).abs() < 1e-6);

@@ -8,11 +8,11 @@ use std::time::Instant;
 use nalgebra::Vector3;
 
 use crate::contact::region_cover::Halt;
-use crate::contact::region_cover::rigid::Holds;
-use crate::contact::region_cover::shift::Cells;
-use crate::contact::sampled::Mover;
+use crate::contact::region_cover::rigid::RigidCover;
+use crate::contact::region_cover::shift::ShiftCover;
+use crate::contact::sampled::MovingBody;
 use crate::geometry::Pose;
-use crate::scene::{Memo, Scene, Surroundings};
+use crate::scene::{Memo, Scene, StandingParts};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::FREE_STEP;
 
@@ -22,7 +22,7 @@ use super::push::projected;
 
 /// What tells of contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Telling {
+pub enum PairMethod {
     /// Convex regions that pieces of surface may be shifted in: of translations.
     Shifts,
     /// Convex regions that pieces of surface stay in while they turn.
@@ -35,7 +35,7 @@ pub enum Telling {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepCost {
     /// What told of contact.
-    pub telling: Telling,
+    pub telling: PairMethod,
     /// Finding what is near; regions are found anew, as where a motion begins.
     pub gather: f64,
     /// What of it stops the motion: constraints of contacts, and the tightest of those that are alike.
@@ -53,7 +53,7 @@ pub struct StepCost {
 /// The termination condition became true.
 pub fn step_costs(
     scene: &Scene,
-    surroundings: &Surroundings,
+    surroundings: &StandingParts,
     (part, poses): (usize, &[Pose]),
     action: Action,
     termination: &Termination,
@@ -69,14 +69,14 @@ pub fn step_costs(
     let drive = Drive::new(scene, part, start, action);
     for by_samples in [false, true] {
         let mut around =
-            Holds::new(scene, surroundings, (part, start), drive.reach(), by_samples, termination);
+            RigidCover::new(scene, surroundings, (part, start), drive.reach(), by_samples, termination);
         for pose in poses {
             termination.check()?;
             // From some way on these would be the others.
             if around.samples() != by_samples {
                 break;
             }
-            let mover = Mover::new(scene, part, *pose).until(termination);
+            let mover = MovingBody::new(scene, part, *pose).until(termination);
             let (near, gather) = timed(|| around.settle(&mover, None));
             let mut near = near?;
             if near.contacts.is_empty() && near.clearance >= drive.step() {
@@ -87,7 +87,7 @@ pub fn step_costs(
             let (_, solve) = timed(|| drive.solved(&known));
             let (step, advance) = timed(|| drive.advance(&mover, &mut near, &mut around));
             step?;
-            let telling = if around.samples() { Telling::Samples } else { Telling::Regions };
+            let telling = if around.samples() { PairMethod::Samples } else { PairMethod::Regions };
             costs.push(StepCost { telling, gather, reduce, solve, advance });
         }
     }
@@ -97,7 +97,7 @@ pub fn step_costs(
 /// Of a translation; none where nothing is near, or regions cannot tell.
 fn of_shift(
     scene: &Scene,
-    surroundings: &Surroundings,
+    surroundings: &StandingParts,
     (part, start): (usize, &Pose),
     force: Vector3<f64>,
     termination: &Termination,
@@ -108,7 +108,7 @@ fn of_shift(
     if near.is_empty() {
         return Ok(None);
     }
-    let mut cells = Cells::new(&scene, (part, start), termination);
+    let mut cells = ShiftCover::new(&scene, (part, start), termination);
     let (here, mut obstacles) = (Vector3::zeros(), Vec::new());
     let cost = (|| {
         let (gathered, gather) = timed(|| near.iter().try_for_each(|&other| cells.add(other, &here)));
@@ -119,7 +119,7 @@ fn of_shift(
         let along = along.and_then(|(along, _)| along.try_normalize(1e-9));
         let (length, advance) = timed(|| along.map(|u| cells.advance(&here, &u, FREE_STEP)).transpose());
         length?;
-        Ok(StepCost { telling: Telling::Shifts, gather, reduce, solve, advance })
+        Ok(StepCost { telling: PairMethod::Shifts, gather, reduce, solve, advance })
     })();
     match cost {
         Ok(cost) => Ok(Some(cost)),
@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn all_ways_to_see_contact_are_told_apart() {
         let (scene, _) = scene(block_on_plate());
-        let around = Surroundings::new(&scene, vec![0]);
+        let around = StandingParts::new(&scene, vec![0]);
         let (start, t) = (scene.bodies[1].planning_from_shape, Termination::default());
         let costs = |action: Action| {
             let motion = SlidingEngine.simulate(&scene, &around, 1, &start, action, &t).unwrap();
@@ -152,9 +152,9 @@ mod tests {
         };
         let count = |costs: &[StepCost], telling| costs.iter().filter(|c| c.telling == telling).count();
         let pushed = costs(Action::Push(Axis::X, true));
-        assert!(!pushed.is_empty() && count(&pushed, Telling::Shifts) == pushed.len());
+        assert!(!pushed.is_empty() && count(&pushed, PairMethod::Shifts) == pushed.len());
         let turned = costs(Action::Turn(Axis::Z, true));
-        assert!(count(&turned, Telling::Regions) > 0 && count(&turned, Telling::Samples) > 0);
+        assert!(count(&turned, PairMethod::Regions) > 0 && count(&turned, PairMethod::Samples) > 0);
         for cost in pushed.iter().chain(&turned) {
             assert!([cost.gather, cost.reduce, cost.solve, cost.advance].iter().all(|c| *c >= 0.0));
         }

@@ -1,6 +1,6 @@
 //! The end of endless turning.
 
-use crate::contact::sampled::Mover;
+use crate::contact::sampled::MovingBody;
 use crate::tolerances::LEAST_TURNING_TRAVEL;
 
 /// Sees when a part turns for ever: a whole turn that took it no further from where it started
@@ -16,7 +16,7 @@ pub(super) struct Turning {
 }
 
 impl Turning {
-    pub(super) fn new(mover: &Mover<'_>) -> Self {
+    pub(super) fn new(mover: &MovingBody<'_>) -> Self {
         Self {
             angle: 0.0,
             start: mover.centre(),
@@ -27,7 +27,7 @@ impl Turning {
         }
     }
 
-    pub(super) fn is_idle(&mut self, mover: &Mover<'_>, turned: f64, touching: &[usize]) -> bool {
+    pub(super) fn is_idle(&mut self, mover: &MovingBody<'_>, turned: f64, touching: &[usize]) -> bool {
         for &t in touching {
             if let Err(at) = self.all_touched.binary_search(&t) {
                 self.all_touched.insert(at, t);

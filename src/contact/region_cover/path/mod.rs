@@ -13,7 +13,7 @@
 //! the other surface is asked about: a region need not hold what is outside by far ([`clip`]).
 //!
 //! Where threads with granted overlap cross each other, and in sight of holes, this may take too long: a
-//! count ends it, or that hardly anything was settled by then ([`Found::open`]).
+//! count ends it, or that hardly anything was settled by then ([`PathDepth::open`]).
 //!
 //! So for closed surfaces the answer is a bound for all points and all times, not for samples (but
 //! for [`FreeRegion`]'s rounding). Of surfaces with holes that holds where the winding number cannot
@@ -33,12 +33,12 @@ use crate::geometry::{FreeRegion, PatchTree, Surface};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::DEPTH_SHARE;
 
-use super::super::course::{Course, Interval, View};
-use super::super::passing::Passing;
+use super::super::course::{Course, CourseView, Interval};
+use super::super::passing::PairPath;
 
 /// How finely depth is told, in the planning frame.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Precision {
+pub(crate) struct DepthPrecision {
     /// Depth beyond what is granted that is not looked into.
     pub(crate) spare: f64,
     /// Depth beyond what is granted from which on points are recorded, but not looked for any
@@ -53,16 +53,16 @@ pub(crate) struct Precision {
 }
 
 /// The way of a part past one that stands.
-pub(crate) struct Way<'a> {
-    pub(crate) passing: &'a Passing<'a>,
+pub(crate) struct PathQuestion<'a> {
+    pub(crate) passing: &'a PairPath<'a>,
     pub(crate) course: &'a Course,
-    pub(crate) precision: Precision,
+    pub(crate) precision: DepthPrecision,
     pub(crate) termination: &'a Termination,
 }
 
-impl Way<'_> {
+impl PathQuestion<'_> {
     /// How deep the moving part gets into the standing one, and the other way round.
-    pub(crate) fn depth(&self) -> Result<[Found; 2], Interrupt> {
+    pub(crate) fn depth(&self) -> Result<[PathDepth; 2], Interrupt> {
         let [moving, standing] = self.passing.surfaces();
         let side = |on_moving| {
             let measured = if on_moving { standing } else { moving };
@@ -80,24 +80,24 @@ impl Way<'_> {
         on_moving: bool,
         interval: Interval,
         most_effort: usize,
-    ) -> Result<Found, Interrupt> {
+    ) -> Result<PathDepth, Interrupt> {
         let Self { passing, course, precision, termination } = *self;
         let [moving, standing] = passing.shapes;
         let (looked_at, measured) = if on_moving { (moving, standing) } else { (standing, moving) };
-        let question = Question {
+        let question = SideQuestion {
             surface: &looked_at.surface,
             tree: looked_at.patches(termination)?,
             measured: &measured.surface,
             granted: passing.granted,
             precision,
         };
-        let view = View::new(course, on_moving, precision.finest / 16.0);
+        let view = CourseView::new(course, on_moving, precision.finest / 16.0);
         question.answer(view, interval, most_effort, termination)
     }
 }
 
 /// One surface that is measured against another.
-pub(crate) struct Question<'a> {
+pub(crate) struct SideQuestion<'a> {
     /// The surface whose points are asked for, and its triangles' tree.
     pub(crate) surface: &'a Surface,
     pub(crate) tree: &'a PatchTree,
@@ -105,18 +105,18 @@ pub(crate) struct Question<'a> {
     pub(crate) measured: &'a Surface,
     /// The depth that counts as none.
     pub(crate) granted: f64,
-    pub(crate) precision: Precision,
+    pub(crate) precision: DepthPrecision,
 }
 
 /// What was found.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Found {
+pub(crate) struct PathDepth {
     /// No point gets deeper than this beyond what is granted.
     pub(crate) bound: f64,
     /// The largest depth that was measured beyond what is granted.
     pub(crate) depth: f64,
     /// Points (frame of the surface asked about) that were measured deeper than
-    /// [`Precision::deep`], or of which no less can be told: a good path has none, of a bad one these
+    /// [`DepthPrecision::deep`], or of which no less can be told: a good path has none, of a bad one these
     /// are the first found.
     pub(crate) deep: Vec<(Point3<f64>, f64)>,
     /// Stretches of the way on which the search was given up: the bound is none there.
@@ -126,14 +126,14 @@ pub(crate) struct Found {
     pub(crate) effort: usize,
 }
 
-impl Precision {
+impl DepthPrecision {
     /// How closely some depth is told.
     fn margin_of(&self, depth: f64) -> f64 {
         (DEPTH_SHARE * depth).min(self.margin)
     }
 }
 
-impl Found {
+impl PathDepth {
     /// Adds what was found elsewhere.
     pub(crate) fn add(&mut self, other: Self) {
         self.bound = self.bound.max(other.bound);
@@ -178,7 +178,7 @@ struct KnownRegion {
 /// The search for the deepest points: the question, the regions found so far, the hull of the piece in question, and
 /// the answer so far.
 struct PathSearch<'a> {
-    asked: &'a Question<'a>,
+    asked: &'a SideQuestion<'a>,
     /// Whether the measured surface has holes, so that depth changes its sign off it, too.
     has_rim: bool,
     most_effort: usize,
@@ -186,7 +186,7 @@ struct PathSearch<'a> {
     price: usize,
     /// How much of surface and way was settled, as a share of all.
     done: f64,
-    view: View<'a>,
+    view: CourseView<'a>,
     termination: &'a Termination,
     regions: Vec<KnownRegion>,
     /// Regions in the order in which they held a piece.
@@ -198,13 +198,13 @@ struct PathSearch<'a> {
     /// All of them, unless they are too many.
     hull: Vec<Point3<f64>>,
     facing: Vector3<f64>,
-    found: Found,
+    found: PathDepth,
 }
 
 impl<'a> PathSearch<'a> {
     fn new(
-        asked: &'a Question<'a>,
-        view: View<'a>,
+        asked: &'a SideQuestion<'a>,
+        view: CourseView<'a>,
         most_effort: usize,
         termination: &'a Termination,
     ) -> Self {
@@ -223,23 +223,23 @@ impl<'a> PathSearch<'a> {
             wanted: Vec::new(),
             hull: Vec::new(),
             facing: Vector3::zeros(),
-            found: Found::default(),
+            found: PathDepth::default(),
         }
     }
 }
 
-impl Question<'_> {
+impl SideQuestion<'_> {
     /// Looks for the deepest points on a stretch of the way, with no more than some effort.
     ///
     /// # Errors
     /// The termination condition became true.
     pub(crate) fn answer(
         &self,
-        view: View<'_>,
+        view: CourseView<'_>,
         interval: Interval,
         most_effort: usize,
         termination: &Termination,
-    ) -> Result<Found, Interrupt> {
+    ) -> Result<PathDepth, Interrupt> {
         let mut search = PathSearch::new(self, view, most_effort, termination);
         search.all(interval)?;
         Ok(search.found)

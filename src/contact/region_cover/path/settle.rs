@@ -7,7 +7,7 @@ use crate::geometry::{Closest, FreeRegion, HullDepth, Parts, PatchTree, Wanted};
 use crate::tolerances::SWEPT_ROOM;
 
 use super::super::super::course::Leg;
-use super::{GridCell, KnownRegion, PathSearch, Question, SearchHint, SweptBall};
+use super::{GridCell, KnownRegion, PathSearch, SearchHint, SideQuestion, SweptBall};
 
 /// How far a piece is from a region: the distance of its worst corner, and that.
 pub(super) type Fit = Option<(f64, Point3<f64>)>;
@@ -100,7 +100,7 @@ impl PathSearch<'_> {
     /// Whether the triangles about a piece tell well how deep it gets; the bound is raised by that.
     fn is_bounded(&mut self, swept: &SweptBall, signed: f64, slack: f64, guess: u32) -> bool {
         let spared = self.spared() - slack;
-        let Question { measured, granted, precision, .. } = self.asked;
+        let SideQuestion { measured, granted, precision, .. } = self.asked;
         // What is deeper is to be recorded.
         let most = spared.max(granted + precision.deep - slack);
         // The middle is no nearer to any triangle than to the nearest.
@@ -126,7 +126,7 @@ impl PathSearch<'_> {
     /// Whether a depth is what it is, as measured at the worst corner, or small enough not to matter:
     /// not only that of a region which is too narrow.
     fn is_told(&mut self, swept: &SweptBall, depth: f64, worst: &Point3<f64>, guess: u32) -> bool {
-        let Question { measured, granted, precision, .. } = self.asked;
+        let SideQuestion { measured, granted, precision, .. } = self.asked;
         let real = -measured.signed(worst, &measured.closest_from(worst, guess));
         let beyond = depth - granted;
         let small = swept.radius <= precision.coarse && beyond <= precision.deep / 2.0;
@@ -156,7 +156,7 @@ impl PathSearch<'_> {
     /// Whether a piece is small, and its corners no deeper than `most`: a region beside a surface with holes
     /// may be inside.
     fn is_outside(&self, swept: &SweptBall, most: f64, guess: u32) -> bool {
-        let Question { measured, precision, .. } = self.asked;
+        let SideQuestion { measured, precision, .. } = self.asked;
         let depth = |p: &Point3<f64>| -measured.signed(p, &measured.closest_from(p, guess));
         swept.radius <= precision.coarse && self.wanted.iter().all(|p| depth(p) <= most)
     }
@@ -218,7 +218,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::contact::course::{Course, Interval, View};
+    use crate::contact::course::{Course, CourseView, Interval};
     use crate::fixtures::{ball, surface, tube, vector};
     use crate::geometry::Pose;
     use crate::termination::Poll;
@@ -233,7 +233,7 @@ mod tests {
             let tree = PatchTree::new(&moving, &Poll::every(1, None)).unwrap();
             let path = [Pose::identity(), Pose::new(shift, turn)];
             let course = Course::new(&path, Point3::origin(), 1.0);
-            let leg = View::new(&course, true, 1e-3).leg(Interval::WHOLE);
+            let leg = CourseView::new(&course, true, 1e-3).leg(Interval::WHOLE);
             let wanted = Wanted { points: &[], most: 0.0, from_behind: false, facing: Vector3::zeros() };
             let centre = Point3::from(centre);
             let Ok(region) = standing.free_region(&centre, radius, wanted) else { return Ok(()) };

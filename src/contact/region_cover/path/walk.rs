@@ -11,7 +11,7 @@ use super::super::super::course::{Interval, Leg};
 use super::super::cover;
 use super::clip::clipped;
 use super::settle::{furthest, furthest_of, swept};
-use super::{PathSearch, Precision, SearchHint, SweptBall};
+use super::{DepthPrecision, PathSearch, SearchHint, SweptBall};
 
 /// Corners of what a triangle passes on a straight way.
 const OF_STRAIGHT_WAY: usize = 6;
@@ -262,7 +262,7 @@ impl PathSearch<'_> {
 
     /// The smallest size of pieces, for now.
     fn finest(&self) -> f64 {
-        let Precision { deep, finest, coarse, .. } = self.asked.precision;
+        let DepthPrecision { deep, finest, coarse, .. } = self.asked.precision;
         if self.found.depth > deep { coarse } else { finest }
     }
 }

@@ -8,13 +8,13 @@ use crate::budgets::POSES_BETWEEN;
 use crate::geometry::{FreeRegion, Pose, Screw};
 use crate::tolerances::{DEPTH_TOLERANCE, STEPS_AHEAD};
 
-use super::super::shift::Cell;
-use super::super::surface_pair::{Facing, Placed, Spot};
+use super::super::shift::ShiftPiece;
+use super::super::surface_pair::{CoverPiece, PlacedPiece, SurfacePair};
 
 /// A piece in its region.
 #[derive(Clone)]
-pub(crate) struct Hold {
-    pub(crate) spot: Spot,
+pub(crate) struct RigidPiece {
+    pub(crate) spot: CoverPiece,
     /// In the measured surface's frame.
     pub(crate) region: Arc<FreeRegion>,
     /// A ball that holds the piece, in the asked surface's frame, …
@@ -30,7 +30,7 @@ pub(crate) struct Hold {
 
 /// From the asked surface's frame to the measured one's at the base and at another pose.
 #[derive(Clone, Copy)]
-pub(crate) struct Ends {
+pub(crate) struct StepPoses {
     pub(crate) here: Pose,
     pub(crate) there: Pose,
     /// Between the two, if they differ.
@@ -39,8 +39,8 @@ pub(crate) struct Ends {
     pub(crate) ahead: Pose,
 }
 
-impl Ends {
-    pub(crate) fn of(facing: &Facing<'_>, base: &Pose, there: &Pose) -> Self {
+impl StepPoses {
+    pub(crate) fn of(facing: &SurfacePair<'_>, base: &Pose, there: &Pose) -> Self {
         let screw = Screw::between(base, there, 1);
         let after = |share: f64| facing.with_part_at(&(screw.times(share) * base));
         let between = std::array::from_fn(|i| after((i + 1) as f64 / (POSES_BETWEEN + 1) as f64));
@@ -54,15 +54,25 @@ impl Ends {
     }
 }
 
-impl Hold {
-    pub(crate) fn new(spot: Spot, region: Arc<FreeRegion>, facing: &Facing<'_>, here: &Pose) -> Self {
+impl RigidPiece {
+    pub(crate) fn new(
+        spot: CoverPiece,
+        region: Arc<FreeRegion>,
+        facing: &SurfacePair<'_>,
+        here: &Pose,
+    ) -> Self {
         let (centre, radius) = facing.ball(&spot.piece);
         let stands = here * centre;
         Self { spot, region, centre, radius, stands, slack: f64::NEG_INFINITY, next: None }
     }
 
     /// A piece that is free in a cell for shifts, without a shift.
-    pub(crate) fn of_cell(cell: &Cell, facing: &Facing<'_>, here: &Pose, placed: &mut Placed) -> Self {
+    pub(crate) fn of_cell(
+        cell: &ShiftPiece,
+        facing: &SurfacePair<'_>,
+        here: &Pose,
+        placed: &mut PlacedPiece,
+    ) -> Self {
         facing.place_at(&cell.spot.piece, here, placed);
         let sides = cell.limits.iter().map(|limit| {
             let normal = facing.shifted * limit.normal;
@@ -74,7 +84,7 @@ impl Hold {
     }
 
     /// How far outside its region it may be.
-    pub(crate) fn most(&self, facing: &Facing<'_>) -> f64 {
+    pub(crate) fn most(&self, facing: &SurfacePair<'_>) -> f64 {
         facing.allowance + self.spot.held.max(DEPTH_TOLERANCE)
     }
 
@@ -82,10 +92,10 @@ impl Hold {
     /// may be and `more`; none where it is further.
     pub(crate) fn slack_at(
         &self,
-        facing: &Facing<'_>,
+        facing: &SurfacePair<'_>,
         there: &Pose,
         more: f64,
-        placed: &mut Placed,
+        placed: &mut PlacedPiece,
     ) -> Option<f64> {
         let of_ball = self.region.slack(&(there * self.centre)) - self.radius;
         if of_ball > 0.0 {
@@ -97,8 +107,8 @@ impl Hold {
 }
 
 /// How far inside a region a piece is, at least; negative where it is outside by no more than `most`.
-pub(crate) fn slack_within(region: &FreeRegion, placed: &Placed, most: f64) -> Option<f64> {
-    let Placed { points, cloud, .. } = placed;
+pub(crate) fn slack_within(region: &FreeRegion, placed: &PlacedPiece, most: f64) -> Option<f64> {
+    let PlacedPiece { points, cloud, .. } = placed;
     let gaps = region.gaps(cloud);
     let farthest = points.iter().map(|p| (p - region.centre()).norm_squared()).fold(0.0, f64::max).sqrt();
     let least = gaps.iter().copied().fold(region.radius() - farthest, f64::min);

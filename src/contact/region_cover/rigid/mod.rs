@@ -15,17 +15,17 @@ mod pair_cover;
 mod tests;
 
 use crate::geometry::Pose;
-use crate::scene::{Scene, Surroundings};
+use crate::scene::{Scene, StandingParts};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::DEPTH_TOLERANCE;
 
-use super::super::sampled::{Around, Mover, Near};
-use pair_cover::Held;
+use super::super::sampled::{ContactSet, ContactSource, MovingBody};
+use pair_cover::RigidPair;
 
 /// What is around a moving part.
-pub(crate) struct Holds<'a> {
+pub(crate) struct RigidCover<'a> {
     scene: &'a Scene,
-    surroundings: &'a Surroundings,
+    surroundings: &'a StandingParts,
     part: usize,
     reach: f64,
     termination: &'a Termination,
@@ -34,18 +34,18 @@ pub(crate) struct Holds<'a> {
     base: Pose,
     /// The pose that was looked at last.
     looked_at: Option<Pose>,
-    pairs: Vec<Held<'a>>,
+    pairs: Vec<RigidPair<'a>>,
     /// Standing parts that only samples tell of.
     sampled: Vec<usize>,
     /// Whether they tell of all.
     all_sampled: bool,
 }
 
-impl<'a> Holds<'a> {
+impl<'a> RigidCover<'a> {
     /// With samples alone, or with regions where these tell.
     pub(crate) fn new(
         scene: &'a Scene,
-        surroundings: &'a Surroundings,
+        surroundings: &'a StandingParts,
         (part, start): (usize, &Pose),
         reach: f64,
         all_sampled: bool,
@@ -75,7 +75,11 @@ impl<'a> Holds<'a> {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub(crate) fn settle(&mut self, mover: &Mover<'_>, near: Option<Near>) -> Result<Near, Interrupt> {
+    pub(crate) fn settle(
+        &mut self,
+        mover: &MovingBody<'_>,
+        near: Option<ContactSet>,
+    ) -> Result<ContactSet, Interrupt> {
         let mut near = match near {
             Some(near) if self.looked_at == Some(mover.pose) => near,
             _ => self.near(mover)?,
@@ -108,7 +112,7 @@ impl<'a> Holds<'a> {
             return Ok(Some(known));
         }
         let is_start = self.base == self.start;
-        match Held::new(self.scene, (self.part, &self.base), other, is_start, self.termination)? {
+        match RigidPair::new(self.scene, (self.part, &self.base), other, is_start, self.termination)? {
             Some(pair) => {
                 self.pairs.push(pair);
                 Ok(Some(self.pairs.len() - 1))
@@ -121,8 +125,8 @@ impl<'a> Holds<'a> {
     }
 }
 
-impl Around for Holds<'_> {
-    fn near(&mut self, mover: &Mover<'_>) -> Result<Near, Interrupt> {
+impl ContactSource for RigidCover<'_> {
+    fn near(&mut self, mover: &MovingBody<'_>) -> Result<ContactSet, Interrupt> {
         self.pairs.iter_mut().for_each(|pair| pair.is_near = false);
         self.looked_at = Some(mover.pose);
         let (surroundings, reach, base) = (self.surroundings, self.reach, self.base);
@@ -142,7 +146,7 @@ impl Around for Holds<'_> {
         Ok(near)
     }
 
-    fn add_known(&mut self, mover: &Mover<'_>, near: &mut Near) -> Result<(), Interrupt> {
+    fn add_known(&mut self, mover: &MovingBody<'_>, near: &mut ContactSet) -> Result<(), Interrupt> {
         for pair in self.pairs.extract_if(.., |pair| pair.is_left_to_samples) {
             let other = pair.facing.other;
             near.contacts.retain(|c| c.other != other);
@@ -158,7 +162,7 @@ impl Around for Holds<'_> {
         Ok(())
     }
 
-    fn is_clear_at(&mut self, between: &Mover<'_>) -> Result<bool, Interrupt> {
+    fn is_clear_at(&mut self, between: &MovingBody<'_>) -> Result<bool, Interrupt> {
         Ok(self.pairs.iter_mut().all(|pair| pair.is_clear_at(between)))
     }
 }

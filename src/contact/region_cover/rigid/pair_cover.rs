@@ -16,11 +16,11 @@ use crate::tolerances::{
     SMALLEST_BIT,
 };
 
-use super::super::super::sampled::{Contact, Mover, Near};
+use super::super::super::sampled::{Contact, ContactSet, MovingBody};
 use super::super::cover;
 use super::super::shift::starting;
-use super::super::surface_pair::{Facing, Piece, Placed, Spot};
-use super::hold::{Ends, Hold, slack_within};
+use super::super::surface_pair::{CoverPiece, Piece, PlacedPiece, SurfacePair};
+use super::hold::{RigidPiece, StepPoses, slack_within};
 
 /// The inverse of the golden ratio.
 const GOLDEN: f64 = 0.618_033_988_749_895;
@@ -28,9 +28,9 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 const AROUND_SMALLEST: f64 = 4.0 * SMALLEST_BIT;
 
 /// A pair, one of whose surfaces is in pieces.
-pub(crate) struct Held<'a> {
-    pub(crate) facing: Facing<'a>,
-    pieces: Vec<Hold>,
+pub(crate) struct RigidPair<'a> {
+    pub(crate) facing: SurfacePair<'a>,
+    pieces: Vec<RigidPiece>,
     /// Contacts that mattered.
     pub(crate) known: Vec<Contact>,
     /// Whether it was looked at there.
@@ -40,17 +40,17 @@ pub(crate) struct Held<'a> {
     /// How many steps were made, and how many regions were looked for.
     steps: usize,
     regions: usize,
-    placed: Placed,
+    placed: PlacedPiece,
 }
 
 /// Pieces that have left their regions.
-pub(crate) struct Left {
+pub(crate) struct OutsidePieces {
     outside: Vec<usize>,
-    ends: Ends,
+    ends: StepPoses,
 }
 
 /// Why a piece got no region.
-enum Unheld {
+enum Uncovered {
     /// The other end is too deep.
     Entered(Contact),
     /// It is too deep between the two.
@@ -59,7 +59,7 @@ enum Unheld {
     Unsure,
 }
 
-impl<'a> Held<'a> {
+impl<'a> RigidPair<'a> {
     /// A pair with the part at a pose, if regions tell of it.
     pub(crate) fn new(
         scene: &'a Scene,
@@ -74,10 +74,11 @@ impl<'a> Held<'a> {
         let gathered = starting(scene, (part, pose), other, (is_start, RIGID_PIECES), termination)?;
         let cells = gathered.cells.as_ref().filter(|cells| cells.len() <= RIGID_PIECES);
         let Some(cells) = cells else { return Ok(None) };
-        let facing = Facing::new(scene, (part, pose), other, gathered.asks_part, termination)?;
-        let mut placed = Placed::default();
+        let facing = SurfacePair::new(scene, (part, pose), other, gathered.asks_part, termination)?;
+        let mut placed = PlacedPiece::default();
         let here = facing.with_part_at(pose);
-        let pieces = cells.iter().map(|cell| Hold::of_cell(cell, &facing, &here, &mut placed)).collect();
+        let pieces =
+            cells.iter().map(|cell| RigidPiece::of_cell(cell, &facing, &here, &mut placed)).collect();
         let known = Vec::new();
         Ok(Some(Self {
             facing,
@@ -97,11 +98,11 @@ impl<'a> Held<'a> {
     pub(crate) fn near(
         &mut self,
         base: &Pose,
-        mover: &Mover<'_>,
+        mover: &MovingBody<'_>,
         reach: f64,
-        near: &mut Near,
-    ) -> Option<Left> {
-        let ends = Ends::of(&self.facing, base, &mover.pose);
+        near: &mut ContactSet,
+    ) -> Option<OutsidePieces> {
+        let ends = StepPoses::of(&self.facing, base, &mover.pose);
         self.is_near = true;
         let outside = self.outside(&ends, near);
         // Contacts lie on pieces that have left their regions, mostly.
@@ -115,7 +116,7 @@ impl<'a> Held<'a> {
             found = self.triangles_inside(&outside, &ends.there);
         }
         if found.is_empty() {
-            return Some(Left { outside, ends });
+            return Some(OutsidePieces { outside, ends });
         }
         self.learn(&found);
         near.contacts.extend(found);
@@ -125,10 +126,10 @@ impl<'a> Held<'a> {
     /// Finds regions for pieces that have left theirs, or what they enter.
     pub(crate) fn renewed(
         &mut self,
-        left: &Left,
-        mover: &Mover<'_>,
+        left: &OutsidePieces,
+        mover: &MovingBody<'_>,
         reach: f64,
-        near: &mut Near,
+        near: &mut ContactSet,
     ) -> Result<(), Interrupt> {
         let found = self.renew(&left.outside, &left.ends);
         if self.is_left_to_samples {
@@ -141,7 +142,7 @@ impl<'a> Held<'a> {
 
     /// The pieces that are not in their regions at the other end. Tells of all what there is left for
     /// them to move.
-    fn outside(&mut self, Ends { here, there, .. }: &Ends, near: &mut Near) -> Vec<usize> {
+    fn outside(&mut self, StepPoses { here, there, .. }: &StepPoses, near: &mut ContactSet) -> Vec<usize> {
         let angle = here.rotation.angle_to(&there.rotation);
         let mut outside = Vec::new();
         for (i, hold) in self.pieces.iter_mut().enumerate() {
@@ -205,20 +206,20 @@ impl<'a> Held<'a> {
     }
 
     /// Finds regions that hold these pieces at both ends, or contacts that are too deep at the other one.
-    fn renew(&mut self, outside: &[usize], ends: &Ends) -> Vec<Contact> {
+    fn renew(&mut self, outside: &[usize], ends: &StepPoses) -> Vec<Contact> {
         let mut left = REGIONS_PER_LOOK;
         let (mut found, mut entered) = (Vec::new(), Vec::new());
         for &i in outside {
             let hold = self.pieces[i].clone();
             match self.held(&hold, ends, &mut left, &mut found) {
                 Ok(()) => {}
-                Err(Unheld::Entered(contact)) => {
+                Err(Uncovered::Entered(contact)) => {
                     entered.push(contact);
                     if entered.len() >= CONTACTS_PER_LOOK {
                         break;
                     }
                 }
-                Err(Unheld::Crossed | Unheld::Unsure) => {
+                Err(Uncovered::Crossed | Uncovered::Unsure) => {
                     self.is_left_to_samples = entered.is_empty();
                     return entered;
                 }
@@ -236,11 +237,11 @@ impl<'a> Held<'a> {
     /// Finds regions for a piece that has none at the other end, or for its parts.
     fn held(
         &mut self,
-        hold: &Hold,
-        ends: &Ends,
+        hold: &RigidPiece,
+        ends: &StepPoses,
         left: &mut usize,
-        out: &mut Vec<Hold>,
-    ) -> Result<(), Unheld> {
+        out: &mut Vec<RigidPiece>,
+    ) -> Result<(), Uncovered> {
         let mut is_whole = true;
         cover(hold.clone(), |mut hold, rest| {
             // A part may be in the region that it came with.
@@ -248,12 +249,12 @@ impl<'a> Held<'a> {
                 let at_here = hold.slack_at(&self.facing, &ends.here, 0.0, &mut self.placed);
                 hold.next = hold.slack_at(&self.facing, &ends.there, 0.0, &mut self.placed);
                 if let (Some(slack), Some(_)) = (at_here, hold.next) {
-                    out.push(Hold { slack, ..hold });
+                    out.push(RigidPiece { slack, ..hold });
                     return Ok(());
                 }
             }
             if *left == 0 {
-                return Err(Unheld::Unsure);
+                return Err(Uncovered::Unsure);
             }
             *left -= 1;
             if let Some(held) = self.held_whole(&hold, ends)? {
@@ -261,7 +262,12 @@ impl<'a> Held<'a> {
                 return Ok(());
             }
             let part = |piece| {
-                Hold::new(Spot { piece, ..hold.spot }, Arc::clone(&hold.region), &self.facing, &ends.here)
+                RigidPiece::new(
+                    CoverPiece { piece, ..hold.spot },
+                    Arc::clone(&hold.region),
+                    &self.facing,
+                    &ends.here,
+                )
             };
             rest.extend(self.facing.parts(&hold.spot.piece).into_iter().rev().map(part));
             Ok(())
@@ -269,7 +275,7 @@ impl<'a> Held<'a> {
     }
 
     /// All of a piece in a region that holds it at both ends; none if it is to be split.
-    fn held_whole(&mut self, hold: &Hold, ends: &Ends) -> Result<Option<Hold>, Unheld> {
+    fn held_whole(&mut self, hold: &RigidPiece, ends: &StepPoses) -> Result<Option<RigidPiece>, Uncovered> {
         self.regions += 1;
         // What could not be held further ahead the last time is not tried at once again.
         let goes_far = hold.spot.level == 0 && ends.here != ends.there;
@@ -277,7 +283,7 @@ impl<'a> Held<'a> {
         let level = usize::from(goes_far && far.is_none());
         match far.map_or_else(|| self.region(hold, &[ends.here, ends.there]), Ok) {
             Ok(region) => {
-                let mut hold = Hold { region: Arc::new(region), ..hold.clone() };
+                let mut hold = RigidPiece { region: Arc::new(region), ..hold.clone() };
                 hold.spot.level = level;
                 hold.slack = hold.slack_at(&self.facing, &ends.here, 0.0, &mut self.placed).unwrap_or(0.0);
                 hold.next = hold.slack_at(&self.facing, &ends.there, 0.0, &mut self.placed).or(Some(0.0));
@@ -285,7 +291,7 @@ impl<'a> Held<'a> {
             }
             Err(NoRegion::Amid(triangle)) => {
                 if let Some(contact) = pierced(&self.facing, hold, triangle, &ends.there) {
-                    return Err(Unheld::Entered(contact));
+                    return Err(Uncovered::Entered(contact));
                 }
             }
             Err(NoRegion::Cramped) => {}
@@ -295,20 +301,20 @@ impl<'a> Held<'a> {
             return Ok(None);
         }
         if let Some(contact) = self.deepest_on_edges(corners, hold.spot.guess, &ends.there) {
-            return Err(Unheld::Entered(contact));
+            return Err(Uncovered::Entered(contact));
         }
         if hold.radius >= SMALLEST_BIT {
             return Ok(None);
         }
         let enters = |at: &Pose| self.deepest_on_edges(corners, hold.spot.guess, at).is_some();
         if ends.here != ends.there && ends.between.iter().any(enters) {
-            return Err(Unheld::Crossed);
+            return Err(Uncovered::Crossed);
         }
         Ok(Some(self.before_face(hold, ends)))
     }
 
     /// A region that holds a piece at some poses.
-    fn region(&mut self, hold: &Hold, at: &[Pose]) -> Result<FreeRegion, NoRegion> {
+    fn region(&mut self, hold: &RigidPiece, at: &[Pose]) -> Result<FreeRegion, NoRegion> {
         let (facing, placed) = (&self.facing, &mut self.placed);
         let (mut wanted, mut centres) = (Vec::new(), Bounds::EMPTY);
         for pose in at {
@@ -377,7 +383,7 @@ impl<'a> Held<'a> {
     /// A small bit that is no deeper than may be, before the face that it is nearest to: where surfaces
     /// cross by less than that, there are no regions. That is not certain, as regions are; paths are
     /// verified.
-    fn before_face(&mut self, hold: &Hold, ends: &Ends) -> Hold {
+    fn before_face(&mut self, hold: &RigidPiece, ends: &StepPoses) -> RigidPiece {
         let (facing, placed) = (&self.facing, &mut self.placed);
         facing.place_at(&hold.spot.piece, &ends.there, placed);
         let closest = facing.look(&placed.centre, hold.spot.guess).closest;
@@ -385,7 +391,7 @@ impl<'a> Held<'a> {
         let height = placed.points.iter().map(|p| normal.dot(&p.coords)).fold(f64::INFINITY, f64::min);
         let ball = (placed.centre, AROUND_SMALLEST);
         let region = Arc::new(FreeRegion::known(ball, [(normal, height, closest.triangle)]));
-        Hold { region, slack: 0.0, next: Some(0.0), ..hold.clone() }
+        RigidPiece { region, slack: 0.0, next: Some(0.0), ..hold.clone() }
     }
 
     /// Keeps contacts for the steps to come.
@@ -401,7 +407,7 @@ impl<'a> Held<'a> {
     /// Goes on from the pose that was looked at last; false where regions do not tell any more.
     pub(crate) fn settle(
         &mut self,
-        mover: &Mover<'_>,
+        mover: &MovingBody<'_>,
         reach: f64,
         termination: &Termination,
     ) -> Result<bool, Interrupt> {
@@ -411,7 +417,7 @@ impl<'a> Held<'a> {
         let outside: Vec<usize> = (0..self.pieces.len()).filter(|&i| self.pieces[i].next.is_none()).collect();
         let (mut left, mut found) = (REGIONS_ON_APPROACH, Vec::new());
         for &i in outside.iter().rev() {
-            let ends = Ends::at(there);
+            let ends = StepPoses::at(there);
             let hold = self.pieces.swap_remove(i);
             termination.check()?;
             if self.held(&hold, &ends, &mut left, &mut found).is_err() {
@@ -428,7 +434,7 @@ impl<'a> Held<'a> {
     }
 
     /// Whether nothing is too deep between the base and the pose that was looked at last.
-    pub(crate) fn is_clear_at(&mut self, between: &Mover<'_>) -> bool {
+    pub(crate) fn is_clear_at(&mut self, between: &MovingBody<'_>) -> bool {
         if self.is_left_to_samples || !self.is_near {
             return !self.is_left_to_samples;
         }
@@ -442,7 +448,7 @@ impl<'a> Held<'a> {
 }
 
 /// The corner of a measured triangle, or the middle of one of its sides, that is too deep inside the asked solid.
-fn pierced(facing: &Facing<'_>, hold: &Hold, triangle: u32, there: &Pose) -> Option<Contact> {
+fn pierced(facing: &SurfacePair<'_>, hold: &RigidPiece, triangle: u32, there: &Pose) -> Option<Contact> {
     if facing.asked.is_open() {
         return None;
     }

@@ -12,19 +12,19 @@ use crate::tolerances::DEPTH_TOLERANCE;
 #[test]
 fn a_loose_peg_turns_and_is_told_by_regions_all_the_way() {
     let (scene, _) = scene(peg_in_hole(-0.05));
-    let around = Surroundings::new(&scene, vec![0]);
+    let around = StandingParts::new(&scene, vec![0]);
     let start = scene.bodies[1].planning_from_shape;
     let termination = Termination::default();
-    let mut holds = Holds::new(&scene, &around, (1, &start), 0.1, false, &termination);
-    let mover = Mover::new(&scene, 1, start);
+    let mut holds = RigidCover::new(&scene, &around, (1, &start), 0.1, false, &termination);
+    let mover = MovingBody::new(&scene, 1, start);
     let near = holds.settle(&mover, None).unwrap();
     assert!(near.contacts.iter().all(|c| c.gap >= 0.0) && !holds.samples());
-    let turned = Mover { pose: start * Pose::rotation(Vector3::z() * 0.3), ..mover };
+    let turned = MovingBody { pose: start * Pose::rotation(Vector3::z() * 0.3), ..mover };
     assert!(
         holds.near(&turned).unwrap().contacts.iter().any(|c| c.gap < -0.01),
         "its corners are in the walls"
     );
-    let lifted = Mover { pose: Pose::translation(0.0, 0.0, 0.1) * start, ..mover };
+    let lifted = MovingBody { pose: Pose::translation(0.0, 0.0, 0.1) * start, ..mover };
     assert!(holds.near(&lifted).unwrap().contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE));
     assert!(!holds.settle(&lifted, None).unwrap().contacts.is_empty(), "what was found of the walls is kept");
     assert!(!holds.samples());
@@ -38,11 +38,11 @@ fn a_long_pin_is_stopped_by_what_its_faces_get_over_without_another_region() {
     let (scene, _) = scene([plate, cuboid([-0.45, -0.45, -4.0], [0.45, 0.45, 4.0])]);
     let start = scene.bodies[1].planning_from_shape;
     let termination = Termination::default();
-    let mover = Mover::new(&scene, 1, start);
-    let mut pair = Held::new(&scene, (1, &start), 0, true, &termination).unwrap().unwrap();
+    let mover = MovingBody::new(&scene, 1, start);
+    let mut pair = RigidPair::new(&scene, (1, &start), 0, true, &termination).unwrap().unwrap();
     let mut looked = |pose: Pose| {
-        let mut near = Near { contacts: Vec::new(), clearance: f64::INFINITY };
-        let left = pair.near(&start, &Mover { pose, ..mover }, 0.1, &mut near);
+        let mut near = ContactSet { contacts: Vec::new(), clearance: f64::INFINITY };
+        let left = pair.near(&start, &MovingBody { pose, ..mover }, 0.1, &mut near);
         (left.is_some(), near.contacts)
     };
     for shift in [Vector3::x() * 0.1, Vector3::new(0.08, 0.06, 1.0)] {
@@ -75,10 +75,10 @@ fn what_regions_let_pass_enters_nothing() {
         if deep(&[start]) > 1e-9 {
             continue;
         }
-        let around = Surroundings::new(&scene, vec![0, 2]);
-        let mover = Mover::new(&scene, 1, start);
+        let around = StandingParts::new(&scene, vec![0, 2]);
+        let mover = MovingBody::new(&scene, 1, start);
         for direction in spread([-1.0; 3], [1.0; 3], 12) {
-            let mut holds = Holds::new(&scene, &around, (1, &start), 0.12, false, &termination);
+            let mut holds = RigidCover::new(&scene, &around, (1, &start), 0.12, false, &termination);
             holds.settle(&mover, None).unwrap();
             // The way to the other solid, with a turn about another axis.
             let step = Pose::new(
@@ -89,10 +89,12 @@ fn what_regions_let_pass_enters_nothing() {
             let mut there = mover;
             for _ in 0..12 {
                 let from = there.pose;
-                let next = Mover { pose: step * from, ..mover };
+                let next = MovingBody { pose: step * from, ..mover };
                 let near = holds.near(&next).unwrap();
-                let middle =
-                    Mover { pose: interpolate(&from, &next.pose, &scene.centre_in_shape(1), 0.5), ..mover };
+                let middle = MovingBody {
+                    pose: interpolate(&from, &next.pose, &scene.centre_in_shape(1), 0.5),
+                    ..mover
+                };
                 if near.contacts.iter().any(|c| c.gap < -DEPTH_TOLERANCE)
                     || !holds.is_clear_at(&middle).unwrap()
                 {

@@ -13,23 +13,23 @@ use nalgebra::Vector3;
 
 use crate::budgets::REMEMBERED_SHIFT_PIECES;
 use crate::geometry::{Pose, Shape};
-use crate::scene::{Pair, Scene, grouped};
+use crate::scene::{CongruentPair, Scene, grouped};
 use crate::termination::Interrupt;
 use crate::tolerances::CONGRUENT_PAIR_DISTANCE;
 
-use super::cell::Cell;
+use super::cell::ShiftPiece;
 
 /// A pair of a part that begins to move and one that stands.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Place<'a> {
+pub(crate) struct StartPair<'a> {
     pub(crate) part: usize,
     pub(crate) start: &'a Pose,
     pub(crate) other: usize,
     /// Under which key it is kept, if it is one that is.
-    kept_as: Option<Key>,
+    kept_as: Option<StartKey>,
 }
 
-impl<'a> Place<'a> {
+impl<'a> StartPair<'a> {
     pub(crate) fn new(part: usize, start: &'a Pose, other: usize) -> Self {
         Self { part, start, other, kept_as: None }
     }
@@ -37,16 +37,16 @@ impl<'a> Place<'a> {
 
 /// All of one side of a pair in cells without a shift.
 #[derive(Debug, Clone)]
-pub(crate) struct Gathered {
+pub(crate) struct StartCover {
     /// Whether the moving part's surface is the one that is in cells.
     pub(crate) asks_part: bool,
     /// None where regions cannot tell.
-    pub(crate) cells: Option<Arc<Vec<Cell>>>,
+    pub(crate) cells: Option<Arc<Vec<ShiftPiece>>>,
     /// How many regions it took.
     pub(crate) regions: usize,
 }
 
-impl Gathered {
+impl StartCover {
     /// The same with the other part moving instead.
     fn mirrored(&self) -> Self {
         let cells = self.cells.as_deref().map(|cells| mirrored(cells));
@@ -56,19 +56,19 @@ impl Gathered {
 
 /// What becomes of a pair's cells when the part is to go somewhere from where it begins.
 #[derive(Debug, Clone)]
-pub(crate) struct Way {
+pub(crate) struct ShiftWay {
     /// Normals (planning frame) of what stops it; free where there are none.
     pub(crate) blocked: Vec<Vector3<f64>>,
     /// The cells that let it go; those that it had where it is stopped; none where regions cannot
     /// tell.
-    pub(crate) cells: Option<Arc<Vec<Cell>>>,
+    pub(crate) cells: Option<Arc<Vec<ShiftPiece>>>,
     /// How many of them were found for this way: the last ones.
     pub(crate) found: usize,
     /// How many regions it took.
     pub(crate) regions: usize,
 }
 
-impl Way {
+impl ShiftWay {
     fn mirrored(&self) -> Self {
         let blocked = self.blocked.iter().map(|n| -n).collect();
         let cells = self.cells.as_deref().map(|cells| mirrored(cells));
@@ -76,35 +76,35 @@ impl Way {
     }
 }
 
-fn size(cells: Option<&Arc<Vec<Cell>>>) -> usize {
+fn size(cells: Option<&Arc<Vec<ShiftPiece>>>) -> usize {
     1 + cells.map_or(0, |cells| cells.len())
 }
 
-fn memory(cells: Option<&Vec<Cell>>) -> usize {
-    cells.map_or(0, |cells| cells.iter().map(Cell::memory).sum())
+fn memory(cells: Option<&Vec<ShiftPiece>>) -> usize {
+    cells.map_or(0, |cells| cells.iter().map(ShiftPiece::memory).sum())
 }
 
-fn mirrored(cells: &[Cell]) -> Arc<Vec<Cell>> {
-    Arc::new(cells.iter().map(Cell::mirrored).collect())
+fn mirrored(cells: &[ShiftPiece]) -> Arc<Vec<ShiftPiece>> {
+    Arc::new(cells.iter().map(ShiftPiece::mirrored).collect())
 }
 
 /// What is kept.
 #[derive(Debug, Default)]
-pub struct KeptCells {
-    kept: Mutex<Kept>,
+pub struct ShiftCoverCache {
+    kept: Mutex<CacheEntries>,
     /// Of the pairs that stand alike, assembled, the first.
     firsts: OnceLock<HashMap<(usize, usize), (usize, usize)>>,
 }
 
 #[derive(Debug, Default)]
-struct Kept {
-    gathered: HashMap<Key, Arc<Gathered>>,
-    ways: HashMap<(Key, [u64; 3], bool), Arc<Way>>,
+struct CacheEntries {
+    gathered: HashMap<StartKey, Arc<StartCover>>,
+    ways: HashMap<(StartKey, [u64; 3], bool), Arc<ShiftWay>>,
     /// How many cells are kept of what may be forgotten.
     count: usize,
 }
 
-impl Kept {
+impl CacheEntries {
     /// Makes room for so many cells: displaced pairs and ways may be forgotten.
     fn make_room(&mut self, cells: usize) {
         self.count += cells;
@@ -118,22 +118,22 @@ impl Kept {
 
 /// Where a pair is; assembled without the bits of a start pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-struct Key {
+struct StartKey {
     part: usize,
     other: usize,
     start: Option<[u64; 7]>,
 }
 
 /// A place as it is kept: the same for pairs that stand alike, and for both parts of a pair.
-struct Canonical {
-    key: Key,
+struct CanonicalStart {
+    key: StartKey,
     /// Where it is found, if not at the place itself.
-    alone: Option<Pair>,
+    alone: Option<CongruentPair>,
     /// Whether the other part moves in it.
     is_mirrored: bool,
 }
 
-impl KeptCells {
+impl ShiftCoverCache {
     /// Those of a scene.
     #[must_use]
     pub fn of(scene: &Scene) -> Arc<Self> {
@@ -153,10 +153,10 @@ impl KeptCells {
     pub(crate) fn gathered(
         &self,
         scene: &Scene,
-        place: &Place<'_>,
-        find: impl Fn(&Scene, &Place<'_>) -> Result<Gathered, Interrupt>,
-    ) -> Result<Arc<Gathered>, Interrupt> {
-        let Canonical { key, alone, is_mirrored } = self.canonical(scene, place);
+        place: &StartPair<'_>,
+        find: impl Fn(&Scene, &StartPair<'_>) -> Result<StartCover, Interrupt>,
+    ) -> Result<Arc<StartCover>, Interrupt> {
+        let CanonicalStart { key, alone, is_mirrored } = self.canonical(scene, place);
         let known = self.lock().gathered.get(&key).cloned();
         let found = if let Some(known) = known {
             known
@@ -174,11 +174,11 @@ impl KeptCells {
     pub(crate) fn way(
         &self,
         scene: &Scene,
-        place: &Place<'_>,
+        place: &StartPair<'_>,
         (u, far): (&Vector3<f64>, bool),
-        find: impl Fn(&Scene, &Place<'_>, &Vector3<f64>) -> Result<Way, Interrupt>,
-    ) -> Result<Arc<Way>, Interrupt> {
-        let Canonical { key: pair_key, alone, is_mirrored } = self.canonical(scene, place);
+        find: impl Fn(&Scene, &StartPair<'_>, &Vector3<f64>) -> Result<ShiftWay, Interrupt>,
+    ) -> Result<Arc<ShiftWay>, Interrupt> {
+        let CanonicalStart { key: pair_key, alone, is_mirrored } = self.canonical(scene, place);
         // The sum makes −0 to 0.
         let u = if is_mirrored { -u } else { *u } + Vector3::zeros();
         let key = (pair_key, <[f64; 3]>::from(u).map(f64::to_bits), far);
@@ -186,7 +186,7 @@ impl KeptCells {
         let found = if let Some(known) = known {
             known
         } else {
-            let find = |scene: &Scene, place: &Place<'_>| find(scene, place, &u);
+            let find = |scene: &Scene, place: &StartPair<'_>| find(scene, place, &u);
             let found = Arc::new(at_place(scene, place, alone, pair_key, &find)?);
             let mut kept = self.lock();
             kept.make_room(size(found.cells.as_ref()));
@@ -196,20 +196,20 @@ impl KeptCells {
         Ok(if is_mirrored { Arc::new(found.mirrored()) } else { found })
     }
 
-    fn canonical(&self, scene: &Scene, place: &Place<'_>) -> Canonical {
-        let Place { part, start, other, kept_as } = *place;
+    fn canonical(&self, scene: &Scene, place: &StartPair<'_>) -> CanonicalStart {
+        let StartPair { part, start, other, kept_as } = *place;
         if let Some(key) = kept_as {
-            return Canonical { key, alone: None, is_mirrored: false };
+            return CanonicalStart { key, alone: None, is_mirrored: false };
         }
         if start != &scene.bodies[part].planning_from_shape {
-            let key = Key { part, other, start: Some(bits(start)) };
-            return Canonical { key, alone: None, is_mirrored: false };
+            let key = StartKey { part, other, start: Some(bits(start)) };
+            return CanonicalStart { key, alone: None, is_mirrored: false };
         }
         let in_order = ordered(scene, part, other);
         let (part, other) = self.first_alike(scene, in_order);
-        let alone = Some(Pair::shifted(scene, part, &scene.bodies[part].planning_from_shape, other));
+        let alone = Some(CongruentPair::shifted(scene, part, &scene.bodies[part].planning_from_shape, other));
         let is_mirrored = in_order != (place.part, place.other);
-        Canonical { key: Key { part, other, start: None }, alone, is_mirrored }
+        CanonicalStart { key: StartKey { part, other, start: None }, alone, is_mirrored }
     }
 
     fn first_alike(&self, scene: &Scene, pair: (usize, usize)) -> (usize, usize) {
@@ -224,7 +224,7 @@ impl KeptCells {
     }
 
     /// It holds plain data: it is whole even if a holder panicked.
-    fn lock(&self) -> MutexGuard<'_, Kept> {
+    fn lock(&self) -> MutexGuard<'_, CacheEntries> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -232,20 +232,20 @@ impl KeptCells {
 /// Finds something about a place, or about the pair that is kept for it.
 fn at_place<T>(
     scene: &Scene,
-    place: &Place<'_>,
-    alone: Option<Pair>,
-    key: Key,
-    find: &dyn Fn(&Scene, &Place<'_>) -> Result<T, Interrupt>,
+    place: &StartPair<'_>,
+    alone: Option<CongruentPair>,
+    key: StartKey,
+    find: &dyn Fn(&Scene, &StartPair<'_>) -> Result<T, Interrupt>,
 ) -> Result<T, Interrupt> {
     let Some(pair) = alone else { return find(scene, place) };
     // What is found on the way is kept here, too.
     let alone = Scene { memo: scene.memo.clone(), ..pair.scene(scene) };
-    find(&alone, &Place { part: 0, start: &pair.poses[0], other: 1, kept_as: Some(key) })
+    find(&alone, &StartPair { part: 0, start: &pair.poses[0], other: 1, kept_as: Some(key) })
 }
 
 /// What pairs have in common that stand alike: the same shapes, poses and allowance.
 fn alike(scene: &Scene, a: usize, b: usize) -> ([*const Shape; 2], [[u64; 7]; 2], u64) {
-    let pair = Pair::shifted(scene, a, &scene.bodies[a].planning_from_shape, b);
+    let pair = CongruentPair::shifted(scene, a, &scene.bodies[a].planning_from_shape, b);
     let shapes = pair.parts.map(|part| Arc::as_ptr(&scene.bodies[part].shape));
     (shapes, pair.poses.map(|pose| bits(&pose)), scene.allowances.of(a, b).to_bits())
 }
@@ -266,7 +266,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{cuboid, moved, scene};
     use crate::geometry::SourceMesh;
-    use crate::scene::Surroundings;
+    use crate::scene::StandingParts;
     use crate::simulation::{Action, Axis, End, Motion, SlidingEngine, TransitionFunction};
     use crate::termination::Termination;
 
@@ -282,7 +282,7 @@ mod tests {
 
     fn motion(scene: &Scene, part: usize, lift: f64, action: Action) -> Motion {
         let standing = (0..scene.bodies.len()).filter(|&i| i != part).collect();
-        let around = Surroundings::new(scene, standing);
+        let around = StandingParts::new(scene, standing);
         let start = Pose::translation(0.0, 0.0, lift) * scene.bodies[part].planning_from_shape;
         SlidingEngine.simulate(scene, &around, part, &start, action, &Termination::default()).unwrap()
     }
@@ -312,7 +312,7 @@ mod tests {
             let with = vec![part ^ 1];
             assert_eq!((path.len(), end), (1, End::Collision { with }), "{part} {action}");
         }
-        let kept = KeptCells::of(&scene);
+        let kept = ShiftCoverCache::of(&scene);
         let kept = kept.lock();
         assert_eq!(kept.gathered.iter().filter(|(key, _)| key.part ^ 1 == key.other).count(), 1);
     }

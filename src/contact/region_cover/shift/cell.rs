@@ -5,13 +5,13 @@ use nalgebra::{Point3, Vector3};
 use crate::budgets::LOWEST_POINTS;
 use crate::tolerances::{SAME_FACE, SHIFT_SUNK, TILT, TOUCHED};
 
-use super::super::surface_pair::{Facing, Obstacle, Placed, Slope, Spot};
+use super::super::surface_pair::{CoverPiece, Obstacle, PlacedPiece, Slope, SurfacePair};
 
 /// A piece that is free while the shift stays within limits.
 #[derive(Debug, Clone)]
-pub(crate) struct Cell {
-    pub(crate) spot: Spot,
-    pub(crate) limits: Vec<Limit>,
+pub(crate) struct ShiftPiece {
+    pub(crate) spot: CoverPiece,
+    pub(crate) limits: Vec<ShiftLimit>,
     /// The shift must stay in this ball, too.
     pub(crate) middle: Vector3<f64>,
     pub(crate) room: f64,
@@ -21,14 +21,14 @@ pub(crate) struct Cell {
 
 /// normal · shift ≥ height.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Limit {
+pub(crate) struct ShiftLimit {
     pub(crate) normal: Vector3<f64>,
     pub(crate) height: f64,
     /// The triangle of the measured surface that it keeps the piece in front of.
     pub(crate) triangle: u32,
 }
 
-impl Cell {
+impl ShiftPiece {
     /// Bytes in memory.
     pub(crate) fn memory(&self) -> usize {
         size_of::<Self>() + size_of_val(&*self.limits)
@@ -36,7 +36,7 @@ impl Cell {
 
     /// The same with the other part of the pair moving instead.
     pub(crate) fn mirrored(&self) -> Self {
-        let limits = self.limits.iter().map(|l| Limit { normal: -l.normal, ..*l }).collect();
+        let limits = self.limits.iter().map(|l| ShiftLimit { normal: -l.normal, ..*l }).collect();
         Self { limits, middle: -self.middle, ..*self }
     }
 
@@ -58,7 +58,12 @@ impl Cell {
     }
 
     /// What of it is in the way of a shift from `at` along `u`.
-    pub(crate) fn obstacles(&self, pair: &Facing<'_>, at: &Vector3<f64>, u: &Vector3<f64>) -> Vec<Obstacle> {
+    pub(crate) fn obstacles(
+        &self,
+        pair: &SurfacePair<'_>,
+        at: &Vector3<f64>,
+        u: &Vector3<f64>,
+    ) -> Vec<Obstacle> {
         let blocking = self.limits.iter().filter(|l| l.blocks(at, u));
         blocking.map(|l| Obstacle { normal: l.normal, other: pair.other }).collect()
     }
@@ -67,12 +72,12 @@ impl Cell {
     /// that are lowest before limits no further off than `reach`, or what gets over the triangles of these.
     pub(crate) fn touched(
         &self,
-        pair: &Facing<'_>,
+        pair: &SurfacePair<'_>,
         (at, u): (&Vector3<f64>, &Vector3<f64>),
         reach: f64,
-        placed: &mut Placed,
+        placed: &mut PlacedPiece,
     ) -> Vec<Obstacle> {
-        let Spot { piece, guess, .. } = &self.spot;
+        let CoverPiece { piece, guess, .. } = &self.spot;
         let ahead = || self.limits.iter().filter(|limit| limit.is_ahead(at, u, reach));
         if ahead().next().is_none() {
             return Vec::new();
@@ -87,7 +92,7 @@ impl Cell {
             probes.extend(touching.take(LOWEST_POINTS).map(|(_, p)| *p));
         }
         // A point beside an edge enters a face that need not be passed: the plane lies before the other one.
-        let agrees = |limit: &Limit, o: &Obstacle| limit.normal.dot(&o.normal) > SAME_FACE;
+        let agrees = |limit: &ShiftLimit, o: &Obstacle| limit.normal.dot(&o.normal) > SAME_FACE;
         // Where it touches now it is seen again at the next step: no witnesses are kept of that.
         let mut by_points = pair.obstacles(&probes, (at, u), (*guess, Slope::Steep), &mut Vec::new());
         by_points.retain(|o| ahead().any(|limit| agrees(limit, o)));
@@ -95,7 +100,7 @@ impl Cell {
             return by_points;
         }
         let guess = pair.triangle_of(piece).unwrap_or(0);
-        let by_triangle = |limit: &Limit| {
+        let by_triangle = |limit: &ShiftLimit| {
             pair.obstacle_of_triangle(limit.triangle, (at, u), guess).filter(|o| agrees(limit, o))
         };
         ahead().find_map(by_triangle).into_iter().collect()
@@ -108,7 +113,7 @@ impl Cell {
     }
 }
 
-impl Limit {
+impl ShiftLimit {
     fn gap(&self, at: &Vector3<f64>) -> f64 {
         self.normal.dot(at) - self.height
     }

@@ -10,9 +10,11 @@ use crate::tolerances::{
     SMALL_BIT_AHEAD, SMALLEST_BIT,
 };
 
-use super::super::surface_pair::{Facing, Obstacle, Piece, Placed, Seen, Slope, Spot, Witness};
+use super::super::surface_pair::{
+    CoverPiece, Obstacle, Piece, PlacedPiece, SignedClosest, Slope, SurfacePair, Witness,
+};
 use super::super::{Halt, cover};
-use super::cell::{Cell, Limit};
+use super::cell::{ShiftLimit, ShiftPiece};
 
 /// Which of these is asked for first; the shorter ones only where something is near ahead.
 const SHORT: usize = 2;
@@ -22,40 +24,40 @@ const BESIDE: usize = 3;
 
 /// A question about a piece: from which shift on, and which way it is to go on.
 #[derive(Clone, Copy)]
-struct Wish {
+struct WantedShift {
     at: Vector3<f64>,
     /// A unit vector, or nothing.
     along: Vector3<f64>,
 }
 
 /// A piece that is to get a cell yet, and what came of looking at it, if somebody had the time.
-struct Waiting {
-    spot: Spot,
+struct PendingPiece {
+    spot: CoverPiece,
     /// Which share it is of all: halves of a piece count as much as each other.
     share: f64,
-    looked: Option<Looked>,
+    looked: Option<PieceSearch>,
 }
 
 /// What came of looking for a cell for all of a piece: it depends on the piece and the wish alone.
-struct Looked {
+struct PieceSearch {
     /// With the triangle that was nearest.
-    spot: Spot,
-    cell: Option<Cell>,
+    spot: CoverPiece,
+    cell: Option<ShiftPiece>,
     is_smallest: bool,
     /// How many regions it took.
     regions: usize,
 }
 
 /// A search for cells of one pair.
-pub(crate) struct Finder<'a> {
+pub(crate) struct ShiftSearch<'a> {
     termination: &'a Termination,
-    pair: &'a Facing<'a>,
+    pair: &'a SurfacePair<'a>,
     /// How many regions were looked for.
     pub(crate) regions: usize,
     /// No more than this.
     pub(crate) budget: usize,
     /// What was found.
-    pub(crate) cells: Vec<Cell>,
+    pub(crate) cells: Vec<ShiftPiece>,
     /// Normals of what is certainly in the way.
     pub(crate) obstacles: Vec<Vector3<f64>>,
     /// Points that show it.
@@ -63,21 +65,21 @@ pub(crate) struct Finder<'a> {
     /// How many regions all of those pieces seem to need that are to have cells where they are.
     pub(crate) needed: f64,
     /// Pieces that are to get cells yet, of those that are to have some where they are; the next one last.
-    waiting: Vec<Waiting>,
+    waiting: Vec<PendingPiece>,
     /// The piece at hand.
-    placed: Placed,
+    placed: PlacedPiece,
 }
 
-impl<'a> Finder<'a> {
+impl<'a> ShiftSearch<'a> {
     /// A search for cells of all of the asked surface, of which no piece may be further outside than `held`.
-    pub(crate) fn of_all(pair: &'a Facing<'a>, held: f64, termination: &'a Termination) -> Self {
+    pub(crate) fn of_all(pair: &'a SurfacePair<'a>, held: f64, termination: &'a Termination) -> Self {
         let mut finder = Self::new(pair, 0, termination);
-        let all = pair.root().map(|piece| Spot { piece, guess: 0, level: 0, held });
-        finder.waiting.extend(all.map(|spot| Waiting { spot, share: 1.0, looked: None }));
+        let all = pair.root().map(|piece| CoverPiece { piece, guess: 0, level: 0, held });
+        finder.waiting.extend(all.map(|spot| PendingPiece { spot, share: 1.0, looked: None }));
         finder
     }
 
-    pub(crate) fn new(pair: &'a Facing<'a>, budget: usize, termination: &'a Termination) -> Self {
+    pub(crate) fn new(pair: &'a SurfacePair<'a>, budget: usize, termination: &'a Termination) -> Self {
         Self {
             termination,
             pair,
@@ -88,14 +90,14 @@ impl<'a> Finder<'a> {
             witnesses: Vec::new(),
             needed: 0.0,
             waiting: Vec::new(),
-            placed: Placed::default(),
+            placed: PlacedPiece::default(),
         }
     }
 
     /// Goes on to find cells for [all](Self::of_all) pieces at a shift, always the same one, as free around it as can
     /// be, with no more than so many regions in all and not many more cells than `most`. Whether that was enough.
     pub(crate) fn gather(&mut self, at: &Vector3<f64>, budget: usize, most: usize) -> Result<bool, Halt> {
-        let wish = Wish { at: *at, along: Vector3::zeros() };
+        let wish = WantedShift { at: *at, along: Vector3::zeros() };
         self.budget = budget;
         let (regions, left) = (self.regions, self.left());
         while let Some(next) = self.waiting.pop() {
@@ -108,7 +110,7 @@ impl<'a> Finder<'a> {
                 return Ok(false);
             }
             let looked = next.looked.unwrap_or_else(|| self.looked_beside(&next.spot, &wish));
-            let Looked { spot, cell, is_smallest, regions } = looked;
+            let PieceSearch { spot, cell, is_smallest, regions } = looked;
             self.regions += regions;
             if let Some(cell) = cell {
                 self.cells.push(cell);
@@ -118,7 +120,11 @@ impl<'a> Finder<'a> {
             } else {
                 let parts = self.pair.parts(&spot.piece);
                 let share = next.share / parts.len() as f64;
-                let waiting = |piece| Waiting { spot: Spot { piece, level: 0, ..spot }, share, looked: None };
+                let waiting = |piece| PendingPiece {
+                    spot: CoverPiece { piece, level: 0, ..spot },
+                    share,
+                    looked: None,
+                };
                 self.waiting.extend(parts.into_iter().rev().map(waiting));
             }
         }
@@ -132,44 +138,45 @@ impl<'a> Finder<'a> {
 
     /// Looks for a cell for a piece, and, side by side with that, for those for the pieces that come next, most
     /// likely: where a single pair is new, nobody else has anything to do. They take unequally long.
-    fn looked_beside(&mut self, spot: &Spot, wish: &Wish) -> Looked {
+    fn looked_beside(&mut self, spot: &CoverPiece, wish: &WantedShift) -> PieceSearch {
         let (pair, termination) = (self.pair, self.termination);
-        let look = |spot: &Spot| Finder::new(pair, 1, termination).looked(*spot, wish);
+        let look = |spot: &CoverPiece| ShiftSearch::new(pair, 1, termination).looked(*spot, wish);
         if !other_thread() {
             return look(spot);
         }
         let from = self.waiting.len().saturating_sub(BESIDE);
         let not_yet = self.waiting[from..].iter_mut().filter(|waiting| waiting.looked.is_none());
-        let beside: Vec<&mut Waiting> = not_yet.collect();
-        let look_at = |waiting: &mut Waiting| waiting.looked = Some(look(&waiting.spot));
+        let beside: Vec<&mut PendingPiece> = not_yet.collect();
+        let look_at = |waiting: &mut PendingPiece| waiting.looked = Some(look(&waiting.spot));
         rayon::join(|| look(spot), || beside.into_par_iter().for_each(look_at)).0
     }
 
-    fn looked(mut self, mut spot: Spot, wish: &Wish) -> Looked {
+    fn looked(mut self, mut spot: CoverPiece, wish: &WantedShift) -> PieceSearch {
         let seen = self.place(&mut spot, wish);
         let free = self.free(&spot, &seen, wish);
         let cell = free.or_else(|| self.held(&spot, &seen, wish, &Vector3::zeros()).ok());
-        Looked { spot, cell, is_smallest: self.is_smallest(&spot), regions: self.regions }
+        PieceSearch { spot, cell, is_smallest: self.is_smallest(&spot), regions: self.regions }
     }
 
     /// Finds cells for a piece at a shift, as free along the unit vector `u` as can be.
-    pub(crate) fn find(&mut self, spot: Spot, at: &Vector3<f64>, u: &Vector3<f64>) -> Result<(), Halt> {
-        let wish = Wish { at: *at, along: *u };
+    pub(crate) fn find(&mut self, spot: CoverPiece, at: &Vector3<f64>, u: &Vector3<f64>) -> Result<(), Halt> {
+        let wish = WantedShift { at: *at, along: *u };
         cover(spot, |spot, parts| self.renew(spot, &wish, parts))
     }
 
     /// A cell for all of a piece that lets it go further than `least` along the unit vector `u`, if there
     /// is one.
-    pub(crate) fn far(&mut self, mut spot: Spot, u: &Vector3<f64>, least: f64) -> Option<Cell> {
-        let wish = Wish { at: Vector3::zeros(), along: *u };
+    pub(crate) fn far(&mut self, mut spot: CoverPiece, u: &Vector3<f64>, least: f64) -> Option<ShiftPiece> {
+        let wish = WantedShift { at: Vector3::zeros(), along: *u };
         let seen = self.place(&mut spot, &wish);
-        let let_go =
-            |level: usize| self.held(&Spot { level, ..spot }, &seen, &wish, &(u * SHIFTS_AHEAD[level])).ok();
+        let let_go = |level: usize| {
+            self.held(&CoverPiece { level, ..spot }, &seen, &wish, &(u * SHIFTS_AHEAD[level])).ok()
+        };
         (0..SHORT).find_map(let_go).filter(|cell| cell.length(&wish.at, u) > least)
     }
 
     /// Takes a piece in hand: what its middle sees.
-    fn place(&mut self, spot: &mut Spot, wish: &Wish) -> Seen {
+    fn place(&mut self, spot: &mut CoverPiece, wish: &WantedShift) -> SignedClosest {
         self.pair.place(&spot.piece, &wish.at, &mut self.placed);
         let seen = self.pair.look(&self.placed.centre, spot.guess);
         spot.guess = seen.closest.triangle;
@@ -177,12 +184,12 @@ impl<'a> Finder<'a> {
     }
 
     /// A cell for the piece at hand if it is so far off that it needs no region.
-    fn free(&self, spot: &Spot, seen: &Seen, wish: &Wish) -> Option<Cell> {
+    fn free(&self, spot: &CoverPiece, seen: &SignedClosest, wish: &WantedShift) -> Option<ShiftPiece> {
         let room = seen.signed - self.placed.radius;
         let held = if self.pair.allowance > 0.0 { spot.held } else { HELD };
         let ball = (self.placed.centre, seen.signed);
-        let spot = Spot { held, ..*spot };
-        (room >= CONTACT_STEP).then(|| Cell { spot, limits: Vec::new(), middle: wish.at, room, ball })
+        let spot = CoverPiece { held, ..*spot };
+        (room >= CONTACT_STEP).then(|| ShiftPiece { spot, limits: Vec::new(), middle: wish.at, room, ball })
     }
 
     fn block(&mut self, by: &[Obstacle]) {
@@ -190,7 +197,12 @@ impl<'a> Finder<'a> {
     }
 
     /// Finds a cell for a piece, as free along the wish as can be, or pushes its parts.
-    fn renew(&mut self, mut spot: Spot, wish: &Wish, parts: &mut Vec<Spot>) -> Result<(), Halt> {
+    fn renew(
+        &mut self,
+        mut spot: CoverPiece,
+        wish: &WantedShift,
+        parts: &mut Vec<CoverPiece>,
+    ) -> Result<(), Halt> {
         self.termination.check()?;
         if self.regions >= self.budget {
             return Err(Halt::Lost);
@@ -202,7 +214,7 @@ impl<'a> Finder<'a> {
         }
         let small = matches!(spot.piece, Piece::Bit(_)) && self.placed.radius < SMALL_BIT_AHEAD;
         let let_go = |cells: &mut Self, level: usize| {
-            cells.held(&Spot { level, ..spot }, &seen, wish, &(wish.along * SHIFTS_AHEAD[level]))
+            cells.held(&CoverPiece { level, ..spot }, &seen, wish, &(wish.along * SHIFTS_AHEAD[level]))
         };
         match let_go(self, SHORT) {
             Ok(short) => {
@@ -236,7 +248,7 @@ impl<'a> Finder<'a> {
             self.cells.push(cell);
             return Ok(());
         }
-        if let Ok(cell) = self.held(&Spot { level: 0, ..spot }, &seen, wish, &Vector3::zeros()) {
+        if let Ok(cell) = self.held(&CoverPiece { level: 0, ..spot }, &seen, wish, &Vector3::zeros()) {
             if cell.length(&wish.at, &wish.along) > ROUNDED {
                 self.cells.push(cell);
                 return Ok(());
@@ -251,18 +263,18 @@ impl<'a> Finder<'a> {
     }
 
     /// Whether a triangle may lie beside the piece at hand.
-    fn is_beside(&self, spot: &Spot, triangle: u32) -> bool {
+    fn is_beside(&self, spot: &CoverPiece, triangle: u32) -> bool {
         let pair = self.pair;
         pair.is_beside(&self.placed, triangle, pair.allowance + spot.held)
     }
 
     /// Whether the piece at hand, without a region, is too small to be split.
-    fn is_smallest(&self, spot: &Spot) -> bool {
+    fn is_smallest(&self, spot: &CoverPiece) -> bool {
         matches!(spot.piece, Piece::Bit(_)) && self.placed.radius < SMALLEST_BIT
     }
 
     /// The piece at hand, too small to be split, gets a cell before a face, or is lost.
-    fn end(&mut self, spot: &Spot, wish: &Wish) -> Result<(), Halt> {
+    fn end(&mut self, spot: &CoverPiece, wish: &WantedShift) -> Result<(), Halt> {
         let cell = self.before_face(spot, wish).ok_or(Halt::Lost)?;
         let blocked = cell.obstacles(self.pair, &wish.at, &wish.along);
         if !blocked.is_empty() {
@@ -274,20 +286,25 @@ impl<'a> Finder<'a> {
     }
 
     /// Pushes the parts of the piece at hand, or ends with it if it is too small.
-    fn split(&mut self, spot: &Spot, wish: &Wish, parts: &mut Vec<Spot>) -> Result<(), Halt> {
+    fn split(
+        &mut self,
+        spot: &CoverPiece,
+        wish: &WantedShift,
+        parts: &mut Vec<CoverPiece>,
+    ) -> Result<(), Halt> {
         if self.is_smallest(spot) {
             return self.end(spot, wish);
         }
         let pieces = self.pair.parts(&spot.piece);
-        parts.extend(pieces.into_iter().rev().map(|piece| Spot { piece, level: 0, ..*spot }));
+        parts.extend(pieces.into_iter().rev().map(|piece| CoverPiece { piece, level: 0, ..*spot }));
         Ok(())
     }
 
     /// The piece at hand, a small bit no deeper than it may be, before the face that it is nearest
     /// to: where facets with granted overlap lie across each other there are no regions. That is not
     /// certain, as regions are; paths are verified.
-    fn before_face(&self, spot: &Spot, wish: &Wish) -> Option<Cell> {
-        let (pair, Placed { points, centre, .. }) = (self.pair, &self.placed);
+    fn before_face(&self, spot: &CoverPiece, wish: &WantedShift) -> Option<ShiftPiece> {
+        let (pair, PlacedPiece { points, centre, .. }) = (self.pair, &self.placed);
         if pair.allowance == 0.0 {
             return None;
         }
@@ -309,9 +326,9 @@ impl<'a> Finder<'a> {
         let gap = points.iter().map(|p| inward.dot(&(p - closest.point))).fold(f64::INFINITY, f64::min);
         let normal = pair.shifted.transpose() * inward;
         let height = normal.dot(&wish.at) - gap.max(0.0) - (held - depth) / 3f64.sqrt();
-        Some(Cell {
+        Some(ShiftPiece {
             spot: *spot,
-            limits: vec![Limit { normal, height, triangle: closest.triangle }],
+            limits: vec![ShiftLimit { normal, height, triangle: closest.triangle }],
             middle: wish.at,
             room: SHIFTS_AHEAD[SHORT],
             ball: (*centre, self.placed.radius + SHIFTS_AHEAD[SHORT]),
@@ -321,16 +338,16 @@ impl<'a> Finder<'a> {
     /// The piece at hand in a region that also lets it go by a shift.
     fn held(
         &mut self,
-        spot: &Spot,
-        seen: &Seen,
-        wish: &Wish,
+        spot: &CoverPiece,
+        seen: &SignedClosest,
+        wish: &WantedShift,
         shift: &Vector3<f64>,
-    ) -> Result<Cell, NoRegion> {
+    ) -> Result<ShiftPiece, NoRegion> {
         self.regions += 1;
         let pair = self.pair;
         let most = pair.allowance + spot.held;
         let ahead = pair.shifted * shift;
-        let Placed { points, cloud, extremes, centre, radius } = &self.placed;
+        let PlacedPiece { points, cloud, extremes, centre, radius } = &self.placed;
         let of = |points| Wanted { points, most, from_behind: true, facing: Vector3::zeros() };
         let region = if ahead == Vector3::zeros() {
             let around = (radius + CONTACT_STEP) * REGION_ROOM;
@@ -352,7 +369,7 @@ impl<'a> Finder<'a> {
         let back = pair.shifted.transpose();
         let limits = region.planes().zip(&gaps).map(|((inward, triangle), gap)| {
             let normal = back * inward;
-            Limit { normal, height: normal.dot(&wish.at) - gap.max(0.0) - slack, triangle }
+            ShiftLimit { normal, height: normal.dot(&wish.at) - gap.max(0.0) - slack, triangle }
         });
         let limits = limits.collect();
         // The ball around the piece stays in that of the region, or all its points are far enough
@@ -367,7 +384,7 @@ impl<'a> Finder<'a> {
         let held = if pair.allowance > 0.0 { HELD_AT_FIRST } else { HELD.max(depth + HELD / 10.0) };
         let held = held.min(spot.held);
         let ball = (region.centre(), region.radius());
-        let cell = Cell { spot: Spot { held, ..*spot }, limits, middle, room, ball };
+        let cell = ShiftPiece { spot: CoverPiece { held, ..*spot }, limits, middle, room, ball };
         let too_small = ahead != Vector3::zeros()
             && cell.length(&wish.at, &wish.along) < LEAST_SHARE_AHEAD * shift.norm();
         if too_small { Err(NoRegion::Cramped) } else { Ok(cell) }
@@ -392,8 +409,8 @@ mod tests {
         pool.install(|| {
             let termination = Termination::default();
             let start = scene.bodies[1].planning_from_shape;
-            let facing = Facing::new(&scene, (1, &start), 0, asks_part, &termination).unwrap();
-            let mut finder = Finder::of_all(&facing, HELD_AT_FIRST, &termination);
+            let facing = SurfacePair::new(&scene, (1, &start), 0, asks_part, &termination).unwrap();
+            let mut finder = ShiftSearch::of_all(&facing, HELD_AT_FIRST, &termination);
             let mut told = Vec::new();
             for budget in [1, 5, 16, 64, 4096] {
                 let ended = finder.gather(&Vector3::zeros(), budget, usize::MAX);

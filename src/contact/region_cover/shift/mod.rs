@@ -26,34 +26,34 @@ mod cell;
 mod finder;
 
 use super::Halt;
-use super::surface_pair::{Facing, Obstacle, Placed, Witness};
-use cache::{Gathered, Place, Way};
-use finder::Finder;
+use super::surface_pair::{Obstacle, PlacedPiece, SurfacePair, Witness};
+use cache::{ShiftWay, StartCover, StartPair};
+use finder::ShiftSearch;
 
-pub(crate) use cell::Cell;
+pub(crate) use cell::ShiftPiece;
 
-pub use cache::KeptCells;
+pub use cache::ShiftCoverCache;
 
 /// All pieces of all pairs of a part with what is near it.
-pub(crate) struct Cells<'a> {
+pub(crate) struct ShiftCover<'a> {
     scene: &'a Scene,
     part: usize,
     /// Shifts are from here.
     start: Pose,
     termination: &'a Termination,
-    pairs: Vec<Pair<'a>>,
+    pairs: Vec<ShiftPair<'a>>,
     regions: usize,
 }
 
 /// A pair, with all of one of its surfaces in cells.
-struct Pair<'a> {
-    facing: Facing<'a>,
-    cells: Arc<Vec<Cell>>,
+struct ShiftPair<'a> {
+    facing: SurfacePair<'a>,
+    cells: Arc<Vec<ShiftPiece>>,
     /// Points that showed what was in the way last: along an obstacle they do so at each step.
     witnesses: Vec<Witness>,
 }
 
-impl<'a> Cells<'a> {
+impl<'a> ShiftCover<'a> {
     pub(crate) fn new(scene: &'a Scene, (part, start): (usize, &Pose), termination: &'a Termination) -> Self {
         Self { scene, part, start: *start, termination, pairs: Vec::new(), regions: 0 }
     }
@@ -77,12 +77,13 @@ impl<'a> Cells<'a> {
         let gathered = if at == &Vector3::zeros() {
             starting(scene, (self.part, &self.start), other, (true, SHIFT_PIECES), termination)?
         } else {
-            let place = Place::new(self.part, &self.start, other);
+            let place = StartPair::new(self.part, &self.start, other);
             Arc::new(gathered(scene, &place, at, SHIFT_PIECES, termination)?)
         };
-        let facing = Facing::new(scene, (self.part, &self.start), other, gathered.asks_part, termination)?;
+        let facing =
+            SurfacePair::new(scene, (self.part, &self.start), other, gathered.asks_part, termination)?;
         let cells = gathered.cells.clone().ok_or(Halt::Lost)?;
-        self.pairs.push(Pair { facing, cells, witnesses: Vec::new() });
+        self.pairs.push(ShiftPair { facing, cells, witnesses: Vec::new() });
         self.count(gathered.regions)
     }
 
@@ -96,7 +97,7 @@ impl<'a> Cells<'a> {
     /// `most`. Pieces whose region ends before that get another where it ends.
     pub(crate) fn advance(&mut self, at: &Vector3<f64>, u: &Vector3<f64>, most: f64) -> Result<f64, Halt> {
         // In the order in which they end, so that at each shift all pieces are in their regions.
-        let ends_of = |pair: &Pair<'_>| pair.cells.iter().map(|cell| cell.length(at, u)).collect();
+        let ends_of = |pair: &ShiftPair<'_>| pair.cells.iter().map(|cell| cell.length(at, u)).collect();
         let mut ends: Vec<Vec<f64>> = self.pairs.iter().map(ends_of).collect();
         let (mut reached, mut stalls) = (0.0, 0);
         loop {
@@ -114,7 +115,7 @@ impl<'a> Cells<'a> {
             let there = at + u * reached;
             let pair = &mut self.pairs[i];
             let left = REGIONS_PER_SHIFT - self.regions;
-            let mut finder = Finder::new(&pair.facing, left, self.termination);
+            let mut finder = ShiftSearch::new(&pair.facing, left, self.termination);
             let found = finder.find(pair.cells[k].spot, &there, u);
             let (mut cells, regions) = (finder.cells, finder.regions);
             match found {
@@ -159,9 +160,9 @@ impl<'a> Cells<'a> {
     fn known_way(&mut self, i: usize, u: &Vector3<f64>) -> Result<(Vec<Vector3<f64>>, usize), Halt> {
         let (scene, termination) = (self.scene, self.termination);
         let pair = &mut self.pairs[i];
-        let place = Place::new(self.part, &self.start, pair.facing.other);
-        let find = |scene: &Scene, place: &Place<'_>, u: &Vector3<f64>| way(scene, place, u, termination);
-        let way = KeptCells::of(scene).way(scene, &place, (u, false), find)?;
+        let place = StartPair::new(self.part, &self.start, pair.facing.other);
+        let find = |scene: &Scene, place: &StartPair<'_>, u: &Vector3<f64>| way(scene, place, u, termination);
+        let way = ShiftCoverCache::of(scene).way(scene, &place, (u, false), find)?;
         pair.cells = Arc::clone(way.cells.as_ref().ok_or(Halt::Lost)?);
         Ok((way.blocked.clone(), way.regions))
     }
@@ -171,10 +172,10 @@ impl<'a> Cells<'a> {
     pub(crate) fn lengthen(&mut self, u: &Vector3<f64>) -> Result<(), Halt> {
         let (scene, termination) = (self.scene, self.termination);
         let find =
-            |scene: &Scene, place: &Place<'_>, u: &Vector3<f64>| long_way(scene, place, u, termination);
+            |scene: &Scene, place: &StartPair<'_>, u: &Vector3<f64>| long_way(scene, place, u, termination);
         for i in 0..self.pairs.len() {
-            let place = Place::new(self.part, &self.start, self.pairs[i].facing.other);
-            let way = KeptCells::of(scene).way(scene, &place, (u, true), find)?;
+            let place = StartPair::new(self.part, &self.start, self.pairs[i].facing.other);
+            let way = ShiftCoverCache::of(scene).way(scene, &place, (u, true), find)?;
             self.pairs[i].cells = Arc::clone(way.cells.as_ref().ok_or(Halt::Lost)?);
             self.count(way.regions)?;
         }
@@ -189,7 +190,7 @@ impl<'a> Cells<'a> {
         u: &Vector3<f64>,
     ) -> Result<(Vec<Vector3<f64>>, usize), Halt> {
         let left = REGIONS_PER_SHIFT - self.regions;
-        let Pair { facing, cells, witnesses } = &mut self.pairs[i];
+        let ShiftPair { facing, cells, witnesses } = &mut self.pairs[i];
         let seen = facing.obstacles_seen_by(witnesses, (at, u));
         if !seen.is_empty() {
             return Ok((seen.into_iter().map(|o| o.normal).collect(), 0));
@@ -213,8 +214,8 @@ pub(crate) fn starting(
     other: usize,
     (is_start, most): (bool, usize),
     termination: &Termination,
-) -> Result<Arc<Gathered>, Interrupt> {
-    let place = Place::new(part, pose, other);
+) -> Result<Arc<StartCover>, Interrupt> {
+    let place = StartPair::new(part, pose, other);
     if is_start {
         kept(scene, &place, termination)
     } else {
@@ -223,30 +224,35 @@ pub(crate) fn starting(
 }
 
 /// Cells for all of a pair's surface where a motion begins.
-fn kept(scene: &Scene, place: &Place<'_>, termination: &Termination) -> Result<Arc<Gathered>, Interrupt> {
-    let find = |scene: &Scene, place: &Place<'_>| {
+fn kept(
+    scene: &Scene,
+    place: &StartPair<'_>,
+    termination: &Termination,
+) -> Result<Arc<StartCover>, Interrupt> {
+    let find = |scene: &Scene, place: &StartPair<'_>| {
         gathered(scene, place, &Vector3::zeros(), SHIFT_PIECES, termination)
     };
-    KeptCells::of(scene).gathered(scene, place, find)
+    ShiftCoverCache::of(scene).gathered(scene, place, find)
 }
 
 /// The way of a pair from where a motion begins.
 fn way(
     scene: &Scene,
-    place: &Place<'_>,
+    place: &StartPair<'_>,
     u: &Vector3<f64>,
     termination: &Termination,
-) -> Result<Way, Interrupt> {
+) -> Result<ShiftWay, Interrupt> {
     let base = kept(scene, place, termination)?;
-    let facing = Facing::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
-    let lost = Way { blocked: Vec::new(), cells: None, found: 0, regions: REGIONS_PER_SHIFT };
+    let facing =
+        SurfacePair::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
+    let lost = ShiftWay { blocked: Vec::new(), cells: None, found: 0, regions: REGIONS_PER_SHIFT };
     let Some(base) = &base.cells else { return Ok(lost) };
     let mut cells = Arc::clone(base);
     match make_way(&facing, &mut cells, (&Vector3::zeros(), u), REGIONS_PER_SHIFT, termination) {
-        Ok(Made { blocked, found, regions, .. }) => {
+        Ok(ClearedWay { blocked, found, regions, .. }) => {
             // Whoever is stopped goes another way from the same cells.
             let (cells, found) = if blocked.is_empty() { (cells, found) } else { (Arc::clone(base), 0) };
-            Ok(Way { blocked, cells: Some(cells), found, regions })
+            Ok(ShiftWay { blocked, cells: Some(cells), found, regions })
         }
         Err(Halt::Interrupted(interrupt)) => Err(interrupt),
         Err(_) => Ok(lost),
@@ -256,16 +262,17 @@ fn way(
 /// The same with longer cells where there are any.
 fn long_way(
     scene: &Scene,
-    place: &Place<'_>,
+    place: &StartPair<'_>,
     u: &Vector3<f64>,
     termination: &Termination,
-) -> Result<Way, Interrupt> {
-    let short = KeptCells::of(scene)
+) -> Result<ShiftWay, Interrupt> {
+    let short = ShiftCoverCache::of(scene)
         .way(scene, place, (u, false), |scene, place, u| way(scene, place, u, termination))?;
     let base = kept(scene, place, termination)?;
-    let facing = Facing::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
-    let mut finder = Finder::new(&facing, REGIONS_PER_SHIFT, termination);
-    let mut lengthened = |cell: &Cell| {
+    let facing =
+        SurfacePair::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
+    let mut finder = ShiftSearch::new(&facing, REGIONS_PER_SHIFT, termination);
+    let mut lengthened = |cell: &ShiftPiece| {
         termination.check()?;
         let length = cell.length(&Vector3::zeros(), u);
         let longer = if length < FREE_STEP { finder.far(cell.spot, u, length) } else { None };
@@ -279,25 +286,25 @@ fn long_way(
             *cell = lengthened(cell)?;
         }
     }
-    Ok(Way { blocked: Vec::new(), cells: cells.map(Arc::new), found: 0, regions: finder.regions })
+    Ok(ShiftWay { blocked: Vec::new(), cells: cells.map(Arc::new), found: 0, regions: finder.regions })
 }
 
 /// Cells for all of a pair's surface, at a shift; none if it takes more than `most`.
 fn gathered(
     scene: &Scene,
-    place: &Place<'_>,
+    place: &StartPair<'_>,
     at: &Vector3<f64>,
     most: usize,
     termination: &Termination,
-) -> Result<Gathered, Interrupt> {
-    let &Place { part, start, other, .. } = place;
-    let facing = |asks_part| Facing::new(scene, (part, start), other, asks_part, termination);
-    let asked = Facing::asked_first(scene, part, other);
+) -> Result<StartCover, Interrupt> {
+    let &StartPair { part, start, other, .. } = place;
+    let facing = |asks_part| SurfacePair::new(scene, (part, start), other, asks_part, termination);
+    let asked = SurfacePair::asked_first(scene, part, other);
     // On its way nothing gets deeper than the engine may let it.
     let held = if at == &Vector3::zeros() { HELD_AT_FIRST } else { HELD };
     // The first side mostly suffices: the patches of the other, perhaps of a large part, are made when it is asked.
-    let sides: Vec<OnceCell<Facing<'_>>> = asked.iter().map(|_| OnceCell::new()).collect();
-    let mut finders: Vec<Option<Finder<'_>>> = asked.iter().map(|_| None).collect();
+    let sides: Vec<OnceCell<SurfacePair<'_>>> = asked.iter().map(|_| OnceCell::new()).collect();
+    let mut finders: Vec<Option<ShiftSearch<'_>>> = asked.iter().map(|_| None).collect();
     // The one inside the other, or the plainer one, needs fewer pieces: which, shows in trying, at first of both in
     // turn. Then the one that seems to need fewer is asked on, twice as far.
     let mut budgets = vec![if asked.len() > 1 { FIRST_SIDE_REGIONS } else { REGIONS_PER_SHIFT }; asked.len()];
@@ -316,7 +323,7 @@ fn gathered(
             Some(finder) => finder,
             none => {
                 let side = facing(asks_part)?;
-                none.insert(Finder::of_all(sides[i].get_or_init(|| side), held, termination))
+                none.insert(ShiftSearch::of_all(sides[i].get_or_init(|| side), held, termination))
             }
         };
         let found = finder.gather(at, budgets[i], most);
@@ -326,18 +333,18 @@ fn gathered(
         let regions = finders.iter().flatten().map(|finder| finder.regions).sum();
         match found {
             Ok(true) if cells.len() > most => {}
-            Ok(true) => return Ok(Gathered { asks_part, cells: Some(Arc::new(cells)), regions }),
+            Ok(true) => return Ok(StartCover { asks_part, cells: Some(Arc::new(cells)), regions }),
             Ok(false) => {}
             Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
-            Err(_) => return Ok(Gathered { asks_part, cells: None, regions }),
+            Err(_) => return Ok(StartCover { asks_part, cells: None, regions }),
         }
     }
     let regions = finders.iter().flatten().map(|finder| finder.regions).sum();
-    Ok(Gathered { asks_part: true, cells: None, regions })
+    Ok(StartCover { asks_part: true, cells: None, regions })
 }
 
 /// What became of making way.
-struct Made {
+struct ClearedWay {
     /// The normals of what is in the way.
     blocked: Vec<Vector3<f64>>,
     /// Points that show that.
@@ -351,33 +358,33 @@ struct Made {
 /// The normals of what is certainly in the way, as the first piece shows that touches something ahead, if any
 /// does. Where overlap is granted, regions let pieces go on by what is left of that: it leads nowhere.
 fn touched(
-    facing: &Facing<'_>,
-    cells: &[Cell],
+    facing: &SurfacePair<'_>,
+    cells: &[ShiftPiece],
     way: (&Vector3<f64>, &Vector3<f64>),
 ) -> Option<Vec<Vector3<f64>>> {
     let reach = if facing.allowance > 0.0 { HELD_AT_FIRST } else { TOUCHED };
-    let mut placed = Placed::default();
-    let of_cell = |cell: &Cell| cell.touched(facing, way, reach, &mut placed);
+    let mut placed = PlacedPiece::default();
+    let of_cell = |cell: &ShiftPiece| cell.touched(facing, way, reach, &mut placed);
     let found = cells.iter().map(of_cell).find(|found| !found.is_empty())?;
     Some(found.into_iter().map(|obstacle| obstacle.normal).collect())
 }
 
 /// Makes way for a pair.
 fn make_way(
-    facing: &Facing<'_>,
-    cells: &mut Arc<Vec<Cell>>,
+    facing: &SurfacePair<'_>,
+    cells: &mut Arc<Vec<ShiftPiece>>,
     (at, u): (&Vector3<f64>, &Vector3<f64>),
     most: usize,
     termination: &Termination,
-) -> Result<Made, Halt> {
+) -> Result<ClearedWay, Halt> {
     if let Some(blocked) = touched(facing, cells, (at, u)) {
-        return Ok(Made { blocked, witnesses: Vec::new(), found: 0, regions: 0 });
+        return Ok(ClearedWay { blocked, witnesses: Vec::new(), found: 0, regions: 0 });
     }
-    let ends = |cell: &Cell| cell.blocks(at, u) || cell.is_exhausted(at, u);
+    let ends = |cell: &ShiftPiece| cell.blocks(at, u) || cell.is_exhausted(at, u);
     if !cells.iter().any(ends) {
-        return Ok(Made { blocked: Vec::new(), witnesses: Vec::new(), found: 0, regions: 0 });
+        return Ok(ClearedWay { blocked: Vec::new(), witnesses: Vec::new(), found: 0, regions: 0 });
     }
-    let mut finder = Finder::new(facing, most, termination);
+    let mut finder = ShiftSearch::new(facing, most, termination);
     let mut ended = Ok(());
     let of_pair = Arc::make_mut(cells);
     let mut i = 0;
@@ -397,9 +404,9 @@ fn make_way(
     let (found, regions) = (finder.cells.len(), finder.regions);
     of_pair.append(&mut finder.cells);
     match ended {
-        Ok(()) => Ok(Made { blocked: Vec::new(), witnesses: Vec::new(), found, regions }),
+        Ok(()) => Ok(ClearedWay { blocked: Vec::new(), witnesses: Vec::new(), found, regions }),
         Err(Halt::Blocked) => {
-            Ok(Made { blocked: finder.obstacles, witnesses: finder.witnesses, found, regions })
+            Ok(ClearedWay { blocked: finder.obstacles, witnesses: finder.witnesses, found, regions })
         }
         Err(halt) => Err(halt),
     }

@@ -3,15 +3,15 @@
 use nalgebra::{Vector3, Vector6};
 
 use crate::budgets::LIFT_ROUNDS;
-use crate::contact::constraint::Row;
-use crate::contact::sampled::Mover;
+use crate::contact::constraint::VelocityConstraint;
+use crate::contact::sampled::MovingBody;
 use crate::geometry::Pose;
-use crate::scene::Surroundings;
+use crate::scene::StandingParts;
 use crate::termination::Interrupt;
 use crate::tolerances::{DEPTH_TOLERANCE, LIFT, LIFT_REACH, LIFT_SPEED};
 
 use super::super::super::projection::project;
-use super::{Drive, Known};
+use super::{Drive, KnownConstraints};
 
 impl Drive {
     /// The pose in the middle of the play around the mover's: the smallest correction that gives all
@@ -19,9 +19,9 @@ impl Drive {
     /// vector) as the other.
     pub(in super::super) fn lifted(
         &self,
-        mover: &Mover<'_>,
+        mover: &MovingBody<'_>,
         axis: &Vector3<f64>,
-        surroundings: &Surroundings,
+        surroundings: &StandingParts,
     ) -> Result<Option<Pose>, Interrupt> {
         let mut here = *mover;
         let mut close = here.near(surroundings, LIFT_REACH)?;
@@ -31,11 +31,15 @@ impl Drive {
             if round > 0 && least >= LIFT * 0.5 {
                 break;
             }
-            let Known { rows, .. } = self.chosen(&here, &close, &Vector6::zeros())?;
+            let KnownConstraints { rows, .. } = self.chosen(&here, &close, &Vector6::zeros())?;
             let margins = (0..5).map(|halving| LIFT / f64::from(1 << halving)).chain([0.0]);
             let correction = margins.filter(|m| *m > least).find_map(|margin| {
-                let scale = |r: &Row| Row { a: r.a.component_div(&self.metric), b: r.b - margin, ..*r };
-                let scaled: Vec<Row> = rows.iter().map(scale).collect();
+                let scale = |r: &VelocityConstraint| VelocityConstraint {
+                    a: r.a.component_div(&self.metric),
+                    b: r.b - margin,
+                    ..*r
+                };
+                let scaled: Vec<VelocityConstraint> = rows.iter().map(scale).collect();
                 project(&Vector6::zeros(), &scaled)
             });
             let mut twist = correction.map_or(Vector6::zeros(), |c| c.w.component_div(&self.metric));
@@ -54,7 +58,7 @@ impl Drive {
 
 /// How far along an axis, after a twist, the middle is between the rows that hold a part on either side;
 /// `None` if they do not, or leave no room.
-fn middle(rows: &[Row], twist: &Vector6<f64>, axis: &Vector3<f64>) -> Option<f64> {
+fn middle(rows: &[VelocityConstraint], twist: &Vector6<f64>, axis: &Vector3<f64>) -> Option<f64> {
     let (mut back, mut forth) = (f64::NEG_INFINITY, f64::INFINITY);
     for row in rows {
         let (gap, speed) = (row.a.dot(twist) + row.b, row.a.fixed_rows::<3>(0).dot(axis));

@@ -8,8 +8,8 @@
 use nalgebra::{Translation3, Unit, Vector3, Vector6};
 
 use crate::budgets::{RELEASE_LOOKS, RELEASE_PLACES};
-use crate::contact::constraint::Row;
-use crate::contact::sampled::{Around, Contact, Mover, Near};
+use crate::contact::constraint::VelocityConstraint;
+use crate::contact::sampled::{Contact, ContactSet, ContactSource, MovingBody};
 use crate::termination::Interrupt;
 use crate::tolerances::{DEPTH_TOLERANCE, FREE_PULL, LIFT, OPPOSED_PULL};
 
@@ -17,13 +17,13 @@ use super::super::super::projection::Projected;
 use super::{Attempt, Drive, Moved, Step};
 
 /// A step that was found free of entry.
-pub(super) struct Taken<'a> {
-    pub(super) mover: &'a Mover<'a>,
-    pub(super) near: &'a Near,
+pub(super) struct FreeStep<'a> {
+    pub(super) mover: &'a MovingBody<'a>,
+    pub(super) near: &'a ContactSet,
     pub(super) twist: &'a Vector6<f64>,
     pub(super) result: &'a Projected,
     /// Its constraints, and the contacts that they come from.
-    pub(super) rows: &'a [Row],
+    pub(super) rows: &'a [VelocityConstraint],
     pub(super) contacts: &'a [Contact],
 }
 
@@ -50,9 +50,9 @@ impl Drive {
     /// One step that pulls alone what is pulled and turned at once, if nothing that is near stops it.
     pub(super) fn pulled_free(
         &self,
-        mover: &Mover<'_>,
-        near: &Near,
-        around: &mut dyn Around,
+        mover: &MovingBody<'_>,
+        near: &ContactSet,
+        around: &mut dyn ContactSource,
     ) -> Result<Option<Moved>, Interrupt> {
         let Some(pull) = self.pull() else { return Ok(None) };
         let pulling = self.pulling(pull);
@@ -71,17 +71,17 @@ impl Drive {
     /// like that other one, then like a pull.
     pub(super) fn released(
         &self,
-        step: &Taken<'_>,
-        around: &mut dyn Around,
+        step: &FreeStep<'_>,
+        around: &mut dyn ContactSource,
     ) -> Result<Option<Moved>, Interrupt> {
         let Some(pull) = self.pull() else { return Ok(None) };
-        let opposes = |row: &Row| row.a.fixed_rows::<3>(0).dot(&pull) < -OPPOSED_PULL;
+        let opposes = |row: &VelocityConstraint| row.a.fixed_rows::<3>(0).dot(&pull) < -OPPOSED_PULL;
         if !step.result.active.iter().any(|(i, _)| opposes(&step.rows[*i])) {
             return Ok(None);
         }
         let lift = Translation3::from(*pull * LIFT);
-        let lifted = |place| Mover { pose: lift * self.at(step, place).0.pose, ..*step.mover };
-        let lifted: Vec<Mover<'_>> = (0..=RELEASE_PLACES).map(lifted).collect();
+        let lifted = |place| MovingBody { pose: lift * self.at(step, place).0.pose, ..*step.mover };
+        let lifted: Vec<MovingBody<'_>> = (0..=RELEASE_PLACES).map(lifted).collect();
         let known = step.rows.iter().zip(step.contacts).filter(|(row, _)| opposes(row)).map(|(_, c)| *c);
         let mut holding: Vec<Contact> = known.collect();
         let mut open: Vec<u32> = (0..=RELEASE_PLACES).collect();
@@ -107,17 +107,17 @@ impl Drive {
     }
 
     /// Where a step has got to at one of its places, and after which twist.
-    fn at<'m>(&self, step: &Taken<'m>, place: u32) -> (Mover<'m>, Vector6<f64>) {
+    fn at<'m>(&self, step: &FreeStep<'m>, place: u32) -> (MovingBody<'m>, Vector6<f64>) {
         let twist = step.twist * (f64::from(place) / f64::from(RELEASE_PLACES));
-        (Mover { pose: self.displaced(step.mover, &twist), ..*step.mover }, twist)
+        (MovingBody { pose: self.displaced(step.mover, &twist), ..*step.mover }, twist)
     }
 
     /// By which angle a step turns the part up to one of its places, if the way there is clear.
     fn turned_to(
         &self,
-        step: &Taken<'_>,
+        step: &FreeStep<'_>,
         place: u32,
-        around: &mut dyn Around,
+        around: &mut dyn ContactSource,
     ) -> Result<Option<f64>, Interrupt> {
         let (mover, twist) = self.at(step, place);
         let near = around.near(&mover)?;
@@ -128,7 +128,7 @@ impl Drive {
 }
 
 /// Takes out of some places, ascending, those where a contact holds a lifted part.
-fn close(open: &mut Vec<u32>, contact: &Contact, lifted: &[Mover<'_>], twist: &Vector6<f64>) {
+fn close(open: &mut Vec<u32>, contact: &Contact, lifted: &[MovingBody<'_>], twist: &Vector6<f64>) {
     let mut next = 0;
     while let Some(&place) = open.get(next) {
         let there = &lifted[place as usize];
@@ -156,7 +156,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{cells, cuboid, moved, scene};
     use crate::geometry::Pose;
-    use crate::scene::Surroundings;
+    use crate::scene::StandingParts;
     use crate::simulation::sliding::SlidingEngine;
     use crate::simulation::{Action, Axis, End, TransitionFunction};
     use crate::termination::Termination;
@@ -180,7 +180,7 @@ mod tests {
         for play in [0.02, 0.005] {
             for degrees in [-20.0, -20.7, -21.4, -60.0] {
                 let (scene, verifier) = scene(bar_under_slot(play, f64::to_radians(degrees)));
-                let around = Surroundings::new(&scene, vec![0]);
+                let around = StandingParts::new(&scene, vec![0]);
                 let (start, t) = (scene.bodies[1].planning_from_shape, Termination::default());
                 let action = Action::Screw(Axis::Z, true, true);
                 let drive = Drive::new(&scene, 1, &start, action);

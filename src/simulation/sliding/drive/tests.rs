@@ -2,7 +2,7 @@ use std::f64::consts::FRAC_PI_3;
 
 use super::*;
 use crate::fixtures::{moved, peg_in_hole, rod, scene, tube};
-use crate::scene::Surroundings;
+use crate::scene::StandingParts;
 use crate::simulation::sliding::SlidingEngine;
 use crate::simulation::{Axis, TransitionFunction};
 use crate::termination::Termination;
@@ -12,7 +12,7 @@ fn a_peg_that_is_pulled_askew_slides_in_steps_as_long_as_those_straight_on() {
     let pose = Pose::new(Vector3::zeros(), Vector3::x() * FRAC_PI_3);
     let action = Action::Drag(Axis::Z, true);
     let (scene, verifier) = scene(peg_in_hole(-0.01).map(|mesh| moved(mesh, &pose)));
-    let around = Surroundings::new(&scene, vec![0]);
+    let around = StandingParts::new(&scene, vec![0]);
     let (start, t) = (scene.bodies[1].planning_from_shape, Termination::default());
     let motion = SlidingEngine.simulate(&scene, &around, 1, &start, action, &t).unwrap();
     let gone = |pose: &Pose| (pose.translation.vector - start.translation.vector).norm();
@@ -30,7 +30,7 @@ fn a_pin_that_is_turned_askew_takes_hardly_shorter_steps_than_one_turned_straigh
     let poses_per_turn = |tilt: f64| {
         let pose = Pose::new(Vector3::zeros(), Vector3::x() * tilt);
         let (scene, _) = scene(pin().map(|mesh| moved(mesh, &pose)));
-        let around = Surroundings::new(&scene, vec![0]);
+        let around = StandingParts::new(&scene, vec![0]);
         let (start, t) = (scene.bodies[1].planning_from_shape, Termination::default());
         let action = Action::Turn(Axis::Z, true);
         let motion = SlidingEngine.simulate(&scene, &around, 1, &start, action, &t).unwrap();
@@ -48,7 +48,7 @@ fn a_step_without_a_turn_is_as_long_as_one_with_hardly_any() {
     let (scene, _) = scene(peg_in_hole(-0.01));
     let start = scene.bodies[1].planning_from_shape;
     let drive = Drive::new(&scene, 1, &start, Action::Drag(Axis::Z, true));
-    let mover = Mover::new(&scene, 1, start);
+    let mover = MovingBody::new(&scene, 1, start);
     let expected = contact_step(&scene.bodies[1].shape) / 0.05;
     for turn in [0.0, 1e-12] {
         let longest = drive.longest(&mover, &Vector6::new(0.0, 0.0, 0.05, turn, 0.0, 0.0));
