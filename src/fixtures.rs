@@ -188,7 +188,7 @@ pub(crate) fn source(meshes: impl IntoIterator<Item = SourceMesh>) -> SourceAsse
 /// Depth at which verification refuses a path in a [`scene`].
 pub(crate) const LIMIT: f64 = 4e-3;
 
-/// Bodies at their assembled poses with their overlaps granted, and the check on the triangles.
+/// Bodies at their assembled poses with their overlaps allowed, and the check on the triangles.
 /// The longest side must be in (5, 10], so that nothing is scaled.
 pub(crate) fn scene(meshes: impl IntoIterator<Item = SourceMesh>) -> (Scene, Verifier) {
     let assembly = Assembly::new(&source(meshes)).unwrap();
@@ -207,7 +207,7 @@ pub(crate) fn scene(meshes: impl IntoIterator<Item = SourceMesh>) -> (Scene, Ver
             .assembled_depth(&scene, &CongruentPair::turned(&scene, a, b), &Termination::default())
             .unwrap();
         if depth > 1e-6 * scene.longest_side {
-            scene.allowances.grant(a, b, depth);
+            scene.allowed.allow(a, b, depth);
         }
     }
     (scene, verifier)

@@ -213,17 +213,17 @@ pub(crate) const PATH_DENSITY: f64 = 0.004;
 /// Share of the limit. Points deeper than this help in refining a motion that is refused.
 pub(crate) const HELPFUL: f64 = 1.0 / 2.0;
 /// Share of the limit. Depth that is not looked into.
-pub(crate) const SPARED_SHARE: f64 = 1.0 / 8.0;
+pub(crate) const IGNORED_SHARE: f64 = 1.0 / 8.0;
 /// The same with an allowed penetration: facets that lie across each other are deep here and there.
-pub(crate) const SPARED_SHARE_IN_OVERLAP: f64 = 1.0 / 4.0;
+pub(crate) const IGNORED_SHARE_IN_OVERLAP: f64 = 1.0 / 4.0;
 /// Share of the limit. The smallest radius of a piece of surface.
 pub(crate) const FINEST_SHARE: f64 = 1.0 / 4.0;
 /// Share of the longest side. Penetrations are reported no closer to each other.
 pub(crate) const COARSE_SHARE: f64 = 4e-3;
-/// Length. Depth that is not looked into when the overlap of assembled parts is measured. No more is allowed than is
+/// Share of the longest side. Depth that is not looked into when the overlap of assembled parts is measured. No more is allowed than is
 /// measured at some point, and no less than nine tenths of what there is ([`DEPTH_SHARE`]).
-pub(crate) const OVERLAP_SPARED: f64 = 2e-6;
-/// Length. The smallest radius of a piece there.
+pub(crate) const OVERLAP_IGNORED: f64 = 2e-6;
+/// Share of the longest side. The smallest radius of a piece there.
 pub(crate) const OVERLAP_FINEST: f64 = 1e-4;
 /// Share of the limit. Large overlaps are told more closely than to [`DEPTH_SHARE`]: what keeps its overlap on its way
 /// is to pass.

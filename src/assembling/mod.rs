@@ -5,7 +5,7 @@
 //! part moves (`room`) → its way through that (`transfer`, by `rrt_connect`) → [`Insertion`]s in order.
 //!
 //! A path in reverse passes the same places, so an insertion past what stands is as verified as the removal
-//! was. The rest is verified here, with the same check and no overlap granted: the way to the insertion
+//! was. The rest is verified here, with the same check and no penetration allowed: the way to the insertion
 //! past all that stands and waits, and the insertion past all that waits. Ways are found by random poses:
 //! the same for the same question, but a way that is not found is no proof that there is none. No floor is
 //! in the way of anything.
@@ -52,7 +52,7 @@ pub struct Insertion {
     pub part: usize,
     /// Poses of its shape, the last one assembled; verified.
     pub path: Vec<Pose>,
-    /// Largest depth beyond what is granted that verification found.
+    /// Largest depth beyond what is allowed that verification found.
     pub depth: f64,
     /// Parts that came before, since this one would have blocked them.
     pub waited_for: Vec<usize>,

@@ -74,7 +74,7 @@ impl Room {
         self.verifier.limit()
     }
 
-    /// Checks a way of a part (poses of its shape) among some numbers (ascending), with no overlap granted.
+    /// Checks a way of a part (poses of its shape) among some numbers (ascending), with no penetration allowed.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -90,15 +90,8 @@ impl Room {
         for glance in pieces.flat_map(|(from, to)| self.glances(part, [from, to])) {
             let near = self.near(among, part, &glance);
             if !near.is_empty() {
-                let allowances = &self.scene.allowances;
-                found.push(self.verifier.check(
-                    &self.scene,
-                    allowances,
-                    &near,
-                    part,
-                    &glance,
-                    termination,
-                )?);
+                let allowed = &self.scene.allowed;
+                found.push(self.verifier.check(&self.scene, allowed, &near, part, &glance, termination)?);
             }
         }
         Ok(Verdict::of_all(found, self.limit()))

@@ -55,14 +55,7 @@ fn assert_apart(scene: &Scene, verifier: &Verifier, insertions: &[Insertion]) {
         let there = Scene { bodies: std::sync::Arc::new(bodies), ..scene.clone() };
         let others: Vec<usize> = (0..scene.bodies.len()).filter(|&p| p != insertion.part).collect();
         let verdict = verifier
-            .check(
-                &there,
-                &scene.allowances,
-                &others,
-                insertion.part,
-                &insertion.path,
-                &Termination::default(),
-            )
+            .check(&there, &scene.allowed, &others, insertion.part, &insertion.path, &Termination::default())
             .unwrap();
         assert!(verdict.entries.is_empty(), "part {}: {}", insertion.part, verdict.depth);
         assert_eq!(insertion.path.last(), Some(&scene.bodies[insertion.part].planning_from_shape));

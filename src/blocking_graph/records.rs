@@ -22,7 +22,7 @@ pub(super) fn blocking_key(
     let mut digest = Digest::new();
     add_pair(&mut digest, scene, pair);
     let [a, b] = pair.parts;
-    digest.text(rule).numbers([scene.allowances.of(a, b), least]).integer(translations.len() as u64);
+    digest.text(rule).numbers([scene.allowed.of(a, b), least]).integer(translations.len() as u64);
     for body in pair.parts.map(|part| &scene.bodies[part]) {
         add_samples(&mut digest, body);
     }
@@ -54,9 +54,9 @@ mod tests {
     fn every_part_of_a_question_is_in_its_key() {
         let (first, _) = scene(block_on_plate());
         let mut all = keys(&first);
-        let mut granted = first.clone();
-        granted.allowances.grant(0, 1, 1e-3);
-        all.extend(keys(&granted));
+        let mut allowed = first.clone();
+        allowed.allowed.allow(0, 1, 1e-3);
+        all.extend(keys(&allowed));
         let [plate, block] = block_on_plate();
         let nearer = moved(block.clone(), &Pose::translation(1e-6, 0.0, 0.0));
         all.extend(keys(&scene([plate.clone(), nearer]).0));

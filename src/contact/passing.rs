@@ -7,7 +7,7 @@
 use nalgebra::{Point3, Translation3};
 
 use crate::geometry::{Pose, Shape, Surface};
-use crate::scene::{Allowances, CongruentPair, Scene, rounded, rounded_pose};
+use crate::scene::{AllowedPenetrations, CongruentPair, Scene, rounded, rounded_pose};
 
 /// Directions are alike within this.
 const ALIKE: f64 = 1.0 / (1u64 << 40) as f64;
@@ -24,7 +24,7 @@ pub struct PairPath<'a> {
     /// The point of the moving shape, in its frame, that is on a line between two of these.
     pub centre: Point3<f64>,
     /// The depth that counts as none, in the planning frame.
-    pub granted: f64,
+    pub allowed: f64,
     /// That of the assembly, by which depths are told.
     pub longest_side: f64,
 }
@@ -32,7 +32,7 @@ pub struct PairPath<'a> {
 impl<'a> PairPath<'a> {
     /// Of a path (poses of the moving shape in the planning frame), what passes the standing part.
     #[must_use]
-    pub fn new(scene: &'a Scene, allowances: &Allowances, parts: [usize; 2], path: &[Pose]) -> Self {
+    pub fn new(scene: &'a Scene, allowed: &AllowedPenetrations, parts: [usize; 2], path: &[Pose]) -> Self {
         let [part, other] = parts;
         let shapes = shapes(scene, parts);
         let path = way_past(shapes, &scene.bodies[other].planning_from_shape, path);
@@ -43,13 +43,13 @@ impl<'a> PairPath<'a> {
             // Of a path that does not turn, any point is on a line.
             centre: if turns { scene.centre_in_shape(part) } else { shapes[0].bounds().centre() }
                 .map(rounded),
-            granted: allowances.of(part, other),
+            allowed: allowed.of(part, other),
             longest_side: scene.longest_side,
             path,
         }
     }
 
-    /// A pair that does not move, with nothing granted.
+    /// A pair that does not move, with nothing allowed.
     #[must_use]
     pub fn standing(scene: &'a Scene, pair: &CongruentPair) -> Self {
         let [one, other] = pair.poses;
@@ -59,7 +59,7 @@ impl<'a> PairPath<'a> {
             shapes,
             path: vec![other.inverse() * one],
             centre: shapes[0].bounds().centre(),
-            granted: 0.0,
+            allowed: 0.0,
             longest_side: scene.longest_side,
         }
     }
@@ -124,7 +124,7 @@ mod tests {
         let start = scene.bodies[1].planning_from_shape;
         let direction = Vector3::new(2.0, 0.3, 0.5).normalize();
         let way = |travel: f64, other| {
-            PairPath::new(&scene, &scene.allowances, [1, other], &straight(&start, direction * travel)).path
+            PairPath::new(&scene, &scene.allowed, [1, other], &straight(&start, direction * travel)).path
         };
         // Past the wall and past the plate, from which it rises slowly.
         for other in [0, 2] {
@@ -154,8 +154,7 @@ mod tests {
         let way = |parts: [usize; 2], direction: Vector3<f64>, travel: f64| {
             let start = &scene.bodies[parts[0]].planning_from_shape;
             let path = straight(start, direction * travel);
-            let PairPath { path, centre, shapes, .. } =
-                PairPath::new(&scene, &scene.allowances, parts, &path);
+            let PairPath { path, centre, shapes, .. } = PairPath::new(&scene, &scene.allowed, parts, &path);
             (path, centre, shapes.map(Shape::content))
         };
         let up = Vector3::z();

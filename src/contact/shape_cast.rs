@@ -8,8 +8,8 @@
 //! other or a corner of the one the other's face. So the convex edges of one surface are swept against the
 //! faces of the other, and the other's corners against the faces of the one: nothing passes between samples.
 //!
-//! What a pair may overlap (its allowance, and the tolerance) is taken off the edges across the
-//! direction: a press fit's rim passes by its hole's. An overlap that is there at the start is taken for granted.
+//! What a pair may overlap (its allowed penetration, and the tolerance) is taken off the edges across the
+//! direction: a press fit's rim passes by its hole's. An overlap that is there at the start is taken for allowed.
 //! Known refusals: contact that slides down a slope, overlaps that grow on the way. Known miss: edges at which faces
 //! are bent by less than a thousandth count as flat.
 
@@ -24,7 +24,7 @@ use crate::termination::{Interrupt, Poll, Termination};
 #[derive(Debug, Clone, Copy)]
 pub struct CastMargins {
     /// How deep the part may get into the other across the direction.
-    pub granted: f64,
+    pub allowed: f64,
     /// How far before the start it may have met the other: what it meets there, it meets at once.
     pub back: f64,
     /// Faces that look along the direction, or against it, by less than this count as walls.
@@ -165,7 +165,7 @@ impl Cast<'_> {
 
     /// Where a corner begins, in the target's frame: back, and below the faces there.
     fn from(&self, p: &Point3<f64>, normals: &[Vector3<f64>], along: &Vector3<f64>) -> Point3<f64> {
-        self.to_target * (p + inward(normals, along, self.margins.granted)) - self.along * self.margins.back
+        self.to_target * (p + inward(normals, along, self.margins.allowed)) - self.along * self.margins.back
     }
 
     /// From where the target's box is reached.
@@ -173,7 +173,7 @@ impl Cast<'_> {
         let bounds = *self.target.bounds();
         let back = self.along * -(self.travel + self.margins.back);
         let before = Bounds { min: bounds.min + back, max: bounds.max + back };
-        bounds.union(&before).grown(2.0 * self.margins.granted)
+        bounds.union(&before).grown(2.0 * self.margins.allowed)
     }
 }
 
@@ -200,8 +200,8 @@ mod tests {
     /// How far part 1 gets along a direction, of `travel`, until it meets part 0.
     fn way(scene: &Scene, direction: Vector3<f64>, travel: f64) -> f64 {
         let start = &scene.bodies[1].planning_from_shape;
-        let granted = scene.allowances.of(0, 1) + DEPTH_TOLERANCE;
-        let margins = CastMargins { granted, back: granted, steepness: 1e-3, sunk: 0.2 * DEPTH_TOLERANCE };
+        let allowed = scene.allowed.of(0, 1) + DEPTH_TOLERANCE;
+        let margins = CastMargins { allowed, back: allowed, steepness: 1e-3, sunk: 0.2 * DEPTH_TOLERANCE };
         let direction = &direction;
         let termination = &Termination::default();
         let (part, other) = (1, 0);

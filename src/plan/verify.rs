@@ -20,17 +20,17 @@ use crate::contact::helix_profile::{centred, depth_on_screw};
 use crate::contact::region_cover::path::{DepthPrecision, PathDepth, PathQuestion};
 use crate::contact::sampled::along_path::{Entry, PathSamples};
 use crate::geometry::{Pose, Shape, Surface, area_normal};
-use crate::scene::{Allowances, CongruentPair, Scene};
+use crate::scene::{AllowedPenetrations, CongruentPair, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
-    COARSE_SHARE, FINEST_SHARE, HELPFUL, OVERLAP_FINEST, OVERLAP_MARGIN, OVERLAP_SPARED, SPARED_SHARE,
-    SPARED_SHARE_IN_OVERLAP,
+    COARSE_SHARE, FINEST_SHARE, HELPFUL, IGNORED_SHARE, IGNORED_SHARE_IN_OVERLAP, OVERLAP_FINEST,
+    OVERLAP_IGNORED, OVERLAP_MARGIN,
 };
 
 /// What the check of a path found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// Nothing gets deeper than this beyond the allowances along a good path; 0 if nothing does. Of a
+    /// Nothing gets deeper than this beyond the allowed penetrations along a good path; 0 if nothing does. Of a
     /// refused one, the deepest that was found before it was given up: it may get deeper.
     pub depth: f64,
     /// Points that got deep along a path that exceeds the limit; empty if the path is good.
@@ -66,7 +66,7 @@ fn deepest(depth: f64, entries: &[Entry]) -> f64 {
 pub struct Verifier {
     /// For what turns far.
     samples: PathSamples,
-    /// Depth beyond the allowance that is still accepted, in the planning frame.
+    /// Depth beyond the allowed penetration that is still accepted, in the planning frame.
     limit: f64,
 }
 
@@ -112,7 +112,7 @@ impl Verifier {
         termination: &Termination,
     ) -> Result<f64, Interrupt> {
         let precision = DepthPrecision {
-            spare: OVERLAP_SPARED * scene.longest_side,
+            ignored: OVERLAP_IGNORED * scene.longest_side,
             deep: f64::INFINITY,
             margin: OVERLAP_MARGIN * self.limit,
             finest: OVERLAP_FINEST * scene.longest_side,
@@ -167,7 +167,7 @@ impl Verifier {
     pub fn check(
         &self,
         scene: &Scene,
-        allowances: &Allowances,
+        allowed: &AllowedPenetrations,
         standing: &[usize],
         part: usize,
         path: &[Pose],
@@ -175,7 +175,7 @@ impl Verifier {
     ) -> Result<Verdict, Interrupt> {
         let swept = scene.swept_bounds(part, path);
         let near = standing.iter().filter(|&&other| scene.bodies[other].bounds.meets(&swept));
-        let passing = |&other: &usize| PairPath::new(scene, allowances, [part, other], path);
+        let passing = |&other: &usize| PairPath::new(scene, allowed, [part, other], path);
         let passing: Vec<_> = near.map(passing).collect();
         let past: Vec<_> = passing.par_iter().map(|p| self.past(p, termination)).collect::<Result<_, _>>()?;
         Ok(Verdict::of_all(past, self.limit))
@@ -192,7 +192,7 @@ impl Verifier {
         let bound = found.iter().map(|f| f.bound).fold(0.0, f64::max);
         let [part, other] = passing.parts;
         let effort = found.each_ref().map(|f| f.effort);
-        tracing::debug!(part, other, granted = passing.granted, bound, ?effort, "verified");
+        tracing::debug!(part, other, allowed = passing.allowed, bound, ?effort, "verified");
         let mut entries = deepest_entries(passing, &found);
         if bound <= *limit {
             for stretch in joined(course, found.iter().flat_map(|f| &f.open)) {
@@ -215,9 +215,9 @@ impl Verifier {
         termination: &Termination,
     ) -> Result<[PathDepth; 2], Interrupt> {
         let limit = self.limit;
-        let share = if passing.granted > 0.0 { SPARED_SHARE_IN_OVERLAP } else { SPARED_SHARE };
+        let share = if passing.allowed > 0.0 { IGNORED_SHARE_IN_OVERLAP } else { IGNORED_SHARE };
         let precision = DepthPrecision {
-            spare: limit * share,
+            ignored: limit * share,
             deep: limit,
             margin: limit,
             finest: limit * FINEST_SHARE,

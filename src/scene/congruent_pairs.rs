@@ -58,7 +58,7 @@ impl CongruentPair {
         if first { one } else { other }
     }
 
-    /// The two alone, as parts 0 and 1, with what they are granted and the resolution of the whole.
+    /// The two alone, as parts 0 and 1, with what they are allowed and the resolution of the whole.
     #[must_use]
     pub fn scene(&self, scene: &Scene) -> Scene {
         let [a, b] = self.parts;
@@ -68,9 +68,9 @@ impl CongruentPair {
             (body.planning_from_shape, body.bounds) = (*pose, Bounds::of(&hull));
         }
         let mut pair = Scene::of(bodies.into(), scene.longest_side);
-        let granted = scene.allowances.of(a, b);
-        if granted > 0.0 {
-            pair.allowances.grant(0, 1, granted);
+        let allowed = scene.allowed.of(a, b);
+        if allowed > 0.0 {
+            pair.allowed.allow(0, 1, allowed);
         }
         pair
     }

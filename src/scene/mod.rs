@@ -1,7 +1,7 @@
 //! The scene: bodies at their assembled poses, how deep each pair may overlap, and what follows from where they stand.
 //!
 //! - [`BroadPhase`]: which bodies' boxes meet a box (parry's bounding-volume hierarchy);
-//! - [`CongruentPair`](Pair): two bodies up to a motion of both, so that equal pairs are asked about once;
+//! - [`CongruentPair`]: two bodies up to a motion of both, so that equal pairs are asked about once;
 //! - [`HullTree`]: the convex hull of all bodies that stand, kept up while they leave one by one;
 //! - [`exit_direction`]: hull separation, the paper's test for a part that is disassembled.
 //!
@@ -74,28 +74,28 @@ impl Body {
     }
 }
 
-/// For each pair, how deep the two overlap at the assembled pose: that much is granted.
+/// For each pair, how deep the two overlap at the assembled pose: that much is allowed.
 #[derive(Debug, Clone, Default)]
-pub struct Allowances {
+pub struct AllowedPenetrations {
     /// By the smaller part, then the larger; pairs without an entry may not overlap.
     depth: Arc<HashMap<(usize, usize), f64>>,
 }
 
-impl Allowances {
+impl AllowedPenetrations {
     /// No overlap anywhere.
     #[must_use]
     pub fn none() -> Self {
         Self::default()
     }
 
-    /// The depth granted to a pair.
+    /// The depth allowed to a pair.
     #[must_use]
     pub fn of(&self, a: usize, b: usize) -> f64 {
         self.depth.get(&(a.min(b), a.max(b))).copied().unwrap_or(0.0)
     }
 
     /// Grants a pair some depth.
-    pub fn grant(&mut self, a: usize, b: usize, depth: f64) {
+    pub fn allow(&mut self, a: usize, b: usize, depth: f64) {
         Arc::make_mut(&mut self.depth).insert((a.min(b), a.max(b)), depth);
     }
 }
@@ -105,8 +105,8 @@ impl Allowances {
 pub struct Scene {
     /// One per part, in the assembly's order.
     pub bodies: Arc<Vec<Body>>,
-    /// Overlaps granted.
-    pub allowances: Allowances,
+    /// Overlaps allowed.
+    pub allowed: AllowedPenetrations,
     /// Longest side of the whole, the unit of resolutions: rounded down, so that most edits leave it and
     /// all that was found out with it.
     pub longest_side: f64,
@@ -121,7 +121,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// An assembly with the fields of its shapes, no overlap granted.
+    /// An assembly with the fields of its shapes, no penetration allowed.
     #[must_use]
     pub fn assembled(assembly: &Assembly, fields: &[Arc<Field>]) -> Self {
         let body = |part: &Part| Body {
@@ -134,13 +134,13 @@ impl Scene {
         Self::of(assembly.parts.iter().map(body).collect(), resolution(assembly))
     }
 
-    /// Some bodies, no overlap granted, and the resolution of a scene with a longest side.
+    /// Some bodies, no penetration allowed, and the resolution of a scene with a longest side.
     #[must_use]
     pub(crate) fn of(bodies: Vec<Body>, longest_side: f64) -> Self {
         let boxes: Vec<Bounds> = bodies.iter().map(|b| b.bounds).collect();
         Self {
             bodies: Arc::new(bodies),
-            allowances: Allowances::none(),
+            allowed: AllowedPenetrations::none(),
             longest_side,
             broad_phase: Arc::new(BroadPhase::new(&boxes)),
             memo: Memo::default(),

@@ -45,7 +45,7 @@ impl Links {
         let mut links = vec![Vec::new(); scene.bodies.len()];
         for &a in parts {
             let near = scene.broad_phase.meeting_of(parts, &scene.bodies[a].bounds);
-            for b in near.into_iter().filter(|&b| b > a && scene.allowances.of(a, b) == 0.0) {
+            for b in near.into_iter().filter(|&b| b > a && scene.allowed.of(a, b) == 0.0) {
                 if are_linked(loops(a), loops(b), &poll)? {
                     links[a].push(b);
                     links[b].push(a);

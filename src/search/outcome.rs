@@ -14,7 +14,7 @@ pub struct Removal {
     pub part: usize,
     /// Poses of its shape, the assembled one first; thinned and verified.
     pub path: Vec<Pose>,
-    /// Largest depth beyond the pairs' allowances that verification found.
+    /// Largest depth beyond the pairs' allowed penetrations that verification found.
     pub depth: f64,
     /// Parts that had blocked it and left before.
     pub waited_for: Vec<usize>,

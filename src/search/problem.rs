@@ -159,7 +159,7 @@ impl Problem<'_> {
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
         let Self { scene, verifier, termination, cache, verdicts, .. } = self;
         let past = |&other: &usize| {
-            let passing = &PairPath::new(scene, &scene.allowances, [part, other], path);
+            let passing = &PairPath::new(scene, &scene.allowed, [part, other], path);
             let question = &VerdictQuestion { passing, limit: verifier.limit() };
             verdicts.verdict(question, cache, || verifier.past(passing, termination))
         };

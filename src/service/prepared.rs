@@ -53,7 +53,7 @@ impl Prepared {
         let verifier = Verifier::new(&assembly.shapes, shape_of, depth_limit(assembly));
         let mut overlaps = measure_overlaps(&scene, &verifier, termination, cache)?;
         for &(a, b, depth) in &overlaps {
-            scene.allowances.grant(a, b, depth);
+            scene.allowed.allow(a, b, depth);
         }
         overlaps.extend(coincident_pairs(&scene, &verifier, termination)?);
         overlaps.sort_by_key(|&(a, b, _)| (a, b));
@@ -95,7 +95,7 @@ impl Prepared {
     }
 }
 
-/// The depth beyond what is granted at which paths are refused, in the planning frame.
+/// The depth beyond what is allowed at which paths are refused, in the planning frame.
 pub(super) fn depth_limit(assembly: &Assembly) -> f64 {
     DEPTH_LIMIT * resolution(assembly)
 }
@@ -126,8 +126,8 @@ fn measure_overlaps(
     Ok(overlaps.filter(|(_, _, d)| *d > LEAST_OVERLAP * scene.longest_side).collect())
 }
 
-/// Pairs without a granted overlap that share their inside all the same. It is reported, but not
-/// granted: their surfaces coincide.
+/// Pairs without a allowed penetration that share their inside all the same. It is reported, but not
+/// allowed: their surfaces coincide.
 fn coincident_pairs(
     scene: &Scene,
     verifier: &Verifier,
@@ -138,7 +138,7 @@ fn coincident_pairs(
         termination.check()?;
         let alike = (scene.bodies[a].bounds.centre() - scene.bodies[b].bounds.centre()).norm()
             < COINCIDENT * scene.bodies[a].bounds.extents().norm();
-        if alike && scene.allowances.of(a, b) == 0.0 {
+        if alike && scene.allowed.of(a, b) == 0.0 {
             let depth = verifier.coincident_depth(scene, a, b);
             if depth > LEAST_OVERLAP * scene.longest_side {
                 out.push((a, b, depth));

@@ -52,7 +52,7 @@ impl NullTwist {
         for &other in &parts {
             let still = &scene.bodies[other];
             let place = &still.planning_from_shape;
-            let within = reach + scene.allowances.of(part, other);
+            let within = reach + scene.allowed.of(part, other);
             contacts_of((body, pose), (still, place), within, &poll, &mut contacts)?;
             contacts_of((still, place), (body, pose), within, &poll, &mut contacts)?;
         }

@@ -78,11 +78,11 @@ pub fn straight_sweep_past<E: From<Interrupt>>(
     let here = bounds.transformed(start);
     let swept = here.union(&bounds.transformed(&end));
     for other in scene.broad_phase.meeting_of(&surroundings.standing, &swept) {
-        let granted = scene.allowances.of(part, other) + DEPTH_TOLERANCE;
+        let allowed = scene.allowed.of(part, other) + DEPTH_TOLERANCE;
         // Beyond, it has passed the other for good: so what is found does not depend on how far others reach.
-        let passed = here.grown(granted).way_past(&scene.bodies[other].bounds, direction);
+        let passed = here.grown(allowed).way_past(&scene.bodies[other].bounds, direction);
         let travel = travel.min(passed);
-        let margins = CastMargins { granted, back: granted, steepness: WALL_STEEPNESS, sunk: SWEEP_SUNK };
+        let margins = CastMargins { allowed, back: allowed, steepness: WALL_STEEPNESS, sunk: SWEEP_SUNK };
         let cast = ShapeCast { scene, part, start, direction, travel, other, margins, termination };
         if enters(&cast)? {
             return Ok(Some(Sweep::Blocked { by: other }));
@@ -201,7 +201,7 @@ mod tests {
             let wall = cuboid([-3.0, 3.5, -4.0], [3.0, 4.0, 4.0]);
             let (mut scene, _) = scene([tube(1.0, 3.0, [-1.0, 1.0], 24), rod(1.0 + excess, z, 24), wall]);
             assert_eq!(swept(&scene, 1, up), Some(Sweep::Blocked { by: 0 }));
-            scene.allowances.grant(0, 1, excess);
+            scene.allowed.allow(0, 1, excess);
             assert!(is_clear(&scene, 1, up));
         }
     }
@@ -210,7 +210,7 @@ mod tests {
     fn a_press_fit_leaves_its_hole_but_not_through_its_walls() {
         let excess = 0.02;
         let (mut scene, _) = scene(peg_in_hole(excess));
-        scene.allowances.grant(0, 1, excess);
+        scene.allowed.allow(0, 1, excess);
         assert!(is_clear(&scene, 1, Vector3::z()));
         assert!(!is_clear(&scene, 1, -Vector3::z()) && !is_clear(&scene, 1, Vector3::x()));
     }

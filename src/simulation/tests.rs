@@ -57,11 +57,11 @@ impl Case {
         engine.simulate(&self.scene, &self.surroundings, 1, &self.assembled(), action, &t).unwrap()
     }
 
-    /// A bound of the depth beyond the allowances along a path, on the triangles, told finely
+    /// A bound of the depth beyond the allowed penetrations along a path, on the triangles, told finely
     /// enough to compare it with `most`.
     fn depth(&self, path: &[Pose], most: f64) -> f64 {
         let (scene, t) = (&self.scene, Termination::default());
-        self.verifier.with_limit(most).check(scene, &scene.allowances, &[0], 1, path, &t).unwrap().depth
+        self.verifier.with_limit(most).check(scene, &scene.allowed, &[0], 1, path, &t).unwrap().depth
     }
 }
 

@@ -54,7 +54,7 @@ impl Touching {
             body.field.prepare_here(termination)?;
             still.field.prepare_here(termination)?;
             let within = common(&bounds, &still.bounds.grown(reach));
-            let deepest = reach + scene.allowances.of(part, other);
+            let deepest = reach + scene.allowed.of(part, other);
             for (asked, at, measured, stands, sense) in [
                 (body, pose, still, &still.planning_from_shape, 1.0),
                 (still, &still.planning_from_shape, body, pose, -1.0),

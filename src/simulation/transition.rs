@@ -61,13 +61,13 @@ pub fn asked_again(action: &Action, number: usize) -> Option<Vector3<f64>> {
 /// A simulation engine: f(s, a, p).
 ///
 /// Contract (one test suite for all engines): the same input gives the same motion to the bit;
-/// the path starts at `start`; no pair is deeper along it than its allowance and the engine's own
+/// the path starts at `start`; no pair is deeper along it than its allowed penetration and the engine's own
 /// declared tolerance; `Disassembled` is returned only with a direction that separates the hulls.
 pub trait TransitionFunction: Sync {
     /// The engine's name in requests and plans.
     fn name(&self) -> &'static str;
 
-    /// How much deeper than the allowance a pair may get, in the planning frame.
+    /// How much deeper than the allowed penetration a pair may get, in the planning frame.
     fn depth_tolerance(&self) -> f64;
 
     /// Its name in the keys of remembered motions; none if they are not to be remembered. Who has one looks

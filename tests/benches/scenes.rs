@@ -27,7 +27,7 @@ fn assembled(assembly: &Assembly, never: &Termination) -> Result<Scene, Interrup
     for (a, b) in scene.broad_phase.pairs(0.0) {
         let depth = verifier.assembled_depth(&scene, &CongruentPair::turned(&scene, a, b), never)?;
         if depth > 1e-6 * scene.longest_side {
-            scene.allowances.grant(a, b, depth);
+            scene.allowed.allow(a, b, depth);
         }
     }
     Ok(scene)

@@ -2,7 +2,7 @@
 //! `cargo bench --bench simulation -- FOLDER …` for assemblies in folders (or `SBDP_MESHES=FOLDER:…`),
 //! else for the small ones of the tests.
 //!
-//! All parts stand as assembled, none granted more overlap than it has. Per assembly, in
+//! All parts stand as assembled, none allowed more overlap than it has. Per assembly, in
 //! microseconds, median and ninetieth percentile: `pair`, static analysis of one pair of near parts in
 //! all six translations; `sweep`, the test whether a part leaves straight along a world axis; `push`,
 //! a translation that travels more than one unit of the planning frame; `turn`, a motion under a

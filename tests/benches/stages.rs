@@ -2,7 +2,7 @@
 //! `cargo bench --bench stages -- FOLDER …` for assemblies in folders (or `SBDP_MESHES=FOLDER:…`), else for
 //! the small ones of the tests.
 //!
-//! All parts stand as assembled, none granted more overlap than it has. Of each part's motions under the
+//! All parts stand as assembled, none allowed more overlap than it has. Of each part's motions under the
 //! translations and turns of the paper (up to eight poses of each, spread over the way), per assembly and by what
 //! tells of contact (see [`PairMethod`]), in microseconds, median and ninetieth percentile: `gather`, `reduce`,
 //! `solve` and `advance` (see [`StepCost`]).

@@ -43,7 +43,7 @@ pub(crate) fn centred(
         return Ok(None);
     };
     let mut widest: Option<(f64, SharedThread)> = None;
-    for &other in standing.iter().filter(|&&other| scene.allowances.of(part, other) == 0.0) {
+    for &other in standing.iter().filter(|&&other| scene.allowed.of(part, other) == 0.0) {
         let shared = SharedThread::shared(scene, (part, other), &followed, left, termination)?;
         if let Some((play, thread)) = shared
             && widest.as_ref().is_none_or(|(most, _)| *most < play)

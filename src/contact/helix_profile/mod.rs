@@ -93,7 +93,7 @@ pub(crate) fn depth_on_screw(way: &PathQuestion<'_>, limit: f64) -> Result<[Path
     }
     // A part that shares no thread with the moving one is soon told to be apart.
     let mut found = bounded(way, vec![Interval::WHOLE], EFFORT_BEFORE_PROFILES)?;
-    if way.passing.granted > 0.0 {
+    if way.passing.allowed > 0.0 {
         // One part lies in the other: surfaces cross, and no more effort would tell how deep.
         return Ok(found);
     }

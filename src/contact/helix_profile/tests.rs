@@ -54,12 +54,12 @@ fn dense(scene: &Scene, path: &[Pose]) -> f64 {
 fn checked(scene: &Scene, verifier: &Verifier, path: &[Pose]) -> f64 {
     let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != 1).collect();
     let t = Termination::default();
-    verifier.check(scene, &scene.allowances, &standing, 1, path, &t).unwrap().depth
+    verifier.check(scene, &scene.allowed, &standing, 1, path, &t).unwrap().depth
 }
 
 /// The share of the way that profiles leave open.
 fn open(scene: &Scene, path: &[Pose]) -> Vec<Interval> {
-    let passing = PairPath::new(scene, &scene.allowances, [1, 0], path);
+    let passing = PairPath::new(scene, &scene.allowed, [1, 0], path);
     let course = Course::new(&passing.path, passing.centre, passing.reach());
     unsettled(&course, passing.surfaces(), vec![Interval::WHOLE], LIMIT, &Termination::default()).unwrap()
 }
@@ -86,7 +86,7 @@ fn a_bolt_whose_head_crosses_its_shank_is_settled_as_others_are_and_one_with_hol
         let (scene, verifier) = scene([joined([bolt.clone(), head]), nut.clone()]);
         let bolt = &scene.bodies[0].shape.surface;
         assert!(bolt.is_open() && bolt.rim().is_some() == open);
-        let passing = PairPath::new(&scene, &scene.allowances, [1, 0], &path(&scene));
+        let passing = PairPath::new(&scene, &scene.allowed, [1, 0], &path(&scene));
         let course = Course::new(&passing.path, passing.centre, passing.reach());
         let t = Termination::default();
         let found = verifier.bounds(&passing, &course, &t).unwrap();

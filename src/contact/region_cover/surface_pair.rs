@@ -55,7 +55,7 @@ pub(crate) struct SurfacePair<'a> {
     measured_from_asked: Pose,
     /// From shifts of the part to shifts of the asked surface against the measured one: orthogonal.
     pub(crate) shifted: Matrix3<f64>,
-    pub(crate) allowance: f64,
+    pub(crate) allowed: f64,
 }
 
 impl<'a> SurfacePair<'a> {
@@ -88,7 +88,7 @@ impl<'a> SurfacePair<'a> {
             stand,
             measured_from_asked: measured_from_asked(&stand, start, asks_part),
             shifted: *turn.to_rotation_matrix().matrix() * sense,
-            allowance: scene.allowances.of(part, other),
+            allowed: scene.allowed.of(part, other),
         })
     }
 
@@ -243,7 +243,7 @@ impl<'a> SurfacePair<'a> {
         (guess, slope): (u32, Slope),
     ) -> Option<(Obstacle, u32)> {
         let ahead = self.shifted * along;
-        let (normal, triangle) = entered(self.measured, (p, &ahead), (guess, slope), self.allowance)?;
+        let (normal, triangle) = entered(self.measured, (p, &ahead), (guess, slope), self.allowed)?;
         Some((Obstacle { normal: self.shifted.transpose() * normal, other: self.other }, triangle))
     }
 
@@ -262,7 +262,7 @@ impl<'a> SurfacePair<'a> {
         let ahead = -here.inverse_transform_vector(&(self.shifted * along));
         self.measured.corners_and_middles(triangle).iter().find_map(|p| {
             let p = here.inverse_transform_point(p);
-            let (normal, _) = entered(self.asked, (&p, &ahead), (guess, Slope::Steep), self.allowance)?;
+            let (normal, _) = entered(self.asked, (&p, &ahead), (guess, Slope::Steep), self.allowed)?;
             Some(Obstacle { normal: self.shifted.transpose() * (here * -normal), other: self.other })
         })
     }
@@ -302,13 +302,13 @@ impl<'a> SurfacePair<'a> {
     }
 }
 
-/// The normal of the face of a surface that a point certainly gets deeper into than is granted on its way along a
+/// The normal of the face of a surface that a point certainly gets deeper into than is allowed on its way along a
 /// unit vector, and the triangle that it is nearest to.
 fn entered(
     surface: &Surface,
     (p, ahead): (&Point3<f64>, &Vector3<f64>),
     (guess, slope): (u32, Slope),
-    allowance: f64,
+    allowed: f64,
 ) -> Option<(Vector3<f64>, u32)> {
     let depth = |p: &Point3<f64>, guess: u32| {
         let closest = surface.closest_from(p, guess);
@@ -330,11 +330,11 @@ fn entered(
         return None;
     }
     // What touches enters below all faces that it touches, at however small an angle.
-    let touches = (-TOUCHED..=HELD).contains(&(now - allowance));
+    let touches = (-TOUCHED..=HELD).contains(&(now - allowed));
     let is_flat = slope == Slope::Any && touches && least.as_ref().is_some_and(blocking);
     let is_certain = is_flat || {
         let (then, _) = depth(&(p + ahead * ENTRY_PROBE), closest.triangle);
-        then > now.max(allowance) + ENTRY_SHARE * ENTRY_PROBE
+        then > now.max(allowed) + ENTRY_SHARE * ENTRY_PROBE
     };
     // Before a convex edge either face is enough to stay above; if that does not help, it is
     // a reentrant one.

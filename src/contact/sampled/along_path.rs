@@ -34,7 +34,7 @@ pub struct Entry {
     pub on_moving: bool,
     /// The point in the frame of the shape that it lies on.
     pub point: Point3<f64>,
-    /// Depth beyond the allowance.
+    /// Depth beyond the allowed penetration.
     pub over: f64,
 }
 
@@ -90,7 +90,7 @@ impl PathSamples {
         shares[closeness as usize].get_or_init(|| dealt(&shape.surface, closeness))
     }
 
-    /// The samples that get deeper than granted along a stretch of a way past a part: of every pose and side
+    /// The samples that get deeper than allowed along a stretch of a way past a part: of every pose and side
     /// the deepest, and all that are deep enough, for a path that is refused beyond `limit`, to help in
     /// refining a motion.
     pub(crate) fn entries_along(
@@ -121,8 +121,8 @@ impl PathSamples {
         let [moving, standing] = passing.surfaces();
         let [part, other] = passing.parts.map(|part| self.of(part, closeness));
         let sides = [
-            PathSide { samples: part, to_measured: poses, measured: standing, granted: passing.granted },
-            PathSide { samples: other, to_measured: &back, measured: moving, granted: passing.granted },
+            PathSide { samples: part, to_measured: poses, measured: standing, allowed: passing.allowed },
+            PathSide { samples: other, to_measured: &back, measured: moving, allowed: passing.allowed },
         ];
         let mut asked: Vec<SampledStretch> = Vec::new();
         for (side, share) in
@@ -172,7 +172,7 @@ struct PathSide<'a> {
     /// The way from the samples' frame to the measured surface's, at all poses.
     to_measured: &'a [Pose],
     measured: &'a Surface,
-    granted: f64,
+    allowed: f64,
 }
 
 /// A share of a side's samples, and the poses at which they are measured.
@@ -182,7 +182,7 @@ struct SampledStretch {
     moments: Vec<usize>,
 }
 
-/// A sample that is deeper than granted.
+/// A sample that is deeper than allowed.
 struct DeepSample {
     moment: usize,
     side: usize,
@@ -197,11 +197,11 @@ struct DeepSample {
 type Known = (u32, Point3<f64>, f64);
 
 impl PathSide<'_> {
-    /// The samples that are deeper than granted. Those in a sphere are settled for all poses at which it stays out of
+    /// The samples that are deeper than allowed. Those in a sphere are settled for all poses at which it stays out of
     /// the measured surface: from one pose to the next most travel less than they are off.
     fn entered(&self, asked: &SampledStretch, poll: &Poll<'_>) -> Result<Vec<DeepSample>, Interrupt> {
-        let Self { measured, granted, .. } = *self;
-        let inner = measured.bounds().grown(-granted);
+        let Self { measured, allowed, .. } = *self;
+        let inner = measured.bounds().grown(-allowed);
         let pose = |moment: usize| &self.to_measured[asked.moments[moment]];
         let mut out = Vec::new();
         let look = |ball: Ball<'_>, moments: &Range<usize>, (guess, c, known): Known| {
@@ -210,7 +210,7 @@ impl PathSide<'_> {
             let ways = moments.clone().map(|moment| (pose(moment) * ball.centre - at).norm_squared());
             let travel = ways.fold(0.0, f64::max).sqrt();
             let (reach, off) = (ball.radius + travel, (at - c).norm());
-            let is_outside = |distance: f64| distance > 0.0 && distance > reach - granted;
+            let is_outside = |distance: f64| distance > 0.0 && distance > reach - allowed;
             poll.check()?;
             if measured.bounds().distance(&at) > reach || is_outside(known - off) {
                 return Ok(Look::Out);
@@ -218,7 +218,7 @@ impl PathSide<'_> {
             let split = if travel > ball.radius { Look::Halve } else { Look::In };
             let is_single = ball.sample.is_some() && travel == 0.0;
             // Where all of it can certainly not be far enough off, nothing is measured yet.
-            if !is_single && known.abs() + off <= reach - granted {
+            if !is_single && known.abs() + off <= reach - allowed {
                 return Ok(split((guess, c, known)));
             }
             if is_single && !inner.contains(&at) {
@@ -229,9 +229,9 @@ impl PathSide<'_> {
             if is_outside(distance) {
                 return Ok(Look::Out);
             }
-            if let Some(sample) = ball.sample.filter(|_| is_single && -distance > granted) {
+            if let Some(sample) = ball.sample.filter(|_| is_single && -distance > allowed) {
                 let (moment, &SampledStretch { side, share, .. }) = (asked.moments[middle], asked);
-                out.push(DeepSample { moment, side, share, sample, over: -distance - granted });
+                out.push(DeepSample { moment, side, share, sample, over: -distance - allowed });
             }
             Ok(split((closest.triangle, at, distance)))
         };
@@ -362,7 +362,7 @@ mod tests {
         let turn = Pose::rotation(Vector3::new(0.0, 0.0, 1.0));
         let path =
             [from, Pose::translation(1.0, 0.0, 0.0) * from, Pose::translation(1.0, 0.0, 0.0) * turn * from];
-        let passing = PairPath::new(&scene, &scene.allowances, [1, 0], &path);
+        let passing = PairPath::new(&scene, &scene.allowed, [1, 0], &path);
         let path = &passing.path;
         let poses = dense(&passing, path);
         assert_eq!((poses[0], poses[poses.len() - 1]), (path[0], path[2]));

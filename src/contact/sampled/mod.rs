@@ -44,24 +44,24 @@ pub(crate) struct Contact {
     side: ContactSide,
     /// The sample in the frame of the shape it lies on.
     sample: Point3<f64>,
-    /// Signed distance plus the pair's allowance: negative is deeper than granted.
+    /// Signed distance plus the pair's allowed penetration: negative is deeper than allowed.
     pub(crate) gap: f64,
     closest: Closest,
-    allowance: f64,
+    allowed: f64,
 }
 
 impl Contact {
     /// A point on the moving part's surface, or on the standing one's (in its shape's frame), that was
-    /// measured against the other: its gap, negative where it is deeper than granted.
+    /// measured against the other: its gap, negative where it is deeper than allowed.
     pub(crate) fn measured(
         other: usize,
         is_moving: bool,
         sample: Point3<f64>,
         (gap, closest): (f64, Closest),
-        allowance: f64,
+        allowed: f64,
     ) -> Self {
         let side = if is_moving { ContactSide::Moving } else { ContactSide::Standing };
-        Self { other, side, sample, gap, closest, allowance }
+        Self { other, side, sample, gap, closest, allowed }
     }
 
     /// Whether both are of one point of a pair.
@@ -225,9 +225,9 @@ impl<'a> MovingBody<'a> {
     ) -> Result<ContactSet, Interrupt> {
         let mut found = ContactSet { contacts: Vec::new(), clearance };
         self.prepare_fields(&self.scene.bodies[other])?;
-        let (sampled, body, to_measured, allowance) = self.sides(side, other);
-        let measured = MeasuredBody { body, to_measured: &to_measured, allowance, reach };
-        let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
+        let (sampled, body, to_measured, allowed) = self.sides(side, other);
+        let measured = MeasuredBody { body, to_measured: &to_measured, allowed, reach };
+        let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowed };
         for tree in [sampled.shape.samples(), &sampled.extra_samples] {
             gather(tree, &measured, self.termination, &mut found, tag)?;
         }
@@ -235,14 +235,14 @@ impl<'a> MovingBody<'a> {
     }
 
     /// Whose samples are asked for, what they are measured against, the way from the one's frame to the other's, and
-    /// the pair's allowance.
+    /// the pair's allowed penetration.
     fn sides(&self, side: ContactSide, other: usize) -> (&'a Body, &'a Body, Pose, f64) {
         let standing = &self.scene.bodies[other];
-        let allowance = self.scene.allowances.of(self.part, other);
+        let allowed = self.scene.allowed.of(self.part, other);
         let standing_from_moving = standing.planning_from_shape.inverse() * self.pose;
         match side {
-            ContactSide::Moving => (self.body, standing, standing_from_moving, allowance),
-            ContactSide::Standing => (standing, self.body, standing_from_moving.inverse(), allowance),
+            ContactSide::Moving => (self.body, standing, standing_from_moving, allowed),
+            ContactSide::Standing => (standing, self.body, standing_from_moving.inverse(), allowed),
         }
     }
 
@@ -272,9 +272,9 @@ impl<'a> MovingBody<'a> {
         let (closest, distance) = if self.is_exact {
             measured.closest_from(&p, contact.closest.triangle)
         } else {
-            measured.closest(&p, (reach - contact.allowance).max(0.0))?
+            measured.closest(&p, (reach - contact.allowed).max(0.0))?
         };
-        Some(Contact { gap: distance + contact.allowance, closest, ..*contact })
+        Some(Contact { gap: distance + contact.allowed, closest, ..*contact })
     }
 
     /// How far a twist that ended at this pose moved a contact's sample against the other surface,
@@ -318,8 +318,8 @@ impl<'a> MovingBody<'a> {
             point: frame.inverse_transform_point(&world),
             motion: frame.rotation.inverse() * motion,
             closest: contact.closest,
-            distance: contact.gap - contact.allowance,
-            below: contact.allowance + ON_SURFACE,
+            distance: contact.gap - contact.allowed,
+            below: contact.allowed + ON_SURFACE,
         };
         let mut planes = Planes::default();
         let closest_to = |p: &Point3<f64>, reach: f64| {
@@ -334,7 +334,7 @@ impl<'a> MovingBody<'a> {
             let n = frame.rotation * plane.normal * sense;
             let moment = arm.cross(&n);
             let a = Vector6::new(n.x, n.y, n.z, moment.x, moment.y, moment.z);
-            out.push(VelocityConstraint { a, b: plane.height + contact.allowance, other: contact.other });
+            out.push(VelocityConstraint { a, b: plane.height + contact.allowed, other: contact.other });
         }
     }
 

@@ -16,7 +16,7 @@ use super::{Contact, ContactSet};
 pub(super) struct MeasuredBody<'m> {
     pub(super) body: &'m Body,
     pub(super) to_measured: &'m Pose,
-    pub(super) allowance: f64,
+    pub(super) allowed: f64,
     pub(super) reach: f64,
 }
 
@@ -28,12 +28,12 @@ pub(super) fn gather(
     near: &mut ContactSet,
     tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
 ) -> Result<(), Interrupt> {
-    let MeasuredBody { body, to_measured, allowance, reach } = *measured;
+    let MeasuredBody { body, to_measured, allowed, reach } = *measured;
     // Deeper than nothing cannot be excluded by a bound that is only sure outside.
-    let limit = (reach - allowance).max(0.0);
+    let limit = (reach - allowed).max(0.0);
     let field: &Grid = &body.field;
     let clearance = Cell::new(near.clearance);
-    let keep = |bound: f64| clearance.set(clearance.get().min(bound + allowance));
+    let keep = |bound: f64| clearance.set(clearance.get().min(bound + allowed));
     // The first node of samples that comes near a large surface fills that surface's field.
     let poll = Poll::every(1, termination);
     let sample_poll = Poll::every(LONG_STEPS_PER_POLL, termination);
@@ -56,8 +56,8 @@ pub(super) fn gather(
                 return Ok(());
             }
             match body.closest(&p, limit) {
-                Some((closest, distance)) if distance + allowance < reach => {
-                    near.contacts.push(tag(*sample, distance + allowance, closest));
+                Some((closest, distance)) if distance + allowed < reach => {
+                    near.contacts.push(tag(*sample, distance + allowed, closest));
                 }
                 Some((_, distance)) => keep(distance),
                 None => keep(limit),
@@ -89,7 +89,7 @@ pub(super) fn gather_exactly(
     near: &mut ContactSet,
     tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
 ) -> Result<Option<()>, Interrupt> {
-    let MeasuredBody { body, to_measured, allowance, reach } = *measured;
+    let MeasuredBody { body, to_measured, allowed, reach } = *measured;
     let bounds = body.shape.surface.bounds();
     let clearance = Cell::new(near.clearance);
     let keep = |gap: f64| clearance.set(clearance.get().min(gap));
@@ -98,7 +98,7 @@ pub(super) fn gather_exactly(
     let look = |p: &Point3<f64>, guess: u32, counts: bool| {
         looks.set(looks.get() + usize::from(counts));
         let (closest, distance) = body.closest_from(p, guess);
-        (distance + allowance, closest)
+        (distance + allowed, closest)
     };
     let is_too_many = || looks.get() > most;
     tree.walk(
@@ -110,8 +110,8 @@ pub(super) fn gather_exactly(
             }
             let p = to_measured * node.centre;
             let apart = bounds.distance(&p);
-            if apart > 0.0 && apart + allowance - node.radius >= reach {
-                keep(apart + allowance - node.radius);
+            if apart > 0.0 && apart + allowed - node.radius >= reach {
+                keep(apart + allowed - node.radius);
                 return Ok(None);
             }
             let (gap, closest) = look(&p, guess, counts);

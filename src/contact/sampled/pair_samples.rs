@@ -63,10 +63,10 @@ impl PairSamples {
         extent: GatherExtent,
     ) -> Result<Option<ContactSet>, Interrupt> {
         let other = self.other;
-        let (sampled, body, to_measured, allowance) = mover.sides(side, other);
-        let measured = MeasuredBody { body, to_measured: &to_measured, allowance, reach: extent.radius };
+        let (sampled, body, to_measured, allowed) = mover.sides(side, other);
+        let measured = MeasuredBody { body, to_measured: &to_measured, allowed, reach: extent.radius };
         let few = GatherLimits { most: extent.most, within: extent.reach, termination: mover.termination };
-        let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowance };
+        let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowed };
         let tree = if side == ContactSide::Moving { &self.mine } else { &self.theirs };
         let mut found = ContactSet { contacts: Vec::new(), clearance: f64::INFINITY };
         for tree in [tree, &sampled.extra_samples] {

@@ -17,8 +17,8 @@ impl MovingBody<'_> {
     /// Whether the fields alone show that a sample of either surface is deeper than allowed. Measures nothing exactly,
     /// so it is quick.
     pub(crate) fn clearly_enters(&self, standing: &[usize]) -> Result<bool, Interrupt> {
-        self.any_pair(standing, 0.0, |[sampled, measured], to_measured, allowance, poll| {
-            let limit = -allowance - measured.field.error_bound();
+        self.any_pair(standing, 0.0, |[sampled, measured], to_measured, allowed, poll| {
+            let limit = -allowed - measured.field.error_bound();
             is_any_below(sampled, &measured.field, to_measured, limit, poll)
         })
     }
@@ -34,8 +34,8 @@ impl MovingBody<'_> {
 
     /// Whether a sample of either surface is deeper by `depth` than allowed: exact, and quick where many are.
     pub(crate) fn enters_by(&self, depth: f64, standing: &[usize]) -> Result<bool, Interrupt> {
-        self.any_pair(standing, 0.0, |[sampled, measured], to_measured, allowance, poll| {
-            is_deeper(sampled.shape.samples(), measured, to_measured, allowance + depth, poll)
+        self.any_pair(standing, 0.0, |[sampled, measured], to_measured, allowed, poll| {
+            is_deeper(sampled.shape.samples(), measured, to_measured, allowed + depth, poll)
         })
     }
 
@@ -53,10 +53,10 @@ impl MovingBody<'_> {
         for other in self.scene.broad_phase.meeting_of(standing, &bounds) {
             let still = &self.scene.bodies[other];
             self.prepare_fields(still)?;
-            let allowance = self.scene.allowances.of(self.part, other);
+            let allowed = self.scene.allowed.of(self.part, other);
             let to_still = still.planning_from_shape.inverse() * self.pose;
-            if test([self.body, still], &to_still, allowance, &poll)?
-                || test([still, self.body], &to_still.inverse(), allowance, &poll)?
+            if test([self.body, still], &to_still, allowed, &poll)?
+                || test([still, self.body], &to_still.inverse(), allowed, &poll)?
             {
                 return Ok(true);
             }

@@ -14,7 +14,7 @@ fn without_fields_the_same_contacts_are_found() {
     let mut contacts = 0;
     for meshes in [
         peg_in_hole(0.0).to_vec(),
-        // Deeper than that is granted, so that nothing is near in the second one.
+        // Deeper than that is allowed, so that nothing is near in the second one.
         peg_in_hole(5e-4).to_vec(),
         block_on_plate().to_vec(),
         vec![l_shape(), moved(ball(3), &askew), post],

@@ -28,9 +28,9 @@ mod tests {
     #[test]
     fn the_pair_is_in_the_key_and_nothing_else() {
         let (first, _) = scene(block_on_plate());
-        let mut granted = first.clone();
-        granted.allowances.grant(0, 1, 1e-3);
-        assert_eq!(key(&granted), key(&first), "what is granted does not change the depth");
+        let mut allowed = first.clone();
+        allowed.allowed.allow(0, 1, 1e-3);
+        assert_eq!(key(&allowed), key(&first), "what is allowed does not change the depth");
         let [plate, block] = block_on_plate();
         let elsewhere = Pose::translation(0.5, -0.25, 8.0);
         let there = scene([moved(plate.clone(), &elsewhere), moved(block.clone(), &elsewhere)]).0;

@@ -69,12 +69,12 @@ impl KnownVerdicts {
 
 impl VerdictQuestion<'_> {
     fn key(&self) -> RecordKey {
-        let PairPath { shapes, path, centre, granted, longest_side, .. } = self.passing;
+        let PairPath { shapes, path, centre, allowed, longest_side, .. } = self.passing;
         let mut digest = Digest::new();
         shapes.iter().for_each(|shape| {
             digest.hash(shape.content());
         });
-        digest.numbers([self.limit, *granted, *longest_side]).numbers(centre.iter().copied());
+        digest.numbers([self.limit, *allowed, *longest_side]).numbers(centre.iter().copied());
         digest.integer(path.len() as u64);
         path.iter().for_each(|pose| add_pose(&mut digest, pose));
         digest.key(&VERDICT)
@@ -102,7 +102,7 @@ mod tests {
         let verdict_on = |parts: [usize; 2], height: f64, aside: f64| {
             let start = scene.bodies[parts[0]].planning_from_shape;
             let path = [start, Pose::translation(aside, 0.0, height) * start];
-            let passing = &PairPath::new(&scene, &scene.allowances, parts, &path);
+            let passing = &PairPath::new(&scene, &scene.allowed, parts, &path);
             let check = || {
                 checks.set(checks.get() + 1);
                 let point = Point3::new(0.5, 0.0, height);

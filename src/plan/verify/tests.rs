@@ -19,7 +19,7 @@ fn checked(scene: &Scene, verifier: &Verifier, steps: &[Vector3<f64>]) -> Verdic
 
 fn checked_path(scene: &Scene, verifier: &Verifier, path: &[Pose]) -> Verdict {
     let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != 1).collect();
-    verifier.check(scene, &scene.allowances, &standing, 1, path, &Termination::default()).unwrap()
+    verifier.check(scene, &scene.allowed, &standing, 1, path, &Termination::default()).unwrap()
 }
 
 fn overlap(scene: &Scene, verifier: &Verifier, a: usize, b: usize) -> f64 {
@@ -99,7 +99,7 @@ fn where_holes_leave_nothing_to_be_settled_samples_are_asked_soon() {
     basket.triangles = basket.triangles.into_iter().step_by(2).collect();
     let (scene, verifier) = scene([basket, cuboid([-2.0, -1.5, 1.0], [1.0, 2.0, 3.5])]);
     let path = [scene.bodies[1].planning_from_shape; 2];
-    let passing = PairPath::new(&scene, &scene.allowances, [1, 0], &path);
+    let passing = PairPath::new(&scene, &scene.allowed, [1, 0], &path);
     let course = Course::new(&passing.path, passing.centre, passing.reach());
     let found = verifier.bounds(&passing, &course, &Termination::default()).unwrap();
     assert!(found.iter().any(|f| !f.open.is_empty() && f.effort < PATH_EFFORT_IN_DOUBT / 5));
@@ -124,7 +124,7 @@ fn a_pin_in_a_round_hole_is_told_by_few_regions() {
     let (scene, verifier) = scene(meshes.map(|mesh| moved(mesh, &turn)));
     let start = scene.bodies[1].planning_from_shape;
     let path = [start, nalgebra::Translation3::from(turn * Vector3::z() * 8.0) * start];
-    let passing = PairPath::new(&scene, &scene.allowances, [1, 0], &path);
+    let passing = PairPath::new(&scene, &scene.allowed, [1, 0], &path);
     let course = Course::new(&passing.path, passing.centre, passing.reach());
     let [pin, _] = verifier.bounds(&passing, &course, &Termination::default()).unwrap();
     let triangles = scene.bodies[1].shape.surface.triangles().len();
@@ -194,10 +194,10 @@ fn a_nut_a_hair_too_tight_for_its_bolt_is_bounded_as_easily_as_one_that_fits() {
     let effort = |inner: f64| {
         let (bolt, nut) = (rod(0.3, [-4.0, 4.0], 40), tube(inner, 0.6, [3.0, 3.4], 40));
         let (scene, verifier) = scene([bolt, nut]);
-        assert_eq!(scene.allowances.of(1, 0) > 0.0, inner < 0.3);
+        assert_eq!(scene.allowed.of(1, 0) > 0.0, inner < 0.3);
         let start = scene.bodies[1].planning_from_shape;
         let path = [start, Pose::translation(0.0, 0.0, 1.2) * start];
-        let passing = &PairPath::new(&scene, &scene.allowances, [1, 0], &path);
+        let passing = &PairPath::new(&scene, &scene.allowed, [1, 0], &path);
         let course = &Course::new(&passing.path, passing.centre, passing.reach());
         let found = verifier.bounds(passing, course, &Termination::default()).unwrap();
         assert!(found.iter().all(|side| side.bound < LIMIT / 2.0 && side.open.is_empty()));
@@ -239,7 +239,7 @@ fn a_cancelled_check_ends_with_the_reason() {
     let termination = Termination::default();
     termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
     let path = [scene.bodies[1].planning_from_shape];
-    let ended = verifier.check(&scene, &scene.allowances, &[0], 1, &path, &termination);
+    let ended = verifier.check(&scene, &scene.allowed, &[0], 1, &path, &termination);
     assert_eq!(ended, Err(Interrupt::Cancelled));
 }
 
@@ -263,7 +263,7 @@ proptest! {
         let place = Pose::new(Vector3::new(3.0 + x, 0.4, 1.5), Vector3::y() * 0.3 + Vector3::z() * turn);
         let far = cuboid([7.0, -1.0, -1.0], [7.5, 0.0, 0.0]);
         let (scene, verifier) = scene([large(l_shape()), moved(large(l_shape()), &place), far]);
-        let granted = scene.allowances.of(0, 1);
+        let allowed = scene.allowed.of(0, 1);
         let from = scene.bodies[1].planning_from_shape;
         let mut path = vec![from];
         path.extend(steps.iter().map(|s| s * from));
@@ -277,7 +277,7 @@ proptest! {
             let relative = scene.bodies[0].planning_from_shape.inverse() * pose;
             let at = if on_moving { relative * p } else { relative.inverse() * p };
             let into = &scene.bodies[usize::from(!on_moving)].shape.surface;
-            -into.signed_distance(&at) - granted
+            -into.signed_distance(&at) - allowed
         };
         // What a dense look finds, at points all over both.
         let deepest = poses(10).into_iter().flat_map(|pose| {

@@ -32,5 +32,5 @@ pub(crate) fn add_standing(digest: &mut Digest, scene: &Scene, part: usize, stan
     digest.hash(body.shape.content());
     add_pose(digest, &body.planning_from_shape);
     add_bounds(digest, &body.bounds);
-    digest.numbers([scene.allowances.of(part, standing)]);
+    digest.numbers([scene.allowed.of(part, standing)]);
 }

@@ -190,8 +190,8 @@ impl<'a> Contacts<'a> {
         let points = self.cache.of(&pair.standing.shape, self.parameters.longest_edge);
         let assembled = self.assembled_penetration(pair, &points);
         // Deeper than its band the field shows no depth, and far inside no way out either.
-        let granted = assembled.max(self.scene.allowances.of(self.part, pair.other));
-        let threshold = granted + self.parameters.penetration_threshold * pair.scale;
+        let allowed = assembled.max(self.scene.allowed.of(self.part, pair.other));
+        let threshold = allowed + self.parameters.penetration_threshold * pair.scale;
         pair.met.get_or_init(|| NearPair { points, threshold })
     }
 

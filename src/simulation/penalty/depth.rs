@@ -45,8 +45,8 @@ fn holds(
     let bounds = contacts.body.shape.bounds().transformed(pose);
     let before = deep.len();
     for (i, pair) in contacts.pairs.iter().enumerate().filter(|(_, p)| p.standing.bounds.meets(&bounds)) {
-        let allowance = contacts.scene.allowances.of(contacts.part, pair.other);
-        let limit = allowance + parameters.depth_tolerance() * pair.scale * SAMPLED_DEPTH_SHARE;
+        let allowed = contacts.scene.allowed.of(contacts.part, pair.other);
+        let limit = allowed + parameters.depth_tolerance() * pair.scale * SAMPLED_DEPTH_SHARE;
         let to_standing = pair.standing.planning_from_shape.inverse() * pose;
         let is_deep = is_deeper(contacts.body, pair.standing, &to_standing, limit)
             || is_deeper(pair.standing, contacts.body, &to_standing.inverse(), limit);

@@ -6,7 +6,7 @@
 //! state that it was in before.
 //!
 //! Guarantees: deterministic to the bit; along the path no sample of either surface is deeper than
-//! its pair's allowance and the declared tolerance, measured on the triangles (`depth`). The paper
+//! its pair's allowed penetration and the declared tolerance, measured on the triangles (`depth`). The paper
 //! has no such check. A block of steps in which it fails ends at the last waypoint that held, and
 //! the next begins there at rest. Known misses: features that enter only between two samples; parts
 //! that turn so fast that a thin one is crossed within a single step.

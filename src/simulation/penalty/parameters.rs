@@ -130,7 +130,7 @@ impl PenaltyParameters {
         (self.planning_time_step / self.time_step).round().max(1.0) as u32
     }
 
-    /// How much deeper than its allowance a pair may get, in the planning frame.
+    /// How much deeper than its allowed penetration a pair may get, in the planning frame.
     #[must_use]
     pub fn depth_tolerance(&self) -> f64 {
         self.penetration_threshold + self.yielding

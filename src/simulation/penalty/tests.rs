@@ -342,7 +342,7 @@ fn a_soft_contact_ends_the_motion_before_it_is_deeper_than_declared() {
     let motion = motion(soft, &scene, DOWN);
     assert_eq!(motion.end, End::Collision { with: vec![0] });
     let t = Termination::default();
-    let depth = verifier.check(&scene, &scene.allowances, &[0], 1, &motion.path, &t).unwrap().depth;
+    let depth = verifier.check(&scene, &scene.allowed, &[0], 1, &motion.path, &t).unwrap().depth;
     assert!(depth <= soft.depth_tolerance(), "{depth}");
     // It got close to it, though: nothing but the check stopped it.
     assert!(depth > 0.3 * soft.depth_tolerance(), "{depth}");

@@ -3,7 +3,7 @@
 //! The record has the motion in contact, until contact stopped it, the engine gave up, or the part was out. Its
 //! *witnesses* are the standing parts whose boxes meet the box of everything that the engine looked at; no other part had
 //! an influence. So the record holds among other parts if the same box meets the same witnesses in the same order: same
-//! meshes, poses, boxes, allowances and added samples. Whether and where the part is out depends on the hull of all
+//! meshes, poses, boxes, allowed penetrations and added samples. Whether and where the part is out depends on the hull of all
 //! standing parts, so that is tested again at each pose where the engine had tested it. A motion that ended because the
 //! part was out, but is not out now, is simulated again.
 //!

@@ -99,7 +99,7 @@ fn key(question: &SweepQuestion<'_>) -> RecordKey {
 /// The hash of how a part on the way stands, and of how far the way past it goes.
 fn place(question: &SweepQuestion<'_>, cast: &ShapeCast<'_>) -> [u8; 16] {
     let mut digest = Digest::new();
-    digest.numbers([cast.travel, cast.margins.granted]);
+    digest.numbers([cast.travel, cast.margins.allowed]);
     add_standing(&mut digest, question.scene, question.part, cast.other);
     let [first, _]: [[u8; 16]; 2] = bytemuck::cast(digest.finish());
     first

@@ -90,7 +90,7 @@ impl<'a> FreeFlight<'a> {
             return Ok(None);
         }
         if self.left == 0.0 {
-            // What is met at a small angle may have been entered a little: to another flight that is granted.
+            // What is met at a small angle may have been entered a little: to another flight that is allowed.
             let lands = std::mem::take(&mut self.is_met);
             (self.left, self.is_met) = if lands { (0.0, false) } else { self.length(from, bounds, u)? };
         }
@@ -114,11 +114,11 @@ impl<'a> FreeFlight<'a> {
         let swept = bounds.union(&Bounds { min: bounds.min + end, max: bounds.max + end });
         let (mut length, mut is_met) = (FLIGHT_STRETCH, false);
         for other in scene.broad_phase.meeting_of(standing, &swept) {
-            let granted = scene.allowances.of(part, other) + ROUNDED;
+            let allowed = scene.allowed.of(part, other) + ROUNDED;
             // As deep as it may be before.
-            let back = granted + BULGE_TOLERANCE;
-            let margins = CastMargins { granted, back, steepness: TILT, sunk: ROUNDED };
-            let passed = bounds.grown(granted).way_past(&scene.bodies[other].bounds, u);
+            let back = allowed + BULGE_TOLERANCE;
+            let margins = CastMargins { allowed, back, steepness: TILT, sunk: ROUNDED };
+            let passed = bounds.grown(allowed).way_past(&scene.bodies[other].bounds, u);
             let travel = passed.min(length + LANDING);
             let (start, direction) = (from, u);
             let cast = ShapeCast { scene, part, start, direction, travel, other, margins, termination };

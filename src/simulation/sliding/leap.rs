@@ -295,7 +295,7 @@ mod tests {
         assert!(matches!(motion.end, End::Disassembled(_)), "{:?}", motion.end);
         let angle: f64 = motion.path.windows(2).map(|w| w[0].rotation.angle_to(&w[1].rotation)).sum();
         assert!(angle > 0.6 * turns * TAU, "{angle}");
-        let verdict = verifier.check(&scene, &scene.allowances, &[0], 1, &motion.path, &t).unwrap();
+        let verdict = verifier.check(&scene, &scene.allowed, &[0], 1, &motion.path, &t).unwrap();
         assert!(verdict.depth < 2e-3, "{}", verdict.depth);
     }
 }

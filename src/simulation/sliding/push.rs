@@ -232,8 +232,7 @@ mod tests {
         let path: Vec<Pose> = shifts.iter().map(|s| Translation3::from(*s) * start).collect();
         let standing: Vec<usize> = (0..scene.bodies.len()).filter(|&i| i != 1).collect();
         let t = Termination::default();
-        let of =
-            |path: &[Pose]| verifier.check(scene, &scene.allowances, &standing, 1, path, &t).unwrap().depth;
+        let of = |path: &[Pose]| verifier.check(scene, &scene.allowed, &standing, 1, path, &t).unwrap().depth;
         // Piece by piece: about bends, what is bounded is more than what happens.
         path.windows(2).map(of).fold(of(&path[..1]), f64::max)
     }
@@ -365,7 +364,7 @@ mod tests {
             let pose = Pose::new(Vector3::from(place), Vector3::from(turn));
             let (scene, verifier) = two_and_a_post(&pose);
             prop_assume!(depth(&scene, &verifier, &[Vector3::zeros()]) < 1e-9);
-            prop_assume!(scene.allowances.of(0, 1) == 0.0 && scene.allowances.of(1, 2) == 0.0);
+            prop_assume!(scene.allowed.of(0, 1) == 0.0 && scene.allowed.of(1, 2) == 0.0);
             let (shifts, stopped) = pushed(&scene, force, 40);
             // So in 40,000 cases.
             let got = depth_declared(&scene, &verifier, &shifts);

@@ -5,14 +5,14 @@
 //! If all of these are within some distance of one convex region that the other surface does not
 //! enter ([`FreeRegion`]), so is the whole piece all the way, and it gets no deeper than that: what
 //! slides along a face, in a hole or in a groove is settled at once, and remembered by its place, for
-//! what comes by later. What lies in the other surface with granted overlap, maybe nearer to one face
+//! what comes by later. What lies in the other surface with allowed penetration, maybe nearer to one face
 //! of it here and to another there, is bounded by the triangles about it
 //! ([`Surface::hull_depth`]). Other pieces are split, in space or in time, whichever is longer; but on a line
 //! in space first, down to triangles: the prism that one of them passes is convex, however long.
 //! Pieces of the smallest size are measured; their size is added. Of a long piece only what is within the box of
 //! the other surface is asked about: a region need not hold what is outside by far ([`clip`]).
 //!
-//! Where threads with granted overlap cross each other, and in sight of holes, this may take too long: a
+//! Where threads with allowed penetration cross each other, and in sight of holes, this may take too long: a
 //! count ends it, or that hardly anything was settled by then ([`PathDepth::open`]).
 //!
 //! So for closed surfaces the answer is a bound for all points and all times, not for samples (but
@@ -39,9 +39,9 @@ use super::super::passing::PairPath;
 /// How finely depth is told, in the planning frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DepthPrecision {
-    /// Depth beyond what is granted that is not looked into.
-    pub(crate) spare: f64,
-    /// Depth beyond what is granted from which on points are recorded, but not looked for any
+    /// Depth beyond what is allowed that is not looked into.
+    pub(crate) ignored: f64,
+    /// Depth beyond what is allowed from which on points are recorded, but not looked for any
     /// closer.
     pub(crate) deep: f64,
     /// Depth is told to a tenth, and as closely as this.
@@ -88,7 +88,7 @@ impl PathQuestion<'_> {
             surface: &looked_at.surface,
             tree: looked_at.patches(termination)?,
             measured: &measured.surface,
-            granted: passing.granted,
+            allowed: passing.allowed,
             precision,
         };
         let view = CourseView::new(course, on_moving, precision.finest / 16.0);
@@ -104,16 +104,16 @@ pub(crate) struct SideQuestion<'a> {
     /// The surface into which they may get.
     pub(crate) measured: &'a Surface,
     /// The depth that counts as none.
-    pub(crate) granted: f64,
+    pub(crate) allowed: f64,
     pub(crate) precision: DepthPrecision,
 }
 
 /// What was found.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PathDepth {
-    /// No point gets deeper than this beyond what is granted.
+    /// No point gets deeper than this beyond what is allowed.
     pub(crate) bound: f64,
-    /// The largest depth that was measured beyond what is granted.
+    /// The largest depth that was measured beyond what is allowed.
     pub(crate) depth: f64,
     /// Points (frame of the surface asked about) that were measured deeper than
     /// [`DepthPrecision::deep`], or of which no less can be told: a good path has none, of a bad one these

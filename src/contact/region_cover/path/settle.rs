@@ -24,8 +24,8 @@ impl PathSearch<'_> {
         corners: impl Fn() -> Vec<Point3<f64>>,
     ) -> bool {
         let asked = self.asked;
-        let spared = self.spared() - slack;
-        if spared < 0.0 || (swept.radius > asked.precision.coarse && self.is_beside_rim(swept)) {
+        let ignored = self.ignored() - slack;
+        if ignored < 0.0 || (swept.radius > asked.precision.coarse && self.is_beside_rim(swept)) {
             return false;
         }
         let place = place(swept);
@@ -34,9 +34,9 @@ impl PathSearch<'_> {
         let recent = self.held.iter().rev().take(RECENT_REGIONS);
         for region in of_place.chain(&hint.region).chain(recent).copied() {
             let KnownRegion { free, is_outside } = &self.regions[region as usize];
-            if let Some((depth, _)) = fits(free, spared) {
+            if let Some((depth, _)) = fits(free, ignored) {
                 hint.region = Some(region);
-                return (*is_outside || self.is_outside(swept, spared, hint.triangle))
+                return (*is_outside || self.is_outside(swept, ignored, hint.triangle))
                     && self.settled(depth + slack);
             }
         }
@@ -46,10 +46,10 @@ impl PathSearch<'_> {
         // Depth changes by no more than the distance, unless the surface has holes. Then it changes its
         // sign in mid-air, too, where the winding number passes a half: next to a point far outside
         // may be one as far inside.
-        if swept.radius - signed <= spared {
+        if swept.radius - signed <= ignored {
             return (!self.has_rim
                 || asked.measured.stays_outside(&swept.centre, swept.radius)
-                || self.is_outside(swept, spared, hint.triangle))
+                || self.is_outside(swept, ignored, hint.triangle))
                 && self.settled(swept.radius - signed + slack);
         }
         if self.is_bounded(swept, signed, slack, hint.triangle) {
@@ -58,7 +58,7 @@ impl PathSearch<'_> {
         // Wider regions than large pieces need are vain; small ones tell how deep they really are.
         let coarse = asked.precision.coarse;
         let wide = if swept.radius > coarse { 0.0 } else { swept.radius.min(coarse / 8.0) };
-        let most = (asked.granted + asked.precision.deep - slack).min(wide).max(spared);
+        let most = (asked.allowed + asked.precision.deep - slack).min(wide).max(ignored);
         if -signed > most {
             return false;
         }
@@ -68,7 +68,7 @@ impl PathSearch<'_> {
         hint.is_vain = true;
         self.found.effort += REGION_EFFORT;
         let seen = (&closest, signed);
-        let Some(mut free) = self.region(swept, seen, most, spared) else { return false };
+        let Some(mut free) = self.region(swept, seen, most, ignored) else { return false };
         let mut fit = fits(&free, most);
         // Planes that leave most room before a few corners may be askew to a wall along which all others lie, as of
         // a hole that is round about a pin: one more region takes less time than all the pieces without.
@@ -78,7 +78,7 @@ impl PathSearch<'_> {
         {
             self.wanted = corners;
             self.found.effort += REGION_EFFORT;
-            if let Some(fitted) = self.region(swept, seen, most, spared) {
+            if let Some(fitted) = self.region(swept, seen, most, ignored) {
                 fit = fits(&fitted, most);
                 free = fitted;
             }
@@ -91,7 +91,7 @@ impl PathSearch<'_> {
         let Some((depth, worst)) = fit else { return false };
         self.places.entry(place).or_default().push(id);
         self.held.push(id);
-        if depth > spared && !self.is_told(swept, depth, &worst, hint.triangle) {
+        if depth > ignored && !self.is_told(swept, depth, &worst, hint.triangle) {
             return false;
         }
         (is_outside || self.is_outside(swept, most, hint.triangle)) && self.settled(depth + slack)
@@ -99,49 +99,55 @@ impl PathSearch<'_> {
 
     /// Whether the triangles about a piece tell well how deep it gets; the bound is raised by that.
     fn is_bounded(&mut self, swept: &SweptBall, signed: f64, slack: f64, guess: u32) -> bool {
-        let spared = self.spared() - slack;
-        let SideQuestion { measured, granted, precision, .. } = self.asked;
+        let ignored = self.ignored() - slack;
+        let SideQuestion { measured, allowed, precision, .. } = self.asked;
         // What is deeper is to be recorded.
-        let most = spared.max(granted + precision.deep - slack);
+        let most = ignored.max(allowed + precision.deep - slack);
         // The middle is no nearer to any triangle than to the nearest.
-        if signed > spared || -signed > most {
+        if signed > ignored || -signed > most {
             return false;
         }
-        let Some(HullDepth { bound, worst }) = measured.hull_depth(&self.hull, guess, spared) else {
+        let Some(HullDepth { bound, worst }) = measured.hull_depth(&self.hull, guess, ignored) else {
             return false;
         };
         let worst = self.hull[worst];
         bound <= most
-            && (bound <= spared || self.is_told(swept, bound, &worst, guess))
+            && (bound <= ignored || self.is_told(swept, bound, &worst, guess))
             && self.settled(bound + slack)
     }
 
     /// A region for a piece, around its middle or what is outside nearest to that.
-    fn region(&self, swept: &SweptBall, seen: (&Closest, f64), most: f64, spared: f64) -> Option<FreeRegion> {
+    fn region(
+        &self,
+        swept: &SweptBall,
+        seen: (&Closest, f64),
+        most: f64,
+        ignored: f64,
+    ) -> Option<FreeRegion> {
         let SweptBall { centre, radius, .. } = swept;
         let wanted = Wanted { points: &self.wanted, most, from_behind: false, facing: self.facing };
-        self.asked.measured.free_region_sparing(centre, radius * SWEPT_ROOM, seen, wanted, spared).ok()
+        self.asked.measured.free_region_sparing(centre, radius * SWEPT_ROOM, seen, wanted, ignored).ok()
     }
 
     /// Whether a depth is what it is, as measured at the worst corner, or small enough not to matter:
     /// not only that of a region which is too narrow.
     fn is_told(&mut self, swept: &SweptBall, depth: f64, worst: &Point3<f64>, guess: u32) -> bool {
-        let SideQuestion { measured, granted, precision, .. } = self.asked;
+        let SideQuestion { measured, allowed, precision, .. } = self.asked;
         let real = -measured.signed(worst, &measured.closest_from(worst, guess));
-        let beyond = depth - granted;
+        let beyond = depth - allowed;
         let small = swept.radius <= precision.coarse && beyond <= precision.deep / 2.0;
-        let exact = real >= depth - precision.spare.max(precision.margin_of(depth));
+        let exact = real >= depth - precision.ignored.max(precision.margin_of(depth));
         let told = exact || (small && precision.deep.is_finite());
         if !told {
             return false;
         }
-        self.found.depth = self.found.depth.max(real - granted);
+        self.found.depth = self.found.depth.max(real - allowed);
         true
     }
 
     /// Raises the bound.
     pub(super) fn settled(&mut self, depth: f64) -> bool {
-        self.found.bound = self.found.bound.max(depth - self.asked.granted);
+        self.found.bound = self.found.bound.max(depth - self.asked.allowed);
         true
     }
 

@@ -223,7 +223,7 @@ impl PathSearch<'_> {
         let TrianglePiece { corners, is_new, .. } = piece;
         let asked = self.asked;
         let over = |at: &Point3<f64>| {
-            -asked.measured.signed(at, &asked.measured.closest_from(at, guess)) - asked.granted
+            -asked.measured.signed(at, &asked.measured.closest_from(at, guess)) - asked.allowed
         };
         for (p, _) in corners.iter().zip(is_new).filter(|(_, new)| **new) {
             let over = over(&(leg.end * p));
@@ -250,14 +250,14 @@ impl PathSearch<'_> {
             }
             self.found.deep.push((corners[0], bound));
         }
-        self.settled(asked.granted + bound)
+        self.settled(asked.allowed + bound)
     }
 
-    /// The depth up to which nothing is looked into: it is granted, spared, or as good as found.
-    pub(super) fn spared(&self) -> f64 {
+    /// The depth up to which nothing is looked into: it is allowed, ignored, or as good as found.
+    pub(super) fn ignored(&self) -> f64 {
         let precision = self.asked.precision;
         let found = self.found.depth + precision.margin_of(self.found.depth);
-        self.asked.granted + found.min(precision.deep).max(precision.spare)
+        self.asked.allowed + found.min(precision.deep).max(precision.ignored)
     }
 
     /// The smallest size of pieces, for now.

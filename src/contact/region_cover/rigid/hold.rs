@@ -85,7 +85,7 @@ impl RigidPiece {
 
     /// How far outside its region it may be.
     pub(crate) fn most(&self, facing: &SurfacePair<'_>) -> f64 {
-        facing.allowance + self.spot.held.max(DEPTH_TOLERANCE)
+        facing.allowed + self.spot.held.max(DEPTH_TOLERANCE)
     }
 
     /// How far inside its region all of it is at a pose, negative where it is outside by no more than it

@@ -68,7 +68,7 @@ impl<'a> RigidPair<'a> {
         is_start: bool,
         termination: &Termination,
     ) -> Result<Option<Self>, Interrupt> {
-        if scene.allowances.of(part, other) > COVERED_OVERLAP {
+        if scene.allowed.of(part, other) > COVERED_OVERLAP {
             return Ok(None);
         }
         let gathered = starting(scene, (part, pose), other, (is_start, RIGID_PIECES), termination)?;
@@ -176,11 +176,11 @@ impl<'a> RigidPair<'a> {
             for (k, _) in out.into_iter().take(PROBED_CORNERS) {
                 let seen = facing.look(&placed.points[k], hold.spot.guess);
                 hold.spot.guess = seen.closest.triangle;
-                let gap = seen.signed + facing.allowance;
+                let gap = seen.signed + facing.allowed;
                 if gap < -most {
                     let sample = facing.corner(&hold.spot.piece, k);
                     let (is_moving, at) = (facing.asks_part, (gap, seen.closest));
-                    inside.push(Contact::measured(facing.other, is_moving, sample, at, facing.allowance));
+                    inside.push(Contact::measured(facing.other, is_moving, sample, at, facing.allowed));
                 }
             }
         }
@@ -343,7 +343,7 @@ impl<'a> RigidPair<'a> {
         let facing = &self.facing;
         let gap = |p: &Point3<f64>| {
             let seen = facing.look(&(there * p), guess);
-            (seen.signed + facing.allowance, seen.closest)
+            (seen.signed + facing.allowed, seen.closest)
         };
         let at_corners = corners.map(|p| gap(&p).0);
         let mut deepest: Option<(f64, Point3<f64>)> = None;
@@ -377,7 +377,7 @@ impl<'a> RigidPair<'a> {
             }
         }
         let (_, p) = deepest.filter(|(gap, _)| *gap < -DEPTH_TOLERANCE)?;
-        Some(Contact::measured(facing.other, facing.asks_part, p, gap(&p), facing.allowance))
+        Some(Contact::measured(facing.other, facing.asks_part, p, gap(&p), facing.allowed))
     }
 
     /// A small bit that is no deeper than may be, before the face that it is nearest to: where surfaces
@@ -456,9 +456,9 @@ fn pierced(facing: &SurfacePair<'_>, hold: &RigidPiece, triangle: u32, there: &P
     facing.measured.corners_and_middles(triangle).into_iter().find_map(|point| {
         let p = there.inverse_transform_point(&point);
         let closest = facing.asked.closest_from(&p, guess);
-        let gap = facing.asked.signed(&p, &closest) + facing.allowance;
+        let gap = facing.asked.signed(&p, &closest) + facing.allowed;
         let at = (gap, closest);
         (gap < -DEPTH_TOLERANCE)
-            .then(|| Contact::measured(facing.other, !facing.asks_part, point, at, facing.allowance))
+            .then(|| Contact::measured(facing.other, !facing.asks_part, point, at, facing.allowed))
     })
 }

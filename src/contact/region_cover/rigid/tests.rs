@@ -69,7 +69,7 @@ fn what_regions_let_pass_enters_nothing() {
         let post = cuboid([2.0, -3.0, -3.0], [2.5, -2.0, 3.0]);
         let (scene, verifier) = scene([l_shape(), moved(l_shape(), &pose), post]);
         let deep = |path: &[Pose]| {
-            verifier.check(&scene, &scene.allowances, &[0, 2], 1, path, &termination).unwrap().depth
+            verifier.check(&scene, &scene.allowed, &[0, 2], 1, path, &termination).unwrap().depth
         };
         let start = scene.bodies[1].planning_from_shape;
         if deep(&[start]) > 1e-9 {

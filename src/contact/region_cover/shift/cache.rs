@@ -243,11 +243,11 @@ fn at_place<T>(
     find(&alone, &StartPair { part: 0, start: &pair.poses[0], other: 1, kept_as: Some(key) })
 }
 
-/// What pairs have in common that stand alike: the same shapes, poses and allowance.
+/// What pairs have in common that stand alike: the same shapes, poses and allowed penetration.
 fn alike(scene: &Scene, a: usize, b: usize) -> ([*const Shape; 2], [[u64; 7]; 2], u64) {
     let pair = CongruentPair::shifted(scene, a, &scene.bodies[a].planning_from_shape, b);
     let shapes = pair.parts.map(|part| Arc::as_ptr(&scene.bodies[part].shape));
-    (shapes, pair.poses.map(|pose| bits(&pose)), scene.allowances.of(a, b).to_bits())
+    (shapes, pair.poses.map(|pose| bits(&pose)), scene.allowed.of(a, b).to_bits())
 }
 
 /// The smaller of two parts first.

@@ -186,7 +186,7 @@ impl<'a> ShiftSearch<'a> {
     /// A cell for the piece at hand if it is so far off that it needs no region.
     fn free(&self, spot: &CoverPiece, seen: &SignedClosest, wish: &WantedShift) -> Option<ShiftPiece> {
         let room = seen.signed - self.placed.radius;
-        let held = if self.pair.allowance > 0.0 { spot.held } else { HELD };
+        let held = if self.pair.allowed > 0.0 { spot.held } else { HELD };
         let ball = (self.placed.centre, seen.signed);
         let spot = CoverPiece { held, ..*spot };
         (room >= CONTACT_STEP).then(|| ShiftPiece { spot, limits: Vec::new(), middle: wish.at, room, ball })
@@ -265,7 +265,7 @@ impl<'a> ShiftSearch<'a> {
     /// Whether a triangle may lie beside the piece at hand.
     fn is_beside(&self, spot: &CoverPiece, triangle: u32) -> bool {
         let pair = self.pair;
-        pair.is_beside(&self.placed, triangle, pair.allowance + spot.held)
+        pair.is_beside(&self.placed, triangle, pair.allowed + spot.held)
     }
 
     /// Whether the piece at hand, without a region, is too small to be split.
@@ -301,14 +301,14 @@ impl<'a> ShiftSearch<'a> {
     }
 
     /// The piece at hand, a small bit no deeper than it may be, before the face that it is nearest
-    /// to: where facets with granted overlap lie across each other there are no regions. That is not
+    /// to: where facets with allowed penetration lie across each other there are no regions. That is not
     /// certain, as regions are; paths are verified.
     fn before_face(&self, spot: &CoverPiece, wish: &WantedShift) -> Option<ShiftPiece> {
         let (pair, PlacedPiece { points, centre, .. }) = (self.pair, &self.placed);
-        if pair.allowance == 0.0 {
+        if pair.allowed == 0.0 {
             return None;
         }
-        let held = pair.allowance + spot.held;
+        let held = pair.allowed + spot.held;
         let depth = points.iter().map(|p| -pair.look(p, spot.guess).signed).fold(0.0, f64::max);
         if depth > held {
             return None;
@@ -345,7 +345,7 @@ impl<'a> ShiftSearch<'a> {
     ) -> Result<ShiftPiece, NoRegion> {
         self.regions += 1;
         let pair = self.pair;
-        let most = pair.allowance + spot.held;
+        let most = pair.allowed + spot.held;
         let ahead = pair.shifted * shift;
         let PlacedPiece { points, cloud, extremes, centre, radius } = &self.placed;
         let of = |points| Wanted { points, most, from_behind: true, facing: Vector3::zeros() };
@@ -365,7 +365,7 @@ impl<'a> ShiftSearch<'a> {
         };
         let here = below(&Vector3::zeros())?;
         let depth = if ahead == Vector3::zeros() { here } else { here.max(below(&ahead)?) };
-        let slack = if pair.allowance > 0.0 { ((most - depth) / 3f64.sqrt()).max(0.0) } else { 0.0 };
+        let slack = if pair.allowed > 0.0 { ((most - depth) / 3f64.sqrt()).max(0.0) } else { 0.0 };
         let back = pair.shifted.transpose();
         let limits = region.planes().zip(&gaps).map(|((inward, triangle), gap)| {
             let normal = back * inward;
@@ -381,7 +381,7 @@ impl<'a> ShiftSearch<'a> {
             let squared = points.iter().map(|p| (p - region.centre()).norm_squared()).fold(0.0, f64::max);
             (wish.at, region.radius() - squared.sqrt())
         };
-        let held = if pair.allowance > 0.0 { HELD_AT_FIRST } else { HELD.max(depth + HELD / 10.0) };
+        let held = if pair.allowed > 0.0 { HELD_AT_FIRST } else { HELD.max(depth + HELD / 10.0) };
         let held = held.min(spot.held);
         let ball = (region.centre(), region.radius());
         let cell = ShiftPiece { spot: CoverPiece { held, ..*spot }, limits, middle, room, ball };

@@ -71,7 +71,7 @@ impl<'a> ShiftCover<'a> {
     /// Takes a pair in, at a shift of the part.
     pub(crate) fn add(&mut self, other: usize, at: &Vector3<f64>) -> Result<(), Halt> {
         let (scene, termination) = (self.scene, self.termination);
-        if scene.allowances.of(self.part, other) > COVERED_OVERLAP {
+        if scene.allowed.of(self.part, other) > COVERED_OVERLAP {
             return Err(Halt::Lost);
         }
         let gathered = if at == &Vector3::zeros() {
@@ -356,13 +356,13 @@ struct ClearedWay {
 }
 
 /// The normals of what is certainly in the way, as the first piece shows that touches something ahead, if any
-/// does. Where overlap is granted, regions let pieces go on by what is left of that: it leads nowhere.
+/// does. Where penetration is allowed, regions let pieces go on by what is left of that: it leads nowhere.
 fn touched(
     facing: &SurfacePair<'_>,
     cells: &[ShiftPiece],
     way: (&Vector3<f64>, &Vector3<f64>),
 ) -> Option<Vec<Vector3<f64>>> {
-    let reach = if facing.allowance > 0.0 { HELD_AT_FIRST } else { TOUCHED };
+    let reach = if facing.allowed > 0.0 { HELD_AT_FIRST } else { TOUCHED };
     let mut placed = PlacedPiece::default();
     let of_cell = |cell: &ShiftPiece| cell.touched(facing, way, reach, &mut placed);
     let found = cells.iter().map(of_cell).find(|found| !found.is_empty())?;
