@@ -17,13 +17,13 @@ pub(crate) mod constraint;
 pub(crate) mod course;
 pub(crate) mod helix_profile;
 mod obstruction;
-mod passing;
+mod pair_path;
 pub(crate) mod region_cover;
 pub(crate) mod sampled;
 mod shape_cast;
 
 pub use obstruction::obstruction;
-pub use passing::PairPath;
+pub use pair_path::PairPath;
 pub use region_cover::ShiftCoverCache;
 pub use sampled::{passes_straight, seems_clear};
 pub use shape_cast::{CastMargins, ShapeCast};

@@ -35,21 +35,21 @@ impl StandingParts {
 #[must_use]
 pub fn exit_direction(
     scene: &Scene,
-    surroundings: &StandingParts,
+    standing_parts: &StandingParts,
     part: usize,
     pose: &Pose,
     hint: Option<Vector3<f64>>,
 ) -> Option<Vector3<f64>> {
     let body = &scene.bodies[part];
     let mine = transformed(&body.shape.hull, pose);
-    let hint = hint.filter(|d| gap_along(d, &mine, &surroundings.hull) >= HULL_MARGIN);
-    let sought = || separating(&Support::of(&mine), &Support::of(&surroundings.hull), HULL_MARGIN);
+    let hint = hint.filter(|d| gap_along(d, &mine, &standing_parts.hull) >= HULL_MARGIN);
+    let sought = || separating(&Support::of(&mine), &Support::of(&standing_parts.hull), HULL_MARGIN);
     let direction = hint.or_else(sought)?;
     let reach = |pose: &Pose, points: &[Point3<f64>]| {
         points.iter().map(|p| (pose * p).coords.dot(&direction)).fold(f64::NEG_INFINITY, f64::max)
     };
     let far = reach(pose, body.shape.surface.vertices());
-    let apart = surroundings.standing.iter().all(|&i| {
+    let apart = standing_parts.standing.iter().all(|&i| {
         let other = &scene.bodies[i];
         // The corner of its box that lies least far: mostly that is enough.
         if -other.bounds.support(&-direction) - far >= HULL_MARGIN {

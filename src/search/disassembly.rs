@@ -255,7 +255,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         let forces: Vec<_> = runs.iter().map(|run| run.action.force()).collect();
         let question = |i: usize| {
             let Run { part, start, .. } = &runs[i];
-            SweepQuestion { scene, surroundings: &around[i], part: *part, start, direction: &forces[i] }
+            SweepQuestion { scene, standing_parts: &around[i], part: *part, start, direction: &forces[i] }
         };
         // What is remembered is told one after the other: to share it with other threads would take longer.
         let mut results = Vec::new();

@@ -38,7 +38,7 @@ pub struct SweepQuestion<'a> {
     /// The bodies.
     pub scene: &'a Scene,
     /// What stands.
-    pub surroundings: &'a StandingParts,
+    pub standing_parts: &'a StandingParts,
     /// What moves.
     pub part: usize,
     /// From where.
@@ -67,17 +67,19 @@ pub fn straight_sweep_past<E: From<Interrupt>>(
     termination: &Termination,
     mut enters: impl FnMut(&ShapeCast<'_>) -> Result<bool, E>,
 ) -> Result<Option<Sweep>, E> {
-    let SweepQuestion { scene, surroundings, part, start, direction } = *question;
+    let SweepQuestion { scene, standing_parts, part, start, direction } = *question;
     termination.check()?;
-    if let Some(exit) = exit_direction(scene, surroundings, part, start, Some(-direction)) {
+    if let Some(exit) = exit_direction(scene, standing_parts, part, start, Some(-direction)) {
         return Ok(Some(Sweep::Clear { path: vec![*start], exit }));
     }
-    let Some((travel, exit)) = way_out(scene, surroundings, part, start, direction) else { return Ok(None) };
+    let Some((travel, exit)) = way_out(scene, standing_parts, part, start, direction) else {
+        return Ok(None);
+    };
     let end = moved(start, direction, travel);
     let bounds = scene.bodies[part].shape.bounds();
     let here = bounds.transformed(start);
     let swept = here.union(&bounds.transformed(&end));
-    for other in scene.broad_phase.meeting_of(&surroundings.standing, &swept) {
+    for other in scene.broad_phase.meeting_of(&standing_parts.standing, &swept) {
         let allowed = scene.allowed.of(part, other) + DEPTH_TOLERANCE;
         // Beyond, it has passed the other for good: so what is found does not depend on how far others reach.
         let passed = here.grown(allowed).way_past(&scene.bodies[other].bounds, direction);
@@ -101,7 +103,7 @@ fn moved(pose: &Pose, direction: &Vector3<f64>, travel: f64) -> Pose {
 /// travel; further back it is looked again, in steps that double, and halved once they meet.
 fn way_out(
     scene: &Scene,
-    surroundings: &StandingParts,
+    standing_parts: &StandingParts,
     part: usize,
     start: &Pose,
     direction: &Vector3<f64>,
@@ -110,8 +112,8 @@ fn way_out(
     let along = |points: &[Point3<f64>], sign: f64| {
         points.iter().map(|p| p.coords.dot(direction) * sign).fold(f64::NEG_INFINITY, f64::max)
     };
-    let beyond = along(&surroundings.hull, 1.0) + along(&hull, -1.0) + 1.5 * HULL_MARGIN;
-    let (mine, around) = (Support::of(&hull), Support::of(&surroundings.hull));
+    let beyond = along(&standing_parts.hull, 1.0) + along(&hull, -1.0) + 1.5 * HULL_MARGIN;
+    let (mine, around) = (Support::of(&hull), Support::of(&standing_parts.hull));
     let margin = HULL_MARGIN * (1.0 + ASSURED_GAP);
     // From where on they are apart along a direction, if they are where it was found.
     let since = |d: &Vector3<f64>| {
@@ -131,7 +133,7 @@ fn way_out(
     }
     let certified = |travel: f64, hint| {
         let pose = moved(start, direction, travel);
-        exit_direction(scene, surroundings, part, &pose, hint).map(|d| (travel, d))
+        exit_direction(scene, standing_parts, part, &pose, hint).map(|d| (travel, d))
     };
     certified(far, Some(exit)).or_else(|| certified(beyond, Some(-direction)))
 }
@@ -145,7 +147,7 @@ mod tests {
         let standing: Vec<_> = (0..scene.bodies.len()).filter(|&i| i != part).collect();
         let around = StandingParts::new(scene, standing);
         let start = &scene.bodies[part].planning_from_shape;
-        let question = SweepQuestion { scene, surroundings: &around, part, start, direction: &direction };
+        let question = SweepQuestion { scene, standing_parts: &around, part, start, direction: &direction };
         straight_sweep(&question, &Termination::default()).unwrap()
     }
 
@@ -157,7 +159,7 @@ mod tests {
         termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
         let start = &scene.bodies[1].planning_from_shape;
         let (scene, direction) = (&scene, &Vector3::z());
-        let question = SweepQuestion { scene, surroundings: &around, part: 1, start, direction };
+        let question = SweepQuestion { scene, standing_parts: &around, part: 1, start, direction };
         assert_eq!(straight_sweep(&question, &termination), Err(Interrupt::Cancelled));
         let termination = Termination::default();
         let swept = straight_sweep_past(&question, &termination, |cast| {

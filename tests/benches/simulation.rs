@@ -74,7 +74,7 @@ fn measure(folder: &std::path::Path) -> Result<[Vec<f64>; 5], String> {
         for action in &translations {
             let direction = &action.force();
             let question =
-                SweepQuestion { scene: &scene, surroundings: &around, part, start: &pose, direction };
+                SweepQuestion { scene: &scene, standing_parts: &around, part, start: &pose, direction };
             let sweep = || straight_sweep(&question, &never);
             times[1].push(timed(sweep).1);
         }

@@ -23,7 +23,7 @@ use crate::geometry::{Ball, Bounds, Look, Pose, SampleTree, Shape, Spacing, Surf
 use crate::termination::{Interrupt, Poll, Termination};
 use crate::tolerances::{HELPFUL, PATH_DENSITY};
 
-use super::super::passing::PairPath;
+use super::super::pair_path::PairPath;
 
 /// A point that got too deep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -164,14 +164,14 @@ impl<'a> MovingBody<'a> {
     ///
     /// # Errors
     /// The termination condition became true; so of all questions below.
-    pub(crate) fn near(&self, surroundings: &StandingParts, reach: f64) -> Result<ContactSet, Interrupt> {
-        self.near_by(surroundings, reach, |other, near| self.near_pair(other, reach, near))
+    pub(crate) fn near(&self, standing_parts: &StandingParts, reach: f64) -> Result<ContactSet, Interrupt> {
+        self.near_by(standing_parts, reach, |other, near| self.near_pair(other, reach, near))
     }
 
     /// The same; `gather` takes in what is near a standing part that may be within reach.
     pub(crate) fn near_by(
         &self,
-        surroundings: &StandingParts,
+        standing_parts: &StandingParts,
         reach: f64,
         mut gather: impl FnMut(usize, &mut ContactSet) -> Result<(), Interrupt>,
     ) -> Result<ContactSet, Interrupt> {
@@ -180,7 +180,7 @@ impl<'a> MovingBody<'a> {
         // What is further off than any step is long need not be known.
         let horizon = reach.max(FREE_STEP);
         near.clearance = horizon;
-        for other in self.scene.broad_phase.meeting_of(&surroundings.standing, &bounds.grown(horizon)) {
+        for other in self.scene.broad_phase.meeting_of(&standing_parts.standing, &bounds.grown(horizon)) {
             let apart = box_distance(&bounds, &self.scene.bodies[other].bounds);
             if apart > reach {
                 near.clearance = near.clearance.min(apart);

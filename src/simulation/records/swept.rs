@@ -136,7 +136,7 @@ mod tests {
         let (scene, _) = scene(meshes);
         let around = StandingParts::new(&scene, vec![0, 2, 3]);
         let (start, direction) = (&scene.bodies[1].planning_from_shape, &Vector3::z());
-        let question = SweepQuestion { scene: &scene, surroundings: &around, part: 1, start, direction };
+        let question = SweepQuestion { scene: &scene, standing_parts: &around, part: 1, start, direction };
         let never = Termination::default();
         let known = known_sweep(cache, &question, &never).unwrap();
         let warm = remembered_sweep(cache, &question, &never).unwrap();

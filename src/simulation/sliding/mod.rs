@@ -1,20 +1,20 @@
 //! The engine `sliding`: motion in the limit of no inertia.
 //!
 //! A translation (`push`) is a shift: the [region cover](crate::contact::region_cover) of the surfaces bounds how far it
-//! may go, and names what is in the way. Where nothing bends a push, a shape cast finds what it meets (`flight`). For
+//! may go, and names what is in the way. Where nothing bends a push, a shape cast finds what it meets (`free_flight`). For
 //! what may turn, and where a region cover cannot answer for a push (open surfaces, deep allowed overlap, points that
 //! verification found missing), each step projects the wanted twist onto what contact allows, in the metric of the
 //! part's mass (rotation weighed by the squared radius of gyration), and advances the pose by the result (`drive`).
 //! Contacts come from the pieces of surface that leave their regions, or, where surfaces are too complicated for that,
 //! from samples. In free space the step is the certified clearance; where samples answer and the projected twist stays
-//! the same, along a wall or a thread, long steps follow it (`leap`).
+//! the same, along a wall or a thread, long steps follow it (`helix_extrapolation`).
 
 mod drive;
-mod flight;
-mod leap;
+mod free_flight;
+mod helix_extrapolation;
 mod pair;
 mod push;
-mod stages;
+mod step_costs;
 mod turning;
 
 use crate::budgets::MOTION_POSES;
@@ -28,12 +28,12 @@ use crate::tolerances::BULGE_TOLERANCE;
 
 use super::{Action, End, Motion, TransitionFunction, asked_again};
 use drive::{Drive, Step};
-use leap::HelixExtrapolation;
+use helix_extrapolation::HelixExtrapolation;
 use push::Push;
 use turning::Turning;
 
 pub use pair::pair_blocks;
-pub use stages::{PairMethod, StepCost, step_costs};
+pub use step_costs::{PairMethod, StepCost, step_costs};
 
 /// The engine.
 #[derive(Debug, Clone, Copy, Default)]
@@ -55,15 +55,15 @@ impl TransitionFunction for SlidingEngine {
     fn simulate(
         &self,
         scene: &Scene,
-        surroundings: &StandingParts,
+        standing_parts: &StandingParts,
         part: usize,
         start: &Pose,
         action: Action,
         termination: &Termination,
     ) -> Result<Motion, Interrupt> {
-        let is_refined = is_refined(scene, surroundings, part);
+        let is_refined = is_refined(scene, standing_parts, part);
         if let (Action::Push(..), false) = (action, is_refined) {
-            match pushed(scene, surroundings, (part, start), action, termination) {
+            match pushed(scene, standing_parts, (part, start), action, termination) {
                 Err(Halt::Lost | Halt::Blocked) => {}
                 Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
                 Ok(motion) => return Ok(motion),
@@ -76,13 +76,13 @@ impl TransitionFunction for SlidingEngine {
         // A push that comes here is one that regions could not tell of.
         let by_samples = is_refined || !action.turns();
         let mut around =
-            RigidCover::new(scene, surroundings, (part, start), drive.reach(), by_samples, termination);
-        let mut leaper = HelixExtrapolation::new(scene, surroundings, part, &drive);
+            RigidCover::new(scene, standing_parts, (part, start), drive.reach(), by_samples, termination);
+        let mut extrapolation = HelixExtrapolation::new(scene, standing_parts, part, &drive);
         let mut near = None;
         while path.len() < MOTION_POSES {
             termination.check()?;
             let (mut turned, mut touching) = (0.0, Vec::new());
-            let mut leap = leaper.follow(&mover)?;
+            let mut leap = extrapolation.follow(&mover)?;
             if leap.is_none() {
                 let mut here = around.settle(&mover, near.take())?;
                 let step = match drive.advance(&mover, &mut here, &mut around)? {
@@ -97,7 +97,7 @@ impl TransitionFunction for SlidingEngine {
                 path.push(step.pose);
                 // Where regions tell, ordinary steps cost less than looking where a long one may lead.
                 if is_straight && !here.contacts.is_empty() && around.samples() {
-                    leap = leaper.leap(&from, &mover, step.pressing, &mut around)?;
+                    leap = extrapolation.leap(&from, &mover, step.pressing, &mut around)?;
                 }
                 (turned, touching, near) = (step.turned, step.touching, Some(step.near));
             }
@@ -110,7 +110,7 @@ impl TransitionFunction for SlidingEngine {
             termination.check()?;
             let hint = asked_again(&action, asked.len());
             asked.push(path.len() as u32 - 1);
-            if let Some(d) = exit_direction(scene, surroundings, part, &mover.pose, hint) {
+            if let Some(d) = exit_direction(scene, standing_parts, part, &mover.pose, hint) {
                 return Ok(Motion::simulated(path, asked, End::Disassembled(d)));
             }
             if turning.is_idle(&mover, turned, &touching) {
@@ -126,20 +126,20 @@ impl TransitionFunction for SlidingEngine {
 }
 
 /// Whether points were found missing around a part: then short steps are the safe ones.
-fn is_refined(scene: &Scene, surroundings: &StandingParts, part: usize) -> bool {
+fn is_refined(scene: &Scene, standing_parts: &StandingParts, part: usize) -> bool {
     let refined = |i: usize| !scene.bodies[i].extra_samples.points().is_empty();
-    refined(part) || surroundings.standing.iter().any(|&i| refined(i))
+    refined(part) || standing_parts.standing.iter().any(|&i| refined(i))
 }
 
 /// A translation, by regions.
 fn pushed(
     scene: &Scene,
-    surroundings: &StandingParts,
+    standing_parts: &StandingParts,
     (part, start): (usize, &Pose),
     action: Action,
     termination: &Termination,
 ) -> Result<Motion, Halt> {
-    let mut push = Push::new(scene, &surroundings.standing, (part, start), action.force(), termination);
+    let mut push = Push::new(scene, &standing_parts.standing, (part, start), action.force(), termination);
     let (mut path, mut asked) = (vec![*start], Vec::new());
     while path.len() < MOTION_POSES {
         let step = match push.step() {
@@ -158,7 +158,7 @@ fn pushed(
         }
         let hint = asked_again(&action, asked.len());
         asked.push(path.len() as u32 - 1);
-        if let Some(d) = exit_direction(scene, surroundings, part, &path[path.len() - 1], hint) {
+        if let Some(d) = exit_direction(scene, standing_parts, part, &path[path.len() - 1], hint) {
             return Ok(Motion::simulated(path, asked, End::Disassembled(d)));
         }
     }

@@ -1,5 +1,5 @@
 //! Translations: a shift that follows a force as far as contact lets it, in steps as long as the
-//! regions around the part's surface allow ([`shift`](crate::contact::region_cover::shift)), or in flight ([`flight`](super::flight)).
+//! regions around the part's surface allow ([`shift`](crate::contact::region_cover::shift)), or in flight ([`flight`](super::free_flight)).
 //!
 //! At each shift the force is projected onto the cone that the obstacles leave. Along an obstacle
 //! steps are short, and each begins with the force as it is: where the obstacle ends, the part
@@ -19,7 +19,7 @@ use crate::tolerances::{FREE_STEP, STALL, STUCK_SHARE};
 
 use super::super::projection::project;
 use super::drive::contact_step;
-use super::flight::FreeFlight;
+use super::free_flight::FreeFlight;
 
 /// A part that is pushed.
 pub(super) struct Push<'a> {
@@ -38,7 +38,7 @@ pub(super) struct Push<'a> {
     contact_step: f64,
     /// Whether it is to get far: the way is then made so from the start.
     is_long: bool,
-    flights: FreeFlight<'a>,
+    flight: FreeFlight<'a>,
 }
 
 /// What a step came to.
@@ -68,20 +68,20 @@ impl<'a> Push<'a> {
             stalls: 0,
             contact_step: contact_step(shape),
             is_long: true,
-            flights: FreeFlight::new(scene, standing, part, termination),
+            flight: FreeFlight::new(scene, standing, part, termination),
         }
     }
 
     /// The same for a short way.
     pub(super) fn short(self) -> Self {
-        Self { is_long: false, flights: self.flights.never(), ..self }
+        Self { is_long: false, flight: self.flight.never(), ..self }
     }
 
     /// Begins again, without flights, if there was one.
     pub(super) fn begins_on_foot(&mut self) -> bool {
-        let has_flown = self.flights.any;
+        let has_flown = self.flight.any;
         if has_flown {
-            self.flights = self.flights.never();
+            self.flight = self.flight.never();
             self.shift = Vector3::zeros();
             self.land();
         }
@@ -115,7 +115,7 @@ impl<'a> Push<'a> {
             }
             u = along.normalize();
         }
-        self.flights.stepped(!obstacles.is_empty());
+        self.flight.stepped(!obstacles.is_empty());
         if self.is_long && self.shift == Vector3::zeros() {
             self.cells.lengthen(&u)?;
         }
@@ -137,8 +137,8 @@ impl<'a> Push<'a> {
 
     /// A step of a flight, if it flies.
     fn flown(&mut self) -> Result<Option<PushStep>, Halt> {
-        let was_aloft = self.flights.is_aloft();
-        let step = self.flights.step(&self.pose(), &self.here(), &self.force)?;
+        let was_aloft = self.flight.is_aloft();
+        let step = self.flight.step(&self.pose(), &self.here(), &self.force)?;
         if let Some(length) = step {
             self.shift += self.force * length;
             return Ok(Some(PushStep::Moved(self.pose())));

@@ -20,8 +20,8 @@
 //! come near one half in a region ([`Rim`](crate::geometry::Rim)); in sight of holes a region may be partly
 //! inside, and only small pieces are settled, by their corners.
 
+mod bound;
 mod clip;
-mod settle;
 mod walk;
 
 use std::collections::HashMap;
@@ -34,7 +34,7 @@ use crate::termination::{Interrupt, Termination};
 use crate::tolerances::DEPTH_SHARE;
 
 use super::super::course::{Course, CourseView, Interval};
-use super::super::passing::PairPath;
+use super::super::pair_path::PairPath;
 
 /// How finely depth is told, in the planning frame.
 #[derive(Debug, Clone, Copy)]

@@ -9,8 +9,8 @@ use crate::tolerances::{CLIP_MARGIN, DOUBTED_SIZE, FACING_ACROSS};
 
 use super::super::super::course::{Interval, Leg};
 use super::super::cover;
+use super::bound::{furthest, furthest_of, swept};
 use super::clip::clipped;
-use super::settle::{furthest, furthest_of, swept};
 use super::{DepthPrecision, PathSearch, SearchHint, SweptBall};
 
 /// Corners of what a triangle passes on a straight way.

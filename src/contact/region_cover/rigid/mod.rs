@@ -9,8 +9,8 @@
 //! many regions, samples tell of the pair from there on. Of contacts, those that were found to matter are kept
 //! from step to step and measured again.
 
-mod hold;
-mod pair_cover;
+mod pair;
+mod piece;
 #[cfg(test)]
 mod tests;
 
@@ -20,12 +20,12 @@ use crate::termination::{Interrupt, Termination};
 use crate::tolerances::DEPTH_TOLERANCE;
 
 use super::super::sampled::{ContactSet, ContactSource, MovingBody};
-use pair_cover::RigidPair;
+use pair::RigidPair;
 
 /// What is around a moving part.
 pub(crate) struct RigidCover<'a> {
     scene: &'a Scene,
-    surroundings: &'a StandingParts,
+    standing_parts: &'a StandingParts,
     part: usize,
     reach: f64,
     termination: &'a Termination,
@@ -45,7 +45,7 @@ impl<'a> RigidCover<'a> {
     /// With samples alone, or with regions where these tell.
     pub(crate) fn new(
         scene: &'a Scene,
-        surroundings: &'a StandingParts,
+        standing_parts: &'a StandingParts,
         (part, start): (usize, &Pose),
         reach: f64,
         all_sampled: bool,
@@ -53,7 +53,7 @@ impl<'a> RigidCover<'a> {
     ) -> Self {
         Self {
             scene,
-            surroundings,
+            standing_parts,
             part,
             reach,
             termination,
@@ -91,7 +91,7 @@ impl<'a> RigidCover<'a> {
             if !pair.is_left_to_samples && pair.settle(mover, self.reach, self.termination)? {
                 told.push(pair);
             } else {
-                self.sampled.push(pair.facing.other);
+                self.sampled.push(pair.surfaces.other);
             }
         }
         self.pairs = told;
@@ -108,7 +108,7 @@ impl<'a> RigidCover<'a> {
         if self.all_sampled || self.sampled.contains(&other) {
             return Ok(None);
         }
-        if let Some(known) = self.pairs.iter().position(|pair| pair.facing.other == other) {
+        if let Some(known) = self.pairs.iter().position(|pair| pair.surfaces.other == other) {
             return Ok(Some(known));
         }
         let is_start = self.base == self.start;
@@ -129,9 +129,9 @@ impl ContactSource for RigidCover<'_> {
     fn near(&mut self, mover: &MovingBody<'_>) -> Result<ContactSet, Interrupt> {
         self.pairs.iter_mut().for_each(|pair| pair.is_near = false);
         self.looked_at = Some(mover.pose);
-        let (surroundings, reach, base) = (self.surroundings, self.reach, self.base);
+        let (standing_parts, reach, base) = (self.standing_parts, self.reach, self.base);
         let mut left = Vec::new();
-        let mut near = mover.near_by(surroundings, reach, |other, near| {
+        let mut near = mover.near_by(standing_parts, reach, |other, near| {
             let Some(pair) = self.pair_of(other)? else { return mover.near_pair(other, reach, near) };
             left.extend(self.pairs[pair].near(&base, mover, reach, near).map(|l| (pair, l)));
             Ok(())
@@ -148,7 +148,7 @@ impl ContactSource for RigidCover<'_> {
 
     fn add_known(&mut self, mover: &MovingBody<'_>, near: &mut ContactSet) -> Result<(), Interrupt> {
         for pair in self.pairs.extract_if(.., |pair| pair.is_left_to_samples) {
-            let other = pair.facing.other;
+            let other = pair.surfaces.other;
             near.contacts.retain(|c| c.other != other);
             mover.near_pair(other, self.reach, near)?;
             self.sampled.push(other);

@@ -17,7 +17,7 @@ use crate::scene::{CongruentPair, Scene, grouped};
 use crate::termination::Interrupt;
 use crate::tolerances::CONGRUENT_PAIR_DISTANCE;
 
-use super::cell::ShiftPiece;
+use super::piece::ShiftPiece;
 
 /// A pair of a part that begins to move and one that stands.
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +41,7 @@ pub(crate) struct StartCover {
     /// Whether the moving part's surface is the one that is in cells.
     pub(crate) asks_part: bool,
     /// None where regions cannot tell.
-    pub(crate) cells: Option<Arc<Vec<ShiftPiece>>>,
+    pub(crate) pieces: Option<Arc<Vec<ShiftPiece>>>,
     /// How many regions it took.
     pub(crate) regions: usize,
 }
@@ -49,8 +49,8 @@ pub(crate) struct StartCover {
 impl StartCover {
     /// The same with the other part moving instead.
     fn mirrored(&self) -> Self {
-        let cells = self.cells.as_deref().map(|cells| mirrored(cells));
-        Self { asks_part: !self.asks_part, cells, regions: self.regions }
+        let pieces = self.pieces.as_deref().map(|pieces| mirrored(pieces));
+        Self { asks_part: !self.asks_part, pieces, regions: self.regions }
     }
 }
 
@@ -61,7 +61,7 @@ pub(crate) struct ShiftWay {
     pub(crate) blocked: Vec<Vector3<f64>>,
     /// The cells that let it go; those that it had where it is stopped; none where regions cannot
     /// tell.
-    pub(crate) cells: Option<Arc<Vec<ShiftPiece>>>,
+    pub(crate) pieces: Option<Arc<Vec<ShiftPiece>>>,
     /// How many of them were found for this way: the last ones.
     pub(crate) found: usize,
     /// How many regions it took.
@@ -71,21 +71,21 @@ pub(crate) struct ShiftWay {
 impl ShiftWay {
     fn mirrored(&self) -> Self {
         let blocked = self.blocked.iter().map(|n| -n).collect();
-        let cells = self.cells.as_deref().map(|cells| mirrored(cells));
-        Self { blocked, cells, found: self.found, regions: self.regions }
+        let pieces = self.pieces.as_deref().map(|pieces| mirrored(pieces));
+        Self { blocked, pieces, found: self.found, regions: self.regions }
     }
 }
 
-fn size(cells: Option<&Arc<Vec<ShiftPiece>>>) -> usize {
-    1 + cells.map_or(0, |cells| cells.len())
+fn size(pieces: Option<&Arc<Vec<ShiftPiece>>>) -> usize {
+    1 + pieces.map_or(0, |pieces| pieces.len())
 }
 
-fn memory(cells: Option<&Vec<ShiftPiece>>) -> usize {
-    cells.map_or(0, |cells| cells.iter().map(ShiftPiece::memory).sum())
+fn memory(pieces: Option<&Vec<ShiftPiece>>) -> usize {
+    pieces.map_or(0, |pieces| pieces.iter().map(ShiftPiece::memory).sum())
 }
 
-fn mirrored(cells: &[ShiftPiece]) -> Arc<Vec<ShiftPiece>> {
-    Arc::new(cells.iter().map(ShiftPiece::mirrored).collect())
+fn mirrored(pieces: &[ShiftPiece]) -> Arc<Vec<ShiftPiece>> {
+    Arc::new(pieces.iter().map(ShiftPiece::mirrored).collect())
 }
 
 /// What is kept.
@@ -106,12 +106,12 @@ struct CacheEntries {
 
 impl CacheEntries {
     /// Makes room for so many cells: displaced pairs and ways may be forgotten.
-    fn make_room(&mut self, cells: usize) {
-        self.count += cells;
+    fn make_room(&mut self, pieces: usize) {
+        self.count += pieces;
         if self.count > REMEMBERED_SHIFT_PIECES {
             self.gathered.retain(|key, _| key.start.is_none());
             self.ways.clear();
-            self.count = cells;
+            self.count = pieces;
         }
     }
 }
@@ -144,8 +144,8 @@ impl ShiftCoverCache {
     #[must_use]
     pub fn memory(&self) -> usize {
         let kept = self.lock();
-        let gathered = kept.gathered.values().map(|g| memory(g.cells.as_deref()));
-        let ways = kept.ways.values().map(|w| memory(w.cells.as_deref()));
+        let gathered = kept.gathered.values().map(|g| memory(g.pieces.as_deref()));
+        let ways = kept.ways.values().map(|w| memory(w.pieces.as_deref()));
         gathered.sum::<usize>() + ways.sum::<usize>()
     }
 
@@ -163,7 +163,7 @@ impl ShiftCoverCache {
         } else {
             let found = Arc::new(at_place(scene, place, alone, key, &find)?);
             let mut kept = self.lock();
-            kept.make_room(if key.start.is_some() { size(found.cells.as_ref()) } else { 0 });
+            kept.make_room(if key.start.is_some() { size(found.pieces.as_ref()) } else { 0 });
             kept.gathered.insert(key, Arc::clone(&found));
             found
         };
@@ -189,7 +189,7 @@ impl ShiftCoverCache {
             let find = |scene: &Scene, place: &StartPair<'_>| find(scene, place, &u);
             let found = Arc::new(at_place(scene, place, alone, pair_key, &find)?);
             let mut kept = self.lock();
-            kept.make_room(size(found.cells.as_ref()));
+            kept.make_room(size(found.pieces.as_ref()));
             kept.ways.insert(key, Arc::clone(&found));
             found
         };

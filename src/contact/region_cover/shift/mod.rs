@@ -22,15 +22,15 @@ use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{COVERED_OVERLAP, FREE_STEP, HELD, HELD_AT_FIRST, STALL, TOUCHED};
 
 mod cache;
-mod cell;
-mod finder;
+mod piece;
+mod search;
 
 use super::Halt;
 use super::surface_pair::{Obstacle, PlacedPiece, SurfacePair, Witness};
 use cache::{ShiftWay, StartCover, StartPair};
-use finder::ShiftSearch;
+use search::ShiftSearch;
 
-pub(crate) use cell::ShiftPiece;
+pub(crate) use piece::ShiftPiece;
 
 pub use cache::ShiftCoverCache;
 
@@ -47,8 +47,8 @@ pub(crate) struct ShiftCover<'a> {
 
 /// A pair, with all of one of its surfaces in cells.
 struct ShiftPair<'a> {
-    facing: SurfacePair<'a>,
-    cells: Arc<Vec<ShiftPiece>>,
+    surfaces: SurfacePair<'a>,
+    pieces: Arc<Vec<ShiftPiece>>,
     /// Points that showed what was in the way last: along an obstacle they do so at each step.
     witnesses: Vec<Witness>,
 }
@@ -65,7 +65,7 @@ impl<'a> ShiftCover<'a> {
 
     /// Whether a standing part is among the pairs.
     pub(crate) fn knows(&self, other: usize) -> bool {
-        self.pairs.iter().any(|p| p.facing.other == other)
+        self.pairs.iter().any(|p| p.surfaces.other == other)
     }
 
     /// Takes a pair in, at a shift of the part.
@@ -80,24 +80,24 @@ impl<'a> ShiftCover<'a> {
             let place = StartPair::new(self.part, &self.start, other);
             Arc::new(gathered(scene, &place, at, SHIFT_PIECES, termination)?)
         };
-        let facing =
+        let surfaces =
             SurfacePair::new(scene, (self.part, &self.start), other, gathered.asks_part, termination)?;
-        let cells = gathered.cells.clone().ok_or(Halt::Lost)?;
-        self.pairs.push(ShiftPair { facing, cells, witnesses: Vec::new() });
+        let pieces = gathered.pieces.clone().ok_or(Halt::Lost)?;
+        self.pairs.push(ShiftPair { surfaces, pieces, witnesses: Vec::new() });
         self.count(gathered.regions)
     }
 
     /// How far the part may be shifted from `at` along the unit vector `u` with all pieces in their regions.
     pub(crate) fn length(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> f64 {
-        let cells = self.pairs.iter().flat_map(|pair| pair.cells.iter());
-        cells.map(|cell| cell.length(at, u)).fold(f64::INFINITY, f64::min)
+        let pieces = self.pairs.iter().flat_map(|pair| pair.pieces.iter());
+        pieces.map(|piece| piece.length(at, u)).fold(f64::INFINITY, f64::min)
     }
 
     /// How far the part may be shifted from `at` along the unit vector `u`, for which way was made, up to
     /// `most`. Pieces whose region ends before that get another where it ends.
     pub(crate) fn advance(&mut self, at: &Vector3<f64>, u: &Vector3<f64>, most: f64) -> Result<f64, Halt> {
         // In the order in which they end, so that at each shift all pieces are in their regions.
-        let ends_of = |pair: &ShiftPair<'_>| pair.cells.iter().map(|cell| cell.length(at, u)).collect();
+        let ends_of = |pair: &ShiftPair<'_>| pair.pieces.iter().map(|piece| piece.length(at, u)).collect();
         let mut ends: Vec<Vec<f64>> = self.pairs.iter().map(ends_of).collect();
         let (mut reached, mut stalls) = (0.0, 0);
         loop {
@@ -115,19 +115,19 @@ impl<'a> ShiftCover<'a> {
             let there = at + u * reached;
             let pair = &mut self.pairs[i];
             let left = REGIONS_PER_SHIFT - self.regions;
-            let mut finder = ShiftSearch::new(&pair.facing, left, self.termination);
-            let found = finder.find(pair.cells[k].spot, &there, u);
-            let (mut cells, regions) = (finder.cells, finder.regions);
+            let mut finder = ShiftSearch::new(&pair.surfaces, left, self.termination);
+            let found = finder.find(pair.pieces[k].spot, &there, u);
+            let (mut pieces, regions) = (finder.pieces, finder.regions);
             match found {
                 // What is in the way there is found again by the next step, with the force as it is.
                 Err(Halt::Blocked | Halt::Lost) => return Ok(reached),
                 Err(halt) => return Err(halt),
                 Ok(()) => {
-                    let of_pair = Arc::make_mut(&mut pair.cells);
+                    let of_pair = Arc::make_mut(&mut pair.pieces);
                     of_pair.swap_remove(k);
                     ends[i].swap_remove(k);
-                    ends[i].extend(cells.iter().map(|cell| reached + cell.length(&there, u)));
-                    of_pair.append(&mut cells);
+                    ends[i].extend(pieces.iter().map(|piece| reached + piece.length(&there, u)));
+                    of_pair.append(&mut pieces);
                 }
             }
             self.count(regions)?;
@@ -148,7 +148,7 @@ impl<'a> ShiftCover<'a> {
                 if at == &Vector3::zeros() { self.known_way(i, u)? } else { self.new_way(i, at, u)? };
             self.count(regions)?;
             if !blocked.is_empty() {
-                let other = self.pairs[i].facing.other;
+                let other = self.pairs[i].surfaces.other;
                 obstacles.extend(blocked.into_iter().map(|normal| Obstacle { normal, other }));
                 return Ok(());
             }
@@ -160,10 +160,10 @@ impl<'a> ShiftCover<'a> {
     fn known_way(&mut self, i: usize, u: &Vector3<f64>) -> Result<(Vec<Vector3<f64>>, usize), Halt> {
         let (scene, termination) = (self.scene, self.termination);
         let pair = &mut self.pairs[i];
-        let place = StartPair::new(self.part, &self.start, pair.facing.other);
+        let place = StartPair::new(self.part, &self.start, pair.surfaces.other);
         let find = |scene: &Scene, place: &StartPair<'_>, u: &Vector3<f64>| way(scene, place, u, termination);
         let way = ShiftCoverCache::of(scene).way(scene, &place, (u, false), find)?;
-        pair.cells = Arc::clone(way.cells.as_ref().ok_or(Halt::Lost)?);
+        pair.pieces = Arc::clone(way.pieces.as_ref().ok_or(Halt::Lost)?);
         Ok((way.blocked.clone(), way.regions))
     }
 
@@ -174,9 +174,9 @@ impl<'a> ShiftCover<'a> {
         let find =
             |scene: &Scene, place: &StartPair<'_>, u: &Vector3<f64>| long_way(scene, place, u, termination);
         for i in 0..self.pairs.len() {
-            let place = StartPair::new(self.part, &self.start, self.pairs[i].facing.other);
+            let place = StartPair::new(self.part, &self.start, self.pairs[i].surfaces.other);
             let way = ShiftCoverCache::of(scene).way(scene, &place, (u, true), find)?;
-            self.pairs[i].cells = Arc::clone(way.cells.as_ref().ok_or(Halt::Lost)?);
+            self.pairs[i].pieces = Arc::clone(way.pieces.as_ref().ok_or(Halt::Lost)?);
             self.count(way.regions)?;
         }
         Ok(())
@@ -190,12 +190,12 @@ impl<'a> ShiftCover<'a> {
         u: &Vector3<f64>,
     ) -> Result<(Vec<Vector3<f64>>, usize), Halt> {
         let left = REGIONS_PER_SHIFT - self.regions;
-        let ShiftPair { facing, cells, witnesses } = &mut self.pairs[i];
-        let seen = facing.obstacles_seen_by(witnesses, (at, u));
+        let ShiftPair { surfaces, pieces, witnesses } = &mut self.pairs[i];
+        let seen = surfaces.obstacles_seen_by(witnesses, (at, u));
         if !seen.is_empty() {
             return Ok((seen.into_iter().map(|o| o.normal).collect(), 0));
         }
-        let mut made = make_way(facing, cells, (at, u), left, self.termination)?;
+        let mut made = make_way(surfaces, pieces, (at, u), left, self.termination)?;
         witnesses.append(&mut made.witnesses);
         witnesses.drain(..witnesses.len().saturating_sub(WITNESSES));
         Ok((made.blocked, made.regions))
@@ -243,16 +243,16 @@ fn way(
     termination: &Termination,
 ) -> Result<ShiftWay, Interrupt> {
     let base = kept(scene, place, termination)?;
-    let facing =
+    let surfaces =
         SurfacePair::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
-    let lost = ShiftWay { blocked: Vec::new(), cells: None, found: 0, regions: REGIONS_PER_SHIFT };
-    let Some(base) = &base.cells else { return Ok(lost) };
-    let mut cells = Arc::clone(base);
-    match make_way(&facing, &mut cells, (&Vector3::zeros(), u), REGIONS_PER_SHIFT, termination) {
+    let lost = ShiftWay { blocked: Vec::new(), pieces: None, found: 0, regions: REGIONS_PER_SHIFT };
+    let Some(base) = &base.pieces else { return Ok(lost) };
+    let mut pieces = Arc::clone(base);
+    match make_way(&surfaces, &mut pieces, (&Vector3::zeros(), u), REGIONS_PER_SHIFT, termination) {
         Ok(ClearedWay { blocked, found, regions, .. }) => {
             // Whoever is stopped goes another way from the same cells.
-            let (cells, found) = if blocked.is_empty() { (cells, found) } else { (Arc::clone(base), 0) };
-            Ok(ShiftWay { blocked, cells: Some(cells), found, regions })
+            let (pieces, found) = if blocked.is_empty() { (pieces, found) } else { (Arc::clone(base), 0) };
+            Ok(ShiftWay { blocked, pieces: Some(pieces), found, regions })
         }
         Err(Halt::Interrupted(interrupt)) => Err(interrupt),
         Err(_) => Ok(lost),
@@ -269,24 +269,24 @@ fn long_way(
     let short = ShiftCoverCache::of(scene)
         .way(scene, place, (u, false), |scene, place, u| way(scene, place, u, termination))?;
     let base = kept(scene, place, termination)?;
-    let facing =
+    let surfaces =
         SurfacePair::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
-    let mut finder = ShiftSearch::new(&facing, REGIONS_PER_SHIFT, termination);
-    let mut lengthened = |cell: &ShiftPiece| {
+    let mut finder = ShiftSearch::new(&surfaces, REGIONS_PER_SHIFT, termination);
+    let mut lengthened = |piece: &ShiftPiece| {
         termination.check()?;
-        let length = cell.length(&Vector3::zeros(), u);
-        let longer = if length < FREE_STEP { finder.far(cell.spot, u, length) } else { None };
-        Ok(longer.unwrap_or_else(|| cell.clone()))
+        let length = piece.length(&Vector3::zeros(), u);
+        let longer = if length < FREE_STEP { finder.far(piece.spot, u, length) } else { None };
+        Ok(longer.unwrap_or_else(|| piece.clone()))
     };
-    let mut cells = short.cells.as_deref().cloned();
-    if let Some(cells) = &mut cells {
+    let mut pieces = short.pieces.as_deref().cloned();
+    if let Some(pieces) = &mut pieces {
         // Those that were found for this way are as long as can be.
-        let others = cells.len() - short.found;
-        for cell in &mut cells[..others] {
-            *cell = lengthened(cell)?;
+        let others = pieces.len() - short.found;
+        for piece in &mut pieces[..others] {
+            *piece = lengthened(piece)?;
         }
     }
-    Ok(ShiftWay { blocked: Vec::new(), cells: cells.map(Arc::new), found: 0, regions: finder.regions })
+    Ok(ShiftWay { blocked: Vec::new(), pieces: pieces.map(Arc::new), found: 0, regions: finder.regions })
 }
 
 /// Cells for all of a pair's surface, at a shift; none if it takes more than `most`.
@@ -298,7 +298,7 @@ fn gathered(
     termination: &Termination,
 ) -> Result<StartCover, Interrupt> {
     let &StartPair { part, start, other, .. } = place;
-    let facing = |asks_part| SurfacePair::new(scene, (part, start), other, asks_part, termination);
+    let surfaces = |asks_part| SurfacePair::new(scene, (part, start), other, asks_part, termination);
     let asked = SurfacePair::asked_first(scene, part, other);
     // On its way nothing gets deeper than the engine may let it.
     let held = if at == &Vector3::zeros() { HELD_AT_FIRST } else { HELD };
@@ -322,25 +322,25 @@ fn gathered(
         let finder = match &mut finders[i] {
             Some(finder) => finder,
             none => {
-                let side = facing(asks_part)?;
+                let side = surfaces(asks_part)?;
                 none.insert(ShiftSearch::of_all(sides[i].get_or_init(|| side), held, termination))
             }
         };
         let found = finder.gather(at, budgets[i], most);
         budgets[i] *= 2;
-        is_told = finder.cells.len() <= most;
-        let cells = if found == Ok(true) { std::mem::take(&mut finder.cells) } else { Vec::new() };
+        is_told = finder.pieces.len() <= most;
+        let pieces = if found == Ok(true) { std::mem::take(&mut finder.pieces) } else { Vec::new() };
         let regions = finders.iter().flatten().map(|finder| finder.regions).sum();
         match found {
-            Ok(true) if cells.len() > most => {}
-            Ok(true) => return Ok(StartCover { asks_part, cells: Some(Arc::new(cells)), regions }),
+            Ok(true) if pieces.len() > most => {}
+            Ok(true) => return Ok(StartCover { asks_part, pieces: Some(Arc::new(pieces)), regions }),
             Ok(false) => {}
             Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
-            Err(_) => return Ok(StartCover { asks_part, cells: None, regions }),
+            Err(_) => return Ok(StartCover { asks_part, pieces: None, regions }),
         }
     }
     let regions = finders.iter().flatten().map(|finder| finder.regions).sum();
-    Ok(StartCover { asks_part: true, cells: None, regions })
+    Ok(StartCover { asks_part: true, pieces: None, regions })
 }
 
 /// What became of making way.
@@ -358,42 +358,42 @@ struct ClearedWay {
 /// The normals of what is certainly in the way, as the first piece shows that touches something ahead, if any
 /// does. Where penetration is allowed, regions let pieces go on by what is left of that: it leads nowhere.
 fn touched(
-    facing: &SurfacePair<'_>,
-    cells: &[ShiftPiece],
+    surfaces: &SurfacePair<'_>,
+    pieces: &[ShiftPiece],
     way: (&Vector3<f64>, &Vector3<f64>),
 ) -> Option<Vec<Vector3<f64>>> {
-    let reach = if facing.allowed > 0.0 { HELD_AT_FIRST } else { TOUCHED };
+    let reach = if surfaces.allowed > 0.0 { HELD_AT_FIRST } else { TOUCHED };
     let mut placed = PlacedPiece::default();
-    let of_cell = |cell: &ShiftPiece| cell.touched(facing, way, reach, &mut placed);
-    let found = cells.iter().map(of_cell).find(|found| !found.is_empty())?;
+    let of_shift_piece = |piece: &ShiftPiece| piece.touched(surfaces, way, reach, &mut placed);
+    let found = pieces.iter().map(of_shift_piece).find(|found| !found.is_empty())?;
     Some(found.into_iter().map(|obstacle| obstacle.normal).collect())
 }
 
 /// Makes way for a pair.
 fn make_way(
-    facing: &SurfacePair<'_>,
-    cells: &mut Arc<Vec<ShiftPiece>>,
+    surfaces: &SurfacePair<'_>,
+    pieces: &mut Arc<Vec<ShiftPiece>>,
     (at, u): (&Vector3<f64>, &Vector3<f64>),
     most: usize,
     termination: &Termination,
 ) -> Result<ClearedWay, Halt> {
-    if let Some(blocked) = touched(facing, cells, (at, u)) {
+    if let Some(blocked) = touched(surfaces, pieces, (at, u)) {
         return Ok(ClearedWay { blocked, witnesses: Vec::new(), found: 0, regions: 0 });
     }
-    let ends = |cell: &ShiftPiece| cell.blocks(at, u) || cell.is_exhausted(at, u);
-    if !cells.iter().any(ends) {
+    let ends = |piece: &ShiftPiece| piece.blocks(at, u) || piece.is_exhausted(at, u);
+    if !pieces.iter().any(ends) {
         return Ok(ClearedWay { blocked: Vec::new(), witnesses: Vec::new(), found: 0, regions: 0 });
     }
-    let mut finder = ShiftSearch::new(facing, most, termination);
+    let mut finder = ShiftSearch::new(surfaces, most, termination);
     let mut ended = Ok(());
-    let of_pair = Arc::make_mut(cells);
+    let of_pair = Arc::make_mut(pieces);
     let mut i = 0;
     while i < of_pair.len() && ended.is_ok() {
         if ends(&of_pair[i]) {
-            let known = finder.cells.len();
+            let known = finder.pieces.len();
             ended = finder.find(of_pair[i].spot, at, u);
             if ended.is_err() {
-                finder.cells.truncate(known);
+                finder.pieces.truncate(known);
             } else {
                 of_pair.swap_remove(i);
                 continue;
@@ -401,8 +401,8 @@ fn make_way(
         }
         i += 1;
     }
-    let (found, regions) = (finder.cells.len(), finder.regions);
-    of_pair.append(&mut finder.cells);
+    let (found, regions) = (finder.pieces.len(), finder.regions);
+    of_pair.append(&mut finder.pieces);
     match ended {
         Ok(()) => Ok(ClearedWay { blocked: Vec::new(), witnesses: Vec::new(), found, regions }),
         Err(Halt::Blocked) => {

@@ -21,10 +21,10 @@ impl Drive {
         &self,
         mover: &MovingBody<'_>,
         axis: &Vector3<f64>,
-        surroundings: &StandingParts,
+        standing_parts: &StandingParts,
     ) -> Result<Option<Pose>, Interrupt> {
         let mut here = *mover;
-        let mut close = here.near(surroundings, LIFT_REACH)?;
+        let mut close = here.near(standing_parts, LIFT_REACH)?;
         for round in 0..LIFT_ROUNDS {
             let least = close.contacts.iter().map(|c| c.gap).fold(f64::INFINITY, f64::min);
             mover.check()?;
@@ -50,7 +50,7 @@ impl Drive {
                 break;
             }
             here.pose = self.displaced(&here, &twist);
-            close = here.near(surroundings, LIFT_REACH)?;
+            close = here.near(standing_parts, LIFT_REACH)?;
         }
         Ok(close.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE).then_some(here.pose))
     }

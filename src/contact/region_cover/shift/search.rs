@@ -14,7 +14,7 @@ use super::super::surface_pair::{
     CoverPiece, Obstacle, Piece, PlacedPiece, SignedClosest, Slope, SurfacePair, Witness,
 };
 use super::super::{Halt, cover};
-use super::cell::{ShiftLimit, ShiftPiece};
+use super::piece::{ShiftLimit, ShiftPiece};
 
 /// Which of these is asked for first; the shorter ones only where something is near ahead.
 const SHORT: usize = 2;
@@ -42,7 +42,7 @@ struct PendingPiece {
 struct PieceSearch {
     /// With the triangle that was nearest.
     spot: CoverPiece,
-    cell: Option<ShiftPiece>,
+    piece: Option<ShiftPiece>,
     is_smallest: bool,
     /// How many regions it took.
     regions: usize,
@@ -57,7 +57,7 @@ pub(crate) struct ShiftSearch<'a> {
     /// No more than this.
     pub(crate) budget: usize,
     /// What was found.
-    pub(crate) cells: Vec<ShiftPiece>,
+    pub(crate) pieces: Vec<ShiftPiece>,
     /// Normals of what is certainly in the way.
     pub(crate) obstacles: Vec<Vector3<f64>>,
     /// Points that show it.
@@ -85,7 +85,7 @@ impl<'a> ShiftSearch<'a> {
             pair,
             regions: 0,
             budget,
-            cells: Vec::new(),
+            pieces: Vec::new(),
             obstacles: Vec::new(),
             witnesses: Vec::new(),
             needed: 0.0,
@@ -102,7 +102,7 @@ impl<'a> ShiftSearch<'a> {
         let (regions, left) = (self.regions, self.left());
         while let Some(next) = self.waiting.pop() {
             self.termination.check()?;
-            if self.regions >= self.budget || self.cells.len() > most {
+            if self.regions >= self.budget || self.pieces.len() > most {
                 self.waiting.push(next);
                 // If the rest goes on as this did: before may have been what lies free.
                 let pace = (self.regions - regions) as f64 / (left - self.left()).max(f64::MIN_POSITIVE);
@@ -110,10 +110,10 @@ impl<'a> ShiftSearch<'a> {
                 return Ok(false);
             }
             let looked = next.looked.unwrap_or_else(|| self.looked_beside(&next.spot, &wish));
-            let PieceSearch { spot, cell, is_smallest, regions } = looked;
+            let PieceSearch { spot, piece, is_smallest, regions } = looked;
             self.regions += regions;
-            if let Some(cell) = cell {
-                self.cells.push(cell);
+            if let Some(piece) = piece {
+                self.pieces.push(piece);
             } else if is_smallest {
                 self.pair.place(&spot.piece, &wish.at, &mut self.placed);
                 self.end(&spot, &wish)?;
@@ -154,8 +154,8 @@ impl<'a> ShiftSearch<'a> {
     fn looked(mut self, mut spot: CoverPiece, wish: &WantedShift) -> PieceSearch {
         let seen = self.place(&mut spot, wish);
         let free = self.free(&spot, &seen, wish);
-        let cell = free.or_else(|| self.held(&spot, &seen, wish, &Vector3::zeros()).ok());
-        PieceSearch { spot, cell, is_smallest: self.is_smallest(&spot), regions: self.regions }
+        let piece = free.or_else(|| self.held(&spot, &seen, wish, &Vector3::zeros()).ok());
+        PieceSearch { spot, piece, is_smallest: self.is_smallest(&spot), regions: self.regions }
     }
 
     /// Finds cells for a piece at a shift, as free along the unit vector `u` as can be.
@@ -172,7 +172,7 @@ impl<'a> ShiftSearch<'a> {
         let let_go = |level: usize| {
             self.held(&CoverPiece { level, ..spot }, &seen, &wish, &(u * SHIFTS_AHEAD[level])).ok()
         };
-        (0..SHORT).find_map(let_go).filter(|cell| cell.length(&wish.at, u) > least)
+        (0..SHORT).find_map(let_go).filter(|piece| piece.length(&wish.at, u) > least)
     }
 
     /// Takes a piece in hand: what its middle sees.
@@ -208,23 +208,23 @@ impl<'a> ShiftSearch<'a> {
             return Err(Halt::Lost);
         }
         let seen = self.place(&mut spot, wish);
-        if let Some(cell) = self.free(&spot, &seen, wish) {
-            self.cells.push(cell);
+        if let Some(piece) = self.free(&spot, &seen, wish) {
+            self.pieces.push(piece);
             return Ok(());
         }
         let small = matches!(spot.piece, Piece::Bit(_)) && self.placed.radius < SMALL_BIT_AHEAD;
-        let let_go = |cells: &mut Self, level: usize| {
-            cells.held(&CoverPiece { level, ..spot }, &seen, wish, &(wish.along * SHIFTS_AHEAD[level]))
+        let let_go = |pieces: &mut Self, level: usize| {
+            pieces.held(&CoverPiece { level, ..spot }, &seen, wish, &(wish.along * SHIFTS_AHEAD[level]))
         };
         match let_go(self, SHORT) {
             Ok(short) => {
                 let further = (0..SHORT).find_map(|level| let_go(self, level).ok());
-                let cell = further.unwrap_or(short);
+                let piece = further.unwrap_or(short);
                 // What gets no further the second time may do so in pieces.
-                if !small && cell.spot.level > 0 && cell.spot.level == spot.level {
+                if !small && piece.spot.level > 0 && piece.spot.level == spot.level {
                     return self.split(&spot, wish, parts);
                 }
-                self.cells.push(cell);
+                self.pieces.push(piece);
                 return Ok(());
             }
             Err(NoRegion::Amid(t)) if !small && !self.is_beside(&spot, t) => {
@@ -241,19 +241,19 @@ impl<'a> ShiftSearch<'a> {
             return Err(Halt::Blocked);
         }
         let nearer = (SHORT + 1..SHIFTS_AHEAD.len()).find_map(|level| let_go(self, level).ok());
-        if let Some(cell) = nearer {
-            if !small && cell.spot.level == spot.level {
+        if let Some(piece) = nearer {
+            if !small && piece.spot.level == spot.level {
                 return self.split(&spot, wish, parts);
             }
-            self.cells.push(cell);
+            self.pieces.push(piece);
             return Ok(());
         }
-        if let Ok(cell) = self.held(&CoverPiece { level: 0, ..spot }, &seen, wish, &Vector3::zeros()) {
-            if cell.length(&wish.at, &wish.along) > ROUNDED {
-                self.cells.push(cell);
+        if let Ok(piece) = self.held(&CoverPiece { level: 0, ..spot }, &seen, wish, &Vector3::zeros()) {
+            if piece.length(&wish.at, &wish.along) > ROUNDED {
+                self.pieces.push(piece);
                 return Ok(());
             }
-            let blocking = cell.obstacles(self.pair, &wish.at, &wish.along);
+            let blocking = piece.obstacles(self.pair, &wish.at, &wish.along);
             if small && !blocking.is_empty() {
                 self.block(&blocking);
                 return Err(Halt::Blocked);
@@ -275,13 +275,13 @@ impl<'a> ShiftSearch<'a> {
 
     /// The piece at hand, too small to be split, gets a cell before a face, or is lost.
     fn end(&mut self, spot: &CoverPiece, wish: &WantedShift) -> Result<(), Halt> {
-        let cell = self.before_face(spot, wish).ok_or(Halt::Lost)?;
-        let blocked = cell.obstacles(self.pair, &wish.at, &wish.along);
+        let piece = self.before_face(spot, wish).ok_or(Halt::Lost)?;
+        let blocked = piece.obstacles(self.pair, &wish.at, &wish.along);
         if !blocked.is_empty() {
             self.block(&blocked);
             return Err(Halt::Blocked);
         }
-        self.cells.push(cell);
+        self.pieces.push(piece);
         Ok(())
     }
 
@@ -384,10 +384,10 @@ impl<'a> ShiftSearch<'a> {
         let held = if pair.allowed > 0.0 { HELD_AT_FIRST } else { HELD.max(depth + HELD / 10.0) };
         let held = held.min(spot.held);
         let ball = (region.centre(), region.radius());
-        let cell = ShiftPiece { spot: CoverPiece { held, ..*spot }, limits, middle, room, ball };
+        let piece = ShiftPiece { spot: CoverPiece { held, ..*spot }, limits, middle, room, ball };
         let too_small = ahead != Vector3::zeros()
-            && cell.length(&wish.at, &wish.along) < LEAST_SHARE_AHEAD * shift.norm();
-        if too_small { Err(NoRegion::Cramped) } else { Ok(cell) }
+            && piece.length(&wish.at, &wish.along) < LEAST_SHARE_AHEAD * shift.norm();
+        if too_small { Err(NoRegion::Cramped) } else { Ok(piece) }
     }
 }
 
@@ -409,12 +409,12 @@ mod tests {
         pool.install(|| {
             let termination = Termination::default();
             let start = scene.bodies[1].planning_from_shape;
-            let facing = SurfacePair::new(&scene, (1, &start), 0, asks_part, &termination).unwrap();
-            let mut finder = ShiftSearch::of_all(&facing, HELD_AT_FIRST, &termination);
+            let surfaces = SurfacePair::new(&scene, (1, &start), 0, asks_part, &termination).unwrap();
+            let mut finder = ShiftSearch::of_all(&surfaces, HELD_AT_FIRST, &termination);
             let mut told = Vec::new();
             for budget in [1, 5, 16, 64, 4096] {
                 let ended = finder.gather(&Vector3::zeros(), budget, usize::MAX);
-                told.push(format!("{ended:?} {} {} {:?}", finder.regions, finder.needed, finder.cells));
+                told.push(format!("{ended:?} {} {} {:?}", finder.regions, finder.needed, finder.pieces));
                 if ended != Ok(false) {
                     break;
                 }

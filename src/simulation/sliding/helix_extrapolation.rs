@@ -45,7 +45,7 @@ struct FollowedHelix {
 
 /// Sees when a motion stays the same, and follows it.
 pub(super) struct HelixExtrapolation<'a> {
-    surroundings: &'a StandingParts,
+    standing_parts: &'a StandingParts,
     drive: &'a Drive,
     /// How far points of the part are from its centre of mass at most.
     radius: f64,
@@ -62,13 +62,13 @@ pub(super) struct HelixExtrapolation<'a> {
 impl<'a> HelixExtrapolation<'a> {
     pub(super) fn new(
         scene: &'a Scene,
-        surroundings: &'a StandingParts,
+        standing_parts: &'a StandingParts,
         part: usize,
         drive: &'a Drive,
     ) -> Self {
-        let disabled = super::is_refined(scene, surroundings, part);
+        let disabled = super::is_refined(scene, standing_parts, part);
         Self {
-            surroundings,
+            standing_parts,
             drive,
             radius: scene.bodies[part].shape.reach,
             last: None,
@@ -140,7 +140,7 @@ impl<'a> HelixExtrapolation<'a> {
         let mut steps = telling(&screw, self.free_on_helix(mover, &screw, wanted, &pressing)?);
         while steps >= SHORTEST_HELIX_LEAP {
             let there = MovingBody { pose: screw.times(steps as f64) * mover.pose, ..*mover };
-            if let Some(pose) = self.drive.lifted(&there, &screw.axis(), self.surroundings)? {
+            if let Some(pose) = self.drive.lifted(&there, &screw.axis(), self.standing_parts)? {
                 let angle = screw.angle() * steps as f64;
                 let screw = Screw::between_turning(&mover.pose, &pose, steps, &screw, angle);
                 let length = if steps == wanted { steps * 2 } else { steps };
@@ -163,7 +163,7 @@ impl<'a> HelixExtrapolation<'a> {
     ) -> Result<usize, Interrupt> {
         let after = |k: usize| MovingBody { pose: screw.times(k as f64) * mover.pose, ..*mover };
         let is_held = |k: usize| try_all(pressing, |push| self.is_on_thread(&after(k), push));
-        let is_free = |k: usize| Ok(!after(k).clearly_enters(&self.surroundings.standing)?);
+        let is_free = |k: usize| Ok(!after(k).clearly_enters(&self.standing_parts.standing)?);
         let held = good_until(wanted, &HELD_STATIONS, &is_held)?;
         good_until(held, &FREE_STATIONS, &is_free)
     }
@@ -184,7 +184,7 @@ impl<'a> HelixExtrapolation<'a> {
     ) -> Result<usize, Interrupt> {
         good_until(wanted, &[1], &|k: usize| {
             let there = MovingBody { pose: screw.times(k as f64) * mover.pose, ..*mover };
-            Ok(!there.clearly_enters(&self.surroundings.standing)? && holds(&there)?)
+            Ok(!there.clearly_enters(&self.standing_parts.standing)? && holds(&there)?)
         })
     }
 
@@ -198,7 +198,7 @@ impl<'a> HelixExtrapolation<'a> {
         let turn = UnitQuaternion::from_scaled_axis(w * scale);
         pose.append_rotation_wrt_point_mut(&turn, &mover.centre());
         pose.append_translation_mut(&Translation3::from(v * scale));
-        MovingBody { pose, ..*mover }.clearly_enters(&self.surroundings.standing)
+        MovingBody { pose, ..*mover }.clearly_enters(&self.standing_parts.standing)
     }
 
     /// Whether a short pull, as far as a push has one, still enters a thread: finer than fields show.
@@ -207,7 +207,7 @@ impl<'a> HelixExtrapolation<'a> {
         let Some(direction) = pull.try_normalize(0.0) else { return Ok(false) };
         let step = direction * (PRESSED_PROBE_ON_HELIX * self.drive.step());
         let pose = Translation3::from(step) * mover.pose;
-        MovingBody { pose, ..*mover }.enters_by(PRESSED_DEPTH, &self.surroundings.standing)
+        MovingBody { pose, ..*mover }.enters_by(PRESSED_DEPTH, &self.standing_parts.standing)
     }
 }
 

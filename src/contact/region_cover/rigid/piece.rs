@@ -40,11 +40,11 @@ pub(crate) struct StepPoses {
 }
 
 impl StepPoses {
-    pub(crate) fn of(facing: &SurfacePair<'_>, base: &Pose, there: &Pose) -> Self {
+    pub(crate) fn of(surfaces: &SurfacePair<'_>, base: &Pose, there: &Pose) -> Self {
         let screw = Screw::between(base, there, 1);
-        let after = |share: f64| facing.with_part_at(&(screw.times(share) * base));
+        let after = |share: f64| surfaces.with_part_at(&(screw.times(share) * base));
         let between = std::array::from_fn(|i| after((i + 1) as f64 / (POSES_BETWEEN + 1) as f64));
-        let [here, there] = [base, there].map(|pose| facing.with_part_at(pose));
+        let [here, there] = [base, there].map(|pose| surfaces.with_part_at(pose));
         Self { here, there, between, ahead: after(STEPS_AHEAD) }
     }
 
@@ -58,41 +58,41 @@ impl RigidPiece {
     pub(crate) fn new(
         spot: CoverPiece,
         region: Arc<FreeRegion>,
-        facing: &SurfacePair<'_>,
+        surfaces: &SurfacePair<'_>,
         here: &Pose,
     ) -> Self {
-        let (centre, radius) = facing.ball(&spot.piece);
+        let (centre, radius) = surfaces.ball(&spot.piece);
         let stands = here * centre;
         Self { spot, region, centre, radius, stands, slack: f64::NEG_INFINITY, next: None }
     }
 
     /// A piece that is free in a cell for shifts, without a shift.
-    pub(crate) fn of_cell(
-        cell: &ShiftPiece,
-        facing: &SurfacePair<'_>,
+    pub(crate) fn of_shift_piece(
+        piece: &ShiftPiece,
+        surfaces: &SurfacePair<'_>,
         here: &Pose,
         placed: &mut PlacedPiece,
     ) -> Self {
-        facing.place_at(&cell.spot.piece, here, placed);
-        let sides = cell.limits.iter().map(|limit| {
-            let normal = facing.shifted * limit.normal;
+        surfaces.place_at(&piece.spot.piece, here, placed);
+        let sides = piece.limits.iter().map(|limit| {
+            let normal = surfaces.shifted * limit.normal;
             let lowest = placed.points.iter().map(|p| normal.dot(&p.coords)).fold(f64::INFINITY, f64::min);
             (normal, lowest + limit.height, limit.triangle)
         });
-        let region = Arc::new(FreeRegion::known(cell.ball, sides));
-        Self::new(cell.spot, region, facing, here)
+        let region = Arc::new(FreeRegion::known(piece.ball, sides));
+        Self::new(piece.spot, region, surfaces, here)
     }
 
     /// How far outside its region it may be.
-    pub(crate) fn most(&self, facing: &SurfacePair<'_>) -> f64 {
-        facing.allowed + self.spot.held.max(DEPTH_TOLERANCE)
+    pub(crate) fn most(&self, surfaces: &SurfacePair<'_>) -> f64 {
+        surfaces.allowed + self.spot.held.max(DEPTH_TOLERANCE)
     }
 
     /// How far inside its region all of it is at a pose, negative where it is outside by no more than it
     /// may be and `more`; none where it is further.
     pub(crate) fn slack_at(
         &self,
-        facing: &SurfacePair<'_>,
+        surfaces: &SurfacePair<'_>,
         there: &Pose,
         more: f64,
         placed: &mut PlacedPiece,
@@ -101,8 +101,8 @@ impl RigidPiece {
         if of_ball > 0.0 {
             return Some(of_ball);
         }
-        facing.place_at(&self.spot.piece, there, placed);
-        slack_within(&self.region, placed, self.most(facing) + more)
+        surfaces.place_at(&self.spot.piece, there, placed);
+        slack_within(&self.region, placed, self.most(surfaces) + more)
     }
 }
 

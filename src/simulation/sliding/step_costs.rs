@@ -53,7 +53,7 @@ pub struct StepCost {
 /// The termination condition became true.
 pub fn step_costs(
     scene: &Scene,
-    surroundings: &StandingParts,
+    standing_parts: &StandingParts,
     (part, poses): (usize, &[Pose]),
     action: Action,
     termination: &Termination,
@@ -61,7 +61,7 @@ pub fn step_costs(
     let mut costs = Vec::new();
     if !action.turns() {
         for pose in poses {
-            costs.extend(of_shift(scene, surroundings, (part, pose), action.force(), termination)?);
+            costs.extend(of_shift(scene, standing_parts, (part, pose), action.force(), termination)?);
         }
         return Ok(costs);
     }
@@ -69,7 +69,7 @@ pub fn step_costs(
     let drive = Drive::new(scene, part, start, action);
     for by_samples in [false, true] {
         let mut around =
-            RigidCover::new(scene, surroundings, (part, start), drive.reach(), by_samples, termination);
+            RigidCover::new(scene, standing_parts, (part, start), drive.reach(), by_samples, termination);
         for pose in poses {
             termination.check()?;
             // From some way on these would be the others.
@@ -97,14 +97,14 @@ pub fn step_costs(
 /// Of a translation; none where nothing is near, or regions cannot tell.
 fn of_shift(
     scene: &Scene,
-    surroundings: &StandingParts,
+    standing_parts: &StandingParts,
     (part, start): (usize, &Pose),
     force: Vector3<f64>,
     termination: &Termination,
 ) -> Result<Option<StepCost>, Interrupt> {
     let scene = Scene { memo: Memo::default(), ..scene.clone() };
     let bounds = scene.bodies[part].shape.bounds().transformed(start).grown(FREE_STEP);
-    let near = scene.broad_phase.meeting_of(&surroundings.standing, &bounds);
+    let near = scene.broad_phase.meeting_of(&standing_parts.standing, &bounds);
     if near.is_empty() {
         return Ok(None);
     }

@@ -20,7 +20,7 @@ use super::super::super::sampled::{Contact, ContactSet, MovingBody};
 use super::super::cover;
 use super::super::shift::starting;
 use super::super::surface_pair::{CoverPiece, Piece, PlacedPiece, SurfacePair};
-use super::hold::{RigidPiece, StepPoses, slack_within};
+use super::piece::{RigidPiece, StepPoses, slack_within};
 
 /// The inverse of the golden ratio.
 const GOLDEN: f64 = 0.618_033_988_749_895;
@@ -29,7 +29,7 @@ const AROUND_SMALLEST: f64 = 4.0 * SMALLEST_BIT;
 
 /// A pair, one of whose surfaces is in pieces.
 pub(crate) struct RigidPair<'a> {
-    pub(crate) facing: SurfacePair<'a>,
+    pub(crate) surfaces: SurfacePair<'a>,
     pieces: Vec<RigidPiece>,
     /// Contacts that mattered.
     pub(crate) known: Vec<Contact>,
@@ -72,16 +72,18 @@ impl<'a> RigidPair<'a> {
             return Ok(None);
         }
         let gathered = starting(scene, (part, pose), other, (is_start, RIGID_PIECES), termination)?;
-        let cells = gathered.cells.as_ref().filter(|cells| cells.len() <= RIGID_PIECES);
-        let Some(cells) = cells else { return Ok(None) };
-        let facing = SurfacePair::new(scene, (part, pose), other, gathered.asks_part, termination)?;
+        let pieces = gathered.pieces.as_ref().filter(|pieces| pieces.len() <= RIGID_PIECES);
+        let Some(pieces) = pieces else { return Ok(None) };
+        let surfaces = SurfacePair::new(scene, (part, pose), other, gathered.asks_part, termination)?;
         let mut placed = PlacedPiece::default();
-        let here = facing.with_part_at(pose);
-        let pieces =
-            cells.iter().map(|cell| RigidPiece::of_cell(cell, &facing, &here, &mut placed)).collect();
+        let here = surfaces.with_part_at(pose);
+        let pieces = pieces
+            .iter()
+            .map(|piece| RigidPiece::of_shift_piece(piece, &surfaces, &here, &mut placed))
+            .collect();
         let known = Vec::new();
         Ok(Some(Self {
-            facing,
+            surfaces,
             pieces,
             known,
             is_near: false,
@@ -102,7 +104,7 @@ impl<'a> RigidPair<'a> {
         reach: f64,
         near: &mut ContactSet,
     ) -> Option<OutsidePieces> {
-        let ends = StepPoses::of(&self.facing, base, &mover.pose);
+        let ends = StepPoses::of(&self.surfaces, base, &mover.pose);
         self.is_near = true;
         let outside = self.outside(&ends, near);
         // Contacts lie on pieces that have left their regions, mostly.
@@ -133,7 +135,7 @@ impl<'a> RigidPair<'a> {
     ) -> Result<(), Interrupt> {
         let found = self.renew(&left.outside, &left.ends);
         if self.is_left_to_samples {
-            return mover.near_pair(self.facing.other, reach, near);
+            return mover.near_pair(self.surfaces.other, reach, near);
         }
         self.learn(&found);
         near.contacts.extend(found);
@@ -145,14 +147,14 @@ impl<'a> RigidPair<'a> {
     fn outside(&mut self, StepPoses { here, there, .. }: &StepPoses, near: &mut ContactSet) -> Vec<usize> {
         let angle = here.rotation.angle_to(&there.rotation);
         let mut outside = Vec::new();
-        for (i, hold) in self.pieces.iter_mut().enumerate() {
-            let moved = (there * hold.centre - hold.stands).norm() + angle * hold.radius;
-            hold.next = if hold.slack > moved {
-                Some(hold.slack - moved)
+        for (i, piece) in self.pieces.iter_mut().enumerate() {
+            let moved = (there * piece.centre - piece.stands).norm() + angle * piece.radius;
+            piece.next = if piece.slack > moved {
+                Some(piece.slack - moved)
             } else {
-                hold.slack_at(&self.facing, there, 0.0, &mut self.placed)
+                piece.slack_at(&self.surfaces, there, 0.0, &mut self.placed)
             };
-            match hold.next {
+            match piece.next {
                 Some(slack) => near.clearance = near.clearance.min(slack.max(0.0)),
                 None => outside.push(i),
             }
@@ -166,21 +168,21 @@ impl<'a> RigidPair<'a> {
     /// The corners of some pieces that are deeper inside the measured solid than may be.
     fn corners_inside(&mut self, pieces: &[usize], there: &Pose, most: f64) -> Vec<Contact> {
         let mut inside = Vec::new();
-        let Self { facing, pieces: all, placed, .. } = self;
+        let Self { surfaces, pieces: all, placed, .. } = self;
         for &i in pieces {
-            let hold = &mut all[i];
-            facing.place_at(&hold.spot.piece, there, placed);
-            let slacks = placed.points.iter().map(|p| hold.region.slack(p)).enumerate();
+            let piece = &mut all[i];
+            surfaces.place_at(&piece.spot.piece, there, placed);
+            let slacks = placed.points.iter().map(|p| piece.region.slack(p)).enumerate();
             let mut out: Vec<(usize, f64)> = slacks.filter(|(_, slack)| *slack < -most).collect();
             out.sort_by(|a, b| a.1.total_cmp(&b.1));
             for (k, _) in out.into_iter().take(PROBED_CORNERS) {
-                let seen = facing.look(&placed.points[k], hold.spot.guess);
-                hold.spot.guess = seen.closest.triangle;
-                let gap = seen.signed + facing.allowed;
+                let seen = surfaces.look(&placed.points[k], piece.spot.guess);
+                piece.spot.guess = seen.closest.triangle;
+                let gap = seen.signed + surfaces.allowed;
                 if gap < -most {
-                    let sample = facing.corner(&hold.spot.piece, k);
-                    let (is_moving, at) = (facing.asks_part, (gap, seen.closest));
-                    inside.push(Contact::measured(facing.other, is_moving, sample, at, facing.allowed));
+                    let sample = surfaces.corner(&piece.spot.piece, k);
+                    let (is_moving, at) = (surfaces.asks_part, (gap, seen.closest));
+                    inside.push(Contact::measured(surfaces.other, is_moving, sample, at, surfaces.allowed));
                 }
             }
         }
@@ -192,11 +194,11 @@ impl<'a> RigidPair<'a> {
     fn triangles_inside(&mut self, pieces: &[usize], there: &Pose) -> Vec<Contact> {
         let mut inside = Vec::new();
         for &i in pieces {
-            let Self { facing, pieces: all, placed, .. } = self;
-            let hold = &all[i];
-            facing.place_at(&hold.spot.piece, there, placed);
-            let passed = hold.region.passed(&placed.cloud, DEPTH_TOLERANCE).take(PASSED_TRIANGLES);
-            for contact in passed.filter_map(|triangle| pierced(facing, hold, triangle, there)) {
+            let Self { surfaces, pieces: all, placed, .. } = self;
+            let piece = &all[i];
+            surfaces.place_at(&piece.spot.piece, there, placed);
+            let passed = piece.region.passed(&placed.cloud, DEPTH_TOLERANCE).take(PASSED_TRIANGLES);
+            for contact in passed.filter_map(|triangle| pierced(surfaces, piece, triangle, there)) {
                 if !inside.iter().any(|c: &Contact| c.is_of_same_point(&contact)) {
                     inside.push(contact);
                 }
@@ -210,8 +212,8 @@ impl<'a> RigidPair<'a> {
         let mut left = REGIONS_PER_LOOK;
         let (mut found, mut entered) = (Vec::new(), Vec::new());
         for &i in outside {
-            let hold = self.pieces[i].clone();
-            match self.held(&hold, ends, &mut left, &mut found) {
+            let piece = self.pieces[i].clone();
+            match self.held(&piece, ends, &mut left, &mut found) {
                 Ok(()) => {}
                 Err(Uncovered::Entered(contact)) => {
                     entered.push(contact);
@@ -237,19 +239,19 @@ impl<'a> RigidPair<'a> {
     /// Finds regions for a piece that has none at the other end, or for its parts.
     fn held(
         &mut self,
-        hold: &RigidPiece,
+        piece: &RigidPiece,
         ends: &StepPoses,
         left: &mut usize,
         out: &mut Vec<RigidPiece>,
     ) -> Result<(), Uncovered> {
         let mut is_whole = true;
-        cover(hold.clone(), |mut hold, rest| {
+        cover(piece.clone(), |mut piece, rest| {
             // A part may be in the region that it came with.
             if !std::mem::take(&mut is_whole) {
-                let at_here = hold.slack_at(&self.facing, &ends.here, 0.0, &mut self.placed);
-                hold.next = hold.slack_at(&self.facing, &ends.there, 0.0, &mut self.placed);
-                if let (Some(slack), Some(_)) = (at_here, hold.next) {
-                    out.push(RigidPiece { slack, ..hold });
+                let at_here = piece.slack_at(&self.surfaces, &ends.here, 0.0, &mut self.placed);
+                piece.next = piece.slack_at(&self.surfaces, &ends.there, 0.0, &mut self.placed);
+                if let (Some(slack), Some(_)) = (at_here, piece.next) {
+                    out.push(RigidPiece { slack, ..piece });
                     return Ok(());
                 }
             }
@@ -257,80 +259,77 @@ impl<'a> RigidPair<'a> {
                 return Err(Uncovered::Unsure);
             }
             *left -= 1;
-            if let Some(held) = self.held_whole(&hold, ends)? {
+            if let Some(held) = self.held_whole(&piece, ends)? {
                 out.push(held);
                 return Ok(());
             }
-            let part = |piece| {
-                RigidPiece::new(
-                    CoverPiece { piece, ..hold.spot },
-                    Arc::clone(&hold.region),
-                    &self.facing,
-                    &ends.here,
-                )
+            let part = |part| {
+                let spot = CoverPiece { piece: part, ..piece.spot };
+                RigidPiece::new(spot, Arc::clone(&piece.region), &self.surfaces, &ends.here)
             };
-            rest.extend(self.facing.parts(&hold.spot.piece).into_iter().rev().map(part));
+            rest.extend(self.surfaces.parts(&piece.spot.piece).into_iter().rev().map(part));
             Ok(())
         })
     }
 
     /// All of a piece in a region that holds it at both ends; none if it is to be split.
-    fn held_whole(&mut self, hold: &RigidPiece, ends: &StepPoses) -> Result<Option<RigidPiece>, Uncovered> {
+    fn held_whole(&mut self, piece: &RigidPiece, ends: &StepPoses) -> Result<Option<RigidPiece>, Uncovered> {
         self.regions += 1;
         // What could not be held further ahead the last time is not tried at once again.
-        let goes_far = hold.spot.level == 0 && ends.here != ends.there;
-        let far = if goes_far { self.region(hold, &[ends.here, ends.there, ends.ahead]).ok() } else { None };
+        let goes_far = piece.spot.level == 0 && ends.here != ends.there;
+        let far = if goes_far { self.region(piece, &[ends.here, ends.there, ends.ahead]).ok() } else { None };
         let level = usize::from(goes_far && far.is_none());
-        match far.map_or_else(|| self.region(hold, &[ends.here, ends.there]), Ok) {
+        match far.map_or_else(|| self.region(piece, &[ends.here, ends.there]), Ok) {
             Ok(region) => {
-                let mut hold = RigidPiece { region: Arc::new(region), ..hold.clone() };
-                hold.spot.level = level;
-                hold.slack = hold.slack_at(&self.facing, &ends.here, 0.0, &mut self.placed).unwrap_or(0.0);
-                hold.next = hold.slack_at(&self.facing, &ends.there, 0.0, &mut self.placed).or(Some(0.0));
-                return Ok(Some(hold));
+                let mut piece = RigidPiece { region: Arc::new(region), ..piece.clone() };
+                piece.spot.level = level;
+                piece.slack =
+                    piece.slack_at(&self.surfaces, &ends.here, 0.0, &mut self.placed).unwrap_or(0.0);
+                piece.next = piece.slack_at(&self.surfaces, &ends.there, 0.0, &mut self.placed).or(Some(0.0));
+                return Ok(Some(piece));
             }
             Err(NoRegion::Amid(triangle)) => {
-                if let Some(contact) = pierced(&self.facing, hold, triangle, &ends.there) {
+                if let Some(contact) = pierced(&self.surfaces, piece, triangle, &ends.there) {
                     return Err(Uncovered::Entered(contact));
                 }
             }
             Err(NoRegion::Cramped) => {}
         }
-        let Piece::Bit(corners) = &hold.spot.piece else { return Ok(None) };
-        if hold.radius >= SMALL_BIT_ENTERED {
+        let Piece::Bit(corners) = &piece.spot.piece else { return Ok(None) };
+        if piece.radius >= SMALL_BIT_ENTERED {
             return Ok(None);
         }
-        if let Some(contact) = self.deepest_on_edges(corners, hold.spot.guess, &ends.there) {
+        if let Some(contact) = self.deepest_on_edges(corners, piece.spot.guess, &ends.there) {
             return Err(Uncovered::Entered(contact));
         }
-        if hold.radius >= SMALLEST_BIT {
+        if piece.radius >= SMALLEST_BIT {
             return Ok(None);
         }
-        let enters = |at: &Pose| self.deepest_on_edges(corners, hold.spot.guess, at).is_some();
+        let enters = |at: &Pose| self.deepest_on_edges(corners, piece.spot.guess, at).is_some();
         if ends.here != ends.there && ends.between.iter().any(enters) {
             return Err(Uncovered::Crossed);
         }
-        Ok(Some(self.before_face(hold, ends)))
+        Ok(Some(self.before_face(piece, ends)))
     }
 
     /// A region that holds a piece at some poses.
-    fn region(&mut self, hold: &RigidPiece, at: &[Pose]) -> Result<FreeRegion, NoRegion> {
-        let (facing, placed) = (&self.facing, &mut self.placed);
+    fn region(&mut self, piece: &RigidPiece, at: &[Pose]) -> Result<FreeRegion, NoRegion> {
+        let (surfaces, placed) = (&self.surfaces, &mut self.placed);
         let (mut wanted, mut centres) = (Vec::new(), Bounds::EMPTY);
         for pose in at {
-            facing.place_at(&hold.spot.piece, pose, placed);
+            surfaces.place_at(&piece.spot.piece, pose, placed);
             wanted.extend_from_slice(&placed.extremes);
             centres = centres.with_point(&placed.centre);
         }
         let middle = centres.centre();
         let around = (placed.radius + (centres.max - middle).norm() + CONTACT_STEP) * REGION_ROOM;
-        let most = hold.most(facing);
+        let most = piece.most(surfaces);
         let wanted = Wanted { points: &wanted, most, from_behind: true, facing: Vector3::zeros() };
-        let seen = facing.look(&middle, hold.spot.guess);
+        let seen = surfaces.look(&middle, piece.spot.guess);
         let region =
-            facing.measured.free_region_around(&middle, around, (&seen.closest, seen.signed), wanted)?;
+            surfaces.measured.free_region_around(&middle, around, (&seen.closest, seen.signed), wanted)?;
         for pose in at {
-            facing.place_at(&hold.spot.piece, pose, placed);
+            surfaces.place_at(&piece.spot.piece, pose, placed);
             slack_within(&region, placed, most).ok_or(NoRegion::Cramped)?;
         }
         Ok(region)
@@ -340,10 +339,10 @@ impl<'a> RigidPair<'a> {
     /// has a corner inside the other. Below the two faces of an edge the depth along a line has one maximum
     /// (found by golden sections).
     fn deepest_on_edges(&self, corners: &[Point3<f64>; 3], guess: u32, there: &Pose) -> Option<Contact> {
-        let facing = &self.facing;
+        let surfaces = &self.surfaces;
         let gap = |p: &Point3<f64>| {
-            let seen = facing.look(&(there * p), guess);
-            (seen.signed + facing.allowed, seen.closest)
+            let seen = surfaces.look(&(there * p), guess);
+            (seen.signed + surfaces.allowed, seen.closest)
         };
         let at_corners = corners.map(|p| gap(&p).0);
         let mut deepest: Option<(f64, Point3<f64>)> = None;
@@ -377,21 +376,21 @@ impl<'a> RigidPair<'a> {
             }
         }
         let (_, p) = deepest.filter(|(gap, _)| *gap < -DEPTH_TOLERANCE)?;
-        Some(Contact::measured(facing.other, facing.asks_part, p, gap(&p), facing.allowed))
+        Some(Contact::measured(surfaces.other, surfaces.asks_part, p, gap(&p), surfaces.allowed))
     }
 
     /// A small bit that is no deeper than may be, before the face that it is nearest to: where surfaces
     /// cross by less than that, there are no regions. That is not certain, as regions are; paths are
     /// verified.
-    fn before_face(&mut self, hold: &RigidPiece, ends: &StepPoses) -> RigidPiece {
-        let (facing, placed) = (&self.facing, &mut self.placed);
-        facing.place_at(&hold.spot.piece, &ends.there, placed);
-        let closest = facing.look(&placed.centre, hold.spot.guess).closest;
-        let normal = facing.measured.pseudo_normal(&closest).normalize();
+    fn before_face(&mut self, piece: &RigidPiece, ends: &StepPoses) -> RigidPiece {
+        let (surfaces, placed) = (&self.surfaces, &mut self.placed);
+        surfaces.place_at(&piece.spot.piece, &ends.there, placed);
+        let closest = surfaces.look(&placed.centre, piece.spot.guess).closest;
+        let normal = surfaces.measured.pseudo_normal(&closest).normalize();
         let height = placed.points.iter().map(|p| normal.dot(&p.coords)).fold(f64::INFINITY, f64::min);
         let ball = (placed.centre, AROUND_SMALLEST);
         let region = Arc::new(FreeRegion::known(ball, [(normal, height, closest.triangle)]));
-        RigidPiece { region, slack: 0.0, next: Some(0.0), ..hold.clone() }
+        RigidPiece { region, slack: 0.0, next: Some(0.0), ..piece.clone() }
     }
 
     /// Keeps contacts for the steps to come.
@@ -411,23 +410,23 @@ impl<'a> RigidPair<'a> {
         reach: f64,
         termination: &Termination,
     ) -> Result<bool, Interrupt> {
-        let there = self.facing.with_part_at(&mover.pose);
+        let there = self.surfaces.with_part_at(&mover.pose);
         let again = self.known.iter().filter_map(|c| mover.remeasured(c, reach));
         self.known = again.filter(|c| c.gap < reach).collect();
         let outside: Vec<usize> = (0..self.pieces.len()).filter(|&i| self.pieces[i].next.is_none()).collect();
         let (mut left, mut found) = (REGIONS_ON_APPROACH, Vec::new());
         for &i in outside.iter().rev() {
             let ends = StepPoses::at(there);
-            let hold = self.pieces.swap_remove(i);
+            let piece = self.pieces.swap_remove(i);
             termination.check()?;
-            if self.held(&hold, &ends, &mut left, &mut found).is_err() {
+            if self.held(&piece, &ends, &mut left, &mut found).is_err() {
                 return Ok(false);
             }
         }
         self.pieces.extend(found);
-        for hold in &mut self.pieces {
-            hold.stands = there * hold.centre;
-            hold.slack = hold.next.unwrap_or(0.0);
+        for piece in &mut self.pieces {
+            piece.stands = there * piece.centre;
+            piece.slack = piece.next.unwrap_or(0.0);
         }
         self.steps += 1;
         Ok(self.regions <= REGIONS_PER_MOTION + REGIONS_PER_STEP * self.steps)
@@ -438,27 +437,27 @@ impl<'a> RigidPair<'a> {
         if self.is_left_to_samples || !self.is_near {
             return !self.is_left_to_samples;
         }
-        let there = self.facing.with_part_at(&between.pose);
+        let there = self.surfaces.with_part_at(&between.pose);
         let more = BULGE_TOLERANCE - DEPTH_TOLERANCE;
         let outside: Vec<usize> = (0..self.pieces.len())
-            .filter(|&i| self.pieces[i].slack_at(&self.facing, &there, more, &mut self.placed).is_none())
+            .filter(|&i| self.pieces[i].slack_at(&self.surfaces, &there, more, &mut self.placed).is_none())
             .collect();
         self.corners_inside(&outside, &there, BULGE_TOLERANCE).is_empty()
     }
 }
 
 /// The corner of a measured triangle, or the middle of one of its sides, that is too deep inside the asked solid.
-fn pierced(facing: &SurfacePair<'_>, hold: &RigidPiece, triangle: u32, there: &Pose) -> Option<Contact> {
-    if facing.asked.is_open() {
+fn pierced(surfaces: &SurfacePair<'_>, piece: &RigidPiece, triangle: u32, there: &Pose) -> Option<Contact> {
+    if surfaces.asked.is_open() {
         return None;
     }
-    let guess = facing.triangle_of(&hold.spot.piece).unwrap_or(0);
-    facing.measured.corners_and_middles(triangle).into_iter().find_map(|point| {
+    let guess = surfaces.triangle_of(&piece.spot.piece).unwrap_or(0);
+    surfaces.measured.corners_and_middles(triangle).into_iter().find_map(|point| {
         let p = there.inverse_transform_point(&point);
-        let closest = facing.asked.closest_from(&p, guess);
-        let gap = facing.asked.signed(&p, &closest) + facing.allowed;
+        let closest = surfaces.asked.closest_from(&p, guess);
+        let gap = surfaces.asked.signed(&p, &closest) + surfaces.allowed;
         let at = (gap, closest);
         (gap < -DEPTH_TOLERANCE)
-            .then(|| Contact::measured(facing.other, !facing.asks_part, point, at, facing.allowed))
+            .then(|| Contact::measured(surfaces.other, !surfaces.asks_part, point, at, surfaces.allowed))
     })
 }

@@ -143,8 +143,8 @@ mod tests {
         let standing: Vec<usize> = (0..scene.bodies.len()).filter(|&i| i != 1).collect();
         let body = &scene.bodies[1];
         let termination = Termination::default();
-        let flights = FreeFlight::new(scene, &standing, 1, &termination);
-        flights.length(&body.planning_from_shape, &body.bounds, &u).unwrap().0
+        let flight = FreeFlight::new(scene, &standing, 1, &termination);
+        flight.length(&body.planning_from_shape, &body.bounds, &u).unwrap().0
     }
 
     #[test]
@@ -168,25 +168,25 @@ mod tests {
         let (scene, _) = scene([plate, block, cuboid([2.0, -4.0, 0.0], [2.5, 4.0, 2.0])]);
         let body = &scene.bodies[1];
         let termination = Termination::default();
-        let mut flights = FreeFlight::new(&scene, &[0, 2], 1, &termination);
+        let mut flight = FreeFlight::new(&scene, &[0, 2], 1, &termination);
         let (mut pose, mut bounds, u) = (body.planning_from_shape, body.bounds, Vector3::x());
         let mut steps = Vec::new();
-        while let Some(step) = flights.step(&pose, &bounds, &u).unwrap() {
-            assert!(flights.is_aloft() && flights.any);
+        while let Some(step) = flight.step(&pose, &bounds, &u).unwrap() {
+            assert!(flight.is_aloft() && flight.any);
             pose.translation.vector += u * step;
             (bounds.min, bounds.max) = (bounds.min + u * step, bounds.max + u * step);
             steps.push(step);
         }
         assert_eq!(steps.len(), 2);
-        assert!(steps[0] == FREE_STEP && steps[1] < FREE_STEP && !flights.is_aloft());
-        assert_eq!(flights.step(&pose, &bounds, &Vector3::z()).unwrap(), None);
+        assert!(steps[0] == FREE_STEP && steps[1] < FREE_STEP && !flight.is_aloft());
+        assert_eq!(flight.step(&pose, &bounds, &Vector3::z()).unwrap(), None);
         for is_bent in [false, true, true] {
-            flights.stepped(is_bent);
-            assert_eq!(flights.step(&pose, &bounds, &Vector3::z()).unwrap(), None);
+            flight.stepped(is_bent);
+            assert_eq!(flight.step(&pose, &bounds, &Vector3::z()).unwrap(), None);
         }
-        flights.stepped(false);
-        assert_eq!(flights.step(&pose, &bounds, &Vector3::z()).unwrap(), Some(FREE_STEP));
-        let mut never = flights.never();
+        flight.stepped(false);
+        assert_eq!(flight.step(&pose, &bounds, &Vector3::z()).unwrap(), Some(FREE_STEP));
+        let mut never = flight.never();
         never.stepped(true);
         never.stepped(false);
         assert_eq!(never.step(&pose, &bounds, &Vector3::z()).unwrap(), None);
