@@ -3,10 +3,15 @@
 use nalgebra::{Matrix3, Point3, Translation3, Vector3};
 
 use crate::budgets::PROBES;
-use crate::geometry::{Closest, Cloud, Parts, PatchTree, Pose, Surface, bisected, separating_direction};
+use crate::geometry::{
+    Closest, Cloud, FreeRegion, NoRegion, Parts, PatchTree, Pose, Surface, Wanted, bisected,
+    separating_direction,
+};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{ENTRY_PROBE, ENTRY_SHARE, HELD, STEEP_COSINE, TILT, TOUCH_INSET, TOUCHED};
+use crate::tolerances::{
+    ENTRY_PROBE, ENTRY_SHARE, HELD, REGION_ROOM, STEEP_COSINE, TILT, TOUCH_INSET, TOUCHED,
+};
 
 /// A plane that a part is kept from passing, by its normal in the planning frame, and whose it is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,6 +119,20 @@ impl<'a> SurfacePair<'a> {
             Piece::Patch(index) => self.tree.vertices(*index)[number],
             Piece::Bit(corners) => corners[number],
         }
+    }
+
+    /// A convex region around a point in the measured surface's frame that holds some points, but for `most` by which
+    /// each may be outside. It reaches `radius` and some room further.
+    pub(crate) fn region(
+        &self,
+        (middle, seen): (&Point3<f64>, &SignedClosest),
+        radius: f64,
+        points: &[Point3<f64>],
+        most: f64,
+    ) -> Result<FreeRegion, NoRegion> {
+        let wanted = Wanted { points, most, from_behind: true, facing: Vector3::zeros() };
+        let closest = (&seen.closest, seen.signed);
+        self.measured.free_region_around(middle, radius * REGION_ROOM, closest, wanted)
     }
 
     /// What of the measured surface is nearest to a point in its frame; `guess` is a triangle near it.

@@ -2,18 +2,17 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use crate::budgets::{
     CONTACTS_PER_LOOK, EDGE_SECTIONS, KEPT_CONTACTS, PASSED_TRIANGLES, PROBED_CORNERS, REGIONS_ON_APPROACH,
     REGIONS_PER_LOOK, REGIONS_PER_MOTION, REGIONS_PER_STEP, RIGID_PIECES,
 };
-use crate::geometry::{Bounds, FreeRegion, NoRegion, Pose, Wanted};
+use crate::geometry::{Bounds, FreeRegion, NoRegion, Pose};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
-    BULGE_TOLERANCE, CONTACT_STEP, COVERED_OVERLAP, DEPTH_TOLERANCE, REGION_ROOM, SMALL_BIT_ENTERED,
-    SMALLEST_BIT,
+    BULGE_TOLERANCE, CONTACT_STEP, COVERED_OVERLAP, DEPTH_TOLERANCE, SMALL_BIT_ENTERED, SMALLEST_BIT,
 };
 
 use super::super::super::sampled::{Contact, ContactSet, MovingBody};
@@ -322,12 +321,10 @@ impl<'a> RigidPair<'a> {
             centres = centres.with_point(&placed.centre);
         }
         let middle = centres.centre();
-        let around = (placed.radius + (centres.max - middle).norm() + CONTACT_STEP) * REGION_ROOM;
+        let around = placed.radius + (centres.max - middle).norm() + CONTACT_STEP;
         let most = piece.most(surfaces);
-        let wanted = Wanted { points: &wanted, most, from_behind: true, facing: Vector3::zeros() };
         let seen = surfaces.look(&middle, piece.spot.guess);
-        let region =
-            surfaces.measured.free_region_around(&middle, around, (&seen.closest, seen.signed), wanted)?;
+        let region = surfaces.region((&middle, &seen), around, &wanted, most)?;
         for pose in at {
             surfaces.place_at(&piece.spot.piece, pose, placed);
             slack_within(&region, placed, most).ok_or(NoRegion::Cramped)?;

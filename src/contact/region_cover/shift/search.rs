@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::geometry::{NoRegion, Wanted};
+use crate::geometry::NoRegion;
 use crate::termination::Termination;
 use crate::tolerances::{
-    CONTACT_STEP, HELD, HELD_AT_FIRST, LEAST_SHARE_AHEAD, REGION_ROOM, ROUNDED, SHIFTS_AHEAD,
-    SMALL_BIT_AHEAD, SMALLEST_BIT,
+    CONTACT_STEP, HELD, HELD_AT_FIRST, LEAST_SHARE_AHEAD, ROUNDED, SHIFTS_AHEAD, SMALL_BIT_AHEAD,
+    SMALLEST_BIT,
 };
 
 use super::super::surface_pair::{
@@ -348,16 +348,13 @@ impl<'a> ShiftSearch<'a> {
         let most = pair.allowed + spot.held;
         let ahead = pair.shifted * shift;
         let PlacedPiece { points, cloud, extremes, centre, radius } = &self.placed;
-        let of = |points| Wanted { points, most, from_behind: true, facing: Vector3::zeros() };
         let region = if ahead == Vector3::zeros() {
-            let around = (radius + CONTACT_STEP) * REGION_ROOM;
-            pair.measured.free_region_around(centre, around, (&seen.closest, seen.signed), of(extremes))
+            pair.region((centre, seen), radius + CONTACT_STEP, extremes, most)
         } else {
             let wanted: Vec<_> = extremes.iter().copied().chain(extremes.iter().map(|p| p + ahead)).collect();
             let middle = centre + ahead / 2.0;
-            let around = (radius + ahead.norm() / 2.0) * REGION_ROOM;
             let seen = pair.look(&middle, spot.guess);
-            pair.measured.free_region_around(&middle, around, (&seen.closest, seen.signed), of(&wanted))
+            pair.region((&middle, &seen), radius + ahead.norm() / 2.0, &wanted, most)
         }?;
         let gaps = region.gaps(cloud);
         let below = |shift: &Vector3<f64>| {
