@@ -1,4 +1,5 @@
-//! Two surfaces that face each other: of one, pieces are asked for; into the other they may not get.
+//! Two surfaces that face each other. One is covered, in pieces; the other is measured, and no piece may enter it.
+//! ("Asked" in names means covered.)
 
 use nalgebra::{Matrix3, Point3, Translation3, Vector3};
 
@@ -13,7 +14,7 @@ use crate::tolerances::{
     ENTRY_PROBE, ENTRY_SHARE, HELD, REGION_ROOM, STEEP_COSINE, TILT, TOUCH_INSET, TOUCHED,
 };
 
-/// A plane that a part is kept from passing, by its normal in the planning frame, and whose it is.
+/// A plane that a part may not pass: its normal in the planning frame, and the standing part that it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Obstacle {
     pub(crate) normal: Vector3<f64>,
@@ -26,45 +27,45 @@ impl Obstacle {
     }
 }
 
-/// At which angles what enters a face is in the way.
+/// The angles at which a face that is entered counts as an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Slope {
-    /// However small: where regions did not let it go.
+    /// Any angle: for points where no region allowed the shift.
     Any,
-    /// At those at which it soon gets deeper than any tolerance, and where it is the only face that the point may be
-    /// before: beside an edge another one may let it go on.
+    /// Only angles at which the point soon gets deeper than any tolerance, and only where no other face of an edge
+    /// would let it pass.
     Steep,
 }
 
-/// A point of the asked surface that got into the measured one.
+/// A point of the covered surface that entered the measured one.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Witness {
-    /// Without a shift, in the measured surface's frame.
+    /// Unshifted, in the measured surface's frame.
     point: Point3<f64>,
-    /// The triangle that it was nearest to.
+    /// The triangle nearest to it.
     triangle: u32,
 }
 
-/// A moving and a standing part: the surface that is asked, and that into which it may not get.
+/// A moving and a standing part: the covered and the measured surface, and the poses between their frames.
 #[derive(Clone)]
 pub(crate) struct SurfacePair<'a> {
     pub(crate) other: usize,
     pub(crate) asked: &'a Surface,
     tree: &'a PatchTree,
     pub(crate) measured: &'a Surface,
-    /// Whether the moving part's surface is the one that is asked.
+    /// Whether the covered surface is the moving part's.
     pub(crate) asks_part: bool,
-    /// Where the standing part stands.
+    /// The pose of the standing part.
     stand: Pose,
-    /// Without a shift.
+    /// At zero shift.
     measured_from_asked: Pose,
-    /// From shifts of the part to shifts of the asked surface against the measured one: orthogonal.
+    /// Maps a shift of the part to the shift of the covered surface against the measured one: orthogonal.
     pub(crate) shifted: Matrix3<f64>,
     pub(crate) allowed: f64,
 }
 
 impl<'a> SurfacePair<'a> {
-    /// With the moving part's surface asked, or the standing one's.
+    /// Covers the moving part's surface, or the standing part's.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -97,8 +98,8 @@ impl<'a> SurfacePair<'a> {
         })
     }
 
-    /// Which sides of a pair can be asked, as what is closed can be measured: whether it is the
-    /// part's. The smaller surface is the first.
+    /// The sides of a pair that can be covered, the smaller surface first: `true` for the moving part's. The other
+    /// surface must be closed, as only closed surfaces can be measured.
     pub(crate) fn asked_first(scene: &Scene, part: usize, other: usize) -> Vec<bool> {
         let surface = |i: usize| &scene.bodies[i].shape.surface;
         let size = |i: usize| surface(i).bounds().extents().product();
@@ -108,12 +109,12 @@ impl<'a> SurfacePair<'a> {
         sides
     }
 
-    /// From the asked surface's frame to the measured one's with the part at a pose.
+    /// Maps the covered surface's frame to the measured one's with the part at a pose.
     pub(crate) fn with_part_at(&self, pose: &Pose) -> Pose {
         measured_from_asked(&self.stand, pose, self.asks_part)
     }
 
-    /// A corner of a piece, in the asked surface's frame, by its number in [`PlacedPiece::points`].
+    /// A corner of a piece in the covered surface's frame, by its index in [`PlacedPiece::points`].
     pub(crate) fn corner(&self, piece: &Piece, number: usize) -> Point3<f64> {
         match piece {
             Piece::Patch(index) => self.tree.vertices(*index)[number],
@@ -121,8 +122,8 @@ impl<'a> SurfacePair<'a> {
         }
     }
 
-    /// A convex region around a point in the measured surface's frame that holds some points, but for `most` by which
-    /// each may be outside. It reaches `radius` and some room further.
+    /// A convex region around a point in the measured surface's frame. It holds the given points, except that each
+    /// may be outside by up to `most`, and it reaches beyond `radius` by some room.
     pub(crate) fn region(
         &self,
         (middle, seen): (&Point3<f64>, &SignedClosest),
@@ -135,13 +136,14 @@ impl<'a> SurfacePair<'a> {
         self.measured.free_region_around(middle, radius * REGION_ROOM, closest, wanted)
     }
 
-    /// What of the measured surface is nearest to a point in its frame; `guess` is a triangle near it.
+    /// The triangle of the measured surface that is nearest to a point in its frame, and the signed distance. The
+    /// search starts at the triangle `guess`.
     pub(crate) fn look(&self, p: &Point3<f64>, guess: u32) -> SignedClosest {
         let closest = self.measured.closest_from(p, guess);
         SignedClosest { signed: self.measured.signed(p, &closest), closest }
     }
 
-    /// A ball that holds a piece, in the asked surface's frame.
+    /// A ball that holds a piece, in the covered surface's frame.
     pub(crate) fn ball(&self, piece: &Piece) -> (Point3<f64>, f64) {
         match piece {
             Piece::Patch(index) => {
@@ -152,7 +154,7 @@ impl<'a> SurfacePair<'a> {
         }
     }
 
-    /// A triangle of a piece's, if it is a patch.
+    /// A triangle of a piece, if the piece is a patch.
     pub(crate) fn triangle_of(&self, piece: &Piece) -> Option<u32> {
         match piece {
             Piece::Patch(index) => self.tree.triangles(*index).first().copied(),
@@ -160,7 +162,7 @@ impl<'a> SurfacePair<'a> {
         }
     }
 
-    /// The whole asked surface, unless it has no triangles.
+    /// The whole covered surface, unless it has no triangles.
     pub(crate) fn root(&self) -> Option<Piece> {
         self.tree.root().map(Piece::Patch)
     }
@@ -176,13 +178,13 @@ impl<'a> SurfacePair<'a> {
         }
     }
 
-    /// Where a piece is against the measured surface when the part is shifted.
+    /// Places a piece against the measured surface, with the part shifted by `at`.
     pub(crate) fn place(&self, piece: &Piece, at: &Vector3<f64>, placed: &mut PlacedPiece) {
         let shift = Translation3::from(self.shifted * at);
         self.place_at(piece, &(shift * self.measured_from_asked), placed);
     }
 
-    /// Where a piece is when the asked surface stands so against the measured one.
+    /// Places a piece with the covered surface at a pose in the measured surface's frame.
     pub(crate) fn place_at(&self, piece: &Piece, measured_from_asked: &Pose, placed: &mut PlacedPiece) {
         let place = |p: &Point3<f64>| measured_from_asked * p;
         placed.points.clear();
@@ -204,19 +206,18 @@ impl<'a> SurfacePair<'a> {
         placed.cloud.refill(&placed.points);
     }
 
-    /// Whether a triangle of the measured surface may lie beside a piece where it is.
+    /// Whether a plane separates a triangle of the measured surface from a placed piece, up to `most`.
     pub(crate) fn is_beside(&self, piece: &PlacedPiece, triangle: u32, most: f64) -> bool {
         let corners = self.measured.corners(triangle);
-        // What touches is beside, too.
+        // A triangle that only touches is beside the piece, too.
         let centre = piece.centre;
         let inset = |p: &Point3<f64>| p + (centre - p) * (most / (centre - p).norm()).clamp(TOUCH_INSET, 1.0);
         let within: Vec<_> = piece.extremes.iter().map(inset).collect();
         separating_direction(&corners, &within, 0.0, None).is_some()
     }
 
-    /// The faces that some points of the asked surface (measured surface's frame) get into when the part
-    /// moves along a unit vector: what is certainly in the way. Points that show it are added to
-    /// `witnesses`.
+    /// The faces that certainly stop some points of the covered surface (in the measured surface's frame) when the
+    /// part moves along a unit vector. Adds the points that show it to `witnesses`.
     pub(crate) fn obstacles(
         &self,
         probes: &[Point3<f64>],
@@ -236,8 +237,7 @@ impl<'a> SurfacePair<'a> {
         obstacles
     }
 
-    /// What points that showed obstacles before still get into, at another shift or along another unit
-    /// vector.
+    /// The faces that stop points which showed obstacles before, at another shift or along another unit vector.
     pub(crate) fn obstacles_seen_by(
         &self,
         witnesses: &[Witness],
@@ -254,7 +254,7 @@ impl<'a> SurfacePair<'a> {
         obstacles
     }
 
-    /// The face that a point gets into when the part moves along a unit vector, and its triangle.
+    /// The face that a point enters when the part moves along a unit vector, and its triangle.
     fn obstacle(
         &self,
         p: &Point3<f64>,
@@ -266,8 +266,8 @@ impl<'a> SurfacePair<'a> {
         Some((Obstacle { normal: self.shifted.transpose() * normal, other: self.other }, triangle))
     }
 
-    /// The face of the asked surface that gets over a corner of a measured triangle, or the middle of one of its
-    /// sides, steeply: a long face may have its own corners far from where it touches.
+    /// The face of the covered surface that a corner of a measured triangle, or the middle of a side, enters steeply:
+    /// a long face may have its own corners far from where it touches.
     pub(crate) fn obstacle_of_triangle(
         &self,
         triangle: u32,
@@ -286,8 +286,8 @@ impl<'a> SurfacePair<'a> {
         })
     }
 
-    /// Points of a piece that are likely to get inside first: corners in front, and the
-    /// middles of the largest faces that look ahead (corners may be at the rims of holes).
+    /// The points of a piece that probably enter first: the corners in front, and the middles of the largest faces
+    /// that look ahead, as corners may lie at the rims of holes.
     pub(crate) fn probes_ahead(
         &self,
         piece: &Piece,
@@ -321,8 +321,8 @@ impl<'a> SurfacePair<'a> {
     }
 }
 
-/// The normal of the face of a surface that a point certainly gets deeper into than is allowed on its way along a
-/// unit vector, and the triangle that it is nearest to.
+/// The normal of a face that a point certainly enters by more than allowed on its way along a unit vector, and the
+/// nearest triangle.
 fn entered(
     surface: &Surface,
     (p, ahead): (&Point3<f64>, &Vector3<f64>),
@@ -348,15 +348,14 @@ fn entered(
     if slope == Slope::Steep && least?.dot(&most?) < STEEP_COSINE {
         return None;
     }
-    // What touches enters below all faces that it touches, at however small an angle.
+    // A point that touches enters below every face that it touches, at any angle.
     let touches = (-TOUCHED..=HELD).contains(&(now - allowed));
     let is_flat = slope == Slope::Any && touches && least.as_ref().is_some_and(blocking);
     let is_certain = is_flat || {
         let (then, _) = depth(&(p + ahead * ENTRY_PROBE), closest.triangle);
         then > now.max(allowed) + ENTRY_SHARE * ENTRY_PROBE
     };
-    // Before a convex edge either face is enough to stay above; if that does not help, it is
-    // a reentrant one.
+    // At a convex edge it is enough to stay above either face. If neither stops the point, the edge is reentrant.
     let normal = is_certain.then_some(least.filter(blocking).or(most.filter(blocking))?)?;
     Some((normal, closest.triangle))
 }
@@ -370,12 +369,12 @@ fn measured_from_asked(stand: &Pose, part: &Pose, asks_part: bool) -> Pose {
     if asks_part { stand.inverse() * part } else { part.inverse() * stand }
 }
 
-/// A piece of the asked surface.
+/// A piece of the covered surface.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Piece {
-    /// A node of the tree.
+    /// A node of the patch tree.
     Patch(u32),
-    /// A triangle, or a bit of one, by its corners.
+    /// A triangle, or a part of one, by its corners.
     Bit([Point3<f64>; 3]),
 }
 
@@ -397,14 +396,14 @@ pub(crate) struct SignedClosest {
     pub(crate) signed: f64,
 }
 
-/// A piece against the measured surface.
+/// A piece in the measured surface's frame.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PlacedPiece {
     /// Its corners.
     pub(crate) points: Vec<Point3<f64>>,
-    /// The same, four by four.
+    /// The same points, grouped by four for vector instructions.
     pub(crate) cloud: Cloud,
-    /// Those that reach furthest.
+    /// The points that reach furthest.
     pub(crate) extremes: Vec<Point3<f64>>,
     /// A ball that holds it.
     pub(crate) centre: Point3<f64>,

@@ -1,10 +1,9 @@
-//! Cells of pairs where motions begin, kept for all motions that begin there.
+//! A cache of covers for shifts, for pairs where motions begin.
 //!
-//! Six pushes from a state, its static analysis, and the same part tried again after another left
-//! ask the same at first: regions around a pair's surface, at one place. They are found once. What is
-//! kept is a function of its key alone, so motions do not depend on which of them came first; and of
-//! assembled pairs it is found in a scene of the two alone, at rounded poses, so that it does not depend
-//! on which other pairs stand alike either.
+//! Six pushes from a state, its static analysis, and the same part tried again after another one left all need the
+//! same regions first. An entry is a function of its key alone, so a motion does not depend on which other motion
+//! came first. The entry of an assembled pair is found in a scene of the two parts alone, at rounded poses, so it
+//! does not depend on which congruent pair came first either.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -19,13 +18,13 @@ use crate::tolerances::CONGRUENT_PAIR_DISTANCE;
 
 use super::piece::ShiftPiece;
 
-/// A pair of a part that begins to move and one that stands.
+/// A part where its motion begins, and one standing part.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StartPair<'a> {
     pub(crate) part: usize,
     pub(crate) start: &'a Pose,
     pub(crate) other: usize,
-    /// Under which key it is kept, if it is one that is.
+    /// The key of its entry, if it stands for a canonical pair.
     kept_as: Option<StartKey>,
 }
 
@@ -35,36 +34,35 @@ impl<'a> StartPair<'a> {
     }
 }
 
-/// All of one side of a pair in cells without a shift.
+/// A cover of all of one surface of a pair, at zero shift.
 #[derive(Debug, Clone)]
 pub(crate) struct StartCover {
-    /// Whether the moving part's surface is the one that is in cells.
+    /// Whether the covered surface is the moving part's.
     pub(crate) asks_part: bool,
-    /// None where regions cannot tell.
+    /// `None` if no cover was found.
     pub(crate) pieces: Option<Arc<Vec<ShiftPiece>>>,
-    /// How many regions it took.
+    /// The number of regions that were computed.
     pub(crate) regions: usize,
 }
 
 impl StartCover {
-    /// The same with the other part moving instead.
+    /// The same pair with the other part moving.
     fn mirrored(&self) -> Self {
         let pieces = self.pieces.as_deref().map(|pieces| mirrored(pieces));
         Self { asks_part: !self.asks_part, pieces, regions: self.regions }
     }
 }
 
-/// What becomes of a pair's cells when the part is to go somewhere from where it begins.
+/// The cover of a pair after it was changed to allow a direction.
 #[derive(Debug, Clone)]
 pub(crate) struct ShiftWay {
-    /// Normals (planning frame) of what stops it; free where there are none.
+    /// Normals (planning frame) of the obstacles; empty if the direction is free.
     pub(crate) blocked: Vec<Vector3<f64>>,
-    /// The cells that let it go; those that it had where it is stopped; none where regions cannot
-    /// tell.
+    /// The pieces that allow the direction, or the former ones if an obstacle stops it; `None` if no cover was found.
     pub(crate) pieces: Option<Arc<Vec<ShiftPiece>>>,
-    /// How many of them were found for this way: the last ones.
+    /// The number of new pieces, which are the last ones.
     pub(crate) found: usize,
-    /// How many regions it took.
+    /// The number of regions that were computed.
     pub(crate) regions: usize,
 }
 
@@ -88,11 +86,11 @@ fn mirrored(pieces: &[ShiftPiece]) -> Arc<Vec<ShiftPiece>> {
     Arc::new(pieces.iter().map(ShiftPiece::mirrored).collect())
 }
 
-/// What is kept.
+/// The cache of a scene.
 #[derive(Debug, Default)]
 pub struct ShiftCoverCache {
     kept: Mutex<CacheEntries>,
-    /// Of the pairs that stand alike, assembled, the first.
+    /// For each assembled pair, the first pair that is congruent to it.
     firsts: OnceLock<HashMap<(usize, usize), (usize, usize)>>,
 }
 
@@ -100,12 +98,12 @@ pub struct ShiftCoverCache {
 struct CacheEntries {
     gathered: HashMap<StartKey, Arc<StartCover>>,
     ways: HashMap<(StartKey, [u64; 3], bool), Arc<ShiftWay>>,
-    /// How many cells are kept of what may be forgotten.
+    /// The number of pieces in entries that may be dropped.
     count: usize,
 }
 
 impl CacheEntries {
-    /// Makes room for so many cells: displaced pairs and ways may be forgotten.
+    /// Makes room for `pieces` more: drops the entries of displaced pairs and of directions.
     fn make_room(&mut self, pieces: usize) {
         self.count += pieces;
         if self.count > REMEMBERED_SHIFT_PIECES {
@@ -116,7 +114,7 @@ impl CacheEntries {
     }
 }
 
-/// Where a pair is; assembled without the bits of a start pose.
+/// The key of a pair: for assembled pairs without a start pose, otherwise with its bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct StartKey {
     part: usize,
@@ -124,17 +122,17 @@ struct StartKey {
     start: Option<[u64; 7]>,
 }
 
-/// A place as it is kept: the same for pairs that stand alike, and for both parts of a pair.
+/// The key that stands for a pair: the same for congruent pairs, and for both parts of a pair.
 struct CanonicalStart {
     key: StartKey,
-    /// Where it is found, if not at the place itself.
+    /// The pair for which the entry is computed, unless it is this one.
     alone: Option<CongruentPair>,
-    /// Whether the other part moves in it.
+    /// Whether the other part moves in the canonical pair.
     is_mirrored: bool,
 }
 
 impl ShiftCoverCache {
-    /// Those of a scene.
+    /// The cache of a scene.
     #[must_use]
     pub fn of(scene: &Scene) -> Arc<Self> {
         scene.memo.of()
@@ -149,7 +147,7 @@ impl ShiftCoverCache {
         gathered.sum::<usize>() + ways.sum::<usize>()
     }
 
-    /// The cells of a pair; `find` finds them.
+    /// The cover of a pair at zero shift; `find` computes it if it is not cached.
     pub(crate) fn gathered(
         &self,
         scene: &Scene,
@@ -170,7 +168,8 @@ impl ShiftCoverCache {
         Ok(if is_mirrored { Arc::new(found.mirrored()) } else { found })
     }
 
-    /// The way of a pair along a unit vector, the next step or far; `find` finds it.
+    /// The cover of a pair that allows a unit vector, for the next step or as far as possible; `find` computes it if
+    /// it is not cached.
     pub(crate) fn way(
         &self,
         scene: &Scene,
@@ -179,7 +178,7 @@ impl ShiftCoverCache {
         find: impl Fn(&Scene, &StartPair<'_>, &Vector3<f64>) -> Result<ShiftWay, Interrupt>,
     ) -> Result<Arc<ShiftWay>, Interrupt> {
         let CanonicalStart { key: pair_key, alone, is_mirrored } = self.canonical(scene, place);
-        // The sum makes −0 to 0.
+        // Adding zero turns −0 into 0.
         let u = if is_mirrored { -u } else { *u } + Vector3::zeros();
         let key = (pair_key, <[f64; 3]>::from(u).map(f64::to_bits), far);
         let known = self.lock().ways.get(&key).cloned();
@@ -223,13 +222,13 @@ impl ShiftCoverCache {
         firsts.get(&pair).copied().unwrap_or(pair)
     }
 
-    /// It holds plain data: it is whole even if a holder panicked.
+    /// A mutex that was poisoned still holds a consistent cache: it is plain data.
     fn lock(&self) -> MutexGuard<'_, CacheEntries> {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// Finds something about a place, or about the pair that is kept for it.
+/// Computes an entry for a pair, or for its canonical pair.
 fn at_place<T>(
     scene: &Scene,
     place: &StartPair<'_>,
@@ -238,19 +237,19 @@ fn at_place<T>(
     find: &dyn Fn(&Scene, &StartPair<'_>) -> Result<T, Interrupt>,
 ) -> Result<T, Interrupt> {
     let Some(pair) = alone else { return find(scene, place) };
-    // What is found on the way is kept here, too.
+    // Entries that are computed on the way go into the same cache.
     let alone = Scene { memo: scene.memo.clone(), ..pair.scene(scene) };
     find(&alone, &StartPair { part: 0, start: &pair.poses[0], other: 1, kept_as: Some(key) })
 }
 
-/// What pairs have in common that stand alike: the same shapes, poses and allowed penetration.
+/// What two congruent pairs have in common: shapes, poses and allowed penetration.
 fn alike(scene: &Scene, a: usize, b: usize) -> ([*const Shape; 2], [[u64; 7]; 2], u64) {
     let pair = CongruentPair::shifted(scene, a, &scene.bodies[a].planning_from_shape, b);
     let shapes = pair.parts.map(|part| Arc::as_ptr(&scene.bodies[part].shape));
     (shapes, pair.poses.map(|pose| bits(&pose)), scene.allowed.of(a, b).to_bits())
 }
 
-/// The smaller of two parts first.
+/// Orders two parts by size.
 fn ordered(scene: &Scene, a: usize, b: usize) -> (usize, usize) {
     let size = |i: usize| scene.bodies[i].bounds.extents().max();
     if (size(a), a) <= (size(b), b) { (a, b) } else { (b, a) }

@@ -1,14 +1,13 @@
-//! How far a part may be shifted: pieces of surface, each in a convex region that the other surface
-//! does not enter.
+//! How far a part may be shifted. Each piece of a surface lies in a convex region that the other surface does not
+//! enter.
 //!
-//! Of each pair one surface is asked, piece by piece: a piece in a [`FreeRegion`] stays out of the
-//! other solid as long as it stays in there, which is a few linear inequalities in the shift, exact
-//! for shifts of any length. A peg in its hole is one piece with one region. Where a region ends that
-//! a shift leads out of, points that are there already may certify that the other part is in the way:
-//! those of the piece that are lowest before that plane, and those of the triangle behind it. Else
-//! the piece gets another region, around all of that shift; where there is none, it is split, until a
-//! vertex that gets inside or a triangle without a region certifies the same. If no surface piece of
-//! the one gets into the other, the two surfaces do not cross, so that one side is enough.
+//! A piece in a [`FreeRegion`] stays outside the other solid as long as it stays in the region. For shifts these are
+//! a few linear inequalities, exact for any length: a peg in its hole is one piece with one region. Where a shift
+//! leads out of a region, points nearby may prove that the other part is in the way: the lowest points of the piece
+//! before that plane, and those of the triangle behind it. Otherwise the piece gets another region, around all of the
+//! shift. If there is none, the piece is split, until a vertex that enters or a triangle without a region proves the
+//! same. It is enough to cover one surface of a pair: if no piece of it enters the other solid, the surfaces do not
+//! cross.
 
 use std::cell::OnceCell;
 use std::sync::Arc;
@@ -34,22 +33,22 @@ pub(crate) use piece::ShiftPiece;
 
 pub use cache::ShiftCoverCache;
 
-/// All pieces of all pairs of a part with what is near it.
+/// The covers of all pairs of a moving part and the standing parts near it.
 pub(crate) struct ShiftCover<'a> {
     scene: &'a Scene,
     part: usize,
-    /// Shifts are from here.
+    /// The pose at zero shift.
     start: Pose,
     termination: &'a Termination,
     pairs: Vec<ShiftPair<'a>>,
     regions: usize,
 }
 
-/// A pair, with all of one of its surfaces in cells.
+/// A pair with the cover of one of its surfaces.
 struct ShiftPair<'a> {
     surfaces: SurfacePair<'a>,
     pieces: Arc<Vec<ShiftPiece>>,
-    /// Points that showed what was in the way last: along an obstacle they do so at each step.
+    /// Points that showed the last obstacles: along an obstacle they show it again at each step.
     witnesses: Vec<Witness>,
 }
 
@@ -58,17 +57,17 @@ impl<'a> ShiftCover<'a> {
         Self { scene, part, start: *start, termination, pairs: Vec::new(), regions: 0 }
     }
 
-    /// None of any pair yet.
+    /// The same part and start, without pairs.
     pub(crate) fn anew(&self) -> Self {
         Self::new(self.scene, (self.part, &self.start), self.termination)
     }
 
-    /// Whether a standing part is among the pairs.
+    /// Whether a standing part is in one of the pairs.
     pub(crate) fn knows(&self, other: usize) -> bool {
         self.pairs.iter().any(|p| p.surfaces.other == other)
     }
 
-    /// Takes a pair in, at a shift of the part.
+    /// Adds a pair, with the part at a shift.
     pub(crate) fn add(&mut self, other: usize, at: &Vector3<f64>) -> Result<(), Halt> {
         let (scene, termination) = (self.scene, self.termination);
         if scene.allowed.of(self.part, other) > COVERED_OVERLAP {
@@ -87,16 +86,16 @@ impl<'a> ShiftCover<'a> {
         self.count(gathered.regions)
     }
 
-    /// How far the part may be shifted from `at` along the unit vector `u` with all pieces in their regions.
+    /// How far the part may be shifted from `at` along the unit vector `u` with every piece in its region.
     pub(crate) fn length(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> f64 {
         let pieces = self.pairs.iter().flat_map(|pair| pair.pieces.iter());
         pieces.map(|piece| piece.length(at, u)).fold(f64::INFINITY, f64::min)
     }
 
-    /// How far the part may be shifted from `at` along the unit vector `u`, for which way was made, up to
-    /// `most`. Pieces whose region ends before that get another where it ends.
+    /// How far the part may be shifted from `at` along the unit vector `u`, up to `most`, after [`Self::make_way`]. A
+    /// piece whose region ends before that gets another one there.
     pub(crate) fn advance(&mut self, at: &Vector3<f64>, u: &Vector3<f64>, most: f64) -> Result<f64, Halt> {
-        // In the order in which they end, so that at each shift all pieces are in their regions.
+        // Regions are replaced in the order in which they end, so that at each shift all pieces are in their regions.
         let ends_of = |pair: &ShiftPair<'_>| pair.pieces.iter().map(|piece| piece.length(at, u)).collect();
         let mut ends: Vec<Vec<f64>> = self.pairs.iter().map(ends_of).collect();
         let (mut reached, mut stalls) = (0.0, 0);
@@ -119,7 +118,7 @@ impl<'a> ShiftCover<'a> {
             let found = finder.find(pair.pieces[k].spot, &there, u);
             let (mut pieces, regions) = (finder.pieces, finder.regions);
             match found {
-                // What is in the way there is found again by the next step, with the force as it is.
+                // The next step finds this obstacle again, with the force unchanged.
                 Err(Halt::Blocked | Halt::Lost) => return Ok(reached),
                 Err(halt) => return Err(halt),
                 Ok(()) => {
@@ -134,9 +133,8 @@ impl<'a> ShiftCover<'a> {
         }
     }
 
-    /// Makes way for a shift from `at` along the unit vector `u`: pieces whose region does not let
-    /// them go there get others. Ends at the first that cannot: what is in its way is added to
-    /// `obstacles`.
+    /// Prepares a shift from `at` along the unit vector `u`: pieces whose region does not allow it get another one.
+    /// Stops at the first piece that cannot, and adds what stops it to `obstacles`.
     pub(crate) fn make_way(
         &mut self,
         at: &Vector3<f64>,
@@ -156,7 +154,7 @@ impl<'a> ShiftCover<'a> {
         Ok(())
     }
 
-    /// The way of a pair from where the motion begins: what stops it, and how many regions it took.
+    /// Prepares a pair at zero shift. Returns the normals of obstacles and the number of regions.
     fn known_way(&mut self, i: usize, u: &Vector3<f64>) -> Result<(Vec<Vector3<f64>>, usize), Halt> {
         let (scene, termination) = (self.scene, self.termination);
         let pair = &mut self.pairs[i];
@@ -167,8 +165,7 @@ impl<'a> ShiftCover<'a> {
         Ok((way.blocked.clone(), way.regions))
     }
 
-    /// Makes the way along `u`, from where the motion begins, as long as regions allow, where
-    /// nothing is in it.
+    /// Extends the regions along `u` at zero shift as far as possible, where nothing is in the way.
     pub(crate) fn lengthen(&mut self, u: &Vector3<f64>) -> Result<(), Halt> {
         let (scene, termination) = (self.scene, self.termination);
         let find =
@@ -182,7 +179,7 @@ impl<'a> ShiftCover<'a> {
         Ok(())
     }
 
-    /// The way of a pair from a shift.
+    /// Prepares a pair at a shift.
     fn new_way(
         &mut self,
         i: usize,
@@ -207,7 +204,8 @@ impl<'a> ShiftCover<'a> {
     }
 }
 
-/// Cells for all of a pair's surface with the part at a pose; kept if a motion begins there, else no more than `most`.
+/// A cover of a pair's surface with the part at a pose: cached if a motion begins there, otherwise with no more than
+/// `most` pieces.
 pub(crate) fn starting(
     scene: &Scene,
     (part, pose): (usize, &Pose),
@@ -223,7 +221,7 @@ pub(crate) fn starting(
     }
 }
 
-/// Cells for all of a pair's surface where a motion begins.
+/// The cached cover of a pair where a motion begins.
 fn kept(
     scene: &Scene,
     place: &StartPair<'_>,
@@ -235,7 +233,7 @@ fn kept(
     ShiftCoverCache::of(scene).gathered(scene, place, find)
 }
 
-/// The way of a pair from where a motion begins.
+/// The cover of a pair at zero shift that allows `u`.
 fn way(
     scene: &Scene,
     place: &StartPair<'_>,
@@ -250,7 +248,7 @@ fn way(
     let mut pieces = Arc::clone(base);
     match make_way(&surfaces, &mut pieces, (&Vector3::zeros(), u), REGIONS_PER_SHIFT, termination) {
         Ok(ClearedWay { blocked, found, regions, .. }) => {
-            // Whoever is stopped goes another way from the same cells.
+            // If an obstacle stops the part, it goes another way from the same cover.
             let (pieces, found) = if blocked.is_empty() { (pieces, found) } else { (Arc::clone(base), 0) };
             Ok(ShiftWay { blocked, pieces: Some(pieces), found, regions })
         }
@@ -259,7 +257,7 @@ fn way(
     }
 }
 
-/// The same with longer cells where there are any.
+/// The same with longer regions where there are any.
 fn long_way(
     scene: &Scene,
     place: &StartPair<'_>,
@@ -280,7 +278,7 @@ fn long_way(
     };
     let mut pieces = short.pieces.as_deref().cloned();
     if let Some(pieces) = &mut pieces {
-        // Those that were found for this way are as long as can be.
+        // The new pieces were already given the longest regions.
         let others = pieces.len() - short.found;
         for piece in &mut pieces[..others] {
             *piece = lengthened(piece)?;
@@ -289,7 +287,7 @@ fn long_way(
     Ok(ShiftWay { blocked: Vec::new(), pieces: pieces.map(Arc::new), found: 0, regions: finder.regions })
 }
 
-/// Cells for all of a pair's surface, at a shift; none if it takes more than `most`.
+/// Covers all of a surface of a pair at a shift, with no more than `most` pieces.
 fn gathered(
     scene: &Scene,
     place: &StartPair<'_>,
@@ -300,13 +298,13 @@ fn gathered(
     let &StartPair { part, start, other, .. } = place;
     let surfaces = |asks_part| SurfacePair::new(scene, (part, start), other, asks_part, termination);
     let asked = SurfacePair::asked_first(scene, part, other);
-    // On its way nothing gets deeper than the engine may let it.
+    // On its way no piece may get deeper than the engine allows.
     let held = if at == &Vector3::zeros() { HELD_AT_FIRST } else { HELD };
-    // The first side mostly suffices: the patches of the other, perhaps of a large part, are made when it is asked.
+    // One side is mostly enough. The patch tree of the other, perhaps of a large part, is built when it is needed.
     let sides: Vec<OnceCell<SurfacePair<'_>>> = asked.iter().map(|_| OnceCell::new()).collect();
     let mut finders: Vec<Option<ShiftSearch<'_>>> = asked.iter().map(|_| None).collect();
-    // The one inside the other, or the plainer one, needs fewer pieces: which, shows in trying, at first of both in
-    // turn. Then the one that seems to need fewer is asked on, twice as far.
+    // The inner or simpler surface needs fewer pieces. Which one this is shows in trying both in turn; then the side
+    // that seems to need fewer gets twice the budget.
     let mut budgets = vec![if asked.len() > 1 { FIRST_SIDE_REGIONS } else { REGIONS_PER_SHIFT }; asked.len()];
     let mut is_told = !asked.is_empty();
     while is_told {
@@ -343,20 +341,20 @@ fn gathered(
     Ok(StartCover { asks_part: true, pieces: None, regions })
 }
 
-/// What became of making way.
+/// The result of preparing a pair.
 struct ClearedWay {
-    /// The normals of what is in the way.
+    /// The normals of obstacles.
     blocked: Vec<Vector3<f64>>,
-    /// Points that show that.
+    /// Points that show them.
     witnesses: Vec<Witness>,
-    /// How many cells were found for it: the last ones.
+    /// The number of new pieces, which are the last ones.
     found: usize,
-    /// How many regions it took.
+    /// The number of regions that were computed.
     regions: usize,
 }
 
-/// The normals of what is certainly in the way, as the first piece shows that touches something ahead, if any
-/// does. Where penetration is allowed, regions let pieces go on by what is left of that: it leads nowhere.
+/// The normals of what is certainly in the way, shown by the first piece that touches something ahead. With an
+/// allowed penetration, regions allow the rest of it, which leads nowhere.
 fn touched(
     surfaces: &SurfacePair<'_>,
     pieces: &[ShiftPiece],
@@ -369,7 +367,7 @@ fn touched(
     Some(found.into_iter().map(|obstacle| obstacle.normal).collect())
 }
 
-/// Makes way for a pair.
+/// Prepares the cover of a pair for a shift along `u`.
 fn make_way(
     surfaces: &SurfacePair<'_>,
     pieces: &mut Arc<Vec<ShiftPiece>>,

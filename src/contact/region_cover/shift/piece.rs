@@ -1,4 +1,4 @@
-//! A piece of surface with the shifts at which it is certainly free.
+//! A piece of surface, and the shifts at which it is certainly free.
 
 use nalgebra::{Point3, Vector3};
 
@@ -12,19 +12,19 @@ use super::super::surface_pair::{CoverPiece, Obstacle, PlacedPiece, Slope, Surfa
 pub(crate) struct ShiftPiece {
     pub(crate) spot: CoverPiece,
     pub(crate) limits: Vec<ShiftLimit>,
-    /// The shift must stay in this ball, too.
+    /// The shift must also stay in this ball.
     pub(crate) middle: Vector3<f64>,
     pub(crate) room: f64,
-    /// The ball that holds the region, in the measured surface's frame.
+    /// The ball around the region, in the measured surface's frame.
     pub(crate) ball: (Point3<f64>, f64),
 }
 
-/// normal · shift ≥ height.
+/// A bound on shifts: normal · shift ≥ height.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ShiftLimit {
     pub(crate) normal: Vector3<f64>,
     pub(crate) height: f64,
-    /// The triangle of the measured surface that it keeps the piece in front of.
+    /// The triangle of the measured surface behind the bound.
     pub(crate) triangle: u32,
 }
 
@@ -34,7 +34,7 @@ impl ShiftPiece {
         size_of::<Self>() + size_of_val(&*self.limits)
     }
 
-    /// The same with the other part of the pair moving instead.
+    /// The same with the other part of the pair moving.
     pub(crate) fn mirrored(&self) -> Self {
         let limits = self.limits.iter().map(|l| ShiftLimit { normal: -l.normal, ..*l }).collect();
         Self { limits, middle: -self.middle, ..*self }
@@ -57,7 +57,7 @@ impl ShiftPiece {
         self.limits.iter().any(|limit| limit.blocks(at, u))
     }
 
-    /// What of it is in the way of a shift from `at` along `u`.
+    /// The obstacles to a shift from `at` along `u`.
     pub(crate) fn obstacles(
         &self,
         pair: &SurfacePair<'_>,
@@ -68,8 +68,9 @@ impl ShiftPiece {
         blocking.map(|l| Obstacle { normal: l.normal, other: pair.other }).collect()
     }
 
-    /// What is certainly and steeply in the way of a shift from `at` along `u`: what the points of the piece enter
-    /// that are lowest before limits no further off than `reach`, or what gets over the triangles of these.
+    /// The obstacles that are certainly and steeply in the way of a shift from `at` along `u`: faces that the lowest
+    /// points of the piece enter before limits within `reach`, or faces of the piece that the triangles of these
+    /// enter.
     pub(crate) fn touched(
         &self,
         pair: &SurfacePair<'_>,
@@ -91,9 +92,9 @@ impl ShiftPiece {
             let touching = heights.filter(|(height, _)| *height <= lowest + TOUCHED);
             probes.extend(touching.take(LOWEST_POINTS).map(|(_, p)| *p));
         }
-        // A point beside an edge enters a face that need not be passed: the plane lies before the other one.
+        // A point beside an edge enters a face that it need not pass: the plane of the limit is the other face's.
         let agrees = |limit: &ShiftLimit, o: &Obstacle| limit.normal.dot(&o.normal) > SAME_FACE;
-        // Where it touches now it is seen again at the next step: no witnesses are kept of that.
+        // The next step sees this contact again, so it needs no witness.
         let mut by_points = pair.obstacles(&probes, (at, u), (*guess, Slope::Steep), &mut Vec::new());
         by_points.retain(|o| ahead().any(|limit| agrees(limit, o)));
         if !by_points.is_empty() {
@@ -106,7 +107,7 @@ impl ShiftPiece {
         ahead().find_map(by_triangle).into_iter().collect()
     }
 
-    /// Whether there is nothing left to go on `u`.
+    /// Whether nothing is left of the region along `u`.
     pub(crate) fn is_exhausted(&self, at: &Vector3<f64>, u: &Vector3<f64>) -> bool {
         let from = at - self.middle;
         (from + u * TOUCHED).norm() >= self.room
@@ -122,7 +123,7 @@ impl ShiftLimit {
         self.is_ahead(at, u, TOUCHED)
     }
 
-    /// Whether a shift along the unit vector `u` ends there, no further off than `reach`.
+    /// Whether a limit within `reach` ends a shift along the unit vector `u`.
     pub(crate) fn is_ahead(&self, at: &Vector3<f64>, u: &Vector3<f64>, reach: f64) -> bool {
         self.normal.dot(u) < -TILT && self.gap(at) <= reach
     }

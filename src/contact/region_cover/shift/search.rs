@@ -1,4 +1,4 @@
-//! Finds regions for the pieces of one surface that another may not be entered by.
+//! Finds regions for the pieces of one surface that another surface does not enter.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -16,62 +16,62 @@ use super::super::surface_pair::{
 use super::super::{Halt, cover};
 use super::piece::{ShiftLimit, ShiftPiece};
 
-/// Which of these is asked for first; the shorter ones only where something is near ahead.
+/// The index in [`SHIFTS_AHEAD`] that is tried first; shorter ones are tried only where something is near ahead.
 const SHORT: usize = 2;
 
-/// So many pieces that come next are looked at beside one.
+/// The number of next pieces that are searched in parallel with one.
 const BESIDE: usize = 3;
 
-/// A question about a piece: from which shift on, and which way it is to go on.
+/// The shift at which a piece is, and the direction in which it is to go on.
 #[derive(Clone, Copy)]
 struct WantedShift {
     at: Vector3<f64>,
-    /// A unit vector, or nothing.
+    /// A unit vector, or zero.
     along: Vector3<f64>,
 }
 
-/// A piece that is to get a cell yet, and what came of looking at it, if somebody had the time.
+/// A piece that is still to be covered, and the result of its search, if a thread made it ahead.
 struct PendingPiece {
     spot: CoverPiece,
-    /// Which share it is of all: halves of a piece count as much as each other.
+    /// Its share of the whole surface: the parts of a piece have equal shares.
     share: f64,
     looked: Option<PieceSearch>,
 }
 
-/// What came of looking for a cell for all of a piece: it depends on the piece and the wish alone.
+/// The result of searching a region for all of a piece. It depends on the piece and the wanted shift alone.
 struct PieceSearch {
-    /// With the triangle that was nearest.
+    /// With the nearest triangle.
     spot: CoverPiece,
     piece: Option<ShiftPiece>,
     is_smallest: bool,
-    /// How many regions it took.
+    /// The number of regions that were computed.
     regions: usize,
 }
 
-/// A search for cells of one pair.
+/// The search for the cover of one pair.
 pub(crate) struct ShiftSearch<'a> {
     termination: &'a Termination,
     pair: &'a SurfacePair<'a>,
-    /// How many regions were looked for.
+    /// The number of regions that were computed.
     pub(crate) regions: usize,
-    /// No more than this.
+    /// The largest number of regions.
     pub(crate) budget: usize,
-    /// What was found.
+    /// The pieces that were covered.
     pub(crate) pieces: Vec<ShiftPiece>,
-    /// Normals of what is certainly in the way.
+    /// Normals of obstacles.
     pub(crate) obstacles: Vec<Vector3<f64>>,
-    /// Points that show it.
+    /// Points that show obstacles.
     pub(crate) witnesses: Vec<Witness>,
-    /// How many regions all of those pieces seem to need that are to have cells where they are.
+    /// An estimate of the regions that a whole cover needs.
     pub(crate) needed: f64,
-    /// Pieces that are to get cells yet, of those that are to have some where they are; the next one last.
+    /// The pieces of a whole cover that are still to be covered; the next one is the last.
     waiting: Vec<PendingPiece>,
-    /// The piece at hand.
+    /// The current piece.
     placed: PlacedPiece,
 }
 
 impl<'a> ShiftSearch<'a> {
-    /// A search for cells of all of the asked surface, of which no piece may be further outside than `held`.
+    /// A search that covers all of the surface, each piece outside its region by no more than `held`.
     pub(crate) fn of_all(pair: &'a SurfacePair<'a>, held: f64, termination: &'a Termination) -> Self {
         let mut finder = Self::new(pair, 0, termination);
         let all = pair.root().map(|piece| CoverPiece { piece, guess: 0, level: 0, held });
@@ -94,8 +94,8 @@ impl<'a> ShiftSearch<'a> {
         }
     }
 
-    /// Goes on to find cells for [all](Self::of_all) pieces at a shift, always the same one, as free around it as can
-    /// be, with no more than so many regions in all and not many more cells than `most`. Whether that was enough.
+    /// Continues a cover of [all](Self::of_all) pieces at a shift, always the same, with wide regions. Stops after
+    /// `budget` regions in all or somewhat more than `most` pieces. Returns whether the cover is complete.
     pub(crate) fn gather(&mut self, at: &Vector3<f64>, budget: usize, most: usize) -> Result<bool, Halt> {
         let wish = WantedShift { at: *at, along: Vector3::zeros() };
         self.budget = budget;
@@ -104,7 +104,7 @@ impl<'a> ShiftSearch<'a> {
             self.termination.check()?;
             if self.regions >= self.budget || self.pieces.len() > most {
                 self.waiting.push(next);
-                // If the rest goes on as this did: before may have been what lies free.
+                // An estimate from the pace of this call: pieces before it may have lain free.
                 let pace = (self.regions - regions) as f64 / (left - self.left()).max(f64::MIN_POSITIVE);
                 self.needed = self.regions as f64 + pace * self.left();
                 return Ok(false);
@@ -131,13 +131,13 @@ impl<'a> ShiftSearch<'a> {
         Ok(true)
     }
 
-    /// The share of pieces that wait.
+    /// The share of the surface that is still to be covered.
     fn left(&self) -> f64 {
         self.waiting.iter().map(|waiting| waiting.share).sum()
     }
 
-    /// Looks for a cell for a piece, and, side by side with that, for those for the pieces that come next, most
-    /// likely: where a single pair is new, nobody else has anything to do. They take unequally long.
+    /// Searches a region for a piece and, in parallel, for the pieces that probably come next: when a single pair is
+    /// new, other threads are idle. Searches take unequal times.
     fn looked_beside(&mut self, spot: &CoverPiece, wish: &WantedShift) -> PieceSearch {
         let (pair, termination) = (self.pair, self.termination);
         let look = |spot: &CoverPiece| ShiftSearch::new(pair, 1, termination).looked(*spot, wish);
@@ -158,14 +158,13 @@ impl<'a> ShiftSearch<'a> {
         PieceSearch { spot, piece, is_smallest: self.is_smallest(&spot), regions: self.regions }
     }
 
-    /// Finds cells for a piece at a shift, as free along the unit vector `u` as can be.
+    /// Covers a piece at a shift, with as much room as possible along the unit vector `u`.
     pub(crate) fn find(&mut self, spot: CoverPiece, at: &Vector3<f64>, u: &Vector3<f64>) -> Result<(), Halt> {
         let wish = WantedShift { at: *at, along: *u };
         cover(spot, |spot, parts| self.renew(spot, &wish, parts))
     }
 
-    /// A cell for all of a piece that lets it go further than `least` along the unit vector `u`, if there
-    /// is one.
+    /// A region for all of a piece that lets it go further than `least` along the unit vector `u`, if there is one.
     pub(crate) fn far(&mut self, mut spot: CoverPiece, u: &Vector3<f64>, least: f64) -> Option<ShiftPiece> {
         let wish = WantedShift { at: Vector3::zeros(), along: *u };
         let seen = self.place(&mut spot, &wish);
@@ -175,7 +174,7 @@ impl<'a> ShiftSearch<'a> {
         (0..SHORT).find_map(let_go).filter(|piece| piece.length(&wish.at, u) > least)
     }
 
-    /// Takes a piece in hand: what its middle sees.
+    /// Makes a piece the current one, and looks at its centre.
     fn place(&mut self, spot: &mut CoverPiece, wish: &WantedShift) -> SignedClosest {
         self.pair.place(&spot.piece, &wish.at, &mut self.placed);
         let seen = self.pair.look(&self.placed.centre, spot.guess);
@@ -183,7 +182,7 @@ impl<'a> ShiftSearch<'a> {
         seen
     }
 
-    /// A cell for the piece at hand if it is so far off that it needs no region.
+    /// The current piece without a region, if it is so far off that it needs none.
     fn free(&self, spot: &CoverPiece, seen: &SignedClosest, wish: &WantedShift) -> Option<ShiftPiece> {
         let room = seen.signed - self.placed.radius;
         let held = if self.pair.allowed > 0.0 { spot.held } else { HELD };
@@ -196,7 +195,7 @@ impl<'a> ShiftSearch<'a> {
         self.obstacles.extend(by.iter().map(|o| o.normal));
     }
 
-    /// Finds a cell for a piece, as free along the wish as can be, or pushes its parts.
+    /// Covers a piece, with as much room as possible along the wanted shift, or pushes its parts.
     fn renew(
         &mut self,
         mut spot: CoverPiece,
@@ -220,7 +219,7 @@ impl<'a> ShiftSearch<'a> {
             Ok(short) => {
                 let further = (0..SHORT).find_map(|level| let_go(self, level).ok());
                 let piece = further.unwrap_or(short);
-                // What gets no further the second time may do so in pieces.
+                // A piece that gets no further the second time may do so in parts.
                 if !small && piece.spot.level > 0 && piece.spot.level == spot.level {
                     return self.split(&spot, wish, parts);
                 }
@@ -262,18 +261,18 @@ impl<'a> ShiftSearch<'a> {
         self.split(&spot, wish, parts)
     }
 
-    /// Whether a triangle may lie beside the piece at hand.
+    /// Whether a triangle may lie beside the current piece.
     fn is_beside(&self, spot: &CoverPiece, triangle: u32) -> bool {
         let pair = self.pair;
         pair.is_beside(&self.placed, triangle, pair.allowed + spot.held)
     }
 
-    /// Whether the piece at hand, without a region, is too small to be split.
+    /// Whether the current piece, without a region, is too small to be split.
     fn is_smallest(&self, spot: &CoverPiece) -> bool {
         matches!(spot.piece, Piece::Bit(_)) && self.placed.radius < SMALLEST_BIT
     }
 
-    /// The piece at hand, too small to be split, gets a cell before a face, or is lost.
+    /// Covers the current piece, too small to be split, by the plane of a face, or gives the pair up.
     fn end(&mut self, spot: &CoverPiece, wish: &WantedShift) -> Result<(), Halt> {
         let piece = self.before_face(spot, wish).ok_or(Halt::Lost)?;
         let blocked = piece.obstacles(self.pair, &wish.at, &wish.along);
@@ -285,7 +284,7 @@ impl<'a> ShiftSearch<'a> {
         Ok(())
     }
 
-    /// Pushes the parts of the piece at hand, or ends with it if it is too small.
+    /// Pushes the parts of the current piece, or ends with it if it is too small.
     fn split(
         &mut self,
         spot: &CoverPiece,
@@ -300,9 +299,8 @@ impl<'a> ShiftSearch<'a> {
         Ok(())
     }
 
-    /// The piece at hand, a small bit no deeper than it may be, before the face that it is nearest
-    /// to: where facets with allowed penetration lie across each other there are no regions. That is not
-    /// certain, as regions are; paths are verified.
+    /// The current piece, a small bit no deeper than allowed, in front of the nearest face. Where facets with an
+    /// allowed penetration cross there are no regions. Unlike a region this is not certain; paths are verified.
     fn before_face(&self, spot: &CoverPiece, wish: &WantedShift) -> Option<ShiftPiece> {
         let (pair, PlacedPiece { points, centre, .. }) = (self.pair, &self.placed);
         if pair.allowed == 0.0 {
@@ -335,7 +333,7 @@ impl<'a> ShiftSearch<'a> {
         })
     }
 
-    /// The piece at hand in a region that also lets it go by a shift.
+    /// The current piece in a region that also allows a shift.
     fn held(
         &mut self,
         spot: &CoverPiece,
@@ -369,8 +367,8 @@ impl<'a> ShiftSearch<'a> {
             ShiftLimit { normal, height: normal.dot(&wish.at) - gap.max(0.0) - slack, triangle }
         });
         let limits = limits.collect();
-        // The ball around the piece stays in that of the region, or all its points are far enough
-        // from the edge.
+        // Either the ball around the piece stays in the region's ball, or all of its points are far enough from the
+        // edge.
         let offset = centre - region.centre();
         let (middle, room) = if offset.norm() + radius < region.radius() {
             (wish.at - back * offset, region.radius() - radius)
@@ -388,7 +386,7 @@ impl<'a> ShiftSearch<'a> {
     }
 }
 
-/// Whether a pool of threads runs this that has one more: elsewhere, handing work over only costs.
+/// Whether the current thread pool has a second thread; elsewhere handing work over only costs.
 fn other_thread() -> bool {
     rayon::current_thread_index().is_some() && rayon::current_num_threads() > 1
 }
@@ -399,7 +397,7 @@ mod tests {
     use crate::fixtures::{peg_in_hole, scene, thread};
     use crate::geometry::SourceMesh;
 
-    /// All cells of one side of a pair, and how many regions they took, as told after each budget.
+    /// All pieces of one side of a pair, and the number of regions after each budget.
     fn gathered(meshes: [SourceMesh; 2], asks_part: bool, threads: usize) -> Vec<String> {
         let (scene, _) = scene(meshes);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
