@@ -1,4 +1,4 @@
-//! What bounds the depth of a whole piece: regions outside the measured surface, and triangles of it.
+//! Bounds on the depth of a whole piece: by regions outside the measured surface, and by triangles.
 
 use nalgebra::{Point3, Vector3};
 
@@ -9,12 +9,12 @@ use crate::tolerances::SWEPT_ROOM;
 use super::super::super::course::Leg;
 use super::{GridCell, KnownRegion, PathSearch, SearchHint, SideQuestion, SweptBall};
 
-/// How far a piece is from a region: the distance of its worst corner, and that.
+/// How far a piece is outside a region: the distance of its worst corner, and that corner.
 pub(super) type Fit = Option<(f64, Point3<f64>)>;
 
 impl PathSearch<'_> {
-    /// Whether some region tells well how deep a piece gets; the bound is raised by that. `corners` tells all
-    /// those of its hull, unless they are too many.
+    /// Whether some region bounds well how deep a piece gets; raises the bound. `corners` returns all corners of the
+    /// hull, unless they are too many.
     pub(super) fn is_settled(
         &mut self,
         swept: &SweptBall,
@@ -43,9 +43,8 @@ impl PathSearch<'_> {
         let closest = asked.measured.closest_from(&swept.centre, hint.triangle);
         hint.triangle = closest.triangle;
         let signed = asked.measured.signed(&swept.centre, &closest);
-        // Depth changes by no more than the distance, unless the surface has holes. Then it changes its
-        // sign in mid-air, too, where the winding number passes a half: next to a point far outside
-        // may be one as far inside.
+        // Depth changes by no more than the distance, unless the surface has holes. Then its sign changes in mid-air,
+        // too, where the winding number passes one half: a point far outside may lie next to one as far inside.
         if swept.radius - signed <= ignored {
             return (!self.has_rim
                 || asked.measured.stays_outside(&swept.centre, swept.radius)
@@ -55,7 +54,8 @@ impl PathSearch<'_> {
         if self.is_bounded(swept, signed, slack, hint.triangle) {
             return true;
         }
-        // Wider regions than large pieces need are vain; small ones tell how deep they really are.
+        // A region that is wider than a large piece needs is useless; of a small piece, a wide region shows how deep
+        // it really is.
         let coarse = asked.precision.coarse;
         let wide = if swept.radius > coarse { 0.0 } else { swept.radius.min(coarse / 8.0) };
         let most = (asked.allowed + asked.precision.deep - slack).min(wide).max(ignored);
@@ -70,8 +70,8 @@ impl PathSearch<'_> {
         let seen = (&closest, signed);
         let Some(mut free) = self.region(swept, seen, most, ignored) else { return false };
         let mut fit = fits(&free, most);
-        // Planes that leave most room before a few corners may be askew to a wall along which all others lie, as of
-        // a hole that is round about a pin: one more region takes less time than all the pieces without.
+        // The planes that leave most room before a few corners may be askew to a wall along which all other corners
+        // lie, as of a hole around a pin. One more region takes less time than the pieces that would follow.
         if fit.is_none()
             && let corners = corners()
             && corners.len() > self.wanted.len()
@@ -97,13 +97,13 @@ impl PathSearch<'_> {
         (is_outside || self.is_outside(swept, most, hint.triangle)) && self.settled(depth + slack)
     }
 
-    /// Whether the triangles about a piece tell well how deep it gets; the bound is raised by that.
+    /// Whether the triangles around a piece bound well how deep it gets; raises the bound.
     fn is_bounded(&mut self, swept: &SweptBall, signed: f64, slack: f64, guess: u32) -> bool {
         let ignored = self.ignored() - slack;
         let SideQuestion { measured, allowed, precision, .. } = self.asked;
-        // What is deeper is to be recorded.
+        // Deeper points are to be recorded.
         let most = ignored.max(allowed + precision.deep - slack);
-        // The middle is no nearer to any triangle than to the nearest.
+        // No triangle is nearer to the centre than the nearest one.
         if signed > ignored || -signed > most {
             return false;
         }
@@ -116,7 +116,7 @@ impl PathSearch<'_> {
             && self.settled(bound + slack)
     }
 
-    /// A region for a piece, around its middle or what is outside nearest to that.
+    /// A region for a piece: around its centre, or around the nearest point outside.
     fn region(
         &self,
         swept: &SweptBall,
@@ -129,8 +129,8 @@ impl PathSearch<'_> {
         self.asked.measured.free_region_sparing(centre, radius * SWEPT_ROOM, seen, wanted, ignored).ok()
     }
 
-    /// Whether a depth is what it is, as measured at the worst corner, or small enough not to matter:
-    /// not only that of a region which is too narrow.
+    /// Whether a depth is real, as measured at the worst corner, or too small to matter, and not the effect of a
+    /// region that is too narrow.
     fn is_told(&mut self, swept: &SweptBall, depth: f64, worst: &Point3<f64>, guess: u32) -> bool {
         let SideQuestion { measured, allowed, precision, .. } = self.asked;
         let real = -measured.signed(worst, &measured.closest_from(worst, guess));
@@ -151,7 +151,7 @@ impl PathSearch<'_> {
         true
     }
 
-    /// Whether holes are so near that no sign would hold for all of a piece.
+    /// Whether a hole is so near that all of a piece cannot have one sign.
     fn is_beside_rim(&self, swept: &SweptBall) -> bool {
         self.asked
             .measured
@@ -159,8 +159,8 @@ impl PathSearch<'_> {
             .is_some_and(|rim| rim.slope(&swept.centre, swept.radius) * swept.radius > 0.5)
     }
 
-    /// Whether a piece is small, and its corners no deeper than `most`: a region beside a surface with holes
-    /// may be inside.
+    /// Whether a piece is small with its corners no deeper than `most`: beside a surface with holes a region may be
+    /// inside.
     fn is_outside(&self, swept: &SweptBall, most: f64, guess: u32) -> bool {
         let SideQuestion { measured, precision, .. } = self.asked;
         let depth = |p: &Point3<f64>| -measured.signed(p, &measured.closest_from(p, guess));
@@ -168,7 +168,7 @@ impl PathSearch<'_> {
     }
 }
 
-/// The ball that holds balls around the corners of a hull.
+/// A ball that holds balls around the corners of a hull.
 pub(super) fn swept(points: &[Point3<f64>], ball: f64) -> SweptBall {
     let sum: Vector3<f64> = points.iter().map(|p| p.coords).sum();
     let centre = Point3::from(sum / points.len().max(1) as f64);
@@ -176,7 +176,7 @@ pub(super) fn swept(points: &[Point3<f64>], ball: f64) -> SweptBall {
     SweptBall { centre, radius: reach + ball }
 }
 
-/// How far the furthest of some points is from a region, and which, unless it is beyond `most`.
+/// The point that is furthest outside a region, and how far; `None` if that is more than `most`.
 pub(super) fn furthest(points: impl IntoIterator<Item = Point3<f64>>, region: &FreeRegion, most: f64) -> Fit {
     points.into_iter().try_fold((0.0, Point3::origin()), |far, p| {
         let d = region.distance_within(&p, most)?;
@@ -184,12 +184,12 @@ pub(super) fn furthest(points: impl IntoIterator<Item = Point3<f64>>, region: &F
     })
 }
 
-/// The same for the images of all vertices of a node, of which most lie in balls that the region holds.
+/// The same for the images of all vertices of a node; the region holds the balls of most of them.
 pub(super) fn furthest_of(tree: &PatchTree, index: u32, leg: &Leg, region: &FreeRegion, most: f64) -> Fit {
     if tree.vertices(index).len() <= HULL_CORNERS {
         return furthest(leg.images(tree.vertices(index)), region, most);
     }
-    // Who is beyond is so with one of these, mostly.
+    // If a point is outside, mostly one of these is.
     let mut far = furthest(leg.images(tree.extremes(index)), region, most)?;
     for map in &leg.maps {
         let mut stack = vec![index];

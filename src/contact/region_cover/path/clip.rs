@@ -5,9 +5,9 @@ use nalgebra::Point3;
 use crate::geometry::Bounds;
 use crate::tolerances::CLIPPED_LENGTH;
 
-/// Points whose hull is the part of the hull of `points` between the two sides of a box past which they reach furthest.
-/// A thin plate sees little of a bolt's long triangles; without clipping the rest is split off piece by piece. `None` if
-/// there is not much to clip.
+/// Points whose hull is the part of the hull of `points` between two sides of a box: those beyond which it reaches
+/// furthest. Only a short stretch of a bolt's long triangles passes a thin plate; without clipping the rest would be
+/// split off piece by piece. `None` if there is little to clip.
 pub(super) fn clipped(points: &[Point3<f64>], bounds: &Bounds) -> Option<Vec<Point3<f64>>> {
     let all = Bounds::of(points);
     let beyond = |axis: usize| {
@@ -21,7 +21,7 @@ pub(super) fn clipped(points: &[Point3<f64>], bounds: &Bounds) -> Option<Vec<Poi
     let sides = [bounds.min[axis], bounds.max[axis]];
     let is_within = |p: &&Point3<f64>| (sides[0]..=sides[1]).contains(&p[axis]);
     let mut left: Vec<_> = points.iter().filter(is_within).copied().collect();
-    // Edges of the hull are among the lines between its corners.
+    // The edges of the hull are among the lines between its corners.
     for (i, p) in points.iter().enumerate() {
         for q in &points[..i] {
             let crossed = sides.iter().filter(|side| (p[axis] < **side) != (q[axis] < **side));

@@ -1,24 +1,22 @@
-//! How deep one surface gets into another on the way of a part: an upper bound, by branch and bound
-//! over surface and way.
+//! How deep one surface gets into another along a path: an upper bound, by branch and bound over surface and time.
 //!
-//! A piece of surface on a stretch of the way lies in the hull of a few points (`contact/course`).
-//! If all of these are within some distance of one convex region that the other surface does not
-//! enter ([`FreeRegion`]), so is the whole piece all the way, and it gets no deeper than that: what
-//! slides along a face, in a hole or in a groove is settled at once, and remembered by its place, for
-//! what comes by later. What lies in the other surface with allowed penetration, maybe nearer to one face
-//! of it here and to another there, is bounded by the triangles about it
-//! ([`Surface::hull_depth`]). Other pieces are split, in space or in time, whichever is longer; but on a line
-//! in space first, down to triangles: the prism that one of them passes is convex, however long.
-//! Pieces of the smallest size are measured; their size is added. Of a long piece only what is within the box of
-//! the other surface is asked about: a region need not hold what is outside by far ([`clip`]).
+//! A piece of surface on a stretch of the path lies in the hull of a few points (`contact/course`). If these points
+//! are within some distance of one convex region that the other surface does not enter ([`FreeRegion`]), so is the
+//! whole piece on the whole stretch, and it gets no deeper than that distance. What slides along a face, in a hole or
+//! in a groove is bounded at once, and the region is kept for later pieces at the same place. A piece that lies in
+//! the other surface by an allowed penetration, nearer to one face here and to another there, is bounded by the
+//! triangles around it ([`Surface::hull_depth`]). Other pieces are split, in space or in time, whichever is longer;
+//! on a straight path first in space, down to triangles, as the prism that a triangle sweeps is convex. The smallest
+//! pieces are measured, and their size is added. Of a long piece only the part within the other surface's box is
+//! considered, as a region need not hold what is far outside ([`clip`]).
 //!
-//! Where threads with allowed penetration cross each other, and in sight of holes, this may take too long: a
-//! count ends it, or that hardly anything was settled by then ([`PathDepth::open`]).
+//! Where threads with an allowed penetration cross, and near holes, this may take too long: a budget ends it, or the
+//! observation that hardly anything is bounded yet ([`PathDepth::open`]).
 //!
-//! So for closed surfaces the answer is a bound for all points and all times, not for samples (but
-//! for [`FreeRegion`]'s rounding). Of surfaces with holes that holds where the winding number cannot
-//! come near one half in a region ([`Rim`](crate::geometry::Rim)); in sight of holes a region may be partly
-//! inside, and only small pieces are settled, by their corners.
+//! For closed surfaces the answer is a bound for all points and all times (up to the rounding of [`FreeRegion`]), and
+//! no sample. For surfaces with holes it is one where the winding number in a region cannot come near one half
+//! ([`Rim`](crate::geometry::Rim)). Near holes a region may be partly inside, and only small pieces are bounded, by
+//! their corners.
 
 mod bound;
 mod clip;
@@ -36,23 +34,22 @@ use crate::tolerances::DEPTH_SHARE;
 use super::super::course::{Course, CourseView, Interval};
 use super::super::pair_path::PairPath;
 
-/// How finely depth is told, in the planning frame.
+/// How precisely depth is computed, in the planning frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DepthPrecision {
-    /// Depth beyond what is allowed that is not looked into.
+    /// Depth beyond the allowed penetration that is ignored.
     pub(crate) ignored: f64,
-    /// Depth beyond what is allowed from which on points are recorded, but not looked for any
-    /// closer.
+    /// Depth beyond the allowed penetration from which on points are recorded, without more precision.
     pub(crate) deep: f64,
-    /// Depth is told to a tenth, and as closely as this.
+    /// Depth is computed to a tenth, and no less precisely than this.
     pub(crate) margin: f64,
     /// Pieces of a smaller radius are not split.
     pub(crate) finest: f64,
-    /// The same once something deep was found.
+    /// The same after something deep was found.
     pub(crate) coarse: f64,
 }
 
-/// The way of a part past one that stands.
+/// How deep does a part get along a path past a standing one?
 pub(crate) struct PathQuestion<'a> {
     pub(crate) passing: &'a PairPath<'a>,
     pub(crate) course: &'a Course,
@@ -73,8 +70,8 @@ impl PathQuestion<'_> {
         Ok([one?, other?])
     }
 
-    /// How deep the moving part gets into the standing one on a stretch of the way, or the other way
-    /// round, looked at with no more than some effort.
+    /// How deep the moving part gets into the standing one on a stretch of the path, or the other way round, with no
+    /// more than some effort.
     pub(crate) fn depth_of_side(
         &self,
         on_moving: bool,
@@ -96,45 +93,43 @@ impl PathQuestion<'_> {
     }
 }
 
-/// One surface that is measured against another.
+/// How deep does one surface get into another?
 pub(crate) struct SideQuestion<'a> {
-    /// The surface whose points are asked for, and its triangles' tree.
+    /// The covered surface and its patch tree.
     pub(crate) surface: &'a Surface,
     pub(crate) tree: &'a PatchTree,
-    /// The surface into which they may get.
+    /// The measured surface.
     pub(crate) measured: &'a Surface,
-    /// The depth that counts as none.
+    /// The allowed penetration.
     pub(crate) allowed: f64,
     pub(crate) precision: DepthPrecision,
 }
 
-/// What was found.
+/// The depth along a path.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PathDepth {
-    /// No point gets deeper than this beyond what is allowed.
+    /// No point gets deeper than this beyond the allowed penetration.
     pub(crate) bound: f64,
-    /// The largest depth that was measured beyond what is allowed.
+    /// The largest depth beyond the allowed penetration that was measured.
     pub(crate) depth: f64,
-    /// Points (frame of the surface asked about) that were measured deeper than
-    /// [`DepthPrecision::deep`], or of which no less can be told: a good path has none, of a bad one these
-    /// are the first found.
+    /// Points (in the covered surface's frame) that were measured deeper than [`DepthPrecision::deep`], or could not
+    /// be bounded by less. A good path has none; of a bad one, these are the first that were found.
     pub(crate) deep: Vec<(Point3<f64>, f64)>,
-    /// Stretches of the way on which the search was given up: the bound is none there.
+    /// Stretches of the path on which the search gave up: the bound does not hold there.
     pub(crate) open: Vec<Interval>,
-    /// How much was looked at: pieces (more for each where signs depend on many edges of holes), and regions that
-    /// were looked for.
+    /// The effort: pieces (more for each where signs depend on many edges of holes) and regions.
     pub(crate) effort: usize,
 }
 
 impl DepthPrecision {
-    /// How closely some depth is told.
+    /// How precisely a depth is computed.
     fn margin_of(&self, depth: f64) -> f64 {
         (DEPTH_SHARE * depth).min(self.margin)
     }
 }
 
 impl PathDepth {
-    /// Adds what was found elsewhere.
+    /// Adds the depth of another stretch.
     pub(crate) fn add(&mut self, other: Self) {
         self.bound = self.bound.max(other.bound);
         self.depth = self.depth.max(other.depth);
@@ -143,48 +138,46 @@ impl PathDepth {
         self.effort += other.effort;
     }
 
-    /// Whether so much is deep that more would not change the answer.
+    /// Whether more deep points would not change the answer.
     pub(crate) fn is_enough(&self) -> bool {
         self.deep.len() >= DEEP_POINTS
     }
 }
 
-/// Where to begin with a piece: a triangle near it, a region around it.
+/// Where the search for a piece starts: a triangle near it, a region around it.
 #[derive(Debug, Clone, Copy)]
 struct SearchHint {
     triangle: u32,
     region: Option<u32>,
-    /// No region was found for the piece of which this is one half.
+    /// Whether the piece was split because no region was found.
     is_vain: bool,
 }
 
-/// A ball that holds the hull of what a piece passes.
+/// A ball that holds all that a piece sweeps.
 #[derive(Debug, Clone, Copy)]
 struct SweptBall {
     centre: Point3<f64>,
     radius: f64,
 }
 
-/// A cell of a grid, by the binary logarithm of its size and its indices.
+/// A grid cell: the binary logarithm of its size, and its indices.
 type GridCell = (i32, [i64; 3]);
 
-/// A region, and whether all of it is outside the surface that is measured: of one with holes, part of it may be
-/// inside.
+/// A region, and whether all of it is outside the measured surface; near holes a part of it may be inside.
 struct KnownRegion {
     free: FreeRegion,
     is_outside: bool,
 }
 
-/// The search for the deepest points: the question, the regions found so far, the hull of the piece in question, and
-/// the answer so far.
+/// The state of a search: the question, the regions so far, the hull of the current piece, and the answer so far.
 struct PathSearch<'a> {
     asked: &'a SideQuestion<'a>,
-    /// Whether the measured surface has holes, so that depth changes its sign off it, too.
+    /// Whether the measured surface has holes, so that the depth changes its sign away from the surface, too.
     has_rim: bool,
     most_effort: usize,
-    /// What a piece costs.
+    /// The effort of a piece.
     price: usize,
-    /// How much of surface and way was settled, as a share of all.
+    /// The share of surface and time that is bounded.
     done: f64,
     view: CourseView<'a>,
     termination: &'a Termination,
@@ -193,9 +186,9 @@ struct PathSearch<'a> {
     held: Vec<u32>,
     /// The same by the places of the pieces.
     places: HashMap<GridCell, Vec<u32>>,
-    /// The corners of the hull in question, or those that say most about where it reaches.
+    /// The corners of the current hull, or those that reach furthest.
     wanted: Vec<Point3<f64>>,
-    /// All of them, unless they are too many.
+    /// All of its corners, unless they are too many.
     hull: Vec<Point3<f64>>,
     facing: Vector3<f64>,
     found: PathDepth,
@@ -229,7 +222,7 @@ impl<'a> PathSearch<'a> {
 }
 
 impl SideQuestion<'_> {
-    /// Looks for the deepest points on a stretch of the way, with no more than some effort.
+    /// The depth on a stretch of the path, with no more than some effort.
     ///
     /// # Errors
     /// The termination condition became true.

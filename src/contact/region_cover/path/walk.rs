@@ -1,4 +1,4 @@
-//! The walk through pieces of a surface and stretches of the way: what no bound settles is split.
+//! The search over pieces of surface and stretches of the path: what no bound settles is split.
 
 use nalgebra::{Point3, Vector3};
 
@@ -13,7 +13,7 @@ use super::bound::{furthest, furthest_of, swept};
 use super::clip::clipped;
 use super::{DepthPrecision, PathSearch, SearchHint, SweptBall};
 
-/// Corners of what a triangle passes on a straight way.
+/// Corners of the prism that a triangle sweeps on a straight path.
 const OF_STRAIGHT_WAY: usize = 6;
 
 /// A piece of the surface on a stretch of the way.
@@ -28,7 +28,7 @@ enum SweptPiece {
 struct PatchPiece {
     node: u32,
     interval: Interval,
-    /// Which share it is of all.
+    /// Its share of all.
     share: f64,
     hint: SearchHint,
 }
@@ -37,16 +37,17 @@ struct PatchPiece {
 #[derive(Clone, Copy)]
 struct TrianglePiece {
     corners: [Point3<f64>; 3],
-    /// Which corners were not measured yet at the end of the stretch, as those of the piece of which this is one half.
+    /// The corners that were not measured yet at the end of the stretch; the others were, with the piece of which
+    /// this is a half.
     is_new: [bool; 3],
     interval: Interval,
-    /// Which share it is of all.
+    /// Its share of all.
     share: f64,
     hint: SearchHint,
 }
 
 impl PathSearch<'_> {
-    /// Looks at all of the surface on a stretch of the way.
+    /// Searches all of the surface on a stretch of the path.
     pub(super) fn all(&mut self, interval: Interval) -> Result<(), Interrupt> {
         if let Some(node) = self.asked.tree.root() {
             let hint = SearchHint { triangle: 0, region: None, is_vain: false };
@@ -75,7 +76,7 @@ impl PathSearch<'_> {
         self.found.effort > self.most_effort || self.is_hopeless()
     }
 
-    /// Whether, in sight of holes, so little is settled after so much effort that most will stay open.
+    /// Whether, near holes, so little is bounded after this effort that most will stay open.
     fn is_hopeless(&self) -> bool {
         self.has_rim && self.found.effort > self.most_effort / HOPELESS_AFTER && self.done < HOPELESS_SHARE
     }
@@ -84,7 +85,7 @@ impl PathSearch<'_> {
         self.gave_up() || self.found.is_enough()
     }
 
-    /// Looks into a node of the tree on a stretch of the way.
+    /// Bounds a node of the tree on a stretch of the path, or splits it.
     fn patch(&mut self, piece: PatchPiece, rest: &mut Vec<SweptPiece>) {
         let PatchPiece { node: index, interval, share, mut hint } = piece;
         let tree = self.asked.tree;
@@ -99,8 +100,8 @@ impl PathSearch<'_> {
                 return;
             }
             let swept = swept(&centres, ball);
-            // What is beyond the ball is half of the way. On a line, all that a small piece passes is convex: what
-            // does not fit is as wide on each half of it.
+            // What is beyond the ball is half of the stretch. On a straight path all that a small piece sweeps is
+            // convex: what does not fit is as wide on each half of the stretch.
             in_time = leg.along.is_none() && swept.radius - ball > 2.0 * patch.radius;
             self.wanted.clear();
             self.facing = Vector3::zeros();
@@ -147,7 +148,7 @@ impl PathSearch<'_> {
         }
     }
 
-    /// Looks at a triangle, or a piece of one, on a stretch of the way.
+    /// Bounds a triangle, or a piece of one, on a stretch of the path, or splits it.
     fn triangle(&mut self, piece: TrianglePiece, rest: &mut Vec<SweptPiece>) {
         let TrianglePiece { corners, is_new, interval, mut hint, .. } = piece;
         let leg = self.view.leg(interval);
@@ -168,7 +169,7 @@ impl PathSearch<'_> {
             let outward = area_normal(&corners[0], &corners[1], &corners[2]);
             self.facing = leg.end.rotation * -outward.try_normalize(0.0).unwrap_or_default();
             if let Some(along) = leg.along {
-                // A plane that is askew to a long way is far off at its ends.
+                // A plane that is askew to a long straight path is far off at its ends.
                 let across = self.facing - along * self.facing.dot(&along);
                 self.facing = across.try_normalize(FACING_ACROSS).unwrap_or(self.facing);
             }
@@ -185,7 +186,7 @@ impl PathSearch<'_> {
         let was_measured = !leg.maps.is_empty();
         let share = piece.share / 2.0;
         if in_time && leg.length > self.finest() / (2.0 * DOUBTED_SIZE) {
-            // The second half of the way ends where all of it does.
+            // The second half of the stretch ends where the whole ends.
             let [first, second] = interval.halves();
             let half = |is_new, interval| {
                 SweptPiece::Triangle(TrianglePiece { is_new, interval, share, hint, ..piece })
@@ -200,8 +201,8 @@ impl PathSearch<'_> {
         }
     }
 
-    /// What of a hull may be in the measured surface, if that is little of it: what is beyond its box is outside,
-    /// unless it has holes. Of a way with bends there are too many lines to be cut.
+    /// The part of a hull that may be in the measured surface, if it is a small part. What is beyond the surface's
+    /// box is outside, unless the surface has holes. On a path with bends there are too many lines to clip.
     fn clipped(&self, points: &[Point3<f64>], slack: f64) -> Option<Vec<Point3<f64>>> {
         if self.has_rim || points.len() > OF_STRAIGHT_WAY {
             return None;
@@ -209,7 +210,7 @@ impl PathSearch<'_> {
         clipped(points, &self.asked.measured.bounds().grown(slack + CLIP_MARGIN))
     }
 
-    /// Whether the box of the measured surface lies beside a hull, given by balls.
+    /// Whether the box of the measured surface lies beside a hull of balls.
     fn is_apart(&self, centres: &[Point3<f64>], radius: f64) -> bool {
         let bounds = self.asked.measured.bounds();
         (0..3).any(|a| {
@@ -218,7 +219,7 @@ impl PathSearch<'_> {
         })
     }
 
-    /// Measures the corners of a piece at its end; whether that is all that can be said about it.
+    /// Measures the corners of a piece at its end; returns whether nothing more can be said about the piece.
     fn is_measured(&mut self, piece: &TrianglePiece, leg: &Leg, swept: &SweptBall, guess: u32) -> bool {
         let TrianglePiece { corners, is_new, .. } = piece;
         let asked = self.asked;
@@ -239,7 +240,7 @@ impl PathSearch<'_> {
         if !self.found.deep.is_empty() {
             return true;
         }
-        // As in `is_settled`: depth changes by no more than the distance, but for surfaces with holes.
+        // As in `is_settled`: depth changes by no more than the distance, except near holes.
         let mut bound = over(&swept.centre) + swept.radius;
         if self.has_rim {
             bound = self.wanted.iter().map(over).fold(bound, f64::max);
@@ -253,14 +254,14 @@ impl PathSearch<'_> {
         self.settled(asked.allowed + bound)
     }
 
-    /// The depth up to which nothing is looked into: it is allowed, ignored, or as good as found.
+    /// The depth up to which nothing is searched: allowed, ignored, or as good as found.
     pub(super) fn ignored(&self) -> f64 {
         let precision = self.asked.precision;
         let found = self.found.depth + precision.margin_of(self.found.depth);
         self.asked.allowed + found.min(precision.deep).max(precision.ignored)
     }
 
-    /// The smallest size of pieces, for now.
+    /// The smallest size of pieces at present.
     fn finest(&self) -> f64 {
         let DepthPrecision { deep, finest, coarse, .. } = self.asked.precision;
         if self.found.depth > deep { coarse } else { finest }

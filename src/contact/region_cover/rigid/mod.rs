@@ -1,13 +1,12 @@
-//! What is near a part that may turn.
+//! A cover for motions that turn: contacts of a part at the poses of a motion.
 //!
-//! Of each pair one surface is in pieces, each with a convex region that the other surface does not
-//! enter (those of [`shift`](super::shift) to begin with). A piece whose corners are in its region is
-//! outside the other solid, however it came there: a few planes tell what hundreds of samples would have
-//! to be measured for. Of what leaves its region, corners that are inside the other solid are contacts, or else
-//! points inside it of the triangles whose planes it has passed. Where there are none in any pair, another
-//! region is looked for that holds the piece at both ends of the step; else it is split. Where that takes too
-//! many regions, samples tell of the pair from there on. Of contacts, those that were found to matter are kept
-//! from step to step and measured again.
+//! One surface of each pair is in pieces, each in a convex region that the other surface does not enter; at the start
+//! these are the regions of [`shift`](super::shift). A piece whose corners are in its region is outside the other
+//! solid, whatever its motion was: a few planes replace hundreds of samples. Of a piece that leaves its region, the
+//! corners inside the other solid are contacts; so are the points of the triangles whose planes it passed that lie
+//! inside its solid. If no pair has a contact, the piece gets another region that holds it at both ends of the step,
+//! or is split. A pair that takes too many regions is measured at samples from then on. Contacts that mattered are
+//! kept from step to step and measured again.
 
 mod pair;
 mod piece;
@@ -22,7 +21,7 @@ use crate::tolerances::DEPTH_TOLERANCE;
 use super::super::sampled::{ContactSet, ContactSource, MovingBody};
 use pair::RigidPair;
 
-/// What is around a moving part.
+/// The cover of all pairs of a moving part.
 pub(crate) struct RigidCover<'a> {
     scene: &'a Scene,
     standing_parts: &'a StandingParts,
@@ -32,17 +31,17 @@ pub(crate) struct RigidCover<'a> {
     start: Pose,
     /// The pose at which all pieces are known to be free.
     base: Pose,
-    /// The pose that was looked at last.
+    /// The pose of the last query.
     looked_at: Option<Pose>,
     pairs: Vec<RigidPair<'a>>,
-    /// Standing parts that only samples tell of.
+    /// Standing parts that are measured at samples.
     sampled: Vec<usize>,
-    /// Whether they tell of all.
+    /// Whether all standing parts are.
     all_sampled: bool,
 }
 
 impl<'a> RigidCover<'a> {
-    /// With samples alone, or with regions where these tell.
+    /// Measures everything at samples, or only what regions cannot cover.
     pub(crate) fn new(
         scene: &'a Scene,
         standing_parts: &'a StandingParts,
@@ -66,12 +65,13 @@ impl<'a> RigidCover<'a> {
         }
     }
 
-    /// Whether samples tell of some part that is near or was.
+    /// Whether some part that is or was near is measured at samples.
     pub(crate) fn samples(&self) -> bool {
         self.all_sampled || !self.sampled.is_empty()
     }
 
-    /// Goes on from a pose: what is near it, if that is not known yet.
+    /// Makes a pose the base of the next step, and returns the contacts there, computing them if they are not known
+    /// yet.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -86,7 +86,7 @@ impl<'a> RigidCover<'a> {
         };
         self.base = mover.pose;
         let mut told = Vec::with_capacity(self.pairs.len());
-        // What is out of reach is found anew when it comes near.
+        // A pair that is out of reach gets a new cover when it comes near again.
         for mut pair in self.pairs.drain(..).filter(|pair| pair.is_near) {
             if !pair.is_left_to_samples && pair.settle(mover, self.reach, self.termination)? {
                 told.push(pair);
@@ -103,7 +103,7 @@ impl<'a> RigidCover<'a> {
         Ok(near)
     }
 
-    /// Whether a standing part's pair is told by regions; takes it in if it is new.
+    /// The index of a standing part's pair if regions cover it; adds the pair if it is new.
     fn pair_of(&mut self, other: usize) -> Result<Option<usize>, Interrupt> {
         if self.all_sampled || self.sampled.contains(&other) {
             return Ok(None);
@@ -136,7 +136,7 @@ impl ContactSource for RigidCover<'_> {
             left.extend(self.pairs[pair].near(&base, mover, reach, near).map(|l| (pair, l)));
             Ok(())
         })?;
-        // Of a pose that is refused already it does not matter what else may be entered.
+        // A pose that is refused already needs no further contacts.
         if near.contacts.iter().any(|c| c.gap < -DEPTH_TOLERANCE) {
             return Ok(near);
         }

@@ -1,4 +1,4 @@
-//! A pair, one of whose surfaces is in pieces that stay in regions.
+//! A pair of surfaces, one of them in pieces with regions.
 
 use std::sync::Arc;
 
@@ -23,20 +23,20 @@ use super::piece::{RigidPiece, StepPoses, slack_within};
 
 /// The inverse of the golden ratio.
 const GOLDEN: f64 = 0.618_033_988_749_895;
-/// A bit that is as small as can be is told by the face before it, so far around.
+/// Around the smallest bit, the plane of the nearest face serves as its region this far, in the planning frame.
 const AROUND_SMALLEST: f64 = 4.0 * SMALLEST_BIT;
 
-/// A pair, one of whose surfaces is in pieces.
+/// A pair with a cover of one of its surfaces.
 pub(crate) struct RigidPair<'a> {
     pub(crate) surfaces: SurfacePair<'a>,
     pieces: Vec<RigidPiece>,
     /// Contacts that mattered.
     pub(crate) known: Vec<Contact>,
-    /// Whether it was looked at there.
+    /// Whether the last query found the pair within reach.
     pub(crate) is_near: bool,
-    /// Whether regions could not tell: from the base on samples do.
+    /// Whether the cover failed: from the base on the pair is measured at samples.
     pub(crate) is_left_to_samples: bool,
-    /// How many steps were made, and how many regions were looked for.
+    /// The number of steps, and of regions that were computed.
     steps: usize,
     regions: usize,
     placed: PlacedPiece,
@@ -50,16 +50,16 @@ pub(crate) struct OutsidePieces {
 
 /// Why a piece got no region.
 enum Uncovered {
-    /// The other end is too deep.
+    /// It is too deep at the other end of the step.
     Entered(Contact),
-    /// It is too deep between the two.
+    /// It is too deep between the two ends.
     Crossed,
-    /// It took too long to tell.
+    /// The budget was spent.
     Unsure,
 }
 
 impl<'a> RigidPair<'a> {
-    /// A pair with the part at a pose, if regions tell of it.
+    /// Covers a pair with the part at a pose; `None` if regions cannot.
     pub(crate) fn new(
         scene: &'a Scene,
         (part, pose): (usize, &Pose),
@@ -93,9 +93,9 @@ impl<'a> RigidPair<'a> {
         }))
     }
 
-    /// What is known to be near with the part at the mover's pose; it was free at `base`. Tells which pieces
-    /// have left their regions, if none of them is known to enter anything: of these it is
-    /// [not yet known](Self::renewed).
+    /// Adds what is near the body's pose to `near`; the part was free at `base`. Returns the pieces that have left
+    /// their regions, unless one of them is known to enter something: whether these enter is [not yet
+    /// known](Self::renewed).
     pub(crate) fn near(
         &mut self,
         base: &Pose,
@@ -106,7 +106,7 @@ impl<'a> RigidPair<'a> {
         let ends = StepPoses::of(&self.surfaces, base, &mover.pose);
         self.is_near = true;
         let outside = self.outside(&ends, near);
-        // Contacts lie on pieces that have left their regions, mostly.
+        // Most contacts lie on pieces that have left their regions.
         if outside.is_empty() {
             return None;
         }
@@ -124,7 +124,7 @@ impl<'a> RigidPair<'a> {
         None
     }
 
-    /// Finds regions for pieces that have left theirs, or what they enter.
+    /// Finds new regions for pieces that have left theirs, or contacts.
     pub(crate) fn renewed(
         &mut self,
         left: &OutsidePieces,
@@ -141,8 +141,7 @@ impl<'a> RigidPair<'a> {
         Ok(())
     }
 
-    /// The pieces that are not in their regions at the other end. Tells of all what there is left for
-    /// them to move.
+    /// The pieces that are not in their regions at the other end. Notes for every piece how far it may still move.
     fn outside(&mut self, StepPoses { here, there, .. }: &StepPoses, near: &mut ContactSet) -> Vec<usize> {
         let angle = here.rotation.angle_to(&there.rotation);
         let mut outside = Vec::new();
@@ -164,7 +163,7 @@ impl<'a> RigidPair<'a> {
         outside
     }
 
-    /// The corners of some pieces that are deeper inside the measured solid than may be.
+    /// The corners of some pieces that are deeper in the measured solid than `most`.
     fn corners_inside(&mut self, pieces: &[usize], there: &Pose, most: f64) -> Vec<Contact> {
         let mut inside = Vec::new();
         let Self { surfaces, pieces: all, placed, .. } = self;
@@ -188,8 +187,8 @@ impl<'a> RigidPair<'a> {
         inside
     }
 
-    /// The corners of measured triangles, and the middles of their sides, that are deeper inside some pieces' solid
-    /// than may be: of those that these have passed the planes of.
+    /// The corners of measured triangles, and the middles of their sides, that are too deep in the covered solid: of
+    /// those triangles whose planes the pieces have passed.
     fn triangles_inside(&mut self, pieces: &[usize], there: &Pose) -> Vec<Contact> {
         let mut inside = Vec::new();
         for &i in pieces {
@@ -206,7 +205,7 @@ impl<'a> RigidPair<'a> {
         inside
     }
 
-    /// Finds regions that hold these pieces at both ends, or contacts that are too deep at the other one.
+    /// Finds regions that hold these pieces at both ends, or contacts that are too deep at the other end.
     fn renew(&mut self, outside: &[usize], ends: &StepPoses) -> Vec<Contact> {
         let mut left = REGIONS_PER_LOOK;
         let (mut found, mut entered) = (Vec::new(), Vec::new());
@@ -235,7 +234,7 @@ impl<'a> RigidPair<'a> {
         entered
     }
 
-    /// Finds regions for a piece that has none at the other end, or for its parts.
+    /// Covers a piece at both ends, or its parts.
     fn held(
         &mut self,
         piece: &RigidPiece,
@@ -245,7 +244,7 @@ impl<'a> RigidPair<'a> {
     ) -> Result<(), Uncovered> {
         let mut is_whole = true;
         cover(piece.clone(), |mut piece, rest| {
-            // A part may be in the region that it came with.
+            // A part may lie in the region of the whole piece.
             if !std::mem::take(&mut is_whole) {
                 let at_here = piece.slack_at(&self.surfaces, &ends.here, 0.0, &mut self.placed);
                 piece.next = piece.slack_at(&self.surfaces, &ends.there, 0.0, &mut self.placed);
@@ -271,10 +270,10 @@ impl<'a> RigidPair<'a> {
         })
     }
 
-    /// All of a piece in a region that holds it at both ends; none if it is to be split.
+    /// All of a piece in a region that holds it at both ends; `None` if the piece is to be split.
     fn held_whole(&mut self, piece: &RigidPiece, ends: &StepPoses) -> Result<Option<RigidPiece>, Uncovered> {
         self.regions += 1;
-        // What could not be held further ahead the last time is not tried at once again.
+        // If a region further ahead failed the last time, it is not tried again at once.
         let goes_far = piece.spot.level == 0 && ends.here != ends.there;
         let far = if goes_far { self.region(piece, &[ends.here, ends.there, ends.ahead]).ok() } else { None };
         let level = usize::from(goes_far && far.is_none());
@@ -311,7 +310,7 @@ impl<'a> RigidPair<'a> {
         Ok(Some(self.before_face(piece, ends)))
     }
 
-    /// A region that holds a piece at some poses.
+    /// A region that holds a piece at several poses.
     fn region(&mut self, piece: &RigidPiece, at: &[Pose]) -> Result<FreeRegion, NoRegion> {
         let (surfaces, placed) = (&self.surfaces, &mut self.placed);
         let (mut wanted, mut centres) = (Vec::new(), Bounds::EMPTY);
@@ -332,9 +331,9 @@ impl<'a> RigidPair<'a> {
         Ok(region)
     }
 
-    /// The deepest point of a bit's edges, if it is deeper than may be: where edges cross, neither surface
-    /// has a corner inside the other. Below the two faces of an edge the depth along a line has one maximum
-    /// (found by golden sections).
+    /// The deepest point on the edges of a bit, if it is too deep: where edges cross, neither surface has a corner
+    /// inside the other. Below the two faces of an edge, the depth along a line has one maximum, which golden
+    /// sections find.
     fn deepest_on_edges(&self, corners: &[Point3<f64>; 3], guess: u32, there: &Pose) -> Option<Contact> {
         let surfaces = &self.surfaces;
         let gap = |p: &Point3<f64>| {
@@ -376,9 +375,8 @@ impl<'a> RigidPair<'a> {
         Some(Contact::measured(surfaces.other, surfaces.asks_part, p, gap(&p), surfaces.allowed))
     }
 
-    /// A small bit that is no deeper than may be, before the face that it is nearest to: where surfaces
-    /// cross by less than that, there are no regions. That is not certain, as regions are; paths are
-    /// verified.
+    /// A small bit that is not too deep, in front of the nearest face: where surfaces cross by less than the
+    /// tolerance, there are no regions. Unlike a region this is not certain; paths are verified.
     fn before_face(&mut self, piece: &RigidPiece, ends: &StepPoses) -> RigidPiece {
         let (surfaces, placed) = (&self.surfaces, &mut self.placed);
         surfaces.place_at(&piece.spot.piece, &ends.there, placed);
@@ -390,7 +388,7 @@ impl<'a> RigidPair<'a> {
         RigidPiece { region, slack: 0.0, next: Some(0.0), ..piece.clone() }
     }
 
-    /// Keeps contacts for the steps to come.
+    /// Keeps contacts for later steps.
     fn learn(&mut self, found: &[Contact]) {
         for contact in found {
             if !self.known.iter().any(|c| c.is_of_same_point(contact)) {
@@ -400,7 +398,7 @@ impl<'a> RigidPair<'a> {
         self.known.drain(..self.known.len().saturating_sub(KEPT_CONTACTS));
     }
 
-    /// Goes on from the pose that was looked at last; false where regions do not tell any more.
+    /// Makes the pose of the last query the base; `false` if the cover fails there.
     pub(crate) fn settle(
         &mut self,
         mover: &MovingBody<'_>,
@@ -429,7 +427,7 @@ impl<'a> RigidPair<'a> {
         Ok(self.regions <= REGIONS_PER_MOTION + REGIONS_PER_STEP * self.steps)
     }
 
-    /// Whether nothing is too deep between the base and the pose that was looked at last.
+    /// Whether nothing is too deep at a pose between the base and the pose of the last query.
     pub(crate) fn is_clear_at(&mut self, between: &MovingBody<'_>) -> bool {
         if self.is_left_to_samples || !self.is_near {
             return !self.is_left_to_samples;
@@ -443,7 +441,7 @@ impl<'a> RigidPair<'a> {
     }
 }
 
-/// The corner of a measured triangle, or the middle of one of its sides, that is too deep inside the asked solid.
+/// The corner of a measured triangle, or the middle of one of its sides, that is too deep in the covered solid.
 fn pierced(surfaces: &SurfacePair<'_>, piece: &RigidPiece, triangle: u32, there: &Pose) -> Option<Contact> {
     if surfaces.asked.is_open() {
         return None;

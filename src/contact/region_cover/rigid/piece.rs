@@ -1,4 +1,4 @@
-//! A piece in its region, and between which poses it is looked at.
+//! A piece in its region, and the poses of a step.
 
 use std::sync::Arc;
 
@@ -17,25 +17,25 @@ pub(crate) struct RigidPiece {
     pub(crate) spot: CoverPiece,
     /// In the measured surface's frame.
     pub(crate) region: Arc<FreeRegion>,
-    /// A ball that holds the piece, in the asked surface's frame, …
+    /// A ball that holds the piece, in the covered surface's frame.
     pub(crate) centre: Point3<f64>,
     pub(crate) radius: f64,
-    /// … and where its centre is at the base, in the measured surface's.
+    /// The ball's centre at the base, in the measured surface's frame.
     pub(crate) stands: Point3<f64>,
-    /// How far inside its region all of it is there.
+    /// How far inside its region all of the piece is at the base.
     pub(crate) slack: f64,
-    /// The same at the pose that was looked at last; none if it was not in its region there.
+    /// The same at the pose of the last query; `None` if the piece was not in its region.
     pub(crate) next: Option<f64>,
 }
 
-/// From the asked surface's frame to the measured one's at the base and at another pose.
+/// Maps from the covered surface's frame to the measured one's, at the base and at other poses of a step.
 #[derive(Clone, Copy)]
 pub(crate) struct StepPoses {
     pub(crate) here: Pose,
     pub(crate) there: Pose,
     /// Between the two, if they differ.
     pub(crate) between: [Pose; POSES_BETWEEN],
-    /// Where the motion from the one to the other leads.
+    /// At the pose to which the motion would continue.
     pub(crate) ahead: Pose,
 }
 
@@ -48,7 +48,7 @@ impl StepPoses {
         Self { here, there, between, ahead: after(STEPS_AHEAD) }
     }
 
-    /// A pose alone.
+    /// One pose instead of a step.
     pub(crate) fn at(there: Pose) -> Self {
         Self { here: there, there, between: [there; POSES_BETWEEN], ahead: there }
     }
@@ -66,7 +66,7 @@ impl RigidPiece {
         Self { spot, region, centre, radius, stands, slack: f64::NEG_INFINITY, next: None }
     }
 
-    /// A piece that is free in a cell for shifts, without a shift.
+    /// A piece in the region of a cover for shifts, at zero shift.
     pub(crate) fn of_shift_piece(
         piece: &ShiftPiece,
         surfaces: &SurfacePair<'_>,
@@ -83,13 +83,13 @@ impl RigidPiece {
         Self::new(piece.spot, region, surfaces, here)
     }
 
-    /// How far outside its region it may be.
+    /// How far outside its region the piece may be.
     pub(crate) fn most(&self, surfaces: &SurfacePair<'_>) -> f64 {
         surfaces.allowed + self.spot.held.max(DEPTH_TOLERANCE)
     }
 
-    /// How far inside its region all of it is at a pose, negative where it is outside by no more than it
-    /// may be and `more`; none where it is further.
+    /// How far inside its region all of the piece is at a pose: negative if it is outside by no more than allowed and
+    /// `more`, `None` if it is further outside.
     pub(crate) fn slack_at(
         &self,
         surfaces: &SurfacePair<'_>,
@@ -106,7 +106,8 @@ impl RigidPiece {
     }
 }
 
-/// How far inside a region a piece is, at least; negative where it is outside by no more than `most`.
+/// How far inside a region all of a piece is: negative if it is outside by no more than `most`, `None` if it is
+/// further outside.
 pub(crate) fn slack_within(region: &FreeRegion, placed: &PlacedPiece, most: f64) -> Option<f64> {
     let PlacedPiece { points, cloud, .. } = placed;
     let gaps = region.gaps(cloud);
