@@ -1,10 +1,9 @@
-//! How points move along a path, as hulls: for any stretch of the way, a few affine maps such that
-//! where a point passes lies in the convex hull of its images.
+//! A path as the motion of points: for any stretch, a few affine maps such that a point stays in the convex hull of
+//! its images.
 //!
-//! Between two poses of a path the part's middle moves on a line and its rotation slerps. Of a
-//! rotation alone, a point's arc lies in the triangle of its ends and the point where the tangents
-//! there meet, and each of these three is a linear map of the point. With the shift, that is true
-//! but for a remainder, which is bounded by [`Leg::slack`].
+//! Between two poses the part's centre moves on a line and its rotation slerps. Under rotation alone, the arc of a
+//! point lies in the triangle of its ends and the point where the tangents there meet; each of these three is a
+//! linear map of the point. With the shift this holds up to a remainder, which [`Leg::slack`] bounds.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -21,13 +20,13 @@ pub(crate) fn turns_far(path: &[Pose]) -> bool {
     turns.sum::<f64>() > SCREW_TURN
 }
 
-/// The path of a part, in the frame of the one that it passes.
+/// The path of a part, in the frame of the part that it passes.
 #[derive(Debug)]
 pub(crate) struct Course {
     pub(crate) segments: Vec<PathSegment>,
-    /// The point of the shape that moves on lines.
+    /// The point of the shape that moves on straight lines.
     pub(crate) centre: Point3<f64>,
-    /// No point of the shape is further from it.
+    /// The largest distance of a point of the shape from the centre.
     pub(crate) reach: f64,
     pub(crate) length: f64,
 }
@@ -36,15 +35,15 @@ pub(crate) struct Course {
 pub(crate) struct PathSegment {
     pub(crate) from: Pose,
     pub(crate) to: Pose,
-    /// Way from the path's start to this segment's.
+    /// The length of the path before this segment.
     pub(crate) before: f64,
-    /// No point moves further on it.
+    /// The largest displacement of a point on it.
     pub(crate) length: f64,
 }
 
 impl Course {
-    /// The path through some poses of a shape whose point `centre` moves on lines; no point of the
-    /// shape is further than `reach` from it.
+    /// The path through some poses of a shape. Its point `centre` moves on lines, and no point of the shape is
+    /// further than `reach` from it.
     pub(crate) fn new(path: &[Pose], centre: Point3<f64>, reach: f64) -> Self {
         let mut course = Self { segments: Vec::new(), centre, reach, length: 0.0 };
         for (from, to) in path.iter().zip(path.iter().skip(1).chain(path.last())) {
@@ -61,7 +60,7 @@ impl Course {
         course
     }
 
-    /// The bends of a stretch of the way: segments with the shares at which they begin and end.
+    /// The bends of a stretch: segments with the shares at which they begin and end.
     fn bends(&self, from: f64, to: f64) -> Vec<(&PathSegment, f64, f64)> {
         let first = self.segments.partition_point(|s| s.before + s.length < from);
         let share = |s: &PathSegment, at: f64| {
@@ -72,7 +71,7 @@ impl Course {
             .take_while(|s| s.before <= to)
             .map(|s| (s, share(s, from), share(s, to)))
             .collect();
-        // Segments that are only touched at an end say nothing new.
+        // A segment that is only touched at an end adds nothing.
         if bends.iter().any(|(_, a, b)| b > a) {
             bends.retain(|(_, a, b)| b > a);
         } else {
@@ -81,14 +80,14 @@ impl Course {
         bends
     }
 
-    /// By how many radians the part turns on a stretch.
+    /// The angle by which the part turns on a stretch, in radians.
     pub(crate) fn turn(&self, interval: Interval) -> f64 {
         let [from, to] = interval.of(self.length);
         let turn = |(s, a, b): &(&PathSegment, f64, f64)| s.from.rotation.angle_to(&s.to.rotation) * (b - a);
         self.bends(from, to).iter().map(turn).sum()
     }
 
-    /// The path from one place on the way to another.
+    /// The path between two places on it.
     pub(crate) fn path_between(&self, [from, to]: [f64; 2]) -> Vec<Pose> {
         let bends = self.bends(from, to);
         let at = |(s, a, _): &(&PathSegment, f64, f64)| interpolate(&s.from, &s.to, &self.centre, *a);
@@ -102,7 +101,7 @@ impl Course {
     }
 }
 
-/// A piece `index` of `2^level` of the way.
+/// Stretch `index` of the `2^level` equal stretches of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Interval {
     level: u32,
@@ -116,18 +115,18 @@ impl Interval {
         [0, 1].map(|k| Self { level: self.level + 1, index: 2 * self.index + k })
     }
 
-    /// Whether another is a piece of it.
+    /// Whether another stretch is part of it.
     pub(crate) fn holds(self, other: Self) -> bool {
         other.level >= self.level && other.index >> (other.level - self.level) == self.index
     }
 
-    /// From where to where it reaches on a way of some length.
+    /// Its begin and end on a path of some length.
     pub(crate) fn of(self, length: f64) -> [f64; 2] {
         let own = length * self.share();
         [own * self.index as f64, own * (self.index + 1) as f64]
     }
 
-    /// Its part of the whole.
+    /// Its share of the whole.
     pub(crate) fn share(self) -> f64 {
         0.5f64.powi(self.level as i32)
     }
@@ -146,25 +145,25 @@ impl Affine {
     }
 }
 
-/// A stretch of the way.
+/// A stretch of a path, as maps.
 #[derive(Debug)]
 pub(crate) struct Leg {
-    /// Where a point passes is in the hull of its images; empty if the stretch is too bent.
+    /// A point stays in the hull of its images under these, up to `slack`; empty if the stretch is too bent.
     pub(crate) maps: Vec<Affine>,
-    /// But for so much.
+    /// The remainder.
     pub(crate) slack: f64,
     /// The largest factor by which a map stretches.
     pub(crate) stretch: f64,
-    /// At its end.
+    /// The map at its end.
     pub(crate) end: Pose,
-    /// No point moves further.
+    /// The largest displacement of a point.
     pub(crate) length: f64,
-    /// The direction in which all points move, if they move alike.
+    /// The direction in which all points move, if it is the same for all.
     pub(crate) along: Option<Vector3<f64>>,
 }
 
 impl Leg {
-    /// The images of points, point by point: they pass through the hull of these, but for the slack.
+    /// The images of points, point by point: the points stay in the hull of these, up to the slack.
     pub(crate) fn images<'l>(
         &'l self,
         points: impl IntoIterator<Item = &'l Point3<f64>> + 'l,
@@ -173,13 +172,13 @@ impl Leg {
     }
 }
 
-/// A course seen from one of the two parts: of points of the moving part in the frame of the
-/// standing one, or the other way round.
+/// A course seen from one of the two parts: points of the moving part in the frame of the standing one, or the other
+/// way round.
 pub(crate) struct CourseView<'a> {
     course: &'a Course,
-    /// Whether points of the moving part are looked at.
+    /// Whether the points are the moving part's.
     on_moving: bool,
-    /// Shorter stretches are taken as a point, however bent.
+    /// A shorter stretch counts as one point, however bent it is.
     shortest: f64,
     legs: HashMap<Interval, Rc<Leg>>,
 }
@@ -228,7 +227,7 @@ impl<'a> CourseView<'a> {
             let [a, b] = [a, b].map(|u| interpolate(&segment.from, &segment.to, &self.course.centre, u));
             self.bend(&a, &b, &mut leg);
         }
-        // One bend that does not turn has two maps.
+        // A bend that does not turn has two maps.
         if let [first, last] = &leg.maps[..] {
             leg.along = (last.shift - first.shift).try_normalize(0.0);
         }
@@ -252,20 +251,20 @@ impl<'a> CourseView<'a> {
             let tangents = along * first + (Matrix3::identity() - along) * (first + last) * (widened / 2.0);
             leg.maps.push(self.map(tangents, start.coords + shift / 2.0));
             leg.stretch = leg.stretch.max(widened);
-            // How far t strays from where the three maps put it: measured, 0.008 of the square.
+            // How far t strays from where the three maps put it: 0.008 of the square, as measured.
             let mut slack = 0.01 * angle * angle * shift.norm();
             if !self.on_moving {
                 slack += angle * (1.0 + angle) / 8.0 * axis.cross(&shift).norm();
             }
             leg.slack = leg.slack.max(slack);
         }
-        // What stands still has one.
+        // A part that stands still has one map.
         if a != b {
             leg.maps.push(self.map(last, (start + shift).coords));
         }
     }
 
-    /// The map for a part turned by `rotation` (or what stands for it) with its centre at `at`.
+    /// The map of a part turned by `rotation` (or by its tangent) with its centre at `at`.
     fn map(&self, rotation: Matrix3<f64>, at: Vector3<f64>) -> Affine {
         let centre = self.course.centre.coords;
         if self.on_moving {

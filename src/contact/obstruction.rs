@@ -1,5 +1,5 @@
-//! How much stands in the way of a part that goes straight, as a hint at which way it is to be turned
-//! out: past the flanks of a thread it goes through a tooth at a time, past a head through all of it.
+//! How long a stretch of other parts is in the way of a straight motion: a hint at the direction in which a part is
+//! to be turned out. Past the flanks of a thread this is one tooth, past a head all of it.
 
 use nalgebra::{Point3, Translation3, Vector3};
 
@@ -9,9 +9,9 @@ use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll};
 use crate::tolerances::WALL_STEEPNESS;
 
-/// The longest stretch that a point of a part, going from `start` along the unit vector `direction` until it
-/// is past all that stands, is inside of another part, or a point of another inside of it. Told by some of
-/// their samples: what is small may go unseen.
+/// The longest stretch that a point of a part is inside another part, or a point of another inside of it, while the
+/// part goes from `start` along the unit vector `direction` past everything. Measured at some samples: small things
+/// may be missed.
 ///
 /// # Errors
 /// The termination condition became true.
@@ -55,7 +55,7 @@ pub fn obstruction(
 struct Rays<'a> {
     target: &'a Surface,
     to_target: Pose,
-    /// How the samples move against the target, in its frame.
+    /// The direction of the samples against the target, in its frame.
     along: Vector3<f64>,
 }
 
@@ -77,7 +77,7 @@ impl Rays<'_> {
             .try_fold(0.0, |longest: f64, way| Ok(longest.max(way?)))
     }
 
-    /// From where the target is met.
+    /// The box of the target, extended against the direction.
     fn corridor(&self, travel: f64) -> Bounds {
         let bounds = *self.target.bounds();
         let back = self.along * -travel;

@@ -1,36 +1,36 @@
-//! A part on its way past another that stands: what a path is checked for, pair by pair.
+//! The path of a part past one standing part: what is verified, pair by pair.
 //!
-//! All is told in the frame of the one that stands, rounded far finer than depth is measured, and the
-//! way ends where that one is left behind. So the same is asked, to the bit, of all bolts that leave nuts
-//! that stand alike, wherever these are and however far the rest of the assembly reaches.
+//! The path is in the standing part's frame, rounded far finer than depth is measured, and it ends where the part has
+//! passed. So all bolts that leave congruent nuts ask the same question to the bit, wherever the nuts are and however
+//! far the rest of the assembly reaches.
 
 use nalgebra::{Point3, Translation3};
 
 use crate::geometry::{Pose, Shape, Surface};
 use crate::scene::{AllowedPenetrations, CongruentPair, Scene, rounded, rounded_pose};
 
-/// Directions are alike within this.
+/// Directions whose components differ by less are equal: the rounding of poses.
 const ALIKE: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// A part on its way past one that stands.
+/// The path of a part past one standing part.
 #[derive(Debug, Clone)]
 pub struct PairPath<'a> {
-    /// The numbers of the moving and of the standing part.
+    /// The indices of the moving and of the standing part.
     pub parts: [usize; 2],
     /// Their shapes.
     pub shapes: [&'a Shape; 2],
     /// Poses of the moving shape in the frame of the standing one, rounded.
     pub path: Vec<Pose>,
-    /// The point of the moving shape, in its frame, that is on a line between two of these.
+    /// The point of the moving shape, in its frame, that moves on a line between two poses.
     pub centre: Point3<f64>,
-    /// The depth that counts as none, in the planning frame.
+    /// The allowed penetration, in the planning frame.
     pub allowed: f64,
-    /// That of the assembly, by which depths are told.
+    /// The longest side of the assembly, from which verification derives its precision.
     pub longest_side: f64,
 }
 
 impl<'a> PairPath<'a> {
-    /// Of a path (poses of the moving shape in the planning frame), what passes the standing part.
+    /// The part of a path (poses of the moving shape in the planning frame) that passes the standing part.
     #[must_use]
     pub fn new(scene: &'a Scene, allowed: &AllowedPenetrations, parts: [usize; 2], path: &[Pose]) -> Self {
         let [part, other] = parts;
@@ -40,7 +40,7 @@ impl<'a> PairPath<'a> {
         Self {
             parts,
             shapes,
-            // Of a path that does not turn, any point is on a line.
+            // On a path that does not turn, any point moves on a line.
             centre: if turns { scene.centre_in_shape(part) } else { shapes[0].bounds().centre() }
                 .map(rounded),
             allowed: allowed.of(part, other),
@@ -49,7 +49,7 @@ impl<'a> PairPath<'a> {
         }
     }
 
-    /// A pair that does not move, with nothing allowed.
+    /// A pair that does not move, without allowed penetration.
     #[must_use]
     pub fn standing(scene: &'a Scene, pair: &CongruentPair) -> Self {
         let [one, other] = pair.poses;
@@ -64,14 +64,14 @@ impl<'a> PairPath<'a> {
         }
     }
 
-    /// How far the moving part reaches from its centre.
+    /// The largest distance of a point of the moving part from the centre.
     #[must_use]
     pub fn reach(&self) -> f64 {
         let hull = self.shapes[0].hull.iter();
         hull.map(|p| (p - self.centre).norm_squared()).fold(0.0, f64::max).sqrt()
     }
 
-    /// Those of the moving and of the standing part.
+    /// The surfaces of the moving and of the standing part.
     #[must_use]
     pub fn surfaces(&self) -> [&'a Surface; 2] {
         self.shapes.map(|shape| &*shape.surface)
@@ -82,8 +82,8 @@ fn shapes(scene: &Scene, parts: [usize; 2]) -> [&Shape; 2] {
     parts.map(|part| &*scene.bodies[part].shape)
 }
 
-/// The path up to where the part has passed the other for good: its last piece, if it is straight, as far
-/// as their boxes meet.
+/// The path up to where the part has passed the other for good: its last piece, if straight, is as long as their
+/// boxes meet.
 fn way_past([moving, standing]: [&Shape; 2], planning_from_standing: &Pose, path: &[Pose]) -> Vec<Pose> {
     let into = planning_from_standing.inverse();
     let mut way: Vec<Pose> = path.iter().map(|pose| rounded_pose(&(into * pose))).collect();
@@ -92,7 +92,7 @@ fn way_past([moving, standing]: [&Shape; 2], planning_from_standing: &Pose, path
         && let shift = end.translation.vector - start.translation.vector
         && let Some(direction) = shift.try_normalize(0.0)
     {
-        // The same to the bit wherever the path ends.
+        // The result is the same to the bit wherever the path ends.
         let direction = (into.rotation * direction).map(|x| (x / ALIKE).round() * ALIKE);
         let passed = moving.bounds().transformed(from).way_past(standing.bounds(), &direction);
         if passed == 0.0 {

@@ -1,17 +1,17 @@
-//! Shape casts: a part that goes straight past one that stands, by the edges and corners of both.
+//! Shape casts: how far a part goes straight before it meets a standing one, by the edges and corners of both.
 //!
-//! A solid that is moved along `d` comes to overlap another exactly if on some line along `d` a
-//! point of its surface that faces `d` passes a point of the other's that faces against it. Walls along the
-//! direction face neither way: sliding along them, however flush, costs nothing.
+//! A solid that moves along `d` comes to overlap another exactly if, on some line along `d`, a point of its surface
+//! that faces `d` passes a point of the other's surface that faces against it. Walls along the direction face neither
+//! way: sliding along them, however flush, is free.
 //!
-//! Such a line first meets at an edge or a corner: of two faces, where an edge of the one passes an edge of the
-//! other or a corner of the one the other's face. So the convex edges of one surface are swept against the
-//! faces of the other, and the other's corners against the faces of the one: nothing passes between samples.
+//! Such lines first meet at an edge or a corner: an edge of one face passes an edge of the other, or a corner of one
+//! the other face. So the convex edges of one surface are swept against the faces of the other, and the other's
+//! corners against the faces of the one: nothing passes between samples.
 //!
-//! What a pair may overlap (its allowed penetration, and the tolerance) is taken off the edges across the
-//! direction: a press fit's rim passes by its hole's. An overlap that is there at the start is taken for allowed.
-//! Known refusals: contact that slides down a slope, overlaps that grow on the way. Known miss: edges at which faces
-//! are bent by less than a thousandth count as flat.
+//! What a pair may overlap (its allowed penetration, and the tolerance) is taken off the edges across the direction:
+//! a press fit's rim passes the rim of its hole. An overlap at the start counts as allowed. Known refusals: contact
+//! that slides down a slope, and overlaps that grow on the way. Known miss: edges whose faces differ by less than a
+//! thousandth count as flat.
 
 use nalgebra::{Point3, Vector3};
 
@@ -20,39 +20,39 @@ use crate::geometry::{Bounds, ConvexEdges, Pose, Surface};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll, Termination};
 
-/// What a shape cast lets pass.
+/// What a shape cast allows.
 #[derive(Debug, Clone, Copy)]
 pub struct CastMargins {
     /// How deep the part may get into the other across the direction.
     pub allowed: f64,
-    /// How far before the start it may have met the other: what it meets there, it meets at once.
+    /// How far before its start the part may have met the other; it meets such things at once.
     pub back: f64,
-    /// Faces that look along the direction, or against it, by less than this count as walls.
+    /// Sine of the angle below which a face along the direction counts as a wall.
     pub steepness: f64,
-    /// So much deeper it may get into a face before it has met that: facets of round walls are a little askew, and
-    /// are past before they matter.
+    /// How deep the part may get into a face before it has met it: facets of round walls are a little askew, and are
+    /// past before they matter.
     pub sunk: f64,
 }
 
-/// A part that goes straight past one that stands.
+/// A part that goes straight past a standing one.
 #[derive(Debug)]
 pub struct ShapeCast<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) part: usize,
     pub(crate) start: &'a Pose,
     pub(crate) direction: &'a Vector3<f64>,
-    /// What stands.
+    /// The standing part.
     pub other: usize,
-    /// How far the part goes, until it is past the other or out of them all.
+    /// How far the part goes, until it is past the other or out.
     pub travel: f64,
-    /// What is let pass.
+    /// What is allowed.
     pub margins: CastMargins,
     pub(crate) termination: &'a Termination,
 }
 
 impl ShapeCast<'_> {
-    /// Whether the part enters the other on the way. That depends on nothing but what is in here, and on the
-    /// shapes of both and where the other stands.
+    /// Whether the part enters the other on its way. This depends only on the fields here, the two shapes, and the
+    /// other's pose.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -60,8 +60,8 @@ impl ShapeCast<'_> {
         Ok(self.way(self.travel)? < self.travel)
     }
 
-    /// How far the part gets on the way until it meets the other: all of the way if it does not. Where that is less
-    /// than `least` it may be less than found.
+    /// How far the part goes until it meets the other, at most `travel`. A result below `least` may be an upper
+    /// bound.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -91,16 +91,16 @@ impl ShapeCast<'_> {
     }
 }
 
-/// What leads of one surface, against another.
+/// The leading edges and corners of one surface, against another surface.
 struct Cast<'a> {
     edges: &'a ConvexEdges,
     target: &'a Surface,
     to_target: Pose,
-    /// How the edges move against the target, in its frame.
+    /// The direction of the edges against the target, in its frame.
     along: Vector3<f64>,
     travel: f64,
     margins: CastMargins,
-    /// Nobody asks how much shorter a way is than this.
+    /// Below this length the result need not be exact.
     least: f64,
     poll: &'a Poll<'a>,
 }
@@ -123,7 +123,7 @@ impl Cast<'_> {
         })
     }
 
-    /// How far of `travel` their ends go.
+    /// How far of `travel` the corners go.
     fn corners(&self, travel: f64) -> Result<f64, Interrupt> {
         let (along, corridor) = (self.along_here(), self.corridor());
         let ends = self.edges.ends().leading(&self.to_target, &corridor, &along, self.margins.steepness);
@@ -148,7 +148,7 @@ impl Cast<'_> {
             if way < self.least {
                 break;
             }
-            // All of the way is told to the bit where nothing is met.
+            // If nothing is met, the result is `travel` to the bit.
             way = met(&item, way + self.margins.back).map_or(way, |at| way.min(at - self.margins.back));
         }
         Ok(way)
@@ -163,12 +163,12 @@ impl Cast<'_> {
         self.to_target.rotation.inverse() * self.along
     }
 
-    /// Where a corner begins, in the target's frame: back, and below the faces there.
+    /// Where a corner starts in the target's frame: moved back, and below the faces there.
     fn from(&self, p: &Point3<f64>, normals: &[Vector3<f64>], along: &Vector3<f64>) -> Point3<f64> {
         self.to_target * (p + inward(normals, along, self.margins.allowed)) - self.along * self.margins.back
     }
 
-    /// From where the target's box is reached.
+    /// The box of the target, extended against the direction.
     fn corridor(&self) -> Bounds {
         let bounds = *self.target.bounds();
         let back = self.along * -(self.travel + self.margins.back);
@@ -177,8 +177,8 @@ impl Cast<'_> {
     }
 }
 
-/// The offset across `along` that takes a point below all faces that meet there, by `depth`; none
-/// where they leave no room for it.
+/// The offset across `along` that moves a point below all faces that meet there by `depth`; `None` if they leave no
+/// room.
 fn inward(normals: &[Vector3<f64>], along: &Vector3<f64>, depth: f64) -> Vector3<f64> {
     let across = |n: &Vector3<f64>| (n - along * n.dot(along)).try_normalize(0.1);
     let mut offset = Vector3::zeros();

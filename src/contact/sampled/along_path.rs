@@ -1,15 +1,14 @@
-//! Verification by samples, for what bounds do not settle.
+//! Verification at samples, where bounds fail.
 //!
-//! At poses so dense that no vertex of the moving part travels further than [`PATH_DENSITY`] of the
-//! longest side between two of them, samples of both surfaces are measured exactly against the other's
-//! triangles through a bounding-volume hierarchy: all vertices, points of convex edges and of faces, closer
-//! together than the engine's. Of a path that passes these, edges are looked at again by points four times
-//! as close. Known miss: features that enter only between two samples or two poses. On long paths the poses
-//! take turns in checking a half or a quarter of the samples each, so that a sample is still checked
-//! every other or every fourth pose.
+//! No vertex of the moving part travels further than [`PATH_DENSITY`] of the longest side between two poses. At each
+//! pose, samples of both surfaces are measured exactly against the other's triangles through a bounding-volume
+//! hierarchy: all vertices, and points of convex edges and faces, closer together than the engine's samples. On a
+//! path that passes, edges are measured again at points four times as close. Known miss: features that penetrate only
+//! between two samples or two poses. On long paths each pose measures a half or a quarter of the samples in turn, so
+//! each sample is measured at every second or fourth pose.
 //!
-//! [`path`](super::super::region_cover::path) has no such misses, but looks at every facet that passes every other: on
-//! a thread of ten turns, millions.
+//! [`path`](super::super::region_cover::path) has no such misses, but looks at every facet that passes another: on a
+//! thread of ten turns these are millions.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -25,12 +24,12 @@ use crate::tolerances::{HELPFUL, PATH_DENSITY};
 
 use super::super::pair_path::PairPath;
 
-/// A point that got too deep.
+/// A point that gets too deep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Entry {
     /// The standing part of the pair.
     pub other: usize,
-    /// Whether the point is one of the moving part.
+    /// Whether the point is on the moving part.
     pub on_moving: bool,
     /// The point in the frame of the shape that it lies on.
     pub point: Point3<f64>,
@@ -38,10 +37,10 @@ pub struct Entry {
     pub over: f64,
 }
 
-/// The samples of all parts, taken when they are needed.
+/// The samples of all parts, computed when they are needed.
 #[derive(Debug, Clone)]
 pub(crate) struct PathSamples {
-    /// Per part: those of its shape, which equal parts share.
+    /// Per part, the samples of its shape, which equal parts share.
     parts: Arc<Vec<Arc<PartSamples>>>,
 }
 
@@ -51,7 +50,7 @@ struct PartSamples {
     shares: [OnceLock<[SampleTree; SAMPLE_SHARES]>; Closeness::ALL.len()],
 }
 
-/// How closely samples stand. Most paths that are refused are so by the few.
+/// The density of samples. Most paths that are refused are refused by the coarse ones.
 #[derive(Debug, Clone, Copy)]
 enum Closeness {
     Sparse,
@@ -63,7 +62,7 @@ impl Closeness {
 }
 
 impl PathSamples {
-    /// For parts of which `shape_of` gives each one's shape.
+    /// For parts whose shapes `shape_of` gives.
     pub(crate) fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>) -> Self {
         let sampled =
             |s: &Arc<Shape>| Arc::new(PartSamples { shape: Arc::clone(s), shares: Default::default() });
@@ -71,7 +70,7 @@ impl PathSamples {
         Self { parts: Arc::new(shape_of.into_iter().map(|s| Arc::clone(&shapes[s])).collect()) }
     }
 
-    /// Bytes in memory, of what was sampled so far; equal parts count once.
+    /// Bytes in memory of the samples so far; equal parts count once.
     pub(crate) fn memory(&self) -> usize {
         let mut shapes: Vec<&Arc<PartSamples>> = self.parts.iter().collect();
         shapes.sort_unstable_by_key(|s| Arc::as_ptr(s));
@@ -80,7 +79,7 @@ impl PathSamples {
         taken.map(SampleTree::memory).sum()
     }
 
-    /// Those of all parts, and of all parts again.
+    /// For all parts, followed by all parts again.
     pub(crate) fn twice(&self) -> Self {
         Self { parts: Arc::new([&self.parts[..], &self.parts[..]].concat()) }
     }
@@ -90,9 +89,9 @@ impl PathSamples {
         shares[closeness as usize].get_or_init(|| dealt(&shape.surface, closeness))
     }
 
-    /// The samples that get deeper than allowed along a stretch of a way past a part: of every pose and side
-    /// the deepest, and all that are deep enough, for a path that is refused beyond `limit`, to help in
-    /// refining a motion.
+    /// The samples that get deeper than allowed on a stretch of a path past a part: for each pose and side the
+    /// deepest one. If the path is refused (beyond `limit`), also all others that are deep enough to help in refining
+    /// the motion.
     pub(crate) fn entries_along(
         &self,
         passing: &PairPath<'_>,
@@ -108,7 +107,7 @@ impl PathSamples {
         Ok(entries)
     }
 
-    /// The same at some poses, by samples that stand so closely.
+    /// The same at some poses, with samples of one density.
     fn entries_at(
         &self,
         passing: &PairPath<'_>,
@@ -166,10 +165,10 @@ fn worth_telling(
     entered.iter().filter(|e| e.over > deep || e.over == worst).map(entry).collect()
 }
 
-/// The samples of one part of a pair, and what they are measured against.
+/// The samples of one part of a pair, and the surface that they are measured against.
 struct PathSide<'a> {
     samples: &'a [SampleTree; SAMPLE_SHARES],
-    /// The way from the samples' frame to the measured surface's, at all poses.
+    /// From the samples' frame to the measured surface's, at all poses.
     to_measured: &'a [Pose],
     measured: &'a Surface,
     allowed: f64,
@@ -188,17 +187,17 @@ struct DeepSample {
     side: usize,
     share: usize,
     sample: usize,
-    /// By so much.
+    /// The depth beyond the allowed penetration.
     over: f64,
 }
 
-/// What is known of where samples are: a triangle of the measured surface that was near, a point in its frame, and how
-/// far outside that lies.
+/// What is known of the place of a ball of samples: a near triangle of the measured surface, a point in its frame,
+/// and the signed distance there.
 type Known = (u32, Point3<f64>, f64);
 
 impl PathSide<'_> {
-    /// The samples that are deeper than allowed. Those in a sphere are settled for all poses at which it stays out of
-    /// the measured surface: from one pose to the next most travel less than they are off.
+    /// The samples that are deeper than allowed. A ball of samples is settled for all poses at which it stays outside
+    /// the measured surface: from one pose to the next most samples travel less than their distance.
     fn entered(&self, asked: &SampledStretch, poll: &Poll<'_>) -> Result<Vec<DeepSample>, Interrupt> {
         let Self { measured, allowed, .. } = *self;
         let inner = measured.bounds().grown(-allowed);
@@ -217,7 +216,7 @@ impl PathSide<'_> {
             }
             let split = if travel > ball.radius { Look::Halve } else { Look::In };
             let is_single = ball.sample.is_some() && travel == 0.0;
-            // Where all of it can certainly not be far enough off, nothing is measured yet.
+            // If all of the ball is certainly too near, its parts are measured instead.
             if !is_single && known.abs() + off <= reach - allowed {
                 return Ok(split((guess, c, known)));
             }
@@ -241,7 +240,7 @@ impl PathSide<'_> {
     }
 }
 
-/// Which shares a pose checks.
+/// The shares of samples that a pose measures.
 #[derive(Debug, Clone, Copy)]
 struct PoseShares {
     index: usize,
@@ -251,7 +250,7 @@ struct PoseShares {
 impl PoseShares {
     const ALL: Self = Self { index: 0, of: 1 };
 
-    /// The turn of pose `index` of `poses`; both ends of a path check all.
+    /// The shares of pose `index` of `poses`; both ends of a path measure all.
     fn of(index: usize, poses: usize) -> Self {
         match poses {
             _ if index == 0 || index + 1 == poses => Self::ALL,
@@ -266,7 +265,7 @@ impl PoseShares {
     }
 }
 
-/// The samples of a surface, dealt out in the order of a tree, so that each share covers all of it.
+/// The samples of a surface, dealt out in the order of a tree, so that each share covers all of the surface.
 fn dealt(surface: &Surface, closeness: Closeness) -> [SampleTree; SAMPLE_SHARES] {
     let all = SampleTree::new(surface, &spacing(surface.bounds(), closeness));
     std::array::from_fn(|i| {
@@ -274,8 +273,8 @@ fn dealt(surface: &Surface, closeness: Closeness) -> [SampleTree; SAMPLE_SHARES]
     })
 }
 
-/// Denser than the engine's samples, and not a multiple of their spacing. Every vertex is one: the crest of a small
-/// rounded thread is told by vertices at blunt edges, closer together than any spacing.
+/// Denser than the engine's samples, and not a multiple of their spacing. Every vertex is a sample: the crest of a
+/// small rounded thread has its vertices at blunt edges, closer together than any spacing.
 fn spacing(bounds: &Bounds, closeness: Closeness) -> Spacing {
     let face = (bounds.extents().max() / 16.0).clamp(0.06, 0.28);
     match closeness {
@@ -285,7 +284,7 @@ fn spacing(bounds: &Bounds, closeness: Closeness) -> Spacing {
     }
 }
 
-/// The poses of a stretch of the way and as many between them as the density asks for.
+/// The poses of a stretch of the path, and as many between them as the density demands.
 fn dense(passing: &PairPath<'_>, path: &[Pose]) -> Vec<Pose> {
     let PairPath { shapes: [shape, _], centre, longest_side, .. } = passing;
     let step = PATH_DENSITY * longest_side;

@@ -1,9 +1,9 @@
-//! Contacts of one moving body with those that stand.
+//! Contacts of a moving body with standing ones, at samples.
 //!
-//! Samples of either surface that are near the other are measured exactly against the triangles
-//! around them. A contact becomes linear constraints on the twist of the moving body, one for each
-//! plane of the closest feature, of which any one is enough where the feature is convex; where it
-//! is not, the check at the trial pose finds what is missing.
+//! Samples of either surface that are near the other are measured exactly against the triangles around them. A
+//! contact becomes linear constraints on the twist of the moving body, one for each plane of the closest feature.
+//! Where the feature is convex, any one of them is enough; where it is not, the check at the trial pose finds what is
+//! missing.
 
 pub(crate) mod along_path;
 mod contact_cache;
@@ -29,7 +29,7 @@ use planes::{ContactSample, Planes};
 
 use super::constraint::VelocityConstraint;
 
-/// Whose surface the sample lies on.
+/// The surface that a sample lies on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ContactSide {
     Moving,
@@ -51,8 +51,8 @@ pub(crate) struct Contact {
 }
 
 impl Contact {
-    /// A point on the moving part's surface, or on the standing one's (in its shape's frame), that was
-    /// measured against the other: its gap, negative where it is deeper than allowed.
+    /// A point of the moving part's surface, or of the standing one's (in its shape's frame), that was measured
+    /// against the other: its gap is negative where it is deeper than allowed.
     pub(crate) fn measured(
         other: usize,
         is_moving: bool,
@@ -64,29 +64,29 @@ impl Contact {
         Self { other, side, sample, gap, closest, allowed }
     }
 
-    /// Whether both are of one point of a pair.
+    /// Whether both are the same point of the same pair.
     pub(crate) fn is_of_same_point(&self, other: &Self) -> bool {
         (self.other, self.side, self.sample) == (other.other, other.side, other.sample)
     }
 }
 
-/// What is near a pose.
+/// The contacts near a pose.
 #[derive(Debug, Clone)]
 pub(crate) struct ContactSet {
-    /// All samples with a gap below the reach that was asked for.
+    /// All samples with a gap below the reach of the query.
     pub(crate) contacts: Vec<Contact>,
     /// No other sample has a smaller gap than this.
     pub(crate) clearance: f64,
 }
 
 impl ContactSet {
-    /// Takes in what else is near.
+    /// Adds other contacts.
     fn add(&mut self, Self { contacts, clearance }: Self) {
         self.clearance = self.clearance.min(clearance);
         self.contacts.extend(contacts);
     }
 
-    /// The same of what is nearer than some reach alone.
+    /// The same with a smaller reach.
     pub(crate) fn within(&self, reach: f64) -> Self {
         let (contacts, others) = self.contacts.iter().partition::<Vec<Contact>, _>(|c| c.gap < reach);
         let clearance = others.iter().map(|c| c.gap).fold(self.clearance, f64::min);
@@ -94,27 +94,26 @@ impl ContactSet {
     }
 }
 
-/// What a step asks about its surroundings.
+/// Where a step gets its contacts from.
 pub(crate) trait ContactSource {
-    /// What is near a mover's pose: if any contacts are deeper than the engine lets them, some of these at
-    /// least.
+    /// The contacts near a body's pose: if any is deeper than the engine allows, at least some of these.
     fn near(&mut self, mover: &MovingBody<'_>) -> Result<ContactSet, Interrupt>;
 
-    /// Takes contacts in that were found at other poses and may matter at the mover's, too.
+    /// Adds contacts that were found at other poses and may matter at this one, too.
     fn add_known(&mut self, mover: &MovingBody<'_>, near: &mut ContactSet) -> Result<(), Interrupt> {
         let _ = (mover, near);
         Ok(())
     }
 
-    /// Whether nothing is too deep at a pose between the last one that was looked at and the one before the
-    /// step, but for what the contacts near these tell.
+    /// Whether nothing is too deep at a pose between the start of the step and the pose of the last query, apart from
+    /// what the contacts at both ends show.
     fn is_clear_at(&mut self, between: &MovingBody<'_>) -> Result<bool, Interrupt> {
         let _ = between;
         Ok(true)
     }
 }
 
-/// What a function gathers.
+/// A function that gathers contacts.
 impl<F: Fn(&MovingBody<'_>) -> Result<ContactSet, Interrupt>> ContactSource for F {
     fn near(&mut self, mover: &MovingBody<'_>) -> Result<ContactSet, Interrupt> {
         self(mover)
@@ -139,12 +138,12 @@ impl<'a> MovingBody<'a> {
         Self { scene, body: &scene.bodies[part], part, pose, termination: None, is_exact: false }
     }
 
-    /// The same with a condition that ends every question as an error.
+    /// The same with a condition whose interruption every query returns as an error.
     pub(crate) fn until(self, termination: &'a Termination) -> Self {
         Self { termination: Some(termination), ..self }
     }
 
-    /// The same that measures without fields, among surfaces that are closed.
+    /// The same, measuring without distance fields; all surfaces must be closed.
     pub(crate) fn exactly(self) -> Self {
         Self { is_exact: true, ..self }
     }
@@ -168,7 +167,7 @@ impl<'a> MovingBody<'a> {
         self.near_by(standing_parts, reach, |other, near| self.near_pair(other, reach, near))
     }
 
-    /// The same; `gather` takes in what is near a standing part that may be within reach.
+    /// The same; `gather` adds the contacts with a standing part that may be within reach.
     pub(crate) fn near_by(
         &self,
         standing_parts: &StandingParts,
@@ -177,7 +176,7 @@ impl<'a> MovingBody<'a> {
     ) -> Result<ContactSet, Interrupt> {
         let mut near = ContactSet { contacts: Vec::new(), clearance: f64::INFINITY };
         let bounds = self.body.shape.bounds().transformed(&self.pose);
-        // What is further off than any step is long need not be known.
+        // The clearance need not exceed the longest step.
         let horizon = reach.max(FREE_STEP);
         near.clearance = horizon;
         for other in self.scene.broad_phase.meeting_of(&standing_parts.standing, &bounds.grown(horizon)) {
@@ -193,16 +192,16 @@ impl<'a> MovingBody<'a> {
 
     /// Gathers the contacts with one standing part.
     pub(crate) fn near_pair(&self, other: usize, reach: f64, near: &mut ContactSet) -> Result<(), Interrupt> {
-        // One after the other: several motions are simulated at a time, and one that waited for its half
-        // would begin with another motion meanwhile, and come back to its own only at the end of that.
+        // The sides are measured one after the other: several motions are simulated in parallel, and a thread that
+        // waited for half a query would begin another motion meanwhile.
         for side in [ContactSide::Moving, ContactSide::Standing] {
             near.add(self.side(side, other, reach, near.clearance)?);
         }
         Ok(())
     }
 
-    /// The same for those with this part alone, both surfaces side by side: where fields are asked for the first time,
-    /// the cells that they fill take most of the time.
+    /// The contacts with one part alone, both sides in parallel: where distance fields are new, filling their cells
+    /// takes most of the time.
     pub(crate) fn near_first(&self, other: usize, reach: f64) -> Result<ContactSet, Interrupt> {
         let standing = &self.scene.bodies[other];
         let (mine, theirs) = rayon::join(|| self.prepare_field(self.body), || self.prepare_field(standing));
@@ -215,7 +214,7 @@ impl<'a> MovingBody<'a> {
         Ok(near)
     }
 
-    /// What is near of the samples of one surface of a pair.
+    /// The contacts at the samples of one surface of a pair.
     fn side(
         &self,
         side: ContactSide,
@@ -234,8 +233,7 @@ impl<'a> MovingBody<'a> {
         Ok(found)
     }
 
-    /// Whose samples are asked for, what they are measured against, the way from the one's frame to the other's, and
-    /// the pair's allowed penetration.
+    /// The sampled and the measured body, the pose from the one's frame to the other's, and the allowed penetration.
     fn sides(&self, side: ContactSide, other: usize) -> (&'a Body, &'a Body, Pose, f64) {
         let standing = &self.scene.bodies[other];
         let allowed = self.scene.allowed.of(self.part, other);
@@ -256,7 +254,7 @@ impl<'a> MovingBody<'a> {
         self.termination.map_or(Ok(()), |t| body.field.prepare_here(t))
     }
 
-    /// The gap of a contact's sample with the mover at its pose, if still below `reach`.
+    /// A contact's sample measured with the body at its pose, if its gap is still below `reach`.
     pub(crate) fn remeasured(&self, contact: &Contact, reach: f64) -> Option<Contact> {
         let standing = &self.scene.bodies[contact.other];
         let (measured, p) = match contact.side {
@@ -277,8 +275,8 @@ impl<'a> MovingBody<'a> {
         Some(Contact { gap: distance + contact.allowed, closest, ..*contact })
     }
 
-    /// How far a twist that ended at this pose moved a contact's sample against the other surface,
-    /// at most: the arc is bounded by its chord and what a turn adds to second order.
+    /// An upper bound on how far a twist that ended at this pose moved a contact's sample against the other surface:
+    /// the chord of the arc, and the second-order part of the turn.
     pub(crate) fn displacement(&self, contact: &Contact, twist: &Vector6<f64>) -> f64 {
         let arm = self.arm(contact);
         let turn: Vector3<f64> = twist.fixed_rows::<3>(3).into();
@@ -295,8 +293,8 @@ impl<'a> MovingBody<'a> {
         world - self.centre()
     }
 
-    /// The constraints on twists (linear part first) about the centre of mass of which a contact
-    /// demands any one, given the twist that is wanted. Appended to `out`; at least one.
+    /// The constraints of a contact on twists about the centre of mass (linear part first), any one of which is
+    /// enough, for a wanted twist. Appends at least one to `out`.
     pub(crate) fn options(
         &self,
         contact: &Contact,
@@ -312,7 +310,7 @@ impl<'a> MovingBody<'a> {
         };
         let arm = world - self.centre();
         let (v, turn) = (wanted.fixed_rows::<3>(0), wanted.fixed_rows::<3>(3));
-        // How the sample moves against the measured surface.
+        // The motion of the sample against the measured surface.
         let motion: Vector3<f64> = (v + turn.cross(&arm)) * sense;
         let sample = ContactSample {
             point: frame.inverse_transform_point(&world),
@@ -338,7 +336,7 @@ impl<'a> MovingBody<'a> {
         }
     }
 
-    /// The constraint that leads a sample that is too deep out the shortest way.
+    /// The constraint that moves a sample that is too deep out the shortest way.
     pub(crate) fn way_out(
         &self,
         contact: &Contact,

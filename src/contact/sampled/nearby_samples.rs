@@ -1,4 +1,4 @@
-//! Gathers the samples of one surface that are near another, by the other's field or without one.
+//! Gathers the samples of one surface that are near another, with the other's distance field or without it.
 
 use std::cell::Cell;
 
@@ -12,7 +12,7 @@ use crate::termination::{Interrupt, Poll, Termination};
 
 use super::{Contact, ContactSet};
 
-/// What samples are measured against.
+/// The body that samples are measured against.
 pub(super) struct MeasuredBody<'m> {
     pub(super) body: &'m Body,
     pub(super) to_measured: &'m Pose,
@@ -20,7 +20,7 @@ pub(super) struct MeasuredBody<'m> {
     pub(super) reach: f64,
 }
 
-/// By the other's field.
+/// With the body's distance field.
 pub(super) fn gather(
     tree: &SampleTree,
     measured: &MeasuredBody<'_>,
@@ -29,7 +29,7 @@ pub(super) fn gather(
     tag: impl Fn(Point3<f64>, f64, Closest) -> Contact,
 ) -> Result<(), Interrupt> {
     let MeasuredBody { body, to_measured, allowed, reach } = *measured;
-    // Deeper than nothing cannot be excluded by a bound that is only sure outside.
+    // The field's bound holds outside alone, so it excludes nothing that is deeper than zero.
     let limit = (reach - allowed).max(0.0);
     let field: &Grid = &body.field;
     let clearance = Cell::new(near.clearance);
@@ -69,19 +69,19 @@ pub(super) fn gather(
     Ok(())
 }
 
-/// How long to look.
+/// The limit on measurements.
 #[derive(Clone, Copy)]
 pub(super) struct GatherLimits<'t> {
-    /// No more often, …
+    /// The largest number of measurements …
     pub(super) most: usize,
-    /// … where what is nearer than this alone is looked for.
+    /// … of samples whose gap may be smaller than this.
     pub(super) within: f64,
     pub(super) termination: Option<&'t Termination>,
 }
 
-/// Without a field, in few looks at the other surface, which is closed; none if there are more to be. Signed
-/// distances vary by no more than the way between points, also inside: of what is deeper than nothing, far less is
-/// looked at than by fields, whose bounds are sure outside alone.
+/// Without a distance field, in few measurements against the other surface, which must be closed; `None` if more are
+/// needed. A signed distance varies by no more than the way between two points, inside as well: for penetrating
+/// samples this takes far fewer measurements than fields, whose bounds hold outside alone.
 pub(super) fn gather_exactly(
     tree: &SampleTree,
     measured: &MeasuredBody<'_>,

@@ -1,5 +1,5 @@
-//! Contacts of a pair that is looked at a few times, without fields: to fill these, and to sample all of two surfaces,
-//! takes several times as long as what is asked.
+//! Samples of a pair that is measured a few times, without distance fields: filling these, and sampling all of both
+//! surfaces, would take several times as long as the measurements.
 
 use crate::geometry::{Bounds, Pose, SampleTree};
 
@@ -8,18 +8,18 @@ use crate::termination::Interrupt;
 use super::nearby_samples::{GatherLimits, MeasuredBody, gather_exactly};
 use super::{Contact, ContactSet, ContactSide, MovingBody};
 
-/// How much to look for.
+/// How much to gather.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GatherExtent {
-    /// What is gathered has a smaller gap.
+    /// Contacts with a smaller gap are gathered.
     pub(crate) radius: f64,
-    /// What has a smaller gap than this is to be found in …
+    /// Contacts with a smaller gap must be found with no more than `most` measurements on either surface.
     pub(crate) reach: f64,
-    /// … no more looks at either surface.
+    /// See `reach`.
     pub(crate) most: usize,
 }
 
-/// Of the samples of a moving part and one that stands, both closed, those that may come near each other.
+/// The samples of a moving and a standing part, both closed, that may come near each other.
 pub(crate) struct PairSamples {
     other: usize,
     mine: SampleTree,
@@ -27,7 +27,8 @@ pub(crate) struct PairSamples {
 }
 
 impl PairSamples {
-    /// Near each other while the mover is shifted from its pose by no more than `way`: nearer than that, too.
+    /// The samples that may come nearer to the other part than `way` while the body is shifted from its pose by no
+    /// more than `way`.
     pub(crate) fn new(mover: &MovingBody<'_>, other: usize, way: f64) -> Self {
         let standing = &mover.scene.bodies[other];
         let (mine, theirs) = (&mover.body.shape, &standing.shape);
@@ -40,7 +41,7 @@ impl PairSamples {
         Self { other, mine, theirs }
     }
 
-    /// What is near at a pose, if that is told by few looks.
+    /// The contacts at a pose; `None` if they take too many measurements.
     ///
     /// # Errors
     /// The mover's termination condition became true.

@@ -1,22 +1,22 @@
-//! The planes that a sample must stay above one of.
+//! The planes of which a sample must stay above one.
 
 use nalgebra::{Point3, Vector3};
 
 use crate::geometry::{Closest, Surface};
 use crate::tolerances::ONE_PLANE_COSINE;
 
-/// A sample seen from the surface that it is near to.
+/// A sample and the surface near it.
 pub(super) struct ContactSample {
     pub(super) point: Point3<f64>,
-    /// The displacement that is wanted.
+    /// The wanted displacement.
     pub(super) motion: Vector3<f64>,
     pub(super) closest: Closest,
     pub(super) distance: f64,
-    /// How far below a plane the sample may be and still count as separated by it.
+    /// How far below a plane the sample may be and still count as above it.
     pub(super) below: f64,
 }
 
-/// A plane that a sample may be asked to stay above.
+/// A plane that a sample may stay above.
 #[derive(Clone, Copy)]
 pub(super) struct Plane {
     pub(super) normal: Vector3<f64>,
@@ -35,7 +35,7 @@ impl Planes {
         self.list.iter().flatten()
     }
 
-    /// Adds a plane, or keeps the higher of two that are nearly parallel.
+    /// Adds a plane; of two that are nearly parallel, the higher one stays.
     fn add(&mut self, plane: Plane) {
         for slot in &mut self.list {
             match slot {
@@ -54,10 +54,9 @@ impl Planes {
 }
 
 impl ContactSample {
-    /// The planes of which the sample must stay above one: those of the closest feature, and, if
-    /// the wanted motion goes below all of them, those of the feature that is closest ahead, as `closest_to` tells
-    /// of a point if there is one as near. The
-    /// solid near a convex feature lies below all its planes, so to stay above any is enough.
+    /// The planes of which the sample must stay above one: those of the closest feature. If the wanted motion goes
+    /// below all of them, also those of the feature that is closest ahead, if there is one as near (`closest_to`
+    /// finds it). Near a convex feature the solid lies below all of its planes, so it is enough to stay above any.
     pub(super) fn planes(
         &self,
         surface: &Surface,
@@ -65,13 +64,13 @@ impl ContactSample {
         out: &mut Planes,
     ) {
         let away = self.point - self.closest.point;
-        // The direction to the closest point: good unless the two coincide.
+        // The direction to the closest point is good unless the two coincide.
         let radial = away.try_normalize(1e-7).map(|d| if self.distance < 0.0 { -d } else { d });
         let above = |normal: Vector3<f64>, foot: &Point3<f64>| {
             let height = normal.dot(&(self.point - foot));
             (height >= -self.below).then_some(Plane { normal, height })
         };
-        // Too deep, the way out is the shortest one.
+        // For a sample that is too deep, the shortest way out.
         if let (Some(normal), true) = (radial, self.distance < -self.below) {
             return out.add(Plane { normal, height: self.distance });
         }
