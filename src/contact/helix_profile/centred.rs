@@ -1,9 +1,9 @@
-//! Paths off a thread, in the middle of its play.
+//! Paths off a thread in the middle of its play.
 //!
-//! An engine that pushes a part off a thread presses it against the flanks: such a path has no room,
-//! and its wobble makes many waypoints. The two threads themselves tell a
-//! better one ([`slip`](super::slip)): both axes as one, the profiles as far apart as they can be, and
-//! nothing but turning along the helix. It is a proposal, to be verified like any path.
+//! An engine that pushes a part off a thread presses it against the flanks: such a path leaves no room, and its
+//! wobble makes many waypoints. The two threads themselves determine a better one ([`slip`](super::slip)): both axes
+//! as one, the profiles as far apart as possible, and no motion but turning along the helix. It is a proposal,
+//! verified like any path.
 
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 
@@ -19,9 +19,8 @@ use super::envelope::{Envelope, ProfileZone};
 use super::path::ScrewPath;
 use super::slip::{FlankFacet, slipping};
 
-/// A path with the same start and end as a given one that turns along the thread which a part shares
-/// with one of those standing; `None` if there is no such thread, or no play in it. `limit` is the depth
-/// at which paths are refused.
+/// A path with the start and end of a given one that turns along the thread which a part shares with a standing part;
+/// `None` if there is no such thread, or no play in it. `limit` is the depth at which paths are refused.
 ///
 /// # Errors
 /// The termination condition became true.
@@ -54,25 +53,25 @@ pub(crate) fn centred(
     Ok(widest.and_then(|(_, thread)| along(&thread, (left, way), path, &course)))
 }
 
-/// The path that turns along a thread up to where the given one leaves it (angle, and way there), and from there on
-/// beside the given one to its end.
+/// The path that turns along a thread up to where the given one leaves it (angle, and place on the path), and from
+/// there on beside the given one to its end.
 fn along(
     thread: &SharedThread,
     (left, way): (f64, f64),
     path: &[Pose],
     course: &Course,
 ) -> Option<Vec<Pose>> {
-    // What is nearly off the thread is turned off it.
+    // A part that is nearly off the thread is turned off it.
     let is_near = (thread.off - left).abs() < UNSCREWING_ANGLE;
     let angle = if is_near { thread.off.abs().max(left.abs()).copysign(left) } else { left };
     let count = (angle / SCREW_POSE_ANGLE).abs().ceil().max(1.0);
     let on_thread = (0..=count as usize).map(|k| thread.pose(angle * k as f64 / count));
     let rest = course.path_between([way, course.length]);
-    // From there on as the given path, at the same distance from it, and at its end on it.
+    // From there on like the given path, at the same distance from it, and on it at the end.
     let aside = rest.first()?.inverse() * thread.pose(angle);
     let rest: Vec<Pose> = if is_near { Vec::new() } else { rest.iter().map(|p| p * aside).collect() };
     let mut poses: Vec<Pose> = path.first().copied().into_iter().chain(on_thread).chain(rest).collect();
-    // In small pieces, so that it is clear which way round it turns.
+    // In pieces so small that their sense of rotation is unique.
     let (from, to) = (*poses.last()?, *path.last()?);
     let share = |k: u32| f64::from(k) / f64::from(CENTRING_PIECES);
     poses.extend((1..CENTRING_PIECES).map(|k| interpolate(&from, &to, &course.centre, share(k))));
@@ -83,9 +82,9 @@ fn along(
 /// A thread that two parts share.
 struct SharedThread {
     helix: Helix,
-    /// The moving part in the middle of its play, in the axis frame, at the start.
+    /// The pose of the moving part in the middle of its play, in the axis frame, at the start.
     reference: Pose,
-    /// The angle by which it is off the other one.
+    /// The angle after which it is off the other part.
     off: f64,
 }
 
@@ -95,7 +94,7 @@ impl SharedThread {
         self.helix.axis_from_frame.inverse() * self.helix.screwed(angle) * self.reference
     }
 
-    /// The thread that a part on its way shares with one that stands, and the play in it.
+    /// The thread that a part on its path shares with a standing one, and the play in it.
     fn shared(
         scene: &Scene,
         (part, other): (usize, usize),

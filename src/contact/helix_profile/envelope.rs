@@ -1,10 +1,10 @@
-//! How far a surface reaches from the axis of a helix, and how near it comes to it, by the height on
-//! the helix: the profiles of a bolt and of a nut.
+//! The profile of a surface along a helix: how far it reaches from the axis, and how near it comes to it, by the
+//! height on the helix.
 //!
-//! All turns of a thread lie on each other there (see [`Helix`](crate::geometry::Helix)). If the
-//! profile of one part is beyond that of the other at every height, and nowhere nearer than the part
-//! strays from the helix, then the helical sheet between the two parts them at every angle: nothing
-//! is met. Only what is about as far from the axis as the other part needs to be known exactly.
+//! There all turns of a thread lie on each other (see [`Helix`](crate::geometry::Helix)). If the profile of one part
+//! is beyond that of the other at every height, by more than the part strays from the helix, then the helical sheet
+//! between the profiles separates the parts at every angle. Exact profiles are needed only about as far from the axis
+//! as the other part is.
 
 use std::f64::consts::TAU;
 
@@ -16,12 +16,12 @@ use crate::geometry::{Footprint, Helix, radii};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{EQUAL_GAP, PROFILE_MARGIN};
 
-/// Where a surface is along an axis and how far from it.
+/// A range along an axis and a range of distances from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ProfileZone {
-    /// From where to where along the axis.
+    /// Begin and end along the axis.
     along: [f64; 2],
-    /// From the least to the largest distance from it.
+    /// The least and the largest distance from it.
     across: [f64; 2],
 }
 
@@ -39,18 +39,18 @@ impl ProfileZone {
         })
     }
 
-    /// Where both are, and what is between if they are apart.
+    /// The common part of two zones, or the gap between them.
     pub(super) fn common(&self, other: &Self) -> Self {
         let both = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].min(b[1])];
         Self { along: both(self.along, other.along), across: both(self.across, other.across) }
     }
 
-    /// Whether nothing can be in it.
+    /// Whether it is empty.
     pub(super) fn is_empty(&self) -> bool {
         self.along[0] >= self.along[1] || self.across[0] >= self.across[1]
     }
 
-    /// The same without so much at both ends, along the axis.
+    /// The same, shorter by some length at both ends along the axis.
     pub(super) fn trimmed(self, by: f64) -> Self {
         Self { along: [self.along[0] + by, self.along[1] - by], ..self }
     }
@@ -60,7 +60,7 @@ impl ProfileZone {
         Self { along: [f64::NEG_INFINITY, f64::INFINITY], ..self }
     }
 
-    /// Whether some of a triangle may be in it.
+    /// Whether part of a triangle may be in it.
     pub(super) fn meets(&self, corners: &[Point3<f64>; 3]) -> bool {
         let [near, far] = radii(corners);
         let [low, high] = min_max(corners.iter().map(|p| p.z));
@@ -68,16 +68,16 @@ impl ProfileZone {
         meets([low, high], self.along) && meets([near, far], self.across)
     }
 
-    /// From where to where it reaches along the axis.
+    /// The range of a triangle along the axis.
     pub(super) fn along(&self) -> [f64; 2] {
         self.along
     }
 }
 
-/// From the least to the largest distance from the axis, by height on the helix.
+/// The least and the largest distance from the axis, by height on the helix.
 type Reaches = Vec<[f64; 2]>;
 
-/// Nowhere anything.
+/// An empty range.
 const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
 /// A piece of the profile along the axis.
@@ -85,11 +85,11 @@ const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 struct Slab {
     /// Empty as long as there is nothing.
     reaches: Reaches,
-    /// Whether something is further in than is told exactly, or further out.
+    /// Whether something is nearer to the axis, or further from it, than the profile is exact.
     further: [bool; 2],
 }
 
-/// What is left of a triangle that is cut, and where a piece of it reaches: kept from one to the next.
+/// Scratch memory: the rest of a triangle that is being cut, and the footprint of a piece.
 #[derive(Debug, Default)]
 struct ProfileCut {
     stack: Vec<([Point3<f64>; 3], u32)>,
@@ -99,18 +99,17 @@ struct ProfileCut {
 /// The profile of a surface.
 pub(super) struct Envelope {
     pitch: f64,
-    /// The size of a bin, the error that footprints may have.
+    /// The size of a bin: the error that footprints may have.
     finest: f64,
-    /// What is told exactly.
+    /// The zone in which the profile is exact.
     zone: ProfileZone,
-    /// Index of the first slab.
+    /// The index of the first slab.
     first: i64,
     slabs: Vec<Slab>,
 }
 
 impl Envelope {
-    /// The profile of triangles (axis frame) along a helix that rises, where another part can be
-    /// near: in `zone`.
+    /// The profile of triangles (axis frame) along a rising helix, exact in `zone`, where the other part can be near.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -132,14 +131,14 @@ impl Envelope {
             triangles.iter().for_each(|corners| envelope.add(corners, helix.rise, &mut cut));
             Ok(envelope)
         };
-        // The least and the largest are the same, however triangles are dealt out.
+        // Minimum and maximum do not depend on how triangles are dealt out.
         triangles
             .par_chunks(SHORT_STEPS_PER_POLL as usize)
             .try_fold(empty, add)
             .try_reduce(empty, |one, other| Ok(one.with(other)))
     }
 
-    /// The profile of what either is the profile of.
+    /// The profile of the union of two surfaces.
     fn with(mut self, mut other: Self) -> Self {
         if self.slabs.len() < other.slabs.len() {
             std::mem::swap(&mut self, &mut other);
@@ -190,7 +189,7 @@ impl Envelope {
         (z / self.pitch * SLABS_PER_PITCH).floor() as i64
     }
 
-    /// The slabs from one to another, made when there are none.
+    /// The slabs from one index to another, made if missing.
     fn slabs_between(&mut self, low: i64, high: i64) -> &mut [Slab] {
         let empty = || Slab { reaches: Vec::new(), further: [false; 2] };
         if self.slabs.is_empty() {
@@ -206,8 +205,8 @@ impl Envelope {
         &mut self.slabs[(low - self.first) as usize..needed]
     }
 
-    /// Notes where a footprint reaches. Its heights on the helix are beside those along the axis, from
-    /// `along[0]` to `along[1]`, by something in `beside`.
+    /// Adds a footprint. Its heights on the helix differ from those along the axis, `along[0]` to `along[1]`, by
+    /// something in `beside`.
     fn enter(&mut self, print: &Footprint, along: [f64; 2], beside: [f64; 2], reaches: &mut Reaches) {
         let (size, pitch) = (self.finest, self.pitch);
         let [from, to] = min_max(print.points.iter().map(|p| p.y));
@@ -246,9 +245,8 @@ impl Envelope {
         all
     }
 
-    /// Whether this surface, between two places along the axis, stays apart from another between two
-    /// places, which is shifted along the axis and strays from there, the more the further its points
-    /// are from the axis.
+    /// Whether this surface, between two places along the axis, stays apart from another one, between two places,
+    /// which is shifted along the axis and strays from there, the more the further its points are from the axis.
     pub(super) fn is_apart(
         &self,
         places: [f64; 2],
@@ -266,7 +264,7 @@ impl Envelope {
         if !stray.is_finite() || inner <= 2.0 * stray {
             return false;
         }
-        // A way in space is a little longer in the half plane.
+        // A distance in space is a little longer in the half plane.
         let margin = stray * 1.0f64.hypot(2.0 * self.pitch / TAU / inner);
         let (size, bins) = (self.finest, HEIGHTS_PER_PITCH as i64);
         let moved = (shift / size).floor() as i64;
@@ -288,8 +286,8 @@ impl Envelope {
         is_inside(&one, &other, moved) || is_inside(&other, &one, -moved)
     }
 
-    /// By how much another profile is to be shifted along the axis, no further than `most`, so that the
-    /// gap across the axis between the two is as wide as can be, and that gap, if there is one.
+    /// The shift of another profile along the axis, up to `most`, that makes the gap across the axis widest, and that
+    /// gap, if there is one.
     pub(super) fn widest_gap(&self, other: &Self, most: f64) -> Option<(f64, f64)> {
         let everywhere = [f64::NEG_INFINITY, f64::INFINITY];
         let (one, other) = (self.between(everywhere), other.between(everywhere));
@@ -309,7 +307,7 @@ impl Envelope {
     }
 }
 
-/// From where to where a footprint reaches across, by bins of heights of some size; the first bin.
+/// The range of a footprint across the axis, by bins of heights of some size, and the first bin.
 fn reached(print: &Footprint, size: f64, reaches: &mut Reaches) -> i64 {
     let [low, high] = min_max(print.points.iter().map(|p| p.y));
     let bins =
@@ -340,7 +338,7 @@ fn reached(print: &Footprint, size: f64, reaches: &mut Reaches) -> i64 {
     first
 }
 
-/// Makes a reach hold another.
+/// Extends a range to hold another.
 fn widen(reach: &mut [f64; 2], other: &[f64; 2]) {
     *reach = [reach[0].min(other[0]), reach[1].max(other[1])];
 }
@@ -349,7 +347,7 @@ fn min_max(values: impl Iterator<Item = f64>) -> [f64; 2] {
     values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
 }
 
-/// The two halves of a triangle, cut across the side that is longest beside the axis.
+/// The two halves of a triangle, cut across the side that is longest across the axis.
 fn halves(corners: &[Point3<f64>; 3]) -> [[Point3<f64>; 3]; 2] {
     let length = |i: usize| (corners[(i + 1) % 3] - corners[i]).xy().norm_squared();
     let side = (1..3).fold(0, |best, i| if length(i) > length(best) { i } else { best });

@@ -1,11 +1,11 @@
-//! Depth along screws: what the profiles of two parts along their helix settle, and the rest.
+//! Depth along screws, bounded by the profiles of two parts along their helix.
 //!
-//! Along a helix, surfaces keep their profile (`envelope`; the helix that a path follows, and how far it
-//! strays from it: `path`): one comparison settles ten turns. Where it does not, because the part strays
-//! too far, or a head meets its seat, it is made on each half of the way, where the part strays less.
-//! What short stretches leave open is left to [`path`](super::region_cover::path), as far as that gets, and to
-//! samples: but for these the answer is the same kind of bound. A path in the middle of a thread's play
-//! (`centred`, from the flanks that face each other: `slip`) has the room that such a bound needs.
+//! Along a helix a surface keeps its profile (`envelope`; the helix that a path follows, and how far it strays from
+//! it: `path`), so one comparison bounds ten turns. If it does not, because the part strays too far or a head meets
+//! its seat, each half of the stretch is compared, where the part strays less. Short stretches that stay open are
+//! left to [`path`](super::region_cover::path), as far as its budget goes, and to samples; otherwise the answer is
+//! the same kind of bound. A path in the middle of a thread's play (`centred`, from the flanks that face each other:
+//! `slip`) leaves the room that such a bound needs.
 
 use crate::budgets::{EFFORT_BEFORE_PROFILES, PATH_EFFORT_IN_DOUBT};
 use crate::tolerances::{SCREW_TURN, SHORTEST_SCREW_STRETCH, STRAY_SHARE};
@@ -29,8 +29,8 @@ use super::region_cover::path::{PathDepth, PathQuestion};
 use envelope::{Envelope, ProfileZone};
 use path::{AxisBoxes, ScrewPath};
 
-/// The stretches of the way on which the profiles of two surfaces, one of which is screwed past the other,
-/// do not show that they are apart.
+/// The stretches of a path on which the profiles of two surfaces, one screwed past the other, do not prove that they
+/// are apart.
 ///
 /// # Errors
 /// The termination condition became true.
@@ -79,22 +79,22 @@ fn unsettled(
     Ok(open)
 }
 
-/// How deep two parts get into each other along a screw: the moving one into the standing one, and the
-/// other way round. Stretches that could not be bounded are told as open.
+/// How deep two parts get into each other along a screw: the moving one into the standing one, and the other way
+/// round. Stretches without a bound are in [`PathDepth::open`].
 ///
 /// # Errors
 /// The termination condition became true.
 pub(crate) fn depth_on_screw(way: &PathQuestion<'_>, limit: f64) -> Result<[PathDepth; 2], Interrupt> {
     let surfaces = way.passing.surfaces();
-    // Depth changes its sign in mid-air where there are holes, and there alone.
+    // Only where there are holes, depth changes its sign in mid-air.
     if surfaces.iter().any(|surface| surface.rim().is_some()) {
         let unknown = || PathDepth { open: vec![Interval::WHOLE], ..PathDepth::default() };
         return Ok([unknown(), unknown()]);
     }
-    // A part that shares no thread with the moving one is soon told to be apart.
+    // A part that shares no thread with the moving one is soon bounded.
     let mut found = bounded(way, vec![Interval::WHOLE], EFFORT_BEFORE_PROFILES)?;
     if way.passing.allowed > 0.0 {
-        // One part lies in the other: surfaces cross, and no more effort would tell how deep.
+        // One part lies in the other: surfaces cross, and more effort would bound no more.
         return Ok(found);
     }
     let open = taken_open(&mut found);
@@ -110,8 +110,8 @@ pub(crate) fn depth_on_screw(way: &PathQuestion<'_>, limit: f64) -> Result<[Path
     Ok([one, other])
 }
 
-/// Looks for the deepest points of both surfaces on some stretches of the way, with no more than some
-/// effort on each side. Long ones are halved first.
+/// The deepest points of both surfaces on some stretches, with no more than some effort on each side. Long stretches
+/// are halved first.
 fn bounded(
     way: &PathQuestion<'_>,
     stretches: Vec<Interval>,
@@ -136,7 +136,7 @@ fn bounded(
     Ok([one?, other?])
 }
 
-/// The stretches that are open on either side, which are none then.
+/// Takes out the stretches that are open on either side.
 fn taken_open(found: &mut [PathDepth; 2]) -> Vec<Interval> {
     let open: Vec<Interval> = found.iter_mut().flat_map(|f| std::mem::take(&mut f.open)).collect();
     let mut apart: Vec<Interval> =

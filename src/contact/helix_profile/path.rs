@@ -1,9 +1,9 @@
 //! The helix that a path follows, and how far it strays from it.
 //!
-//! At every time, the part is where a fixed reference pose was screwed to, but for a small
-//! displacement: a nut in its play rattles. The axis is that on which directions in the part and in
-//! space keep together (the largest singular value of the sum of all rotations) and points keep their
-//! distance (least squares); what lies far off, such as the last pull, is left out.
+//! At every time the part is where a fixed reference pose was screwed to, up to a small displacement: a nut rattles
+//! in its play. The direction of the axis is the one that the part and space keep in common (the largest singular
+//! value of the sum of all rotations), and its place follows from points that keep their distance (least squares).
+//! What lies far off, such as a last pull, is left out.
 
 use nalgebra::{Matrix3, Point3, Quaternion, SMatrix, SVector, Translation3, UnitQuaternion, Vector3};
 
@@ -13,20 +13,20 @@ use crate::tolerances::{LEAST_PITCH, OUTLIER};
 
 use super::super::course::{Course, Interval, PathSegment};
 
-/// A short piece of the way.
+/// A short piece of the path.
 #[derive(Debug, Clone)]
 struct Knot {
-    /// From where to where on the way.
+    /// Its begin and end on the path.
     way: [f64; 2],
     /// The angles there, counted from the start.
     angles: [f64; 2],
-    /// The pose of the shape in the middle.
+    /// The pose of the shape in the middle of the piece.
     pose: Pose,
     /// The same in the axis frame, screwed back by the angle there.
     unscrewed: Pose,
-    /// From there, the part's middle moves no further, when screwed back.
+    /// The largest displacement of the part's centre from there, when screwed back.
     strays: f64,
-    /// Nor does the part turn further.
+    /// The largest rotation from there.
     turns: f64,
 }
 
@@ -41,42 +41,43 @@ pub(super) struct ScrewPath {
     knots: Vec<Knot>,
 }
 
-/// Where two parts are in the axis frame, the moving one at the reference pose: boxes along the axis do not
-/// depend on how the parts lie in the world.
+/// Two parts in the axis frame, the moving one at the reference pose: boxes along the axis do not depend on how the
+/// parts lie in the world.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct AxisBoxes {
     pub(super) moving: Bounds,
     pub(super) standing: Bounds,
 }
 
-/// A stretch of the way, as far as the two parts can meet there.
+/// A stretch of the path, as far as the two parts can meet there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ScrewStretch {
-    /// How much further along the axis it is than the reference says.
+    /// How much further along the axis it is than the reference.
     pub(super) shift: f64,
-    /// The middle of where it can meet the other part is no further from where this says.
+    /// The largest distance, from the place that the reference gives, of the centre of where it can meet the other
+    /// part.
     pub(super) strays: f64,
-    /// The part is turned no further against what this says.
+    /// The largest rotation against the reference.
     pub(super) tilt: f64,
-    /// How far along the axis the parts can meet on either side of that middle.
+    /// How far along the axis the parts can meet on either side of that centre.
     pub(super) height: f64,
-    /// Between which places along the axis what can meet the other part is: of the moving part at the
-    /// reference pose, and of the standing one.
+    /// The ranges along the axis in which the parts can meet: of the moving part at the reference pose, and of the
+    /// standing one.
     pub(super) places_of_moving: [f64; 2],
     pub(super) places_of_standing: [f64; 2],
 }
 
 impl ScrewStretch {
-    /// How far points so far from the axis may be from where this says, if they can meet the other
-    /// part at all.
+    /// The largest distance of a point at some radius from the place that the reference gives, if it can meet the
+    /// other part.
     pub(super) fn stray(&self, radius: f64) -> f64 {
         (self.strays + self.tilt * radius.hypot(self.height)) / (1.0 - self.tilt)
     }
 }
 
 impl ScrewPath {
-    /// The helix that most of some stretches of the way are close to, told by pieces on which no point
-    /// strays much further than `finest`.
+    /// The helix to which most of some stretches are close, from pieces on which no point strays much further than
+    /// `finest`.
     pub(super) fn new(course: &Course, stretches: &[Interval], finest: f64) -> Option<Self> {
         let stretches: Vec<[f64; 2]> = stretches.iter().map(|i| i.of(course.length)).collect();
         let is_in = |s: &&PathSegment| {
@@ -93,7 +94,7 @@ impl ScrewPath {
         Some(path)
     }
 
-    /// A pose close to most of the unscrewed ones.
+    /// A pose close to most of those that were screwed back.
     fn mean(&self, stretches: &[[f64; 2]]) -> Option<Pose> {
         let is_in = |k: &Knot| stretches.iter().any(|[from, to]| k.way[0] < *to && *from < k.way[1]);
         let weight = |k: &Knot| if is_in(k) { (k.angles[1] - k.angles[0]).abs() } else { 0.0 };
@@ -118,13 +119,13 @@ impl ScrewPath {
         mean
     }
 
-    /// Where it is last as near to the helix as `near`: the angle, and the way there.
+    /// The last place as near to the helix as `near`: the angle, and the place on the path.
     pub(super) fn leaves(&self, near: f64) -> Option<(f64, f64)> {
         let off = |k: &&Knot| (k.unscrewed * self.centre - self.reference * self.centre).norm() <= near;
         self.knots.iter().rev().find(off).map(|k| (k.angles[1], k.way[1]))
     }
 
-    /// What is known of a stretch: `None` if the two parts are nowhere near each other.
+    /// The data of a stretch; `None` if the two parts are nowhere near each other.
     pub(super) fn stretch(
         &self,
         interval: Interval,
@@ -134,7 +135,7 @@ impl ScrewPath {
         let [from, to] = interval.of(self.length);
         let first = self.knots.partition_point(|k| k.way[1] < from);
         let knots = || self.knots[first..].iter().take_while(|k| k.way[0] <= to);
-        // Where the moving part can meet the other, and how far it is from the reference there.
+        // The place where the moving part can meet the other, and its distance from the reference there.
         let zones = knots().map(|k| {
             let near = standing
                 .grown((k.way[1] - k.way[0]) / 2.0)
@@ -174,7 +175,7 @@ impl ScrewPath {
     }
 }
 
-/// A segment in its middle, with how far it turns, and how far all before it turned.
+/// The middle of a segment, the angle by which it turns, and the angle before it.
 struct SegmentSample {
     pose: Pose,
     turn: Vector3<f64>,
@@ -189,12 +190,12 @@ impl SegmentSample {
     }
 }
 
-/// How a segment turns.
+/// The rotation of a segment.
 fn turn(segment: &PathSegment) -> Vector3<f64> {
     (segment.to.rotation * segment.from.rotation.inverse()).scaled_axis()
 }
 
-/// The helix that most of some poses are screwed along.
+/// The helix along which most of some poses are screwed.
 fn fit(samples: &[SegmentSample], centre: &Point3<f64>) -> Option<Helix> {
     let mut weights: Vec<f64> = samples.iter().map(|s| s.turn.norm()).collect();
     let mut found = None;
@@ -208,7 +209,7 @@ fn fit(samples: &[SegmentSample], centre: &Point3<f64>) -> Option<Helix> {
         let (axis, own) = (u.column(largest).into_owned(), v.row(largest).transpose());
         let along: f64 = weighted().map(|(s, w)| s.turn.dot(&axis) * w).sum();
         let (axis, own) = if along < 0.0 { (-axis, -own) } else { (axis, own) };
-        // A point of space and one of the part that stay together beside the axis.
+        // A point of space and one of the part that stay together across the axis.
         let across = Matrix3::identity() - axis * axis.transpose();
         let mut normal = SMatrix::<f64, 6, 6>::identity() * 1e-9;
         let mut right = SVector::<f64, 6>::zeros();
@@ -258,7 +259,7 @@ fn line(x: &[f64], y: &[f64], weights: &[f64]) -> Option<(f64, f64)> {
     (sum > 0.0 && of_x > 0.0).then(|| (of_both / of_x, my - mx * of_both / of_x))
 }
 
-/// Takes the weight from what is much further off than most.
+/// Takes the weight from points that are much further off than most.
 fn leave_out(weights: &mut [f64], off: &[f64]) {
     let mut order: Vec<usize> = (0..off.len()).collect();
     order.sort_by(|&i, &j| off[i].total_cmp(&off[j]));
@@ -273,7 +274,7 @@ fn leave_out(weights: &mut [f64], off: &[f64]) {
     weights.iter_mut().zip(off).filter(|(_, off)| **off > most).for_each(|(w, _)| *w = 0.0);
 }
 
-/// The way in pieces on which nothing moves much when it is screwed back.
+/// The path in pieces on which nothing moves much when it is screwed back.
 fn knots(course: &Course, helix: &Helix, finest: f64) -> Vec<Knot> {
     let frame = helix.axis_from_frame;
     let mut angle = 0.0;
@@ -282,8 +283,8 @@ fn knots(course: &Course, helix: &Helix, finest: f64) -> Vec<Knot> {
         let turn = frame.rotation * turn(s);
         let by = turn.z;
         let [a, b] = [s.from, s.to].map(|pose| frame * (pose * course.centre));
-        // Speeds per segment: of the middle against a point screwed along (linear in the place, so at
-        // its largest at an end), and of the rotation.
+        // Speeds per segment: of the centre against a point that is screwed along (linear in the place, so largest at
+        // an end), and of the rotation.
         let along = |p: &Point3<f64>| (b - a) - Vector3::new(-p.y, p.x, helix.rise) * by;
         let speed = along(&a).norm().max(along(&b).norm());
         let turning = (turn - Vector3::z() * by).norm();

@@ -1,11 +1,10 @@
 //! Threads of surfaces, found by how they slip.
 //!
-//! A surface slips along a screw motion that keeps every point's velocity in its tangent plane
-//! (N. Gelfand and L. Guibas 2004, Shape segmentation using local slippage analysis): the flanks of a
-//! thread do so along their own helix. Of the screws near a given one, that along which the flanks of a
-//! surface slip best is a linear least-squares problem; facets that belong to something else (chamfers,
-//! run-outs) are weighed down by how badly they slip (A. Beaton and J. Tukey 1974, iterative
-//! reweighting, here with Cauchy's weights).
+//! A surface slips along a screw motion that keeps every point's velocity in its tangent plane (N. Gelfand and L.
+//! Guibas 2004, Shape segmentation using local slippage analysis): the flanks of a thread do so along their own
+//! helix. Of the screws near a given one, the screw along which the flanks slip best is a linear least-squares
+//! problem. Facets of something else (chamfers, run-outs) get smaller weights the worse they slip (A. Beaton and J.
+//! Tukey 1974, iterative reweighting, here with Cauchy's weights).
 
 use nalgebra::{Point3, SMatrix, SVector, Vector3};
 
@@ -24,7 +23,7 @@ pub(super) struct FlankFacet {
 impl FlankFacet {
     pub(super) fn of(corners: &[Point3<f64>; 3]) -> Option<Self> {
         let double = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
-        // Right triangles on a curved surface have the normal that it has there.
+        // Right triangles on a curved surface have the normal of the surface.
         let side = |i: usize| (corners[(i + 1) % 3] - corners[i]).norm_squared();
         let longest = (1..3).fold(0, |best, i| if side(i) > side(best) { i } else { best });
         let middle = nalgebra::center(&corners[longest], &corners[(longest + 1) % 3]);
@@ -32,10 +31,9 @@ impl FlankFacet {
     }
 }
 
-/// The helix of some rise along which the flanks among some facets slip best; that along z is close to
-/// it, in whose frame they are given. `None` if they are too few or tell no axis. (Facets on a grid lean
-/// all the same way against the flank that they stand for, and would tell a false rise; about the axis,
-/// that evens out.)
+/// The helix of some rise along which the flanks among some facets slip best, near the z axis of the frame of the
+/// facets. `None` if there are too few, or they determine no axis. (Facets on a grid lean all the same way against
+/// their flank and would give a false rise; around the axis this evens out.)
 pub(super) fn slipping(facets: &[FlankFacet], rise: f64) -> Option<Helix> {
     // The speed along the normal is linear in the twist: ω = (a, b, 1), v = (c, d, rise).
     let row = |f: &FlankFacet| {

@@ -38,18 +38,18 @@ pub(super) enum Step {
 /// A step that was made.
 pub(super) struct Moved {
     pub(super) pose: Pose,
-    /// By which angle, in radians.
+    /// The angle by which it turned, in radians.
     pub(super) turned: f64,
     pub(super) touching: Vec<usize>,
-    /// What is near the new pose comes along: it was gathered to check that pose.
+    /// The contacts at the new pose, which were gathered to check it.
     pub(super) near: ContactSet,
     /// Twists against what holds the part back, of any length.
     pub(super) pressing: Vec<Vector6<f64>>,
-    /// Where it passed, if it did not go straight there.
+    /// The poses on the way, if the step was not straight.
     pub(super) via: Vec<Pose>,
 }
 
-/// The wanted twist of an action for one part, and the metric.
+/// The wanted twist of an action for a part, and the metric.
 pub(super) struct Drive {
     /// Wanted twist (linear part first) of one contact step.
     wanted: Vector6<f64>,
@@ -58,8 +58,8 @@ pub(super) struct Drive {
     gyration: f64,
     step: f64,
     turns: bool,
-    /// Whether it slides along what it is pressed to in steps as long as they may be. What is pulled and turned
-    /// at once finds its thread by short ones.
+    /// Whether it slides along what it is pressed to in the longest steps. A part that is pulled and turned at once
+    /// finds its thread in short steps.
     takes_long_steps: bool,
 }
 
@@ -93,17 +93,17 @@ impl Drive {
         }
     }
 
-    /// How long a step in contact is.
+    /// The length of a step in contact.
     pub(super) fn step(&self) -> f64 {
         self.step
     }
 
-    /// How far contacts are looked for.
+    /// The reach within which contacts are gathered.
     pub(super) fn reach(&self) -> f64 {
         self.step * CONTACT_REACH
     }
 
-    /// What a step begins with, as [`Self::advance`] does.
+    /// The start of a step, as in [`Self::advance`].
     pub(super) fn constraints(
         &self,
         mover: &MovingBody<'_>,
@@ -152,7 +152,7 @@ impl Drive {
                     Attempt::Moved(step) => return Ok(Step::Moved(step)),
                     Attempt::Stuck(by) => {
                         with = by;
-                        // A shorter step would be stopped by the same constraints.
+                        // The same constraints would stop a shorter step.
                         break;
                     }
                     Attempt::Entered(by) => with = by,
@@ -160,12 +160,12 @@ impl Drive {
                 around.add_known(mover, near)?;
             }
         }
-        // A slot's wall may be taken for one that stops the pull as well: then nothing does.
+        // The wall of a slot may also be taken for a wall that stops the pull: then nothing stops it.
         Ok(self.pulled_free(mover, near, around)?.map_or(Step::Stuck { with }, Step::Moved))
     }
 
-    /// So much more of what is wanted that the motion, as contacts let it, is as long as a step in contact may be;
-    /// none if it nearly is already. Without inertia the same way is gone, in fewer steps.
+    /// The wanted twist, lengthened so that the motion that contacts allow is as long as a contact step; `None` if it
+    /// nearly is. Without inertia the part goes the same way in fewer steps.
     fn stretched(&self, mover: &MovingBody<'_>, known: &KnownConstraints) -> Option<Vector6<f64>> {
         if !self.takes_long_steps || known.rows.is_empty() {
             return None;
@@ -178,8 +178,8 @@ impl Drive {
         is_worth_it.then(|| self.wanted * stretch.min(STEP_STRETCH.end))
     }
 
-    /// A step in contact may be so many times as long as a twist: by how far points travel, and by how much the arc
-    /// bulges.
+    /// How many times as long as a twist a contact step may be: by the travel of points, and by the bulge of their
+    /// arcs.
     fn longest(&self, mover: &MovingBody<'_>, twist: &Vector6<f64>) -> f64 {
         let shape = &mover.body.shape;
         let (v, turn): (Vector3<f64>, Vector3<f64>) =
@@ -194,8 +194,8 @@ impl Drive {
         by_travel(arc).min((8.0 * radius * STEP_BULGE).sqrt() / arc)
     }
 
-    /// Projects the wanted twist until the trial pose is free of entry. If it is stretched, the motion is no longer
-    /// than a step in contact.
+    /// Projects the wanted twist until nothing enters at the trial pose. A lengthened motion is no longer than a
+    /// contact step.
     fn attempt(
         &self,
         mover: &MovingBody<'_>,
@@ -209,7 +209,7 @@ impl Drive {
         let mut entered = Vec::new();
         for round in 0..rounds {
             mover.check()?;
-            // Rows that nearly contradict each other meet far away: nothing on the way there is looked at.
+            // Constraints that nearly contradict each other meet far away; nothing on the way there would be checked.
             let is_near = |p: &Projected| p.w.norm_squared() <= STEP_OVERSHOOT * target.norm_squared();
             let Some(result) = self.projected(&target, &rows, round == 0).filter(is_near) else { break };
             let touching = result.others(&rows);
@@ -222,8 +222,8 @@ impl Drive {
                 twist *= self.longest(mover, &twist).min(1.0);
             }
             let trial = MovingBody { pose: self.displaced(mover, &twist), ..*mover };
-            // From the second round on, those behind the constraints first: most of what enters is
-            // among them.
+            // From the second round on, the contacts behind the constraints come first: most of what enters is among
+            // them.
             let mut violated = Vec::new();
             if round > 0 {
                 violated = self.violations(&trial, &working, &twist);
@@ -269,7 +269,7 @@ impl Drive {
                 let row = self.freed(trial.way_out(c, &mut options)?);
                 // Linearised at the trial pose: gap(u) ≈ gap(u₀) + a·(u − u₀) ≥ 0.
                 let row = VelocityConstraint { b: row.b - row.a.dot(&twist), ..row };
-                // A plane that the sample was beyond already at the start does not separate it.
+                // A plane that the sample was below at the start already does not separate it.
                 let separates = row.b >= -2.0 * DEPTH_TOLERANCE;
                 if separates {
                     return Some(row);
@@ -284,9 +284,9 @@ impl Drive {
         Ok(Attempt::Entered(entered))
     }
 
-    /// Whether a turn that is clear at both ends is so on the way: points move on arcs, which
-    /// bulge, and what is pulled as well may turn before it is out. Contacts further off at both ends than twice the
-    /// bulge are not asked.
+    /// Whether a turn whose ends are free is free in between: points move on arcs, which bulge, and a part that is
+    /// also pulled may turn before it is out. Contacts that are further off at both ends than twice the bulge are
+    /// left out.
     fn is_clear_between(
         &self,
         (from, near): (&MovingBody<'_>, &ContactSet),
@@ -306,9 +306,9 @@ impl Drive {
         })
     }
 
-    /// One constraint per contact, reduced, and which contacts they come from. Where a contact
-    /// leaves a choice of planes, the one is taken along which the motion gets furthest that the
-    /// contacts without a choice allow: at the rim of a hole, that is the hole's wall.
+    /// One constraint for each contact, reduced, and the contacts that they come from. If a contact has several
+    /// planes, the constraint is of the plane along which the motion gets furthest, as far as the contacts with one
+    /// plane allow: at the rim of a hole, that is the wall of the hole.
     fn chosen(
         &self,
         mover: &MovingBody<'_>,
@@ -347,7 +347,7 @@ impl Drive {
         Ok(KnownConstraints { rows, working, rounds: EAGER_ROUNDS })
     }
 
-    /// A row without the freedoms that the action does not give.
+    /// A constraint without the freedoms that the action does not have.
     fn freed(&self, mut row: VelocityConstraint) -> VelocityConstraint {
         if !self.turns {
             row.a.fixed_rows_mut::<3>(3).fill(0.0);
@@ -355,8 +355,8 @@ impl Drive {
         row
     }
 
-    /// Projects in the metric. Rows that are slightly violated at the start ask to be left; if that
-    /// is impossible, they are only kept from getting worse.
+    /// Projects in the metric. Constraints that are slightly violated at the start are to be left; if that is
+    /// impossible, they must not get worse.
     fn projected(
         &self,
         target: &Vector6<f64>,
@@ -375,7 +375,7 @@ impl Drive {
         if result.is_none() && first { project(target, &scaled(0.0)) } else { result }
     }
 
-    /// Of some contacts, those that are too deep at the trial pose, measured there.
+    /// The contacts that are too deep at the trial pose, measured there.
     fn violations(&self, trial: &MovingBody<'_>, contacts: &[Contact], twist: &Vector6<f64>) -> Vec<Contact> {
         contacts
             .iter()
@@ -385,9 +385,8 @@ impl Drive {
             .collect()
     }
 
-    /// Against what a projected motion is pressed: each contact that holds a translation back by
-    /// itself; of a motion that may turn, the whole that contact takes away, for there the points
-    /// of contact change all the time.
+    /// The directions in which contact holds a projected motion back: of a translation, each contact alone; of a
+    /// motion that may turn, all that contact takes away, as its points of contact change all the time.
     fn pressing(
         &self,
         target: &Vector6<f64>,
@@ -403,7 +402,7 @@ impl Drive {
         }
         let normals: Vec<Vector6<f64>> = result.active.iter().map(|(i, _)| rows[*i].a).collect();
         let alone = |i: usize| {
-            // Without what pushes into the others.
+            // Without the part that pushes into the others.
             let mut basis: Vec<Vector6<f64>> = Vec::new();
             for (_, n) in normals.iter().enumerate().filter(|(j, _)| *j != i) {
                 let rest = basis.iter().fold(*n, |rest, b| rest - b * b.dot(n));
@@ -448,25 +447,25 @@ pub(super) fn contact_step(shape: &Shape) -> f64 {
     (shape.bounds().extents().min() * 0.5).clamp(SHORTEST_CONTACT_STEP, CONTACT_STEP)
 }
 
-/// What the first projection of a step knows of the contacts; tried in this order.
+/// What the first projection of a step knows of the contacts. Tried in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FirstGuess {
-    /// One plane each: the one along which the motion gets furthest that contacts without a choice
+    /// One plane for each contact: the one along which the motion gets furthest, as far as contacts with one plane
     /// allow.
     Certain,
-    /// None: constraints come only from what enters at a trial, linearised there. Finds the way
-    /// where every plane chosen before the motion is the wrong one of a corner's.
+    /// No contact: constraints come only from what enters at a trial, linearised there. This finds the way where
+    /// every plane that was chosen beforehand is the wrong one of a corner's.
     Lazy,
 }
 
-/// What a step begins with.
+/// The constraints from which a step starts.
 #[derive(Clone)]
 pub(super) struct KnownConstraints {
-    /// The constraints, …
+    /// The constraints.
     rows: Vec<VelocityConstraint>,
-    /// … and the contacts that they come from.
+    /// The contacts that they come from.
     working: Vec<Contact>,
-    /// How many times it is projected at most.
+    /// The largest number of projections.
     rounds: usize,
 }
 

@@ -1,8 +1,8 @@
 //! Free flight: how far a push goes before it meets anything.
 //!
-//! Where nothing bends a push, regions further on along its line would only tell that nothing is there. So the
-//! way to where it meets something is told by the edges and corners that lead ([`ShapeCast`]), in stretches as
-//! long as the longest regions. There, and wherever the push is bent, regions tell.
+//! Where nothing bends a push, regions along its line would only show that nothing is there. So the edges and corners
+//! that lead are cast ([`ShapeCast`]) to where they meet something, in stretches as long as the longest regions.
+//! There, and wherever something bends the push, regions take over.
 
 use nalgebra::Vector3;
 
@@ -14,33 +14,33 @@ use crate::tolerances::{
     BULGE_TOLERANCE, FLIGHT_STRETCH, FREE_STEP, LANDING, ROUNDED, SHORTEST_FLIGHT, TILT,
 };
 
-/// The flights of a push.
+/// The free flight of a push.
 #[derive(Clone, Copy)]
 pub(super) struct FreeFlight<'a> {
     scene: &'a Scene,
     standing: &'a [usize],
     part: usize,
     termination: &'a Termination,
-    /// How much further it flies, and whether something is met there.
+    /// How much further it flies, and whether it meets something there.
     left: f64,
     is_met: bool,
     state: FlightState,
-    /// Whether there was one.
+    /// Whether it has flown.
     pub(super) any: bool,
 }
 
-/// What a push is about to do.
+/// How a push goes on.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum FlightState {
-    /// To fly, if nothing is in the way.
+    /// Fly, if nothing is in the way.
     Ready,
-    /// To fly on, or to land.
+    /// Fly on, or land.
     Aloft,
-    /// To follow regions, until it was bent …
+    /// Follow regions, until something bends the push.
     Grounded,
-    /// … and then until it is not any more.
+    /// Follow regions, until nothing bends the push any more.
     Bent,
-    /// To follow regions.
+    /// Follow regions to the end.
     Never,
 }
 
@@ -63,13 +63,12 @@ impl<'a> FreeFlight<'a> {
         }
     }
 
-    /// The same of a push that is not to fly.
+    /// For a push that must not fly.
     pub(super) fn never(self) -> Self {
         Self { left: 0.0, is_met: false, state: FlightState::Never, any: false, ..self }
     }
 
-    /// A step by regions was bent, or was not: where nothing bends a push any more that something did bend, it may
-    /// fly again.
+    /// Notes whether a step by regions was bent. Where nothing bends a push any more, it may fly again.
     pub(super) fn stepped(&mut self, is_bent: bool) {
         self.state = match (self.state, is_bent) {
             (FlightState::Grounded, true) => FlightState::Bent,
@@ -78,8 +77,8 @@ impl<'a> FreeFlight<'a> {
         };
     }
 
-    /// The next step of a flight from a pose, where the part's box is so, along the unit vector `u`; none where
-    /// regions are to tell.
+    /// The next step of a flight from a pose, with the part's box there, along the unit vector `u`; `None` where
+    /// regions take over.
     pub(super) fn step(
         &mut self,
         from: &Pose,
@@ -90,7 +89,8 @@ impl<'a> FreeFlight<'a> {
             return Ok(None);
         }
         if self.left == 0.0 {
-            // What is met at a small angle may have been entered a little: to another flight that is allowed.
+            // A face that is met at a small angle may have been entered a little: another flight counts that as
+            // allowed.
             let lands = std::mem::take(&mut self.is_met);
             (self.left, self.is_met) = if lands { (0.0, false) } else { self.length(from, bounds, u)? };
         }
@@ -106,8 +106,8 @@ impl<'a> FreeFlight<'a> {
         self.state == FlightState::Aloft
     }
 
-    /// How far it gets before it meets anything, up to a [`FLIGHT_STRETCH`], and whether it meets anything; 0 where that is
-    /// hardly worth anything. It depends on nothing but what the box meets on this stretch.
+    /// How far it goes until it meets something, up to [`FLIGHT_STRETCH`], and whether it does; 0 if that is too
+    /// short. It depends only on what the box meets on this stretch.
     fn length(&self, from: &Pose, bounds: &Bounds, u: &Vector3<f64>) -> Result<(f64, bool), Interrupt> {
         let Self { scene, standing, part, termination, .. } = *self;
         let end = u * (FLIGHT_STRETCH + LANDING);
@@ -115,7 +115,7 @@ impl<'a> FreeFlight<'a> {
         let (mut length, mut is_met) = (FLIGHT_STRETCH, false);
         for other in scene.broad_phase.meeting_of(standing, &swept) {
             let allowed = scene.allowed.of(part, other) + ROUNDED;
-            // As deep as it may be before.
+            // By the depth that it may have before.
             let back = allowed + BULGE_TOLERANCE;
             let margins = CastMargins { allowed, back, steepness: TILT, sunk: ROUNDED };
             let passed = bounds.grown(allowed).way_past(&scene.bodies[other].bounds, u);

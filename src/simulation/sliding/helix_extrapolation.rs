@@ -1,11 +1,10 @@
 //! Long steps along a motion that stays the same: along a wall, down a hole, off a thread.
 //!
-//! Steps of equal displacement show a screw (a line, if nothing turns). It is followed as far as
-//! the fields show that nothing is entered, and that what the part is pressed against is still
-//! there, so that it falls into a slot as it would in short steps. Where a leap lands, everything
-//! is measured exactly. Threads of triangles make a part that is pressed to them wobble; such a part
-//! is lifted into the middle of its play, and the mean screw of its steps is followed there, each leap
-//! twice as long as the one before: where it lands, the screw is known twice as well.
+//! Steps of equal displacement show a screw (a line, if nothing turns). It is followed as long as the fields show
+//! that nothing is entered and that what the part is pressed against is still there, so the part falls into a slot as
+//! it would in short steps. At the end of a long step everything is measured exactly. A part that is pressed to a
+//! thread of triangles wobbles; it is lifted into the middle of its play, and the mean screw of its steps is followed
+//! there. Each long step is twice as long as the one before: at its end, the screw is known twice as well.
 
 use std::f64::consts::TAU;
 
@@ -23,39 +22,39 @@ use crate::tolerances::{
 
 use super::drive::Drive;
 
-/// What a leap came to.
+/// A long step.
 pub(super) struct HelixLeap {
-    /// The poses on the way, the last one where it lands.
+    /// Its poses, the last one at its end.
     pub(super) poses: Vec<Pose>,
-    /// What is near there, if that was looked for.
+    /// The contacts at its end, if they were gathered.
     pub(super) near: Option<ContactSet>,
-    /// The angle, in radians.
+    /// The angle by which it turns, in radians.
     pub(super) turned: f64,
 }
 
-/// A helix that is followed.
+/// A helix that is being followed.
 #[derive(Clone)]
 struct FollowedHelix {
     /// The displacement of one step.
     screw: Screw,
-    /// How many steps the next leap is to have.
+    /// The number of steps of the next long step.
     length: usize,
     pressing: Vec<Vector6<f64>>,
 }
 
-/// Sees when a motion stays the same, and follows it.
+/// Detects a motion that stays the same, and extrapolates it.
 pub(super) struct HelixExtrapolation<'a> {
     standing_parts: &'a StandingParts,
     drive: &'a Drive,
-    /// How far points of the part are from its centre of mass at most.
+    /// The largest distance of a point of the part from its centre of mass.
     radius: f64,
-    /// The last step, and how many steps the next leap along it is to have.
+    /// The last step, and the number of steps of the next long step along it.
     last: Option<Screw>,
     length: usize,
-    /// Where the steps that are alike began, and how many there are; leaps count as all their steps.
+    /// The pose where the equal steps began, and their number; long steps count as all of their steps.
     alike: Option<(Pose, usize)>,
     helix: Option<FollowedHelix>,
-    /// Where points were found missing, short steps are the safe ones.
+    /// Whether verification found missing points: then only short steps are safe.
     disabled: bool,
 }
 
@@ -79,8 +78,8 @@ impl<'a> HelixExtrapolation<'a> {
         }
     }
 
-    /// After an ordinary contact step from `from` to where `mover` is: a leap, if the motion is the
-    /// same as before. `pressing` are the directions in which contact held the part back.
+    /// A long step after an ordinary contact step from `from` to the body's pose, if the motion is the same as
+    /// before. `pressing` are the directions in which contact held the part back.
     pub(super) fn leap(
         &mut self,
         from: &Pose,
@@ -133,7 +132,7 @@ impl<'a> HelixExtrapolation<'a> {
         self.helix = Some(FollowedHelix { screw, length: count, pressing });
     }
 
-    /// The next leap along a helix that is followed.
+    /// The next long step along the helix that is being followed.
     pub(super) fn follow(&mut self, mover: &MovingBody<'_>) -> Result<Option<HelixLeap>, Interrupt> {
         let Some(FollowedHelix { screw, length, pressing }) = self.helix.take() else { return Ok(None) };
         let wanted = telling(&screw, length.min(HELIX_LEAP_STEPS));
@@ -153,7 +152,7 @@ impl<'a> HelixExtrapolation<'a> {
         Ok(None)
     }
 
-    /// How many steps along a helix, of those wanted, are on the thread and free.
+    /// The number of steps along a helix, of those wanted, that stay on the thread and enter nothing.
     fn free_on_helix(
         &self,
         mover: &MovingBody<'_>,
@@ -168,13 +167,13 @@ impl<'a> HelixExtrapolation<'a> {
         good_until(held, &FREE_STATIONS, &is_free)
     }
 
-    /// How far apart two displacements take the part's points, at most.
+    /// The largest distance between the images of a point of the part under two displacements.
     fn apart(&self, a: &Screw, b: &Screw, from: &Pose) -> f64 {
         let (a, b) = (a.times(1.0) * from, b.times(1.0) * from);
         (a.translation.vector - b.translation.vector).norm() + a.rotation.angle_to(&b.rotation) * self.radius
     }
 
-    /// How many steps, of those wanted, enter nothing and leave the part pressed to what it was.
+    /// The number of steps, of those wanted, that enter nothing and keep the part pressed to the same things.
     fn free_steps(
         &self,
         mover: &MovingBody<'_>,
@@ -188,8 +187,8 @@ impl<'a> HelixExtrapolation<'a> {
         })
     }
 
-    /// Whether the fields show that a push still meets what it met: not beside a slot's rim, where
-    /// short steps are needed.
+    /// Whether the fields show that a push still meets what it met. Beside the rim of a slot it does not, and short
+    /// steps are needed.
     fn is_pressed(&self, mover: &MovingBody<'_>, push: &Vector6<f64>) -> Result<bool, Interrupt> {
         let (v, w): (Vector3<f64>, Vector3<f64>) =
             (push.fixed_rows::<3>(0).into(), push.fixed_rows::<3>(3).into());
@@ -201,7 +200,7 @@ impl<'a> HelixExtrapolation<'a> {
         MovingBody { pose, ..*mover }.clearly_enters(&self.standing_parts.standing)
     }
 
-    /// Whether a short pull, as far as a push has one, still enters a thread: finer than fields show.
+    /// Whether the part, pulled a little as far as its action pulls, still enters a thread: finer than fields show.
     fn is_on_thread(&self, mover: &MovingBody<'_>, push: &Vector6<f64>) -> Result<bool, Interrupt> {
         let pull: Vector3<f64> = push.fixed_rows::<3>(0).into();
         let Some(direction) = pull.try_normalize(0.0) else { return Ok(false) };
@@ -211,14 +210,14 @@ impl<'a> HelixExtrapolation<'a> {
     }
 }
 
-/// The most steps of a leap along a screw.
+/// The largest number of steps along a screw.
 fn longest(screw: &Screw) -> usize {
     let most = if screw.angle() > 0.0 { (LEAP_ANGLE / screw.angle()) as usize } else { LEAP_STEPS };
     most.min(LEAP_STEPS)
 }
 
-/// Up to which step all that are looked at are good: every so many of them, and beyond the last good one
-/// every so many again, down to every one.
+/// The step up to which all stations are good. Stations are a number of steps apart; beyond the last good one they
+/// are tried more closely, down to every step.
 fn good_until(
     last: usize,
     every: &[usize],
@@ -233,7 +232,7 @@ fn good_until(
     Ok(good)
 }
 
-/// The most steps of a leap along a helix, of those wanted, that tell its screw.
+/// The largest number of steps along a helix, of those wanted, whose two ends determine the screw.
 fn telling(screw: &Screw, wanted: usize) -> usize {
     let tells = |steps: &usize| {
         let angle = screw.angle() * *steps as f64;

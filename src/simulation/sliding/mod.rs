@@ -73,7 +73,7 @@ impl TransitionFunction for SlidingEngine {
         let mut mover = MovingBody::new(scene, part, *start).until(termination);
         let (mut path, mut asked) = (vec![*start], Vec::new());
         let mut turning = Turning::new(&mover);
-        // A push that comes here is one that regions could not tell of.
+        // A push comes here only if regions could not cover it.
         let by_samples = is_refined || !action.turns();
         let mut around =
             RigidCover::new(scene, standing_parts, (part, start), drive.reach(), by_samples, termination);
@@ -95,7 +95,7 @@ impl TransitionFunction for SlidingEngine {
                 let is_straight = step.via.is_empty();
                 path.extend(step.via);
                 path.push(step.pose);
-                // Where regions tell, ordinary steps cost less than looking where a long one may lead.
+                // With regions, an ordinary step costs less than checking a long one.
                 if is_straight && !here.contacts.is_empty() && around.samples() {
                     leap = extrapolation.leap(&from, &mover, step.pressing, &mut around)?;
                 }
@@ -125,13 +125,13 @@ impl TransitionFunction for SlidingEngine {
     }
 }
 
-/// Whether points were found missing around a part: then short steps are the safe ones.
+/// Whether verification found missing points around a part: then only short steps are safe.
 fn is_refined(scene: &Scene, standing_parts: &StandingParts, part: usize) -> bool {
     let refined = |i: usize| !scene.bodies[i].extra_samples.points().is_empty();
     refined(part) || standing_parts.standing.iter().any(|&i| refined(i))
 }
 
-/// A translation, by regions.
+/// A translation by a region cover.
 fn pushed(
     scene: &Scene,
     standing_parts: &StandingParts,
@@ -143,7 +143,7 @@ fn pushed(
     let (mut path, mut asked) = (vec![*start], Vec::new());
     while path.len() < MOTION_POSES {
         let step = match push.step() {
-            // Where it landed regions cannot tell: they are to tell all the way.
+            // If regions cannot cover the place where a flight landed, the push starts again without flights.
             Err(Halt::Lost) if push.begins_on_foot() => {
                 (path, asked) = (vec![*start], Vec::new());
                 continue;

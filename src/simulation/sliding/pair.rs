@@ -1,4 +1,4 @@
-//! Static analysis by sliding: what contact with one part alone lets another do.
+//! Static analysis with this engine: whether contact with one part alone stops another.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -17,8 +17,8 @@ use super::super::Action;
 use super::drive::{Drive, Moved, Step, contact_step};
 use super::push::{self, Push};
 
-/// For each action, whether `other` alone keeps `part` at `pose` from following it by more than
-/// `least`: the static analysis that suits this engine, which excludes nothing that could slide.
+/// For each action, whether `other` alone keeps `part` at `pose` from following it by more than `least`: the static
+/// analysis for this engine, which excludes nothing that could slide.
 ///
 /// # Errors
 /// The termination condition became true.
@@ -75,15 +75,15 @@ pub fn pair_blocks(
         }
         Ok(matches!(step, Step::Stuck { .. }))
     };
-    // Side by side, one by one: two parts alone are but one pair, and some take several times as long as others.
+    // In parallel, one by one: two parts are but one pair, and some actions take several times as long as others.
     actions.par_iter().with_max_len(1).map(blocked).collect()
 }
 
-/// Derives what is asked of the shapes of two parts first, if it is not there, side by side: threads that come to one
-/// thing at the same time would wait for each other, or do it twice.
+/// Derives in parallel what the queries need of both shapes, if it is missing: threads that come to one thing at the
+/// same time would wait for each other, or do it twice.
 fn derived(scene: &Scene, part: usize, other: usize, termination: &Termination) -> Result<(), Interrupt> {
     let [one, two] = [part, other].map(|i| &scene.bodies[i].shape);
-    // The other one's patches are seldom asked.
+    // The patch tree of the other part is seldom needed.
     let first = SurfacePair::asked_first(scene, part, other)
         .first()
         .map(|asks_part| if *asks_part { one } else { two });
@@ -94,7 +94,7 @@ fn derived(scene: &Scene, part: usize, other: usize, termination: &Termination) 
     patches
 }
 
-/// The same by regions, for translations.
+/// The same for translations, by a region cover.
 fn translations_blocked(
     scene: &Scene,
     part: usize,
@@ -105,7 +105,8 @@ fn translations_blocked(
     termination: &Termination,
 ) -> Result<Vec<bool>, Halt> {
     let standing = [other];
-    // What all pushes begin with is found once, and not by each thread that comes to it at the same time.
+    // The cover from which all pushes start is computed once, and not by each thread that comes to it at the same
+    // time.
     let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(FREE_STEP);
     if !actions.is_empty() && !scene.broad_phase.meeting_of(&standing, &bounds).is_empty() {
         ShiftCover::new(scene, (part, pose), termination).add(other, &Vector3::zeros())?;

@@ -1,9 +1,8 @@
-//! Translations: a shift that follows a force as far as contact lets it, in steps as long as the
-//! regions around the part's surface allow ([`shift`](crate::contact::region_cover::shift)), or in flight ([`flight`](super::free_flight)).
+//! Translations: a shift that follows a force as far as contact allows, in steps as long as the regions around the
+//! part's surface allow ([`shift`](crate::contact::region_cover::shift)), or in [free flight](super::free_flight).
 //!
-//! At each shift the force is projected onto the cone that the obstacles leave. Along an obstacle
-//! steps are short, and each begins with the force as it is: where the obstacle ends, the part
-//! follows it again.
+//! At each shift the force is projected onto the cone that the obstacles leave. Along an obstacle steps are short,
+//! and each starts with the force unchanged: where the obstacle ends, the part follows the force again.
 
 use nalgebra::{Vector3, Vector6};
 
@@ -26,22 +25,22 @@ pub(super) struct Push<'a> {
     scene: &'a Scene,
     start: Pose,
     standing: &'a [usize],
-    /// The part's box without a shift.
+    /// The part's box at zero shift.
     bounds: Bounds,
     force: Vector3<f64>,
-    /// How far it got.
+    /// The shift so far.
     shift: Vector3<f64>,
     cells: ShiftCover<'a>,
-    /// Where the surroundings were asked last.
+    /// The shift at which nearby parts were last searched.
     asked_at: Option<Vector3<f64>>,
     stalls: usize,
     contact_step: f64,
-    /// Whether it is to get far: the way is then made so from the start.
+    /// Whether it is to get far: then long regions are asked for from the start.
     is_long: bool,
     flight: FreeFlight<'a>,
 }
 
-/// What a step came to.
+/// The result of a step.
 pub(super) enum PushStep {
     Moved(Pose),
     Stuck { with: Vec<usize> },
@@ -77,7 +76,7 @@ impl<'a> Push<'a> {
         Self { is_long: false, flight: self.flight.never(), ..self }
     }
 
-    /// Begins again, without flights, if there was one.
+    /// Starts again without flights, if there was one.
     pub(super) fn begins_on_foot(&mut self) -> bool {
         let has_flown = self.flight.any;
         if has_flown {
@@ -88,12 +87,12 @@ impl<'a> Push<'a> {
         has_flown
     }
 
-    /// How far it got.
+    /// The shift so far.
     pub(super) fn travel(&self) -> f64 {
         self.shift.norm()
     }
 
-    /// One step; `Halt::Lost` where regions cannot tell.
+    /// One step; `Halt::Lost` where regions cannot cover it.
     pub(super) fn step(&mut self) -> Result<PushStep, Halt> {
         if let Some(step) = self.flown()? {
             return Ok(step);
@@ -122,7 +121,7 @@ impl<'a> Push<'a> {
         let longest = if obstacles.is_empty() { FREE_STEP } else { self.contact_step };
         let seen = self.asked_at.map_or(0.0, |at| FREE_STEP - (self.shift - at).norm());
         let most = longest.min(seen);
-        // Whoever asks about a short way is not to pay for regions further on.
+        // A push that is only to show a short way must not pay for regions further on.
         let length = match self.is_long {
             true => self.cells.advance(&self.shift, &u, most)?,
             false => self.cells.length(&self.shift, &u).min(most),
@@ -135,7 +134,7 @@ impl<'a> Push<'a> {
         Ok(PushStep::Moved(self.pose()))
     }
 
-    /// A step of a flight, if it flies.
+    /// A step in flight, if the push flies.
     fn flown(&mut self) -> Result<Option<PushStep>, Halt> {
         let was_aloft = self.flight.is_aloft();
         let step = self.flight.step(&self.pose(), &self.here(), &self.force)?;
@@ -149,7 +148,7 @@ impl<'a> Push<'a> {
         Ok(None)
     }
 
-    /// Whatever regions there were are of elsewhere.
+    /// Former regions lie elsewhere.
     fn land(&mut self) {
         self.cells = self.cells.anew();
         (self.asked_at, self.stalls) = (None, 0);
@@ -161,12 +160,12 @@ impl<'a> Push<'a> {
         pose
     }
 
-    /// Where its box is.
+    /// The part's box at its shift.
     fn here(&self) -> Bounds {
         Bounds { min: self.bounds.min + self.shift, max: self.bounds.max + self.shift }
     }
 
-    /// Takes in parts that come near.
+    /// Adds parts that have come near.
     fn look_around(&mut self) -> Result<(), Halt> {
         if self.asked_at.is_some_and(|at| (self.shift - at).norm() < FREE_STEP * 0.9) {
             return Ok(());

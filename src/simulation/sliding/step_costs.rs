@@ -1,7 +1,7 @@
-//! What the stages of a step cost, one by one: for benchmarks.
+//! The cost of each stage of a step, for benchmarks.
 //!
-//! All three ways to see contact have the same stages: contacts are gathered, reduced to what matters, the wanted
-//! motion is projected onto what they allow, and the pose advances.
+//! All three methods have the same stages: contacts are gathered and reduced, the wanted motion is projected onto
+//! what they allow, and the pose advances.
 
 use std::time::Instant;
 
@@ -20,34 +20,33 @@ use super::super::Action;
 use super::drive::Drive;
 use super::push::projected;
 
-/// What tells of contact.
+/// The method that finds contacts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PairMethod {
-    /// Convex regions that pieces of surface may be shifted in: of translations.
+    /// A region cover for shifts.
     Shifts,
-    /// Convex regions that pieces of surface stay in while they turn.
+    /// A region cover for motions that turn.
     Regions,
     /// Samples near the other surface.
     Samples,
 }
 
-/// Microseconds that the stages of one step took.
+/// The microseconds of each stage of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepCost {
-    /// What told of contact.
+    /// The method.
     pub telling: PairMethod,
-    /// Finding what is near; regions are found anew, as where a motion begins.
+    /// Gathering contacts, without cached regions, as at the start of a motion.
     pub gather: f64,
-    /// What of it stops the motion: constraints of contacts, and the tightest of those that are alike.
+    /// Reducing them: constraints, and of nearly equal ones the tightest.
     pub reduce: f64,
-    /// The nearest motion to the wanted one that this allows.
+    /// Projecting the wanted motion onto the constraints.
     pub solve: f64,
-    /// To where the step leads. Of what may turn this is the whole step, with all trials.
+    /// Making the step; for motions that may turn this is the whole step, with all trials.
     pub advance: f64,
 }
 
-/// What steps cost that begin at the poses of a motion of a part under an action, those that are free of anything
-/// near left out.
+/// The costs of steps from the poses of a motion of a part under an action, without those that are near nothing.
 ///
 /// # Errors
 /// The termination condition became true.
@@ -94,7 +93,7 @@ pub fn step_costs(
     Ok(costs)
 }
 
-/// Of a translation; none where nothing is near, or regions cannot tell.
+/// Of a translation; `None` where nothing is near, or regions cannot cover it.
 fn of_shift(
     scene: &Scene,
     standing_parts: &StandingParts,
@@ -128,7 +127,7 @@ fn of_shift(
     }
 }
 
-/// What a question comes to, and the microseconds it takes.
+/// The result of a function, and its microseconds.
 fn timed<T>(question: impl FnOnce() -> T) -> (T, f64) {
     let started = Instant::now();
     let answer = question();

@@ -3,8 +3,8 @@
 use crate::contact::sampled::MovingBody;
 use crate::tolerances::LEAST_TURNING_TRAVEL;
 
-/// Sees when a part turns for ever: a whole turn that took it no further from where it started
-/// than it had been, and brought no new contact. A thread gets further with every turn.
+/// Detects endless turning: a whole turn that took the part no further from its start than it had been, and brought
+/// no new contact. A thread gets further with every turn.
 pub(super) struct Turning {
     angle: f64,
     start: nalgebra::Point3<f64>,

@@ -1,4 +1,4 @@
-//! Into the middle of the play.
+//! Moves a part into the middle of its play.
 
 use nalgebra::{Vector3, Vector6};
 
@@ -14,9 +14,8 @@ use super::super::super::projection::project;
 use super::{Drive, KnownConstraints};
 
 impl Drive {
-    /// The pose in the middle of the play around the mover's: the smallest correction that gives all
-    /// contacts as large a gap as they can have at once, and as much room one way along `axis` (a unit
-    /// vector) as the other.
+    /// The pose in the middle of the play around the body's pose: the smallest correction that gives all contacts the
+    /// largest possible gap at once, and as much room one way along `axis` (a unit vector) as the other.
     pub(in super::super) fn lifted(
         &self,
         mover: &MovingBody<'_>,
@@ -56,8 +55,8 @@ impl Drive {
     }
 }
 
-/// How far along an axis, after a twist, the middle is between the rows that hold a part on either side;
-/// `None` if they do not, or leave no room.
+/// How far along an axis, after a twist, the middle is between the constraints on either side; `None` if there are
+/// none, or they leave no room.
 fn middle(rows: &[VelocityConstraint], twist: &Vector6<f64>, axis: &Vector3<f64>) -> Option<f64> {
     let (mut back, mut forth) = (f64::NEG_INFINITY, f64::INFINITY);
     for row in rows {

@@ -1,9 +1,9 @@
-//! Where what holds a pull back lets go.
+//! Releases: where a contact that holds a pull back lets go.
 //!
-//! Of a part that is pulled and turned at once, a lug that comes before its slot stops the pull until it is in
-//! line, and a step may well turn it from one rim of the slot to the other. Without inertia the part goes in
-//! where it first can: so a step is looked through for places where nothing that is known to hold the pull back
-//! does so, and the part is pulled from the middle of these.
+//! A lug that comes before its slot stops the pull of a part that is pulled and turned at once, until it is in line;
+//! one step may turn it from one rim of the slot to the other. Without inertia the part goes in where it first can.
+//! So a step is searched for places where none of the contacts that hold the pull back does so, and the part is
+//! pulled from the middle of these.
 
 use nalgebra::{Translation3, Unit, Vector3, Vector6};
 
@@ -16,7 +16,7 @@ use crate::tolerances::{DEPTH_TOLERANCE, FREE_PULL, LIFT, OPPOSED_PULL};
 use super::super::super::projection::Projected;
 use super::{Attempt, Drive, Moved, Step};
 
-/// A step that was found free of entry.
+/// A step that enters nothing.
 pub(super) struct FreeStep<'a> {
     pub(super) mover: &'a MovingBody<'a>,
     pub(super) near: &'a ContactSet,
@@ -28,26 +28,26 @@ pub(super) struct FreeStep<'a> {
 }
 
 impl Drive {
-    /// Which way it is pulled, if it is pulled and turned at once.
+    /// The direction of the pull of an action that pulls and turns at once.
     fn pull(&self) -> Option<Unit<Vector3<f64>>> {
         let (pull, turn) = (self.wanted.fixed_rows::<3>(0), self.wanted.fixed_rows::<3>(3));
         if turn == Vector3::zeros() { None } else { Unit::try_new(pull.into_owned(), 0.0) }
     }
 
-    /// Whether a twist is one of what is pulled and turned at once that goes half as far along the pull as is wanted,
-    /// at least.
+    /// Whether a twist belongs to an action that pulls and turns at once, and goes at least half as far along the
+    /// pull as wanted.
     pub(super) fn is_pulled(&self, twist: &Vector6<f64>) -> bool {
         let along = |twist: &Vector6<f64>, pull: &Vector3<f64>| twist.fixed_rows::<3>(0).dot(pull);
         self.pull().is_some_and(|pull| along(twist, &pull) > 0.5 * along(&self.wanted, &pull))
     }
 
-    /// The same without turning: what a part does that was let go.
+    /// The same action without turning: the motion of a part that was released.
     fn pulling(&self, pull: Unit<Vector3<f64>>) -> Self {
         let pull = *pull * self.step;
         Self { wanted: Vector6::new(pull.x, pull.y, pull.z, 0.0, 0.0, 0.0), takes_long_steps: false, ..*self }
     }
 
-    /// One step that pulls alone what is pulled and turned at once, if nothing that is near stops it.
+    /// A step that only pulls, for an action that pulls and turns at once, if nothing near stops the pull.
     pub(super) fn pulled_free(
         &self,
         mover: &MovingBody<'_>,
@@ -67,8 +67,8 @@ impl Drive {
         })
     }
 
-    /// The step that pulls the part out of another one that would turn it past where it can be pulled: part of the way
-    /// like that other one, then like a pull.
+    /// The step that pulls the part out of another step, which would turn it past the place where it can be pulled:
+    /// first a share of the other step, then the pull.
     pub(super) fn released(
         &self,
         step: &FreeStep<'_>,
@@ -106,13 +106,13 @@ impl Drive {
         Ok(None)
     }
 
-    /// Where a step has got to at one of its places, and after which twist.
+    /// The body at one of the places of a step, and the twist up to there.
     fn at<'m>(&self, step: &FreeStep<'m>, place: u32) -> (MovingBody<'m>, Vector6<f64>) {
         let twist = step.twist * (f64::from(place) / f64::from(RELEASE_PLACES));
         (MovingBody { pose: self.displaced(step.mover, &twist), ..*step.mover }, twist)
     }
 
-    /// By which angle a step turns the part up to one of its places, if the way there is clear.
+    /// The angle by which a step turns the part up to one of its places, if the way there is clear.
     fn turned_to(
         &self,
         step: &FreeStep<'_>,
@@ -127,14 +127,14 @@ impl Drive {
     }
 }
 
-/// Takes out of some places, ascending, those where a contact holds a lifted part.
+/// Removes those places (ascending) where a contact holds a lifted part.
 fn close(open: &mut Vec<u32>, contact: &Contact, lifted: &[MovingBody<'_>], twist: &Vector6<f64>) {
     let mut next = 0;
     while let Some(&place) = open.get(next) {
         let there = &lifted[place as usize];
         let depth = there.remeasured(contact, 0.0).map_or(0.0, |c| -c.gap) - DEPTH_TOLERANCE;
         if depth > 0.0 {
-            // As deep as it is, it holds as far as it moves by less than that.
+            // A contact that is this deep holds for as long as it moves by less than its depth.
             let travel = there.displacement(contact, twist) / f64::from(RELEASE_PLACES);
             let held = (depth / travel) as u32;
             open.retain(|other| other.abs_diff(place) > held);
@@ -143,10 +143,10 @@ fn close(open: &mut Vec<u32>, contact: &Contact, lifted: &[MovingBody<'_>], twis
     }
 }
 
-/// Of places, ascending, the one in the middle of the longest row of them.
+/// The middle of the longest run of places (ascending).
 fn middle_of_longest(places: &[u32]) -> Option<u32> {
     let rows = places.chunk_by(|a, b| a + 1 == *b);
-    // The first of those that are as long: where the part comes first.
+    // Of runs of equal length the first: the part comes there first.
     let longest = rows.reduce(|longest, row| if row.len() > longest.len() { row } else { longest })?;
     Some(longest[longest.len() / 2])
 }
