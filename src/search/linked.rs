@@ -14,8 +14,6 @@ use crate::geometry::{linking_number, surface_loops};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll, Termination, try_all};
 
-use super::sbdp::Search;
-
 /// Two per hole.
 const MOST_LOOPS: usize = 64;
 /// Pairs of loop segments that are looked at for one pair of parts.
@@ -28,7 +26,7 @@ const CLEARANCE: f64 = 2e-3;
 /// A closed polygon in the planning frame.
 type Loop = Vec<Point3<f64>>;
 
-/// Per part: those that it is linked with.
+/// For each part, the parts that it is linked with.
 #[derive(Debug, Default)]
 pub(super) struct Links(Vec<Vec<usize>>);
 
@@ -37,7 +35,11 @@ impl Links {
     ///
     /// # Errors
     /// The termination condition became true.
-    fn among(scene: &Scene, parts: &[usize], termination: &Termination) -> Result<Self, Interrupt> {
+    pub(super) fn among(
+        scene: &Scene,
+        parts: &[usize],
+        termination: &Termination,
+    ) -> Result<Self, Interrupt> {
         let poll = Poll::every(SIDES_POLL, Some(termination));
         // Many parts have nobody near whom they could be linked with: theirs are never looked for.
         let known = vec![OnceCell::new(); scene.bodies.len()];
@@ -58,28 +60,6 @@ impl Links {
     /// One of some parts (ascending) that a part is linked with.
     pub(super) fn holder(&self, part: usize, among: &[usize]) -> Option<usize> {
         self.0.get(part)?.iter().copied().find(|p| among.binary_search(p).is_ok())
-    }
-}
-
-impl Search<'_, '_> {
-    /// Looks, once, which of the parts that stand are linked; true if any is. Beyond the paper.
-    ///
-    /// # Errors
-    /// The termination condition became true.
-    pub(super) fn find_links(&mut self) -> Result<bool, Interrupt> {
-        if self.links.is_some() || self.separate_lists || !self.guided {
-            return Ok(false);
-        }
-        let (problem, standing) = (&self.disassembly.problem, self.disassembly.everything.standing());
-        let links = Links::among(&problem.scene, standing, &problem.termination)?;
-        let any = standing.iter().any(|&p| links.holder(p, standing).is_some());
-        self.links = Some(links);
-        Ok(any)
-    }
-
-    /// A part that stands and is linked with this one.
-    pub(super) fn linked_with(&self, part: usize) -> Option<usize> {
-        self.links.as_ref()?.holder(part, self.disassembly.everything.standing())
     }
 }
 

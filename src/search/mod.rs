@@ -4,34 +4,37 @@
 //! one part after the other), which works on the `disassembly` under way → [`Outcome`].
 //! Everything below the request is in the planning frame.
 
-mod ahead;
-mod begun;
+mod action_table;
+mod ball;
 mod directions;
 mod disassembly;
+mod initial_analysis;
 mod known_states;
 mod linked;
+mod novelty;
+mod obstructions;
 mod order;
 mod outcome;
-mod own_actions;
 mod pdp;
 mod problem;
 mod rays;
 mod report;
 mod request;
-mod retraction;
-mod rooms;
-mod round;
+mod rules;
 mod sbdp;
+mod speculation;
 mod state;
-mod straight;
+mod states;
+mod sweep_memory;
 #[cfg(test)]
 mod tests;
 mod trace;
 mod twists;
+mod view;
 
 pub use crate::termination::{Interrupt, Termination};
-pub use begun::initial_blockages;
 pub use directions::axes_of;
+pub use initial_analysis::initial_blockages;
 pub use outcome::{BlockedAction, Counters, Outcome, Removal};
 pub use problem::{Checked, Observer, Problem};
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging};
@@ -44,8 +47,8 @@ pub fn search(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observe
     match planner {
         Planner::SbdpStar => sbdp::sbdp(problem, observer, true),
         Planner::Sbdp => sbdp::sbdp(problem, observer, false),
-        Planner::PdpT => pdp::pdp(problem, observer, pdp::Mode::Translation),
-        Planner::PdpR => pdp::pdp(problem, observer, pdp::Mode::Rotation),
+        Planner::PdpT => pdp::pdp(problem, observer, pdp::PdpMode::Translation),
+        Planner::PdpR => pdp::pdp(problem, observer, pdp::PdpMode::Rotation),
         Planner::PdpStar => pdp::pdp_star(problem, observer),
     }
 }

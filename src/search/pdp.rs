@@ -20,26 +20,26 @@ use super::trace::{TraceEvent, TracePhase};
 
 /// Which actions PDP has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Mode {
+pub(super) enum PdpMode {
     Translation,
     Rotation,
 }
 
 /// PDP_t or PDP_r.
-pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: Mode) -> Outcome {
+pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: PdpMode) -> Outcome {
     let count = problem.scene.bodies.len();
     let (disassembly, actions) = Disassembly::beside(problem, observer, |problem| {
         let (translations, rotations) = problem.action_lists(&problem.directions()?);
         Ok(match mode {
-            Mode::Translation => translations,
-            Mode::Rotation => rotations,
+            PdpMode::Translation => translations,
+            PdpMode::Rotation => rotations,
         })
     });
     let actions = match actions {
         Ok(actions) => actions,
         Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), String::new(), Vec::new()),
     };
-    let mut search = Search { disassembly, mode, actions, stopped_by: vec![Vec::new(); count], states: 0 };
+    let mut search = PdpSearch { disassembly, mode, actions, stopped_by: vec![Vec::new(); count], states: 0 };
     let stop = search.run().err();
     let (evidence, blocked) = (search.evidence(), search.blocked());
     search.disassembly.counters.states = search.states;
@@ -50,25 +50,25 @@ pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: Mode)
 /// before it has succeeded. With a deadline, the first run has half of the time.
 pub(super) fn pdp_star(problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
     let first = Problem { termination: problem.termination.halfway(), ..problem.clone() };
-    let mut held = Held { observer, removals: Vec::new() };
-    let outcome = pdp(first, &mut held, Mode::Translation);
-    let Held { observer, removals } = held;
+    let mut held = HeldRemovals { observer, removals: Vec::new() };
+    let outcome = pdp(first, &mut held, PdpMode::Translation);
+    let HeldRemovals { observer, removals } = held;
     let spent = outcome.counters.simulations;
     let nothing_left = problem.max_simulations.is_some_and(|most| spent >= most);
     if matches!(outcome.status, PlanStatus::Complete | PlanStatus::Cancelled) || nothing_left {
         removals.iter().for_each(|r| observer.removal(r));
         return outcome;
     }
-    pdp(Problem { spent, ..problem }, observer, Mode::Rotation)
+    pdp(Problem { spent, ..problem }, observer, PdpMode::Rotation)
 }
 
 /// Keeps removals until it is known whether they count.
-struct Held<'o> {
+struct HeldRemovals<'o> {
     observer: &'o mut dyn Observer,
     removals: Vec<Removal>,
 }
 
-impl Observer for Held<'_> {
+impl Observer for HeldRemovals<'_> {
     fn progress(&mut self, removed: usize, simulations: u64) {
         self.observer.progress(removed, simulations);
     }
@@ -87,27 +87,27 @@ impl Observer for Held<'_> {
 }
 
 /// A configuration in the search tree of one part.
-struct Node {
+struct PdpNode {
     /// From the assembled pose on.
     path: Vec<Pose>,
     depth: usize,
 }
 
 /// The search tree of one part.
-struct Tree {
-    nodes: Vec<Node>,
+struct PdpTree {
+    nodes: Vec<PdpNode>,
     known: KnownStates,
 }
 
-impl Tree {
-    fn add(&mut self, node: Node) {
+impl PdpTree {
+    fn add(&mut self, node: PdpNode) {
         self.known.add(self.nodes.len(), node.path[node.path.len() - 1]);
         self.nodes.push(node);
     }
 }
 
 /// How the search for one part ended.
-enum Found {
+enum PdpResult {
     Out,
     /// Nothing new within the limit; `cut` if there may be more beyond.
     Nothing {
@@ -115,9 +115,9 @@ enum Found {
     },
 }
 
-struct Search<'a, 'o> {
+struct PdpSearch<'a, 'o> {
     disassembly: Disassembly<'a, 'o>,
-    mode: Mode,
+    mode: PdpMode,
     actions: Vec<Action>,
     /// Per part: who stopped each action at the assembled pose, when last tried.
     stopped_by: Vec<Vec<(usize, Vec<usize>)>>,
@@ -125,7 +125,7 @@ struct Search<'a, 'o> {
     states: u64,
 }
 
-impl Search<'_, '_> {
+impl PdpSearch<'_, '_> {
     fn run(&mut self) -> Result<(), Stop> {
         self.take_free_parts()?;
         let mut limit = 1;
@@ -139,8 +139,8 @@ impl Search<'_, '_> {
                     continue;
                 }
                 match self.search(part, limit)? {
-                    Found::Nothing { cut: c } => cut |= c,
-                    Found::Out => {
+                    PdpResult::Nothing { cut: c } => cut |= c,
+                    PdpResult::Out => {
                         removed = true;
                         self.take_free_parts()?;
                     }
@@ -180,11 +180,11 @@ impl Search<'_, '_> {
     }
 
     /// Breadth-first search for a way out of one part.
-    fn search(&mut self, part: usize, limit: usize) -> Result<Found, Stop> {
+    fn search(&mut self, part: usize, limit: usize) -> Result<PdpResult, Stop> {
         let phase = self.phase();
         let known = KnownStates::new(&self.disassembly.problem.scene, part);
-        let mut tree = Tree { nodes: Vec::new(), known };
-        tree.add(Node { path: vec![self.disassembly.assembled(part)], depth: 0 });
+        let mut tree = PdpTree { nodes: Vec::new(), known };
+        tree.add(PdpNode { path: vec![self.disassembly.assembled(part)], depth: 0 });
         let (mut next, mut cut) = (0, false);
         let started = Instant::now();
         let too_long = |limit: Duration| started.elapsed() >= limit;
@@ -205,15 +205,15 @@ impl Search<'_, '_> {
                 excluded: Vec::new(),
             });
             if self.expand(part, &mut tree, next)? {
-                return Ok(Found::Out);
+                return Ok(PdpResult::Out);
             }
             next += 1;
         }
-        Ok(Found::Nothing { cut })
+        Ok(PdpResult::Nothing { cut })
     }
 
     /// Tries all actions from a node; true if one of them led out.
-    fn expand(&mut self, part: usize, tree: &mut Tree, at: usize) -> Result<bool, Stop> {
+    fn expand(&mut self, part: usize, tree: &mut PdpTree, at: usize) -> Result<bool, Stop> {
         let prefix = tree.nodes[at].path.clone();
         let start = prefix[prefix.len() - 1];
         let window = rayon::current_num_threads();
@@ -253,7 +253,7 @@ impl Search<'_, '_> {
     }
 
     /// Adds the end of a motion to the tree, unless it is there.
-    fn grow(&mut self, tree: &mut Tree, at: usize, run: &Run, action: usize, motion: Motion) {
+    fn grow(&mut self, tree: &mut PdpTree, at: usize, run: &Run, action: usize, motion: Motion) {
         let Motion { path, end, .. } = motion;
         let (word, with) = match end {
             End::Collision { with } => ("collision", with),
@@ -272,21 +272,21 @@ impl Search<'_, '_> {
             self.states += 1;
             let from = &tree.nodes[at];
             let (path, depth) = (joined(&from.path, &path), from.depth + 1);
-            tree.add(Node { path, depth });
+            tree.add(PdpNode { path, depth });
         }
     }
 
     fn phase(&self) -> TracePhase {
         match self.mode {
-            Mode::Translation => TracePhase::Translation,
-            Mode::Rotation => TracePhase::Rotation,
+            PdpMode::Translation => TracePhase::Translation,
+            PdpMode::Rotation => TracePhase::Rotation,
         }
     }
 
     fn evidence(&self) -> String {
         let kind = match self.mode {
-            Mode::Translation => "translations",
-            Mode::Rotation => "actions with rotational freedom",
+            PdpMode::Translation => "translations",
+            PdpMode::Rotation => "actions with rotational freedom",
         };
         let stuck = self.disassembly.problem.wanted(self.disassembly.everything.standing()).len();
         format!(

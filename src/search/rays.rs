@@ -15,71 +15,30 @@ use nalgebra::{Unit, Vector3};
 
 use crate::geometry::extreme_rays;
 use crate::simulation::{Action, Axis, Touching, remembered_touching};
+use crate::termination::Interrupt;
 
-use super::disassembly::Stop;
-use super::own_actions::OwnActions;
-use super::request::ActionSet;
-use super::sbdp::Search;
-use super::state::{Phase, least_travel};
+use super::problem::Problem;
+use super::state::least_travel;
 
 /// A cone with more rays is not narrow.
-const MOST_RAYS: usize = 4;
-/// Rays of all parts together, at most.
-const MOST_ACTIONS: usize = 32;
-/// cos of the angle within which two directions are one (a quarter of a degree).
-const ALIKE: f64 = 0.999_99;
+const NARROW: usize = 4;
 
-/// Which rays are known, and whose they are.
-#[derive(Debug)]
-pub(super) struct Rays {
-    pub(super) own: OwnActions,
-    /// Whether they are simulated, too.
-    pub(super) simulated: bool,
-}
-
-impl Rays {
-    /// None yet, beside the translations along axes.
-    pub(super) fn beside(translations: &[Action]) -> Self {
-        Self { own: OwnActions::new(translations.len(), MOST_ACTIONS, ALIKE), simulated: false }
-    }
-}
-
-impl Search<'_, '_> {
-    /// Adds the extreme rays of open parts as assembled to the translations, unless they are known; true
-    /// if anything was added.
-    pub(super) fn offer_rays(&mut self, phase: Phase, open: &[usize]) -> Result<bool, Stop> {
-        if phase != Phase::Translation || self.disassembly.problem.actions != ActionSet::Extended {
-            return Ok(false);
-        }
-        self.offer_own(
-            phase,
-            open,
-            |_| true,
-            |problem, part, others| {
-                let scene = &problem.scene;
-                let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
-                let Touching { normals, parts } = remembered_touching(
-                    &problem.cache,
-                    scene,
-                    part,
-                    &pose,
-                    others,
-                    reach,
-                    &problem.termination,
-                )?;
-                let rays = extreme_rays(&normals.unwrap_or_default());
-                let few = if rays.len() <= MOST_RAYS { &rays[..] } else { &[] };
-                Ok((few.iter().map(push_along).collect(), parts))
-            },
-        )
-    }
-
-    /// Lets the rays be simulated; true if there are any and they were not before.
-    pub(super) fn simulate_rays(&mut self) -> bool {
-        let late = !self.rays.simulated && self.translations.len() > self.rays.own.common;
-        self.rays.simulated = late || self.rays.simulated;
-        late
-    }
+/// The pushes along the extreme rays that the contacts of a part as assembled leave, and the parts that it touches.
+///
+/// # Errors
+/// The termination condition became true.
+pub(super) fn extreme_pushes(
+    problem: &Problem<'_>,
+    part: usize,
+    others: &[usize],
+) -> Result<(Vec<Action>, Vec<usize>), Interrupt> {
+    let Problem { scene, cache, termination, .. } = problem;
+    let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
+    let Touching { normals, parts } =
+        remembered_touching(cache, scene, part, &pose, others, reach, termination)?;
+    let rays = extreme_rays(&normals.unwrap_or_default());
+    let few = if rays.len() <= NARROW { &rays[..] } else { &[] };
+    Ok((few.iter().map(push_along).collect(), parts))
 }
 
 /// The push along a ray.

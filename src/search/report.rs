@@ -3,14 +3,14 @@
 use crate::blocking_graph::Blockage;
 
 use super::outcome::BlockedAction;
-use super::sbdp::Search;
 use super::state::Phase;
 use super::trace::{BlockedBy, TraceEvent};
+use super::view::SearchView;
 
 /// What stands for every action where parts are linked.
 const LINKED: &str = "any";
 
-impl Search<'_, '_> {
+impl SearchView<'_, '_, '_> {
     /// What was tried before the search gave up.
     pub(super) fn evidence(&self) -> String {
         let (problem, standing) = (&self.disassembly.problem, self.disassembly.everything.standing());
@@ -31,17 +31,17 @@ impl Search<'_, '_> {
     }
 
     fn exhausted(&self, stuck: &[usize]) -> String {
-        let most = stuck.iter().map(|&p| self.known[p].len()).max().unwrap_or(0);
-        let coarse = self.coarsest(most);
+        let most = stuck.iter().map(|&p| self.states.of_part(p)).max().unwrap_or(0);
+        let coarse = self.states.coarsest(most);
         format!(
             "every state reached was expanded with {} translations and {} actions with rotational freedom ({} \
              states in all, told apart at {:.3} of the longest side and {:.1} rad){}",
-            self.translations.len(),
-            self.rotations.len(),
+            self.actions.of(Phase::Translation).len(),
+            self.actions.of(Phase::Rotation).len(),
             self.disassembly.counters.states,
             0.05 * coarse / self.disassembly.problem.scene.longest_side,
             0.5 * coarse,
-            if self.guided { ", also where static analysis saw no way" } else { "" },
+            if self.rules.guided { ", also where static analysis saw no way" } else { "" },
         )
     }
 
@@ -49,7 +49,7 @@ impl Search<'_, '_> {
     pub(super) fn blocked(&self) -> Vec<BlockedAction> {
         let wanted = self.disassembly.problem.wanted(self.disassembly.everything.standing());
         let mut out = Vec::new();
-        for node in self.nodes.iter().filter(|n| n.alive && n.is_root() && wanted.contains(&n.part)) {
+        for node in self.states.iter().filter(|n| n.alive && n.is_root() && wanted.contains(&n.part)) {
             out.extend(self.linked_with(node.part).map(|by| BlockedAction {
                 part: node.part,
                 action: LINKED.to_owned(),
@@ -68,40 +68,28 @@ impl Search<'_, '_> {
     }
 
     fn edges<'s>(&'s self, phase: Phase, b: &'s Blockage) -> impl Iterator<Item = BlockedBy> + 's {
-        self.actions(phase).iter().enumerate().filter_map(|(i, action)| {
+        self.actions.of(phase).iter().enumerate().filter_map(|(i, action)| {
             let parts: Vec<_> = b.blockers(i).into_iter().collect();
             (!parts.is_empty()).then(|| BlockedBy { action: action.to_string(), parts })
         })
     }
 
-    /// The number of a state in the trace: 0 is the assembled one.
-    pub(super) fn state(&self, node: usize) -> usize {
-        if self.nodes[node].is_root() { 0 } else { node + 1 - self.roots }
+    /// The event for the static analysis of a state.
+    pub(super) fn analysed(&self, node: usize) -> Option<TraceEvent> {
+        let b = self.states[node].translation.as_ref().filter(|_| self.rules.guided)?;
+        let blocked = self.edges(Phase::Translation, b).collect();
+        Some(TraceEvent::Analysed { state: self.states.number(node), part: self.states[node].part, blocked })
     }
 
-    pub(super) fn trace_analysis(&mut self, node: usize) {
-        if self.guided
-            && self.disassembly.observer.traces()
-            && let Some(b) = &self.nodes[node].translation
-        {
-            let blocked = self.edges(Phase::Translation, b).collect();
-            let (state, part) = (self.state(node), self.nodes[node].part);
-            self.disassembly.observer.traced(TraceEvent::Analysed { state, part, blocked });
-        }
-    }
-
-    pub(super) fn trace_expansion(&mut self, phase: Phase, node: usize) {
-        if !self.disassembly.observer.traces() {
-            return;
-        }
-        let (state, part) = (self.state(node), self.nodes[node].part);
+    /// The event for the expansion of a state.
+    pub(super) fn expanded(&self, phase: Phase, node: usize) -> TraceEvent {
         let (mut evaluation, mut excluded) = (None, Vec::new());
-        if let (true, Some(b)) = (self.guided, self.nodes[node].blockage(phase)) {
+        if let (true, Some(b)) = (self.rules.guided, self.states[node].blockage(phase)) {
             let e = b.evaluation();
             evaluation = Some([e.colliding_parts, e.open_actions]);
             excluded = self.edges(phase, b).collect();
         }
-        let phase = phase.into();
-        self.disassembly.observer.traced(TraceEvent::Expanded { phase, state, part, evaluation, excluded });
+        let (state, part) = (self.states.number(node), self.states[node].part);
+        TraceEvent::Expanded { phase: phase.into(), state, part, evaluation, excluded }
     }
 }

@@ -4,7 +4,6 @@ use crate::blocking_graph::Blockage;
 use crate::geometry::Pose;
 use crate::scene::Scene;
 
-use super::retraction::Origin;
 use super::trace::TracePhase;
 
 /// The travel at which two states of a part count as the same (the paper's rmd).
@@ -13,7 +12,7 @@ const TRANSLATION: f64 = 0.05;
 /// there is much free play, states multiply without end.
 const STATES_PER_LEVEL: usize = 3;
 
-/// Translation without, or rotation with, freedom to turn.
+/// The kind of planning: translations, or actions with rotational freedom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum Phase {
     Translation,
@@ -29,9 +28,19 @@ impl From<Phase> for TracePhase {
     }
 }
 
-/// A state to expand.
+/// An action from a state: what a search expands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) struct Expansion {
+    /// The index of the state's node.
+    pub(super) node: usize,
+    pub(super) phase: Phase,
+    /// The index in the list of actions of the phase.
+    pub(super) action: usize,
+}
+
+/// A state of the search: a part at a pose, with the path there.
 #[derive(Debug, Clone)]
-pub(super) struct Node {
+pub(super) struct StateNode {
     pub(super) part: usize,
     /// Path so far, from the assembled pose to this state's.
     pub(super) path: Vec<Pose>,
@@ -39,15 +48,15 @@ pub(super) struct Node {
     pub(super) translation: Option<Blockage>,
     /// Blockage under actions with rotational freedom; starts empty.
     pub(super) rotation: Blockage,
-    /// Parent node and action, unless assembled.
-    pub(super) origin: Option<Origin>,
+    /// The expansion that led here; `None` for an assembled part.
+    pub(super) origin: Option<Expansion>,
     /// How far it is from the part's states known before, in units of the resolution; 0 assembled.
     pub(super) novelty: f64,
     /// False once its part is gone or its path was refuted.
     pub(super) alive: bool,
 }
 
-impl Node {
+impl StateNode {
     pub(super) fn pose(&self) -> &Pose {
         // A path always holds its start.
         &self.path[self.path.len() - 1]
@@ -78,7 +87,7 @@ pub fn least_travel(scene: &Scene, part: usize) -> f64 {
     TRANSLATION.min(scene.bodies[part].shape.bounds().extents().max() / 20.0)
 }
 
-/// How coarse a part's states are told apart once it has `states` of them: a factor.
+/// The factor by which the resolution of a part's states is coarser once it has `states` of them.
 pub(super) fn coarseness(states: usize) -> f64 {
     2f64.powi((states / STATES_PER_LEVEL).min(10) as i32)
 }

@@ -8,64 +8,25 @@
 //! know of its thread.
 
 use crate::simulation::{Action, Axis, NullTwist};
+use crate::termination::Interrupt;
 
-use super::disassembly::Stop;
-use super::own_actions::OwnActions;
-use super::request::ActionSet;
-use super::sbdp::Search;
-use super::state::{Phase, least_travel};
+use super::problem::Problem;
+use super::state::least_travel;
 
-/// Twists of all parts together, at most.
-const MOST_ACTIONS: usize = 64;
-/// cos of the angle within which an axis is as good as another: two degrees.
-const ALIKE: f64 = 0.9994;
-
-/// Which twists are known, and whose they are.
-#[derive(Debug)]
-pub(super) struct Twists {
-    pub(super) own: OwnActions,
-    /// Whether parts are asked that are made along an axis of all, too.
-    of_all: bool,
-}
-
-impl Twists {
-    /// None yet, beside the actions with rotational freedom about axes.
-    pub(super) fn beside(rotations: &[Action]) -> Self {
-        Self { own: OwnActions::new(rotations.len(), MOST_ACTIONS, ALIKE), of_all: false }
-    }
-}
-
-impl Search<'_, '_> {
-    /// Adds the near-null twists of open parts as assembled to the rotations, unless they are known; true if
-    /// anything was added.
-    pub(super) fn offer_twists(&mut self, phase: Phase, open: &[usize]) -> Result<bool, Stop> {
-        if phase != Phase::Rotation || !self.follows_twists() {
-            return Ok(false);
-        }
-        let of_all = self.twists.of_all;
-        let without: Vec<bool> = (0..self.known.len()).map(|part| !self.directions.has_own(part)).collect();
-        self.offer_own(
-            phase,
-            open,
-            |part| of_all || without[part],
-            |problem, part, others| {
-                let scene = &problem.scene;
-                let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
-                let (twist, touched) =
-                    NullTwist::of(scene, part, &pose, others, reach, &problem.termination)?;
-                Ok((twist.iter().flat_map(along).collect(), touched))
-            },
-        )
-    }
-
-    /// Lets all parts be asked for their twists; true if they were not before.
-    pub(super) fn ask_for_all_twists(&mut self) -> bool {
-        self.follows_twists() && !std::mem::replace(&mut self.twists.of_all, true)
-    }
-
-    fn follows_twists(&self) -> bool {
-        self.guided && self.disassembly.problem.actions == ActionSet::Extended
-    }
+/// The actions that follow the twist which the contacts of a part as assembled hardly resist, and the parts that it
+/// touches.
+///
+/// # Errors
+/// The termination condition became true.
+pub(super) fn null_twists(
+    problem: &Problem<'_>,
+    part: usize,
+    others: &[usize],
+) -> Result<(Vec<Action>, Vec<usize>), Interrupt> {
+    let scene = &problem.scene;
+    let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
+    let (twist, touched) = NullTwist::of(scene, part, &pose, others, reach, &problem.termination)?;
+    Ok((twist.iter().flat_map(along).collect(), touched))
 }
 
 /// The wrenches that follow a twist either way: in the sense of its helix, or in both where it has none.
@@ -85,10 +46,9 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::super::problem::Problem;
-    use super::super::request::Planner;
+    use super::super::request::{ActionSet, Planner};
     use super::super::tests::{Recorder, problem};
     use super::super::{TraceEvent, search};
-    use super::*;
     use crate::fixtures::{moved, scene, thread};
     use crate::geometry::{Pose, SourceMesh};
     use crate::plan::PlanStatus;

@@ -1,4 +1,4 @@
-//! What a search begins with: directions, actions along them, and the blocking graphs of the assembled state.
+//! The start of a search: directions, actions along them, and the blocking graphs of the assembled state.
 
 use std::time::{Duration, Instant};
 
@@ -10,7 +10,7 @@ use super::directions::Directions;
 use super::problem::Problem;
 use super::state::least_travel;
 
-/// The blocking graphs of the assembled state along the directions that a search would begin with.
+/// The blocking graphs of the assembled state along the directions with which a search starts.
 ///
 /// # Errors
 /// The termination condition became true.
@@ -26,18 +26,18 @@ fn assembled_blockages(problem: &Problem<'_>, translations: &[Action]) -> Result
     analysis.initial_blockages(present, &least, termination)
 }
 
-/// What a search begins with.
-pub(super) struct Begun {
+/// What a search starts with.
+pub(super) struct InitialAnalysis {
     pub(super) directions: Directions,
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
-    /// Of all parts as assembled.
+    /// The blockage of each part as assembled.
     pub(super) blockages: Vec<Blockage>,
-    /// How long these took.
-    pub(super) took: Duration,
+    /// The time that these took.
+    pub(super) duration: Duration,
 }
 
-impl Begun {
+impl InitialAnalysis {
     /// # Errors
     /// The termination condition became true.
     pub(super) fn of(problem: &Problem<'_>, guided: bool) -> Result<Self, Interrupt> {
@@ -49,6 +49,6 @@ impl Begun {
         } else {
             vec![Blockage::open(translations.len()); problem.scene.bodies.len()]
         };
-        Ok(Self { directions, translations, rotations, blockages, took: started.elapsed() })
+        Ok(Self { directions, translations, rotations, blockages, duration: started.elapsed() })
     }
 }
