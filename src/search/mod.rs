@@ -22,6 +22,7 @@ mod report;
 mod request;
 mod rules;
 mod sbdp;
+mod search_view;
 mod speculation;
 mod state;
 mod states;
@@ -30,7 +31,6 @@ mod sweep_memory;
 mod tests;
 mod trace;
 mod twists;
-mod view;
 
 pub use crate::termination::{Interrupt, Termination};
 pub use directions::axes_of;

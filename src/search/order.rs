@@ -5,8 +5,8 @@ use std::cmp::Reverse;
 use crate::blocking_graph::{Blockage, Evaluation};
 
 use super::obstructions::Obstructions;
+use super::search_view::SearchView;
 use super::state::{Expansion, Phase, StateNode};
-use super::view::SearchView;
 
 impl SearchView<'_, '_, '_> {
     /// The states to expand, the initial one included. Of the last two parts, it is the same which one moves against

@@ -3,9 +3,9 @@
 use crate::blocking_graph::Blockage;
 
 use super::outcome::BlockedAction;
+use super::search_view::SearchView;
 use super::state::Phase;
 use super::trace::{BlockedBy, TraceEvent};
-use super::view::SearchView;
 
 /// What stands for every action where parts are linked.
 const LINKED: &str = "any";

@@ -30,13 +30,13 @@ use super::outcome::Outcome;
 use super::problem::{Observer, Problem};
 use super::rays::extreme_pushes;
 use super::rules::Rules;
+use super::search_view::SearchView;
 use super::speculation::Speculation;
 use super::state::{Expansion, Phase, StateNode, least_travel};
 use super::states::States;
 use super::sweep_memory::{SweepBlock, SweepMemory};
 use super::trace::TraceEvent;
 use super::twists::null_twists;
-use super::view::SearchView;
 
 /// Ways out that are shorter are equal, in the planning frame.
 const LEAST_WAY: f64 = 1e-6;
