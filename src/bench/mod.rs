@@ -13,6 +13,7 @@ mod corpus;
 mod estimate;
 pub(crate) mod families;
 mod figure;
+mod markdown;
 mod record;
 mod rotated;
 mod rotation;

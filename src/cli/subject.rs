@@ -9,7 +9,8 @@ use super::error::CliError;
 use super::part_names::part_named;
 use crate::blocking_graph::DirectionalGraph;
 use crate::geometry::{
-    Assembly, Pose, Revision, SourceAssembly, Waypoint, content_hash, load_assembly, pose_from_waypoint,
+    Assembly, Pose, Revision, SourceAssembly, SourceMesh, Waypoint, content_hash, load_assembly,
+    pose_from_waypoint,
 };
 use crate::plan::PlanKind;
 use crate::plan::export::{PlanDocument, SourceDocument};
@@ -148,12 +149,25 @@ pub(super) fn plan_in(file: &Path) -> Result<PlanDocument, CliError> {
     read_plan(&text).map_err(|e| refused(&e))
 }
 
+/// The mesh of a file that has just one.
+pub(super) fn only_mesh(file: &Path, option: &str) -> Result<SourceMesh, CliError> {
+    let mut parts = load_assembly(file)?.parts;
+    match (parts.pop(), parts.len()) {
+        (Some(part), 0) => Ok(part.mesh),
+        (_, rest) => Err(CliError::Refused(format!(
+            "{option}: `{}` has {} parts where one is wanted",
+            file.display(),
+            rest + 1
+        ))),
+    }
+}
+
 /// What was changed before the plan began, but for parts that were moved.
 fn revision(base: &SourceAssembly, source: &SourceDocument) -> Result<Revision, CliError> {
     let mut revision = Revision::default();
     for (name, file) in &source.replaced {
         let place = part_named(base, "source.replaced", name)?;
-        revision.replaced.push((place, super::plan::only_mesh(Path::new(file), "source.replaced")?));
+        revision.replaced.push((place, only_mesh(Path::new(file), "source.replaced")?));
     }
     for path in &source.added {
         revision.added.extend(load_assembly(Path::new(path))?.parts);

@@ -81,6 +81,6 @@ pub use samples::Spacing;
 pub use screw::Screw;
 pub use shape::Shape;
 pub use source::{SourceAssembly, SourceMesh, SourcePart};
-pub use surface::{Closest, Surface};
+pub use surface::Surface;
 pub use surface_loops::surface_loops;
-pub use triangle::{Feature, area_normal, bisected, closest_on_triangle};
+pub use triangle::{Closest, Feature, area_normal, bisected, closest_on_triangle};

@@ -45,8 +45,7 @@ pub(crate) fn known_sweep(
     termination: &Termination,
 ) -> Result<Option<Option<Sweep>>, Interrupt> {
     let Some(known) = cache.get::<SweptPast>(&key(question)) else { return Ok(None) };
-    let enters =
-        |cast: &ShapeCast<'_>| entered(&known, &place(question, cast)).ok_or(UnknownSweep::Missing);
+    let enters = |cast: &ShapeCast<'_>| entered(&known, &place(question, cast)).ok_or(UnknownSweep::Missing);
     match straight_sweep_past(question, termination, enters) {
         Ok(swept) => Ok(Some(swept)),
         Err(UnknownSweep::Missing) => Ok(None),
