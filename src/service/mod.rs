@@ -4,17 +4,18 @@
 //! tested is what is used. It knows nothing of shared memory.
 //!
 //! Data flow of a request: assembly (`geometry`; those in memory: `store`) → fields (`sdf`) and overlaps
-//! (`prepared`) → `search` (`entry`), for an assembly plan → `assembling` (`putting_back`) → plan in the
+//! (`prepared`) → `search` (`entry`), for an assembly plan → `assembling` (`assembly_plan`) → plan in the
 //! input's units (`answer`). What was answered before, in
 //! whole or in part, the `cache` knows.
 
 mod answer;
+mod assembly_plan;
 mod entry;
 mod pools;
 mod prepared;
-mod putting_back;
 mod records;
 mod relay;
+mod shared_shape;
 mod store;
 #[cfg(test)]
 mod tests;
