@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use sbdp_ipc::error::{ErrorCode, WireError};
 
-use super::desk::Desk;
+use super::dispatcher::Dispatcher;
 use super::intake::Upload;
 use super::session::{Input, Link, State};
 use super::workers::Planning;
@@ -30,7 +30,7 @@ impl Closing {
     }
 }
 
-impl<L: Link, P: Planning> Desk<L, P> {
+impl<L: Link, P: Planning> Dispatcher<L, P> {
     pub(super) fn shutting_down(&self) -> WireError {
         WireError::new(ErrorCode::ShuttingDown, "the daemon is shutting down")
     }

@@ -1,4 +1,4 @@
-//! The port thread: waits, receives, copies, hands to the desk, sends. It never plans.
+//! The port thread: waits, receives, copies, hands to the dispatcher, sends. It never plans.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -12,7 +12,7 @@ use sbdp_ipc::polling::Polling;
 use sbdp_ipc::services::{Active, ServerPort};
 
 use super::DaemonError;
-use super::desk::{Desk, Event, Incoming};
+use super::dispatcher::{Dispatcher, Event, Incoming};
 use super::figures::Surroundings;
 use super::inbox::{Inbound, Recently, reporter, watch_signals};
 use super::intake::ticket;
@@ -88,7 +88,7 @@ pub fn run_reloading<P: Planning>(
     let metrics = metrics
         .transpose()
         .map_err(|source| DaemonError::System { what: "opening the metrics socket", source })?;
-    let desk = Desk::new(service, queues, config);
+    let dispatcher = Dispatcher::new(service, queues, config);
     lease.publish()?;
     let supervisor = Supervisor::of_this_process();
     supervisor.ready();
@@ -105,7 +105,7 @@ pub fn run_reloading<P: Planning>(
     let next_sweep = Instant::now() + SWEEP;
     let event_loop = EventLoop {
         ports,
-        desk,
+        dispatcher,
         inbox,
         recently: Recently::default(),
         tick,
@@ -162,7 +162,7 @@ struct EventLoop<'l, P> {
     watchdog: Watchdog,
     shared_memory: SharedMemory,
     ports: Ports,
-    desk: Desk<ActiveLink, P>,
+    dispatcher: Dispatcher<ActiveLink, P>,
     inbox: Receiver<Inbound>,
     recently: Recently,
     tick: Duration,
@@ -180,11 +180,11 @@ impl<P: Planning> EventLoop<'_, P> {
         loop {
             let received = self.receive_all();
             self.read_inbox();
-            self.desk.settle(Instant::now());
+            self.dispatcher.settle(Instant::now());
             self.deliver();
             self.supervisor.alive();
             self.watchdog.beat();
-            if self.desk.is_closed() {
+            if self.dispatcher.is_closed() {
                 return;
             }
             if Instant::now() >= next_tick {
@@ -212,15 +212,15 @@ impl<P: Planning> EventLoop<'_, P> {
         }
         self.look_around();
         if let Some(metrics) = &self.metrics {
-            metrics.update(self.desk.figures().prometheus());
+            metrics.update(self.dispatcher.figures().prometheus());
         }
     }
 
-    /// Brings up to date what the desk is to tell of its surroundings.
+    /// Brings up to date what the dispatcher is to tell of its surroundings.
     fn look_around(&mut self) {
         let (connections, clients) = self.ports.clients();
         let shared_memory_free = self.shared_memory.look();
-        self.desk.surroundings = Surroundings { connections, clients, shared_memory_free };
+        self.dispatcher.surroundings = Surroundings { connections, clients, shared_memory_free };
     }
 
     /// Looks for the next request for a moment.
@@ -231,7 +231,7 @@ impl<P: Planning> EventLoop<'_, P> {
 
     fn wait(&self, next_tick: Instant) {
         let now = Instant::now();
-        let until = self.desk.next_deadline(now).map_or(next_tick, |d| d.min(next_tick));
+        let until = self.dispatcher.next_deadline(now).map_or(next_tick, |d| d.min(next_tick));
         let timeout = self.recently.patience(now, until.saturating_duration_since(now));
         if let Err(error) = self.ports.listener.timed_wait(|_| {}, timeout) {
             // A signal, or a listener out of order: never spin on it.
@@ -256,7 +256,7 @@ impl<P: Planning> EventLoop<'_, P> {
                     continue;
                 }
             };
-            self.desk.handle(event, Instant::now());
+            self.dispatcher.handle(event, Instant::now());
         }
     }
 
@@ -267,7 +267,7 @@ impl<P: Planning> EventLoop<'_, P> {
                 for key in self.config.restart_needed(&config) {
                     tracing::warn!(key, "changed in the configuration, which only a restart puts in force");
                 }
-                self.desk.reload(&config);
+                self.dispatcher.reload(&config);
                 self.tick = seconds(config.times.tick_s);
                 self.polling = Polling::new(config.times.poll());
                 self.limits = ReceiveLimits::of(&config);
@@ -291,12 +291,12 @@ impl<P: Planning> EventLoop<'_, P> {
             });
             for active in taken {
                 let owner = self.ports.owner_of(active.origin().value(), geometry);
-                let refuse = |length| self.desk.refuses_upload(owner, length);
+                let refuse = |length| self.dispatcher.refuses_upload(owner, length);
                 let event = read(active, owner, geometry, self.limits, refuse);
                 if matches!(event, Event::Figures(_)) {
                     self.look_around();
                 }
-                self.desk.handle(event, Instant::now());
+                self.dispatcher.handle(event, Instant::now());
                 // Whoever is answered already is not to wait for those behind.
                 self.deliver();
             }
@@ -305,15 +305,15 @@ impl<P: Planning> EventLoop<'_, P> {
     }
 
     fn deliver(&mut self) {
-        for sample in self.desk.samples.drain(..) {
+        for sample in self.dispatcher.samples.drain(..) {
             if let Err(error) = self.ports.progress.send_copy(sample) {
                 tracing::debug!(%error, "progress lost");
             }
         }
-        self.desk.wakes.sort_unstable();
-        self.desk.wakes.dedup();
-        self.ports.wake(&self.desk.wakes);
-        self.desk.wakes.clear();
+        self.dispatcher.wakes.sort_unstable();
+        self.dispatcher.wakes.dedup();
+        self.ports.wake(&self.dispatcher.wakes);
+        self.dispatcher.wakes.clear();
     }
 }
 

@@ -8,7 +8,7 @@ use sbdp_ipc::clock;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::RequestHeader;
 
-use super::desk::{Desk, Incoming};
+use super::dispatcher::{Dispatcher, Incoming};
 use super::figures::Timed;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::resources;
@@ -43,7 +43,7 @@ pub(crate) fn ticket(owner: Owner, bytes: usize) -> Ticket {
     Ticket { owner, class: Class::Interactive, bytes: bytes as u64 }
 }
 
-impl<L: Link, P: Planning> Desk<L, P> {
+impl<L: Link, P: Planning> Dispatcher<L, P> {
     pub(super) fn have(&mut self, incoming: &Incoming<L>) {
         match <[u8; 32]>::try_from(incoming.payload.as_slice()) {
             Ok(handle) => {

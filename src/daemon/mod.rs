@@ -4,14 +4,15 @@
 //! and sends. It never plans, heals or blocks. `workers` do, and report back as events.
 //! What was answered before is answered from `answers` at once; while nothing is asked, assemblies are made
 //! ready for what may be (`prefetch`, `foresight`).
-//! `desk` decides, by the state machine of `session` and the bounded `outbox`; none of these
+//! `dispatcher` decides, by the state machine of `session` and the bounded `outbox`; none of these
 //! three knows iceoryx2, so they are tested without it. Only `convert` sees both wire and
 //! working types.
 
 mod answers;
 mod closing;
 mod convert;
-mod desk;
+mod dispatcher;
+
 mod event_loop;
 mod figures;
 mod foresight;

@@ -63,7 +63,7 @@ pub(crate) enum Event<L> {
     Terminate,
 }
 
-/// The limits that the desk keeps.
+/// The limits that the dispatcher keeps.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limits {
     outbox: usize,
@@ -92,9 +92,9 @@ fn megabytes(mb: u64) -> usize {
     usize::try_from(mb.saturating_mul(1 << 20)).unwrap_or(usize::MAX)
 }
 
-/// The desk.
+/// The dispatcher.
 #[derive(Debug)]
-pub(crate) struct Desk<L, P> {
+pub(crate) struct Dispatcher<L, P> {
     pub(super) service: Arc<P>,
     pub(super) queues: Queues,
     pub(super) limits: Limits,
@@ -116,7 +116,7 @@ pub(crate) struct Desk<L, P> {
     pub(crate) samples: Vec<ProgressSample>,
 }
 
-impl<L: Link, P: Planning> Desk<L, P> {
+impl<L: Link, P: Planning> Dispatcher<L, P> {
     pub(crate) fn new(service: Arc<P>, queues: Queues, config: &Config) -> Self {
         let counters = StatusHeader {
             pid: std::process::id(),
@@ -486,5 +486,5 @@ fn expired() -> (Input, WireError) {
 }
 
 #[cfg(test)]
-#[path = "desk_tests.rs"]
+#[path = "dispatcher_tests.rs"]
 mod tests;
