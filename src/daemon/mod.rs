@@ -3,7 +3,7 @@
 //! One thread owns the ports (`event_loop`): it receives, copies and checks, admits or refuses,
 //! and sends. It never plans, heals or blocks. `workers` do, and report back as events.
 //! What was answered before is answered from `answers` at once; while nothing is asked, assemblies are made
-//! ready for what may be (`prefetch`, `foresight`).
+//! ready for what may be (`prefetch`, `speculation`).
 //! `dispatcher` decides, by the state machine of `session` and the bounded `outbox`; none of these
 //! three knows iceoryx2, so they are tested without it. Only `convert` sees both wire and
 //! working types.
@@ -15,7 +15,7 @@ mod dispatcher;
 
 mod event_loop;
 mod figures;
-mod foresight;
+
 mod inbox;
 mod instance;
 mod intake;
@@ -29,6 +29,7 @@ mod request_queue;
 mod resources;
 mod session;
 mod shared_queue;
+mod speculation;
 mod supervisor;
 mod watchdog;
 mod workers;

@@ -111,7 +111,7 @@ pub(crate) struct Queues {
     /// What is made ready while nothing is asked, if anything is.
     pub(super) prefetch: Arc<Prefetch>,
     /// How much time may go into what may be asked after a plan.
-    pub(super) foresight: Duration,
+    pub(super) speculation: Duration,
 }
 
 /// The bounds of plans, and of assemblies to take in.
@@ -153,7 +153,7 @@ impl Queues {
             plans: Arc::new(SharedQueue::new(plans)),
             admissions: Arc::new(SharedQueue::new(admissions)),
             prefetch: Arc::default(),
-            foresight: config.cache.foresight(),
+            speculation: config.cache.foresight(),
         }
     }
 

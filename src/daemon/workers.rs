@@ -12,9 +12,9 @@ use sbdp_ipc::plan::Step;
 
 use super::answers::Answer;
 use super::convert;
-use super::foresight::Foresight;
 use super::request_queue::Owner;
 use super::shared_queue::Queues;
+use super::speculation::Speculation;
 use crate::geometry::{Pose, Revision, SourceAssembly, load_assembly, remember_given, remember_revised};
 use crate::plan::{Plan, PlanStep};
 use crate::search::{PlanRequest, PlanSink, Progress, Termination};
@@ -369,8 +369,8 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Repor
         Ok(Ok(plan)) => {
             log_plan(&plan);
             // Before whoever asked is told, and may ask what is foreseen.
-            if let Some(foresight) = Foresight::after(job, &plan, queues.foresight) {
-                queues.prefetch.foresee(foresight);
+            if let Some(speculation) = Speculation::after(job, &plan, queues.speculation) {
+                queues.prefetch.foresee(speculation);
             }
             let again = job.question.clone().zip(Answer::of(&plan));
             if let Some((question, answer)) = &again {
