@@ -13,13 +13,13 @@ use sbdp_ipc::plan::PlanRequest;
 use sbdp_ipc::progress::ProgressSample;
 use sbdp_ipc::status::{Status, StatusHeader};
 
-use super::answers::{Answer, Answers, question};
 use super::closing::Closing;
 use super::convert;
 use super::figures::{AtHand, Figures, Latencies, Surroundings};
 use super::intake::Upload;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::resources;
+use super::response_cache::{CachedResponse, ResponseCache, question};
 use super::session::{End, Input, Link, Session, State};
 use super::shared_queue::Queues;
 use super::workers::{AdmitJob, PlanJob, Planning, SessionKey, WorkerEvent};
@@ -101,7 +101,7 @@ pub(crate) struct Dispatcher<L, P> {
     pub(super) sessions: HashMap<SessionKey, Session<L>>,
     pub(super) uploads: HashMap<u64, Upload<L>>,
     running: BTreeSet<(u128, u64)>,
-    answers: Answers,
+    answers: ResponseCache,
     pub(super) next_upload: u64,
     pub(super) latencies: Latencies,
     pub(super) closing: Closing,
@@ -125,7 +125,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
             queue_limit: config.requests.queue as u32,
             ..StatusHeader::default()
         };
-        let answers = Answers::recent(&*service, config.cache.memory().answers);
+        let answers = ResponseCache::recent(&*service, config.cache.memory().answers);
         service.answers_take(answers.figures().bytes);
         Self {
             service,
@@ -210,21 +210,21 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         }
     }
 
-    fn keep(&mut self, question: &[u8], answer: Answer) {
+    fn keep(&mut self, question: &[u8], answer: CachedResponse) {
         self.answers.insert(question, answer);
         self.service.answers_take(self.answers.figures().bytes);
     }
 
     /// The answer to a request whose bytes are those of a question that was answered before: then all that
     /// would be found by reading them was found then.
-    fn answered_to_the_byte(&mut self, payload: &AlignedBytes) -> Option<Arc<Answer>> {
+    fn answered_to_the_byte(&mut self, payload: &AlignedBytes) -> Option<Arc<CachedResponse>> {
         if self.closing != Closing::Open {
             return None;
         }
         self.answers.get(payload.as_slice())
     }
 
-    fn answer_again(&mut self, session: &mut Session<L>, answer: &Answer) {
+    fn answer_again(&mut self, session: &mut Session<L>, answer: &CachedResponse) {
         self.queues.prefetch.answered();
         session.answer(answer);
         self.counters.remembered += 1;

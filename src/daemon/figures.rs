@@ -146,7 +146,7 @@ pub(crate) struct Figures {
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct AtHand {
     /// Answers in memory, as they were sent.
-    pub(crate) answers: AnswerFigures,
+    pub(crate) answers: ResponseCacheMetrics,
     /// Assemblies and records; what is on disk is not counted.
     pub(crate) remembered: Option<Remembered>,
     /// What is made ready while nothing is asked.
@@ -155,7 +155,7 @@ pub(crate) struct AtHand {
 
 /// Answers in memory.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
-pub(crate) struct AnswerFigures {
+pub(crate) struct ResponseCacheMetrics {
     pub(crate) entries: usize,
     pub(crate) bytes: usize,
 }

@@ -2,13 +2,12 @@
 //!
 //! One thread owns the ports (`event_loop`): it receives, copies and checks, admits or refuses,
 //! and sends. It never plans, heals or blocks. `workers` do, and report back as events.
-//! What was answered before is answered from `answers` at once; while nothing is asked, assemblies are made
+//! What was answered before is answered from `response_cache` at once; while nothing is asked, assemblies are made
 //! ready for what may be (`prefetch`, `speculation`).
 //! `dispatcher` decides, by the state machine of `session` and the bounded `outbox`; none of these
 //! three knows iceoryx2, so they are tested without it. Only `convert` sees both wire and
 //! working types.
 
-mod answers;
 mod closing;
 mod convert;
 mod dispatcher;
@@ -27,6 +26,7 @@ mod ports;
 mod prefetch;
 mod request_queue;
 mod resources;
+mod response_cache;
 mod session;
 mod shared_queue;
 mod speculation;

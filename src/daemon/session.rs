@@ -9,9 +9,9 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::{ResponseHeader, ResponseKind};
 use sbdp_ipc::plan::Step;
 
-use super::answers::Answer;
 use super::figures::Timed;
 use super::outbox::Outbox;
+use super::response_cache::CachedResponse;
 use crate::termination::Termination;
 
 /// Where a request stands.
@@ -197,14 +197,14 @@ impl<L: Link> Session<L> {
     }
 
     /// Answers at once with what was answered before.
-    pub(crate) fn answer(&mut self, answer: &Answer) {
+    pub(crate) fn answer(&mut self, answer: &CachedResponse) {
         if [Input::Enqueue, Input::Start].into_iter().all(|input| self.input(input)) {
             self.answer_running(answer);
         }
     }
 
     /// Answers what runs with what was answered before.
-    pub(crate) fn answer_running(&mut self, answer: &Answer) {
+    pub(crate) fn answer_running(&mut self, answer: &CachedResponse) {
         self.remembered = true;
         for message in &answer.steps {
             if self.outbox.push_whole(ResponseKind::Steps, Arc::clone(message)).is_err() {

@@ -10,9 +10,9 @@ use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::plan::Step;
 
-use super::answers::Answer;
 use super::convert;
 use super::request_queue::Owner;
+use super::response_cache::CachedResponse;
 use super::shared_queue::Queues;
 use super::speculation::Speculation;
 use crate::geometry::{Pose, Revision, SourceAssembly, load_assembly, remember_given, remember_revised};
@@ -257,9 +257,9 @@ pub(crate) enum WorkerEvent {
     Step(SessionKey, Step),
     Progress(SessionKey, Progress),
     /// A plan's summary, and what to answer when the same is asked again.
-    Planned(SessionKey, Arc<Vec<u8>>, Option<(Vec<u8>, Answer)>),
+    Planned(SessionKey, Arc<Vec<u8>>, Option<(Vec<u8>, CachedResponse)>),
     /// The question was answered before, and is so again.
-    Answered(SessionKey, Vec<u8>, Answer),
+    Answered(SessionKey, Vec<u8>, CachedResponse),
     Unplanned(SessionKey, WireError),
     Admitted {
         number: u64,
@@ -356,7 +356,8 @@ fn log_plan(plan: &Plan) {
 fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Report) {
     let _span = span(job).entered();
     report(WorkerEvent::Started(job.key));
-    let before = job.question.as_ref().and_then(|q| Some((q, Answer::from_messages(service.answered(q)?)?)));
+    let before =
+        job.question.as_ref().and_then(|q| Some((q, CachedResponse::from_messages(service.answered(q)?)?)));
     if let Some((question, answer)) = before {
         return report(WorkerEvent::Answered(job.key, question.clone(), answer));
     }
@@ -372,7 +373,7 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Repor
             if let Some(speculation) = Speculation::after(job, &plan, queues.speculation) {
                 queues.prefetch.foresee(speculation);
             }
-            let again = job.question.clone().zip(Answer::of(&plan));
+            let again = job.question.clone().zip(CachedResponse::of(&plan));
             if let Some((question, answer)) = &again {
                 service.remember(question, answer.messages());
             }
