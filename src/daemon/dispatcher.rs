@@ -15,8 +15,8 @@ use sbdp_ipc::status::{Status, StatusHeader};
 
 use super::closing::Closing;
 use super::convert;
-use super::figures::{AtHand, Figures, Latencies, Surroundings};
 use super::intake::Upload;
+use super::metrics::{CacheMetrics, HostStatus, Latencies, Metrics};
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::resources;
 use super::response_cache::{CachedResponse, ResponseCache, question};
@@ -109,7 +109,7 @@ pub(crate) struct Dispatcher<L, P> {
     preloaded: Vec<(String, [u8; 32])>,
     started: Instant,
     /// What only the ports and the system know.
-    pub(crate) surroundings: Surroundings,
+    pub(crate) host: HostStatus,
     /// Listeners to wake.
     pub(crate) wakes: Vec<u128>,
     /// Progress to publish.
@@ -126,7 +126,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
             ..StatusHeader::default()
         };
         let answers = ResponseCache::recent(&*service, config.cache.memory().answers);
-        service.answers_take(answers.figures().bytes);
+        service.answers_take(answers.metrics().bytes);
         Self {
             service,
             queues,
@@ -141,7 +141,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
             counters,
             preloaded: Vec::new(),
             started: Instant::now(),
-            surroundings: Surroundings::default(),
+            host: HostStatus::default(),
             wakes: Vec::new(),
             samples: Vec::new(),
         }
@@ -163,7 +163,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
                 self.answer(&incoming.link, &incoming.header, ResponseKind::Status, &status);
             }
             Event::Figures(incoming) => {
-                let text = self.figures().json();
+                let text = self.metrics().json();
                 self.answer(&incoming.link, &incoming.header, ResponseKind::Figures, text.as_bytes());
             }
             Event::Have(incoming) => self.have(&incoming),
@@ -212,7 +212,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
 
     fn keep(&mut self, question: &[u8], answer: CachedResponse) {
         self.answers.insert(question, answer);
-        self.service.answers_take(self.answers.figures().bytes);
+        self.service.answers_take(self.answers.metrics().bytes);
     }
 
     /// The answer to a request whose bytes are those of a question that was answered before: then all that
@@ -419,18 +419,18 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         }
     }
 
-    pub(crate) fn figures(&self) -> Figures {
+    pub(crate) fn metrics(&self) -> Metrics {
         let open = self.sessions.len() + self.uploads.len();
-        Figures::of(
+        Metrics::of(
             &self.numbers(),
             open,
-            self.surroundings,
+            self.host,
             &self.latencies,
             &self.preloaded,
-            AtHand {
-                answers: self.answers.figures(),
+            CacheMetrics {
+                answers: self.answers.metrics(),
                 remembered: self.service.remembered(),
-                ahead: self.queues.prefetch.ahead(),
+                ahead: self.queues.prefetch.metrics(),
             },
         )
     }

@@ -254,7 +254,7 @@ fn what_was_answered_before_a_restart_is_answered_at_once_after_it() {
 #[test]
 fn the_service_is_told_what_answers_take_also_after_a_restart() {
     let told = |bench: &Bench| {
-        (bench.service.answers.load(Ordering::Relaxed), bench.dispatcher.answers.figures().bytes)
+        (bench.service.answers.load(Ordering::Relaxed), bench.dispatcher.answers.metrics().bytes)
     };
     let mut bench = Bench::new(4);
     assert_eq!(told(&bench), (0, 0));

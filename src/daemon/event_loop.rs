@@ -13,11 +13,11 @@ use sbdp_ipc::services::{Active, ServerPort};
 
 use super::DaemonError;
 use super::dispatcher::{Dispatcher, Event, Incoming};
-use super::figures::Surroundings;
 use super::inbox::{Inbound, Recently, reporter, watch_signals};
 use super::intake::ticket;
 use super::lifecycle::{Lease, Place};
-use super::metrics::Metrics;
+use super::metrics::HostStatus;
+use super::metrics_socket::MetricsSocket;
 use super::ports::{ActiveLink, Ports};
 use super::prefetch::{self, Closing};
 use super::request_queue::Owner;
@@ -84,7 +84,8 @@ pub fn run_reloading<P: Planning>(
             tracing::warn!(path = %path.display(), "not preloaded: the list is too long");
         }
     }
-    let metrics = config.metrics.socket.as_ref().map(|path| Metrics::serve(&place.runtime_dir.join(path)));
+    let metrics =
+        config.metrics.socket.as_ref().map(|path| MetricsSocket::serve(&place.runtime_dir.join(path)));
     let metrics = metrics
         .transpose()
         .map_err(|source| DaemonError::System { what: "opening the metrics socket", source })?;
@@ -170,7 +171,7 @@ struct EventLoop<'l, P> {
     limits: ReceiveLimits,
     config: Config,
     reload: Reload,
-    metrics: Option<Metrics>,
+    metrics: Option<MetricsSocket>,
     supervisor: Supervisor,
 }
 
@@ -212,15 +213,15 @@ impl<P: Planning> EventLoop<'_, P> {
         }
         self.look_around();
         if let Some(metrics) = &self.metrics {
-            metrics.update(self.dispatcher.figures().prometheus());
+            metrics.update(self.dispatcher.metrics().prometheus());
         }
     }
 
-    /// Brings up to date what the dispatcher is to tell of its surroundings.
+    /// Brings up to date what the dispatcher is to tell of its host.
     fn look_around(&mut self) {
         let (connections, clients) = self.ports.clients();
         let shared_memory_free = self.shared_memory.look();
-        self.dispatcher.surroundings = Surroundings { connections, clients, shared_memory_free };
+        self.dispatcher.host = HostStatus { connections, clients, shared_memory_free };
     }
 
     /// Looks for the next request for a moment.

@@ -9,7 +9,7 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::RequestHeader;
 
 use super::dispatcher::{Dispatcher, Incoming};
-use super::figures::Timed;
+use super::metrics::LatencyKind;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::resources;
 use super::session::Link;
@@ -116,7 +116,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
 
     pub(super) fn admitted(&mut self, number: u64, result: Result<AssemblyId, WireError>) {
         let Some(Upload { link, header, received, .. }) = self.uploads.remove(&number) else { return };
-        self.latencies.add(Timed::Upload, received.elapsed());
+        self.latencies.add(LatencyKind::Upload, received.elapsed());
         match result {
             Ok(id) => self.answer_handle(&link, &header, id.0, true),
             Err(error) => self.answer_error(&link, &header, &error),

@@ -13,7 +13,6 @@ mod convert;
 mod dispatcher;
 
 mod event_loop;
-mod figures;
 
 mod inbox;
 mod instance;
@@ -21,6 +20,7 @@ mod intake;
 mod lifecycle;
 mod lock;
 mod metrics;
+mod metrics_socket;
 mod outbox;
 mod ports;
 mod prefetch;

@@ -124,7 +124,7 @@ pub(super) enum Work {
 
 /// What is made ready, in figures.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub(crate) struct Ahead {
+pub(crate) struct PrefetchMetrics {
     /// Assemblies that wait, with the one at work.
     pub(crate) assemblies: usize,
     /// Questions that may be asked and wait to be planned, with the one at work.
@@ -194,12 +194,12 @@ impl Prefetch {
     }
 
     /// What waits, and what was done.
-    pub(super) fn ahead(&self) -> Ahead {
+    pub(super) fn metrics(&self) -> PrefetchMetrics {
         let state = self.state();
         let at_work = state.at_work.as_ref();
         let assembly = at_work.is_some_and(|work| work.questions.is_none());
         let questions = at_work.and_then(|work| work.questions).unwrap_or(0);
-        Ahead {
+        PrefetchMetrics {
             assemblies: state.waiting.len() + usize::from(assembly),
             questions: state.speculations.iter().map(Speculation::left).sum::<usize>() + questions,
             foreseen: state.foreseen,
@@ -360,9 +360,9 @@ mod tests {
         prefetch.foresee(questions(2, 2));
         prefetch.want(id(3));
         prefetch.foresee(questions(1, 3));
-        assert_eq!(prefetch.ahead(), Ahead { assemblies: 1, questions: 13, foreseen: 0 });
+        assert_eq!(prefetch.metrics(), PrefetchMetrics { assemblies: 1, questions: 13, foreseen: 0 });
         let mut taken = Vec::new();
-        while let Some((work, _)) = (prefetch.ahead().questions > 0).then(|| prefetch.next()).flatten() {
+        while let Some((work, _)) = (prefetch.metrics().questions > 0).then(|| prefetch.next()).flatten() {
             taken.push(match work {
                 Work::Assembly(_) => 0,
                 Work::Question(speculation) => speculation.left(),
@@ -383,8 +383,8 @@ mod tests {
         prefetch.foresee(questions(1, 1));
         let (work, termination) = prefetch.next().unwrap();
         assert_eq!(
-            prefetch.ahead(),
-            Ahead { assemblies: 0, questions: 2, foreseen: 0 },
+            prefetch.metrics(),
+            PrefetchMetrics { assemblies: 0, questions: 2, foreseen: 0 },
             "with what is at work"
         );
         prefetch.answered();
@@ -393,7 +393,7 @@ mod tests {
         state.at_work = None;
         state.put_back(work, true);
         drop(state);
-        assert_eq!(prefetch.ahead().questions, 2, "they are left");
+        assert_eq!(prefetch.metrics().questions, 2, "they are left");
     }
 
     #[test]
@@ -402,10 +402,10 @@ mod tests {
         for n in 0..=MOST_SPECULATIONS as u8 {
             prefetch.foresee(questions(n, 1));
         }
-        assert_eq!(prefetch.ahead().questions, 2 * MOST_SPECULATIONS);
+        assert_eq!(prefetch.metrics().questions, 2 * MOST_SPECULATIONS);
         prefetch.close();
         prefetch.state().speculations.clear();
         prefetch.state().put_back(Work::Question(Box::new(questions(1, 1))), true);
-        assert_eq!(prefetch.ahead().questions, 0, "nothing waits once it is closed");
+        assert_eq!(prefetch.metrics().questions, 0, "nothing waits once it is closed");
     }
 }

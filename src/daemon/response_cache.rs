@@ -6,7 +6,7 @@ use std::sync::Arc;
 use sbdp_ipc::plan::PlanRequest;
 
 use super::convert;
-use super::figures::ResponseCacheMetrics;
+use super::metrics::ResponseCacheMetrics;
 use super::outbox::steps_messages;
 use super::workers::Planning;
 use crate::lru::{self, Lru};
@@ -96,7 +96,7 @@ impl ResponseCache {
         answers
     }
 
-    pub(crate) fn figures(&self) -> ResponseCacheMetrics {
+    pub(crate) fn metrics(&self) -> ResponseCacheMetrics {
         ResponseCacheMetrics { entries: self.by_question.len(), bytes: self.bytes }
     }
 

@@ -9,7 +9,7 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::{ResponseHeader, ResponseKind};
 use sbdp_ipc::plan::Step;
 
-use super::figures::Timed;
+use super::metrics::LatencyKind;
 use super::outbox::Outbox;
 use super::response_cache::CachedResponse;
 use crate::termination::Termination;
@@ -276,8 +276,8 @@ impl<L: Link> Session<L> {
     }
 
     /// How long a plan took that was sent to its end, and from where it came.
-    pub(crate) fn timed(&self) -> Option<(Timed, Duration)> {
-        let kind = if self.remembered { Timed::RememberedPlan } else { Timed::Plan };
+    pub(crate) fn timed(&self) -> Option<(LatencyKind, Duration)> {
+        let kind = if self.remembered { LatencyKind::RememberedPlan } else { LatencyKind::Plan };
         (self.state == State::Ended(End::Done)).then(|| (kind, self.received.elapsed()))
     }
 
