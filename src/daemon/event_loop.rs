@@ -13,7 +13,6 @@ use sbdp_ipc::services::{Active, ServerPort};
 
 use super::DaemonError;
 use super::dispatcher::{Dispatcher, Event, Incoming};
-use super::inbox::{Inbound, Recently, reporter, watch_signals};
 use super::intake::ticket;
 use super::lifecycle::{Lease, Place};
 use super::metrics::HostStatus;
@@ -24,6 +23,7 @@ use super::request_queue::Owner;
 use super::resources::{SharedMemory, raise_file_limit};
 use super::shared_queue::Queues;
 use super::supervisor::Supervisor;
+use super::thread_events::{Recently, ThreadEvent, reporter, watch_signals};
 use super::watchdog::{Watchdog, give_up};
 use super::workers::{AdmitJob, Planning, start};
 use crate::config::{Config, seconds};
@@ -75,7 +75,7 @@ pub fn run_reloading<P: Planning>(
     let watchdog = watch(config, &place)?;
     let ports = Ports::open(&lease.instance.iceoryx2_config()?)?;
     lease.instance.close_to_others()?;
-    let (sender, inbox) = channel();
+    let (sender, thread_events) = channel();
     watch_signals(&ports, sender.clone())?;
     start(config.workers.count, &queues, &service, &reporter(&ports, sender))
         .map_err(|source| DaemonError::System { what: "starting workers", source })?;
@@ -107,7 +107,7 @@ pub fn run_reloading<P: Planning>(
     let event_loop = EventLoop {
         ports,
         dispatcher,
-        inbox,
+        thread_events,
         recently: Recently::default(),
         tick,
         polling,
@@ -164,7 +164,7 @@ struct EventLoop<'l, P> {
     shared_memory: SharedMemory,
     ports: Ports,
     dispatcher: Dispatcher<ActiveLink, P>,
-    inbox: Receiver<Inbound>,
+    thread_events: Receiver<ThreadEvent>,
     recently: Recently,
     tick: Duration,
     polling: Polling,
@@ -180,7 +180,7 @@ impl<P: Planning> EventLoop<'_, P> {
         let mut next_tick = Instant::now() + self.tick;
         loop {
             let received = self.receive_all();
-            self.read_inbox();
+            self.read_thread_events();
             self.dispatcher.settle(Instant::now());
             self.deliver();
             self.supervisor.alive();
@@ -241,18 +241,18 @@ impl<P: Planning> EventLoop<'_, P> {
         }
     }
 
-    fn read_inbox(&mut self) {
-        while let Ok(inbound) = self.inbox.try_recv() {
-            let event = match inbound {
-                Inbound::Worker(event) => {
+    fn read_thread_events(&mut self) {
+        while let Ok(event) = self.thread_events.try_recv() {
+            let event = match event {
+                ThreadEvent::Worker(event) => {
                     self.recently.heard(Instant::now());
                     Event::Worker(event)
                 }
-                Inbound::Terminate => {
+                ThreadEvent::Terminate => {
                     self.supervisor.stopping();
                     Event::Terminate
                 }
-                Inbound::Reload => {
+                ThreadEvent::Reload => {
                     self.reload();
                     continue;
                 }

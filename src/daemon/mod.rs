@@ -14,7 +14,6 @@ mod dispatcher;
 
 mod event_loop;
 
-mod inbox;
 mod instance;
 mod intake;
 mod lifecycle;
@@ -31,6 +30,7 @@ mod session;
 mod shared_queue;
 mod speculation;
 mod supervisor;
+mod thread_events;
 mod watchdog;
 mod workers;
 

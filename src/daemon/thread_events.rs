@@ -18,7 +18,7 @@ use super::ports::Ports;
 use super::workers::{Report, WorkerEvent};
 
 /// What comes from other threads of this process.
-pub(super) enum Inbound {
+pub(super) enum ThreadEvent {
     Worker(WorkerEvent),
     Terminate,
     Reload,
@@ -53,7 +53,7 @@ impl Wakes {
 }
 
 /// Takes workers' reports to the port thread.
-pub(super) fn reporter(ports: &Ports, sender: Sender<Inbound>) -> Report {
+pub(super) fn reporter(ports: &Ports, sender: Sender<ThreadEvent>) -> Report {
     let notifier = Arc::downgrade(&ports.wake_self);
     let told = Mutex::new((sender, Wakes::default()));
     Arc::new(move |event| {
@@ -62,7 +62,7 @@ pub(super) fn reporter(ports: &Ports, sender: Sender<Inbound>) -> Report {
             // The time before it is sent: it is read later than that.
             let is_due = wakes.is_due(&event, Instant::now());
             // A send fails only when the port thread has left; then nobody is interested.
-            let _ = sender.send(Inbound::Worker(event));
+            let _ = sender.send(ThreadEvent::Worker(event));
             is_due
         };
         if is_due {
@@ -72,13 +72,13 @@ pub(super) fn reporter(ports: &Ports, sender: Sender<Inbound>) -> Report {
 }
 
 /// Takes signals to the port thread.
-pub(super) fn watch_signals(ports: &Ports, sender: Sender<Inbound>) -> Result<(), DaemonError> {
+pub(super) fn watch_signals(ports: &Ports, sender: Sender<ThreadEvent>) -> Result<(), DaemonError> {
     let system = |source| DaemonError::System { what: "watching signals", source };
     let notifier = Arc::downgrade(&ports.wake_self);
     let mut signals = Signals::new([SIGTERM, SIGINT, SIGHUP]).map_err(system)?;
     let watch = move || {
         for signal in signals.forever() {
-            let _ = sender.send(if signal == SIGHUP { Inbound::Reload } else { Inbound::Terminate });
+            let _ = sender.send(if signal == SIGHUP { ThreadEvent::Reload } else { ThreadEvent::Terminate });
             wake(&notifier);
         }
     };
