@@ -6,8 +6,8 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 
 use super::dispatcher::Dispatcher;
 use super::intake::Upload;
+use super::planning::Planning;
 use super::session::{Input, Link, State};
-use super::workers::Planning;
 
 /// How far shutting down is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

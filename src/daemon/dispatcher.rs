@@ -16,13 +16,15 @@ use sbdp_ipc::status::{Status, StatusHeader};
 use super::closing::Closing;
 use super::convert;
 use super::intake::Upload;
+use super::jobs::{AdmitJob, PlanJob, SessionKey};
 use super::metrics::{CacheMetrics, HostStatus, Latencies, Metrics};
+use super::planning::Planning;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::resources;
 use super::response_cache::{CachedResponse, ResponseCache, question};
 use super::session::{End, Input, Link, Session, State};
 use super::shared_queue::Queues;
-use super::workers::{AdmitJob, PlanJob, Planning, SessionKey, WorkerEvent};
+use super::workers::WorkerEvent;
 use crate::config::{Config, seconds};
 use crate::service::AssemblyId;
 

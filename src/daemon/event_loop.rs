@@ -14,18 +14,20 @@ use sbdp_ipc::services::{Active, ServerPort};
 use super::DaemonError;
 use super::dispatcher::{Dispatcher, Event, Incoming};
 use super::intake::ticket;
+use super::jobs::AdmitJob;
 use super::lifecycle::{Lease, Place};
 use super::metrics::HostStatus;
 use super::metrics_socket::MetricsSocket;
+use super::planning::Planning;
 use super::ports::{ActiveLink, Ports};
-use super::prefetch::{self, Closing};
+use super::prefetch::{self, CloseOnDrop};
 use super::request_queue::Owner;
 use super::resources::{SharedMemory, raise_file_limit};
 use super::shared_queue::Queues;
 use super::supervisor::Supervisor;
 use super::thread_events::{Recently, ThreadEvent, reporter, watch_signals};
 use super::watchdog::{Watchdog, give_up};
-use super::workers::{AdmitJob, Planning, start};
+use super::workers::start;
 use crate::config::{Config, seconds};
 
 /// Requests taken from one port before workers' reports are looked at again.
@@ -67,9 +69,9 @@ pub fn run_reloading<P: Planning>(
     let lease = Lease::take(place.clone())?;
     let queues = Queues::new(config);
     // First of all: it makes ready what was asked about last, while ports are opened. Whatever fails ends it.
-    let _closing = Closing(Arc::clone(&queues.prefetch));
+    let _closing = CloseOnDrop(Arc::clone(&queues.prefetch));
     if config.cache.prefetch {
-        prefetch::start(&queues, &service)
+        prefetch::start(&queues.prefetch, &service)
             .map_err(|source| DaemonError::System { what: "starting workers", source })?;
     }
     let watchdog = watch(config, &place)?;

@@ -9,11 +9,12 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::RequestHeader;
 
 use super::dispatcher::{Dispatcher, Incoming};
+use super::jobs::{AdmitJob, Received};
 use super::metrics::LatencyKind;
+use super::planning::Planning;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::resources;
 use super::session::Link;
-use super::workers::{AdmitJob, Planning, Received};
 use crate::service::AssemblyId;
 use crate::termination::Termination;
 
@@ -155,14 +156,4 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
 
 fn expired() -> WireError {
     WireError::new(ErrorCode::Expired, "the deadline passed before the upload was looked at")
-}
-
-impl AdmitJob {
-    /// The upload's number, if it is one.
-    pub(super) fn number(&self) -> Option<u64> {
-        match self {
-            Self::Upload(received) | Self::Revise(received) => Some(received.number),
-            Self::Preload(_) => None,
-        }
-    }
 }

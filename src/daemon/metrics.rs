@@ -8,6 +8,7 @@ use sbdp_ipc::status::StatusHeader;
 use serde::Serialize;
 
 use super::prefetch::PrefetchMetrics;
+use super::response_cache::ResponseCacheMetrics;
 use crate::cache::KindStatistics;
 use crate::service::Remembered;
 
@@ -151,13 +152,6 @@ pub(crate) struct CacheMetrics {
     pub(crate) remembered: Option<Remembered>,
     /// What is made ready while nothing is asked.
     pub(crate) ahead: PrefetchMetrics,
-}
-
-/// Answers in memory.
-#[derive(Debug, Clone, Copy, Default, Serialize)]
-pub(crate) struct ResponseCacheMetrics {
-    pub(crate) entries: usize,
-    pub(crate) bytes: usize,
 }
 
 impl Metrics {

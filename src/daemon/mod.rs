@@ -16,11 +16,13 @@ mod event_loop;
 
 mod instance;
 mod intake;
+mod jobs;
 mod lifecycle;
 mod lock;
 mod metrics;
 mod metrics_socket;
 mod outbox;
+mod planning;
 mod ports;
 mod prefetch;
 mod request_queue;
@@ -38,7 +40,7 @@ pub(crate) use convert::source_assembly as uploaded_assembly;
 pub use event_loop::{Reload, run, run_reloading};
 pub use lifecycle::LifecycleError;
 pub use lifecycle::check_place;
-pub use workers::Planning;
+pub use planning::Planning;
 
 /// The ports, for measuring them without a daemon behind.
 pub(crate) mod transport {

@@ -11,9 +11,8 @@ use std::time::{Duration, Instant};
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 
-use super::shared_queue::Queues;
+use super::planning::{Planning, contained};
 use super::speculation::Speculation;
-use super::workers::{Planning, contained};
 use crate::service::AssemblyId;
 use crate::termination::Termination;
 
@@ -35,8 +34,8 @@ const NICEST: i32 = 19;
 ///
 /// # Errors
 /// The system has no thread for it.
-pub(super) fn start<P: Planning>(queues: &Queues, service: &Arc<P>) -> std::io::Result<()> {
-    let (queues, service) = (queues.clone(), Arc::clone(service));
+pub(super) fn start<P: Planning>(prefetch: &Arc<Prefetch>, service: &Arc<P>) -> std::io::Result<()> {
+    let (prefetch, service) = (Arc::clone(prefetch), Arc::clone(service));
     let prepare = move || {
         // Questions leave half of the processors to whoever else works on this machine: what shares a core with
         // others slows them down, however nice it is.
@@ -51,9 +50,9 @@ pub(super) fn start<P: Planning>(queues: &Queues, service: &Arc<P>) -> std::io::
         };
         for_assemblies.install(|| service.recall_recent());
         for id in service.recent(MOST_RECENT) {
-            queues.prefetch.want(id);
+            prefetch.want(id);
         }
-        queues.prefetch.run(|work, termination| match work {
+        prefetch.run(|work, termination| match work {
             Work::Assembly(id) => {
                 // Whoever asks will be told what is wrong.
                 let _ = contained(|| for_assemblies.install(|| service.prepare(*id, termination)));
@@ -148,9 +147,9 @@ impl Drop for Busy<'_> {
 
 /// Once this is dropped, nothing is made ready any more.
 #[derive(Debug)]
-pub(super) struct Closing(pub(super) Arc<Prefetch>);
+pub(super) struct CloseOnDrop(pub(super) Arc<Prefetch>);
 
-impl Drop for Closing {
+impl Drop for CloseOnDrop {
     fn drop(&mut self) {
         self.0.close();
     }
@@ -291,7 +290,7 @@ impl State {
 mod tests {
     use std::sync::mpsc::channel;
 
-    use super::super::workers::PlanJob;
+    use super::super::jobs::PlanJob;
     use super::*;
     use crate::fixtures::{plan_of, step_of};
     use crate::plan::PlanStatus;

@@ -4,11 +4,11 @@
 use std::sync::Arc;
 
 use sbdp_ipc::plan::PlanRequest;
+use serde::Serialize;
 
 use super::convert;
-use super::metrics::ResponseCacheMetrics;
 use super::outbox::steps_messages;
-use super::workers::Planning;
+use super::planning::Planning;
 use crate::lru::{self, Lru};
 use crate::plan::{Plan, PlanStats, PlanStatus};
 
@@ -69,6 +69,13 @@ pub(crate) fn question(request: &PlanRequest) -> Option<Vec<u8>> {
     let PlanRequest { no_cache, .. } = *request;
     (!no_cache)
         .then(|| PlanRequest { threads: 0, batch: false, deadline_ns: None, ..request.clone() }.encode())
+}
+
+/// Answers in memory.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub(crate) struct ResponseCacheMetrics {
+    pub(crate) entries: usize,
+    pub(crate) bytes: usize,
 }
 
 /// The answers that are remembered: those that were asked for last, within a number of bytes.

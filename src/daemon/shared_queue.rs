@@ -3,9 +3,9 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::jobs::{AdmitJob, PlanJob};
 use super::prefetch::Prefetch;
 use super::request_queue::{Bounds, Owner, Rejected, RequestQueue, Ticket};
-use super::workers::{AdmitJob, PlanJob};
 use crate::config::Config;
 
 /// A queue that threads share.

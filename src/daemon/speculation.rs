@@ -5,7 +5,8 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use super::workers::{PlanJob, Planning, contained, with_moved};
+use super::jobs::PlanJob;
+use super::planning::{Planning, contained, with_moved};
 use crate::geometry::Pose;
 use crate::plan::{Plan, PlanStatus};
 use crate::search::{PlanRequest, Planner};

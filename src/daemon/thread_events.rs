@@ -107,7 +107,7 @@ impl Recently {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::daemon::workers::SessionKey;
+    use crate::daemon::jobs::SessionKey;
 
     #[test]
     fn a_step_that_wakes_nobody_is_read_soon() {
