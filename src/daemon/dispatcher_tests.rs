@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 
-use sbdp_ipc::headers::RequestKind;
+use sbdp_ipc::headers::{RequestHeader, RequestKind, ResponseHeader};
 
 use super::*;
 use crate::daemon::session::Undelivered;
@@ -448,5 +448,5 @@ fn a_batch_request_waits_for_interactive_ones() {
     assert_eq!(batch.summary_status(), Some("complete"));
 }
 
-#[path = "intake_tests.rs"]
-mod intake;
+#[path = "uploads_tests.rs"]
+mod uploads;

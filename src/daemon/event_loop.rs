@@ -12,8 +12,8 @@ use sbdp_ipc::polling::Polling;
 use sbdp_ipc::services::{Active, ServerPort};
 
 use super::DaemonError;
-use super::dispatcher::{Dispatcher, Event, Incoming};
-use super::intake::ticket;
+use super::dispatcher::Dispatcher;
+use super::events::{Event, Incoming};
 use super::jobs::AdmitJob;
 use super::lifecycle::{Lease, Place};
 use super::metrics::HostStatus;
@@ -26,6 +26,7 @@ use super::resources::{SharedMemory, raise_file_limit};
 use super::shared_queue::Queues;
 use super::supervisor::Supervisor;
 use super::thread_events::{Recently, ThreadEvent, reporter, watch_signals};
+use super::uploads::ticket;
 use super::watchdog::{Watchdog, give_up};
 use super::workers::start;
 use crate::config::{Config, seconds};
@@ -294,7 +295,7 @@ impl<P: Planning> EventLoop<'_, P> {
             });
             for active in taken {
                 let owner = self.ports.owner_of(active.origin().value(), geometry);
-                let refuse = |length| self.dispatcher.refuses_upload(owner, length);
+                let refuse = |length| self.dispatcher.uploads.refusal(owner, length);
                 let event = read(active, owner, geometry, self.limits, refuse);
                 if matches!(event, Event::Figures(_)) {
                     self.look_around();
@@ -308,15 +309,15 @@ impl<P: Planning> EventLoop<'_, P> {
     }
 
     fn deliver(&mut self) {
-        for sample in self.dispatcher.samples.drain(..) {
+        for sample in self.dispatcher.outgoing.samples.drain(..) {
             if let Err(error) = self.ports.progress.send_copy(sample) {
                 tracing::debug!(%error, "progress lost");
             }
         }
-        self.dispatcher.wakes.sort_unstable();
-        self.dispatcher.wakes.dedup();
-        self.ports.wake(&self.dispatcher.wakes);
-        self.dispatcher.wakes.clear();
+        self.dispatcher.outgoing.wakes.sort_unstable();
+        self.dispatcher.outgoing.wakes.dedup();
+        self.ports.wake(&self.dispatcher.outgoing.wakes);
+        self.dispatcher.outgoing.wakes.clear();
     }
 }
 

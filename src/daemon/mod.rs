@@ -8,20 +8,20 @@
 //! three knows iceoryx2, so they are tested without it. Only `convert` sees both wire and
 //! working types.
 
-mod closing;
 mod convert;
 mod dispatcher;
 
 mod event_loop;
+mod events;
 
 mod instance;
-mod intake;
 mod jobs;
 mod lifecycle;
 mod lock;
 mod metrics;
 mod metrics_socket;
 mod outbox;
+mod outgoing;
 mod planning;
 mod ports;
 mod prefetch;
@@ -30,9 +30,11 @@ mod resources;
 mod response_cache;
 mod session;
 mod shared_queue;
+mod shutdown;
 mod speculation;
 mod supervisor;
 mod thread_events;
+mod uploads;
 mod watchdog;
 mod workers;
 
