@@ -15,9 +15,10 @@ use super::DaemonError;
 use super::dispatcher::Dispatcher;
 use super::events::{Event, Incoming};
 use super::jobs::AdmitJob;
-use super::lifecycle::{Lease, Place};
+use super::lease::Lease;
 use super::metrics::HostStatus;
 use super::metrics_socket::MetricsSocket;
+use super::place::DaemonPlace;
 use super::planning::Planning;
 use super::ports::{ActiveLink, Ports};
 use super::prefetch::{self, CloseOnDrop};
@@ -66,7 +67,7 @@ pub fn run_reloading<P: Planning>(
     raise_file_limit();
     let mut shared_memory = SharedMemory::default();
     shared_memory.look();
-    let place = Place::of(&config.endpoint)?;
+    let place = DaemonPlace::of(&config.endpoint)?;
     let lease = Lease::take(place.clone())?;
     let queues = Queues::new(config);
     // First of all: it makes ready what was asked about last, while ports are opened. Whatever fails ends it.
@@ -130,7 +131,7 @@ pub fn run_reloading<P: Planning>(
 }
 
 /// Ends this daemon if the port thread stands still, from the opening of its ports on.
-fn watch(config: &Config, place: &Place) -> Result<Watchdog, DaemonError> {
+fn watch(config: &Config, place: &DaemonPlace) -> Result<Watchdog, DaemonError> {
     let limit = seconds(config.times.hang_s);
     let place = place.runtime_dir.display().to_string();
     Watchdog::start(limit, move || give_up(limit, &place))

@@ -16,12 +16,13 @@ mod events;
 
 mod instance;
 mod jobs;
-mod lifecycle;
+mod lease;
 mod lock;
 mod metrics;
 mod metrics_socket;
 mod outbox;
 mod outgoing;
+mod place;
 mod planning;
 mod ports;
 mod prefetch;
@@ -40,8 +41,7 @@ mod workers;
 
 pub(crate) use convert::source_assembly as uploaded_assembly;
 pub use event_loop::{Reload, run, run_reloading};
-pub use lifecycle::LifecycleError;
-pub use lifecycle::check_place;
+pub use place::{PlaceError, check_place};
 pub use planning::Planning;
 
 /// The ports, for measuring them without a daemon behind.
@@ -57,7 +57,7 @@ use sbdp_ipc::services::SetupError;
 pub enum DaemonError {
     /// The place is taken or unusable.
     #[error(transparent)]
-    Lifecycle(#[from] LifecycleError),
+    Place(#[from] PlaceError),
     /// iceoryx2 could not be set up.
     #[error(transparent)]
     Setup(#[from] SetupError),
