@@ -19,7 +19,7 @@ use super::outgoing::Outgoing;
 use super::planning::Planning;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::response_cache::{CachedResponse, ResponseCache, question};
-use super::session::{End, Input, Link, Session, State};
+use super::session::{Input, Link, Session, SessionEnd, State};
 use super::shared_queue::Queues;
 use super::shutdown::Shutdown;
 use super::uploads::Uploads;
@@ -406,10 +406,10 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
     /// Counts a session that is finished, and lets its request go.
     fn over(&mut self, key: SessionKey, session: Session<L>) {
         let counter = match session.state() {
-            State::Ended(End::Done) => &mut self.counters.done,
-            State::Ended(End::Cancelled) => &mut self.counters.cancelled,
-            State::Ended(End::Expired) => &mut self.counters.expired,
-            State::Ended(End::Refused) => &mut self.counters.refused,
+            State::Ended(SessionEnd::Done) => &mut self.counters.done,
+            State::Ended(SessionEnd::Cancelled) => &mut self.counters.cancelled,
+            State::Ended(SessionEnd::Expired) => &mut self.counters.expired,
+            State::Ended(SessionEnd::Refused) => &mut self.counters.refused,
             _ => &mut self.counters.failed,
         };
         *counter += 1;

@@ -54,7 +54,7 @@ pub use cone::extreme_rays;
 pub use content_hash::content_hash;
 pub use convex_edges::{ConvexEdge, ConvexEdges, Corner};
 pub use error::GeometryError;
-pub use faces::{Faces, Facing, NEAR_AXIS, SQUARE, oriented};
+pub use faces::{Faces, NEAR_AXIS, SQUARE, WeightedDirection, oriented};
 pub use free_region::{FreeRegion, NoRegion, Wanted};
 pub use half_space::Cloud;
 pub use heal::{Healed, heal, heal_until};
