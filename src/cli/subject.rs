@@ -16,7 +16,7 @@ use crate::plan::PlanKind;
 use crate::plan::export::{PlanDocument, SourceDocument};
 use crate::search::Termination;
 use crate::service::{AssemblyId, Service};
-use crate::view::{Storyboard, Up, ViewError, glb, kind_of, page, read_plan};
+use crate::view::{PlanScene, Up, ViewError, glb, kind_of, page, read_plan};
 
 /// A plan, and the meshes that it moves.
 pub(super) struct Subject {
@@ -115,7 +115,7 @@ impl Subject {
 
     /// The plan as a GLB scene.
     pub(super) fn glb(&self) -> Result<Vec<u8>, CliError> {
-        Ok(glb::glb(&Storyboard::new(&self.assembly()?, self.up(), &self.plan)?)?)
+        Ok(glb::glb(&PlanScene::new(&self.assembly()?, self.up(), &self.plan)?)?)
     }
 
     /// The plan as a page, blocking graphs included.
@@ -128,7 +128,7 @@ impl Subject {
         let graphs: Option<Vec<DirectionalGraph>> =
             service.blocking_graphs(id, None, &removed, termination)?;
         let graphs = graphs.ok_or_else(|| CliError::Failed("interrupted".to_owned()))?;
-        let scene = Storyboard::new(&assembly, self.up(), &self.plan)?;
+        let scene = PlanScene::new(&assembly, self.up(), &self.plan)?;
         page::page(&scene, &names, &graphs)
             .map_err(|e| CliError::Failed(format!("cannot write the scene as JSON: {e}")))
     }

@@ -107,7 +107,7 @@ pub enum Up {
 
 /// A plan that can be drawn.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Storyboard {
+pub struct PlanScene {
     /// The assembly's name.
     pub name: String,
     /// Unit of all lengths, if known.
@@ -130,7 +130,7 @@ pub struct Storyboard {
     pub steps: Vec<SceneStep>,
 }
 
-impl Storyboard {
+impl PlanScene {
     /// The scene of a plan about an assembly, whose parts stand where the plan has them assembled.
     ///
     /// # Errors
