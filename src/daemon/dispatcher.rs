@@ -83,7 +83,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
             ..StatusHeader::default()
         };
         let answers = ResponseCache::recent(&*service, config.cache.memory().answers);
-        service.answers_take(answers.metrics().bytes);
+        service.set_response_bytes(answers.metrics().bytes);
         Self {
             service,
             limits: Limits::of(config),
@@ -149,9 +149,9 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         }
         let mut session =
             Session::new(link, header.request, id_of_words(header.listener), self.limits.outbox);
-        if let Some(answer) = self.answered_to_the_byte(&payload) {
+        if let Some(answer) = self.response_to_same_bytes(&payload) {
             session.admit(None);
-            self.answer_again(&mut session, &answer);
+            self.answer_from_cache(&mut session, &answer);
         } else if let Err((input, error)) = self.admit(&mut session, key, owner, &payload) {
             session.end_with(input, &error);
         }
@@ -160,27 +160,27 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
             self.outgoing.wakes.push(session.listener);
         }
         if session.is_finished() {
-            self.over(key, session);
+            self.finish(key, session);
         } else {
             self.sessions.insert(key, session);
         }
     }
 
-    fn keep(&mut self, question: &[u8], answer: CachedResponse) {
+    fn remember(&mut self, question: &[u8], answer: CachedResponse) {
         self.answers.insert(question, answer);
-        self.service.answers_take(self.answers.metrics().bytes);
+        self.service.set_response_bytes(self.answers.metrics().bytes);
     }
 
     /// The answer to a request whose bytes are those of a question that was answered before: then all that
     /// would be found by reading them was found then.
-    fn answered_to_the_byte(&mut self, payload: &AlignedBytes) -> Option<Arc<CachedResponse>> {
+    fn response_to_same_bytes(&mut self, payload: &AlignedBytes) -> Option<Arc<CachedResponse>> {
         if self.shutdown.is_requested() {
             return None;
         }
         self.answers.get(payload.as_slice())
     }
 
-    fn answer_again(&mut self, session: &mut Session<L>, answer: &CachedResponse) {
+    fn answer_from_cache(&mut self, session: &mut Session<L>, answer: &CachedResponse) {
         self.queues.prefetch.answered();
         session.answer(answer);
         self.counters.remembered += 1;
@@ -214,7 +214,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         }
         session.admit(deadline);
         if let Some(answer) = answer {
-            self.answer_again(session, &answer);
+            self.answer_from_cache(session, &answer);
             return Ok(());
         }
         let termination = session.termination();
@@ -296,7 +296,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
             WorkerEvent::Planned(key, summary, again) => {
                 self.running.remove(&(key.client, key.request));
                 if let Some((question, answer)) = again {
-                    self.keep(&question, answer);
+                    self.remember(&question, answer);
                 }
                 self.with_session(key, |s| s.finish(summary));
             }
@@ -304,7 +304,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
                 self.running.remove(&(key.client, key.request));
                 self.counters.remembered += 1;
                 self.with_session(key, |s| s.answer_running(&answer));
-                self.keep(&question, answer);
+                self.remember(&question, answer);
             }
             WorkerEvent::Unplanned(key, error) => {
                 self.running.remove(&(key.client, key.request));
@@ -399,12 +399,12 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
 
     fn remove(&mut self, key: SessionKey) {
         if let Some(session) = self.sessions.remove(&key) {
-            self.over(key, session);
+            self.finish(key, session);
         }
     }
 
     /// Counts a session that is finished, and lets its request go.
-    fn over(&mut self, key: SessionKey, session: Session<L>) {
+    fn finish(&mut self, key: SessionKey, session: Session<L>) {
         let counter = match session.state() {
             State::Ended(SessionEnd::Done) => &mut self.counters.done,
             State::Ended(SessionEnd::Cancelled) => &mut self.counters.cancelled,

@@ -60,7 +60,7 @@ impl Planning for Scripted {
         id.0 == [7; 32]
     }
 
-    fn answers_take(&self, bytes: usize) {
+    fn set_response_bytes(&self, bytes: usize) {
         self.answers.store(bytes, Ordering::Relaxed);
     }
 

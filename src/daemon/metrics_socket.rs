@@ -31,9 +31,9 @@ impl MetricsSocket {
         let answer = move || {
             for stream in listener.incoming() {
                 let text = shared.lock().unwrap_or_else(PoisonError::into_inner).clone();
-                let told = stream.and_then(|stream| tell(stream, &text));
-                if let Err(error) = told {
-                    tracing::debug!(%error, "metrics not told");
+                let served = stream.and_then(|stream| respond(stream, &text));
+                if let Err(error) = served {
+                    tracing::debug!(%error, "metrics not served");
                     // Never spin when there are no descriptors left.
                     std::thread::sleep(Duration::from_millis(10));
                 }
@@ -55,7 +55,7 @@ impl Drop for MetricsSocket {
 }
 
 /// Answers any HTTP request with the text.
-fn tell(mut stream: UnixStream, text: &str) -> std::io::Result<()> {
+fn respond(mut stream: UnixStream, text: &str) -> std::io::Result<()> {
     stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
     let (mut request, mut piece) = (Vec::new(), [0; 512]);

@@ -50,11 +50,11 @@ pub trait Planning: Send + Sync + 'static {
     fn prepare(&self, _: AssemblyId, _: &Termination) -> Result<(), ServiceError> {
         Ok(())
     }
-    /// See [`Service::foresee`].
+    /// See [`Service::speculate`].
     ///
     /// # Errors
     /// Nothing could be planned.
-    fn foresee(&self, _: AssemblyId, _: &PlanRequest, _: &Termination) -> Result<Plan, ServiceError> {
+    fn speculate(&self, _: AssemblyId, _: &PlanRequest, _: &Termination) -> Result<Plan, ServiceError> {
         Err(ServiceError::UnknownAssembly)
     }
     /// See [`Service::recall_recent`].
@@ -67,8 +67,8 @@ pub trait Planning: Send + Sync + 'static {
     fn remembered(&self) -> Option<Remembered> {
         None
     }
-    /// See [`Service::answers_take`]. Called on the port thread: it must not block.
-    fn answers_take(&self, _bytes: usize) {}
+    /// See [`Service::set_response_bytes`]. Called on the port thread: it must not block.
+    fn set_response_bytes(&self, _bytes: usize) {}
     /// The messages that answered a question before, also before a restart.
     fn answered(&self, _question: &[u8]) -> Option<Vec<Vec<u8>>> {
         None
@@ -131,13 +131,13 @@ impl Planning for Service {
         Self::prepare(self, id, termination)
     }
 
-    fn foresee(
+    fn speculate(
         &self,
         id: AssemblyId,
         request: &PlanRequest,
         termination: &Termination,
     ) -> Result<Plan, ServiceError> {
-        Self::foresee(self, id, request, termination)
+        Self::speculate(self, id, request, termination)
     }
 
     fn recall_recent(&self) {
@@ -152,8 +152,8 @@ impl Planning for Service {
         Some(Self::remembered(self))
     }
 
-    fn answers_take(&self, bytes: usize) {
-        Self::answers_take(self, bytes);
+    fn set_response_bytes(&self, bytes: usize) {
+        Self::set_response_bytes(self, bytes);
     }
 
     fn answered(&self, question: &[u8]) -> Option<Vec<Vec<u8>>> {

@@ -184,7 +184,7 @@ impl Prefetch {
     }
 
     /// Wants that planned which may be asked after a plan, before what may be asked after others.
-    pub(super) fn foresee(&self, speculation: Speculation) {
+    pub(super) fn speculate(&self, speculation: Speculation) {
         let mut state = self.state();
         state.speculations.retain(|waiting| !waiting.is_as(&speculation));
         state.speculations.push_front(speculation);
@@ -355,10 +355,10 @@ mod tests {
     #[test]
     fn assemblies_come_before_questions_and_the_newest_plan_before_others() {
         let prefetch = Prefetch::default();
-        prefetch.foresee(questions(1, 1));
-        prefetch.foresee(questions(2, 2));
+        prefetch.speculate(questions(1, 1));
+        prefetch.speculate(questions(2, 2));
         prefetch.want(id(3));
-        prefetch.foresee(questions(1, 3));
+        prefetch.speculate(questions(1, 3));
         assert_eq!(prefetch.metrics(), PrefetchMetrics { assemblies: 1, questions: 13, foreseen: 0 });
         let mut taken = Vec::new();
         while let Some((work, _)) = (prefetch.metrics().questions > 0).then(|| prefetch.next()).flatten() {
@@ -379,7 +379,7 @@ mod tests {
         prefetch.answered();
         assert!(termination.check().is_ok());
         prefetch.state().at_work = None;
-        prefetch.foresee(questions(1, 1));
+        prefetch.speculate(questions(1, 1));
         let (work, termination) = prefetch.next().unwrap();
         assert_eq!(
             prefetch.metrics(),
@@ -399,7 +399,7 @@ mod tests {
     fn only_so_many_plans_wait() {
         let prefetch = Prefetch::default();
         for n in 0..=MOST_SPECULATIONS as u8 {
-            prefetch.foresee(questions(n, 1));
+            prefetch.speculate(questions(n, 1));
         }
         assert_eq!(prefetch.metrics().questions, 2 * MOST_SPECULATIONS);
         prefetch.close();

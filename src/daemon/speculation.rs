@@ -101,7 +101,7 @@ impl Speculation {
         // Whoever asks will be told what is wrong.
         let planned = contained(|| {
             let assembly = with_moved(service, self.assembly, &self.moved, &within)?;
-            service.foresee(assembly, &request, &within)
+            service.speculate(assembly, &request, &within)
         });
         self.time = self.time.saturating_sub(began.elapsed());
         if termination.check().is_err() {
@@ -133,7 +133,7 @@ mod tests {
     /// Of which assembly, with which parts stuck, and with which gone.
     type Asked = (AssemblyId, Vec<usize>, Vec<usize>);
 
-    /// Writes down what it is asked to foresee.
+    /// Writes down what it is asked to speculate.
     #[derive(Default)]
     struct Scripted {
         asked: Mutex<Vec<Asked>>,
@@ -170,7 +170,7 @@ mod tests {
             Err(ServiceError::UnknownAssembly)
         }
 
-        fn foresee(
+        fn speculate(
             &self,
             id: AssemblyId,
             request: &PlanRequest,

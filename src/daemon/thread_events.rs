@@ -55,10 +55,10 @@ impl Wakes {
 /// Takes workers' reports to the port thread.
 pub(super) fn reporter(ports: &Ports, sender: Sender<ThreadEvent>) -> Report {
     let notifier = Arc::downgrade(&ports.wake_self);
-    let told = Mutex::new((sender, Wakes::default()));
+    let shared = Mutex::new((sender, Wakes::default()));
     Arc::new(move |event| {
         let is_due = {
-            let (sender, wakes) = &mut *told.lock().unwrap_or_else(PoisonError::into_inner);
+            let (sender, wakes) = &mut *shared.lock().unwrap_or_else(PoisonError::into_inner);
             // The time before it is sent: it is read later than that.
             let is_due = wakes.is_due(&event, Instant::now());
             // A send fails only when the port thread has left; then nobody is interested.

@@ -141,7 +141,7 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Repor
             log_plan(&plan);
             // Before whoever asked is told, and may ask what is foreseen.
             if let Some(speculation) = Speculation::after(job, &plan, queues.speculation) {
-                queues.prefetch.foresee(speculation);
+                queues.prefetch.speculate(speculation);
             }
             let again = job.question.clone().zip(CachedResponse::of(&plan));
             if let Some((question, answer)) = &again {

@@ -25,7 +25,7 @@ use super::assembly_plan::AssemblyPlanner;
 use super::pools::Pools;
 use super::prepared::{self, Prepared};
 use super::records::{Answered, PlanQuestion, remember_plan, remembered_plan};
-use super::relay::{Quiet, Relay, Silent};
+use super::relay::{Discard, Relay, WithoutSteps};
 use super::shared_shape::SharedShape;
 
 /// One admitted assembly; overlaps are measured, and fields built, when first needed.
@@ -132,10 +132,10 @@ impl Entry {
             return frame.plan(answer);
         };
         // The steps of an assembly plan are others.
-        let quiet = &mut Quiet { sink: &mut *sink };
+        let without_steps = &mut WithoutSteps { sink: &mut *sink };
         let (frame, answer) = match known {
-            Some(known) => self.remembered(frame, known, quiet, time.started),
-            None => self.searched(frame, &ready, time, quiet),
+            Some(known) => self.remembered(frame, known, without_steps, time.started),
+            None => self.searched(frame, &ready, time, without_steps),
         };
         let removals = answer.outcome.removals.clone();
         let plan = frame.plan(answer);
@@ -274,7 +274,7 @@ impl Entry {
         let _ = initial_blockages(&self.problem(&prepared, &asked, termination, cache));
         let all = (0..self.assembly.parts.len()).collect();
         let _ = HullTree::new(&prepared.scene, all, termination);
-        let _ = prepared.build_fields(termination, &mut Silent);
+        let _ = prepared.build_fields(termination, &mut Discard);
     }
 
     /// Overlaps, if they are there.
