@@ -17,7 +17,7 @@ use crate::daemon::uploaded_assembly;
 use crate::geometry::{self, Assembly, SourceAssembly, SourceMesh, SourcePart, Surface};
 use crate::sdf;
 use crate::service::RECORD_KINDS;
-use crate::view::{self, Scene, Up, read_plan};
+use crate::view::{self, PlanScene, Up, read_plan};
 
 /// A reader.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -187,7 +187,7 @@ fn plan(text: &str) -> String {
     let parts = plan.parts.iter().map(part).collect();
     let assembly = Assembly::new(&SourceAssembly { parts, ..SourceAssembly::default() });
     said(assembly.map_err(|e| e.to_string()).and_then(|assembly| {
-        let scene = Scene::new(&assembly, Up::Z, &plan).map_err(|e| e.to_string())?;
+        let scene = PlanScene::new(&assembly, Up::Z, &plan).map_err(|e| e.to_string())?;
         view::page::page(&scene, &plan.parts, &[]).map_err(|e| e.to_string())?;
         view::glb::glb(&scene).map_err(|e| e.to_string())
     }))

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use rustix::process::{Pid, Signal, kill_process};
-use sbdp::bench::{self, BenchError, Observer, Record, Request, Shard, Summary};
+use sbdp::bench::{self, BenchError, BenchObserver, Record, Request, Shard, Summary};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests")
@@ -51,7 +51,7 @@ fn request(folder: &Path, assemblies: &[&str]) -> Request {
 
 struct Unwatched;
 
-impl Observer for Unwatched {
+impl BenchObserver for Unwatched {
     fn begun(&mut self, _: usize, _: usize) {}
     fn ran(&mut self, _: &Record, _: usize, _: Option<Duration>) {}
 }
@@ -137,7 +137,7 @@ struct CancelWhileOneHangs<'a> {
     cancel: &'a AtomicBool,
 }
 
-impl Observer for CancelWhileOneHangs<'_> {
+impl BenchObserver for CancelWhileOneHangs<'_> {
     fn begun(&mut self, _: usize, _: usize) {}
     fn ran(&mut self, _: &Record, _: usize, _: Option<Duration>) {
         while !log(self.out).iter().any(|l| l.starts_with("hang")) {

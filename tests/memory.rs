@@ -128,7 +128,7 @@ fn assemblies_leave_what_records_and_answers_take() {
         assert!(held(&service).1 <= budget, "{:?} of {budget} after {i}", held(&service));
     }
     let (before, _) = held(&service);
-    service.answers_take(answers);
+    service.set_response_bytes(answers);
     plan(&service, &grown(&base, 2.0));
     let (after, bytes) = held(&service);
     assert!(bytes <= budget - answers, "{bytes} beside {answers} of {budget}");

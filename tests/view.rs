@@ -10,7 +10,7 @@ use sbdp::plan::PlanKind;
 use sbdp::plan::export::PlanDocument;
 use sbdp::search::{PlanRequest, Staging, Termination};
 use sbdp::service::Service;
-use sbdp::view::{Scene, Up, glb};
+use sbdp::view::{PlanScene, Up, glb};
 
 fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/assemblies").join(name)
@@ -116,7 +116,7 @@ fn apart(a: &[Point3<f64>], b: &[Point3<f64>]) -> f64 {
 
 /// Every part is all the time where the plan has it: at waypoints, between them, before its step and after.
 fn check_motion(name: &str, assembly: &Assembly, plan: &PlanDocument) {
-    let scene = Scene::new(assembly, Up::Z, plan).unwrap();
+    let scene = PlanScene::new(assembly, Up::Z, plan).unwrap();
     let played = Played::new(&glb::glb(&scene).unwrap());
     let source = load_assembly(&folder(name)).unwrap();
     let scale = glb::metres(scene.units.as_deref()).unwrap_or(1.0);
@@ -169,7 +169,7 @@ fn parts_that_wait_beside_the_assembly_are_put_in() {
         let (assembly, plan) = asked(name, Vec::new(), &request);
         assert_eq!((plan.kind.as_str(), plan.status.as_str()), ("assembly", "complete"), "{:?}", plan.reason);
         check_motion(name, &assembly, &plan);
-        let scene = Scene::new(&assembly, Up::Z, &plan).unwrap();
+        let scene = PlanScene::new(&assembly, Up::Z, &plan).unwrap();
         assert!(scene.parts.iter().all(|p| p.stays == p.step.is_none()));
     }
 }
@@ -188,7 +188,7 @@ fn parts_that_stand_elsewhere_are_shown_there() {
 #[test]
 fn equal_parts_share_a_mesh_and_neighbours_differ() {
     let (assembly, plan) = planned("bolted-bracket-20", Vec::new());
-    let scene = Scene::new(&assembly, Up::Z, &plan).unwrap();
+    let scene = PlanScene::new(&assembly, Up::Z, &plan).unwrap();
     assert!(scene.drawn.len() < scene.parts.len(), "{} meshes", scene.drawn.len());
     let clashes = |a: &sbdp::view::ScenePart| {
         scene
@@ -218,7 +218,7 @@ fn equal_parts_share_a_mesh_and_neighbours_differ() {
 fn a_plan_of_other_parts_is_refused() {
     let (assembly, mut plan) = planned("l-slot", Vec::new());
     plan.parts[0] = "wheel".into();
-    let error = Scene::new(&assembly, Up::Z, &plan).unwrap_err().to_string();
+    let error = PlanScene::new(&assembly, Up::Z, &plan).unwrap_err().to_string();
     assert!(error.contains("no part `wheel`"), "{error}");
 }
 

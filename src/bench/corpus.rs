@@ -51,7 +51,7 @@ impl Category {
 
 /// One assembly to be planned.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
+pub struct CorpusProblem {
     /// Its name in the records: the given folder's name and the path below it, so that it is
     /// the same on every machine.
     pub name: String,
@@ -65,7 +65,7 @@ pub struct Problem {
 ///
 /// # Errors
 /// A folder cannot be read or has no assembly in it, or two assemblies would have one name.
-pub fn find(roots: &[PathBuf]) -> Result<Vec<Problem>, BenchError> {
+pub fn find(roots: &[PathBuf]) -> Result<Vec<CorpusProblem>, BenchError> {
     let mut found = Vec::new();
     for root in roots {
         let before = found.len();
@@ -87,7 +87,7 @@ fn collect(
     folder: &Path,
     name: String,
     visited: &mut HashSet<PathBuf>,
-    found: &mut Vec<Problem>,
+    found: &mut Vec<CorpusProblem>,
 ) -> Result<(), BenchError> {
     let unreadable = |e: std::io::Error| BenchError::file(folder, &e);
     if !visited.insert(folder.canonicalize().map_err(unreadable)?) {
@@ -109,7 +109,7 @@ fn collect(
     // Sorted, so that of two links to one folder the same one counts on every machine.
     below.sort_by(|a, b| natural_order(&a.0, &b.0));
     if parts > 0 {
-        found.push(Problem { name: name.clone(), folder: folder.to_owned(), parts });
+        found.push(CorpusProblem { name: name.clone(), folder: folder.to_owned(), parts });
     }
     below.into_iter().try_for_each(|(file, path)| collect(&path, format!("{name}/{file}"), visited, found))
 }
@@ -118,7 +118,7 @@ fn is_mesh(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj") || e.eq_ignore_ascii_case("stl"))
 }
 
-fn check_names(problems: &[Problem]) -> Result<(), BenchError> {
+fn check_names(problems: &[CorpusProblem]) -> Result<(), BenchError> {
     let mut by_name = HashMap::new();
     for problem in problems {
         if let Some(other) = by_name.insert(&problem.name, &problem.folder) {
@@ -146,7 +146,7 @@ impl Shard {
 
     /// Every N-th problem by size, so that all shards get about as many large ones.
     #[must_use]
-    pub fn select(self, problems: Vec<Problem>) -> Vec<Problem> {
+    pub fn select(self, problems: Vec<CorpusProblem>) -> Vec<CorpusProblem> {
         let mut order: Vec<usize> = (0..problems.len()).collect();
         order.sort_by_key(|&i| problems[i].parts);
         let mine: HashSet<usize> = order.into_iter().skip(self.number - 1).step_by(self.of).collect();
@@ -171,8 +171,8 @@ impl FromStr for Shard {
 mod tests {
     use super::*;
 
-    fn problems(parts: &[usize]) -> Vec<Problem> {
-        let problem = |(i, &parts): (usize, &usize)| Problem {
+    fn problems(parts: &[usize]) -> Vec<CorpusProblem> {
+        let problem = |(i, &parts): (usize, &usize)| CorpusProblem {
             name: format!("c/{i}"),
             folder: PathBuf::from(i.to_string()),
             parts,
@@ -191,12 +191,12 @@ mod tests {
     fn shards_cover_all_problems_exactly_once_and_share_the_large_ones() {
         let all = problems(&[3, 60, 3, 70, 12, 4, 80, 3, 90, 5, 3]);
         for of in 1..=12 {
-            let shards: Vec<Vec<Problem>> =
+            let shards: Vec<Vec<CorpusProblem>> =
                 (1..=of).map(|k| format!("{k}/{of}").parse::<Shard>().unwrap().select(all.clone())).collect();
             let mut names: Vec<&str> = shards.iter().flatten().map(|p| p.name.as_str()).collect();
             names.sort_by(|a, b| natural_order(a, b));
             assert_eq!(names, all.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), "{of} shards");
-            let large = |s: &Vec<Problem>| s.iter().filter(|p| p.parts >= 50).count();
+            let large = |s: &Vec<CorpusProblem>| s.iter().filter(|p| p.parts >= 50).count();
             let (least, most) = (shards.iter().map(large).min(), shards.iter().map(large).max());
             assert!(most.unwrap() - least.unwrap() <= 1, "{of} shards");
         }

@@ -13,6 +13,7 @@ mod corpus;
 mod estimate;
 pub(crate) mod families;
 mod figure;
+mod markdown;
 mod record;
 mod rotated;
 mod rotation;
@@ -32,13 +33,13 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 pub use cancel::{CancelRecord, CancelRequest, cancel};
-pub use corpus::{Category, Problem, Shard, find};
+pub use corpus::{Category, CorpusProblem, Shard, find};
 pub use families::Family;
-pub use record::{Key, Record, Settings, Store, read};
+pub use record::{Record, RunKey, Settings, Store, read};
 pub use scale::{Growth, PARTS, ScaleRequest, scale};
 pub use through_daemon::{
-    Churn, ChurnRequest, ChurnSample, Cost, DaemonFigures, Footprint, Kind, KindFigures, Latency,
-    LatencyRequest, Load, LoadClient, LoadRequest, Percentiles, Phase, ReplanRecord, Restart, Role, Soak,
+    Churn, ChurnRequest, ChurnSample, Cost, DaemonFigures, Kind, KindFigures, Latency, LatencyRequest, Load,
+    LoadClient, LoadRequest, Percentiles, Phase, ProcessFootprint, ReplanRecord, Restart, Role, Soak,
     SoakRequest, churn, latency, load, load_client, replan, restart, serve_raw, soak,
 };
 
@@ -130,7 +131,7 @@ pub struct Request {
 }
 
 /// Is told how a benchmark gets on.
-pub trait Observer {
+pub trait BenchObserver {
     /// So many runs in all, of which so many had been done before.
     fn begun(&mut self, total: usize, done: usize);
     /// A run ended and is recorded; `left` is an estimate for all that is still to do.
@@ -163,7 +164,7 @@ pub fn grace(timeout: Duration) -> Duration {
 pub fn run(
     request: &Request,
     cancel: &AtomicBool,
-    observer: &mut dyn Observer,
+    observer: &mut dyn BenchObserver,
 ) -> Result<Summary, BenchError> {
     let planners = planners_to_run(&request.planners)?;
     let engines = known("engine", &ENGINES, &request.engines)?;
@@ -297,7 +298,7 @@ fn different(here: &Settings, there: &Settings, folder: &Path) -> BenchError {
 
 /// Problem by problem, so that an interrupted benchmark has problems that all planners ran on.
 fn jobs<'a>(
-    problems: &'a [Problem],
+    problems: &'a [CorpusProblem],
     rotations: u32,
     planners: &[&'static str],
     engines: &[&'static str],
@@ -321,7 +322,7 @@ fn run_missing(
     store: Store,
     records: &mut Vec<Record>,
     cancel: &AtomicBool,
-    observer: &mut dyn Observer,
+    observer: &mut dyn BenchObserver,
 ) -> Result<usize, BenchError> {
     let present: HashSet<_> = records.iter().map(Record::key).collect();
     let to_do: Vec<Job<'_>> = jobs.iter().copied().filter(|j| !present.contains(&j.key())).collect();
@@ -371,7 +372,7 @@ impl Drop for Scratch {
 struct Ledger<'a> {
     store: Store,
     records: &'a mut Vec<Record>,
-    observer: &'a mut dyn Observer,
+    observer: &'a mut dyn BenchObserver,
     estimate: Estimate,
     done: usize,
     jobs: usize,

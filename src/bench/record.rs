@@ -137,7 +137,7 @@ pub struct Record {
 }
 
 /// Assembly, rotation, planner and engine.
-pub type Key<'a> = (&'a str, u32, &'a str, &'a str);
+pub type RunKey<'a> = (&'a str, u32, &'a str, &'a str);
 
 impl Record {
     /// Whether the problem counts as solved.
@@ -148,7 +148,7 @@ impl Record {
 
     /// What the run was: no two records of a results file share it.
     #[must_use]
-    pub fn key(&self) -> Key<'_> {
+    pub fn key(&self) -> RunKey<'_> {
         (&self.assembly, self.rotation, &self.planner, &self.engine)
     }
 

@@ -1,9 +1,9 @@
 //! What rotating the input changes: solved problems and times of the same planner on the same
 //! problems, rotated against as given.
 
+use super::markdown::{Table, cell, number, optional, title};
 use super::record::Record;
 use super::statistics::{EngineResults, PlannerResults};
-use super::tables::{Table, cell, number, optional, title};
 
 /// One planner's runs as given and rotated, over problems that ran both ways.
 #[derive(Debug, Default, PartialEq)]

@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use super::BenchError;
-use super::corpus::{Category, Problem};
-use super::record::{Key, Record, Settings};
+use super::corpus::{Category, CorpusProblem};
+use super::record::{Record, RunKey, Settings};
 use super::rotation::random_rotation;
 use crate::plan::export::PlanDocument;
 
@@ -25,7 +25,7 @@ const LAST_WORDS: usize = 4096;
 /// What to run.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Job<'a> {
-    pub(super) problem: &'a Problem,
+    pub(super) problem: &'a CorpusProblem,
     /// As [`Record::rotation`].
     pub(super) rotation: u32,
     pub(super) planner: &'static str,
@@ -58,7 +58,7 @@ impl<'a> Job<'a> {
     }
 
     /// As [`Record::key`] of its record.
-    pub(super) fn key(&self) -> Key<'a> {
+    pub(super) fn key(&self) -> RunKey<'a> {
         (&self.problem.name, self.rotation, self.planner, self.engine)
     }
 }

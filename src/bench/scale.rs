@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use super::{BenchError, Family, Observer, PATH_TIMEOUT, Record, Request, Shard, Summary, grace, read};
+use super::{BenchError, BenchObserver, Family, PATH_TIMEOUT, Record, Request, Shard, Summary, grace, read};
 
 /// Numbers of parts unless asked otherwise.
 pub const PARTS: [usize; 5] = [10, 30, 100, 300, 1000];
@@ -62,7 +62,7 @@ pub struct Growth {
 pub fn scale(
     request: &ScaleRequest,
     cancel: &AtomicBool,
-    observer: &mut dyn Observer,
+    observer: &mut dyn BenchObserver,
 ) -> Result<Summary, BenchError> {
     if let Some(few) = request.parts.iter().find(|n| **n < Family::LEAST) {
         let least = Family::LEAST;

@@ -5,6 +5,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::PDP_STAR;
+use super::markdown::{Table, bold, cell, number, optional, title};
 use super::record::Record;
 use super::rotated;
 use super::statistics::{EngineResults, Group, Measure, PlannerResults, REFERENCE, geometric_mean};
@@ -282,79 +283,4 @@ fn ratio(first: &Record, second: &Record) -> Option<f64> {
     let solved = first.solved() && second.solved();
     let simulated = first.path_time_s > 0.0 && second.path_time_s > 0.0;
     (solved && simulated).then(|| second.path_time_s / first.path_time_s)
-}
-
-/// A planner as the paper writes it.
-pub(super) fn title(planner: &str) -> String {
-    super::title(planner).replace('*', "\\*")
-}
-
-/// Three digits or so, thousands as in the paper.
-pub(super) fn number(x: f64) -> String {
-    match x {
-        0.0 => "0".to_owned(),
-        x if x < 1.0 => format!("{x:.3}"),
-        x if x < 10.0 => format!("{x:.2}"),
-        x if x < 100.0 => format!("{x:.1}"),
-        x if x < 1000.0 => format!("{x:.0}"),
-        x => format!("{:.1}K", x / 1000.0),
-    }
-}
-
-pub(super) fn optional<T>(value: Option<T>, text: impl Fn(T) -> String) -> String {
-    value.map_or_else(|| "–".to_owned(), text)
-}
-
-fn bold(text: String, yes: bool) -> String {
-    if yes { format!("**{text}**") } else { text }
-}
-
-/// Names come from folders: no sign of theirs may end a cell.
-pub(super) fn cell(name: &str) -> String {
-    name.replace('|', "\\|").replace('\n', " ")
-}
-
-/// A table in Markdown.
-pub(super) struct Table {
-    header: Vec<String>,
-    rows: Vec<Vec<String>>,
-}
-
-impl Table {
-    pub(super) fn new<S: ToString>(header: &[S]) -> Self {
-        Self { header: header.iter().map(S::to_string).collect(), rows: Vec::new() }
-    }
-
-    pub(super) fn row(&mut self, cells: impl IntoIterator<Item = String>) {
-        self.rows.push(cells.into_iter().collect());
-    }
-
-    pub(super) fn is_empty(&self) -> bool {
-        self.rows.is_empty()
-    }
-
-    pub(super) fn render(&self) -> String {
-        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
-        let rule = format!("|{}\n", "---|".repeat(self.header.len()));
-        let rows: String = self.rows.iter().map(|r| line(r)).collect();
-        line(&self.header) + &rule + &rows
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_keep_three_digits_or_so() {
-        let shown = [0.0, 0.0123, 1.234, 12.34, 123.4, 1234.0, 12345.0].map(number);
-        assert_eq!(shown, ["0", "0.012", "1.23", "12.3", "123", "1.2K", "12.3K"]);
-    }
-
-    #[test]
-    fn a_name_cannot_break_a_table() {
-        let mut table = Table::new(&["a"]);
-        table.row([cell("x|y\nz")]);
-        assert_eq!(table.render(), "| a |\n|---|\n| x\\|y z |\n");
-    }
 }

@@ -15,7 +15,7 @@ use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use super::args::{BenchArguments, BenchCommand, BenchReport, BenchRun, BenchScale};
 use super::error::CliError;
 use super::{interrupt, print};
-use crate::bench::{self, BenchError, Observer, Record, Request, ScaleRequest, Shard, Summary};
+use crate::bench::{self, BenchError, BenchObserver, Record, Request, ScaleRequest, Shard, Summary};
 use crate::blocking_graph::StaticAnalysis;
 use crate::search;
 
@@ -144,7 +144,7 @@ impl BenchDisplay {
     }
 }
 
-impl Observer for BenchDisplay {
+impl BenchObserver for BenchDisplay {
     fn begun(&mut self, total: usize, done: usize) {
         self.total = total;
         if let Some(bar) = &self.bar {

@@ -11,11 +11,9 @@ use super::error::{CliError, exit_code};
 use super::listener::Listener;
 use super::part_names::{part_named, resolve};
 use super::staging::staging;
-use super::subject::{Subject, content_of};
+use super::subject::{Subject, content_of, only_mesh};
 use super::{cache, interrupt, print, report, written};
-use crate::geometry::{
-    Revision, SourceAssembly, SourceMesh, content_hash, load_assembly, pose_from_waypoint,
-};
+use crate::geometry::{Revision, SourceAssembly, content_hash, load_assembly, pose_from_waypoint};
 use crate::plan::Plan;
 use crate::plan::export::{PlanDocument, SourceDocument};
 use crate::search::{PlanRequest, Planner, Termination};
@@ -158,19 +156,6 @@ fn choose_backend(arguments: &PlanArguments) -> Result<Box<dyn Backend>, CliErro
             }
             Ok(embedded())
         }
-    }
-}
-
-/// The mesh of a file that has just one.
-pub(super) fn only_mesh(file: &Path, option: &str) -> Result<SourceMesh, CliError> {
-    let mut parts = load_assembly(file)?.parts;
-    match (parts.pop(), parts.len()) {
-        (Some(part), 0) => Ok(part.mesh),
-        (_, rest) => Err(CliError::Refused(format!(
-            "{option}: `{}` has {} parts where one is wanted",
-            file.display(),
-            rest + 1
-        ))),
     }
 }
 

@@ -9,13 +9,14 @@ use super::error::CliError;
 use super::part_names::part_named;
 use crate::blocking_graph::DirectionalGraph;
 use crate::geometry::{
-    Assembly, Pose, Revision, SourceAssembly, Waypoint, content_hash, load_assembly, pose_from_waypoint,
+    Assembly, Pose, Revision, SourceAssembly, SourceMesh, Waypoint, content_hash, load_assembly,
+    pose_from_waypoint,
 };
 use crate::plan::PlanKind;
 use crate::plan::export::{PlanDocument, SourceDocument};
 use crate::search::Termination;
 use crate::service::{AssemblyId, Service};
-use crate::view::{Scene, Up, ViewError, glb, kind_of, page, read_plan};
+use crate::view::{PlanScene, Up, ViewError, glb, kind_of, page, read_plan};
 
 /// A plan, and the meshes that it moves.
 pub(super) struct Subject {
@@ -114,7 +115,7 @@ impl Subject {
 
     /// The plan as a GLB scene.
     pub(super) fn glb(&self) -> Result<Vec<u8>, CliError> {
-        Ok(glb::glb(&Scene::new(&self.assembly()?, self.up(), &self.plan)?)?)
+        Ok(glb::glb(&PlanScene::new(&self.assembly()?, self.up(), &self.plan)?)?)
     }
 
     /// The plan as a page, blocking graphs included.
@@ -127,7 +128,7 @@ impl Subject {
         let graphs: Option<Vec<DirectionalGraph>> =
             service.blocking_graphs(id, None, &removed, termination)?;
         let graphs = graphs.ok_or_else(|| CliError::Failed("interrupted".to_owned()))?;
-        let scene = Scene::new(&assembly, self.up(), &self.plan)?;
+        let scene = PlanScene::new(&assembly, self.up(), &self.plan)?;
         page::page(&scene, &names, &graphs)
             .map_err(|e| CliError::Failed(format!("cannot write the scene as JSON: {e}")))
     }
@@ -148,12 +149,25 @@ pub(super) fn plan_in(file: &Path) -> Result<PlanDocument, CliError> {
     read_plan(&text).map_err(|e| refused(&e))
 }
 
+/// The mesh of a file that has just one.
+pub(super) fn only_mesh(file: &Path, option: &str) -> Result<SourceMesh, CliError> {
+    let mut parts = load_assembly(file)?.parts;
+    match (parts.pop(), parts.len()) {
+        (Some(part), 0) => Ok(part.mesh),
+        (_, rest) => Err(CliError::Refused(format!(
+            "{option}: `{}` has {} parts where one is wanted",
+            file.display(),
+            rest + 1
+        ))),
+    }
+}
+
 /// What was changed before the plan began, but for parts that were moved.
 fn revision(base: &SourceAssembly, source: &SourceDocument) -> Result<Revision, CliError> {
     let mut revision = Revision::default();
     for (name, file) in &source.replaced {
         let place = part_named(base, "source.replaced", name)?;
-        revision.replaced.push((place, super::plan::only_mesh(Path::new(file), "source.replaced")?));
+        revision.replaced.push((place, only_mesh(Path::new(file), "source.replaced")?));
     }
     for path in &source.added {
         revision.added.extend(load_assembly(Path::new(path))?.parts);

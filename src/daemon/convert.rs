@@ -18,7 +18,7 @@ use crate::service::{AssemblyId, ServiceError};
 use crate::simulation::PenaltyParameters;
 use crate::termination::Interrupt;
 
-/// What a wire request asks; the handle and the deadline are handled by the desk.
+/// What a wire request asks; the handle and the deadline are handled by the dispatcher.
 pub(crate) fn plan_request(
     request: &wire::PlanRequest,
     most_threads: usize,

@@ -1,4 +1,4 @@
-//! The port thread: waits, receives, copies, hands to the desk, sends. It never plans.
+//! The port thread: waits, receives, copies, hands to the dispatcher, sends. It never plans.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -12,20 +12,24 @@ use sbdp_ipc::polling::Polling;
 use sbdp_ipc::services::{Active, ServerPort};
 
 use super::DaemonError;
-use super::desk::{Desk, Event, Incoming};
-use super::figures::Surroundings;
-use super::inbox::{Inbound, Recently, reporter, watch_signals};
-use super::intake::ticket;
-use super::lifecycle::{Lease, Place};
-use super::metrics::Metrics;
+use super::dispatcher::Dispatcher;
+use super::events::{Event, Incoming};
+use super::jobs::AdmitJob;
+use super::lease::Lease;
+use super::metrics::HostStatus;
+use super::metrics_socket::MetricsSocket;
+use super::place::DaemonPlace;
+use super::planning::Planning;
 use super::ports::{ActiveLink, Ports};
-use super::prefetch::{self, Closing};
+use super::prefetch::{self, CloseOnDrop};
 use super::request_queue::Owner;
 use super::resources::{SharedMemory, raise_file_limit};
 use super::shared_queue::Queues;
 use super::supervisor::Supervisor;
+use super::thread_events::{Recently, ThreadEvent, reporter, watch_signals};
+use super::uploads::ticket;
 use super::watchdog::{Watchdog, give_up};
-use super::workers::{AdmitJob, Planning, start};
+use super::workers::start;
 use crate::config::{Config, seconds};
 
 /// Requests taken from one port before workers' reports are looked at again.
@@ -63,19 +67,19 @@ pub fn run_reloading<P: Planning>(
     raise_file_limit();
     let mut shared_memory = SharedMemory::default();
     shared_memory.look();
-    let place = Place::of(&config.endpoint)?;
+    let place = DaemonPlace::of(&config.endpoint)?;
     let lease = Lease::take(place.clone())?;
     let queues = Queues::new(config);
     // First of all: it makes ready what was asked about last, while ports are opened. Whatever fails ends it.
-    let _closing = Closing(Arc::clone(&queues.prefetch));
+    let _closing = CloseOnDrop(Arc::clone(&queues.prefetch));
     if config.cache.prefetch {
-        prefetch::start(&queues, &service)
+        prefetch::start(&queues.prefetch, &service)
             .map_err(|source| DaemonError::System { what: "starting workers", source })?;
     }
     let watchdog = watch(config, &place)?;
     let ports = Ports::open(&lease.instance.iceoryx2_config()?)?;
     lease.instance.close_to_others()?;
-    let (sender, inbox) = channel();
+    let (sender, thread_events) = channel();
     watch_signals(&ports, sender.clone())?;
     start(config.workers.count, &queues, &service, &reporter(&ports, sender))
         .map_err(|source| DaemonError::System { what: "starting workers", source })?;
@@ -84,11 +88,12 @@ pub fn run_reloading<P: Planning>(
             tracing::warn!(path = %path.display(), "not preloaded: the list is too long");
         }
     }
-    let metrics = config.metrics.socket.as_ref().map(|path| Metrics::serve(&place.runtime_dir.join(path)));
+    let metrics =
+        config.metrics.socket.as_ref().map(|path| MetricsSocket::serve(&place.runtime_dir.join(path)));
     let metrics = metrics
         .transpose()
         .map_err(|source| DaemonError::System { what: "opening the metrics socket", source })?;
-    let desk = Desk::new(service, queues, config);
+    let dispatcher = Dispatcher::new(service, queues, config);
     lease.publish()?;
     let supervisor = Supervisor::of_this_process();
     supervisor.ready();
@@ -105,8 +110,8 @@ pub fn run_reloading<P: Planning>(
     let next_sweep = Instant::now() + SWEEP;
     let event_loop = EventLoop {
         ports,
-        desk,
-        inbox,
+        dispatcher,
+        thread_events,
         recently: Recently::default(),
         tick,
         polling,
@@ -126,7 +131,7 @@ pub fn run_reloading<P: Planning>(
 }
 
 /// Ends this daemon if the port thread stands still, from the opening of its ports on.
-fn watch(config: &Config, place: &Place) -> Result<Watchdog, DaemonError> {
+fn watch(config: &Config, place: &DaemonPlace) -> Result<Watchdog, DaemonError> {
     let limit = seconds(config.times.hang_s);
     let place = place.runtime_dir.display().to_string();
     Watchdog::start(limit, move || give_up(limit, &place))
@@ -162,15 +167,15 @@ struct EventLoop<'l, P> {
     watchdog: Watchdog,
     shared_memory: SharedMemory,
     ports: Ports,
-    desk: Desk<ActiveLink, P>,
-    inbox: Receiver<Inbound>,
+    dispatcher: Dispatcher<ActiveLink, P>,
+    thread_events: Receiver<ThreadEvent>,
     recently: Recently,
     tick: Duration,
     polling: Polling,
     limits: ReceiveLimits,
     config: Config,
     reload: Reload,
-    metrics: Option<Metrics>,
+    metrics: Option<MetricsSocket>,
     supervisor: Supervisor,
 }
 
@@ -179,12 +184,12 @@ impl<P: Planning> EventLoop<'_, P> {
         let mut next_tick = Instant::now() + self.tick;
         loop {
             let received = self.receive_all();
-            self.read_inbox();
-            self.desk.settle(Instant::now());
+            self.read_thread_events();
+            self.dispatcher.settle(Instant::now());
             self.deliver();
             self.supervisor.alive();
             self.watchdog.beat();
-            if self.desk.is_closed() {
+            if self.dispatcher.is_closed() {
                 return;
             }
             if Instant::now() >= next_tick {
@@ -212,15 +217,15 @@ impl<P: Planning> EventLoop<'_, P> {
         }
         self.look_around();
         if let Some(metrics) = &self.metrics {
-            metrics.update(self.desk.figures().prometheus());
+            metrics.update(self.dispatcher.metrics().prometheus());
         }
     }
 
-    /// Brings up to date what the desk is to tell of its surroundings.
+    /// Brings up to date what the dispatcher is to tell of its host.
     fn look_around(&mut self) {
         let (connections, clients) = self.ports.clients();
         let shared_memory_free = self.shared_memory.look();
-        self.desk.surroundings = Surroundings { connections, clients, shared_memory_free };
+        self.dispatcher.host = HostStatus { connections, clients, shared_memory_free };
     }
 
     /// Looks for the next request for a moment.
@@ -231,7 +236,7 @@ impl<P: Planning> EventLoop<'_, P> {
 
     fn wait(&self, next_tick: Instant) {
         let now = Instant::now();
-        let until = self.desk.next_deadline(now).map_or(next_tick, |d| d.min(next_tick));
+        let until = self.dispatcher.next_deadline(now).map_or(next_tick, |d| d.min(next_tick));
         let timeout = self.recently.patience(now, until.saturating_duration_since(now));
         if let Err(error) = self.ports.listener.timed_wait(|_| {}, timeout) {
             // A signal, or a listener out of order: never spin on it.
@@ -240,23 +245,23 @@ impl<P: Planning> EventLoop<'_, P> {
         }
     }
 
-    fn read_inbox(&mut self) {
-        while let Ok(inbound) = self.inbox.try_recv() {
-            let event = match inbound {
-                Inbound::Worker(event) => {
+    fn read_thread_events(&mut self) {
+        while let Ok(event) = self.thread_events.try_recv() {
+            let event = match event {
+                ThreadEvent::Worker(event) => {
                     self.recently.heard(Instant::now());
                     Event::Worker(event)
                 }
-                Inbound::Terminate => {
+                ThreadEvent::Terminate => {
                     self.supervisor.stopping();
                     Event::Terminate
                 }
-                Inbound::Reload => {
+                ThreadEvent::Reload => {
                     self.reload();
                     continue;
                 }
             };
-            self.desk.handle(event, Instant::now());
+            self.dispatcher.handle(event, Instant::now());
         }
     }
 
@@ -267,7 +272,7 @@ impl<P: Planning> EventLoop<'_, P> {
                 for key in self.config.restart_needed(&config) {
                     tracing::warn!(key, "changed in the configuration, which only a restart puts in force");
                 }
-                self.desk.reload(&config);
+                self.dispatcher.reload(&config);
                 self.tick = seconds(config.times.tick_s);
                 self.polling = Polling::new(config.times.poll());
                 self.limits = ReceiveLimits::of(&config);
@@ -291,12 +296,12 @@ impl<P: Planning> EventLoop<'_, P> {
             });
             for active in taken {
                 let owner = self.ports.owner_of(active.origin().value(), geometry);
-                let refuse = |length| self.desk.refuses_upload(owner, length);
+                let refuse = |length| self.dispatcher.uploads.refusal(owner, length);
                 let event = read(active, owner, geometry, self.limits, refuse);
                 if matches!(event, Event::Figures(_)) {
                     self.look_around();
                 }
-                self.desk.handle(event, Instant::now());
+                self.dispatcher.handle(event, Instant::now());
                 // Whoever is answered already is not to wait for those behind.
                 self.deliver();
             }
@@ -305,15 +310,15 @@ impl<P: Planning> EventLoop<'_, P> {
     }
 
     fn deliver(&mut self) {
-        for sample in self.desk.samples.drain(..) {
+        for sample in self.dispatcher.outgoing.samples.drain(..) {
             if let Err(error) = self.ports.progress.send_copy(sample) {
                 tracing::debug!(%error, "progress lost");
             }
         }
-        self.desk.wakes.sort_unstable();
-        self.desk.wakes.dedup();
-        self.ports.wake(&self.desk.wakes);
-        self.desk.wakes.clear();
+        self.dispatcher.outgoing.wakes.sort_unstable();
+        self.dispatcher.outgoing.wakes.dedup();
+        self.ports.wake(&self.dispatcher.outgoing.wakes);
+        self.dispatcher.outgoing.wakes.clear();
     }
 }
 

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use iceoryx2::prelude::Config as IoxConfig;
 use sbdp_ipc::layout::{self, TAG};
 
-use super::lifecycle::{LifecycleError, Place, io_error};
+use super::place::{DaemonPlace, PlaceError, ignore_missing, io_error};
 
 /// Names of this process's part of a place.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,7 +30,7 @@ const TRIES: u32 = 64;
 
 impl Instance {
     /// One that nobody has. Its folder is made.
-    pub(super) fn create(place: &Place) -> Result<Self, LifecycleError> {
+    pub(super) fn create(place: &DaemonPlace) -> Result<Self, PlaceError> {
         fs::create_dir_all(&place.root).map_err(io_error(&place.root))?;
         let mut refused = None;
         for attempt in 0..TRIES {
@@ -46,7 +46,7 @@ impl Instance {
         Err(io_error(&place.root)(refused.unwrap_or_else(|| io::ErrorKind::AlreadyExists.into())))
     }
 
-    fn of(place: &Place, tag: &str) -> Self {
+    fn of(place: &DaemonPlace, tag: &str) -> Self {
         Self { prefix: format!("{}{tag}_", place.prefix), root: place.root.join(tag) }
     }
 
@@ -56,7 +56,7 @@ impl Instance {
 
     /// Takes from others what they may do with files in shared memory: iceoryx2 makes one that anybody may
     /// write. To be called when the ports are open.
-    pub(crate) fn close_to_others(&self) -> Result<(), LifecycleError> {
+    pub(crate) fn close_to_others(&self) -> Result<(), PlaceError> {
         let shm = Path::new("/dev/shm");
         for path in layout::shared_memory_files(&self.prefix).map_err(io_error(shm))? {
             let mode = fs::metadata(&path).map_err(io_error(&path))?.mode();
@@ -69,7 +69,7 @@ impl Instance {
     }
 
     /// How iceoryx2 is to work here.
-    pub(crate) fn iceoryx2_config(&self) -> Result<IoxConfig, LifecycleError> {
+    pub(crate) fn iceoryx2_config(&self) -> Result<IoxConfig, PlaceError> {
         Ok(layout::iceoryx2_config(&self.prefix, &self.root)?)
     }
 }
@@ -88,7 +88,7 @@ fn is_tag(text: &[u8]) -> bool {
 /// Removes what instances of a place have, but for the one that is kept. Whoever holds the place's lock may
 /// do so: the others' daemons are dead, and what clients of theirs have mapped stays theirs. As long as such
 /// clients live they may make new files meanwhile: what could not be removed is left to the next time.
-pub(super) fn sweep(place: &Place, kept: Option<&Instance>) {
+pub(super) fn sweep(place: &DaemonPlace, kept: Option<&Instance>) {
     for entry in fs::read_dir(&place.root).into_iter().flatten().flatten() {
         let path = entry.path();
         if is_tag(entry.file_name().as_encoded_bytes()) && kept.is_none_or(|k| k.root != path) {
@@ -112,22 +112,14 @@ fn log_failure(path: &Path, removed: io::Result<()>) {
     }
 }
 
-/// Somebody else may remove the same.
-pub(super) fn ignore_missing(removed: io::Result<()>) -> io::Result<()> {
-    match removed {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-        _ => Ok(()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::config::EndpointConfig;
 
-    fn place(dir: &Path) -> Place {
+    fn place(dir: &Path) -> DaemonPlace {
         let config = EndpointConfig { runtime_dir: Some(dir.join("run")), ..EndpointConfig::default() };
-        Place::of(&config).unwrap()
+        DaemonPlace::of(&config).unwrap()
     }
 
     /// A file in shared memory that goes with the test.

@@ -2,41 +2,47 @@
 //!
 //! One thread owns the ports (`event_loop`): it receives, copies and checks, admits or refuses,
 //! and sends. It never plans, heals or blocks. `workers` do, and report back as events.
-//! What was answered before is answered from `answers` at once; while nothing is asked, assemblies are made
-//! ready for what may be (`prefetch`, `foresight`).
-//! `desk` decides, by the state machine of `session` and the bounded `outbox`; none of these
+//! What was answered before is answered from `response_cache` at once; while nothing is asked, assemblies are made
+//! ready for what may be (`prefetch`, `speculation`).
+//! `dispatcher` decides, by the state machine of `session` and the bounded `outbox`; none of these
 //! three knows iceoryx2, so they are tested without it. Only `convert` sees both wire and
 //! working types.
 
-mod answers;
-mod closing;
 mod convert;
-mod desk;
+mod dispatcher;
+
 mod event_loop;
-mod figures;
-mod foresight;
-mod inbox;
+mod events;
+
 mod instance;
-mod intake;
-mod lifecycle;
+mod jobs;
+mod lease;
 mod lock;
 mod metrics;
+mod metrics_socket;
 mod outbox;
+mod outgoing;
+mod place;
+mod planning;
 mod ports;
 mod prefetch;
 mod request_queue;
 mod resources;
+mod response_cache;
 mod session;
 mod shared_queue;
+mod shutdown;
+mod speculation;
 mod supervisor;
+mod thread_events;
+mod uploads;
 mod watchdog;
 mod workers;
 
 pub(crate) use convert::source_assembly as uploaded_assembly;
 pub use event_loop::{Reload, run, run_reloading};
-pub use lifecycle::LifecycleError;
-pub use lifecycle::check_place;
-pub use workers::Planning;
+pub use place::{PlaceError, check_place};
+pub use planning::Planning;
 
 /// The ports, for measuring them without a daemon behind.
 pub(crate) mod transport {
@@ -51,7 +57,7 @@ use sbdp_ipc::services::SetupError;
 pub enum DaemonError {
     /// The place is taken or unusable.
     #[error(transparent)]
-    Lifecycle(#[from] LifecycleError),
+    Place(#[from] PlaceError),
     /// iceoryx2 could not be set up.
     #[error(transparent)]
     Setup(#[from] SetupError),

@@ -1,6 +1,6 @@
 //! What workers make ready while nothing is asked: what was remembered last before a restart, read ahead; fields,
 //! overlaps and blocking graphs of assemblies that just came, or were asked about before a restart; then what may be asked next about those that were
-//! planned ([`foresight`](super::foresight)). Whatever is asked stops it.
+//! planned ([`speculation`](super::speculation)). Whatever is asked stops it.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,9 +11,8 @@ use std::time::{Duration, Instant};
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 
-use super::foresight::Foresight;
-use super::shared_queue::Queues;
-use super::workers::{Planning, contained};
+use super::planning::{Planning, contained};
+use super::speculation::Speculation;
 use crate::service::AssemblyId;
 use crate::termination::Termination;
 
@@ -22,7 +21,7 @@ const QUIET: Duration = Duration::from_millis(50);
 /// So many assemblies may wait; those that came first are left out.
 const MOST_WAITING: usize = 256;
 /// So many plans may wait for what may be asked after them; those made first are left out.
-const MOST_FORESIGHTS: usize = 16;
+const MOST_SPECULATIONS: usize = 16;
 
 /// Assemblies that were asked about before a restart are made ready, up to so many.
 const MOST_RECENT: usize = 8;
@@ -35,8 +34,8 @@ const NICEST: i32 = 19;
 ///
 /// # Errors
 /// The system has no thread for it.
-pub(super) fn start<P: Planning>(queues: &Queues, service: &Arc<P>) -> std::io::Result<()> {
-    let (queues, service) = (queues.clone(), Arc::clone(service));
+pub(super) fn start<P: Planning>(prefetch: &Arc<Prefetch>, service: &Arc<P>) -> std::io::Result<()> {
+    let (prefetch, service) = (Arc::clone(prefetch), Arc::clone(service));
     let prepare = move || {
         // Questions leave half of the processors to whoever else works on this machine: what shares a core with
         // others slows them down, however nice it is.
@@ -51,16 +50,16 @@ pub(super) fn start<P: Planning>(queues: &Queues, service: &Arc<P>) -> std::io::
         };
         for_assemblies.install(|| service.recall_recent());
         for id in service.recent(MOST_RECENT) {
-            queues.prefetch.want(id);
+            prefetch.want(id);
         }
-        queues.prefetch.run(|work, termination| match work {
+        prefetch.run(|work, termination| match work {
             Work::Assembly(id) => {
                 // Whoever asks will be told what is wrong.
                 let _ = contained(|| for_assemblies.install(|| service.prepare(*id, termination)));
                 false
             }
-            Work::Question(foresight) => {
-                for_questions.install(|| foresight.plan_next(&*service, termination))
+            Work::Question(speculation) => {
+                for_questions.install(|| speculation.plan_next(&*service, termination))
             }
         });
     };
@@ -87,7 +86,7 @@ pub(super) struct Prefetch {
 struct State {
     waiting: VecDeque<AssemblyId>,
     /// The newest first: that plan is the one that is carried out.
-    foresights: VecDeque<Foresight>,
+    speculations: VecDeque<Speculation>,
     /// Questions that were planned ahead.
     foreseen: u64,
     /// Requests that workers work on.
@@ -119,12 +118,12 @@ pub(super) enum Work {
     /// What any plan of an assembly needs.
     Assembly(AssemblyId),
     /// The next of the questions that may be asked after a plan.
-    Question(Box<Foresight>),
+    Question(Box<Speculation>),
 }
 
 /// What is made ready, in figures.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub(crate) struct Ahead {
+pub(crate) struct PrefetchMetrics {
     /// Assemblies that wait, with the one at work.
     pub(crate) assemblies: usize,
     /// Questions that may be asked and wait to be planned, with the one at work.
@@ -148,9 +147,9 @@ impl Drop for Busy<'_> {
 
 /// Once this is dropped, nothing is made ready any more.
 #[derive(Debug)]
-pub(super) struct Closing(pub(super) Arc<Prefetch>);
+pub(super) struct CloseOnDrop(pub(super) Arc<Prefetch>);
 
-impl Drop for Closing {
+impl Drop for CloseOnDrop {
     fn drop(&mut self) {
         self.0.close();
     }
@@ -185,23 +184,23 @@ impl Prefetch {
     }
 
     /// Wants that planned which may be asked after a plan, before what may be asked after others.
-    pub(super) fn foresee(&self, foresight: Foresight) {
+    pub(super) fn speculate(&self, speculation: Speculation) {
         let mut state = self.state();
-        state.foresights.retain(|waiting| !waiting.is_as(&foresight));
-        state.foresights.push_front(foresight);
-        state.foresights.truncate(MOST_FORESIGHTS);
+        state.speculations.retain(|waiting| !waiting.is_as(&speculation));
+        state.speculations.push_front(speculation);
+        state.speculations.truncate(MOST_SPECULATIONS);
         self.changed.notify_all();
     }
 
     /// What waits, and what was done.
-    pub(super) fn ahead(&self) -> Ahead {
+    pub(super) fn metrics(&self) -> PrefetchMetrics {
         let state = self.state();
         let at_work = state.at_work.as_ref();
         let assembly = at_work.is_some_and(|work| work.questions.is_none());
         let questions = at_work.and_then(|work| work.questions).unwrap_or(0);
-        Ahead {
+        PrefetchMetrics {
             assemblies: state.waiting.len() + usize::from(assembly),
-            questions: state.foresights.iter().map(Foresight::left).sum::<usize>() + questions,
+            questions: state.speculations.iter().map(Speculation::left).sum::<usize>() + questions,
             foreseen: state.foreseen,
         }
     }
@@ -243,7 +242,7 @@ impl Prefetch {
                 let termination = Termination::default();
                 let questions = match &work {
                     Work::Assembly(_) => None,
-                    Work::Question(foresight) => Some(foresight.left()),
+                    Work::Question(speculation) => Some(speculation.left()),
                 };
                 state.at_work = Some(AtWork { stop: termination.cancel_flag(), questions });
                 return Some((work, termination));
@@ -259,12 +258,12 @@ impl Prefetch {
 
 impl State {
     fn is_idle(&self) -> bool {
-        self.waiting.is_empty() && self.foresights.is_empty()
+        self.waiting.is_empty() && self.speculations.is_empty()
     }
 
     fn take(&mut self) -> Option<Work> {
         let assembly = self.waiting.pop_front().map(Work::Assembly);
-        assembly.or_else(|| self.foresights.pop_front().map(|f| Work::Question(Box::new(f))))
+        assembly.or_else(|| self.speculations.pop_front().map(|f| Work::Question(Box::new(f))))
     }
 
     /// What was stopped is the next, and so are the questions that are left of a plan.
@@ -276,11 +275,11 @@ impl State {
                     self.waiting.push_front(id);
                 }
             }
-            Work::Question(foresight) => {
-                let is_there = self.foresights.iter().any(|waiting| waiting.is_as(&foresight));
-                if foresight.left() > 0 && !is_there {
-                    self.foresights.push_front(*foresight);
-                    self.foresights.truncate(MOST_FORESIGHTS);
+            Work::Question(speculation) => {
+                let is_there = self.speculations.iter().any(|waiting| waiting.is_as(&speculation));
+                if speculation.left() > 0 && !is_there {
+                    self.speculations.push_front(*speculation);
+                    self.speculations.truncate(MOST_SPECULATIONS);
                 }
             }
         }
@@ -291,7 +290,7 @@ impl State {
 mod tests {
     use std::sync::mpsc::channel;
 
-    use super::super::workers::PlanJob;
+    use super::super::jobs::PlanJob;
     use super::*;
     use crate::fixtures::{plan_of, step_of};
     use crate::plan::PlanStatus;
@@ -347,25 +346,25 @@ mod tests {
         assert_eq!(state.waiting.iter().filter(|w| **w == id(7)).count(), 1);
     }
 
-    fn questions(assembly: u8, parts: usize) -> Foresight {
+    fn questions(assembly: u8, parts: usize) -> Speculation {
         let job = PlanJob::about(id(assembly), PlanRequest::default());
         let plan = plan_of(PlanStatus::Complete, (0..parts).map(step_of).collect());
-        Foresight::after(&job, &plan, Duration::from_secs(1000)).unwrap()
+        Speculation::after(&job, &plan, Duration::from_secs(1000)).unwrap()
     }
 
     #[test]
     fn assemblies_come_before_questions_and_the_newest_plan_before_others() {
         let prefetch = Prefetch::default();
-        prefetch.foresee(questions(1, 1));
-        prefetch.foresee(questions(2, 2));
+        prefetch.speculate(questions(1, 1));
+        prefetch.speculate(questions(2, 2));
         prefetch.want(id(3));
-        prefetch.foresee(questions(1, 3));
-        assert_eq!(prefetch.ahead(), Ahead { assemblies: 1, questions: 13, foreseen: 0 });
+        prefetch.speculate(questions(1, 3));
+        assert_eq!(prefetch.metrics(), PrefetchMetrics { assemblies: 1, questions: 13, foreseen: 0 });
         let mut taken = Vec::new();
-        while let Some((work, _)) = (prefetch.ahead().questions > 0).then(|| prefetch.next()).flatten() {
+        while let Some((work, _)) = (prefetch.metrics().questions > 0).then(|| prefetch.next()).flatten() {
             taken.push(match work {
                 Work::Assembly(_) => 0,
-                Work::Question(foresight) => foresight.left(),
+                Work::Question(speculation) => speculation.left(),
             });
             prefetch.state().at_work = None;
         }
@@ -380,11 +379,11 @@ mod tests {
         prefetch.answered();
         assert!(termination.check().is_ok());
         prefetch.state().at_work = None;
-        prefetch.foresee(questions(1, 1));
+        prefetch.speculate(questions(1, 1));
         let (work, termination) = prefetch.next().unwrap();
         assert_eq!(
-            prefetch.ahead(),
-            Ahead { assemblies: 0, questions: 2, foreseen: 0 },
+            prefetch.metrics(),
+            PrefetchMetrics { assemblies: 0, questions: 2, foreseen: 0 },
             "with what is at work"
         );
         prefetch.answered();
@@ -393,19 +392,19 @@ mod tests {
         state.at_work = None;
         state.put_back(work, true);
         drop(state);
-        assert_eq!(prefetch.ahead().questions, 2, "they are left");
+        assert_eq!(prefetch.metrics().questions, 2, "they are left");
     }
 
     #[test]
     fn only_so_many_plans_wait() {
         let prefetch = Prefetch::default();
-        for n in 0..=MOST_FORESIGHTS as u8 {
-            prefetch.foresee(questions(n, 1));
+        for n in 0..=MOST_SPECULATIONS as u8 {
+            prefetch.speculate(questions(n, 1));
         }
-        assert_eq!(prefetch.ahead().questions, 2 * MOST_FORESIGHTS);
+        assert_eq!(prefetch.metrics().questions, 2 * MOST_SPECULATIONS);
         prefetch.close();
-        prefetch.state().foresights.clear();
+        prefetch.state().speculations.clear();
         prefetch.state().put_back(Work::Question(Box::new(questions(1, 1))), true);
-        assert_eq!(prefetch.ahead().questions, 0, "nothing waits once it is closed");
+        assert_eq!(prefetch.metrics().questions, 0, "nothing waits once it is closed");
     }
 }

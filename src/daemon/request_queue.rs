@@ -46,7 +46,7 @@ pub(crate) enum Rejected {
 
 /// What may wait and work at once.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Bounds {
+pub(crate) struct QueueLimits {
     /// Jobs that wait.
     pub(crate) waiting: usize,
     /// Those of one client.
@@ -80,7 +80,7 @@ const LONGEST_HINT_MS: f64 = 3_600_000.0;
 #[derive(Debug)]
 pub(crate) struct RequestQueue<J> {
     waiting: Vec<(Ticket, J)>,
-    bounds: Bounds,
+    bounds: QueueLimits,
     /// By client: jobs at work, and the number of its last turn.
     owners: HashMap<Owner, Turns>,
     turns: u64,
@@ -102,7 +102,7 @@ struct Turns {
 }
 
 impl<J> RequestQueue<J> {
-    pub(crate) fn new(bounds: Bounds) -> Self {
+    pub(crate) fn new(bounds: QueueLimits) -> Self {
         Self {
             waiting: Vec::new(),
             bounds,
@@ -128,7 +128,7 @@ impl<J> RequestQueue<J> {
     }
 
     /// Other bounds from now on; what waits stays.
-    pub(crate) fn rebound(&mut self, bounds: Bounds) {
+    pub(crate) fn rebound(&mut self, bounds: QueueLimits) {
         self.bounds = bounds;
         if bounds.work_s_per_owner.is_none() {
             self.owners.values_mut().for_each(|turns| turns.spent_s = 0.0);
@@ -151,7 +151,7 @@ impl<J> RequestQueue<J> {
         if self.overspent(ticket.owner) > 0.0 {
             return Err(Rejected::OwnerSpent);
         }
-        let Bounds { waiting_per_owner, bytes_per_owner, .. } = self.bounds;
+        let QueueLimits { waiting_per_owner, bytes_per_owner, .. } = self.bounds;
         if own >= waiting_per_owner || (own > 0 && own_bytes > bytes_per_owner) {
             return Err(Rejected::OwnerFull);
         }

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-const FREE: Bounds = Bounds {
+const FREE: QueueLimits = QueueLimits {
     waiting: 100,
     waiting_per_owner: 100,
     bytes: u64::MAX,
@@ -40,7 +40,7 @@ proptest! {
         per_owner in 1_usize..4,
         steps in proptest::collection::vec((0_u8..10, 0_u64..3), 0..80),
     ) {
-        let bounds = Bounds { waiting: limit, waiting_per_owner: per_owner, working_per_owner: 2, ..FREE };
+        let bounds = QueueLimits { waiting: limit, waiting_per_owner: per_owner, working_per_owner: 2, ..FREE };
         let mut queue = RequestQueue::new(bounds);
         let (mut model, mut working): (Vec<(u64, u32)>, Vec<Ticket>) = (Vec::new(), Vec::new());
         for (number, (step, owner)) in (0_u32..).zip(steps) {
@@ -113,7 +113,7 @@ fn those_who_come_again_at_once_do_not_pass_one_who_waits() {
 
 #[test]
 fn a_client_at_work_waits_for_others_and_never_works_beyond_its_share() {
-    let mut queue = RequestQueue::new(Bounds { working_per_owner: 1, ..FREE });
+    let mut queue = RequestQueue::new(QueueLimits { working_per_owner: 1, ..FREE });
     (0..3).for_each(|n| queue.push(of(1), n).unwrap());
     let (first, _) = queue.pop().unwrap();
     assert_eq!(queue.pop(), None, "it works already");
@@ -134,7 +134,7 @@ fn interactive_goes_before_batch_but_not_for_ever() {
 
 #[test]
 fn batch_leaves_workers_to_those_who_wait() {
-    let mut queue = RequestQueue::new(Bounds { working_batch: 1, ..FREE });
+    let mut queue = RequestQueue::new(QueueLimits { working_batch: 1, ..FREE });
     queue.push(batch(1), 1).unwrap();
     queue.push(batch(2), 2).unwrap();
     let (first, _) = queue.pop().unwrap();
@@ -148,7 +148,7 @@ fn batch_leaves_workers_to_those_who_wait() {
 #[test]
 fn waiting_bytes_are_bounded_in_all_and_per_client_but_one_always_fits() {
     let heavy = |owner: u64, bytes: u64| Ticket { bytes, ..of(owner) };
-    let mut queue = RequestQueue::new(Bounds { bytes: 250, bytes_per_owner: 120, ..FREE });
+    let mut queue = RequestQueue::new(QueueLimits { bytes: 250, bytes_per_owner: 120, ..FREE });
     queue.push(heavy(1, 1000), 0).unwrap();
     assert_eq!(queue.push(heavy(1, 1), 1), Err(Rejected::OwnerFull));
     assert_eq!(queue.push(heavy(2, 1), 1), Err(Rejected::Full));
@@ -161,7 +161,7 @@ fn waiting_bytes_are_bounded_in_all_and_per_client_but_one_always_fits() {
 
 #[test]
 fn the_hint_grows_with_what_waits_and_how_long_it_takes() {
-    let mut queue = RequestQueue::new(Bounds { workers: 2, ..FREE });
+    let mut queue = RequestQueue::new(QueueLimits { workers: 2, ..FREE });
     assert_eq!(queue.hint_ms(Owner(1)), HINT_MS.0 as u32);
     queue.push(of(1), 0).unwrap();
     let (ticket, _) = queue.pop().unwrap();
@@ -187,7 +187,7 @@ fn a_closed_queue_takes_nothing_but_gives_what_it_has() {
 
 #[test]
 fn who_has_had_its_share_of_the_workers_is_told_when_there_is_more_and_others_are_not_kept_from_theirs() {
-    let mut queue = RequestQueue::new(Bounds { work_s_per_owner: Some(6.0), ..FREE });
+    let mut queue = RequestQueue::new(QueueLimits { work_s_per_owner: Some(6.0), ..FREE });
     let start = queue.now;
     queue.push(of(1), 0).unwrap();
     let (ticket, _) = queue.pop().unwrap();

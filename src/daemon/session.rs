@@ -9,9 +9,9 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::{ResponseHeader, ResponseKind};
 use sbdp_ipc::plan::Step;
 
-use super::answers::Answer;
-use super::figures::Timed;
+use super::metrics::LatencyKind;
 use super::outbox::Outbox;
+use super::response_cache::CachedResponse;
 use crate::termination::Termination;
 
 /// Where a request stands.
@@ -28,12 +28,12 @@ pub(crate) enum State {
     /// The plan is ready and leaves as fast as the client reads.
     Streaming,
     /// It is over.
-    Ended(End),
+    Ended(SessionEnd),
 }
 
 /// How a request ended. Every end is an answer, except when the client is gone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum End {
+pub(crate) enum SessionEnd {
     /// The whole plan was sent.
     Done,
     /// The client left or cancelled.
@@ -69,11 +69,13 @@ impl State {
             (Admitted, Input::Enqueue) => Queued,
             (Queued, Input::Start) => Running,
             (Running, Input::Finish) => Streaming,
-            (Streaming, Input::Drain) => Ended(End::Done),
-            (Received | Admitted | Queued | Running, Input::Refuse) => Ended(End::Refused),
-            (Received | Admitted | Queued, Input::Expire) => Ended(End::Expired),
-            (Received | Admitted | Queued | Running | Streaming, Input::Cancel) => Ended(End::Cancelled),
-            (Running | Streaming, Input::Fail) => Ended(End::Failed),
+            (Streaming, Input::Drain) => Ended(SessionEnd::Done),
+            (Received | Admitted | Queued | Running, Input::Refuse) => Ended(SessionEnd::Refused),
+            (Received | Admitted | Queued, Input::Expire) => Ended(SessionEnd::Expired),
+            (Received | Admitted | Queued | Running | Streaming, Input::Cancel) => {
+                Ended(SessionEnd::Cancelled)
+            }
+            (Running | Streaming, Input::Fail) => Ended(SessionEnd::Failed),
             _ => return None,
         };
         Some(next)
@@ -157,7 +159,7 @@ impl<L: Link> Session<L> {
         match next {
             State::Admitted => self.admitted_ns = monotonic_ns(),
             State::Running => self.started_ns = monotonic_ns(),
-            State::Ended(End::Cancelled | End::Failed) => self.cancel_work(),
+            State::Ended(SessionEnd::Cancelled | SessionEnd::Failed) => self.cancel_work(),
             _ => {}
         }
         self.state = next;
@@ -197,14 +199,14 @@ impl<L: Link> Session<L> {
     }
 
     /// Answers at once with what was answered before.
-    pub(crate) fn answer(&mut self, answer: &Answer) {
+    pub(crate) fn answer(&mut self, answer: &CachedResponse) {
         if [Input::Enqueue, Input::Start].into_iter().all(|input| self.input(input)) {
             self.answer_running(answer);
         }
     }
 
     /// Answers what runs with what was answered before.
-    pub(crate) fn answer_running(&mut self, answer: &Answer) {
+    pub(crate) fn answer_running(&mut self, answer: &CachedResponse) {
         self.remembered = true;
         for message in &answer.steps {
             if self.outbox.push_whole(ResponseKind::Steps, Arc::clone(message)).is_err() {
@@ -276,9 +278,9 @@ impl<L: Link> Session<L> {
     }
 
     /// How long a plan took that was sent to its end, and from where it came.
-    pub(crate) fn timed(&self) -> Option<(Timed, Duration)> {
-        let kind = if self.remembered { Timed::RememberedPlan } else { Timed::Plan };
-        (self.state == State::Ended(End::Done)).then(|| (kind, self.received.elapsed()))
+    pub(crate) fn timed(&self) -> Option<(LatencyKind, Duration)> {
+        let kind = if self.remembered { LatencyKind::RememberedPlan } else { LatencyKind::Plan };
+        (self.state == State::Ended(SessionEnd::Done)).then(|| (kind, self.received.elapsed()))
     }
 
     /// Over, and the client has what it can get.
@@ -342,7 +344,13 @@ mod tests {
 
     #[test]
     fn nothing_leads_out_of_an_end() {
-        for end in [End::Done, End::Cancelled, End::Expired, End::Refused, End::Failed] {
+        for end in [
+            SessionEnd::Done,
+            SessionEnd::Cancelled,
+            SessionEnd::Expired,
+            SessionEnd::Refused,
+            SessionEnd::Failed,
+        ] {
             for input in INPUTS {
                 assert_eq!(State::Ended(end).after(input), None);
             }
@@ -352,7 +360,7 @@ mod tests {
     #[test]
     fn every_live_state_can_be_left_by_a_client_that_goes() {
         for state in [State::Received, State::Admitted, State::Queued, State::Running, State::Streaming] {
-            assert_eq!(state.after(Input::Cancel), Some(State::Ended(End::Cancelled)));
+            assert_eq!(state.after(Input::Cancel), Some(State::Ended(SessionEnd::Cancelled)));
         }
     }
 
@@ -370,7 +378,7 @@ mod tests {
         assert_eq!(session.state(), State::Streaming);
         link.room.set(1);
         assert!(session.pump(Instant::now(), Duration::from_secs(9)));
-        assert_eq!(session.state(), State::Ended(End::Done));
+        assert_eq!(session.state(), State::Ended(SessionEnd::Done));
         assert!(session.is_finished());
     }
 
@@ -383,7 +391,7 @@ mod tests {
         session.pump(now, Duration::from_secs(1));
         assert!(session.stuck_since.is_some());
         session.pump(now + Duration::from_secs(2), Duration::from_secs(1));
-        assert_eq!(session.state(), State::Ended(End::Failed));
+        assert_eq!(session.state(), State::Ended(SessionEnd::Failed));
         assert!(is_cancelled(&session), "its worker stops");
         link.room.set(1);
         session.pump(now, Duration::from_secs(1));
@@ -407,6 +415,6 @@ mod tests {
         for _ in 0..50 {
             session.step(Step { path: vec![[0.0; 7]; 20], ..Step::default() });
         }
-        assert_eq!(session.state(), State::Ended(End::Failed));
+        assert_eq!(session.state(), State::Ended(SessionEnd::Failed));
     }
 }

@@ -3,9 +3,9 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::jobs::{AdmitJob, PlanJob};
 use super::prefetch::Prefetch;
-use super::request_queue::{Bounds, Owner, Rejected, RequestQueue, Ticket};
-use super::workers::{AdmitJob, PlanJob};
+use super::request_queue::{Owner, QueueLimits, Rejected, RequestQueue, Ticket};
 use crate::config::Config;
 
 /// A queue that threads share.
@@ -32,7 +32,7 @@ impl<J> Drop for Working<'_, J> {
 }
 
 impl<J> SharedQueue<J> {
-    fn new(bounds: Bounds) -> Self {
+    fn new(bounds: QueueLimits) -> Self {
         Self { queue: Mutex::new(RequestQueue::new(bounds)), ready: Condvar::new() }
     }
 
@@ -48,7 +48,7 @@ impl<J> SharedQueue<J> {
         queue
     }
 
-    fn rebound(&self, bounds: Bounds) {
+    fn rebound(&self, bounds: QueueLimits) {
         self.lock().rebound(bounds);
         self.ready.notify_all();
     }
@@ -111,16 +111,16 @@ pub(crate) struct Queues {
     /// What is made ready while nothing is asked, if anything is.
     pub(super) prefetch: Arc<Prefetch>,
     /// How much time may go into what may be asked after a plan.
-    pub(super) foresight: Duration,
+    pub(super) speculation: Duration,
 }
 
 /// The bounds of plans, and of assemblies to take in.
-fn bounds(config: &Config) -> [Bounds; 2] {
+fn bounds(config: &Config) -> [QueueLimits; 2] {
     let (workers, requests) = (config.workers.count, &config.requests);
     // One worker is left to others, if there is more than one.
     let share = workers.saturating_sub(1).max(1);
     let megabytes = |mb: u64| mb.saturating_mul(1 << 20);
-    let plans = Bounds {
+    let plans = QueueLimits {
         waiting: requests.queue,
         waiting_per_owner: requests.waiting_per_client.min(requests.queue),
         bytes: u64::MAX,
@@ -133,7 +133,7 @@ fn bounds(config: &Config) -> [Bounds; 2] {
         working_batch: share,
         work_s_per_owner: Some(requests.work_s_per_client).filter(|most| *most > 0.0),
     };
-    let admissions = Bounds {
+    let admissions = QueueLimits {
         waiting: ADMISSION_QUEUE,
         waiting_per_owner: ADMISSION_QUEUE,
         bytes: megabytes(requests.uploads_mb),
@@ -153,7 +153,7 @@ impl Queues {
             plans: Arc::new(SharedQueue::new(plans)),
             admissions: Arc::new(SharedQueue::new(admissions)),
             prefetch: Arc::default(),
-            foresight: config.cache.foresight(),
+            speculation: config.cache.foresight(),
         }
     }
 

@@ -1,254 +1,24 @@
 //! The threads that plan and heal. A panic is contained to its request.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use sbdp_ipc::bytes::AlignedBytes;
-use sbdp_ipc::error::{ErrorCode, WireError};
+use sbdp_ipc::error::WireError;
 use sbdp_ipc::plan::Step;
 
-use super::answers::Answer;
 use super::convert;
-use super::foresight::Foresight;
-use super::request_queue::Owner;
+use super::jobs::{AdmitJob, PlanJob, Received, SessionKey};
+use super::planning::{Planning, contained, with_moved};
+use super::response_cache::CachedResponse;
 use super::shared_queue::Queues;
-use crate::geometry::{Pose, Revision, SourceAssembly, load_assembly, remember_given, remember_revised};
+use super::speculation::Speculation;
+use crate::geometry::load_assembly;
 use crate::plan::{Plan, PlanStep};
-use crate::search::{PlanRequest, PlanSink, Progress, Termination};
-use crate::service::{
-    Admission, AnsweredQuestion, AssemblyId, Remembered, Service, ServiceError, recent_answers,
-    remember_answer, remembered_answer,
-};
-
-/// What the workers ask of the planning service; tests script it.
-pub trait Planning: Send + Sync + 'static {
-    /// See [`Service::admit`]. What was given is remembered.
-    ///
-    /// # Errors
-    /// The geometry was refused, or the termination condition became true.
-    fn admit(&self, source: &SourceAssembly, termination: &Termination) -> Result<Admission, ServiceError>;
-    /// See [`Service::revise_until`]. The change is remembered.
-    ///
-    /// # Errors
-    /// The base is unknown, the change is refused, or the termination condition became true.
-    fn revise(
-        &self,
-        base: AssemblyId,
-        revision: &Revision,
-        termination: &Termination,
-    ) -> Result<Admission, ServiceError>;
-    /// The same for a question that brings its change along: nobody will ask for its handle.
-    ///
-    /// # Errors
-    /// As [`Planning::revise`].
-    fn revise_for_now(
-        &self,
-        base: AssemblyId,
-        revision: &Revision,
-        termination: &Termination,
-    ) -> Result<Admission, ServiceError> {
-        self.revise(base, revision, termination)
-    }
-    /// See [`Service::knows`]. Called on the port thread: it must not block.
-    fn knows(&self, id: AssemblyId) -> bool;
-    /// See [`Service::prepare`].
-    ///
-    /// # Errors
-    /// The id is unknown.
-    fn prepare(&self, _: AssemblyId, _: &Termination) -> Result<(), ServiceError> {
-        Ok(())
-    }
-    /// See [`Service::foresee`].
-    ///
-    /// # Errors
-    /// Nothing could be planned.
-    fn foresee(&self, _: AssemblyId, _: &PlanRequest, _: &Termination) -> Result<Plan, ServiceError> {
-        Err(ServiceError::UnknownAssembly)
-    }
-    /// See [`Service::recall_recent`].
-    fn recall_recent(&self) {}
-    /// See [`Service::recent`].
-    fn recent(&self, _: usize) -> Vec<AssemblyId> {
-        Vec::new()
-    }
-    /// See [`Service::remembered`]. Called on the port thread: it must not block.
-    fn remembered(&self) -> Option<Remembered> {
-        None
-    }
-    /// See [`Service::answers_take`]. Called on the port thread: it must not block.
-    fn answers_take(&self, _bytes: usize) {}
-    /// The messages that answered a question before, also before a restart.
-    fn answered(&self, _question: &[u8]) -> Option<Vec<Vec<u8>>> {
-        None
-    }
-    /// The answers that were used last before this process began, with their questions; the last one used comes last.
-    fn recent_answers(&self, _most: usize, _bytes: u64) -> Vec<AnsweredQuestion> {
-        Vec::new()
-    }
-    /// Remembers the messages that answered a question.
-    fn remember(&self, _question: &[u8], _messages: Vec<Vec<u8>>) {}
-    /// See [`Service::plan`].
-    ///
-    /// # Errors
-    /// Nothing could be planned.
-    fn plan(
-        &self,
-        id: AssemblyId,
-        request: &PlanRequest,
-        termination: &Termination,
-        sink: &mut dyn PlanSink,
-    ) -> Result<Plan, ServiceError>;
-}
-
-impl Planning for Service {
-    fn admit(&self, source: &SourceAssembly, termination: &Termination) -> Result<Admission, ServiceError> {
-        let admission = self.admit_until(source, termination)?;
-        remember_given(self.cache(), &admission.id.0, source);
-        self.keep(admission.id)?;
-        Ok(admission)
-    }
-
-    fn revise(
-        &self,
-        base: AssemblyId,
-        revision: &Revision,
-        termination: &Termination,
-    ) -> Result<Admission, ServiceError> {
-        let admission = self.revise_until(base, revision, termination)?;
-        if admission.id != base {
-            remember_revised(self.cache(), &admission.id.0, &base.0, revision);
-            self.keep(admission.id)?;
-        }
-        Ok(admission)
-    }
-
-    fn revise_for_now(
-        &self,
-        base: AssemblyId,
-        revision: &Revision,
-        termination: &Termination,
-    ) -> Result<Admission, ServiceError> {
-        self.revise_until(base, revision, termination)
-    }
-
-    fn knows(&self, id: AssemblyId) -> bool {
-        Self::knows(self, id)
-    }
-
-    fn prepare(&self, id: AssemblyId, termination: &Termination) -> Result<(), ServiceError> {
-        Self::prepare(self, id, termination)
-    }
-
-    fn foresee(
-        &self,
-        id: AssemblyId,
-        request: &PlanRequest,
-        termination: &Termination,
-    ) -> Result<Plan, ServiceError> {
-        Self::foresee(self, id, request, termination)
-    }
-
-    fn recall_recent(&self) {
-        Self::recall_recent(self);
-    }
-
-    fn recent(&self, most: usize) -> Vec<AssemblyId> {
-        Self::recent(self, most)
-    }
-
-    fn remembered(&self) -> Option<Remembered> {
-        Some(Self::remembered(self))
-    }
-
-    fn answers_take(&self, bytes: usize) {
-        Self::answers_take(self, bytes);
-    }
-
-    fn answered(&self, question: &[u8]) -> Option<Vec<Vec<u8>>> {
-        remembered_answer(self.cache(), question)
-    }
-
-    fn recent_answers(&self, most: usize, bytes: u64) -> Vec<AnsweredQuestion> {
-        recent_answers(self.cache(), most, bytes)
-    }
-
-    fn remember(&self, question: &[u8], messages: Vec<Vec<u8>>) {
-        remember_answer(self.cache(), question, messages);
-    }
-
-    fn plan(
-        &self,
-        id: AssemblyId,
-        request: &PlanRequest,
-        termination: &Termination,
-        sink: &mut dyn PlanSink,
-    ) -> Result<Plan, ServiceError> {
-        Self::plan(self, id, request, termination, sink)
-    }
-}
-
-/// Which plan request: the client port's id and its number there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) struct SessionKey {
-    pub(crate) client: u128,
-    pub(crate) request: u64,
-}
-
-/// A plan to make.
-#[derive(Debug)]
-pub(crate) struct PlanJob {
-    pub(crate) key: SessionKey,
-    pub(crate) owner: Owner,
-    pub(crate) received: Instant,
-    pub(crate) assembly: AssemblyId,
-    /// What is remembered with its answer, if anything is to be.
-    pub(crate) question: Option<Vec<u8>>,
-    /// Parts that stand elsewhere than in it.
-    pub(crate) moved: Vec<(usize, Pose)>,
-    pub(crate) request: PlanRequest,
-    pub(crate) termination: Termination,
-}
-
-#[cfg(test)]
-impl PlanJob {
-    /// A request about an assembly by nobody in particular.
-    pub(super) fn about(assembly: AssemblyId, request: PlanRequest) -> Self {
-        Self {
-            key: SessionKey { client: 0, request: 0 },
-            owner: Owner::default(),
-            received: Instant::now(),
-            assembly,
-            question: None,
-            moved: vec![],
-            request,
-            termination: Termination::default(),
-        }
-    }
-}
-
-/// What was received with an upload.
-#[derive(Debug)]
-pub(crate) struct Received {
-    pub(crate) number: u64,
-    /// A private copy.
-    pub(crate) bytes: AlignedBytes,
-    /// True once nobody waits for it.
-    pub(crate) termination: Termination,
-}
-
-/// An assembly to take in.
-#[derive(Debug)]
-pub(crate) enum AdmitJob {
-    /// Received meshes.
-    Upload(Received),
-    /// The same of what differs from a known assembly.
-    Revise(Received),
-    /// A file or folder of the configuration.
-    Preload(PathBuf),
-}
+use crate::search::{PlanSink, Progress, Termination};
+use crate::service::AssemblyId;
 
 /// What workers report.
 #[derive(Debug)]
@@ -257,9 +27,9 @@ pub(crate) enum WorkerEvent {
     Step(SessionKey, Step),
     Progress(SessionKey, Progress),
     /// A plan's summary, and what to answer when the same is asked again.
-    Planned(SessionKey, Arc<Vec<u8>>, Option<(Vec<u8>, Answer)>),
+    Planned(SessionKey, Arc<Vec<u8>>, Option<(Vec<u8>, CachedResponse)>),
     /// The question was answered before, and is so again.
-    Answered(SessionKey, Vec<u8>, Answer),
+    Answered(SessionKey, Vec<u8>, CachedResponse),
     Unplanned(SessionKey, WireError),
     Admitted {
         number: u64,
@@ -356,7 +126,8 @@ fn log_plan(plan: &Plan) {
 fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Report) {
     let _span = span(job).entered();
     report(WorkerEvent::Started(job.key));
-    let before = job.question.as_ref().and_then(|q| Some((q, Answer::from_messages(service.answered(q)?)?)));
+    let before =
+        job.question.as_ref().and_then(|q| Some((q, CachedResponse::from_messages(service.answered(q)?)?)));
     if let Some((question, answer)) = before {
         return report(WorkerEvent::Answered(job.key, question.clone(), answer));
     }
@@ -369,10 +140,10 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Repor
         Ok(Ok(plan)) => {
             log_plan(&plan);
             // Before whoever asked is told, and may ask what is foreseen.
-            if let Some(foresight) = Foresight::after(job, &plan, queues.foresight) {
-                queues.prefetch.foresee(foresight);
+            if let Some(speculation) = Speculation::after(job, &plan, queues.speculation) {
+                queues.prefetch.speculate(speculation);
             }
-            let again = job.question.clone().zip(Answer::of(&plan));
+            let again = job.question.clone().zip(CachedResponse::of(&plan));
             if let Some((question, answer)) = &again {
                 service.remember(question, answer.messages());
             }
@@ -384,20 +155,6 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Repor
         }
         Err(panic) => WorkerEvent::Unplanned(job.key, panic),
     });
-}
-
-/// An assembly with some parts elsewhere.
-pub(super) fn with_moved<P: Planning>(
-    service: &P,
-    assembly: AssemblyId,
-    moved: &[(usize, Pose)],
-    termination: &Termination,
-) -> Result<AssemblyId, ServiceError> {
-    if moved.is_empty() {
-        return Ok(assembly);
-    }
-    let revision = Revision { moved: moved.to_vec(), ..Revision::default() };
-    Ok(service.revise_for_now(assembly, &revision, termination)?.id)
 }
 
 /// Which assembly was taken in, if it was.
@@ -456,18 +213,4 @@ fn admit_revision<P: Planning>(
     drop(bytes);
     let admission = service.revise(base, &revision, termination).map_err(|e| convert::service_error(&e))?;
     Ok(admission.id)
-}
-
-/// Runs one request's work; a panic becomes an answer. The service must stay usable after one:
-/// it holds no lock across planning.
-pub(super) fn contained<T>(work: impl FnOnce() -> T) -> Result<T, WireError> {
-    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
-        let reason = panic
-            .downcast_ref::<&str>()
-            .map(|s| (*s).to_owned())
-            .or_else(|| panic.downcast_ref::<String>().cloned())
-            .unwrap_or_else(|| "no message".to_owned());
-        tracing::error!("a request panicked: {reason}");
-        WireError::new(ErrorCode::Failed, format!("the daemon failed on this request: {reason}"))
-    })
 }

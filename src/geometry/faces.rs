@@ -27,14 +27,14 @@ const TURNED_APART: f64 = 0.06;
 
 /// A direction and the surface that speaks for it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Facing {
+pub struct WeightedDirection {
     /// The direction; its opposite is the same one.
     pub direction: Unit<Vector3<f64>>,
     /// Area that is parallel or at right angles to it.
     pub weight: f64,
 }
 
-impl Facing {
+impl WeightedDirection {
     /// Whether a direction, or its opposite, is this one.
     #[must_use]
     pub fn is_like(&self, direction: &Unit<Vector3<f64>>) -> bool {
@@ -54,16 +54,16 @@ impl Facing {
 #[derive(Debug, Clone)]
 pub struct Faces {
     /// The normals with the most area, opposite ones as one.
-    normals: Vec<Facing>,
+    normals: Vec<WeightedDirection>,
     /// The area of the whole surface.
     area: f64,
     /// Directions that enough of the surface agrees on, best first.
-    pub candidates: Vec<Facing>,
+    pub candidates: Vec<WeightedDirection>,
     /// The axis that the shape is turned about, or else the best candidate.
-    pub own: Option<Facing>,
+    pub own: Option<WeightedDirection>,
     /// Of a shape whose surface agrees on none, the principal axes that stand apart: an open ring has them
     /// along and across its gap.
-    pub principal: Vec<Facing>,
+    pub principal: Vec<WeightedDirection>,
 }
 
 impl Faces {
@@ -74,12 +74,13 @@ impl Faces {
         let spread = Spread::of(surface);
         if faces.candidates.is_empty() {
             let principal = (0..3).filter(|&i| spread.apart(i) > TURNED_APART).filter_map(|i| spread.axis(i));
-            faces.principal = principal.map(|direction| Facing { direction, weight: area }).collect();
+            faces.principal =
+                principal.map(|direction| WeightedDirection { direction, weight: area }).collect();
         }
         let turned = spread.turning_axis().map(|axis| {
             let mut known = faces.candidates.iter().chain(&faces.normals).map(|c| c.direction);
             let direction = known.find(|d| d.dot(&axis).abs() > NEAR_AXIS).unwrap_or(axis);
-            Facing { direction, weight: faces.speaking_for(&direction) }
+            WeightedDirection { direction, weight: faces.speaking_for(&direction) }
         });
         faces.own = turned.or_else(|| faces.candidates.first().copied());
         faces
@@ -94,16 +95,16 @@ impl Faces {
     /// The area that is parallel or at right angles to a direction.
     #[must_use]
     pub fn speaking_for(&self, direction: &Unit<Vector3<f64>>) -> f64 {
-        let speaks = |n: &&Facing| {
+        let speaks = |n: &&WeightedDirection| {
             let cos = n.direction.dot(direction).abs();
             !(SQUARE..=ALIKE).contains(&cos)
         };
         self.normals.iter().filter(speaks).map(|n| n.weight).sum()
     }
 
-    fn agreed(&self) -> Vec<Facing> {
+    fn agreed(&self) -> Vec<WeightedDirection> {
         let Some(largest) = self.normals.first() else { return Vec::new() };
-        let mut out: Vec<Facing> = Vec::new();
+        let mut out: Vec<WeightedDirection> = Vec::new();
         // A turned part without flat ends shows its axis as what two of its sides have in common.
         let sides = self.normals[1..]
             .iter()
@@ -115,7 +116,7 @@ impl Faces {
             }
             let weight = self.speaking_for(&direction);
             if weight > LEAST_SHARE * self.area {
-                out.push(Facing { direction, weight });
+                out.push(WeightedDirection { direction, weight });
             }
         }
         out.sort_by(|a, b| b.weight.total_cmp(&a.weight));
@@ -164,8 +165,8 @@ impl Spread {
 
 /// The directions in which most of a shape's surface faces, with their areas, largest first;
 /// opposite ones are one. Also the area of the whole surface.
-fn normals(surface: &Surface) -> (Vec<Facing>, f64) {
-    let mut buckets: HashMap<[i16; 3], Facing> = HashMap::new();
+fn normals(surface: &Surface) -> (Vec<WeightedDirection>, f64) {
+    let mut buckets: HashMap<[i16; 3], WeightedDirection> = HashMap::new();
     let mut area = 0.0;
     for t in 0..surface.triangles().len() as u32 {
         let [a, b, c] = surface.corners(t);
@@ -174,9 +175,9 @@ fn normals(surface: &Surface) -> (Vec<Facing>, f64) {
         let weight = twice.norm() / 2.0;
         area += weight;
         let key = direction.map(|x| (x * BUCKETS).round() as i16).into();
-        buckets.entry(key).or_insert(Facing { direction, weight: 0.0 }).weight += weight;
+        buckets.entry(key).or_insert(WeightedDirection { direction, weight: 0.0 }).weight += weight;
     }
-    let mut largest: Vec<([i16; 3], Facing)> = buckets.into_iter().collect();
+    let mut largest: Vec<([i16; 3], WeightedDirection)> = buckets.into_iter().collect();
     // The keys decide among equals, so that the order of the map does not.
     largest.sort_by(|(k, a), (l, b)| b.weight.total_cmp(&a.weight).then(k.cmp(l)));
     let mut out = Vec::new();

@@ -13,26 +13,13 @@ mod winding;
 use nalgebra::{Point3, Vector3, center};
 
 use super::rim::{Rim, WINDING_DOUBT};
-use super::triangle::{Feature, closest_on_triangle};
+use super::triangle::{Closest, Feature, closest_on_triangle};
 use super::triangle_tree::{TriangleTree, Visitor};
 use super::{Bounds, Mesh, Solidity};
 use derived::{Adjacency, Derived, Opening};
 
 /// No triangle.
 pub(super) const NO_TRIANGLE: u32 = u32::MAX;
-
-/// The closest surface point to some point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Closest {
-    /// The triangle it lies on.
-    pub triangle: u32,
-    /// Where on the triangle.
-    pub feature: Feature,
-    /// The point.
-    pub point: Point3<f64>,
-    /// Distance, not negative.
-    pub distance: f64,
-}
 
 /// A triangle surface with its adjacency, normals and bounding-volume hierarchy.
 #[derive(Clone)]

@@ -15,6 +15,19 @@ pub enum Feature {
     Vertex(u8),
 }
 
+/// The closest point of a triangle, or of a surface, to some point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Closest {
+    /// The triangle it lies on.
+    pub triangle: u32,
+    /// Where on the triangle.
+    pub feature: Feature,
+    /// The point.
+    pub point: Point3<f64>,
+    /// Distance, not negative.
+    pub distance: f64,
+}
+
 /// Where the line from `p` along `direction` meets a triangle, borders included (T. Möller and
 /// B. Trumbore 1997).
 #[must_use]

@@ -1,11 +1,11 @@
 //! The nodes of one brick: which triangle is nearest to each, how far it is, on which side.
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use crate::geometry::{Closest, Surface};
 
 use super::facet::{ACROSS, Facet, Lanes, POINTS};
-use super::grid::{BAND, BRICK, CELLS, FAR_NODE, NODES, Nodes};
+use super::nodes::{BAND, BRICK, CELLS, FAR_NODE, Lattice, NODES, Nodes, beside, place};
 use super::rim::sign;
 
 /// Lattices along a brick's side.
@@ -15,9 +15,7 @@ const _: () = assert!(NODES == LATTICES * ACROSS && LATTICES == ACROSS, "a latti
 /// A brick to be measured.
 pub(super) struct Brick<'a> {
     pub(super) surface: &'a Surface,
-    /// Its lowest node.
-    pub(super) origin: Point3<f64>,
-    pub(super) cell: f64,
+    pub(super) lattice: Lattice,
 }
 
 /// The triangles that may be nearest in a brick, in single precision.
@@ -79,15 +77,11 @@ impl Brick<'_> {
         out
     }
 
-    pub(super) fn node_at(&self, i: usize) -> Point3<f64> {
-        self.origin + place(i, NODES).map(|x| x as f64) * self.cell
-    }
-
     fn facets(&self, triangles: &[u32]) -> Facets {
-        let middle = self.origin + Vector3::repeat((CELLS / 2) as f64 * self.cell);
+        let middle = self.lattice.origin + Vector3::repeat((CELLS / 2) as f64 * self.lattice.cell);
         let mut out = Facets::default();
         for &t in triangles {
-            match Facet::new(&self.surface.corners(t), &middle, self.cell) {
+            match Facet::new(&self.surface.corners(t), &middle, self.lattice.cell) {
                 Some(facet) => {
                     out.rounding = out.rounding.max(1e-6 * (facet.extent() + 16.0));
                     out.facets.push(facet);
@@ -121,7 +115,7 @@ impl Brick<'_> {
                 let at = (corner + place(i, ACROSS)).map(|x| x as f64 - (CELLS / 2) as f64);
                 match facet.height_over(&at) {
                     Some(height) if !self.surface.is_folded(t) => {
-                        best[i].consider(t, height.abs() * self.cell, Foot::Face(height));
+                        best[i].consider(t, height.abs() * self.lattice.cell, Foot::Face(height));
                     }
                     _ => self.consider(t, node(&corner, i), &mut best[i]),
                 }
@@ -131,35 +125,35 @@ impl Brick<'_> {
             self.consider(t, node(&corner, i), &mut best[i]);
         }
         for (i, found) in best.iter().enumerate() {
-            if found.distance < BAND * self.cell {
+            if found.distance < BAND * self.lattice.cell {
                 let i = node(&corner, i);
                 out.nearest[i] = found.triangle;
                 out.values[i] = match (self.surface.rim(), &found.foot) {
                     (Some(_), _) => found.distance,
-                    (None, Foot::Face(height)) => height * self.cell,
-                    (None, Foot::Other(closest)) => self.surface.signed(&self.node_at(i), closest),
+                    (None, Foot::Face(height)) => height * self.lattice.cell,
+                    (None, Foot::Other(closest)) => self.surface.signed(&self.lattice.node_at(i), closest),
                 } as f32;
             }
         }
     }
 
     fn consider(&self, t: u32, node: usize, best: &mut Nearest) {
-        let found = self.surface.closest_on(t, &self.node_at(node));
+        let found = self.surface.closest_on(t, &self.lattice.node_at(node));
         best.consider(t, found.distance, Foot::Other(found));
     }
 
     /// Signs of what lies outside the band, or of all nodes if the surface is open.
     fn sign_untouched(&self, out: &mut Nodes) {
-        let band = (BAND * self.cell) as f32;
+        let band = (BAND * self.lattice.cell) as f32;
         if let Some(rim) = self.surface.rim() {
             for v in out.values.iter_mut().filter(|v| v.is_nan()) {
                 *v = band;
             }
-            return sign(rim, self, &mut out.values);
+            return sign(rim, self.surface, &self.lattice, &mut out.values);
         }
         if out.nearest.iter().all(|&t| t == FAR_NODE) {
             // The band passes between the nodes, or beside the brick: all lie on one side.
-            out.values[0] = band.copysign(self.surface.signed_distance(&self.origin) as f32);
+            out.values[0] = band.copysign(self.surface.signed_distance(&self.lattice.origin) as f32);
         }
         spread_signs(&mut out.values, band);
     }
@@ -205,40 +199,10 @@ fn limits(squared: &[Lanes], rounding: f32) -> Lanes {
     out
 }
 
-/// Place of the `i`th of a cube of `across`³ things.
-pub(super) fn place(i: usize, across: usize) -> Vector3<usize> {
-    Vector3::new(i % across, i / across % across, i / (across * across))
-}
-
 /// A brick's node, by the lowest one of a lattice and its number in that.
 fn node(corner: &Vector3<usize>, i: usize) -> usize {
     let at = corner + place(i, ACROSS);
     (at.z * NODES + at.y) * NODES + at.x
-}
-
-/// The nodes beside a node of a brick; the node itself where there is none.
-#[inline]
-pub(super) fn beside(i: usize) -> [usize; 6] {
-    BESIDE[i].map(usize::from)
-}
-
-static BESIDE: [[u16; 6]; BRICK] = beside_all();
-
-const fn beside_all() -> [[u16; 6]; BRICK] {
-    const STRIDES: [usize; 3] = [1, NODES, NODES * NODES];
-    let mut out = [[0; 6]; BRICK];
-    let mut i = 0;
-    while i < BRICK {
-        let mut axis = 0;
-        while axis < 3 {
-            let (at, stride) = (i / STRIDES[axis] % NODES, STRIDES[axis]);
-            out[i][2 * axis] = (if at > 0 { i - stride } else { i }) as u16;
-            out[i][2 * axis + 1] = (if at + 1 < NODES { i + stride } else { i }) as u16;
-            axis += 1;
-        }
-        i += 1;
-    }
-    out
 }
 
 /// Gives nodes outside the band the band's half-width with the sign of the nodes beside them: no

@@ -4,15 +4,15 @@ use std::sync::Arc;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::geometry::{Bounds, Surface, closest_on_triangle};
 use crate::termination::{Interrupt, Poll, Termination};
 
-use super::brick::Brick;
-use super::file::NOT_STORED;
-use super::grid::{BAND, CELLS, EMPTY, Grid, Held, NearBrick, Nodes};
+use super::grid::{Grid, NearBrick};
+use super::nodes::{BAND, CELLS};
+use super::stored::NOT_STORED;
 
 /// Cells are no larger than this, in units of the planning frame.
 const LARGEST_CELL: f64 = 0.05;
@@ -20,8 +20,6 @@ const LARGEST_CELL: f64 = 0.05;
 const CELLS_ACROSS: f64 = 20.0;
 /// Bricks a field may hold (48 MB); the cell grows until it is met.
 const MOST_BRICKS: usize = 8192;
-/// Bricks of the whole box, empty ones included.
-pub(super) const MOST_SLOTS: usize = 1 << 21;
 
 /// Who builds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,51 +64,6 @@ impl Grid {
         field.near.shrink_to_fit();
         field.fill_far();
         Ok(field)
-    }
-
-    /// The nodes of a brick, taken from the file or measured when they are first asked for.
-    #[inline]
-    pub(super) fn nodes(&self, slot: u32) -> &Nodes {
-        let near = &self.near[slot as usize];
-        near.nodes.get_or_init(|| {
-            self.in_file(near).map_or_else(|| Held::Filled(Box::new(self.measured(near))), Held::Stored)
-        })
-    }
-
-    fn measured(&self, near: &NearBrick) -> Nodes {
-        let [start, end] = near.triangles.map(|i| i as usize);
-        let origin = self.brick_min(near.brick as usize);
-        let brick = Brick { surface: &self.surface, origin, cell: self.cell };
-        brick.nodes(&self.triangles[start..end])
-    }
-
-    /// A grid without bricks around a surface; `None` if it would be too large.
-    pub(super) fn empty(surface: &Arc<Surface>, cell: f64) -> Option<Self> {
-        let bounds = surface.bounds();
-        let side = cell * CELLS as f64;
-        // A brick of margin on every side, so that "outside" is connected.
-        let origin = bounds.min.map(|x| ((x / side).floor() - 1.0) * side);
-        let dims = std::array::from_fn(|a| ((bounds.max[a] - origin[a]) / side).ceil() as usize + 1);
-        let slots = dims.iter().product::<usize>();
-        (slots <= MOST_SLOTS).then(|| Self {
-            origin,
-            cell,
-            dims,
-            slots: vec![EMPTY; slots],
-            far: Vec::new(),
-            far_inside: Vec::new(),
-            near: Vec::new(),
-            triangles: Vec::new(),
-            surface: Arc::clone(surface),
-            bounds: *bounds,
-            file: None,
-        })
-    }
-
-    pub(super) fn brick_min(&self, brick: usize) -> Point3<f64> {
-        let [nx, ny, _] = self.dims;
-        let at = Vector3::new((brick % nx) as f64, (brick / nx % ny) as f64, (brick / (nx * ny)) as f64);
-        self.origin + at * (self.cell * CELLS as f64)
     }
 }
 

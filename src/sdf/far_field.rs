@@ -4,7 +4,8 @@ use std::sync::OnceLock;
 
 use nalgebra::{Point3, Vector3};
 
-use super::grid::{BAND, CELLS, EMPTY, Grid};
+use super::grid::{EMPTY, Grid};
+use super::nodes::{BAND, CELLS};
 
 impl Grid {
     /// Fills `far`. Bricks fewer than `n` steps away (Chebyshev) do not touch the band, so whoever

@@ -1,15 +1,14 @@
 #![doc = include_str!("FORMAT.md")]
 
 use std::io::{self, Write};
-use std::mem::offset_of;
-use std::ops::{Deref, Range};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use bytemuck::{Pod, Zeroable};
 
-use super::build::MOST_SLOTS;
-use super::grid::{FAR_NODE, Grid, Held, NearBrick, Nodes};
+use super::grid::{Grid, Held, MOST_SLOTS, NearBrick};
+use super::nodes::Nodes;
+use super::stored::{Bricks, Checksum, NOT_STORED, StoredBricks, checksum};
 use crate::cache::Mapping;
 use crate::geometry::Surface;
 
@@ -18,11 +17,6 @@ const VERSION: u32 = 1;
 /// Bricks begin at a multiple of this.
 const ALIGNMENT: usize = 64;
 const CHECKSUM_AT: usize = 80;
-/// Marks a brick of which the file has no nodes.
-pub(super) const NOT_STORED: u32 = u32::MAX;
-
-type Checksum = [u8; 16];
-
 /// The file's beginning, in the order of `FORMAT.md`.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
@@ -51,16 +45,6 @@ struct NearEntry {
     brick: u32,
     triangles_end: u32,
     stored: u32,
-}
-
-/// Where the bricks of a file are, and what is known of them.
-#[derive(Debug, Clone, Copy)]
-struct Bricks {
-    filled: u32,
-    /// Triangles that they may name.
-    triangles: u32,
-    checksums_at: usize,
-    at: usize,
 }
 
 /// A file whose header and tables are as they were written.
@@ -152,84 +136,6 @@ impl<'f> Tables<'f> {
     }
 }
 
-impl Bricks {
-    /// Where the file ends.
-    fn end(&self) -> usize {
-        self.at + self.filled as usize * size_of::<Nodes>()
-    }
-
-    #[inline]
-    fn bytes<'f>(&self, file: &'f [u8], stored: u32) -> &'f [u8] {
-        let at = self.at + stored as usize * size_of::<Nodes>();
-        &file[at..at + size_of::<Nodes>()]
-    }
-
-    /// Whether a brick is as it was written, and names triangles that there are.
-    fn is_intact(&self, file: &[u8], stored: u32) -> bool {
-        let at = self.checksums_at + stored as usize * size_of::<Checksum>();
-        let bytes = self.bytes(file, stored);
-        let (_, nearest) = bytes.split_at(offset_of!(Nodes, nearest));
-        let (nearest, _) = nearest.as_chunks();
-        let known = |&t: &[u8; 4]| matches!(u32::from_le_bytes(t), t if t < self.triangles || t == FAR_NODE);
-        file[at..at + size_of::<Checksum>()] == checksum([bytes]) && nearest.iter().all(known)
-    }
-}
-
-/// A file of which the header and the tables were checked.
-#[derive(Debug)]
-pub(super) struct StoredBricks {
-    mapping: Mapping,
-    bricks: Bricks,
-    /// A brick was not as it was written.
-    damaged: AtomicBool,
-}
-
-impl StoredBricks {
-    fn is_intact(&self, stored: u32) -> bool {
-        let intact = self.bricks.is_intact(&self.mapping, stored);
-        // Counted once: the file is replaced as a whole.
-        if !intact && !self.damaged.swap(true, Ordering::Relaxed) {
-            self.mapping.is_damaged();
-        }
-        intact
-    }
-
-    /// Whether a brick was found that is not as it was written.
-    pub(super) fn is_damaged(&self) -> bool {
-        self.damaged.load(Ordering::Relaxed)
-    }
-
-    /// Bricks in the file.
-    pub(super) fn count(&self) -> usize {
-        self.bricks.filled as usize
-    }
-}
-
-/// A brick of a file, checked.
-#[derive(Debug)]
-pub(super) struct StoredNodes {
-    file: Arc<StoredBricks>,
-    stored: u32,
-}
-
-impl StoredNodes {
-    /// The brick at a place in a file, if it is there and as it was written.
-    pub(super) fn of(file: &Arc<StoredBricks>, stored: u32) -> Option<Self> {
-        let there = stored != NOT_STORED && file.is_intact(stored);
-        there.then(|| Self { file: Arc::clone(file), stored })
-    }
-}
-
-impl Deref for StoredNodes {
-    type Target = Nodes;
-
-    #[inline]
-    fn deref(&self) -> &Nodes {
-        let StoredBricks { mapping, bricks, .. } = &*self.file;
-        bytemuck::from_bytes(bricks.bytes(mapping, self.stored))
-    }
-}
-
 impl Grid {
     /// The grid of a surface as a file has it; `None` if that is damaged, or another's.
     #[must_use]
@@ -238,8 +144,7 @@ impl Grid {
             mapping.is_damaged();
             return None;
         };
-        let file = StoredBricks { mapping, bricks, damaged: AtomicBool::new(false) };
-        Some(Self { file: Some(Arc::new(file)), ..grid })
+        Some(Self { file: Some(Arc::new(StoredBricks::new(mapping, bricks))), ..grid })
     }
 
     fn read(surface: &Arc<Surface>, key: &[u8; 32], bytes: &[u8]) -> Option<(Self, Bricks)> {
@@ -324,11 +229,6 @@ impl Grid {
         }
         near.nodes.get().map(|held| &**held)
     }
-
-    /// The nodes of a brick in the file, if it has them.
-    pub(super) fn in_file(&self, near: &NearBrick) -> Option<StoredNodes> {
-        StoredNodes::of(self.file.as_ref()?, near.stored)
-    }
 }
 
 /// Whether all of a file is as it was written.
@@ -337,16 +237,6 @@ pub fn is_intact(key: &[u8; 32], bytes: &[u8]) -> bool {
     let Some(file) = Tables::of(bytes, key) else { return false };
     let tables = file.triangles().is_some() && file.near().is_some() && file.insides().is_some();
     tables && (0..file.bricks.filled).all(|stored| file.bricks.is_intact(bytes, stored))
-}
-
-fn checksum<'b>(pieces: impl IntoIterator<Item = &'b [u8]>) -> Checksum {
-    let mut hasher = blake3::Hasher::new();
-    for piece in pieces {
-        hasher.update(piece);
-    }
-    let mut sum = [0; 16];
-    sum.copy_from_slice(&hasher.finalize().as_bytes()[..16]);
-    sum
 }
 
 pub(crate) mod hostile;

@@ -3,25 +3,18 @@
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
 
-use bytemuck::{Pod, Zeroable};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::file::{StoredBricks, StoredNodes};
+use super::brick::Brick;
+use super::nodes::{BAND, CELLS, FAR_NODE, Lattice, NODES, Nodes};
+use super::stored::{StoredBricks, StoredNodes};
 use crate::geometry::{Bounds, Surface};
 
-/// Cells along a brick's side.
-pub(super) const CELLS: usize = 8;
-/// Nodes along a brick's side; neighbouring bricks repeat their common nodes.
-pub(super) const NODES: usize = CELLS + 1;
-/// Nodes in a brick.
-pub(super) const BRICK: usize = NODES * NODES * NODES;
-/// Half-width of the narrow band, in cells.
-pub(super) const BAND: f64 = 3.0;
 /// Marks a brick without nodes.
 pub(super) const EMPTY: u32 = u32::MAX;
-/// Marks a node outside the band: it knows no nearest triangle.
-pub(super) const FAR_NODE: u32 = u32::MAX;
+/// Bricks of the whole box, empty ones included.
+pub(super) const MOST_SLOTS: usize = 1 << 21;
 
 /// What a [`Field`](super::Field) is when it was built.
 #[derive(Debug)]
@@ -80,16 +73,6 @@ impl Deref for Held {
     }
 }
 
-/// What is known at the nodes of a brick, in memory as in a file.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct Nodes {
-    /// Distances; outside the band they stand at ± the band's half-width.
-    pub(super) values: [f32; BRICK],
-    /// Nearest triangles.
-    pub(super) nearest: [u32; BRICK],
-}
-
 /// What a field knows about a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
@@ -124,6 +107,29 @@ impl FieldSample {
 }
 
 impl Grid {
+    /// A grid without bricks around a surface; `None` if it would be too large.
+    pub(super) fn empty(surface: &Arc<Surface>, cell: f64) -> Option<Self> {
+        let bounds = surface.bounds();
+        let side = cell * CELLS as f64;
+        // A brick of margin on every side, so that "outside" is connected.
+        let origin = bounds.min.map(|x| ((x / side).floor() - 1.0) * side);
+        let dims = std::array::from_fn(|a| ((bounds.max[a] - origin[a]) / side).ceil() as usize + 1);
+        let slots = dims.iter().product::<usize>();
+        (slots <= MOST_SLOTS).then(|| Self {
+            origin,
+            cell,
+            dims,
+            slots: vec![EMPTY; slots],
+            far: Vec::new(),
+            far_inside: Vec::new(),
+            near: Vec::new(),
+            triangles: Vec::new(),
+            surface: Arc::clone(surface),
+            bounds: *bounds,
+            file: None,
+        })
+    }
+
     /// Cell size, in the shape's units.
     #[must_use]
     pub fn cell(&self) -> f64 {
@@ -251,6 +257,33 @@ impl Grid {
         let nodes = self.nodes(slot);
         let known = |k: usize| Some(nodes.nearest[base + CORNERS[closest ^ k]]).filter(|t| *t != FAR_NODE);
         (0..8).find_map(known)
+    }
+
+    /// The nodes of a brick, taken from the file or measured when they are first asked for.
+    #[inline]
+    pub(super) fn nodes(&self, slot: u32) -> &Nodes {
+        let near = &self.near[slot as usize];
+        near.nodes.get_or_init(|| {
+            self.in_file(near).map_or_else(|| Held::Filled(Box::new(self.measured(near))), Held::Stored)
+        })
+    }
+
+    fn measured(&self, near: &NearBrick) -> Nodes {
+        let [start, end] = near.triangles.map(|i| i as usize);
+        let lattice = Lattice { origin: self.brick_min(near.brick as usize), cell: self.cell };
+        let brick = Brick { surface: &self.surface, lattice };
+        brick.nodes(&self.triangles[start..end])
+    }
+
+    pub(super) fn brick_min(&self, brick: usize) -> Point3<f64> {
+        let [nx, ny, _] = self.dims;
+        let at = Vector3::new((brick % nx) as f64, (brick / nx % ny) as f64, (brick / (nx * ny)) as f64);
+        self.origin + at * (self.cell * CELLS as f64)
+    }
+
+    /// The nodes of a brick in the file, if it has them.
+    pub(super) fn in_file(&self, near: &NearBrick) -> Option<StoredNodes> {
+        StoredNodes::of(self.file.as_ref()?, near.stored)
     }
 
     /// Brick index and position inside the brick in cells.

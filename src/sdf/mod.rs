@@ -1,7 +1,9 @@
 //! Signed distance fields: sparse bricks near the surface, conservative bounds elsewhere.
 //!
-//! A field is made per distinct mesh, in the shape's own frame, when it is first looked at (`field`), from its
-//! file (`file`; `field_files` keeps them) as far as that has it. Values are negative inside.
+//! A field is made per distinct mesh, in the shape's own frame, when it is first looked at (`field`). Its grid
+//! (`grid`) is built from the surface (`build`, `far_field`) or read from a file (`file`; `field_files` keeps
+//! them). The nodes of a brick are taken from the file (`stored`) or measured (`brick`; signs of open surfaces:
+//! `rim`) when they are first looked at. Values are negative inside.
 //! Guarantees: at nodes of the narrow band the stored distance is that of the nearest triangle
 //! (exact, then rounded to f32), and that triangle's index is kept, so that whoever needs an exact
 //! distance measures against a few triangles instead of interpolating. Everywhere else a field
@@ -15,7 +17,9 @@ mod field;
 mod field_files;
 mod file;
 mod grid;
+mod nodes;
 mod rim;
+mod stored;
 #[cfg(test)]
 mod tests;
 

@@ -4,24 +4,23 @@
 
 use std::collections::VecDeque;
 
-use crate::geometry::{Rim, RimEdge, WINDING_DOUBT};
+use crate::geometry::{Rim, RimEdge, Surface, WINDING_DOUBT};
 
-use super::brick::{Brick, beside};
-use super::grid::{BRICK, CELLS};
+use super::nodes::{BRICK, CELLS, Lattice, beside};
 
 /// With more edges of openings beside a brick, each node is asked for itself.
 const MOST_EDGES: usize = 256;
 
 /// Gives distances at the nodes of a brick their signs.
-pub(super) fn sign(rim: &Rim, brick: &Brick<'_>, values: &mut [f32; BRICK]) {
-    let radius = brick.cell * (CELLS / 2) as f64 * 3f64.sqrt();
-    let middle = brick.node_at(BRICK / 2);
+pub(super) fn sign(rim: &Rim, surface: &Surface, lattice: &Lattice, values: &mut [f32; BRICK]) {
+    let radius = lattice.cell * (CELLS / 2) as f64 * 3f64.sqrt();
+    let middle = lattice.node_at(BRICK / 2);
     let (beyond, near): (Vec<&RimEdge>, Vec<&RimEdge>) =
         rim.edges().iter().partition(|e| e.distance(&middle) > 2.0 * radius);
     let common: f64 = beyond.iter().map(|e| e.slope(&middle, radius)).sum();
     let slope = |i: usize| {
-        let p = brick.node_at(i);
-        let sum: f64 = near.iter().map(|e| e.slope(&p, brick.cell)).sum();
+        let p = lattice.node_at(i);
+        let sum: f64 = near.iter().map(|e| e.slope(&p, lattice.cell)).sum();
         sum + common
     };
     let mut known: [Option<bool>; BRICK] = [None; BRICK];
@@ -30,11 +29,11 @@ pub(super) fn sign(rim: &Rim, brick: &Brick<'_>, values: &mut [f32; BRICK]) {
         if known[seed].is_some() {
             continue;
         }
-        let winding = brick.surface.winding(&brick.node_at(seed)).unwrap_or(0.0);
+        let winding = surface.winding(&lattice.node_at(seed)).unwrap_or(0.0);
         known[seed] = Some(winding > 0.5);
         let margin = (winding - 0.5).abs() - WINDING_DOUBT;
         if !alone {
-            pass_on(seed, margin, brick.cell, values, &slope, &mut known);
+            pass_on(seed, margin, lattice.cell, values, &slope, &mut known);
         }
     }
     for (v, inside) in values.iter_mut().zip(known) {

@@ -5,7 +5,8 @@ use nalgebra::{Point3, Vector3};
 
 use super::Field;
 use super::build::Threads;
-use super::grid::{BAND, BRICK, CELLS, EMPTY, FAR_NODE, Grid, NODES};
+use super::grid::{EMPTY, Grid};
+use super::nodes::{BAND, BRICK, CELLS, FAR_NODE, NODES};
 use crate::fixtures::{ball, cuboid, l_shape, moved, open_box, spread, surface, winding_surface};
 use crate::geometry::{Pose, Surface};
 use crate::termination::{Interrupt, Termination};

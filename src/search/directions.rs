@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use nalgebra::{Unit, Vector3};
 
-use crate::geometry::{Facing, NEAR_AXIS, SQUARE, Shape, oriented};
+use crate::geometry::{NEAR_AXIS, SQUARE, Shape, WeightedDirection, oriented};
 use crate::scene::Scene;
 use crate::simulation::Axis;
 use crate::termination::{Interrupt, Termination};
@@ -49,9 +49,9 @@ impl Directions {
     /// # Errors
     /// The termination condition became true.
     pub(super) fn of(scene: &Scene, present: &[usize], termination: &Termination) -> Result<Self, Interrupt> {
-        let mut votes = Axis::WORLD.map(|a| Facing { direction: a.unit(), weight: 0.0 }).to_vec();
-        let mut own: Vec<Option<Facing>> = vec![None; scene.bodies.len()];
-        let mut principal: Vec<Facing> = Vec::new();
+        let mut votes = Axis::WORLD.map(|a| WeightedDirection { direction: a.unit(), weight: 0.0 }).to_vec();
+        let mut own: Vec<Option<WeightedDirection>> = vec![None; scene.bodies.len()];
+        let mut principal: Vec<WeightedDirection> = Vec::new();
         let mut spoken: HashMap<(*const Shape, [u64; 4]), [f64; 3]> = HashMap::new();
         for &part in present {
             termination.check()?;
@@ -66,18 +66,21 @@ impl Directions {
             for (vote, weight) in votes.iter_mut().zip(for_world) {
                 vote.weight += *weight;
             }
-            let turned = |c: &Facing| Facing { direction: oriented(rotation * c.direction), ..*c };
+            let turned = |c: &WeightedDirection| WeightedDirection {
+                direction: oriented(rotation * c.direction),
+                ..*c
+            };
             for c in faces.candidates.iter().map(turned).filter(|c| !is_of_world(c)) {
                 c.count_among(&mut votes);
             }
             own[part] = faces.own.as_ref().map(turned);
             faces.principal.iter().map(turned).for_each(|c| c.count_among(&mut principal));
         }
-        let best_first = |c: &mut Vec<Facing>| c.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
+        let best_first = |c: &mut Vec<WeightedDirection>| c.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
         best_first(&mut votes);
         best_first(&mut principal);
         let mut axes = frame(&votes, &principal);
-        let mut extra: Vec<Facing> = Vec::new();
+        let mut extra: Vec<WeightedDirection> = Vec::new();
         for c in own.iter().flatten().chain(&principal).filter(|c| nearest(&axes, &c.direction).is_none()) {
             c.count_among(&mut extra);
         }
@@ -104,21 +107,21 @@ fn nearest(axes: &[Unit<Vector3<f64>>], d: &Unit<Vector3<f64>>) -> Option<usize>
     (0..axes.len()).max_by(|i, j| cos(i).total_cmp(&cos(j))).filter(|i| cos(i) > NEAR_AXIS)
 }
 
-fn is_of_world(c: &Facing) -> bool {
+fn is_of_world(c: &WeightedDirection) -> bool {
     Axis::WORLD.iter().any(|a| c.is_like(&a.unit()))
 }
 
 /// The weight of a direction; more for the world's axes, for of a round part's many sides none is better.
-fn rank(c: &Facing) -> f64 {
+fn rank(c: &WeightedDirection) -> f64 {
     c.weight * if is_of_world(c) { WORLD_PREFERENCE } else { 1.0 }
 }
 
 /// Three axes at right angles: the best, the best at right angles to it (a part's principal axis if surfaces
 /// agree on none), and the third.
-fn frame(votes: &[Facing], principal: &[Facing]) -> Vec<Unit<Vector3<f64>>> {
+fn frame(votes: &[WeightedDirection], principal: &[WeightedDirection]) -> Vec<Unit<Vector3<f64>>> {
     let world = Axis::WORLD.map(Axis::unit).to_vec();
     let Some(first) = votes.first().map(|c| c.direction) else { return world };
-    let square = |c: &&Facing| c.direction.dot(&first).abs() < SQUARE;
+    let square = |c: &&WeightedDirection| c.direction.dot(&first).abs() < SQUARE;
     let across = |d: &Unit<Vector3<f64>>| Unit::try_new(d.into_inner() - *first * first.dot(d), 0.1);
     let second =
         votes.iter().chain(principal).find(square).and_then(|c| across(&c.direction)).or_else(|| {

@@ -21,12 +21,12 @@ use crate::termination::{Interrupt, Termination};
 
 use super::ServiceError;
 use super::answer::{self, Answer, Found, Frame, Times};
+use super::assembly_plan::AssemblyPlanner;
 use super::pools::Pools;
 use super::prepared::{self, Prepared};
-use super::putting_back::PuttingBack;
 use super::records::{Answered, PlanQuestion, remember_plan, remembered_plan};
-use super::relay::{Quiet, Relay, Silent};
-use super::store::SharedShape;
+use super::relay::{Discard, Relay, WithoutSteps};
+use super::shared_shape::SharedShape;
 
 /// One admitted assembly; overlaps are measured, and fields built, when first needed.
 #[derive(Debug)]
@@ -132,16 +132,16 @@ impl Entry {
             return frame.plan(answer);
         };
         // The steps of an assembly plan are others.
-        let quiet = &mut Quiet { sink: &mut *sink };
+        let without_steps = &mut WithoutSteps { sink: &mut *sink };
         let (frame, answer) = match known {
-            Some(known) => self.remembered(frame, known, quiet, time.started),
-            None => self.searched(frame, &ready, time, quiet),
+            Some(known) => self.remembered(frame, known, without_steps, time.started),
+            None => self.searched(frame, &ready, time, without_steps),
         };
         let removals = answer.outcome.removals.clone();
         let plan = frame.plan(answer);
-        let back =
-            PuttingBack { assembly: &self.assembly, prepared: &prepared, removals: &removals, staging };
-        back.plan(plan, time, sink)
+        let planner =
+            AssemblyPlanner { assembly: &self.assembly, prepared: &prepared, removals: &removals, staging };
+        planner.plan(plan, time.started, time.termination, sink)
     }
 
     /// Overlaps, and whether they were there already.
@@ -274,7 +274,7 @@ impl Entry {
         let _ = initial_blockages(&self.problem(&prepared, &asked, termination, cache));
         let all = (0..self.assembly.parts.len()).collect();
         let _ = HullTree::new(&prepared.scene, all, termination);
-        let _ = prepared.build_fields(termination, &mut Silent);
+        let _ = prepared.build_fields(termination, &mut Discard);
     }
 
     /// Overlaps, if they are there.
@@ -323,9 +323,9 @@ struct Asked<'a> {
 
 /// Since when a request is worked on, and what ends it.
 #[derive(Clone, Copy)]
-pub(super) struct Time<'a> {
-    pub(super) started: Instant,
-    pub(super) termination: &'a Termination,
+struct Time<'a> {
+    started: Instant,
+    termination: &'a Termination,
 }
 
 /// What a search works with.

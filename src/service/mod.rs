@@ -4,17 +4,18 @@
 //! tested is what is used. It knows nothing of shared memory.
 //!
 //! Data flow of a request: assembly (`geometry`; those in memory: `store`) → fields (`sdf`) and overlaps
-//! (`prepared`) → `search` (`entry`), for an assembly plan → `assembling` (`putting_back`) → plan in the
+//! (`prepared`) → `search` (`entry`), for an assembly plan → `assembling` (`assembly_plan`) → plan in the
 //! input's units (`answer`). What was answered before, in
 //! whole or in part, the `cache` knows.
 
 mod answer;
+mod assembly_plan;
 mod entry;
 mod pools;
 mod prepared;
-mod putting_back;
 mod records;
 mod relay;
+mod shared_shape;
 mod store;
 #[cfg(test)]
 mod tests;
@@ -41,7 +42,7 @@ use entry::{Entry, engine_of};
 use pools::Pools;
 pub use records::RECORD_KINDS;
 pub(crate) use records::{AnsweredQuestion, recent_answers, remember_answer, remembered_answer};
-use relay::Silent;
+use relay::Discard;
 use store::Store;
 pub use store::StoreStatistics;
 
@@ -123,7 +124,7 @@ impl Service {
     }
 
     /// A service that remembers in a cache, and knows assemblies up to so many bytes of memory together with
-    /// the records that the cache has in memory and the answers of [`Service::answers_take`]: so it takes as much
+    /// the records that the cache has in memory and the answers of [`Service::set_response_bytes`]: so it takes as much
     /// while there are few of these as when there are many.
     #[must_use]
     pub fn new(cache: Arc<Cache>, budget: usize) -> Self {
@@ -142,7 +143,7 @@ impl Service {
     }
 
     /// Assemblies leave so many bytes of the budget for answers that whoever asks keeps. Told at once.
-    pub fn answers_take(&self, bytes: usize) {
+    pub fn set_response_bytes(&self, bytes: usize) {
         self.answers.store(bytes, Ordering::Relaxed);
     }
 
@@ -294,13 +295,13 @@ impl Service {
     ///
     /// # Errors
     /// As [`Service::plan`].
-    pub fn foresee(
+    pub fn speculate(
         &self,
         id: AssemblyId,
         request: &PlanRequest,
         termination: &Termination,
     ) -> Result<Plan, ServiceError> {
-        self.planned(id, request, termination, &mut Silent, None)
+        self.planned(id, request, termination, &mut Discard, None)
     }
 
     fn planned(

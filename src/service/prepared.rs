@@ -15,7 +15,7 @@ use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
 use crate::termination::{Interrupt, Termination};
 
-use super::store::SharedShape;
+use super::shared_shape::SharedShape;
 
 /// Overlaps smaller than this share of the longest side are rounding, not modelling.
 const LEAST_OVERLAP: f64 = 1e-6;

@@ -31,11 +31,11 @@ impl Observer for Relay<'_> {
 }
 
 /// Hands on how a search gets on, but no step.
-pub(super) struct Quiet<'a> {
+pub(super) struct WithoutSteps<'a> {
     pub(super) sink: &'a mut dyn PlanSink,
 }
 
-impl PlanSink for Quiet<'_> {
+impl PlanSink for WithoutSteps<'_> {
     fn progress(&mut self, progress: Progress) {
         self.sink.progress(progress);
     }
@@ -52,9 +52,9 @@ impl PlanSink for Quiet<'_> {
 }
 
 /// Nobody listens.
-pub(super) struct Silent;
+pub(super) struct Discard;
 
-impl PlanSink for Silent {
+impl PlanSink for Discard {
     fn progress(&mut self, _: Progress) {}
     fn step(&mut self, _: &crate::plan::PlanStep) {}
 }

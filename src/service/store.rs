@@ -10,33 +10,11 @@ use serde::Serialize;
 
 use super::AssemblyId;
 use super::entry::Entry;
+use super::shared_shape::SharedShape;
 use crate::geometry::{Assembly, Shape};
 use crate::lru::Lru;
 use crate::scene::JoinedHulls;
-use crate::sdf::{Field, FieldStore};
-
-/// A shape and its field, for all assemblies that have it.
-#[derive(Debug)]
-pub(super) struct SharedShape {
-    pub(super) shape: Arc<Shape>,
-    pub(super) field: Arc<Field>,
-}
-
-impl SharedShape {
-    /// A shape whose field is built anew.
-    pub(super) fn new(shape: Arc<Shape>) -> Self {
-        Self { field: Arc::new(Field::of(&shape.surface)), shape }
-    }
-
-    /// A shape whose field may be in a store.
-    fn stored(shape: Arc<Shape>, fields: Weak<dyn FieldStore>) -> Self {
-        Self { field: Arc::new(Field::stored(&shape.surface, fields, *shape.content())), shape }
-    }
-
-    fn memory(&self) -> usize {
-        self.shape.memory() + self.field.memory()
-    }
-}
+use crate::sdf::FieldStore;
 
 /// How much there is.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]

@@ -20,13 +20,13 @@ use gltf::json::scene::UnitQuaternion;
 use gltf::json::validation::{Checked, USize64};
 use gltf::json::{self, Accessor, Animation, Asset, Index, Material, Mesh, Node, Root};
 
-use super::{Drawn, PALETTE, Placement, Rgb, Scene, SceneStep, Up, ViewError};
+use super::{Drawn, PALETTE, Placement, PlanScene, Rgb, SceneStep, Up, ViewError};
 
 /// The scene as the bytes of a `.glb` file.
 ///
 /// # Errors
 /// It has more than 4 GiB.
-pub fn glb(scene: &Scene) -> Result<Vec<u8>, ViewError> {
+pub fn glb(scene: &PlanScene) -> Result<Vec<u8>, ViewError> {
     let mut writer = Writer { scale: metres(scene.units.as_deref()).unwrap_or(1.0), ..Writer::default() };
     writer.materials();
     let nodes = writer.parts(scene);
@@ -51,7 +51,7 @@ pub fn metres(units: Option<&str>) -> Option<f64> {
     })
 }
 
-fn asset(scene: &Scene) -> Asset {
+fn asset(scene: &PlanScene) -> Asset {
     let notes = serde_json::json!({
         "units": scene.units,
         "metresPerUnit": metres(scene.units.as_deref()),
@@ -91,7 +91,7 @@ impl Writer {
     }
 
     /// A node per part, at its start.
-    fn parts(&mut self, scene: &Scene) -> Vec<Index<Node>> {
+    fn parts(&mut self, scene: &PlanScene) -> Vec<Index<Node>> {
         let mut nodes = Vec::new();
         for part in &scene.parts {
             let mesh = self.mesh(part.drawn, part.colour, &scene.drawn[part.drawn]);
@@ -162,7 +162,7 @@ impl Writer {
         Surface { positions, normals, indices }
     }
 
-    fn scene(&mut self, scene: &Scene, parts: &[Index<Node>]) {
+    fn scene(&mut self, scene: &PlanScene, parts: &[Index<Node>]) {
         let upright = match scene.up {
             Up::Y => [0.0, 0.0, 0.0, 1.0],
             Up::Z => [-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2],
@@ -179,7 +179,7 @@ impl Writer {
         self.root.scene = Some(Index::push(&mut self.root.scenes, scene));
     }
 
-    fn animation(&mut self, scene: &Scene, nodes: &[Index<Node>]) {
+    fn animation(&mut self, scene: &PlanScene, nodes: &[Index<Node>]) {
         let mut animation = Animation {
             channels: Vec::new(),
             samplers: Vec::new(),

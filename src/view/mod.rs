@@ -1,6 +1,6 @@
 //! Plans for people: in motion as a GLB scene or a page, in words, and blocking graphs as pictures.
 //!
-//! Data flow: a plan's JSON ([`read_plan`]) and the assembly that it is about → [`Scene`], parts with meshes
+//! Data flow: a plan's JSON ([`read_plan`]) and the assembly that it is about → [`PlanScene`], parts with meshes
 //! and a timeline → [`glb`] or [`page`]. [`steps`] tells the plan alone in words; [`picture`] draws
 //! blocking graphs, which [`layout`] arranges. No planning module depends on anything here.
 //!
@@ -22,7 +22,7 @@ mod words;
 
 pub use colour::{PALETTE, Rgb};
 pub use document::{kind_of, read_plan};
-pub use scene::{Drawn, Key, Placement, Scene, ScenePart, SceneStep, Up};
+pub use scene::{Drawn, Keyframe, Placement, PlanScene, ScenePart, SceneStep, Up};
 
 /// Why a plan cannot be shown.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

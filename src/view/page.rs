@@ -12,7 +12,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
 use super::layout::layout;
-use super::{Drawn, Key, PALETTE, Placement, Scene, ScenePart, SceneStep, Up};
+use super::{Drawn, Keyframe, PALETTE, Placement, PlanScene, ScenePart, SceneStep, Up};
 use crate::blocking_graph::DirectionalGraph;
 use crate::plan::export::BlockedDocument;
 use nalgebra::Point3;
@@ -25,7 +25,7 @@ const SCRIPT: &str = include_str!("page/dist/page.js");
 ///
 /// # Errors
 /// None that is known: all keys are text.
-pub fn page(scene: &Scene, names: &[String], graphs: &[DirectionalGraph]) -> serde_json::Result<String> {
+pub fn page(scene: &PlanScene, names: &[String], graphs: &[DirectionalGraph]) -> serde_json::Result<String> {
     let data = serde_json::to_string(&data(scene, names, graphs))?;
     let title = if scene.name.is_empty() { "assembly" } else { &scene.name };
     // In this order: what a name holds is never taken for a placeholder.
@@ -116,7 +116,7 @@ struct Graph {
     edges: Vec<[usize; 2]>,
 }
 
-fn data<'a>(scene: &'a Scene, names: &[String], graphs: &[DirectionalGraph]) -> Data<'a> {
+fn data<'a>(scene: &'a PlanScene, names: &[String], graphs: &[DirectionalGraph]) -> Data<'a> {
     let middle = scene.bounds().centre();
     let mut bytes = Vec::new();
     let meshes = scene.drawn.iter().map(|m| mesh(m, &mut bytes)).collect();
@@ -206,7 +206,7 @@ fn part<'a>(part: &'a ScenePart, middle: &Point3<f64>) -> Part<'a> {
 }
 
 fn step<'a>(step: &'a SceneStep, middle: &Point3<f64>, bytes: &mut Vec<u8>) -> Step<'a> {
-    let numbers = |k: &Key| placed(&k.placement, middle).map(|x| x as f32);
+    let numbers = |k: &Keyframe| placed(&k.placement, middle).map(|x| x as f32);
     let keys: Vec<u8> = step.keys.iter().flat_map(numbers).flat_map(f32::to_le_bytes).collect();
     Step {
         part: step.part,
@@ -218,11 +218,11 @@ fn step<'a>(step: &'a SceneStep, middle: &Point3<f64>, bytes: &mut Vec<u8>) -> S
     }
 }
 
-fn place(scene: &Scene, name: &str) -> Option<usize> {
+fn place(scene: &PlanScene, name: &str) -> Option<usize> {
     scene.parts.iter().position(|p| p.name == name)
 }
 
-fn stuck<'a>(scene: &Scene, blocked: &'a BlockedDocument) -> Stuck<'a> {
+fn stuck<'a>(scene: &PlanScene, blocked: &'a BlockedDocument) -> Stuck<'a> {
     Stuck {
         part: place(scene, &blocked.part),
         by: blocked.by.iter().filter_map(|n| place(scene, n)).collect(),
@@ -230,7 +230,7 @@ fn stuck<'a>(scene: &Scene, blocked: &'a BlockedDocument) -> Stuck<'a> {
     }
 }
 
-fn graph(scene: &Scene, names: &[String], graph: &DirectionalGraph) -> Graph {
+fn graph(scene: &PlanScene, names: &[String], graph: &DirectionalGraph) -> Graph {
     let at = |part: usize| names.get(part).and_then(|n| place(scene, n));
     let edges: Vec<_> = graph.edges.iter().filter_map(|[p, b]| Some([at(*p)?, at(*b)?])).collect();
     let layout = layout(scene.parts.len(), &edges);
@@ -246,12 +246,12 @@ mod tests {
     use crate::simulation::Action;
     use crate::view::document::tests::plan;
 
-    fn scene(name: &str) -> Scene {
+    fn scene(name: &str) -> PlanScene {
         let assembly = Assembly { name: name.into(), ..Assembly::new(&source(block_on_plate())).unwrap() };
-        Scene::new(&assembly, Up::Z, &plan()).unwrap()
+        PlanScene::new(&assembly, Up::Z, &plan()).unwrap()
     }
 
-    fn written(scene: &Scene) -> String {
+    fn written(scene: &PlanScene) -> String {
         let names = ["0", "1"].map(String::from);
         let graph = DirectionalGraph { direction: Action::translations()[4], edges: vec![[0, 1]] };
         page(scene, &names, &[graph]).unwrap()

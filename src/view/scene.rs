@@ -74,7 +74,7 @@ pub struct ScenePart {
 
 /// A moment of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Key {
+pub struct Keyframe {
     /// Seconds from the start of the timeline.
     pub time: f64,
     /// Where the part is then; in between it moves on a line and its rotation slerps.
@@ -87,7 +87,7 @@ pub struct SceneStep {
     /// Index of the part.
     pub part: usize,
     /// One per waypoint, times strictly ascending.
-    pub keys: Vec<Key>,
+    pub keys: Vec<Keyframe>,
     /// When it is over.
     pub ends: f64,
     /// Parts that it could not go before.
@@ -107,7 +107,7 @@ pub enum Up {
 
 /// A plan that can be drawn.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Scene {
+pub struct PlanScene {
     /// The assembly's name.
     pub name: String,
     /// Unit of all lengths, if known.
@@ -130,7 +130,7 @@ pub struct Scene {
     pub steps: Vec<SceneStep>,
 }
 
-impl Scene {
+impl PlanScene {
     /// The scene of a plan about an assembly, whose parts stand where the plan has them assembled.
     ///
     /// # Errors
@@ -326,18 +326,18 @@ impl<'a> Stage<'a> {
 }
 
 /// Puts a path on the timeline: every part of it takes its share of the time by how far it goes and turns.
-fn keys(path: &[Placement], begins: f64, size: f64) -> (Vec<Key>, f64) {
+fn keys(path: &[Placement], begins: f64, size: f64) -> (Vec<Keyframe>, f64) {
     let effort = |a: &Placement, b: &Placement| {
         (b.centre - a.centre).norm() / size * PER_LENGTH
             + a.rotation.angle_to(&b.rotation) / std::f64::consts::TAU * PER_TURN
     };
     let total: f64 = path.windows(2).map(|w| effort(&w[0], &w[1])).sum();
     let lasts = total.clamp(SHORTEST, LONGEST);
-    let (mut done, mut keys): (f64, Vec<Key>) = (0.0, Vec::new());
+    let (mut done, mut keys): (f64, Vec<Keyframe>) = (0.0, Vec::new());
     for (i, &placement) in path.iter().enumerate() {
         done += if i > 0 { effort(&path[i - 1], &placement) } else { 0.0 };
         let share = if total > 0.0 { done / total } else { 0.0 };
-        let key = Key { time: begins + lasts * share, placement };
+        let key = Keyframe { time: begins + lasts * share, placement };
         match keys.last_mut() {
             // What takes no time is no motion.
             Some(last) if last.time >= key.time => *last = key,

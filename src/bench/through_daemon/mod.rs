@@ -16,7 +16,7 @@ mod server;
 pub use churn::{Churn, ChurnRequest, ChurnSample, churn};
 pub use latency::{Latency, LatencyRequest, Percentiles, latency};
 pub use load::{
-    DaemonFigures, Footprint, Kind, KindFigures, Load, LoadClient, LoadRequest, Phase, Role, Soak,
+    DaemonFigures, Kind, KindFigures, Load, LoadClient, LoadRequest, Phase, ProcessFootprint, Role, Soak,
     SoakRequest, load, load_client, soak,
 };
 pub use raw_peer::serve as serve_raw;

@@ -1,5 +1,7 @@
 //! What is written is read, and nothing else is believed.
 
+use std::mem::offset_of;
+
 use super::super::build::Threads;
 use super::*;
 use crate::cache::MappingTally;

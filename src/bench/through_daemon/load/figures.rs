@@ -123,7 +123,7 @@ pub struct KindFigures {
 
 /// What the daemon's process holds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Footprint {
+pub struct ProcessFootprint {
     /// Requests that had ended by then.
     pub requests: u64,
     /// Resident set without what is shared (of which its shared memory is the most).
@@ -138,11 +138,11 @@ pub struct Footprint {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct DaemonFigures {
     /// When two thousand requests had ended (or at the end, if there are fewer).
-    pub at_2000: Footprint,
+    pub at_2000: ProcessFootprint,
     /// At the end, all clients still connected.
-    pub at_end: Footprint,
+    pub at_end: ProcessFootprint,
     /// The largest of everything from the two thousandth request on.
-    pub largest: Footprint,
+    pub largest: ProcessFootprint,
 }
 
 /// A load and what came of it.

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::figures::{DaemonFigures, Footprint};
+use super::figures::{DaemonFigures, ProcessFootprint};
 
 /// Requests after which nothing may grow any more.
 const SETTLED: u64 = 2000;
 
 /// What the process holds now; zeros where the system does not tell.
-pub(in crate::bench) fn footprint(pid: u32, requests: u64) -> Footprint {
+pub(in crate::bench) fn footprint(pid: u32, requests: u64) -> ProcessFootprint {
     let proc = Path::new("/proc").join(pid.to_string());
     let status = std::fs::read_to_string(proc.join("status")).unwrap_or_default();
     let kib = |name: &str| -> u64 {
@@ -16,7 +16,7 @@ pub(in crate::bench) fn footprint(pid: u32, requests: u64) -> Footprint {
         value.and_then(|v| v.split_whitespace().next()?.parse().ok()).unwrap_or(0)
     };
     let descriptors = std::fs::read_dir(proc.join("fd")).map_or(0, |list| list.count() as u64);
-    Footprint { requests, private_kib: kib("RssAnon"), resident_kib: kib("VmRSS"), descriptors }
+    ProcessFootprint { requests, private_kib: kib("RssAnon"), resident_kib: kib("VmRSS"), descriptors }
 }
 
 /// Follows a process while requests end.
@@ -63,7 +63,7 @@ mod tests {
         let here = footprint(std::process::id(), 7);
         assert!(here.resident_kib > 100 && here.private_kib > 0 && here.descriptors > 2, "{here:?}");
         assert_eq!(here.requests, 7);
-        assert_eq!(footprint(u32::MAX, 0), Footprint::default());
+        assert_eq!(footprint(u32::MAX, 0), ProcessFootprint::default());
     }
 
     #[test]

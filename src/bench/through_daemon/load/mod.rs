@@ -22,7 +22,7 @@ use sbdp_client::{Client, ConnectOptions};
 use serde::Serialize;
 
 pub use client::{LoadClient, Role, load_client};
-pub use figures::{DaemonFigures, Footprint, KindFigures, Phase};
+pub use figures::{DaemonFigures, KindFigures, Phase, ProcessFootprint};
 pub use mix::Kind;
 pub use soak::{Soak, SoakRequest, soak};
 

@@ -5,7 +5,8 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use super::workers::{PlanJob, Planning, contained, with_moved};
+use super::jobs::PlanJob;
+use super::planning::{Planning, contained, with_moved};
 use crate::geometry::Pose;
 use crate::plan::{Plan, PlanStatus};
 use crate::search::{PlanRequest, Planner};
@@ -51,7 +52,7 @@ impl Contingency {
 
 /// What may be asked after a question, as far as it was not planned yet.
 #[derive(Debug)]
-pub(super) struct Foresight {
+pub(super) struct Speculation {
     assembly: AssemblyId,
     /// Parts that stand elsewhere than in it.
     moved: Vec<(usize, Pose)>,
@@ -63,7 +64,7 @@ pub(super) struct Foresight {
     time: Duration,
 }
 
-impl Foresight {
+impl Speculation {
     /// What may be asked after a question that was answered by a plan, with so much time for it; none if nothing
     /// comes off, if whoever asked does not want it any more, or if it was asked by a planner that is there to be
     /// compared with.
@@ -100,7 +101,7 @@ impl Foresight {
         // Whoever asks will be told what is wrong.
         let planned = contained(|| {
             let assembly = with_moved(service, self.assembly, &self.moved, &within)?;
-            service.foresee(assembly, &request, &within)
+            service.speculate(assembly, &request, &within)
         });
         self.time = self.time.saturating_sub(began.elapsed());
         if termination.check().is_err() {
@@ -132,7 +133,7 @@ mod tests {
     /// Of which assembly, with which parts stuck, and with which gone.
     type Asked = (AssemblyId, Vec<usize>, Vec<usize>);
 
-    /// Writes down what it is asked to foresee.
+    /// Writes down what it is asked to speculate.
     #[derive(Default)]
     struct Scripted {
         asked: Mutex<Vec<Asked>>,
@@ -169,7 +170,7 @@ mod tests {
             Err(ServiceError::UnknownAssembly)
         }
 
-        fn foresee(
+        fn speculate(
             &self,
             id: AssemblyId,
             request: &PlanRequest,
@@ -197,32 +198,32 @@ mod tests {
         plan_of(PlanStatus::Complete, vec![step_of(2), step_of(0)])
     }
 
-    fn foresight(request: PlanRequest) -> Foresight {
-        Foresight::after(&job(request), &plan(), TIME).unwrap()
+    fn speculation(request: PlanRequest) -> Speculation {
+        Speculation::after(&job(request), &plan(), TIME).unwrap()
     }
 
     #[test]
     fn each_part_is_stuck_in_its_turn_or_before_and_gone_in_the_order_of_the_plan() {
         let (service, t) = (Scripted::default(), Termination::default());
-        let mut foresight =
-            foresight(PlanRequest { fixed: vec![7], removed: vec![5], ..PlanRequest::default() });
+        let mut speculation =
+            speculation(PlanRequest { fixed: vec![7], removed: vec![5], ..PlanRequest::default() });
         let mut planned = 0;
-        while foresight.plan_next(&service, &t) {
+        while speculation.plan_next(&service, &t) {
             planned += 1;
         }
         let id = AssemblyId([1; 32]);
         let of = |fixed: &[usize], removed: &[usize]| (id, fixed.to_vec(), removed.to_vec());
         let first = [of(&[7, 2], &[5]), of(&[7], &[5, 2])];
         let second = [of(&[7, 0], &[5, 2]), of(&[7, 0], &[5]), of(&[7], &[5, 0])];
-        assert_eq!((service.asked(), planned, foresight.left()), ([&first[..], &second].concat(), 5, 0));
+        assert_eq!((service.asked(), planned, speculation.left()), ([&first[..], &second].concat(), 5, 0));
     }
 
     #[test]
     fn parts_that_stood_elsewhere_do_so_there_too() {
         let service = Scripted::default();
         let job = PlanJob { moved: vec![(0, Pose::identity())], ..job(PlanRequest::default()) };
-        let mut foresight = Foresight::after(&job, &plan(), TIME).unwrap();
-        assert!(foresight.plan_next(&service, &Termination::default()));
+        let mut speculation = Speculation::after(&job, &plan(), TIME).unwrap();
+        assert!(speculation.plan_next(&service, &Termination::default()));
         assert_eq!(service.asked()[0].0, AssemblyId([2; 32]));
     }
 
@@ -233,12 +234,12 @@ mod tests {
             PlanStatus::Cancelled
         };
         let service = Scripted { first: Some(stopped), ..Scripted::default() };
-        let mut foresight = foresight(PlanRequest::default());
-        assert!(!foresight.plan_next(&service, &Termination::default()));
-        assert_eq!(foresight.left(), 5);
-        assert!(foresight.plan_next(&service, &Termination::default()));
+        let mut speculation = speculation(PlanRequest::default());
+        assert!(!speculation.plan_next(&service, &Termination::default()));
+        assert_eq!(speculation.left(), 5);
+        assert!(speculation.plan_next(&service, &Termination::default()));
         let asked = service.asked();
-        assert_eq!((asked[0] == asked[1], foresight.left()), (true, 4));
+        assert_eq!((asked[0] == asked[1], speculation.left()), (true, 4));
     }
 
     #[test]
@@ -248,27 +249,28 @@ mod tests {
             PlanStatus::Timeout
         };
         let service = Scripted { first: Some(out_of_time), ..Scripted::default() };
-        let mut foresight = foresight(PlanRequest::default());
-        assert!(!foresight.plan_next(&service, &Termination::default()));
-        assert!(foresight.plan_next(&service, &Termination::default()));
-        assert_eq!((foresight.left(), service.asked().len()), (3, 2));
+        let mut speculation = speculation(PlanRequest::default());
+        assert!(!speculation.plan_next(&service, &Termination::default()));
+        assert!(speculation.plan_next(&service, &Termination::default()));
+        assert_eq!((speculation.left(), service.asked().len()), (3, 2));
     }
 
     #[test]
     fn what_cannot_be_planned_or_took_all_the_time_is_the_last() {
         let service = Scripted { first: Some(|_| panic!("scripted panic")), ..Scripted::default() };
-        let mut failing = foresight(PlanRequest::default());
+        let mut failing = speculation(PlanRequest::default());
         assert!(!failing.plan_next(&service, &Termination::default()));
         assert_eq!((failing.left(), service.asked().len()), (0, 1));
-        let mut foresight = Foresight { time: Duration::from_nanos(1), ..foresight(PlanRequest::default()) };
-        assert!(foresight.plan_next(&Scripted::default(), &Termination::default()));
-        assert_eq!(foresight.left(), 0, "the time is over");
+        let mut speculation =
+            Speculation { time: Duration::from_nanos(1), ..speculation(PlanRequest::default()) };
+        assert!(speculation.plan_next(&Scripted::default(), &Termination::default()));
+        assert_eq!(speculation.left(), 0, "the time is over");
     }
 
     #[test]
     fn nothing_is_foreseen_where_nobody_carries_a_plan_out() {
         let none = |request: PlanRequest, plan: &Plan, time| {
-            assert!(Foresight::after(&job(request), plan, time).is_none());
+            assert!(Speculation::after(&job(request), plan, time).is_none());
         };
         let default = PlanRequest::default;
         none(default(), &plan_of(PlanStatus::Infeasible, vec![]), TIME);
@@ -277,7 +279,7 @@ mod tests {
         none(PlanRequest { planner: Planner::Sbdp, ..default() }, &plan(), TIME);
         none(PlanRequest { assembly: Some(Staging::None), ..default() }, &plan(), TIME);
         none(PlanRequest { no_cache: true, ..default() }, &plan(), TIME);
-        assert!(foresight(default()).is_as(&foresight(default())));
-        assert!(!foresight(default()).is_as(&foresight(PlanRequest { fixed: vec![1], ..default() })));
+        assert!(speculation(default()).is_as(&speculation(default())));
+        assert!(!speculation(default()).is_as(&speculation(PlanRequest { fixed: vec![1], ..default() })));
     }
 }

@@ -4,11 +4,11 @@
 use std::sync::Arc;
 
 use sbdp_ipc::plan::PlanRequest;
+use serde::Serialize;
 
 use super::convert;
-use super::figures::AnswerFigures;
 use super::outbox::steps_messages;
-use super::workers::Planning;
+use super::planning::Planning;
 use crate::lru::{self, Lru};
 use crate::plan::{Plan, PlanStats, PlanStatus};
 
@@ -19,14 +19,14 @@ const RECENT_BYTES: u64 = 4 << 20;
 
 /// A whole answer, ready to be sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Answer {
+pub(crate) struct CachedResponse {
     /// Messages with steps, in order.
     pub(crate) steps: Vec<Arc<Vec<u8>>>,
     /// The message that ends the plan.
     pub(crate) summary: Arc<Vec<u8>>,
 }
 
-impl Answer {
+impl CachedResponse {
     /// What is answered when the question that led to a plan is asked again. None if the plan ended by
     /// the clock: then another one may come.
     pub(crate) fn of(plan: &Plan) -> Option<Self> {
@@ -71,15 +71,22 @@ pub(crate) fn question(request: &PlanRequest) -> Option<Vec<u8>> {
         .then(|| PlanRequest { threads: 0, batch: false, deadline_ns: None, ..request.clone() }.encode())
 }
 
+/// Answers in memory.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub(crate) struct ResponseCacheMetrics {
+    pub(crate) entries: usize,
+    pub(crate) bytes: usize,
+}
+
 /// The answers that are remembered: those that were asked for last, within a number of bytes.
 #[derive(Debug, Default)]
-pub(crate) struct Answers {
-    by_question: Lru<Arc<[u8]>, Answer>,
+pub(crate) struct ResponseCache {
+    by_question: Lru<Arc<[u8]>, CachedResponse>,
     bytes: usize,
     limit: usize,
 }
 
-impl Answers {
+impl ResponseCache {
     pub(crate) fn new(limit: usize) -> Self {
         Self { limit, ..Self::default() }
     }
@@ -89,24 +96,24 @@ impl Answers {
     pub(crate) fn recent(service: &impl Planning, limit: usize) -> Self {
         let mut answers = Self::new(limit);
         for (question, messages) in service.recent_answers(MOST_RECENT, RECENT_BYTES) {
-            if let Some(answer) = Answer::from_messages(messages) {
+            if let Some(answer) = CachedResponse::from_messages(messages) {
                 answers.insert(&question, answer);
             }
         }
         answers
     }
 
-    pub(crate) fn figures(&self) -> AnswerFigures {
-        AnswerFigures { entries: self.by_question.len(), bytes: self.bytes }
+    pub(crate) fn metrics(&self) -> ResponseCacheMetrics {
+        ResponseCacheMetrics { entries: self.by_question.len(), bytes: self.bytes }
     }
 
     /// The answer to a question.
-    pub(crate) fn get(&mut self, question: &[u8]) -> Option<Arc<Answer>> {
+    pub(crate) fn get(&mut self, question: &[u8]) -> Option<Arc<CachedResponse>> {
         self.by_question.get(question)
     }
 
     /// Remembers an answer in place of those that were not asked for the longest.
-    pub(crate) fn insert(&mut self, question: &[u8], answer: Answer) {
+    pub(crate) fn insert(&mut self, question: &[u8], answer: CachedResponse) {
         let needed = cost(question, &answer);
         if needed > self.limit {
             return;
@@ -126,22 +133,22 @@ impl Answers {
     }
 }
 
-fn cost(question: &[u8], answer: &Answer) -> usize {
-    Lru::<Arc<[u8]>, Answer>::OVERHEAD + lru::shared(question.len()) + answer.memory()
+fn cost(question: &[u8], answer: &CachedResponse) -> usize {
+    Lru::<Arc<[u8]>, CachedResponse>::OVERHEAD + lru::shared(question.len()) + answer.memory()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn answer(bytes: usize) -> Answer {
-        Answer { steps: vec![Arc::new(vec![1; bytes - 8])], summary: Arc::new(vec![0; 8]) }
+    fn answer(bytes: usize) -> CachedResponse {
+        CachedResponse { steps: vec![Arc::new(vec![1; bytes - 8])], summary: Arc::new(vec![0; 8]) }
     }
 
     #[test]
     fn those_not_asked_for_the_longest_are_forgotten_first() {
         let one = cost(b"a", &answer(10_000));
-        let mut answers = Answers::new(3 * one);
+        let mut answers = ResponseCache::new(3 * one);
         for question in [b"a", b"b", b"c"] {
             answers.insert(question, answer(10_000));
         }
@@ -158,7 +165,7 @@ mod tests {
 
     #[test]
     fn an_answer_given_anew_takes_the_place_of_the_old_one() {
-        let mut answers = Answers::new(1 << 20);
+        let mut answers = ResponseCache::new(1 << 20);
         answers.insert(b"a", answer(100));
         answers.insert(b"a", answer(200));
         assert_eq!((answers.bytes, answers.by_question.len()), (cost(b"a", &answer(200)), 1));
@@ -169,8 +176,8 @@ mod tests {
     fn what_an_answer_has_in_reserve_counts() {
         let mut roomy = Vec::with_capacity(5_000);
         roomy.push(0);
-        let costs =
-            [vec![0], roomy].map(|message| cost(b"a", &Answer::from_messages(vec![message]).unwrap()));
+        let costs = [vec![0], roomy]
+            .map(|message| cost(b"a", &CachedResponse::from_messages(vec![message]).unwrap()));
         assert!(costs[1] > 4_900 + costs[0], "{costs:?}");
     }
 

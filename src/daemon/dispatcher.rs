@@ -7,63 +7,27 @@ use std::time::{Duration, Instant};
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::clock;
 use sbdp_ipc::error::{ErrorCode, WireError};
-use sbdp_ipc::geometry::HandleResponse;
-use sbdp_ipc::headers::{CONTROL_CANCEL, RequestHeader, ResponseHeader, ResponseKind, id_of_words, id_words};
+use sbdp_ipc::headers::{CONTROL_CANCEL, ResponseKind, id_of_words, id_words};
 use sbdp_ipc::plan::PlanRequest;
-use sbdp_ipc::progress::ProgressSample;
 use sbdp_ipc::status::{Status, StatusHeader};
 
-use super::answers::{Answer, Answers, question};
-use super::closing::Closing;
 use super::convert;
-use super::figures::{AtHand, Figures, Latencies, Surroundings};
-use super::intake::Upload;
+use super::events::{Event, Incoming};
+use super::jobs::{AdmitJob, PlanJob, Received, SessionKey};
+use super::metrics::{CacheMetrics, HostStatus, Latencies, Metrics};
+use super::outgoing::Outgoing;
+use super::planning::Planning;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
-use super::resources;
-use super::session::{End, Input, Link, Session, State};
+use super::response_cache::{CachedResponse, ResponseCache, question};
+use super::session::{Input, Link, Session, SessionEnd, State};
 use super::shared_queue::Queues;
-use super::workers::{AdmitJob, PlanJob, Planning, SessionKey, WorkerEvent};
+use super::shutdown::Shutdown;
+use super::uploads::Uploads;
+use super::workers::WorkerEvent;
 use crate::config::{Config, seconds};
 use crate::service::AssemblyId;
 
-/// A request as it came in: header and payload are private copies.
-#[derive(Debug)]
-pub(crate) struct Incoming<L> {
-    pub(crate) link: L,
-    /// The client's port.
-    pub(crate) client: u128,
-    /// Who counts for quotas.
-    pub(crate) owner: Owner,
-    pub(crate) header: RequestHeader,
-    pub(crate) payload: AlignedBytes,
-}
-
-/// Everything that can happen.
-#[derive(Debug)]
-pub(crate) enum Event<L> {
-    /// A plan is asked for.
-    Plan(Incoming<L>),
-    /// Credit for a plan's stream, or the wish to end it.
-    Control(Incoming<L>),
-    /// The status is asked for.
-    Status(Incoming<L>),
-    /// The figures are asked for.
-    Figures(Incoming<L>),
-    /// Is this handle known?
-    Have(Incoming<L>),
-    /// Meshes.
-    Upload(Incoming<L>),
-    /// What differs from a known assembly.
-    Revise(Incoming<L>),
-    /// Something that cannot be taken, and why.
-    Unusable(Incoming<L>, WireError),
-    /// A worker reports.
-    Worker(WorkerEvent),
-    /// SIGTERM or SIGINT.
-    Terminate,
-}
-
-/// The limits that the desk keeps.
+/// The limits that the dispatcher enforces.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limits {
     outbox: usize,
@@ -71,8 +35,6 @@ pub(super) struct Limits {
     threads: usize,
     pub(super) grace: Duration,
     pub(super) drain: Duration,
-    /// How much memory is left, in bytes, if the system says.
-    pub(super) free_memory: fn() -> Option<u64>,
 }
 
 impl Limits {
@@ -83,7 +45,6 @@ impl Limits {
             threads: config.workers.threads_per_request,
             grace: seconds(config.times.grace_s),
             drain: seconds(config.times.drain_s),
-            free_memory: resources::free_memory,
         }
     }
 }
@@ -92,31 +53,27 @@ fn megabytes(mb: u64) -> usize {
     usize::try_from(mb.saturating_mul(1 << 20)).unwrap_or(usize::MAX)
 }
 
-/// The desk.
+/// The dispatcher.
 #[derive(Debug)]
-pub(crate) struct Desk<L, P> {
+pub(crate) struct Dispatcher<L, P> {
     pub(super) service: Arc<P>,
     pub(super) queues: Queues,
     pub(super) limits: Limits,
     pub(super) sessions: HashMap<SessionKey, Session<L>>,
-    pub(super) uploads: HashMap<u64, Upload<L>>,
+    pub(super) uploads: Uploads<L>,
     running: BTreeSet<(u128, u64)>,
-    answers: Answers,
-    pub(super) next_upload: u64,
+    answers: ResponseCache,
     pub(super) latencies: Latencies,
-    pub(super) closing: Closing,
+    shutdown: Shutdown,
     pub(super) counters: StatusHeader,
     preloaded: Vec<(String, [u8; 32])>,
     started: Instant,
     /// What only the ports and the system know.
-    pub(crate) surroundings: Surroundings,
-    /// Listeners to wake.
-    pub(crate) wakes: Vec<u128>,
-    /// Progress to publish.
-    pub(crate) samples: Vec<ProgressSample>,
+    pub(crate) host: HostStatus,
+    pub(crate) outgoing: Outgoing,
 }
 
-impl<L: Link, P: Planning> Desk<L, P> {
+impl<L: Link, P: Planning> Dispatcher<L, P> {
     pub(crate) fn new(service: Arc<P>, queues: Queues, config: &Config) -> Self {
         let counters = StatusHeader {
             pid: std::process::id(),
@@ -125,25 +82,23 @@ impl<L: Link, P: Planning> Desk<L, P> {
             queue_limit: config.requests.queue as u32,
             ..StatusHeader::default()
         };
-        let answers = Answers::recent(&*service, config.cache.memory().answers);
-        service.answers_take(answers.figures().bytes);
+        let answers = ResponseCache::recent(&*service, config.cache.memory().answers);
+        service.set_response_bytes(answers.metrics().bytes);
         Self {
             service,
-            queues,
             limits: Limits::of(config),
             latencies: Latencies::default(),
             sessions: HashMap::new(),
-            uploads: HashMap::new(),
+            uploads: Uploads::new(Arc::clone(&queues.admissions)),
             running: BTreeSet::new(),
             answers,
-            next_upload: 0,
-            closing: Closing::Open,
+            shutdown: Shutdown::NotRequested,
             counters,
             preloaded: Vec::new(),
             started: Instant::now(),
-            surroundings: Surroundings::default(),
-            wakes: Vec::new(),
-            samples: Vec::new(),
+            host: HostStatus::default(),
+            outgoing: Outgoing::default(),
+            queues,
         }
     }
 
@@ -160,22 +115,23 @@ impl<L: Link, P: Planning> Desk<L, P> {
             Event::Control(incoming) => self.control(&incoming),
             Event::Status(incoming) => {
                 let status = self.status().encode();
-                self.answer(&incoming.link, &incoming.header, ResponseKind::Status, &status);
+                self.outgoing.respond(&incoming.link, &incoming.header, ResponseKind::Status, &status);
             }
             Event::Figures(incoming) => {
-                let text = self.figures().json();
-                self.answer(&incoming.link, &incoming.header, ResponseKind::Figures, text.as_bytes());
+                let text = self.metrics().json();
+                self.outgoing.respond(
+                    &incoming.link,
+                    &incoming.header,
+                    ResponseKind::Figures,
+                    text.as_bytes(),
+                );
             }
             Event::Have(incoming) => self.have(&incoming),
-            Event::Upload(incoming) => {
-                self.take_in(incoming, AdmitJob::Upload);
-            }
-            Event::Revise(incoming) => {
-                self.take_in(incoming, AdmitJob::Revise);
-            }
+            Event::Upload(incoming) => self.upload(incoming, AdmitJob::Upload),
+            Event::Revise(incoming) => self.upload(incoming, AdmitJob::Revise),
             Event::Unusable(incoming, error) => {
                 self.counters.refused += 1;
-                self.answer_error(&incoming.link, &incoming.header, &error);
+                self.outgoing.error(&incoming.link, &incoming.header, &error);
             }
             Event::Worker(event) => self.worker(event),
             Event::Terminate => self.terminate(now),
@@ -189,42 +145,42 @@ impl<L: Link, P: Planning> Desk<L, P> {
         if self.sessions.contains_key(&key) {
             let error = WireError::new(ErrorCode::Malformed, "this request number is in use");
             self.counters.refused += 1;
-            return self.answer_error(&link, &header, &error);
+            return self.outgoing.error(&link, &header, &error);
         }
         let mut session =
             Session::new(link, header.request, id_of_words(header.listener), self.limits.outbox);
-        if let Some(answer) = self.answered_to_the_byte(&payload) {
+        if let Some(answer) = self.response_to_same_bytes(&payload) {
             session.admit(None);
-            self.answer_again(&mut session, &answer);
+            self.answer_from_cache(&mut session, &answer);
         } else if let Err((input, error)) = self.admit(&mut session, key, owner, &payload) {
             session.end_with(input, &error);
         }
         // What is there goes out at once, not behind other requests.
         if session.pump(Instant::now(), self.limits.patience) {
-            self.wakes.push(session.listener);
+            self.outgoing.wakes.push(session.listener);
         }
         if session.is_finished() {
-            self.over(key, session);
+            self.finish(key, session);
         } else {
             self.sessions.insert(key, session);
         }
     }
 
-    fn keep(&mut self, question: &[u8], answer: Answer) {
+    fn remember(&mut self, question: &[u8], answer: CachedResponse) {
         self.answers.insert(question, answer);
-        self.service.answers_take(self.answers.figures().bytes);
+        self.service.set_response_bytes(self.answers.metrics().bytes);
     }
 
     /// The answer to a request whose bytes are those of a question that was answered before: then all that
     /// would be found by reading them was found then.
-    fn answered_to_the_byte(&mut self, payload: &AlignedBytes) -> Option<Arc<Answer>> {
-        if self.closing != Closing::Open {
+    fn response_to_same_bytes(&mut self, payload: &AlignedBytes) -> Option<Arc<CachedResponse>> {
+        if self.shutdown.is_requested() {
             return None;
         }
         self.answers.get(payload.as_slice())
     }
 
-    fn answer_again(&mut self, session: &mut Session<L>, answer: &Answer) {
+    fn answer_from_cache(&mut self, session: &mut Session<L>, answer: &CachedResponse) {
         self.queues.prefetch.answered();
         session.answer(answer);
         self.counters.remembered += 1;
@@ -239,8 +195,8 @@ impl<L: Link, P: Planning> Desk<L, P> {
         payload: &AlignedBytes,
     ) -> Result<(), (Input, WireError)> {
         let refuse = |code, message: String| (Input::Refuse, WireError::new(code, message));
-        if self.closing != Closing::Open {
-            return Err((Input::Refuse, self.shutting_down()));
+        if self.shutdown.is_requested() {
+            return Err((Input::Refuse, Shutdown::error()));
         }
         let wire = PlanRequest::decode(payload.as_slice())
             .map_err(|e| refuse(ErrorCode::Malformed, format!("plan request: {e}")))?;
@@ -258,7 +214,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
         session.admit(deadline);
         if let Some(answer) = answer {
-            self.answer_again(session, &answer);
+            self.answer_from_cache(session, &answer);
             return Ok(());
         }
         let termination = session.termination();
@@ -280,9 +236,28 @@ impl<L: Link, P: Planning> Desk<L, P> {
             Rejected::OwnerSpent => {
                 busy("busy: this client has had its share of the workers' time".to_owned())
             }
-            Rejected::Closed => self.shutting_down(),
+            Rejected::Closed => Shutdown::error(),
         };
         Err((Input::Refuse, error))
+    }
+
+    fn have(&mut self, incoming: &Incoming<L>) {
+        let Incoming { link, header, payload, .. } = incoming;
+        match <[u8; 32]>::try_from(payload.as_slice()) {
+            Ok(handle) => {
+                let known = self.service.knows(AssemblyId(handle));
+                self.outgoing.handle(link, header, handle, known);
+            }
+            Err(_) => {
+                let error = WireError::new(ErrorCode::Malformed, "a handle has 32 bytes");
+                self.outgoing.error(link, header, &error);
+            }
+        }
+    }
+
+    fn upload(&mut self, incoming: Incoming<L>, job: impl FnOnce(Received) -> AdmitJob) {
+        self.counters.uploads += 1;
+        self.uploads.take_in(incoming, job, &mut self.outgoing);
     }
 
     fn control(&mut self, incoming: &Incoming<L>) {
@@ -310,14 +285,18 @@ impl<L: Link, P: Planning> Desk<L, P> {
             WorkerEvent::Step(key, step) => self.with_session(key, |s| s.step(step)),
             WorkerEvent::Progress(key, progress) => {
                 if let Some(session) = self.sessions.get(&key) {
-                    self.samples.push(convert::progress(id_words(key.client), key.request, progress));
-                    self.wakes.push(session.listener);
+                    self.outgoing.samples.push(convert::progress(
+                        id_words(key.client),
+                        key.request,
+                        progress,
+                    ));
+                    self.outgoing.wakes.push(session.listener);
                 }
             }
             WorkerEvent::Planned(key, summary, again) => {
                 self.running.remove(&(key.client, key.request));
                 if let Some((question, answer)) = again {
-                    self.keep(&question, answer);
+                    self.remember(&question, answer);
                 }
                 self.with_session(key, |s| s.finish(summary));
             }
@@ -325,14 +304,16 @@ impl<L: Link, P: Planning> Desk<L, P> {
                 self.running.remove(&(key.client, key.request));
                 self.counters.remembered += 1;
                 self.with_session(key, |s| s.answer_running(&answer));
-                self.keep(&question, answer);
+                self.remember(&question, answer);
             }
             WorkerEvent::Unplanned(key, error) => {
                 self.running.remove(&(key.client, key.request));
                 let input = if error.code == ErrorCode::Failed { Input::Fail } else { Input::Refuse };
                 self.with_session(key, |s| s.end_with(input, &error));
             }
-            WorkerEvent::Admitted { number, result } => self.admitted(number, result),
+            WorkerEvent::Admitted { number, result } => {
+                self.uploads.answer(number, result, &mut self.outgoing, &mut self.latencies);
+            }
             WorkerEvent::Preloaded { name, id } => {
                 tracing::info!(name, "preloaded");
                 self.preloaded.push((name, id.0));
@@ -362,7 +343,7 @@ impl<L: Link, P: Planning> Desk<L, P> {
                 session.end_with(input, &error);
             }
             if session.pump(now, self.limits.patience) {
-                self.wakes.push(session.listener);
+                self.outgoing.wakes.push(session.listener);
             }
             if session.is_finished() {
                 over.push(*key);
@@ -371,23 +352,64 @@ impl<L: Link, P: Planning> Desk<L, P> {
         for key in over {
             self.remove(key);
         }
-        self.settle_uploads(now);
-        self.close_down(now);
+        self.uploads.settle(now, &mut self.outgoing, &mut self.latencies);
+        self.shut_down(now);
+    }
+
+    /// Takes no new requests any more, and gives those that run a grace period, which another signal ends.
+    fn terminate(&mut self, now: Instant) {
+        self.shutdown = self.shutdown.requested(now, self.limits.grace);
+        self.queues.close();
+        let error = Shutdown::error();
+        for (key, session) in &mut self.sessions {
+            if session.state() == State::Queued && self.queues.plans.withdraw(|job| job.key == *key) {
+                session.end_with(Input::Refuse, &error);
+            }
+        }
+    }
+
+    fn shut_down(&mut self, now: Instant) {
+        match self.shutdown {
+            Shutdown::Grace(end) if end <= now => {
+                self.sessions.values().for_each(Session::cancel_work);
+                self.uploads.cancel_work();
+                self.shutdown = Shutdown::Drain(now + self.limits.drain);
+            }
+            Shutdown::Drain(end) if end <= now => {
+                let error = Shutdown::error();
+                for session in self.sessions.values_mut() {
+                    // Legal from every live state: a worker that does not stop is left behind.
+                    let input =
+                        if matches!(session.state(), State::Streaming) { Input::Fail } else { Input::Refuse };
+                    session.end_with(input, &error);
+                    session.pump(now, self.limits.patience);
+                    self.outgoing.wakes.push(session.listener);
+                }
+                self.sessions.clear();
+                self.uploads.clear();
+            }
+            _ => {}
+        }
+    }
+
+    /// Whether the shutdown is over: everybody is answered.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.shutdown.is_requested() && self.sessions.is_empty() && self.uploads.is_empty()
     }
 
     fn remove(&mut self, key: SessionKey) {
         if let Some(session) = self.sessions.remove(&key) {
-            self.over(key, session);
+            self.finish(key, session);
         }
     }
 
     /// Counts a session that is finished, and lets its request go.
-    fn over(&mut self, key: SessionKey, session: Session<L>) {
+    fn finish(&mut self, key: SessionKey, session: Session<L>) {
         let counter = match session.state() {
-            State::Ended(End::Done) => &mut self.counters.done,
-            State::Ended(End::Cancelled) => &mut self.counters.cancelled,
-            State::Ended(End::Expired) => &mut self.counters.expired,
-            State::Ended(End::Refused) => &mut self.counters.refused,
+            State::Ended(SessionEnd::Done) => &mut self.counters.done,
+            State::Ended(SessionEnd::Cancelled) => &mut self.counters.cancelled,
+            State::Ended(SessionEnd::Expired) => &mut self.counters.expired,
+            State::Ended(SessionEnd::Refused) => &mut self.counters.refused,
             _ => &mut self.counters.failed,
         };
         *counter += 1;
@@ -400,14 +422,14 @@ impl<L: Link, P: Planning> Desk<L, P> {
         // The request is let go before its client is woken, so that it sees the end.
         let listener = session.listener;
         drop(session);
-        self.wakes.push(listener);
+        self.outgoing.wakes.push(listener);
     }
 
     /// When `settle` must be called next without anything happening.
     pub(crate) fn next_deadline(&self, now: Instant) -> Option<Instant> {
         let queued = self.sessions.values().filter(|s| s.state() == State::Queued).filter_map(|s| s.deadline);
-        let closing = self.closing.end();
-        queued.chain(closing).chain(self.next_upload_deadline(now)).min()
+        let shutdown = self.shutdown.end();
+        queued.chain(shutdown).chain(self.uploads.next_deadline(now)).min()
     }
 
     fn numbers(&self) -> StatusHeader {
@@ -419,18 +441,18 @@ impl<L: Link, P: Planning> Desk<L, P> {
         }
     }
 
-    pub(crate) fn figures(&self) -> Figures {
+    pub(crate) fn metrics(&self) -> Metrics {
         let open = self.sessions.len() + self.uploads.len();
-        Figures::of(
+        Metrics::of(
             &self.numbers(),
             open,
-            self.surroundings,
+            self.host,
             &self.latencies,
             &self.preloaded,
-            AtHand {
-                answers: self.answers.figures(),
+            CacheMetrics {
+                answers: self.answers.metrics(),
                 remembered: self.service.remembered(),
-                ahead: self.queues.prefetch.ahead(),
+                ahead: self.queues.prefetch.metrics(),
             },
         )
     }
@@ -442,42 +464,6 @@ impl<L: Link, P: Planning> Desk<L, P> {
             preloaded: self.preloaded.clone(),
         }
     }
-
-    pub(super) fn answer_handle(&mut self, link: &L, header: &RequestHeader, handle: [u8; 32], known: bool) {
-        let response = HandleResponse { handle, known: u32::from(known), reserved: 0 };
-        self.answer(link, header, ResponseKind::Handle, bytemuck::bytes_of(&response));
-    }
-
-    pub(super) fn answer_error(&mut self, link: &L, header: &RequestHeader, error: &WireError) {
-        self.respond(link, header, ResponseKind::Error, &error.encode(), error.retry_ms);
-    }
-
-    fn answer(&mut self, link: &L, request: &RequestHeader, kind: ResponseKind, bytes: &[u8]) {
-        self.respond(link, request, kind, bytes, 0);
-    }
-
-    /// The one response to a request that is not a plan; its buffer is empty, so it fits.
-    fn respond(
-        &mut self,
-        link: &L,
-        request: &RequestHeader,
-        kind: ResponseKind,
-        bytes: &[u8],
-        retry_ms: u32,
-    ) {
-        let header = ResponseHeader {
-            kind: kind as u32,
-            retry_ms,
-            request: request.request,
-            total: bytes.len() as u64,
-            sent_ns: clock::monotonic_ns(),
-            ..ResponseHeader::default()
-        };
-        if let Err(error) = link.send(header, bytes) {
-            tracing::debug!(?error, ?kind, "answer not delivered");
-        }
-        self.wakes.push(id_of_words(request.listener));
-    }
 }
 
 fn expired() -> (Input, WireError) {
@@ -486,5 +472,5 @@ fn expired() -> (Input, WireError) {
 }
 
 #[cfg(test)]
-#[path = "desk_tests.rs"]
+#[path = "dispatcher_tests.rs"]
 mod tests;

@@ -18,7 +18,7 @@ use super::ports::Ports;
 use super::workers::{Report, WorkerEvent};
 
 /// What comes from other threads of this process.
-pub(super) enum Inbound {
+pub(super) enum ThreadEvent {
     Worker(WorkerEvent),
     Terminate,
     Reload,
@@ -53,16 +53,16 @@ impl Wakes {
 }
 
 /// Takes workers' reports to the port thread.
-pub(super) fn reporter(ports: &Ports, sender: Sender<Inbound>) -> Report {
+pub(super) fn reporter(ports: &Ports, sender: Sender<ThreadEvent>) -> Report {
     let notifier = Arc::downgrade(&ports.wake_self);
-    let told = Mutex::new((sender, Wakes::default()));
+    let shared = Mutex::new((sender, Wakes::default()));
     Arc::new(move |event| {
         let is_due = {
-            let (sender, wakes) = &mut *told.lock().unwrap_or_else(PoisonError::into_inner);
+            let (sender, wakes) = &mut *shared.lock().unwrap_or_else(PoisonError::into_inner);
             // The time before it is sent: it is read later than that.
             let is_due = wakes.is_due(&event, Instant::now());
             // A send fails only when the port thread has left; then nobody is interested.
-            let _ = sender.send(Inbound::Worker(event));
+            let _ = sender.send(ThreadEvent::Worker(event));
             is_due
         };
         if is_due {
@@ -72,13 +72,13 @@ pub(super) fn reporter(ports: &Ports, sender: Sender<Inbound>) -> Report {
 }
 
 /// Takes signals to the port thread.
-pub(super) fn watch_signals(ports: &Ports, sender: Sender<Inbound>) -> Result<(), DaemonError> {
+pub(super) fn watch_signals(ports: &Ports, sender: Sender<ThreadEvent>) -> Result<(), DaemonError> {
     let system = |source| DaemonError::System { what: "watching signals", source };
     let notifier = Arc::downgrade(&ports.wake_self);
     let mut signals = Signals::new([SIGTERM, SIGINT, SIGHUP]).map_err(system)?;
     let watch = move || {
         for signal in signals.forever() {
-            let _ = sender.send(if signal == SIGHUP { Inbound::Reload } else { Inbound::Terminate });
+            let _ = sender.send(if signal == SIGHUP { ThreadEvent::Reload } else { ThreadEvent::Terminate });
             wake(&notifier);
         }
     };
@@ -107,7 +107,7 @@ impl Recently {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::daemon::workers::SessionKey;
+    use crate::daemon::jobs::SessionKey;
 
     #[test]
     fn a_step_that_wakes_nobody_is_read_soon() {

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 
-use sbdp_ipc::headers::RequestKind;
+use sbdp_ipc::headers::{RequestHeader, RequestKind, ResponseHeader};
 
 use super::*;
 use crate::daemon::session::Undelivered;
@@ -60,7 +60,7 @@ impl Planning for Scripted {
         id.0 == [7; 32]
     }
 
-    fn answers_take(&self, bytes: usize) {
+    fn set_response_bytes(&self, bytes: usize) {
         self.answers.store(bytes, Ordering::Relaxed);
     }
 
@@ -132,7 +132,7 @@ impl Wire {
 }
 
 struct Bench {
-    desk: Desk<Wire, Scripted>,
+    dispatcher: Dispatcher<Wire, Scripted>,
     service: Arc<Scripted>,
     reports: Receiver<WorkerEvent>,
     next_request: u64,
@@ -157,7 +157,12 @@ impl Bench {
             let _ = sender.lock().unwrap().send(event);
         });
         start(1, &queues, &service, &report).unwrap();
-        Self { desk: Desk::new(Arc::clone(&service), queues, &config), service, reports, next_request: 0 }
+        Self {
+            dispatcher: Dispatcher::new(Arc::clone(&service), queues, &config),
+            service,
+            reports,
+            next_request: 0,
+        }
     }
 
     fn incoming(&mut self, kind: RequestKind, payload: &[u8]) -> (Wire, Incoming<Wire>) {
@@ -180,25 +185,25 @@ impl Bench {
     }
 
     fn handle(&mut self, event: Event<Wire>) {
-        self.desk.handle(event, Instant::now());
-        self.desk.settle(Instant::now());
+        self.dispatcher.handle(event, Instant::now());
+        self.dispatcher.settle(Instant::now());
     }
 
     /// Lets workers report until something holds.
-    fn until(&mut self, holds: impl Fn(&Desk<Wire, Scripted>) -> bool) {
+    fn until(&mut self, holds: impl Fn(&Dispatcher<Wire, Scripted>) -> bool) {
         let start = Instant::now();
-        while !holds(&self.desk) {
+        while !holds(&self.dispatcher) {
             assert!(start.elapsed() < HANG, "this never happens");
             match self.reports.recv_timeout(Duration::from_millis(5)) {
                 Ok(event) => self.handle(Event::Worker(event)),
-                Err(RecvTimeoutError::Timeout) => self.desk.settle(Instant::now()),
+                Err(RecvTimeoutError::Timeout) => self.dispatcher.settle(Instant::now()),
                 Err(RecvTimeoutError::Disconnected) => panic!("the workers are gone"),
             }
         }
     }
 
     fn until_running(&mut self) {
-        self.until(|desk| desk.sessions.values().any(|s| s.state() == State::Running));
+        self.until(|dispatcher| dispatcher.sessions.values().any(|s| s.state() == State::Running));
     }
 }
 
@@ -210,7 +215,7 @@ fn request(script: u64) -> PlanRequest {
 fn a_plan_is_streamed_and_summed_up() {
     let mut bench = Bench::new(4);
     let wire = bench.script(QUICK);
-    bench.until(|desk| desk.counters.done == 1);
+    bench.until(|dispatcher| dispatcher.counters.done == 1);
     assert_eq!(wire.kinds(), [ResponseKind::Steps as u32, ResponseKind::Summary as u32]);
     assert_eq!(wire.summary_status(), Some("complete"));
 }
@@ -219,12 +224,12 @@ fn a_plan_is_streamed_and_summed_up() {
 fn what_was_answered_before_is_answered_at_once_while_no_worker_is_free() {
     let mut bench = Bench::new(1);
     let first = bench.script(QUICK);
-    bench.until(|desk| desk.counters.done == 1);
+    bench.until(|dispatcher| dispatcher.counters.done == 1);
     bench.script(HOLD);
     bench.until_running();
     let again = bench.script(QUICK);
     assert_eq!((again.kinds(), again.summary_status()), (first.kinds(), Some("complete")));
-    assert_eq!((bench.desk.counters.remembered, bench.desk.counters.done), (1, 2));
+    assert_eq!((bench.dispatcher.counters.remembered, bench.dispatcher.counters.done), (1, 2));
     let unremembered = PlanRequest { no_cache: true, ..request(QUICK) };
     assert!(bench.ask(&unremembered).kinds().is_empty(), "it waits for a worker");
     let error = bench.script(HOLD).error();
@@ -235,29 +240,30 @@ fn what_was_answered_before_is_answered_at_once_while_no_worker_is_free() {
 fn what_was_answered_before_a_restart_is_answered_at_once_after_it() {
     let mut bench = Bench::new(1);
     let first = bench.script(QUICK);
-    bench.until(|desk| desk.counters.done == 1);
+    bench.until(|dispatcher| dispatcher.counters.done == 1);
     let asked = question(&request(QUICK)).unwrap();
-    let before = vec![(asked.clone(), bench.desk.answers.get(&asked).unwrap().messages())];
+    let before = vec![(asked.clone(), bench.dispatcher.answers.get(&asked).unwrap().messages())];
     let mut bench = Bench::of(1, Scripted { before, ..Scripted::default() });
     bench.script(HOLD);
     bench.until_running();
     let again = bench.script(QUICK);
     assert_eq!((again.kinds(), again.summary_status()), (first.kinds(), Some("complete")));
-    assert_eq!(bench.desk.counters.remembered, 1);
+    assert_eq!(bench.dispatcher.counters.remembered, 1);
 }
 
 #[test]
 fn the_service_is_told_what_answers_take_also_after_a_restart() {
-    let told =
-        |bench: &Bench| (bench.service.answers.load(Ordering::Relaxed), bench.desk.answers.figures().bytes);
+    let told = |bench: &Bench| {
+        (bench.service.answers.load(Ordering::Relaxed), bench.dispatcher.answers.metrics().bytes)
+    };
     let mut bench = Bench::new(4);
     assert_eq!(told(&bench), (0, 0));
     bench.script(QUICK);
-    bench.until(|desk| desk.counters.done == 1);
+    bench.until(|dispatcher| dispatcher.counters.done == 1);
     let (bytes, held) = told(&bench);
     assert!(bytes > 0 && bytes == held, "{bytes} told, {held} held");
     let asked = question(&request(QUICK)).unwrap();
-    let before = vec![(asked.clone(), bench.desk.answers.get(&asked).unwrap().messages())];
+    let before = vec![(asked.clone(), bench.dispatcher.answers.get(&asked).unwrap().messages())];
     let bench = Bench::of(1, Scripted { before, ..Scripted::default() });
     assert_eq!(told(&bench), (bytes, bytes));
 }
@@ -266,7 +272,7 @@ fn the_service_is_told_what_answers_take_also_after_a_restart() {
 fn of_a_question_asked_again_only_what_makes_it_another_counts() {
     let mut bench = Bench::new(1);
     bench.script(QUICK);
-    bench.until(|desk| desk.counters.done == 1);
+    bench.until(|dispatcher| dispatcher.counters.done == 1);
     let soon = Some(clock::monotonic_ns() + 1_000_000_000_000);
     for same in [
         request(QUICK),
@@ -276,7 +282,7 @@ fn of_a_question_asked_again_only_what_makes_it_another_counts() {
     ] {
         assert_eq!(bench.ask(&same).summary_status(), Some("complete"), "{same:?}");
     }
-    assert_eq!(bench.desk.counters.remembered, 4);
+    assert_eq!(bench.dispatcher.counters.remembered, 4);
     let late = PlanRequest { deadline_ns: Some(1), ..request(QUICK) };
     assert_eq!(bench.ask(&late).error(), Some(ErrorCode::Expired), "nobody waits for it any more");
     let in_use = bench.next_request;
@@ -285,7 +291,7 @@ fn of_a_question_asked_again_only_what_makes_it_another_counts() {
     assert_eq!(bench.script(QUICK).error(), Some(ErrorCode::Malformed), "its number is that of another");
     bench.handle(Event::Terminate);
     assert_eq!(bench.script(QUICK).error(), Some(ErrorCode::ShuttingDown));
-    assert_eq!(bench.desk.counters.remembered, 4);
+    assert_eq!(bench.dispatcher.counters.remembered, 4);
 }
 
 #[test]
@@ -297,7 +303,7 @@ fn more_than_the_queue_holds_is_answered_busy() {
     let refused = bench.script(QUICK);
     assert_eq!(refused.error(), Some(ErrorCode::Busy));
     bench.service.let_go.store(true, Ordering::Relaxed);
-    bench.until(|desk| desk.counters.done == 2);
+    bench.until(|dispatcher| dispatcher.counters.done == 2);
     assert_eq!(waiting.summary_status(), Some("complete"));
 }
 
@@ -305,10 +311,10 @@ fn more_than_the_queue_holds_is_answered_busy() {
 fn a_panic_is_an_answer_and_the_next_request_is_served() {
     let mut bench = Bench::new(4);
     let wire = bench.script(PANIC);
-    bench.until(|desk| desk.counters.failed == 1);
+    bench.until(|dispatcher| dispatcher.counters.failed == 1);
     assert_eq!(wire.error(), Some(ErrorCode::Failed));
     let wire = bench.script(QUICK);
-    bench.until(|desk| desk.counters.done == 1);
+    bench.until(|dispatcher| dispatcher.counters.done == 1);
     assert_eq!(wire.summary_status(), Some("complete"));
 }
 
@@ -319,10 +325,10 @@ fn a_client_that_leaves_frees_its_worker() {
     bench.until_running();
     held.gone.set(true);
     let next = bench.script(QUICK);
-    bench.until(|desk| desk.counters.done == 1);
+    bench.until(|dispatcher| dispatcher.counters.done == 1);
     assert_eq!(next.summary_status(), Some("complete"));
     assert!(held.kinds().is_empty());
-    assert_eq!(bench.desk.counters.cancelled, 1);
+    assert_eq!(bench.dispatcher.counters.cancelled, 1);
 }
 
 #[test]
@@ -334,7 +340,7 @@ fn cancelling_a_running_request_is_answered_with_what_there_is() {
     control.header.request = 1;
     control.header.flags = CONTROL_CANCEL;
     bench.handle(Event::Control(control));
-    bench.until(|desk| desk.sessions.is_empty());
+    bench.until(|dispatcher| dispatcher.sessions.is_empty());
     assert_eq!(wire.summary_status(), Some("cancelled"));
 }
 
@@ -363,8 +369,8 @@ fn a_deadline_that_passes_in_the_queue_is_answered_expired() {
         ..PlanRequest::default()
     };
     let wire = bench.ask(&request);
-    assert!(bench.desk.next_deadline(Instant::now()).is_some());
-    bench.until(|desk| desk.counters.expired == 1);
+    assert!(bench.dispatcher.next_deadline(Instant::now()).is_some());
+    bench.until(|dispatcher| dispatcher.counters.expired == 1);
     assert_eq!(wire.error(), Some(ErrorCode::Expired));
     bench.service.let_go.store(true, Ordering::Relaxed);
 }
@@ -382,7 +388,7 @@ fn requests_that_cannot_be_planned_are_refused_with_their_code() {
     let (garbage, incoming) = bench.incoming(RequestKind::Plan, &[1, 2, 3]);
     bench.handle(Event::Plan(incoming));
     assert_eq!(garbage.error(), Some(ErrorCode::Malformed));
-    assert_eq!((bench.desk.counters.refused, bench.desk.counters.expired), (3, 1));
+    assert_eq!((bench.dispatcher.counters.refused, bench.dispatcher.counters.expired), (3, 1));
 }
 
 #[test]
@@ -395,7 +401,7 @@ fn terminating_cancels_what_runs_refuses_what_waits_and_then_is_closed() {
     assert_eq!(waiting.error(), Some(ErrorCode::ShuttingDown));
     let late = bench.script(QUICK);
     assert_eq!(late.error(), Some(ErrorCode::ShuttingDown));
-    bench.until(|desk| desk.is_closed());
+    bench.until(|dispatcher| dispatcher.is_closed());
     assert_eq!(running.summary_status(), Some("cancelled"));
 }
 
@@ -413,7 +419,7 @@ impl Bench {
 #[test]
 fn a_client_that_fills_its_share_is_told_when_to_come_again_and_others_are_taken() {
     let mut bench = Bench::new(4);
-    bench.desk.queues = {
+    bench.dispatcher.queues = {
         let mut config = Config::default();
         config.requests.waiting_per_client = 1;
         Queues::new(&config)
@@ -424,7 +430,7 @@ fn a_client_that_fills_its_share_is_told_when_to_come_again_and_others_are_taken
     assert_eq!(refused.error(), Some(ErrorCode::Busy));
     assert!(refused.got.borrow()[0].0.retry_ms > 0);
     assert!(bench.ask_as(OTHER, &unremembered).kinds().is_empty(), "it waits");
-    assert_eq!(bench.desk.queues.plans.len(), 2);
+    assert_eq!(bench.dispatcher.queues.plans.len(), 2);
 }
 
 #[test]
@@ -436,11 +442,11 @@ fn a_batch_request_waits_for_interactive_ones() {
     let batch = bench.ask(&PlanRequest { batch: true, ..unremembered.clone() });
     let urgent = bench.ask_as(OTHER, &unremembered);
     bench.service.let_go.store(true, Ordering::Relaxed);
-    bench.until(|desk| desk.counters.done >= 2);
+    bench.until(|dispatcher| dispatcher.counters.done >= 2);
     assert_eq!(urgent.summary_status(), Some("complete"));
-    bench.until(|desk| desk.counters.done == 3);
+    bench.until(|dispatcher| dispatcher.counters.done == 3);
     assert_eq!(batch.summary_status(), Some("complete"));
 }
 
-#[path = "intake_tests.rs"]
-mod intake;
+#[path = "uploads_tests.rs"]
+mod uploads;

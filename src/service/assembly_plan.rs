@@ -1,4 +1,4 @@
-//! From a disassembly that was found to the plan that puts it together again.
+//! Turns a disassembly plan into the assembly plan.
 
 use std::time::Instant;
 
@@ -6,17 +6,16 @@ use crate::assembling::{Assembling, Hindrance, Unfinished, Waiting};
 use crate::geometry::{Assembly, Waypoint};
 use crate::plan::{Blocked, Plan, PlanStatus, Warning};
 use crate::search::{PlanSink, Progress, Removal, Stage, Staging};
-use crate::termination::Interrupt;
+use crate::termination::{Interrupt, Termination};
 
 use super::answer;
-use super::entry::Time;
 use super::prepared::Prepared;
 
 /// In plans, the action of a part that cannot be put in from where it waits.
 const INSERTION: &str = "insertion";
 
 /// What an assembly plan is made from.
-pub(super) struct PuttingBack<'a> {
+pub(super) struct AssemblyPlanner<'a> {
     pub(super) assembly: &'a Assembly,
     pub(super) prepared: &'a Prepared,
     /// The disassembly, in the planning frame.
@@ -24,13 +23,19 @@ pub(super) struct PuttingBack<'a> {
     pub(super) staging: &'a Staging,
 }
 
-impl PuttingBack<'_> {
-    /// Makes a disassembly plan the assembly plan.
-    pub(super) fn plan(&self, mut plan: Plan, time: Time<'_>, sink: &mut dyn PlanSink) -> Plan {
+impl AssemblyPlanner<'_> {
+    /// The assembly plan of a disassembly plan. Its request was received at `received`.
+    pub(super) fn plan(
+        &self,
+        mut plan: Plan,
+        received: Instant,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+    ) -> Plan {
         let started = Instant::now();
         let Prepared { scene, verifier, .. } = self.prepared;
         let waiting = self.waiting();
-        let (remain, termination) = (&plan.remaining, time.termination);
+        let remain = &plan.remaining;
         let assembling = Assembling::new(scene, verifier, self.removals, remain, &waiting, termination);
         let total = self.removals.len() as u32;
         let mut steps = Vec::new();
@@ -45,10 +50,10 @@ impl PuttingBack<'_> {
         plan.steps = steps;
         plan.warnings.extend(self.unused());
         if let Err(unfinished) = ended {
-            self.told(&mut plan, unfinished);
+            self.explain(&mut plan, unfinished);
         }
         plan.stats.transfer_time_s = Some(started.elapsed().as_secs_f64());
-        plan.stats.total_time_s = time.started.elapsed().as_secs_f64();
+        plan.stats.total_time_s = received.elapsed().as_secs_f64();
         plan
     }
 
@@ -60,7 +65,7 @@ impl PuttingBack<'_> {
         }
     }
 
-    /// Where parts stand at the start that do not stand there as they were given.
+    /// The parts whose start pose differs from the pose that was given, with that start pose.
     fn starts(&self, plan: &Plan, assembling: &Assembling<'_>) -> Vec<(usize, Waypoint)> {
         let starts = assembling.starts();
         let stays = |part: &usize| starts.iter().all(|(p, _)| p != part);
@@ -70,7 +75,7 @@ impl PuttingBack<'_> {
         poses
     }
 
-    /// Poses were given for parts that do not move.
+    /// Warns of staging poses that were given for parts that do not move.
     fn unused(&self) -> Vec<Warning> {
         let Staging::Beside(given) = self.staging else { return Vec::new() };
         let moves = |part: usize| self.removals.iter().any(|r| r.part == part);
@@ -80,7 +85,7 @@ impl PuttingBack<'_> {
     }
 
     /// Says why not all parts are in place.
-    fn told(&self, plan: &mut Plan, unfinished: Unfinished) {
+    fn explain(&self, plan: &mut Plan, unfinished: Unfinished) {
         let (part, what, by) = match unfinished {
             Unfinished::Hindered(part, what, by) => (part, what, by),
             Unfinished::Interrupted(interrupt) => {
@@ -90,7 +95,7 @@ impl PuttingBack<'_> {
                         (PlanStatus::Timeout, "the deadline passed before all parts were in place")
                     }
                 };
-                // Whatever had ended the search is still the reason.
+                // If the search ended for the same reason, its own message stays.
                 if plan.status != status {
                     (plan.status, plan.reason) = (status, Some(reason.to_owned()));
                 }

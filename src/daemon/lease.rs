@@ -1,83 +1,19 @@
-//! The daemon's place: its lock, its `daemon.json`, and its own part of shared memory.
+//! The lease of a place: its locks, `daemon.json`, and the instance in shared memory.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use sbdp_ipc::endpoint::{self, DAEMON_FILE, Endpoint, EndpointError};
-use sbdp_ipc::layout::{self, LayoutError};
+use sbdp_ipc::endpoint::{self, DAEMON_FILE, Endpoint};
+use sbdp_ipc::layout;
 
-use super::instance::{Instance, ignore_missing, sweep};
+use super::instance::{Instance, sweep};
 use super::lock::{LockError, LockFile};
-use crate::config::EndpointConfig;
-
-const LOCK_FILE: &str = "lock";
-
-/// Why the daemon cannot have its place.
-#[derive(Debug, thiserror::Error)]
-pub enum LifecycleError {
-    /// Another daemon has it.
-    #[error("another sbdpd (pid {pid}) holds {lock}: stop it, or give this one another {option}")]
-    Taken {
-        /// The holder's process id, as the lock file says.
-        pid: String,
-        /// The lock file.
-        lock: PathBuf,
-        /// What would have to differ.
-        option: &'static str,
-    },
-    /// The runtime folder is not usable.
-    #[error(transparent)]
-    Endpoint(#[from] EndpointError),
-    /// Prefix or root are not usable.
-    #[error(transparent)]
-    Layout(#[from] LayoutError),
-    /// A file or folder cannot be used.
-    #[error("{path}: {source}")]
-    Io {
-        /// Which.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-}
-
-/// Where a configuration puts the daemon.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Place {
-    pub(crate) runtime_dir: PathBuf,
-    pub(crate) prefix: String,
-    pub(crate) root: PathBuf,
-}
-
-impl Place {
-    pub(crate) fn of(config: &EndpointConfig) -> Result<Self, LifecycleError> {
-        let chosen = config.runtime_dir.clone().unwrap_or_else(endpoint::default_runtime_dir);
-        // The default prefix and root derive from it: it must mean the same from everywhere.
-        let runtime_dir = std::path::absolute(&chosen).map_err(io_error(&chosen))?;
-        let prefix = config.prefix.clone().unwrap_or_else(|| endpoint::default_prefix(&runtime_dir));
-        let root = config.root.clone().unwrap_or_else(|| runtime_dir.join("iox"));
-        Ok(Self { runtime_dir, prefix, root })
-    }
-
-    fn prefix_lock(&self) -> PathBuf {
-        Path::new("/dev/shm").join(format!("{}{LOCK_FILE}", self.prefix))
-    }
-}
-
-/// Checks that a configured place can be used, without touching it.
-///
-/// # Errors
-/// Prefix or root are not usable.
-pub fn check_place(config: &EndpointConfig) -> Result<(), LifecycleError> {
-    let Place { prefix, root, .. } = Place::of(config)?;
-    layout::check_place(&prefix, &root)?;
-    Ok(())
-}
+use super::place::{DaemonPlace, LOCK_FILE, PlaceError, ignore_missing, io_error};
 
 /// The held lock. Dropping it removes `daemon.json`, and all that is in shared memory.
 #[derive(Debug)]
 pub(crate) struct Lease {
-    place: Place,
+    place: DaemonPlace,
     /// This daemon's part of shared memory.
     pub(crate) instance: Instance,
     _locks: [LockFile; 2],
@@ -85,7 +21,7 @@ pub(crate) struct Lease {
 
 impl Lease {
     /// Takes the lock, or says who holds it; then clears what dead daemons left.
-    pub(crate) fn take(place: Place) -> Result<Self, LifecycleError> {
+    pub(crate) fn take(place: DaemonPlace) -> Result<Self, PlaceError> {
         layout::check_place(&place.prefix, &place.root)?;
         endpoint::create_runtime_dir(&place.runtime_dir)?;
         let folder_lock = take_lock(&place.runtime_dir.join(LOCK_FILE), "--runtime-dir")?;
@@ -99,10 +35,10 @@ impl Lease {
     }
 
     /// Tells clients where we are; to be called when the ports are open.
-    pub(crate) fn publish(&self) -> Result<(), LifecycleError> {
+    pub(crate) fn publish(&self) -> Result<(), PlaceError> {
         Endpoint::of_this_process(&self.instance.prefix, &self.instance.root)
             .publish(&self.place.runtime_dir)
-            .map_err(LifecycleError::from)
+            .map_err(PlaceError::from)
     }
 
     /// Removes what clients of dead daemons still made when these were swept.
@@ -122,14 +58,9 @@ impl Drop for Lease {
     }
 }
 
-pub(super) fn io_error(path: &Path) -> impl FnOnce(std::io::Error) -> LifecycleError {
-    let path = path.to_owned();
-    move |source| LifecycleError::Io { path, source }
-}
-
-fn take_lock(path: &Path, option: &'static str) -> Result<LockFile, LifecycleError> {
+fn take_lock(path: &Path, option: &'static str) -> Result<LockFile, PlaceError> {
     LockFile::take(path).map_err(|error| match error {
-        LockError::Held(pid) => LifecycleError::Taken {
+        LockError::Held(pid) => PlaceError::Taken {
             pid: pid.map_or_else(|| "unknown".to_owned(), |pid| pid.to_string()),
             lock: path.to_owned(),
             option,
@@ -138,17 +69,19 @@ fn take_lock(path: &Path, option: &'static str) -> Result<LockFile, LifecycleErr
     })
 }
 
-fn remove_if_there(path: &Path) -> Result<(), LifecycleError> {
+fn remove_if_there(path: &Path) -> Result<(), PlaceError> {
     ignore_missing(fs::remove_file(path)).map_err(io_error(path))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::EndpointConfig;
+    use sbdp_ipc::endpoint::EndpointError;
 
-    fn place(dir: &Path) -> Place {
+    fn place(dir: &Path) -> DaemonPlace {
         let config = EndpointConfig { runtime_dir: Some(dir.join("run")), ..EndpointConfig::default() };
-        Place::of(&config).unwrap()
+        DaemonPlace::of(&config).unwrap()
     }
 
     #[test]
@@ -167,7 +100,7 @@ mod tests {
         let (here, there) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let first = place(here.path());
         let _lease = Lease::take(first.clone()).unwrap();
-        let second = Place { prefix: first.prefix, ..place(there.path()) };
+        let second = DaemonPlace { prefix: first.prefix, ..place(there.path()) };
         let error = Lease::take(second).unwrap_err().to_string();
         assert!(error.contains("--prefix"), "{error}");
     }

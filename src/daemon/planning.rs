@@ -1,0 +1,208 @@
+//! The planning service as the daemon uses it.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use sbdp_ipc::error::{ErrorCode, WireError};
+
+use crate::geometry::{Pose, Revision, SourceAssembly, remember_given, remember_revised};
+use crate::plan::Plan;
+use crate::search::{PlanRequest, PlanSink, Termination};
+use crate::service::{
+    Admission, AnsweredQuestion, AssemblyId, Remembered, Service, ServiceError, recent_answers,
+    remember_answer, remembered_answer,
+};
+
+/// What the workers ask of the planning service; tests script it.
+pub trait Planning: Send + Sync + 'static {
+    /// See [`Service::admit`]. What was given is remembered.
+    ///
+    /// # Errors
+    /// The geometry was refused, or the termination condition became true.
+    fn admit(&self, source: &SourceAssembly, termination: &Termination) -> Result<Admission, ServiceError>;
+    /// See [`Service::revise_until`]. The change is remembered.
+    ///
+    /// # Errors
+    /// The base is unknown, the change is refused, or the termination condition became true.
+    fn revise(
+        &self,
+        base: AssemblyId,
+        revision: &Revision,
+        termination: &Termination,
+    ) -> Result<Admission, ServiceError>;
+    /// The same for a question that brings its change along: nobody will ask for its handle.
+    ///
+    /// # Errors
+    /// As [`Planning::revise`].
+    fn revise_for_now(
+        &self,
+        base: AssemblyId,
+        revision: &Revision,
+        termination: &Termination,
+    ) -> Result<Admission, ServiceError> {
+        self.revise(base, revision, termination)
+    }
+    /// See [`Service::knows`]. Called on the port thread: it must not block.
+    fn knows(&self, id: AssemblyId) -> bool;
+    /// See [`Service::prepare`].
+    ///
+    /// # Errors
+    /// The id is unknown.
+    fn prepare(&self, _: AssemblyId, _: &Termination) -> Result<(), ServiceError> {
+        Ok(())
+    }
+    /// See [`Service::speculate`].
+    ///
+    /// # Errors
+    /// Nothing could be planned.
+    fn speculate(&self, _: AssemblyId, _: &PlanRequest, _: &Termination) -> Result<Plan, ServiceError> {
+        Err(ServiceError::UnknownAssembly)
+    }
+    /// See [`Service::recall_recent`].
+    fn recall_recent(&self) {}
+    /// See [`Service::recent`].
+    fn recent(&self, _: usize) -> Vec<AssemblyId> {
+        Vec::new()
+    }
+    /// See [`Service::remembered`]. Called on the port thread: it must not block.
+    fn remembered(&self) -> Option<Remembered> {
+        None
+    }
+    /// See [`Service::set_response_bytes`]. Called on the port thread: it must not block.
+    fn set_response_bytes(&self, _bytes: usize) {}
+    /// The messages that answered a question before, also before a restart.
+    fn answered(&self, _question: &[u8]) -> Option<Vec<Vec<u8>>> {
+        None
+    }
+    /// The answers that were used last before this process began, with their questions; the last one used comes last.
+    fn recent_answers(&self, _most: usize, _bytes: u64) -> Vec<AnsweredQuestion> {
+        Vec::new()
+    }
+    /// Remembers the messages that answered a question.
+    fn remember(&self, _question: &[u8], _messages: Vec<Vec<u8>>) {}
+    /// See [`Service::plan`].
+    ///
+    /// # Errors
+    /// Nothing could be planned.
+    fn plan(
+        &self,
+        id: AssemblyId,
+        request: &PlanRequest,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+    ) -> Result<Plan, ServiceError>;
+}
+
+impl Planning for Service {
+    fn admit(&self, source: &SourceAssembly, termination: &Termination) -> Result<Admission, ServiceError> {
+        let admission = self.admit_until(source, termination)?;
+        remember_given(self.cache(), &admission.id.0, source);
+        self.keep(admission.id)?;
+        Ok(admission)
+    }
+
+    fn revise(
+        &self,
+        base: AssemblyId,
+        revision: &Revision,
+        termination: &Termination,
+    ) -> Result<Admission, ServiceError> {
+        let admission = self.revise_until(base, revision, termination)?;
+        if admission.id != base {
+            remember_revised(self.cache(), &admission.id.0, &base.0, revision);
+            self.keep(admission.id)?;
+        }
+        Ok(admission)
+    }
+
+    fn revise_for_now(
+        &self,
+        base: AssemblyId,
+        revision: &Revision,
+        termination: &Termination,
+    ) -> Result<Admission, ServiceError> {
+        self.revise_until(base, revision, termination)
+    }
+
+    fn knows(&self, id: AssemblyId) -> bool {
+        Self::knows(self, id)
+    }
+
+    fn prepare(&self, id: AssemblyId, termination: &Termination) -> Result<(), ServiceError> {
+        Self::prepare(self, id, termination)
+    }
+
+    fn speculate(
+        &self,
+        id: AssemblyId,
+        request: &PlanRequest,
+        termination: &Termination,
+    ) -> Result<Plan, ServiceError> {
+        Self::speculate(self, id, request, termination)
+    }
+
+    fn recall_recent(&self) {
+        Self::recall_recent(self);
+    }
+
+    fn recent(&self, most: usize) -> Vec<AssemblyId> {
+        Self::recent(self, most)
+    }
+
+    fn remembered(&self) -> Option<Remembered> {
+        Some(Self::remembered(self))
+    }
+
+    fn set_response_bytes(&self, bytes: usize) {
+        Self::set_response_bytes(self, bytes);
+    }
+
+    fn answered(&self, question: &[u8]) -> Option<Vec<Vec<u8>>> {
+        remembered_answer(self.cache(), question)
+    }
+
+    fn recent_answers(&self, most: usize, bytes: u64) -> Vec<AnsweredQuestion> {
+        recent_answers(self.cache(), most, bytes)
+    }
+
+    fn remember(&self, question: &[u8], messages: Vec<Vec<u8>>) {
+        remember_answer(self.cache(), question, messages);
+    }
+
+    fn plan(
+        &self,
+        id: AssemblyId,
+        request: &PlanRequest,
+        termination: &Termination,
+        sink: &mut dyn PlanSink,
+    ) -> Result<Plan, ServiceError> {
+        Self::plan(self, id, request, termination, sink)
+    }
+}
+
+/// An assembly with some parts elsewhere.
+pub(super) fn with_moved<P: Planning>(
+    service: &P,
+    assembly: AssemblyId,
+    moved: &[(usize, Pose)],
+    termination: &Termination,
+) -> Result<AssemblyId, ServiceError> {
+    if moved.is_empty() {
+        return Ok(assembly);
+    }
+    let revision = Revision { moved: moved.to_vec(), ..Revision::default() };
+    Ok(service.revise_for_now(assembly, &revision, termination)?.id)
+}
+
+/// Runs one request's work; a panic becomes an answer. The service must stay usable after one:
+/// it holds no lock across planning.
+pub(super) fn contained<T>(work: impl FnOnce() -> T) -> Result<T, WireError> {
+    catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
+        let reason = panic
+            .downcast_ref::<&str>()
+            .map(|s| (*s).to_owned())
+            .or_else(|| panic.downcast_ref::<String>().cloned())
+            .unwrap_or_else(|| "no message".to_owned());
+        tracing::error!("a request panicked: {reason}");
+        WireError::new(ErrorCode::Failed, format!("the daemon failed on this request: {reason}"))
+    })
+}
