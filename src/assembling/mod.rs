@@ -156,7 +156,7 @@ impl<'a> Assembling<'a> {
             let mut waiting: Vec<usize> = waits.collect();
             waiting.sort_unstable();
             let past = self.room.check(&waiting, part, &path, self.termination)?;
-            if !past.entries.is_empty() {
+            if !past.penetrations.is_empty() {
                 return Err(self.hindered(part, Hindrance::InsertionMeets, &past));
             }
             let (way, to_there) = self.transfer(place, waiting)?;
@@ -178,7 +178,7 @@ impl<'a> Assembling<'a> {
         among.extend(waiting);
         let ends = [self.start_of(removal), removal.path.last().copied().unwrap_or_default()];
         let at_start = self.room.check(&among, part, &ends[..1], self.termination)?;
-        if !at_start.entries.is_empty() {
+        if !at_start.penetrations.is_empty() {
             return Err(self.hindered(part, Hindrance::WaitsIn, &at_start));
         }
         let away = self.away(removal, &among);
@@ -187,7 +187,8 @@ impl<'a> Assembling<'a> {
         let retreat = RETREAT * self.room.reach(part).max(LEAST_RETREAT * self.room.scene.longest_side);
         let clear = Translation3::from(away * retreat) * goal;
         let last = self.room.check(&among, part, &[clear, goal], self.termination)?;
-        let (goal, last) = if last.entries.is_empty() { (clear, Some(last.depth)) } else { (goal, None) };
+        let (goal, last) =
+            if last.penetrations.is_empty() { (clear, Some(last.depth)) } else { (goal, None) };
         let found = Transfer::new(&self.room, &among, part, [start, goal], away, self.termination).path()?;
         let (mut way, depth) =
             found.ok_or_else(|| Unfinished::Hindered(part, Hindrance::NoWay(MOST_SAMPLES), Vec::new()))?;
@@ -213,7 +214,7 @@ impl<'a> Assembling<'a> {
     }
 
     fn hindered(&self, part: usize, what: Hindrance, verdict: &Verdict) -> Unfinished {
-        let mut by: Vec<usize> = verdict.entries.iter().map(|e| self.room.part(e.other)).collect();
+        let mut by: Vec<usize> = verdict.penetrations.iter().map(|e| self.room.part(e.other)).collect();
         by.sort_unstable();
         by.dedup();
         Unfinished::Hindered(part, what, by)

@@ -57,7 +57,7 @@ fn assert_apart(scene: &Scene, verifier: &Verifier, insertions: &[Insertion]) {
         let verdict = verifier
             .check(&there, &scene.allowed, &others, insertion.part, &insertion.path, &Termination::default())
             .unwrap();
-        assert!(verdict.entries.is_empty(), "part {}: {}", insertion.part, verdict.depth);
+        assert!(verdict.penetrations.is_empty(), "part {}: {}", insertion.part, verdict.depth);
         assert_eq!(insertion.path.last(), Some(&scene.bodies[insertion.part].planning_from_shape));
     }
 }

@@ -73,7 +73,7 @@ impl<'a> Transfer<'a> {
             self.exact = exact;
             let Some(way) = self.tried(if exact { MOST_SAMPLES } else { FEW_SAMPLES })? else { continue };
             let verdict = self.room.check(self.among, self.part, &way, self.termination)?;
-            if verdict.entries.is_empty() {
+            if verdict.penetrations.is_empty() {
                 return Ok(Some((way, verdict.depth)));
             }
         }
@@ -132,7 +132,7 @@ impl Space for Transfer<'_> {
         }
         let way = self.room.way(self.part, from, to);
         let verdict = self.room.check(self.among, self.part, &way, self.termination)?;
-        Ok(verdict.entries.is_empty())
+        Ok(verdict.penetrations.is_empty())
     }
 
     fn sample(&mut self) -> Pose {

@@ -18,7 +18,7 @@ use crate::contact::PairPath;
 use crate::contact::course::{Course, Interval, turns_far};
 use crate::contact::helix_profile::{centred, depth_on_screw};
 use crate::contact::region_cover::path::{DepthPrecision, PathDepth, PathQuestion};
-use crate::contact::sampled::along_path::{Entry, PathSamples};
+use crate::contact::sampled::along_path::{PathSamples, Penetration};
 use crate::geometry::{Pose, Shape, Surface, area_normal};
 use crate::scene::{AllowedPenetrations, CongruentPair, Scene};
 use crate::termination::{Interrupt, Termination};
@@ -34,31 +34,31 @@ pub struct Verdict {
     /// refused one, the deepest that was found before it was given up: it may get deeper.
     pub depth: f64,
     /// Points that got deep along a path that exceeds the limit; empty if the path is good.
-    pub entries: Vec<Entry>,
+    pub penetrations: Vec<Penetration>,
 }
 
 impl Verdict {
     /// On a path where nothing but these points gets deeper than `bound` into one part.
-    fn past(bound: f64, entries: Vec<Entry>) -> Self {
-        Self { depth: deepest(bound, &entries), entries }
+    fn past(bound: f64, penetrations: Vec<Penetration>) -> Self {
+        Self { depth: deepest(bound, &penetrations), penetrations }
     }
 
-    /// Of what was found past each of the parts that stand; entries up to `limit` make a good path and
+    /// Of what was found past each of the parts that stand; penetrations up to `limit` make a good path and
     /// are dropped, as are those of a refused one that are too shallow to help.
     #[must_use]
     pub fn of_all(past: Vec<Self>, limit: f64) -> Self {
         let depth = past.iter().map(|v| v.depth).fold(0.0, f64::max);
         if depth <= limit {
-            return Self { depth, entries: Vec::new() };
+            return Self { depth, penetrations: Vec::new() };
         }
-        let entries = past.into_iter().flat_map(|v| v.entries);
-        Self { depth, entries: entries.filter(|e| e.over > limit * HELPFUL).collect() }
+        let penetrations = past.into_iter().flat_map(|v| v.penetrations);
+        Self { depth, penetrations: penetrations.filter(|e| e.over > limit * HELPFUL).collect() }
     }
 }
 
 /// The largest of a depth and those of some points.
-fn deepest(depth: f64, entries: &[Entry]) -> f64 {
-    entries.iter().map(|e| e.over).fold(depth, f64::max)
+fn deepest(depth: f64, penetrations: &[Penetration]) -> f64 {
+    penetrations.iter().map(|e| e.over).fold(depth, f64::max)
 }
 
 /// The check, prepared for all shapes.
@@ -126,8 +126,9 @@ impl Verifier {
         let effort = [one.effort, other.effort];
         tracing::debug!(parts = ?pair.parts, depth, ?effort, "overlap measured");
         if !one.open.is_empty() || !other.open.is_empty() {
-            let entries = self.samples.entries_along(&passing, &passing.path, self.limit, termination)?;
-            return Ok(deepest(depth, &entries));
+            let penetrations =
+                self.samples.penetrations_along(&passing, &passing.path, self.limit, termination)?;
+            return Ok(deepest(depth, &penetrations));
         }
         Ok(depth)
     }
@@ -193,14 +194,14 @@ impl Verifier {
         let [part, other] = passing.parts;
         let effort = found.each_ref().map(|f| f.effort);
         tracing::debug!(part, other, allowed = passing.allowed, bound, ?effort, "verified");
-        let mut entries = deepest_entries(passing, &found);
+        let mut penetrations = deepest_penetrations(passing, &found);
         if bound <= *limit {
             for stretch in joined(course, found.iter().flat_map(|f| &f.open)) {
                 let path = course.path_between(stretch);
-                entries.extend(samples.entries_along(passing, &path, *limit, termination)?);
+                penetrations.extend(samples.penetrations_along(passing, &path, *limit, termination)?);
             }
         }
-        Ok(Verdict::past(bound, entries))
+        Ok(Verdict::past(bound, penetrations))
     }
 
     /// How deep the moving part gets into the standing one, and the other way round, as far as that can be
@@ -241,14 +242,14 @@ fn joined<'i>(course: &Course, intervals: impl Iterator<Item = &'i Interval>) ->
 }
 
 /// The points that help in refining a motion: of those that are near each other, the deepest.
-fn deepest_entries(passing: &PairPath<'_>, [moving, standing]: &[PathDepth; 2]) -> Vec<Entry> {
+fn deepest_penetrations(passing: &PairPath<'_>, [moving, standing]: &[PathDepth; 2]) -> Vec<Penetration> {
     let PairPath { parts: [_, other], longest_side, .. } = *passing;
     let cell = COARSE_SHARE * longest_side;
-    let mut taken: BTreeMap<(bool, [i64; 3]), Entry> = BTreeMap::new();
+    let mut taken: BTreeMap<(bool, [i64; 3]), Penetration> = BTreeMap::new();
     for (on_moving, side) in [(true, moving), (false, standing)] {
         for &(point, over) in &side.deep {
             let key = (on_moving, point.coords.map(|x| (x / cell).floor() as i64).into());
-            let entry = Entry { other, on_moving, point, over };
+            let entry = Penetration { other, on_moving, point, over };
             match taken.entry(key) {
                 Occupied(mut known) if known.get().over < over => {
                     known.insert(entry);

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::contact::sampled::along_path::Entry;
+use crate::contact::sampled::along_path::Penetration;
 use crate::geometry::{Pose, separating_direction, transformed};
 use crate::plan::PlanStatus;
 use crate::scene::{HullTree, StandingParts, exit_direction};
@@ -286,7 +286,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         let part = run.part;
         let refuted = match self.checked(part, &joined(prefix, motion))? {
             Ok(proof) => return Ok(Ok(proof)),
-            Err(entries) => entries,
+            Err(penetrations) => penetrations,
         };
         tracing::debug!(part, action = %run.action, over = refuted.first().map(|e| e.over), "sweep refuted");
         self.trace_refutation(run, &refuted);
@@ -296,8 +296,8 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     }
 
     /// Tells of a refuted path; the parts that it enters.
-    fn trace_refutation(&mut self, run: &Run, entries: &[Entry]) -> Vec<usize> {
-        let mut by: Vec<_> = entries.iter().map(|e| e.other).collect();
+    fn trace_refutation(&mut self, run: &Run, penetrations: &[Penetration]) -> Vec<usize> {
+        let mut by: Vec<_> = penetrations.iter().map(|e| e.other).collect();
         by.sort_unstable();
         by.dedup();
         let (part, action) = (run.part, run.action.to_string());
@@ -313,7 +313,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         for refinement in 0..=REFINEMENTS {
             let refuted = match self.checked(part, &joined(prefix, &motion))? {
                 Ok((path, depth)) => return Ok(Proof::Path { path, depth }),
-                Err(entries) => entries,
+                Err(penetrations) => penetrations,
             };
             tracing::debug!(part, refinement, over = refuted.first().map(|e| e.over), "path refuted");
             self.problem.add_samples(part, &refuted);

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::blocking_graph::StaticAnalysis;
 use crate::cache::RequestCache;
 use crate::contact::PairPath;
-use crate::contact::sampled::along_path::Entry;
+use crate::contact::sampled::along_path::Penetration;
 use crate::geometry::{Pose, SampleTree};
 use crate::plan::{KnownVerdicts, Verdict, VerdictQuestion, Verifier, thinned};
 use crate::scene::Scene;
@@ -37,7 +37,7 @@ pub trait Observer {
 }
 
 /// A verified path with its depth, or the points that refute it.
-pub type Checked = Result<(Vec<Pose>, f64), Vec<Entry>>;
+pub type Checked = Result<(Vec<Pose>, f64), Vec<Penetration>>;
 
 /// What is to be searched.
 #[derive(Clone)]
@@ -137,12 +137,16 @@ impl Problem<'_> {
         if let Some(centred) = centred {
             let thin = self.thinned(part, &centred);
             let verdict = self.verdict(&self.near(&standing, part, &thin), part, &thin)?;
-            if verdict.entries.is_empty() {
+            if verdict.penetrations.is_empty() {
                 return Ok(Ok((thin, verdict.depth)));
             }
         }
         let verdict = self.verdict(&near, part, &thin)?;
-        if verdict.entries.is_empty() { Ok(Ok((thin, verdict.depth))) } else { Ok(Err(verdict.entries)) }
+        if verdict.penetrations.is_empty() {
+            Ok(Ok((thin, verdict.depth)))
+        } else {
+            Ok(Err(verdict.penetrations))
+        }
     }
 
     fn thinned(&self, part: usize, path: &[Pose]) -> Vec<Pose> {
@@ -168,14 +172,14 @@ impl Problem<'_> {
     }
 
     /// Makes points that refuted a path samples of their bodies.
-    pub fn add_samples(&mut self, part: usize, entries: &[Entry]) {
+    pub fn add_samples(&mut self, part: usize, penetrations: &[Penetration]) {
         let key = |p: &Point3<f64>| p.coords.map(f64::to_bits);
         let mut known: HashSet<_> = self
             .extra_points
             .iter()
             .flat_map(|(body, list)| list.iter().map(move |p| (*body, key(p))))
             .collect();
-        for entry in entries {
+        for entry in penetrations {
             let body = if entry.on_moving { part } else { entry.other };
             if known.insert((body, key(&entry.point))) {
                 self.extra_points.entry(body).or_default().push(entry.point);

@@ -26,7 +26,7 @@ use super::super::pair_path::PairPath;
 
 /// A point that gets too deep.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
+pub struct Penetration {
     /// The standing part of the pair.
     pub other: usize,
     /// Whether the point is on the moving part.
@@ -92,19 +92,19 @@ impl PathSamples {
     /// The samples that get deeper than allowed on a stretch of a path past a part: for each pose and side the
     /// deepest one. If the path is refused (beyond `limit`), also all others that are deep enough to help in refining
     /// the motion.
-    pub(crate) fn entries_along(
+    pub(crate) fn penetrations_along(
         &self,
         passing: &PairPath<'_>,
         stretch: &[Pose],
         limit: f64,
         termination: &Termination,
-    ) -> Result<Vec<Entry>, Interrupt> {
+    ) -> Result<Vec<Penetration>, Interrupt> {
         let poses = dense(passing, stretch);
-        let mut entries = self.entries_at(passing, &poses, limit, Closeness::Sparse, termination)?;
-        if entries.iter().all(|e| e.over <= limit) {
-            entries.extend(self.entries_at(passing, &poses, limit, Closeness::Dense, termination)?);
+        let mut penetrations = self.entries_at(passing, &poses, limit, Closeness::Sparse, termination)?;
+        if penetrations.iter().all(|e| e.over <= limit) {
+            penetrations.extend(self.entries_at(passing, &poses, limit, Closeness::Dense, termination)?);
         }
-        Ok(entries)
+        Ok(penetrations)
     }
 
     /// The same at some poses, with samples of one density.
@@ -115,7 +115,7 @@ impl PathSamples {
         limit: f64,
         closeness: Closeness,
         termination: &Termination,
-    ) -> Result<Vec<Entry>, Interrupt> {
+    ) -> Result<Vec<Penetration>, Interrupt> {
         let back: Vec<Pose> = poses.iter().map(Pose::inverse).collect();
         let [moving, standing] = passing.surfaces();
         let [part, other] = passing.parts.map(|part| self.of(part, closeness));
@@ -154,9 +154,9 @@ fn worth_telling(
     deep: f64,
     passing: &PairPath<'_>,
     sides: &[PathSide<'_>; 2],
-) -> Vec<Entry> {
+) -> Vec<Penetration> {
     let worst = entered.iter().map(|e| e.over).fold(0.0, f64::max);
-    let entry = |e: &DeepSample| Entry {
+    let entry = |e: &DeepSample| Penetration {
         other: passing.parts[1],
         on_moving: e.side == 0,
         point: sides[e.side].samples[e.share].points()[e.sample],
@@ -341,16 +341,16 @@ mod tests {
             scene([rod(1.0, long, 3), moved(rod(1.0, long, 3), &place)])
         };
         let t = Termination::default();
-        let entries = |depth: f64| {
+        let penetrations = |depth: f64| {
             let (scene, _) = across(depth);
             let passing = PairPath::standing(&scene, &CongruentPair::turned(&scene, 1, 0));
             let assembled: Vec<Arc<Shape>> = scene.bodies.iter().map(|b| Arc::clone(&b.shape)).collect();
             let samples = PathSamples::new(&assembled, vec![0, 1]);
             let sparse = samples.entries_at(&passing, &passing.path, 1.0, Closeness::Sparse, &t).unwrap();
-            (sparse.len(), samples.entries_along(&passing, &passing.path, 1.0, &t).unwrap().len())
+            (sparse.len(), samples.penetrations_along(&passing, &passing.path, 1.0, &t).unwrap().len())
         };
-        assert_eq!(entries(-0.01), (0, 0));
-        let (sparse, all) = entries(0.02);
+        assert_eq!(penetrations(-0.01), (0, 0));
+        let (sparse, all) = penetrations(0.02);
         assert!(sparse == 0 && all > 0, "{sparse} of {all}");
     }
 

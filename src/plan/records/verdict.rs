@@ -57,7 +57,7 @@ impl KnownVerdicts {
         };
         // It may have been found past a part that stands alike.
         let [_, other] = question.passing.parts;
-        verdict.entries.iter_mut().for_each(|entry| entry.other = other);
+        verdict.penetrations.iter_mut().for_each(|entry| entry.other = other);
         Ok(verdict)
     }
 
@@ -88,7 +88,7 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
-    use crate::contact::sampled::along_path::Entry;
+    use crate::contact::sampled::along_path::Penetration;
     use crate::fixtures::{cuboid, moved, scene};
     use crate::geometry::Pose;
 
@@ -106,15 +106,18 @@ mod tests {
             let check = || {
                 checks.set(checks.get() + 1);
                 let point = Point3::new(0.5, 0.0, height);
-                let entry = Entry { other: parts[1], on_moving: true, point, over: 0.5 };
-                Ok(Verdict { depth: 0.5, entries: vec![entry] })
+                let entry = Penetration { other: parts[1], on_moving: true, point, over: 0.5 };
+                Ok(Verdict { depth: 0.5, penetrations: vec![entry] })
             };
             known.verdict(&VerdictQuestion { passing, limit: 2e-3 }, &cache, check).unwrap()
         };
         let (one, other) = (verdict_on([1, 0], 0.25, 0.0), verdict_on([3, 2], 0.5, 0.0));
         assert_eq!((checks.get(), one.depth, other.depth), (1, 0.5, 0.5));
-        assert_eq!((one.entries[0].other, other.entries[0].other), (0, 2));
-        assert_eq!(one.entries[0].point, other.entries[0].point, "past the foot, both are out of its sight");
+        assert_eq!((one.penetrations[0].other, other.penetrations[0].other), (0, 2));
+        assert_eq!(
+            one.penetrations[0].point, other.penetrations[0].point,
+            "past the foot, both are out of its sight"
+        );
         verdict_on([1, 0], 0.0, 0.25);
         verdict_on([1, 2], 0.25, 0.0);
         assert_eq!(checks.get(), 3, "another way, and past another part");

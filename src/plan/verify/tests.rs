@@ -33,9 +33,11 @@ fn a_path_through_a_wall_is_refused_and_the_wall_named() {
     let (scene, verifier) = scene([plate, block, wall]);
     let verdict = checked(&scene, &verifier, &[Vector3::x() * 6.0]);
     let moving = scene.bodies[1].planning_from_shape;
-    assert!(verdict.entries.iter().any(|e| e.on_moving) && verdict.entries.iter().any(|e| !e.on_moving));
-    assert!(verdict.entries.len() > 10);
-    for e in &verdict.entries {
+    assert!(
+        verdict.penetrations.iter().any(|e| e.on_moving) && verdict.penetrations.iter().any(|e| !e.on_moving)
+    );
+    assert!(verdict.penetrations.len() > 10);
+    for e in &verdict.penetrations {
         assert!(e.other == 2 && e.over > LIMIT, "{e:?}");
         let (own, into) = if e.on_moving { (1, 2) } else { (2, 1) };
         let surface = |part: usize| &scene.bodies[part].shape.surface;
@@ -52,7 +54,7 @@ fn a_path_through_a_wall_is_refused_and_the_wall_named() {
     }
     // The verdict is the deepest of them, and no block is deeper in a wall than half its width.
     let by_side = |on: bool| {
-        let side = verdict.entries.iter().filter(|e| e.on_moving == on);
+        let side = verdict.penetrations.iter().filter(|e| e.on_moving == on);
         side.map(|e| e.over).fold(0.0, f64::max)
     };
     assert_eq!(by_side(true).max(by_side(false)), verdict.depth);
@@ -64,7 +66,7 @@ fn entries_are_points_of_the_surface_that_they_name() {
     let (scene, verifier) = scene(block_on_plate());
     let verdict = checked(&scene, &verifier, &[Vector3::new(0.3, 0.2, -0.1)]);
     assert!((verdict.depth - 0.1).abs() < 1e-9, "{}", verdict.depth);
-    for e in &verdict.entries {
+    for e in &verdict.penetrations {
         let shape = &scene.bodies[if e.on_moving { 1 } else { e.other }].shape;
         assert!(shape.surface.signed_distance(&e.point).abs() < 1e-9, "{e:?}");
     }
@@ -112,7 +114,7 @@ fn flush_sliding_is_not_deep() {
         let (scene, verifier) = scene(block_on_plate().map(|m| moved(m, &pose)));
         let steps = [Vector3::new(2.0, 1.0, 0.0), Vector3::new(-4.0, 0.5, 0.0), Vector3::new(8.0, 0.0, 0.0)];
         let verdict = checked(&scene, &verifier, &steps.map(|s| pose * s));
-        assert!(verdict.depth < 1e-9 && verdict.entries.is_empty(), "{}", verdict.depth);
+        assert!(verdict.depth < 1e-9 && verdict.penetrations.is_empty(), "{}", verdict.depth);
     }
 }
 
@@ -186,7 +188,7 @@ fn what_keeps_a_deep_overlap_on_its_way_is_let_pass() {
         "{depth} of {deepest}"
     );
     let verdict = checked(&scene, &verifier, &[Vector3::x() * 0.7]);
-    assert!(verdict.depth < LIMIT / 2.0 && verdict.entries.is_empty(), "{}", verdict.depth);
+    assert!(verdict.depth < LIMIT / 2.0 && verdict.penetrations.is_empty(), "{}", verdict.depth);
 }
 
 #[test]
@@ -228,8 +230,8 @@ fn coincident_parts_share_their_inside() {
 fn a_depth_up_to_the_limit_is_told_but_not_refused() {
     let (scene, verifier) = scene(block_on_plate());
     let slight = checked(&scene, &verifier, &[Vector3::z() * (-0.9 * LIMIT)]);
-    assert!((slight.depth - 0.9 * LIMIT).abs() < 1e-9 && slight.entries.is_empty());
-    assert!(!checked(&scene, &verifier, &[Vector3::z() * (-1.1 * LIMIT)]).entries.is_empty());
+    assert!((slight.depth - 0.9 * LIMIT).abs() < 1e-9 && slight.penetrations.is_empty());
+    assert!(!checked(&scene, &verifier, &[Vector3::z() * (-1.1 * LIMIT)]).penetrations.is_empty());
     assert_eq!(verifier.limit(), LIMIT);
 }
 
@@ -289,10 +291,10 @@ proptest! {
         });
         let deepest = deepest.fold(0.0, f64::max);
         prop_assert!(verdict.depth >= deepest.min(LIMIT) - 1e-5, "{} for {deepest}", verdict.depth);
-        prop_assert_eq!(verdict.depth > LIMIT, !verdict.entries.is_empty());
+        prop_assert_eq!(verdict.depth > LIMIT, !verdict.penetrations.is_empty());
         // No alarm without a cause; a corner may be deep for a moment only.
         let dense = poses(600);
-        for e in verdict.entries.iter().take(20) {
+        for e in verdict.penetrations.iter().take(20) {
             let there = dense.iter().map(|pose| depth(pose, e.on_moving, &e.point)).fold(0.0, f64::max);
             prop_assert!(there > 0.25 * LIMIT && e.over <= there + 0.01, "{there} at {e:?}");
         }
