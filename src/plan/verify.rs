@@ -1,8 +1,8 @@
 //! Verification of a path on the triangles, independent of distance fields and engines.
 //!
-//! For every standing part that the moving one comes near ([`PairPath`]), both surfaces are bounded against
-//! each other all along the way ([`path`](crate::contact::region_cover::path) says how, and what that
-//! guarantees): what counts is depth beyond that of the pair at the assembled pose, which is measured with the same search.
+//! Both surfaces of the moving part and of each standing part near its path ([`PairPath`]) are bounded against each
+//! other all along the path ([`path`](crate::contact::region_cover::path) describes how, and with which guarantees).
+//! Only depth beyond that of the pair at the assembled pose counts, which is measured by the same search.
 //! Screws of many turns are bounded by their profiles, too ([`helix_profile`](crate::contact::helix_profile)), and what
 //! neither settles is checked at samples ([`along_path`](crate::contact::sampled::along_path)).
 
@@ -43,8 +43,8 @@ impl Verdict {
         Self { depth: deepest(bound, &penetrations), penetrations }
     }
 
-    /// Of what was found past each of the parts that stand; penetrations up to `limit` make a good path and
-    /// are dropped, as are those of a refused one that are too shallow to help.
+    /// Joins the results past each standing part. If no penetration exceeds `limit`, the path is good, and they are
+    /// dropped; of a refused path, those that are too shallow to help are dropped.
     #[must_use]
     pub fn of_all(past: Vec<Self>, limit: f64) -> Self {
         let depth = past.iter().map(|v| v.depth).fold(0.0, f64::max);
@@ -64,14 +64,14 @@ fn deepest(depth: f64, penetrations: &[Penetration]) -> f64 {
 /// The check, prepared for all shapes.
 #[derive(Debug, Clone)]
 pub struct Verifier {
-    /// For what turns far.
+    /// The samples for paths that turn far.
     samples: PathSamples,
     /// Depth beyond the allowed penetration that is still accepted, in the planning frame.
     limit: f64,
 }
 
 impl Verifier {
-    /// Bytes in memory, of what was prepared so far.
+    /// Bytes in memory so far.
     #[must_use]
     pub fn memory(&self) -> usize {
         self.samples.memory()
@@ -229,7 +229,7 @@ impl Verifier {
     }
 }
 
-/// Stretches of the way, those that touch each other as one.
+/// Stretches of the path; those that touch each other become one.
 fn joined<'i>(course: &Course, intervals: impl Iterator<Item = &'i Interval>) -> Vec<[f64; 2]> {
     let mut stretches: Vec<[f64; 2]> = intervals.map(|i| i.of(course.length)).collect();
     stretches.sort_by(|a, b| a[0].total_cmp(&b[0]));
@@ -241,7 +241,7 @@ fn joined<'i>(course: &Course, intervals: impl Iterator<Item = &'i Interval>) ->
     stretches
 }
 
-/// The points that help in refining a motion: of those that are near each other, the deepest.
+/// The points that help in refining a motion: the deepest of those near each other.
 fn deepest_penetrations(passing: &PairPath<'_>, [moving, standing]: &[PathDepth; 2]) -> Vec<Penetration> {
     let PairPath { parts: [_, other], longest_side, .. } = *passing;
     let cell = COARSE_SHARE * longest_side;

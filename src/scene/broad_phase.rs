@@ -12,7 +12,7 @@ use crate::geometry::Bounds;
 #[derive(Debug, Clone)]
 pub struct BroadPhase {
     boxes: Arc<PartBoxes>,
-    /// Takes in every box that is asked about.
+    /// Extended by every box of a query.
     watched: Option<Arc<Mutex<Bounds>>>,
 }
 
@@ -35,7 +35,7 @@ impl BroadPhase {
         Self { boxes: Arc::new(PartBoxes { tree, list: boxes.to_vec() }), watched: None }
     }
 
-    /// The same boxes; `looked_at` grows to hold every box that is asked about.
+    /// The same boxes; `looked_at` is extended by every box of a query.
     #[must_use]
     pub fn watched(&self, looked_at: Arc<Mutex<Bounds>>) -> Self {
         Self { boxes: Arc::clone(&self.boxes), watched: Some(looked_at) }

@@ -1,9 +1,9 @@
-//! Pairs of parts as they stand to each other, wherever that is: what holds for one bolt in its nut
-//! holds for all that stand alike, in this assembly and in others.
+//! Pairs of parts up to a common motion: what holds for one bolt in its nut holds for all congruent pairs, in this
+//! assembly and in others.
 //!
-//! Poses are rounded, far finer than contact is measured, and what is asked about a pair is answered for
-//! the rounded poses in a scene of the two alone. So the answer is the same, to the bit, for all pairs
-//! that stand alike, whichever is asked first.
+//! Poses are rounded, far finer than contact is measured, and questions about a pair are answered for the rounded
+//! poses in a scene of the two alone. So the answer is the same to the bit for all congruent pairs, whichever comes
+//! first.
 
 use std::collections::HashMap;
 use std::hash::Hash;
@@ -58,7 +58,7 @@ impl CongruentPair {
         if first { one } else { other }
     }
 
-    /// The two alone, as parts 0 and 1, with what they are allowed and the resolution of the whole.
+    /// A scene of the two alone, as parts 0 and 1, with their allowed penetration and the resolution of the whole.
     #[must_use]
     pub fn scene(&self, scene: &Scene) -> Scene {
         let [a, b] = self.parts;
@@ -97,13 +97,13 @@ pub fn rounded(x: f64) -> f64 {
     (x / STEP).round() * STEP + 0.0
 }
 
-/// A pose, rounded: what stands alike is equal then, to the bit.
+/// A rounded pose: congruent pairs have equal ones to the bit.
 #[must_use]
 pub fn rounded_pose(pose: &Pose) -> Pose {
     Pose::from_parts(pose.translation.vector.map(rounded).into(), rounded_turn(&pose.rotation))
 }
 
-/// A rotation, of whose two quaternions one is taken.
+/// A rotation, by one of its two quaternions.
 fn rounded_turn(q: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let coords = q.coords.map(rounded);
     let sign = coords.iter().find(|c| **c != 0.0).map_or(1.0, |c| c.signum());

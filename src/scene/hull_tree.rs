@@ -1,11 +1,11 @@
-//! The convex hull of all that stands, kept up while parts leave one by one.
+//! The convex hull of all standing parts, kept up to date while parts leave one by one.
 //!
-//! A binary tree over the parts, neighbours in space together, whose nodes hold the hull of their
-//! parts: without one part only the hulls above it differ, each made of two smaller ones. So leaving
-//! costs the logarithm of the number of parts, where a hull of all points would cost their number. Most of
-//! these need not even be joined again: the points of both halves do as well, while they are few enough. All
-//! parts of the scene have their places in it, whichever stand: so what is gone from the start is taken out of the tree
-//! of all, which the scene keeps.
+//! The nodes of a binary tree over the parts, neighbours in space together, hold the hulls of their parts. If one
+//! part leaves, only the hulls above it change, each made of two smaller ones: this costs the logarithm of the number
+//! of parts, where a hull of all points would cost their number. Most of these need not be joined at once: the points
+//! of both halves serve as well, as long as they are few. All parts of the scene have their places in the tree,
+//! whether they stand or not: parts that are gone from the start are taken out of the tree of all parts, which the
+//! scene keeps.
 
 use std::sync::Arc;
 

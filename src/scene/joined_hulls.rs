@@ -1,5 +1,5 @@
-//! Hulls of two hulls, remembered by their points: planning again what changed a little joins the same ones
-//! again. The larger ones are in a store as well, if there is one.
+//! Hulls of two hulls, remembered by their points: planning a slightly changed assembly joins the same ones again.
+//! The larger ones are in a store as well, if there is one.
 
 use std::collections::HashSet;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,10 +14,10 @@ use crate::lru::Lru;
 pub trait HullStore: std::fmt::Debug + Send + Sync {
     /// The vertices of the hull of points with a hash, if they are there.
     fn hull(&self, points: &[u8; 32]) -> Option<Vec<Point3<f64>>>;
-    /// Those used last before this process began, with the hashes of their points, of no more than so many vertices
-    /// in all; the last one used comes last. They do not count as used by this.
+    /// The hulls used last before this process began, with the hashes of their points, with at most `most` vertices
+    /// in all; the last one used comes last. This does not count as use.
     fn recent_hulls(&self, most: usize) -> Vec<([u8; 32], Vec<Point3<f64>>)>;
-    /// Notes that one of these was used.
+    /// Notes that a hull was used.
     fn hull_used(&self, points: &[u8; 32]);
     /// Remembers them.
     fn remember_hull(&self, points: &[u8; 32], vertices: &[Point3<f64>]);
@@ -34,7 +34,7 @@ pub struct JoinedHulls {
 struct JoinedHull {
     joined: Lru<[u8; 32], [Point3<f64>]>,
     points: usize,
-    /// Those that were read ahead and that nobody has asked for yet.
+    /// Hulls that were read ahead and not used yet.
     unused: HashSet<[u8; 32]>,
 }
 
@@ -45,7 +45,7 @@ impl JoinedHulls {
         Self { held: Mutex::default(), store: Some(store) }
     }
 
-    /// Reads what was used last from the store: read one by one, as they are asked for, hulls take longer.
+    /// Reads the hulls used last from the store at once: one by one they take longer.
     pub fn recall_recent(&self) {
         let store = self.store.as_ref();
         let recent = store.map_or_else(Vec::new, |store| store.recent_hulls(REMEMBERED_HULL_POINTS / 2));
@@ -64,11 +64,11 @@ impl JoinedHulls {
             return Arc::clone(if a.is_empty() { b } else { a });
         }
         let key = key(a, b);
-        // Nobody else waits while the store is told.
+        // No other thread waits while the store notes the use.
         let known = self.held().known(&key);
         if let Some((known, is_first_use)) = known {
             if is_first_use && let Some(store) = &self.store {
-                // Else those that every process uses would be the first to leave it.
+                // Otherwise the hulls that every process uses would leave the store first.
                 store.hull_used(&key);
             }
             return known;

@@ -12,7 +12,7 @@ pub struct Memo {
 }
 
 impl Memo {
-    /// The value of a type; the default one is made when it is first asked for.
+    /// The value of a type; a default one is made on first use.
     #[must_use]
     pub fn of<T: Any + Default + Send + Sync>(&self) -> Arc<T> {
         // A value is inserted whole: a thread that panicked while it held the lock left the map as it was.

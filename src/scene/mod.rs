@@ -110,13 +110,13 @@ pub struct Scene {
     /// Longest side of the whole, the unit of resolutions: rounded down, so that most edits leave it and
     /// all that was found out with it.
     pub longest_side: f64,
-    /// Their boxes, to be asked which are near.
+    /// The tree of their boxes.
     pub broad_phase: Arc<BroadPhase>,
     /// What other modules derive from the scene.
     pub memo: Memo,
     /// Hulls joined so far, also in other scenes.
     pub hulls: Arc<JoinedHulls>,
-    /// Those of all bodies in a tree, once they were asked for.
+    /// The hull tree of all bodies, once it was needed.
     pub(crate) whole: Arc<OnceLock<HullTree>>,
 }
 

@@ -1,11 +1,10 @@
-//! The twists that the contacts of a part hardly resist: the joint that it makes with what it lies in.
+//! The twists that the contacts of a part hardly resist: the joint that it makes with its surroundings.
 //!
-//! Where two surfaces lie close at a point p, with normal n, the twist (v, ω) about a centre c parts or presses
-//! them at the speed n·(v + ω × (p − c)). Taken as equations in both senses, with lengths as shares of the points'
-//! own spread, these rows make up the contact matrix. Right singular vectors whose singular values are small are
-//! motions along which the surfaces slip on each other (N. Gelfand and L. Guibas 2004, Shape segmentation using
-//! local slippage analysis; SVD by faer): a thread shows its own helix there, however it stands and whatever the
-//! rest of the part looks like.
+//! Where two surfaces lie close at a point p, with normal n, the twist (v, ω) about a centre c separates or presses
+//! them at the speed n·(v + ω × (p − c)). These rows, with lengths as shares of the points' own spread, make up the
+//! contact matrix, for both senses. Right singular vectors with small singular values are motions along which the
+//! surfaces slip on each other (N. Gelfand and L. Guibas 2004, Shape segmentation using local slippage analysis; SVD
+//! by faer): a thread shows its own helix there, whatever its pose and the rest of the part.
 
 use faer::Mat;
 use nalgebra::{Matrix3x2, Matrix6, Point3, Unit, Vector3, Vector6};
@@ -23,8 +22,8 @@ use super::Touching;
 pub struct NullTwist {
     /// Its direction, in the planning frame.
     pub axis: Unit<Vector3<f64>>,
-    /// About how far the part moves along it per radian: facets that lean against the flanks they stand for tell it
-    /// wrong by up to a third, its sense right. `None` if the part may turn and shift as it likes.
+    /// About how far the part moves along the axis per radian. Facets that lean against their flanks make it wrong by
+    /// up to a third, its sign right. `None` if the part may turn and shift independently.
     pub rise: Option<f64>,
 }
 
@@ -32,8 +31,8 @@ pub struct NullTwist {
 type TwistContact = (Point3<f64>, Vector3<f64>);
 
 impl NullTwist {
-    /// That of a part at a pose among those that stand (ascending), if contact leaves it one axis to turn about;
-    /// and the parts that were looked at. What is within `reach` (planning frame) is in contact.
+    /// The null twist of a part at a pose among standing parts (ascending), if contact leaves it one axis to turn
+    /// about, and the parts near it. Surfaces within `reach` (planning frame) are in contact.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -83,7 +82,7 @@ impl NullTwist {
             1 => {
                 let (shift, turn) = (vector(5, 0), vector(5, 3));
                 let axis = Unit::try_new(turn, NULL_TURN)?;
-                // Turning is told in units of the spread.
+                // Turning is in units of the spread.
                 Some(Self { axis, rise: Some(axis.dot(&shift) * spread / turn.norm()) })
             }
             2 => {
@@ -149,7 +148,7 @@ mod tests {
             let twist = left(thread(3.0, pitch)).unwrap();
             assert!(along_z(&twist) > 0.9999, "{twist:?}");
             let found = twist.rise.unwrap() * std::f64::consts::TAU;
-            // Facets on a grid lean all the same way against the flank, and tell a false rise.
+            // Facets on a grid all lean the same way against the flank, and show a false rise.
             assert!((found / pitch - 1.0).abs() < 0.3, "{found} of {pitch}");
         }
     }

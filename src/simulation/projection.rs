@@ -16,7 +16,7 @@ pub(super) struct Projected {
 }
 
 impl Projected {
-    /// The parts behind the rows that hold it, ascending; those that hardly push are left out.
+    /// The parts behind the constraints that hold it, ascending, without those that hardly push.
     pub(super) fn others(&self, rows: &[VelocityConstraint]) -> Vec<usize> {
         let strongest = self.active.iter().map(|(_, m)| *m).fold(0.0, f64::max);
         let pushing = self.active.iter().filter(|(_, m)| *m > 1e-6 * strongest);

@@ -1,9 +1,8 @@
-//! Straight sweeps: whether a part leaves along a straight direction without entering anything,
-//! told without simulating.
+//! Straight sweeps: whether a part leaves along a straight direction without entering anything, without simulation.
 //!
-//! The way out ends where the part's hull is apart from that of all others; each part on the way is asked
-//! whether it is entered ([`ShapeCast`], with what that may miss). So "clear" is a claim to be verified like
-//! every path, and "blocked" leaves the question to simulation.
+//! The sweep ends where the part's hull is apart from the hull of all others; each part on the way is cast against
+//! ([`ShapeCast`], with what that may miss). So "clear" is a claim, verified like every path, and "blocked" leaves
+//! the question to simulation.
 
 use nalgebra::{Point3, Translation3, Vector3};
 
@@ -15,7 +14,7 @@ use crate::tolerances::{
     ASSURED_GAP, DEPTH_TOLERANCE, HULL_MARGIN, SWEEP_SUNK, WALL_STEEPNESS, WAY_OUT_FINENESS,
 };
 
-/// What a straight sweep told.
+/// The result of a straight sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Sweep {
     /// The part leaves along a line, to where its hull is apart from that of all others.
@@ -25,14 +24,14 @@ pub enum Sweep {
         /// Along this direction the hulls are apart in the end.
         exit: Vector3<f64>,
     },
-    /// It enters this part, or would have to be simulated to be told.
+    /// It enters this part, or only simulation can decide.
     Blocked {
         /// The part.
         by: usize,
     },
 }
 
-/// A part that is to go along a line out of its surroundings.
+/// A part that is to leave along a line.
 #[derive(Debug, Clone, Copy)]
 pub struct SweepQuestion<'a> {
     /// The bodies.
@@ -58,7 +57,7 @@ pub fn straight_sweep(
     straight_sweep_past(question, termination, |cast| cast.enters())
 }
 
-/// The same, with somebody who tells of each part on the way whether the sweep enters it.
+/// The same, with a function that says of each part on the way whether the sweep enters it.
 ///
 /// # Errors
 /// The termination condition became true, or what `enters` returns.
@@ -81,7 +80,7 @@ pub fn straight_sweep_past<E: From<Interrupt>>(
     let swept = here.union(&bounds.transformed(&end));
     for other in scene.broad_phase.meeting_of(&standing_parts.standing, &swept) {
         let allowed = scene.allowed.of(part, other) + DEPTH_TOLERANCE;
-        // Beyond, it has passed the other for good: so what is found does not depend on how far others reach.
+        // Beyond, it has passed the other for good: so the result does not depend on how far other parts reach.
         let passed = here.grown(allowed).way_past(&scene.bodies[other].bounds, direction);
         let travel = travel.min(passed);
         let margins = CastMargins { allowed, back: allowed, steepness: WALL_STEEPNESS, sunk: SWEEP_SUNK };
@@ -97,10 +96,10 @@ fn moved(pose: &Pose, direction: &Vector3<f64>, travel: f64) -> Pose {
     Translation3::from(direction * travel) * pose
 }
 
-/// How far the part has to go until its hull is apart, and the direction that shows it. Two convex
-/// bodies of which one moves along a line meet during one interval. Its end is sought from beyond: a direction along
-/// which they are apart tells how far back they are so at least, as the gap along it changes evenly with the
-/// travel; further back it is looked again, in steps that double, and halved once they meet.
+/// How far the part has to go until its hull is apart, and the direction that shows it. Two convex bodies, one moving
+/// along a line, meet during one interval, whose end is sought from beyond. A direction along which they are apart
+/// shows how much further back they are apart at least, as the gap along it changes linearly with the travel; further
+/// back it is computed again, in steps that double, and that are halved once the bodies meet.
 fn way_out(
     scene: &Scene,
     standing_parts: &StandingParts,

@@ -1,9 +1,8 @@
 //! The planes that a part lies against.
 //!
-//! Contact between faces is looked for from inside faces: what is nearest to a corner that stands in a
-//! corner leaves a choice of planes, what is nearest to the middle of a face does not. Both
-//! surfaces are cut into bits as fine as their boxes' common part is small. Missed are planes that hold
-//! the part by less than one bit, or only by an edge or a corner of it.
+//! Contact between faces is searched from inside faces: at a corner in a corner, the nearest point leaves a choice of
+//! planes; at the middle of a face it does not. Both surfaces are cut into bits as fine as the common part of their
+//! boxes is small. Planes that hold the part by less than one bit, or only by an edge or a corner, are missed.
 
 use nalgebra::{Point3, Unit, Vector3};
 
@@ -16,15 +15,14 @@ use crate::tolerances::{ONE_DIRECTION_COSINE, OPPOSED_COSINE, TOUCHING_BIT};
 /// What a part touches.
 #[derive(Debug, Clone, Default)]
 pub struct Touching {
-    /// The normals of the planes, in the planning frame, towards the part; `None` if they are too
-    /// many to be told one by one.
+    /// The normals of the planes, in the planning frame, towards the part; `None` if there are too many.
     pub normals: Option<Vec<Unit<Vector3<f64>>>>,
-    /// The parts whose surfaces were looked at, ascending.
+    /// The parts near it, ascending.
     pub parts: Vec<usize>,
 }
 
 impl Touching {
-    /// The parts that may be touched within `reach`: of no others anything is looked at.
+    /// The parts that may be touched within `reach`; no others matter.
     #[must_use]
     pub fn near(scene: &Scene, part: usize, pose: &Pose, standing: &[usize], reach: f64) -> Vec<usize> {
         let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(reach);
@@ -76,24 +74,24 @@ fn common(a: &Bounds, b: &Bounds) -> Bounds {
     Bounds { min: a.min.sup(&b.min), max: a.max.inf(&b.max) }
 }
 
-/// A body whose faces are cut into bits, and one that is measured from there.
+/// A body whose faces are cut into bits, and a body that is measured from there.
 struct TouchingFaces<'a> {
     asked: &'a Body,
     at: &'a Pose,
     measured: &'a Body,
     stands: &'a Pose,
-    /// Where the bits are looked at, in the planning frame.
+    /// The pose of the bits in the planning frame.
     within: Bounds,
     reach: f64,
     deepest: f64,
-    /// Bits still to be looked at, by their corners in the planning frame.
+    /// Bits that are left, by their corners in the planning frame.
     bits: Vec<[Point3<f64>; 3]>,
     poll: &'a Poll<'a>,
 }
 
 impl TouchingFaces<'_> {
-    /// Adds the planes of the measured body, or of the asked one if `sense` is negative: faces that
-    /// are in contact look against each other. False if they are too many.
+    /// Adds the planes of the measured body, or of the cut one if `sense` is negative; faces in contact look against
+    /// each other. False if there are too many.
     fn planes(&mut self, sense: f64, normals: &mut Vec<Unit<Vector3<f64>>>) -> Result<bool, Interrupt> {
         let surface: &Surface = &self.asked.shape.surface;
         let finest = self.within.extents().max() * TOUCHING_BIT;

@@ -35,7 +35,7 @@ pub struct Motion {
     /// Poses of the part's shape in the planning frame, the start first. In contact they are a
     /// contact step apart at most, in free space as far as the clearance allows.
     pub path: Vec<Pose>,
-    /// Indices in the path, ascending, at which it was asked whether the part is out.
+    /// Indices in the path, ascending, of the poses at which the hulls were tested.
     pub asked: Vec<u32>,
     /// How it ended.
     pub end: End,

@@ -1,6 +1,6 @@
-//! Verification: what the check of a path found past one part that stands. It depends only on the two shapes and on how one
-//! passes the other ([`PairPath`]). So a change costs only the checks of the paths that come near it, and parts that leave
-//! alike are checked once.
+//! Verification: the result of the check of a path past one standing part. It depends only on the two shapes and on
+//! how one passes the other ([`PairPath`]). So a change costs only the checks of the paths near it, and parts that
+//! leave congruent pairs are checked once.
 
 use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -55,13 +55,13 @@ impl KnownVerdicts {
                 found
             }
         };
-        // It may have been found past a part that stands alike.
+        // The record may be of a congruent pair.
         let [_, other] = question.passing.parts;
         verdict.penetrations.iter_mut().for_each(|entry| entry.other = other);
         Ok(verdict)
     }
 
-    /// It holds plain data: it is whole even if a holder panicked.
+    /// A mutex that was poisoned still holds consistent data.
     fn lock(&self) -> MutexGuard<'_, HashMap<RecordKey, Verdict>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -1,11 +1,11 @@
 //! Motions: f(s, a, p) is remembered with what it met, and not with the rest of the assembly.
 //!
 //! The record has the motion in contact, until contact stopped it, the engine gave up, or the part was out. Its
-//! *witnesses* are the standing parts whose boxes meet the box of everything that the engine looked at; no other part had
-//! an influence. So the record holds among other parts if the same box meets the same witnesses in the same order: same
-//! meshes, poses, boxes, allowed penetrations and added samples. Whether and where the part is out depends on the hull of all
-//! standing parts, so that is tested again at each pose where the engine had tested it. A motion that ended because the
-//! part was out, but is not out now, is simulated again.
+//! *witnesses* are the standing parts whose boxes meet the box of everything that the engine measured; no other part
+//! had an influence. So the record holds among other parts if the same box meets the same witnesses in the same
+//! order: the same meshes, poses, boxes, allowed penetrations and added samples. Whether and where the part is out
+//! depends on the hull of all standing parts, so that is tested again at each pose where the engine had tested it. A
+//! motion that ended because the part was out, but is not out now, is simulated again.
 //!
 //! The box is known only after the motion, so a look-up takes two steps: what the motion starts from leads to the boxes
 //! and witnesses of known motions ([`WITNESS`]), and these lead to a motion ([`MOTION`]).
@@ -22,7 +22,7 @@ use crate::scene::{Scene, StandingParts, add_samples, add_standing, exit_directi
 use crate::simulation::{Action, End, Motion, TransitionFunction, asked_again};
 use crate::termination::{Interrupt, Termination};
 
-/// Where motions with one start looked, and the witnesses that they met.
+/// The boxes of motions with one start, and the witnesses in them.
 pub(crate) static WITNESS: RecordKind =
     RecordKind::of::<Vec<MotionWitnesses>>(3, "witness", Storage::MemoryAndDisk, SOURCES);
 /// A motion of the transition function.
@@ -32,7 +32,7 @@ pub(crate) static MOTION: RecordKind =
 /// The surroundings of one motion. In a record, the ones used last come last.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct MotionWitnesses {
-    /// The box of everything that the engine looked at.
+    /// The box of everything that the engine measured.
     looked_at: Bounds,
     /// The hash of the parts whose boxes meet it.
     witnesses: [u8; 32],
