@@ -125,6 +125,31 @@ pub(crate) const BACKTRACKS: u32 = 6;
 /// Slopes that are kept at one contact point.
 pub(crate) const SLOPES_PER_POINT: usize = 8;
 
+// The search.
+
+/// Translational passes in a row before turning is tried, if they only find new states. Turning costs several times
+/// more; the paper has one pass.
+pub(crate) const TRANSLATION_PASSES: usize = 6;
+/// States of one part after which its resolution is halved, and again after as many more: in free play states multiply
+/// without end.
+pub(crate) const STATES_PER_LEVEL: usize = 3;
+/// States of the other kind, or not reached straight, that count as one.
+pub(crate) const STATES_ELSEWHERE: usize = 8;
+/// Simulations of one motion with the points at which verification refuted it.
+pub(crate) const REFINEMENTS: usize = 4;
+/// Own pushes of single parts, of all parts together, …
+pub(crate) const OWN_RAYS: usize = 32;
+/// … and own twists.
+pub(crate) const OWN_TWISTS: usize = 64;
+/// A cone with more extreme rays is not narrow.
+pub(crate) const NARROW_CONE_RAYS: usize = 4;
+/// Axes of askew parts beyond the frame.
+pub(crate) const EXTRA_AXES: usize = 3;
+/// Loops of a surface for linking numbers, two for each hole, …
+pub(crate) const SURFACE_LOOPS: usize = 64;
+/// … and pairs of their segments for one pair of parts.
+pub(crate) const SEGMENT_PAIRS: usize = 4_000_000;
+
 // Helices and threads.
 
 /// Slabs along the axis per pitch: a profile is told in these alone.
@@ -166,6 +191,8 @@ pub(crate) const LONG_STEPS_PER_POLL: u32 = 4;
 
 // Memory.
 
+/// Sets of standing parts with their hulls: all would be the square of the number of parts.
+pub(crate) const REMEMBERED_STANDING_PARTS: usize = 64;
 /// Levels of the legs of a path that are remembered: some thousands.
 pub(crate) const REMEMBERED_LEG_LEVELS: u32 = 12;
 /// Pieces for shifts that are kept besides those of assembled pairs; then they are forgotten.

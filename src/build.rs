@@ -26,7 +26,7 @@ const STAGES: [(&str, &str); 18] = [
     ("simulation", "budgets cache contact geometry scene sdf termination tolerances"),
     ("blocking_graph", "cache geometry scene simulation termination"),
     ("plan", "budgets cache contact geometry scene termination tolerances"),
-    ("search", "blocking_graph cache contact geometry plan scene simulation termination tolerances"),
+    ("search", "blocking_graph budgets cache contact geometry plan scene simulation termination tolerances"),
     ("assembling", "contact geometry plan scene search termination"),
     (
         "service",

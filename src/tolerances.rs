@@ -202,6 +202,22 @@ pub(crate) const PRESSED_DEPTH: f64 = 2e-3;
 /// Steps. Samples around the start of a motion are known this far.
 pub(crate) const KNOWN_SAMPLE_STEPS: f64 = 2.0;
 
+// States and directions of the search.
+
+/// Length. Two poses of a part are one state if its centre of mass moves by less (the paper's rmd), or by less than a
+/// twentieth of the part's own length …
+pub(crate) const SAME_STATE_TRAVEL: f64 = 0.05;
+/// … and it turns by less than this many radians (the paper's rmd).
+pub(crate) const SAME_STATE_ROTATION: f64 = 0.5;
+/// Radians. A part that is turned by less was only pushed.
+pub(crate) const TURNED: f64 = 0.05;
+/// Multiple. How much more the axes of the world count than others.
+pub(crate) const WORLD_PREFERENCE: f64 = 1.2;
+/// Cosine. The axis of a null twist is a common axis within this (two degrees).
+pub(crate) const ONE_AXIS_COSINE: f64 = 0.9994;
+/// Length. Curves that come closer might pass through each other within what engines tolerate.
+pub(crate) const LINK_CLEARANCE: f64 = 2e-3;
+
 // Verification.
 
 /// Length. How far any point of a part may lie from the dense path after thinning.

@@ -11,23 +11,16 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::blocking_graph::Blockage;
+use crate::budgets::{OWN_RAYS, OWN_TWISTS};
 use crate::simulation::{Action, Axis};
 use crate::termination::Interrupt;
+use crate::tolerances::{ONE_AXIS_COSINE, ONE_DIRECTION_COSINE};
 
 use super::directions::Directions;
 use super::disassembly::{Disassembly, Stop};
 use super::problem::Problem;
 use super::state::Phase;
 use super::states::States;
-
-/// The most extreme rays, of all parts together.
-const MOST_RAYS: usize = 32;
-/// Cosine within which two rays are one (a quarter of a degree).
-const SAME_RAY: f64 = 0.999_99;
-/// The most near-null twists, of all parts together.
-const MOST_TWISTS: usize = 64;
-/// Cosine within which the axis of a twist is one of all parts (two degrees).
-const SAME_TWIST: f64 = 0.9994;
 
 /// The own actions of parts in one phase.
 #[derive(Debug)]
@@ -70,8 +63,8 @@ pub(super) struct ActionTable {
 
 impl ActionTable {
     pub(super) fn new(directions: Directions, translations: Vec<Action>, rotations: Vec<Action>) -> Self {
-        let rays = OwnActions::new(translations.len(), MOST_RAYS, SAME_RAY);
-        let twists = OwnActions::new(rotations.len(), MOST_TWISTS, SAME_TWIST);
+        let rays = OwnActions::new(translations.len(), OWN_RAYS, ONE_DIRECTION_COSINE);
+        let twists = OwnActions::new(rotations.len(), OWN_TWISTS, ONE_AXIS_COSINE);
         Self {
             directions,
             translations: PhaseActions { actions: translations, own: rays },

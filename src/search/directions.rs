@@ -10,15 +10,12 @@ use std::sync::Arc;
 
 use nalgebra::{Unit, Vector3};
 
+use crate::budgets::EXTRA_AXES;
 use crate::geometry::{NEAR_AXIS, SQUARE, Shape, WeightedDirection, oriented};
 use crate::scene::Scene;
 use crate::simulation::Axis;
 use crate::termination::{Interrupt, Termination};
-
-/// How much more an axis of the world counts.
-const WORLD_PREFERENCE: f64 = 1.2;
-/// Axes of askew parts beyond the frame, at most.
-const MOST_EXTRA: usize = 3;
+use crate::tolerances::WORLD_PREFERENCE;
 
 /// The axes along which a search of some parts of an assembly moves them: a right-angled frame, the world's
 /// where surfaces do not agree on another, and those of parts that stand askew in it.
@@ -85,7 +82,7 @@ impl Directions {
             c.count_among(&mut extra);
         }
         best_first(&mut extra);
-        axes.extend(extra.into_iter().take(MOST_EXTRA).map(|c| c.direction));
+        axes.extend(extra.into_iter().take(EXTRA_AXES).map(|c| c.direction));
         let own = own.iter().map(|c| nearest(&axes, &c.as_ref()?.direction)).collect();
         Ok(Self { axes: axes.into_iter().map(Axis::along).collect(), own })
     }

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use crate::budgets::{REFINEMENTS, REMEMBERED_STANDING_PARTS};
 use crate::contact::sampled::along_path::Penetration;
 use crate::geometry::{Pose, separating_direction, transformed};
 use crate::plan::PlanStatus;
@@ -21,9 +22,6 @@ use crate::tolerances::HULL_MARGIN;
 use super::outcome::{BlockedAction, Counters, Outcome, Removal};
 use super::problem::{Observer, Problem};
 use super::trace::TraceEvent;
-
-/// How often a motion is simulated again with the points at which verification refuted it.
-pub(super) const REFINEMENTS: usize = 4;
 
 /// Why a motion is given up that took too long.
 const NO_TIME: &str = "the time for one path is used up";
@@ -127,8 +125,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
 
     /// All that stands but one part. A few are remembered: all would be the square of their number.
     fn surroundings(&mut self, part: usize) -> Arc<StandingParts> {
-        const REMEMBERED: usize = 64;
-        if self.around.len() >= REMEMBERED && !self.around.contains_key(&part) {
+        if self.around.len() >= REMEMBERED_STANDING_PARTS && !self.around.contains_key(&part) {
             self.around.clear();
         }
         let (everything, scene) = (&self.everything, &self.problem.scene);

@@ -10,11 +10,9 @@ use nalgebra::Point3;
 
 use crate::geometry::Pose;
 use crate::scene::Scene;
+use crate::tolerances::SAME_STATE_ROTATION;
 
 use super::state::{coarseness, least_travel};
-
-/// The rotation at which two states of a part count as the same (the paper's rmd).
-const ROTATION: f64 = 0.5;
 
 /// States of one part, by numbers that their owner gives.
 #[derive(Debug)]
@@ -70,7 +68,7 @@ impl KnownStates {
     pub(super) fn novelty(&self, pose: &Pose) -> f64 {
         let distance = |known: &Pose| {
             let travel = (known * self.centre - pose * self.centre).norm() / self.least_travel;
-            travel + known.rotation.angle_to(&pose.rotation) / ROTATION
+            travel + known.rotation.angle_to(&pose.rotation) / SAME_STATE_ROTATION
         };
         self.states.iter().map(|(_, known)| distance(known)).fold(f64::INFINITY, f64::min)
     }
@@ -83,7 +81,7 @@ impl KnownStates {
     /// Whether two poses are the same state at a multiple of the resolution.
     pub(super) fn alike(&self, a: &Pose, b: &Pose, coarseness: f64) -> bool {
         (a * self.centre - b * self.centre).norm() < self.least_travel * coarseness
-            && a.rotation.angle_to(&b.rotation) < ROTATION * coarseness
+            && a.rotation.angle_to(&b.rotation) < SAME_STATE_ROTATION * coarseness
     }
 
     fn width(&self) -> f64 {
@@ -121,7 +119,7 @@ mod tests {
             for p in asked.iter().map(pose) {
                 let like = |q: &Pose| {
                     (q * centre - p * centre).norm() < least_travel(&scene, 0) * coarse
-                        && q.rotation.angle_to(&p.rotation) < ROTATION * coarse
+                        && q.rotation.angle_to(&p.rotation) < SAME_STATE_ROTATION * coarse
                 };
                 let scanned = states.iter().enumerate().any(|(i, q)| i % 3 != left_out && like(&pose(q)));
                 prop_assert_eq!(known.has_like(&p, |i| i % 3 != left_out), scanned);

@@ -10,18 +10,11 @@ use std::cell::OnceCell;
 
 use nalgebra::Point3;
 
+use crate::budgets::{LONG_STEPS_PER_POLL, SEGMENT_PAIRS, SURFACE_LOOPS};
 use crate::geometry::{linking_number, surface_loops};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll, Termination, try_all};
-
-/// Two per hole.
-const MOST_LOOPS: usize = 64;
-/// Pairs of loop segments that are looked at for one pair of parts.
-const MOST_SEGMENT_PAIRS: usize = 4_000_000;
-/// Segments of one loop, each against all of another, between two looks at the termination condition.
-const SIDES_POLL: u32 = 4;
-/// Curves that come closer than this, in the planning frame, might meet by what engines tolerate.
-const CLEARANCE: f64 = 2e-3;
+use crate::tolerances::LINK_CLEARANCE;
 
 /// A closed polygon in the planning frame.
 type Loop = Vec<Point3<f64>>;
@@ -40,7 +33,7 @@ impl Links {
         parts: &[usize],
         termination: &Termination,
     ) -> Result<Self, Interrupt> {
-        let poll = Poll::every(SIDES_POLL, Some(termination));
+        let poll = Poll::every(LONG_STEPS_PER_POLL, Some(termination));
         // Many parts have nobody near whom they could be linked with: theirs are never looked for.
         let known = vec![OnceCell::new(); scene.bodies.len()];
         let loops = |part: usize| known[part].get_or_init(|| loops(scene, part));
@@ -66,7 +59,7 @@ impl Links {
 /// Curves that generate all on a part's surface, as it stands.
 fn loops(scene: &Scene, part: usize) -> Vec<Loop> {
     let body = &scene.bodies[part];
-    let mut loops = surface_loops(&body.shape.surface, MOST_LOOPS).unwrap_or_default();
+    let mut loops = surface_loops(&body.shape.surface, SURFACE_LOOPS).unwrap_or_default();
     for p in loops.iter_mut().flatten() {
         *p = body.planning_from_shape * *p;
     }
@@ -75,11 +68,11 @@ fn loops(scene: &Scene, part: usize) -> Vec<Loop> {
 
 fn are_linked(a: &[Loop], b: &[Loop], poll: &Poll<'_>) -> Result<bool, Interrupt> {
     let segments = |loops: &[Loop]| loops.iter().map(Vec::len).sum::<usize>();
-    if segments(a) * segments(b) > MOST_SEGMENT_PAIRS {
+    if segments(a) * segments(b) > SEGMENT_PAIRS {
         return Ok(false);
     }
     let are_apart =
-        |(a, b): (&Loop, &Loop)| Ok(linking_number(a, b, CLEARANCE, poll)?.is_none_or(|n| n == 0));
+        |(a, b): (&Loop, &Loop)| Ok(linking_number(a, b, LINK_CLEARANCE, poll)?.is_none_or(|n| n == 0));
     Ok(!try_all(a.iter().flat_map(|a| b.iter().map(move |b| (a, b))), are_apart)?)
 }
 

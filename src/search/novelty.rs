@@ -7,18 +7,15 @@
 
 use rayon::prelude::*;
 
+use crate::budgets::STATES_ELSEWHERE;
 use crate::contact::passes_straight;
 use crate::geometry::Pose;
 use crate::termination::Interrupt;
+use crate::tolerances::TURNED;
 
 use super::disassembly::Disassembly;
 use super::known_states::KnownStates;
 use super::state::coarseness;
-
-/// The number of states of the other kind, or not reached straight, that count as one.
-const ELSEWHERE: usize = 8;
-/// Radians. A part that is turned by less was only pushed.
-const TURNED: f64 = 0.05;
 
 /// The resolution, as a multiple of the paper's, at which a pose of a part is like one of some states of the part;
 /// `None` if it is new.
@@ -48,7 +45,7 @@ pub(super) fn hiding_coarseness(
     let of_kind =
         |wanted: bool| states.iter().zip(&kinds).filter(move |(_, is)| **is == wanted).map(|(s, _)| s);
     let (near, far): (Vec<&Pose>, Vec<&Pose>) = (of_kind(true).collect(), of_kind(false).collect());
-    let coarse = coarseness(near.len() + far.len() / ELSEWHERE);
+    let coarse = coarseness(near.len() + far.len() / STATES_ELSEWHERE);
     let hides = |state: &&Pose| known.alike(state, pose, coarse);
     let hidden = near.iter().any(hides) || (turned && far.iter().any(hides));
     Ok(hidden.then_some(coarse))

@@ -4,6 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 
 use rayon::prelude::*;
 
+use crate::budgets::SHORT_STEPS_PER_POLL;
 use crate::contact::obstruction;
 use crate::termination::{Interrupt, Poll};
 
@@ -11,9 +12,6 @@ use super::action_table::ActionTable;
 use super::disassembly::{Disassembly, Stop};
 use super::state::{Expansion, Phase};
 use super::states::States;
-
-/// Rays between two checks of the termination condition.
-const RAY_POLL: u32 = 64;
 
 /// For a state and a push, the longest stretch of other parts in its way, by its binary logarithm, and the version of
 /// the disassembly for which that holds.
@@ -40,7 +38,7 @@ impl Obstructions {
         let (pushes, problem) = (actions.of(Phase::Translation), &disassembly.problem);
         let found = asked.par_iter().map(|((node, push), standing)| {
             let (node, force) = (&states[*node], pushes[*push].force());
-            let poll = Poll::every(RAY_POLL, Some(&problem.termination));
+            let poll = Poll::every(SHORT_STEPS_PER_POLL, Some(&problem.termination));
             obstruction(&problem.scene, standing, node.part, node.pose(), &force, &poll)
         });
         let found: Vec<f64> = found.collect::<Result<_, Interrupt>>()?;

@@ -13,15 +13,13 @@
 
 use nalgebra::{Unit, Vector3};
 
+use crate::budgets::NARROW_CONE_RAYS;
 use crate::geometry::extreme_rays;
 use crate::simulation::{Action, Axis, Touching, remembered_touching};
 use crate::termination::Interrupt;
 
 use super::problem::Problem;
 use super::state::least_travel;
-
-/// A cone with more rays is not narrow.
-const NARROW: usize = 4;
 
 /// The pushes along the extreme rays that the contacts of a part as assembled leave, and the parts that it touches.
 ///
@@ -37,7 +35,7 @@ pub(super) fn extreme_pushes(
     let Touching { normals, parts } =
         remembered_touching(cache, scene, part, &pose, others, reach, termination)?;
     let rays = extreme_rays(&normals.unwrap_or_default());
-    let few = if rays.len() <= NARROW { &rays[..] } else { &[] };
+    let few = if rays.len() <= NARROW_CONE_RAYS { &rays[..] } else { &[] };
     Ok((few.iter().map(push_along).collect(), parts))
 }
 

@@ -1,11 +1,9 @@
 //! The variant of the search: the paper's or the extended one, with or without blocking graphs.
 
+use crate::budgets::TRANSLATION_PASSES;
+
 use super::request::ActionSet;
 use super::state::{Phase, StateNode};
-
-/// Translational passes in a row before turning is tried, if they only find new states. Turning costs several times
-/// more; with one pass, as in the paper, a maze of pushes is interrupted by turns after every pass.
-const TRANSLATION_PASSES: usize = 6;
 
 /// What a variant of the search does.
 #[derive(Debug, Clone, Copy)]

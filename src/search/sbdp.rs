@@ -19,6 +19,7 @@ use crate::blocking_graph::{Analysis, Blockage};
 use crate::geometry::Pose;
 use crate::simulation::{End, Motion, Sweep};
 use crate::termination::Interrupt;
+use crate::tolerances::TOUCHED;
 
 use super::action_table::ActionTable;
 use super::ball::is_ball;
@@ -37,9 +38,6 @@ use super::states::States;
 use super::sweep_memory::{SweepBlock, SweepMemory};
 use super::trace::TraceEvent;
 use super::twists::null_twists;
-
-/// Ways out that are shorter are equal, in the planning frame.
-const LEAST_WAY: f64 = 1e-6;
 
 /// The result of a pass.
 #[derive(Debug, Clone, Copy, Default)]
@@ -520,7 +518,7 @@ impl<'a, 'o> Search<'a, 'o> {
             let way = |action: &usize| reaches[*action] + bounds.support(&-forces[*action]);
             let mut actions: Vec<usize> = (0..forces.len()).collect();
             // Only a large difference counts, so the order is mostly the same in all assemblies.
-            actions.sort_by_cached_key(|action| (way(action).max(LEAST_WAY).log2() * 2.0).floor() as i32);
+            actions.sort_by_cached_key(|action| (way(action).max(TOUCHED).log2() * 2.0).floor() as i32);
             actions.into_iter().map(move |action| Expansion { node, phase, action })
         };
         self.view().ranked(phase, open.to_vec()).into_iter().flat_map(jobs).collect()

@@ -1,16 +1,12 @@
 //! States: one displaced part among the others at their assembled poses.
 
 use crate::blocking_graph::Blockage;
+use crate::budgets::STATES_PER_LEVEL;
 use crate::geometry::Pose;
 use crate::scene::Scene;
+use crate::tolerances::SAME_STATE_TRAVEL;
 
 use super::trace::TracePhase;
-
-/// The travel at which two states of a part count as the same (the paper's rmd).
-const TRANSLATION: f64 = 0.05;
-/// States of one part after which the resolution is halved, and again after as many more: where
-/// there is much free play, states multiply without end.
-const STATES_PER_LEVEL: usize = 3;
 
 /// The kind of planning: translations, or actions with rotational freedom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -84,7 +80,7 @@ impl StateNode {
 /// Least travel that makes a new state of a part: bounded by its own size.
 #[must_use]
 pub fn least_travel(scene: &Scene, part: usize) -> f64 {
-    TRANSLATION.min(scene.bodies[part].shape.bounds().extents().max() / 20.0)
+    SAME_STATE_TRAVEL.min(scene.bodies[part].shape.bounds().extents().max() / 20.0)
 }
 
 /// The factor by which the resolution of a part's states is coarser once it has `states` of them.

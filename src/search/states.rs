@@ -7,11 +7,12 @@
 use std::collections::HashMap;
 use std::ops::{Index, IndexMut};
 
+use crate::budgets::REFINEMENTS;
 use crate::geometry::Pose;
 use crate::scene::Scene;
 use crate::termination::Interrupt;
 
-use super::disassembly::{Disassembly, REFINEMENTS, Stop};
+use super::disassembly::{Disassembly, Stop};
 use super::known_states::KnownStates;
 use super::novelty::hiding_coarseness;
 use super::rules::Rules;
