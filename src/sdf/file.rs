@@ -150,7 +150,7 @@ impl Grid {
     fn read(surface: &Arc<Surface>, key: &[u8; 32], bytes: &[u8]) -> Option<(Self, Bricks)> {
         let file = Tables::of(bytes, key)?;
         let Header { cell, dims, triangles, open, .. } = file.header;
-        // So that it can be asked which grid such a cell makes.
+        // Otherwise the sizes of the grid would overflow.
         if !(cell.is_normal() && surface.bounds().extents().max() < cell * MOST_SLOTS as f64) {
             return None;
         }
@@ -173,7 +173,7 @@ impl Grid {
 
     /// Writes the grid and the bricks that were filled.
     pub(super) fn write(&self, key: &[u8; 32], out: &mut impl Write) -> io::Result<()> {
-        // What is filled from now on is for another file.
+        // Bricks that are measured from now on go into a later file.
         let known: Vec<Option<&Nodes>> = self.near.iter().map(|near| self.known(near)).collect();
         let mut filled = 0;
         let entry = |(near, known): (&NearBrick, &Option<&Nodes>)| {
@@ -224,7 +224,7 @@ impl Grid {
         if near.nodes.get().is_none()
             && let Some(stored) = self.in_file(near)
         {
-            // Whoever filled it meanwhile found the same.
+            // Another thread that set it meanwhile found the same nodes.
             let _filled = near.nodes.set(Held::Stored(stored));
         }
         near.nodes.get().map(|held| &**held)
