@@ -19,7 +19,7 @@ use super::outgoing::Outgoing;
 use super::planning::Planning;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::response_cache::{CachedResponse, ResponseCache, question};
-use super::session::{Input, Link, Session, SessionEnd, State};
+use super::session::{Input, Link, Session, SessionEnd, SessionState};
 use super::shared_queue::Queues;
 use super::shutdown::Shutdown;
 use super::uploads::Uploads;
@@ -268,7 +268,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
             return;
         }
         session.cancel_work();
-        if session.state() == State::Queued && self.queues.plans.withdraw(|job| job.key == key) {
+        if session.state() == SessionState::Queued && self.queues.plans.withdraw(|job| job.key == key) {
             let error = WireError::new(ErrorCode::Cancelled, "cancelled before planning began");
             session.end_with(Input::Cancel, &error);
         }
@@ -338,7 +338,10 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
                 session.input(Input::Cancel);
             }
             let late = session.deadline.is_some_and(|d| d <= now);
-            if late && session.state() == State::Queued && self.queues.plans.withdraw(|job| job.key == *key) {
+            if late
+                && session.state() == SessionState::Queued
+                && self.queues.plans.withdraw(|job| job.key == *key)
+            {
                 let (input, error) = expired();
                 session.end_with(input, &error);
             }
@@ -362,7 +365,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         self.queues.close();
         let error = Shutdown::error();
         for (key, session) in &mut self.sessions {
-            if session.state() == State::Queued && self.queues.plans.withdraw(|job| job.key == *key) {
+            if session.state() == SessionState::Queued && self.queues.plans.withdraw(|job| job.key == *key) {
                 session.end_with(Input::Refuse, &error);
             }
         }
@@ -379,8 +382,11 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
                 let error = Shutdown::error();
                 for session in self.sessions.values_mut() {
                     // Legal from every live state: a worker that does not stop is left behind.
-                    let input =
-                        if matches!(session.state(), State::Streaming) { Input::Fail } else { Input::Refuse };
+                    let input = if matches!(session.state(), SessionState::Streaming) {
+                        Input::Fail
+                    } else {
+                        Input::Refuse
+                    };
                     session.end_with(input, &error);
                     session.pump(now, self.limits.patience);
                     self.outgoing.wakes.push(session.listener);
@@ -406,10 +412,10 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
     /// Counts a finished session and releases its request.
     fn finish(&mut self, key: SessionKey, session: Session<L>) {
         let counter = match session.state() {
-            State::Ended(SessionEnd::Done) => &mut self.counters.done,
-            State::Ended(SessionEnd::Cancelled) => &mut self.counters.cancelled,
-            State::Ended(SessionEnd::Expired) => &mut self.counters.expired,
-            State::Ended(SessionEnd::Refused) => &mut self.counters.refused,
+            SessionState::Ended(SessionEnd::Done) => &mut self.counters.done,
+            SessionState::Ended(SessionEnd::Cancelled) => &mut self.counters.cancelled,
+            SessionState::Ended(SessionEnd::Expired) => &mut self.counters.expired,
+            SessionState::Ended(SessionEnd::Refused) => &mut self.counters.refused,
             _ => &mut self.counters.failed,
         };
         *counter += 1;
@@ -427,7 +433,8 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
 
     /// When `settle` must be called next, if no event comes before.
     pub(crate) fn next_deadline(&self, now: Instant) -> Option<Instant> {
-        let queued = self.sessions.values().filter(|s| s.state() == State::Queued).filter_map(|s| s.deadline);
+        let queued =
+            self.sessions.values().filter(|s| s.state() == SessionState::Queued).filter_map(|s| s.deadline);
         let shutdown = self.shutdown.end();
         queued.chain(shutdown).chain(self.uploads.next_deadline(now)).min()
     }

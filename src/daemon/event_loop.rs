@@ -151,7 +151,7 @@ impl ReceiveLimits {
 
 /// How many of the waiting requests were taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Received {
+enum Taken {
     /// There were none.
     Nothing,
     /// All.
@@ -198,10 +198,10 @@ impl<P: Planning> EventLoop<'_, P> {
                 continue;
             }
             match received {
-                Received::Nothing => self.wait(next_tick),
+                Taken::Nothing => self.wait(next_tick),
                 // A client that was answered may send its next request at once.
-                Received::All if !self.is_asked_again() => self.wait(next_tick),
-                Received::All | Received::Batch => {}
+                Taken::All if !self.is_asked_again() => self.wait(next_tick),
+                Taken::All | Taken::Batch => {}
             }
         }
     }
@@ -282,16 +282,16 @@ impl<P: Planning> EventLoop<'_, P> {
         self.supervisor.reloading(true);
     }
 
-    fn receive_all(&mut self) -> Received {
-        let mut received = Received::Nothing;
+    fn receive_all(&mut self) -> Taken {
+        let mut received = Taken::Nothing;
         for geometry in [false, true] {
             let port = if geometry { &self.ports.geometry } else { &self.ports.plan };
             // The requests that are here now come before the next ones of clients that are answered first.
             let taken: Vec<Active> = std::iter::from_fn(|| receive(port)).take(RECEIVE_AT_ONCE).collect();
             received = received.max(match taken.len() {
-                0 => Received::Nothing,
-                RECEIVE_AT_ONCE => Received::Batch,
-                _ => Received::All,
+                0 => Taken::Nothing,
+                RECEIVE_AT_ONCE => Taken::Batch,
+                _ => Taken::All,
             });
             for active in taken {
                 let owner = self.ports.owner_of(active.origin().value(), geometry);

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::prefetch::PrefetchMetrics;
 use super::response_cache::ResponseCacheMetrics;
 use crate::cache::KindStatistics;
-use crate::service::Remembered;
+use crate::service::MemoryStatistics;
 
 /// The kinds of requests whose latencies are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -149,7 +149,7 @@ pub(crate) struct CacheMetrics {
     /// The response cache.
     pub(crate) answers: ResponseCacheMetrics,
     /// Assemblies and records in memory.
-    pub(crate) remembered: Option<Remembered>,
+    pub(crate) remembered: Option<MemoryStatistics>,
     /// What is prepared while the workers are idle.
     pub(crate) ahead: PrefetchMetrics,
 }
@@ -263,7 +263,7 @@ impl Metrics {
     }
 }
 
-fn cache_metrics(text: &mut String, Remembered { assemblies, records }: &Remembered) {
+fn cache_metrics(text: &mut String, MemoryStatistics { assemblies, records }: &MemoryStatistics) {
     let gauges = [
         ("assemblies", assemblies.assemblies),
         ("assemblies_bytes", assemblies.bytes),

@@ -8,7 +8,7 @@ use crate::geometry::{Pose, Revision, SourceAssembly, remember_given, remember_r
 use crate::plan::Plan;
 use crate::search::{PlanRequest, PlanSink, Termination};
 use crate::service::{
-    Admission, AnsweredQuestion, AssemblyId, Remembered, Service, ServiceError, recent_answers,
+    Admission, AnsweredQuestion, AssemblyId, MemoryStatistics, Service, ServiceError, recent_answers,
     remember_answer, remembered_answer,
 };
 
@@ -64,7 +64,7 @@ pub trait Planning: Send + Sync + 'static {
         Vec::new()
     }
     /// See [`Service::remembered`]. Called on the port thread: it must not block.
-    fn remembered(&self) -> Option<Remembered> {
+    fn remembered(&self) -> Option<MemoryStatistics> {
         None
     }
     /// See [`Service::set_response_bytes`]. Called on the port thread: it must not block.
@@ -148,7 +148,7 @@ impl Planning for Service {
         Self::recent(self, most)
     }
 
-    fn remembered(&self) -> Option<Remembered> {
+    fn remembered(&self) -> Option<MemoryStatistics> {
         Some(Self::remembered(self))
     }
 

@@ -79,12 +79,12 @@ fn yield_to_others(niceness: i32) {
 /// What waits to be prepared, and whether the workers are idle. Shared by all threads.
 #[derive(Debug, Default)]
 pub(super) struct Prefetch {
-    state: Mutex<State>,
+    state: Mutex<PrefetchState>,
     changed: Condvar,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct PrefetchState {
     waiting: VecDeque<AssemblyId>,
     /// The newest first: its plan is probably the one that is being carried out.
     speculations: VecDeque<Speculation>,
@@ -252,12 +252,12 @@ impl Prefetch {
     }
 
     /// The state is plain data, so it is consistent even if a thread panicked while it held the lock.
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, PrefetchState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl State {
+impl PrefetchState {
     fn is_idle(&self) -> bool {
         self.waiting.is_empty() && self.speculations.is_empty()
     }

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use bytemuck::{Pod, Zeroable};
 
-use super::grid::{Grid, Held, MOST_SLOTS, NearBrick};
+use super::grid::{BrickNodes, Grid, MOST_SLOTS, NearBrick};
 use super::nodes::Nodes;
 use super::stored::{Bricks, Checksum, NOT_STORED, StoredBricks, checksum};
 use crate::cache::Mapping;
@@ -225,7 +225,7 @@ impl Grid {
             && let Some(stored) = self.in_file(near)
         {
             // Another thread that set it meanwhile found the same nodes.
-            let _filled = near.nodes.set(Held::Stored(stored));
+            let _filled = near.nodes.set(BrickNodes::Stored(stored));
         }
         near.nodes.get().map(|held| &**held)
     }

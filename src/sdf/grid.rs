@@ -49,19 +49,19 @@ pub(super) struct NearBrick {
     /// Its place in the file, or [`NOT_STORED`](super::stored::NOT_STORED).
     pub(super) stored: u32,
     /// Measured when they are first used. The result does not depend on when that is, nor on the thread.
-    pub(super) nodes: OnceLock<Held>,
+    pub(super) nodes: OnceLock<BrickNodes>,
 }
 
 /// Where the nodes of a brick are.
 #[derive(Debug)]
-pub(super) enum Held {
+pub(super) enum BrickNodes {
     /// Measured here.
     Filled(Box<Nodes>),
     /// In the file.
     Stored(StoredNodes),
 }
 
-impl Deref for Held {
+impl Deref for BrickNodes {
     type Target = Nodes;
 
     #[inline]
@@ -157,7 +157,7 @@ impl Grid {
     /// Bricks that were measured by this process, and so are in no file.
     #[must_use]
     pub fn filled(&self) -> usize {
-        self.near.iter().filter(|near| matches!(near.nodes.get(), Some(Held::Filled(_)))).count()
+        self.near.iter().filter(|near| matches!(near.nodes.get(), Some(BrickNodes::Filled(_)))).count()
     }
 
     /// Bricks in the file that the grid was read from, and whether one of them was found damaged.
@@ -264,7 +264,8 @@ impl Grid {
     pub(super) fn nodes(&self, slot: u32) -> &Nodes {
         let near = &self.near[slot as usize];
         near.nodes.get_or_init(|| {
-            self.in_file(near).map_or_else(|| Held::Filled(Box::new(self.measured(near))), Held::Stored)
+            self.in_file(near)
+                .map_or_else(|| BrickNodes::Filled(Box::new(self.measured(near))), BrickNodes::Stored)
         })
     }
 

@@ -20,11 +20,11 @@ use crate::simulation::{
 use crate::termination::{Interrupt, Termination};
 
 use super::ServiceError;
-use super::answer::{self, Answer, Found, Frame, Times};
+use super::answer::{self, CacheHits, PlanFrame, SearchAnswer, StageTimes};
 use super::assembly_plan::AssemblyPlanner;
 use super::pools::Pools;
 use super::prepared::{self, Prepared};
-use super::records::{Answered, PlanQuestion, remember_plan, remembered_plan};
+use super::records::{PlanAnswer, PlanQuestion, remember_plan, remembered_plan};
 use super::relay::{Discard, Relay, WithoutSteps};
 use super::shared_shape::SharedShape;
 
@@ -79,7 +79,7 @@ impl Entry {
             list.dedup();
         }
         fixed.retain(|p| removed.binary_search(p).is_err());
-        let frame = Frame {
+        let frame = PlanFrame {
             assembly: &self.assembly,
             request,
             fixed,
@@ -109,9 +109,9 @@ impl Entry {
     /// Makes a plan. `known` is the search's cached answer, if there is one.
     fn made(
         &self,
-        frame: Frame<'_>,
+        frame: PlanFrame<'_>,
         question: &PlanQuestion<'_>,
-        known: Option<Answered>,
+        known: Option<PlanAnswer>,
         time: Time<'_>,
         sink: &mut dyn PlanSink,
         cache: &RequestCache,
@@ -126,7 +126,7 @@ impl Entry {
         {
             return ended_before(frame, interrupt, "fields were built");
         }
-        let ready = Ready { prepared: &prepared, hit, fields: started.elapsed(), cache, question };
+        let ready = SearchInput { prepared: &prepared, hit, fields: started.elapsed(), cache, question };
         let Some(staging) = &question.request.assembly else {
             let (frame, answer) = self.searched(frame, &ready, time, sink);
             return frame.plan(answer);
@@ -163,38 +163,38 @@ impl Entry {
     /// The answer from the cache, with all steps reported to the sink.
     fn remembered<'f>(
         &self,
-        mut frame: Frame<'f>,
-        answered: Answered,
+        mut frame: PlanFrame<'f>,
+        answered: PlanAnswer,
         sink: &mut dyn PlanSink,
         started: Instant,
-    ) -> (Frame<'f>, Answer) {
-        let Answered { outcome, overlaps } = answered;
+    ) -> (PlanFrame<'f>, SearchAnswer) {
+        let PlanAnswer { outcome, overlaps } = answered;
         frame.overlaps = answer::overlaps(&self.assembly, &overlaps);
         let engine = engine_of(frame.request.engine, frame.request.penalty);
         frame.notes.extend(accepted(&*engine, prepared::depth_limit(&self.assembly), &self.assembly).1);
         for removal in &outcome.removals {
             sink.step(&answer::removal(&self.assembly, removal));
         }
-        let times = Times { total: started.elapsed(), ..Times::default() };
-        (frame, Answer { outcome, times, found: Found { plan: true, ..Found::default() } })
+        let times = StageTimes { total: started.elapsed(), ..StageTimes::default() };
+        (frame, SearchAnswer { outcome, times, found: CacheHits { plan: true, ..CacheHits::default() } })
     }
 
     fn searched<'f>(
         &self,
-        mut frame: Frame<'f>,
-        ready: &Ready<'_>,
+        mut frame: PlanFrame<'f>,
+        ready: &SearchInput<'_>,
         time: Time<'_>,
         sink: &mut dyn PlanSink,
-    ) -> (Frame<'f>, Answer) {
+    ) -> (PlanFrame<'f>, SearchAnswer) {
         let request = frame.request;
         let Time { started, termination } = time;
-        let Ready { prepared, hit, fields, cache, question } = *ready;
+        let SearchInput { prepared, hit, fields, cache, question } = *ready;
         frame.overlaps = answer::overlaps(&self.assembly, &prepared.overlaps);
         let engine = engine_of(request.engine, request.penalty);
         let (limit, note) = accepted(&*engine, prepared.verifier.limit(), &self.assembly);
         let verifier = prepared.verifier.with_limit(limit);
         frame.notes.extend(note);
-        let asked = Asked { question, engine: &*engine, verifier: &verifier };
+        let asked = SearchQuestion { question, engine: &*engine, verifier: &verifier };
         let problem = self.problem(prepared, &asked, termination, cache);
         let total = problem.present.len() as u32;
         let mut relay = Relay { assembly: &self.assembly, sink, total };
@@ -208,7 +208,7 @@ impl Entry {
         let outcome = search(request.planner, problem, &mut relay);
         remember_plan(cache, question, termination, &outcome, &prepared.overlaps);
         let reused = |kinds: &[&RecordKind]| kinds.iter().map(|kind| cache.reused(kind)).sum();
-        let found = Found {
+        let found = CacheHits {
             fields: self.shapes_reused(request, hit),
             blocking: reused(&[&OVERLAP, &BLOCKING, &TOUCHING]),
             motions: reused(&[&MOTION]),
@@ -216,8 +216,8 @@ impl Entry {
             plan: false,
         };
         let overlaps = if hit { Duration::ZERO } else { prepared.overlap_time };
-        let times = Times { fields, overlaps, total: started.elapsed() };
-        (frame, Answer { outcome, times, found })
+        let times = StageTimes { fields, overlaps, total: started.elapsed() };
+        (frame, SearchAnswer { outcome, times, found })
     }
 
     /// How many shapes, with the bricks of their fields so far, were there already.
@@ -233,7 +233,7 @@ impl Entry {
     fn problem<'a>(
         &self,
         prepared: &Prepared,
-        asked: &Asked<'a>,
+        asked: &SearchQuestion<'a>,
         termination: &Termination,
         cache: &RequestCache,
     ) -> Problem<'a> {
@@ -269,7 +269,7 @@ impl Entry {
         let request = PlanRequest::default();
         let question = PlanQuestion { assembly: &self.assembly, request: &request, fixed: &[], removed: &[] };
         let engine = engine_of(request.engine, request.penalty);
-        let asked = Asked { question: &question, engine: &*engine, verifier: &prepared.verifier };
+        let asked = SearchQuestion { question: &question, engine: &*engine, verifier: &prepared.verifier };
         // If it is interrupted, the blockages that were found are cached all the same.
         let _ = initial_blockages(&self.problem(&prepared, &asked, termination, cache));
         let all = (0..self.assembly.parts.len()).collect();
@@ -315,7 +315,7 @@ impl Entry {
 }
 
 /// A question, with the engine and the verifier that answer it.
-struct Asked<'a> {
+struct SearchQuestion<'a> {
     question: &'a PlanQuestion<'a>,
     engine: &'a dyn TransitionFunction,
     verifier: &'a Verifier,
@@ -330,7 +330,7 @@ struct Time<'a> {
 
 /// The input of a search.
 #[derive(Clone, Copy)]
-struct Ready<'a> {
+struct SearchInput<'a> {
     prepared: &'a Prepared,
     /// Whether `prepared` was there already.
     hit: bool,
@@ -348,7 +348,7 @@ fn looks_at_all_fields(request: &PlanRequest) -> bool {
 }
 
 /// The plan of a request that ended before its search began.
-fn ended_before(frame: Frame<'_>, interrupt: Interrupt, what: &str) -> Plan {
+fn ended_before(frame: PlanFrame<'_>, interrupt: Interrupt, what: &str) -> Plan {
     match interrupt {
         Interrupt::Cancelled => frame.empty(PlanStatus::Cancelled, Some("cancelled".to_owned())),
         Interrupt::DeadlinePassed => {

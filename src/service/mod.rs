@@ -62,7 +62,7 @@ pub struct Admission {
 
 /// The memory that a service uses.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Remembered {
+pub struct MemoryStatistics {
     /// Assemblies, in memory.
     pub assemblies: StoreStatistics,
     /// Records in memory.
@@ -153,8 +153,8 @@ impl Service {
 
     /// The memory that it uses. Does not block.
     #[must_use]
-    pub fn remembered(&self) -> Remembered {
-        Remembered { assemblies: self.store.statistics(), records: self.cache.counters() }
+    pub fn remembered(&self) -> MemoryStatistics {
+        MemoryStatistics { assemblies: self.store.statistics(), records: self.cache.counters() }
     }
 
     /// The cache.

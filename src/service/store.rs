@@ -38,13 +38,13 @@ pub(super) struct Store {
     left: AtomicUsize,
     hulls: Arc<JoinedHulls>,
     fields: Weak<dyn FieldStore>,
-    held: Mutex<Held>,
+    held: Mutex<StoreState>,
 }
 
 #[derive(Debug, Default)]
-struct Held {
+struct StoreState {
     entries: Lru<AssemblyId, Entry>,
-    shapes: HashMap<[u8; 32], Counted>,
+    shapes: HashMap<[u8; 32], CountedShape>,
     /// The bytes of each entry without its shapes, as last measured.
     own: HashMap<AssemblyId, usize>,
     bytes: usize,
@@ -54,7 +54,7 @@ struct Held {
 
 /// A shape that entries have.
 #[derive(Debug)]
-struct Counted {
+struct CountedShape {
     shared: Arc<SharedShape>,
     entries: usize,
     /// As last measured.
@@ -138,12 +138,12 @@ impl Store {
     }
 
     /// After a panic of a thread that held the lock, only the sums may be wrong.
-    fn held(&self) -> MutexGuard<'_, Held> {
+    fn held(&self) -> MutexGuard<'_, StoreState> {
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Held {
+impl StoreState {
     fn share(
         &mut self,
         content: &[u8; 32],
@@ -151,7 +151,7 @@ impl Held {
         fields: &Weak<dyn FieldStore>,
     ) -> Arc<SharedShape> {
         let known = self.shapes.len();
-        let counted = self.shapes.entry(*content).or_insert_with(|| Counted {
+        let counted = self.shapes.entry(*content).or_insert_with(|| CountedShape {
             shared: Arc::new(SharedShape::stored(Arc::clone(shape), Weak::clone(fields))),
             entries: 0,
             bytes: 0,
