@@ -145,9 +145,9 @@ pub struct CacheConfig {
     pub disk_mb: u64,
     /// Megabytes of memory for all that is remembered; see [`CacheConfig::memory`].
     pub memory_mb: u64,
-    /// Whether assemblies are made ready while nothing is asked, and what was remembered last is read ahead.
+    /// Whether likely requests are prepared while the workers are idle.
     pub prefetch: bool,
-    /// Seconds of such time for what may be asked after a plan.
+    /// Seconds of idle time for planning the likely questions after each plan.
     pub foresight_s: u64,
 }
 
@@ -258,7 +258,7 @@ impl CacheConfig {
         MemoryBudget { all: all / 2, records: all / 16 * 2, answers: all / 16 }
     }
 
-    /// How much time may go into what may be asked after a plan.
+    /// The idle time for planning the likely questions after a plan.
     #[must_use]
     pub fn foresight(&self) -> Duration {
         Duration::from_secs(if self.prefetch { self.foresight_s } else { 0 })

@@ -29,7 +29,7 @@ use crate::termination::{Interrupt, Termination};
 use room::Room;
 use transfer::{MOST_SAMPLES, Transfer};
 
-/// So many insertions are looked for at once; they are told in order.
+/// Insertions that are planned in parallel; they are reported in order.
 const AT_ONCE: usize = 8;
 /// How far a part is led away from where its insertion begins before it may go anywhere: this share of its
 /// reach, or of this share of the longest side if that is more.
@@ -65,7 +65,7 @@ pub enum Hindrance {
     WaitsIn,
     /// Others wait where it is inserted.
     InsertionMeets,
-    /// No way from where it waits to where its insertion begins was found with so many random poses.
+    /// RRT-Connect found no path from where it waits to where its insertion begins, with this many random poses.
     NoWay(usize),
 }
 
@@ -130,16 +130,16 @@ impl<'a> Assembling<'a> {
         given.map_or(end, |(_, pose)| *pose)
     }
 
-    /// Tells the insertions in order, as they are found.
+    /// Reports the insertions in order, as they are found.
     ///
     /// # Errors
-    /// Some part could not be put in; those told before it stand.
-    pub fn run(&self, mut tell: impl FnMut(Insertion)) -> Result<(), Unfinished> {
+    /// A part could not be put in; those reported before it are in place.
+    pub fn run(&self, mut report: impl FnMut(Insertion)) -> Result<(), Unfinished> {
         let order: Vec<usize> = (0..self.removals.len()).rev().collect();
         for some in order.chunks(AT_ONCE) {
             let found: Vec<_> = some.par_iter().map(|&place| self.insertion(place)).collect();
             for insertion in found {
-                tell(insertion?);
+                report(insertion?);
             }
         }
         Ok(())

@@ -12,7 +12,7 @@ use crate::termination::{Interrupt, Termination, try_all};
 
 /// Turns between two waypoints stay below this, so that the slerp is unambiguous.
 const MOST_TURN: f64 = 1.5;
-/// A way is looked at piece by piece, up to so many.
+/// The most pieces in which a way is checked.
 const MOST_GLANCES: f64 = 64.0;
 /// Looks are no closer and no further apart than these shares of the longest side.
 const FINE: f64 = 0.005;

@@ -30,7 +30,7 @@ pub(super) trait Space {
     fn extent(&self) -> f64;
 }
 
-/// A way from `start` to `goal` by free pieces, if one was found with so many random poses.
+/// A way from `start` to `goal` by free pieces, if one is found with that many random poses.
 ///
 /// # Errors
 /// The termination condition became true.

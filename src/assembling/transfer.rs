@@ -14,8 +14,8 @@ pub(super) const MOST_SAMPLES: usize = 1000;
 const FEW_SAMPLES: usize = 300;
 /// Shortcuts that are tried on a way.
 const SHORTCUTS: usize = 24;
-/// Mostly the part need not turn: so many poses at first, and then this share of them, are turned as the
-/// way's ends are, or between them.
+/// Mostly the part need not turn. So the first `SOME` poses, and then this share of them, have the rotation of one of
+/// the way's ends, or one between them.
 const SOME: usize = 100;
 const TURNED_ALIKE: f64 = 0.5;
 /// Directions away from an end of the way.

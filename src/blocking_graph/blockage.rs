@@ -23,7 +23,7 @@ pub struct Blockage {
     outlived: BTreeSet<usize>,
     /// All parts that block some action.
     parts: BTreeSet<usize>,
-    /// The first so many actions are open to all parts: these count in f_a.
+    /// How many actions, from the first, are open to all parts: these count in f_a.
     common: usize,
     /// Of these, those that nothing is known to block.
     open: usize,
@@ -93,7 +93,7 @@ impl Blockage {
         self.jointly[action].is_empty()
     }
 
-    /// Whether an action can never succeed, whoever leaves.
+    /// Whether an action can never succeed, whichever parts leave.
     #[must_use]
     pub fn is_barred(&self, action: usize) -> bool {
         self.jointly[action].iter().any(Vec::is_empty)

@@ -1,4 +1,4 @@
-//! The blocking graphs of the assembled state, one per direction, as they are told to people.
+//! The blocking graphs of the assembled state, one per direction, for display.
 
 use super::Blockage;
 use crate::simulation::Action;

@@ -1,4 +1,4 @@
-//! Admission and bookkeeping: what happens to every request, without any transport.
+//! Handles every event: admits requests, follows them to their end, and counts them. It knows no transport.
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
@@ -19,7 +19,7 @@ use super::outgoing::Outgoing;
 use super::planning::Planning;
 use super::request_queue::{Class, Owner, Rejected, Ticket};
 use super::response_cache::{CachedResponse, ResponseCache, question};
-use super::session::{Input, Link, Session, SessionEnd, State};
+use super::session::{Input, Link, Session, SessionEnd, SessionState};
 use super::shared_queue::Queues;
 use super::shutdown::Shutdown;
 use super::uploads::Uploads;
@@ -68,7 +68,7 @@ pub(crate) struct Dispatcher<L, P> {
     pub(super) counters: StatusHeader,
     preloaded: Vec<(String, [u8; 32])>,
     started: Instant,
-    /// What only the ports and the system know.
+    /// Figures that only the ports and the system have.
     pub(crate) host: HostStatus,
     pub(crate) outgoing: Outgoing,
 }
@@ -102,7 +102,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         }
     }
 
-    /// Keeps other limits from now on; what was taken under the old ones stays.
+    /// Enforces other limits from now on. Requests that were admitted under the old ones stay.
     pub(crate) fn reload(&mut self, config: &Config) {
         self.limits = Limits { threads: self.limits.threads, ..Limits::of(config) };
         self.counters.queue_limit = config.requests.queue as u32;
@@ -155,7 +155,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         } else if let Err((input, error)) = self.admit(&mut session, key, owner, &payload) {
             session.end_with(input, &error);
         }
-        // What is there goes out at once, not behind other requests.
+        // Messages that are ready are sent at once, before other requests are read.
         if session.pump(Instant::now(), self.limits.patience) {
             self.outgoing.wakes.push(session.listener);
         }
@@ -171,8 +171,8 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         self.service.set_response_bytes(self.answers.metrics().bytes);
     }
 
-    /// The answer to a request whose bytes are those of a question that was answered before: then all that
-    /// would be found by reading them was found then.
+    /// The response to a request whose bytes equal those of a question that was answered before. The request need
+    /// not be decoded and checked again.
     fn response_to_same_bytes(&mut self, payload: &AlignedBytes) -> Option<Arc<CachedResponse>> {
         if self.shutdown.is_requested() {
             return None;
@@ -186,7 +186,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         self.counters.remembered += 1;
     }
 
-    /// Reads a plan request and puts it into the queue.
+    /// Decodes a plan request and queues it.
     fn admit(
         &mut self,
         session: &mut Session<L>,
@@ -268,7 +268,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
             return;
         }
         session.cancel_work();
-        if session.state() == State::Queued && self.queues.plans.withdraw(|job| job.key == key) {
+        if session.state() == SessionState::Queued && self.queues.plans.withdraw(|job| job.key == key) {
             let error = WireError::new(ErrorCode::Cancelled, "cancelled before planning began");
             session.end_with(Input::Cancel, &error);
         }
@@ -321,15 +321,15 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         }
     }
 
-    /// A session that is gone was left by its client: its worker's reports come to nothing.
+    /// Reports about a session whose client left are dropped.
     fn with_session(&mut self, key: SessionKey, act: impl FnOnce(&mut Session<L>)) {
         if let Some(session) = self.sessions.get_mut(&key) {
             act(session);
         }
     }
 
-    /// Looks after every session: who left, what expired, what can be sent. Called whenever
-    /// anything happened.
+    /// Updates every session: cancels those whose clients left, ends those that expired, sends what can be sent.
+    /// Called after every event.
     pub(crate) fn settle(&mut self, now: Instant) {
         let mut over = Vec::new();
         for (key, session) in &mut self.sessions {
@@ -338,7 +338,10 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
                 session.input(Input::Cancel);
             }
             let late = session.deadline.is_some_and(|d| d <= now);
-            if late && session.state() == State::Queued && self.queues.plans.withdraw(|job| job.key == *key) {
+            if late
+                && session.state() == SessionState::Queued
+                && self.queues.plans.withdraw(|job| job.key == *key)
+            {
                 let (input, error) = expired();
                 session.end_with(input, &error);
             }
@@ -362,7 +365,7 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         self.queues.close();
         let error = Shutdown::error();
         for (key, session) in &mut self.sessions {
-            if session.state() == State::Queued && self.queues.plans.withdraw(|job| job.key == *key) {
+            if session.state() == SessionState::Queued && self.queues.plans.withdraw(|job| job.key == *key) {
                 session.end_with(Input::Refuse, &error);
             }
         }
@@ -379,8 +382,11 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
                 let error = Shutdown::error();
                 for session in self.sessions.values_mut() {
                     // Legal from every live state: a worker that does not stop is left behind.
-                    let input =
-                        if matches!(session.state(), State::Streaming) { Input::Fail } else { Input::Refuse };
+                    let input = if matches!(session.state(), SessionState::Streaming) {
+                        Input::Fail
+                    } else {
+                        Input::Refuse
+                    };
                     session.end_with(input, &error);
                     session.pump(now, self.limits.patience);
                     self.outgoing.wakes.push(session.listener);
@@ -403,13 +409,13 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         }
     }
 
-    /// Counts a session that is finished, and lets its request go.
+    /// Counts a finished session and releases its request.
     fn finish(&mut self, key: SessionKey, session: Session<L>) {
         let counter = match session.state() {
-            State::Ended(SessionEnd::Done) => &mut self.counters.done,
-            State::Ended(SessionEnd::Cancelled) => &mut self.counters.cancelled,
-            State::Ended(SessionEnd::Expired) => &mut self.counters.expired,
-            State::Ended(SessionEnd::Refused) => &mut self.counters.refused,
+            SessionState::Ended(SessionEnd::Done) => &mut self.counters.done,
+            SessionState::Ended(SessionEnd::Cancelled) => &mut self.counters.cancelled,
+            SessionState::Ended(SessionEnd::Expired) => &mut self.counters.expired,
+            SessionState::Ended(SessionEnd::Refused) => &mut self.counters.refused,
             _ => &mut self.counters.failed,
         };
         *counter += 1;
@@ -419,15 +425,16 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         }
         let total_ms = timed.map(|(_, time)| time.as_secs_f64() * 1e3);
         tracing::debug!(request = key.request, state = ?session.state(), total_ms, "request over");
-        // The request is let go before its client is woken, so that it sees the end.
+        // The request is released before its client is woken, so that the client sees the end.
         let listener = session.listener;
         drop(session);
         self.outgoing.wakes.push(listener);
     }
 
-    /// When `settle` must be called next without anything happening.
+    /// When `settle` must be called next, if no event comes before.
     pub(crate) fn next_deadline(&self, now: Instant) -> Option<Instant> {
-        let queued = self.sessions.values().filter(|s| s.state() == State::Queued).filter_map(|s| s.deadline);
+        let queued =
+            self.sessions.values().filter(|s| s.state() == SessionState::Queued).filter_map(|s| s.deadline);
         let shutdown = self.shutdown.end();
         queued.chain(shutdown).chain(self.uploads.next_deadline(now)).min()
     }

@@ -37,7 +37,7 @@ struct Scripted {
     taking_in: AtomicUsize,
     /// What was answered before a restart.
     before: Vec<AnsweredQuestion>,
-    /// Bytes that it was told answers take.
+    /// The bytes of responses that were reported to it.
     answers: AtomicUsize,
 }
 
@@ -203,7 +203,7 @@ impl Bench {
     }
 
     fn until_running(&mut self) {
-        self.until(|dispatcher| dispatcher.sessions.values().any(|s| s.state() == State::Running));
+        self.until(|dispatcher| dispatcher.sessions.values().any(|s| s.state() == SessionState::Running));
     }
 }
 

@@ -1,4 +1,4 @@
-//! The port thread: waits, receives, copies, hands to the dispatcher, sends. It never plans.
+//! The port thread: waits for requests, copies them, hands them to the dispatcher, and sends. It never plans.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -32,12 +32,11 @@ use super::watchdog::{Watchdog, give_up};
 use super::workers::start;
 use crate::config::{Config, seconds};
 
-/// Requests taken from one port before workers' reports are looked at again.
-/// Nobody's requests are taken twice before everybody's were taken once: iceoryx2 looks at the ports in
-/// the same order each time, but gives no more of one than it may have active.
+/// Requests taken from one port before workers' reports are read again. It is the number of requests that may be
+/// active: iceoryx2 asks the clients' ports in the same order each time, and with fewer the last ones would starve.
 const RECEIVE_AT_ONCE: usize = (MAX_CLIENTS + 1) * PLAN_ACTIVE_REQUESTS;
 
-/// Between two looks for what clients of dead daemons left.
+/// The time between two removals of files that clients of dead daemons left.
 const SWEEP: Duration = Duration::from_secs(60);
 
 /// Runs the daemon until SIGTERM or SIGINT.
@@ -70,7 +69,7 @@ pub fn run_reloading<P: Planning>(
     let place = DaemonPlace::of(&config.endpoint)?;
     let lease = Lease::take(place.clone())?;
     let queues = Queues::new(config);
-    // First of all: it makes ready what was asked about last, while ports are opened. Whatever fails ends it.
+    // The preparation begins first, so that it works while the ports are opened. A failure below ends it.
     let _closing = CloseOnDrop(Arc::clone(&queues.prefetch));
     if config.cache.prefetch {
         prefetch::start(&queues.prefetch, &service)
@@ -130,7 +129,7 @@ pub fn run_reloading<P: Planning>(
     Ok(())
 }
 
-/// Ends this daemon if the port thread stands still, from the opening of its ports on.
+/// Watches the port thread, and ends this daemon if it stands still.
 fn watch(config: &Config, place: &DaemonPlace) -> Result<Watchdog, DaemonError> {
     let limit = seconds(config.times.hang_s);
     let place = place.runtime_dir.display().to_string();
@@ -150,9 +149,9 @@ impl ReceiveLimits {
     }
 }
 
-/// What was taken of the requests that were there.
+/// How many of the waiting requests were taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Received {
+enum Taken {
     /// There were none.
     Nothing,
     /// All.
@@ -199,16 +198,16 @@ impl<P: Planning> EventLoop<'_, P> {
                 continue;
             }
             match received {
-                Received::Nothing => self.wait(next_tick),
-                // Whoever was answered may ask again at once.
-                Received::All if !self.is_asked_again() => self.wait(next_tick),
-                Received::All | Received::Batch => {}
+                Taken::Nothing => self.wait(next_tick),
+                // A client that was answered may send its next request at once.
+                Taken::All if !self.is_asked_again() => self.wait(next_tick),
+                Taken::All | Taken::Batch => {}
             }
         }
     }
 
     fn tick(&mut self) {
-        // A killed client is seen, and its memory given back, only by this.
+        // Only this notices a killed client and frees its memory.
         let _ = self.ports.node.try_cleanup_dead_nodes();
         self.ports.forget_owners();
         if Instant::now() >= self.next_sweep {
@@ -221,16 +220,16 @@ impl<P: Planning> EventLoop<'_, P> {
         }
     }
 
-    /// Brings up to date what the dispatcher is to tell of its host.
+    /// Updates the host's figures in the dispatcher.
     fn look_around(&mut self) {
         let (connections, clients) = self.ports.clients();
         let shared_memory_free = self.shared_memory.look();
         self.dispatcher.host = HostStatus { connections, clients, shared_memory_free };
     }
 
-    /// Looks for the next request for a moment.
+    /// Polls for the next request for a moment.
     fn is_asked_again(&mut self) -> bool {
-        // A port that is out of order says so when it is asked for the request.
+        // A broken port reports its error when the request is received.
         self.polling.look(|| self.ports.plan.has_requests().unwrap_or(true))
     }
 
@@ -239,7 +238,7 @@ impl<P: Planning> EventLoop<'_, P> {
         let until = self.dispatcher.next_deadline(now).map_or(next_tick, |d| d.min(next_tick));
         let timeout = self.recently.patience(now, until.saturating_duration_since(now));
         if let Err(error) = self.ports.listener.timed_wait(|_| {}, timeout) {
-            // A signal, or a listener out of order: never spin on it.
+            // A signal, or a broken listener: the pause keeps the loop from spinning.
             tracing::debug!(%error, "waiting was interrupted");
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -283,16 +282,16 @@ impl<P: Planning> EventLoop<'_, P> {
         self.supervisor.reloading(true);
     }
 
-    fn receive_all(&mut self) -> Received {
-        let mut received = Received::Nothing;
+    fn receive_all(&mut self) -> Taken {
+        let mut received = Taken::Nothing;
         for geometry in [false, true] {
             let port = if geometry { &self.ports.geometry } else { &self.ports.plan };
-            // Those that are here now come before what those ask next who are answered first.
+            // The requests that are here now come before the next ones of clients that are answered first.
             let taken: Vec<Active> = std::iter::from_fn(|| receive(port)).take(RECEIVE_AT_ONCE).collect();
             received = received.max(match taken.len() {
-                0 => Received::Nothing,
-                RECEIVE_AT_ONCE => Received::Batch,
-                _ => Received::All,
+                0 => Taken::Nothing,
+                RECEIVE_AT_ONCE => Taken::Batch,
+                _ => Taken::All,
             });
             for active in taken {
                 let owner = self.ports.owner_of(active.origin().value(), geometry);
@@ -302,7 +301,7 @@ impl<P: Planning> EventLoop<'_, P> {
                     self.look_around();
                 }
                 self.dispatcher.handle(event, Instant::now());
-                // Whoever is answered already is not to wait for those behind.
+                // A response does not wait for the requests behind it.
                 self.deliver();
             }
         }
@@ -329,9 +328,8 @@ fn receive(port: &ServerPort) -> Option<Active> {
     })
 }
 
-/// Copies a request out of shared memory: the client may change it after sending. What `refuse` says of
-/// so many bytes of meshes comes first: what waits within its quota is not to be joined by copies that
-/// will be refused.
+/// Copies a request out of shared memory: the client may change it after sending. `refuse` is asked about an upload
+/// of that many bytes before they are copied, so that refused uploads take no memory.
 fn read(
     active: Active,
     owner: Owner,

@@ -1,8 +1,8 @@
-//! What one daemon process has in shared memory, apart from what all others had.
+//! The part of shared memory that belongs to one daemon process alone.
 //!
-//! A process that is killed at a bad moment may leave files of iceoryx2 in a state in which whoever opens
-//! them waits for ever. So no daemon ever opens what another left: each has a prefix and a folder of its own,
-//! which clients read in `daemon.json`, and removes what the dead had.
+//! A killed process may leave files of iceoryx2 in a state in which a process that opens them waits for ever. So no
+//! daemon opens the files of another: each has its own prefix and folder, which clients read in `daemon.json`, and
+//! removes the files of dead daemons.
 
 use std::fs::{self, DirBuilder};
 use std::io;
@@ -25,11 +25,11 @@ pub(crate) struct Instance {
 
 /// Hexadecimal digits of a tag, behind its first letter.
 const DIGITS: usize = TAG - 1;
-/// So many tags are tried: that all of them are taken cannot happen by chance.
+/// The number of tags that are tried. That all are taken cannot happen by chance.
 const TRIES: u32 = 64;
 
 impl Instance {
-    /// One that nobody has. Its folder is made.
+    /// A new instance, with its folder.
     pub(super) fn create(place: &DaemonPlace) -> Result<Self, PlaceError> {
         fs::create_dir_all(&place.root).map_err(io_error(&place.root))?;
         let mut refused = None;
@@ -54,8 +54,8 @@ impl Instance {
         layout::shared_memory_files(&self.prefix).is_ok_and(|files| files.is_empty())
     }
 
-    /// Takes from others what they may do with files in shared memory: iceoryx2 makes one that anybody may
-    /// write. To be called when the ports are open.
+    /// Removes other users' rights to the files in shared memory: iceoryx2 creates one that everybody may write. To
+    /// be called when the ports are open.
     pub(crate) fn close_to_others(&self) -> Result<(), PlaceError> {
         let shm = Path::new("/dev/shm");
         for path in layout::shared_memory_files(&self.prefix).map_err(io_error(shm))? {
@@ -68,7 +68,7 @@ impl Instance {
         Ok(())
     }
 
-    /// How iceoryx2 is to work here.
+    /// The configuration of iceoryx2 for this instance.
     pub(crate) fn iceoryx2_config(&self) -> Result<IoxConfig, PlaceError> {
         Ok(layout::iceoryx2_config(&self.prefix, &self.root)?)
     }
@@ -85,9 +85,9 @@ fn is_tag(text: &[u8]) -> bool {
     matches!(text, [b'i', digits @ ..] if digits.len() == DIGITS && digits.iter().all(u8::is_ascii_hexdigit))
 }
 
-/// Removes what instances of a place have, but for the one that is kept. Whoever holds the place's lock may
-/// do so: the others' daemons are dead, and what clients of theirs have mapped stays theirs. As long as such
-/// clients live they may make new files meanwhile: what could not be removed is left to the next time.
+/// Removes the files of all instances of a place but the one that is kept. The holder of the place's lock may do so:
+/// the other daemons are dead, and memory that their clients mapped stays valid. Such clients may create new files
+/// meanwhile: files that could not be removed are left to the next call.
 pub(super) fn sweep(place: &DaemonPlace, kept: Option<&Instance>) {
     for entry in fs::read_dir(&place.root).into_iter().flatten().flatten() {
         let path = entry.path();

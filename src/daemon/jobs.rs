@@ -10,7 +10,7 @@ use crate::geometry::Pose;
 use crate::search::{PlanRequest, Termination};
 use crate::service::AssemblyId;
 
-/// Which plan request: the client port's id and its number there.
+/// The key of a plan request: the client port's id, and the request's number there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct SessionKey {
     pub(crate) client: u128,
@@ -24,9 +24,9 @@ pub(crate) struct PlanJob {
     pub(crate) owner: Owner,
     pub(crate) received: Instant,
     pub(crate) assembly: AssemblyId,
-    /// What is remembered with its answer, if anything is to be.
+    /// The key under which the response is cached, if the request allows that.
     pub(crate) question: Option<Vec<u8>>,
-    /// Parts that stand elsewhere than in it.
+    /// Parts that the request moves.
     pub(crate) moved: Vec<(usize, Pose)>,
     pub(crate) request: PlanRequest,
     pub(crate) termination: Termination,
@@ -34,7 +34,7 @@ pub(crate) struct PlanJob {
 
 #[cfg(test)]
 impl PlanJob {
-    /// A request about an assembly by nobody in particular.
+    /// A request about an assembly, from no client.
     pub(super) fn about(assembly: AssemblyId, request: PlanRequest) -> Self {
         Self {
             key: SessionKey { client: 0, request: 0 },
@@ -49,13 +49,13 @@ impl PlanJob {
     }
 }
 
-/// What was received with an upload.
+/// An upload as it was received.
 #[derive(Debug)]
 pub(crate) struct Received {
     pub(crate) number: u64,
     /// A private copy.
     pub(crate) bytes: AlignedBytes,
-    /// True once nobody waits for it.
+    /// Becomes true when the client left.
     pub(crate) termination: Termination,
 }
 

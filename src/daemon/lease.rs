@@ -10,7 +10,7 @@ use super::instance::{Instance, sweep};
 use super::lock::{LockError, LockFile};
 use super::place::{DaemonPlace, LOCK_FILE, PlaceError, ignore_missing, io_error};
 
-/// The held lock. Dropping it removes `daemon.json`, and all that is in shared memory.
+/// The held locks. Dropping it removes `daemon.json` and the instance's files in shared memory.
 #[derive(Debug)]
 pub(crate) struct Lease {
     place: DaemonPlace,
@@ -20,13 +20,13 @@ pub(crate) struct Lease {
 }
 
 impl Lease {
-    /// Takes the lock, or says who holds it; then clears what dead daemons left.
+    /// Takes the locks, or reports their holder; then removes the files of dead daemons.
     pub(crate) fn take(place: DaemonPlace) -> Result<Self, PlaceError> {
         layout::check_place(&place.prefix, &place.root)?;
         endpoint::create_runtime_dir(&place.runtime_dir)?;
         let folder_lock = take_lock(&place.runtime_dir.join(LOCK_FILE), "--runtime-dir")?;
-        // Shared memory knows no folders: without this, a daemon elsewhere with the same prefix
-        // would be wiped from under its clients.
+        // Shared memory has no folders: without this lock, the files of a daemon with another folder but the same
+        // prefix would be removed while it runs.
         let prefix_lock = take_lock(&place.prefix_lock(), "--prefix")?;
         remove_if_there(&place.runtime_dir.join(DAEMON_FILE))?;
         sweep(&place, None);
@@ -34,14 +34,14 @@ impl Lease {
         Ok(Self { place, instance, _locks: [folder_lock, prefix_lock] })
     }
 
-    /// Tells clients where we are; to be called when the ports are open.
+    /// Writes `daemon.json`, by which clients find the daemon. To be called when the ports are open.
     pub(crate) fn publish(&self) -> Result<(), PlaceError> {
         Endpoint::of_this_process(&self.instance.prefix, &self.instance.root)
             .publish(&self.place.runtime_dir)
             .map_err(PlaceError::from)
     }
 
-    /// Removes what clients of dead daemons still made when these were swept.
+    /// Removes files that clients of dead daemons created after `take`.
     pub(crate) fn sweep(&self) {
         sweep(&self.place, Some(&self.instance));
     }

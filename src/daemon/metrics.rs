@@ -1,4 +1,4 @@
-//! How the daemon does, in figures: for `sbdp status --json`, and as Prometheus wants them.
+//! The daemon's metrics: as JSON for `sbdp status --json`, and in the text format of Prometheus.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -10,15 +10,15 @@ use serde::Serialize;
 use super::prefetch::PrefetchMetrics;
 use super::response_cache::ResponseCacheMetrics;
 use crate::cache::KindStatistics;
-use crate::service::Remembered;
+use crate::service::MemoryStatistics;
 
-/// What requests are told apart by.
+/// The kinds of requests whose latencies are measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum LatencyKind {
-    /// Plans that a worker made.
+    /// Plans made by a worker.
     Plan,
-    /// Plans from memory.
+    /// Plans from the response cache.
     RememberedPlan,
     /// Uploads and revisions.
     Upload,
@@ -34,11 +34,11 @@ impl LatencyKind {
     }
 }
 
-/// Eight buckets for each power of two of microseconds: a percentile is off by an eighth at most.
+/// Buckets for each power of two of microseconds. With eight, a percentile is off by an eighth at most.
 const PER_OCTAVE: u32 = 8;
 const BUCKETS: usize = 64 * PER_OCTAVE as usize;
 
-/// Times of requests, from their reception to their last byte, in a fixed amount of memory.
+/// A histogram of times from the reception of a request to its last byte.
 #[derive(Debug, Clone)]
 struct Histogram {
     counts: Vec<u64>,
@@ -101,18 +101,18 @@ struct LatencySummary {
     p99_s: f64,
 }
 
-/// Who is connected, and what the system has left.
+/// The connections, and the shared memory that is left.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct HostStatus {
     /// Connections of clients.
     pub(crate) connections: usize,
     /// Processes that these belong to.
     pub(crate) clients: usize,
-    /// Bytes free in /dev/shm; none where it has no limit.
+    /// Bytes free in /dev/shm; `None` where it has no limit.
     pub(crate) shared_memory_free: Option<u64>,
 }
 
-/// Everything, as `sbdp status --json` prints it.
+/// All metrics, as `sbdp status --json` prints them.
 #[derive(Debug, Serialize)]
 pub(crate) struct Metrics {
     version: &'static str,
@@ -123,7 +123,7 @@ pub(crate) struct Metrics {
     running: u32,
     queued: u32,
     queue_limit: u32,
-    /// Plan requests and uploads that are not over.
+    /// Plan requests and uploads without an answer yet.
     open_requests: usize,
     /// Processes that are connected, and their connections.
     clients: usize,
@@ -143,14 +143,14 @@ pub(crate) struct Metrics {
     cache: CacheMetrics,
 }
 
-/// What is there before it is asked for, and what is becoming so.
+/// The caches, and the preparation of likely requests.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct CacheMetrics {
-    /// Answers in memory, as they were sent.
+    /// The response cache.
     pub(crate) answers: ResponseCacheMetrics,
-    /// Assemblies and records; what is on disk is not counted.
-    pub(crate) remembered: Option<Remembered>,
-    /// What is made ready while nothing is asked.
+    /// Assemblies and records in memory.
+    pub(crate) remembered: Option<MemoryStatistics>,
+    /// What is prepared while the workers are idle.
     pub(crate) ahead: PrefetchMetrics,
 }
 
@@ -263,7 +263,7 @@ impl Metrics {
     }
 }
 
-fn cache_metrics(text: &mut String, Remembered { assemblies, records }: &Remembered) {
+fn cache_metrics(text: &mut String, MemoryStatistics { assemblies, records }: &MemoryStatistics) {
     let gauges = [
         ("assemblies", assemblies.assemblies),
         ("assemblies_bytes", assemblies.bytes),

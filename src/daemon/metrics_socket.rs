@@ -1,4 +1,4 @@
-//! The figures on a Unix socket, for Prometheus: whoever connects gets the text of the last tick.
+//! Serves the metrics on a Unix socket, for Prometheus: a connection gets the text of the last tick.
 
 use std::io::{Read, Write};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Who asks has so long to say so, and to take the answer; others wait meanwhile.
+/// The time that a connection has for its request, and for reading the response. Other connections wait.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// The socket and what is told there. The file goes when this is dropped.
+/// The socket and the text that it serves. The socket's file is removed when this is dropped.
 #[derive(Debug)]
 pub(crate) struct MetricsSocket {
     text: Arc<Mutex<String>>,

@@ -1,12 +1,11 @@
 //! The daemon: the planning service behind shared memory.
 //!
-//! One thread owns the ports (`event_loop`): it receives, copies and checks, admits or refuses,
-//! and sends. It never plans, heals or blocks. `workers` do, and report back as events.
-//! What was answered before is answered from `response_cache` at once; while nothing is asked, assemblies are made
-//! ready for what may be (`prefetch`, `speculation`).
-//! `dispatcher` decides, by the state machine of `session` and the bounded `outbox`; none of these
-//! three knows iceoryx2, so they are tested without it. Only `convert` sees both wire and
-//! working types.
+//! One thread owns the ports (`event_loop`): it receives, copies and checks requests, admits or refuses them,
+//! and sends responses. It never plans, heals or blocks. `workers` plan and heal, and report back as events.
+//! Repeated questions are answered from `response_cache` at once. While the workers are idle, assemblies are
+//! prepared (`prefetch`) and likely questions are planned (`speculation`).
+//! `dispatcher` handles every event with the state machine of `session`, the bounded `outbox` and `uploads`; none
+//! of these knows iceoryx2, so they are tested without it. Only `convert` sees both wire and working types.
 
 mod convert;
 mod dispatcher;

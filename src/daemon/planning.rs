@@ -8,18 +8,18 @@ use crate::geometry::{Pose, Revision, SourceAssembly, remember_given, remember_r
 use crate::plan::Plan;
 use crate::search::{PlanRequest, PlanSink, Termination};
 use crate::service::{
-    Admission, AnsweredQuestion, AssemblyId, Remembered, Service, ServiceError, recent_answers,
+    Admission, AnsweredQuestion, AssemblyId, MemoryStatistics, Service, ServiceError, recent_answers,
     remember_answer, remembered_answer,
 };
 
-/// What the workers ask of the planning service; tests script it.
+/// The operations of the planning service that the daemon uses. Tests implement it with scripted answers.
 pub trait Planning: Send + Sync + 'static {
-    /// See [`Service::admit`]. What was given is remembered.
+    /// See [`Service::admit`]. The meshes as given are recorded.
     ///
     /// # Errors
     /// The geometry was refused, or the termination condition became true.
     fn admit(&self, source: &SourceAssembly, termination: &Termination) -> Result<Admission, ServiceError>;
-    /// See [`Service::revise_until`]. The change is remembered.
+    /// See [`Service::revise_until`]. The revision is recorded.
     ///
     /// # Errors
     /// The base is unknown, the change is refused, or the termination condition became true.
@@ -29,7 +29,7 @@ pub trait Planning: Send + Sync + 'static {
         revision: &Revision,
         termination: &Termination,
     ) -> Result<Admission, ServiceError>;
-    /// The same for a question that brings its change along: nobody will ask for its handle.
+    /// The same for a plan request with moved parts: no client gets the handle, so nothing is recorded.
     ///
     /// # Errors
     /// As [`Planning::revise`].
@@ -64,16 +64,16 @@ pub trait Planning: Send + Sync + 'static {
         Vec::new()
     }
     /// See [`Service::remembered`]. Called on the port thread: it must not block.
-    fn remembered(&self) -> Option<Remembered> {
+    fn remembered(&self) -> Option<MemoryStatistics> {
         None
     }
     /// See [`Service::set_response_bytes`]. Called on the port thread: it must not block.
     fn set_response_bytes(&self, _bytes: usize) {}
-    /// The messages that answered a question before, also before a restart.
+    /// The messages that answered a question before, also before a restart of the daemon.
     fn answered(&self, _question: &[u8]) -> Option<Vec<Vec<u8>>> {
         None
     }
-    /// The answers that were used last before this process began, with their questions; the last one used comes last.
+    /// The answers that were used last before this process began, with their questions; the most recent comes last.
     fn recent_answers(&self, _most: usize, _bytes: u64) -> Vec<AnsweredQuestion> {
         Vec::new()
     }
@@ -148,7 +148,7 @@ impl Planning for Service {
         Self::recent(self, most)
     }
 
-    fn remembered(&self) -> Option<Remembered> {
+    fn remembered(&self) -> Option<MemoryStatistics> {
         Some(Self::remembered(self))
     }
 
@@ -179,7 +179,7 @@ impl Planning for Service {
     }
 }
 
-/// An assembly with some parts elsewhere.
+/// The assembly with some parts moved.
 pub(super) fn with_moved<P: Planning>(
     service: &P,
     assembly: AssemblyId,
@@ -193,8 +193,8 @@ pub(super) fn with_moved<P: Planning>(
     Ok(service.revise_for_now(assembly, &revision, termination)?.id)
 }
 
-/// Runs one request's work; a panic becomes an answer. The service must stay usable after one:
-/// it holds no lock across planning.
+/// Runs the work of one request; a panic becomes an error. The service stays usable after a panic because it
+/// holds no lock while it plans.
 pub(super) fn contained<T>(work: impl FnOnce() -> T) -> Result<T, WireError> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|panic| {
         let reason = panic

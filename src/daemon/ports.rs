@@ -75,7 +75,7 @@ impl Ports {
         })
     }
 
-    /// Whose port this is: the process that opened it, or the port itself where that cannot be told.
+    /// The owner of a port: the process that opened it, or the port itself where that is unknown.
     pub(crate) fn owner_of(&mut self, client: u128, geometry: bool) -> Owner {
         if let Some(owner) = self.owners.get(&client) {
             return *owner;

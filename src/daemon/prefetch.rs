@@ -1,6 +1,7 @@
-//! What workers make ready while nothing is asked: what was remembered last before a restart, read ahead; fields,
-//! overlaps and blocking graphs of assemblies that just came, or were asked about before a restart; then what may be asked next about those that were
-//! planned ([`speculation`](super::speculation)). Whatever is asked stops it.
+//! Prepares likely requests while the workers are idle: reads the records that were used last before a restart;
+//! computes the fields, overlaps and blocking graphs of new assemblies and of those used last before a restart; then
+//! plans the likely next questions about planned assemblies ([`speculation`](super::speculation)). A request
+//! interrupts all of it.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,29 +17,29 @@ use super::speculation::Speculation;
 use crate::service::AssemblyId;
 use crate::termination::Termination;
 
-/// Whoever uploads mostly asks at once: so long nothing is begun.
+/// Nothing is prepared until no request came for this long: clients mostly ask for a plan right after an upload.
 const QUIET: Duration = Duration::from_millis(50);
-/// So many assemblies may wait; those that came first are left out.
+/// At most this many assemblies wait; the oldest are dropped.
 const MOST_WAITING: usize = 256;
-/// So many plans may wait for what may be asked after them; those made first are left out.
+/// The questions after at most this many plans wait; those after the oldest are dropped.
 const MOST_SPECULATIONS: usize = 16;
 
-/// Assemblies that were asked about before a restart are made ready, up to so many.
+/// At most this many of the assemblies that were used last before a restart are prepared.
 const MOST_RECENT: usize = 8;
-/// How much less the processor is for assemblies that nobody asked about yet (Unix niceness) …
+/// Unix niceness of the threads that prepare assemblies …
 const NICE: i32 = 10;
-/// … and for questions that perhaps nobody will ask.
+/// … and of those that plan likely questions.
 const NICEST: i32 = 19;
 
-/// Starts the thread that makes ready what is wanted.
+/// Starts the thread that prepares what waits.
 ///
 /// # Errors
 /// The system has no thread for it.
 pub(super) fn start<P: Planning>(prefetch: &Arc<Prefetch>, service: &Arc<P>) -> std::io::Result<()> {
     let (prefetch, service) = (Arc::clone(prefetch), Arc::clone(service));
     let prepare = move || {
-        // Questions leave half of the processors to whoever else works on this machine: what shares a core with
-        // others slows them down, however nice it is.
+        // Speculation leaves half of the processors to other programs: a thread that shares a core with them slows
+        // them down, whatever its niceness.
         let all = thread::available_parallelism().map_or(1, usize::from);
         let pools = [(all, NICE), (all.div_ceil(2), NICEST)].map(|(threads, niceness)| {
             let pool = ThreadPoolBuilder::new().num_threads(threads);
@@ -54,7 +55,7 @@ pub(super) fn start<P: Planning>(prefetch: &Arc<Prefetch>, service: &Arc<P>) -> 
         }
         prefetch.run(|work, termination| match work {
             Work::Assembly(id) => {
-                // Whoever asks will be told what is wrong.
+                // An error is reported to the client that plans the assembly.
                 let _ = contained(|| for_assemblies.install(|| service.prepare(*id, termination)));
                 false
             }
@@ -67,7 +68,7 @@ pub(super) fn start<P: Planning>(prefetch: &Arc<Prefetch>, service: &Arc<P>) -> 
     Ok(())
 }
 
-/// Makes this thread wait for all others of the machine. On Linux niceness is a thread's own.
+/// Lowers the priority of this thread. On Linux each thread has its own niceness.
 fn yield_to_others(niceness: i32) {
     let this = rustix::thread::gettid();
     if let Err(error) = rustix::process::setpriority_process(Some(this), niceness) {
@@ -75,34 +76,34 @@ fn yield_to_others(niceness: i32) {
     }
 }
 
-/// What is to be made ready, and whether there is time for it. Shared by all threads.
+/// What waits to be prepared, and whether the workers are idle. Shared by all threads.
 #[derive(Debug, Default)]
 pub(super) struct Prefetch {
-    state: Mutex<State>,
+    state: Mutex<PrefetchState>,
     changed: Condvar,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct PrefetchState {
     waiting: VecDeque<AssemblyId>,
-    /// The newest first: that plan is the one that is carried out.
+    /// The newest first: its plan is probably the one that is being carried out.
     speculations: VecDeque<Speculation>,
     /// Questions that were planned ahead.
     foreseen: u64,
-    /// Requests that workers work on.
+    /// Requests at work.
     busy: usize,
     quiet_since: Option<Instant>,
-    /// What is being made ready.
+    /// What is being prepared.
     at_work: Option<AtWork>,
     closed: bool,
 }
 
-/// Something that is being made ready.
+/// A preparation at work.
 #[derive(Debug)]
 struct AtWork {
-    /// Stops it.
+    /// Interrupts it.
     stop: Arc<AtomicBool>,
-    /// It is questions, so many.
+    /// The number of questions that are left, if it plans questions.
     questions: Option<usize>,
 }
 
@@ -112,27 +113,27 @@ impl AtWork {
     }
 }
 
-/// Something to make ready.
+/// Something to prepare.
 #[derive(Debug)]
 pub(super) enum Work {
-    /// What any plan of an assembly needs.
+    /// An assembly: what any plan of it needs.
     Assembly(AssemblyId),
-    /// The next of the questions that may be asked after a plan.
+    /// The next of the likely questions after a plan.
     Question(Box<Speculation>),
 }
 
-/// What is made ready, in figures.
+/// How much waits to be prepared, and how much was.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub(crate) struct PrefetchMetrics {
-    /// Assemblies that wait, with the one at work.
+    /// Assemblies that wait or are being prepared.
     pub(crate) assemblies: usize,
-    /// Questions that may be asked and wait to be planned, with the one at work.
+    /// Questions that wait or are being planned.
     pub(crate) questions: usize,
     /// Questions that were planned ahead, since the daemon started.
     pub(crate) foreseen: u64,
 }
 
-/// As long as this lives, nothing is made ready.
+/// As long as this lives, nothing is prepared.
 #[derive(Debug)]
 pub(super) struct Busy<'p>(&'p Prefetch);
 
@@ -145,7 +146,7 @@ impl Drop for Busy<'_> {
     }
 }
 
-/// Once this is dropped, nothing is made ready any more.
+/// Ends all preparation when it is dropped.
 #[derive(Debug)]
 pub(super) struct CloseOnDrop(pub(super) Arc<Prefetch>);
 
@@ -156,7 +157,7 @@ impl Drop for CloseOnDrop {
 }
 
 impl Prefetch {
-    /// A worker works on a request.
+    /// A worker begins a request.
     pub(super) fn busy(&self) -> Busy<'_> {
         let mut state = self.state();
         state.busy += 1;
@@ -164,15 +165,15 @@ impl Prefetch {
         Busy(self)
     }
 
-    /// A request was answered without a worker: whoever asked may ask again at once, and is not to wait for
-    /// a processor. Assemblies that just came are made ready nevertheless: somebody is about to ask.
+    /// A request was answered without a worker. Speculation stops, so that the client's next request finds a free
+    /// processor. The preparation of an assembly goes on: a client is probably about to plan it.
     pub(super) fn answered(&self) {
         let mut state = self.state();
         state.quiet_since = Some(Instant::now());
         state.at_work.iter().filter(|work| work.questions.is_some()).for_each(AtWork::stop);
     }
 
-    /// Wants an assembly made ready, after those that wait.
+    /// Queues an assembly behind those that wait.
     pub(super) fn want(&self, id: AssemblyId) {
         let mut state = self.state();
         state.waiting.retain(|waiting| *waiting != id);
@@ -183,7 +184,7 @@ impl Prefetch {
         self.changed.notify_all();
     }
 
-    /// Wants that planned which may be asked after a plan, before what may be asked after others.
+    /// Queues the likely questions after a plan before those after older plans.
     pub(super) fn speculate(&self, speculation: Speculation) {
         let mut state = self.state();
         state.speculations.retain(|waiting| !waiting.is_as(&speculation));
@@ -192,7 +193,7 @@ impl Prefetch {
         self.changed.notify_all();
     }
 
-    /// What waits, and what was done.
+    /// Figures for the metrics.
     pub(super) fn metrics(&self) -> PrefetchMetrics {
         let state = self.state();
         let at_work = state.at_work.as_ref();
@@ -205,7 +206,7 @@ impl Prefetch {
         }
     }
 
-    /// Nothing is made ready any more.
+    /// Ends all preparation.
     pub(super) fn close(&self) {
         let mut state = self.state();
         state.closed = true;
@@ -213,8 +214,8 @@ impl Prefetch {
         self.changed.notify_all();
     }
 
-    /// Makes ready what is wanted, as long as it is quiet, until it is closed. `prepare` is given what is next, and
-    /// tells whether that was a question that it planned.
+    /// Prepares what waits, whenever the workers are idle, until it is closed. `prepare` returns whether it planned a
+    /// question.
     pub(super) fn run(&self, prepare: impl Fn(&mut Work, &Termination) -> bool) {
         while let Some((mut work, termination)) = self.next() {
             let foresaw = prepare(&mut work, &termination);
@@ -225,7 +226,7 @@ impl Prefetch {
         }
     }
 
-    /// Waits until it is quiet and something is wanted.
+    /// Waits until the workers are idle and something is queued.
     fn next(&self) -> Option<(Work, Termination)> {
         let mut state = self.state();
         loop {
@@ -250,13 +251,13 @@ impl Prefetch {
         }
     }
 
-    /// It holds plain data: it is whole even if a holder panicked.
-    fn state(&self) -> MutexGuard<'_, State> {
+    /// The state is plain data, so it is consistent even if a thread panicked while it held the lock.
+    fn state(&self) -> MutexGuard<'_, PrefetchState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl State {
+impl PrefetchState {
     fn is_idle(&self) -> bool {
         self.waiting.is_empty() && self.speculations.is_empty()
     }
@@ -266,7 +267,7 @@ impl State {
         assembly.or_else(|| self.speculations.pop_front().map(|f| Work::Question(Box::new(f))))
     }
 
-    /// What was stopped is the next, and so are the questions that are left of a plan.
+    /// Interrupted work comes next again, and so do the questions that are left after a plan.
     fn put_back(&mut self, work: Work, was_stopped: bool) {
         match work {
             _ if self.closed => {}

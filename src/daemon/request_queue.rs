@@ -1,10 +1,9 @@
 //! A bounded queue of jobs with priorities, quotas and fair turns. It holds no locks; `shared_queue`
 //! shares it.
 //!
-//! Who waits is taken in this order: interactive jobs before batch jobs (but a batch job that saw
-//! [`PATIENCE`] others pass goes next); of these, those of the client with the fewest jobs at work; of
-//! these, the client whose last turn is longest ago; of its jobs the oldest. A client that asks a hundred
-//! times so waits for itself, not the others for it.
+//! The next job is chosen in this order: interactive jobs before batch jobs (but a batch job that was passed over
+//! [`PATIENCE`] times goes next); of these, the jobs of the client with the fewest jobs at work; of these, those of the
+//! client whose last turn is longest ago; of these, the oldest. So a client with a hundred requests delays only itself.
 
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
@@ -34,13 +33,13 @@ pub(crate) struct Ticket {
 /// Why a job was not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Rejected {
-    /// As many wait as may wait.
+    /// The queue is full.
     Full,
-    /// As many of this client wait as may wait of one.
+    /// This client has the most waiting jobs that one client may have.
     OwnerFull,
-    /// This client has had as much time of workers as it may have.
+    /// This client has used up its share of the workers' time.
     OwnerSpent,
-    /// Nothing is taken any more.
+    /// The queue is closed.
     Closed,
 }
 
@@ -65,15 +64,15 @@ pub(crate) struct QueueLimits {
     pub(crate) work_s_per_owner: Option<f64>,
 }
 
-/// So many interactive jobs go before a batch job that waits.
+/// The most interactive jobs that go before a waiting batch job.
 const PATIENCE: u32 = 16;
-/// The share of the newest in the running mean of how long jobs take.
+/// The weight of the newest job in the running mean of the jobs' times.
 const NEWEST: f64 = 0.2;
-/// The least and the most milliseconds that a client is told to wait.
+/// The least and the most milliseconds in the hint when to retry.
 const HINT_MS: (f64, f64) = (10.0, 10_000.0);
 /// Work is shared out by the minute.
 const MINUTE_S: f64 = 60.0;
-/// The most for one that has had more than its share.
+/// The most milliseconds in the hint for a client that has used up its share.
 const LONGEST_HINT_MS: f64 = 3_600_000.0;
 
 /// The queue.
@@ -97,7 +96,7 @@ pub(crate) struct RequestQueue<J> {
 struct Turns {
     working: usize,
     last: u64,
-    /// Seconds of work that this client had, less what was forgiven since.
+    /// Seconds of work that this client used and that are not forgiven yet.
     spent_s: f64,
 }
 
@@ -116,7 +115,7 @@ impl<J> RequestQueue<J> {
         }
     }
 
-    /// Lets time pass: what clients have had of workers is forgiven at the rate at which they may have it.
+    /// Lets time pass: used time is forgiven at the rate of a client's share.
     pub(crate) fn pass_until(&mut self, now: Instant) {
         let passed = now.saturating_duration_since(self.now).as_secs_f64();
         self.now = self.now.max(now);
@@ -127,7 +126,7 @@ impl<J> RequestQueue<J> {
         self.forget_idle();
     }
 
-    /// Other bounds from now on; what waits stays.
+    /// Sets other limits. Waiting jobs stay.
     pub(crate) fn rebound(&mut self, bounds: QueueLimits) {
         self.bounds = bounds;
         if bounds.work_s_per_owner.is_none() {
@@ -169,8 +168,8 @@ impl<J> RequestQueue<J> {
 
     pub(crate) fn push(&mut self, ticket: Ticket, job: J) -> Result<(), Rejected> {
         self.check(ticket)?;
-        // Who comes (again) stands behind everybody who waits already: else a few who come again at once
-        // would always go before one who waits.
+        // A client that returns goes behind all waiting ones: otherwise a few clients that return at once would
+        // always go before one that waits.
         if !self.waiting.iter().any(|(other, _)| other.owner == ticket.owner) {
             self.owners.entry(ticket.owner).or_default().last = self.turns;
         }
@@ -178,7 +177,7 @@ impl<J> RequestQueue<J> {
         Ok(())
     }
 
-    /// The job whose turn it is, if any may be worked on now. [`Self::done`] must follow.
+    /// The next job that may begin now. [`Self::done`] must follow.
     pub(crate) fn pop(&mut self) -> Option<(Ticket, J)> {
         let place = self.next_place()?;
         let (ticket, job) = self.waiting.remove(place);
@@ -217,7 +216,7 @@ impl<J> RequestQueue<J> {
         self.owners.get(&owner).copied().unwrap_or_default()
     }
 
-    /// A job that was popped is over, after so long.
+    /// A popped job has ended.
     pub(crate) fn done(&mut self, ticket: Ticket, took: Duration) {
         let took_ms = took.as_secs_f64() * 1e3;
         self.mean_ms =
@@ -234,7 +233,7 @@ impl<J> RequestQueue<J> {
         self.forget_idle();
     }
 
-    /// Who neither waits nor works, and owes nothing, need not be known.
+    /// Forgets clients without waiting jobs, jobs at work, and used time.
     fn forget_idle(&mut self) {
         let waiting = &self.waiting;
         let is_known = |owner: &Owner, turns: &Turns| {
@@ -256,19 +255,19 @@ impl<J> RequestQueue<J> {
         (self.mean_ms * jobs / self.bounds.workers.max(1) as f64).clamp(HINT_MS.0, HINT_MS.1) as u32
     }
 
-    /// Takes back what still waits and fits; false if nothing did.
+    /// Removes the waiting jobs that fit; whether there were any.
     pub(crate) fn withdraw(&mut self, fits: impl Fn(&J) -> bool) -> bool {
         let before = self.waiting.len();
         self.waiting.retain(|(_, job)| !fits(job));
         self.waiting.len() < before
     }
 
-    /// From now on nothing is taken; what waits may still be popped.
+    /// Closes the queue. Waiting jobs may still be popped.
     pub(crate) fn close(&mut self) {
         self.closed = true;
     }
 
-    /// Nothing waits, and nothing will.
+    /// Whether the queue is closed and empty.
     pub(crate) fn is_over(&self) -> bool {
         self.closed && self.waiting.is_empty()
     }

@@ -1,5 +1,5 @@
-//! Answers that were given before, as the bytes that were sent: the port thread gives them again
-//! without waking a worker.
+//! Responses to earlier requests, as the bytes that were sent: the port thread sends them again without waking a
+//! worker.
 
 use std::sync::Arc;
 
@@ -12,12 +12,12 @@ use super::planning::Planning;
 use crate::lru::{self, Lru};
 use crate::plan::{Plan, PlanStats, PlanStatus};
 
-/// So many answers of before a restart are there at once …
+/// At most this many responses from before a restart are loaded …
 const MOST_RECENT: usize = 64;
-/// … of no more than so many bytes in all: it takes a few milliseconds before clients are let in.
+/// … of at most this many bytes in all. Loading them delays the first client by a few milliseconds.
 const RECENT_BYTES: u64 = 4 << 20;
 
-/// A whole answer, ready to be sent.
+/// A whole response, ready to be sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct CachedResponse {
     /// Messages with steps, in order.
@@ -27,8 +27,8 @@ pub(crate) struct CachedResponse {
 }
 
 impl CachedResponse {
-    /// What is answered when the question that led to a plan is asked again. None if the plan ended by
-    /// the clock: then another one may come.
+    /// The response when the request that led to a plan is repeated. `None` if the plan ended by the clock: another
+    /// run may find another plan.
     pub(crate) fn of(plan: &Plan) -> Option<Self> {
         if !matches!(plan.status, PlanStatus::Complete | PlanStatus::Infeasible | PlanStatus::Partial) {
             return None;
@@ -39,23 +39,23 @@ impl CachedResponse {
         let summary = convert::summary(plan, &stats);
         let mut messages = steps_messages(&steps);
         messages.push(summary);
-        // They stay, and what they have in reserve with them: as much again, from where it is doubled.
+        // The messages are kept for long, and a vector that grew by doubling has up to half of its memory unused.
         messages.iter_mut().for_each(Vec::shrink_to_fit);
         Self::from_messages(messages)
     }
 
-    /// From its messages in order; the last one ends the plan.
+    /// A response from its messages in order; the last one ends the plan.
     pub(crate) fn from_messages(mut messages: Vec<Vec<u8>>) -> Option<Self> {
         let summary = Arc::new(messages.pop()?);
         Some(Self { steps: messages.into_iter().map(Arc::new).collect(), summary })
     }
 
-    /// The inverse.
+    /// The inverse of `from_messages`.
     pub(crate) fn messages(&self) -> Vec<Vec<u8>> {
         self.steps.iter().chain([&self.summary]).map(|message| (**message).clone()).collect()
     }
 
-    /// Bytes in memory, about.
+    /// Approximate bytes in memory.
     fn memory(&self) -> usize {
         let message = |message: &Arc<Vec<u8>>| lru::shared(size_of::<Vec<u8>>()) + message.capacity();
         let steps = self.steps.iter().map(|step| size_of_val(step) + message(step));
@@ -63,22 +63,22 @@ impl CachedResponse {
     }
 }
 
-/// What makes two requests the same question: all but who asks, how many work, and until when. None if
-/// nothing is to be remembered.
+/// The key of a request: requests that differ only in threads, priority and deadline have the same. `None` if the
+/// request forbids caching.
 pub(crate) fn question(request: &PlanRequest) -> Option<Vec<u8>> {
     let PlanRequest { no_cache, .. } = *request;
     (!no_cache)
         .then(|| PlanRequest { threads: 0, batch: false, deadline_ns: None, ..request.clone() }.encode())
 }
 
-/// Answers in memory.
+/// The size of the cache.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub(crate) struct ResponseCacheMetrics {
     pub(crate) entries: usize,
     pub(crate) bytes: usize,
 }
 
-/// The answers that are remembered: those that were asked for last, within a number of bytes.
+/// The responses that were used last, within a limit of bytes.
 #[derive(Debug, Default)]
 pub(crate) struct ResponseCache {
     by_question: Lru<Arc<[u8]>, CachedResponse>,
@@ -91,7 +91,7 @@ impl ResponseCache {
         Self { limit, ..Self::default() }
     }
 
-    /// With those that were used last before a restart: whoever asks for one of them first waits neither for
+    /// A cache with the responses that were used last before a restart, so that their first use waits neither for
     /// the disk nor for a worker.
     pub(crate) fn recent(service: &impl Planning, limit: usize) -> Self {
         let mut answers = Self::new(limit);
@@ -107,12 +107,12 @@ impl ResponseCache {
         ResponseCacheMetrics { entries: self.by_question.len(), bytes: self.bytes }
     }
 
-    /// The answer to a question.
+    /// The response to a question.
     pub(crate) fn get(&mut self, question: &[u8]) -> Option<Arc<CachedResponse>> {
         self.by_question.get(question)
     }
 
-    /// Remembers an answer in place of those that were not asked for the longest.
+    /// Stores a response in place of the least recently used ones.
     pub(crate) fn insert(&mut self, question: &[u8], answer: CachedResponse) {
         let needed = cost(question, &answer);
         if needed > self.limit {

@@ -16,7 +16,7 @@ use crate::termination::Termination;
 
 /// Where a request stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum State {
+pub(crate) enum SessionState {
     /// Its bytes are copied.
     Received,
     /// It can be read and names a known assembly.
@@ -60,10 +60,10 @@ pub(crate) enum Input {
     Fail,
 }
 
-impl State {
+impl SessionState {
     /// The state after an input; `None` where the input is not legal.
     pub(crate) fn after(self, input: Input) -> Option<Self> {
-        use State::{Admitted, Ended, Queued, Received, Running, Streaming};
+        use SessionState::{Admitted, Ended, Queued, Received, Running, Streaming};
         let next = match (self, input) {
             (Received, Input::Admit) => Admitted,
             (Admitted, Input::Enqueue) => Queued,
@@ -110,7 +110,7 @@ pub(crate) struct Session<L> {
     request: u64,
     /// The listener to wake.
     pub(crate) listener: u128,
-    state: State,
+    state: SessionState,
     outbox: Outbox,
     /// The flag that its worker's termination condition polls, once there is one.
     cancel: Option<Arc<AtomicBool>>,
@@ -130,7 +130,7 @@ impl<L: Link> Session<L> {
             link,
             request,
             listener,
-            state: State::Received,
+            state: SessionState::Received,
             outbox: Outbox::new(outbox_limit),
             cancel: None,
             deadline: None,
@@ -142,7 +142,7 @@ impl<L: Link> Session<L> {
         }
     }
 
-    pub(crate) fn state(&self) -> State {
+    pub(crate) fn state(&self) -> SessionState {
         self.state
     }
 
@@ -157,9 +157,9 @@ impl<L: Link> Session<L> {
             return false;
         };
         match next {
-            State::Admitted => self.admitted_ns = monotonic_ns(),
-            State::Running => self.started_ns = monotonic_ns(),
-            State::Ended(SessionEnd::Cancelled | SessionEnd::Failed) => self.cancel_work(),
+            SessionState::Admitted => self.admitted_ns = monotonic_ns(),
+            SessionState::Running => self.started_ns = monotonic_ns(),
+            SessionState::Ended(SessionEnd::Cancelled | SessionEnd::Failed) => self.cancel_work(),
             _ => {}
         }
         self.state = next;
@@ -193,7 +193,7 @@ impl<L: Link> Session<L> {
     }
 
     pub(crate) fn step(&mut self, step: Step) {
-        if self.state == State::Running && self.outbox.push_step(step).is_err() {
+        if self.state == SessionState::Running && self.outbox.push_step(step).is_err() {
             self.lose("its outbox is full");
         }
     }
@@ -242,7 +242,7 @@ impl<L: Link> Session<L> {
             self.lose("nothing was read for too long");
             return self.send_waiting();
         }
-        if self.state == State::Streaming && self.outbox.is_empty() {
+        if self.state == SessionState::Streaming && self.outbox.is_empty() {
             self.input(Input::Drain);
         }
         sent
@@ -280,7 +280,7 @@ impl<L: Link> Session<L> {
     /// How long a plan took that was sent to its end, and from where it came.
     pub(crate) fn timed(&self) -> Option<(LatencyKind, Duration)> {
         let kind = if self.remembered { LatencyKind::RememberedPlan } else { LatencyKind::Plan };
-        (self.state == State::Ended(SessionEnd::Done)).then(|| (kind, self.received.elapsed()))
+        (self.state == SessionState::Ended(SessionEnd::Done)).then(|| (kind, self.received.elapsed()))
     }
 
     /// Over, and the client has what it can get.
@@ -352,21 +352,27 @@ mod tests {
             SessionEnd::Failed,
         ] {
             for input in INPUTS {
-                assert_eq!(State::Ended(end).after(input), None);
+                assert_eq!(SessionState::Ended(end).after(input), None);
             }
         }
     }
 
     #[test]
     fn every_live_state_can_be_left_by_a_client_that_goes() {
-        for state in [State::Received, State::Admitted, State::Queued, State::Running, State::Streaming] {
-            assert_eq!(state.after(Input::Cancel), Some(State::Ended(SessionEnd::Cancelled)));
+        for state in [
+            SessionState::Received,
+            SessionState::Admitted,
+            SessionState::Queued,
+            SessionState::Running,
+            SessionState::Streaming,
+        ] {
+            assert_eq!(state.after(Input::Cancel), Some(SessionState::Ended(SessionEnd::Cancelled)));
         }
     }
 
     #[test]
     fn a_running_request_does_not_expire_it_times_out_with_a_plan() {
-        assert_eq!(State::Running.after(Input::Expire), None);
+        assert_eq!(SessionState::Running.after(Input::Expire), None);
     }
 
     #[test]
@@ -375,10 +381,10 @@ mod tests {
         let mut session = running(&link);
         session.finish(Arc::new(vec![0; 8]));
         assert!(!session.pump(Instant::now(), Duration::from_secs(9)));
-        assert_eq!(session.state(), State::Streaming);
+        assert_eq!(session.state(), SessionState::Streaming);
         link.room.set(1);
         assert!(session.pump(Instant::now(), Duration::from_secs(9)));
-        assert_eq!(session.state(), State::Ended(SessionEnd::Done));
+        assert_eq!(session.state(), SessionState::Ended(SessionEnd::Done));
         assert!(session.is_finished());
     }
 
@@ -391,7 +397,7 @@ mod tests {
         session.pump(now, Duration::from_secs(1));
         assert!(session.stuck_since.is_some());
         session.pump(now + Duration::from_secs(2), Duration::from_secs(1));
-        assert_eq!(session.state(), State::Ended(SessionEnd::Failed));
+        assert_eq!(session.state(), SessionState::Ended(SessionEnd::Failed));
         assert!(is_cancelled(&session), "its worker stops");
         link.room.set(1);
         session.pump(now, Duration::from_secs(1));
@@ -415,6 +421,6 @@ mod tests {
         for _ in 0..50 {
             session.step(Step { path: vec![[0.0; 7]; 20], ..Step::default() });
         }
-        assert_eq!(session.state(), State::Ended(SessionEnd::Failed));
+        assert_eq!(session.state(), SessionState::Ended(SessionEnd::Failed));
     }
 }

@@ -15,7 +15,7 @@ pub(crate) struct SharedQueue<J> {
     ready: Condvar,
 }
 
-/// A job at work; the queue is told when this is dropped, also by a panic.
+/// A job at work. When it is dropped, also by a panic, the queue counts it as done.
 #[derive(Debug)]
 pub(crate) struct Working<'q, J> {
     queue: &'q SharedQueue<J>,
@@ -26,7 +26,7 @@ pub(crate) struct Working<'q, J> {
 impl<J> Drop for Working<'_, J> {
     fn drop(&mut self) {
         self.queue.lock_now().done(self.ticket, self.started.elapsed());
-        // What its client has waiting may go on now.
+        // Waiting jobs of its client may begin now.
         self.queue.ready.notify_all();
     }
 }
@@ -36,7 +36,7 @@ impl<J> SharedQueue<J> {
         Self { queue: Mutex::new(RequestQueue::new(bounds)), ready: Condvar::new() }
     }
 
-    /// The queue holds plain data: it is whole even if a holder panicked.
+    /// The queue is plain data, so it is consistent even if a thread panicked while it held the lock.
     fn lock(&self) -> MutexGuard<'_, RequestQueue<J>> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -103,21 +103,21 @@ impl<J> SharedQueue<J> {
 /// Uploads that may wait to be healed; each client port has at most one.
 const ADMISSION_QUEUE: usize = 128;
 
-/// The queues of plans, of assemblies to take in, and of those to make ready.
+/// The queues of plans, of assemblies to take in, and of what is to be prepared.
 #[derive(Debug, Clone)]
 pub(crate) struct Queues {
     pub(crate) plans: Arc<SharedQueue<PlanJob>>,
     pub(crate) admissions: Arc<SharedQueue<AdmitJob>>,
-    /// What is made ready while nothing is asked, if anything is.
+    /// What is prepared while the workers are idle.
     pub(super) prefetch: Arc<Prefetch>,
-    /// How much time may go into what may be asked after a plan.
+    /// The time for planning the likely questions after one plan.
     pub(super) speculation: Duration,
 }
 
 /// The bounds of plans, and of assemblies to take in.
 fn bounds(config: &Config) -> [QueueLimits; 2] {
     let (workers, requests) = (config.workers.count, &config.requests);
-    // One worker is left to others, if there is more than one.
+    // If there are several workers, one is left for other clients.
     let share = workers.saturating_sub(1).max(1);
     let megabytes = |mb: u64| mb.saturating_mul(1 << 20);
     let plans = QueueLimits {

@@ -1,6 +1,6 @@
-//! What may be asked next about an assembly that was planned: a part does not come off where the plan has it leave,
-//! may not move at all, or is gone already. Whoever carries a plan out asks that in the middle of it, and has no time; so such questions
-//! are planned while nothing is asked, in the order of the plan, and what was found is remembered.
+//! Plans the likely next questions about a planned assembly: a part does not come off when its turn comes, may not
+//! move at all, or is gone already. A robot that carries a plan out asks such a question in the middle of it and cannot
+//! wait. So the questions are planned while the workers are idle, in the order of the plan, and the answers are cached.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -13,29 +13,29 @@ use crate::search::{PlanRequest, Planner};
 use crate::service::AssemblyId;
 use crate::termination::Termination;
 
-/// In less time than this, no question is planned.
+/// With less time left than this, no question is planned.
 const LEAST_TIME: Duration = Duration::from_millis(1);
 
-/// What may become of a part, by its place in the plan.
+/// What may happen to a part, by its place in the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Contingency {
-    /// It may not move any more when its turn comes: those before it are gone.
+    /// It does not move when its turn comes: the parts before it are gone.
     StuckInTurn(usize),
-    /// It may not move any more.
+    /// It does not move.
     Stuck(usize),
-    /// It is not there any more.
+    /// It is gone.
     Gone(usize),
 }
 
 impl Contingency {
-    /// All that may become of one: in the order in which it may be asked about while the plan is carried out.
+    /// All that may happen to a part, the earliest first.
     fn all(place: usize) -> impl Iterator<Item = Self> {
-        // Nothing is before the first.
+        // No part is before the first.
         let in_turn = (place > 0).then_some(Self::StuckInTurn(place));
         in_turn.into_iter().chain([Self::Stuck(place), Self::Gone(place)])
     }
 
-    /// The question about it, after a request whose plan takes parts out in some order.
+    /// The question that asks about it, for a request whose plan takes the parts out in `order`.
     fn question(self, request: &PlanRequest, order: &[usize]) -> PlanRequest {
         let mut request = request.clone();
         match self {
@@ -50,7 +50,7 @@ impl Contingency {
     }
 }
 
-/// What may be asked after a question, as far as it was not planned yet.
+/// The likely questions after a plan that were not planned yet.
 #[derive(Debug)]
 pub(super) struct Speculation {
     assembly: AssemblyId,
@@ -60,14 +60,13 @@ pub(super) struct Speculation {
     /// The parts that its plan takes out, in order.
     order: Vec<usize>,
     left: VecDeque<Contingency>,
-    /// So much time may go into it yet.
+    /// The time that is left for them.
     time: Duration,
 }
 
 impl Speculation {
-    /// What may be asked after a question that was answered by a plan, with so much time for it; none if nothing
-    /// comes off, if whoever asked does not want it any more, or if it was asked by a planner that is there to be
-    /// compared with.
+    /// The likely questions after a plan, to be planned within `time`. `None` if the plan has no steps, if it was
+    /// cancelled, or if its planner serves only for comparison.
     pub(super) fn after(job: &PlanJob, plan: &Plan, time: Duration) -> Option<Self> {
         let PlanRequest { planner, assembly, no_cache, .. } = &job.request;
         let is_for_use = *planner == Planner::SbdpStar && assembly.is_none() && !no_cache;
@@ -81,7 +80,7 @@ impl Speculation {
         Some(Self { assembly: job.assembly, moved, request, order, left, time })
     }
 
-    /// Whether both come after the same question.
+    /// Whether both come after plans of the same request.
     pub(super) fn is_as(&self, other: &Self) -> bool {
         (self.assembly, &self.moved, &self.request) == (other.assembly, &other.moved, &other.request)
     }
@@ -91,14 +90,14 @@ impl Speculation {
         self.left.len()
     }
 
-    /// Plans the next question; true if that was done. One that was stopped stays the next; one that takes more than
-    /// half of the time is left out, though what was found for it is remembered.
+    /// Plans the next question; whether a plan was found. A question that was interrupted stays the next. A question
+    /// that takes more than half of the time is dropped, but the motions found for it stay cached.
     pub(super) fn plan_next<P: Planning>(&mut self, service: &P, termination: &Termination) -> bool {
         let Some(next) = self.left.pop_front() else { return false };
         let began = Instant::now();
         let request = next.question(&self.request, &self.order);
         let within = termination.within(self.time / 2);
-        // Whoever asks will be told what is wrong.
+        // An error is reported to the client that asks the question.
         let planned = contained(|| {
             let assembly = with_moved(service, self.assembly, &self.moved, &within)?;
             service.speculate(assembly, &request, &within)
@@ -110,7 +109,7 @@ impl Speculation {
         }
         let plan = planned.ok().and_then(Result::ok);
         if plan.is_none() || self.time < LEAST_TIME {
-            // Another would fail as this one did, or there is no time for it.
+            // The others would fail in the same way, or there is no time for them.
             self.left.clear();
         }
         plan.is_some_and(|plan| !matches!(plan.status, PlanStatus::Timeout | PlanStatus::Cancelled))

@@ -1,5 +1,5 @@
-//! What a service manager is told, by the protocol of sd_notify(3): ready, stopping, still alive. Without
-//! one nothing happens.
+//! Notifies a service manager by the protocol of sd_notify(3): ready, stopping, still alive. Without one nothing
+//! happens.
 
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};

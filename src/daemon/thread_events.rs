@@ -1,8 +1,8 @@
-//! What comes to the port thread from other threads of this process, and how these wake it.
+//! Events that other threads of this process send to the port thread, and how these wake it.
 //!
-//! Where much is remembered, a plan's steps follow each other within microseconds; on few processors the thread that
-//! makes them would be held up by those that it wakes. So steps that come soon after a wake-up wake nobody: the port
-//! thread, woken by that, looks again by itself for as long ([`Recently`]).
+//! With warm caches, a plan's steps follow each other within microseconds. On few processors the worker would be slowed
+//! down by the threads that it wakes. So steps that come soon after a wake-up do not wake the port thread: it polls for
+//! that long by itself ([`Recently`]).
 
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -17,18 +17,18 @@ use super::DaemonError;
 use super::ports::Ports;
 use super::workers::{Report, WorkerEvent};
 
-/// What comes from other threads of this process.
+/// An event from another thread of this process.
 pub(super) enum ThreadEvent {
     Worker(WorkerEvent),
     Terminate,
     Reload,
 }
 
-/// Steps that follow within this time are told together.
+/// Steps that follow within this time share one wake-up.
 const TOGETHER: Duration = Duration::from_millis(1);
 
-/// Other threads hold the notifier weakly: one that is still busy when the daemon leaves must
-/// not keep the service's files alive.
+/// Wakes the port thread. Threads hold the notifier weakly: one that is still busy when the daemon ends must not
+/// keep the service's files alive.
 fn wake(notifier: &Weak<Notifier<Transport>>) {
     if let Some(notifier) = notifier.upgrade() {
         // A failed wake-up costs one tick, no more.
@@ -41,7 +41,7 @@ fn wake(notifier: &Weak<Notifier<Transport>>) {
 struct Wakes(Option<Instant>);
 
 impl Wakes {
-    /// Whether a report wakes it.
+    /// Whether a report must wake it.
     fn is_due(&mut self, event: &WorkerEvent, now: Instant) -> bool {
         let is_seen_soon = self.0.is_some_and(|last| now.saturating_duration_since(last) < TOGETHER);
         let is_due = !(matches!(event, WorkerEvent::Step(..)) && is_seen_soon);
@@ -52,16 +52,16 @@ impl Wakes {
     }
 }
 
-/// Takes workers' reports to the port thread.
+/// Sends workers' reports to the port thread.
 pub(super) fn reporter(ports: &Ports, sender: Sender<ThreadEvent>) -> Report {
     let notifier = Arc::downgrade(&ports.wake_self);
     let shared = Mutex::new((sender, Wakes::default()));
     Arc::new(move |event| {
         let is_due = {
             let (sender, wakes) = &mut *shared.lock().unwrap_or_else(PoisonError::into_inner);
-            // The time before it is sent: it is read later than that.
+            // The time before the report is sent: it is read later than that.
             let is_due = wakes.is_due(&event, Instant::now());
-            // A send fails only when the port thread has left; then nobody is interested.
+            // A send fails only when the port thread has ended.
             let _ = sender.send(ThreadEvent::Worker(event));
             is_due
         };
@@ -71,7 +71,7 @@ pub(super) fn reporter(ports: &Ports, sender: Sender<ThreadEvent>) -> Report {
     })
 }
 
-/// Takes signals to the port thread.
+/// Sends signals to the port thread.
 pub(super) fn watch_signals(ports: &Ports, sender: Sender<ThreadEvent>) -> Result<(), DaemonError> {
     let system = |source| DaemonError::System { what: "watching signals", source };
     let notifier = Arc::downgrade(&ports.wake_self);
@@ -86,7 +86,7 @@ pub(super) fn watch_signals(ports: &Ports, sender: Sender<ThreadEvent>) -> Resul
     Ok(())
 }
 
-/// Whether a report came so recently that others may come that wake nobody.
+/// When a report was read last: reports that follow soon come without a wake-up.
 #[derive(Debug, Default)]
 pub(super) struct Recently(Option<Instant>);
 
@@ -98,7 +98,7 @@ impl Recently {
 
     /// How long to wait for the next event, if there is `timeout` for it.
     pub(super) fn patience(&self, now: Instant, timeout: Duration) -> Duration {
-        // Twice: who waits for as long, once that is nearly over, waits beyond it.
+        // Twice the time: a wait of this length that begins near its end lasts beyond it.
         let may_follow = self.0.is_some_and(|last| now.saturating_duration_since(last) < 2 * TOGETHER);
         if may_follow { timeout.min(TOGETHER) } else { timeout }
     }

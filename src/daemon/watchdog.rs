@@ -1,8 +1,8 @@
 //! Ends a daemon whose port thread stands still.
 //!
-//! A client that is killed at a bad moment may leave shared memory in a state in which whoever comes next
-//! waits for ever. A daemon that waits so would keep its place and serve nobody: better it ends, says so, and
-//! the next one starts with shared memory of its own.
+//! A killed client may leave shared memory in a state in which the next process that uses it waits for ever. A daemon
+//! that waits so would keep its place and serve no client: it ends with a log line, and the next daemon starts with
+//! shared memory of its own.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,4 +1,4 @@
-//! The threads that plan and heal. A panic is contained to its request.
+//! The threads that plan and take assemblies in. A panic ends only its own request.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -26,9 +26,9 @@ pub(crate) enum WorkerEvent {
     Started(SessionKey),
     Step(SessionKey, Step),
     Progress(SessionKey, Progress),
-    /// A plan's summary, and what to answer when the same is asked again.
+    /// A plan's summary, and the response when the question is repeated.
     Planned(SessionKey, Arc<Vec<u8>>, Option<(Vec<u8>, CachedResponse)>),
-    /// The question was answered before, and is so again.
+    /// The question was answered before: its response comes from the disk.
     Answered(SessionKey, Vec<u8>, CachedResponse),
     Unplanned(SessionKey, WireError),
     Admitted {
@@ -41,11 +41,10 @@ pub(crate) enum WorkerEvent {
     },
 }
 
-/// Takes reports to the port thread and wakes it.
+/// Sends a report to the port thread and wakes it.
 pub(crate) type Report = Arc<dyn Fn(WorkerEvent) + Send + Sync>;
 
-/// Starts `count` planning threads, and one that takes assemblies in, so that an upload never
-/// waits behind a long plan.
+/// Starts `count` planning threads, and one that takes assemblies in: an upload never waits for a long plan.
 pub(crate) fn start<P: Planning>(
     count: usize,
     queues: &Queues,
@@ -73,14 +72,14 @@ pub(crate) fn start<P: Planning>(
     Ok(())
 }
 
-/// Streams what a plan yields to the port thread.
+/// Streams a plan's steps and progress to the port thread.
 struct Sink<'r> {
     key: SessionKey,
     report: &'r Report,
     last_progress: Option<Instant>,
 }
 
-/// Progress more often than this would only wake people up.
+/// Progress is reported at most once in this time: each report wakes the port thread and the client.
 const PROGRESS_PAUSE: Duration = Duration::from_millis(50);
 
 impl PlanSink for Sink<'_> {
@@ -96,7 +95,7 @@ impl PlanSink for Sink<'_> {
     }
 }
 
-/// The span of a request: whatever is logged while it is worked on names it.
+/// The span of a request: log lines written during its work carry these fields.
 fn span(job: &PlanJob) -> tracing::Span {
     let waited_ms = job.received.elapsed().as_secs_f64() * 1e3;
     let assembly = format!(
@@ -106,7 +105,7 @@ fn span(job: &PlanJob) -> tracing::Span {
     tracing::info_span!("request", client = job.owner.0, request = job.key.request, assembly, waited_ms)
 }
 
-/// Tells how a request's plan came about: its stages, in seconds.
+/// Logs the times of a plan's stages, in seconds.
 fn log_plan(plan: &Plan) {
     let stats = &plan.stats;
     tracing::info!(
@@ -139,7 +138,7 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Repor
     report(match planned {
         Ok(Ok(plan)) => {
             log_plan(&plan);
-            // Before whoever asked is told, and may ask what is foreseen.
+            // Before the client learns of the plan, and may ask one of these questions.
             if let Some(speculation) = Speculation::after(job, &plan, queues.speculation) {
                 queues.prefetch.speculate(speculation);
             }
@@ -157,7 +156,7 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Repor
     });
 }
 
-/// Which assembly was taken in, if it was.
+/// Takes an assembly in; its id, if that succeeded.
 fn admit<P: Planning>(service: &P, job: AdmitJob, report: &Report) -> Option<AssemblyId> {
     match job {
         AdmitJob::Upload(Received { number, bytes, termination }) => {
@@ -198,7 +197,7 @@ fn admit_upload<P: Planning>(
     termination: &Termination,
 ) -> Result<AssemblyId, WireError> {
     let source = convert::source_assembly(&bytes)?;
-    // Healing takes memory of its own: an upload need not be there three times.
+    // Healing needs memory of its own: the bytes are freed before.
     drop(bytes);
     let admission = service.admit(&source, termination).map_err(|e| convert::service_error(&e))?;
     Ok(admission.id)

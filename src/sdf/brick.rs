@@ -23,9 +23,9 @@ pub(super) struct Brick<'a> {
 struct Facets {
     of: Vec<u32>,
     facets: Vec<Facet>,
-    /// Too thin for single precision: may be nearest anywhere.
+    /// Triangles too thin for single precision: each may be nearest anywhere.
     thin: Vec<u32>,
-    /// What distances may be off by, in cells.
+    /// The error of distances, in cells.
     rounding: f32,
 }
 

@@ -21,18 +21,18 @@ const CELLS_ACROSS: f64 = 20.0;
 /// Bricks a field may hold (48 MB); the cell grows until it is met.
 const MOST_BRICKS: usize = 8192;
 
-/// Who builds.
+/// The threads that build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Threads {
     /// Those of the current rayon pool.
     All,
-    /// The one that asks.
+    /// The caller's.
     This,
 }
 
 impl Grid {
-    /// Builds the field of a surface. Bricks are filled when they are first looked at: of most parts, contact
-    /// never sees but a small share.
+    /// Builds the grid of a surface. Its bricks are measured when they are first used: contact uses only a small
+    /// share of most parts' bricks.
     pub(super) fn build(
         surface: &Arc<Surface>,
         threads: Threads,
@@ -59,7 +59,7 @@ impl Grid {
             start = end;
         }
         field.triangles = pairs.into_iter().map(|(_, t)| t).collect();
-        // They stay for long.
+        // The field is kept for long.
         field.triangles.shrink_to_fit();
         field.near.shrink_to_fit();
         field.fill_far();

@@ -51,7 +51,7 @@ pub(super) struct Facet {
 impl Facet {
     /// A triangle given by its corners and the frame; `None` if it is too thin to have a plane.
     pub(super) fn new(corners: &[Point3<f64>; 3], middle: &Point3<f64>, cell: f64) -> Option<Self> {
-        /// Height by length of triangles whose plane is told from rounding by far.
+        /// Triangles with a smaller ratio of height to length have no plane that exceeds rounding.
         const THIN: f64 = 1e-6;
         let corners = corners.map(|p| (p - middle) / cell);
         let sides = [0, 1, 2].map(|e| corners[(e + 1) % 3] - corners[e]);

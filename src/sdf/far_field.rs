@@ -8,9 +8,9 @@ use super::grid::{EMPTY, Grid};
 use super::nodes::{BAND, CELLS};
 
 impl Grid {
-    /// Fills `far`. Bricks fewer than `n` steps away (Chebyshev) do not touch the band, so whoever
-    /// walks to the surface leaves them after `n - 1` sides, with the band still to cross. A component
-    /// of empty bricks has the sign of any of its points.
+    /// Fills `far`. Bricks fewer than `n` steps away (Chebyshev) do not touch the band, so a path to the surface is at
+    /// least `n - 1` sides and the half-width of the band long. A component of empty bricks has the sign of any of its
+    /// points.
     pub(super) fn fill_far(&mut self) {
         let steps = self.steps_to_surface();
         let (side, band) = (self.cell * CELLS as f64, BAND * self.cell);

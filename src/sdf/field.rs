@@ -29,7 +29,7 @@ pub struct Field {
     /// wait to be written.
     store: Option<(Weak<dyn FieldStore>, [u8; 32])>,
     grid: OnceLock<Grid>,
-    /// So many of the bricks that were filled here are in a file.
+    /// How many of the bricks that this process measured are in a file.
     written: AtomicUsize,
 }
 
@@ -113,7 +113,7 @@ impl Field {
         filled.saturating_sub(self.written.load(Ordering::Relaxed))
     }
 
-    /// Whether so many bricks are in no file that one is to be written with them; or the file is damaged.
+    /// Whether a new file is due: enough bricks are in no file, or the file is damaged.
     #[must_use]
     pub fn is_worth_writing(&self) -> bool {
         let Some(grid) = self.grid.get() else { return false };
@@ -122,8 +122,8 @@ impl Field {
         unwritten > 0 && (damaged || unwritten * NEW_BRICKS >= written)
     }
 
-    /// Writes the file of what is known of it, under the hash of all that it depends on. Whether it gets its
-    /// name is for [`Field::is_written`] to hear.
+    /// Writes the grid with its measured bricks, under the hash of all that they depend on; the number of bricks that
+    /// this process measured. [`Field::is_written`] must be called when the file has its name.
     ///
     /// # Errors
     /// The system refused; or it is not built.
@@ -134,13 +134,13 @@ impl Field {
         Ok(filled)
     }
 
-    /// So many of the bricks that were filled here are in a file now.
+    /// Records that `filled` of the bricks that this process measured are in a file now.
     pub fn is_written(&self, filled: usize) {
         self.written.fetch_max(filled, Ordering::Relaxed);
     }
 }
 
-/// Looking at it builds it: whoever did not make it ready waits for that, as long as it takes.
+/// The first use builds the grid, if it was not prepared before, and waits until it is built.
 impl Deref for Field {
     type Target = Grid;
 

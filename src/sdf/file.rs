@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use bytemuck::{Pod, Zeroable};
 
-use super::grid::{Grid, Held, MOST_SLOTS, NearBrick};
+use super::grid::{BrickNodes, Grid, MOST_SLOTS, NearBrick};
 use super::nodes::Nodes;
 use super::stored::{Bricks, Checksum, NOT_STORED, StoredBricks, checksum};
 use crate::cache::Mapping;
@@ -150,7 +150,7 @@ impl Grid {
     fn read(surface: &Arc<Surface>, key: &[u8; 32], bytes: &[u8]) -> Option<(Self, Bricks)> {
         let file = Tables::of(bytes, key)?;
         let Header { cell, dims, triangles, open, .. } = file.header;
-        // So that it can be asked which grid such a cell makes.
+        // Otherwise the sizes of the grid would overflow.
         if !(cell.is_normal() && surface.bounds().extents().max() < cell * MOST_SLOTS as f64) {
             return None;
         }
@@ -173,7 +173,7 @@ impl Grid {
 
     /// Writes the grid and the bricks that were filled.
     pub(super) fn write(&self, key: &[u8; 32], out: &mut impl Write) -> io::Result<()> {
-        // What is filled from now on is for another file.
+        // Bricks that are measured from now on go into a later file.
         let known: Vec<Option<&Nodes>> = self.near.iter().map(|near| self.known(near)).collect();
         let mut filled = 0;
         let entry = |(near, known): (&NearBrick, &Option<&Nodes>)| {
@@ -224,8 +224,8 @@ impl Grid {
         if near.nodes.get().is_none()
             && let Some(stored) = self.in_file(near)
         {
-            // Whoever filled it meanwhile found the same.
-            let _filled = near.nodes.set(Held::Stored(stored));
+            // Another thread that set it meanwhile found the same nodes.
+            let _filled = near.nodes.set(BrickNodes::Stored(stored));
         }
         near.nodes.get().map(|held| &**held)
     }

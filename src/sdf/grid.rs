@@ -11,12 +11,12 @@ use super::nodes::{BAND, CELLS, FAR_NODE, Lattice, NODES, Nodes};
 use super::stored::{StoredBricks, StoredNodes};
 use crate::geometry::{Bounds, Surface};
 
-/// Marks a brick without nodes.
+/// Marks a brick without nodes in `slots`.
 pub(super) const EMPTY: u32 = u32::MAX;
-/// Bricks of the whole box, empty ones included.
+/// The most bricks of the whole box, empty ones included (16 MB with their bounds); the cell grows until it is met.
 pub(super) const MOST_SLOTS: usize = 1 << 21;
 
-/// What a [`Field`](super::Field) is when it was built.
+/// A built [`Field`](super::Field).
 #[derive(Debug)]
 pub struct Grid {
     pub(super) origin: Point3<f64>,
@@ -27,15 +27,15 @@ pub struct Grid {
     /// Per brick without nodes: bound, |bound| ≤ distance anywhere in the brick; signed, unless the
     /// surface is open.
     pub(super) far: Vec<f32>,
-    /// Per brick, if the surface is open: whether its middle is inside, asked when first looked at.
+    /// Per brick, if the surface is open: whether its middle is inside, computed when it is first used.
     pub(super) far_inside: Vec<OnceLock<bool>>,
     /// Bricks with nodes.
     pub(super) near: Vec<NearBrick>,
-    /// The triangles of all of them.
+    /// The triangles of all bricks, brick by brick.
     pub(super) triangles: Vec<u32>,
     pub(super) surface: Arc<Surface>,
     pub(super) bounds: Bounds,
-    /// The file that it was read from, if it was.
+    /// The file that the grid was read from, if there is one.
     pub(super) file: Option<Arc<StoredBricks>>,
 }
 
@@ -46,22 +46,22 @@ pub(super) struct NearBrick {
     pub(super) brick: u32,
     /// Which of the field's triangles may be nearest in it, as a range.
     pub(super) triangles: [u32; 2],
-    /// Its place in the file, if there is one.
+    /// Its place in the file, or [`NOT_STORED`](super::stored::NOT_STORED).
     pub(super) stored: u32,
-    /// Measured when first looked at: what comes out does not depend on when or by whom.
-    pub(super) nodes: OnceLock<Held>,
+    /// Measured when they are first used. The result does not depend on when that is, nor on the thread.
+    pub(super) nodes: OnceLock<BrickNodes>,
 }
 
 /// Where the nodes of a brick are.
 #[derive(Debug)]
-pub(super) enum Held {
+pub(super) enum BrickNodes {
     /// Measured here.
     Filled(Box<Nodes>),
     /// In the file.
     Stored(StoredNodes),
 }
 
-impl Deref for Held {
+impl Deref for BrickNodes {
     type Target = Nodes;
 
     #[inline]
@@ -144,7 +144,7 @@ impl Grid {
         self.cell * 0.87
     }
 
-    /// Bytes in memory, of bricks looked at so far; those of a file are not counted.
+    /// Bytes in memory, without the bricks in a file.
     #[must_use]
     pub fn memory(&self) -> usize {
         self.slots.len() * 8
@@ -154,13 +154,13 @@ impl Grid {
             + self.filled() * size_of::<Nodes>()
     }
 
-    /// Bricks that were filled here, in no file then.
+    /// Bricks that were measured by this process, and so are in no file.
     #[must_use]
     pub fn filled(&self) -> usize {
-        self.near.iter().filter(|near| matches!(near.nodes.get(), Some(Held::Filled(_)))).count()
+        self.near.iter().filter(|near| matches!(near.nodes.get(), Some(BrickNodes::Filled(_)))).count()
     }
 
-    /// Bricks in the file that it was read from, and whether one of these was found damaged.
+    /// Bricks in the file that the grid was read from, and whether one of them was found damaged.
     #[must_use]
     pub fn in_its_file(&self) -> (usize, bool) {
         self.file.as_ref().map_or((0, false), |file| (file.count(), file.is_damaged()))
@@ -259,12 +259,13 @@ impl Grid {
         (0..8).find_map(known)
     }
 
-    /// The nodes of a brick, taken from the file or measured when they are first asked for.
+    /// The nodes of a brick, taken from the file or measured when they are first used.
     #[inline]
     pub(super) fn nodes(&self, slot: u32) -> &Nodes {
         let near = &self.near[slot as usize];
         near.nodes.get_or_init(|| {
-            self.in_file(near).map_or_else(|| Held::Filled(Box::new(self.measured(near))), Held::Stored)
+            self.in_file(near)
+                .map_or_else(|| BrickNodes::Filled(Box::new(self.measured(near))), BrickNodes::Stored)
         })
     }
 

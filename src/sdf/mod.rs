@@ -5,9 +5,9 @@
 //! them). The nodes of a brick are taken from the file (`stored`) or measured (`brick`; signs of open surfaces:
 //! `rim`) when they are first looked at. Values are negative inside.
 //! Guarantees: at nodes of the narrow band the stored distance is that of the nearest triangle
-//! (exact, then rounded to f32), and that triangle's index is kept, so that whoever needs an exact
-//! distance measures against a few triangles instead of interpolating. Everywhere else a field
-//! only gives bounds that never overstate the distance.
+//! (exact, then rounded to f32), and that triangle's index is kept, so that an exact distance can be
+//! measured against a few triangles instead of interpolated. Everywhere else a field only gives bounds
+//! that never overstate the distance.
 
 mod brick;
 mod build;

@@ -8,7 +8,7 @@ use crate::geometry::{Rim, RimEdge, Surface, WINDING_DOUBT};
 
 use super::nodes::{BRICK, CELLS, Lattice, beside};
 
-/// With more edges of openings beside a brick, each node is asked for itself.
+/// With more edges of openings beside a brick, the winding number of each node is computed.
 const MOST_EDGES: usize = 256;
 
 /// Gives distances at the nodes of a brick their signs.

@@ -13,11 +13,11 @@ pub(super) const NOT_STORED: u32 = u32::MAX;
 
 pub(super) type Checksum = [u8; 16];
 
-/// Where the bricks of a file are, and what is known of them.
+/// Where the bricks of a file and their checksums are.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bricks {
     pub(super) filled: u32,
-    /// Triangles that they may name.
+    /// The number of triangles that nodes may name.
     pub(super) triangles: u32,
     pub(super) checksums_at: usize,
     pub(super) at: usize,
@@ -51,7 +51,7 @@ impl Bricks {
 pub(super) struct StoredBricks {
     mapping: Mapping,
     bricks: Bricks,
-    /// A brick was not as it was written.
+    /// Whether a damaged brick was found.
     damaged: AtomicBool,
 }
 
@@ -62,14 +62,14 @@ impl StoredBricks {
 
     fn is_intact(&self, stored: u32) -> bool {
         let intact = self.bricks.is_intact(&self.mapping, stored);
-        // Counted once: the file is replaced as a whole.
+        // Reported once: the file is replaced as a whole.
         if !intact && !self.damaged.swap(true, Ordering::Relaxed) {
             self.mapping.is_damaged();
         }
         intact
     }
 
-    /// Whether a brick was found that is not as it was written.
+    /// Whether a damaged brick was found.
     pub(super) fn is_damaged(&self) -> bool {
         self.damaged.load(Ordering::Relaxed)
     }

@@ -77,7 +77,7 @@ pub(super) fn warnings(assembly: &Assembly) -> Vec<Warning> {
 }
 
 /// Everything that is known before the search.
-pub(super) struct Frame<'a> {
+pub(super) struct PlanFrame<'a> {
     pub(super) assembly: &'a Assembly,
     pub(super) request: &'a PlanRequest,
     pub(super) fixed: Vec<usize>,
@@ -89,7 +89,7 @@ pub(super) struct Frame<'a> {
 
 /// What of an answer was there already.
 #[derive(Default)]
-pub(super) struct Found {
+pub(super) struct CacheHits {
     /// Distance fields.
     pub(super) fields: u64,
     /// Overlaps and blocking relations of pairs, and planes that parts touch.
@@ -102,7 +102,7 @@ pub(super) struct Found {
 
 /// What a request spent its time on, beside its search.
 #[derive(Default)]
-pub(super) struct Times {
+pub(super) struct StageTimes {
     pub(super) fields: Duration,
     pub(super) overlaps: Duration,
     /// Its search included.
@@ -110,16 +110,16 @@ pub(super) struct Times {
 }
 
 /// What a search found, in the planning frame, now or before.
-pub(super) struct Answer {
+pub(super) struct SearchAnswer {
     pub(super) outcome: Outcome,
-    pub(super) times: Times,
-    pub(super) found: Found,
+    pub(super) times: StageTimes,
+    pub(super) found: CacheHits,
 }
 
-impl Frame<'_> {
+impl PlanFrame<'_> {
     /// The plan of a finished search.
-    pub(super) fn plan(self, answer: Answer) -> Plan {
-        let Answer { outcome, times, found } = answer;
+    pub(super) fn plan(self, answer: SearchAnswer) -> Plan {
+        let SearchAnswer { outcome, times, found } = answer;
         let c = outcome.counters;
         let stats = PlanStats {
             simulations: c.simulations,

@@ -20,23 +20,23 @@ use crate::simulation::{
 use crate::termination::{Interrupt, Termination};
 
 use super::ServiceError;
-use super::answer::{self, Answer, Found, Frame, Times};
+use super::answer::{self, CacheHits, PlanFrame, SearchAnswer, StageTimes};
 use super::assembly_plan::AssemblyPlanner;
 use super::pools::Pools;
 use super::prepared::{self, Prepared};
-use super::records::{Answered, PlanQuestion, remember_plan, remembered_plan};
+use super::records::{PlanAnswer, PlanQuestion, remember_plan, remembered_plan};
 use super::relay::{Discard, Relay, WithoutSteps};
 use super::shared_shape::SharedShape;
 
-/// One admitted assembly; overlaps are measured, and fields built, when first needed.
+/// An admitted assembly. Overlaps are measured, and fields built, when they are first needed.
 #[derive(Debug)]
 pub(super) struct Entry {
     pub(super) assembly: Assembly,
-    /// Those of the assembly, with their fields.
+    /// The shapes of the assembly, with their fields.
     pub(super) shapes: Vec<Arc<SharedShape>>,
-    /// So many of them were there before, as another assembly's.
+    /// How many of the shapes another assembly had before.
     shapes_known: u64,
-    /// Joined so far, also for others.
+    /// Joined hulls, shared with other assemblies.
     hulls: Arc<JoinedHulls>,
     prepared: Mutex<Option<Arc<Prepared>>>,
 }
@@ -51,14 +51,14 @@ impl Entry {
         Self { assembly, shapes, shapes_known, hulls, prepared: Mutex::default() }
     }
 
-    /// Bytes in memory beside its shapes, about.
+    /// Approximate bytes in memory, without its shapes.
     pub(super) fn memory(&self) -> usize {
         let parts = self.assembly.parts.iter().map(|part| size_of_val(part) + part.name.len());
         size_of::<Self>() + parts.sum::<usize>() + self.at_hand().map_or(0, |prepared| prepared.memory())
     }
 
-    /// Plans, on as many threads of the pools as the request has, or on those of whoever calls, unless it was
-    /// planned before.
+    /// The plan of a request: the cached one, or a new one, made on a pool with as many threads as the request asks
+    /// for or, without pools, on the caller's threads.
     ///
     /// # Errors
     /// The threads could not be started.
@@ -79,7 +79,7 @@ impl Entry {
             list.dedup();
         }
         fixed.retain(|p| removed.binary_search(p).is_err());
-        let frame = Frame {
+        let frame = PlanFrame {
             assembly: &self.assembly,
             request,
             fixed,
@@ -89,7 +89,7 @@ impl Entry {
         };
         let (fixed, removed) = (frame.fixed.clone(), frame.removed.clone());
         let question = PlanQuestion { assembly: &self.assembly, request, fixed: &fixed, removed: &removed };
-        // Whoever wants to be told what the search does wants it done.
+        // A trace shows what the search does, so the search must run.
         let known = if sink.traces() { None } else { remembered_plan(cache, &question) };
         let known = match known {
             Some(answered) if request.assembly.is_none() => {
@@ -106,12 +106,12 @@ impl Entry {
         }
     }
 
-    /// A plan of which at most the search is known.
+    /// Makes a plan. `known` is the search's cached answer, if there is one.
     fn made(
         &self,
-        frame: Frame<'_>,
+        frame: PlanFrame<'_>,
         question: &PlanQuestion<'_>,
-        known: Option<Answered>,
+        known: Option<PlanAnswer>,
         time: Time<'_>,
         sink: &mut dyn PlanSink,
         cache: &RequestCache,
@@ -126,12 +126,12 @@ impl Entry {
         {
             return ended_before(frame, interrupt, "fields were built");
         }
-        let ready = Ready { prepared: &prepared, hit, fields: started.elapsed(), cache, question };
+        let ready = SearchInput { prepared: &prepared, hit, fields: started.elapsed(), cache, question };
         let Some(staging) = &question.request.assembly else {
             let (frame, answer) = self.searched(frame, &ready, time, sink);
             return frame.plan(answer);
         };
-        // The steps of an assembly plan are others.
+        // The steps of the disassembly are not those of the assembly plan.
         let without_steps = &mut WithoutSteps { sink: &mut *sink };
         let (frame, answer) = match known {
             Some(known) => self.remembered(frame, known, without_steps, time.started),
@@ -144,7 +144,7 @@ impl Entry {
         planner.plan(plan, time.started, time.termination, sink)
     }
 
-    /// Overlaps, and whether they were there already.
+    /// The overlaps, and whether they were there already.
     fn ready(
         &self,
         request: &PlanRequest,
@@ -160,41 +160,41 @@ impl Entry {
         Ok((Arc::new(prepared), false))
     }
 
-    /// An answer that was found before, told as if it were found now.
+    /// The answer from the cache, with all steps reported to the sink.
     fn remembered<'f>(
         &self,
-        mut frame: Frame<'f>,
-        answered: Answered,
+        mut frame: PlanFrame<'f>,
+        answered: PlanAnswer,
         sink: &mut dyn PlanSink,
         started: Instant,
-    ) -> (Frame<'f>, Answer) {
-        let Answered { outcome, overlaps } = answered;
+    ) -> (PlanFrame<'f>, SearchAnswer) {
+        let PlanAnswer { outcome, overlaps } = answered;
         frame.overlaps = answer::overlaps(&self.assembly, &overlaps);
         let engine = engine_of(frame.request.engine, frame.request.penalty);
         frame.notes.extend(accepted(&*engine, prepared::depth_limit(&self.assembly), &self.assembly).1);
         for removal in &outcome.removals {
             sink.step(&answer::removal(&self.assembly, removal));
         }
-        let times = Times { total: started.elapsed(), ..Times::default() };
-        (frame, Answer { outcome, times, found: Found { plan: true, ..Found::default() } })
+        let times = StageTimes { total: started.elapsed(), ..StageTimes::default() };
+        (frame, SearchAnswer { outcome, times, found: CacheHits { plan: true, ..CacheHits::default() } })
     }
 
     fn searched<'f>(
         &self,
-        mut frame: Frame<'f>,
-        ready: &Ready<'_>,
+        mut frame: PlanFrame<'f>,
+        ready: &SearchInput<'_>,
         time: Time<'_>,
         sink: &mut dyn PlanSink,
-    ) -> (Frame<'f>, Answer) {
+    ) -> (PlanFrame<'f>, SearchAnswer) {
         let request = frame.request;
         let Time { started, termination } = time;
-        let Ready { prepared, hit, fields, cache, question } = *ready;
+        let SearchInput { prepared, hit, fields, cache, question } = *ready;
         frame.overlaps = answer::overlaps(&self.assembly, &prepared.overlaps);
         let engine = engine_of(request.engine, request.penalty);
         let (limit, note) = accepted(&*engine, prepared.verifier.limit(), &self.assembly);
         let verifier = prepared.verifier.with_limit(limit);
         frame.notes.extend(note);
-        let asked = Asked { question, engine: &*engine, verifier: &verifier };
+        let asked = SearchQuestion { question, engine: &*engine, verifier: &verifier };
         let problem = self.problem(prepared, &asked, termination, cache);
         let total = problem.present.len() as u32;
         let mut relay = Relay { assembly: &self.assembly, sink, total };
@@ -208,7 +208,7 @@ impl Entry {
         let outcome = search(request.planner, problem, &mut relay);
         remember_plan(cache, question, termination, &outcome, &prepared.overlaps);
         let reused = |kinds: &[&RecordKind]| kinds.iter().map(|kind| cache.reused(kind)).sum();
-        let found = Found {
+        let found = CacheHits {
             fields: self.shapes_reused(request, hit),
             blocking: reused(&[&OVERLAP, &BLOCKING, &TOUCHING]),
             motions: reused(&[&MOTION]),
@@ -216,11 +216,11 @@ impl Entry {
             plan: false,
         };
         let overlaps = if hit { Duration::ZERO } else { prepared.overlap_time };
-        let times = Times { fields, overlaps, total: started.elapsed() };
-        (frame, Answer { outcome, times, found })
+        let times = StageTimes { fields, overlaps, total: started.elapsed() };
+        (frame, SearchAnswer { outcome, times, found })
     }
 
-    /// How many shapes were there already, with their fields, as far as anything had looked at these.
+    /// How many shapes, with the bricks of their fields so far, were there already.
     fn shapes_reused(&self, request: &PlanRequest, prepared: bool) -> u64 {
         match (request.no_cache, prepared) {
             (true, _) => 0,
@@ -229,11 +229,11 @@ impl Entry {
         }
     }
 
-    /// The question in the planning frame.
+    /// The request as a problem of the search, in the planning frame.
     fn problem<'a>(
         &self,
         prepared: &Prepared,
-        asked: &Asked<'a>,
+        asked: &SearchQuestion<'a>,
         termination: &Termination,
         cache: &RequestCache,
     ) -> Problem<'a> {
@@ -259,9 +259,9 @@ impl Entry {
         }
     }
 
-    /// Makes ready what any plan needs, as far as `termination` lets it.
+    /// Computes what any plan needs, until `termination` interrupts it.
     pub(super) fn prepare(&self, termination: &Termination, cache: &RequestCache) {
-        // First what no record holds: after a restart, whoever asks at once waits for this.
+        // First what is not cached: a request right after a restart waits for it.
         if self.shapes.par_iter().try_for_each(|shape| shape.shape.derive(termination)).is_err() {
             return;
         }
@@ -269,15 +269,15 @@ impl Entry {
         let request = PlanRequest::default();
         let question = PlanQuestion { assembly: &self.assembly, request: &request, fixed: &[], removed: &[] };
         let engine = engine_of(request.engine, request.penalty);
-        let asked = Asked { question: &question, engine: &*engine, verifier: &prepared.verifier };
-        // Interrupted, they have kept what they found.
+        let asked = SearchQuestion { question: &question, engine: &*engine, verifier: &prepared.verifier };
+        // If it is interrupted, the blockages that were found are cached all the same.
         let _ = initial_blockages(&self.problem(&prepared, &asked, termination, cache));
         let all = (0..self.assembly.parts.len()).collect();
         let _ = HullTree::new(&prepared.scene, all, termination);
         let _ = prepared.build_fields(termination, &mut Discard);
     }
 
-    /// Overlaps, if they are there.
+    /// The overlaps, if they are there.
     fn at_hand(&self) -> Option<Arc<Prepared>> {
         match self.prepared.try_lock() {
             Ok(slot) => slot.clone(),
@@ -286,8 +286,8 @@ impl Entry {
         }
     }
 
-    /// Overlaps, and whether they were there already. Whoever comes while they are
-    /// being made waits for them, but not beyond its own termination.
+    /// The overlaps, and whether they were there already. A request that comes while another one measures them waits
+    /// for them until its own termination.
     pub(super) fn prepared(
         &self,
         termination: &Termination,
@@ -314,41 +314,41 @@ impl Entry {
     }
 }
 
-/// A question, with what answers it.
-struct Asked<'a> {
+/// A question, with the engine and the verifier that answer it.
+struct SearchQuestion<'a> {
     question: &'a PlanQuestion<'a>,
     engine: &'a dyn TransitionFunction,
     verifier: &'a Verifier,
 }
 
-/// Since when a request is worked on, and what ends it.
+/// The start of a request's work, and its termination.
 #[derive(Clone, Copy)]
 struct Time<'a> {
     started: Instant,
     termination: &'a Termination,
 }
 
-/// What a search works with.
+/// The input of a search.
 #[derive(Clone, Copy)]
-struct Ready<'a> {
+struct SearchInput<'a> {
     prepared: &'a Prepared,
-    /// It was there already.
+    /// Whether `prepared` was there already.
     hit: bool,
-    /// How long fields took that were built before the search.
+    /// The time to build fields before the search.
     fields: Duration,
     cache: &'a RequestCache,
     question: &'a PlanQuestion<'a>,
 }
 
-/// Whether what answers a request looks at the fields of all parts, again and again: the others build those
-/// that they come to look at.
+/// Whether a request needs the fields of all parts, so that they are built in parallel before. Other requests build
+/// the bricks that they use.
 fn looks_at_all_fields(request: &PlanRequest) -> bool {
     let PlanRequest { engine, static_analysis, assembly, .. } = request;
     *engine == Engine::Penalty || *static_analysis == StaticAnalysis::Paper || assembly.is_some()
 }
 
 /// The plan of a request that ended before its search began.
-fn ended_before(frame: Frame<'_>, interrupt: Interrupt, what: &str) -> Plan {
+fn ended_before(frame: PlanFrame<'_>, interrupt: Interrupt, what: &str) -> Plan {
     match interrupt {
         Interrupt::Cancelled => frame.empty(PlanStatus::Cancelled, Some("cancelled".to_owned())),
         Interrupt::DeadlinePassed => {
@@ -357,8 +357,8 @@ fn ended_before(frame: Frame<'_>, interrupt: Interrupt, what: &str) -> Plan {
     }
 }
 
-/// The depth to which paths are verified, and what the reader of a plan should know of it: an engine that
-/// lets parts overlap by more than is accepted is held to its own word.
+/// The depth to which paths are verified, and a note for the plan: paths of an engine whose depth tolerance is larger
+/// than the limit are verified to that tolerance.
 fn accepted(engine: &dyn TransitionFunction, limit: f64, assembly: &Assembly) -> (f64, Option<String>) {
     if engine.depth_tolerance() <= limit {
         return (limit, None);
@@ -377,5 +377,5 @@ pub(super) fn engine_of(engine: Engine, penalty: PenaltyParameters) -> Box<dyn T
     }
 }
 
-/// What verification finds between the samples of an engine, in the planning frame.
+/// The depth that verification may find between the samples of an engine, in units of the planning frame.
 const BETWEEN_SAMPLES: f64 = 1e-3;

@@ -1,7 +1,6 @@
-//! The planning service: assemblies that it knows by content, and plans about them.
+//! The planning service: it knows assemblies by their content, and plans them.
 //!
-//! The daemon's workers and the command line without a daemon both call this, so what is
-//! tested is what is used. It knows nothing of shared memory.
+//! The daemon's workers and the command line without a daemon both call it. It knows nothing of shared memory.
 //!
 //! Data flow of a request: assembly (`geometry`; those in memory: `store`) → fields (`sdf`) and overlaps
 //! (`prepared`) → `search` (`entry`), for an assembly plan → `assembling` (`assembly_plan`) → plan in the
@@ -50,23 +49,23 @@ pub use store::StoreStatistics;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct AssemblyId(pub [u8; 32]);
 
-/// What admission found out about an assembly.
+/// The result of an admission.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Admission {
     /// Its handle.
     pub id: AssemblyId,
-    /// It was there before: nothing was done.
+    /// It was known before: nothing was done.
     pub known: bool,
     /// What healing found.
     pub warnings: Vec<Warning>,
 }
 
-/// What a service remembers.
+/// The memory that a service uses.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Remembered {
+pub struct MemoryStatistics {
     /// Assemblies, in memory.
     pub assemblies: StoreStatistics,
-    /// Records; those on disk are not counted.
+    /// Records in memory.
     pub records: CacheStatistics,
 }
 
@@ -100,32 +99,31 @@ pub struct Service {
     store: Store,
     cache: Arc<Cache>,
     pools: Pools,
-    /// Bytes of answers that whoever asks keeps.
+    /// Bytes of responses that the caller keeps in memory.
     answers: AtomicUsize,
 }
 
-/// Bytes of records that a service remembers which was given no cache.
+/// Bytes of records in memory, in a service without a given cache.
 const RECORDS: usize = 64 << 20;
-/// Bytes of records and assemblies in a service which was given no budget.
+/// Bytes of records and assemblies in memory, in a service without a given budget.
 const ASSEMBLIES: usize = 1 << 30;
 
 impl Default for Service {
-    /// Remembers in memory, for as long as it lives.
+    /// A service that caches in memory, for as long as it lives.
     fn default() -> Self {
         Self::new(Arc::new(Cache::in_memory(RECORDS, &RECORD_KINDS)), ASSEMBLIES)
     }
 }
 
 impl Service {
-    /// A service for one process's own questions, which remembers in a cache.
+    /// A service for the requests of its own process, with a cache.
     #[must_use]
     pub fn remembering(cache: Arc<Cache>) -> Self {
         Self::new(cache, ASSEMBLIES)
     }
 
-    /// A service that remembers in a cache, and knows assemblies up to so many bytes of memory together with
-    /// the records that the cache has in memory and the answers of [`Service::set_response_bytes`]: so it takes as much
-    /// while there are few of these as when there are many.
+    /// A service with a cache, which keeps assemblies in memory. `budget` is in bytes and covers assemblies, the
+    /// records that the cache has in memory, and the responses of [`Service::set_response_bytes`].
     #[must_use]
     pub fn new(cache: Arc<Cache>, budget: usize) -> Self {
         let hulls = JoinedHulls::stored(Arc::clone(&cache) as Arc<dyn HullStore>);
@@ -134,7 +132,7 @@ impl Service {
         Self { store, cache, pools: Pools::default(), answers: AtomicUsize::new(0) }
     }
 
-    /// Starts the threads that the first request will be answered on, if it is given so many (0: all processors).
+    /// Starts the threads for a first request that asks for `threads` of them (0: all processors).
     ///
     /// # Errors
     /// They could not be started.
@@ -142,24 +140,24 @@ impl Service {
         self.pools.on(threads, || ())
     }
 
-    /// Assemblies leave so many bytes of the budget for answers that whoever asks keeps. Told at once.
+    /// Sets how many bytes of the budget the caller's responses take. Does not block.
     pub fn set_response_bytes(&self, bytes: usize) {
         self.answers.store(bytes, Ordering::Relaxed);
     }
 
-    /// How many assemblies it knows, and what they take.
+    /// How many assemblies are in memory, and how much memory they take.
     #[must_use]
     pub fn store_statistics(&self) -> StoreStatistics {
         self.store.statistics()
     }
 
-    /// What it remembers; told at once.
+    /// The memory that it uses. Does not block.
     #[must_use]
-    pub fn remembered(&self) -> Remembered {
-        Remembered { assemblies: self.store.statistics(), records: self.cache.counters() }
+    pub fn remembered(&self) -> MemoryStatistics {
+        MemoryStatistics { assemblies: self.store.statistics(), records: self.cache.counters() }
     }
 
-    /// What it remembers in.
+    /// The cache.
     #[must_use]
     pub fn cache(&self) -> &Arc<Cache> {
         &self.cache
@@ -189,7 +187,7 @@ impl Service {
         Ok(self.taken_in(id, Assembly::new_until(source, termination)?))
     }
 
-    /// Registers what becomes of a known assembly with some change. Of no change it is the same.
+    /// Registers a revision of a known assembly. An empty revision gives the assembly itself.
     ///
     /// # Errors
     /// The base is unknown, or the change is refused; the error names the part and the reason.
@@ -221,8 +219,7 @@ impl Service {
         Admission { id, known: false, warnings: answer::warnings(&entry.assembly) }
     }
 
-    /// Keeps an assembly on disk as it was taken in, if there is a store on disk: it is ready sooner after a
-    /// restart then.
+    /// Writes a healed assembly to the cache's disk, if there is one: after a restart it is loaded without healing.
     ///
     /// # Errors
     /// The id is unknown.
@@ -231,28 +228,26 @@ impl Service {
         Ok(())
     }
 
-    /// Whether an assembly is known, here or on disk. If it is, it counts as used: whoever asks is about
-    /// to.
+    /// Whether an assembly is known, in memory or on disk. If it is, it counts as used: the caller is about to use it.
     #[must_use]
     pub fn knows(&self, id: AssemblyId) -> bool {
         self.store.get(id).is_some() || has_source(&self.cache, &id.0)
     }
 
-    /// The handles of the assemblies that were asked about last before this process began, if there is a
-    /// store on disk.
+    /// The handles of the assemblies that were used last before this process began, if the cache is on disk.
     #[must_use]
     pub fn recent(&self, most: usize) -> Vec<AssemblyId> {
         recent_sources(&self.cache, most).into_iter().map(AssemblyId).collect()
     }
 
-    /// Reads into memory what was used last before this process began, if there is a store on disk.
+    /// Reads the records that were used last before this process began into memory, if the cache is on disk.
     pub fn recall_recent(&self) {
         self.store.recall_hulls();
         self.cache.recall_recent();
     }
 
-    /// Makes ready what any plan of an assembly needs: fields, overlaps, hulls, and the blocking graph of the
-    /// assembled state, for questions with the options as they are by default.
+    /// Computes what any plan of an assembly with default options needs: fields, overlaps, hulls, and the blocking
+    /// graph of the assembled state.
     ///
     /// # Errors
     /// The id is unknown.
@@ -261,7 +256,7 @@ impl Service {
         let cache = RequestCache::of(Arc::clone(&self.cache));
         entry.prepare(termination, &cache);
         self.settle(id, &entry);
-        // One that was loaded from what it was made of, because another build had taken it in.
+        // It may have been loaded from its source, because another build had healed it.
         remember_healed(&self.cache, &id.0, &entry.assembly);
         Ok(())
     }
@@ -291,7 +286,7 @@ impl Service {
         self.planned(id, request, termination, sink, Some(&self.pools))
     }
 
-    /// Plans what may be asked later, on the threads of whoever calls: the plan is remembered.
+    /// Plans a likely question on the caller's threads. The plan is cached.
     ///
     /// # Errors
     /// As [`Service::plan`].
@@ -324,7 +319,7 @@ impl Service {
         plan
     }
 
-    /// After an assembly was asked about: measures what it takes, and keeps what was seen of its fields.
+    /// After a request: measures the memory of its assembly, and writes the new bricks of its fields.
     fn settle(&self, id: AssemblyId, entry: &Entry) {
         self.store.leave(self.cache.memory_bytes() + self.answers.load(Ordering::Relaxed));
         self.store.settle(id, entry);
@@ -354,8 +349,8 @@ impl Service {
         Ok(audit(rule, scene, &present, &*engine, &least, termination).ok())
     }
 
-    /// The blocking graphs of the assembled state along some axes, both ways each, without the parts that
-    /// are gone already (ascending). No axes given: those that a search moves the parts along.
+    /// The blocking graphs of the assembled state along some axes, both ways each, without the `removed` parts
+    /// (ascending). `None`: the axes of the search.
     ///
     /// # Errors
     /// The assembly is unknown, a part does not exist, or the termination condition became true (`Ok(None)`).
@@ -393,13 +388,13 @@ impl Service {
         self.kept(id).map_or_else(|| self.reloaded(id, termination), Ok)
     }
 
-    /// An assembly that is in memory, or on disk as it was taken in.
+    /// An assembly that is in memory, or healed on disk.
     fn kept(&self, id: AssemblyId) -> Option<Arc<Entry>> {
         let on_disk = || healed_assembly(&self.cache, &id.0, |content| self.store.shape(content));
         self.store.get(id).or_else(|| Some(self.store.insert(id, on_disk()?)))
     }
 
-    /// An assembly that is not there as it was taken in, from what it was made of.
+    /// An assembly that is healed anew from its source: the meshes as given, and the revisions.
     fn reloaded(&self, id: AssemblyId, termination: &Termination) -> Result<Arc<Entry>, ServiceError> {
         let (mut at, mut revisions) = (id, Vec::new());
         let mut entry = loop {
@@ -424,7 +419,7 @@ impl Service {
 }
 
 impl Drop for Service {
-    /// Keeps what is left of the fields.
+    /// Writes the rest of the fields.
     fn drop(&mut self) {
         for shared in self.store.shapes() {
             keep_rest_of_field(&self.cache, shared.shape.content(), &shared.field);
@@ -432,7 +427,7 @@ impl Drop for Service {
     }
 }
 
-/// Parts that a request or a change names, by field.
+/// Parts that a request or a revision names, by field.
 type Named = [(&'static str, Vec<usize>)];
 
 fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 4] {

@@ -1,5 +1,4 @@
-//! The threads that requests are answered on, kept from one request to the next: to start them takes as long
-//! as a small change to plan.
+//! Thread pools that are reused from one request to the next: to start a pool takes as long as to replan a small change.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -7,17 +6,17 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::ServiceError;
 
-/// So many pools that nobody works in are kept.
+/// At most this many idle pools are kept.
 const MOST_IDLE: usize = 4;
 
-/// Pools of threads in which nobody works, with the number of threads that was asked for.
+/// Idle pools, with the number of threads that was asked for.
 #[derive(Debug, Default)]
 pub(super) struct Pools {
     idle: Mutex<Vec<(usize, ThreadPool)>>,
 }
 
 impl Pools {
-    /// Does some work on so many threads (0: all processors) that nobody else works on meanwhile.
+    /// Does some work on a pool of `threads` threads (0: all processors) of its own.
     ///
     /// # Errors
     /// The threads could not be started.
@@ -35,7 +34,7 @@ impl Pools {
 
     fn taken(&self, threads: usize) -> Result<ThreadPool, ServiceError> {
         let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
-        // That which was left last: what it works with is still at hand.
+        // The pool that was used last: its memory is probably still in the processors' caches.
         if let Some(at) = idle.iter().rposition(|(of, _)| *of == threads) {
             return Ok(idle.remove(at).1);
         }
@@ -49,7 +48,7 @@ impl Pools {
         let oldest = (idle.len() >= MOST_IDLE).then(|| idle.remove(0));
         idle.push((threads, pool));
         drop(idle);
-        // Its threads are ended by whoever drops it.
+        // The drop ends its threads, outside the lock.
         drop(oldest);
     }
 }

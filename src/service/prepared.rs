@@ -1,4 +1,4 @@
-//! What must be there before an assembly can be searched: fields, overlaps, verification samples.
+//! An assembly prepared for the search: its scene, verifier, overlaps and fields.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -31,14 +31,14 @@ pub(super) struct Prepared {
     pub(super) verifier: Verifier,
     /// Overlapping pairs and their depths in the planning frame.
     pub(super) overlaps: Vec<(usize, usize, f64)>,
-    /// Those of the shapes.
+    /// The fields of the shapes.
     fields: Vec<Arc<Field>>,
-    /// How long it took to prepare verification and measure overlaps.
+    /// The time to prepare the verifier and to measure the overlaps.
     pub(super) overlap_time: Duration,
 }
 
 impl Prepared {
-    /// Measures all overlaps, in parallel on the current rayon pool. Fields are built when they are looked at.
+    /// Measures all overlaps, in parallel on the current rayon pool. Fields are built when they are first used.
     pub(super) fn new(
         assembly: &Assembly,
         shapes: &[Arc<SharedShape>],
@@ -83,7 +83,7 @@ impl Prepared {
         })
     }
 
-    /// Bytes in memory beside the shapes and their fields, about.
+    /// Approximate bytes in memory, without the shapes and their fields.
     pub(super) fn memory(&self) -> usize {
         let Self { scene, verifier, overlaps, .. } = self;
         let hulls = scene.whole.get().map_or(0, HullTree::memory);
@@ -113,7 +113,7 @@ fn measure_overlaps(
     };
     let keyed: Vec<_> = pairs.par_iter().map(placed).collect();
     let (first, group_of) = grouped(keyed.iter().map(|(key, _)| *key));
-    // One by one: most are remembered, and two that are not must not come after one another on one thread.
+    // One pair per task: most depths are cached, and two that are not must not run one after the other on a thread.
     let depths = first
         .par_iter()
         .with_max_len(1)
@@ -126,8 +126,8 @@ fn measure_overlaps(
     Ok(overlaps.filter(|(_, _, d)| *d > LEAST_OVERLAP * scene.longest_side).collect())
 }
 
-/// Pairs without a allowed penetration that share their inside all the same. It is reported, but not
-/// allowed: their surfaces coincide.
+/// Pairs without an allowed penetration that share their inside all the same, because their surfaces coincide. The
+/// overlap is reported, but not allowed.
 fn coincident_pairs(
     scene: &Scene,
     verifier: &Verifier,
@@ -148,5 +148,5 @@ fn coincident_pairs(
     Ok(out)
 }
 
-/// Middles closer than this share of the size make a pair suspicious.
+/// Pairs whose centres are closer than this share of their size are examined.
 const COINCIDENT: f64 = 1e-3;

@@ -1,10 +1,10 @@
-//! Whom a search tells what it does.
+//! Sinks and observers: they pass the events of a search on, in the input's units.
 
 use super::answer;
 use crate::geometry::Assembly;
 use crate::search::{Observer, PlanSink, Progress, Removal, Stage, TraceEvent};
 
-/// Hands a search's events on, in the input's units.
+/// Passes the events of a search on to a sink.
 pub(super) struct Relay<'a> {
     pub(super) assembly: &'a Assembly,
     pub(super) sink: &'a mut dyn PlanSink,
@@ -30,7 +30,7 @@ impl Observer for Relay<'_> {
     }
 }
 
-/// Hands on how a search gets on, but no step.
+/// Passes progress on, but no steps.
 pub(super) struct WithoutSteps<'a> {
     pub(super) sink: &'a mut dyn PlanSink,
 }
@@ -51,7 +51,7 @@ impl PlanSink for WithoutSteps<'_> {
     }
 }
 
-/// Nobody listens.
+/// Drops all events.
 pub(super) struct Discard;
 
 impl PlanSink for Discard {

@@ -1,4 +1,4 @@
-//! A shape with its distance field, which all assemblies that have the shape share.
+//! A shape with its distance field, shared by all assemblies with that shape.
 
 use std::sync::{Arc, Weak};
 

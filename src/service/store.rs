@@ -1,6 +1,5 @@
-//! The assemblies that the service knows, in memory, up to a budget in bytes: those not asked about for
-//! longest leave. What does not depend on the assembly is shared: equal shapes with their fields, and joined
-//! hulls.
+//! The assemblies in memory, up to a budget in bytes; the least recently used are evicted. Equal shapes with their
+//! fields, and joined hulls, are shared by all assemblies.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -16,18 +15,18 @@ use crate::lru::Lru;
 use crate::scene::JoinedHulls;
 use crate::sdf::FieldStore;
 
-/// How much there is.
+/// How many assemblies and shapes are in memory.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct StoreStatistics {
     /// Assemblies.
     pub assemblies: u64,
     /// Distinct shapes.
     pub shapes: u64,
-    /// Bytes that they take.
+    /// Their bytes.
     pub bytes: u64,
-    /// Assemblies that left for others, since the start.
+    /// Assemblies that were evicted since the start.
     pub evictions: u64,
-    /// Shapes that an assembly found there when it came, since the start.
+    /// Shapes of new assemblies that were there already, since the start.
     pub shared: u64,
 }
 
@@ -35,18 +34,18 @@ pub struct StoreStatistics {
 #[derive(Debug)]
 pub(super) struct Store {
     budget: usize,
-    /// Bytes of the budget that others take.
+    /// Bytes of the budget that records and responses take.
     left: AtomicUsize,
     hulls: Arc<JoinedHulls>,
     fields: Weak<dyn FieldStore>,
-    held: Mutex<Held>,
+    held: Mutex<StoreState>,
 }
 
 #[derive(Debug, Default)]
-struct Held {
+struct StoreState {
     entries: Lru<AssemblyId, Entry>,
-    shapes: HashMap<[u8; 32], Counted>,
-    /// What each entry takes beside its shapes, as last measured.
+    shapes: HashMap<[u8; 32], CountedShape>,
+    /// The bytes of each entry without its shapes, as last measured.
     own: HashMap<AssemblyId, usize>,
     bytes: usize,
     evictions: u64,
@@ -55,7 +54,7 @@ struct Held {
 
 /// A shape that entries have.
 #[derive(Debug)]
-struct Counted {
+struct CountedShape {
     shared: Arc<SharedShape>,
     entries: usize,
     /// As last measured.
@@ -68,7 +67,7 @@ impl Store {
         Self { budget, left: AtomicUsize::new(0), hulls: Arc::new(hulls), fields, held: Mutex::default() }
     }
 
-    /// An assembly, which is used by this.
+    /// An assembly. It counts as used.
     pub(super) fn get(&self, id: AssemblyId) -> Option<Arc<Entry>> {
         self.held().entries.get(&id)
     }
@@ -78,10 +77,10 @@ impl Store {
         self.held().shapes.get(content).map(|counted| Arc::clone(&counted.shared.shape))
     }
 
-    /// Takes an assembly in, with the shapes that are there in place of equal ones. Of two that came at
-    /// the same time, the first stays. It is measured by [`Store::settle`].
+    /// Adds an assembly, with the known shapes in place of equal ones. If another thread added it before, that entry
+    /// stays.
     pub(super) fn insert(&self, id: AssemblyId, mut assembly: Assembly) -> Arc<Entry> {
-        // Hashing is not for the lock.
+        // Hash before the lock is taken.
         let contents: Vec<[u8; 32]> = assembly.shapes.iter().map(|shape| *shape.content()).collect();
         let mut held = self.held();
         if let Some(entry) = held.entries.get(&id) {
@@ -107,14 +106,14 @@ impl Store {
         self.hulls.recall_recent();
     }
 
-    /// Has assemblies leave so many bytes of the budget, from the next time on that one is measured.
+    /// Sets the bytes of the budget that records and responses take. It has effect at the next `settle`.
     pub(super) fn leave(&self, bytes: usize) {
         self.left.store(bytes, Ordering::Relaxed);
     }
 
-    /// Measures what an assembly takes, when it came and after it was asked about, and lets others go for it.
+    /// Measures the memory of an assembly, and evicts others if the budget is exceeded. Called after each use.
     pub(super) fn settle(&self, id: AssemblyId, entry: &Entry) {
-        // Whoever asks whether an assembly is known does not wait for this.
+        // Measured before the lock is taken: other threads do not wait for it.
         let own = entry.memory();
         let shapes: Vec<usize> = entry.shapes.iter().map(|shape| shape.memory()).collect();
         let mut held = self.held();
@@ -138,13 +137,13 @@ impl Store {
         }
     }
 
-    /// A thread that panicked while it held the maps cannot have left more than the sums wrong.
-    fn held(&self) -> MutexGuard<'_, Held> {
+    /// After a panic of a thread that held the lock, only the sums may be wrong.
+    fn held(&self) -> MutexGuard<'_, StoreState> {
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Held {
+impl StoreState {
     fn share(
         &mut self,
         content: &[u8; 32],
@@ -152,7 +151,7 @@ impl Held {
         fields: &Weak<dyn FieldStore>,
     ) -> Arc<SharedShape> {
         let known = self.shapes.len();
-        let counted = self.shapes.entry(*content).or_insert_with(|| Counted {
+        let counted = self.shapes.entry(*content).or_insert_with(|| CountedShape {
             shared: Arc::new(SharedShape::stored(Arc::clone(shape), Weak::clone(fields))),
             entries: 0,
             bytes: 0,
@@ -163,9 +162,9 @@ impl Held {
         shared
     }
 
-    /// Notes what an assembly takes: beside its shapes, and each of these.
+    /// Records the bytes of an assembly: its own, and those of each shape.
     fn note(&mut self, id: AssemblyId, entry: &Entry, own: usize, shapes: &[usize]) {
-        // It may have left, and come again, while it was measured.
+        // It may have been evicted, and added again, while it was measured.
         if !self.entries.peek(&id).is_some_and(|known| std::ptr::eq(Arc::as_ptr(known), entry)) {
             return;
         }

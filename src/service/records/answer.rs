@@ -1,4 +1,4 @@
-//! Answers as they were sent, by the bytes of the question: after a restart, what was answered before is answered without
+//! Responses as they were sent, by the bytes of the question: after a restart, a repeated question is answered without
 //! the assembly.
 
 use serde::{Deserialize, Serialize};

@@ -4,7 +4,7 @@ mod answer;
 mod plan;
 
 pub(crate) use answer::{AnsweredQuestion, recent_answers, remember_answer, remembered_answer};
-pub(super) use plan::{Answered, PlanQuestion, remember_plan, remembered_plan};
+pub(super) use plan::{PlanAnswer, PlanQuestion, remember_plan, remembered_plan};
 
 use crate::blocking_graph::BLOCKING;
 use crate::cache::RecordKind;

@@ -9,7 +9,7 @@ use crate::search::{Outcome, PlanRequest, Planner};
 use crate::termination::Termination;
 
 /// What a search answered. The service prepares the scene and the limits that it searches with.
-pub(crate) static PLAN: RecordKind = RecordKind::of::<Answered>(6, "plan", Storage::MemoryAndDisk, SOURCES);
+pub(crate) static PLAN: RecordKind = RecordKind::of::<PlanAnswer>(6, "plan", Storage::MemoryAndDisk, SOURCES);
 const SOURCES: Validity = Validity::Sources(env!("SBDP_SOURCES_SERVICE"));
 
 /// A question about an assembly; lists are ascending.
@@ -27,7 +27,7 @@ pub(crate) struct PlanQuestion<'a> {
 
 /// A remembered answer, in the planning frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Answered {
+pub(crate) struct PlanAnswer {
     /// What the search found. Its counters have no times, and all simulations count as recalled.
     pub outcome: Outcome,
     /// Overlaps at the assembled pose.
@@ -35,8 +35,8 @@ pub(crate) struct Answered {
 }
 
 /// The answer to a question, if it was answered before.
-pub(crate) fn remembered_plan(cache: &RequestCache, question: &PlanQuestion<'_>) -> Option<Answered> {
-    let mut answered: Answered = cache.get(&question.key())?;
+pub(crate) fn remembered_plan(cache: &RequestCache, question: &PlanQuestion<'_>) -> Option<PlanAnswer> {
+    let mut answered: PlanAnswer = cache.get(&question.key())?;
     let counters = &mut answered.outcome.counters;
     counters.recalled = counters.simulations;
     answered.names_only(question.assembly.parts.len()).then_some(answered)
@@ -55,11 +55,11 @@ pub(crate) fn remember_plan(
     let timed = halved || question.request.path_timeout.is_some();
     let ended = matches!(outcome.status, PlanStatus::Timeout | PlanStatus::Cancelled);
     if !timed && !ended {
-        cache.put(question.key(), &Answered { outcome: outcome.clone(), overlaps: overlaps.to_vec() });
+        cache.put(question.key(), &PlanAnswer { outcome: outcome.clone(), overlaps: overlaps.to_vec() });
     }
 }
 
-impl Answered {
+impl PlanAnswer {
     /// Whether all parts that it names are among the first `count`.
     fn names_only(&self, count: usize) -> bool {
         let Outcome { removals, remaining, blocked, .. } = &self.outcome;
