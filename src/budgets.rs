@@ -127,28 +127,45 @@ pub(crate) const SLOPES_PER_POINT: usize = 8;
 
 // The search.
 
-/// Translational passes in a row before turning is tried, if they only find new states. Turning costs several times
-/// more; the paper has one pass.
+/// Largest number of translational passes in a row before turning is tried. 1 is the paper's, and turns parts that
+/// further pushes would free; a large number pushes through free play first.
 pub(crate) const TRANSLATION_PASSES: usize = 6;
-/// States of one part after which its resolution is halved, and again after as many more: in free play states multiply
-/// without end.
+/// Number of states of one part after which the resolution is halved, and again after as many more. Free play yields
+/// states without end. Half of it merges states sooner; double it simulates more of the play first.
 pub(crate) const STATES_PER_LEVEL: usize = 3;
-/// States of the other kind, or not reached straight, that count as one.
+/// Number of states of the other kind, or in other regions, that count as one. Half of it hides more junctions of a
+/// large maze; double it keeps more states of free play in many regions.
 pub(crate) const STATES_ELSEWHERE: usize = 8;
-/// Simulations of one motion with the points at which verification refuted it.
+/// Number of times that a motion is simulated again with the points at which verification refuted it. Half of it
+/// gives motions up that more samples would mend; double it spends as many more simulations on each that they do not
+/// mend.
 pub(crate) const REFINEMENTS: usize = 4;
-/// Own pushes of single parts, of all parts together, …
+/// Largest number of rays, of all parts together. It bounds the number of sweeps. Once it is reached, further parts
+/// get no rays.
 pub(crate) const OWN_RAYS: usize = 32;
-/// … and own twists.
+/// Largest number of twists, of all parts together: two for a helix, four where it has no sense. It bounds the number
+/// of simulations. Once it is reached, further parts get no twist.
 pub(crate) const OWN_TWISTS: usize = 64;
-/// A cone with more extreme rays is not narrow.
+/// Largest number of rays of a narrow cone: three planes of a corner bound a cone of three. Half of it leaves that
+/// corner out; double it adds rays of wide cones, which are no better than the axes.
 pub(crate) const NARROW_CONE_RAYS: usize = 4;
-/// Axes of askew parts beyond the frame.
+/// Largest number of axes beyond the frame, for parts that stand askew. Each adds its actions to every state; half of
+/// it leaves out askew parts of small surface.
 pub(crate) const EXTRA_AXES: usize = 3;
-/// Loops of a surface for linking numbers, two for each hole, …
+/// Largest number of curves per part: two per hole. It bounds the time; parts with more holes are not found to be
+/// linked.
 pub(crate) const SURFACE_LOOPS: usize = 64;
-/// … and pairs of their segments for one pair of parts.
+/// Largest number of pairs of segments for one pair of parts. It bounds the time; pairs with more are not found to be
+/// linked.
 pub(crate) const SEGMENT_PAIRS: usize = 4_000_000;
+
+/// Number of simulations per thread in one window, where few of them lead out: long and short ones share the threads
+/// better. 1 leaves threads idle; more throws away more when one leads out. No plan depends on it.
+pub(crate) const WINDOW_PER_THREAD: usize = 4;
+
+/// Largest number of halvings: at 2^10 times the resolution every pose of a large part is the same state (51 lengths
+/// and 512 rad), so that more of them change nothing.
+pub(crate) const STATE_LEVELS: usize = 10;
 
 // Helices and threads.
 

@@ -204,19 +204,28 @@ pub(crate) const KNOWN_SAMPLE_STEPS: f64 = 2.0;
 
 // States and directions of the search.
 
-/// Length. Two poses of a part are one state if its centre of mass moves by less (the paper's rmd), or by less than a
-/// twentieth of the part's own length …
+/// Length. The least travel of the centre of mass that makes a new state (the paper's rmd). Half of it keeps more
+/// states, and each costs simulations; double it may merge two junctions of a maze.
 pub(crate) const SAME_STATE_TRAVEL: f64 = 0.05;
-/// … and it turns by less than this many radians (the paper's rmd).
+/// Radians. The least angle, that makes a new state of a part (the paper's rmd). Half of it keeps more states, and
+/// each costs simulations; double (1 rad) still tells a quarter turn from none.
 pub(crate) const SAME_STATE_ROTATION: f64 = 0.5;
-/// Radians. A part that is turned by less was only pushed.
+/// Radians. The least angle from the assembled pose, at which a part counts as turned. A tenth of the rotation that
+/// makes a new state. Chosen, not derived.
 pub(crate) const TURNED: f64 = 0.05;
-/// Multiple. How much more the axes of the world count than others.
+/// Multiple. Factor by which the surface of an axis of the world counts more. At 1, rounding decides between the axes
+/// of a round part; double it may prefer the world to the frame of a turned assembly.
 pub(crate) const WORLD_PREFERENCE: f64 = 1.2;
-/// Cosine. The axis of a null twist is a common axis within this (two degrees).
+/// Cosine. cos of the angle within which two axes are the same: two degrees. A narrower angle lists one thread twice;
+/// a wider one drops a thread that leans by less.
 pub(crate) const ONE_AXIS_COSINE: f64 = 0.9994;
-/// Length. Curves that come closer might pass through each other within what engines tolerate.
+/// Length. The least distance of two curves: closer ones might pass through each other within the depth that engines
+/// allow. Half of it may call parts linked that engines separate; double it misses links with little play.
 pub(crate) const LINK_CLEARANCE: f64 = 2e-3;
+
+/// Divisor. Divides a part's largest extent: the least travel of a part smaller than `SHARE_OF_EXTENT *
+/// SAME_STATE_TRAVEL`, one length, is that share of its size. Chosen, not derived.
+pub(crate) const SHARE_OF_EXTENT: f64 = 20.0;
 
 // Verification.
 

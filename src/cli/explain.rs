@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use super::args::ExplainArguments;
 use super::error::CliError;
 use super::print;
-use crate::search::{BlockedBy, TraceEvent, TracePhase};
+use crate::search::{BlockedBy, PlanningPhase, TraceEvent};
 
 pub(super) fn run(arguments: &ExplainArguments) -> Result<ExitCode, CliError> {
     let file = arguments.trace.display();
@@ -49,8 +49,8 @@ impl Account {
             }
             TraceEvent::Pass { phase, depth_limit } => {
                 let kind = match phase {
-                    TracePhase::Translation => "translational",
-                    TracePhase::Rotation => "rotational",
+                    PlanningPhase::Translation => "translational",
+                    PlanningPhase::Rotation => "rotational",
                 };
                 let limit =
                     depth_limit.map(|d| format!(", at most {d} motions per part")).unwrap_or_default();

@@ -1,254 +1,156 @@
-//! The actions of a search, and which parts have which.
+//! The actions of a search: those of all parts, and behind them those of single parts.
 //!
-//! All parts have the common actions, which come first in the list of their phase. Behind them come actions that single
-//! parts have beside these, from what a part touches as assembled (`rays`, `twists`); they are withheld from all other
-//! parts. The evaluation f_a does not count them: parts are compared by the common actions. They are derived again when
-//! a part that they came from is gone.
+//! Actions of single parts are drawn from what a part touches as assembled: the extreme rays of its contacts
+//! and its null twist. They are withheld from all other parts. The evaluation f_a does not count them: parts
+//! are compared by what is open to all. They are drawn again when a part that they came from is gone.
 
-use std::collections::{HashMap, HashSet};
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use crate::blocking_graph::Blockage;
 use crate::budgets::{OWN_RAYS, OWN_TWISTS};
-use crate::simulation::{Action, Axis};
+use crate::simulation::Action;
 use crate::termination::Interrupt;
 use crate::tolerances::{ONE_AXIS_COSINE, ONE_DIRECTION_COSINE};
 
+use super::action_list::{ActionList, DrawnActions};
 use super::directions::Directions;
 use super::disassembly::{Disassembly, Stop};
 use super::problem::Problem;
-use super::state::Phase;
+use super::rays::extreme_ray_actions;
+use super::state::StateNode;
 use super::states::States;
-
-/// The own actions of parts in one phase.
-#[derive(Debug)]
-struct OwnActions {
-    /// The number of common actions, which are the first ones.
-    common: usize,
-    /// The most own actions, of all parts together.
-    most: usize,
-    /// Cosine of the angle within which two directions are one.
-    same: f64,
-    /// For each part, the parts that it touched when its actions were derived.
-    touched: HashMap<usize, Vec<usize>>,
-    /// Parts with their own actions.
-    offered: HashSet<(usize, usize)>,
-}
-
-impl OwnActions {
-    fn new(common: usize, most: usize, same: f64) -> Self {
-        Self { common, most, same, touched: HashMap::new(), offered: HashSet::new() }
-    }
-}
-
-/// The actions of one phase.
-#[derive(Debug)]
-struct PhaseActions {
-    actions: Vec<Action>,
-    own: OwnActions,
-}
+use super::strategy::Strategy;
+use super::trace::PlanningPhase;
+use super::twists::null_twist_actions;
 
 /// The actions of both phases.
+#[derive(Debug)]
 pub(super) struct ActionTable {
-    pub(super) directions: Directions,
-    translations: PhaseActions,
-    rotations: PhaseActions,
-    /// Whether own translations are simulated, too, and not only swept.
+    directions: Directions,
+    pub(super) translations: ActionList,
+    pub(super) rotations: ActionList,
+    /// Extreme rays are simulated, too, not only swept.
     simulates_rays: bool,
-    /// Whether own rotations are derived for parts that are made along a common axis, too.
-    twists_all_parts: bool,
+    /// Null twists are drawn for parts that are made along an axis of all, too.
+    draws_all_twists: bool,
 }
 
 impl ActionTable {
     pub(super) fn new(directions: Directions, translations: Vec<Action>, rotations: Vec<Action>) -> Self {
-        let rays = OwnActions::new(translations.len(), OWN_RAYS, ONE_DIRECTION_COSINE);
-        let twists = OwnActions::new(rotations.len(), OWN_TWISTS, ONE_AXIS_COSINE);
         Self {
             directions,
-            translations: PhaseActions { actions: translations, own: rays },
-            rotations: PhaseActions { actions: rotations, own: twists },
+            translations: ActionList::new(translations, OWN_RAYS, ONE_DIRECTION_COSINE),
+            rotations: ActionList::new(rotations, OWN_TWISTS, ONE_AXIS_COSINE),
             simulates_rays: false,
-            twists_all_parts: false,
+            draws_all_twists: false,
         }
     }
 
-    fn phase(&self, phase: Phase) -> &PhaseActions {
+    pub(super) fn of(&self, phase: PlanningPhase) -> &ActionList {
         match phase {
-            Phase::Translation => &self.translations,
-            Phase::Rotation => &self.rotations,
+            PlanningPhase::Translation => &self.translations,
+            PlanningPhase::Rotation => &self.rotations,
         }
     }
 
-    fn phase_mut(&mut self, phase: Phase) -> &mut PhaseActions {
+    /// Number of actions that are simulated.
+    pub(super) fn simulated(&self, phase: PlanningPhase) -> usize {
         match phase {
-            Phase::Translation => &mut self.translations,
-            Phase::Rotation => &mut self.rotations,
+            PlanningPhase::Translation if !self.simulates_rays => self.translations.common,
+            _ => self.of(phase).all.len(),
         }
     }
 
-    /// All actions of a phase, the common ones first.
-    pub(super) fn of(&self, phase: Phase) -> &[Action] {
-        &self.phase(phase).actions
+    /// Whether an action is only this part's.
+    pub(super) fn is_own(&self, phase: PlanningPhase, part: usize, action: usize) -> bool {
+        self.of(phase).is_own(part, action)
     }
 
-    /// The common actions of a phase.
-    pub(super) fn common(&self, phase: Phase) -> &[Action] {
-        let PhaseActions { actions, own } = self.phase(phase);
-        &actions[..own.common]
+    /// The push that pulls as an action does that also turns a part about its own axis.
+    pub(super) fn pull(&self, part: usize, rotation: usize) -> Option<usize> {
+        let action = self.rotations.all[rotation];
+        let Action::Screw(axis, ..) = action else { return None };
+        self.directions.is_own(part, axis).then_some(())?;
+        self.translations.all.iter().position(|push| push.force() == action.force())
     }
 
-    /// The number of actions of a phase that are simulated.
-    pub(super) fn simulated(&self, phase: Phase) -> usize {
-        match phase {
-            Phase::Translation if !self.simulates_rays => self.translations.own.common,
-            _ => self.of(phase).len(),
-        }
-    }
-
-    /// Whether a part has an action beside the common ones.
-    pub(super) fn is_own(&self, phase: Phase, part: usize, action: usize) -> bool {
-        self.phase(phase).own.offered.contains(&(part, action))
-    }
-
-    /// Own translations are simulated from now on; true if there are any and they were not before.
+    /// Lets extreme rays be simulated; true if there are any and they were not before.
     pub(super) fn simulate_rays(&mut self) -> bool {
-        let late = !self.simulates_rays && self.translations.actions.len() > self.translations.own.common;
-        self.simulates_rays = late || self.simulates_rays;
+        let late = !self.simulates_rays && self.translations.all.len() > self.translations.common;
+        self.simulates_rays |= late;
         late
     }
 
-    /// Own rotations are derived for all parts from now on; true if they were not before.
-    pub(super) fn twist_all_parts(&mut self) -> bool {
-        !std::mem::replace(&mut self.twists_all_parts, true)
+    /// Lets null twists be drawn for all parts; true if they were not before.
+    pub(super) fn draw_all_twists(&mut self, strategy: Strategy) -> bool {
+        strategy.is_extended() && !std::mem::replace(&mut self.draws_all_twists, true)
     }
 
-    /// Whether own rotations are derived for a part.
-    pub(super) fn twists(&self, part: usize) -> bool {
-        self.twists_all_parts || !self.directions.has_own(part)
-    }
-
-    /// The push with the force of an action that also turns a part about the part's own axis.
-    pub(super) fn pull_of(&self, part: usize, rotation: usize) -> Option<usize> {
-        let action = self.rotations.actions[rotation];
-        let Action::Screw(axis, ..) = action else { return None };
-        self.is_axis_of(part, axis).then_some(())?;
-        self.translations.actions.iter().position(|push| push.force() == action.force())
-    }
-
-    fn is_axis_of(&self, part: usize, axis: Axis) -> bool {
-        self.directions.is_own(part, axis)
-    }
-
-    /// The blockage of a new state of a part, with own actions; `blockage` knows only the common ones.
-    pub(super) fn with_own(&self, phase: Phase, part: usize, mut blockage: Blockage) -> Blockage {
-        for action in self.phase(phase).own.common..self.of(phase).len() {
-            blockage.add_withheld();
-            if self.is_own(phase, part, action) {
-                blockage.reopen(action);
-            }
-        }
-        blockage
-    }
-
-    /// Derives the own actions of open parts as assembled for which `is_asked`; true if any was added. `derive` gets a
-    /// part and the parts that stand beside it, and returns actions and the parts that they came from.
-    pub(super) fn derive_own(
+    /// Draws the own actions of open parts as assembled, unless they are current; true if any was added.
+    pub(super) fn draw(
         &mut self,
-        disassembly: &mut Disassembly<'_, '_>,
+        strategy: Strategy,
+        phase: PlanningPhase,
+        open: &[usize],
         states: &mut States,
-        (phase, open): (Phase, &[usize]),
-        is_asked: impl Fn(&Self, usize) -> bool,
-        derive: impl Fn(&Problem<'_>, usize, &[usize]) -> Result<(Vec<Action>, Vec<usize>), Interrupt> + Sync,
+        disassembly: &mut Disassembly<'_, '_>,
     ) -> Result<bool, Stop> {
+        type Draw = fn(&Problem<'_>, usize, &[usize]) -> Result<DrawnActions, Interrupt>;
+        let (is_drawn, draw): (_, Draw) = match phase {
+            PlanningPhase::Translation => (!strategy.separate_lists, extreme_ray_actions),
+            PlanningPhase::Rotation => (strategy.is_extended(), null_twist_actions),
+        };
+        if !is_drawn {
+            return Ok(false);
+        }
         let started = Instant::now();
         let standing = disassembly.everything.standing();
-        let stands = |part: &usize| standing.binary_search(part).is_ok();
-        let own = &self.phase(phase).own;
-        let is_known = |part: &usize| own.touched.get(part).is_some_and(|t| t.iter().all(stands));
-        let roots = open.iter().map(|&i| &states[i]).filter(|n| n.is_root());
-        let parts: Vec<usize> =
-            roots.map(|n| n.part).filter(|p| is_asked(self, *p) && !is_known(p)).collect();
+        let is_asked = |part: usize| {
+            let by_kind = phase == PlanningPhase::Translation || self.draws_all_twists;
+            (by_kind || !self.directions.has_own(part)) && !self.of(phase).is_current(part, standing)
+        };
+        let roots = open.iter().map(|&i| &states.nodes[i]).filter(|n| n.is_root());
+        let parts: Vec<usize> = roots.map(|n| n.part).filter(|&part| is_asked(part)).collect();
         let problem = &disassembly.problem;
-        let found = parts.par_iter().map(|&part| {
+        let drawn = parts.par_iter().map(|&part| {
             problem.termination.check()?;
             let others: Vec<usize> = standing.iter().copied().filter(|&p| p != part).collect();
-            derive(problem, part, &others)
+            draw(problem, part, &others)
         });
-        let found = found.collect::<Result<Vec<_>, Interrupt>>()?;
+        let drawn = drawn.collect::<Result<Vec<_>, Interrupt>>()?;
         let mut added = false;
-        for (part, (actions, touched)) in parts.into_iter().zip(found) {
-            self.phase_mut(phase).own.touched.insert(part, touched);
+        for (part, DrawnActions { actions, touched }) in parts.into_iter().zip(drawn) {
+            self.of_mut(phase).touched.insert(part, touched);
             for action in actions {
-                added |= self.offer(states, phase, part, action);
+                added |= self.add_own(phase, part, action, states);
             }
         }
         disassembly.counters.static_analysis += started.elapsed();
         Ok(added)
     }
 
-    /// Gives an action to a part, unless a common one is as good; true if the part did not have it.
-    fn offer(&mut self, states: &mut States, phase: Phase, part: usize, wanted: Action) -> bool {
-        let PhaseActions { actions, own } = self.phase_mut(phase);
-        let action = match actions.iter().position(|a| a.is_like(&wanted, own.same)) {
-            Some(common) if common < own.common => return false,
-            Some(known) => known,
-            None if actions.len() - own.common == own.most => return false,
-            None => {
-                actions.push(wanted);
-                states.iter_mut().filter_map(|n| n.blockage_mut(phase)).for_each(Blockage::add_withheld);
-                actions.len() - 1
-            }
-        };
-        let is_new = own.offered.insert((part, action));
-        if is_new {
-            tracing::debug!(part, action = %actions[action], "own action");
-            let of_part = states.iter_mut().filter(|n| n.part == part);
-            of_part.filter_map(|n| n.blockage_mut(phase)).for_each(|b| b.reopen(action));
+    fn of_mut(&mut self, phase: PlanningPhase) -> &mut ActionList {
+        match phase {
+            PlanningPhase::Translation => &mut self.translations,
+            PlanningPhase::Rotation => &mut self.rotations,
         }
-        is_new
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use nalgebra::Vector3;
-
-    use super::super::request::ActionSet;
-    use super::super::rules::Rules;
-    use super::super::state::StateNode;
-    use super::*;
-    use crate::fixtures::{block_on_plate, scene};
-
-    const PUSH: Phase = Phase::Translation;
-
-    #[test]
-    fn an_own_action_is_open_to_its_part_alone_and_never_repeats_a_common_one() {
-        let (scene, _) = scene(block_on_plate());
-        let directions = Directions::of_world(&scene);
-        let common = Action::translations_along(&directions.axes);
-        let mut table = ActionTable::new(directions, common.clone(), Vec::new());
-        let mut states = States::new(&scene, Rules::new(ActionSet::Extended, true));
-        for part in [0, 1] {
-            let blockage = || Blockage::open(common.len());
-            let (path, origin) = (vec![scene.bodies[part].planning_from_shape], None);
-            let (translation, rotation) = (Some(blockage()), Blockage::open(0));
-            states.add(StateNode { part, path, translation, rotation, origin, novelty: 0.0, alive: true });
+    /// Makes an action a part's own and opens it in the part's states; whether it was not its own yet.
+    fn add_own(&mut self, phase: PlanningPhase, part: usize, wanted: Action, states: &mut States) -> bool {
+        let list = self.of_mut(phase);
+        let before = list.all.len();
+        let action = list.add_own(part, wanted);
+        if list.all.len() > before {
+            states.nodes.iter_mut().filter_map(|n| n.blockage_mut(phase)).for_each(Blockage::add_withheld);
         }
-        let slanted =
-            Action::Push(Axis::along(nalgebra::Unit::new_normalize(Vector3::new(1.0, 2.0, 3.0))), true);
-        assert!(!table.offer(&mut states, PUSH, 1, common[0]), "all parts have it");
-        assert!(table.offer(&mut states, PUSH, 1, slanted));
-        assert!(!table.offer(&mut states, PUSH, 1, slanted), "the part has it already");
-        let own = common.len();
-        assert_eq!((table.of(PUSH).len(), table.common(PUSH).len()), (own + 1, own));
-        let open = |states: &States, node: usize| states[node].translation.as_ref().unwrap().is_open(own);
-        assert!(open(&states, 1) && !open(&states, 0));
-        let of_new_state = |part| table.with_own(PUSH, part, Blockage::open(own)).is_open(own);
-        assert!(of_new_state(1) && !of_new_state(0));
-        assert_eq!(table.simulated(PUSH), own, "it is only swept");
-        assert!(table.simulate_rays() && !table.simulate_rays());
-        assert_eq!(table.simulated(PUSH), own + 1);
+        let Some(action) = action else { return false };
+        tracing::debug!(part, action = %list.all[action], "own action");
+        let of_part = |n: &&mut StateNode| n.part == part;
+        let blockages = states.nodes.iter_mut().filter(of_part).filter_map(|n| n.blockage_mut(phase));
+        blockages.for_each(|b| b.reopen(action));
+        true
     }
 }

@@ -8,8 +8,8 @@ use crate::geometry::Shape;
 /// the centre of mass at most. Turning it is then no motion, at this resolution.
 pub(super) fn is_ball(shape: &Shape, tolerance: f64) -> bool {
     let (surface, centre) = (&shape.surface, shape.mass.centre);
-    // What is about as far on all sides takes a search for the closest point longest, and few such parts are
-    // balls: most have a vertex or the middle of a triangle that says so.
+    // The search for the closest point is slowest for a surface at about the same distance on all sides. Most
+    // parts that are no balls have a vertex or the middle of a triangle that proves it sooner.
     let is_near = |p: &Point3<f64>| shape.reach - (p - centre).norm() > tolerance;
     let middle =
         |t: u32| Point3::from(surface.corners(t).iter().map(|p| p.coords).sum::<Vector3<f64>>() / 3.0);

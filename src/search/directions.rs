@@ -17,8 +17,8 @@ use crate::simulation::Axis;
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::WORLD_PREFERENCE;
 
-/// The axes along which a search of some parts of an assembly moves them: a right-angled frame, the world's
-/// where surfaces do not agree on another, and those of parts that stand askew in it.
+/// The axes along which a search moves some parts of an assembly: a right-angled frame (the world's where
+/// surfaces do not agree on another) and the axes of parts that stand askew in it.
 ///
 /// # Errors
 /// The termination condition became true.
@@ -31,17 +31,17 @@ pub fn axes_of(scene: &Scene, present: &[usize], termination: &Termination) -> R
 pub(super) struct Directions {
     /// A right-angled frame, then the axes of parts that stand askew in it.
     pub(super) axes: Vec<Axis>,
-    /// For each part, which of the axes it is made along, if any.
+    /// Per part: the index of the axis that it is made along, if any.
     own: Vec<Option<usize>>,
 }
 
 impl Directions {
-    /// Those of the paper: the axes of the world, and no part's own.
+    /// The paper's directions: the axes of the world, and no part's own.
     pub(super) fn of_world(scene: &Scene) -> Self {
         Self { axes: Axis::WORLD.to_vec(), own: vec![None; scene.bodies.len()] }
     }
 
-    /// Those of the present parts; the world's axes where surfaces do not agree on any.
+    /// The directions of the present parts; the world's axes where surfaces do not agree on any.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -55,7 +55,7 @@ impl Directions {
             let body = &scene.bodies[part];
             let faces = body.shape.faces();
             let rotation = body.planning_from_shape.rotation;
-            // Many bolts stand alike.
+            // Many equal parts have the same orientation: their weights are computed once.
             let standing = (Arc::as_ptr(&body.shape), rotation.coords.data.0[0].map(f64::to_bits));
             let for_world = spoken.entry(standing).or_insert_with(|| {
                 Axis::WORLD.map(|a| faces.speaking_for(&rotation.inverse_transform_unit_vector(&a.unit())))
@@ -98,7 +98,7 @@ impl Directions {
     }
 }
 
-/// Which axis is the nearest to a direction, if it is near.
+/// The index of the axis nearest to a direction, if it is near.
 fn nearest(axes: &[Unit<Vector3<f64>>], d: &Unit<Vector3<f64>>) -> Option<usize> {
     let cos = |i: &usize| axes[*i].dot(d).abs();
     (0..axes.len()).max_by(|i, j| cos(i).total_cmp(&cos(j))).filter(|i| cos(i) > NEAR_AXIS)

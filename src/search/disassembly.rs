@@ -1,5 +1,5 @@
-//! The disassembly under way: what stands, what is out, and what every planner does with it:
-//! simulate, prove a path, take parts out that nothing holds.
+//! The state of a disassembly: which parts stand and which are out. All planners use it to simulate a motion,
+//! to prove a path, and to take parts out that nothing holds.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -20,13 +20,13 @@ use crate::termination::Interrupt;
 use crate::tolerances::HULL_MARGIN;
 
 use super::outcome::{BlockedAction, Counters, Outcome, Removal};
-use super::problem::{Observer, Problem};
+use super::problem::{Checked, Observer, Problem, VerifiedPath};
 use super::trace::TraceEvent;
 
-/// Why a motion is given up that took too long.
+/// The reason given for a motion that took too long.
 const NO_TIME: &str = "the time for one path is used up";
 
-/// Why a search stops before it is done.
+/// The reason why a search stops before it is done.
 pub(super) enum Stop {
     Interrupted(Interrupt),
     Budget(u64),
@@ -40,16 +40,23 @@ impl From<Interrupt> for Stop {
 
 /// One use of the transition function: f(s, a, p), with all parts but p as they stand.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Run {
+pub(super) struct Transition {
     pub(super) part: usize,
     pub(super) start: Pose,
     pub(super) action: Action,
 }
 
-/// What became of a motion that leads out, once it was checked on the triangles.
+/// The version of the scene that motions depend on: which parts stand, and where contact is sampled.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct SceneVersion {
+    pub(super) removals: usize,
+    pub(super) extra_points: usize,
+}
+
+/// The result of the check on the triangles of a motion that leads out.
 pub(super) enum Proof {
     /// Thinned and verified.
-    Path { path: Vec<Pose>, depth: f64 },
+    Path(VerifiedPath),
     /// Already the way to the motion's start does not hold.
     PrefixRefuted,
     /// It enters these parts, however often it is refined.
@@ -64,28 +71,28 @@ pub(super) struct Refuted {
     pub(super) prefix: bool,
 }
 
-/// What every planner shares.
+/// The part of a search that all planners share.
 pub(super) struct Disassembly<'a, 'o> {
     pub(super) problem: Problem<'a>,
     pub(super) observer: &'o mut dyn Observer,
     /// All present parts that have not been taken out.
     pub(super) everything: HullTree,
-    /// What stands around some parts, until the next removal.
+    /// The surroundings of some parts, until the next removal.
     around: HashMap<usize, Arc<StandingParts>>,
-    /// A part whose hull meets this part's, both assembled: proof that it is not free.
+    /// Per part: another part whose hull meets this part's, both assembled: a proof that it is not free.
     entangled: Vec<Option<usize>>,
-    /// At which change of the hull a part that does not shape it was found not to be free.
+    /// Per part that does not shape the hull: the number of hull changes when it was found not to be free.
     held_since: Vec<Option<usize>>,
     hull_changes: usize,
     pub(super) removals: Vec<Removal>,
     pub(super) counters: Counters,
-    /// Whether some path was given up for want of time: nothing found is then no proof.
+    /// Whether some path was given up for lack of time: a search that finds nothing then proves nothing.
     pub(super) path_time_ran_out: bool,
 }
 
 impl<'a, 'o> Disassembly<'a, 'o> {
-    /// A disassembly, with something else that depends on the problem alone: computed while hulls are joined. If either
-    /// is interrupted, the disassembly has no hulls: all it can do is to give its [outcome](Self::outcome).
+    /// A disassembly, and the result of `other`, which runs while hulls are joined. If either is interrupted, the
+    /// disassembly has no hulls: it can only give its [outcome](Self::outcome).
     pub(super) fn beside<T: Send>(
         problem: Problem<'a>,
         observer: &'o mut dyn Observer,
@@ -123,8 +130,9 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.problem.scene.bodies[part].planning_from_shape
     }
 
-    /// All that stands but one part. A few are remembered: all would be the square of their number.
+    /// All parts that stand but one. Only some are kept: all would take the square of their number in memory.
     fn surroundings(&mut self, part: usize) -> Arc<StandingParts> {
+        // Number of surroundings kept. No plan depends on it; fewer are computed more often.
         if self.around.len() >= REMEMBERED_STANDING_PARTS && !self.around.contains_key(&part) {
             self.around.clear();
         }
@@ -132,9 +140,9 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         Arc::clone(self.around.entry(part).or_insert_with(|| Arc::new(everything.without(scene, part))))
     }
 
-    /// Those of all runs; hulls of many parts take long.
-    fn all_surroundings(&mut self, runs: &[Run]) -> Result<Vec<Arc<StandingParts>>, Stop> {
-        let around = |run: &Run| {
+    /// The surroundings of all runs. Polls the termination condition, since hulls of many parts take long.
+    fn all_surroundings(&mut self, runs: &[Transition]) -> Result<Vec<Arc<StandingParts>>, Stop> {
+        let around = |run: &Transition| {
             self.problem.termination.check()?;
             Ok(self.surroundings(run.part))
         };
@@ -145,24 +153,24 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.everything.standing().iter().copied().filter(|&i| i != part).collect()
     }
 
-    /// Tells the observer, if it listens.
+    /// Passes an event to the observer, if it traces.
     pub(super) fn trace(&mut self, event: impl FnOnce() -> TraceEvent) {
         if self.observer.traces() {
             self.observer.traced(event());
         }
     }
 
-    /// Tells how a simulation ended, and the number of the new state that it led to.
+    /// Traces how a simulation ended, and the number of the new state that it led to.
     pub(super) fn trace_simulation(
         &mut self,
         state: usize,
-        run: &Run,
+        run: &Transition,
         end: &str,
         with: &[usize],
         poses: usize,
         leads_to: Option<usize>,
     ) {
-        let Run { part, action, .. } = *run;
+        let Transition { part, action, .. } = *run;
         self.trace(|| TraceEvent::Simulated {
             state,
             part,
@@ -174,13 +182,12 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         });
     }
 
-    /// What motions depend on besides their own question: which parts stand and where contact is
-    /// looked for. Changes with both.
-    pub(super) fn version(&self) -> (usize, usize) {
-        (self.removals.len(), self.problem.extra_points.values().map(Vec::len).sum())
+    pub(super) fn version(&self) -> SceneVersion {
+        let extra_points = self.problem.extra_points.values().map(Vec::len).sum();
+        SceneVersion { removals: self.removals.len(), extra_points }
     }
 
-    /// Counts one simulation against the budget; a motion that was known costs what it would have cost.
+    /// Counts one simulation against the budget. A remembered motion counts, too.
     pub(super) fn charge(&mut self) -> Result<(), Stop> {
         if let Some(most) = self.problem.max_simulations
             && self.problem.spent + self.counters.simulations >= most
@@ -192,21 +199,21 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         Ok(())
     }
 
-    /// Notes that a motion was used for which a simulation was counted.
+    /// Counts a motion that was remembered.
     pub(super) fn used(&mut self, motion: &Motion) {
         self.counters.recalled += u64::from(motion.recalled);
     }
 
-    /// The motions of some runs, in order, up to the first that leads out: that one changes the
-    /// question to which later ones were answers, so they are stopped.
-    pub(super) fn simulate(&mut self, runs: &[Run]) -> Result<Vec<Motion>, Stop> {
+    /// The motions of some runs, in order, up to the first that leads out. It changes the scene of the later ones,
+    /// so they are stopped.
+    pub(super) fn simulate(&mut self, runs: &[Transition]) -> Result<Vec<Motion>, Stop> {
         let started = Instant::now();
         let around = self.all_surroundings(runs)?;
         let problem = &self.problem;
         let winner = Arc::new(AtomicUsize::new(usize::MAX));
-        let simulated = |(rank, run): (usize, &Run)| {
+        let simulated = |(rank, run): (usize, &Transition)| {
             let around = &around[rank];
-            let Run { part, start, action } = run;
+            let Transition { part, start, action } = run;
             let termination = problem.termination.unless_won(&winner, rank);
             let limited = problem.path_timeout.map(|limit| termination.within(limit));
             let poll = limited.as_ref().unwrap_or(&termination);
@@ -241,9 +248,8 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         Ok(motions.into_iter().take(wanted).collect::<Result<_, Interrupt>>()?)
     }
 
-    /// What straight sweeps along the forces of some runs tell, in order, up to the first that is
-    /// clear.
-    pub(super) fn sweep(&mut self, runs: &[Run]) -> Result<Vec<Option<Sweep>>, Stop> {
+    /// The results of straight sweeps along the forces of some runs, in order, up to the first that is clear.
+    pub(super) fn sweep(&mut self, runs: &[Transition]) -> Result<Vec<Option<Sweep>>, Stop> {
         self.problem.termination.check()?;
         let started = Instant::now();
         let around = self.all_surroundings(runs)?;
@@ -251,10 +257,10 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         let clear = |s: &Option<Sweep>| matches!(s, Some(Sweep::Clear { .. }));
         let forces: Vec<_> = runs.iter().map(|run| run.action.force()).collect();
         let question = |i: usize| {
-            let Run { part, start, .. } = &runs[i];
+            let Transition { part, start, .. } = &runs[i];
             SweepQuestion { scene, standing_parts: &around[i], part: *part, start, direction: &forces[i] }
         };
-        // What is remembered is told one after the other: to share it with other threads would take longer.
+        // Remembered sweeps are read one after the other: sharing them with other threads would take longer.
         let mut results = Vec::new();
         while results.len() < runs.len() && !results.last().is_some_and(clear) {
             let Some(known) = known_sweep(cache, &question(results.len()), termination)? else { break };
@@ -272,14 +278,14 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         Ok(results)
     }
 
-    /// Verifies a path that a sweep claims to be clear, from the end of `prefix`. What refutes it
-    /// becomes samples, for the simulation that must answer instead.
+    /// Verifies a path that a sweep claims to be clear, from the end of `prefix`. Refuting points become samples
+    /// for the simulation that must answer instead.
     pub(super) fn prove_sweep(
         &mut self,
-        run: &Run,
+        run: &Transition,
         prefix: &[Pose],
         motion: &[Pose],
-    ) -> Result<Result<(Vec<Pose>, f64), Refuted>, Stop> {
+    ) -> Result<Result<VerifiedPath, Refuted>, Stop> {
         let part = run.part;
         let refuted = match self.checked(part, &joined(prefix, motion))? {
             Ok(proof) => return Ok(Ok(proof)),
@@ -292,8 +298,8 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         Ok(Err(Refuted { prefix }))
     }
 
-    /// Tells of a refuted path; the parts that it enters.
-    fn trace_refutation(&mut self, run: &Run, penetrations: &[Penetration]) -> Vec<usize> {
+    /// Traces a refuted path. Returns the parts that it enters.
+    fn trace_refutation(&mut self, run: &Transition, penetrations: &[Penetration]) -> Vec<usize> {
         let mut by: Vec<_> = penetrations.iter().map(|e| e.other).collect();
         by.sort_unstable();
         by.dedup();
@@ -304,12 +310,17 @@ impl<'a, 'o> Disassembly<'a, 'o> {
 
     /// Thins and verifies a motion that leads out from the end of `prefix`. A refuted one is
     /// simulated again with the refuting points as samples, and given up after some tries.
-    pub(super) fn prove(&mut self, run: Run, prefix: &[Pose], motion: Vec<Pose>) -> Result<Proof, Stop> {
+    pub(super) fn prove(
+        &mut self,
+        run: Transition,
+        prefix: &[Pose],
+        motion: Vec<Pose>,
+    ) -> Result<Proof, Stop> {
         let part = run.part;
         let mut motion = motion;
         for refinement in 0..=REFINEMENTS {
             let refuted = match self.checked(part, &joined(prefix, &motion))? {
-                Ok((path, depth)) => return Ok(Proof::Path { path, depth }),
+                Ok(verified) => return Ok(Proof::Path(verified)),
                 Err(penetrations) => penetrations,
             };
             tracing::debug!(part, refinement, over = refuted.first().map(|e| e.over), "path refuted");
@@ -337,7 +348,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         Ok(self.checked(part, path)?.is_ok())
     }
 
-    fn checked(&mut self, part: usize, path: &[Pose]) -> Result<super::Checked, Stop> {
+    fn checked(&mut self, part: usize, path: &[Pose]) -> Result<Checked, Stop> {
         let started = Instant::now();
         let checked = self.problem.checked_path(self.standing(part), part, path);
         self.counters.verification += started.elapsed();
@@ -371,7 +382,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     fn is_free(&mut self, part: usize) -> bool {
         let standing = self.everything.standing();
         let stands = |other: usize| standing.binary_search(&other).is_ok();
-        // What was found the last time mostly still holds.
+        // The last answer mostly still holds.
         let held = self.held_since[part] == Some(self.hull_changes);
         if standing.len() < 2 || held || self.entangled[part].is_some_and(stands) {
             return false;
@@ -397,8 +408,8 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         free
     }
 
-    /// What the search answers. `evidence` says what was tried before nothing more was found;
-    /// `blocked` who stands in the way of what remains.
+    /// The outcome of the search. `evidence` lists what was tried before nothing more was found; `blocked` lists
+    /// which parts block those that remain.
     pub(super) fn outcome(
         mut self,
         stop: Option<Stop>,

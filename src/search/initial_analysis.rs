@@ -1,4 +1,4 @@
-//! The start of a search: directions, actions along them, and the blocking graphs of the assembled state.
+//! The analysis before a search: directions, actions along them, and the blocking graphs of the assembled state.
 
 use std::time::{Duration, Instant};
 
@@ -10,7 +10,7 @@ use super::directions::Directions;
 use super::problem::Problem;
 use super::state::least_travel;
 
-/// The blocking graphs of the assembled state along the directions with which a search starts.
+/// The blocking graphs of the assembled state along the directions that a search would begin with.
 ///
 /// # Errors
 /// The termination condition became true.
@@ -26,14 +26,14 @@ fn assembled_blockages(problem: &Problem<'_>, translations: &[Action]) -> Result
     analysis.initial_blockages(present, &least, termination)
 }
 
-/// What a search starts with.
+/// The results of the analysis.
 pub(super) struct InitialAnalysis {
     pub(super) directions: Directions,
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
-    /// The blockage of each part as assembled.
+    /// Per part, as assembled.
     pub(super) blockages: Vec<Blockage>,
-    /// The time that these took.
+    /// How long the analysis took.
     pub(super) duration: Duration,
 }
 

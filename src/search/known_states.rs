@@ -1,8 +1,8 @@
-//! The states of a part, to be asked whether a pose is among them (the paper's rmd).
+//! The states of one part, and whether a pose is one of them (the paper's rmd).
 //!
-//! A hash grid over where the centre of mass stands, as wide as the resolution: what is alike lies
-//! in the same cell or in one of the 26 around it. Cells are as coarse as the states are told
-//! apart; when that changes the grid is made anew, which happens ten times at most.
+//! A hash grid over the positions of the centre of mass. A cell is as wide as the resolution, so poses of the
+//! same state lie in the same cell or in one of the 26 around it. When the resolution changes, which happens
+//! ten times at most, the grid is built again.
 
 use std::collections::HashMap;
 
@@ -14,7 +14,7 @@ use crate::tolerances::SAME_STATE_ROTATION;
 
 use super::state::{coarseness, least_travel};
 
-/// States of one part, by numbers that their owner gives.
+/// States of one part, by numbers that the caller gives.
 #[derive(Debug)]
 pub(super) struct KnownStates {
     centre: Point3<f64>,
@@ -53,8 +53,7 @@ impl KnownStates {
         }
     }
 
-    /// Whether one of the states is like a pose, as coarsely as so many states are told apart; only
-    /// those count whose number `counts`.
+    /// Whether a pose is one of the states whose number `counts`, at the present resolution.
     pub(super) fn has_like(&self, pose: &Pose, counts: impl Fn(usize) -> bool) -> bool {
         let [x, y, z] = self.cell(pose);
         let around = |c: i64| c.saturating_sub(1)..=c.saturating_add(1);
@@ -64,7 +63,7 @@ impl KnownStates {
         states.any(|(number, known)| self.alike(known, pose, self.coarseness) && counts(*number))
     }
 
-    /// How far a pose is from the nearest state, in units of the resolution: infinite if there is none.
+    /// The distance of a pose to the nearest state, in units of the resolution: infinite if there is none.
     pub(super) fn novelty(&self, pose: &Pose) -> f64 {
         let distance = |known: &Pose| {
             let travel = (known * self.centre - pose * self.centre).norm() / self.least_travel;

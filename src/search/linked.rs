@@ -1,10 +1,10 @@
 //! Parts that are linked, as two links of a chain: a proof that neither leaves while both are there.
 //!
 //! If a closed curve on one body and one on another have a linking number other than 0, no motion
-//! that keeps the bodies from entering each other separates them. Guarantees: no part is called
-//! linked that could leave. Not found are links of open or crossing meshes, of parts that overlap,
-//! of more holes than are looked at, of curves that come too close to each other, and whatever is
-//! held without being linked, as a ball in a cage.
+//! that keeps the bodies from entering each other separates them. Guarantees: a part that could leave is
+//! never called linked. Not found are links of open or crossing meshes, of parts that overlap, of more than
+//! `SURFACE_LOOPS` curves, of curves closer than `LINK_CLEARANCE`, and parts that are held without being linked, as a
+//! ball in a cage.
 
 use std::cell::OnceCell;
 
@@ -19,12 +19,12 @@ use crate::tolerances::LINK_CLEARANCE;
 /// A closed polygon in the planning frame.
 type Loop = Vec<Point3<f64>>;
 
-/// For each part, the parts that it is linked with.
+/// Per part: the parts that it is linked with.
 #[derive(Debug, Default)]
 pub(super) struct Links(Vec<Vec<usize>>);
 
 impl Links {
-    /// Among some parts (ascending), at their assembled poses.
+    /// The links among some parts (ascending), at their assembled poses.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -34,7 +34,7 @@ impl Links {
         termination: &Termination,
     ) -> Result<Self, Interrupt> {
         let poll = Poll::every(LONG_STEPS_PER_POLL, Some(termination));
-        // Many parts have nobody near whom they could be linked with: theirs are never looked for.
+        // Many parts have no other near that they could be linked with: their curves are never computed.
         let known = vec![OnceCell::new(); scene.bodies.len()];
         let loops = |part: usize| known[part].get_or_init(|| loops(scene, part));
         let mut links = vec![Vec::new(); scene.bodies.len()];
@@ -56,7 +56,7 @@ impl Links {
     }
 }
 
-/// Curves that generate all on a part's surface, as it stands.
+/// Curves on a part's surface that generate its first homology, as assembled.
 fn loops(scene: &Scene, part: usize) -> Vec<Loop> {
     let body = &scene.bodies[part];
     let mut loops = surface_loops(&body.shape.surface, SURFACE_LOOPS).unwrap_or_default();

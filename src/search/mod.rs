@@ -1,18 +1,23 @@
 //! Search: State-Based Disassembly Planning.
 //!
 //! Data flow: [`PlanRequest`] → [`Problem`] → a planner (`sbdp`: states and blocking graphs; `pdp`:
-//! one part after the other), which works on the `disassembly` under way → [`Outcome`].
+//! one part after the other), which changes the `disassembly` → [`Outcome`].
 //! Everything below the request is in the planning frame.
+//!
+//! A search by states has parts, each of its own type and file: `states`, `action_table`, `order`, `novelty`,
+//! `invalidation`, `sweep_memory`, `speculation`. The loop in `sbdp` is Algorithm 1 of the paper and passes
+//! them to each other.
 
+mod action_list;
 mod action_table;
 mod ball;
 mod directions;
 mod disassembly;
 mod initial_analysis;
+mod invalidation;
 mod known_states;
 mod linked;
 mod novelty;
-mod obstructions;
 mod order;
 mod outcome;
 mod pdp;
@@ -20,12 +25,11 @@ mod problem;
 mod rays;
 mod report;
 mod request;
-mod rules;
 mod sbdp;
-mod search_view;
 mod speculation;
 mod state;
 mod states;
+mod strategy;
 mod sweep_memory;
 #[cfg(test)]
 mod tests;
@@ -36,10 +40,10 @@ pub use crate::termination::{Interrupt, Termination};
 pub use directions::axes_of;
 pub use initial_analysis::initial_blockages;
 pub use outcome::{BlockedAction, Counters, Outcome, Removal};
-pub use problem::{Checked, Observer, Problem};
+pub use problem::{Checked, Observer, Problem, VerifiedPath};
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging};
 pub use state::least_travel;
-pub use trace::{BlockedBy, TraceEvent, TracePhase};
+pub use trace::{BlockedBy, PlanningPhase, TraceEvent};
 
 /// Runs the planner that a request names.
 #[must_use]

@@ -1,9 +1,10 @@
-//! When a state that is not far from others is new: beyond the paper's resolution (rmd), where a part plays freely.
+//! Which states are new: the paper's rmd, and coarser than that where a part plays freely.
 //!
-//! In free play states multiply without end, and none of them matters much; in a maze, every one may be a junction. A
-//! state that a part was only pushed to is told apart the more coarsely, the more states it reaches straight; states
-//! that it does not reach straight count little, and never hide one. A part that turns mostly turns in its play: a
-//! state that it was turned to is told apart the more coarsely, the more such states there are, wherever they are.
+//! Free play yields states without end, and none of them matters much; in a maze, each may be a junction. So
+//! poses that a part was only pushed to are told apart the coarser the more of them lie in one free region,
+//! that is, where the part gets straight from one to the other; poses in other regions count little, and never
+//! hide one. A part that turns mostly turns in its play: turned poses are told apart the coarser the more
+//! there are of them, wherever they lie.
 
 use rayon::prelude::*;
 
@@ -14,39 +15,76 @@ use crate::termination::Interrupt;
 use crate::tolerances::TURNED;
 
 use super::disassembly::Disassembly;
-use super::known_states::KnownStates;
 use super::state::coarseness;
+use super::states::States;
+use super::strategy::Strategy;
+use super::trace::PlanningPhase;
 
-/// The resolution, as a multiple of the paper's, at which a pose of a part is like one of some states of the part;
-/// `None` if it is new.
-///
-/// # Errors
-/// The termination condition became true.
-pub(super) fn hiding_coarseness(
-    disassembly: &Disassembly<'_, '_>,
-    known: &KnownStates,
-    states: &[Pose],
-    part: usize,
-    pose: &Pose,
-) -> Result<Option<f64>, Interrupt> {
-    if states.iter().any(|state| known.alike(state, pose, 1.0)) {
-        return Ok(Some(1.0));
+/// The decision which poses make new states.
+#[derive(Debug)]
+pub(super) struct Novelty {
+    /// The coarsest resolution at which a pose was taken for a known state, as a multiple of the paper's.
+    coarsest: f64,
+}
+
+impl Default for Novelty {
+    fn default() -> Self {
+        Self { coarsest: 1.0 }
     }
-    let assembled = disassembly.assembled(part).rotation;
-    let is_turned = |state: &Pose| state.rotation.angle_to(&assembled) > TURNED;
-    let (scene, standing) = (&disassembly.problem.scene, disassembly.standing(part));
-    let termination = &disassembly.problem.termination;
-    let turned = is_turned(pose);
-    let is_near = |state: &Pose| match turned {
-        true => Ok(is_turned(state)),
-        false => passes_straight(scene, &standing, part, [state, pose], termination),
-    };
-    let kinds: Vec<bool> = states.par_iter().map(is_near).collect::<Result<_, Interrupt>>()?;
-    let of_kind =
-        |wanted: bool| states.iter().zip(&kinds).filter(move |(_, is)| **is == wanted).map(|(s, _)| s);
-    let (near, far): (Vec<&Pose>, Vec<&Pose>) = (of_kind(true).collect(), of_kind(false).collect());
-    let coarse = coarseness(near.len() + far.len() / STATES_ELSEWHERE);
-    let hides = |state: &&Pose| known.alike(state, pose, coarse);
-    let hidden = near.iter().any(hides) || (turned && far.iter().any(hides));
-    Ok(hidden.then_some(coarse))
+}
+
+impl Novelty {
+    /// Whether a part has no state like a pose.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn is_new(
+        &mut self,
+        strategy: Strategy,
+        states: &States,
+        disassembly: &Disassembly<'_, '_>,
+        phase: PlanningPhase,
+        part: usize,
+        pose: &Pose,
+    ) -> Result<bool, Interrupt> {
+        let counts = |node: usize| states.nodes[node].alive && strategy.lists(phase, &states.nodes[node]);
+        let known = &states.known[part];
+        // At the coarsest resolution that this number of states allows.
+        if !known.has_like(pose, counts) {
+            return Ok(true);
+        }
+        if !strategy.is_extended() {
+            return Ok(false);
+        }
+        let states: Vec<Pose> = known.poses(counts).collect();
+        if states.iter().any(|state| known.alike(state, pose, 1.0)) {
+            return Ok(false);
+        }
+        let assembled = disassembly.assembled(part).rotation;
+        let is_turned = |state: &Pose| state.rotation.angle_to(&assembled) > TURNED;
+        let (scene, standing) = (&disassembly.problem.scene, disassembly.standing(part));
+        let termination = &disassembly.problem.termination;
+        let turned = is_turned(pose);
+        let is_near = |state: &Pose| match turned {
+            true => Ok(is_turned(state)),
+            false => passes_straight(scene, &standing, part, [state, pose], termination),
+        };
+        let kinds: Vec<bool> = states.par_iter().map(is_near).collect::<Result<_, Interrupt>>()?;
+        let of_kind =
+            |wanted: bool| states.iter().zip(&kinds).filter(move |(_, is)| **is == wanted).map(|(s, _)| s);
+        let (near, far): (Vec<&Pose>, Vec<&Pose>) = (of_kind(true).collect(), of_kind(false).collect());
+        let coarse = coarseness(near.len() + far.len() / STATES_ELSEWHERE);
+        let hides = |state: &&Pose| known.alike(state, pose, coarse);
+        let hidden = near.iter().any(hides) || (turned && far.iter().any(hides));
+        if hidden {
+            self.coarsest = self.coarsest.max(coarse);
+        }
+        Ok(!hidden)
+    }
+
+    /// The coarsest resolution used, as a multiple of the paper's; `most_states` is the largest number of
+    /// states of one part.
+    pub(super) fn coarsest(&self, strategy: Strategy, most_states: usize) -> f64 {
+        if strategy.is_extended() { self.coarsest } else { coarseness(most_states) }
+    }
 }

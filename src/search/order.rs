@@ -1,109 +1,277 @@
-//! The order in which a state-based search expands states and tries actions.
+//! In which order a state-based search expands states and tries actions.
 
 use std::cmp::Reverse;
+use std::collections::{BTreeSet, HashMap};
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use crate::blocking_graph::{Blockage, Evaluation};
+use crate::budgets::SHORT_STEPS_PER_POLL;
+use crate::contact::obstruction;
+use crate::scene::Scene;
+use crate::termination::{Interrupt, Poll};
+use crate::tolerances::TOUCHED;
 
-use super::obstructions::Obstructions;
-use super::search_view::SearchView;
-use super::state::{Expansion, Phase, StateNode};
+use super::action_table::ActionTable;
+use super::ball::is_ball;
+use super::disassembly::{Disassembly, SceneVersion, Stop};
+use super::linked::Links;
+use super::state::{StateAction, StateNode, least_travel};
+use super::states::States;
+use super::strategy::Strategy;
+use super::trace::PlanningPhase;
 
-impl SearchView<'_, '_, '_> {
-    /// The states to expand, the initial one included. Of the last two parts, it is the same which one moves against
-    /// the other: beyond the first push, only the smaller one does. A linked part is not moved, as it cannot leave, and
-    /// a ball is not turned.
-    pub(super) fn expandable(&self, phase: Phase) -> Vec<usize> {
-        let standing = self.disassembly.everything.standing();
-        let problem = &self.disassembly.problem;
+/// How much is in the way of a push from a state.
+#[derive(Debug, Clone, Copy)]
+struct Obstruction {
+    /// The scene for which it holds.
+    version: SceneVersion,
+    /// The logarithm to base 2 of its length along the push, rounded down.
+    doublings: i32,
+}
+
+/// The order of states and actions, and the parts that need not be tried at all.
+pub(super) struct Order {
+    /// Per part: the distance of its farthest point from its centre of mass.
+    reach: Vec<f64>,
+    /// Per part: whether it is a ball, which no action has to turn.
+    balls: Vec<bool>,
+    /// The linked parts, once they were looked for.
+    links: Option<Links>,
+    /// By state and push.
+    obstructions: HashMap<StateAction, Obstruction>,
+}
+
+impl Order {
+    pub(super) fn new(scene: &Scene, strategy: Strategy) -> Self {
+        let bodies = scene.bodies.iter().enumerate();
+        let is_ball = |(part, shape)| strategy.is_extended() && is_ball(shape, least_travel(scene, part));
+        Self {
+            reach: scene.bodies.iter().map(|b| b.shape.reach).collect(),
+            balls: bodies.map(|(part, b)| is_ball((part, &*b.shape))).collect(),
+            links: None,
+            obstructions: HashMap::new(),
+        }
+    }
+
+    /// Finds, once, which of the parts that stand are linked; true if any is. Beyond the paper.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn find_links(
+        &mut self,
+        strategy: Strategy,
+        disassembly: &Disassembly<'_, '_>,
+    ) -> Result<bool, Interrupt> {
+        if self.links.is_some() || !strategy.is_extended() {
+            return Ok(false);
+        }
+        let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());
+        let links = Links::among(&problem.scene, standing, &problem.termination)?;
+        let any = standing.iter().any(|&p| links.holder(p, standing).is_some());
+        self.links = Some(links);
+        Ok(any)
+    }
+
+    /// One of the parts that stand (ascending) that a part is linked with.
+    pub(super) fn linked_with(&self, part: usize, standing: &[usize]) -> Option<usize> {
+        self.links.as_ref()?.holder(part, standing)
+    }
+
+    /// The states to expand, the initial one included. Of two last parts it does not matter which one moves
+    /// against the other: beyond the first push, only the smaller one does. A linked part is not moved, for it
+    /// cannot leave, and a ball not turned.
+    pub(super) fn expandable(
+        &self,
+        strategy: Strategy,
+        phase: PlanningPhase,
+        states: &States,
+        disassembly: &Disassembly<'_, '_>,
+    ) -> Vec<usize> {
+        let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());
         let still = match standing[..] {
-            [a, b] if !self.rules.separate_lists && problem.may_move(a) && problem.may_move(b) => {
-                let reach = |p: usize| problem.scene.bodies[p].shape.reach;
-                Some(if reach(a) < reach(b) { b } else { a })
+            [a, b] if !strategy.separate_lists && problem.may_move(a) && problem.may_move(b) => {
+                Some(if self.reach[a] < self.reach[b] { b } else { a })
             }
             _ => None,
         };
-        let skipped = |n: &StateNode| Some(n.part) == still && (phase == Phase::Rotation || !n.is_root());
+        let is_rotation = phase == PlanningPhase::Rotation;
+        let skipped = |n: &StateNode| Some(n.part) == still && (is_rotation || !n.is_root());
         let in_vain = |n: &StateNode| {
-            (phase == Phase::Rotation && self.balls[n.part]) || self.linked_with(n.part).is_some()
+            (is_rotation && self.balls[n.part]) || self.linked_with(n.part, standing).is_some()
         };
-        let wanted = |n: &StateNode| n.alive && self.rules.lists(phase, n) && !skipped(n) && !in_vain(n);
-        (0..self.states.len()).filter(|&i| wanted(&self.states[i])).collect()
+        let wanted = |n: &StateNode| n.alive && strategy.lists(phase, n) && !skipped(n) && !in_vain(n);
+        (0..states.nodes.len()).filter(|&i| wanted(&states.nodes[i])).collect()
     }
 
-    /// Takes the best displaced state off the open list: with the smaller f_c, then the smaller f_a and, beyond the
-    /// paper, the larger distance from the states known before. If there is none, takes the initial state, whose f_c
-    /// and f_a count as infinite, for all its parts in their order. Without guidance the first one is taken: the
-    /// initial state, then displaced states by age.
-    ///
-    /// Beyond the paper, turning takes all states at once: the next action matters more than the state.
-    pub(super) fn extract(&self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
-        if self.rules.turns_by_action(phase) {
-            return self.ranked(phase, std::mem::take(open));
+    /// Takes the best displaced state off the open list (smaller f_c, then smaller f_a; beyond the paper, then
+    /// the larger distance from earlier states), or else the initial state, which comes last (its f_c and f_a
+    /// count as infinite) and stands for all its parts in their order. Without guidance the first comes first:
+    /// the initial state, then displaced ones by age. Where actions have an order of their own, all states are
+    /// taken at once.
+    pub(super) fn extract(
+        &self,
+        strategy: Strategy,
+        phase: PlanningPhase,
+        states: &States,
+        open: &mut Vec<usize>,
+    ) -> Vec<usize> {
+        if strategy.orders_actions(phase) {
+            return self.ranked(strategy, phase, states, std::mem::take(open));
         }
-        let displaced = open.iter().copied().filter(|&i| !self.states[i].is_root());
-        let next = if self.rules.guided {
-            displaced.min_by_key(|&i| self.rank(phase, i))
+        let displaced = |i: &usize| !states.nodes[*i].is_root();
+        let next = if strategy.guided {
+            open.iter().copied().filter(displaced).min_by_key(|&i| rank(strategy, phase, states, i))
         } else {
-            open.first().copied().filter(|&i| !self.states[i].is_root())
+            open.first().copied().filter(displaced)
         };
         match next {
             Some(best) => {
                 open.retain(|&i| i != best);
                 vec![best]
             }
-            None => self.ordered_roots(phase, open),
+            None => self.ordered_roots(strategy, phase, states, open),
         }
     }
 
-    /// The rank of a displaced state among the others.
-    fn rank(&self, phase: Phase, node: usize) -> (Evaluation, Reverse<u64>, usize) {
-        // It is not negative, so its bits have its order.
-        let novelty = if self.rules.separate_lists { 0.0 } else { self.states[node].novelty };
-        (self.evaluation(phase, node), Reverse(novelty.to_bits()), node)
-    }
-
     /// Open states in the order of expansion.
-    pub(super) fn ranked(&self, phase: Phase, mut open: Vec<usize>) -> Vec<usize> {
-        let roots = self.ordered_roots(phase, &mut open);
-        if self.rules.guided {
-            open.sort_by_cached_key(|&i| self.rank(phase, i));
+    fn ranked(
+        &self,
+        strategy: Strategy,
+        phase: PlanningPhase,
+        states: &States,
+        mut open: Vec<usize>,
+    ) -> Vec<usize> {
+        let roots = self.ordered_roots(strategy, phase, states, &mut open);
+        if strategy.guided {
+            open.sort_by_cached_key(|&i| rank(strategy, phase, states, i));
         }
         open.extend(roots);
         open
     }
 
-    fn ordered_roots(&self, phase: Phase, open: &mut Vec<usize>) -> Vec<usize> {
-        let (mut roots, rest) = open.iter().partition::<Vec<usize>, _>(|&&i| self.states[i].is_root());
+    fn ordered_roots(
+        &self,
+        strategy: Strategy,
+        phase: PlanningPhase,
+        states: &States,
+        open: &mut Vec<usize>,
+    ) -> Vec<usize> {
+        let (mut roots, rest) = open.iter().partition::<Vec<usize>, _>(|&&i| states.nodes[i].is_root());
         *open = rest;
-        if !self.rules.guided {
+        if !strategy.guided {
             return roots;
         }
-        // Before anything was turned, the parts that stop pushes show which part is held least; of equal ones the
+        // Before anything was turned, what stops pushes tells which part is least held; among equals the
         // smallest is the likeliest fastener and the cheapest to simulate.
-        let other = |i: usize| self.states[i].blockage(Phase::Translation).map(Blockage::evaluation);
-        let reach =
-            |i: usize| self.disassembly.problem.scene.bodies[self.states[i].part].shape.reach.to_bits();
+        let other = |i: usize| states.nodes[i].blockage(PlanningPhase::Translation).map(Blockage::evaluation);
+        let reach = |i: usize| self.reach[states.nodes[i].part].to_bits();
         roots.sort_by_key(|&i| match phase {
-            Phase::Translation => (self.evaluation(phase, i), None, 0, i),
-            Phase::Rotation => (self.evaluation(phase, i), other(i), reach(i), i),
+            PlanningPhase::Translation => (evaluation(phase, states, i), None, 0, i),
+            PlanningPhase::Rotation => (evaluation(phase, states, i), other(i), reach(i), i),
         });
         roots
     }
 
-    fn evaluation(&self, phase: Phase, node: usize) -> Evaluation {
-        let none = Evaluation { colliding_parts: 0, open_actions: 0 };
-        self.states[node].blockage(phase).map_or(none, Blockage::evaluation)
+    /// The sweeps from some open states in the order of expansion: displaced states first, then all parts as
+    /// assembled; each along the shorter ways out first. Such a plan takes less room, and less is to be
+    /// verified.
+    pub(super) fn sweeps(
+        &self,
+        strategy: Strategy,
+        open: &[usize],
+        states: &States,
+        actions: &ActionTable,
+        disassembly: &Disassembly<'_, '_>,
+    ) -> Vec<StateAction> {
+        let phase = PlanningPhase::Translation;
+        let hull = disassembly.everything.hull();
+        let forces: Vec<_> = actions.translations.all.iter().map(|action| action.force()).collect();
+        let reach =
+            |force: &Vector3<f64>| hull.iter().map(|p| p.coords.dot(force)).fold(f64::NEG_INFINITY, f64::max);
+        let reaches: Vec<f64> = forces.iter().map(reach).collect();
+        let sweeps = |node: usize| {
+            let StateNode { part, .. } = states.nodes[node];
+            let bounds = disassembly.problem.scene.bodies[part].shape.bounds();
+            let bounds = bounds.transformed(states.nodes[node].pose());
+            let way = |action: &usize| reaches[*action] + bounds.support(&-forces[*action]);
+            let mut actions: Vec<usize> = (0..forces.len()).collect();
+            // Lengths are compared in half powers of two: rounding of the input must not change the order.
+            actions.sort_by_cached_key(|action| (way(action).max(TOUCHED).log2() * 2.0).floor() as i32);
+            actions.into_iter().map(move |action| StateAction { node, phase, action })
+        };
+        self.ranked(strategy, phase, states, open.to_vec()).into_iter().flat_map(sweeps).collect()
     }
 
-    /// The order of turns over all states; smaller is earlier. First those that pull the part along its own axis, or
-    /// that only this part has. Of these, those that fewer parts stop, as far as pushes show, and then those with less
-    /// in their way: a nut is not turned towards the head of its bolt.
-    pub(super) fn promise(&self, obstructions: &Obstructions, turn: &Expansion) -> (bool, usize, i32) {
-        let node = &self.states[turn.node];
-        let Some(push) = self.actions.pull_of(node.part, turn.action) else {
-            return (!self.actions.is_own(Phase::Rotation, node.part, turn.action), 0, 0);
-        };
-        let against = node.translation.as_ref().map_or(0, |b| b.blockers(push).len());
-        (false, against, obstructions.of(turn.node, push))
+    /// Measures what is in the way of some actions along their parts' own axes, unless it is known.
+    pub(super) fn measure_obstructions(
+        &mut self,
+        jobs: &[StateAction],
+        states: &States,
+        actions: &ActionTable,
+        disassembly: &Disassembly<'_, '_>,
+    ) -> Result<(), Stop> {
+        let version = disassembly.version();
+        let asked: BTreeSet<StateAction> = jobs
+            .iter()
+            .filter_map(|&job| pull(job, states, actions))
+            .filter(|push| self.obstructions.get(push).is_none_or(|known| known.version != version))
+            .collect();
+        let standing = |push: &StateAction| disassembly.standing(states.nodes[push.node].part);
+        let asked: Vec<_> = asked.into_iter().map(|push| (push, standing(&push))).collect();
+        let problem = &disassembly.problem;
+        let lengths = asked.par_iter().map(|(push, standing)| {
+            let node = &states.nodes[push.node];
+            let force = actions.translations.all[push.action].force();
+            let poll = Poll::every(SHORT_STEPS_PER_POLL, Some(&problem.termination));
+            obstruction(&problem.scene, standing, node.part, node.pose(), &force, &poll)
+        });
+        let lengths: Vec<f64> = lengths.collect::<Result<_, Interrupt>>()?;
+        for ((push, _), length) in asked.into_iter().zip(lengths) {
+            let doublings = if length > 0.0 { length.log2().floor() as i32 } else { i32::MIN };
+            self.obstructions.insert(push, Obstruction { version, doublings });
+        }
+        Ok(())
     }
+
+    /// Where an action that may turn a part stands among the others, over all parts. First those that pull a
+    /// part along its own axis, or that are its own; of these, those that fewer parts block, as far as pushes
+    /// tell, and then those with less in their way: a nut is not turned towards the head of its bolt.
+    pub(super) fn action_rank(
+        &self,
+        at: StateAction,
+        states: &States,
+        actions: &ActionTable,
+    ) -> (bool, usize, i32) {
+        let node = &states.nodes[at.node];
+        let Some(push) = pull(at, states, actions) else {
+            return (!actions.is_own(PlanningPhase::Rotation, node.part, at.action), 0, 0);
+        };
+        let against = node.translation.as_ref().map_or(0, |b| b.blockers(push.action).len());
+        (false, against, self.obstructions.get(&push).map_or(0, |known| known.doublings))
+    }
+}
+
+/// The push from the same state that pulls as an action does that also turns a part about its own axis.
+fn pull(at: StateAction, states: &States, actions: &ActionTable) -> Option<StateAction> {
+    let action = actions.pull(states.nodes[at.node].part, at.action)?;
+    Some(StateAction { phase: PlanningPhase::Translation, action, ..at })
+}
+
+/// Where a displaced state stands among the others.
+fn rank(
+    strategy: Strategy,
+    phase: PlanningPhase,
+    states: &States,
+    node: usize,
+) -> (Evaluation, Reverse<u64>, usize) {
+    // Not negative, so its bits are in its order.
+    let novelty = if strategy.separate_lists { 0.0 } else { states.nodes[node].novelty };
+    (evaluation(phase, states, node), Reverse(novelty.to_bits()), node)
+}
+
+fn evaluation(phase: PlanningPhase, states: &States, node: usize) -> Evaluation {
+    let none = Evaluation { colliding_parts: 0, open_actions: 0 };
+    states.nodes[node].blockage(phase).map_or(none, Blockage::evaluation)
 }

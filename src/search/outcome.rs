@@ -1,4 +1,4 @@
-//! What a search yields, in the planning frame.
+//! The result of a search, in the planning frame.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ pub struct Removal {
     pub waited_for: Vec<usize>,
 }
 
-/// An action of a part that remains, and who blocks it.
+/// An action of a part that remains, and the parts that block it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BlockedAction {
     /// The part.
@@ -36,7 +36,7 @@ pub struct BlockedAction {
 pub struct Counters {
     /// Transition functions used.
     pub simulations: u64,
-    /// Of them, those whose motion was known.
+    /// Of them, those whose motion was remembered.
     pub recalled: u64,
     /// Removals that a straight sweep showed, without simulation.
     pub sweeps: u64,
@@ -64,7 +64,7 @@ pub struct Outcome {
     pub removals: Vec<Removal>,
     /// Parts that remain, ascending.
     pub remaining: Vec<usize>,
-    /// Why those that should have come out did not.
+    /// The blocked actions of the parts that should have come out.
     pub blocked: Vec<BlockedAction>,
     /// Counts and times.
     pub counters: Counters,

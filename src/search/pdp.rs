@@ -12,13 +12,13 @@ use crate::geometry::Pose;
 use crate::plan::PlanStatus;
 use crate::simulation::{Action, End, Motion};
 
-use super::disassembly::{Disassembly, Proof, Run, Stop, joined};
+use super::disassembly::{Disassembly, Proof, Stop, Transition, joined};
 use super::known_states::KnownStates;
 use super::outcome::{BlockedAction, Outcome, Removal};
-use super::problem::{Observer, Problem};
-use super::trace::{TraceEvent, TracePhase};
+use super::problem::{Observer, Problem, VerifiedPath};
+use super::trace::{PlanningPhase, TraceEvent};
 
-/// Which actions PDP has.
+/// The actions of PDP.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PdpMode {
     Translation,
@@ -39,20 +39,20 @@ pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: PdpMo
         Ok(actions) => actions,
         Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), String::new(), Vec::new()),
     };
-    let mut search = PdpSearch { disassembly, mode, actions, stopped_by: vec![Vec::new(); count], states: 0 };
+    let mut search = Pdp { disassembly, mode, actions, stopped_by: vec![Vec::new(); count], states: 0 };
     let stop = search.run().err();
     let (evidence, blocked) = (search.evidence(), search.blocked());
     search.disassembly.counters.states = search.states;
     search.disassembly.outcome(stop, evidence, blocked)
 }
 
-/// PDP*: the counters are those of the run that answers. Steps of the first run are not told
-/// before it has succeeded. With a deadline, the first run has half of the time.
+/// PDP*: the counters are those of the run that answers. Removals of the first run reach the observer only once
+/// it has succeeded. With a deadline, the first run has half of the time.
 pub(super) fn pdp_star(problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
     let first = Problem { termination: problem.termination.halfway(), ..problem.clone() };
-    let mut held = HeldRemovals { observer, removals: Vec::new() };
-    let outcome = pdp(first, &mut held, PdpMode::Translation);
-    let HeldRemovals { observer, removals } = held;
+    let mut deferred = DeferredRemovals { observer, removals: Vec::new() };
+    let outcome = pdp(first, &mut deferred, PdpMode::Translation);
+    let DeferredRemovals { observer, removals } = deferred;
     let spent = outcome.counters.simulations;
     let nothing_left = problem.max_simulations.is_some_and(|most| spent >= most);
     if matches!(outcome.status, PlanStatus::Complete | PlanStatus::Cancelled) || nothing_left {
@@ -62,13 +62,13 @@ pub(super) fn pdp_star(problem: Problem<'_>, observer: &mut dyn Observer) -> Out
     pdp(Problem { spent, ..problem }, observer, PdpMode::Rotation)
 }
 
-/// Keeps removals until it is known whether they count.
-struct HeldRemovals<'o> {
+/// Keeps removals until the run has succeeded.
+struct DeferredRemovals<'o> {
     observer: &'o mut dyn Observer,
     removals: Vec<Removal>,
 }
 
-impl Observer for HeldRemovals<'_> {
+impl Observer for DeferredRemovals<'_> {
     fn progress(&mut self, removed: usize, simulations: u64) {
         self.observer.progress(removed, simulations);
     }
@@ -87,45 +87,45 @@ impl Observer for HeldRemovals<'_> {
 }
 
 /// A configuration in the search tree of one part.
-struct PdpNode {
-    /// From the assembled pose on.
+struct TreeNode {
+    /// The path from the assembled pose.
     path: Vec<Pose>,
     depth: usize,
 }
 
 /// The search tree of one part.
-struct PdpTree {
-    nodes: Vec<PdpNode>,
+struct SearchTree {
+    nodes: Vec<TreeNode>,
     known: KnownStates,
 }
 
-impl PdpTree {
-    fn add(&mut self, node: PdpNode) {
+impl SearchTree {
+    fn add(&mut self, node: TreeNode) {
         self.known.add(self.nodes.len(), node.path[node.path.len() - 1]);
         self.nodes.push(node);
     }
 }
 
 /// How the search for one part ended.
-enum PdpResult {
+enum TreeEnd {
     Out,
-    /// Nothing new within the limit; `cut` if there may be more beyond.
+    /// Nothing new within the depth limit; `cut` if there may be more beyond it.
     Nothing {
         cut: bool,
     },
 }
 
-struct PdpSearch<'a, 'o> {
+struct Pdp<'a, 'o> {
     disassembly: Disassembly<'a, 'o>,
     mode: PdpMode,
     actions: Vec<Action>,
-    /// Per part: who stopped each action at the assembled pose, when last tried.
+    /// Per part: each action from the assembled pose with the parts that stopped it, when last tried.
     stopped_by: Vec<Vec<(usize, Vec<usize>)>>,
-    /// Configurations made, over all trees.
+    /// Number of configurations, over all trees.
     states: u64,
 }
 
-impl PdpSearch<'_, '_> {
+impl Pdp<'_, '_> {
     fn run(&mut self) -> Result<(), Stop> {
         self.take_free_parts()?;
         let mut limit = 1;
@@ -139,8 +139,8 @@ impl PdpSearch<'_, '_> {
                     continue;
                 }
                 match self.search(part, limit)? {
-                    PdpResult::Nothing { cut: c } => cut |= c,
-                    PdpResult::Out => {
+                    TreeEnd::Nothing { cut: c } => cut |= c,
+                    TreeEnd::Out => {
                         removed = true;
                         self.take_free_parts()?;
                     }
@@ -180,11 +180,11 @@ impl PdpSearch<'_, '_> {
     }
 
     /// Breadth-first search for a way out of one part.
-    fn search(&mut self, part: usize, limit: usize) -> Result<PdpResult, Stop> {
+    fn search(&mut self, part: usize, limit: usize) -> Result<TreeEnd, Stop> {
         let phase = self.phase();
         let known = KnownStates::new(&self.disassembly.problem.scene, part);
-        let mut tree = PdpTree { nodes: Vec::new(), known };
-        tree.add(PdpNode { path: vec![self.disassembly.assembled(part)], depth: 0 });
+        let mut tree = SearchTree { nodes: Vec::new(), known };
+        tree.add(TreeNode { path: vec![self.disassembly.assembled(part)], depth: 0 });
         let (mut next, mut cut) = (0, false);
         let started = Instant::now();
         let too_long = |limit: Duration| started.elapsed() >= limit;
@@ -205,24 +205,24 @@ impl PdpSearch<'_, '_> {
                 excluded: Vec::new(),
             });
             if self.expand(part, &mut tree, next)? {
-                return Ok(PdpResult::Out);
+                return Ok(TreeEnd::Out);
             }
             next += 1;
         }
-        Ok(PdpResult::Nothing { cut })
+        Ok(TreeEnd::Nothing { cut })
     }
 
     /// Tries all actions from a node; true if one of them led out.
-    fn expand(&mut self, part: usize, tree: &mut PdpTree, at: usize) -> Result<bool, Stop> {
+    fn expand(&mut self, part: usize, tree: &mut SearchTree, at: usize) -> Result<bool, Stop> {
         let prefix = tree.nodes[at].path.clone();
         let start = prefix[prefix.len() - 1];
         let window = rayon::current_num_threads();
         let mut action = 0;
         while action < self.actions.len() {
-            let runs: Vec<Run> = self.actions[action..]
+            let runs: Vec<Transition> = self.actions[action..]
                 .iter()
                 .take(window)
-                .map(|&action| Run { part, start, action })
+                .map(|&action| Transition { part, start, action })
                 .collect();
             let motions = self.disassembly.simulate(&runs)?;
             for (run, motion) in runs.into_iter().zip(motions) {
@@ -232,7 +232,7 @@ impl PdpSearch<'_, '_> {
                     Motion { path, end: End::Disassembled(_), .. } => {
                         self.disassembly.trace_simulation(at, &run, "disassembled", &[], path.len(), None);
                         match self.disassembly.prove(run, &prefix, path)? {
-                            Proof::Path { path, depth } => {
+                            Proof::Path(VerifiedPath { path, depth }) => {
                                 self.remove(part, path, depth);
                                 return Ok(true);
                             }
@@ -253,7 +253,7 @@ impl PdpSearch<'_, '_> {
     }
 
     /// Adds the end of a motion to the tree, unless it is there.
-    fn grow(&mut self, tree: &mut PdpTree, at: usize, run: &Run, action: usize, motion: Motion) {
+    fn grow(&mut self, tree: &mut SearchTree, at: usize, run: &Transition, action: usize, motion: Motion) {
         let Motion { path, end, .. } = motion;
         let (word, with) = match end {
             End::Collision { with } => ("collision", with),
@@ -272,14 +272,14 @@ impl PdpSearch<'_, '_> {
             self.states += 1;
             let from = &tree.nodes[at];
             let (path, depth) = (joined(&from.path, &path), from.depth + 1);
-            tree.add(PdpNode { path, depth });
+            tree.add(TreeNode { path, depth });
         }
     }
 
-    fn phase(&self) -> TracePhase {
+    fn phase(&self) -> PlanningPhase {
         match self.mode {
-            PdpMode::Translation => TracePhase::Translation,
-            PdpMode::Rotation => TracePhase::Rotation,
+            PdpMode::Translation => PlanningPhase::Translation,
+            PdpMode::Rotation => PlanningPhase::Rotation,
         }
     }
 

@@ -22,24 +22,33 @@ use super::outcome::Removal;
 use super::request::ActionSet;
 use super::trace::TraceEvent;
 
-/// Is told what a search does.
+/// Receives the events of a search.
 pub trait Observer {
-    /// So many parts are out after so many simulations.
+    /// The number of parts that are out and of simulations so far.
     fn progress(&mut self, removed: usize, simulations: u64);
     /// A part is out; in order.
     fn removal(&mut self, removal: &Removal);
-    /// Whether it wants to be told every event.
+    /// Whether it wants every event.
     fn traces(&self) -> bool {
         false
     }
-    /// An event, if it wants to be told.
+    /// An event, if it wants them.
     fn traced(&mut self, _event: TraceEvent) {}
 }
 
-/// A verified path with its depth, or the points that refute it.
-pub type Checked = Result<(Vec<Pose>, f64), Vec<Penetration>>;
+/// A path that was thinned and verified on the triangles.
+#[derive(Debug, Clone)]
+pub struct VerifiedPath {
+    /// Its poses.
+    pub path: Vec<Pose>,
+    /// The largest depth beyond the pairs' allowed penetrations.
+    pub depth: f64,
+}
 
-/// What is to be searched.
+/// A verified path, or the points that refute it.
+pub type Checked = Result<VerifiedPath, Vec<Penetration>>;
+
+/// A planning question about one scene.
 #[derive(Clone)]
 pub struct Problem<'a> {
     /// The bodies. Owned: a search adds samples where verification found some missing.
@@ -48,7 +57,7 @@ pub struct Problem<'a> {
     pub verifier: &'a Verifier,
     /// The transition function.
     pub engine: &'a dyn TransitionFunction,
-    /// Parts that are there, ascending.
+    /// The parts of the assembly that are present, ascending.
     pub present: Vec<usize>,
     /// Parts that may not move.
     pub fixed: Vec<usize>,
@@ -56,11 +65,11 @@ pub struct Problem<'a> {
     pub targets: Option<Vec<usize>>,
     /// Which actions are used.
     pub actions: ActionSet,
-    /// How blocking graphs are begun.
+    /// The rule that fills blocking graphs before anything is simulated.
     pub static_analysis: StaticAnalysis,
-    /// Whether what leaves straight is taken out without simulation.
+    /// Whether parts that leave straight are taken out without simulation.
     pub sweeps: bool,
-    /// Simulations after which to give up.
+    /// The number of simulations after which the search gives up.
     pub max_simulations: Option<u64>,
     /// Simulations that an earlier search of the same question has used up.
     pub spent: u64,
@@ -68,7 +77,7 @@ pub struct Problem<'a> {
     pub path_timeout: Option<Duration>,
     /// Ends the search early.
     pub termination: Termination,
-    /// What is remembered.
+    /// Remembered answers.
     pub cache: RequestCache,
     /// The verdicts of this request.
     pub verdicts: Arc<KnownVerdicts>,
@@ -101,7 +110,7 @@ impl Problem<'_> {
         (Action::translations_along(axes), rotations)
     }
 
-    /// Whether a part is there and not fixed.
+    /// Whether a part is present and not fixed.
     #[must_use]
     pub fn may_move(&self, part: usize) -> bool {
         self.present.binary_search(&part).is_ok() && !self.fixed.contains(&part)
@@ -138,28 +147,25 @@ impl Problem<'_> {
             let thin = self.thinned(part, &centred);
             let verdict = self.verdict(&self.near(&standing, part, &thin), part, &thin)?;
             if verdict.penetrations.is_empty() {
-                return Ok(Ok((thin, verdict.depth)));
+                return Ok(Ok(VerifiedPath { path: thin, depth: verdict.depth }));
             }
         }
         let verdict = self.verdict(&near, part, &thin)?;
-        if verdict.penetrations.is_empty() {
-            Ok(Ok((thin, verdict.depth)))
-        } else {
-            Ok(Err(verdict.penetrations))
-        }
+        let Verdict { penetrations, depth, .. } = verdict;
+        Ok(if penetrations.is_empty() { Ok(VerifiedPath { path: thin, depth }) } else { Err(penetrations) })
     }
 
     fn thinned(&self, part: usize, path: &[Pose]) -> Vec<Pose> {
         thinned(path, self.scene.bodies[part].shape.bounds(), &self.scene.centre_in_shape(part))
     }
 
-    /// Of the parts that stand, those that a path may meet.
+    /// Those of the standing parts that a path may meet.
     fn near(&self, standing: &[usize], part: usize, path: &[Pose]) -> Vec<usize> {
         let swept = self.scene.swept_bounds(part, path).grown(self.verifier.limit());
         self.scene.broad_phase.meeting_of(standing, &swept)
     }
 
-    /// Verifies a path past all that it may meet.
+    /// Verifies a path against all parts that it may meet.
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
         let Self { scene, verifier, termination, cache, verdicts, .. } = self;
         let past = |&other: &usize| {
@@ -171,7 +177,7 @@ impl Problem<'_> {
         Ok(Verdict::of_all(past, verifier.limit()))
     }
 
-    /// Makes points that refuted a path samples of their bodies.
+    /// Adds the points that refuted a path to the contact samples of their bodies.
     pub fn add_samples(&mut self, part: usize, penetrations: &[Penetration]) {
         let key = |p: &Point3<f64>| p.coords.map(f64::to_bits);
         let mut known: HashSet<_> = self

@@ -1,15 +1,14 @@
-//! Extreme rays as actions: the directions that a part's contacts leave when they hold it tightly.
+//! Extreme rays as actions: the edges of the cone within which a part's contacts let it move.
 //!
-//! A part that lies against several planes can leave at first only within the cone that they bound. If
-//! this cone is narrow, its extreme rays are the ways out of the fit, even if no surface of
-//! the assembly is made along them: a slanted key in a flat plate. Forces along the axes follow
-//! such a way, too, as contact bends them, but leave it wherever its wall has a gap.
+//! A part that lies against several planes can leave at first only within the cone that they bound. If this
+//! cone is narrow, its extreme rays lead out of the fit, even if no surface of the assembly is made along
+//! them: a slanted key in a flat plate. Contact bends forces along the axes into such a way, too, but they
+//! leave it wherever its wall has a gap.
 //!
-//! So when no sweep along the axes takes anything out any more, the rays of the parts as assembled join
-//! the translations, each for the parts whose contacts leave it. They are swept at
-//! once; simulated they are only when everything else has been tried, for they seldom lead to what
-//! bent forces do not. Cones with many rays are wide, and no ray of them is better than others;
-//! these are left out.
+//! The rays of the parts as assembled join the translations, each for the parts whose contacts leave it, when
+//! no sweep along the axes takes anything out any more. They are swept at once. They are simulated only when
+//! everything else has been tried, for they seldom lead to what bent forces do not. Cones with many rays are
+//! wide, and no ray of them is better than others; these are left out.
 
 use nalgebra::{Unit, Vector3};
 
@@ -18,25 +17,26 @@ use crate::geometry::extreme_rays;
 use crate::simulation::{Action, Axis, Touching, remembered_touching};
 use crate::termination::Interrupt;
 
+use super::action_list::DrawnActions;
 use super::problem::Problem;
 use super::state::least_travel;
 
-/// The pushes along the extreme rays that the contacts of a part as assembled leave, and the parts that it touches.
+/// The pushes along the extreme rays of a part as assembled among `others`.
 ///
 /// # Errors
 /// The termination condition became true.
-pub(super) fn extreme_pushes(
+pub(super) fn extreme_ray_actions(
     problem: &Problem<'_>,
     part: usize,
     others: &[usize],
-) -> Result<(Vec<Action>, Vec<usize>), Interrupt> {
+) -> Result<DrawnActions, Interrupt> {
     let Problem { scene, cache, termination, .. } = problem;
     let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
-    let Touching { normals, parts } =
+    let Touching { normals, parts: touched } =
         remembered_touching(cache, scene, part, &pose, others, reach, termination)?;
     let rays = extreme_rays(&normals.unwrap_or_default());
     let few = if rays.len() <= NARROW_CONE_RAYS { &rays[..] } else { &[] };
-    Ok((few.iter().map(push_along).collect(), parts))
+    Ok(DrawnActions { actions: few.iter().map(push_along).collect(), touched })
 }
 
 /// The push along a ray.

@@ -1,4 +1,4 @@
-//! What a planning request asks for, free of any transport.
+//! A planning request, independent of any transport.
 
 use std::time::Duration;
 
@@ -38,7 +38,7 @@ impl Planner {
         }
     }
 
-    /// The actions it has unless others are asked for: the paper's, where it is the paper's.
+    /// The actions that it uses by default: the paper's for all but SBDP*.
     #[must_use]
     pub fn default_actions(self) -> ActionSet {
         match self {
@@ -86,7 +86,7 @@ impl ActionSet {
     /// All sets, in the order of their numbers on the wire.
     pub const ALL: [Self; 2] = [Self::Paper, Self::Extended];
 
-    /// Whether sweeps come with it unless asked otherwise.
+    /// Whether a request with these actions sweeps by default.
     #[must_use]
     pub fn default_sweeps(self) -> bool {
         self == Self::Extended
@@ -123,10 +123,10 @@ pub struct PlanRequest {
     pub penalty: PenaltyParameters,
     /// Which actions.
     pub actions: ActionSet,
-    /// How blocking graphs are begun, before anything is simulated.
+    /// The rule that fills blocking graphs before anything is simulated.
     pub static_analysis: StaticAnalysis,
     /// Whether parts that leave straight are taken out by a sweep, without simulation, by the planners
-    /// `sbdp-star` and `sbdp`; `None` for what goes with the actions: the paper's know no sweeps.
+    /// `sbdp-star` and `sbdp`; `None` for the default of the actions: the paper has no sweeps.
     pub sweeps: Option<bool>,
     /// Simulations after which the search gives up with `partial`.
     pub max_simulations: Option<u64>,
@@ -141,9 +141,9 @@ pub struct PlanRequest {
     pub removed: Vec<usize>,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<usize>>,
-    /// An assembly plan is wanted (the disassembly reversed), with parts that begin there.
+    /// Set for an assembly plan (the disassembly reversed): where its parts begin.
     pub assembly: Option<Staging>,
-    /// Neither read nor write anything remembered.
+    /// Whether the cache is neither read nor written.
     pub no_cache: bool,
 }
 
@@ -156,7 +156,7 @@ impl PlanRequest {
     }
 }
 
-/// What a request is doing; lossy, for display only.
+/// The progress of a request; lossy, for display only.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
     /// The stage that runs.
@@ -180,16 +180,16 @@ pub enum Stage {
     Transfer,
 }
 
-/// Receives what a request yields while it runs.
+/// Receives the results of a request while it runs.
 pub trait PlanSink: Send {
-    /// Something moved on.
+    /// A stage made progress.
     fn progress(&mut self, progress: Progress);
     /// A verified step, in order.
     fn step(&mut self, step: &crate::plan::PlanStep);
-    /// Whether it wants to be told every event of the search.
+    /// Whether it wants every event of the search.
     fn traces(&self) -> bool {
         false
     }
-    /// An event of the search, if it wants to be told.
+    /// An event of the search, if it wants them.
     fn traced(&mut self, _event: super::TraceEvent) {}
 }

@@ -1,58 +1,62 @@
-//! Motions that were simulated before their turn, in parallel, and wait for it.
+//! Motions that were simulated before the serial algorithm asks for them.
+//!
+//! Invariant: all motions are of one version of the scene, so a kept motion is the one that a simulation
+//! would yield now.
 
 use std::collections::HashMap;
 
 use crate::simulation::Motion;
 
-use super::state::Expansion;
+use super::disassembly::SceneVersion;
+use super::state::StateAction;
 
-/// Motions by their expansion, as long as nothing changes that they depend on: the standing parts, and the samples at
-/// which contact is measured.
 #[derive(Debug, Default)]
 pub(super) struct Speculation {
-    /// The version of the disassembly in which they were simulated.
-    version: (usize, usize),
-    motions: HashMap<Expansion, Motion>,
+    version: SceneVersion,
+    motions: HashMap<StateAction, Motion>,
 }
 
 impl Speculation {
-    /// Forgets the motions of other versions.
-    pub(super) fn at(&mut self, version: (usize, usize)) -> &mut Self {
-        if self.version != version {
-            self.version = version;
+    /// Forgets what was simulated in another version of the scene.
+    pub(super) fn valid_at(&mut self, now: SceneVersion) -> &mut Self {
+        if self.version != now {
+            self.version = now;
             self.motions.clear();
         }
         self
     }
 
-    pub(super) fn has(&self, expansion: &Expansion) -> bool {
-        self.motions.contains_key(expansion)
+    pub(super) fn has(&self, at: StateAction) -> bool {
+        self.motions.contains_key(&at)
     }
 
-    pub(super) fn take(&mut self, expansion: &Expansion) -> Option<Motion> {
-        self.motions.remove(expansion)
+    pub(super) fn take(&mut self, at: StateAction) -> Option<Motion> {
+        self.motions.remove(&at)
     }
 
-    pub(super) fn keep(&mut self, expansion: Expansion, motion: Motion) {
-        self.motions.insert(expansion, motion);
+    pub(super) fn keep(&mut self, at: StateAction, motion: Motion) {
+        self.motions.insert(at, motion);
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::state::Phase;
     use super::*;
+    use crate::search::trace::PlanningPhase;
     use crate::simulation::End;
 
     #[test]
-    fn a_motion_is_taken_once_and_forgotten_when_the_disassembly_changes() {
-        let motion = || Motion::simulated(Vec::new(), Vec::new(), End::Collision { with: vec![1] });
-        let expansion = |action| Expansion { node: 0, phase: Phase::Rotation, action };
+    fn a_motion_is_given_once_and_never_in_another_scene() {
         let mut speculation = Speculation::default();
-        speculation.keep(expansion(0), motion());
-        speculation.keep(expansion(1), motion());
-        assert!(speculation.at((0, 0)).has(&expansion(0)) && !speculation.has(&expansion(2)));
-        assert!(speculation.take(&expansion(0)).is_some() && speculation.take(&expansion(0)).is_none());
-        assert!(!speculation.at((1, 0)).has(&expansion(1)));
+        let at = StateAction { node: 1, phase: PlanningPhase::Rotation, action: 2 };
+        let motion = || Motion::simulated(Vec::new(), Vec::new(), End::Collision { with: vec![3] });
+        let other = StateAction { phase: PlanningPhase::Translation, ..at };
+        speculation.keep(at, motion());
+        let same = speculation.valid_at(SceneVersion::default());
+        assert!(same.has(at) && !same.has(other));
+        assert!(same.take(at).is_some() && same.take(at).is_none());
+        speculation.keep(at, motion());
+        let later = SceneVersion { removals: 1, extra_points: 0 };
+        assert!(!speculation.valid_at(later).has(at));
     }
 }

@@ -1,52 +1,37 @@
 //! States: one displaced part among the others at their assembled poses.
 
 use crate::blocking_graph::Blockage;
-use crate::budgets::STATES_PER_LEVEL;
+use crate::budgets::{STATE_LEVELS, STATES_PER_LEVEL};
 use crate::geometry::Pose;
 use crate::scene::Scene;
-use crate::tolerances::SAME_STATE_TRAVEL;
+use crate::tolerances::{SAME_STATE_TRAVEL, SHARE_OF_EXTENT};
 
-use super::trace::TracePhase;
+use super::trace::PlanningPhase;
 
-/// The kind of planning: translations, or actions with rotational freedom.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) enum Phase {
-    Translation,
-    Rotation,
-}
-
-impl From<Phase> for TracePhase {
-    fn from(phase: Phase) -> Self {
-        match phase {
-            Phase::Translation => Self::Translation,
-            Phase::Rotation => Self::Rotation,
-        }
-    }
-}
-
-/// An action from a state: what a search expands.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(super) struct Expansion {
-    /// The index of the state's node.
+/// An action from a state, the pair (s, a) of the transition function.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) struct StateAction {
+    /// The number of the state's node.
     pub(super) node: usize,
-    pub(super) phase: Phase,
-    /// The index in the list of actions of the phase.
+    /// Which list the action is in.
+    pub(super) phase: PlanningPhase,
+    /// The action's number in that list.
     pub(super) action: usize,
 }
 
-/// A state of the search: a part at a pose, with the path there.
+/// A state to expand.
 #[derive(Debug, Clone)]
 pub(super) struct StateNode {
     pub(super) part: usize,
-    /// Path so far, from the assembled pose to this state's.
+    /// The path from the assembled pose to this state's.
     pub(super) path: Vec<Pose>,
-    /// Blockage under translations; filled when first needed.
+    /// Blockage under translations; none until it is analysed.
     pub(super) translation: Option<Blockage>,
-    /// Blockage under actions with rotational freedom; starts empty.
+    /// Blockage under actions with rotational freedom; filled by simulations alone.
     pub(super) rotation: Blockage,
-    /// The expansion that led here; `None` for an assembled part.
-    pub(super) origin: Option<Expansion>,
-    /// How far it is from the part's states known before, in units of the resolution; 0 assembled.
+    /// The parent's node and the action that led here; none for an assembled pose.
+    pub(super) origin: Option<StateAction>,
+    /// The distance to the nearest earlier state of the part, in units of the resolution; 0 as assembled.
     pub(super) novelty: f64,
     /// False once its part is gone or its path was refuted.
     pub(super) alive: bool,
@@ -62,28 +47,28 @@ impl StateNode {
         self.origin.is_none()
     }
 
-    pub(super) fn blockage(&self, phase: Phase) -> Option<&Blockage> {
+    pub(super) fn blockage(&self, phase: PlanningPhase) -> Option<&Blockage> {
         match phase {
-            Phase::Translation => self.translation.as_ref(),
-            Phase::Rotation => Some(&self.rotation),
+            PlanningPhase::Translation => self.translation.as_ref(),
+            PlanningPhase::Rotation => Some(&self.rotation),
         }
     }
 
-    pub(super) fn blockage_mut(&mut self, phase: Phase) -> Option<&mut Blockage> {
+    pub(super) fn blockage_mut(&mut self, phase: PlanningPhase) -> Option<&mut Blockage> {
         match phase {
-            Phase::Translation => self.translation.as_mut(),
-            Phase::Rotation => Some(&mut self.rotation),
+            PlanningPhase::Translation => self.translation.as_mut(),
+            PlanningPhase::Rotation => Some(&mut self.rotation),
         }
     }
 }
 
-/// Least travel that makes a new state of a part: bounded by its own size.
+/// The least travel that makes a new state of a part.
 #[must_use]
 pub fn least_travel(scene: &Scene, part: usize) -> f64 {
-    SAME_STATE_TRAVEL.min(scene.bodies[part].shape.bounds().extents().max() / 20.0)
+    SAME_STATE_TRAVEL.min(scene.bodies[part].shape.bounds().extents().max() / SHARE_OF_EXTENT)
 }
 
-/// The factor by which the resolution of a part's states is coarser once it has `states` of them.
+/// The factor by which the resolution of a part with `states` states is coarser than the first.
 pub(super) fn coarseness(states: usize) -> f64 {
-    2f64.powi((states / STATES_PER_LEVEL).min(10) as i32)
+    2f64.powi((states / STATES_PER_LEVEL).min(STATE_LEVELS) as i32)
 }

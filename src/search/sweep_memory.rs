@@ -1,35 +1,34 @@
-//! The straight sweeps that need not be repeated.
+//! Straight sweeps that need not be repeated.
 //!
-//! A sweep that a part blocked is not repeated while that part stands. A claim that verification refuted is not made
-//! again: the action stays open, for simulation.
+//! A sweep that was blocked is not repeated while the part that blocked it stands. A claim that verification
+//! refutes is not made again: the action stays open, for simulation.
 
 use std::collections::HashMap;
 
-use super::state::Expansion;
-
-/// Sweeps that were no way out.
-#[derive(Debug, Default)]
-pub(super) struct SweepMemory(HashMap<Expansion, SweepBlock>);
+use super::state::StateAction;
 
 /// Why a sweep is no way out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum SweepBlock {
-    /// This part blocks it.
+pub(super) enum BlockedSweep {
+    /// While this part stands.
     By(usize),
-    /// Removals do not change that.
+    /// Whatever part leaves.
     ForGood,
 }
 
+#[derive(Debug, Default)]
+pub(super) struct SweepMemory(HashMap<StateAction, BlockedSweep>);
+
 impl SweepMemory {
-    pub(super) fn block(&mut self, sweep: Expansion, by: SweepBlock) {
-        self.0.insert(sweep, by);
+    pub(super) fn keep(&mut self, at: StateAction, blocked: BlockedSweep) {
+        self.0.insert(at, blocked);
     }
 
-    /// Whether a sweep is known to be no way out while some parts (ascending) stand.
-    pub(super) fn is_blocked(&self, sweep: &Expansion, standing: &[usize]) -> bool {
-        match self.0.get(sweep) {
-            Some(SweepBlock::By(part)) => standing.binary_search(part).is_ok(),
-            Some(SweepBlock::ForGood) => true,
+    /// Whether a sweep is known to be blocked while some parts (ascending) stand.
+    pub(super) fn is_blocked(&self, at: StateAction, standing: &[usize]) -> bool {
+        match self.0.get(&at) {
+            Some(BlockedSweep::By(part)) => standing.binary_search(part).is_ok(),
+            Some(BlockedSweep::ForGood) => true,
             None => false,
         }
     }
@@ -37,18 +36,17 @@ impl SweepMemory {
 
 #[cfg(test)]
 mod tests {
-    use super::super::state::Phase;
     use super::*;
+    use crate::search::trace::PlanningPhase;
 
     #[test]
-    fn a_blocked_sweep_is_repeated_once_the_part_that_blocked_it_is_gone() {
-        let sweep = |action| Expansion { node: 0, phase: Phase::Translation, action };
+    fn a_blocked_sweep_is_repeated_once_its_blocker_is_gone_and_a_refuted_one_never() {
+        let at = |action: usize| StateAction { node: 0, phase: PlanningPhase::Translation, action };
         let mut memory = SweepMemory::default();
-        memory.block(sweep(0), SweepBlock::By(2));
-        memory.block(sweep(1), SweepBlock::ForGood);
-        let blocked =
-            |standing: &[usize]| [0, 1, 2].map(|action| memory.is_blocked(&sweep(action), standing));
-        assert_eq!(blocked(&[1, 2, 3]), [true, true, false]);
-        assert_eq!(blocked(&[1, 3]), [false, true, false]);
+        memory.keep(at(0), BlockedSweep::By(4));
+        memory.keep(at(1), BlockedSweep::ForGood);
+        let blocked = |standing: &[usize]| [0, 1, 2].map(|action| memory.is_blocked(at(action), standing));
+        assert_eq!(blocked(&[1, 4]), [true, true, false]);
+        assert_eq!(blocked(&[1]), [false, true, false]);
     }
 }

@@ -301,7 +301,7 @@ fn what_leaves_either_way_takes_the_shorter() {
 
 #[test]
 fn a_sweep_that_the_triangles_refute_takes_nothing_out_and_leaves_its_points_for_simulation() {
-    use super::disassembly::{Disassembly, Run};
+    use super::disassembly::{Disassembly, Transition};
     use crate::geometry::Pose;
     use crate::simulation::Action;
 
@@ -311,7 +311,7 @@ fn a_sweep_that_the_triangles_refute_takes_nothing_out_and_leaves_its_points_for
     let present = (0..scene.bodies.len()).collect();
     let problem = Problem { present, ..problem(scene, &verifier) };
     let (mut disassembly, _) = Disassembly::beside(problem, &mut recorder, |_| Ok(()));
-    let run = Run { part: 1, start, action: Action::translations()[0] };
+    let run = Transition { part: 1, start, action: Action::translations()[0] };
     let through = [start, Pose::translation(9.0, 0.0, 0.0) * start];
     let Ok(Err(refuted)) = disassembly.prove_sweep(&run, &[start], &through) else { panic!("not refuted") };
     assert!(!refuted.prefix);

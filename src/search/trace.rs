@@ -1,10 +1,10 @@
-//! What a search did, event by event, for a trace: which state was expanded with which
-//! (f_c, f_a), which actions the graphs excluded, how each simulation ended, each update.
+//! The events of a search, for a trace: which state was expanded with which (f_c, f_a), which actions the graphs
+//! excluded, how each simulation ended, each update.
 
 use serde::{Deserialize, Serialize};
 
-/// Who blocks an action: the parts that outgoing edges of one vertex lead to, in the blocking
-/// graph of one direction.
+/// The parts that block an action: those that the outgoing edges of one vertex lead to, in the blocking graph of
+/// one direction.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BlockedBy {
     /// The action's name.
@@ -13,10 +13,10 @@ pub struct BlockedBy {
     pub parts: Vec<usize>,
 }
 
-/// Translation, or motion with freedom to turn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// Translational or rotational planning: which list of actions is used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum TracePhase {
+pub enum PlanningPhase {
     /// Translations.
     Translation,
     /// Actions with rotational freedom.
@@ -50,14 +50,14 @@ pub enum TraceEvent {
     /// A run over the open list began.
     Pass {
         /// With which actions.
-        phase: TracePhase,
+        phase: PlanningPhase,
         /// The depth limit of a breadth-first planner.
         depth_limit: Option<usize>,
     },
     /// A state was taken off the open list.
     Expanded {
         /// With which actions.
-        phase: TracePhase,
+        phase: PlanningPhase,
         /// The state.
         state: usize,
         /// The part that moves.

@@ -1,32 +1,32 @@
-//! Near-null twists as actions: a part is turned about the axis that its contacts leave it.
+//! Null twists as actions: a part is turned about the axis of the twist that its contacts resist least.
 //!
 //! The axes that all parts are turned about are drawn from faces, and are few; an assembly may have threads
-//! along many more. So before anything is turned, the contacts of each part that is made along none
-//! of these axes are asked which twist they hardly resist ([`NullTwist`]); pulling and turning at once about that
-//! axis, in the sense of its helix, join the actions with rotational freedom, for this part alone, and are tried
-//! first. When everything else has been tried, all other parts are asked, too: a part's largest faces need not
-//! know of its thread.
+//! along many more. So before anything is turned, the [`NullTwist`] of each part that is made along none of
+//! these axes is computed from its contacts. Pulling and turning at once about the twist's axis, in the sense
+//! of its helix, join the actions with rotational freedom, for this part alone, and are tried first. When
+//! everything else has been tried, this is done for all other parts, too: a part's largest faces need not be
+//! along its thread.
 
 use crate::simulation::{Action, Axis, NullTwist};
 use crate::termination::Interrupt;
 
+use super::action_list::DrawnActions;
 use super::problem::Problem;
 use super::state::least_travel;
 
-/// The actions that follow the twist which the contacts of a part as assembled hardly resist, and the parts that it
-/// touches.
+/// The wrenches along the null twist of a part as assembled among `others`.
 ///
 /// # Errors
 /// The termination condition became true.
-pub(super) fn null_twists(
+pub(super) fn null_twist_actions(
     problem: &Problem<'_>,
     part: usize,
     others: &[usize],
-) -> Result<(Vec<Action>, Vec<usize>), Interrupt> {
-    let scene = &problem.scene;
+) -> Result<DrawnActions, Interrupt> {
+    let Problem { scene, termination, .. } = problem;
     let (pose, reach) = (scene.bodies[part].planning_from_shape, least_travel(scene, part));
-    let (twist, touched) = NullTwist::of(scene, part, &pose, others, reach, &problem.termination)?;
-    Ok((twist.iter().flat_map(along).collect(), touched))
+    let (twist, touched) = NullTwist::of(scene, part, &pose, others, reach, termination)?;
+    Ok(DrawnActions { actions: twist.iter().flat_map(along).collect(), touched })
 }
 
 /// The wrenches that follow a twist either way: in the sense of its helix, or in both where it has none.
