@@ -221,7 +221,7 @@ impl<'a> SurfacePair<'a> {
     pub(crate) fn obstacles(
         &self,
         probes: &[Point3<f64>],
-        (at, along): (&Vector3<f64>, &Vector3<f64>),
+        WantedShift { at, along }: &WantedShift,
         (guess, slope): (u32, Slope),
         witnesses: &mut Vec<Witness>,
     ) -> Vec<Obstacle> {
@@ -241,7 +241,7 @@ impl<'a> SurfacePair<'a> {
     pub(crate) fn obstacles_seen_by(
         &self,
         witnesses: &[Witness],
-        (at, along): (&Vector3<f64>, &Vector3<f64>),
+        WantedShift { at, along }: &WantedShift,
     ) -> Vec<Obstacle> {
         let shift = self.shifted * at;
         let mut obstacles: Vec<Obstacle> = Vec::new();
@@ -271,7 +271,7 @@ impl<'a> SurfacePair<'a> {
     pub(crate) fn obstacle_of_triangle(
         &self,
         triangle: u32,
-        (at, along): (&Vector3<f64>, &Vector3<f64>),
+        WantedShift { at, along }: &WantedShift,
         guess: u32,
     ) -> Option<Obstacle> {
         if self.asked.is_open() {
@@ -292,7 +292,7 @@ impl<'a> SurfacePair<'a> {
         &self,
         piece: &Piece,
         placed: &PlacedPiece,
-        (at, along): (&Vector3<f64>, &Vector3<f64>),
+        WantedShift { at, along }: &WantedShift,
     ) -> Vec<Point3<f64>> {
         let Self { asked, tree, measured_from_asked, shifted, .. } = self;
         let ahead = &(shifted * along);
@@ -378,6 +378,14 @@ pub(crate) enum Piece {
     Bit([Point3<f64>; 3]),
 }
 
+/// The shift at which a piece is, and the direction in which it is to go on.
+#[derive(Clone, Copy)]
+pub(crate) struct WantedShift {
+    pub(crate) at: Vector3<f64>,
+    /// A unit vector, or zero.
+    pub(crate) along: Vector3<f64>,
+}
+
 /// A piece that is to be covered, and what helps to find its region.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CoverPiece {
@@ -430,9 +438,15 @@ mod tests {
         pair.place(&pair.root().unwrap(), &still, &mut placed);
         for u in [Vector3::x(), -Vector3::y(), Vector3::new(0.6, 0.8, 0.0), Vector3::z(), -Vector3::z()] {
             assert!(
-                pair.obstacles(&placed.points, (&still, &u), (0, Slope::Any), &mut Vec::new()).is_empty()
+                pair.obstacles(
+                    &placed.points,
+                    &WantedShift { at: still, along: u },
+                    (0, Slope::Any),
+                    &mut Vec::new()
+                )
+                .is_empty()
             );
-            let of_triangle = |t| pair.obstacle_of_triangle(t, (&still, &u), 0);
+            let of_triangle = |t| pair.obstacle_of_triangle(t, &WantedShift { at: still, along: u }, 0);
             let found = (0..pair.measured.triangles().len() as u32).filter_map(of_triangle);
             let found: Vec<Obstacle> = found.collect();
             assert_eq!(found.is_empty(), u.z != 0.0, "{u}");

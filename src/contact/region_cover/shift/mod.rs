@@ -25,7 +25,7 @@ mod piece;
 mod search;
 
 use super::Halt;
-use super::surface_pair::{Obstacle, PlacedPiece, SurfacePair, Witness};
+use super::surface_pair::{Obstacle, PlacedPiece, SurfacePair, WantedShift, Witness};
 use cache::{ShiftWay, StartCover, StartPair};
 use search::ShiftSearch;
 
@@ -188,11 +188,12 @@ impl<'a> ShiftCover<'a> {
     ) -> Result<(Vec<Vector3<f64>>, usize), Halt> {
         let left = REGIONS_PER_SHIFT - self.regions;
         let ShiftPair { surfaces, pieces, witnesses } = &mut self.pairs[i];
-        let seen = surfaces.obstacles_seen_by(witnesses, (at, u));
+        let seen = surfaces.obstacles_seen_by(witnesses, &WantedShift { at: *at, along: *u });
         if !seen.is_empty() {
             return Ok((seen.into_iter().map(|o| o.normal).collect(), 0));
         }
-        let mut made = make_way(surfaces, pieces, (at, u), left, self.termination)?;
+        let mut made =
+            make_way(surfaces, pieces, &WantedShift { at: *at, along: *u }, left, self.termination)?;
         witnesses.append(&mut made.witnesses);
         witnesses.drain(..witnesses.len().saturating_sub(WITNESSES));
         Ok((made.blocked, made.regions))
@@ -246,7 +247,13 @@ fn way(
     let lost = ShiftWay { blocked: Vec::new(), pieces: None, found: 0, regions: REGIONS_PER_SHIFT };
     let Some(base) = &base.pieces else { return Ok(lost) };
     let mut pieces = Arc::clone(base);
-    match make_way(&surfaces, &mut pieces, (&Vector3::zeros(), u), REGIONS_PER_SHIFT, termination) {
+    match make_way(
+        &surfaces,
+        &mut pieces,
+        &WantedShift { at: Vector3::zeros(), along: *u },
+        REGIONS_PER_SHIFT,
+        termination,
+    ) {
         Ok(ClearedWay { blocked, found, regions, .. }) => {
             // If an obstacle stops the part, it goes another way from the same cover.
             let (pieces, found) = if blocked.is_empty() { (pieces, found) } else { (Arc::clone(base), 0) };
@@ -358,26 +365,27 @@ struct ClearedWay {
 fn touched(
     surfaces: &SurfacePair<'_>,
     pieces: &[ShiftPiece],
-    way: (&Vector3<f64>, &Vector3<f64>),
+    wish: &WantedShift,
 ) -> Option<Vec<Vector3<f64>>> {
     let reach = if surfaces.allowed > 0.0 { HELD_AT_FIRST } else { TOUCHED };
     let mut placed = PlacedPiece::default();
-    let of_shift_piece = |piece: &ShiftPiece| piece.touched(surfaces, way, reach, &mut placed);
+    let of_shift_piece = |piece: &ShiftPiece| piece.touched(surfaces, wish, reach, &mut placed);
     let found = pieces.iter().map(of_shift_piece).find(|found| !found.is_empty())?;
     Some(found.into_iter().map(|obstacle| obstacle.normal).collect())
 }
 
-/// Prepares the cover of a pair for a shift along `u`.
+/// Prepares the cover of a pair for a wanted shift.
 fn make_way(
     surfaces: &SurfacePair<'_>,
     pieces: &mut Arc<Vec<ShiftPiece>>,
-    (at, u): (&Vector3<f64>, &Vector3<f64>),
+    wish: &WantedShift,
     most: usize,
     termination: &Termination,
 ) -> Result<ClearedWay, Halt> {
-    if let Some(blocked) = touched(surfaces, pieces, (at, u)) {
+    if let Some(blocked) = touched(surfaces, pieces, wish) {
         return Ok(ClearedWay { blocked, witnesses: Vec::new(), found: 0, regions: 0 });
     }
+    let WantedShift { at, along: u } = wish;
     let ends = |piece: &ShiftPiece| piece.blocks(at, u) || piece.is_exhausted(at, u);
     if !pieces.iter().any(ends) {
         return Ok(ClearedWay { blocked: Vec::new(), witnesses: Vec::new(), found: 0, regions: 0 });

@@ -5,7 +5,7 @@ use nalgebra::{Point3, Vector3};
 use crate::budgets::LOWEST_POINTS;
 use crate::tolerances::{SAME_FACE, SHIFT_SUNK, TILT, TOUCHED};
 
-use super::super::surface_pair::{CoverPiece, Obstacle, PlacedPiece, Slope, SurfacePair};
+use super::super::surface_pair::{CoverPiece, Obstacle, PlacedPiece, Slope, SurfacePair, WantedShift};
 
 /// A piece that is free while the shift stays within limits.
 #[derive(Debug, Clone)]
@@ -68,18 +68,19 @@ impl ShiftPiece {
         blocking.map(|l| Obstacle { normal: l.normal, other: pair.other }).collect()
     }
 
-    /// The obstacles that are certainly and steeply in the way of a shift from `at` along `u`: faces that the lowest
+    /// The obstacles that are certainly and steeply in the way of a wanted shift: faces that the lowest
     /// points of the piece enter before limits within `reach`, or faces of the piece that the triangles of these
     /// enter.
     pub(crate) fn touched(
         &self,
         pair: &SurfacePair<'_>,
-        (at, u): (&Vector3<f64>, &Vector3<f64>),
+        wish: &WantedShift,
         reach: f64,
         placed: &mut PlacedPiece,
     ) -> Vec<Obstacle> {
         let CoverPiece { piece, guess, .. } = &self.spot;
-        let ahead = || self.limits.iter().filter(|limit| limit.is_ahead(at, u, reach));
+        let WantedShift { at, along } = wish;
+        let ahead = || self.limits.iter().filter(|limit| limit.is_ahead(at, along, reach));
         if ahead().next().is_none() {
             return Vec::new();
         }
@@ -95,14 +96,14 @@ impl ShiftPiece {
         // A point beside an edge enters a face that it need not pass: the plane of the limit is the other face's.
         let agrees = |limit: &ShiftLimit, o: &Obstacle| limit.normal.dot(&o.normal) > SAME_FACE;
         // The next step sees this contact again, so it needs no witness.
-        let mut by_points = pair.obstacles(&probes, (at, u), (*guess, Slope::Steep), &mut Vec::new());
+        let mut by_points = pair.obstacles(&probes, wish, (*guess, Slope::Steep), &mut Vec::new());
         by_points.retain(|o| ahead().any(|limit| agrees(limit, o)));
         if !by_points.is_empty() {
             return by_points;
         }
         let guess = pair.triangle_of(piece).unwrap_or(0);
         let by_triangle = |limit: &ShiftLimit| {
-            pair.obstacle_of_triangle(limit.triangle, (at, u), guess).filter(|o| agrees(limit, o))
+            pair.obstacle_of_triangle(limit.triangle, wish, guess).filter(|o| agrees(limit, o))
         };
         ahead().find_map(by_triangle).into_iter().collect()
     }

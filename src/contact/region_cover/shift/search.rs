@@ -11,7 +11,7 @@ use crate::tolerances::{
 };
 
 use super::super::surface_pair::{
-    CoverPiece, Obstacle, Piece, PlacedPiece, SignedClosest, Slope, SurfacePair, Witness,
+    CoverPiece, Obstacle, Piece, PlacedPiece, SignedClosest, Slope, SurfacePair, WantedShift, Witness,
 };
 use super::super::{Halt, cover};
 use super::piece::{ShiftLimit, ShiftPiece};
@@ -21,14 +21,6 @@ const SHORT: usize = 2;
 
 /// The number of next pieces that are searched in parallel with one.
 const BESIDE: usize = 3;
-
-/// The shift at which a piece is, and the direction in which it is to go on.
-#[derive(Clone, Copy)]
-struct WantedShift {
-    at: Vector3<f64>,
-    /// A unit vector, or zero.
-    along: Vector3<f64>,
-}
 
 /// A piece that is still to be covered, and the result of its search, if a thread made it ahead.
 struct PendingPiece {
@@ -232,9 +224,8 @@ impl<'a> ShiftSearch<'a> {
             Err(_) => {}
         }
         let pair = self.pair;
-        let probes = pair.probes_ahead(&spot.piece, &self.placed, (&wish.at, &wish.along));
-        let certain =
-            pair.obstacles(&probes, (&wish.at, &wish.along), (spot.guess, Slope::Any), &mut self.witnesses);
+        let probes = pair.probes_ahead(&spot.piece, &self.placed, wish);
+        let certain = pair.obstacles(&probes, wish, (spot.guess, Slope::Any), &mut self.witnesses);
         if !certain.is_empty() {
             self.block(&certain);
             return Err(Halt::Blocked);
