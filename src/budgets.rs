@@ -1,45 +1,46 @@
 //! The table of budgets: every count that bounds work, memory or a number of attempts.
 //!
-//! A motion or path that exceeds a budget is never taken to be free or blocked by that: it goes on with a slower way to
-//! tell (regions → samples, profiles → surfaces), or ends as undecided. Halving a budget makes that happen sooner,
-//! doubling it later.
+//! All of them are counts, of what the first words name. A motion or path that exceeds its budget does not count as free
+//! or blocked: a slower method takes over (samples for regions, surfaces for profiles), or it ends as undecided. Half of
+//! a budget makes this happen sooner, double later. Where no reason stands beside a value, it was chosen for the time of
+//! the corpus, and no derivation is recorded.
 //!
-//! "Measured" says what the constant at half and at double its value changed in the plans of 18 corpus entries (11
-//! generated, 3 of the gallery, 1 press fit, 3 of `truth`), one thread, up to 150 simulations, in November 2026; not
-//! what it changed in their time. "No effect" means on these.
+//! "Measured" names the plans of 18 corpus entries (11 generated, 3 of the gallery, 1 press fit, 3 of `truth`) that
+//! change at half and at double the value; times were not compared. One thread, up to 150 simulations, November 2026.
 
 // Region covers: pieces and regions.
 
-/// Regions per shift before a motion is given up as lost.
+/// Regions of one shift. A cover that needs more is given up, and samples take over. Covers that succeed need some
+/// hundred.
 /// Measured: no effect at half and double.
 pub(crate) const REGIONS_PER_SHIFT: usize = 20_000;
-/// Pieces of one surface per cover for shifts; with more, samples tell. In the play of a thread, which has thousands,
-/// each step ends at the next of them, and samples take a fraction of the time.
+/// Pieces of one surface in a cover for shifts; with more, samples take over. In the play of a thread, which has
+/// thousands, each step ends at the next piece, and samples take a fraction of the time.
 /// Measured: no effect at half and double.
 pub(crate) const SHIFT_PIECES: usize = 1000;
-/// The same for motions that turn.
+/// Pieces of one surface in a cover for motions that turn: fewer, as every step looks at all of them.
 /// Measured: no effect at half and double.
 pub(crate) const RIGID_PIECES: usize = 600;
-/// Regions on one side of a pair before as many are looked for on the other; doubled each time …
+/// Regions of the first cover of one surface of a pair, before the other surface gets as many; doubled each time, …
 /// Measured: no effect at half and double.
 pub(crate) const FIRST_SIDE_REGIONS: usize = 16;
-/// … up to this: from fewer, the number that a side needs in all is guessed badly.
+/// … up to this. Fewer regions predict badly how many the whole surface needs.
 /// Measured: no effect at half and double.
 pub(crate) const SIDE_REGIONS: usize = 64;
 /// Pieces in a row whose new region allows no further shift, after which a shift ends. A corner where many pieces touch
 /// needs one each.
 /// Measured: no effect at half and double.
 pub(crate) const STALLS: usize = 16;
-/// Regions during one look at a pair while turning …
+/// Regions of one query of a pair while turning.
 /// Measured: no effect at half and double.
 pub(crate) const REGIONS_PER_LOOK: usize = 100;
-/// … and where a pair comes near and a piece is outside the region that it came with.
+/// Regions when a pair comes near and pieces lie outside the regions of the cover for shifts.
 /// Measured: no effect at half and double.
 pub(crate) const REGIONS_ON_APPROACH: usize = 200;
-/// Regions of one motion, …
+/// Regions of one motion that turns …
 /// Measured: no effect at half and double.
 pub(crate) const REGIONS_PER_MOTION: usize = 400;
-/// … and more for each of its steps: beyond, samples cost less.
+/// … and of each of its steps. A motion that needs more than both costs less at samples.
 /// Measured: no effect at half and double.
 pub(crate) const REGIONS_PER_STEP: usize = 40;
 /// Poses between the ends of a step at which small bits without a region are measured.
@@ -50,7 +51,7 @@ pub(crate) const EDGE_SECTIONS: usize = 10;
 /// Contacts of a pair that are kept from step to step.
 /// Measured: no effect at half and double.
 pub(crate) const KEPT_CONTACTS: usize = 128;
-/// Contacts that are looked for by pieces without a region.
+/// Contacts of one query after which no more pieces without a region are searched.
 /// Measured: no effect at half and double.
 pub(crate) const CONTACTS_PER_LOOK: usize = 4;
 /// Corners of a piece that are measured, …
@@ -59,10 +60,10 @@ pub(crate) const PROBED_CORNERS: usize = 24;
 /// … and triangles whose planes it has passed.
 /// Measured: no effect at half and double.
 pub(crate) const PASSED_TRIANGLES: usize = 12;
-/// Corners, and faces, of a piece that are probed ahead.
+/// Corners of a piece that are probed ahead, and as many faces.
 /// Measured: no effect at half and double.
 pub(crate) const PROBES: usize = 16;
-/// Points of a piece that are looked at before each plane that it touches.
+/// Points of a piece that are probed before each plane that it touches.
 /// Measured: no effect at half and double.
 pub(crate) const LOWEST_POINTS: usize = 8;
 /// Points that showed obstacles of a pair and are remembered.
@@ -78,13 +79,13 @@ pub(crate) const PATH_EFFORT_IN_DOUBT: usize = 200_000;
 /// In sight of holes, after this part of the effort (a divisor) …
 /// Measured: no effect at half and double.
 pub(crate) const HOPELESS_AFTER: usize = 10;
-/// … the rest is not looked at if no more than this share is settled.
+/// … the search ends if no more than this share is bounded.
 /// Measured: no effect at half and double.
 pub(crate) const HOPELESS_SHARE: f64 = 0.02;
 /// The effort of a region, in pieces.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const REGION_EFFORT: usize = 40;
-/// Edges of holes that take as long to ask as a piece without holes.
+/// Edges of holes whose winding numbers take as long as a piece without holes.
 /// Measured: no effect at half and double.
 pub(crate) const RIM_EDGES_PER_EFFORT: usize = 32;
 /// Deep points after which a path is refuted.
@@ -96,13 +97,13 @@ pub(crate) const REGIONS_OF_PLACE: usize = 3;
 /// … and of those that held a piece last: the next piece lies beside it, mostly.
 /// Measured: at half another plan of 3 entries; at double another plan of 5 entries.
 pub(crate) const RECENT_REGIONS: usize = 4;
-/// Hulls of more corners are not asked about corner by corner.
+/// Corners of a hull; larger hulls are not tested corner by corner.
 /// Measured: no effect at half and double.
 pub(crate) const HULL_CORNERS: usize = 64;
-/// Regions are grown around no more corners than this.
+/// Corners around which a region is grown.
 /// Measured: no effect at half and double.
 pub(crate) const WANTED_CORNERS: usize = 1024;
-/// Legs of a path with more bends have no hull.
+/// Bends of a leg of a path; a leg with more has no hull.
 /// Measured: no effect at half and double.
 pub(crate) const LEG_BENDS: usize = 12;
 
@@ -126,10 +127,10 @@ pub(crate) const PUSH_BENDS: usize = 64;
 /// Corrections that bring a part to the middle of its play.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const LIFT_ROUNDS: usize = 3;
-/// Places of a step that are looked at for a release: no slot with less play than an eighth of a step is found.
+/// Places of a step that are tested for a release: slots with less play than an eighth of a step are missed.
 /// Measured: at half and at double another plan of `bayonet`.
 pub(crate) const RELEASE_PLACES: u32 = 16;
-/// Looks at the surroundings before a step is made without release.
+/// Contact queries of one step before the step is made without release.
 /// Measured: no effect at half and double.
 pub(crate) const RELEASE_LOOKS: usize = 8;
 /// Steps that the static analysis of a pair looks ahead (the paper's five extensions), …
@@ -147,15 +148,15 @@ pub(crate) const HELIX_LEAP_STEPS: usize = 512;
 /// A shorter extrapolation along a helix gains nothing over steps.
 /// Measured: at half no effect; at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const SHORTEST_HELIX_LEAP: usize = 4;
-/// Steps between two looks whether a part is still held by its thread, coarse and fine, …
+/// Steps between two tests whether a thread still holds the part, coarse and fine, …
 pub(crate) const HELD_STATIONS: [usize; 2] = [4, 1];
 /// … and whether it clearly enters anything.
 pub(crate) const FREE_STATIONS: [usize; 3] = [16, 4, 1];
-/// Looks at samples of either surface; with more, distance fields are quicker: in the play of a thread nearly all
-/// samples are near.
+/// Measurements of samples of either surface; with more, distance fields are quicker: in the play of a thread nearly
+/// all samples are near.
 /// Measured: no effect at half and double.
 pub(crate) const LOOKS_BY_SAMPLES: usize = 1200;
-/// Poses looked at on the way through a passage.
+/// Poses that are tested on the way through a passage.
 /// Measured: no effect at half and double.
 pub(crate) const PASSAGE_POSES: usize = 64;
 /// Rays that measure what is in a part's way.
@@ -222,7 +223,7 @@ pub(crate) const STATE_LEVELS: usize = 10;
 
 // Helices and threads.
 
-/// Slabs along the axis per pitch: a profile is told in these alone.
+/// Slabs along the axis per pitch; a profile is stored by slab.
 /// Measured: no effect at half and double.
 pub(crate) const SLABS_PER_PITCH: f64 = 4.0;
 /// Heights of a profile within a pitch.
@@ -231,7 +232,7 @@ pub(crate) const HEIGHTS_PER_PITCH: usize = 300;
 /// Halvings of a triangle until its profile is taken as it is.
 /// Measured: no effect at half and double.
 pub(crate) const TRIANGLE_HALVINGS: u32 = 24;
-/// Effort on a side before profiles are asked.
+/// Effort on a surface of a screw path before profiles are compared.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const EFFORT_BEFORE_PROFILES: usize = 8_000;
 /// Pieces of the way from the middle of a thread's play to where the given path ends.
@@ -252,7 +253,7 @@ pub(crate) const FEWEST_FLANK_FACETS: usize = 24;
 
 // Paths by samples.
 
-/// Poses that are looked at together at first.
+/// Poses in the first batch of a path that is measured at samples.
 pub(crate) const POSES_AT_ONCE: usize = 32;
 /// Shares into which the samples of a shape are dealt, …
 pub(crate) const SAMPLE_SHARES: usize = 4;
@@ -270,7 +271,7 @@ pub(crate) const LONG_STEPS_PER_POLL: u32 = 4;
 
 // Memory.
 
-/// Sets of standing parts with their hulls: all would be the square of the number of parts.
+/// Sets of standing parts with their hulls; one set for each part would take memory of the square of their number.
 pub(crate) const REMEMBERED_STANDING_PARTS: usize = 64;
 /// Levels of the legs of a path that are remembered: some thousands.
 pub(crate) const REMEMBERED_LEG_LEVELS: u32 = 12;
@@ -289,5 +290,5 @@ pub(crate) const FEWEST_STORED_POINTS: usize = 12;
 /// A hull of more points than this times those that it had when it was last joined is joined again: a join takes as
 /// long as some hundred tests.
 pub(crate) const LOOSE_HULL: usize = 32;
-/// If no more than one part in this many is gone, the tree of all parts is made: the next question may be about others.
+/// If no more than one part in this many is gone, the tree of all parts is made: the next request may be about others.
 pub(crate) const MOSTLY_STANDING: usize = 2;

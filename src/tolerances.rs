@@ -177,7 +177,7 @@ pub(crate) const FACING_ACROSS: f64 = 0.5;
 /// Divisor. Pieces that may be too deep are split to sizes this much smaller than others.
 /// Measured: no effect at half and double.
 pub(crate) const DOUBTED_SIZE: f64 = 4.0;
-/// Share. Depths are told this closely.
+/// Share of a depth. A depth is computed with this error at most.
 /// Measured: at half and at double another plan of `caxif-as1-tu-203`, `caxif-s1-c5-214`.
 pub(crate) const DEPTH_SHARE: f64 = 0.1;
 
@@ -244,7 +244,7 @@ pub(crate) const SCREW_POSE_ANGLE: f64 = 0.1;
 /// Radians. A part that is off its thread after turning this much further is turned off it: chamfers end threads early.
 /// Measured: no effect at half and double.
 pub(crate) const UNSCREWING_ANGLE: f64 = 2.0 * TAU;
-/// Pitches. What is this much further out or in than the other part is not told exactly.
+/// Pitches. A profile is exact up to this distance outside and inside the other part.
 /// Measured: no effect at half and double.
 pub(crate) const PROFILE_MARGIN: f64 = 0.5;
 /// Share. Of the shifts with the widest gap, those within this count as equal.
@@ -267,11 +267,11 @@ pub(crate) const SAME_HELIX: f64 = 0.15;
 /// Radians of a helix that steps must have passed before it is extrapolated.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const SEEN_HELIX_ANGLE: f64 = 0.4;
-/// Radians. An extrapolation off a helix turns by less than half a turn, so that its two poses tell its screw.
+/// Radians. An extrapolation off a helix turns by less than half a turn, so that its two poses determine its screw.
 /// Measured: at half no effect; at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const LEAP_ANGLE: f64 = 2.4;
 /// Radians. Beyond whole turns, an extrapolation along a helix turns at least this far, and this much less than a turn
-/// at most: near whole turns, nothing tells the axis.
+/// at most: near whole turns, the two poses do not determine the axis.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const SCREW_FROM_POSES_ANGLE: f64 = 0.25 * TAU;
 /// Steps. How far a part is moved against what it is pressed to, to see whether that is still there.
@@ -293,7 +293,7 @@ pub(crate) const KNOWN_SAMPLE_STEPS: f64 = 2.0;
 /// states, and each costs simulations; double it may merge two junctions of a maze.
 pub(crate) const SAME_STATE_TRAVEL: f64 = 0.05;
 /// Radians. The least angle, that makes a new state of a part (the paper's rmd). Half of it keeps more states, and
-/// each costs simulations; double (1 rad) still tells a quarter turn from none.
+/// each costs simulations; double (1 rad) still separates a quarter turn from none.
 pub(crate) const SAME_STATE_ROTATION: f64 = 0.5;
 /// Radians. The least angle from the assembled pose, at which a part counts as turned. A tenth of the rotation that
 /// makes a new state. Chosen, not derived.
@@ -348,8 +348,8 @@ pub(crate) const OVERLAP_IGNORED: f64 = 2e-6;
 /// Measured: at half another plan of `caxif-s1-c5-214`; at double another plan of `caxif-as1-tu-203`,
 /// `caxif-s1-c5-214`.
 pub(crate) const OVERLAP_FINEST: f64 = 1e-4;
-/// Share of the limit. Large overlaps are told more closely than to [`DEPTH_SHARE`]: what keeps its overlap on its way
-/// is to pass.
+/// Share of the limit. The error of a large overlap is at most this, and not [`DEPTH_SHARE`] of the overlap: a part that
+/// keeps its overlap along its path must pass.
 /// Measured: at half another plan of `caxif-s1-c5-214`, `press_fit_overlap_0.05`; at double another plan of
 /// `caxif-s1-c5-214`.
 pub(crate) const OVERLAP_MARGIN: f64 = 1.0 / 8.0;

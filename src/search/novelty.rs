@@ -1,10 +1,10 @@
 //! Which states are new: the paper's rmd, and coarser than that where a part plays freely.
 //!
-//! Free play yields states without end, and none of them matters much; in a maze, each may be a junction. So
-//! poses that a part was only pushed to are told apart the coarser the more of them lie in one free region,
-//! that is, where the part gets straight from one to the other; poses in other regions count little, and never
-//! hide one. A part that turns mostly turns in its play: turned poses are told apart the coarser the more
-//! there are of them, wherever they lie.
+//! Free play yields states without end, and none of them matters much; in a maze, each may be a junction. A pose that a
+//! part was only pushed to is compared with known states of the same free region, that is, those from which the part
+//! gets there straight. The more of them there are, the coarser is the comparison. States of other regions count little,
+//! and never make a pose known. A part that turns mostly turns in its play, so turned poses are compared with all turned
+//! states, the more coarsely the more there are.
 
 use rayon::prelude::*;
 
