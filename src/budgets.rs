@@ -10,8 +10,7 @@
 
 // Region covers: pieces and regions.
 
-/// Regions of one shift. A cover that needs more is given up, and samples take over. Covers that succeed need some
-/// hundred.
+/// Regions of one shift. A cover that needs more is given up, and samples take over.
 /// Measured: no effect at half and double.
 pub(crate) const REGIONS_PER_SHIFT: usize = 20_000;
 /// Pieces of one surface in a cover for shifts; with more, samples take over. In the play of a thread, which has
