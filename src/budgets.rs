@@ -140,13 +140,13 @@ pub(crate) const STATIC_STEPS: usize = 5;
 pub(crate) const STATIC_PUSHES: usize = 32;
 /// Steps of an extrapolation.
 /// Measured: at half another plan of `bayonet`; at double no effect.
-pub(crate) const LEAP_STEPS: usize = 32;
+pub(crate) const EXTRAPOLATION_STEPS: usize = 32;
 /// The same along a helix.
 /// Measured: at half another plan of `bolt_nut_m8_thread`; at double no effect.
-pub(crate) const HELIX_LEAP_STEPS: usize = 512;
+pub(crate) const HELIX_EXTRAPOLATION_STEPS: usize = 512;
 /// A shorter extrapolation along a helix gains nothing over steps.
 /// Measured: at half no effect; at double another plan of `bolt_nut_m8_thread`.
-pub(crate) const SHORTEST_HELIX_LEAP: usize = 4;
+pub(crate) const SHORTEST_HELIX_EXTRAPOLATION: usize = 4;
 /// Steps between two tests whether a thread still holds the part, coarse and fine, …
 pub(crate) const HELD_STATIONS: [usize; 2] = [4, 1];
 /// … and whether it clearly enters anything.

@@ -148,7 +148,7 @@ pub struct CacheConfig {
     /// Whether likely requests are prepared while the workers are idle.
     pub prefetch: bool,
     /// Seconds of idle time for planning the likely questions after each plan.
-    pub foresight_s: u64,
+    pub speculation_s: u64,
 }
 
 /// What of the memory is for what, in bytes.
@@ -244,7 +244,7 @@ impl TimesConfig {
 
 impl Default for CacheConfig {
     fn default() -> Self {
-        Self { disk: true, dir: None, disk_mb: 1024, memory_mb: 256, prefetch: true, foresight_s: 10 }
+        Self { disk: true, dir: None, disk_mb: 1024, memory_mb: 256, prefetch: true, speculation_s: 10 }
     }
 }
 
@@ -260,8 +260,8 @@ impl CacheConfig {
 
     /// The idle time for planning the likely questions after a plan.
     #[must_use]
-    pub fn foresight(&self) -> Duration {
-        Duration::from_secs(if self.prefetch { self.foresight_s } else { 0 })
+    pub fn speculation(&self) -> Duration {
+        Duration::from_secs(if self.prefetch { self.speculation_s } else { 0 })
     }
 
     /// What the cache is to keep to.
@@ -337,7 +337,7 @@ impl Config {
         within("requests.slow_reader_s", self.requests.slow_reader_s, 0.1..=86_400.0, "0.1 to 86400")?;
         within("cache.disk_mb", self.cache.disk_mb, 16..=1_048_576, "16 to 1048576")?;
         within("cache.memory_mb", self.cache.memory_mb, 0..=1_048_576, "0 to 1048576")?;
-        within("cache.foresight_s", self.cache.foresight_s, 0..=86_400, "0 to 86400")?;
+        within("cache.speculation_s", self.cache.speculation_s, 0..=86_400, "0 to 86400")?;
         within("times.tick_s", self.times.tick_s, 0.05..=60.0, "0.05 to 60")?;
         within("times.grace_s", self.times.grace_s, 0.0..=3600.0, "0 to 3600")?;
         within("times.drain_s", self.times.drain_s, 0.1..=3600.0, "0.1 to 3600")?;

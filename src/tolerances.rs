@@ -269,7 +269,7 @@ pub(crate) const SAME_HELIX: f64 = 0.15;
 pub(crate) const SEEN_HELIX_ANGLE: f64 = 0.4;
 /// Radians. An extrapolation off a helix turns by less than half a turn, so that its two poses determine its screw.
 /// Measured: at half no effect; at double another plan of `bolt_nut_m8_thread`.
-pub(crate) const LEAP_ANGLE: f64 = 2.4;
+pub(crate) const EXTRAPOLATION_ANGLE: f64 = 2.4;
 /// Radians. Beyond whole turns, an extrapolation along a helix turns at least this far, and this much less than a turn
 /// at most: near whole turns, the two poses do not determine the axis.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.

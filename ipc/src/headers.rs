@@ -24,15 +24,15 @@ pub enum RequestKind {
     Upload = 5,
     /// `geometry`: what differs from a known assembly.
     Revise = 6,
-    /// `plan`: no payload; how is the daemon, in figures that may be added to?
-    Figures = 7,
+    /// `plan`: no payload; the metrics of the daemon, to which more may be added
+    Metrics = 7,
 }
 
 impl RequestKind {
     /// The kind of a number on the wire.
     #[must_use]
     pub fn from_wire(kind: u32) -> Option<Self> {
-        [Self::Plan, Self::Control, Self::Status, Self::Have, Self::Upload, Self::Revise, Self::Figures]
+        [Self::Plan, Self::Control, Self::Status, Self::Have, Self::Upload, Self::Revise, Self::Metrics]
             .into_iter()
             .find(|k| *k as u32 == kind)
     }
@@ -52,15 +52,15 @@ pub enum ResponseKind {
     Status = 4,
     /// The answer to `Have`, `Upload` and `Revise`.
     Handle = 5,
-    /// The answer to `Figures`: a JSON text.
-    Figures = 6,
+    /// The answer to `Metrics`: a JSON text.
+    Metrics = 6,
 }
 
 impl ResponseKind {
     /// The kind of a number on the wire.
     #[must_use]
     pub fn from_wire(kind: u32) -> Option<Self> {
-        [Self::Steps, Self::Summary, Self::Error, Self::Status, Self::Handle, Self::Figures]
+        [Self::Steps, Self::Summary, Self::Error, Self::Status, Self::Handle, Self::Metrics]
             .into_iter()
             .find(|k| *k as u32 == kind)
     }

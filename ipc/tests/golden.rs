@@ -75,7 +75,7 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
         RequestKind::Have,
         RequestKind::Upload,
         RequestKind::Revise,
-        RequestKind::Figures,
+        RequestKind::Metrics,
     ];
     assert_eq!(requests.map(|k| k as u32), [1, 2, 3, 4, 5, 6, 7]);
     let responses = [
@@ -84,7 +84,7 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
         ResponseKind::Error,
         ResponseKind::Status,
         ResponseKind::Handle,
-        ResponseKind::Figures,
+        ResponseKind::Metrics,
     ];
     assert_eq!(responses.map(|k| k as u32), [1, 2, 3, 4, 5, 6]);
     let codes: Vec<u32> = (0..20).filter(|c| ErrorCode::from_wire(*c).is_some()).collect();

@@ -31,8 +31,8 @@ impl Daemon {
         self.client.status()
     }
 
-    pub(super) fn figures(&self) -> Result<String, ClientError> {
-        self.client.figures()
+    pub(super) fn metrics(&self) -> Result<String, ClientError> {
+        self.client.metrics()
     }
 
     fn ask(&self, question: &Question<'_>, sink: &mut dyn PlanSink) -> Result<Plan, ClientError> {

@@ -22,7 +22,7 @@ pub(super) fn run(arguments: &StatusArguments) -> Result<ExitCode, CliError> {
     let failed = |e: sbdp_client::ClientError| CliError::Failed(e.to_string());
     let daemon = Daemon::connect().map_err(failed)?;
     if arguments.json {
-        print(&format!("{}\n", daemon.figures().map_err(failed)?))?;
+        print(&format!("{}\n", daemon.metrics().map_err(failed)?))?;
         return Ok(ExitCode::SUCCESS);
     }
     print(&describe(&daemon.status().map_err(failed)?))?;

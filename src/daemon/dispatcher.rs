@@ -117,12 +117,12 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
                 let status = self.status().encode();
                 self.outgoing.respond(&incoming.link, &incoming.header, ResponseKind::Status, &status);
             }
-            Event::Figures(incoming) => {
+            Event::Metrics(incoming) => {
                 let text = self.metrics().json();
                 self.outgoing.respond(
                     &incoming.link,
                     &incoming.header,
-                    ResponseKind::Figures,
+                    ResponseKind::Metrics,
                     text.as_bytes(),
                 );
             }

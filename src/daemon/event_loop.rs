@@ -297,7 +297,7 @@ impl<P: Planning> EventLoop<'_, P> {
                 let owner = self.ports.owner_of(active.origin().value(), geometry);
                 let refuse = |length| self.dispatcher.uploads.refusal(owner, length);
                 let event = read(active, owner, geometry, self.limits, refuse);
-                if matches!(event, Event::Figures(_)) {
+                if matches!(event, Event::Metrics(_)) {
                     self.look_around();
                 }
                 self.dispatcher.handle(event, Instant::now());
@@ -360,7 +360,7 @@ fn read(
         (false, Some(RequestKind::Plan)) => Event::Plan(incoming),
         (false, Some(RequestKind::Control)) => Event::Control(incoming),
         (false, Some(RequestKind::Status)) => Event::Status(incoming),
-        (false, Some(RequestKind::Figures)) => Event::Figures(incoming),
+        (false, Some(RequestKind::Metrics)) => Event::Metrics(incoming),
         (true, Some(RequestKind::Have)) => Event::Have(incoming),
         (true, Some(RequestKind::Upload)) => Event::Upload(incoming),
         (true, Some(RequestKind::Revise)) => Event::Revise(incoming),

@@ -29,7 +29,7 @@ pub(crate) enum Event<L> {
     /// A client asks for the status.
     Status(Incoming<L>),
     /// A client asks for the metrics.
-    Figures(Incoming<L>),
+    Metrics(Incoming<L>),
     /// A client asks whether a handle is known.
     Have(Incoming<L>),
     /// A client uploads meshes.

@@ -238,10 +238,12 @@ impl Metrics {
         for (end, count) in ends {
             let _ = writeln!(text, "sbdp_plan_requests_ended_total{{end=\"{end}\"}} {count}");
         }
-        let (remembered, foreseen) = (self.plans_remembered, self.cache.ahead.foreseen);
-        for (name, count) in
-            [("plans_remembered", remembered), ("questions_foreseen", foreseen), ("uploads", self.uploads)]
-        {
+        let (remembered, speculated) = (self.plans_remembered, self.cache.ahead.speculated);
+        for (name, count) in [
+            ("plans_remembered", remembered),
+            ("questions_speculated", speculated),
+            ("uploads", self.uploads),
+        ] {
             let _ = writeln!(text, "# TYPE sbdp_{name}_total counter\nsbdp_{name}_total {count}");
         }
         let _ = writeln!(text, "# TYPE sbdp_request_seconds summary");
@@ -322,7 +324,7 @@ mod tests {
             &[("frame".to_owned(), [0; 32])],
             CacheMetrics {
                 remembered: Some(Service::default().remembered()),
-                ahead: PrefetchMetrics { assemblies: 1, questions: 3, foreseen: 8 },
+                ahead: PrefetchMetrics { assemblies: 1, questions: 3, speculated: 8 },
                 ..CacheMetrics::default()
             },
         );
@@ -339,7 +341,7 @@ mod tests {
             "sbdp_assemblies 0",
             "sbdp_clients 2",
             "sbdp_ahead_questions 3",
-            "sbdp_questions_foreseen_total 8",
+            "sbdp_questions_speculated_total 8",
             "sbdp_cache_mapped_bytes 0",
             "sbdp_shared_memory_free_bytes 1048576",
         ] {

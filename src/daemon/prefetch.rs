@@ -89,7 +89,7 @@ struct PrefetchState {
     /// The newest first: its plan is probably the one that is being carried out.
     speculations: VecDeque<Speculation>,
     /// Questions that were planned ahead.
-    foreseen: u64,
+    speculated: u64,
     /// Requests at work.
     busy: usize,
     quiet_since: Option<Instant>,
@@ -130,7 +130,7 @@ pub(crate) struct PrefetchMetrics {
     /// Questions that wait or are being planned.
     pub(crate) questions: usize,
     /// Questions that were planned ahead, since the daemon started.
-    pub(crate) foreseen: u64,
+    pub(crate) speculated: u64,
 }
 
 /// As long as this lives, nothing is prepared.
@@ -202,7 +202,7 @@ impl Prefetch {
         PrefetchMetrics {
             assemblies: state.waiting.len() + usize::from(assembly),
             questions: state.speculations.iter().map(Speculation::left).sum::<usize>() + questions,
-            foreseen: state.foreseen,
+            speculated: state.speculated,
         }
     }
 
@@ -218,10 +218,10 @@ impl Prefetch {
     /// question.
     pub(super) fn run(&self, prepare: impl Fn(&mut Work, &Termination) -> bool) {
         while let Some((mut work, termination)) = self.next() {
-            let foresaw = prepare(&mut work, &termination);
+            let speculated = prepare(&mut work, &termination);
             let mut state = self.state();
             state.at_work = None;
-            state.foreseen += u64::from(foresaw);
+            state.speculated += u64::from(speculated);
             state.put_back(work, termination.check().is_err());
         }
     }
@@ -360,7 +360,7 @@ mod tests {
         prefetch.speculate(questions(2, 2));
         prefetch.want(id(3));
         prefetch.speculate(questions(1, 3));
-        assert_eq!(prefetch.metrics(), PrefetchMetrics { assemblies: 1, questions: 13, foreseen: 0 });
+        assert_eq!(prefetch.metrics(), PrefetchMetrics { assemblies: 1, questions: 13, speculated: 0 });
         let mut taken = Vec::new();
         while let Some((work, _)) = (prefetch.metrics().questions > 0).then(|| prefetch.next()).flatten() {
             taken.push(match work {
@@ -384,7 +384,7 @@ mod tests {
         let (work, termination) = prefetch.next().unwrap();
         assert_eq!(
             prefetch.metrics(),
-            PrefetchMetrics { assemblies: 0, questions: 2, foreseen: 0 },
+            PrefetchMetrics { assemblies: 0, questions: 2, speculated: 0 },
             "with what is at work"
         );
         prefetch.answered();

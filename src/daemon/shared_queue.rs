@@ -153,7 +153,7 @@ impl Queues {
             plans: Arc::new(SharedQueue::new(plans)),
             admissions: Arc::new(SharedQueue::new(admissions)),
             prefetch: Arc::default(),
-            speculation: config.cache.foresight(),
+            speculation: config.cache.speculation(),
         }
     }
 

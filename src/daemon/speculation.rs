@@ -267,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_foreseen_where_nobody_carries_a_plan_out() {
+    fn nothing_is_speculated_where_nobody_carries_a_plan_out() {
         let none = |request: PlanRequest, plan: &Plan, time| {
             assert!(Speculation::after(&job(request), plan, time).is_none());
         };

@@ -95,8 +95,8 @@ pub struct PlanStats {
     pub sweeps: u64,
     /// States kept.
     pub states: u64,
-    /// Reading, healing and preparing the meshes, before `total_time_s` begins; `None` where that is
-    /// not told, as by the daemon.
+    /// Reading, healing and preparing the meshes, before `total_time_s` begins; `None` where it is
+    /// unknown, as from the daemon.
     pub load_time_s: Option<f64>,
     /// Building or loading distance fields.
     pub sdf_time_s: f64,
@@ -109,7 +109,7 @@ pub struct PlanStats {
     /// Shortening and verification.
     pub verify_time_s: f64,
     /// In an assembly plan, finding and verifying the ways to where insertions begin; `None` where there
-    /// are none or that is not told, as by the daemon.
+    /// are none or it is unknown, as from the daemon.
     pub transfer_time_s: Option<f64>,
     /// From admission to the last step.
     pub total_time_s: f64,
@@ -119,7 +119,7 @@ pub struct PlanStats {
     pub blocking_hits: u64,
     /// Motions that were there already.
     pub motion_hits: u64,
-    /// Verified paths that were there already; `None` where that is not told, as by the daemon.
+    /// Verified paths that were there already; `None` where it is unknown, as from the daemon.
     pub verdict_hits: Option<u64>,
     /// The whole plan was there already.
     pub plan_hit: bool,

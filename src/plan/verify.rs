@@ -118,16 +118,16 @@ impl Verifier {
             finest: OVERLAP_FINEST * scene.longest_side,
             coarse: COARSE_SHARE * scene.longest_side,
         };
-        let passing = PairPath::standing(scene, pair);
-        let course = Course::new(&passing.path, passing.centre, 0.0);
-        let way = PathQuestion { passing: &passing, course: &course, precision, termination };
+        let pair_path = PairPath::standing(scene, pair);
+        let course = Course::new(&pair_path.path, pair_path.centre, 0.0);
+        let way = PathQuestion { pair_path: &pair_path, course: &course, precision, termination };
         let [one, other] = way.depth()?;
         let depth = one.depth.max(other.depth);
         let effort = [one.effort, other.effort];
         tracing::debug!(parts = ?pair.parts, depth, ?effort, "overlap measured");
         if !one.open.is_empty() || !other.open.is_empty() {
             let penetrations =
-                self.samples.penetrations_along(&passing, &passing.path, self.limit, termination)?;
+                self.samples.penetrations_along(&pair_path, &pair_path.path, self.limit, termination)?;
             return Ok(deepest(depth, &penetrations));
         }
         Ok(depth)
@@ -176,9 +176,10 @@ impl Verifier {
     ) -> Result<Verdict, Interrupt> {
         let swept = scene.swept_bounds(part, path);
         let near = standing.iter().filter(|&&other| scene.bodies[other].bounds.meets(&swept));
-        let passing = |&other: &usize| PairPath::new(scene, allowed, [part, other], path);
-        let passing: Vec<_> = near.map(passing).collect();
-        let past: Vec<_> = passing.par_iter().map(|p| self.past(p, termination)).collect::<Result<_, _>>()?;
+        let pair_path = |&other: &usize| PairPath::new(scene, allowed, [part, other], path);
+        let pair_path: Vec<_> = near.map(pair_path).collect();
+        let past: Vec<_> =
+            pair_path.par_iter().map(|p| self.past(p, termination)).collect::<Result<_, _>>()?;
         Ok(Verdict::of_all(past, self.limit))
     }
 
@@ -186,19 +187,19 @@ impl Verifier {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub fn past(&self, passing: &PairPath<'_>, termination: &Termination) -> Result<Verdict, Interrupt> {
+    pub fn past(&self, pair_path: &PairPath<'_>, termination: &Termination) -> Result<Verdict, Interrupt> {
         let Self { limit, samples } = self;
-        let course = &Course::new(&passing.path, passing.centre, passing.reach());
-        let found = self.bounds(passing, course, termination)?;
+        let course = &Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
+        let found = self.bounds(pair_path, course, termination)?;
         let bound = found.iter().map(|f| f.bound).fold(0.0, f64::max);
-        let [part, other] = passing.parts;
+        let [part, other] = pair_path.parts;
         let effort = found.each_ref().map(|f| f.effort);
-        tracing::debug!(part, other, allowed = passing.allowed, bound, ?effort, "verified");
-        let mut penetrations = deepest_penetrations(passing, &found);
+        tracing::debug!(part, other, allowed = pair_path.allowed, bound, ?effort, "verified");
+        let mut penetrations = deepest_penetrations(pair_path, &found);
         if bound <= *limit {
             for stretch in joined(course, found.iter().flat_map(|f| &f.open)) {
                 let path = course.path_between(stretch);
-                penetrations.extend(samples.penetrations_along(passing, &path, *limit, termination)?);
+                penetrations.extend(samples.penetrations_along(pair_path, &path, *limit, termination)?);
             }
         }
         Ok(Verdict::past(bound, penetrations))
@@ -211,21 +212,21 @@ impl Verifier {
     /// The termination condition became true.
     pub(crate) fn bounds(
         &self,
-        passing: &PairPath<'_>,
+        pair_path: &PairPath<'_>,
         course: &Course,
         termination: &Termination,
     ) -> Result<[PathDepth; 2], Interrupt> {
         let limit = self.limit;
-        let share = if passing.allowed > 0.0 { IGNORED_SHARE_IN_OVERLAP } else { IGNORED_SHARE };
+        let share = if pair_path.allowed > 0.0 { IGNORED_SHARE_IN_OVERLAP } else { IGNORED_SHARE };
         let precision = DepthPrecision {
             ignored: limit * share,
             deep: limit,
             margin: limit,
             finest: limit * FINEST_SHARE,
-            coarse: COARSE_SHARE * passing.longest_side,
+            coarse: COARSE_SHARE * pair_path.longest_side,
         };
-        let way = PathQuestion { passing, course, precision, termination };
-        if turns_far(&passing.path) { depth_on_screw(&way, limit) } else { way.depth() }
+        let way = PathQuestion { pair_path, course, precision, termination };
+        if turns_far(&pair_path.path) { depth_on_screw(&way, limit) } else { way.depth() }
     }
 }
 
@@ -242,8 +243,8 @@ fn joined<'i>(course: &Course, intervals: impl Iterator<Item = &'i Interval>) ->
 }
 
 /// The points that help in refining a motion: the deepest of those near each other.
-fn deepest_penetrations(passing: &PairPath<'_>, [moving, standing]: &[PathDepth; 2]) -> Vec<Penetration> {
-    let PairPath { parts: [_, other], longest_side, .. } = *passing;
+fn deepest_penetrations(pair_path: &PairPath<'_>, [moving, standing]: &[PathDepth; 2]) -> Vec<Penetration> {
+    let PairPath { parts: [_, other], longest_side, .. } = *pair_path;
     let cell = COARSE_SHARE * longest_side;
     let mut taken: BTreeMap<(bool, [i64; 3]), Penetration> = BTreeMap::new();
     for (on_moving, side) in [(true, moving), (false, standing)] {

@@ -105,7 +105,7 @@ impl AllowedPenetrations {
 pub struct Scene {
     /// One per part, in the assembly's order.
     pub bodies: Arc<Vec<Body>>,
-    /// Overlaps allowed.
+    /// The allowed penetrations of all pairs.
     pub allowed: AllowedPenetrations,
     /// Longest side of the whole, the unit of resolutions: rounded down, so that most edits leave it and
     /// all that was found out with it.

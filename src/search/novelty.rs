@@ -16,9 +16,8 @@ use crate::tolerances::TURNED;
 
 use super::disassembly::Disassembly;
 use super::state::coarseness;
-use super::states::States;
+use super::states::PhaseStates;
 use super::strategy::Strategy;
-use super::trace::PlanningPhase;
 
 /// The decision which poses make new states.
 #[derive(Debug)]
@@ -40,14 +39,13 @@ impl Novelty {
     /// The termination condition became true.
     pub(super) fn is_new(
         &mut self,
-        strategy: Strategy,
-        states: &States,
+        of: &PhaseStates<'_>,
         disassembly: &Disassembly<'_, '_>,
-        phase: PlanningPhase,
         part: usize,
         pose: &Pose,
     ) -> Result<bool, Interrupt> {
-        let counts = |node: usize| states.nodes[node].alive && strategy.lists(phase, &states.nodes[node]);
+        let PhaseStates { strategy, states, .. } = *of;
+        let counts = |node: usize| states.nodes[node].alive && of.lists(&states.nodes[node]);
         let known = &states.known[part];
         // At the coarsest resolution that this number of states allows.
         if !known.has_like(pose, counts) {

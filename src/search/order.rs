@@ -1,12 +1,11 @@
 //! In which order a state-based search expands states and tries actions.
 
-use std::cmp::Reverse;
 use std::collections::{BTreeSet, HashMap};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use crate::blocking_graph::{Blockage, Evaluation};
+use crate::blocking_graph::Blockage;
 use crate::budgets::SHORT_STEPS_PER_POLL;
 use crate::contact::obstruction;
 use crate::scene::Scene;
@@ -18,7 +17,7 @@ use super::ball::is_ball;
 use super::disassembly::{Disassembly, SceneVersion, Stop};
 use super::linked::Links;
 use super::state::{StateAction, StateNode, least_travel};
-use super::states::States;
+use super::states::{PhaseStates, States};
 use super::strategy::Strategy;
 use super::trace::PlanningPhase;
 
@@ -33,8 +32,6 @@ struct Obstruction {
 
 /// The order of states and actions, and the parts that need not be tried at all.
 pub(super) struct Order {
-    /// Per part: the distance of its farthest point from its centre of mass.
-    reach: Vec<f64>,
     /// Per part: whether it is a ball, which no action has to turn.
     balls: Vec<bool>,
     /// The linked parts, once they were looked for.
@@ -48,7 +45,6 @@ impl Order {
         let bodies = scene.bodies.iter().enumerate();
         let is_ball = |(part, shape)| strategy.is_extended() && is_ball(shape, least_travel(scene, part));
         Self {
-            reach: scene.bodies.iter().map(|b| b.shape.reach).collect(),
             balls: bodies.map(|(part, b)| is_ball((part, &*b.shape))).collect(),
             links: None,
             obstructions: HashMap::new(),
@@ -82,17 +78,12 @@ impl Order {
     /// The states to expand, the initial one included. Of two last parts it does not matter which one moves
     /// against the other: beyond the first push, only the smaller one does. A linked part is not moved, for it
     /// cannot leave, and a ball not turned.
-    pub(super) fn expandable(
-        &self,
-        strategy: Strategy,
-        phase: PlanningPhase,
-        states: &States,
-        disassembly: &Disassembly<'_, '_>,
-    ) -> Vec<usize> {
+    pub(super) fn expandable(&self, of: &PhaseStates<'_>, disassembly: &Disassembly<'_, '_>) -> Vec<usize> {
+        let PhaseStates { strategy, phase, states, .. } = *of;
         let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());
         let still = match standing[..] {
             [a, b] if !strategy.separate_lists && problem.may_move(a) && problem.may_move(b) => {
-                Some(if self.reach[a] < self.reach[b] { b } else { a })
+                Some(if of.reach(a) < of.reach(b) { b } else { a })
             }
             _ => None,
         };
@@ -101,7 +92,7 @@ impl Order {
         let in_vain = |n: &StateNode| {
             (is_rotation && self.balls[n.part]) || self.linked_with(n.part, standing).is_some()
         };
-        let wanted = |n: &StateNode| n.alive && strategy.lists(phase, n) && !skipped(n) && !in_vain(n);
+        let wanted = |n: &StateNode| n.alive && of.lists(n) && !skipped(n) && !in_vain(n);
         (0..states.nodes.len()).filter(|&i| wanted(&states.nodes[i])).collect()
     }
 
@@ -110,19 +101,14 @@ impl Order {
     /// count as infinite) and stands for all its parts in their order. Without guidance the first comes first:
     /// the initial state, then displaced ones by age. Where actions have an order of their own, all states are
     /// taken at once.
-    pub(super) fn extract(
-        &self,
-        strategy: Strategy,
-        phase: PlanningPhase,
-        states: &States,
-        open: &mut Vec<usize>,
-    ) -> Vec<usize> {
+    pub(super) fn extract(&self, of: &PhaseStates<'_>, open: &mut Vec<usize>) -> Vec<usize> {
+        let PhaseStates { strategy, phase, states, .. } = *of;
         if strategy.orders_actions(phase) {
-            return self.ranked(strategy, phase, states, std::mem::take(open));
+            return self.ranked(of, std::mem::take(open));
         }
         let displaced = |i: &usize| !states.nodes[*i].is_root();
         let next = if strategy.guided {
-            open.iter().copied().filter(displaced).min_by_key(|&i| rank(strategy, phase, states, i))
+            open.iter().copied().filter(displaced).min_by_key(|&i| of.rank(i))
         } else {
             open.first().copied().filter(displaced)
         };
@@ -131,61 +117,49 @@ impl Order {
                 open.retain(|&i| i != best);
                 vec![best]
             }
-            None => self.ordered_roots(strategy, phase, states, open),
+            None => self.ordered_roots(of, open),
         }
     }
 
     /// Open states in the order of expansion.
-    fn ranked(
-        &self,
-        strategy: Strategy,
-        phase: PlanningPhase,
-        states: &States,
-        mut open: Vec<usize>,
-    ) -> Vec<usize> {
-        let roots = self.ordered_roots(strategy, phase, states, &mut open);
-        if strategy.guided {
-            open.sort_by_cached_key(|&i| rank(strategy, phase, states, i));
+    fn ranked(&self, of: &PhaseStates<'_>, mut open: Vec<usize>) -> Vec<usize> {
+        let roots = self.ordered_roots(of, &mut open);
+        if of.strategy.guided {
+            open.sort_by_cached_key(|&i| of.rank(i));
         }
         open.extend(roots);
         open
     }
 
-    fn ordered_roots(
-        &self,
-        strategy: Strategy,
-        phase: PlanningPhase,
-        states: &States,
-        open: &mut Vec<usize>,
-    ) -> Vec<usize> {
+    fn ordered_roots(&self, of: &PhaseStates<'_>, open: &mut Vec<usize>) -> Vec<usize> {
+        let PhaseStates { strategy, phase, states, .. } = *of;
         let (mut roots, rest) = open.iter().partition::<Vec<usize>, _>(|&&i| states.nodes[i].is_root());
         *open = rest;
         if !strategy.guided {
             return roots;
         }
-        // Before anything was turned, what stops pushes tells which part is least held; among equals the
-        // smallest is the likeliest fastener and the cheapest to simulate.
+        // Before anything was turned, the parts that stop pushes show which part is held least; of equal
+        // ones the smallest is the likeliest fastener and the cheapest to simulate.
         let other = |i: usize| states.nodes[i].blockage(PlanningPhase::Translation).map(Blockage::evaluation);
-        let reach = |i: usize| self.reach[states.nodes[i].part].to_bits();
+        let reach = |i: usize| of.reach(states.nodes[i].part).to_bits();
         roots.sort_by_key(|&i| match phase {
-            PlanningPhase::Translation => (evaluation(phase, states, i), None, 0, i),
-            PlanningPhase::Rotation => (evaluation(phase, states, i), other(i), reach(i), i),
+            PlanningPhase::Translation => (of.evaluation(i), None, 0, i),
+            PlanningPhase::Rotation => (of.evaluation(i), other(i), reach(i), i),
         });
         roots
     }
 
-    /// The sweeps from some open states in the order of expansion: displaced states first, then all parts as
+    /// The sweeps along translations from some open states, in the order of expansion: displaced states first, then all parts as
     /// assembled; each along the shorter ways out first. Such a plan takes less room, and less is to be
     /// verified.
     pub(super) fn sweeps(
         &self,
-        strategy: Strategy,
+        of: &PhaseStates<'_>,
         open: &[usize],
-        states: &States,
         actions: &ActionTable,
         disassembly: &Disassembly<'_, '_>,
     ) -> Vec<StateAction> {
-        let phase = PlanningPhase::Translation;
+        let PhaseStates { phase, states, .. } = *of;
         let hull = disassembly.everything.hull();
         let forces: Vec<_> = actions.translations.all.iter().map(|action| action.force()).collect();
         let reach =
@@ -201,7 +175,7 @@ impl Order {
             actions.sort_by_cached_key(|action| (way(action).max(TOUCHED).log2() * 2.0).floor() as i32);
             actions.into_iter().map(move |action| StateAction { node, phase, action })
         };
-        self.ranked(strategy, phase, states, open.to_vec()).into_iter().flat_map(sweeps).collect()
+        self.ranked(of, open.to_vec()).into_iter().flat_map(sweeps).collect()
     }
 
     /// Measures what is in the way of some actions along their parts' own axes, unless it is known.
@@ -237,7 +211,7 @@ impl Order {
 
     /// Where an action that may turn a part stands among the others, over all parts. First those that pull a
     /// part along its own axis, or that are its own; of these, those that fewer parts block, as far as pushes
-    /// tell, and then those with less in their way: a nut is not turned towards the head of its bolt.
+    /// show, and then those with less in their way: a nut is not turned towards the head of its bolt.
     pub(super) fn action_rank(
         &self,
         at: StateAction,
@@ -257,21 +231,4 @@ impl Order {
 fn pull(at: StateAction, states: &States, actions: &ActionTable) -> Option<StateAction> {
     let action = actions.pull(states.nodes[at.node].part, at.action)?;
     Some(StateAction { phase: PlanningPhase::Translation, action, ..at })
-}
-
-/// Where a displaced state stands among the others.
-fn rank(
-    strategy: Strategy,
-    phase: PlanningPhase,
-    states: &States,
-    node: usize,
-) -> (Evaluation, Reverse<u64>, usize) {
-    // Not negative, so its bits are in its order.
-    let novelty = if strategy.separate_lists { 0.0 } else { states.nodes[node].novelty };
-    (evaluation(phase, states, node), Reverse(novelty.to_bits()), node)
-}
-
-fn evaluation(phase: PlanningPhase, states: &States, node: usize) -> Evaluation {
-    let none = Evaluation { colliding_parts: 0, open_actions: 0 };
-    states.nodes[node].blockage(phase).map_or(none, Blockage::evaluation)
 }

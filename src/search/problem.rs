@@ -169,9 +169,9 @@ impl Problem<'_> {
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
         let Self { scene, verifier, termination, cache, verdicts, .. } = self;
         let past = |&other: &usize| {
-            let passing = &PairPath::new(scene, &scene.allowed, [part, other], path);
-            let question = &VerdictQuestion { passing, limit: verifier.limit() };
-            verdicts.verdict(question, cache, || verifier.past(passing, termination))
+            let pair_path = &PairPath::new(scene, &scene.allowed, [part, other], path);
+            let question = &VerdictQuestion { pair_path, limit: verifier.limit() };
+            verdicts.verdict(question, cache, || verifier.past(pair_path, termination))
         };
         let past: Vec<_> = near.par_iter().map(past).collect::<Result<_, _>>()?;
         Ok(Verdict::of_all(past, verifier.limit()))
@@ -185,10 +185,10 @@ impl Problem<'_> {
             .iter()
             .flat_map(|(body, list)| list.iter().map(move |p| (*body, key(p))))
             .collect();
-        for entry in penetrations {
-            let body = if entry.on_moving { part } else { entry.other };
-            if known.insert((body, key(&entry.point))) {
-                self.extra_points.entry(body).or_default().push(entry.point);
+        for penetration in penetrations {
+            let body = if penetration.on_moving { part } else { penetration.other };
+            if known.insert((body, key(&penetration.point))) {
+                self.extra_points.entry(body).or_default().push(penetration.point);
             }
         }
         for (body, points) in &self.extra_points {

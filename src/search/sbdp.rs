@@ -37,7 +37,7 @@ use super::report::SearchReport;
 use super::request::ActionSet;
 use super::speculation::Speculation;
 use super::state::{StateAction, StateNode, least_travel};
-use super::states::States;
+use super::states::{PhaseStates, States};
 use super::strategy::Strategy;
 use super::sweep_memory::{BlockedSweep, SweepMemory};
 use super::trace::{PlanningPhase, TraceEvent};
@@ -178,7 +178,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 open = self.expandable(phase);
                 continue;
             }
-            let batch = self.order.extract(self.strategy, phase, &self.states, &mut open);
+            let batch = self.order.extract(&self.of(phase), &mut open);
             let result = self.expand(phase, &batch)?;
             gain.new_states |= result.new_states;
             if result.new_states && self.strategy.orders_actions(phase) {
@@ -196,8 +196,13 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         Ok(gain)
     }
 
+    fn of(&self, phase: PlanningPhase) -> PhaseStates<'_> {
+        let Self { strategy, states, disassembly, .. } = self;
+        PhaseStates { strategy: *strategy, phase, states, scene: &disassembly.problem.scene }
+    }
+
     fn expandable(&self, phase: PlanningPhase) -> Vec<usize> {
-        self.order.expandable(self.strategy, phase, &self.states, &self.disassembly)
+        self.order.expandable(&self.of(phase), &self.disassembly)
     }
 
     /// Static analysis of displaced states that have none yet.
@@ -249,7 +254,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         {
             return Ok(false);
         }
-        let sweeps = self.order.sweeps(self.strategy, open, &self.states, &self.actions, &self.disassembly);
+        let sweeps = self.order.sweeps(&self.of(phase), open, &self.actions, &self.disassembly);
         let (mut next, mut removed) = (0, false);
         while next < sweeps.len() && !self.disassembly.is_done() {
             let standing = self.disassembly.everything.standing();
@@ -392,7 +397,9 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         let is_new = match path.last() {
             Some(end) => {
                 let Self { novelty, strategy, states, disassembly, .. } = self;
-                novelty.is_new(*strategy, states, disassembly, at.phase, run.part, end)?
+                let (strategy, scene) = (*strategy, &disassembly.problem.scene);
+                let of = PhaseStates { strategy, phase: at.phase, states, scene };
+                novelty.is_new(&of, disassembly, run.part, end)?
             }
             None => false,
         };
@@ -467,7 +474,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
     }
 }
 
-/// The indices of the next `size` wanted penetrations from an index on, and where those after them begin.
+/// The indices of the next `size` wanted entries from an index on, and where those after them begin.
 fn window(
     list: &[StateAction],
     from: usize,

@@ -3,11 +3,15 @@
 //! Invariants: nodes are only added, so a node's number never changes and a parent is older than its
 //! children; the first `roots` nodes are the parts at their assembled poses.
 
+use std::cmp::Reverse;
+
+use crate::blocking_graph::{Blockage, Evaluation};
 use crate::scene::Scene;
 
 use super::known_states::KnownStates;
 use super::state::{StateAction, StateNode};
 use super::strategy::Strategy;
+use super::trace::PlanningPhase;
 
 pub(super) struct States {
     pub(super) nodes: Vec<StateNode>,
@@ -15,6 +19,39 @@ pub(super) struct States {
     roots: usize,
     /// Per part, for asking whether a pose is known.
     pub(super) known: Vec<KnownStates>,
+}
+
+/// The states of a search in one phase, under its strategy.
+#[derive(Clone, Copy)]
+pub(super) struct PhaseStates<'s> {
+    pub(super) strategy: Strategy,
+    pub(super) phase: PlanningPhase,
+    pub(super) states: &'s States,
+    pub(super) scene: &'s Scene,
+}
+
+impl PhaseStates<'_> {
+    /// Whether a state is in the open list of the phase.
+    pub(super) fn lists(&self, node: &StateNode) -> bool {
+        self.strategy.lists(self.phase, node)
+    }
+
+    /// The rank of a displaced state among the others; smaller comes first.
+    pub(super) fn rank(&self, node: usize) -> (Evaluation, Reverse<u64>, usize) {
+        // Novelty is not negative, so its bits have its order.
+        let novelty = if self.strategy.separate_lists { 0.0 } else { self.states.nodes[node].novelty };
+        (self.evaluation(node), Reverse(novelty.to_bits()), node)
+    }
+
+    /// The distance of the farthest point of a part from its centre of mass.
+    pub(super) fn reach(&self, part: usize) -> f64 {
+        self.scene.bodies[part].shape.reach
+    }
+
+    pub(super) fn evaluation(&self, node: usize) -> Evaluation {
+        let none = Evaluation { colliding_parts: 0, open_actions: 0 };
+        self.states.nodes[node].blockage(self.phase).map_or(none, Blockage::evaluation)
+    }
 }
 
 impl States {

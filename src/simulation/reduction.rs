@@ -36,7 +36,7 @@ pub(super) fn reduced(
     (out, kept)
 }
 
-/// Hashes keys of bins: thousands of them at every step, and nobody chooses them to collide.
+/// Hashes keys of bins: thousands of them at every step, and no input chooses them to collide.
 #[derive(Default)]
 struct BinHasher(u64);
 

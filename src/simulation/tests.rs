@@ -57,7 +57,7 @@ impl Case {
         engine.simulate(&self.scene, &self.surroundings, 1, &self.assembled(), action, &t).unwrap()
     }
 
-    /// A bound of the depth beyond the allowed penetrations along a path, on the triangles, told finely
+    /// A bound of the depth beyond the allowed penetrations along a path, on the triangles, precisely
     /// enough to compare it with `most`.
     fn depth(&self, path: &[Pose], most: f64) -> f64 {
         let (scene, t) = (&self.scene, Termination::default());

@@ -61,15 +61,15 @@ impl Client {
         Ok(Status::decode(answer.as_slice())?)
     }
 
-    /// How the daemon is, in all figures that it offers: a JSON object, to which fields may be added.
+    /// All metrics of the daemon: a JSON object, to which fields may be added.
     ///
     /// # Errors
     /// The daemon is gone, gives no answer, or is older than this request.
-    pub fn figures(&self) -> Result<String, ClientError> {
-        let header = Self::header(RequestKind::Figures, self.new_request());
+    pub fn metrics(&self) -> Result<String, ClientError> {
+        let header = Self::header(RequestKind::Metrics, self.new_request());
         let length = bytes::ALIGNMENT;
-        let answer = self.ask("figures", Through::Plan, header, length, |_| {}, self.options.timeout)?;
-        let wrong = |_| ClientError::Protocol("its figures are no text".to_owned());
+        let answer = self.ask("metrics", Through::Plan, header, length, |_| {}, self.options.timeout)?;
+        let wrong = |_| ClientError::Protocol("its metrics are no text".to_owned());
         String::from_utf8(answer.as_slice().to_vec()).map_err(wrong)
     }
 

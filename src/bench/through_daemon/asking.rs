@@ -53,7 +53,7 @@ fn follow(
 
 /// All that the daemon tells of itself.
 pub(super) fn figures(client: &Client) -> Result<serde_json::Value, BenchError> {
-    let figures = client.figures().map_err(BenchError::failed)?;
+    let figures = client.metrics().map_err(BenchError::failed)?;
     serde_json::from_str(&figures).map_err(BenchError::failed)
 }
 

@@ -35,8 +35,8 @@ pub struct ReplanRecord {
     pub cold: Cost,
     /// Asked at once of a daemon that planned the assembly as it was.
     pub changed: Cost,
-    /// Asked of one that had time to foresee what may be asked then.
-    pub foreseen: Cost,
+    /// Asked of one that had time to plan likely next requests.
+    pub speculated: Cost,
     /// Whether all gave the same plan to the bit, which the cold daemon verified path by path.
     pub verified: bool,
 }
@@ -88,15 +88,15 @@ fn compared(source: &SourceAssembly, part: usize, change: &Changed) -> Result<Re
     let ready = Asked::of(source, "ready")?;
     plan(&ready.client, ready.handle, &PlanOptions::default())?;
     leave_alone(&ready.client)?;
-    let (foreseen_plan, foreseen) = ready.changed(source, part, change)?;
+    let (speculated_plan, speculated) = ready.changed(source, part, change)?;
     Ok(ReplanRecord {
         assembly: source.name.clone(),
         part: source.parts[part].name.clone(),
         change: change.name,
         cold,
         changed,
-        foreseen,
-        verified: changed_plan == cold_plan && foreseen_plan == cold_plan,
+        speculated,
+        verified: changed_plan == cold_plan && speculated_plan == cold_plan,
     })
 }
 

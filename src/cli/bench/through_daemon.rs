@@ -75,7 +75,7 @@ fn line(r: &ReplanRecord) -> String {
         r.cold.time_s,
         r.cold.simulations,
         shares(r.changed),
-        shares(r.foreseen),
+        shares(r.speculated),
         if r.verified { "the same plan" } else { "NOT the same plan" }
     )
 }

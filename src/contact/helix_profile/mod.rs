@@ -25,6 +25,7 @@ use crate::termination::{Interrupt, Termination};
 pub(crate) use centred::centred;
 
 use super::course::{Course, Interval};
+use super::region_cover::cover;
 use super::region_cover::path::{PathDepth, PathQuestion};
 use envelope::{Envelope, ProfileZone};
 use path::{AxisBoxes, ScrewPath};
@@ -60,22 +61,22 @@ fn unsettled(
     let (moving, standing) = rayon::join(|| envelope(moving), || envelope(standing));
     let (moving, standing) = (moving?, standing?);
     let mut open = Vec::new();
-    let mut stack = stretches;
-    while let Some(interval) = stack.pop() {
+    cover(stretches, |interval, rest| {
         termination.check()?;
-        let Some(stretch) = screw.stretch(interval, &boxes) else { continue };
+        let Some(stretch) = screw.stretch(interval, &boxes) else { return Ok(()) };
         let stray = |radius: f64| stretch.stray(radius);
         let places = [stretch.places_of_standing, stretch.places_of_moving];
         if standing.is_apart(places[0], &moving, places[1], stretch.shift, stray) {
-            continue;
+            return Ok(());
         }
         if course.turn(interval) < SHORTEST_SCREW_STRETCH {
             open.push(interval);
         } else {
             let [first, second] = interval.halves();
-            stack.extend([second, first]);
+            rest.extend([second, first]);
         }
-    }
+        Ok(())
+    })?;
     Ok(open)
 }
 
@@ -85,7 +86,7 @@ fn unsettled(
 /// # Errors
 /// The termination condition became true.
 pub(crate) fn depth_on_screw(way: &PathQuestion<'_>, limit: f64) -> Result<[PathDepth; 2], Interrupt> {
-    let surfaces = way.passing.surfaces();
+    let surfaces = way.pair_path.surfaces();
     // Only where there are holes, depth changes its sign in mid-air.
     if surfaces.iter().any(|surface| surface.rim().is_some()) {
         let unknown = || PathDepth { open: vec![Interval::WHOLE], ..PathDepth::default() };
@@ -93,7 +94,7 @@ pub(crate) fn depth_on_screw(way: &PathQuestion<'_>, limit: f64) -> Result<[Path
     }
     // A part that shares no thread with the moving one is soon bounded.
     let mut found = bounded(way, vec![Interval::WHOLE], EFFORT_BEFORE_PROFILES)?;
-    if way.passing.allowed > 0.0 {
+    if way.pair_path.allowed > 0.0 {
         // One part lies in the other: surfaces cross, and more effort would bound no more.
         return Ok(found);
     }
@@ -119,17 +120,17 @@ fn bounded(
 ) -> Result<[PathDepth; 2], Interrupt> {
     let side = |on_moving| {
         let mut all = PathDepth::default();
-        let mut stack = stretches.clone();
-        while let Some(interval) = stack.pop() {
+        cover(stretches.clone(), |interval, rest| {
             let left = most_effort.saturating_sub(all.effort);
             if left == 0 || all.is_enough() {
                 all.open.push(interval);
             } else if way.course.turn(interval) > SCREW_TURN {
-                stack.extend(interval.halves());
+                rest.extend(interval.halves());
             } else {
                 all.add(way.depth_of_side(on_moving, interval, left)?);
             }
-        }
+            Ok(())
+        })?;
         Ok(all)
     };
     let (one, other) = rayon::join(|| side(true), || side(false));

@@ -59,9 +59,9 @@ fn checked(scene: &Scene, verifier: &Verifier, path: &[Pose]) -> f64 {
 
 /// The share of the way that profiles leave open.
 fn open(scene: &Scene, path: &[Pose]) -> Vec<Interval> {
-    let passing = PairPath::new(scene, &scene.allowed, [1, 0], path);
-    let course = Course::new(&passing.path, passing.centre, passing.reach());
-    unsettled(&course, passing.surfaces(), vec![Interval::WHOLE], LIMIT, &Termination::default()).unwrap()
+    let pair_path = PairPath::new(scene, &scene.allowed, [1, 0], path);
+    let course = Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
+    unsettled(&course, pair_path.surfaces(), vec![Interval::WHOLE], LIMIT, &Termination::default()).unwrap()
 }
 
 fn nut_on_bolt() -> [SourceMesh; 2] {
@@ -86,10 +86,10 @@ fn a_bolt_whose_head_crosses_its_shank_is_settled_as_others_are_and_one_with_hol
         let (scene, verifier) = scene([joined([bolt.clone(), head]), nut.clone()]);
         let bolt = &scene.bodies[0].shape.surface;
         assert!(bolt.is_open() && bolt.rim().is_some() == open);
-        let passing = PairPath::new(&scene, &scene.allowed, [1, 0], &path(&scene));
-        let course = Course::new(&passing.path, passing.centre, passing.reach());
+        let pair_path = PairPath::new(&scene, &scene.allowed, [1, 0], &path(&scene));
+        let course = Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
         let t = Termination::default();
-        let found = verifier.bounds(&passing, &course, &t).unwrap();
+        let found = verifier.bounds(&pair_path, &course, &t).unwrap();
         assert_eq!(found.iter().all(|f| f.open.is_empty()), !open, "{found:?}");
         assert!(checked(&scene, &verifier, &path(&scene)) < LIMIT / 8.0);
     }

@@ -20,12 +20,13 @@ use crate::termination::Interrupt;
 
 pub use shift::ShiftCoverCache;
 
-/// Covers a piece: `attempt` covers the piece it is given, or pushes the parts to cover instead, the next one last.
+/// Covers pieces, the last one first: `attempt` covers the piece it is given, or pushes the parts to cover instead, the
+/// next one last.
 pub(crate) fn cover<P, E>(
-    piece: P,
+    pieces: Vec<P>,
     mut attempt: impl FnMut(P, &mut Vec<P>) -> Result<(), E>,
 ) -> Result<(), E> {
-    let mut rest = vec![piece];
+    let mut rest = pieces;
     while let Some(next) = rest.pop() {
         attempt(next, &mut rest)?;
     }

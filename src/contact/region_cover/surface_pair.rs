@@ -1,5 +1,5 @@
 //! Two surfaces that face each other. One is covered, in pieces; the other is measured, and no piece may enter it.
-//! ("Asked" in names means covered.)
+//!
 
 use nalgebra::{Matrix3, Point3, Translation3, Vector3};
 
@@ -50,15 +50,15 @@ pub(crate) struct Witness {
 #[derive(Clone)]
 pub(crate) struct SurfacePair<'a> {
     pub(crate) other: usize,
-    pub(crate) asked: &'a Surface,
+    pub(crate) covered: &'a Surface,
     tree: &'a PatchTree,
     pub(crate) measured: &'a Surface,
     /// Whether the covered surface is the moving part's.
-    pub(crate) asks_part: bool,
+    pub(crate) covers_part: bool,
     /// The pose of the standing part.
     stand: Pose,
     /// At zero shift.
-    measured_from_asked: Pose,
+    measured_from_covered: Pose,
     /// Maps a shift of the part to the shift of the covered surface against the measured one: orthogonal.
     pub(crate) shifted: Matrix3<f64>,
     pub(crate) allowed: f64,
@@ -73,26 +73,26 @@ impl<'a> SurfacePair<'a> {
         scene: &'a Scene,
         (part, start): (usize, &Pose),
         other: usize,
-        asks_part: bool,
+        covers_part: bool,
         termination: &Termination,
     ) -> Result<Self, Interrupt> {
         let (moving, standing) = (&scene.bodies[part], &scene.bodies[other]);
         let stand = standing.planning_from_shape;
         let [mine, theirs] = [moving, standing].map(|body| &body.shape);
-        let (asked, measured, turn) = if asks_part {
+        let (covered, measured, turn) = if covers_part {
             (mine, theirs, stand.rotation.inverse())
         } else {
             (theirs, mine, start.rotation.inverse())
         };
-        let sense = if asks_part { 1.0 } else { -1.0 };
+        let sense = if covers_part { 1.0 } else { -1.0 };
         Ok(Self {
             other,
-            asked: &asked.surface,
-            tree: asked.patches(termination)?,
+            covered: &covered.surface,
+            tree: covered.patches(termination)?,
             measured: &measured.surface,
-            asks_part,
+            covers_part,
             stand,
-            measured_from_asked: measured_from_asked(&stand, start, asks_part),
+            measured_from_covered: measured_from_covered(&stand, start, covers_part),
             shifted: *turn.to_rotation_matrix().matrix() * sense,
             allowed: scene.allowed.of(part, other),
         })
@@ -100,18 +100,18 @@ impl<'a> SurfacePair<'a> {
 
     /// The sides of a pair that can be covered, the smaller surface first: `true` for the moving part's. The other
     /// surface must be closed, as only closed surfaces can be measured.
-    pub(crate) fn asked_first(scene: &Scene, part: usize, other: usize) -> Vec<bool> {
+    pub(crate) fn coverable_sides(scene: &Scene, part: usize, other: usize) -> Vec<bool> {
         let surface = |i: usize| &scene.bodies[i].shape.surface;
         let size = |i: usize| surface(i).bounds().extents().product();
         let mine_first = size(part) <= size(other);
         let mut sides = vec![mine_first, !mine_first];
-        sides.retain(|&asks_part| !surface(if asks_part { other } else { part }).is_open());
+        sides.retain(|&covers_part| !surface(if covers_part { other } else { part }).is_open());
         sides
     }
 
     /// Maps the covered surface's frame to the measured one's with the part at a pose.
     pub(crate) fn with_part_at(&self, pose: &Pose) -> Pose {
-        measured_from_asked(&self.stand, pose, self.asks_part)
+        measured_from_covered(&self.stand, pose, self.covers_part)
     }
 
     /// A corner of a piece in the covered surface's frame, by its index in [`PlacedPiece::points`].
@@ -173,7 +173,7 @@ impl<'a> SurfacePair<'a> {
             Piece::Bit(corners) => bisected(corners).1.map(Piece::Bit).to_vec(),
             Piece::Patch(index) => match self.tree.parts(*index) {
                 Parts::Patches(children) => children.map(Piece::Patch).to_vec(),
-                Parts::Triangles(list) => list.iter().map(|&t| Piece::Bit(self.asked.corners(t))).collect(),
+                Parts::Triangles(list) => list.iter().map(|&t| Piece::Bit(self.covered.corners(t))).collect(),
             },
         }
     }
@@ -181,12 +181,12 @@ impl<'a> SurfacePair<'a> {
     /// Places a piece against the measured surface, with the part shifted by `at`.
     pub(crate) fn place(&self, piece: &Piece, at: &Vector3<f64>, placed: &mut PlacedPiece) {
         let shift = Translation3::from(self.shifted * at);
-        self.place_at(piece, &(shift * self.measured_from_asked), placed);
+        self.place_at(piece, &(shift * self.measured_from_covered), placed);
     }
 
     /// Places a piece with the covered surface at a pose in the measured surface's frame.
-    pub(crate) fn place_at(&self, piece: &Piece, measured_from_asked: &Pose, placed: &mut PlacedPiece) {
-        let place = |p: &Point3<f64>| measured_from_asked * p;
+    pub(crate) fn place_at(&self, piece: &Piece, measured_from_covered: &Pose, placed: &mut PlacedPiece) {
+        let place = |p: &Point3<f64>| measured_from_covered * p;
         placed.points.clear();
         placed.extremes.clear();
         match piece {
@@ -274,14 +274,14 @@ impl<'a> SurfacePair<'a> {
         WantedShift { at, along }: &WantedShift,
         guess: u32,
     ) -> Option<Obstacle> {
-        if self.asked.is_open() {
+        if self.covered.is_open() {
             return None;
         }
-        let here = Translation3::from(self.shifted * at) * self.measured_from_asked;
+        let here = Translation3::from(self.shifted * at) * self.measured_from_covered;
         let ahead = -here.inverse_transform_vector(&(self.shifted * along));
         self.measured.corners_and_middles(triangle).iter().find_map(|p| {
             let p = here.inverse_transform_point(p);
-            let (normal, _) = entered(self.asked, (&p, &ahead), (guess, Slope::Steep), self.allowed)?;
+            let (normal, _) = entered(self.covered, (&p, &ahead), (guess, Slope::Steep), self.allowed)?;
             Some(Obstacle { normal: self.shifted.transpose() * (here * -normal), other: self.other })
         })
     }
@@ -294,7 +294,7 @@ impl<'a> SurfacePair<'a> {
         placed: &PlacedPiece,
         WantedShift { at, along }: &WantedShift,
     ) -> Vec<Point3<f64>> {
-        let Self { asked, tree, measured_from_asked, shifted, .. } = self;
+        let Self { covered, tree, measured_from_covered, shifted, .. } = self;
         let ahead = &(shifted * along);
         let mut probes = placed.points.clone();
         if probes.len() > PROBES {
@@ -306,17 +306,17 @@ impl<'a> SurfacePair<'a> {
         let shift = shifted * at;
         let mut middles = Vec::new();
         let mut middle = |[a, b, c]: [Point3<f64>; 3]| {
-            let area = (b - a).cross(&(c - a)).dot(&measured_from_asked.inverse_transform_vector(ahead));
+            let area = (b - a).cross(&(c - a)).dot(&measured_from_covered.inverse_transform_vector(ahead));
             if area > 0.0 {
                 middles.push((area, Point3::from((a.coords + b.coords + c.coords) / 3.0)));
             }
         };
         match *piece {
-            Piece::Patch(index) => tree.triangles(index).iter().for_each(|&t| middle(asked.corners(t))),
+            Piece::Patch(index) => tree.triangles(index).iter().for_each(|&t| middle(covered.corners(t))),
             Piece::Bit(corners) => middle(corners),
         }
         middles.sort_by(|a, b| b.0.total_cmp(&a.0));
-        probes.extend(middles.into_iter().take(PROBES).map(|(_, p)| measured_from_asked * p + shift));
+        probes.extend(middles.into_iter().take(PROBES).map(|(_, p)| measured_from_covered * p + shift));
         probes
     }
 }
@@ -365,8 +365,8 @@ fn ball_of(corners: &[Point3<f64>; 3]) -> (Point3<f64>, f64) {
     (centre, corners.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max))
 }
 
-fn measured_from_asked(stand: &Pose, part: &Pose, asks_part: bool) -> Pose {
-    if asks_part { stand.inverse() * part } else { part.inverse() * stand }
+fn measured_from_covered(stand: &Pose, part: &Pose, covers_part: bool) -> Pose {
+    if covers_part { stand.inverse() * part } else { part.inverse() * stand }
 }
 
 /// A piece of the covered surface.

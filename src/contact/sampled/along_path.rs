@@ -94,34 +94,41 @@ impl PathSamples {
     /// the motion.
     pub(crate) fn penetrations_along(
         &self,
-        passing: &PairPath<'_>,
+        pair_path: &PairPath<'_>,
         stretch: &[Pose],
         limit: f64,
         termination: &Termination,
     ) -> Result<Vec<Penetration>, Interrupt> {
-        let poses = dense(passing, stretch);
-        let mut penetrations = self.entries_at(passing, &poses, limit, Closeness::Sparse, termination)?;
+        let poses = dense(pair_path, stretch);
+        let mut penetrations =
+            self.penetrations_at(pair_path, &poses, limit, Closeness::Sparse, termination)?;
         if penetrations.iter().all(|e| e.over <= limit) {
-            penetrations.extend(self.entries_at(passing, &poses, limit, Closeness::Dense, termination)?);
+            penetrations.extend(self.penetrations_at(
+                pair_path,
+                &poses,
+                limit,
+                Closeness::Dense,
+                termination,
+            )?);
         }
         Ok(penetrations)
     }
 
     /// The same at some poses, with samples of one density.
-    fn entries_at(
+    fn penetrations_at(
         &self,
-        passing: &PairPath<'_>,
+        pair_path: &PairPath<'_>,
         poses: &[Pose],
         limit: f64,
         closeness: Closeness,
         termination: &Termination,
     ) -> Result<Vec<Penetration>, Interrupt> {
         let back: Vec<Pose> = poses.iter().map(Pose::inverse).collect();
-        let [moving, standing] = passing.surfaces();
-        let [part, other] = passing.parts.map(|part| self.of(part, closeness));
+        let [moving, standing] = pair_path.surfaces();
+        let [part, other] = pair_path.parts.map(|part| self.of(part, closeness));
         let sides = [
-            PathSide { samples: part, to_measured: poses, measured: standing, allowed: passing.allowed },
-            PathSide { samples: other, to_measured: &back, measured: moving, allowed: passing.allowed },
+            PathSide { samples: part, to_measured: poses, measured: standing, allowed: pair_path.allowed },
+            PathSide { samples: other, to_measured: &back, measured: moving, allowed: pair_path.allowed },
         ];
         let mut asked: Vec<SampledStretch> = Vec::new();
         for (side, share) in
@@ -144,7 +151,7 @@ impl PathSamples {
         let mut entered: Vec<DeepSample> = found.into_iter().flatten().collect();
         entered.sort_unstable_by_key(|e| (e.moment, e.side, e.share, e.sample));
         let of_side = entered.chunk_by(|a, b| (a.moment, a.side) == (b.moment, b.side));
-        Ok(of_side.flat_map(|entered| worth_telling(entered, limit * HELPFUL, passing, &sides)).collect())
+        Ok(of_side.flat_map(|entered| worth_telling(entered, limit * HELPFUL, pair_path, &sides)).collect())
     }
 }
 
@@ -152,12 +159,12 @@ impl PathSamples {
 fn worth_telling(
     entered: &[DeepSample],
     deep: f64,
-    passing: &PairPath<'_>,
+    pair_path: &PairPath<'_>,
     sides: &[PathSide<'_>; 2],
 ) -> Vec<Penetration> {
     let worst = entered.iter().map(|e| e.over).fold(0.0, f64::max);
     let entry = |e: &DeepSample| Penetration {
-        other: passing.parts[1],
+        other: pair_path.parts[1],
         on_moving: e.side == 0,
         point: sides[e.side].samples[e.share].points()[e.sample],
         over: e.over,
@@ -285,8 +292,8 @@ fn spacing(bounds: &Bounds, closeness: Closeness) -> Spacing {
 }
 
 /// The poses of a stretch of the path, and as many between them as the density demands.
-fn dense(passing: &PairPath<'_>, path: &[Pose]) -> Vec<Pose> {
-    let PairPath { shapes: [shape, _], centre, longest_side, .. } = passing;
+fn dense(pair_path: &PairPath<'_>, path: &[Pose]) -> Vec<Pose> {
+    let PairPath { shapes: [shape, _], centre, longest_side, .. } = pair_path;
     let step = PATH_DENSITY * longest_side;
     let mut out = Vec::new();
     for (a, b) in path.iter().zip(path.iter().skip(1)) {
@@ -343,11 +350,12 @@ mod tests {
         let t = Termination::default();
         let penetrations = |depth: f64| {
             let (scene, _) = across(depth);
-            let passing = PairPath::standing(&scene, &CongruentPair::turned(&scene, 1, 0));
+            let pair_path = PairPath::standing(&scene, &CongruentPair::turned(&scene, 1, 0));
             let assembled: Vec<Arc<Shape>> = scene.bodies.iter().map(|b| Arc::clone(&b.shape)).collect();
             let samples = PathSamples::new(&assembled, vec![0, 1]);
-            let sparse = samples.entries_at(&passing, &passing.path, 1.0, Closeness::Sparse, &t).unwrap();
-            (sparse.len(), samples.penetrations_along(&passing, &passing.path, 1.0, &t).unwrap().len())
+            let sparse =
+                samples.penetrations_at(&pair_path, &pair_path.path, 1.0, Closeness::Sparse, &t).unwrap();
+            (sparse.len(), samples.penetrations_along(&pair_path, &pair_path.path, 1.0, &t).unwrap().len())
         };
         assert_eq!(penetrations(-0.01), (0, 0));
         let (sparse, all) = penetrations(0.02);
@@ -361,9 +369,9 @@ mod tests {
         let turn = Pose::rotation(Vector3::new(0.0, 0.0, 1.0));
         let path =
             [from, Pose::translation(1.0, 0.0, 0.0) * from, Pose::translation(1.0, 0.0, 0.0) * turn * from];
-        let passing = PairPath::new(&scene, &scene.allowed, [1, 0], &path);
-        let path = &passing.path;
-        let poses = dense(&passing, path);
+        let pair_path = PairPath::new(&scene, &scene.allowed, [1, 0], &path);
+        let path = &pair_path.path;
+        let poses = dense(&pair_path, path);
         assert_eq!((poses[0], poses[poses.len() - 1]), (path[0], path[2]));
         assert!(poses.iter().any(|p| (p.to_matrix() - path[1].to_matrix()).norm() < 1e-12));
         for w in poses.windows(2) {

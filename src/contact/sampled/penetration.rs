@@ -82,7 +82,7 @@ fn is_any_below(
     )
 }
 
-/// Whether some sample is deeper than `limit` in a body, exactly; the body's field tells which samples need not be
+/// Whether some sample is deeper than `limit` in a body, exactly; the body's field shows which samples need not be
 /// measured.
 ///
 /// # Errors

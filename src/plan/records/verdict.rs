@@ -21,7 +21,7 @@ pub(crate) static VERDICT: RecordKind =
 #[derive(Debug, Clone, Copy)]
 pub struct VerdictQuestion<'a> {
     /// The moving part, the standing part, and the path.
-    pub passing: &'a PairPath<'a>,
+    pub pair_path: &'a PairPath<'a>,
     /// The depth at which the path is refused, in the planning frame.
     pub limit: f64,
 }
@@ -56,7 +56,7 @@ impl KnownVerdicts {
             }
         };
         // The record may be of a congruent pair.
-        let [_, other] = question.passing.parts;
+        let [_, other] = question.pair_path.parts;
         verdict.penetrations.iter_mut().for_each(|entry| entry.other = other);
         Ok(verdict)
     }
@@ -69,7 +69,7 @@ impl KnownVerdicts {
 
 impl VerdictQuestion<'_> {
     fn key(&self) -> RecordKey {
-        let PairPath { shapes, path, centre, allowed, longest_side, .. } = self.passing;
+        let PairPath { shapes, path, centre, allowed, longest_side, .. } = self.pair_path;
         let mut digest = Digest::new();
         shapes.iter().for_each(|shape| {
             digest.hash(shape.content());
@@ -102,14 +102,14 @@ mod tests {
         let verdict_on = |parts: [usize; 2], height: f64, aside: f64| {
             let start = scene.bodies[parts[0]].planning_from_shape;
             let path = [start, Pose::translation(aside, 0.0, height) * start];
-            let passing = &PairPath::new(&scene, &scene.allowed, parts, &path);
+            let pair_path = &PairPath::new(&scene, &scene.allowed, parts, &path);
             let check = || {
                 checks.set(checks.get() + 1);
                 let point = Point3::new(0.5, 0.0, height);
                 let entry = Penetration { other: parts[1], on_moving: true, point, over: 0.5 };
                 Ok(Verdict { depth: 0.5, penetrations: vec![entry] })
             };
-            known.verdict(&VerdictQuestion { passing, limit: 2e-3 }, &cache, check).unwrap()
+            known.verdict(&VerdictQuestion { pair_path, limit: 2e-3 }, &cache, check).unwrap()
         };
         let (one, other) = (verdict_on([1, 0], 0.25, 0.0), verdict_on([3, 2], 0.5, 0.0));
         assert_eq!((checks.get(), one.depth, other.depth), (1, 0.5, 0.5));

@@ -2,7 +2,7 @@
 //!
 //! Forces follow the interpolated field, which is off by up to 0.87 cells near edges, and contact
 //! points are far apart; so what a motion claims is checked by other means: the samples that
-//! `sliding` uses, against the triangles. The field only tells which samples need not be asked.
+//! `sliding` uses, against the triangles. The field only shows which samples need no measurement.
 
 use crate::budgets::SHORT_STEPS_PER_POLL;
 use crate::contact::sampled;

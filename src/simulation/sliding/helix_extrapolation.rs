@@ -10,20 +10,23 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Translation3, UnitQuaternion, Vector3, Vector6};
 
-use crate::budgets::{FREE_STATIONS, HELD_STATIONS, HELIX_LEAP_STEPS, LEAP_STEPS, SHORTEST_HELIX_LEAP};
+use crate::budgets::{
+    EXTRAPOLATION_STEPS, FREE_STATIONS, HELD_STATIONS, HELIX_EXTRAPOLATION_STEPS,
+    SHORTEST_HELIX_EXTRAPOLATION,
+};
 use crate::contact::sampled::{ContactSet, ContactSource, MovingBody};
 use crate::geometry::{Pose, Screw};
 use crate::scene::{Scene, StandingParts};
 use crate::termination::{Interrupt, try_all};
 use crate::tolerances::{
-    DEPTH_TOLERANCE, LEAP_ANGLE, LEAST_PITCH, PRESSED_DEPTH, PRESSED_PROBE, PRESSED_PROBE_ON_HELIX,
+    DEPTH_TOLERANCE, EXTRAPOLATION_ANGLE, LEAST_PITCH, PRESSED_DEPTH, PRESSED_PROBE, PRESSED_PROBE_ON_HELIX,
     SAME_HELIX, SAME_STEP, SCREW_FROM_POSES_ANGLE, SEEN_HELIX_ANGLE,
 };
 
 use super::drive::Drive;
 
 /// A long step.
-pub(super) struct HelixLeap {
+pub(super) struct Extrapolated {
     /// Its poses, the last one at its end.
     pub(super) poses: Vec<Pose>,
     /// The contacts at its end, if they were gathered.
@@ -80,13 +83,13 @@ impl<'a> HelixExtrapolation<'a> {
 
     /// A long step after an ordinary contact step from `from` to the body's pose, if the motion is the same as
     /// before. `pressing` are the directions in which contact held the part back.
-    pub(super) fn leap(
+    pub(super) fn extrapolated(
         &mut self,
         from: &Pose,
         mover: &MovingBody<'_>,
         pressing: Vec<Vector6<f64>>,
         around: &mut dyn ContactSource,
-    ) -> Result<Option<HelixLeap>, Interrupt> {
+    ) -> Result<Option<Extrapolated>, Interrupt> {
         if self.disabled {
             return Ok(None);
         }
@@ -111,7 +114,7 @@ impl<'a> HelixExtrapolation<'a> {
             if near.contacts.iter().all(|c| c.gap >= -DEPTH_TOLERANCE) {
                 self.length = if steps == wanted { steps * 2 } else { steps };
                 self.alike = self.alike.map(|(begin, count)| (begin, count + steps));
-                return Ok(Some(leapt(mover, &now, steps, Some(near))));
+                return Ok(Some(extrapolated_by(mover, &now, steps, Some(near))));
             }
             steps /= 2;
         }
@@ -133,18 +136,18 @@ impl<'a> HelixExtrapolation<'a> {
     }
 
     /// The next long step along the helix that is being followed.
-    pub(super) fn follow(&mut self, mover: &MovingBody<'_>) -> Result<Option<HelixLeap>, Interrupt> {
+    pub(super) fn follow(&mut self, mover: &MovingBody<'_>) -> Result<Option<Extrapolated>, Interrupt> {
         let Some(FollowedHelix { screw, length, pressing }) = self.helix.take() else { return Ok(None) };
-        let wanted = telling(&screw, length.min(HELIX_LEAP_STEPS));
+        let wanted = telling(&screw, length.min(HELIX_EXTRAPOLATION_STEPS));
         let mut steps = telling(&screw, self.free_on_helix(mover, &screw, wanted, &pressing)?);
-        while steps >= SHORTEST_HELIX_LEAP {
+        while steps >= SHORTEST_HELIX_EXTRAPOLATION {
             let there = MovingBody { pose: screw.times(steps as f64) * mover.pose, ..*mover };
             if let Some(pose) = self.drive.lifted(&there, &screw.axis(), self.standing_parts)? {
                 let angle = screw.angle() * steps as f64;
                 let screw = Screw::between_turning(&mover.pose, &pose, steps, &screw, angle);
                 let length = if steps == wanted { steps * 2 } else { steps };
                 self.helix = Some(FollowedHelix { screw, length, pressing });
-                return Ok(Some(leapt(mover, &screw, steps, None)));
+                return Ok(Some(extrapolated_by(mover, &screw, steps, None)));
             }
             steps = telling(&screw, steps / 2);
         }
@@ -212,8 +215,12 @@ impl<'a> HelixExtrapolation<'a> {
 
 /// The largest number of steps along a screw.
 fn longest(screw: &Screw) -> usize {
-    let most = if screw.angle() > 0.0 { (LEAP_ANGLE / screw.angle()) as usize } else { LEAP_STEPS };
-    most.min(LEAP_STEPS)
+    let most = if screw.angle() > 0.0 {
+        (EXTRAPOLATION_ANGLE / screw.angle()) as usize
+    } else {
+        EXTRAPOLATION_STEPS
+    };
+    most.min(EXTRAPOLATION_STEPS)
 }
 
 /// The step up to which all stations are good. Stations are a number of steps apart; beyond the last good one they
@@ -236,15 +243,20 @@ fn good_until(
 fn telling(screw: &Screw, wanted: usize) -> usize {
     let tells = |steps: &usize| {
         let angle = screw.angle() * *steps as f64;
-        angle < LEAP_ANGLE
+        angle < EXTRAPOLATION_ANGLE
             || (SCREW_FROM_POSES_ANGLE..=TAU - SCREW_FROM_POSES_ANGLE).contains(&angle.rem_euclid(TAU))
     };
     (1..=wanted).rev().find(tells).unwrap_or(0)
 }
 
-fn leapt(mover: &MovingBody<'_>, screw: &Screw, steps: usize, near: Option<ContactSet>) -> HelixLeap {
+fn extrapolated_by(
+    mover: &MovingBody<'_>,
+    screw: &Screw,
+    steps: usize,
+    near: Option<ContactSet>,
+) -> Extrapolated {
     let poses = (1..=steps).map(|k| screw.times(k as f64) * mover.pose).collect();
-    HelixLeap { poses, near, turned: screw.angle() * steps as f64 }
+    Extrapolated { poses, near, turned: screw.angle() * steps as f64 }
 }
 
 #[cfg(test)]
@@ -267,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn leaps_along_a_helix_do_not_end_near_whole_turns() {
+    fn extrapolations_along_a_helix_do_not_end_near_whole_turns() {
         let turn = Pose::new(Vector3::z() * 0.01, Vector3::z() * 0.1);
         let screw = Screw::between(&Pose::identity(), &turn, 1);
         assert_eq!(telling(&screw, 20), 20, "within the first turn");

@@ -2,7 +2,7 @@
 //!
 //! A translation (`push`) is a shift: the [region cover](crate::contact::region_cover) of the surfaces bounds how far it
 //! may go, and names what is in the way. Where nothing bends a push, a shape cast finds what it meets (`free_flight`). For
-//! what may turn, and where a region cover cannot answer for a push (open surfaces, deep allowed overlap, points that
+//! what may turn, and where a region cover cannot answer for a push (open surfaces, deep allowed penetration, points that
 //! verification found missing), each step projects the wanted twist onto what contact allows, in the metric of the
 //! part's mass (rotation weighed by the squared radius of gyration), and advances the pose by the result (`drive`).
 //! Contacts come from the pieces of surface that leave their regions, or, where surfaces are too complicated for that,
@@ -82,8 +82,8 @@ impl TransitionFunction for SlidingEngine {
         while path.len() < MOTION_POSES {
             termination.check()?;
             let (mut turned, mut touching) = (0.0, Vec::new());
-            let mut leap = extrapolation.follow(&mover)?;
-            if leap.is_none() {
+            let mut extrapolated = extrapolation.follow(&mover)?;
+            if extrapolated.is_none() {
                 let mut here = around.settle(&mover, near.take())?;
                 let step = match drive.advance(&mover, &mut here, &mut around)? {
                     Step::Stuck { with } => {
@@ -97,15 +97,15 @@ impl TransitionFunction for SlidingEngine {
                 path.push(step.pose);
                 // With regions, an ordinary step costs less than checking a long one.
                 if is_straight && !here.contacts.is_empty() && around.samples() {
-                    leap = extrapolation.leap(&from, &mover, step.pressing, &mut around)?;
+                    extrapolated = extrapolation.extrapolated(&from, &mover, step.pressing, &mut around)?;
                 }
                 (turned, touching, near) = (step.turned, step.touching, Some(step.near));
             }
-            if let Some(leap) = leap {
-                path.extend(leap.poses);
+            if let Some(extrapolated) = extrapolated {
+                path.extend(extrapolated.poses);
                 mover.pose = path[path.len() - 1];
-                near = leap.near;
-                turned += leap.turned;
+                near = extrapolated.near;
+                turned += extrapolated.turned;
             }
             termination.check()?;
             let hint = asked_again(&action, asked.len());

@@ -84,9 +84,9 @@ pub fn pair_blocks(
 fn derived(scene: &Scene, part: usize, other: usize, termination: &Termination) -> Result<(), Interrupt> {
     let [one, two] = [part, other].map(|i| &scene.bodies[i].shape);
     // The patch tree of the other part is seldom needed.
-    let first = SurfacePair::asked_first(scene, part, other)
+    let first = SurfacePair::coverable_sides(scene, part, other)
         .first()
-        .map(|asks_part| if *asks_part { one } else { two });
+        .map(|covers_part| if *covers_part { one } else { two });
     let (_, patches) = rayon::join(
         || rayon::join(|| one.surface.prepare(), || two.surface.prepare()),
         || first.map_or(Ok(()), |shape| shape.patches(termination).map(|_| ())),

@@ -30,7 +30,7 @@ pub(super) struct Push<'a> {
     force: Vector3<f64>,
     /// The shift so far.
     shift: Vector3<f64>,
-    cells: ShiftCover<'a>,
+    cover: ShiftCover<'a>,
     /// The shift at which nearby parts were last searched.
     asked_at: Option<Vector3<f64>>,
     stalls: usize,
@@ -62,7 +62,7 @@ impl<'a> Push<'a> {
             bounds: shape.bounds().transformed(start),
             force,
             shift: Vector3::zeros(),
-            cells: ShiftCover::new(scene, (part, start), termination),
+            cover: ShiftCover::new(scene, (part, start), termination),
             asked_at: None,
             stalls: 0,
             contact_step: contact_step(shape),
@@ -102,7 +102,7 @@ impl<'a> Push<'a> {
         self.look_around()?;
         for bends in 0.. {
             let known = obstacles.len();
-            self.cells.make_way(&self.shift, &u, &mut obstacles)?;
+            self.cover.make_way(&self.shift, &u, &mut obstacles)?;
             if obstacles.len() == known {
                 break;
             }
@@ -116,15 +116,15 @@ impl<'a> Push<'a> {
         }
         self.flight.stepped(!obstacles.is_empty());
         if self.is_long && self.shift == Vector3::zeros() {
-            self.cells.lengthen(&u)?;
+            self.cover.lengthen(&u)?;
         }
         let longest = if obstacles.is_empty() { FREE_STEP } else { self.contact_step };
         let seen = self.asked_at.map_or(0.0, |at| FREE_STEP - (self.shift - at).norm());
         let most = longest.min(seen);
         // A push that is only to show a short way must not pay for regions further on.
         let length = match self.is_long {
-            true => self.cells.advance(&self.shift, &u, most)?,
-            false => self.cells.length(&self.shift, &u).min(most),
+            true => self.cover.advance(&self.shift, &u, most)?,
+            false => self.cover.length(&self.shift, &u).min(most),
         };
         self.stalls = if length < STALL { self.stalls + 1 } else { 0 };
         if self.stalls > STALLS {
@@ -150,7 +150,7 @@ impl<'a> Push<'a> {
 
     /// Former regions lie elsewhere.
     fn land(&mut self) {
-        self.cells = self.cells.anew();
+        self.cover = self.cover.anew();
         (self.asked_at, self.stalls) = (None, 0);
     }
 
@@ -172,8 +172,8 @@ impl<'a> Push<'a> {
         }
         self.asked_at = Some(self.shift);
         for other in self.scene.broad_phase.meeting_of(self.standing, &self.here().grown(FREE_STEP)) {
-            if !self.cells.knows(other) {
-                self.cells.add(other, &self.shift)?;
+            if !self.cover.knows(other) {
+                self.cover.add(other, &self.shift)?;
             }
         }
         Ok(())

@@ -107,16 +107,16 @@ fn of_shift(
     if near.is_empty() {
         return Ok(None);
     }
-    let mut cells = ShiftCover::new(&scene, (part, start), termination);
+    let mut cover = ShiftCover::new(&scene, (part, start), termination);
     let (here, mut obstacles) = (Vector3::zeros(), Vec::new());
     let cost = (|| {
-        let (gathered, gather) = timed(|| near.iter().try_for_each(|&other| cells.add(other, &here)));
+        let (gathered, gather) = timed(|| near.iter().try_for_each(|&other| cover.add(other, &here)));
         gathered?;
-        let (made, reduce) = timed(|| cells.make_way(&here, &force, &mut obstacles));
+        let (made, reduce) = timed(|| cover.make_way(&here, &force, &mut obstacles));
         made?;
         let (along, solve) = timed(|| projected(&force, &obstacles));
         let along = along.and_then(|(along, _)| along.try_normalize(1e-9));
-        let (length, advance) = timed(|| along.map(|u| cells.advance(&here, &u, FREE_STEP)).transpose());
+        let (length, advance) = timed(|| along.map(|u| cover.advance(&here, &u, FREE_STEP)).transpose());
         length?;
         Ok(StepCost { telling: PairMethod::Shifts, gather, reduce, solve, advance })
     })();

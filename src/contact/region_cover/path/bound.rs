@@ -23,9 +23,9 @@ impl PathSearch<'_> {
         fits: impl Fn(&FreeRegion, f64) -> Fit,
         corners: impl Fn() -> Vec<Point3<f64>>,
     ) -> bool {
-        let asked = self.asked;
+        let question = self.question;
         let ignored = self.ignored() - slack;
-        if ignored < 0.0 || (swept.radius > asked.precision.coarse && self.is_beside_rim(swept)) {
+        if ignored < 0.0 || (swept.radius > question.precision.coarse && self.is_beside_rim(swept)) {
             return false;
         }
         let place = place(swept);
@@ -40,14 +40,14 @@ impl PathSearch<'_> {
                     && self.settled(depth + slack);
             }
         }
-        let closest = asked.measured.closest_from(&swept.centre, hint.triangle);
+        let closest = question.measured.closest_from(&swept.centre, hint.triangle);
         hint.triangle = closest.triangle;
-        let signed = asked.measured.signed(&swept.centre, &closest);
+        let signed = question.measured.signed(&swept.centre, &closest);
         // Depth changes by no more than the distance, unless the surface has holes. Then its sign changes in mid-air,
         // too, where the winding number passes one half: a point far outside may lie next to one as far inside.
         if swept.radius - signed <= ignored {
             return (!self.has_rim
-                || asked.measured.stays_outside(&swept.centre, swept.radius)
+                || question.measured.stays_outside(&swept.centre, swept.radius)
                 || self.is_outside(swept, ignored, hint.triangle))
                 && self.settled(swept.radius - signed + slack);
         }
@@ -56,9 +56,9 @@ impl PathSearch<'_> {
         }
         // A region that is wider than a large piece needs is useless; of a small piece, a wide region shows how deep
         // it really is.
-        let coarse = asked.precision.coarse;
+        let coarse = question.precision.coarse;
         let wide = if swept.radius > coarse { 0.0 } else { swept.radius.min(coarse / 8.0) };
-        let most = (asked.allowed + asked.precision.deep - slack).min(wide).max(ignored);
+        let most = (question.allowed + question.precision.deep - slack).min(wide).max(ignored);
         if -signed > most {
             return false;
         }
@@ -84,7 +84,7 @@ impl PathSearch<'_> {
             }
         }
         let id = self.regions.len() as u32;
-        let is_outside = free.is_outside(asked.measured);
+        let is_outside = free.is_outside(question.measured);
         self.regions.push(KnownRegion { free, is_outside });
         hint.region = Some(id);
         hint.is_vain = false;
@@ -100,7 +100,7 @@ impl PathSearch<'_> {
     /// Whether the triangles around a piece bound well how deep it gets; raises the bound.
     fn is_bounded(&mut self, swept: &SweptBall, signed: f64, slack: f64, guess: u32) -> bool {
         let ignored = self.ignored() - slack;
-        let SideQuestion { measured, allowed, precision, .. } = self.asked;
+        let SideQuestion { measured, allowed, precision, .. } = self.question;
         // Deeper points are to be recorded.
         let most = ignored.max(allowed + precision.deep - slack);
         // No triangle is nearer to the centre than the nearest one.
@@ -126,13 +126,13 @@ impl PathSearch<'_> {
     ) -> Option<FreeRegion> {
         let SweptBall { centre, radius, .. } = swept;
         let wanted = Wanted { points: &self.wanted, most, from_behind: false, facing: self.facing };
-        self.asked.measured.free_region_sparing(centre, radius * SWEPT_ROOM, seen, wanted, ignored).ok()
+        self.question.measured.free_region_sparing(centre, radius * SWEPT_ROOM, seen, wanted, ignored).ok()
     }
 
     /// Whether a depth is real, as measured at the worst corner, or too small to matter, and not the effect of a
     /// region that is too narrow.
     fn is_told(&mut self, swept: &SweptBall, depth: f64, worst: &Point3<f64>, guess: u32) -> bool {
-        let SideQuestion { measured, allowed, precision, .. } = self.asked;
+        let SideQuestion { measured, allowed, precision, .. } = self.question;
         let real = -measured.signed(worst, &measured.closest_from(worst, guess));
         let beyond = depth - allowed;
         let small = swept.radius <= precision.coarse && beyond <= precision.deep / 2.0;
@@ -147,13 +147,13 @@ impl PathSearch<'_> {
 
     /// Raises the bound.
     pub(super) fn settled(&mut self, depth: f64) -> bool {
-        self.found.bound = self.found.bound.max(depth - self.asked.allowed);
+        self.found.bound = self.found.bound.max(depth - self.question.allowed);
         true
     }
 
     /// Whether a hole is so near that all of a piece cannot have one sign.
     fn is_beside_rim(&self, swept: &SweptBall) -> bool {
-        self.asked
+        self.question
             .measured
             .rim()
             .is_some_and(|rim| rim.slope(&swept.centre, swept.radius) * swept.radius > 0.5)
@@ -162,7 +162,7 @@ impl PathSearch<'_> {
     /// Whether a piece is small with its corners no deeper than `most`: beside a surface with holes a region may be
     /// inside.
     fn is_outside(&self, swept: &SweptBall, most: f64, guess: u32) -> bool {
-        let SideQuestion { measured, precision, .. } = self.asked;
+        let SideQuestion { measured, precision, .. } = self.question;
         let depth = |p: &Point3<f64>| -measured.signed(p, &measured.closest_from(p, guess));
         swept.radius <= precision.coarse && self.wanted.iter().all(|p| depth(p) <= most)
     }

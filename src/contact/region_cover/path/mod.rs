@@ -51,7 +51,7 @@ pub(crate) struct DepthPrecision {
 
 /// How deep does a part get along a path past a standing one?
 pub(crate) struct PathQuestion<'a> {
-    pub(crate) passing: &'a PairPath<'a>,
+    pub(crate) pair_path: &'a PairPath<'a>,
     pub(crate) course: &'a Course,
     pub(crate) precision: DepthPrecision,
     pub(crate) termination: &'a Termination,
@@ -60,7 +60,7 @@ pub(crate) struct PathQuestion<'a> {
 impl PathQuestion<'_> {
     /// How deep the moving part gets into the standing one, and the other way round.
     pub(crate) fn depth(&self) -> Result<[PathDepth; 2], Interrupt> {
-        let [moving, standing] = self.passing.surfaces();
+        let [moving, standing] = self.pair_path.surfaces();
         let side = |on_moving| {
             let measured = if on_moving { standing } else { moving };
             let most_effort = if measured.rim().is_some() { PATH_EFFORT_IN_DOUBT } else { PATH_EFFORT };
@@ -78,14 +78,14 @@ impl PathQuestion<'_> {
         interval: Interval,
         most_effort: usize,
     ) -> Result<PathDepth, Interrupt> {
-        let Self { passing, course, precision, termination } = *self;
-        let [moving, standing] = passing.shapes;
+        let Self { pair_path, course, precision, termination } = *self;
+        let [moving, standing] = pair_path.shapes;
         let (looked_at, measured) = if on_moving { (moving, standing) } else { (standing, moving) };
         let question = SideQuestion {
             surface: &looked_at.surface,
             tree: looked_at.patches(termination)?,
             measured: &measured.surface,
-            allowed: passing.allowed,
+            allowed: pair_path.allowed,
             precision,
         };
         let view = CourseView::new(course, on_moving, precision.finest / 16.0);
@@ -171,7 +171,7 @@ struct KnownRegion {
 
 /// The state of a search: the question, the regions so far, the hull of the current piece, and the answer so far.
 struct PathSearch<'a> {
-    asked: &'a SideQuestion<'a>,
+    question: &'a SideQuestion<'a>,
     /// Whether the measured surface has holes, so that the depth changes its sign away from the surface, too.
     has_rim: bool,
     most_effort: usize,
@@ -196,14 +196,14 @@ struct PathSearch<'a> {
 
 impl<'a> PathSearch<'a> {
     fn new(
-        asked: &'a SideQuestion<'a>,
+        question: &'a SideQuestion<'a>,
         view: CourseView<'a>,
         most_effort: usize,
         termination: &'a Termination,
     ) -> Self {
-        let rim = asked.measured.rim();
+        let rim = question.measured.rim();
         Self {
-            asked,
+            question,
             has_rim: rim.is_some(),
             most_effort,
             price: 1 + rim.map_or(0, |rim| rim.edges().len() / RIM_EDGES_PER_EFFORT),

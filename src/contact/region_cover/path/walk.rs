@@ -49,10 +49,10 @@ struct TrianglePiece {
 impl PathSearch<'_> {
     /// Searches all of the surface on a stretch of the path.
     pub(super) fn all(&mut self, interval: Interval) -> Result<(), Interrupt> {
-        if let Some(node) = self.asked.tree.root() {
+        if let Some(node) = self.question.tree.root() {
             let hint = SearchHint { triangle: 0, region: None, is_vain: false };
             let root = SweptPiece::Patch(PatchPiece { node, interval, share: 1.0, hint });
-            cover(root, |piece, rest| {
+            cover(vec![root], |piece, rest| {
                 self.termination.check()?;
                 self.found.effort += self.price;
                 if self.is_enough() {
@@ -88,7 +88,7 @@ impl PathSearch<'_> {
     /// Bounds a node of the tree on a stretch of the path, or splits it.
     fn patch(&mut self, piece: PatchPiece, rest: &mut Vec<SweptPiece>) {
         let PatchPiece { node: index, interval, share, mut hint } = piece;
-        let tree = self.asked.tree;
+        let tree = self.question.tree;
         let patch = tree.patch(index);
         let leg = self.view.leg(interval);
         let mut in_time = leg.maps.is_empty();
@@ -141,7 +141,7 @@ impl PathSearch<'_> {
             Parts::Triangles(list) => {
                 let share = piece.share / list.len() as f64;
                 rest.extend(list.iter().rev().map(|&t| {
-                    let corners = self.asked.surface.corners(t);
+                    let corners = self.question.surface.corners(t);
                     SweptPiece::Triangle(TrianglePiece { corners, is_new: [true; 3], interval, share, hint })
                 }));
             }
@@ -207,12 +207,12 @@ impl PathSearch<'_> {
         if self.has_rim || points.len() > OF_STRAIGHT_WAY {
             return None;
         }
-        clipped(points, &self.asked.measured.bounds().grown(slack + CLIP_MARGIN))
+        clipped(points, &self.question.measured.bounds().grown(slack + CLIP_MARGIN))
     }
 
     /// Whether the box of the measured surface lies beside a hull of balls.
     fn is_apart(&self, centres: &[Point3<f64>], radius: f64) -> bool {
-        let bounds = self.asked.measured.bounds();
+        let bounds = self.question.measured.bounds();
         (0..3).any(|a| {
             centres.iter().all(|c| c[a] - radius >= bounds.max[a])
                 || centres.iter().all(|c| c[a] + radius <= bounds.min[a])
@@ -222,14 +222,14 @@ impl PathSearch<'_> {
     /// Measures the corners of a piece at its end; returns whether nothing more can be said about the piece.
     fn is_measured(&mut self, piece: &TrianglePiece, leg: &Leg, swept: &SweptBall, guess: u32) -> bool {
         let TrianglePiece { corners, is_new, .. } = piece;
-        let asked = self.asked;
+        let question = self.question;
         let over = |at: &Point3<f64>| {
-            -asked.measured.signed(at, &asked.measured.closest_from(at, guess)) - asked.allowed
+            -question.measured.signed(at, &question.measured.closest_from(at, guess)) - question.allowed
         };
         for (p, _) in corners.iter().zip(is_new).filter(|(_, new)| **new) {
             let over = over(&(leg.end * p));
             self.found.depth = self.found.depth.max(over);
-            if over > asked.precision.deep {
+            if over > question.precision.deep {
                 self.found.deep.push((*p, over));
             }
         }
@@ -245,25 +245,25 @@ impl PathSearch<'_> {
         if self.has_rim {
             bound = self.wanted.iter().map(over).fold(bound, f64::max);
         }
-        if bound > asked.precision.deep {
+        if bound > question.precision.deep {
             if swept.radius > self.finest() / DOUBTED_SIZE {
                 return false;
             }
             self.found.deep.push((corners[0], bound));
         }
-        self.settled(asked.allowed + bound)
+        self.settled(question.allowed + bound)
     }
 
     /// The depth up to which nothing is searched: allowed, ignored, or as good as found.
     pub(super) fn ignored(&self) -> f64 {
-        let precision = self.asked.precision;
+        let precision = self.question.precision;
         let found = self.found.depth + precision.margin_of(self.found.depth);
-        self.asked.allowed + found.min(precision.deep).max(precision.ignored)
+        self.question.allowed + found.min(precision.deep).max(precision.ignored)
     }
 
     /// The smallest size of pieces at present.
     fn finest(&self) -> f64 {
-        let DepthPrecision { deep, finest, coarse, .. } = self.asked.precision;
+        let DepthPrecision { deep, finest, coarse, .. } = self.question.precision;
         if self.found.depth > deep { coarse } else { finest }
     }
 }

@@ -73,7 +73,7 @@ impl<'a> RigidPair<'a> {
         let gathered = starting(scene, (part, pose), other, (is_start, RIGID_PIECES), termination)?;
         let pieces = gathered.pieces.as_ref().filter(|pieces| pieces.len() <= RIGID_PIECES);
         let Some(pieces) = pieces else { return Ok(None) };
-        let surfaces = SurfacePair::new(scene, (part, pose), other, gathered.asks_part, termination)?;
+        let surfaces = SurfacePair::new(scene, (part, pose), other, gathered.covers_part, termination)?;
         let mut placed = PlacedPiece::default();
         let here = surfaces.with_part_at(pose);
         let pieces = pieces
@@ -179,7 +179,7 @@ impl<'a> RigidPair<'a> {
                 let gap = seen.signed + surfaces.allowed;
                 if gap < -most {
                     let sample = surfaces.corner(&piece.spot.piece, k);
-                    let (is_moving, at) = (surfaces.asks_part, (gap, seen.closest));
+                    let (is_moving, at) = (surfaces.covers_part, (gap, seen.closest));
                     inside.push(Contact::measured(surfaces.other, is_moving, sample, at, surfaces.allowed));
                 }
             }
@@ -243,7 +243,7 @@ impl<'a> RigidPair<'a> {
         out: &mut Vec<RigidPiece>,
     ) -> Result<(), Uncovered> {
         let mut is_whole = true;
-        cover(piece.clone(), |mut piece, rest| {
+        cover(vec![piece.clone()], |mut piece, rest| {
             // A part may lie in the region of the whole piece.
             if !std::mem::take(&mut is_whole) {
                 let at_here = piece.slack_at(&self.surfaces, &ends.here, 0.0, &mut self.placed);
@@ -372,7 +372,7 @@ impl<'a> RigidPair<'a> {
             }
         }
         let (_, p) = deepest.filter(|(gap, _)| *gap < -DEPTH_TOLERANCE)?;
-        Some(Contact::measured(surfaces.other, surfaces.asks_part, p, gap(&p), surfaces.allowed))
+        Some(Contact::measured(surfaces.other, surfaces.covers_part, p, gap(&p), surfaces.allowed))
     }
 
     /// A small bit that is not too deep, in front of the nearest face: where surfaces cross by less than the
@@ -443,16 +443,16 @@ impl<'a> RigidPair<'a> {
 
 /// The corner of a measured triangle, or the middle of one of its sides, that is too deep in the covered solid.
 fn pierced(surfaces: &SurfacePair<'_>, piece: &RigidPiece, triangle: u32, there: &Pose) -> Option<Contact> {
-    if surfaces.asked.is_open() {
+    if surfaces.covered.is_open() {
         return None;
     }
     let guess = surfaces.triangle_of(&piece.spot.piece).unwrap_or(0);
     surfaces.measured.corners_and_middles(triangle).into_iter().find_map(|point| {
         let p = there.inverse_transform_point(&point);
-        let closest = surfaces.asked.closest_from(&p, guess);
-        let gap = surfaces.asked.signed(&p, &closest) + surfaces.allowed;
+        let closest = surfaces.covered.closest_from(&p, guess);
+        let gap = surfaces.covered.signed(&p, &closest) + surfaces.allowed;
         let at = (gap, closest);
         (gap < -DEPTH_TOLERANCE)
-            .then(|| Contact::measured(surfaces.other, !surfaces.asks_part, point, at, surfaces.allowed))
+            .then(|| Contact::measured(surfaces.other, !surfaces.covers_part, point, at, surfaces.allowed))
     })
 }

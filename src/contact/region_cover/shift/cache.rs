@@ -38,7 +38,7 @@ impl<'a> StartPair<'a> {
 #[derive(Debug, Clone)]
 pub(crate) struct StartCover {
     /// Whether the covered surface is the moving part's.
-    pub(crate) asks_part: bool,
+    pub(crate) covers_part: bool,
     /// `None` if no cover was found.
     pub(crate) pieces: Option<Arc<Vec<ShiftPiece>>>,
     /// The number of regions that were computed.
@@ -49,7 +49,7 @@ impl StartCover {
     /// The same pair with the other part moving.
     fn mirrored(&self) -> Self {
         let pieces = self.pieces.as_deref().map(|pieces| mirrored(pieces));
-        Self { asks_part: !self.asks_part, pieces, regions: self.regions }
+        Self { covers_part: !self.covers_part, pieces, regions: self.regions }
     }
 }
 

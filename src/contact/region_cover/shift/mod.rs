@@ -80,7 +80,7 @@ impl<'a> ShiftCover<'a> {
             Arc::new(gathered(scene, &place, at, SHIFT_PIECES, termination)?)
         };
         let surfaces =
-            SurfacePair::new(scene, (self.part, &self.start), other, gathered.asks_part, termination)?;
+            SurfacePair::new(scene, (self.part, &self.start), other, gathered.covers_part, termination)?;
         let pieces = gathered.pieces.clone().ok_or(Halt::Lost)?;
         self.pairs.push(ShiftPair { surfaces, pieces, witnesses: Vec::new() });
         self.count(gathered.regions)
@@ -114,9 +114,9 @@ impl<'a> ShiftCover<'a> {
             let there = at + u * reached;
             let pair = &mut self.pairs[i];
             let left = REGIONS_PER_SHIFT - self.regions;
-            let mut finder = ShiftSearch::new(&pair.surfaces, left, self.termination);
-            let found = finder.find(pair.pieces[k].spot, &there, u);
-            let (mut pieces, regions) = (finder.pieces, finder.regions);
+            let mut search = ShiftSearch::new(&pair.surfaces, left, self.termination);
+            let found = search.find(pair.pieces[k].spot, &there, u);
+            let (mut pieces, regions) = (search.pieces, search.regions);
             match found {
                 // The next step finds this obstacle again, with the force unchanged.
                 Err(Halt::Blocked | Halt::Lost) => return Ok(reached),
@@ -243,7 +243,7 @@ fn way(
 ) -> Result<ShiftWay, Interrupt> {
     let base = kept(scene, place, termination)?;
     let surfaces =
-        SurfacePair::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
+        SurfacePair::new(scene, (place.part, place.start), place.other, base.covers_part, termination)?;
     let lost = ShiftWay { blocked: Vec::new(), pieces: None, found: 0, regions: REGIONS_PER_SHIFT };
     let Some(base) = &base.pieces else { return Ok(lost) };
     let mut pieces = Arc::clone(base);
@@ -275,12 +275,12 @@ fn long_way(
         .way(scene, place, (u, false), |scene, place, u| way(scene, place, u, termination))?;
     let base = kept(scene, place, termination)?;
     let surfaces =
-        SurfacePair::new(scene, (place.part, place.start), place.other, base.asks_part, termination)?;
-    let mut finder = ShiftSearch::new(&surfaces, REGIONS_PER_SHIFT, termination);
+        SurfacePair::new(scene, (place.part, place.start), place.other, base.covers_part, termination)?;
+    let mut search = ShiftSearch::new(&surfaces, REGIONS_PER_SHIFT, termination);
     let mut lengthened = |piece: &ShiftPiece| {
         termination.check()?;
         let length = piece.length(&Vector3::zeros(), u);
-        let longer = if length < FREE_STEP { finder.far(piece.spot, u, length) } else { None };
+        let longer = if length < FREE_STEP { search.far(piece.spot, u, length) } else { None };
         Ok(longer.unwrap_or_else(|| piece.clone()))
     };
     let mut pieces = short.pieces.as_deref().cloned();
@@ -291,7 +291,7 @@ fn long_way(
             *piece = lengthened(piece)?;
         }
     }
-    Ok(ShiftWay { blocked: Vec::new(), pieces: pieces.map(Arc::new), found: 0, regions: finder.regions })
+    Ok(ShiftWay { blocked: Vec::new(), pieces: pieces.map(Arc::new), found: 0, regions: search.regions })
 }
 
 /// Covers all of a surface of a pair at a shift, with no more than `most` pieces.
@@ -303,49 +303,50 @@ fn gathered(
     termination: &Termination,
 ) -> Result<StartCover, Interrupt> {
     let &StartPair { part, start, other, .. } = place;
-    let surfaces = |asks_part| SurfacePair::new(scene, (part, start), other, asks_part, termination);
-    let asked = SurfacePair::asked_first(scene, part, other);
+    let surfaces = |covers_part| SurfacePair::new(scene, (part, start), other, covers_part, termination);
+    let coverable = SurfacePair::coverable_sides(scene, part, other);
     // On its way no piece may get deeper than the engine allows.
     let held = if at == &Vector3::zeros() { HELD_AT_FIRST } else { HELD };
     // One side is mostly enough. The patch tree of the other, perhaps of a large part, is built when it is needed.
-    let sides: Vec<OnceCell<SurfacePair<'_>>> = asked.iter().map(|_| OnceCell::new()).collect();
-    let mut finders: Vec<Option<ShiftSearch<'_>>> = asked.iter().map(|_| None).collect();
+    let sides: Vec<OnceCell<SurfacePair<'_>>> = coverable.iter().map(|_| OnceCell::new()).collect();
+    let mut searches: Vec<Option<ShiftSearch<'_>>> = coverable.iter().map(|_| None).collect();
     // The inner or simpler surface needs fewer pieces. Which one this is shows in trying both in turn; then the side
     // that seems to need fewer gets twice the budget.
-    let mut budgets = vec![if asked.len() > 1 { FIRST_SIDE_REGIONS } else { REGIONS_PER_SHIFT }; asked.len()];
-    let mut is_told = !asked.is_empty();
-    while is_told {
-        let needed = |i: usize| finders[i].as_ref().map_or(0.0, |finder| finder.needed);
+    let mut budgets =
+        vec![if coverable.len() > 1 { FIRST_SIDE_REGIONS } else { REGIONS_PER_SHIFT }; coverable.len()];
+    let mut goes_on = !coverable.is_empty();
+    while goes_on {
+        let needed = |i: usize| searches[i].as_ref().map_or(0.0, |search| search.needed);
         let rank = |i: usize| {
             if budgets[i] <= SIDE_REGIONS { budgets[i] as f64 } else { REGIONS_PER_SHIFT as f64 + needed(i) }
         };
-        let Some(i) = (0..asked.len()).min_by(|&i, &k| rank(i).total_cmp(&rank(k))) else { break };
+        let Some(i) = (0..coverable.len()).min_by(|&i, &k| rank(i).total_cmp(&rank(k))) else { break };
         if budgets[i] > REGIONS_PER_SHIFT {
             break;
         }
-        let asks_part = asked[i];
-        let finder = match &mut finders[i] {
-            Some(finder) => finder,
+        let covers_part = coverable[i];
+        let search = match &mut searches[i] {
+            Some(search) => search,
             none => {
-                let side = surfaces(asks_part)?;
+                let side = surfaces(covers_part)?;
                 none.insert(ShiftSearch::of_all(sides[i].get_or_init(|| side), held, termination))
             }
         };
-        let found = finder.gather(at, budgets[i], most);
+        let found = search.gather(at, budgets[i], most);
         budgets[i] *= 2;
-        is_told = finder.pieces.len() <= most;
-        let pieces = if found == Ok(true) { std::mem::take(&mut finder.pieces) } else { Vec::new() };
-        let regions = finders.iter().flatten().map(|finder| finder.regions).sum();
+        goes_on = search.pieces.len() <= most;
+        let pieces = if found == Ok(true) { std::mem::take(&mut search.pieces) } else { Vec::new() };
+        let regions = searches.iter().flatten().map(|search| search.regions).sum();
         match found {
             Ok(true) if pieces.len() > most => {}
-            Ok(true) => return Ok(StartCover { asks_part, pieces: Some(Arc::new(pieces)), regions }),
+            Ok(true) => return Ok(StartCover { covers_part, pieces: Some(Arc::new(pieces)), regions }),
             Ok(false) => {}
             Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
-            Err(_) => return Ok(StartCover { asks_part, pieces: None, regions }),
+            Err(_) => return Ok(StartCover { covers_part, pieces: None, regions }),
         }
     }
-    let regions = finders.iter().flatten().map(|finder| finder.regions).sum();
-    Ok(StartCover { asks_part: true, pieces: None, regions })
+    let regions = searches.iter().flatten().map(|search| search.regions).sum();
+    Ok(StartCover { covers_part: true, pieces: None, regions })
 }
 
 /// The result of preparing a pair.
@@ -390,16 +391,16 @@ fn make_way(
     if !pieces.iter().any(ends) {
         return Ok(ClearedWay { blocked: Vec::new(), witnesses: Vec::new(), found: 0, regions: 0 });
     }
-    let mut finder = ShiftSearch::new(surfaces, most, termination);
+    let mut search = ShiftSearch::new(surfaces, most, termination);
     let mut ended = Ok(());
     let of_pair = Arc::make_mut(pieces);
     let mut i = 0;
     while i < of_pair.len() && ended.is_ok() {
         if ends(&of_pair[i]) {
-            let known = finder.pieces.len();
-            ended = finder.find(of_pair[i].spot, at, u);
+            let known = search.pieces.len();
+            ended = search.find(of_pair[i].spot, at, u);
             if ended.is_err() {
-                finder.pieces.truncate(known);
+                search.pieces.truncate(known);
             } else {
                 of_pair.swap_remove(i);
                 continue;
@@ -407,12 +408,12 @@ fn make_way(
         }
         i += 1;
     }
-    let (found, regions) = (finder.pieces.len(), finder.regions);
-    of_pair.append(&mut finder.pieces);
+    let (found, regions) = (search.pieces.len(), search.regions);
+    of_pair.append(&mut search.pieces);
     match ended {
         Ok(()) => Ok(ClearedWay { blocked: Vec::new(), witnesses: Vec::new(), found, regions }),
         Err(Halt::Blocked) => {
-            Ok(ClearedWay { blocked: finder.obstacles, witnesses: finder.witnesses, found, regions })
+            Ok(ClearedWay { blocked: search.obstacles, witnesses: search.witnesses, found, regions })
         }
         Err(halt) => Err(halt),
     }

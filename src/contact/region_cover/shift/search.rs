@@ -65,10 +65,10 @@ pub(crate) struct ShiftSearch<'a> {
 impl<'a> ShiftSearch<'a> {
     /// A search that covers all of the surface, each piece outside its region by no more than `held`.
     pub(crate) fn of_all(pair: &'a SurfacePair<'a>, held: f64, termination: &'a Termination) -> Self {
-        let mut finder = Self::new(pair, 0, termination);
+        let mut search = Self::new(pair, 0, termination);
         let all = pair.root().map(|piece| CoverPiece { piece, guess: 0, level: 0, held });
-        finder.waiting.extend(all.map(|spot| PendingPiece { spot, share: 1.0, looked: None }));
-        finder
+        search.waiting.extend(all.map(|spot| PendingPiece { spot, share: 1.0, looked: None }));
+        search
     }
 
     pub(crate) fn new(pair: &'a SurfacePair<'a>, budget: usize, termination: &'a Termination) -> Self {
@@ -153,7 +153,7 @@ impl<'a> ShiftSearch<'a> {
     /// Covers a piece at a shift, with as much room as possible along the unit vector `u`.
     pub(crate) fn find(&mut self, spot: CoverPiece, at: &Vector3<f64>, u: &Vector3<f64>) -> Result<(), Halt> {
         let wish = WantedShift { at: *at, along: *u };
-        cover(spot, |spot, parts| self.renew(spot, &wish, parts))
+        cover(vec![spot], |spot, parts| self.renew(spot, &wish, parts))
     }
 
     /// A region for all of a piece that lets it go further than `least` along the unit vector `u`, if there is one.
@@ -389,22 +389,22 @@ mod tests {
     use crate::geometry::SourceMesh;
 
     /// All pieces of one side of a pair, and the number of regions after each budget.
-    fn gathered(meshes: [SourceMesh; 2], asks_part: bool, threads: usize) -> Vec<String> {
+    fn gathered(meshes: [SourceMesh; 2], covers_part: bool, threads: usize) -> Vec<String> {
         let (scene, _) = scene(meshes);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let termination = Termination::default();
             let start = scene.bodies[1].planning_from_shape;
-            let surfaces = SurfacePair::new(&scene, (1, &start), 0, asks_part, &termination).unwrap();
-            let mut finder = ShiftSearch::of_all(&surfaces, HELD_AT_FIRST, &termination);
+            let surfaces = SurfacePair::new(&scene, (1, &start), 0, covers_part, &termination).unwrap();
+            let mut search = ShiftSearch::of_all(&surfaces, HELD_AT_FIRST, &termination);
             let mut told = Vec::new();
             for budget in [1, 5, 16, 64, 4096] {
-                let ended = finder.gather(&Vector3::zeros(), budget, usize::MAX);
-                told.push(format!("{ended:?} {} {} {:?}", finder.regions, finder.needed, finder.pieces));
+                let ended = search.gather(&Vector3::zeros(), budget, usize::MAX);
+                told.push(format!("{ended:?} {} {} {:?}", search.regions, search.needed, search.pieces));
                 if ended != Ok(false) {
                     break;
                 }
-                assert!(finder.needed > finder.regions as f64, "there is more to come");
+                assert!(search.needed > search.regions as f64, "there is more to come");
             }
             told
         })
@@ -412,11 +412,11 @@ mod tests {
 
     #[test]
     fn cells_do_not_depend_on_who_else_looks() {
-        for (meshes, asks_part) in
+        for (meshes, covers_part) in
             [(peg_in_hole(5e-4), false), (peg_in_hole(0.0), true), (thread(3.0, 0.5), true)]
         {
-            let alone = gathered(meshes.clone(), asks_part, 1);
-            assert_eq!(alone, gathered(meshes, asks_part, 3));
+            let alone = gathered(meshes.clone(), covers_part, 1);
+            assert_eq!(alone, gathered(meshes, covers_part, 3));
         }
         assert!(gathered(peg_in_hole(5e-4), false, 1).len() > 2, "there was something to look at ahead");
     }

@@ -1,5 +1,5 @@
 //! What is planned ahead while nothing is asked, by the real daemon: whoever finds a part stuck or gone in the
-//! middle of a plan is answered from memory, and as if nothing had been foreseen.
+//! middle of a plan is answered from memory, and as if nothing had been speculated.
 
 mod common;
 
@@ -10,24 +10,24 @@ use sbdp_client::{Client, Handle, PlanOptions, PlanStatus};
 
 /// Questions that wait, with the one at work, and those that were planned ahead.
 fn ahead(client: &Client) -> (u64, u64) {
-    let figures: serde_json::Value = serde_json::from_str(&client.figures().unwrap()).unwrap();
-    let of = |what: &str| figures["ahead"][what].as_u64().unwrap();
-    (of("questions") + of("assemblies"), of("foreseen"))
+    let metrics: serde_json::Value = serde_json::from_str(&client.metrics().unwrap()).unwrap();
+    let of = |what: &str| metrics["ahead"][what].as_u64().unwrap();
+    (of("questions") + of("assemblies"), of("speculated"))
 }
 
 fn left_alone(client: &Client) -> u64 {
     let began = Instant::now();
     loop {
-        let (waiting, foreseen) = ahead(client);
+        let (waiting, speculated) = ahead(client);
         if waiting == 0 {
-            return foreseen;
+            return speculated;
         }
         assert!(began.elapsed() < HANG, "{waiting} questions wait");
         std::thread::sleep(Duration::from_millis(10));
     }
 }
 
-/// All that is foreseen of a plan that takes out some parts.
+/// All that is speculated of a plan that takes out some parts.
 fn contingencies(parts: &[u32]) -> Vec<PlanOptions> {
     let question = |fixed: &[u32], removed: &[u32]| PlanOptions {
         fixed: fixed.to_vec(),
@@ -49,22 +49,22 @@ fn upload(daemon: &Daemon) -> (Client, Handle) {
 
 #[test]
 fn what_may_be_asked_after_a_plan_is_answered_from_memory_and_no_otherwise() {
-    let (foreseeing, other) = (Daemon::start(), Daemon::start_with("[cache]\nforesight_s = 0\n"));
-    let ((client, handle), (cold, same)) = (upload(&foreseeing), upload(&other));
+    let (speculating, other) = (Daemon::start(), Daemon::start_with("[cache]\nspeculation_s = 0\n"));
+    let ((client, handle), (cold, same)) = (upload(&speculating), upload(&other));
     let (parts, _) = plan(&client, handle, &PlanOptions::default());
     assert_eq!(plan(&cold, same, &PlanOptions::default()).0, parts);
     assert_eq!(left_alone(&client), contingencies(&parts).len() as u64);
     assert_eq!(left_alone(&cold), 0);
     for options in contingencies(&parts) {
-        let (foreseen, found) = plan(&client, handle, &options);
+        let (speculated, found) = plan(&client, handle, &options);
         let (expected, made) = plan(&cold, same, &options);
-        assert_eq!((foreseen, found.status), (expected, made.status), "{options:?}");
+        assert_eq!((speculated, found.status), (expected, made.status), "{options:?}");
         assert_eq!((found.stats.plan_hit, made.stats.plan_hit), (1, 0), "{options:?}");
     }
 }
 
 #[test]
-fn what_was_foreseen_outlives_the_daemon_and_leads_on() {
+fn what_was_speculated_outlives_the_daemon_and_leads_on() {
     let mut daemon = Daemon::start();
     let (client, handle) = upload(&daemon);
     let (parts, _) = plan(&client, handle, &PlanOptions::default());
