@@ -75,6 +75,13 @@ pub(crate) const PATH_EFFORT: usize = 20_000_000;
 /// The same where holes are in sight or threads cross: most stays open, whatever is spent.
 /// Measured: no effect at half and double.
 pub(crate) const PATH_EFFORT_IN_DOUBT: usize = 200_000;
+/// Effort on one surface of a path, after which the depth that is not looked into grows: the rest of it up to the limit
+/// is halved, and again after as much effort, …
+pub(crate) const EFFORT_PER_HALVING: usize = 100_000;
+/// … this often. Then a part that touches all along its path is bounded to seven eighths of the limit.
+pub(crate) const MOST_HALVINGS: usize = 3;
+/// Effort on each surface of a path before it is looked at by samples: most paths that are refused are refused by them.
+pub(crate) const EFFORT_BEFORE_SAMPLES: usize = 100_000;
 /// In sight of holes, after this part of the effort (a divisor) …
 /// Measured: no effect at half and double.
 pub(crate) const HOPELESS_AFTER: usize = 10;
@@ -215,6 +222,16 @@ pub(crate) const SEGMENT_PAIRS: usize = 4_000_000;
 /// Number of simulations per thread in one window, where few of them lead out: long and short ones share the threads
 /// better. 1 leaves threads idle; more throws away more when one leads out. No plan depends on it.
 pub(crate) const WINDOW_PER_THREAD: usize = 4;
+
+/// Edges that are cast to search the cells of one part before anything is turned: some thousands of casts of a box, a
+/// few of a thread, whose play has cells without end. Half of it leaves large mazes to the end of the search.
+pub(crate) const EDGES_CAST_BEFORE_TURNING: usize = 200_000;
+/// The same at the end of the search, when nothing else is left. Half of it misses ways through the largest mazes;
+/// double takes twice as long where there is no way.
+pub(crate) const EDGES_CAST_AT_LAST: usize = 5_000_000;
+/// Cells that are kept of the line of one cast. A surface with thousands of critical coordinates (a thread) would fill
+/// the search with one line; half of it misses narrow windows among as many.
+pub(crate) const CELLS_PER_CAST: usize = 256;
 
 /// Largest number of halvings: at 2^10 times the resolution every pose of a large part is the same state (51 lengths
 /// and 512 rad), so that more of them change nothing.

@@ -308,6 +308,10 @@ pub(crate) const ONE_AXIS_COSINE: f64 = 0.9994;
 /// allow. Half of it may call parts linked that engines separate; double it misses links with little play.
 pub(crate) const LINK_CLEARANCE: f64 = 2e-3;
 
+/// Length. Places of a part this near are in one cell: more than the rounding of coordinates in files, less than any
+/// play that is drawn on purpose. Half of it keeps cells twice that differ by rounding; double merges cells of fine play.
+pub(crate) const SAME_CELL: f64 = 10.0 * ROUNDED;
+
 /// Divisor. Divides a part's largest extent: the least travel of a part smaller than `SHARE_OF_EXTENT *
 /// SAME_STATE_TRAVEL`, one length, is that share of its size. Chosen, not derived.
 pub(crate) const SHARE_OF_EXTENT: f64 = 20.0;

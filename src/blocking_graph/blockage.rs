@@ -11,8 +11,16 @@ pub struct Evaluation {
     pub open_actions: usize,
 }
 
-/// Who blocks which action. A collision is about a set of parts: when any of them is gone the
-/// motion may differ, so the action is open again.
+/// When an action that several parts stopped is open again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reopening {
+    /// When any of them is gone: the motion may differ.
+    AnyGone,
+    /// When all of them are, as in the paper, where each has an edge.
+    AllGone,
+}
+
+/// Who blocks which action. A collision is about a set of parts.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Blockage {
     /// Per action: parts that each alone block it (static analysis).
@@ -105,7 +113,7 @@ impl Blockage {
     }
 
     /// A part is gone: deletes its vertex.
-    pub fn remove(&mut self, part: usize) {
+    pub fn remove(&mut self, part: usize, reopening: Reopening) {
         if !self.parts.contains(&part) {
             return;
         }
@@ -115,11 +123,12 @@ impl Blockage {
             }
         }
         for sets in &mut self.jointly {
-            let before = sets.len();
-            sets.retain(|s| !s.contains(&part));
-            if sets.len() < before {
+            sets.retain_mut(|set| {
+                let Some(at) = set.iter().position(|&p| p == part) else { return true };
                 self.outlived.insert(part);
-            }
+                set.remove(at);
+                reopening == Reopening::AllGone && !set.is_empty()
+            });
         }
         self.refresh();
     }
@@ -153,9 +162,14 @@ mod tests {
         b.block_jointly(0, vec![3, 5]);
         b.block_single(1, 5);
         assert_eq!(b.evaluation(), Evaluation { colliding_parts: 2, open_actions: 0 });
-        b.remove(3);
+        let mut paper = b.clone();
+        b.remove(3, Reopening::AnyGone);
         assert!(b.is_open(0) && !b.is_open(1));
-        b.remove(5);
+        paper.remove(3, Reopening::AllGone);
+        assert!(!paper.is_open(0), "part 5 still stands");
+        paper.remove(5, Reopening::AllGone);
+        assert!(paper.is_open(0) && paper.is_open(1));
+        b.remove(5, Reopening::AnyGone);
         assert_eq!(b.evaluation(), Evaluation { colliding_parts: 0, open_actions: 2 });
         assert_eq!(b.outlived().iter().copied().collect::<Vec<_>>(), [3, 5]);
     }
@@ -164,7 +178,7 @@ mod tests {
     fn a_collision_with_nothing_stays() {
         let mut b = Blockage::open(1);
         b.block_jointly(0, Vec::new());
-        b.remove(0);
+        b.remove(0, Reopening::AnyGone);
         assert!(!b.is_open(0) && !b.is_untried(0));
     }
 }

@@ -12,7 +12,7 @@ mod records;
 mod static_analysis;
 
 pub use audit::{Audit, audit};
-pub use blockage::{Blockage, Evaluation};
+pub use blockage::{Blockage, Evaluation, Reopening};
 pub use graph::DirectionalGraph;
 pub(crate) use records::BLOCKING;
 pub use static_analysis::{Analysis, StaticAnalysis};

@@ -80,6 +80,13 @@ impl Account {
                 let place = self.place(*part, *state);
                 format!("    {place} {action}: leaves straight, by a sweep without simulation")
             }
+            TraceEvent::CellsSearched { part, cells, leaves } => {
+                let end = if *leaves { "a way out was found" } else { "no way out" };
+                format!(
+                    "    {}: {cells} cells of places reached by casts along the axes, {end}",
+                    self.name(*part)
+                )
+            }
             TraceEvent::Refuted { part, action, by } => format!(
                 "    the path of {} by {action} enters {} on the triangles: refused",
                 self.name(*part),

@@ -14,6 +14,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::budgets::EFFORT_BEFORE_SAMPLES;
 use crate::contact::PairPath;
 use crate::contact::course::{Course, Interval, turns_far};
 use crate::contact::helix_profile::{centred, depth_on_screw};
@@ -190,7 +191,24 @@ impl Verifier {
     pub fn past(&self, pair_path: &PairPath<'_>, termination: &Termination) -> Result<Verdict, Interrupt> {
         let Self { limit, samples } = self;
         let course = &Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
-        let found = self.bounds(pair_path, course, termination)?;
+        let soon = if turns_far(&pair_path.path) {
+            None
+        } else {
+            let found = self.question(pair_path, course, termination).depth_within(EFFORT_BEFORE_SAMPLES)?;
+            if found.iter().all(|side| side.open.is_empty()) {
+                Some(found)
+            } else {
+                let seen = samples.sparse_penetrations_along(pair_path, *limit, termination)?;
+                if seen.iter().any(|e| e.over > *limit) {
+                    return Ok(Verdict::past(0.0, seen));
+                }
+                None
+            }
+        };
+        let found = match soon {
+            Some(found) => found,
+            None => self.bounds(pair_path, course, termination)?,
+        };
         let bound = found.iter().map(|f| f.bound).fold(0.0, f64::max);
         let [part, other] = pair_path.parts;
         let effort = found.each_ref().map(|f| f.effort);
@@ -216,6 +234,17 @@ impl Verifier {
         course: &Course,
         termination: &Termination,
     ) -> Result<[PathDepth; 2], Interrupt> {
+        let question = self.question(pair_path, course, termination);
+        if turns_far(&pair_path.path) { depth_on_screw(&question, self.limit) } else { question.depth() }
+    }
+
+    /// The question of how deep each of two parts gets into the other along a path.
+    fn question<'a>(
+        &self,
+        pair_path: &'a PairPath<'a>,
+        course: &'a Course,
+        termination: &'a Termination,
+    ) -> PathQuestion<'a> {
         let limit = self.limit;
         let share = if pair_path.allowed > 0.0 { IGNORED_SHARE_IN_OVERLAP } else { IGNORED_SHARE };
         let precision = DepthPrecision {
@@ -225,8 +254,7 @@ impl Verifier {
             finest: limit * FINEST_SHARE,
             coarse: COARSE_SHARE * pair_path.longest_side,
         };
-        let way = PathQuestion { pair_path, course, precision, termination };
-        if turns_far(&pair_path.path) { depth_on_screw(&way, limit) } else { way.depth() }
+        PathQuestion { pair_path, course, precision, termination }
     }
 }
 

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::blocking_graph::Blockage;
 use crate::budgets::{OWN_RAYS, OWN_TWISTS};
-use crate::simulation::Action;
+use crate::simulation::{Action, Axis};
 use crate::termination::Interrupt;
 use crate::tolerances::{ONE_AXIS_COSINE, ONE_DIRECTION_COSINE};
 
@@ -46,6 +46,11 @@ impl ActionTable {
             simulates_rays: false,
             draws_all_twists: false,
         }
+    }
+
+    /// The axes along and about which all parts are moved.
+    pub(super) fn axes(&self) -> &[Axis] {
+        &self.directions.axes
     }
 
     pub(super) fn of(&self, phase: PlanningPhase) -> &ActionList {

@@ -131,7 +131,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     }
 
     /// All parts that stand but one. Only some are kept: all would take the square of their number in memory.
-    fn surroundings(&mut self, part: usize) -> Arc<StandingParts> {
+    pub(super) fn surroundings(&mut self, part: usize) -> Arc<StandingParts> {
         // Number of surroundings kept. No plan depends on it; fewer are computed more often.
         if self.around.len() >= REMEMBERED_STANDING_PARTS && !self.around.contains_key(&part) {
             self.around.clear();

@@ -11,6 +11,8 @@
 mod action_list;
 mod action_table;
 mod ball;
+mod cell_decomposition;
+mod cell_memory;
 mod directions;
 mod disassembly;
 mod initial_analysis;

@@ -96,6 +96,12 @@ impl Order {
         (0..states.nodes.len()).filter(|&i| wanted(&states.nodes[i])).collect()
     }
 
+    /// The parts of open states, in the order in which they are expanded as assembled.
+    pub(super) fn parts(&self, of: &PhaseStates<'_>, open: &[usize]) -> Vec<usize> {
+        let roots = self.ordered_roots(of, &mut open.to_vec());
+        roots.into_iter().map(|node| of.states.nodes[node].part).collect()
+    }
+
     /// Takes the best displaced state off the open list (smaller f_c, then smaller f_a; beyond the paper, then
     /// the larger distance from earlier states), or else the initial state, which comes last (its f_c and f_a
     /// count as infinite) and stands for all its parts in their order. Without guidance the first comes first:

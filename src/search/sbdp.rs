@@ -20,12 +20,15 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::blocking_graph::{Analysis, Blockage};
-use crate::budgets::{TRANSLATION_PASSES, WINDOW_PER_THREAD};
+use crate::budgets::{REFINEMENTS, TRANSLATION_PASSES, WINDOW_PER_THREAD};
 use crate::geometry::Pose;
 use crate::simulation::{End, Motion, Sweep};
 use crate::termination::Interrupt;
+use crate::tolerances::TURNED;
 
 use super::action_table::ActionTable;
+use super::cell_decomposition::{CellDecomposition, CellExit};
+use super::cell_memory::{CellMemory, CellStage};
 use super::disassembly::{Disassembly, Proof, Stop, Transition, joined};
 use super::initial_analysis::InitialAnalysis;
 use super::invalidation::Invalidation;
@@ -64,6 +67,7 @@ struct Sbdp<'a, 'o> {
     novelty: Novelty,
     invalidation: Invalidation,
     sweep_memory: SweepMemory,
+    cell_memory: CellMemory,
     speculation: Speculation,
 }
 
@@ -89,12 +93,13 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         let strategy = Strategy { guided, separate_lists, distrust_static: false };
         let mut search = Self {
             strategy,
-            states: States::new(&disassembly.problem.scene),
+            states: States::new(&disassembly.problem.scene, strategy),
             actions: ActionTable::new(directions, translations, rotations),
             order: Order::new(&disassembly.problem.scene, strategy),
             novelty: Novelty::default(),
             invalidation: Invalidation::default(),
             sweep_memory: SweepMemory::default(),
+            cell_memory: CellMemory::default(),
             speculation: Speculation::default(),
             disassembly,
         };
@@ -133,6 +138,12 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                     break;
                 }
             }
+            if !gain.any() && self.leave_by_cells(CellStage::BeforeTurning)? {
+                if self.disassembly.is_done() {
+                    return Ok(());
+                }
+                continue;
+            }
             let turned = self.pass(PlanningPhase::Rotation)?;
             if self.disassembly.is_done() {
                 return Ok(());
@@ -150,7 +161,10 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             self.strategy.distrust_static = true;
             let last = self.pass(PlanningPhase::Translation);
             self.strategy.distrust_static = false;
-            if self.disassembly.is_done() || !last?.any() {
+            if self.disassembly.is_done() || !(last?.any() || self.leave_by_cells(CellStage::Last)?) {
+                return Ok(());
+            }
+            if self.disassembly.is_done() {
                 return Ok(());
             }
         }
@@ -285,6 +299,64 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         Ok(removed)
     }
 
+    /// Takes a part out through the cells of its places, if any leaves them; true if one does.
+    fn leave_by_cells(&mut self, stage: CellStage) -> Result<bool, Stop> {
+        if !self.strategy.is_extended() {
+            return Ok(false);
+        }
+        let open = self.expandable(PlanningPhase::Translation);
+        for part in self.order.parts(&self.of(PlanningPhase::Translation), &open) {
+            let is_start = |&node: &usize| {
+                let node = &self.states.nodes[node];
+                node.part == part && (stage == CellStage::Last || !self.is_turned(node))
+            };
+            let starts: Vec<usize> = open.iter().copied().filter(is_start).collect();
+            let known = self.cell_memory.holds(part, stage, &starts, self.disassembly.everything.standing());
+            if !known && self.leaves_by_cells(part, stage, starts)? {
+                self.take_free_parts()?;
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    fn is_turned(&self, node: &StateNode) -> bool {
+        node.pose().rotation.angle_to(&self.disassembly.assembled(node.part).rotation) > TURNED
+    }
+
+    fn leaves_by_cells(&mut self, part: usize, stage: CellStage, starts: Vec<usize>) -> Result<bool, Stop> {
+        let started = Instant::now();
+        let standing = self.disassembly.surroundings(part);
+        let Problem { scene, termination, .. } = &self.disassembly.problem;
+        let (scene, termination) = (scene.clone(), termination.clone());
+        let poses: Vec<_> = starts.iter().map(|&node| (node, *self.states.nodes[node].pose())).collect();
+        let mut coordinates = std::mem::take(&mut self.cell_memory.coordinates);
+        let axes = self.actions.axes();
+        let most = stage.most_edges();
+        let mut search = CellDecomposition::new(&scene, &standing, part, axes, &mut coordinates, most, poses);
+        let (mut leaves, mut tries) = (false, 0);
+        while !leaves && tries < REFINEMENTS {
+            let Some(CellExit { state, way, action }) = search.next_exit(&termination)? else { break };
+            tries += 1;
+            let run = Transition { part, start: way[way.len() - 1], action };
+            let Some(Sweep::Clear { path, .. }) = self.disassembly.sweep(&[run])?.pop().flatten() else {
+                continue;
+            };
+            let prefix = joined(&self.states.nodes[state].path, &way);
+            if let Ok(VerifiedPath { path, depth }) = self.disassembly.prove_sweep(&run, &prefix, &path)? {
+                self.remove(part, path, depth);
+                leaves = true;
+            }
+        }
+        let (cells, met) = search.ended();
+        self.cell_memory.coordinates = coordinates;
+        self.cell_memory.keep(part, stage, starts, met);
+        self.disassembly.counters.simulation += started.elapsed();
+        tracing::debug!(part, cells, leaves, "cells searched");
+        self.disassembly.trace(|| TraceEvent::CellsSearched { part, cells, leaves });
+        Ok(leaves)
+    }
+
     /// Verifies a path that a sweep claims to be clear, and takes the part out if it holds.
     fn prove_sweep(&mut self, at: StateAction, run: &Transition, motion: &[Pose]) -> Result<bool, Stop> {
         let prefix = &self.states.nodes[at.node].path;
@@ -347,9 +419,9 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                     break;
                 }
             }
-            // What a part that was turned out leaves free mostly leaves straight: pushes first.
-            let pushes_first =
-                phase == PlanningPhase::Rotation && gain.removed && !self.strategy.separate_lists;
+            // What a part that was turned out leaves free mostly leaves straight: pushes first (Algorithm 1, lines 21
+            // and 22).
+            let pushes_first = phase == PlanningPhase::Rotation && gain.removed;
             if self.disassembly.is_done() || pushes_first || (by_action && gain.new_states) {
                 break;
             }

@@ -5,7 +5,7 @@
 
 use std::cmp::Reverse;
 
-use crate::blocking_graph::{Blockage, Evaluation};
+use crate::blocking_graph::{Blockage, Evaluation, Reopening};
 use crate::scene::Scene;
 
 use super::known_states::KnownStates;
@@ -19,6 +19,7 @@ pub(super) struct States {
     roots: usize,
     /// Per part, for asking whether a pose is known.
     pub(super) known: Vec<KnownStates>,
+    reopening: Reopening,
 }
 
 /// The states of a search in one phase, under its strategy.
@@ -55,9 +56,10 @@ impl PhaseStates<'_> {
 }
 
 impl States {
-    pub(super) fn new(scene: &Scene) -> Self {
-        let known = (0..scene.bodies.len()).map(|part| KnownStates::new(scene, part)).collect();
-        Self { nodes: Vec::new(), roots: 0, known }
+    pub(super) fn new(scene: &Scene, strategy: Strategy) -> Self {
+        let of_part = |part| KnownStates::new(scene, part, strategy.resolution());
+        let known = (0..scene.bodies.len()).map(of_part).collect();
+        Self { nodes: Vec::new(), roots: 0, known, reopening: strategy.reopening() }
     }
 
     pub(super) fn add(&mut self, node: StateNode) {
@@ -100,9 +102,9 @@ impl States {
                 continue;
             }
             if let Some(b) = &mut node.translation {
-                b.remove(part);
+                b.remove(part, self.reopening);
             }
-            node.rotation.remove(part);
+            node.rotation.remove(part, self.reopening);
         }
         waited_for.sort_unstable();
         waited_for.dedup();
@@ -121,7 +123,8 @@ mod tests {
     #[test]
     fn a_part_that_leaves_ends_its_states_and_is_in_nobodys_way() {
         let (scene, _) = scene(block_on_plate());
-        let mut states = States::new(&scene);
+        let strategy = Strategy { guided: true, separate_lists: false, distrust_static: false };
+        let mut states = States::new(&scene, strategy);
         let node = |part: usize, x: f64, origin| StateNode {
             part,
             path: vec![Pose::identity(), Pose::translation(x, 0.0, 0.0)],
@@ -137,7 +140,6 @@ mod tests {
         states.add(node(0, 1.0, Some(at)));
         assert_eq!([0, 1, 2].map(|n| states.number(n)), [0, 0, 1]);
 
-        let strategy = Strategy { guided: true, separate_lists: false, distrust_static: false };
         states.block(at, vec![1]);
         assert!(!states.is_open(strategy, at));
         assert!(states.remove(1).is_empty());

@@ -1,7 +1,8 @@
 //! Which rules a state-based search follows: SBDP, SBDP*, the paper's or the extended ones.
 
-use crate::blocking_graph::Blockage;
+use crate::blocking_graph::{Blockage, Reopening};
 
+use super::known_states::Resolution;
 use super::state::StateNode;
 use super::trace::PlanningPhase;
 
@@ -20,6 +21,16 @@ impl Strategy {
     /// Whether the search is guided and leaves the paper's rules where others find more.
     pub(super) fn is_extended(self) -> bool {
         self.guided && !self.separate_lists
+    }
+
+    /// How states are distinguished: the paper's way but for the extended search, which has free play to expect.
+    pub(super) fn resolution(self) -> Resolution {
+        if self.is_extended() { Resolution::Adaptive } else { Resolution::Fixed }
+    }
+
+    /// When an action that was blocked is open again.
+    pub(super) fn reopening(self) -> Reopening {
+        if self.separate_lists { Reopening::AllGone } else { Reopening::AnyGone }
     }
 
     /// Whether actions are tried in an order of their own over all states at once. Which action is tried

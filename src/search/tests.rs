@@ -193,9 +193,58 @@ fn serpentine(rows: usize) -> [SourceMesh; 2] {
 
 #[test]
 fn no_maze_has_too_many_moves() {
-    for rows in [3, 10] {
+    for rows in [3, 10, 25] {
         let outcome = pair(serpentine(rows));
         assert_eq!(outcome.status, PlanStatus::Complete, "{rows} rows: {:?}", outcome.reason);
+    }
+}
+
+/// A closed corridor of 2 by 2 along x, from 1 to 7, with a window of some width in its ceiling, whose middle is at
+/// x = 4.5, and at the corridor's end a cube that fills it but for the play at each side.
+fn corridor(play: f64, width: f64) -> [SourceMesh; 2] {
+    let window = [4.5 - width / 2.0, 4.5 + width / 2.0];
+    let housing = cells(
+        [&[0.0, 1.0, window[0], window[1], 7.0, 8.0], &[0.0, 1.0, 3.0, 4.0], &[0.0, 1.0, 3.0, 4.0]],
+        |c| {
+            let is_corridor = (1..=3).contains(&c[0]) && c[1] == 1 && c[2] == 1;
+            let is_window = c == [2, 1, 2];
+            !is_corridor && !is_window
+        },
+    );
+    [housing, cuboid([1.0 + play; 3], [3.0 - play; 3])]
+}
+
+#[test]
+fn a_part_stops_half_way_where_a_window_is_as_wide_as_its_play_or_just_fits() {
+    let turn = nalgebra::UnitQuaternion::from_euler_angles(0.3, -0.7, 1.1);
+    let turned = crate::geometry::Pose::from_parts(nalgebra::Translation3::new(1.0, 2.0, 3.0), turn);
+    for (play, width) in [(0.05, 2.0), (0.0, 2.0), (0.0, 2.5), (0.01, 1.981)] {
+        for pose in [crate::geometry::Pose::identity(), turned] {
+            let outcome = pair(corridor(play, width).map(|mesh| moved(mesh, &pose)));
+            assert_eq!(
+                outcome.status,
+                PlanStatus::Complete,
+                "play {play}, window {width}: {:?}",
+                outcome.reason
+            );
+        }
+    }
+    assert_ne!(pair(corridor(0.05, 1.8)).status, PlanStatus::Complete, "the cube is 1.9 wide");
+}
+
+#[test]
+fn a_loose_part_finds_a_hole_that_is_beside_all_walls_and_above_none_of_its_places() {
+    // A box with a room of 6 by 6 by 4, and in its ceiling a hole of 1.1; in the room a cube of 1.
+    for hole in [[3.1, 2.3], [5.2, 4.4]] {
+        let lines = |at: f64| [0.0, 1.0, at, at + 1.1, 7.0, 8.0];
+        let (x, y) = (lines(hole[0]), lines(hole[1]));
+        let housing = cells([&x, &y, &[0.0, 1.0, 5.0, 6.0]], |c| {
+            let is_room = (1..=3).contains(&c[0]) && (1..=3).contains(&c[1]) && c[2] == 1;
+            let is_hole = c == [2, 2, 2];
+            !is_room && !is_hole
+        });
+        let outcome = pair([housing, cuboid([1.7, 1.2, 1.0], [2.7, 2.2, 2.0])]);
+        assert_eq!(outcome.status, PlanStatus::Complete, "{hole:?}: {:?}", outcome.reason);
     }
 }
 

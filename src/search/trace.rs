@@ -93,6 +93,15 @@ pub enum TraceEvent {
         /// The action whose direction it followed.
         action: String,
     },
+    /// The cells of a part's places were searched, the last resort for translations.
+    CellsSearched {
+        /// The part.
+        part: usize,
+        /// The number of cells that it reached.
+        cells: usize,
+        /// Whether a way out of them was found and confirmed.
+        leaves: bool,
+    },
     /// The check on the triangles refuted a path.
     Refuted {
         /// The part.

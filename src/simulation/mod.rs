@@ -29,6 +29,6 @@ pub(crate) use records::{
     MOTION, SWEPT, TOUCHING, WITNESS, add_action, known_sweep, remembered_sweep, remembered_touching,
 };
 pub use sliding::{PairMethod, SlidingEngine, StepCost, pair_blocks, step_costs};
-pub use sweep::{Sweep, SweepQuestion, straight_sweep, straight_sweep_past};
+pub use sweep::{FreeTravel, Sweep, SweepQuestion, free_travel, straight_sweep, straight_sweep_past};
 pub use touching::Touching;
 pub use transition::{End, Motion, TransitionFunction, asked_again};

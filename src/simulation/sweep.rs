@@ -75,21 +75,70 @@ pub fn straight_sweep_past<E: From<Interrupt>>(
         return Ok(None);
     };
     let end = moved(start, direction, travel);
-    let bounds = scene.bodies[part].shape.bounds();
-    let here = bounds.transformed(start);
-    let swept = here.union(&bounds.transformed(&end));
-    for other in scene.broad_phase.meeting_of(&standing_parts.standing, &swept) {
-        let allowed = scene.allowed.of(part, other) + DEPTH_TOLERANCE;
-        // Beyond, it has passed the other for good: so the result does not depend on how far other parts reach.
-        let passed = here.grown(allowed).way_past(&scene.bodies[other].bounds, direction);
-        let travel = travel.min(passed);
-        let margins = CastMargins { allowed, back: allowed, steepness: WALL_STEEPNESS, sunk: SWEEP_SUNK };
-        let cast = ShapeCast { scene, part, start, direction, travel, other, margins, termination };
-        if enters(&cast)? {
+    for other in on_the_way(question, travel) {
+        if enters(&cast_at(question, other, travel, termination))? {
             return Ok(Some(Sweep::Blocked { by: other }));
         }
     }
     Ok(Some(Sweep::Clear { path: vec![*start, end], exit }))
+}
+
+/// How far a part goes along a line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FreeTravel {
+    /// The length, in the planning frame.
+    pub length: f64,
+    /// The part that it meets there; none if it meets nothing.
+    pub met: Option<usize>,
+    /// The number of edges that were cast, as a measure of the effort.
+    pub edges: usize,
+}
+
+/// How far a part goes along a line until it meets a standing part, at most `travel`. Like a sweep, this is a claim to
+/// be verified.
+///
+/// # Errors
+/// The termination condition became true.
+pub fn free_travel(
+    question: &SweepQuestion<'_>,
+    travel: f64,
+    termination: &Termination,
+) -> Result<FreeTravel, Interrupt> {
+    let edges = |part: usize| question.scene.bodies[part].shape.convex_edges().count();
+    let mut free = FreeTravel { length: travel, met: None, edges: 0 };
+    for other in on_the_way(question, travel) {
+        let cast = cast_at(question, other, free.length, termination);
+        let met = cast.way(0.0)?;
+        if met < cast.travel {
+            (free.length, free.met) = (met.max(0.0), Some(other));
+        }
+        free.edges += edges(question.part) + edges(other);
+    }
+    Ok(free)
+}
+
+/// The standing parts whose boxes meet the box that a sweep passes, ascending.
+fn on_the_way(question: &SweepQuestion<'_>, travel: f64) -> Vec<usize> {
+    let SweepQuestion { scene, standing_parts, part, start, direction } = *question;
+    let bounds = scene.bodies[part].shape.bounds();
+    let swept = bounds.transformed(start).union(&bounds.transformed(&moved(start, direction, travel)));
+    scene.broad_phase.meeting_of(&standing_parts.standing, &swept)
+}
+
+/// The cast of a sweep at a standing part, to where it has passed that part for good: so the result does not depend on
+/// how far other parts reach.
+fn cast_at<'a>(
+    question: &SweepQuestion<'a>,
+    other: usize,
+    travel: f64,
+    termination: &'a Termination,
+) -> ShapeCast<'a> {
+    let SweepQuestion { scene, part, start, direction, .. } = *question;
+    let allowed = scene.allowed.of(part, other) + DEPTH_TOLERANCE;
+    let here = scene.bodies[part].shape.bounds().transformed(start);
+    let passed = here.grown(allowed).way_past(&scene.bodies[other].bounds, direction);
+    let margins = CastMargins { allowed, back: allowed, steepness: WALL_STEEPNESS, sunk: SWEEP_SUNK };
+    ShapeCast { scene, part, start, direction, travel: travel.min(passed), other, margins, termination }
 }
 
 fn moved(pose: &Pose, direction: &Vector3<f64>, travel: f64) -> Pose {

@@ -114,6 +114,17 @@ impl PathSamples {
         Ok(penetrations)
     }
 
+    /// The same along all of a path, at the coarse samples alone.
+    pub(crate) fn sparse_penetrations_along(
+        &self,
+        pair_path: &PairPath<'_>,
+        limit: f64,
+        termination: &Termination,
+    ) -> Result<Vec<Penetration>, Interrupt> {
+        let poses = dense(pair_path, &pair_path.path);
+        self.penetrations_at(pair_path, &poses, limit, Closeness::Sparse, termination)
+    }
+
     /// The same at some poses, with samples of one density.
     fn penetrations_at(
         &self,

@@ -60,10 +60,16 @@ pub(crate) struct PathQuestion<'a> {
 impl PathQuestion<'_> {
     /// How deep the moving part gets into the standing one, and the other way round.
     pub(crate) fn depth(&self) -> Result<[PathDepth; 2], Interrupt> {
+        self.depth_within(PATH_EFFORT)
+    }
+
+    /// The same with no more than some effort on each surface.
+    pub(crate) fn depth_within(&self, effort: usize) -> Result<[PathDepth; 2], Interrupt> {
         let [moving, standing] = self.pair_path.surfaces();
         let side = |on_moving| {
             let measured = if on_moving { standing } else { moving };
-            let most_effort = if measured.rim().is_some() { PATH_EFFORT_IN_DOUBT } else { PATH_EFFORT };
+            let most_effort =
+                if measured.rim().is_some() { effort.min(PATH_EFFORT_IN_DOUBT) } else { effort };
             self.depth_of_side(on_moving, Interval::WHOLE, most_effort)
         };
         let (one, other) = rayon::join(|| side(true), || side(false));
@@ -192,6 +198,8 @@ struct PathSearch<'a> {
     hull: Vec<Point3<f64>>,
     facing: Vector3<f64>,
     found: PathDepth,
+    /// The effort after which the first deep point was found.
+    first_deep: Option<usize>,
 }
 
 impl<'a> PathSearch<'a> {
@@ -217,6 +225,7 @@ impl<'a> PathSearch<'a> {
             hull: Vec::new(),
             facing: Vector3::zeros(),
             found: PathDepth::default(),
+            first_deep: None,
         }
     }
 }

@@ -2,7 +2,9 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::budgets::{HOPELESS_AFTER, HOPELESS_SHARE, HULL_CORNERS, WANTED_CORNERS};
+use crate::budgets::{
+    EFFORT_PER_HALVING, HOPELESS_AFTER, HOPELESS_SHARE, HULL_CORNERS, MOST_HALVINGS, WANTED_CORNERS,
+};
 use crate::geometry::{FreeRegion, Parts, area_normal, bisected};
 use crate::termination::Interrupt;
 use crate::tolerances::{CLIP_MARGIN, DOUBTED_SIZE, FACING_ACROSS};
@@ -63,6 +65,9 @@ impl PathSearch<'_> {
                     SweptPiece::Patch(piece) => self.patch(piece, rest),
                     SweptPiece::Triangle(piece) => self.triangle(piece, rest),
                 }
+                if self.first_deep.is_none() && !self.found.deep.is_empty() {
+                    self.first_deep = Some(self.found.effort);
+                }
                 Ok(())
             })?;
         }
@@ -82,7 +87,10 @@ impl PathSearch<'_> {
     }
 
     fn is_enough(&self) -> bool {
-        self.gave_up() || self.found.is_enough()
+        // A search for more deep points takes no longer than that for the first one.
+        let (effort, few) = (self.found.effort, EFFORT_PER_HALVING);
+        let is_refuted = self.first_deep.is_some_and(|first| effort > (2 * first).max(few));
+        self.gave_up() || self.found.is_enough() || is_refuted
     }
 
     /// Bounds a node of the tree on a stretch of the path, or splits it.
@@ -258,7 +266,12 @@ impl PathSearch<'_> {
     pub(super) fn ignored(&self) -> f64 {
         let precision = self.question.precision;
         let found = self.found.depth + precision.margin_of(self.found.depth);
-        self.question.allowed + found.min(precision.deep).max(precision.ignored)
+        // What touches all along a path is bounded less precisely, the longer it takes.
+        let halvings = (self.found.effort / EFFORT_PER_HALVING).min(MOST_HALVINGS) as i32;
+        let coarse =
+            if precision.deep.is_finite() { precision.deep * (1.0 - 0.5f64.powi(halvings)) } else { 0.0 };
+        let ignored = precision.ignored.max(coarse);
+        self.question.allowed + found.min(precision.deep).max(ignored)
     }
 
     /// The smallest size of pieces at present.

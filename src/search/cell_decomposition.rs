@@ -1,0 +1,318 @@
+//! A search over the places of one part that needs no contact: the last resort for translations.
+//!
+//! Motions of the transition function end in contact. A part that has to stop half-way along a corridor, a slot or a
+//! rail to leave sideways has nothing to stop it there. But what it may do from a place changes only at critical
+//! places, where a [critical coordinate](critical_coordinates) of the part passes one of the others: between them, the
+//! places make cells, and one place stands for each cell (exact cell decomposition: J.-C. Latombe, "Robot Motion
+//! Planning", 1991, chapter 5). A critical place is a cell of its own where the part fits in without play: there several
+//! critical coordinates fall together.
+//!
+//! Cells are found breadth first from the states of the part. Along each axis the part is cast as far as it goes in both
+//! senses, and the cells that it passes are new ones. For solids whose faces are along and across the axes this finds
+//! every way by translations along the axes; for others it finds windows whose rims have their extreme points inside the
+//! cells. Rotations stay as the states have them.
+
+use std::collections::{BTreeSet, HashMap, HashSet};
+
+use nalgebra::{Translation3, UnitQuaternion};
+use rayon::prelude::*;
+
+use crate::budgets::CELLS_PER_CAST;
+use crate::geometry::{Pose, critical_coordinates};
+use crate::scene::{Scene, StandingParts};
+use crate::simulation::{Action, Axis, FreeTravel, SweepQuestion, free_travel};
+use crate::termination::{Interrupt, Termination};
+use crate::tolerances::{ROUNDED, SAME_CELL};
+
+/// Cells whose neighbours are searched in parallel.
+const CELLS_AT_ONCE: usize = 64;
+
+/// A place of the part that stands for a cell.
+#[derive(Clone, Copy)]
+struct Cell {
+    pose: Pose,
+    /// From where it was reached; none for a state of the search.
+    parent: Option<usize>,
+    /// The number of the state that it was reached from.
+    state: usize,
+    /// The axis along which it was reached, and along which it has no new neighbours.
+    axis: Option<usize>,
+    /// The index of its rotation.
+    rotation: usize,
+}
+
+/// A place from which the part leaves along a line.
+pub(super) struct CellExit {
+    /// The number of the state from which the way begins, as it was given.
+    pub(super) state: usize,
+    /// The poses from that state to the place.
+    pub(super) way: Vec<Pose>,
+    /// The push with which the part leaves.
+    pub(super) action: Action,
+}
+
+/// The search of one part.
+pub(super) struct CellDecomposition<'a> {
+    scene: &'a Scene,
+    standing: &'a StandingParts,
+    part: usize,
+    /// The axes along which the part is moved, in both senses.
+    axes: Vec<Axis>,
+    coordinates: &'a mut CriticalCoordinates,
+    /// Per axis: the critical coordinates of the standing parts, ascending; none until they are needed.
+    still: Vec<Option<Vec<f64>>>,
+    /// The rotations of the states.
+    rotations: Vec<Rotation>,
+    cells: Vec<Cell>,
+    known: HashSet<(usize, [i64; 3])>,
+    /// The cells whose neighbours are not known, the next ones first.
+    next: usize,
+    exits: Vec<CellExit>,
+    /// The parts that stopped a cast.
+    met: BTreeSet<usize>,
+    /// The number of edges that were cast, and how many may be.
+    edges: usize,
+    most_edges: usize,
+}
+
+/// A rotation of the part.
+struct Rotation {
+    rotation: UnitQuaternion<f64>,
+    /// Per axis: the part's critical coordinates without translation, ascending; none until they are needed.
+    mine: Vec<Option<Vec<f64>>>,
+}
+
+/// The critical coordinates of parts at their assembled poses, by part and axis.
+#[derive(Debug, Default)]
+pub(super) struct CriticalCoordinates(HashMap<(usize, usize), Vec<f64>>);
+
+impl CriticalCoordinates {
+    /// Of some parts, ascending, and of equal ones the first.
+    fn of_all(&mut self, scene: &Scene, parts: &[usize], (index, axis): (usize, Axis)) -> Vec<f64> {
+        let mut all = Vec::new();
+        for &part in parts {
+            let of_part = || coordinates(scene, part, &scene.bodies[part].planning_from_shape, axis);
+            all.extend_from_slice(self.0.entry((part, index)).or_insert_with(of_part));
+        }
+        distinct(all)
+    }
+}
+
+impl<'a> CellDecomposition<'a> {
+    /// The search from some states of a part, each with its number.
+    pub(super) fn new(
+        scene: &'a Scene,
+        standing: &'a StandingParts,
+        part: usize,
+        axes: &[Axis],
+        coordinates: &'a mut CriticalCoordinates,
+        most_edges: usize,
+        states: impl IntoIterator<Item = (usize, Pose)>,
+    ) -> Self {
+        let mut search = Self {
+            scene,
+            standing,
+            part,
+            axes: axes.to_vec(),
+            coordinates,
+            still: vec![None; axes.len()],
+            rotations: Vec::new(),
+            cells: Vec::new(),
+            known: HashSet::new(),
+            next: 0,
+            exits: Vec::new(),
+            met: BTreeSet::new(),
+            edges: 0,
+            most_edges,
+        };
+        for (state, pose) in states {
+            let rotation = search.rotation(&pose);
+            search.add(Cell { pose, parent: None, state, axis: None, rotation });
+        }
+        search
+    }
+
+    /// The next place from which the part leaves along a line; `None` if there is no further cell, or the budget of
+    /// edges is used up.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn next_exit(&mut self, termination: &Termination) -> Result<Option<CellExit>, Interrupt> {
+        while self.exits.is_empty() && self.next < self.cells.len() && self.edges < self.most_edges {
+            let batch = self.next..self.cells.len().min(self.next + CELLS_AT_ONCE);
+            self.next = batch.end;
+            let casts: Vec<_> = batch
+                .clone()
+                .into_par_iter()
+                .map(|cell| self.casts(&self.cells[cell], termination))
+                .collect::<Result<_, Interrupt>>()?;
+            for (cell, casts) in batch.zip(casts) {
+                casts.into_iter().for_each(|cast| self.pass(cell, &cast));
+            }
+            self.exits.reverse();
+        }
+        Ok(self.exits.pop())
+    }
+
+    /// The number of cells that were reached, and the parts that stopped a cast.
+    pub(super) fn ended(self) -> (usize, BTreeSet<usize>) {
+        (self.cells.len(), self.met)
+    }
+
+    /// How far the part goes from a cell along each axis that may lead to new cells, in both senses.
+    fn casts(&self, cell: &Cell, termination: &Termination) -> Result<Vec<AxisCast>, Interrupt> {
+        let bounds = self.scene.bodies[self.part].shape.bounds().transformed(&cell.pose);
+        let axes = (0..self.axes.len()).filter(|axis| cell.axis != Some(*axis));
+        axes.flat_map(|axis| [true, false].map(|forward| (axis, forward)))
+            .map(|(axis, forward)| {
+                let direction = Action::Push(self.axes[axis], forward).force();
+                // To where the part is past the hull of all others.
+                let reach =
+                    self.standing.hull.iter().map(|p| direction.dot(&p.coords)).fold(f64::MIN, f64::max);
+                let travel = (reach + bounds.support(&-direction)).max(0.0);
+                let question = SweepQuestion {
+                    scene: self.scene,
+                    standing_parts: self.standing,
+                    part: self.part,
+                    start: &cell.pose,
+                    direction: &direction,
+                };
+                Ok(AxisCast { axis, forward, free: free_travel(&question, travel, termination)? })
+            })
+            .collect()
+    }
+
+    /// Adds the cells that a cast passes, or the exit that it leads to.
+    fn pass(&mut self, from: usize, cast: &AxisCast) {
+        let AxisCast { axis, forward, free: FreeTravel { length, met, edges } } = *cast;
+        self.edges += edges;
+        let Cell { pose, state, rotation, .. } = self.cells[from];
+        let Some(met) = met else {
+            let action = Action::Push(self.axes[axis], forward);
+            self.exits.push(CellExit { state, way: self.way_to(from), action });
+            return;
+        };
+        self.met.insert(met);
+        if length < ROUNDED {
+            return;
+        }
+        let direction = self.axes[axis].unit().into_inner();
+        let here = direction.dot(&pose.translation.vector);
+        let [low, high] = if forward { [here, here + length] } else { [here - length, here] };
+        let Self { scene, standing, part, ref axes, .. } = *self;
+        let numbered = (axis, axes[axis]);
+        let still = self.still[axis]
+            .get_or_insert_with(|| self.coordinates.of_all(scene, &standing.standing, numbered));
+        let Rotation { rotation: turned, mine } = &mut self.rotations[rotation];
+        let turned = Pose::from_parts(Translation3::identity(), *turned);
+        let mine = mine[axis].get_or_insert_with(|| distinct(coordinates(scene, part, &turned, numbered.1)));
+        let critical = critical_places(still, mine, [low, high]);
+        for place in stops(&critical, low, high) {
+            let pose = Translation3::from(direction * (place - here)) * pose;
+            self.add(Cell { pose, parent: Some(from), state, axis: Some(axis), rotation });
+        }
+    }
+
+    /// Adds a cell unless it is known.
+    fn add(&mut self, cell: Cell) {
+        let at = cell.pose.translation.vector / SAME_CELL;
+        if self.known.insert((cell.rotation, at.map(|x| x.round() as i64).into())) {
+            self.cells.push(cell);
+        }
+    }
+
+    /// The index of a pose's rotation.
+    fn rotation(&mut self, pose: &Pose) -> usize {
+        let known = self.rotations.iter().position(|r| r.rotation.angle_to(&pose.rotation) < ROUNDED);
+        known.unwrap_or_else(|| {
+            self.rotations.push(Rotation { rotation: pose.rotation, mine: vec![None; self.axes.len()] });
+            self.rotations.len() - 1
+        })
+    }
+
+    fn way_to(&self, cell: usize) -> Vec<Pose> {
+        let mut way = vec![self.cells[cell].pose];
+        let mut at = cell;
+        while let Some(parent) = self.cells[at].parent {
+            way.push(self.cells[parent].pose);
+            at = parent;
+        }
+        way.reverse();
+        way
+    }
+}
+
+/// How far the part goes along an axis.
+struct AxisCast {
+    axis: usize,
+    /// Whether it goes along the axis, and not against it.
+    forward: bool,
+    free: FreeTravel,
+}
+
+/// The critical coordinates of a part at a pose along a unit vector.
+fn coordinates(scene: &Scene, part: usize, pose: &Pose, axis: Axis) -> Vec<f64> {
+    let axis = axis.unit().into_inner();
+    let here = axis.dot(&pose.translation.vector);
+    let in_shape = pose.rotation.inverse() * axis;
+    let mut found = critical_coordinates(&scene.bodies[part].shape.surface, &in_shape);
+    found.iter_mut().for_each(|x| *x += here);
+    found
+}
+
+fn sorted(mut list: Vec<f64>) -> Vec<f64> {
+    list.sort_by(f64::total_cmp);
+    list
+}
+
+/// Sorted, and of equal ones the first.
+fn distinct(list: Vec<f64>) -> Vec<f64> {
+    let mut list = sorted(list);
+    list.dedup_by(|a, b| *a - *b < ROUNDED);
+    list
+}
+
+/// The critical places between two coordinates of a translation, ascending: where a critical coordinate of the part
+/// is one of the standing parts'.
+fn critical_places(still: &[f64], mine: &[f64], [low, high]: [f64; 2]) -> Vec<f64> {
+    let between = |&here: &f64| {
+        let first = still.partition_point(|there| there - here <= low + ROUNDED);
+        let last = still.partition_point(|there| there - here < high - ROUNDED);
+        still[first..last.max(first)].iter().map(move |there| there - here)
+    };
+    sorted(mine.iter().flat_map(between).collect())
+}
+
+/// The places to stop at between two coordinates: the ends, the middles between critical places, and those where
+/// several of these fall together. Of too many, those amid the longest stretches are left out last.
+fn stops(critical: &[f64], low: f64, high: f64) -> Vec<f64> {
+    let mut stops = vec![(f64::INFINITY, low), (f64::INFINITY, high)];
+    let mut from = low;
+    for together in critical.chunk_by(|a, b| b - a < ROUNDED) {
+        stops.push((together[0] - from, (from + together[0]) / 2.0));
+        if together.len() > 1 {
+            stops.push((f64::INFINITY, together[0]));
+        }
+        from = together[0];
+    }
+    stops.push((high - from, (from + high) / 2.0));
+    stops.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.total_cmp(&b.1)));
+    stops.truncate(CELLS_PER_CAST);
+    sorted(stops.into_iter().map(|(_, at)| at).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cast_stops_between_critical_places_and_where_several_fall_together() {
+        // A slot from 0 to 10 with a window from 4 to 6, and a part from 0 to 1 in it.
+        let critical = critical_places(&[0.0, 4.0, 6.0, 10.0], &[0.0, 1.0], [0.0, 9.0]);
+        assert_eq!(critical, [3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(stops(&critical, 0.0, 9.0), [0.0, 1.5, 3.5, 4.5, 5.5, 7.5, 9.0]);
+        // The window is as wide as the part.
+        let critical = critical_places(&[0.0, 4.0, 5.0, 10.0], &[0.0, 1.0], [0.0, 9.0]);
+        assert_eq!(stops(&critical, 0.0, 9.0), [0.0, 1.5, 3.5, 4.0, 4.5, 7.0, 9.0]);
+    }
+}
