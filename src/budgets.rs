@@ -285,6 +285,23 @@ pub(crate) const STEPS_PER_POLL: u32 = 16;
 /// A piece of surface.
 pub(crate) const LONG_STEPS_PER_POLL: u32 = 4;
 
+// Parts that are given twice, and what they have in common.
+
+/// Points of a surface, and as many vertices, at which a part is compared with one that it may be a copy or a body of.
+/// Half may miss a small hole; double takes twice as long where parts are given twice. Others differ at the first few.
+pub(crate) const REPEATED_POINTS: usize = 500;
+/// Points of the surface below which points deep inside are compared.
+pub(crate) const REPEATED_DEEP_POINTS: usize = 32;
+/// Parts that a warning names; others are counted.
+pub(crate) const NAMED_BODIES: usize = 8;
+/// Steps in which a ball is shrunk until it touches a surface; most take three or four.
+pub(crate) const BALL_SHRINKS: usize = 32;
+/// Points at which the inside that two parts have in common is measured. A cube takes 150; a large thin part would take
+/// any number to prove that no point is deeper, and its deepest is found from the surface.
+pub(crate) const COMMON_POINTS: usize = 2000;
+/// Points of each surface below which the deepest point is looked for first.
+pub(crate) const COMMON_SEEDS: usize = 64;
+
 // Memory.
 
 /// Sets of standing parts with their hulls; one set for each part would take memory of the square of their number.

@@ -19,7 +19,7 @@ const STAGES: [(&str, &str); 18] = [
     ("ipc", ""),
     ("cache", "lru"),
     ("config", "cache ipc"),
-    ("geometry", "cache termination"),
+    ("geometry", "budgets cache termination tolerances"),
     ("sdf", "cache geometry termination"),
     ("scene", "budgets cache geometry lru sdf termination tolerances"),
     ("contact", "budgets geometry scene sdf termination tolerances"),

@@ -358,6 +358,30 @@ pub(crate) const OVERLAP_FINEST: f64 = 1e-4;
 /// `caxif-s1-c5-214`.
 pub(crate) const OVERLAP_MARGIN: f64 = 1.0 / 8.0;
 
+// Parts that are given twice.
+
+/// Share of a part's largest extent. How far the surface of a copy may be off: a circle of 16 sides leaves out as much.
+/// At half, copies with fewer than 22 sides are missed; at double, bodies that are 2 % of their size apart count as one.
+pub(crate) const REPEATED_SIZE: f64 = 0.01;
+/// Share of a part's volume over its area, which is half of the thickness of a sheet. The same for thin parts: it is a
+/// twentieth of their walls, and what is just below one side of a wall ([`BELOW_SURFACE`]) is not yet at the other. Half
+/// misses copies of tubes of few sides; at five times as much, a wall is as thin as that.
+pub(crate) const REPEATED_WALL: f64 = 0.1;
+/// Multiple of that tolerance. Below its surface by this, a body is told from what it only touches, by four times the
+/// tolerance. It must be more than 1, or both are within the tolerance.
+pub(crate) const BELOW_SURFACE: f64 = 2.0;
+/// Share of the depth that a point deep in a body has at least in a part that holds the body. Bodies that overlap in the
+/// whole have surface of others inside, so it is less than 1. It only has to tell solid from hollow.
+pub(crate) const DEEP_SHARE: f64 = 0.5;
+/// Share of its surface that a body has in common with a part that holds it beside other bodies. Less takes in what is
+/// sunk into a part without a hole for it; more misses bodies that are joined to others in the whole.
+pub(crate) const BODY_SURFACE: f64 = 0.9;
+/// Share of its surface that a whole has from its bodies. Less takes in a part with others sunk flush into it; more
+/// misses a whole with a small body more.
+pub(crate) const WHOLE_SURFACE: f64 = 0.9;
+/// Share of its radius by which a ball may be entered by the surface that it touches: rounding.
+pub(crate) const BALL_TOUCHES: f64 = 1e-6;
+
 // The penalty engine (the paper's simulation), beside its own parameters.
 
 /// Length. Contact points are gathered this far ahead: about ten steps at full speed.

@@ -138,6 +138,71 @@ fn check_tells_parts_findings_and_overlaps() {
     assert!(text.contains("overlaps at the assembled pose:\n  none"), "{text}");
 }
 
+/// A box as an OBJ file, after so many vertices of others.
+fn box_obj(lo: [f64; 3], hi: [f64; 3], before: u32) -> String {
+    let corner = |i: u32| (0..3).map(move |axis| if i >> axis & 1 == 0 { lo[axis] } else { hi[axis] });
+    let line = |kind: &str, words: Vec<String>| format!("{kind} {}\n", words.join(" "));
+    let vertices = (0..8).map(|i| line("v", corner(i).map(|x| x.to_string()).collect()));
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let faces = faces.map(|f: [u32; 4]| line("f", f.map(|v| (v + 1 + before).to_string()).to_vec()));
+    vertices.chain(faces).collect()
+}
+
+/// A base, the same with one edge split, a lid on it, and all of it as one mesh: without the faces between the two, which
+/// healing drops.
+fn given_twice(folder: &Path) {
+    let (base, lid) = (([0.0; 3], [10.0; 3]), ([0.0, 0.0, 10.0], [10.0, 10.0, 12.0]));
+    let split = box_obj(base.0, base.1, 0).replace("f 1 2 6 5\n", "v 5 0 0\nf 1 9 5\nf 9 2 6\nf 9 6 5\n");
+    let split = split.replace("f 1 3 4 2\n", "f 1 3 9\nf 3 4 9\nf 4 2 9\n");
+    let whole = box_obj(base.0, base.1, 0) + &box_obj(lid.0, lid.1, 8);
+    for (name, text) in [
+        ("base", box_obj(base.0, base.1, 0)),
+        ("copy", split),
+        ("lid", box_obj(lid.0, lid.1, 0)),
+        ("zz_full", whole),
+    ] {
+        fs::write(folder.join(name).with_extension("obj"), text).unwrap();
+    }
+}
+
+const COPIES: &str =
+    "base and copy are the same body in the same place: leave one of them out (--removed copy)";
+const WHOLE: &str = "zz_full holds base, copy and lid: it seems to be the whole assembly beside its bodies; \
+                     leave it out (--removed zz_full)";
+
+#[test]
+fn parts_that_are_given_twice_are_named_by_check_and_in_plans() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().to_str().unwrap();
+    given_twice(folder.path());
+    let text = stdout(&run(&["check", path]));
+    let overlaps = "  base and copy: 5.00 deep\n  base and zz_full: 5.00 deep\n  copy and zz_full: 5.00 deep\n  \
+                    lid and zz_full: 2.00 deep\n";
+    for part in [&format!("given twice:\n  {COPIES}\n  {WHOLE}\n"), overlaps] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+    let warnings = |options: &[&str], daemon: Option<&Daemon>| {
+        let mut command = sbdp();
+        if let Some(daemon) = daemon {
+            command.env("SBDP_RUNTIME_DIR", daemon.runtime_dir());
+        }
+        let place = if daemon.is_some() { "--daemon" } else { "--embedded" };
+        let output = command.args(["plan", path, place, "--json", "-"]).args(options).output().unwrap();
+        let plan: PlanDocument = serde_json::from_slice(&output.stdout).unwrap();
+        (output.status.code(), plan.warnings.into_iter().map(|w| w.message).collect::<Vec<_>>())
+    };
+    let daemon = Daemon::start();
+    for place in [None, Some(&daemon)] {
+        let (_, found) = warnings(&[], place);
+        assert!(found.ends_with(&[COPIES.to_owned(), WHOLE.to_owned()]), "{found:?}");
+        let (status, found) = warnings(&["--removed", "copy", "--removed", "zz_full"], place);
+        assert_eq!(status, Some(0));
+        assert!(!found.iter().any(|w| w.contains("same body") || w.contains("holds")), "{found:?}");
+    }
+    let text = stdout(&run(&["check", assembly("pin-bolt-cover").to_str().unwrap()]));
+    assert!(text.contains("given twice:\n  nothing\n"), "{text}");
+}
+
 #[test]
 fn check_compares_the_blocking_graphs_with_simulation() {
     // How many are excluded is kept here: fewer make searches longer, and nobody would see it.

@@ -9,7 +9,7 @@ use super::{interrupt, print};
 use crate::blocking_graph::Audit;
 use crate::geometry::{Healed, Solidity, SourceAssembly, heal, load_assembly};
 use crate::search::{Engine, Termination};
-use crate::service::Service;
+use crate::service::{Admission, Service};
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
     let assembly = load_assembly(&arguments.assembly)?;
@@ -20,6 +20,7 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
     let mut text = headline(&assembly, &healed);
     text.push_str(&parts(&assembly, &healed));
     text.push_str(&findings(&assembly, &healed));
+    text.push_str(&given_twice(&admission));
     text.push_str("\noverlaps at the assembled pose:\n");
     let name = |part: usize| assembly.parts.get(part).map_or("?", |p| p.name.as_str());
     for overlap in &overlaps {
@@ -54,6 +55,17 @@ fn graphs<'a>(audit: &Audit, name: impl Fn(usize) -> &'a str) -> String {
     for (part, action) in &audit.wrong {
         text.push_str(&format!("  {} can move along {action}\n", name(*part)));
     }
+    text
+}
+
+/// Warnings of the whole assembly: those of single parts are findings of healing.
+fn given_twice(admission: &Admission) -> String {
+    let mut text = String::from("\ngiven twice:\n");
+    let mut lines = admission.warnings.iter().filter(|w| w.part.is_none()).peekable();
+    if lines.peek().is_none() {
+        text.push_str("  nothing\n");
+    }
+    text.extend(lines.map(|w| format!("  {}\n", w.message)));
     text
 }
 

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::congruence::congruence;
 use super::heal::heal_until;
 use super::own_frame::OwnFrame;
-use super::{Bounds, GeometryError, Mesh, Pose, Shape, SourceAssembly};
+use super::repeated::{PlacedShape, repetitions};
+use super::{Bounds, GeometryError, Mesh, Pose, Repetition, Shape, SourceAssembly};
 use crate::termination::{Interrupt, Termination};
 
 /// A part of an assembly.
@@ -25,6 +26,13 @@ pub struct Part {
     pub bounds: Bounds,
     /// Where its mesh stands against where it was given (input units and frame).
     pub moved: Pose,
+}
+
+impl Part {
+    /// Its shape and where that stands.
+    pub(super) fn place(&self) -> PlacedShape {
+        (self.shape, self.planning_from_shape, self.bounds)
+    }
 }
 
 /// Parts in the planning frame.
@@ -45,6 +53,8 @@ pub struct Assembly {
     pub fixed: Vec<usize>,
     /// What healing found, with the part it is about.
     pub findings: Vec<(usize, String)>,
+    /// Parts that are given twice.
+    pub repetitions: Vec<Repetition>,
 }
 
 impl Assembly {
@@ -90,8 +100,9 @@ impl Assembly {
                     .ok_or_else(|| refuse(format!("`fixed` names part `{name}`, which does not exist")))
             })
             .collect::<Result<_, _>>()?;
+        let repetitions = repetitions(parts.iter().map(Part::place), &shapes, None, termination)?;
         let (name, units) = (source.name.clone(), source.units.clone());
-        Ok(Self { name, units, scale, parts, shapes, fixed, findings })
+        Ok(Self { name, units, scale, parts, shapes, fixed, findings, repetitions })
     }
 
     /// The shape of a part.

@@ -43,6 +43,12 @@ impl Bounds {
         Self { min: self.min.inf(&other.min), max: self.max.sup(&other.max) }
     }
 
+    /// What is in both boxes; empty if nothing is.
+    #[must_use]
+    pub fn intersection(self, other: &Self) -> Self {
+        Self { min: self.min.sup(&other.min), max: self.max.inf(&other.max) }
+    }
+
     /// Grown by `margin` on every side (shrunk if negative).
     #[must_use]
     pub fn grown(self, margin: f64) -> Self {

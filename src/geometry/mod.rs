@@ -24,6 +24,7 @@ mod helix;
 mod hull;
 mod hull_depth;
 mod incidence;
+mod inner_points;
 mod leading;
 mod linking_number;
 mod load;
@@ -36,6 +37,7 @@ mod pose;
 mod random;
 mod ray;
 mod records;
+mod repeated;
 mod revision;
 mod rim;
 mod sample_tree;
@@ -63,6 +65,7 @@ pub use heal::{Healed, heal, heal_until};
 pub use helix::{Footprint, Helix, radii};
 pub use hull::{Support, gap_along, hull_vertices, separating, separating_direction, transformed};
 pub use hull_depth::HullDepth;
+pub use inner_points::SurfacePoint;
 pub use linking_number::linking_number;
 pub use load::{load_assembly, natural_order};
 pub(crate) use load::{parse_notes, parse_part, parse_scene};
@@ -76,6 +79,7 @@ pub(crate) use records::{
     AssemblySource, HEALED, SHAPE, SOURCE, add_bounds, add_pose, has_source, healed_assembly, recent_sources,
     remember_given, remember_healed, remember_revised, source_of,
 };
+pub use repeated::Repetition;
 pub use revision::Revision;
 pub use rim::{Rim, RimEdge, WINDING_DOUBT};
 pub use sample_tree::{Ball, Look, Node as SampleNode, SampleTree};

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::congruence::congruence;
 use super::own_frame::OwnFrame;
+use super::repeated::{KnownRepetitions, repetitions};
 use super::{
     Assembly, Bounds, GeometryError, Mesh, Part, Pose, Shape, SourceAssembly, SourceMesh, SourcePart,
     heal_until, transformed, waypoint_from_pose,
@@ -156,6 +157,12 @@ impl Assembly {
                 self.longest_side() / self.scale
             )));
         }
+        let named = revision.replaced.iter().map(|(part, _)| *part);
+        let named = named.chain(revision.moved.iter().map(|(part, _)| *part));
+        let changed = named.chain(self.parts.len()..revised.parts.len()).collect();
+        let known = KnownRepetitions { found: &self.repetitions, changed: &changed };
+        let places = revised.parts.iter().map(Part::place);
+        revised.repetitions = repetitions(places, &revised.shapes, Some(&known), termination)?;
         Ok(revised)
     }
 

@@ -35,6 +35,7 @@ pub struct Shape {
     samples: OnceLock<SampleTree>,
     patches: OnceLock<PatchTree>,
     faces: OnceLock<Faces>,
+    inner_points: OnceLock<Vec<Point3<f64>>>,
     content: OnceLock<[u8; 32]>,
 }
 
@@ -86,6 +87,7 @@ impl Shape {
             samples: OnceLock::new(),
             patches: OnceLock::new(),
             faces: OnceLock::new(),
+            inner_points: OnceLock::new(),
             content,
         }
     }
@@ -156,6 +158,11 @@ impl Shape {
         self.faces.get_or_init(|| Faces::of(&self.surface))
     }
 
+    /// A point inside for each connected piece of the surface, as far as there is one.
+    pub fn inner_points(&self) -> &[Point3<f64>] {
+        self.inner_points.get_or_init(|| self.surface.inner_points())
+    }
+
     /// Bytes in memory, of what was derived so far.
     #[must_use]
     pub fn memory(&self) -> usize {
@@ -167,6 +174,7 @@ impl Shape {
             + self.convex_edges.get().map_or(0, ConvexEdges::memory)
             + self.patches.get().map_or(0, PatchTree::memory)
             + self.faces.get().map_or(0, Faces::memory)
+            + self.inner_points.get().map_or(0, |points| size_of_val(&**points))
     }
 
     /// The hash of the mesh, on which alone everything here depends.

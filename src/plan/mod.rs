@@ -1,5 +1,6 @@
 //! Plans: what is returned, and the check that it is true.
 
+mod common_depth;
 pub mod export;
 mod model;
 mod records;
@@ -10,4 +11,4 @@ pub use model::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanSta
 pub use records::{KnownVerdicts, VerdictQuestion};
 pub(crate) use records::{OVERLAP, VERDICT, overlap_key};
 pub use shorten::thinned;
-pub use verify::{Verdict, Verifier};
+pub use verify::{PairOverlap, Verdict, Verifier};

@@ -10,7 +10,6 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry::{Occupied, Vacant};
 use std::sync::Arc;
 
-use nalgebra::Point3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -20,13 +19,15 @@ use crate::contact::course::{Course, Interval, turns_far};
 use crate::contact::helix_profile::{centred, depth_on_screw};
 use crate::contact::region_cover::path::{DepthPrecision, PathDepth, PathQuestion};
 use crate::contact::sampled::along_path::{PathSamples, Penetration};
-use crate::geometry::{Pose, Shape, Surface, area_normal};
+use crate::geometry::{Pose, Shape};
 use crate::scene::{AllowedPenetrations, CongruentPair, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
     COARSE_SHARE, FINEST_SHARE, HELPFUL, IGNORED_SHARE, IGNORED_SHARE_IN_OVERLAP, OVERLAP_FINEST,
     OVERLAP_IGNORED, OVERLAP_MARGIN,
 };
+
+use super::common_depth::common_depth;
 
 /// What the check of a path found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,6 +55,24 @@ impl Verdict {
         }
         let penetrations = past.into_iter().flat_map(|v| v.penetrations);
         Self { depth, penetrations: penetrations.filter(|e| e.over > limit * HELPFUL).collect() }
+    }
+}
+
+/// How deep two parts overlap as assembled, in the planning frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PairOverlap {
+    /// The depth of the deepest point of either surface in the other part: what the pair is allowed.
+    pub surface: f64,
+    /// The depth of the deepest point inside both, where they have a body in common: then the surfaces coincide, and
+    /// neither is deep in the other part.
+    pub common: f64,
+}
+
+impl PairOverlap {
+    /// The deepest point of either part in the other.
+    #[must_use]
+    pub fn depth(&self) -> f64 {
+        self.surface.max(self.common)
     }
 }
 
@@ -102,7 +121,7 @@ impl Verifier {
         self.limit
     }
 
-    /// How deep two parts overlap as they stand.
+    /// How deep the surface of one of two parts gets into the other as they stand.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -134,16 +153,19 @@ impl Verifier {
         Ok(depth)
     }
 
-    /// How deep a point in the middle of one part lies in both, where surfaces show no overlap: two
-    /// parts that coincide have none of their surface inside the other.
-    #[must_use]
-    pub fn coincident_depth(&self, scene: &Scene, a: usize, b: usize) -> f64 {
-        let (one, other) = (&scene.bodies[a], &scene.bodies[b]);
-        let to_other = other.planning_from_shape.inverse() * one.planning_from_shape;
-        let depth = |surface: &Surface, p: &Point3<f64>| -surface.signed_distance(p);
-        interior_points(&one.shape.surface)
-            .map(|p| depth(&one.shape.surface, &p).min(depth(&other.shape.surface, &(to_other * p))))
-            .fold(0.0, f64::max)
+    /// The same, and how deep the inside is that they have in common.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn overlap(
+        &self,
+        scene: &Scene,
+        pair: &CongruentPair,
+        termination: &Termination,
+    ) -> Result<PairOverlap, Interrupt> {
+        let surface = self.assembled_depth(scene, pair, termination)?;
+        let common = common_depth(&PairPath::standing(scene, pair), termination)?;
+        Ok(PairOverlap { surface, common })
     }
 
     /// A path from where a given one begins to where it ends that turns in the middle of the play of a
@@ -291,22 +313,6 @@ fn deepest_penetrations(pair_path: &PairPath<'_>, [moving, standing]: &[PathDept
         }
     }
     taken.into_values().collect()
-}
-
-/// A few points below the largest faces, by a tenth of the smallest extent.
-fn interior_points(surface: &Surface) -> impl Iterator<Item = Point3<f64>> + '_ {
-    const PROBES: usize = 8;
-    let area = |t: u32| {
-        let [a, b, c] = surface.corners(t);
-        area_normal(&a, &b, &c).norm()
-    };
-    let mut faces: Vec<u32> = (0..surface.triangles().len() as u32).collect();
-    faces.sort_by(|&s, &t| area(t).total_cmp(&area(s)).then(s.cmp(&t)));
-    let below = surface.bounds().extents().min() / 10.0;
-    faces.into_iter().take(PROBES).map(move |t| {
-        let [a, b, c] = surface.corners(t);
-        Point3::from((a.coords + b.coords + c.coords) / 3.0) - surface.face_normal(t) * below
-    })
 }
 
 #[cfg(test)]

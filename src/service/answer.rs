@@ -71,9 +71,12 @@ pub(super) fn overlaps(assembly: &Assembly, found: &[(usize, usize, f64)]) -> Ve
     found.iter().map(|&(a, b, d)| Overlap { parts: [a, b], depth: d / assembly.scale }).collect()
 }
 
-pub(super) fn warnings(assembly: &Assembly) -> Vec<Warning> {
-    let warning = |(part, message): &(usize, String)| Warning { part: Some(*part), message: message.clone() };
-    assembly.findings.iter().map(warning).collect()
+/// What was found about the input, but for parts given twice of which so many are gone that none is left twice.
+pub(super) fn warnings(assembly: &Assembly, is_gone: impl Fn(usize) -> bool) -> Vec<Warning> {
+    let finding = |(part, message): &(usize, String)| Warning { part: Some(*part), message: message.clone() };
+    let twice = assembly.repetitions.iter().filter_map(|r| r.without(&is_gone));
+    let twice = twice.map(|r| Warning { part: None, message: r.message(|part| &assembly.parts[part].name) });
+    assembly.findings.iter().map(finding).chain(twice).collect()
 }
 
 /// Everything that is known before the search.
@@ -158,7 +161,7 @@ impl PlanFrame<'_> {
     /// A plan without steps, for a request that ended before its search began.
     pub(super) fn empty(self, status: PlanStatus, reason: Option<String>) -> Plan {
         let count = self.assembly.parts.len();
-        let mut warnings = warnings(self.assembly);
+        let mut warnings = warnings(self.assembly, |part| self.removed.contains(&part));
         warnings.extend(self.notes.into_iter().map(|message| Warning { part: None, message }));
         let kind = match self.request.assembly {
             Some(_) => PlanKind::Assembly,

@@ -56,7 +56,7 @@ pub struct Admission {
     pub id: AssemblyId,
     /// It was known before: nothing was done.
     pub known: bool,
-    /// What healing found.
+    /// What healing found, and parts that are given twice.
     pub warnings: Vec<Warning>,
 }
 
@@ -182,7 +182,7 @@ impl Service {
     ) -> Result<Admission, ServiceError> {
         let id = AssemblyId(content_hash(source));
         if let Some(entry) = self.kept(id) {
-            return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly) });
+            return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly, |_| false) });
         }
         Ok(self.taken_in(id, Assembly::new_until(source, termination)?))
     }
@@ -209,14 +209,14 @@ impl Service {
         check_parts(&revised_parts(revision), entry.assembly.parts.len())?;
         let id = if revision.is_empty() { base } else { AssemblyId(revision.content_hash(&base.0)) };
         if let Some(entry) = self.kept(id) {
-            return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly) });
+            return Ok(Admission { id, known: true, warnings: answer::warnings(&entry.assembly, |_| false) });
         }
         Ok(self.taken_in(id, entry.assembly.revised_until(revision, termination)?))
     }
 
     fn taken_in(&self, id: AssemblyId, assembly: Assembly) -> Admission {
         let entry = self.store.insert(id, assembly);
-        Admission { id, known: false, warnings: answer::warnings(&entry.assembly) }
+        Admission { id, known: false, warnings: answer::warnings(&entry.assembly, |_| false) }
     }
 
     /// Writes a healed assembly to the cache's disk, if there is one: after a restart it is loaded without healing.

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::cache::RequestCache;
 use crate::contact::ShiftCoverCache;
 use crate::geometry::Assembly;
-use crate::plan::{Verifier, overlap_key};
+use crate::plan::{PairOverlap, Verifier, overlap_key};
 use crate::scene::{CongruentPair, HullTree, JoinedHulls, Scene, grouped, resolution};
 use crate::sdf::Field;
 use crate::search::{PlanSink, Progress, Stage};
@@ -51,12 +51,17 @@ impl Prepared {
         let mut scene = Scene { hulls: Arc::clone(hulls), ..Scene::assembled(assembly, &fields) };
         let shape_of = assembly.parts.iter().map(|p| p.shape).collect();
         let verifier = Verifier::new(&assembly.shapes, shape_of, depth_limit(assembly));
-        let mut overlaps = measure_overlaps(&scene, &verifier, termination, cache)?;
-        for &(a, b, depth) in &overlaps {
-            scene.allowed.allow(a, b, depth);
+        let least = LEAST_OVERLAP * scene.longest_side;
+        let mut overlaps = Vec::new();
+        for (a, b, found) in measure_overlaps(&scene, &verifier, termination, cache)? {
+            // Surfaces that coincide are reported, but not allowed.
+            if found.surface > least {
+                scene.allowed.allow(a, b, found.surface);
+            }
+            if found.depth() > least {
+                overlaps.push((a, b, found.depth()));
+            }
         }
-        overlaps.extend(coincident_pairs(&scene, &verifier, termination)?);
-        overlaps.sort_by_key(|&(a, b, _)| (a, b));
         Ok(Self { scene, verifier, overlaps, fields, overlap_time: started.elapsed() })
     }
 
@@ -105,7 +110,7 @@ fn measure_overlaps(
     verifier: &Verifier,
     termination: &Termination,
     cache: &RequestCache,
-) -> Result<Vec<(usize, usize, f64)>, Interrupt> {
+) -> Result<Vec<(usize, usize, PairOverlap)>, Interrupt> {
     let pairs = scene.broad_phase.pairs(0.0);
     let placed = |&(a, b): &(usize, usize)| {
         let pair = CongruentPair::turned(scene, a, b);
@@ -119,34 +124,8 @@ fn measure_overlaps(
         .with_max_len(1)
         .map(|&i| {
             let (key, pair) = &keyed[i];
-            cache.get_or(*key, || verifier.assembled_depth(scene, pair, termination))
+            cache.get_or(*key, || verifier.overlap(scene, pair, termination))
         })
         .collect::<Result<Vec<_>, Interrupt>>()?;
-    let overlaps = pairs.into_iter().zip(group_of).map(|((a, b), group)| (a, b, depths[group]));
-    Ok(overlaps.filter(|(_, _, d)| *d > LEAST_OVERLAP * scene.longest_side).collect())
+    Ok(pairs.into_iter().zip(group_of).map(|((a, b), group)| (a, b, depths[group])).collect())
 }
-
-/// Pairs without an allowed penetration that share their inside all the same, because their surfaces coincide. The
-/// overlap is reported, but not allowed.
-fn coincident_pairs(
-    scene: &Scene,
-    verifier: &Verifier,
-    termination: &Termination,
-) -> Result<Vec<(usize, usize, f64)>, Interrupt> {
-    let mut out = Vec::new();
-    for (a, b) in scene.broad_phase.pairs(0.0) {
-        termination.check()?;
-        let alike = (scene.bodies[a].bounds.centre() - scene.bodies[b].bounds.centre()).norm()
-            < COINCIDENT * scene.bodies[a].bounds.extents().norm();
-        if alike && scene.allowed.of(a, b) == 0.0 {
-            let depth = verifier.coincident_depth(scene, a, b);
-            if depth > LEAST_OVERLAP * scene.longest_side {
-                out.push((a, b, depth));
-            }
-        }
-    }
-    Ok(out)
-}
-
-/// Pairs whose centres are closer than this share of their size are examined.
-const COINCIDENT: f64 = 1e-3;

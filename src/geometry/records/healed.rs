@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::source::source_key;
 use crate::cache::{Cache, Digest, RecordKey, RecordKind, Storage, Validity};
-use crate::geometry::{Assembly, Mesh, Shape};
+use crate::geometry::{Assembly, Mesh, Repetition, Shape};
 
 const SOURCES: Validity = Validity::Sources(env!("SBDP_SOURCES_GEOMETRY"));
 /// A healed mesh in its own frame.
@@ -99,11 +99,12 @@ fn assembly_record(assembly: &Assembly) -> HealedRecord {
 
 /// The assembly of a record, unless it names shapes or parts that it does not have.
 fn assembly(HealedRecord { assembly, .. }: HealedRecord, shapes: Vec<Arc<Shape>>) -> Option<Assembly> {
-    let Assembly { parts, fixed, findings, .. } = &assembly;
+    let Assembly { parts, fixed, findings, repetitions, .. } = &assembly;
     let is_part = |part: &usize| *part < parts.len();
     let is_whole = parts.iter().all(|part| part.shape < shapes.len())
         && fixed.iter().all(is_part)
-        && findings.iter().all(|(part, _)| is_part(part));
+        && findings.iter().all(|(part, _)| is_part(part))
+        && repetitions.iter().flat_map(Repetition::parts).all(|part| is_part(&part));
     is_whole.then_some(Assembly { shapes, ..assembly })
 }
 
@@ -135,10 +136,10 @@ mod tests {
     }
 
     fn text(assembly: &Assembly) -> String {
-        let Assembly { name, units, scale, parts, shapes, fixed, findings } = assembly;
+        let Assembly { name, units, scale, parts, shapes, fixed, findings, repetitions } = assembly;
         let shapes: Vec<_> =
             shapes.iter().map(|s| (s.mesh(), &s.hull, s.mass, s.samples().points())).collect();
-        format!("{name} {units:?} {scale} {parts:?} {shapes:?} {fixed:?} {findings:?}")
+        format!("{name} {units:?} {scale} {parts:?} {shapes:?} {fixed:?} {findings:?} {repetitions:?}")
     }
 
     #[test]
@@ -192,6 +193,7 @@ mod tests {
         assert!(broken(&|r| r.assembly.parts[1].shape = 4));
         assert!(broken(&|r| r.assembly.fixed = vec![5]));
         assert!(broken(&|r| r.assembly.findings.push((5, String::new()))));
+        assert!(broken(&|r| r.assembly.repetitions.push(Repetition::Copies(vec![1, 5]))));
         let record = shape_record(&whole.shapes[0]);
         let of = |record| shape(record, &HANDLE);
         let with = |triangles| {

@@ -3,10 +3,12 @@
 
 use super::SOURCES;
 use crate::cache::{Digest, RecordKey, RecordKind, Storage};
+use crate::plan::PairOverlap;
 use crate::scene::{CongruentPair, Scene, add_pair};
 
 /// How deep two parts overlap as assembled, in the planning frame.
-pub(crate) static OVERLAP: RecordKind = RecordKind::of::<f64>(1, "overlap", Storage::MemoryAndDisk, SOURCES);
+pub(crate) static OVERLAP: RecordKind =
+    RecordKind::of::<PairOverlap>(1, "overlap", Storage::MemoryAndDisk, SOURCES);
 
 /// The key of how deep a pair overlaps.
 pub(crate) fn overlap_key(scene: &Scene, pair: &CongruentPair) -> RecordKey {

@@ -1,4 +1,4 @@
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 
 use super::*;
@@ -6,7 +6,7 @@ use crate::budgets::PATH_EFFORT_IN_DOUBT;
 use crate::fixtures::{
     LIMIT, ball, block_on_plate, cells, cuboid, l_shape, moved, open_box, peg_in_hole, rod, scene, tube,
 };
-use crate::geometry::{SourceMesh, interpolate};
+use crate::geometry::{SourceMesh, Surface, interpolate};
 
 /// The path of part 1 by steps from its assembled pose, checked against all others.
 fn checked(scene: &Scene, verifier: &Verifier, steps: &[Vector3<f64>]) -> Verdict {
@@ -212,9 +212,9 @@ fn a_nut_a_hair_too_tight_for_its_bolt_is_bounded_as_easily_as_one_that_fits() {
 #[test]
 fn parts_that_touch_or_are_apart_do_not_overlap() {
     let (scene, verifier) = scene(block_on_plate());
-    assert!(overlap(&scene, &verifier, 0, 1) < 1e-12);
-    assert_eq!(verifier.coincident_depth(&scene, 0, 1), 0.0);
-    assert_eq!(verifier.coincident_depth(&scene, 1, 0), 0.0);
+    let pair = CongruentPair::turned(&scene, 0, 1);
+    let found = verifier.overlap(&scene, &pair, &Termination::default()).unwrap();
+    assert!(found.surface < 1e-12 && found.common == 0.0);
 }
 
 #[test]
@@ -222,8 +222,9 @@ fn coincident_parts_share_their_inside() {
     let block = || cuboid([-3.0, -2.0, -1.0], [3.0, 2.0, 1.0]);
     let (scene, verifier) = scene([block(), block()]);
     assert!(overlap(&scene, &verifier, 0, 1) < 1e-9, "no surface is inside the other");
-    let depth = verifier.coincident_depth(&scene, 0, 1);
-    assert!(depth > 0.1 && depth <= 1.0, "{depth}");
+    let pair = CongruentPair::turned(&scene, 0, 1);
+    let found = verifier.overlap(&scene, &pair, &Termination::default()).unwrap();
+    assert!((0.9..=1.0).contains(&found.common) && found.depth() == found.common, "{found:?}");
 }
 
 #[test]
