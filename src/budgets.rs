@@ -218,6 +218,15 @@ pub(crate) const SURFACE_LOOPS: usize = 64;
 /// Largest number of pairs of segments for one pair of parts. It bounds the time; pairs with more are not found to be
 /// linked.
 pub(crate) const SEGMENT_PAIRS: usize = 4_000_000;
+/// Cells that are measured for one ball inside a part: about as many as a plate of 30 by 30 times its thickness needs.
+/// A part that needs more gets a smaller ball.
+pub(crate) const INSCRIBED_BALL_CELLS: usize = 4000;
+/// Cells along the longest side of a part's box in which the way out of a ball is looked for; the next grid follows if
+/// one proves nothing. The last one tells windows from balls that differ by a hundredth of the side.
+pub(crate) const ENCLOSURE_GRIDS: [usize; 4] = [16, 32, 64, 128];
+/// Cells of all such grids of one search: some seconds. Half of it leaves out the last pairs of assemblies of many
+/// parts; double it lets the end of such a search take twice as long.
+pub(crate) const ENCLOSURE_CELLS: usize = 2_000_000;
 
 /// Number of simulations per thread in one window, where few of them lead out: long and short ones share the threads
 /// better. 1 leaves threads idle; more throws away more when one leads out. No plan depends on it.

@@ -72,7 +72,7 @@ pub const CONTROL_CANCEL: u32 = 1;
 /// Beside every request.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("sbdp/v1/RequestHeader")]
+#[type_name("sbdp/v2/RequestHeader")]
 pub struct RequestHeader {
     /// A [`RequestKind`].
     pub kind: u32,
@@ -90,7 +90,7 @@ pub struct RequestHeader {
 /// Beside every response.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("sbdp/v1/ResponseHeader")]
+#[type_name("sbdp/v2/ResponseHeader")]
 pub struct ResponseHeader {
     /// A [`ResponseKind`].
     pub kind: u32,

@@ -23,6 +23,6 @@ pub mod summary;
 pub type Transport = iceoryx2::prelude::ipc_threadsafe::Service;
 
 /// Version of this contract. It is part of every service name: versions do not meet.
-pub const PROTOCOL: u32 = 1;
+pub const PROTOCOL: u32 = 2;
 /// The iceoryx2 version both sides must have: nodes and services carry it.
 pub const ICEORYX2_VERSION: &str = "0.10.0";

@@ -6,7 +6,7 @@ use crate::bytes::{Malformed, Reader, Text, TextWriter, Texts, Writer};
 use crate::plan::{MovedPart, check_range, slice_of};
 
 /// Names of the plan statuses; the wire carries the index.
-pub const STATUSES: [&str; 5] = ["complete", "partial", "infeasible", "timeout", "cancelled"];
+pub const STATUSES: [&str; 6] = ["complete", "partial", "infeasible", "timeout", "cancelled", "exhausted"];
 
 /// The plan carries a reason.
 pub const SUMMARY_HAS_REASON: u32 = 1;
@@ -326,7 +326,7 @@ impl<'a> SummaryView<'a> {
         self.header.flags & SUMMARY_ASSEMBLY != 0
     }
 
-    /// `complete`, `partial`, `infeasible`, `timeout` or `cancelled`.
+    /// `complete`, `partial`, `infeasible`, `timeout`, `cancelled` or `exhausted`.
     #[must_use]
     pub fn status(&self) -> &'static str {
         STATUSES.get(self.header.status as usize).copied().unwrap_or("partial")

@@ -1,4 +1,4 @@
-//! The bytes of every message of protocol 1, written down once. Whoever changes one breaks clients that
+//! The bytes of every message of protocol 2, written down once. Whoever changes one breaks clients that
 //! are out there: a new layout needs a new version in the service names.
 
 use sbdp_ipc::PROTOCOL;
@@ -92,12 +92,12 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
     assert_eq!((ErrorCode::Busy as u32, ErrorCode::Cancelled as u32), (3, 12));
     assert_eq!(
         (PROTOCOL, layout::PLAN_SERVICE, layout::GEOMETRY_SERVICE),
-        (1, "sbdp/v1/plan", "sbdp/v1/geometry")
+        (2, "sbdp/v2/plan", "sbdp/v2/geometry")
     );
-    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v1/progress");
+    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v2/progress");
     assert_eq!(
         (layout::WAKE_SERVER_SERVICE, layout::WAKE_CLIENT_SERVICE),
-        ("sbdp/v1/wake/server", "sbdp/v1/wake/client")
+        ("sbdp/v2/wake/server", "sbdp/v2/wake/client")
     );
 }
 

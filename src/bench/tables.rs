@@ -275,6 +275,7 @@ fn verdict(record: &Record) -> &'static str {
     match record.status.as_str() {
         _ if record.solved() => "solved",
         "infeasible" => "infeasible",
+        "exhausted" => "exhausted",
         _ => "none",
     }
 }

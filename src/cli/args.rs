@@ -33,7 +33,7 @@ pub(super) struct Arguments {
     pub(super) command: Command,
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 complete, 2 wrong usage or refused input, 3 infeasible or partial, \
+const EXIT_CODES: &str = "Exit codes: 0 complete, 2 wrong usage or refused input, 3 infeasible, exhausted or partial, \
 4 timeout, 5 cancelled, 1 anything else.";
 
 /// What to do.

@@ -213,6 +213,7 @@ fn status(status: client::PlanStatus) -> PlanStatus {
         client::PlanStatus::Infeasible => PlanStatus::Infeasible,
         client::PlanStatus::Timeout => PlanStatus::Timeout,
         client::PlanStatus::Cancelled => PlanStatus::Cancelled,
+        client::PlanStatus::Exhausted => PlanStatus::Exhausted,
     }
 }
 

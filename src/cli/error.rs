@@ -56,7 +56,7 @@ impl From<BenchError> for CliError {
 pub(super) fn exit_code(status: PlanStatus) -> ExitCode {
     ExitCode::from(match status {
         PlanStatus::Complete => 0,
-        PlanStatus::Partial | PlanStatus::Infeasible => 3,
+        PlanStatus::Partial | PlanStatus::Infeasible | PlanStatus::Exhausted => 3,
         PlanStatus::Timeout => 4,
         PlanStatus::Cancelled => 5,
     })

@@ -156,6 +156,7 @@ fn status(status: PlanStatus) -> u32 {
         PlanStatus::Infeasible => 2,
         PlanStatus::Timeout => 3,
         PlanStatus::Cancelled => 4,
+        PlanStatus::Exhausted => 5,
     }
 }
 

@@ -30,7 +30,7 @@ impl CachedResponse {
     /// The response when the request that led to a plan is repeated. `None` if the plan ended by the clock: another
     /// run may find another plan.
     pub(crate) fn of(plan: &Plan) -> Option<Self> {
-        if !matches!(plan.status, PlanStatus::Complete | PlanStatus::Infeasible | PlanStatus::Partial) {
+        if matches!(plan.status, PlanStatus::Timeout | PlanStatus::Cancelled) {
             return None;
         }
         let steps: Vec<_> = plan.steps.iter().map(convert::step).collect();

@@ -8,6 +8,7 @@
 
 mod assembly;
 mod bounds;
+mod closed_shell;
 mod cone;
 mod congruence;
 mod content_hash;
@@ -53,6 +54,7 @@ mod triangle_tree;
 
 pub use assembly::{Assembly, Part};
 pub use bounds::Bounds;
+pub use closed_shell::is_within_closed_shell;
 pub use cone::extreme_rays;
 pub use content_hash::content_hash;
 pub use convex_edges::{ConvexEdge, ConvexEdges, Corner};

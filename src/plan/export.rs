@@ -23,7 +23,7 @@ pub struct PlanDocument {
     /// Where the meshes are, if that is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<SourceDocument>,
-    /// `complete`, `partial`, `infeasible`, `timeout` or `cancelled`.
+    /// `complete`, `partial`, `infeasible`, `timeout`, `cancelled` or `exhausted`.
     pub status: String,
     /// Why it is not complete.
     pub reason: Option<String>,
@@ -204,6 +204,7 @@ impl PlanStatus {
             Self::Complete => "complete",
             Self::Partial => "partial",
             Self::Infeasible => "infeasible",
+            Self::Exhausted => "exhausted",
             Self::Timeout => "timeout",
             Self::Cancelled => "cancelled",
         }

@@ -21,12 +21,15 @@ pub enum PlanStatus {
     Complete,
     /// A budget ran out (the reason names it); the steps are the best so far.
     Partial,
-    /// Some parts cannot come off one at a time at the resolution that the reason names.
+    /// It is proved that parts which were asked for cannot come off one at a time (or, in an assembly plan, cannot
+    /// wait where they are to).
     Infeasible,
     /// The deadline passed.
     Timeout,
     /// The request was cancelled.
     Cancelled,
+    /// The search found nothing more to try, and nothing was proved.
+    Exhausted,
 }
 
 /// Whether a step turns the part.

@@ -19,7 +19,10 @@ use crate::simulation::{
 use crate::termination::Interrupt;
 use crate::tolerances::HULL_MARGIN;
 
-use super::outcome::{BlockedAction, Counters, Outcome, Removal};
+use super::blocked_actions::{few_of_each_part, of_inseparable};
+use super::inseparable::first_inseparable;
+use super::linked::Links;
+use super::outcome::{BlockedAction, Counters, Outcome, Reason, Removal};
 use super::problem::{Checked, Observer, Problem, VerifiedPath};
 use super::trace::TraceEvent;
 
@@ -408,40 +411,53 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         free
     }
 
-    /// The outcome of the search. `evidence` lists what was tried before nothing more was found; `blocked` lists
+    /// The outcome of the search. If it came to its end, it is infeasible where some pair is proved never to come
+    /// apart, and exhausted otherwise. `links` are the linked parts, if they were looked for; `blocked` lists
     /// which parts block those that remain.
     pub(super) fn outcome(
         mut self,
         stop: Option<Stop>,
-        evidence: String,
+        links: Option<Links>,
         blocked: Vec<BlockedAction>,
     ) -> Outcome {
-        let (status, reason) = match stop {
-            _ if self.is_done() => (PlanStatus::Complete, None),
-            None if self.path_time_ran_out => (PlanStatus::Timeout, Some(NO_TIME.to_owned())),
-            None => (PlanStatus::Infeasible, Some(evidence)),
-            Some(Stop::Interrupted(Interrupt::Cancelled)) => {
-                (PlanStatus::Cancelled, Some("cancelled".to_owned()))
-            }
-            Some(Stop::Interrupted(Interrupt::DeadlinePassed)) => {
-                (PlanStatus::Timeout, Some("the deadline passed".to_owned()))
-            }
+        let remaining = self.everything.standing().to_vec();
+        let mut blocked = blocked;
+        let limit = |status, words: &str| (status, Some(Reason::Limit(words.to_owned())));
+        let ended = match stop {
+            _ if self.is_done() => Ok((PlanStatus::Complete, None)),
+            None if self.path_time_ran_out => Ok(limit(PlanStatus::Timeout, NO_TIME)),
+            None => first_inseparable(&self.problem, &remaining, links).map(|pair| match pair {
+                Some(pair) => {
+                    let wanted = self.problem.wanted(&remaining);
+                    // What is blocked for ever needs no further words.
+                    let proved = of_inseparable(&pair, &wanted);
+                    blocked.retain(|b| proved.iter().all(|p| p.part != b.part));
+                    blocked.extend(proved);
+                    (PlanStatus::Infeasible, Some(Reason::Inseparable(pair)))
+                }
+                None => (PlanStatus::Exhausted, Some(Reason::Exhausted)),
+            }),
+            Some(Stop::Interrupted(interrupt)) => Err(interrupt),
             Some(Stop::Budget(n)) => {
-                (PlanStatus::Partial, Some(format!("the budget of {n} simulations is used up")))
+                Ok(limit(PlanStatus::Partial, &format!("the budget of {n} simulations is used up")))
             }
         };
+        let (status, reason) = ended.unwrap_or_else(|interrupt| match interrupt {
+            Interrupt::Cancelled => limit(PlanStatus::Cancelled, "cancelled"),
+            Interrupt::DeadlinePassed => limit(PlanStatus::Timeout, "the deadline passed"),
+        });
         let Counters { simulations, sweeps, .. } = self.counters;
         self.trace(|| TraceEvent::End {
             status: status.name().to_owned(),
-            reason: reason.clone(),
+            reason: reason.as_ref().map(|r| r.text(&remaining, |part| format!("part {part}"))),
             simulations,
             sweeps,
         });
         Outcome {
             status,
             reason,
-            remaining: self.everything.standing().to_vec(),
-            blocked: if status == PlanStatus::Complete { Vec::new() } else { blocked },
+            remaining,
+            blocked: if status == PlanStatus::Complete { Vec::new() } else { few_of_each_part(blocked) },
             removals: self.removals,
             counters: self.counters,
         }

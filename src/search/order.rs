@@ -70,6 +70,11 @@ impl Order {
         Ok(any)
     }
 
+    /// The linked parts among those that stood when they were looked for, if they were.
+    pub(super) fn into_links(self) -> Option<Links> {
+        self.links
+    }
+
     /// One of the parts that stand (ascending) that a part is linked with.
     pub(super) fn linked_with(&self, part: usize, standing: &[usize]) -> Option<usize> {
         self.links.as_ref()?.holder(part, standing)

@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::Pose;
 use crate::plan::PlanStatus;
 
+/// The most parts that a reason names as those that remain.
+const NAMED_PARTS: usize = 4;
+
 /// One part taken out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Removal {
@@ -29,6 +32,73 @@ pub struct BlockedAction {
     pub action: String,
     /// The parts in its way, ascending.
     pub by: Vec<usize>,
+}
+
+/// What proves that two parts never come apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SeparationProof {
+    /// Closed curves on them are linked.
+    Linked,
+    /// A ball inside the first one fits through no opening of the second one.
+    Ball,
+    /// The first one is in a closed void of the second one.
+    Void,
+}
+
+/// Two parts that never come apart one at a time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Inseparable {
+    /// The two.
+    pub parts: [usize; 2],
+    /// What proves it.
+    pub proof: SeparationProof,
+}
+
+/// Why a search is not complete.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Reason {
+    /// A limit ended it, in words.
+    Limit(String),
+    /// It is proved that these never come apart.
+    Inseparable(Inseparable),
+    /// Nothing more was found, and nothing was proved.
+    Exhausted,
+}
+
+impl Reason {
+    /// At most two sentences about it, given which parts remain and the parts' names.
+    #[must_use]
+    pub fn text(&self, remaining: &[usize], name: impl Fn(usize) -> String) -> String {
+        let Inseparable { parts: [a, b], proof } = match self {
+            Self::Limit(words) => return words.clone(),
+            Self::Exhausted => {
+                return format!(
+                    "{}. The search found no further motion that takes one of them out, and no proof that there is \
+                     none.",
+                    remain(remaining, &name)
+                );
+            }
+            Self::Inseparable(pair) => *pair,
+        };
+        let (remain, a, b) = (remain(remaining, &name), name(a), name(b));
+        let because = match proof {
+            SeparationProof::Linked => "closed curves on the two are linked".to_owned(),
+            SeparationProof::Ball => format!("a ball inside {a} fits through no opening of {b}"),
+            SeparationProof::Void => format!("{a} is in a closed void of {b}"),
+        };
+        format!("{remain}. It is proved that {a} and {b} never come apart: {because}.")
+    }
+}
+
+/// Which parts remain: their names, or their number if they are many.
+fn remain(remaining: &[usize], name: impl Fn(usize) -> String) -> String {
+    match remaining {
+        [all @ .., last] if !all.is_empty() && remaining.len() <= NAMED_PARTS => {
+            let all: Vec<String> = all.iter().map(|&part| name(part)).collect();
+            format!("{} and {} remain", all.join(", "), name(*last))
+        }
+        _ => format!("{} parts remain", remaining.len()),
+    }
 }
 
 /// Counts and times of a search.
@@ -59,13 +129,36 @@ pub struct Outcome {
     /// Its status.
     pub status: PlanStatus,
     /// Why it is not complete.
-    pub reason: Option<String>,
+    pub reason: Option<Reason>,
     /// Removals in order.
     pub removals: Vec<Removal>,
     /// Parts that remain, ascending.
     pub remaining: Vec<usize>,
-    /// The blocked actions of the parts that should have come out.
+    /// The blocked actions of the parts that should have come out: a few of each part.
     pub blocked: Vec<BlockedAction>,
     /// Counts and times.
     pub counters: Counters,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_name_parts_and_say_what_was_proved() {
+        let name = |part: usize| ["base", "ring", "ball", "pin", "lid"][part].to_owned();
+        let text = |reason: Reason, remaining: &[usize]| reason.text(remaining, name);
+        assert_eq!(
+            text(Reason::Inseparable(Inseparable { parts: [2, 0], proof: SeparationProof::Ball }), &[0, 2]),
+            "base and ball remain. It is proved that ball and base never come apart: a ball inside ball fits through \
+             no opening of base."
+        );
+        let linked = Inseparable { parts: [0, 1], proof: SeparationProof::Linked };
+        assert!(
+            text(Reason::Inseparable(linked), &[0, 1, 2, 3]).starts_with("base, ring, ball and pin remain. ")
+        );
+        let exhausted = text(Reason::Exhausted, &[0, 1, 2, 3, 4]);
+        assert!(exhausted.starts_with("5 parts remain. The search found no further motion"), "{exhausted}");
+        assert_eq!(text(Reason::Limit("cancelled".into()), &[0, 1]), "cancelled");
+    }
 }

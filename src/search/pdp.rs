@@ -37,13 +37,13 @@ pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: PdpMo
     });
     let actions = match actions {
         Ok(actions) => actions,
-        Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), String::new(), Vec::new()),
+        Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), None, Vec::new()),
     };
     let mut search = Pdp { disassembly, mode, actions, stopped_by: vec![Vec::new(); count], states: 0 };
     let stop = search.run().err();
-    let (evidence, blocked) = (search.evidence(), search.blocked());
+    let blocked = search.blocked();
     search.disassembly.counters.states = search.states;
-    search.disassembly.outcome(stop, evidence, blocked)
+    search.disassembly.outcome(stop, None, blocked)
 }
 
 /// PDP*: the counters are those of the run that answers. Removals of the first run reach the observer only once
@@ -281,20 +281,6 @@ impl Pdp<'_, '_> {
             PdpMode::Translation => PlanningPhase::Translation,
             PdpMode::Rotation => PlanningPhase::Rotation,
         }
-    }
-
-    fn evidence(&self) -> String {
-        let kind = match self.mode {
-            PdpMode::Translation => "translations",
-            PdpMode::Rotation => "actions with rotational freedom",
-        };
-        let stuck = self.disassembly.problem.wanted(self.disassembly.everything.standing()).len();
-        format!(
-            "{stuck} of {} parts cannot leave one at a time: breadth-first search with {} {kind} found no new \
-             configuration of any part",
-            self.disassembly.problem.present.len(),
-            self.actions.len(),
-        )
     }
 
     fn blocked(&self) -> Vec<BlockedAction> {

@@ -1,10 +1,11 @@
-//! What a state-based search reports: why it found no more, who blocks what remains, its trace.
+//! What a state-based search reports: what it tried, who blocks what remains, its trace.
 
 use crate::blocking_graph::Blockage;
 use crate::simulation::Action;
 use crate::tolerances::{SAME_STATE_ROTATION, SAME_STATE_TRAVEL};
 
 use super::action_table::ActionTable;
+use super::blocked_actions::ANY;
 use super::disassembly::Disassembly;
 use super::novelty::Novelty;
 use super::order::Order;
@@ -12,9 +13,6 @@ use super::outcome::BlockedAction;
 use super::states::States;
 use super::strategy::Strategy;
 use super::trace::{BlockedBy, PlanningPhase, TraceEvent};
-
-/// The name of all actions together, where parts are linked.
-const LINKED: &str = "any";
 
 /// The parts of a search that its report is about.
 #[derive(Clone, Copy)]
@@ -27,38 +25,21 @@ pub(super) struct SearchReport<'s> {
 }
 
 impl SearchReport<'_> {
-    /// A sentence about what was tried before the search gave up.
-    pub(super) fn evidence(self, disassembly: &Disassembly<'_, '_>) -> String {
-        let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());
-        let stuck = problem.wanted(standing);
-        let linked = stuck.iter().filter(|p| self.order.linked_with(**p, standing).is_some()).count();
-        let mut found = Vec::new();
-        if linked > 0 {
-            found.push(format!(
-                "{linked} of them are linked with others, as links of a chain, which no motion undoes (linking \
-                 numbers of curves on their surfaces)"
-            ));
-        }
-        if linked < stuck.len() {
-            found.push(self.exhausted(&stuck, disassembly));
-        }
-        let (stuck, all) = (stuck.len(), problem.present.len());
-        format!("{stuck} of {all} parts cannot leave one at a time: {}", found.join("; of the others, "))
-    }
-
-    fn exhausted(self, stuck: &[usize], disassembly: &Disassembly<'_, '_>) -> String {
+    /// What was tried, for the log: a plan's reason leaves it out.
+    pub(super) fn log(self, disassembly: &Disassembly<'_, '_>) {
+        let stuck = disassembly.problem.wanted(disassembly.everything.standing());
         let most = stuck.iter().map(|&p| self.states.known[p].len()).max().unwrap_or(0);
         let coarse = self.novelty.coarsest(self.strategy, most);
-        format!(
-            "every state reached was expanded with {} translations and {} actions with rotational freedom ({} \
-             states in all, told apart at {:.3} of the longest side and {:.1} rad){}",
-            self.actions.translations.all.len(),
-            self.actions.rotations.all.len(),
-            disassembly.counters.states,
-            SAME_STATE_TRAVEL * coarse / disassembly.problem.scene.longest_side,
-            SAME_STATE_ROTATION * coarse,
-            if self.strategy.guided { ", also where static analysis saw no way" } else { "" },
-        )
+        tracing::debug!(
+            stuck = stuck.len(),
+            translations = self.actions.translations.all.len(),
+            rotations = self.actions.rotations.all.len(),
+            states = disassembly.counters.states,
+            share_of_longest_side = SAME_STATE_TRAVEL * coarse / disassembly.problem.scene.longest_side,
+            radians = SAME_STATE_ROTATION * coarse,
+            distrusts_static = self.strategy.distrust_static,
+            "the search has ended"
+        );
     }
 
     /// The actions of the parts that remain, at the assembled pose, and the parts that block them.
@@ -68,8 +49,10 @@ impl SearchReport<'_> {
         let mut out = Vec::new();
         for node in self.states.nodes.iter().filter(|n| n.alive && n.is_root() && wanted.contains(&n.part)) {
             let part = node.part;
-            let linked = self.order.linked_with(part, standing);
-            out.extend(linked.map(|by| BlockedAction { part, action: LINKED.to_owned(), by: vec![by] }));
+            if let Some(by) = self.order.linked_with(part, standing) {
+                out.push(BlockedAction { part, action: ANY.to_owned(), by: vec![by] });
+                continue;
+            }
             for phase in [PlanningPhase::Translation, PlanningPhase::Rotation] {
                 let Some(b) = node.blockage(phase) else { continue };
                 out.extend(

@@ -76,13 +76,14 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
     let (disassembly, initial) = Disassembly::beside(problem, observer, |p| InitialAnalysis::of(p, guided));
     let initial = match initial {
         Ok(initial) => initial,
-        Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), String::new(), Vec::new()),
+        Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), None, Vec::new()),
     };
     let mut search = Sbdp::new(disassembly, initial, guided);
     let stop = search.run().err();
     let (report, disassembly) = search.report();
-    let (evidence, blocked) = (report.evidence(disassembly), report.blocked(disassembly));
-    search.disassembly.outcome(stop, evidence, blocked)
+    report.log(disassembly);
+    let blocked = report.blocked(disassembly);
+    search.disassembly.outcome(stop, search.order.into_links(), blocked)
 }
 
 impl<'a, 'o> Sbdp<'a, 'o> {

@@ -148,7 +148,9 @@ impl PlanFrame<'_> {
             by,
             action,
         });
-        let (status, reason) = (outcome.status, outcome.reason);
+        let name = |part: usize| self.assembly.parts[part].name.clone();
+        let reason = outcome.reason.map(|reason| reason.text(&outcome.remaining, name));
+        let status = outcome.status;
         Plan {
             steps,
             remaining: outcome.remaining,

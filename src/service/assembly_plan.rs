@@ -106,10 +106,11 @@ impl AssemblyPlanner<'_> {
         let (name, names) = (plan.part_name(part), names.join(", "));
         let (status, reason) = match what {
             Hindrance::WaitsIn => {
-                (PlanStatus::Infeasible, format!("the staging pose of {name} puts it into {names}"))
+                (PlanStatus::Infeasible, format!("The staging pose of {name} puts it into {names}."))
             }
             Hindrance::InsertionMeets => {
-                (PlanStatus::Infeasible, format!("where {name} is inserted, {names} would wait"))
+                // Another way in, past what waits there, is not looked for: nothing is proved.
+                (PlanStatus::Exhausted, format!("Where {name} is inserted, {names} would wait."))
             }
             Hindrance::NoWay(samples) => {
                 let reason = format!(

@@ -11,16 +11,19 @@ pub enum PlanStatus {
     Complete,
     /// A budget ran out; the steps are the best so far.
     Partial,
-    /// Some parts cannot come off, at the resolution that the reason names.
+    /// It is proved that some parts cannot come off one at a time.
     Infeasible,
     /// The deadline passed.
     Timeout,
     /// The request was cancelled.
     Cancelled,
+    /// The search found nothing more to try, and nothing was proved.
+    Exhausted,
 }
 
 impl PlanStatus {
-    const ALL: [Self; 5] = [Self::Complete, Self::Partial, Self::Infeasible, Self::Timeout, Self::Cancelled];
+    const ALL: [Self; 6] =
+        [Self::Complete, Self::Partial, Self::Infeasible, Self::Timeout, Self::Cancelled, Self::Exhausted];
 
     /// Its name, as in the JSON contract.
     #[must_use]
