@@ -334,3 +334,7 @@ pub(crate) const FEWEST_STORED_POINTS: usize = 12;
 pub(crate) const LOOSE_HULL: usize = 32;
 /// If no more than one part in this many is gone, the tree of all parts is made: the next request may be about others.
 pub(crate) const MOSTLY_STANDING: usize = 2;
+
+/// Points of a surface at which its thickness is measured. The quarter that is thinnest has a fourth of them; half of
+/// them misses thin flanges of large parts, double takes twice as long once for each shape (a closest point costs most).
+pub(crate) const THICKNESS_POINTS: usize = 200;

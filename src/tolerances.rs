@@ -335,6 +335,14 @@ pub(crate) const WAYPOINT_TURN: f64 = 2.0;
 /// Share of the longest side. Largest travel of a vertex between two poses that samples are checked at.
 /// Measured: no effect at half and double.
 pub(crate) const PATH_DENSITY: f64 = 0.004;
+/// Share of the longest side of the smaller part of a pair. A path is refused at this depth, whatever stands beside the
+/// pair. The independent check refuses at 0.001 of that side; what is left is for what lies between its samples.
+pub(crate) const PAIR_LIMIT: f64 = 8e-4;
+/// Share of the thickness of the thinner part of a pair. A path is refused at this depth: nothing passes through a wall
+/// unseen that is refused at half of it, and the independent check refuses at a quarter.
+pub(crate) const THIN_LIMIT: f64 = 0.2;
+/// The same for paths that turn, whose poses are only as exact as [`BULGE_TOLERANCE`].
+pub(crate) const TURNING_THIN_LIMIT: f64 = 0.4;
 /// Share of the limit. Points deeper than this help in refining a motion that is refused.
 /// Measured: no effect at half and double.
 pub(crate) const HELPFUL: f64 = 1.0 / 2.0;
@@ -351,14 +359,14 @@ pub(crate) const FINEST_SHARE: f64 = 1.0 / 4.0;
 /// Measured: at half another plan of `bayonet`, `caxif-s1-c5-214`; at double another plan of `bayonet`,
 /// `caxif-as1-tu-203`.
 pub(crate) const COARSE_SHARE: f64 = 4e-3;
-/// Share of the longest side. Depth that is not looked into when the overlap of assembled parts is measured. No more is allowed than is
-/// measured at some point, and no less than nine tenths of what there is ([`DEPTH_SHARE`]).
+/// Share of the limit. Depth that is not looked into when the overlap of assembled parts is measured. No more is allowed
+/// than is measured at some point, and no less than nine tenths of what there is ([`DEPTH_SHARE`]).
 /// Measured: no effect at half and double.
-pub(crate) const OVERLAP_IGNORED: f64 = 2e-6;
-/// Share of the longest side. The smallest radius of a piece there.
+pub(crate) const OVERLAP_IGNORED: f64 = 0.01;
+/// Share of the limit. The smallest radius of a piece there.
 /// Measured: at half another plan of `caxif-s1-c5-214`; at double another plan of `caxif-as1-tu-203`,
 /// `caxif-s1-c5-214`.
-pub(crate) const OVERLAP_FINEST: f64 = 1e-4;
+pub(crate) const OVERLAP_FINEST: f64 = 0.5;
 /// Share of the limit. The error of a large overlap is at most this, and not [`DEPTH_SHARE`] of the overlap: a part that
 /// keeps its overlap along its path must pass.
 /// Measured: at half another plan of `caxif-s1-c5-214`, `press_fit_overlap_0.05`; at double another plan of

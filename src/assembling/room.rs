@@ -69,11 +69,6 @@ impl Room {
         self.reach[part]
     }
 
-    /// Deeper than this is not free.
-    pub(super) fn limit(&self) -> f64 {
-        self.verifier.limit()
-    }
-
     /// Checks a way of a part (poses of its shape) among some numbers (ascending), with no penetration allowed.
     ///
     /// # Errors
@@ -94,7 +89,7 @@ impl Room {
                 found.push(self.verifier.check(&self.scene, allowed, &near, part, &glance, termination)?);
             }
         }
-        Ok(Verdict::of_all(found, self.limit()))
+        Ok(Verdict::of_all(found))
     }
 
     /// Whether a part on a straight way is seen to keep clear of some numbers (ascending), at poses so close

@@ -4,10 +4,12 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Point3, Vector3};
 
+use crate::budgets::THICKNESS_POINTS;
 use crate::termination::{Interrupt, Poll, Termination};
 
 use super::content_hash::mesh_hash;
 use super::hull::hull_vertices;
+use super::inner_points::SurfacePoint;
 use super::own_frame::OwnFrame;
 use super::samples::{Sited, sited, sited_within};
 use super::{
@@ -36,6 +38,7 @@ pub struct Shape {
     patches: OnceLock<PatchTree>,
     faces: OnceLock<Faces>,
     inner_points: OnceLock<Vec<Point3<f64>>>,
+    thickness: OnceLock<f64>,
     content: OnceLock<[u8; 32]>,
 }
 
@@ -88,6 +91,7 @@ impl Shape {
             patches: OnceLock::new(),
             faces: OnceLock::new(),
             inner_points: OnceLock::new(),
+            thickness: OnceLock::new(),
             content,
         }
     }
@@ -161,6 +165,25 @@ impl Shape {
     /// A point inside for each connected piece of the surface, as far as there is one.
     pub fn inner_points(&self) -> &[Point3<f64>] {
         self.inner_points.get_or_init(|| self.surface.inner_points())
+    }
+
+    /// The thickness that a quarter of the surface does not exceed: twice the radius of the largest ball that touches it
+    /// from inside. Infinite for open surfaces, which have no inside.
+    pub fn thickness(&self) -> f64 {
+        *self.thickness.get_or_init(|| {
+            if self.surface.is_open() {
+                return f64::INFINITY;
+            }
+            let of_ball = |at: SurfacePoint| {
+                let centre = self.surface.inner_point(&at)?;
+                Some(2.0 * (centre - at.0).norm())
+            };
+            let points = self.surface.spread_points(THICKNESS_POINTS);
+            // Corners have balls of any size: where there is none, a point says nothing.
+            let mut found: Vec<f64> = points.filter_map(of_ball).collect();
+            found.sort_by(f64::total_cmp);
+            found.get(found.len() / 4).copied().unwrap_or(f64::INFINITY)
+        })
     }
 
     /// Bytes in memory, of what was derived so far.

@@ -23,8 +23,8 @@ use crate::geometry::{Pose, Shape};
 use crate::scene::{AllowedPenetrations, CongruentPair, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
-    COARSE_SHARE, FINEST_SHARE, HELPFUL, IGNORED_SHARE, IGNORED_SHARE_IN_OVERLAP, OVERLAP_FINEST,
-    OVERLAP_IGNORED, OVERLAP_MARGIN,
+    BULGE_TOLERANCE, COARSE_SHARE, FINEST_SHARE, HELPFUL, IGNORED_SHARE, IGNORED_SHARE_IN_OVERLAP,
+    OVERLAP_FINEST, OVERLAP_IGNORED, OVERLAP_MARGIN, PAIR_LIMIT, THIN_LIMIT, TURNING_THIN_LIMIT,
 };
 
 use super::common_depth::common_depth;
@@ -37,24 +37,27 @@ pub struct Verdict {
     pub depth: f64,
     /// Points that got deep along a path that exceeds the limit; empty if the path is good.
     pub penetrations: Vec<Penetration>,
+    /// The depth at which the path is refused, in the planning frame.
+    pub limit: f64,
 }
 
 impl Verdict {
     /// On a path where nothing but these points gets deeper than `bound` into one part.
-    fn past(bound: f64, penetrations: Vec<Penetration>) -> Self {
-        Self { depth: deepest(bound, &penetrations), penetrations }
+    fn past(bound: f64, penetrations: Vec<Penetration>, limit: f64) -> Self {
+        Self { depth: deepest(bound, &penetrations), penetrations, limit }
     }
 
-    /// Joins the results past each standing part. If no penetration exceeds `limit`, the path is good, and they are
+    /// Joins the results past each standing part. If none exceeds its limit, the path is good, and penetrations are
     /// dropped; of a refused path, those that are too shallow to help are dropped.
     #[must_use]
-    pub fn of_all(past: Vec<Self>, limit: f64) -> Self {
+    pub fn of_all(past: Vec<Self>) -> Self {
         let depth = past.iter().map(|v| v.depth).fold(0.0, f64::max);
-        if depth <= limit {
-            return Self { depth, penetrations: Vec::new() };
+        let limit = past.iter().map(|v| v.limit).fold(f64::INFINITY, f64::min);
+        if past.iter().all(|v| v.depth <= v.limit) {
+            return Self { depth, penetrations: Vec::new(), limit };
         }
-        let penetrations = past.into_iter().flat_map(|v| v.penetrations);
-        Self { depth, penetrations: penetrations.filter(|e| e.over > limit * HELPFUL).collect() }
+        let helpful = |v: Self| v.penetrations.into_iter().filter(move |e| e.over > v.limit * HELPFUL);
+        Self { depth, penetrations: past.into_iter().flat_map(helpful).collect(), limit }
     }
 }
 
@@ -88,6 +91,8 @@ pub struct Verifier {
     samples: PathSamples,
     /// Depth beyond the allowed penetration that is still accepted, in the planning frame.
     limit: f64,
+    /// Whether small and thin parts have lower limits.
+    is_by_pair: bool,
 }
 
 impl Verifier {
@@ -100,25 +105,43 @@ impl Verifier {
     /// Prepares the check for shapes; `shape_of` gives each part's shape.
     #[must_use]
     pub fn new(shapes: &[Arc<Shape>], shape_of: Vec<usize>, limit: f64) -> Self {
-        Self { samples: PathSamples::new(shapes, shape_of), limit }
+        Self { samples: PathSamples::new(shapes, shape_of), limit, is_by_pair: true }
     }
 
-    /// The same check for an engine that declares another depth.
+    /// The same check for an engine that declares another depth, for all pairs.
     #[must_use]
     pub fn with_limit(&self, limit: f64) -> Self {
-        Self { limit, samples: self.samples.clone() }
+        Self { limit, samples: self.samples.clone(), is_by_pair: self.is_by_pair && limit == self.limit }
     }
 
     /// The same check for a scene that has every part twice: all of them, and then all of them again.
     #[must_use]
     pub fn twice(&self) -> Self {
-        Self { limit: self.limit, samples: self.samples.twice() }
+        Self { samples: self.samples.twice(), ..*self }
     }
 
-    /// The depth at which a path is refused, in the planning frame.
+    /// The largest depth at which a path is refused, in the planning frame.
     #[must_use]
     pub fn limit(&self) -> f64 {
         self.limit
+    }
+
+    /// The depth at which a path past a standing part is refused: it depends on the two parts, not on what else is in
+    /// the assembly.
+    #[must_use]
+    pub fn limit_past(&self, pair_path: &PairPath<'_>) -> f64 {
+        if !self.is_by_pair {
+            return self.limit;
+        }
+        let [size, thickness] = [
+            pair_path.shapes.map(|shape| shape.bounds().extents().max()),
+            pair_path.shapes.map(Shape::thickness),
+        ]
+        .map(|[one, other]| one.min(other));
+        let of_pair = (PAIR_LIMIT * size).min(THIN_LIMIT * thickness);
+        let turns = pair_path.path.iter().any(|pose| pose.rotation != pair_path.path[0].rotation);
+        let least = if turns { BULGE_TOLERANCE.min(TURNING_THIN_LIMIT * thickness) } else { 0.0 };
+        self.limit.min(of_pair.max(least))
     }
 
     /// How deep the surface of one of two parts gets into the other as they stand.
@@ -131,14 +154,15 @@ impl Verifier {
         pair: &CongruentPair,
         termination: &Termination,
     ) -> Result<f64, Interrupt> {
+        let pair_path = PairPath::standing(scene, pair);
+        let limit = self.limit_past(&pair_path);
         let precision = DepthPrecision {
-            ignored: OVERLAP_IGNORED * scene.longest_side,
+            ignored: OVERLAP_IGNORED * limit,
             deep: f64::INFINITY,
-            margin: OVERLAP_MARGIN * self.limit,
-            finest: OVERLAP_FINEST * scene.longest_side,
+            margin: OVERLAP_MARGIN * limit,
+            finest: OVERLAP_FINEST * limit,
             coarse: COARSE_SHARE * scene.longest_side,
         };
-        let pair_path = PairPath::standing(scene, pair);
         let course = Course::new(&pair_path.path, pair_path.centre, 0.0);
         let way = PathQuestion { pair_path: &pair_path, course: &course, precision, termination };
         let [one, other] = way.depth()?;
@@ -203,7 +227,7 @@ impl Verifier {
         let pair_path: Vec<_> = near.map(pair_path).collect();
         let past: Vec<_> =
             pair_path.par_iter().map(|p| self.past(p, termination)).collect::<Result<_, _>>()?;
-        Ok(Verdict::of_all(past, self.limit))
+        Ok(Verdict::of_all(past))
     }
 
     /// What is found of a path past one part that stands: it depends on no other.
@@ -211,7 +235,7 @@ impl Verifier {
     /// # Errors
     /// The termination condition became true.
     pub fn past(&self, pair_path: &PairPath<'_>, termination: &Termination) -> Result<Verdict, Interrupt> {
-        let Self { limit, samples } = self;
+        let (samples, limit) = (&self.samples, &self.limit_past(pair_path));
         let course = &Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
         let soon = if turns_far(&pair_path.path) {
             None
@@ -222,7 +246,7 @@ impl Verifier {
             } else {
                 let seen = samples.sparse_penetrations_along(pair_path, *limit, termination)?;
                 if seen.iter().any(|e| e.over > *limit) {
-                    return Ok(Verdict::past(0.0, seen));
+                    return Ok(Verdict::past(0.0, seen, *limit));
                 }
                 None
             }
@@ -242,7 +266,7 @@ impl Verifier {
                 penetrations.extend(samples.penetrations_along(pair_path, &path, *limit, termination)?);
             }
         }
-        Ok(Verdict::past(bound, penetrations))
+        Ok(Verdict::past(bound, penetrations, *limit))
     }
 
     /// How deep the moving part gets into the standing one, and the other way round, as far as that can be
@@ -257,7 +281,11 @@ impl Verifier {
         termination: &Termination,
     ) -> Result<[PathDepth; 2], Interrupt> {
         let question = self.question(pair_path, course, termination);
-        if turns_far(&pair_path.path) { depth_on_screw(&question, self.limit) } else { question.depth() }
+        if turns_far(&pair_path.path) {
+            depth_on_screw(&question, self.limit_past(pair_path))
+        } else {
+            question.depth()
+        }
     }
 
     /// The question of how deep each of two parts gets into the other along a path.
@@ -267,7 +295,7 @@ impl Verifier {
         course: &'a Course,
         termination: &'a Termination,
     ) -> PathQuestion<'a> {
-        let limit = self.limit;
+        let limit = self.limit_past(pair_path);
         let share = if pair_path.allowed > 0.0 { IGNORED_SHARE_IN_OVERLAP } else { IGNORED_SHARE };
         let precision = DepthPrecision {
             ignored: limit * share,

@@ -170,11 +170,11 @@ impl Problem<'_> {
         let Self { scene, verifier, termination, cache, verdicts, .. } = self;
         let past = |&other: &usize| {
             let pair_path = &PairPath::new(scene, &scene.allowed, [part, other], path);
-            let question = &VerdictQuestion { pair_path, limit: verifier.limit() };
+            let question = &VerdictQuestion { pair_path, limit: verifier.limit_past(pair_path) };
             verdicts.verdict(question, cache, || verifier.past(pair_path, termination))
         };
         let past: Vec<_> = near.par_iter().map(past).collect::<Result<_, _>>()?;
-        Ok(Verdict::of_all(past, verifier.limit()))
+        Ok(Verdict::of_all(past))
     }
 
     /// Adds the points that refuted a path to the contact samples of their bodies.

@@ -107,7 +107,7 @@ mod tests {
                 checks.set(checks.get() + 1);
                 let point = Point3::new(0.5, 0.0, height);
                 let entry = Penetration { other: parts[1], on_moving: true, point, over: 0.5 };
-                Ok(Verdict { depth: 0.5, penetrations: vec![entry] })
+                Ok(Verdict { depth: 0.5, penetrations: vec![entry], limit: 0.1 })
             };
             known.verdict(&VerdictQuestion { pair_path, limit: 2e-3 }, &cache, check).unwrap()
         };
