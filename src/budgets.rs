@@ -303,10 +303,10 @@ pub(crate) const REPEATED_POINTS: usize = 500;
 pub(crate) const REPEATED_DEEP_POINTS: usize = 32;
 /// Parts that a warning names; others are counted.
 pub(crate) const NAMED_BODIES: usize = 8;
-/// Steps in which a ball is shrunk until it touches a surface; most take three or four.
+/// Steps in which a ball is shrunk until it touches a surface. What takes more gives no point.
 pub(crate) const BALL_SHRINKS: usize = 32;
-/// Points at which the inside that two parts have in common is measured. A cube takes 150; a large thin part would take
-/// any number to prove that no point is deeper, and its deepest is found from the surface.
+/// Points at which the inside that two parts have in common is measured. In a large thin part far more would be needed to
+/// prove that no point is deeper; its deepest point is found from the surface.
 pub(crate) const COMMON_POINTS: usize = 2000;
 /// Points of each surface below which the deepest point is looked for first.
 pub(crate) const COMMON_SEEDS: usize = 64;

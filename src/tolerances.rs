@@ -376,11 +376,11 @@ pub(crate) const OVERLAP_MARGIN: f64 = 1.0 / 8.0;
 // Parts that are given twice.
 
 /// Share of a part's largest extent. How far the surface of a copy may be off: a circle of 16 sides leaves out as much.
-/// At half, copies with fewer than 22 sides are missed; at double, bodies that are 2 % of their size apart count as one.
+/// At half, copies with fewer than 23 sides are missed; at double, bodies that are 2 % of their size apart count as one.
 pub(crate) const REPEATED_SIZE: f64 = 0.01;
 /// Share of a part's volume over its area, which is half of the thickness of a sheet. The same for thin parts: it is a
-/// twentieth of their walls, and what is just below one side of a wall ([`BELOW_SURFACE`]) is not yet at the other. Half
-/// misses copies of tubes of few sides; at five times as much, a wall is as thin as that.
+/// twentieth of their walls, and what is just below one side of a wall ([`BELOW_SURFACE`]) is a tenth through it. Half
+/// misses more copies of tubes with few sides; at ten times as much, it is through the wall.
 pub(crate) const REPEATED_WALL: f64 = 0.1;
 /// Multiple of that tolerance. Below its surface by this, a body is told from what it only touches, by four times the
 /// tolerance. It must be more than 1, or both are within the tolerance.

@@ -193,7 +193,8 @@ fn parts_that_are_given_twice_are_named_by_check_and_in_plans() {
     };
     let daemon = Daemon::start();
     for place in [None, Some(&daemon)] {
-        let (_, found) = warnings(&[], place);
+        // Parts that cannot leave are searched for a way out for long.
+        let (_, found) = warnings(&["--max-simulations", "1"], place);
         assert!(found.ends_with(&[COPIES.to_owned(), WHOLE.to_owned()]), "{found:?}");
         let (status, found) = warnings(&["--removed", "copy", "--removed", "zz_full"], place);
         assert_eq!(status, Some(0));

@@ -76,8 +76,11 @@ impl Repetition {
         match self {
             Self::Copies(parts) => {
                 let rest = parts.get(1..).unwrap_or_default();
-                let options: Vec<_> =
+                let mut options: Vec<_> =
                     rest.iter().take(NAMED_BODIES).map(|p| format!("--removed {}", name(*p))).collect();
+                if rest.len() > NAMED_BODIES {
+                    options.push("…".to_owned());
+                }
                 let which = if rest.len() == 1 { "one" } else { "all but one" };
                 format!(
                     "{} are the same body in the same place: leave {which} of them out ({})",
@@ -289,7 +292,9 @@ fn held_by(
             return Ok(Some(Held { parts, is_all: true }));
         }
     }
-    lying.retain(|(_, surface)| *surface >= BODY_SURFACE);
+    // A sheet that is drawn as a surface on another part has no inside of its own.
+    let is_sheet = |part: usize| bodies[part].solid.surface().rim().is_some();
+    lying.retain(|(part, surface)| *surface >= BODY_SURFACE && !is_sheet(*part));
     let parts: Vec<usize> = lying.into_iter().map(|(part, _)| part).collect();
     Ok((!parts.is_empty()).then_some(Held { parts, is_all: false }))
 }

@@ -204,6 +204,7 @@ mod tests {
                 assert_eq!(names.len(), parts);
                 let assembly = Assembly::new(&source(member.into_iter().map(|(_, m)| m))).unwrap();
                 assert!(assembly.findings.is_empty(), "{}: {:?}", family.name(), assembly.findings);
+                assert_eq!(assembly.repetitions, [], "{}", family.name());
             }
         }
     }

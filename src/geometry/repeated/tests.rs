@@ -141,6 +141,13 @@ fn parts_that_fit_into_each_other_are_not_told() {
     let nested = moved(cup(0.1), &Pose::translation(0.0, 0.0, 0.1));
     assert_eq!(found([cup(0.1), large(nested, 2.9 / 3.0)]), none, "a cup in a cup");
     assert_eq!(found(thread(4.0, 0.6)), none);
+    let block = cuboid([-3.0; 3], [3.0; 3]);
+    let mut sheet = moved(block.clone(), &Pose::translation(-0.002, 0.0, -0.002));
+    sheet.triangles.retain(|t| {
+        let on = |axis: usize| t.iter().all(|&v| sheet.vertices[v as usize][axis] == -3.002);
+        on(0) || on(2)
+    });
+    assert_eq!(found([block, sheet]), none, "an angle drawn as a surface");
 }
 
 #[test]
@@ -186,7 +193,8 @@ fn messages_name_the_parts_and_what_to_do() {
         assert_eq!(repetition.message(name), message);
     }
     let many = Repetition::Copies((0..20).collect());
-    assert!(many.message(|_| "x").contains(" and 12 others are"), "{}", many.message(|_| "x"));
+    let many = many.message(|_| "x");
+    assert!(many.contains(" and 12 others are") && many.ends_with("--removed x …)"), "{many}");
 }
 
 #[test]
