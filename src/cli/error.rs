@@ -61,3 +61,15 @@ pub(super) fn exit_code(status: PlanStatus) -> ExitCode {
         PlanStatus::Cancelled => 5,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_ends_without_a_plan_and_what_is_proved_to_have_none_exit_alike() {
+        let code = |status| format!("{:?}", exit_code(status));
+        let three = format!("{:?}", ExitCode::from(3));
+        assert_eq!((code(PlanStatus::Exhausted), code(PlanStatus::Infeasible)), (three.clone(), three));
+    }
+}

@@ -140,6 +140,7 @@ fn cost(question: &[u8], answer: &CachedResponse) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::plan_of;
 
     fn answer(bytes: usize) -> CachedResponse {
         CachedResponse { steps: vec![Arc::new(vec![1; bytes - 8])], summary: Arc::new(vec![0; 8]) }
@@ -161,6 +162,21 @@ mod tests {
         assert_eq!(answers.by_question.len(), 1);
         answers.insert(b"f", answer(40_000));
         assert!(answers.get(b"f").is_none() && answers.get(b"e").is_some(), "what never fits takes no room");
+    }
+
+    #[test]
+    fn what_the_clock_did_not_end_is_repeated_under_its_status() {
+        let repeated = |status| {
+            let answer = CachedResponse::of(&plan_of(status, vec![]))?;
+            let bytes = sbdp_ipc::bytes::AlignedBytes::copy_of(&answer.summary);
+            Some(sbdp_ipc::summary::SummaryView::new(bytes.as_slice()).unwrap().status())
+        };
+        for status in
+            [PlanStatus::Complete, PlanStatus::Partial, PlanStatus::Infeasible, PlanStatus::Exhausted]
+        {
+            assert_eq!(repeated(status), Some(status.name()));
+        }
+        assert_eq!((repeated(PlanStatus::Timeout), repeated(PlanStatus::Cancelled)), (None, None));
     }
 
     #[test]

@@ -449,7 +449,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         let Counters { simulations, sweeps, .. } = self.counters;
         self.trace(|| TraceEvent::End {
             status: status.name().to_owned(),
-            reason: reason.as_ref().map(|r| r.text(&remaining, |part| format!("part {part}"))),
+            reason: reason.as_ref().map(|r| r.text(&remaining, |part| part.to_string())),
             simulations,
             sweeps,
         });

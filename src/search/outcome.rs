@@ -95,7 +95,7 @@ fn remain(remaining: &[usize], name: impl Fn(usize) -> String) -> String {
     match remaining {
         [all @ .., last] if !all.is_empty() && remaining.len() <= NAMED_PARTS => {
             let all: Vec<String> = all.iter().map(|&part| name(part)).collect();
-            format!("{} and {} remain", all.join(", "), name(*last))
+            format!("Parts {} and {} remain", all.join(", "), name(*last))
         }
         _ => format!("{} parts remain", remaining.len()),
     }
@@ -150,12 +150,13 @@ mod tests {
         let text = |reason: Reason, remaining: &[usize]| reason.text(remaining, name);
         assert_eq!(
             text(Reason::Inseparable(Inseparable { parts: [2, 0], proof: SeparationProof::Ball }), &[0, 2]),
-            "base and ball remain. It is proved that ball and base never come apart: a ball inside ball fits through \
+            "Parts base and ball remain. It is proved that ball and base never come apart: a ball inside ball fits through \
              no opening of base."
         );
         let linked = Inseparable { parts: [0, 1], proof: SeparationProof::Linked };
         assert!(
-            text(Reason::Inseparable(linked), &[0, 1, 2, 3]).starts_with("base, ring, ball and pin remain. ")
+            text(Reason::Inseparable(linked), &[0, 1, 2, 3])
+                .starts_with("Parts base, ring, ball and pin remain. ")
         );
         let exhausted = text(Reason::Exhausted, &[0, 1, 2, 3, 4]);
         assert!(exhausted.starts_with("5 parts remain. The search found no further motion"), "{exhausted}");
