@@ -23,8 +23,8 @@ use crate::geometry::{Pose, Shape};
 use crate::scene::{AllowedPenetrations, CongruentPair, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
-    BULGE_TOLERANCE, COARSE_SHARE, FINEST_SHARE, HELPFUL, IGNORED_SHARE, IGNORED_SHARE_IN_OVERLAP,
-    OVERLAP_FINEST, OVERLAP_IGNORED, OVERLAP_MARGIN, PAIR_LIMIT, THIN_LIMIT, TURNING_THIN_LIMIT,
+    COARSE_SHARE, FINEST_SHARE, HELPFUL, IGNORED_SHARE, IGNORED_SHARE_IN_OVERLAP, OVERLAP_FINEST,
+    OVERLAP_IGNORED, OVERLAP_MARGIN, PAIR_LIMIT, THIN_LIMIT, TURNING_THIN_LIMIT,
 };
 
 use super::common_depth::common_depth;
@@ -139,8 +139,9 @@ impl Verifier {
         ]
         .map(|[one, other]| one.min(other));
         let of_pair = (PAIR_LIMIT * size).min(THIN_LIMIT * thickness);
+        // Poses of paths that turn are less exact than those of translations.
         let turns = pair_path.path.iter().any(|pose| pose.rotation != pair_path.path[0].rotation);
-        let least = if turns { BULGE_TOLERANCE.min(TURNING_THIN_LIMIT * thickness) } else { 0.0 };
+        let least = if turns { TURNING_THIN_LIMIT * thickness } else { 0.0 };
         self.limit.min(of_pair.max(least))
     }
 

@@ -7,6 +7,7 @@ use crate::fixtures::{
     LIMIT, ball, block_on_plate, cells, cuboid, l_shape, moved, open_box, peg_in_hole, rod, scene, tube,
 };
 use crate::geometry::{SourceMesh, Surface, interpolate};
+use crate::tolerances::PAIR_LIMIT;
 
 /// The path of part 1 by steps from its assembled pose, checked against all others.
 fn checked(scene: &Scene, verifier: &Verifier, steps: &[Vector3<f64>]) -> Verdict {
@@ -230,10 +231,34 @@ fn coincident_parts_share_their_inside() {
 #[test]
 fn a_depth_up_to_the_limit_is_told_but_not_refused() {
     let (scene, verifier) = scene(block_on_plate());
-    let slight = checked(&scene, &verifier, &[Vector3::z() * (-0.9 * LIMIT)]);
-    assert!((slight.depth - 0.9 * LIMIT).abs() < 1e-9 && slight.penetrations.is_empty());
-    assert!(!checked(&scene, &verifier, &[Vector3::z() * (-1.1 * LIMIT)]).penetrations.is_empty());
-    assert_eq!(verifier.limit(), LIMIT);
+    // The block is 2 wide and the plate 1 thick.
+    let limit = 2.0 * PAIR_LIMIT;
+    let slight = checked(&scene, &verifier, &[Vector3::z() * (-0.9 * limit)]);
+    assert!((slight.depth - 0.9 * limit).abs() < 1e-9 && slight.penetrations.is_empty());
+    assert!(!checked(&scene, &verifier, &[Vector3::z() * (-1.1 * limit)]).penetrations.is_empty());
+    assert_eq!((verifier.limit(), slight.limit), (LIMIT, limit));
+}
+
+#[test]
+fn a_pair_is_judged_alike_whatever_stands_beside_it() {
+    // A captive rivet: its head is 0.004 wider than the hole on all sides.
+    let limits = [5.5, 9.5].map(|length| {
+        let beside = cuboid([2.0, -length / 2.0, 0.0], [3.0, length / 2.0, 1.0]);
+        let (scene, verifier) = scene([tube(0.3, 1.0, [0.0, 0.5], 24), rod(0.304, [0.5, 0.8], 24), beside]);
+        let verdict = checked(&scene, &verifier, &[Vector3::z() * -2.0]);
+        assert!(!verdict.penetrations.is_empty() && verdict.limit < 1e-3, "{}", verdict.limit);
+        verdict.limit
+    });
+    assert_eq!(limits[0], limits[1]);
+}
+
+#[test]
+fn a_thin_shelf_does_not_pass_a_thin_wall() {
+    let wall = cuboid([-4.5, -4.5, 0.0], [4.5, 4.5, 0.004]);
+    let shelf = cuboid([-2.0, -0.002, 1.0], [2.0, 0.002, 2.0]);
+    let (scene, verifier) = scene([wall, shelf]);
+    let verdict = checked(&scene, &verifier, &[Vector3::z() * -3.0]);
+    assert!(!verdict.penetrations.is_empty() && verdict.limit < 0.001, "{}", verdict.limit);
 }
 
 #[test]
@@ -291,13 +316,14 @@ proptest! {
             })
         });
         let deepest = deepest.fold(0.0, f64::max);
-        prop_assert!(verdict.depth >= deepest.min(LIMIT) - 1e-5, "{} for {deepest}", verdict.depth);
-        prop_assert_eq!(verdict.depth > LIMIT, !verdict.penetrations.is_empty());
+        let limit = verdict.limit;
+        prop_assert!(verdict.depth >= deepest.min(limit) - 1e-5, "{} for {deepest}", verdict.depth);
+        prop_assert_eq!(verdict.depth > limit, !verdict.penetrations.is_empty());
         // No alarm without a cause; a corner may be deep for a moment only.
         let dense = poses(600);
         for e in verdict.penetrations.iter().take(20) {
             let there = dense.iter().map(|pose| depth(pose, e.on_moving, &e.point)).fold(0.0, f64::max);
-            prop_assert!(there > 0.25 * LIMIT && e.over <= there + 0.01, "{there} at {e:?}");
+            prop_assert!(there > 0.25 * limit && e.over <= there + 0.01, "{there} at {e:?}");
         }
     }
 }
