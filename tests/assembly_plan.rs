@@ -100,7 +100,7 @@ fn a_place_that_is_taken_is_told() {
     refused("[]", &["staging.json", "poses by part"]);
     std::fs::write(&file, r#"{"pin": [0, 0, 0]}"#).unwrap();
     let plan = here("pin-bolt-cover", &["--staging", file.to_str().unwrap()]);
-    assert_eq!(plan.status, "infeasible");
+    assert_eq!(plan.status, "exhausted");
     let reason = plan.reason.unwrap();
     assert!(reason.contains("pin"), "{reason}");
     assert!(plan.blocked.iter().any(|b| b.action == "insertion"), "{:?}", plan.blocked);
