@@ -21,14 +21,13 @@ pub enum PlanStatus {
     Complete,
     /// A budget ran out (the reason names it); the steps are the best so far.
     Partial,
-    /// It is proved that parts which were asked for cannot come off one at a time (or, in an assembly plan, cannot
-    /// wait where they are to).
+    /// It is proved that parts which were asked for cannot come off one at a time.
     Infeasible,
     /// The deadline passed.
     Timeout,
     /// The request was cancelled.
     Cancelled,
-    /// The search found nothing more to try, and nothing was proved.
+    /// Nothing more was found to try, and nothing was proved.
     Exhausted,
 }
 

@@ -104,12 +104,12 @@ impl AssemblyPlanner<'_> {
         };
         let names: Vec<&str> = by.iter().map(|&p| plan.part_name(p)).collect();
         let (name, names) = (plan.part_name(part), names.join(", "));
+        // Only the order and the ways in that the disassembly gives are tried: nothing is proved.
         let (status, reason) = match what {
             Hindrance::WaitsIn => {
-                (PlanStatus::Infeasible, format!("The staging pose of {name} puts it into {names}."))
+                (PlanStatus::Exhausted, format!("The staging pose of {name} puts it into {names}."))
             }
             Hindrance::InsertionMeets => {
-                // Another way in, past what waits there, is not looked for: nothing is proved.
                 (PlanStatus::Exhausted, format!("Where {name} is inserted, {names} would wait."))
             }
             Hindrance::NoWay(samples) => {
