@@ -190,6 +190,7 @@ mod tests {
                 assert!(in_line < 0.9 * turn, "in line for {in_line}, and a step turns by {turn}");
                 let motion = SlidingEngine.simulate(&scene, &around, 1, &start, action, &t).unwrap();
                 assert!(matches!(motion.end, End::Disassembled(_)), "{play} at {degrees}: {:?}", motion.end);
+                let verifier = verifier.with_limit(2e-3);
                 let verdict = verifier.check(&scene, &scene.allowed, &[0], 1, &motion.path, &t).unwrap();
                 assert!(verdict.depth < 2e-3, "{play} at {degrees}: {}", verdict.depth);
             }
