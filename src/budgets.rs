@@ -75,12 +75,16 @@ pub(crate) const PATH_EFFORT: usize = 20_000_000;
 /// The same where holes are in sight or threads cross: most stays open, whatever is spent.
 /// Measured: no effect at half and double.
 pub(crate) const PATH_EFFORT_IN_DOUBT: usize = 200_000;
-/// Effort on one surface of a path, after which the depth that is not looked into grows: the rest of it up to the limit
-/// is halved, and again after as much effort, …
+/// Effort on one surface of a path (pieces and [`REGION_EFFORT`]) after which depths are ignored up to half the limit;
+/// after twice as much effort up to three quarters, … Chosen, not derived: most paths of the corpus need less. Half of
+/// it reports less exact depths of more paths; double makes a lid that is tilted out take about twice as long.
 pub(crate) const EFFORT_PER_HALVING: usize = 100_000;
-/// … this often. Then a part that touches all along its path is bounded to seven eighths of the limit.
+/// … at most this many times. A part that touches all along its path is then bounded to seven eighths of the limit; a
+/// fourth halving would leave a sixteenth of the limit for pieces that must be measured.
 pub(crate) const MOST_HALVINGS: usize = 3;
-/// Effort on each surface of a path before it is looked at by samples: most paths that are refused are refused by them.
+/// Effort on each surface of a path before its samples are measured, which refute most paths that are refused. As much
+/// as [`EFFORT_PER_HALVING`]: up to there depths are exact. Half measures samples of more good paths in vain; double
+/// spends as much more on paths that samples refute.
 pub(crate) const EFFORT_BEFORE_SAMPLES: usize = 100_000;
 /// In sight of holes, after this part of the effort (a divisor) …
 /// Measured: no effect at half and double.

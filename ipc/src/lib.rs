@@ -22,7 +22,8 @@ pub mod summary;
 /// The iceoryx2 service flavour that both sides use: ports may be used from several threads.
 pub type Transport = iceoryx2::prelude::ipc_threadsafe::Service;
 
-/// Version of this contract. It is part of every service name: versions do not meet.
+/// Version of this contract, a count of its incompatible changes. It is part of every service name, so that a client
+/// never opens a service of another version.
 pub const PROTOCOL: u32 = 2;
 /// The iceoryx2 version both sides must have: nodes and services carry it.
 pub const ICEORYX2_VERSION: &str = "0.10.0";

@@ -1,4 +1,4 @@
-//! The bytes of every message of protocol 2, written down once. Whoever changes one breaks clients that
+//! The bytes of every message of protocol 2, written down once. A change to one of them breaks clients that
 //! are out there: a new layout needs a new version in the service names.
 
 use sbdp_ipc::PROTOCOL;

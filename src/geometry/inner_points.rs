@@ -27,7 +27,8 @@ impl Surface {
         (0..self.triangles().len() as u32).map(|t| self.double_area_of(t)).sum::<f64>() / 2.0
     }
 
-    /// So many points of the surface: each stands for the same area, whatever the triangles are. None if it has no area.
+    /// `count` points of the surface. Each stands for the same area, whatever the triangles are. A surface without area
+    /// has none.
     pub fn spread_points(&self, count: usize) -> impl Iterator<Item = SurfacePoint> + '_ {
         // The R2 sequence (M. Roberts 2018) places the points within their triangles.
         const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
@@ -48,8 +49,8 @@ impl Surface {
         })
     }
 
-    /// The centre of the largest ball that touches the surface at a point of it from inside. None where the surface is
-    /// so narrow that there is no such ball, or inside and outside are told otherwise there.
+    /// The centre of the largest ball that touches the surface at a point of it from inside. None where the
+    /// solid is too thin for such a ball, or the signed distance says that its centre is outside.
     #[must_use]
     pub fn inner_point(&self, (p, normal): &SurfacePoint) -> Option<Point3<f64>> {
         // No ball in the solid is larger than this one.

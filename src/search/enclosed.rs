@@ -192,7 +192,8 @@ impl Cells {
     }
 }
 
-/// Looks for the widest way of a ball out of a surface's box, on a grid of so many cells across.
+/// Searches a grid over a surface's box for the widest way of a ball out of it. `across` is the number of cells along
+/// the box's longest side.
 fn passage(
     surface: &Surface,
     ball: &Ball,

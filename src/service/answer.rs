@@ -71,7 +71,7 @@ pub(super) fn overlaps(assembly: &Assembly, found: &[(usize, usize, f64)]) -> Ve
     found.iter().map(|&(a, b, d)| Overlap { parts: [a, b], depth: d / assembly.scale }).collect()
 }
 
-/// What was found about the input, but for parts given twice of which so many are gone that none is left twice.
+/// The findings about the input. The one about parts that are given twice is left out if enough of them are removed.
 pub(super) fn warnings(assembly: &Assembly, is_gone: impl Fn(usize) -> bool) -> Vec<Warning> {
     let finding = |(part, message): &(usize, String)| Warning { part: Some(*part), message: message.clone() };
     let twice = assembly.repetitions.iter().filter_map(|r| r.without(&is_gone));
