@@ -20,9 +20,8 @@ use crate::termination::Interrupt;
 use crate::tolerances::HULL_MARGIN;
 
 use super::blocked_actions::{few_of_each_part, of_inseparable};
-use super::inseparable::first_inseparable;
-use super::linked::Links;
-use super::outcome::{BlockedAction, Counters, Outcome, Reason, Removal};
+use super::inseparable::InseparablePairs;
+use super::outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal};
 use super::problem::{Checked, Observer, Problem, VerifiedPath};
 use super::trace::TraceEvent;
 
@@ -412,12 +411,12 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     }
 
     /// The outcome of the search. If it came to its end, it is infeasible where some pair is proved never to come
-    /// apart, and exhausted otherwise. `links` are the linked parts, if they were looked for; `blocked` lists
-    /// which parts block those that remain.
+    /// apart, and exhausted otherwise. `inseparable` are the pairs that were found so far; `blocked` lists which parts
+    /// block those that remain.
     pub(super) fn outcome(
         mut self,
         stop: Option<Stop>,
-        links: Option<Links>,
+        mut inseparable: InseparablePairs,
         blocked: Vec<BlockedAction>,
     ) -> Outcome {
         let remaining = self.everything.standing().to_vec();
@@ -426,7 +425,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         let ended = match stop {
             _ if self.is_done() => Ok((PlanStatus::Complete, None)),
             None if self.path_time_ran_out => Ok(limit(PlanStatus::Timeout, NO_TIME)),
-            None => first_inseparable(&self.problem, &remaining, links).map(|pair| match pair {
+            None => self.first_inseparable(&remaining, &mut inseparable).map(|pair| match pair {
                 Some(pair) => {
                     let wanted = self.problem.wanted(&remaining);
                     // What is blocked for ever needs no further words.
@@ -461,6 +460,21 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             removals: self.removals,
             counters: self.counters,
         }
+    }
+
+    /// A pair that never comes apart and of which one is wanted. What was not looked for yet is, the cheaper proof
+    /// first.
+    fn first_inseparable(
+        &self,
+        remaining: &[usize],
+        known: &mut InseparablePairs,
+    ) -> Result<Option<Inseparable>, Interrupt> {
+        let wanted = self.problem.wanted(remaining);
+        known.find_linked(&self.problem, remaining)?;
+        if known.first(remaining, &wanted).is_none() {
+            known.find_enclosed(&self.problem, remaining)?;
+        }
+        Ok(known.first(remaining, &wanted))
     }
 }
 

@@ -12,7 +12,8 @@
 //! cell is farther away than the cell's centre by more than half of the cell's diagonal.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::hash_map::Entry;
+use std::collections::{BinaryHeap, HashMap};
 
 use nalgebra::{Point3, Vector3};
 
@@ -40,41 +41,49 @@ enum Passage {
     Unclear,
 }
 
-/// The first pair of some parts (ascending) of which one encloses the other and `is_wanted` holds for one.
+/// The pairs of some parts (ascending) of which one encloses the other, but for those that `is_known` holds for. Pairs
+/// of which one part is wanted come first: the number of cells is limited.
 ///
 /// # Errors
 /// The termination condition became true.
-pub(super) fn first_enclosed(
+pub(super) fn enclosed_pairs(
     problem: &Problem<'_>,
     parts: &[usize],
-    is_wanted: impl Fn(usize) -> bool,
-) -> Result<Option<Inseparable>, Interrupt> {
+    is_known: impl Fn(usize, usize) -> bool,
+) -> Result<Vec<Inseparable>, Interrupt> {
     let scene = &problem.scene;
     let poll = Poll::every(LONG_STEPS_PER_POLL, Some(&problem.termination));
+    let wanted = problem.wanted(parts);
+    let is_wanted = |part: usize| wanted.binary_search(&part).is_ok();
     let mut budget = ENCLOSURE_CELLS;
+    let mut inscribed: HashMap<usize, Ball> = HashMap::new();
+    let mut pairs: Vec<(usize, usize)> = Vec::new();
     for &held in parts {
         let body = &scene.bodies[held];
-        let is_pair = |&holder: &usize| holder != held && (is_wanted(held) || is_wanted(holder));
-        let mut holders = scene.broad_phase.meeting_of(parts, &body.bounds);
-        holders.retain(is_pair);
         // An open surface has no inside that a ball could be in.
-        if holders.is_empty() || body.shape.surface.is_open() {
-            continue;
-        }
-        let inscribed = inscribed_ball(&body.shape.surface, &poll)?;
-        for holder in holders {
-            let other = &scene.bodies[holder];
-            let accepted = scene.allowed.of(held, holder) + problem.verifier.limit();
-            let ball = Ball {
-                centre: other.planning_from_shape.inverse() * body.planning_from_shape * inscribed.centre,
-                radius: inscribed.radius - accepted - ENCLOSED_MARGIN,
-            };
-            if let Some(proof) = enclosure(&other.shape.surface, &ball, &mut budget, &poll)? {
-                return Ok(Some(Inseparable { parts: [held, holder], proof }));
-            }
+        if !body.shape.surface.is_open() {
+            let holders = scene.broad_phase.meeting_of(parts, &body.bounds).into_iter();
+            pairs.extend(holders.filter(|&h| h != held && !is_known(held, h)).map(|h| (held, h)));
         }
     }
-    Ok(None)
+    pairs.sort_by_key(|&(held, holder)| !is_wanted(held) && !is_wanted(holder));
+    let mut enclosed = Vec::new();
+    for (held, holder) in pairs {
+        let (body, other) = (&scene.bodies[held], &scene.bodies[holder]);
+        let largest = match inscribed.entry(held) {
+            Entry::Occupied(known) => *known.get(),
+            Entry::Vacant(new) => *new.insert(inscribed_ball(&body.shape.surface, &poll)?),
+        };
+        let accepted = scene.allowed.of(held, holder) + problem.verifier.limit();
+        let ball = Ball {
+            centre: other.planning_from_shape.inverse() * body.planning_from_shape * largest.centre,
+            radius: largest.radius - accepted - ENCLOSED_MARGIN,
+        };
+        if let Some(proof) = enclosure(&other.shape.surface, &ball, &mut budget, &poll)? {
+            enclosed.push(Inseparable { parts: [held, holder], proof });
+        }
+    }
+    Ok(enclosed)
 }
 
 /// A large ball inside a closed surface: the deepest place, but for a share of the depth or what the budget leaves
@@ -251,7 +260,7 @@ mod tests {
     fn proof(meshes: [SourceMesh; 2]) -> Option<Inseparable> {
         let (scene, verifier) = scene(meshes);
         let problem = Problem { present: vec![0, 1], ..problem(scene, &verifier) };
-        first_enclosed(&problem, &[0, 1], |_| true).unwrap()
+        enclosed_pairs(&problem, &[0, 1], |_, _| false).unwrap().first().copied()
     }
 
     /// The twelve bars of a cube's edges, with a square window of half the width `window` on each side.
@@ -304,13 +313,12 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_counts_only_if_one_of_it_is_wanted() {
+    fn known_pairs_are_left_out() {
         let (scene, verifier) = scene([cage(1.0), sized(ball(3), 1.15)]);
         let problem = Problem { present: vec![0, 1], ..problem(scene, &verifier) };
-        for wanted in [0, 1] {
-            assert!(first_enclosed(&problem, &[0, 1], |p| p == wanted).unwrap().is_some());
-        }
-        assert!(first_enclosed(&problem, &[0, 1], |_| false).unwrap().is_none());
+        let found = |known: [usize; 2]| enclosed_pairs(&problem, &[0, 1], |a, b| [a, b] == known).unwrap();
+        assert_eq!(found([0, 1]).len(), 1);
+        assert_eq!(found([1, 0]), []);
     }
 
     #[test]
@@ -319,7 +327,7 @@ mod tests {
         let termination = Termination::default();
         termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
         let problem = Problem { present: vec![0, 1], termination, ..problem(scene, &verifier) };
-        let ended = first_enclosed(&problem, &[0, 1], |_| true);
+        let ended = enclosed_pairs(&problem, &[0, 1], |_, _| false);
         assert_eq!(ended.err(), Some(Interrupt::Cancelled));
     }
 }

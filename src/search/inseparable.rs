@@ -6,32 +6,93 @@
 
 use crate::termination::Interrupt;
 
-use super::enclosed::first_enclosed;
-use super::linked::Links;
+use super::enclosed::enclosed_pairs;
+use super::linked::linked_pairs;
 use super::outcome::{Inseparable, SeparationProof};
 use super::problem::Problem;
 
-/// The first pair of parts that remain (ascending) which never comes apart, and of which one is wanted. `links` are
-/// those among parts that include all that remain, if they are known.
-///
-/// # Errors
-/// The termination condition became true.
-pub(super) fn first_inseparable(
-    problem: &Problem<'_>,
-    remaining: &[usize],
-    links: Option<Links>,
-) -> Result<Option<Inseparable>, Interrupt> {
-    let wanted = problem.wanted(remaining);
-    let links = match links {
-        Some(links) => links,
-        None => Links::among(&problem.scene, remaining, &problem.termination)?,
-    };
-    let linked = |&part: &usize| {
-        let holder = links.holder(part, remaining)?;
-        Some(Inseparable { parts: [part, holder], proof: SeparationProof::Linked })
-    };
-    match wanted.iter().find_map(linked) {
-        Some(found) => Ok(Some(found)),
-        None => first_enclosed(problem, remaining, |part| wanted.binary_search(&part).is_ok()),
+/// The pairs that were found so far. Each kind of proof is looked for once, among the parts that remain then.
+#[derive(Debug, Default)]
+pub(super) struct InseparablePairs {
+    pairs: Vec<Inseparable>,
+    knows_linked: bool,
+    knows_enclosed: bool,
+}
+
+impl InseparablePairs {
+    /// Finds the linked pairs among some parts (ascending), unless that was done; true if there are new ones.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn find_linked(&mut self, problem: &Problem<'_>, parts: &[usize]) -> Result<bool, Interrupt> {
+        if self.knows_linked {
+            return Ok(false);
+        }
+        let linked = linked_pairs(&problem.scene, parts, &problem.termination)?;
+        self.knows_linked = true;
+        let pair = |parts| Inseparable { parts, proof: SeparationProof::Linked };
+        Ok(self.add(linked.into_iter().map(pair).collect()))
+    }
+
+    /// The same for pairs of which one part encloses the other.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn find_enclosed(
+        &mut self,
+        problem: &Problem<'_>,
+        parts: &[usize],
+    ) -> Result<bool, Interrupt> {
+        if self.knows_enclosed {
+            return Ok(false);
+        }
+        let is_known = |a: usize, b: usize| self.pairs.iter().any(|p| p.parts == [a, b] || p.parts == [b, a]);
+        let enclosed = enclosed_pairs(problem, parts, is_known)?;
+        self.knows_enclosed = true;
+        Ok(self.add(enclosed))
+    }
+
+    fn add(&mut self, pairs: Vec<Inseparable>) -> bool {
+        let any = !pairs.is_empty();
+        self.pairs.extend(pairs);
+        any
+    }
+
+    /// One of the parts that stand (ascending) from which a part never comes away.
+    pub(super) fn holder(&self, part: usize, standing: &[usize]) -> Option<usize> {
+        let other = |pair: &Inseparable| match pair.parts {
+            [a, b] if a == part => Some(b),
+            [a, b] if b == part => Some(a),
+            _ => None,
+        };
+        self.pairs.iter().filter_map(other).find(|p| standing.binary_search(p).is_ok())
+    }
+
+    /// The first pair among the parts that stand (ascending) of which one is wanted (ascending).
+    pub(super) fn first(&self, standing: &[usize], wanted: &[usize]) -> Option<Inseparable> {
+        let is_among = |part: usize, parts: &[usize]| parts.binary_search(&part).is_ok();
+        let counts = |pair: &&Inseparable| {
+            pair.parts.iter().all(|&p| is_among(p, standing))
+                && pair.parts.iter().any(|&p| is_among(p, wanted))
+        };
+        self.pairs.iter().find(counts).copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pair_counts_while_both_stand_and_one_is_wanted() {
+        let pair = |parts| Inseparable { parts, proof: SeparationProof::Ball };
+        let mut pairs = InseparablePairs::default();
+        assert!(pairs.add(vec![pair([4, 1]), pair([2, 3])]));
+        assert_eq!(pairs.holder(1, &[0, 1, 4]), Some(4));
+        assert_eq!(pairs.holder(4, &[0, 1, 4]), Some(1));
+        assert_eq!(pairs.holder(1, &[0, 1, 2, 3]), None);
+        assert_eq!(pairs.first(&[0, 1, 2, 3], &[0, 3]), Some(pair([2, 3])));
+        assert_eq!(pairs.first(&[1, 2, 3, 4], &[1]), Some(pair([4, 1])));
+        assert_eq!(pairs.first(&[0, 1, 2, 3], &[0, 1]), None);
     }
 }

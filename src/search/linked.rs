@@ -19,41 +19,29 @@ use crate::tolerances::LINK_CLEARANCE;
 /// A closed polygon in the planning frame.
 type Loop = Vec<Point3<f64>>;
 
-/// Per part: the parts that it is linked with.
-#[derive(Debug, Default)]
-pub(super) struct Links(Vec<Vec<usize>>);
-
-impl Links {
-    /// The links among some parts (ascending), at their assembled poses.
-    ///
-    /// # Errors
-    /// The termination condition became true.
-    pub(super) fn among(
-        scene: &Scene,
-        parts: &[usize],
-        termination: &Termination,
-    ) -> Result<Self, Interrupt> {
-        let poll = Poll::every(LONG_STEPS_PER_POLL, Some(termination));
-        // Many parts have no other near that they could be linked with: their curves are never computed.
-        let known = vec![OnceCell::new(); scene.bodies.len()];
-        let loops = |part: usize| known[part].get_or_init(|| loops(scene, part));
-        let mut links = vec![Vec::new(); scene.bodies.len()];
-        for &a in parts {
-            let near = scene.broad_phase.meeting_of(parts, &scene.bodies[a].bounds);
-            for b in near.into_iter().filter(|&b| b > a && scene.allowed.of(a, b) == 0.0) {
-                if are_linked(loops(a), loops(b), &poll)? {
-                    links[a].push(b);
-                    links[b].push(a);
-                }
+/// The linked pairs among some parts (ascending), at their assembled poses; each pair ascending.
+///
+/// # Errors
+/// The termination condition became true.
+pub(super) fn linked_pairs(
+    scene: &Scene,
+    parts: &[usize],
+    termination: &Termination,
+) -> Result<Vec<[usize; 2]>, Interrupt> {
+    let poll = Poll::every(LONG_STEPS_PER_POLL, Some(termination));
+    // Many parts have no other near that they could be linked with: their curves are never computed.
+    let known = vec![OnceCell::new(); scene.bodies.len()];
+    let loops = |part: usize| known[part].get_or_init(|| loops(scene, part));
+    let mut linked = Vec::new();
+    for &a in parts {
+        let near = scene.broad_phase.meeting_of(parts, &scene.bodies[a].bounds);
+        for b in near.into_iter().filter(|&b| b > a && scene.allowed.of(a, b) == 0.0) {
+            if are_linked(loops(a), loops(b), &poll)? {
+                linked.push([a, b]);
             }
         }
-        Ok(Self(links))
     }
-
-    /// One of some parts (ascending) that a part is linked with.
-    pub(super) fn holder(&self, part: usize, among: &[usize]) -> Option<usize> {
-        self.0.get(part)?.iter().copied().find(|p| among.binary_search(p).is_ok())
-    }
+    Ok(linked)
 }
 
 /// Curves on a part's surface that generate its first homology, as assembled.
@@ -101,18 +89,11 @@ mod tests {
     fn each_link_of_a_chain_is_linked_with_its_neighbours_alone() {
         let (scene, _) = scene(chain(8));
         let all: Vec<usize> = (0..9).collect();
-        let links = Links::among(&scene, &all, &Termination::default()).unwrap();
-        let expected: Vec<Vec<usize>> = (0..8)
-            .map(|i: usize| [i.wrapping_sub(1), i + 1].into_iter().filter(|&j| j < 8).collect())
-            .collect();
-        assert_eq!(links.0[..8], expected);
-        assert!(links.0[8].is_empty(), "a block has no hole");
-        assert_eq!(
-            (links.holder(3, &all), links.holder(3, &[4, 5]), links.holder(3, &[5])),
-            (Some(2), Some(4), None)
-        );
-        let few = Links::among(&scene, &[0, 2, 3], &Termination::default()).unwrap();
-        assert_eq!((few.holder(0, &all), few.holder(2, &all)), (None, Some(3)));
+        let linked = |parts: &[usize]| linked_pairs(&scene, parts, &Termination::default()).unwrap();
+        // The block, the last part, has no hole.
+        let neighbours: Vec<[usize; 2]> = (0..7).map(|i| [i, i + 1]).collect();
+        assert_eq!(linked(&all), neighbours);
+        assert_eq!(linked(&[0, 2, 3]), [[2, 3]]);
     }
 
     #[test]
@@ -120,7 +101,7 @@ mod tests {
         let (scene, _) = scene(chain(8));
         let termination = Termination::default();
         termination.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
-        let ended = Links::among(&scene, &[0, 1], &termination);
+        let ended = linked_pairs(&scene, &[0, 1], &termination);
         assert_eq!(ended.err(), Some(Interrupt::Cancelled));
     }
 }

@@ -15,7 +15,7 @@ use crate::tolerances::TOUCHED;
 use super::action_table::ActionTable;
 use super::ball::is_ball;
 use super::disassembly::{Disassembly, SceneVersion, Stop};
-use super::linked::Links;
+use super::inseparable::InseparablePairs;
 use super::state::{StateAction, StateNode, least_travel};
 use super::states::{PhaseStates, States};
 use super::strategy::Strategy;
@@ -34,8 +34,8 @@ struct Obstruction {
 pub(super) struct Order {
     /// Per part: whether it is a ball, which no action has to turn.
     balls: Vec<bool>,
-    /// The linked parts, once they were looked for.
-    links: Option<Links>,
+    /// Parts that need not be tried while others stand.
+    inseparable: InseparablePairs,
     /// By state and push.
     obstructions: HashMap<StateAction, Obstruction>,
 }
@@ -46,7 +46,7 @@ impl Order {
         let is_ball = |(part, shape)| strategy.is_extended() && is_ball(shape, least_travel(scene, part));
         Self {
             balls: bodies.map(|(part, b)| is_ball((part, &*b.shape))).collect(),
-            links: None,
+            inseparable: InseparablePairs::default(),
             obstructions: HashMap::new(),
         }
     }
@@ -55,34 +55,41 @@ impl Order {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub(super) fn find_links(
+    pub(super) fn find_linked(
         &mut self,
         strategy: Strategy,
         disassembly: &Disassembly<'_, '_>,
     ) -> Result<bool, Interrupt> {
-        if self.links.is_some() || !strategy.is_extended() {
-            return Ok(false);
-        }
-        let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());
-        let links = Links::among(&problem.scene, standing, &problem.termination)?;
-        let any = standing.iter().any(|&p| links.holder(p, standing).is_some());
-        self.links = Some(links);
-        Ok(any)
+        let standing = disassembly.everything.standing();
+        Ok(strategy.is_extended() && self.inseparable.find_linked(&disassembly.problem, standing)?)
     }
 
-    /// The linked parts among those that stood when they were looked for, if they were.
-    pub(super) fn into_links(self) -> Option<Links> {
-        self.links
+    /// The same for parts that enclose one another.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn find_enclosed(
+        &mut self,
+        strategy: Strategy,
+        disassembly: &Disassembly<'_, '_>,
+    ) -> Result<bool, Interrupt> {
+        let standing = disassembly.everything.standing();
+        Ok(strategy.is_extended() && self.inseparable.find_enclosed(&disassembly.problem, standing)?)
     }
 
-    /// One of the parts that stand (ascending) that a part is linked with.
-    pub(super) fn linked_with(&self, part: usize, standing: &[usize]) -> Option<usize> {
-        self.links.as_ref()?.holder(part, standing)
+    /// The pairs that were found.
+    pub(super) fn into_inseparable(self) -> InseparablePairs {
+        self.inseparable
+    }
+
+    /// One of the parts that stand (ascending) from which a part is proved never to come away.
+    pub(super) fn holder(&self, part: usize, standing: &[usize]) -> Option<usize> {
+        self.inseparable.holder(part, standing)
     }
 
     /// The states to expand, the initial one included. Of two last parts it does not matter which one moves
-    /// against the other: beyond the first push, only the smaller one does. A linked part is not moved, for it
-    /// cannot leave, and a ball not turned.
+    /// against the other: beyond the first push, only the smaller one does. A part that is proved to stay is not moved,
+    /// and a ball not turned.
     pub(super) fn expandable(&self, of: &PhaseStates<'_>, disassembly: &Disassembly<'_, '_>) -> Vec<usize> {
         let PhaseStates { strategy, phase, states, .. } = *of;
         let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());
@@ -95,7 +102,7 @@ impl Order {
         let is_rotation = phase == PlanningPhase::Rotation;
         let skipped = |n: &StateNode| Some(n.part) == still && (is_rotation || !n.is_root());
         let in_vain = |n: &StateNode| {
-            (is_rotation && self.balls[n.part]) || self.linked_with(n.part, standing).is_some()
+            (is_rotation && self.balls[n.part]) || self.holder(n.part, standing).is_some()
         };
         let wanted = |n: &StateNode| n.alive && of.lists(n) && !skipped(n) && !in_vain(n);
         (0..states.nodes.len()).filter(|&i| wanted(&states.nodes[i])).collect()

@@ -13,6 +13,7 @@ use crate::plan::PlanStatus;
 use crate::simulation::{Action, End, Motion};
 
 use super::disassembly::{Disassembly, Proof, Stop, Transition, joined};
+use super::inseparable::InseparablePairs;
 use super::known_states::KnownStates;
 use super::outcome::{BlockedAction, Outcome, Removal};
 use super::problem::{Observer, Problem, VerifiedPath};
@@ -37,13 +38,13 @@ pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: PdpMo
     });
     let actions = match actions {
         Ok(actions) => actions,
-        Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), None, Vec::new()),
+        Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), InseparablePairs::default(), Vec::new()),
     };
     let mut search = Pdp { disassembly, mode, actions, stopped_by: vec![Vec::new(); count], states: 0 };
     let stop = search.run().err();
     let blocked = search.blocked();
     search.disassembly.counters.states = search.states;
-    search.disassembly.outcome(stop, None, blocked)
+    search.disassembly.outcome(stop, InseparablePairs::default(), blocked)
 }
 
 /// PDP*: the counters are those of the run that answers. Removals of the first run reach the observer only once

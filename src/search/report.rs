@@ -49,7 +49,7 @@ impl SearchReport<'_> {
         let mut out = Vec::new();
         for node in self.states.nodes.iter().filter(|n| n.alive && n.is_root() && wanted.contains(&n.part)) {
             let part = node.part;
-            if let Some(by) = self.order.linked_with(part, standing) {
+            if let Some(by) = self.order.holder(part, standing) {
                 out.push(BlockedAction { part, action: ANY.to_owned(), by: vec![by] });
                 continue;
             }

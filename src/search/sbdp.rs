@@ -31,6 +31,7 @@ use super::cell_decomposition::{CellDecomposition, CellExit};
 use super::cell_memory::{CellMemory, CellStage};
 use super::disassembly::{Disassembly, Proof, Stop, Transition, joined};
 use super::initial_analysis::InitialAnalysis;
+use super::inseparable::InseparablePairs;
 use super::invalidation::Invalidation;
 use super::novelty::Novelty;
 use super::order::Order;
@@ -76,14 +77,14 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
     let (disassembly, initial) = Disassembly::beside(problem, observer, |p| InitialAnalysis::of(p, guided));
     let initial = match initial {
         Ok(initial) => initial,
-        Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), None, Vec::new()),
+        Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), InseparablePairs::default(), Vec::new()),
     };
     let mut search = Sbdp::new(disassembly, initial, guided);
     let stop = search.run().err();
     let (report, disassembly) = search.report();
     report.log(disassembly);
     let blocked = report.blocked(disassembly);
-    search.disassembly.outcome(stop, search.order.into_links(), blocked)
+    search.disassembly.outcome(stop, search.order.into_inseparable(), blocked)
 }
 
 impl<'a, 'o> Sbdp<'a, 'o> {
@@ -139,6 +140,10 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                     break;
                 }
             }
+            // Before the searches that take longest.
+            if self.order.find_enclosed(self.strategy, &self.disassembly)? {
+                continue;
+            }
             if !gain.any() && self.leave_by_cells(CellStage::BeforeTurning)? {
                 if self.disassembly.is_done() {
                     return Ok(());
@@ -189,7 +194,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 continue;
             }
             // Before the first simulation: what leaves straight is out.
-            if self.order.find_links(self.strategy, &self.disassembly)? {
+            if self.order.find_linked(self.strategy, &self.disassembly)? {
                 open = self.expandable(phase);
                 continue;
             }
