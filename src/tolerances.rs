@@ -307,10 +307,6 @@ pub(crate) const ONE_AXIS_COSINE: f64 = 0.9994;
 /// Length. The least distance of two curves: closer ones might pass through each other within the depth that engines
 /// allow. Half of it may call parts linked that engines separate; double it misses links with little play.
 pub(crate) const LINK_CLEARANCE: f64 = 2e-3;
-/// Length. The radius of a ball inside a part is reduced by this, beyond the depth that verification accepts, before
-/// the ball proves that another part encloses it. Equal to [`DEPTH_TOLERANCE`], far above what rounding changes: half
-/// of it proves no more than windows that are 0.0003 wider; double it misses as many.
-pub(crate) const ENCLOSED_MARGIN: f64 = DEPTH_TOLERANCE;
 /// Share. A ball inside a part is large enough if no other one is larger by more than this share. Half of it doubles the
 /// cells that are measured; double it misses windows that are narrower than the ball by less than 2%.
 pub(crate) const INSCRIBED_GAIN: f64 = 0.01;

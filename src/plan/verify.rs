@@ -129,20 +129,27 @@ impl Verifier {
     /// The depth at which a path past a standing part is refused: it depends on the two parts, not on what else is in
     /// the assembly.
     #[must_use]
-    pub fn limit_past(&self, pair_path: &PairPath<'_>) -> f64 {
+    pub fn limit_past(&self, PairPath { shapes, path, .. }: &PairPath<'_>) -> f64 {
+        let turns = path.iter().any(|pose| pose.rotation != path[0].rotation);
+        self.limit_of(*shapes, turns)
+    }
+
+    /// No path of one of two shapes past the other is accepted at this depth.
+    #[must_use]
+    pub fn largest_limit(&self, shapes: [&Shape; 2]) -> f64 {
+        self.limit_of(shapes, true)
+    }
+
+    fn limit_of(&self, shapes: [&Shape; 2], turns: bool) -> f64 {
         if !self.is_by_pair {
             return self.limit;
         }
-        let [size, thickness] = [
-            pair_path.shapes.map(|shape| shape.bounds().extents().max()),
-            pair_path.shapes.map(Shape::thickness),
-        ]
-        .map(|[one, other]| one.min(other));
+        let least = |of: fn(&Shape) -> f64| of(shapes[0]).min(of(shapes[1]));
+        let (size, thickness) = (least(|shape| shape.bounds().extents().max()), least(Shape::thickness));
         let of_pair = (PAIR_LIMIT * size).min(THIN_LIMIT * thickness);
         // Poses of paths that turn are less exact than those of translations.
-        let turns = pair_path.path.iter().any(|pose| pose.rotation != pair_path.path[0].rotation);
-        let least = if turns { TURNING_THIN_LIMIT * thickness } else { 0.0 };
-        self.limit.min(of_pair.max(least))
+        let of_turns = if turns { TURNING_THIN_LIMIT * thickness } else { 0.0 };
+        self.limit.min(of_pair.max(of_turns))
     }
 
     /// How deep the surface of one of two parts gets into the other as they stand.

@@ -20,7 +20,7 @@ use nalgebra::{Point3, Vector3};
 use crate::budgets::{ENCLOSURE_CELLS, ENCLOSURE_GRIDS, INSCRIBED_BALL_CELLS, LONG_STEPS_PER_POLL};
 use crate::geometry::{Bounds, Surface, is_within_closed_shell};
 use crate::termination::{Interrupt, Poll};
-use crate::tolerances::{ENCLOSED_MARGIN, INSCRIBED_GAIN};
+use crate::tolerances::{INSCRIBED_GAIN, ROUNDED};
 
 use super::outcome::{Inseparable, SeparationProof};
 use super::problem::Problem;
@@ -74,10 +74,11 @@ pub(super) fn enclosed_pairs(
             Entry::Occupied(known) => *known.get(),
             Entry::Vacant(new) => *new.insert(inscribed_ball(&body.shape.surface, &poll)?),
         };
-        let accepted = scene.allowed.of(held, holder) + problem.verifier.limit();
+        let limit = problem.verifier.largest_limit([&body.shape, &other.shape]);
+        let accepted = scene.allowed.of(held, holder) + limit;
         let ball = Ball {
             centre: other.planning_from_shape.inverse() * body.planning_from_shape * largest.centre,
-            radius: largest.radius - accepted - ENCLOSED_MARGIN,
+            radius: largest.radius - accepted - ROUNDED,
         };
         if let Some(proof) = enclosure(&other.shape.surface, &ball, &mut budget, &poll)? {
             enclosed.push(Inseparable { parts: [held, holder], proof });
