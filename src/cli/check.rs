@@ -88,6 +88,7 @@ fn parts(assembly: &SourceAssembly, healed: &[Healed]) -> String {
         let sign = match mesh.solidity {
             Solidity::Closed => "closed surface",
             Solidity::Winding => "winding number",
+            Solidity::Wall => "none: a wall",
         };
         table.row([
             part.name.clone(),

@@ -40,6 +40,7 @@ pub(super) fn mesh_hash(mesh: &Mesh) -> [u8; 32] {
     hasher.update(&[match mesh.solidity {
         Solidity::Closed => 0,
         Solidity::Winding => 1,
+        Solidity::Wall => 2,
     }]);
     number(&mut hasher, mesh.vertices.len());
     for vertex in &mesh.vertices {

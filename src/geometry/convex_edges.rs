@@ -8,7 +8,7 @@ use super::samples::{Site, convex_edges};
 use super::surface::NO_TRIANGLE;
 use super::{Bounds, OrientedSamples, Pose, Surface};
 
-/// The convex edges of a surface, with the rims of what is open.
+/// The convex edges of a surface. Of a wall, all edges and rims, once for each side.
 #[derive(Debug, Clone, Default)]
 pub struct ConvexEdges {
     ends: OrientedSamples,
@@ -51,6 +51,9 @@ impl ConvexEdges {
             let other = surface.neighbour(t, e);
             let normals = [t, if other == NO_TRIANGLE { t } else { other }].map(|t| surface.face_normal(t));
             edges.push(ConvexEdge { ends, normals });
+            if surface.is_wall() {
+                edges.push(ConvexEdge { ends, normals: normals.map(|n| -n) });
+            }
         }
         edges.shrink_to_fit();
         let ends = OrientedSamples::new(surface, &sited);

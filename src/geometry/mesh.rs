@@ -12,8 +12,11 @@ pub enum Solidity {
     /// (voids inward), that neither cross nor touch: the pseudo-normal at the nearest point of
     /// the surface gives the sign.
     Closed,
-    /// Open, crossing or non-manifold shells: the sign comes from the winding number.
+    /// Crossing or non-manifold shells without holes: the sign comes from the winding number.
     Winding,
+    /// With holes: a wall, which nothing crosses from either side. It has no inside for solids; for another wall the
+    /// sign comes from the winding number.
+    Wall,
 }
 
 /// An undirected edge and the triangles that meet there.

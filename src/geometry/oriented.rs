@@ -10,7 +10,7 @@ use super::{Bounds, Pose, Surface};
 /// cos of the angle below which two normals are one (about a tenth of a degree).
 const SAME: f64 = 0.999_998;
 
-/// Points of a surface, each with the unit normals of the faces that meet there.
+/// Points of a surface, each with the unit normals of the faces that meet there; of a wall, of both their sides.
 #[derive(Debug, Clone, Default)]
 pub struct OrientedSamples {
     points: Vec<Point3<f64>>,
@@ -35,8 +35,11 @@ impl OrientedSamples {
             let first = out.normals.len();
             faces_at(surface, *site, |t| {
                 let normal = surface.face_normal(t);
-                if out.normals[first..].iter().all(|n| n.dot(&normal) < SAME) {
-                    out.normals.push(normal);
+                let senses: &[f64] = if surface.is_wall() { &[1.0, -1.0] } else { &[1.0] };
+                for normal in senses.iter().map(|sense| normal * *sense) {
+                    if out.normals[first..].iter().all(|n| n.dot(&normal) < SAME) {
+                        out.normals.push(normal);
+                    }
                 }
             });
             out.points.push(*point);

@@ -75,7 +75,7 @@ const THINNEST: f64 = 0.005;
 /// cos of the dihedral deviation below which an edge counts as blunt (about 20 degrees).
 const BLUNT_COS: f64 = 0.94;
 
-/// How an edge is bent, seen from outside.
+/// How an edge is bent, seen from outside; of a wall, from the side on which it is convex.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Bend {
     /// Flat or reentrant: no point of it is first to touch.
@@ -95,7 +95,9 @@ fn bend(surface: &Surface, t: u32, e: u8) -> Bend {
     let edge = corners[(e as usize + 1) % 3] - corners[e as usize];
     let (n, m) = (surface.face_normal(t), surface.face_normal(other));
     // Convex: the neighbour's normal leans away from this face's inside.
-    if n.cross(&m).dot(&edge) <= 1e-3 * edge.norm() {
+    let lean = n.cross(&m).dot(&edge);
+    let lean = if surface.is_wall() { lean.abs() } else { lean };
+    if lean <= 1e-3 * edge.norm() {
         Bend::Inward
     } else if n.dot(&m) < BLUNT_COS {
         Bend::Sharp
@@ -104,7 +106,7 @@ fn bend(surface: &Surface, t: u32, e: u8) -> Bend {
     }
 }
 
-/// The convex edges of a surface, and the rims of an open one, each once: a triangle and which of its edges it is.
+/// The convex edges of a surface, and all edges and rims of a wall, each once: a triangle and which of its edges it is.
 pub(super) fn convex_edges(surface: &Surface) -> impl Iterator<Item = (u32, u8)> {
     let all = (0..surface.triangles().len() as u32).flat_map(|t| (0..3u8).map(move |e| (t, e)));
     let is_first = |t: u32, other: u32| other == NO_TRIANGLE || other >= t;

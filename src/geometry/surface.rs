@@ -130,7 +130,7 @@ impl Surface {
     /// Whether inside and outside are told apart by winding number.
     #[must_use]
     pub fn is_open(&self) -> bool {
-        self.mesh.solidity == Solidity::Winding
+        self.mesh.solidity != Solidity::Closed
     }
 
     /// Whether a triangle is folded on another: then being above its face does not mean outside.
@@ -150,6 +150,20 @@ impl Surface {
     #[must_use]
     pub fn rim(&self) -> Option<&Rim> {
         self.opening().rim.as_ref()
+    }
+
+    /// Whether it has holes. Then it is a wall, which nothing crosses from either side.
+    #[must_use]
+    pub fn is_wall(&self) -> bool {
+        self.mesh.solidity == Solidity::Wall
+    }
+
+    /// Whether points of another surface count as inside of this one. A wall has no inside: what meets a solid is
+    /// measured by the depth of the wall's points in the solid. Of two walls neither is a solid: there winding numbers
+    /// tell inside from outside.
+    #[must_use]
+    pub fn has_inside_for(&self, other: &Self) -> bool {
+        !self.is_wall() || other.is_wall()
     }
 
     /// Whether all that a straight line of at most `radius` joins with `p`, without meeting the surface, is

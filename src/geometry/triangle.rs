@@ -48,8 +48,9 @@ pub(super) fn crossing(p: &Point3<f64>, direction: &Vector3<f64>, corners: &[Poi
     inside.then(|| ac.dot(&q) / determinant)
 }
 
-/// How far the edge `[a, b]` gets along the unit vector `direction` until it meets a triangle with a unit normal
-/// against that, from its outer side; 0 where it is through it already. The border belongs to the triangle.
+/// How far the edge `[a, b]` gets along the unit vector `direction` until it meets a triangle with a unit normal;
+/// 0 where it is through it already. The border belongs to the triangle. Seen against the direction, the corners may
+/// follow each other in either sense.
 #[must_use]
 pub(super) fn met_by_edge(
     [a, b]: &[Point3<f64>; 2],
@@ -61,8 +62,9 @@ pub(super) fn met_by_edge(
     const BORDER: f64 = 1e-9;
     // The stretch of the edge that is before the triangle, seen along the direction.
     let (mut from, mut to) = (0.0f64, 1.0f64);
+    let against = normal.dot(direction);
     for (i, p) in corners.iter().enumerate() {
-        let outline = (corners[(i + 1) % 3] - p).cross(direction);
+        let outline = (corners[(i + 1) % 3] - p).cross(direction) * -against.signum();
         let slack = BORDER * outline.norm();
         let [at_a, at_b] = [a, b].map(|x| (x - p).dot(&outline) + slack);
         if at_a < 0.0 && at_b < 0.0 {
@@ -77,7 +79,6 @@ pub(super) fn met_by_edge(
     if from > to {
         return None;
     }
-    let against = normal.dot(direction);
     let [at_a, at_b] = [a, b].map(|x| (corners[0] - x).dot(normal) / against);
     let [at_from, at_to] = [from, to].map(|t| at_a + (at_b - at_a) * t);
     (at_from.max(at_to) >= 0.0).then(|| at_from.min(at_to).max(0.0))

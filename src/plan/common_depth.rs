@@ -55,6 +55,10 @@ impl Common<'_> {
     /// Whether none of the bodies of one has its inner point in the other.
     fn is_empty(&self) -> bool {
         let [one, other] = self.shapes;
+        let surfaces = [&one.surface, &other.surface];
+        if !surfaces[0].has_inside_for(surfaces[1]) || !surfaces[1].has_inside_for(surfaces[0]) {
+            return true;
+        }
         let one_from_other = self.other_from_one.inverse();
         let is_in = |surface: &Surface, p: &Point3<f64>| {
             surface.bounds().contains(p) && surface.signed_distance(p) < 0.0

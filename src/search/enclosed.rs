@@ -136,8 +136,11 @@ fn enclosure(
         return Ok(None);
     }
     // Parts of which one stands in the solid of the other, as two copies in one place, are a fault of the model, and
-    // how deep they may be is doubtful. Of a ball that meets the surface already, nothing is proved.
-    if surface.signed_distance(&ball.centre) < ball.radius {
+    // how deep they may be is doubtful. Of a ball that meets the surface already, nothing is proved. A wall has no
+    // inside.
+    let Some(nearest) = surface.closest(&ball.centre, f64::INFINITY) else { return Ok(None) };
+    let is_inside = !surface.is_wall() && surface.signed(&ball.centre, &nearest) < 0.0;
+    if is_inside || nearest.distance < ball.radius {
         return Ok(None);
     }
     if is_within_closed_shell(surface, &ball.centre) {

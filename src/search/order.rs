@@ -101,9 +101,8 @@ impl Order {
         };
         let is_rotation = phase == PlanningPhase::Rotation;
         let skipped = |n: &StateNode| Some(n.part) == still && (is_rotation || !n.is_root());
-        let in_vain = |n: &StateNode| {
-            (is_rotation && self.balls[n.part]) || self.holder(n.part, standing).is_some()
-        };
+        let in_vain =
+            |n: &StateNode| (is_rotation && self.balls[n.part]) || self.holder(n.part, standing).is_some();
         let wanted = |n: &StateNode| n.alive && of.lists(n) && !skipped(n) && !in_vain(n);
         (0..states.nodes.len()).filter(|&i| wanted(&states.nodes[i])).collect()
     }

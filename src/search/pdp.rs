@@ -38,7 +38,9 @@ pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: PdpMo
     });
     let actions = match actions {
         Ok(actions) => actions,
-        Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), InseparablePairs::default(), Vec::new()),
+        Err(interrupt) => {
+            return disassembly.outcome(Some(interrupt.into()), InseparablePairs::default(), Vec::new());
+        }
     };
     let mut search = Pdp { disassembly, mode, actions, stopped_by: vec![Vec::new(); count], states: 0 };
     let stop = search.run().err();

@@ -77,7 +77,9 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
     let (disassembly, initial) = Disassembly::beside(problem, observer, |p| InitialAnalysis::of(p, guided));
     let initial = match initial {
         Ok(initial) => initial,
-        Err(interrupt) => return disassembly.outcome(Some(interrupt.into()), InseparablePairs::default(), Vec::new()),
+        Err(interrupt) => {
+            return disassembly.outcome(Some(interrupt.into()), InseparablePairs::default(), Vec::new());
+        }
     };
     let mut search = Sbdp::new(disassembly, initial, guided);
     let stop = search.run().err();

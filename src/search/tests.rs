@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::*;
 use crate::blocking_graph::StaticAnalysis;
 use crate::cache::RequestCache;
-use crate::fixtures::{cells, cuboid, moved, rod, scene, tube};
+use crate::fixtures::{cells, cuboid, moved, open_box, rod, scene, tube};
 use crate::geometry::SourceMesh;
 use crate::plan::{PlanStatus, Verifier};
 use crate::scene::Scene;
@@ -245,6 +245,46 @@ fn a_loose_part_finds_a_hole_that_is_beside_all_walls_and_above_none_of_its_plac
         });
         let outcome = pair([housing, cuboid([1.7, 1.2, 1.0], [2.7, 2.2, 2.0])]);
         assert_eq!(outcome.status, PlanStatus::Complete, "{hole:?}: {:?}", outcome.reason);
+    }
+}
+
+/// A box drawn as a surface without thickness, with a square hole in the middle of its top, and in it a cube.
+fn surface_box(hole: f64, cube: f64) -> [SourceMesh; 2] {
+    let lines: &[f64] = &[-3.0, -hole / 2.0, hole / 2.0, 3.0];
+    let mut walls = cells([lines, lines, &[-3.0, 3.0]], |_| true);
+    let SourceMesh { vertices, triangles } = &mut walls;
+    let is_in_hole = |v: &u32| {
+        let [x, y, z] = vertices[*v as usize];
+        z == 3.0 && x.abs() < 3.0 && y.abs() < 3.0
+    };
+    triangles.retain(|t| !t.iter().all(is_in_hole));
+    let [low, high] = [-2.5, cube - 2.5];
+    [walls, cuboid([low; 3], [high; 3])]
+}
+
+#[test]
+fn a_surface_is_a_wall_from_both_sides() {
+    let turns = [
+        (0.0, 0.0, 0.0),
+        (std::f64::consts::PI, 0.0, 0.0),
+        (0.0, std::f64::consts::FRAC_PI_2, 0.0),
+        (0.3, -0.7, 1.1),
+    ];
+    for (roll, pitch, yaw) in turns {
+        let turn = nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw);
+        let turned = crate::geometry::Pose::from_parts(nalgebra::Translation3::identity(), turn);
+        let status = |meshes: [SourceMesh; 2]| pair(meshes.map(|mesh| moved(mesh, &turned))).status;
+        assert_eq!(status(surface_box(2.2, 2.0)), PlanStatus::Complete, "the cube fits, {turn}");
+        assert_eq!(status(surface_box(1.9, 2.0)), PlanStatus::Infeasible, "it does not fit, {turn}");
+        let tray = pair(
+            [open_box([-3.0; 3], [3.0; 3]), cuboid([-2.9, -2.9, -2.9], [2.9, 2.9, -1.0])]
+                .map(|mesh| moved(mesh, &turned)),
+        );
+        let [Removal { part, path, .. }] = &tray.removals[..] else { panic!("{:?}", tray.reason) };
+        let way = path[path.len() - 1].translation.vector - path[0].translation.vector;
+        // The cuboid leaves upwards, or the tray downwards.
+        let up = turn.inverse() * way * if *part == 1 { 1.0 } else { -1.0 };
+        assert!(up.z > 1.9 && up.xy().norm() < 0.5 * up.z, "part {part} leaves by {up:?}");
     }
 }
 

@@ -142,9 +142,9 @@ impl PathSamples {
             PathSide { samples: other, to_measured: &back, measured: moving, allowed: pair_path.allowed },
         ];
         let mut asked: Vec<SampledStretch> = Vec::new();
-        for (side, share) in
-            (0..sides.len()).flat_map(|side| (0..SAMPLE_SHARES).map(move |share| (side, share)))
-        {
+        let has_inside = [standing.has_inside_for(moving), moving.has_inside_for(standing)];
+        let measured = (0..sides.len()).filter(|&side| has_inside[side]);
+        for (side, share) in measured.flat_map(|side| (0..SAMPLE_SHARES).map(move |share| (side, share))) {
             let takes = |i: &usize| PoseShares::of(*i, poses.len()).takes(share);
             let moments: Vec<usize> = (0..poses.len()).filter(takes).collect();
             let stretches = moments.chunks(POSES_AT_ONCE).map(<[usize]>::to_vec);

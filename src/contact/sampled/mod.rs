@@ -194,9 +194,8 @@ impl<'a> MovingBody<'a> {
     pub(crate) fn near_pair(&self, other: usize, reach: f64, near: &mut ContactSet) -> Result<(), Interrupt> {
         // The sides are measured one after the other: several motions are simulated in parallel, and a thread that
         // waited for half a query would begin another motion meanwhile.
-        for side in [ContactSide::Moving, ContactSide::Standing] {
-            near.add(self.side(side, other, reach, near.clearance)?);
-        }
+        near.add(self.side(ContactSide::Moving, other, reach, near.clearance)?);
+        near.add(self.side(ContactSide::Standing, other, reach, near.clearance)?);
         Ok(())
     }
 
@@ -223,8 +222,11 @@ impl<'a> MovingBody<'a> {
         clearance: f64,
     ) -> Result<ContactSet, Interrupt> {
         let mut found = ContactSet { contacts: Vec::new(), clearance };
-        self.prepare_fields(&self.scene.bodies[other])?;
         let (sampled, body, to_measured, allowed) = self.sides(side, other);
+        if !body.shape.surface.has_inside_for(&sampled.shape.surface) {
+            return Ok(found);
+        }
+        self.prepare_fields(&self.scene.bodies[other])?;
         let measured = MeasuredBody { body, to_measured: &to_measured, allowed, reach };
         let tag = |sample, gap, closest| Contact { other, side, sample, gap, closest, allowed };
         for tree in [sampled.shape.samples(), &sampled.extra_samples] {

@@ -55,10 +55,13 @@ impl MovingBody<'_> {
             self.prepare_fields(still)?;
             let allowed = self.scene.allowed.of(self.part, other);
             let to_still = still.planning_from_shape.inverse() * self.pose;
-            if test([self.body, still], &to_still, allowed, &poll)?
-                || test([still, self.body], &to_still.inverse(), allowed, &poll)?
+            for (bodies, to_measured) in
+                [([self.body, still], to_still), ([still, self.body], to_still.inverse())]
             {
-                return Ok(true);
+                let [sampled, measured] = bodies.map(|body| &body.shape.surface);
+                if measured.has_inside_for(sampled) && test(bodies, &to_measured, allowed, &poll)? {
+                    return Ok(true);
+                }
             }
         }
         Ok(false)

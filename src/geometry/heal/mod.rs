@@ -97,9 +97,13 @@ fn heal_mesh(part: &SourcePart, termination: &Termination) -> Result<Healed, Unh
     let gaps = open_edges(&oriented.triangles);
     draft.triangles = std::mem::take(&mut oriented.triangles);
     let solidity = if gaps > 0 {
-        findings.add(gaps, "edge", "without neighbour: not closed; inside and outside by winding number");
+        findings.add(
+            gaps,
+            "edge",
+            "without neighbour: not closed; taken as a wall that nothing crosses, without an inside",
+        );
         orientation::face_outward(&mut draft);
-        Solidity::Winding
+        Solidity::Wall
     } else {
         shells::settle(&mut draft, oriented.one_sided, &mut findings, termination)?
     };

@@ -117,7 +117,7 @@ fn a_missing_face_is_told() {
     mesh.triangles.truncate(10);
     for mesh in [mesh.clone(), inverted(mesh)] {
         let result = healed(mesh);
-        assert_eq!(result.mesh.solidity, Solidity::Winding);
+        assert_eq!(result.mesh.solidity, Solidity::Wall);
         says(&result, "4 edges without neighbour: not closed");
         assert!(result.mesh.volume() > 0.0);
     }

@@ -89,7 +89,7 @@ impl Adjacency {
     fn of(mesh: &Mesh, face_normals: &[Vector3<f64>]) -> Self {
         let (fan_start, fan) = fans(mesh);
         let (neighbours, shared) = across(mesh);
-        let is_open = mesh.solidity == Solidity::Winding;
+        let is_open = mesh.solidity != Solidity::Closed;
         let folds = if is_open { None } else { Folds::of(mesh, face_normals, &neighbours, &shared) };
         Self { neighbours, vertex_normals: vertex_normals(mesh, face_normals), fan_start, fan, folds }
     }
@@ -105,7 +105,7 @@ impl Adjacency {
 
 impl Opening {
     fn of(mesh: &Mesh) -> Self {
-        if mesh.solidity != Solidity::Winding {
+        if mesh.solidity == Solidity::Closed {
             return Self::default();
         }
         let rim = Some(Rim::of(&mesh.vertices, &mesh.triangles)).filter(|r| !r.edges().is_empty());

@@ -5,10 +5,32 @@ use nalgebra::{Point3, Vector3};
 use super::super::triangle::{crossing, met_by_edge};
 use super::Surface;
 
+/// From which sides a face stops what meets it.
+#[derive(Clone, Copy)]
+enum Sides {
+    Outer,
+    Both,
+}
+
+impl Sides {
+    fn of(surface: &Surface) -> Self {
+        if surface.is_wall() { Self::Both } else { Self::Outer }
+    }
+
+    /// The sine of the angle at which a unit vector meets a face from a side that stops it.
+    fn against(self, normal: &Vector3<f64>, direction: &Vector3<f64>) -> f64 {
+        let against = -normal.dot(direction);
+        match self {
+            Self::Outer => against,
+            Self::Both => against.abs(),
+        }
+    }
+}
+
 impl Surface {
     /// How far a point gets from `p` along the unit vector `direction`, up to `length`, until it is deeper than
-    /// `sunk` below a triangle that it met from its outer side, at more than a grazing angle (`steepness`: sine of
-    /// the angle); none where it gets there. The border of a triangle belongs to it.
+    /// `sunk` below a triangle that it met from its outer side (of a wall, from either side), at more than a grazing
+    /// angle (`steepness`: sine of the angle); none where it gets there. The border of a triangle belongs to it.
     #[must_use]
     pub fn met_by_point(
         &self,
@@ -18,8 +40,9 @@ impl Surface {
         [steepness, sunk]: [f64; 2],
     ) -> Option<f64> {
         let mut first = First { within: length, at: None };
+        let sides = Sides::of(self);
         self.tree().any_along(p, direction, length, |t| {
-            let against = -self.face_normal(t).dot(direction);
+            let against = sides.against(&self.face_normal(t), direction);
             if against > steepness {
                 let met = crossing(p, direction, &self.corners(t)).filter(|at| *at >= 0.0);
                 first.take(met.map(|at| at + sunk / against));
@@ -39,9 +62,10 @@ impl Surface {
         [steepness, sunk]: [f64; 2],
     ) -> Option<f64> {
         let mut first = First { within: length, at: None };
+        let sides = Sides::of(self);
         self.tree().any_swept(edge, direction, length, |t| {
             let normal = self.face_normal(t);
-            let against = -normal.dot(direction);
+            let against = sides.against(&normal, direction);
             if against > steepness {
                 let met = met_by_edge(edge, direction, &self.corners(t), &normal);
                 first.take(met.map(|at| at + sunk / against));

@@ -82,25 +82,30 @@ fn a_thin_wall_between_two_waypoints_is_found() {
 }
 
 #[test]
-fn what_pokes_into_the_mouth_of_an_open_box_is_found() {
-    // Half-way into the mouth, the middle of a crumb is far outside and its foot far inside.
+fn what_goes_through_the_mouth_of_a_wall_is_free_and_what_pokes_into_the_wall_is_found() {
     let crumb = cuboid([-0.01, -0.01, 3.001], [0.01, 0.01, 3.021]);
     let (scene, verifier) = scene([open_box([-3.0; 3], [3.0; 3]), crumb]);
-    assert!(scene.bodies[0].shape.surface.is_open());
-    assert!(checked(&scene, &verifier, &[Vector3::z()]).depth < 1e-9);
-    let verdict = checked(&scene, &verifier, &[Vector3::z() * -0.006]);
-    assert!(verdict.depth > 2.9 && verdict.depth < 3.01, "{}", verdict.depth);
+    assert!(scene.bodies[0].shape.surface.is_wall());
+    for shift in [1.0, -0.006, -6.0] {
+        assert_eq!(checked(&scene, &verifier, &[Vector3::z() * shift]).depth, 0.0, "{shift}");
+    }
+    // The floor is at -3: from 6.001 on it is in the crumb, and most of all half-way through.
+    for (shift, depth) in [(-6.006, 0.005), (-6.5, 0.01)] {
+        let verdict = checked(&scene, &verifier, &[Vector3::z() * shift]);
+        assert!((verdict.depth - depth).abs() < 2e-3, "{} after {shift}", verdict.depth);
+        assert!(verdict.penetrations.iter().all(|p| !p.on_moving));
+    }
 }
 
 #[test]
 fn where_holes_leave_nothing_to_be_settled_samples_are_asked_soon() {
-    // A basket all of holes: every other facet is missing.
+    // A basket all of holes: every other facet is missing. In it a box without a lid.
     let mut basket = ball(4);
     for vertex in &mut basket.vertices {
         *vertex = vertex.map(|x| 3.0 * x);
     }
     basket.triangles = basket.triangles.into_iter().step_by(2).collect();
-    let (scene, verifier) = scene([basket, cuboid([-2.0, -1.5, 1.0], [1.0, 2.0, 3.5])]);
+    let (scene, verifier) = scene([basket, open_box([-2.0, -1.5, 1.0], [1.0, 2.0, 3.5])]);
     let path = [scene.bodies[1].planning_from_shape; 2];
     let pair_path = PairPath::new(&scene, &scene.allowed, [1, 0], &path);
     let course = Course::new(&pair_path.path, pair_path.centre, pair_path.reach());

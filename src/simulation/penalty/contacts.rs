@@ -157,6 +157,9 @@ impl<'a> Contacts<'a> {
             for side in [PointSide::Moving, PointSide::Standing] {
                 let start = near.len();
                 let (trees, measured, to_measured) = self.side(pair, side, &to_standing);
+                if !measured.shape.surface.has_inside_for(&self.sampled(pair, side).shape.surface) {
+                    continue;
+                }
                 let found = |point| near.push(NearPoint { point, before: 0.0 });
                 points_near(&trees, &measured.field, &to_measured, reach, found);
                 if near.len() > start {
@@ -183,6 +186,14 @@ impl<'a> Contacts<'a> {
         }
     }
 
+    /// The body on whose surface the points of one side of a pair are.
+    fn sampled(&self, pair: &PenaltyPair<'a>, side: PointSide) -> &'a Body {
+        match side {
+            PointSide::Moving => self.body,
+            PointSide::Standing => pair.standing,
+        }
+    }
+
     fn met<'b>(&self, pair: &'b PenaltyPair<'a>) -> &'b NearPair {
         if let Some(met) = pair.met.get() {
             return met;
@@ -202,10 +213,13 @@ impl<'a> Contacts<'a> {
         }
         let to_standing = pair.standing.planning_from_shape.inverse() * self.body.planning_from_shape;
         let mut depth = 0.0f64;
-        for (trees, measured, to_measured) in [
-            ([&self.mine, &self.body.extra_samples], pair.standing, to_standing),
-            ([theirs, &pair.standing.extra_samples], self.body, to_standing.inverse()),
+        for (side, trees, measured, to_measured) in [
+            (PointSide::Moving, [&self.mine, &self.body.extra_samples], pair.standing, to_standing),
+            (PointSide::Standing, [theirs, &pair.standing.extra_samples], self.body, to_standing.inverse()),
         ] {
+            if !measured.shape.surface.has_inside_for(&self.sampled(pair, side).shape.surface) {
+                continue;
+            }
             let field: &Grid = &measured.field;
             points_near(&trees, field, &to_measured, 0.0, |p| {
                 depth = depth.max(-field.value(&(to_measured * p)));

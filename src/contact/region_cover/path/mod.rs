@@ -87,6 +87,9 @@ impl PathQuestion<'_> {
         let Self { pair_path, course, precision, termination } = *self;
         let [moving, standing] = pair_path.shapes;
         let (looked_at, measured) = if on_moving { (moving, standing) } else { (standing, moving) };
+        if !measured.surface.has_inside_for(&looked_at.surface) {
+            return Ok(PathDepth::default());
+        }
         let question = SideQuestion {
             surface: &looked_at.surface,
             tree: looked_at.patches(termination)?,
