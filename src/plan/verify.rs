@@ -23,8 +23,8 @@ use crate::geometry::{Pose, Shape};
 use crate::scene::{AllowedPenetrations, CongruentPair, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
-    COARSE_SHARE, FINEST_SHARE, HELPFUL, IGNORED_SHARE, IGNORED_SHARE_IN_OVERLAP, OVERLAP_FINEST,
-    OVERLAP_IGNORED, OVERLAP_MARGIN, PAIR_LIMIT, THIN_LIMIT, TURNING_THIN_LIMIT,
+    BULGE_TOLERANCE, COARSE_SHARE, FINEST_SHARE, HELPFUL, IGNORED_SHARE, IGNORED_SHARE_IN_OVERLAP,
+    OVERLAP_FINEST, OVERLAP_IGNORED, OVERLAP_MARGIN, PAIR_LIMIT, THIN_LIMIT, TURNING_THIN_LIMIT,
 };
 
 use super::common_depth::common_depth;
@@ -59,6 +59,15 @@ impl Verdict {
         let helpful = |v: Self| v.penetrations.into_iter().filter(move |e| e.over > v.limit * HELPFUL);
         Self { depth, penetrations: past.into_iter().flat_map(helpful).collect(), limit }
     }
+}
+
+/// How far a path turns.
+#[derive(Debug, Clone, Copy)]
+enum Turning {
+    None,
+    Little,
+    /// As a part that is unscrewed ([`turns_far`]).
+    Far,
 }
 
 /// How deep two parts overlap as assembled, in the planning frame.
@@ -130,25 +139,35 @@ impl Verifier {
     /// the assembly.
     #[must_use]
     pub fn limit_past(&self, PairPath { shapes, path, .. }: &PairPath<'_>) -> f64 {
-        let turns = path.iter().any(|pose| pose.rotation != path[0].rotation);
-        self.limit_of(*shapes, turns)
+        let turning = if turns_far(path) {
+            Turning::Far
+        } else if path.iter().any(|pose| pose.rotation != path[0].rotation) {
+            Turning::Little
+        } else {
+            Turning::None
+        };
+        self.limit_of(*shapes, turning)
     }
 
     /// No path of one of two shapes past the other is accepted at this depth.
     #[must_use]
     pub fn largest_limit(&self, shapes: [&Shape; 2]) -> f64 {
-        self.limit_of(shapes, true)
+        self.limit_of(shapes, Turning::Far)
     }
 
-    fn limit_of(&self, shapes: [&Shape; 2], turns: bool) -> f64 {
+    fn limit_of(&self, shapes: [&Shape; 2], turning: Turning) -> f64 {
         if !self.is_by_pair {
             return self.limit;
         }
         let least = |of: fn(&Shape) -> f64| of(shapes[0]).min(of(shapes[1]));
         let (size, thickness) = (least(|shape| shape.bounds().extents().max()), least(Shape::thickness));
         let of_pair = (PAIR_LIMIT * size).min(THIN_LIMIT * thickness);
-        // Poses of paths that turn are less exact than those of translations.
-        let of_turns = if turns { TURNING_THIN_LIMIT * thickness } else { 0.0 };
+        // Poses of paths that turn are less exact than those of translations, and threads are bounded less precisely.
+        let of_turns = match turning {
+            Turning::None => 0.0,
+            Turning::Little => BULGE_TOLERANCE.min(TURNING_THIN_LIMIT * thickness),
+            Turning::Far => TURNING_THIN_LIMIT * thickness,
+        };
         self.limit.min(of_pair.max(of_turns))
     }
 
