@@ -10,14 +10,24 @@ use nalgebra::Point3;
 
 use crate::geometry::Pose;
 use crate::scene::Scene;
-use crate::tolerances::SAME_STATE_ROTATION;
+use crate::tolerances::{SAME_STATE_ROTATION, SAME_STATE_TRAVEL};
 
 use super::state::{coarseness, least_travel};
+
+/// At which resolution states are distinguished.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Resolution {
+    /// The paper's: δ_t and δ_r for all parts, however many states there are.
+    Fixed,
+    /// A smaller δ_t for small parts; coarser, the more states a part has.
+    Adaptive,
+}
 
 /// States of one part, by numbers that the caller gives.
 #[derive(Debug)]
 pub(super) struct KnownStates {
     centre: Point3<f64>,
+    resolution: Resolution,
     least_travel: f64,
     /// Width of a cell, as a multiple of the least travel.
     coarseness: f64,
@@ -27,11 +37,15 @@ pub(super) struct KnownStates {
 }
 
 impl KnownStates {
-    pub(super) fn new(scene: &Scene, part: usize) -> Self {
+    pub(super) fn new(scene: &Scene, part: usize, resolution: Resolution) -> Self {
         Self {
             centre: scene.bodies[part].shape.mass.centre,
-            least_travel: least_travel(scene, part),
-            coarseness: coarseness(0),
+            resolution,
+            least_travel: match resolution {
+                Resolution::Fixed => SAME_STATE_TRAVEL,
+                Resolution::Adaptive => least_travel(scene, part),
+            },
+            coarseness: 1.0,
             states: Vec::new(),
             cells: HashMap::new(),
         }
@@ -44,8 +58,12 @@ impl KnownStates {
     pub(super) fn add(&mut self, number: usize, pose: Pose) {
         self.cells.entry(self.cell(&pose)).or_default().push(self.states.len());
         self.states.push((number, pose));
-        if coarseness(self.len()) != self.coarseness {
-            self.coarseness = coarseness(self.len());
+        let coarse = match self.resolution {
+            Resolution::Fixed => 1.0,
+            Resolution::Adaptive => coarseness(self.len()),
+        };
+        if coarse != self.coarseness {
+            self.coarseness = coarse;
             self.cells.clear();
             for (i, (_, pose)) in self.states.iter().enumerate() {
                 self.cells.entry(self.cell(pose)).or_default().push(i);
@@ -110,7 +128,7 @@ mod tests {
         };
         let poses = |most| prop::collection::vec(prop::array::uniform6(-0.4..0.4f64), 1..most);
         proptest!(|(states in poses(40), asked in poses(20), left_out in 0..3usize)| {
-            let mut known = KnownStates::new(&scene, 0);
+            let mut known = KnownStates::new(&scene, 0, Resolution::Adaptive);
             for (number, p) in states.iter().enumerate() {
                 known.add(number, pose(p));
             }

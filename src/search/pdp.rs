@@ -14,7 +14,7 @@ use crate::simulation::{Action, End, Motion};
 
 use super::disassembly::{Disassembly, Proof, Stop, Transition, joined};
 use super::inseparable::InseparablePairs;
-use super::known_states::KnownStates;
+use super::known_states::{KnownStates, Resolution};
 use super::outcome::{BlockedAction, Outcome, Removal};
 use super::problem::{Observer, Problem, VerifiedPath};
 use super::trace::{PlanningPhase, TraceEvent};
@@ -185,7 +185,7 @@ impl Pdp<'_, '_> {
     /// Breadth-first search for a way out of one part.
     fn search(&mut self, part: usize, limit: usize) -> Result<TreeEnd, Stop> {
         let phase = self.phase();
-        let known = KnownStates::new(&self.disassembly.problem.scene, part);
+        let known = KnownStates::new(&self.disassembly.problem.scene, part, Resolution::Fixed);
         let mut tree = SearchTree { nodes: Vec::new(), known };
         tree.add(TreeNode { path: vec![self.disassembly.assembled(part)], depth: 0 });
         let (mut next, mut cut) = (0, false);

@@ -57,7 +57,8 @@ impl PhaseStates<'_> {
 
 impl States {
     pub(super) fn new(scene: &Scene, strategy: Strategy) -> Self {
-        let known = (0..scene.bodies.len()).map(|part| KnownStates::new(scene, part)).collect();
+        let of_part = |part| KnownStates::new(scene, part, strategy.resolution());
+        let known = (0..scene.bodies.len()).map(of_part).collect();
         Self { nodes: Vec::new(), roots: 0, known, reopening: strategy.reopening() }
     }
 

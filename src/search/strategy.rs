@@ -2,6 +2,7 @@
 
 use crate::blocking_graph::{Blockage, Reopening};
 
+use super::known_states::Resolution;
 use super::state::StateNode;
 use super::trace::PlanningPhase;
 
@@ -20,6 +21,11 @@ impl Strategy {
     /// Whether the search is guided and leaves the paper's rules where others find more.
     pub(super) fn is_extended(self) -> bool {
         self.guided && !self.separate_lists
+    }
+
+    /// How states are distinguished: the paper's way but for the extended search, which has free play to expect.
+    pub(super) fn resolution(self) -> Resolution {
+        if self.is_extended() { Resolution::Adaptive } else { Resolution::Fixed }
     }
 
     /// When an action that was blocked is open again.
