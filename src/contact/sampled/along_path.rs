@@ -17,7 +17,7 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::budgets::{LONG_PATH, POSES_AT_ONCE, SAMPLE_SHARES};
+use crate::budgets::{FIRST_POSES_EVERY, LONG_PATH, LONG_STEPS_PER_POLL, POSES_AT_ONCE, SAMPLE_SHARES};
 use crate::geometry::{Ball, Bounds, Look, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
 use crate::termination::{Interrupt, Poll, Termination};
 use crate::tolerances::{HELPFUL, PATH_DENSITY};
@@ -91,7 +91,7 @@ impl PathSamples {
 
     /// The samples that get deeper than allowed on a stretch of a path past a part: for each pose and side the
     /// deepest one. If the path is refused (beyond `limit`), also all others that are deep enough to help in refining
-    /// the motion.
+    /// the motion, at the poses that were measured until then.
     pub(crate) fn penetrations_along(
         &self,
         pair_path: &PairPath<'_>,
@@ -100,16 +100,16 @@ impl PathSamples {
         termination: &Termination,
     ) -> Result<Vec<Penetration>, Interrupt> {
         let poses = dense(pair_path, stretch);
-        let mut penetrations =
-            self.penetrations_at(pair_path, &poses, limit, Closeness::Sparse, termination)?;
-        if penetrations.iter().all(|e| e.over <= limit) {
-            penetrations.extend(self.penetrations_at(
-                pair_path,
-                &poses,
-                limit,
-                Closeness::Dense,
-                termination,
-            )?);
+        let few: Vec<Pose> = poses.iter().step_by(FIRST_POSES_EVERY).copied().collect();
+        let mut penetrations = Vec::new();
+        // What is refused soon is not measured any further.
+        for (poses, closeness) in
+            [(&few, Closeness::Sparse), (&poses, Closeness::Sparse), (&poses, Closeness::Dense)]
+        {
+            penetrations.extend(self.penetrations_at(pair_path, poses, limit, closeness, termination)?);
+            if penetrations.iter().any(|e| e.over > limit) {
+                break;
+            }
         }
         Ok(penetrations)
     }
@@ -154,8 +154,7 @@ impl PathSamples {
             .par_iter()
             .map(|asked| {
                 termination.check()?;
-                // Samples of open surfaces take long.
-                let poll = Poll::every(1, Some(termination));
+                let poll = Poll::every(LONG_STEPS_PER_POLL, Some(termination));
                 sides[asked.side].entered(asked, &poll)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;

@@ -26,9 +26,11 @@ use std::collections::HashMap;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::budgets::{DEEP_POINTS, PATH_EFFORT, PATH_EFFORT_IN_DOUBT, RIM_EDGES_PER_EFFORT};
+use crate::budgets::{
+    DEEP_POINTS, LONG_STEPS_PER_POLL, PATH_EFFORT, PATH_EFFORT_IN_DOUBT, RIM_EDGES_PER_EFFORT,
+};
 use crate::geometry::{FreeRegion, PatchTree, Surface};
-use crate::termination::{Interrupt, Termination};
+use crate::termination::{Interrupt, Poll, Termination};
 use crate::tolerances::DEPTH_SHARE;
 
 use super::super::course::{Course, CourseView, Interval};
@@ -189,7 +191,7 @@ struct PathSearch<'a> {
     /// The share of surface and time that is bounded.
     done: f64,
     view: CourseView<'a>,
-    termination: &'a Termination,
+    poll: Poll<'a>,
     regions: Vec<KnownRegion>,
     /// Regions in the order in which they held a piece.
     held: Vec<u32>,
@@ -220,7 +222,7 @@ impl<'a> PathSearch<'a> {
             price: 1 + rim.map_or(0, |rim| rim.edges().len() / RIM_EDGES_PER_EFFORT),
             done: 0.0,
             view,
-            termination,
+            poll: Poll::every(LONG_STEPS_PER_POLL, Some(termination)),
             regions: Vec::new(),
             held: Vec::new(),
             places: HashMap::new(),

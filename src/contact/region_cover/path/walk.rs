@@ -55,7 +55,7 @@ impl PathSearch<'_> {
             let hint = SearchHint { triangle: 0, region: None, is_vain: false };
             let root = SweptPiece::Patch(PatchPiece { node, interval, share: 1.0, hint });
             cover(vec![root], |piece, rest| {
-                self.termination.check()?;
+                self.poll.check()?;
                 self.found.effort += self.price;
                 if self.is_enough() {
                     rest.clear();
