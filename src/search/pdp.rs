@@ -240,8 +240,10 @@ impl Pdp<'_, '_> {
                                 return Ok(true);
                             }
                             Proof::Otherwise(motion) => Some(motion),
+                            // No action from here can hold.
+                            Proof::PrefixRefuted => return Ok(false),
                             // The tree is rebuilt with the refuting points as samples.
-                            Proof::PrefixRefuted | Proof::Refuted { .. } => None,
+                            Proof::Refuted { .. } => None,
                         }
                     }
                     motion => Some(motion),
