@@ -286,6 +286,9 @@ fn a_trace_is_explained_in_words() {
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }
+    assert_eq!(plan("linked-rings", &["--trace", file.to_str().unwrap()]).status.code(), Some(3));
+    let text = stdout(&run(&["explain", file.to_str().unwrap()]));
+    assert!(text.contains("It is proved that") && text.contains("RINGS remain"), "{text}");
     fs::write(&file, "{\"event\":\"pass\",\"phase\":\"rotation\",\"depth_limit\":null}\nnonsense\n").unwrap();
     refused(&run(&["explain", file.to_str().unwrap()]), &["trace.jsonl", "line 2"]);
 }

@@ -99,8 +99,9 @@ impl Account {
                 };
                 format!("=== {} is out{after}; its edges are deleted from all graphs", self.name(*part))
             }
-            TraceEvent::End { status, reason, simulations, sweeps } => {
-                let why = reason.as_ref().map(|r| format!(": {r}")).unwrap_or_default();
+            TraceEvent::End { status, reason, remaining, simulations, sweeps } => {
+                let text = reason.as_ref().map(|r| r.text(remaining, |part| self.name(part)));
+                let why = text.map(|text| format!(": {text}")).unwrap_or_default();
                 format!(
                     "{status}{why}\n{simulations} simulations counted, {sweeps} parts out by straight sweeps; where states were expanded, the graphs \
                      excluded {} actions",

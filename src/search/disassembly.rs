@@ -448,7 +448,8 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         let Counters { simulations, sweeps, .. } = self.counters;
         self.trace(|| TraceEvent::End {
             status: status.name().to_owned(),
-            reason: reason.as_ref().map(|r| r.text(&remaining, |part| part.to_string())),
+            reason: reason.clone(),
+            remaining: remaining.clone(),
             simulations,
             sweeps,
         });

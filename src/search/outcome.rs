@@ -36,6 +36,7 @@ pub struct BlockedAction {
 
 /// What proves that two parts never come apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SeparationProof {
     /// Closed curves on them are linked.
     Linked,
@@ -56,6 +57,7 @@ pub struct Inseparable {
 
 /// Why a search is not complete.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Reason {
     /// A limit ended it, in words.
     Limit(String),

@@ -3,6 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::outcome::Reason;
+
 /// The parts that block an action: those that the outgoing edges of one vertex lead to, in the blocking graph of
 /// one direction.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -123,7 +125,9 @@ pub enum TraceEvent {
         /// The plan's status.
         status: String,
         /// Why it is not complete.
-        reason: Option<String>,
+        reason: Option<Reason>,
+        /// Parts that remain, ascending.
+        remaining: Vec<usize>,
         /// Simulations counted.
         simulations: u64,
         /// Removals by a straight sweep, without simulation.
