@@ -86,9 +86,9 @@ pub(crate) const MOST_HALVINGS: usize = 3;
 /// as [`EFFORT_PER_HALVING`]: up to there depths are exact. Half measures samples of more good paths in vain; double
 /// spends as much more on paths that samples refute.
 pub(crate) const EFFORT_BEFORE_SAMPLES: usize = 100_000;
-/// Of a path that is measured at samples, every fourth pose is measured first, and what is refused there no further: a
-/// thread that is refused is too deep all along. Half (2) spends twice as much on such paths. At 16 fewer points mend a
-/// motion less well: `furniture-round-table` took twice as long.
+/// Poses. Samples of a path are measured at every fourth pose first, and a path that is refused there is not measured
+/// further: a thread that is refused is too deep all along. Chosen, not derived. Half (2) spends twice as much on such
+/// paths. At 16 verification finds fewer points to refine the motion with: `furniture-round-table` took twice as long.
 pub(crate) const FIRST_POSES_EVERY: usize = 4;
 /// In sight of holes, after this part of the effort (a divisor) …
 /// Measured: no effect at half and double.

@@ -16,6 +16,7 @@ use super::action_table::ActionTable;
 use super::ball::is_ball;
 use super::disassembly::{Disassembly, SceneVersion, Stop};
 use super::inseparable::InseparablePairs;
+use super::problem::Problem;
 use super::state::{StateAction, StateNode, least_travel};
 use super::states::{PhaseStates, States};
 use super::strategy::Strategy;
@@ -51,30 +52,19 @@ impl Order {
         }
     }
 
-    /// Finds, once, which of the parts that stand are linked; true if any is. Beyond the paper.
+    /// Finds, once for each kind of proof `find`, which of the parts that stand never come apart; true if there are new
+    /// pairs. Beyond the paper.
     ///
     /// # Errors
     /// The termination condition became true.
-    pub(super) fn find_linked(
+    pub(super) fn find_inseparable(
         &mut self,
         strategy: Strategy,
         disassembly: &Disassembly<'_, '_>,
+        find: fn(&mut InseparablePairs, &Problem<'_>, &[usize]) -> Result<bool, Interrupt>,
     ) -> Result<bool, Interrupt> {
-        let standing = disassembly.everything.standing();
-        Ok(strategy.is_extended() && self.inseparable.find_linked(&disassembly.problem, standing)?)
-    }
-
-    /// The same for parts that enclose one another.
-    ///
-    /// # Errors
-    /// The termination condition became true.
-    pub(super) fn find_enclosed(
-        &mut self,
-        strategy: Strategy,
-        disassembly: &Disassembly<'_, '_>,
-    ) -> Result<bool, Interrupt> {
-        let standing = disassembly.everything.standing();
-        Ok(strategy.is_extended() && self.inseparable.find_enclosed(&disassembly.problem, standing)?)
+        let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());
+        Ok(strategy.is_extended() && find(&mut self.inseparable, problem, standing)?)
     }
 
     /// The pairs that were found.

@@ -143,7 +143,11 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 }
             }
             // Before the searches that take longest.
-            if self.order.find_enclosed(self.strategy, &self.disassembly)? {
+            if self.order.find_inseparable(
+                self.strategy,
+                &self.disassembly,
+                InseparablePairs::find_enclosed,
+            )? {
                 continue;
             }
             if !gain.any() && self.leave_by_cells(CellStage::BeforeTurning)? {
@@ -196,7 +200,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 continue;
             }
             // Before the first simulation: what leaves straight is out.
-            if self.order.find_linked(self.strategy, &self.disassembly)? {
+            if self.order.find_inseparable(self.strategy, &self.disassembly, InseparablePairs::find_linked)? {
                 open = self.expandable(phase);
                 continue;
             }
