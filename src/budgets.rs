@@ -259,9 +259,10 @@ pub(crate) const STATE_LEVELS: usize = 10;
 /// Slabs along the axis per pitch; a profile is stored by slab.
 /// Measured: no effect at half and double.
 pub(crate) const SLABS_PER_PITCH: f64 = 4.0;
-/// Heights of a profile within a pitch.
-/// Measured: at half no effect; at double another plan of `bolt_nut_m8_thread`.
-pub(crate) const HEIGHTS_PER_PITCH: usize = 300;
+/// Heights of a profile within a pitch: at first, and where these show no gap. The finest see a play of a
+/// hundredth of the pitch of a thread of three starts; at half, such threads are checked at samples, which takes seconds.
+/// The first measured: at half no effect; at double another plan of `bolt_nut_m8_thread`.
+pub(crate) const HEIGHTS_PER_PITCH: [usize; 4] = [300, 900, 2700, 8100];
 /// Halvings of a triangle until its profile is taken as it is.
 /// Measured: no effect at half and double.
 pub(crate) const TRIANGLE_HALVINGS: u32 = 24;
@@ -280,6 +281,19 @@ pub(crate) const KNOTS_PER_SEGMENT: f64 = 64.0;
 /// Rounds of weighing facets when the axis of flanks is fitted.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const FLANK_ROUNDS: usize = 6;
+/// Poses of a way along a thread of which one is looked at before the way is verified: a look every 0.8 radians. At half
+/// looks take twice as long; at double a way into a thin obstacle is verified for seconds before it is refuted.
+pub(crate) const POSES_PER_LOOK: usize = 8;
+/// Ranges of heights within a pitch by which the rise of a thread is fitted. Within each the flank should be straight: at
+/// half, it has corners there; at double, coarse threads have a single row of points in each. No effect of either on
+/// threads of one to three starts with 36 rows of points a pitch.
+pub(crate) const RISE_RANGES: usize = 24;
+/// Rounds of fitting the helix of a thread before the last one: the ends of the thread, which do not count, are known
+/// only with its pitch. With none, seats and bottoms of holes distort the fit; with double no effect.
+pub(crate) const HELIX_ROUNDS: usize = 1;
+/// Points of each surface from which the rise is fitted. At half it is less exact for fine meshes; at double it takes
+/// twice as long.
+pub(crate) const RISE_POINTS: usize = 4000;
 /// Facets that make a thread.
 /// Measured: no effect at half and double.
 pub(crate) const FEWEST_FLANK_FACETS: usize = 24;

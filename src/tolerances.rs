@@ -250,11 +250,41 @@ pub(crate) const PROFILE_MARGIN: f64 = 0.5;
 /// Share. Of the shifts with the widest gap, those within this count as equal.
 /// Measured: no effect at half and double.
 pub(crate) const EQUAL_GAP: f64 = 0.02;
+/// Multiples of the least travel of a part within which its threads are sought, the first that shows one: flanks are as
+/// far apart as their play. With half of the largest, threads with a play of 0.2 are left to simulation; with double,
+/// what stands beside a thread is taken for a part of it.
+pub(crate) const THREAD_REACHES: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+/// Share of the pitch by which points travel on one knot of a helix, about: then a head that is a quarter of the pitch
+/// from a nut is not taken for a part of the thread. At half, profiles take a little longer; at double, more stretches
+/// near a head are left to samples.
+pub(crate) const KNOT_TRAVEL: f64 = 0.125;
 /// Multiple. What is this many times further off the helix than most is left out of its fit.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const OUTLIER: f64 = 3.0;
 /// Cosines. Flanks lean along the axis by at least and at most these.
 pub(crate) const FLANK_LEAN: [f64; 2] = [0.15, 0.97];
+/// Shares of a guess within which the rise of a thread is sought: null twists of flanks with play are wrong by half and
+/// by double. With half the range, these are missed; with double it takes a little longer.
+pub(crate) const RISE_RANGE: [f64; 2] = [0.4, 3.0];
+/// Length. Profiles are compared no finer, at a third of the depth at which paths past thin parts are refused: at half,
+/// fine threads that do not pass take four times as long to refute; at double, threads with a play of a thousandth of the
+/// longest side are checked at samples, which takes seconds.
+pub(crate) const PROFILE_FINENESS: f64 = 2e-4;
+/// Shares of the radius within which a rise is sought if a part turns and shifts independently, as far as its contacts
+/// show: pitches from a twentieth of the radius to the radius. Coarser threads show their rise; finer ones are left to
+/// simulation.
+pub(crate) const RISE_BY_RADIUS: [f64; 2] = [0.05 / TAU, 1.0 / TAU];
+/// Share of the radius, radians, or share of the rise: the first step of the fit of a helix, about as far as the axis that
+/// facets show is off. At half, one round more; at double, one less.
+pub(crate) const HELIX_FIT_STEP: f64 = 0.01;
+/// The same for the last step: a hundredth of a play that is a thousandth of the radius. At half it takes a little longer;
+/// at double, the play of tight threads is not used to the full.
+pub(crate) const HELIX_FIT_PRECISION: f64 = 1e-5;
+/// Share of the rise to which it is fitted: over a hundred turns this adds up to a ten-thousandth of the pitch.
+pub(crate) const RISE_PRECISION: f64 = 1e-6;
+/// Share of the rise, for a thread of one turn, between two rises that are tried: flanks on each other then differ by
+/// less than a flank is high. At half it takes twice as long; at double the true rise may be stepped over.
+pub(crate) const RISE_STEP: f64 = 0.05;
 /// Share of the turning speed. Facets that slip faster are none of a thread.
 /// Measured: no effect at half and double.
 pub(crate) const FLANK_SLIP: f64 = 0.15;

@@ -40,6 +40,7 @@ mod sweep_memory;
 mod tests;
 mod trace;
 mod twists;
+mod unscrewing;
 
 pub use crate::termination::{Interrupt, Termination};
 pub use directions::axes_of;

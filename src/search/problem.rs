@@ -134,25 +134,35 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub fn checked_path(
+    pub fn checked_path(&self, standing: &[usize], part: usize, path: &[Pose]) -> Result<Checked, Interrupt> {
+        let thin = self.thinned(part, path);
+        let near = self.near(standing, part, &thin);
+        let centred = self.verifier.centred_on_thread(&self.scene, &near, part, &thin, &self.termination)?;
+        if let Some(centred) = centred
+            && let Ok(verified) = self.checked_as_given(standing, part, &centred)?
+        {
+            return Ok(Ok(verified));
+        }
+        self.checked_thin(&near, part, thin)
+    }
+
+    /// Thins a path and verifies it on the triangles.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub fn checked_as_given(
         &self,
-        standing: Vec<usize>,
+        standing: &[usize],
         part: usize,
         path: &[Pose],
     ) -> Result<Checked, Interrupt> {
         let thin = self.thinned(part, path);
-        let near = self.near(&standing, part, &thin);
-        let centred = self.verifier.centred_on_thread(&self.scene, &near, part, &thin, &self.termination)?;
-        if let Some(centred) = centred {
-            let thin = self.thinned(part, &centred);
-            let verdict = self.verdict(&self.near(&standing, part, &thin), part, &thin)?;
-            if verdict.penetrations.is_empty() {
-                return Ok(Ok(VerifiedPath { path: thin, depth: verdict.depth }));
-            }
-        }
-        let verdict = self.verdict(&near, part, &thin)?;
-        let Verdict { penetrations, depth, .. } = verdict;
-        Ok(if penetrations.is_empty() { Ok(VerifiedPath { path: thin, depth }) } else { Err(penetrations) })
+        self.checked_thin(&self.near(standing, part, &thin), part, thin)
+    }
+
+    fn checked_thin(&self, near: &[usize], part: usize, path: Vec<Pose>) -> Result<Checked, Interrupt> {
+        let Verdict { penetrations, depth, .. } = self.verdict(near, part, &path)?;
+        Ok(if penetrations.is_empty() { Ok(VerifiedPath { path, depth }) } else { Err(penetrations) })
     }
 
     fn thinned(&self, part: usize, path: &[Pose]) -> Vec<Pose> {

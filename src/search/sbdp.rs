@@ -45,6 +45,7 @@ use super::states::{PhaseStates, States};
 use super::strategy::Strategy;
 use super::sweep_memory::{BlockedSweep, SweepMemory};
 use super::trace::{PlanningPhase, TraceEvent};
+use super::unscrewing::{Unscrewed, UnscrewingMemory, unscrewed};
 
 /// The results of a pass.
 #[derive(Debug, Clone, Copy, Default)]
@@ -69,6 +70,7 @@ struct Sbdp<'a, 'o> {
     invalidation: Invalidation,
     sweep_memory: SweepMemory,
     cell_memory: CellMemory,
+    unscrewing_memory: UnscrewingMemory,
     speculation: Speculation,
 }
 
@@ -104,6 +106,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             invalidation: Invalidation::default(),
             sweep_memory: SweepMemory::default(),
             cell_memory: CellMemory::default(),
+            unscrewing_memory: UnscrewingMemory::default(),
             speculation: Speculation::default(),
             disassembly,
         };
@@ -150,7 +153,9 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             )? {
                 continue;
             }
-            if !gain.any() && self.leave_by_cells(CellStage::BeforeTurning)? {
+            if self.leave_along_threads()?
+                || (!gain.any() && self.leave_by_cells(CellStage::BeforeTurning)?)
+            {
                 if self.disassembly.is_done() {
                     return Ok(());
                 }
@@ -309,6 +314,34 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             }
         }
         Ok(removed)
+    }
+
+    /// Takes a part out along a thread, if one leaves so; true if one does.
+    fn leave_along_threads(&mut self) -> Result<bool, Stop> {
+        if !self.strategy.is_extended() || !self.disassembly.problem.sweeps {
+            return Ok(false);
+        }
+        let open = self.expandable(PlanningPhase::Translation);
+        for part in self.order.parts(&self.of(PlanningPhase::Translation), &open) {
+            if self.unscrewing_memory.holds(part, self.disassembly.everything.standing()) {
+                continue;
+            }
+            let started = Instant::now();
+            let unscrewed = unscrewed(&mut self.disassembly, part)?;
+            self.disassembly.counters.simulation += started.elapsed();
+            match unscrewed {
+                Ok(Unscrewed { verified: VerifiedPath { path, depth }, action }) => {
+                    self.disassembly.counters.sweeps += 1;
+                    let action = action.to_string();
+                    self.disassembly.trace(|| TraceEvent::Swept { state: 0, part, action });
+                    self.remove(part, path, depth);
+                    self.take_free_parts()?;
+                    return Ok(true);
+                }
+                Err(met) => self.unscrewing_memory.keep(part, met),
+            }
+        }
+        Ok(false)
     }
 
     /// Takes a part out through the cells of its places, if any leaves them; true if one does.

@@ -22,6 +22,8 @@ use super::Touching;
 pub struct NullTwist {
     /// Its direction, in the planning frame.
     pub axis: Unit<Vector3<f64>>,
+    /// A point on it, in the planning frame.
+    pub through: Point3<f64>,
     /// About how far the part moves along the axis per radian. Facets that lean against their flanks make it wrong by
     /// up to a third, its sign right. `None` if the part may turn and shift independently.
     pub rise: Option<f64>,
@@ -78,12 +80,17 @@ impl NullTwist {
         let values = svd.S().column_vector();
         let near_null = (0..6).filter(|&i| values[i] < values[0] * NEAR_NULL * NEAR_NULL).count();
         let vector = |i: usize, from: usize| Vector3::from_fn(|k, _| svd.V()[(from + k, i)]);
+        // Turning is in units of the spread.
+        let through = |i: usize| {
+            let (shift, turn) = (vector(i, 0), vector(i, 3));
+            Point3::from(centre + turn.cross(&shift) * (spread / turn.norm_squared()))
+        };
         match near_null {
             1 => {
                 let (shift, turn) = (vector(5, 0), vector(5, 3));
                 let axis = Unit::try_new(turn, NULL_TURN)?;
-                // Turning is in units of the spread.
-                Some(Self { axis, rise: Some(axis.dot(&shift) * spread / turn.norm()) })
+                let rise = Some(axis.dot(&shift) * spread / turn.norm());
+                Some(Self { axis, through: through(5), rise })
             }
             2 => {
                 let turns = Matrix3x2::from_columns(&[vector(4, 3), vector(5, 3)]);
@@ -91,7 +98,9 @@ impl NullTwist {
                 let svd = turns.svd(true, false);
                 let (axis, [most, next]) = (svd.u?.column(0).into_owned(), svd.singular_values.into());
                 let axis = Unit::new_normalize(axis);
-                (most > NULL_TURN && next < NULL_TURN * most).then_some(Self { axis, rise: None })
+                let turns_most = if vector(4, 3).norm() > vector(5, 3).norm() { 4 } else { 5 };
+                let through = through(turns_most);
+                (most > NULL_TURN && next < NULL_TURN * most).then_some(Self { axis, through, rise: None })
             }
             _ => None,
         }

@@ -8,7 +8,7 @@
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::budgets::CENTRING_PIECES;
-use crate::geometry::{Helix, Pose, Surface, interpolate};
+use crate::geometry::{Helix, Pose, interpolate};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{OFF_HELIX, SCREW_POSE_ANGLE, STRAY_SHARE, THREAD_ENDS, UNSCREWING_ANGLE};
@@ -43,7 +43,11 @@ pub(crate) fn centred(
     };
     let mut widest: Option<(f64, SharedThread)> = None;
     for &other in standing.iter().filter(|&&other| scene.allowed.of(part, other) == 0.0) {
-        let shared = SharedThread::shared(scene, (part, other), &followed, left, termination)?;
+        let pair = ThreadPair::new(scene, [part, other], &followed.helix, &followed.reference);
+        let rise = followed.helix.rise;
+        let axis = |facets: Vec<FlankFacet>| Some(Helix { rise, ..slipping(&facets, rise)? });
+        let [Some(own), Some(others)] = pair.flanks().map(axis) else { continue };
+        let shared = SharedThread::shared(&pair, [own, others], termination)?;
         if let Some((play, thread)) = shared
             && widest.as_ref().is_none_or(|(most, _)| *most < play)
         {
@@ -62,10 +66,10 @@ fn along(
     course: &Course,
 ) -> Option<Vec<Pose>> {
     // A part that is nearly off the thread is turned off it.
-    let is_near = (thread.off - left).abs() < UNSCREWING_ANGLE;
-    let angle = if is_near { thread.off.abs().max(left.abs()).copysign(left) } else { left };
-    let count = (angle / SCREW_POSE_ANGLE).abs().ceil().max(1.0);
-    let on_thread = (0..=count as usize).map(|k| thread.pose(angle * k as f64 / count));
+    let off = thread.off[usize::from(thread.helix.rise * left <= 0.0)];
+    let is_near = (off - left).abs() < UNSCREWING_ANGLE;
+    let angle = if is_near { off.abs().max(left.abs()).copysign(left) } else { left };
+    let on_thread = thread.poses_to(angle);
     let rest = course.path_between([way, course.length]);
     // From there on like the given path, at the same distance from it, and on it at the end.
     let aside = rest.first()?.inverse() * thread.pose(angle);
@@ -79,64 +83,98 @@ fn along(
     Some(poses)
 }
 
+/// Two parts that may share a thread, in the axis frame of a helix near it.
+pub(super) struct ThreadPair {
+    guess: Helix,
+    /// The pose of the moving part.
+    reference: Pose,
+    /// The triangles of the moving part, and of the standing one.
+    triangles: [Vec<[Point3<f64>; 3]>; 2],
+    zones: [ProfileZone; 2],
+    /// Where both may have the thread; its ends do not count.
+    zone: ProfileZone,
+}
+
+impl ThreadPair {
+    /// A moving and a standing part, with a helix near their thread and the pose of the moving one in its axis frame.
+    pub(super) fn new(scene: &Scene, [part, other]: [usize; 2], guess: &Helix, reference: &Pose) -> Self {
+        let triangles = |part: usize, frame: Pose| -> Vec<[Point3<f64>; 3]> {
+            let surface = &scene.bodies[part].shape.surface;
+            (0..surface.triangles().len() as u32).map(|t| surface.corners(t).map(|p| frame * p)).collect()
+        };
+        let standing = guess.axis_from_frame * scene.bodies[other].planning_from_shape;
+        let triangles = [triangles(part, *reference), triangles(other, standing)];
+        let zones = triangles.each_ref().map(|t| ProfileZone::of(t));
+        let zone = zones[0].common(&zones[1]).trimmed(THREAD_ENDS * guess.pitch().abs());
+        Self { guess: *guess, reference: *reference, triangles, zones, zone }
+    }
+
+    /// Facets of both parts where they may have the thread.
+    pub(super) fn flanks(&self) -> [Vec<FlankFacet>; 2] {
+        let in_zone = |t: &Vec<[Point3<f64>; 3]>| {
+            t.iter().filter(|c| self.zone.meets(c)).filter_map(FlankFacet::of).collect()
+        };
+        self.triangles.each_ref().map(in_zone)
+    }
+}
+
 /// A thread that two parts share.
-struct SharedThread {
-    helix: Helix,
+pub(super) struct SharedThread {
+    pub(super) helix: Helix,
     /// The pose of the moving part in the middle of its play, in the axis frame, at the start.
     reference: Pose,
-    /// The angle after which it is off the other part.
-    off: f64,
+    /// The angles after which it is off the other part, further along the axis and against it.
+    pub(super) off: [f64; 2],
 }
 
 impl SharedThread {
     /// The pose of the moving part after turning by an angle.
-    fn pose(&self, angle: f64) -> Pose {
+    pub(super) fn pose(&self, angle: f64) -> Pose {
         self.helix.axis_from_frame.inverse() * self.helix.screwed(angle) * self.reference
     }
 
-    /// The thread that a part on its path shares with a standing one, and the play in it.
-    fn shared(
-        scene: &Scene,
-        (part, other): (usize, usize),
-        followed: &ScrewPath,
-        left: f64,
+    /// Its poses from the start to an angle.
+    pub(super) fn poses_to(&self, angle: f64) -> impl Iterator<Item = Pose> {
+        let count = (angle / SCREW_POSE_ANGLE).abs().ceil().max(1.0);
+        (0..=count as usize).map(move |k| self.pose(angle * k as f64 / count))
+    }
+
+    /// The thread that two parts share along their helices (moving and standing, of one rise, in the pair's frame), and
+    /// the play in it.
+    pub(super) fn shared(
+        pair: &ThreadPair,
+        [own, others]: [Helix; 2],
         termination: &Termination,
     ) -> Result<Option<(f64, Self)>, Interrupt> {
         termination.check()?;
-        let ScrewPath { helix: guess, reference, .. } = followed;
-        let (moving, standing) = (&scene.bodies[part].shape.surface, &scene.bodies[other].shape.surface);
-        let guess_from_standing = guess.axis_from_frame * scene.bodies[other].planning_from_shape;
-        let triangles = |surface: &Surface, frame: Pose| -> Vec<[Point3<f64>; 3]> {
-            (0..surface.triangles().len() as u32).map(|t| surface.corners(t).map(|p| frame * p)).collect()
-        };
-        let (moving, standing) = (triangles(moving, *reference), triangles(standing, guess_from_standing));
-        let zones = [ProfileZone::of(&moving), ProfileZone::of(&standing)];
-        let zone = zones[0].common(&zones[1]).trimmed(THREAD_ENDS * guess.pitch().abs());
+        let ThreadPair { guess, reference, triangles: [moving, standing], zones, zone } = pair;
         if zone.is_empty() {
             return Ok(None);
         }
-        let [own, others] = [&moving, &standing].map(|t| {
-            let facets: Vec<FlankFacet> =
-                t.iter().filter(|c| zone.meets(c)).filter_map(FlankFacet::of).collect();
-            slipping(&facets, guess.rise)
-        });
-        let (Some(own), Some(others)) = (own, others) else { return Ok(None) };
-        let helix = Helix { rise: guess.rise, ..others };
+        let helix = others;
         // The moving part's axis onto the standing one's.
         let to_other = onto(&own, &others, f64::midpoint(zone.along()[0], zone.along()[1]));
         let frame = helix.axis_from_frame;
-        let envelope = |t: &[[Point3<f64>; 3]], frame: Pose| {
+        let envelope = |t: &[[Point3<f64>; 3]], frame: Pose, heights: usize| {
             let moved: Vec<_> = t.iter().map(|c| c.map(|p| frame * p)).collect();
-            Envelope::new(&moved, &helix, &zone, termination)
+            Envelope::new(&moved, &helix, zone, heights, termination)
         };
-        let (one, two) = rayon::join(|| envelope(&moving, frame * to_other), || envelope(&standing, frame));
-        let gap = two?.widest_gap(&one?, OFF_HELIX * helix.pitch().abs());
+        let mut gap = None;
+        for heights in Envelope::finenesses(helix.pitch()) {
+            let (one, two) = rayon::join(
+                || envelope(moving, frame * to_other, heights),
+                || envelope(standing, frame, heights),
+            );
+            gap = two?.widest_gap(&one?, OFF_HELIX * helix.pitch().abs());
+            if gap.is_some() {
+                break;
+            }
+        }
         let Some((play, shift)) = gap else { return Ok(None) };
         let reference = Translation3::from(Vector3::z() * shift) * frame * to_other * reference;
         let helix = Helix { axis_from_frame: frame * guess.axis_from_frame, ..helix };
-        let [own, others] = zones.map(|zone| zone.along());
-        let travel = if helix.rise * left > 0.0 { others[1] - own[0] } else { others[0] - own[1] };
-        let off = travel / helix.rise;
+        let [own, others] = zones.each_ref().map(ProfileZone::along);
+        let off = [others[1] - own[0], others[0] - own[1]].map(|travel| travel / helix.rise);
         Ok(Some((play, Self { helix, reference, off })))
     }
 }

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use crate::budgets::{HEIGHTS_PER_PITCH, SHORT_STEPS_PER_POLL, SLABS_PER_PITCH, TRIANGLE_HALVINGS};
 use crate::geometry::{Footprint, Helix, radii};
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{EQUAL_GAP, PROFILE_MARGIN};
+use crate::tolerances::{EQUAL_GAP, PROFILE_FINENESS, PROFILE_MARGIN};
 
 /// A range along an axis and a range of distances from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,6 +99,8 @@ struct ProfileCut {
 /// The profile of a surface.
 pub(super) struct Envelope {
     pitch: f64,
+    /// The number of heights within a pitch.
+    heights: usize,
     /// The size of a bin: the error that footprints may have.
     finest: f64,
     /// The zone in which the profile is exact.
@@ -109,7 +111,15 @@ pub(super) struct Envelope {
 }
 
 impl Envelope {
-    /// The profile of triangles (axis frame) along a rising helix, exact in `zone`, where the other part can be near.
+    /// The numbers of heights within a pitch by which profiles are compared, coarse ones first.
+    pub(super) fn finenesses(pitch: f64) -> impl Iterator<Item = usize> {
+        let most = (pitch.abs() / PROFILE_FINENESS) as usize;
+        let [first, finer @ ..] = HEIGHTS_PER_PITCH;
+        std::iter::once(first).chain(finer.into_iter().filter(move |&heights| heights <= most))
+    }
+
+    /// The profile of triangles (axis frame) along a rising helix by some number of heights within a pitch, exact in
+    /// `zone`, where the other part can be near.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -117,14 +127,15 @@ impl Envelope {
         triangles: &[[Point3<f64>; 3]],
         helix: &Helix,
         zone: &ProfileZone,
+        heights: usize,
         termination: &Termination,
     ) -> Result<Self, Interrupt> {
         let pitch = helix.pitch().abs();
         let [near, far] = zone.across;
         let zone =
             ProfileZone { across: [near - PROFILE_MARGIN * pitch, far + PROFILE_MARGIN * pitch], ..*zone };
-        let empty =
-            || Self { pitch, finest: pitch / HEIGHTS_PER_PITCH as f64, zone, first: 0, slabs: Vec::new() };
+        let finest = pitch / heights as f64;
+        let empty = || Self { pitch, heights, finest, zone, first: 0, slabs: Vec::new() };
         let add = |mut envelope: Self, triangles: &[[Point3<f64>; 3]]| {
             termination.check()?;
             let mut cut = ProfileCut::default();
@@ -208,22 +219,22 @@ impl Envelope {
     /// Adds a footprint. Its heights on the helix differ from those along the axis, `along[0]` to `along[1]`, by
     /// something in `beside`.
     fn enter(&mut self, print: &Footprint, along: [f64; 2], beside: [f64; 2], reaches: &mut Reaches) {
-        let (size, pitch) = (self.finest, self.pitch);
+        let (size, pitch, heights) = (self.finest, self.pitch, self.heights);
         let [from, to] = min_max(print.points.iter().map(|p| p.y));
         let first = reached(print, size, reaches);
         let lowest = self.slab(along[0]);
         for (low, slab) in (lowest..).zip(self.slabs_between(lowest, self.slab(along[1]))) {
             if slab.reaches.is_empty() {
-                slab.reaches.resize(HEIGHTS_PER_PITCH, NOTHING);
+                slab.reaches.resize(heights, NOTHING);
             }
             let ends = [low as f64, (low + 1) as f64].map(|z| z / SLABS_PER_PITCH * pitch);
             let from = ((from.max(ends[0] + beside[0]) - print.error) / size).floor() as i64;
             let to = ((to.min(ends[1] + beside[1]) + print.error) / size).floor() as i64;
-            let mut bin = from.rem_euclid(HEIGHTS_PER_PITCH as i64) as usize;
+            let mut bin = from.rem_euclid(heights as i64) as usize;
             let within = reaches.iter().skip((from - first) as usize).take((to - from + 1).max(0) as usize);
             for reach in within {
                 widen(&mut slab.reaches[bin], reach);
-                bin = if bin + 1 == HEIGHTS_PER_PITCH { 0 } else { bin + 1 };
+                bin = if bin + 1 == heights { 0 } else { bin + 1 };
             }
         }
     }
@@ -232,7 +243,7 @@ impl Envelope {
     fn between(&self, [from, to]: [f64; 2]) -> Reaches {
         let within = |z: f64| self.slab(z).saturating_sub(self.first).clamp(-1, self.slabs.len() as i64);
         let range = within(from).max(0)..=within(to).min(self.slabs.len() as i64 - 1);
-        let mut all = vec![NOTHING; HEIGHTS_PER_PITCH];
+        let mut all = vec![NOTHING; self.heights];
         let mut further = [false; 2];
         for slab in range {
             let slab = &self.slabs[slab as usize];
@@ -266,7 +277,7 @@ impl Envelope {
         }
         // A distance in space is a little longer in the half plane.
         let margin = stray * 1.0f64.hypot(2.0 * self.pitch / TAU / inner);
-        let (size, bins) = (self.finest, HEIGHTS_PER_PITCH as i64);
+        let (size, bins) = (self.finest, self.heights as i64);
         let moved = (shift / size).floor() as i64;
         if margin >= PROFILE_MARGIN * self.pitch {
             return false;
@@ -291,7 +302,7 @@ impl Envelope {
     pub(super) fn widest_gap(&self, other: &Self, most: f64) -> Option<(f64, f64)> {
         let everywhere = [f64::NEG_INFINITY, f64::INFINITY];
         let (one, other) = (self.between(everywhere), other.between(everywhere));
-        let (bins, size) = (HEIGHTS_PER_PITCH as i64, self.finest);
+        let (bins, size) = (self.heights as i64, self.finest);
         let gap = |inner: &Reaches, outer: &Reaches, shift: i64| {
             let at = |i: i64| outer[(i + shift).rem_euclid(bins) as usize][0] - inner[i as usize][1];
             (0..bins).map(at).fold(f64::INFINITY, f64::min)

@@ -12,10 +12,12 @@ use crate::tolerances::{SCREW_TURN, SHORTEST_SCREW_STRETCH, STRAY_SHARE};
 
 mod centred;
 mod envelope;
+mod helix_fit;
 mod path;
 mod slip;
 #[cfg(test)]
 mod tests;
+mod unscrewing;
 
 use nalgebra::Point3;
 
@@ -23,6 +25,7 @@ use crate::geometry::{Bounds, Pose, Surface};
 use crate::termination::{Interrupt, Termination};
 
 pub(crate) use centred::centred;
+pub(crate) use unscrewing::{ScrewWay, ways_off};
 
 use super::course::{Course, Interval};
 use super::region_cover::cover;
@@ -38,7 +41,7 @@ use path::{AxisBoxes, ScrewPath};
 fn unsettled(
     course: &Course,
     [moving, standing]: [&Surface; 2],
-    stretches: Vec<Interval>,
+    mut stretches: Vec<Interval>,
     limit: f64,
     termination: &Termination,
 ) -> Result<Vec<Interval>, Interrupt> {
@@ -56,17 +59,35 @@ fn unsettled(
     let boxes = AxisBoxes { moving: of_moving, standing: of_standing };
     let [one, other] = [&moving, &standing].map(|t| ProfileZone::of(t).everywhere());
     let zone = one.common(&other);
-    let envelope =
-        |triangles: Vec<[Point3<f64>; 3]>| Envelope::new(&triangles, &screw.helix, &zone, termination);
-    let (moving, standing) = rayon::join(|| envelope(moving), || envelope(standing));
-    let (moving, standing) = (moving?, standing?);
+    for heights in Envelope::finenesses(screw.helix.pitch()) {
+        let envelope = |triangles: &[[Point3<f64>; 3]]| {
+            Envelope::new(triangles, &screw.helix, &zone, heights, termination)
+        };
+        let (moving, standing) = rayon::join(|| envelope(&moving), || envelope(&standing));
+        stretches = uncovered(course, &screw, &boxes, [&moving?, &standing?], stretches, termination)?;
+        if stretches.is_empty() {
+            break;
+        }
+    }
+    Ok(stretches)
+}
+
+/// The stretches on which the profiles of a moving and a standing surface do not prove that they are apart.
+fn uncovered(
+    course: &Course,
+    screw: &ScrewPath,
+    boxes: &AxisBoxes,
+    [moving, standing]: [&Envelope; 2],
+    stretches: Vec<Interval>,
+    termination: &Termination,
+) -> Result<Vec<Interval>, Interrupt> {
     let mut open = Vec::new();
     cover(stretches, |interval, rest| {
         termination.check()?;
-        let Some(stretch) = screw.stretch(interval, &boxes) else { return Ok(()) };
+        let Some(stretch) = screw.stretch(interval, boxes) else { return Ok(()) };
         let stray = |radius: f64| stretch.stray(radius);
         let places = [stretch.places_of_standing, stretch.places_of_moving];
-        if standing.is_apart(places[0], &moving, places[1], stretch.shift, stray) {
+        if standing.is_apart(places[0], moving, places[1], stretch.shift, stray) {
             return Ok(());
         }
         if course.turn(interval) < SHORTEST_SCREW_STRETCH {

@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Point3, Quaternion, SMatrix, SVector, Translation3, Unit
 
 use crate::budgets::{KNOTS_PER_SEGMENT, OUTLIER_ROUNDS};
 use crate::geometry::{Bounds, Helix, Pose, interpolate};
-use crate::tolerances::{LEAST_PITCH, OUTLIER};
+use crate::tolerances::{KNOT_TRAVEL, LEAST_PITCH, OUTLIER};
 
 use super::super::course::{Course, Interval, PathSegment};
 
@@ -288,7 +288,10 @@ fn knots(course: &Course, helix: &Helix, finest: f64) -> Vec<Knot> {
         let along = |p: &Point3<f64>| (b - a) - Vector3::new(-p.y, p.x, helix.rise) * by;
         let speed = along(&a).norm().max(along(&b).norm());
         let turning = (turn - Vector3::z() * by).norm();
-        let count = ((speed + turning * course.reach) / (2.0 * finest)).ceil().clamp(1.0, KNOTS_PER_SEGMENT);
+        let by_stray = (speed + turning * course.reach) / (2.0 * finest);
+        // Where the parts can meet is known as well as points travel little.
+        let by_travel = s.length / (KNOT_TRAVEL * helix.pitch().abs()).max(LEAST_PITCH);
+        let count = by_stray.max(by_travel).ceil().clamp(1.0, KNOTS_PER_SEGMENT);
         for i in 0..count as usize {
             let share = |k: f64| (i as f64 + k) / count;
             let pose = interpolate(&s.from, &s.to, &course.centre, share(0.5));

@@ -16,6 +16,7 @@ use crate::tolerances::{FLANK_LEAN, FLANK_SLIP};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FlankFacet {
     pub(super) middle: Point3<f64>,
+    pub(super) corners: [Point3<f64>; 3],
     pub(super) normal: Vector3<f64>,
     pub(super) area: f64,
 }
@@ -27,7 +28,17 @@ impl FlankFacet {
         let side = |i: usize| (corners[(i + 1) % 3] - corners[i]).norm_squared();
         let longest = (1..3).fold(0, |best, i| if side(i) > side(best) { i } else { best });
         let middle = nalgebra::center(&corners[longest], &corners[(longest + 1) % 3]);
-        Some(Self { middle, normal: double.try_normalize(0.0)?, area: double.norm() / 2.0 })
+        Some(Self {
+            middle,
+            corners: *corners,
+            normal: double.try_normalize(0.0)?,
+            area: double.norm() / 2.0,
+        })
+    }
+
+    /// Whether it leans along the axis as the flanks of threads do.
+    pub(super) fn is_flank(&self) -> bool {
+        (FLANK_LEAN[0]..FLANK_LEAN[1]).contains(&self.normal.z.abs())
     }
 }
 
@@ -45,12 +56,8 @@ pub(super) fn slipping(facets: &[FlankFacet], rise: f64) -> Option<Helix> {
     let share = |f: &FlankFacet, twist: &SVector<f64, 4>| {
         (row(f).dot(twist) + turning(f)) / f.middle.xy().coords.norm().max(1e-12)
     };
-    let flanks: Vec<&FlankFacet> = facets
-        .iter()
-        .filter(|f| {
-            (FLANK_LEAN[0]..FLANK_LEAN[1]).contains(&f.normal.z.abs()) && share(f, &twist).abs() < FLANK_SLIP
-        })
-        .collect();
+    let flanks: Vec<&FlankFacet> =
+        facets.iter().filter(|f| f.is_flank() && share(f, &twist).abs() < FLANK_SLIP).collect();
     if flanks.len() < FEWEST_FLANK_FACETS {
         return None;
     }

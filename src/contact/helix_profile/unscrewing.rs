@@ -1,0 +1,115 @@
+//! Ways off a thread, from the thread alone.
+//!
+//! A part that shares a thread with others leaves it along the thread's own helix. So its way needs no simulation: the
+//! helix is fitted to the flanks of both parts, and the part turns along it in the middle of its play. Such a way is a
+//! proposal, verified like any path.
+
+use nalgebra::{Point3, Vector3};
+
+use crate::budgets::HELIX_ROUNDS;
+use crate::geometry::{Helix, Pose};
+use crate::scene::Scene;
+use crate::termination::{Interrupt, Termination};
+use crate::tolerances::{RISE_BY_RADIUS, RISE_RANGE};
+
+use super::centred::{SharedThread, ThreadPair};
+use super::helix_fit::{fitted_helix, fitted_rise};
+use super::slip::{FlankFacet, slipping};
+
+/// A way off a thread.
+#[derive(Debug, Clone)]
+pub(crate) struct ScrewWay {
+    /// The poses of the part's shape, the given one first.
+    pub(crate) path: Vec<Pose>,
+    /// The unit vector along which the part goes, in the planning frame.
+    pub(crate) along: Vector3<f64>,
+    pub(crate) is_right_handed: bool,
+}
+
+/// The ways of a part from a pose off the threads that it shares with some others, near a helix (in the planning
+/// frame; without a rise, it gives the axis alone); the shorter one first. None where it shares none with play.
+///
+/// # Errors
+/// The termination condition became true.
+pub(crate) fn ways_off(
+    scene: &Scene,
+    others: &[usize],
+    part: usize,
+    pose: &Pose,
+    guess: &Helix,
+    termination: &Termination,
+) -> Result<Vec<ScrewWay>, Interrupt> {
+    let mut widest: Option<(f64, SharedThread)> = None;
+    let mut off = [0.0f64; 2];
+    for &other in others.iter().filter(|&&other| scene.allowed.of(part, other) == 0.0) {
+        let Some((pair, axes)) = fitted(scene, [part, other], pose, guess, termination)? else { continue };
+        let Some((play, thread)) = SharedThread::shared(&pair, axes, termination)? else { continue };
+        for (off, own) in off.iter_mut().zip(thread.off) {
+            *off = if own.abs() > off.abs() { own } else { *off };
+        }
+        if widest.as_ref().is_none_or(|(most, _)| *most < play) {
+            widest = Some((play, thread));
+        }
+    }
+    let Some((_, thread)) = widest else { return Ok(Vec::new()) };
+    let axis = thread.helix.axis_from_frame.inverse() * Vector3::z();
+    let mut ways = off.map(|angle| {
+        (
+            angle.abs(),
+            ScrewWay {
+                path: std::iter::once(*pose).chain(thread.poses_to(angle)).collect(),
+                along: axis * (angle * thread.helix.rise).signum(),
+                is_right_handed: thread.helix.rise > 0.0,
+            },
+        )
+    });
+    ways.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(ways.into_iter().map(|(_, way)| way).collect())
+}
+
+/// Two parts in the frame of the helix that fits their thread, and both helices in that frame, near another helix; of
+/// any rise if that has none.
+fn fitted(
+    scene: &Scene,
+    parts: [usize; 2],
+    pose: &Pose,
+    guess: &Helix,
+    termination: &Termination,
+) -> Result<Option<(ThreadPair, [Helix; 2])>, Interrupt> {
+    let mut helix = *guess;
+    for _ in 0..HELIX_ROUNDS {
+        termination.check()?;
+        let pair = ThreadPair::new(scene, parts, &helix, &(helix.axis_from_frame * pose));
+        let Some(axes) = axes(&pair, helix.rise) else { return Ok(None) };
+        helix =
+            Helix { axis_from_frame: axes[1].axis_from_frame * helix.axis_from_frame, rise: axes[1].rise };
+    }
+    let pair = ThreadPair::new(scene, parts, &helix, &(helix.axis_from_frame * pose));
+    Ok(axes(&pair, helix.rise).map(|axes| (pair, axes)))
+}
+
+/// The helices of the flanks of two parts, in the frame of a helix near both.
+fn axes(pair: &ThreadPair, guess: f64) -> Option<[Helix; 2]> {
+    let flanks = pair.flanks();
+    let [Some(own), Some(others)] = flanks.each_ref().map(|facets| slipping(facets, guess)) else {
+        return None;
+    };
+    let points = |axis: &Helix, facets: &[FlankFacet]| -> Vec<Point3<f64>> {
+        let flanks = facets.iter().filter(|f| f.is_flank());
+        flanks.flat_map(|f| f.corners).map(|p| axis.axis_from_frame * p).collect()
+    };
+    let points = [points(&own, &flanks[0]), points(&others, &flanks[1])];
+    let ranges = if guess == 0.0 {
+        let radius = points.iter().flatten().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
+        let [least, most] = RISE_BY_RADIUS.map(|share| share * radius);
+        vec![[least, most], [-least, -most]]
+    } else {
+        vec![RISE_RANGE.map(|share| share * guess)]
+    };
+    let rise = fitted_rise(&points, &ranges)?;
+    let (own_fit, other_fit) =
+        rayon::join(|| fitted_helix(&points[0], rise), || fitted_helix(&points[1], rise));
+    let rise = f64::midpoint(own_fit.rise, other_fit.rise);
+    let fits = [(own, own_fit), (others, other_fit)];
+    Some(fits.map(|(axis, fit)| Helix { axis_from_frame: fit.axis_from_frame * axis.axis_from_frame, rise }))
+}
