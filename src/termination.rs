@@ -5,7 +5,7 @@ mod silence;
 use std::cell::Cell;
 use std::panic::Location;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 pub use silence::{Silence, Watch};
@@ -26,8 +26,24 @@ pub enum Interrupt {
 pub struct Termination {
     cancelled: Arc<AtomicBool>,
     deadline: Option<Instant>,
+    budget: Option<TimeBudget>,
     race: Option<(Arc<AtomicUsize>, usize)>,
     watch: Option<Arc<Watch>>,
+}
+
+/// A span of time in which some of the work does not count. Copies count together.
+#[derive(Debug, Clone)]
+struct TimeBudget {
+    started: Instant,
+    limit: Duration,
+    /// Nanoseconds of work that does not count.
+    left_out: Arc<AtomicU64>,
+}
+
+impl TimeBudget {
+    fn spent(&self) -> Duration {
+        self.started.elapsed().saturating_sub(Duration::from_nanos(self.left_out.load(Ordering::Relaxed)))
+    }
 }
 
 impl Termination {
@@ -63,18 +79,45 @@ impl Termination {
         Self { deadline: earlier, ..self.clone() }
     }
 
+    /// The same with a budget of so much time from now on, of which work that is [left out](Self::leave_out) takes
+    /// nothing.
+    #[must_use]
+    pub fn with_budget(&self, limit: Duration) -> Self {
+        let budget = TimeBudget { started: Instant::now(), limit, left_out: Arc::default() };
+        Self { budget: Some(budget), ..self.clone() }
+    }
+
+    /// The same without the budget: for work that is to be left out of it.
+    #[must_use]
+    pub fn without_budget(&self) -> Self {
+        Self { budget: None, ..self.clone() }
+    }
+
+    /// Leaves work that took so long out of the budget, if there is one.
+    pub fn leave_out(&self, took: Duration) {
+        if let Some(budget) = &self.budget {
+            let nanoseconds = u64::try_from(took.as_nanos()).unwrap_or(u64::MAX);
+            budget.left_out.fetch_add(nanoseconds, Ordering::Relaxed);
+        }
+    }
+
     /// The same with half of the time that is left.
     #[must_use]
     pub fn halfway(&self) -> Self {
         let now = Instant::now();
         let half = |d: Instant| now + d.saturating_duration_since(now) / 2;
-        Self { deadline: self.deadline.map(half), ..self.clone() }
+        let half_budget = |b: &TimeBudget| {
+            let spent = b.spent();
+            TimeBudget { limit: spent + b.limit.saturating_sub(spent) / 2, ..b.clone() }
+        };
+        let budget = self.budget.as_ref().map(half_budget);
+        Self { deadline: self.deadline.map(half), budget, ..self.clone() }
     }
 
     /// Whether the clock can end the work.
     #[must_use]
     pub fn has_deadline(&self) -> bool {
-        self.deadline.is_some()
+        self.deadline.is_some() || self.budget.is_some()
     }
 
     /// # Errors
@@ -92,10 +135,11 @@ impl Termination {
         {
             return Err(Interrupt::Cancelled);
         }
-        match self.deadline {
-            Some(d) if Instant::now() >= d => Err(Interrupt::DeadlinePassed),
-            _ => Ok(()),
+        let is_late = self.deadline.is_some_and(|d| Instant::now() >= d);
+        if is_late || self.budget.as_ref().is_some_and(|b| b.spent() >= b.limit) {
+            return Err(Interrupt::DeadlinePassed);
         }
+        Ok(())
     }
 }
 
@@ -157,6 +201,23 @@ impl<'t> Poll<'t> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_left_out_takes_nothing_of_a_budget() {
+        let hour = Duration::from_secs(3600);
+        let none = Termination::default().with_budget(Duration::ZERO);
+        assert_eq!(none.check(), Err(Interrupt::DeadlinePassed));
+        assert_eq!(none.without_budget().check(), Ok(()));
+        // As if an hour had passed, all of it verification.
+        let mut late = Termination::default().with_budget(hour);
+        late.budget.as_mut().unwrap().started -= hour;
+        let copy = late.clone();
+        assert_eq!(late.check(), Err(Interrupt::DeadlinePassed));
+        copy.leave_out(hour);
+        assert_eq!((late.check(), late.halfway().check()), (Ok(()), Ok(())), "copies count together");
+        let half = late.halfway().budget.unwrap();
+        assert!(half.limit <= hour / 2 + half.spent() && half.limit > hour / 3, "{:?}", half.limit);
+    }
 
     #[test]
     fn a_poll_looks_now_and_then_and_stays_over() {

@@ -25,6 +25,8 @@ mod linked;
 mod novelty;
 mod order;
 mod outcome;
+#[cfg(test)]
+mod paper_tests;
 mod pdp;
 mod problem;
 mod rays;
