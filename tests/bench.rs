@@ -114,7 +114,7 @@ fn a_record_holds_the_papers_measures() {
     assert_eq!((times, record.verify_time_s), ([2.0, 3.0, 0.5, 0.25], 1.0));
     let line = &log(&request.out)[0];
     assert!(
-        line.contains(" --embedded --no-cache --planner sbdp-star --engine sliding --timeout 7200 --path-timeout 360 --actions paper --dbg sliding --no-sweeps --json "),
+        line.contains(" --embedded --no-cache --planner sbdp-star --engine sliding --planning-timeout 7200 --path-timeout 360 --actions paper --dbg sliding --no-sweeps --json "),
         "{line}"
     );
 }

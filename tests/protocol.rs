@@ -155,7 +155,7 @@ fn the_daemon_answers_to_the_bit_what_the_service_answers_in_process() {
                 assert_eq!(there.verified_depth.to_bits(), here.verified_depth.to_bits());
                 assert_eq!(there.blockers, numbers(&here.waited_for));
             }
-            Event::Progress(_) => {}
+            Event::Progress(_) | Event::Trace(_) => {}
             Event::Restarted => panic!("nothing was restarted"),
             Event::Done(there) => {
                 assert!(steps.next().is_none());

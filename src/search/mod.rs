@@ -45,7 +45,7 @@ mod twists;
 
 pub use crate::termination::{Interrupt, Termination};
 pub use directions::axes_of;
-pub use initial_analysis::initial_blockages;
+pub use initial_analysis::initial_graphs;
 pub use outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal, SeparationProof};
 pub use problem::{Checked, Observer, Problem, VerifiedPath};
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging};

@@ -67,7 +67,7 @@ pub struct Problem<'a> {
     pub actions: ActionSet,
     /// The rule that fills blocking graphs before anything is simulated.
     pub static_analysis: StaticAnalysis,
-    /// Whether parts that leave straight are taken out without simulation.
+    /// Whether parts that leave straight, or are apart already, are taken out without simulation.
     pub sweeps: bool,
     /// The number of simulations after which the search gives up.
     pub max_simulations: Option<u64>,

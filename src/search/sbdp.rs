@@ -19,7 +19,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::blocking_graph::{Analysis, Blockage};
+use crate::blocking_graph::{Analysis, Blockage, StateGraphs};
 use crate::budgets::{REFINEMENTS, TRANSLATION_PASSES, WINDOW_PER_THREAD};
 use crate::geometry::Pose;
 use crate::simulation::{End, Motion, Sweep};
@@ -90,7 +90,7 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
 
 impl<'a, 'o> Sbdp<'a, 'o> {
     fn new(mut disassembly: Disassembly<'a, 'o>, initial: InitialAnalysis, guided: bool) -> Self {
-        let InitialAnalysis { directions, translations, rotations, blockages, duration } = initial;
+        let InitialAnalysis { directions, translations, rotations, graphs, duration } = initial;
         disassembly.counters.static_analysis += duration;
         let strategy = Strategy::new(guided, disassembly.problem.actions);
         let mut search = Self {
@@ -105,8 +105,9 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             speculation: Speculation::default(),
             disassembly,
         };
-        for (part, blockage) in blockages.into_iter().enumerate() {
+        for (part, StateGraphs { blockage, remembered }) in graphs.into_iter().enumerate() {
             if search.disassembly.problem.may_move(part) {
+                search.disassembly.counters.graphs_recalled += u64::from(remembered);
                 search.add_node(StateNode {
                     part,
                     path: vec![search.disassembly.assembled(part)],
@@ -261,11 +262,12 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 termination.check()?;
                 let node = &nodes[i];
                 let least = least_travel(scene, node.part);
-                analysis.blocked_from(&standing, node.part, node.pose(), least, termination)
+                analysis.displaced_graphs(&standing, node.part, node.pose(), least, termination)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
-        for (&i, blockage) in todo.iter().zip(found) {
+        for (&i, StateGraphs { blockage, remembered }) in todo.iter().zip(found) {
             let node = &mut states.nodes[i];
+            self.disassembly.counters.graphs_recalled += u64::from(remembered);
             node.translation = Some(list.with_own(node.part, blockage));
         }
         self.disassembly.counters.static_analysis += started.elapsed();
