@@ -249,7 +249,11 @@ fn the_papers_planner_is_asked_for_over_the_wire_with_its_parameters_and_its_tra
         refusal(&client, handle, &options(vec![(PenaltyParameter::TimeStep, 0.0)], literal));
     assert!(code == ErrorCode::Unsupported && message.contains("time-step"), "{message}");
     for options in [
-        PlanOptions { path_timeout: Some(Duration::ZERO), sweeps: Some(false), ..PlanOptions::default() },
+        PlanOptions {
+            path_timeout: Some(Duration::ZERO),
+            actions: sbdp_client::ActionSet::Paper,
+            ..PlanOptions::default()
+        },
         PlanOptions { planning_timeout: Some(Duration::ZERO), ..PlanOptions::default() },
     ] {
         let (lines, summary) = trace(&client, handle, &options);
