@@ -26,21 +26,21 @@ pub enum Interrupt {
 pub struct Termination {
     cancelled: Arc<AtomicBool>,
     deadline: Option<Instant>,
-    budget: Option<TimeBudget>,
+    planning_time: Option<PlanningTime>,
     race: Option<(Arc<AtomicUsize>, usize)>,
     watch: Option<Arc<Watch>>,
 }
 
 /// A span of time in which some of the work does not count. Copies count together.
 #[derive(Debug, Clone)]
-struct TimeBudget {
+struct PlanningTime {
     started: Instant,
     limit: Duration,
     /// Nanoseconds of work that does not count.
     left_out: Arc<AtomicU64>,
 }
 
-impl TimeBudget {
+impl PlanningTime {
     fn spent(&self) -> Duration {
         self.started.elapsed().saturating_sub(Duration::from_nanos(self.left_out.load(Ordering::Relaxed)))
     }
@@ -79,25 +79,25 @@ impl Termination {
         Self { deadline: earlier, ..self.clone() }
     }
 
-    /// The same with a budget of so much time from now on, of which work that is [left out](Self::leave_out) takes
-    /// nothing.
+    /// The same with a limit of the time from now on in which work that is [left out](Self::leave_out) does not
+    /// count.
     #[must_use]
-    pub fn with_budget(&self, limit: Duration) -> Self {
-        let budget = TimeBudget { started: Instant::now(), limit, left_out: Arc::default() };
-        Self { budget: Some(budget), ..self.clone() }
+    pub fn with_planning_time(&self, limit: Duration) -> Self {
+        let planning_time = PlanningTime { started: Instant::now(), limit, left_out: Arc::default() };
+        Self { planning_time: Some(planning_time), ..self.clone() }
     }
 
-    /// The same without the budget: for work that is to be left out of it.
+    /// The same without that limit: for work that is to be left out of it.
     #[must_use]
-    pub fn without_budget(&self) -> Self {
-        Self { budget: None, ..self.clone() }
+    pub fn without_planning_time(&self) -> Self {
+        Self { planning_time: None, ..self.clone() }
     }
 
-    /// Leaves work that took so long out of the budget, if there is one.
+    /// Leaves work that took so long out of that limit, if there is one.
     pub fn leave_out(&self, took: Duration) {
-        if let Some(budget) = &self.budget {
+        if let Some(planning_time) = &self.planning_time {
             let nanoseconds = u64::try_from(took.as_nanos()).unwrap_or(u64::MAX);
-            budget.left_out.fetch_add(nanoseconds, Ordering::Relaxed);
+            planning_time.left_out.fetch_add(nanoseconds, Ordering::Relaxed);
         }
     }
 
@@ -106,18 +106,18 @@ impl Termination {
     pub fn halfway(&self) -> Self {
         let now = Instant::now();
         let half = |d: Instant| now + d.saturating_duration_since(now) / 2;
-        let half_budget = |b: &TimeBudget| {
+        let half_time = |b: &PlanningTime| {
             let spent = b.spent();
-            TimeBudget { limit: spent + b.limit.saturating_sub(spent) / 2, ..b.clone() }
+            PlanningTime { limit: spent + b.limit.saturating_sub(spent) / 2, ..b.clone() }
         };
-        let budget = self.budget.as_ref().map(half_budget);
-        Self { deadline: self.deadline.map(half), budget, ..self.clone() }
+        let planning_time = self.planning_time.as_ref().map(half_time);
+        Self { deadline: self.deadline.map(half), planning_time, ..self.clone() }
     }
 
     /// Whether the clock can end the work.
     #[must_use]
     pub fn has_deadline(&self) -> bool {
-        self.deadline.is_some() || self.budget.is_some()
+        self.deadline.is_some() || self.planning_time.is_some()
     }
 
     /// # Errors
@@ -136,7 +136,7 @@ impl Termination {
             return Err(Interrupt::Cancelled);
         }
         let is_late = self.deadline.is_some_and(|d| Instant::now() >= d);
-        if is_late || self.budget.as_ref().is_some_and(|b| b.spent() >= b.limit) {
+        if is_late || self.planning_time.as_ref().is_some_and(|b| b.spent() >= b.limit) {
             return Err(Interrupt::DeadlinePassed);
         }
         Ok(())
@@ -203,19 +203,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_left_out_takes_nothing_of_a_budget() {
+    fn what_is_left_out_takes_nothing_of_the_planning_time() {
         let hour = Duration::from_secs(3600);
-        let none = Termination::default().with_budget(Duration::ZERO);
+        let none = Termination::default().with_planning_time(Duration::ZERO);
         assert_eq!(none.check(), Err(Interrupt::DeadlinePassed));
-        assert_eq!(none.without_budget().check(), Ok(()));
+        assert_eq!(none.without_planning_time().check(), Ok(()));
         // As if an hour had passed, all of it verification.
-        let mut late = Termination::default().with_budget(hour);
-        late.budget.as_mut().unwrap().started -= hour;
+        let mut late = Termination::default().with_planning_time(hour);
+        late.planning_time.as_mut().unwrap().started -= hour;
         let copy = late.clone();
         assert_eq!(late.check(), Err(Interrupt::DeadlinePassed));
         copy.leave_out(hour);
         assert_eq!((late.check(), late.halfway().check()), (Ok(()), Ok(())), "copies count together");
-        let half = late.halfway().budget.unwrap();
+        let half = late.halfway().planning_time.unwrap();
         assert!(half.limit <= hour / 2 + half.spent() && half.limit > hour / 3, "{:?}", half.limit);
     }
 

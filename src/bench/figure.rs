@@ -69,6 +69,14 @@ impl Coverage {
         }
     }
 
+    /// The upper end of the vertical axis.
+    fn top(self, problems: usize) -> usize {
+        match self {
+            Self::All => problems,
+            Self::Common => 10_000,
+        }
+    }
+
     fn label(self, height: usize) -> String {
         match self {
             Self::All => height.to_string(),
@@ -169,7 +177,7 @@ fn draw_panel<B: DrawingBackend>(
         Coverage::Common => "solved by all",
     };
     let caption = format!("{} parts ({problems} {of})", group.title()).replace('–', "-");
-    let top = coverage.height(problems, problems);
+    let top = coverage.top(problems);
     let mut chart = ChartBuilder::on(panel)
         .caption(caption, (FAMILY, CAPTION))
         .margin(12)

@@ -236,3 +236,17 @@ fn only_simulations_that_are_used_take_path_planning_time() {
     assert!(!motions[1].time.is_zero());
     assert_eq!(disassembly.counters.simulation, motions[1].time);
 }
+
+#[test]
+fn verification_takes_nothing_of_the_planning_time() {
+    let (scene, verifier) = scene(pin_bolt_cover());
+    let start = scene.bodies[PIN].planning_from_shape;
+    let lifted = crate::geometry::Pose::translation(0.0, 0.0, 1.0) * start;
+    let termination = Termination::default().with_planning_time(std::time::Duration::ZERO);
+    let problem = Problem { termination, ..problem(scene, &verifier) };
+    assert_eq!(problem.termination.check(), Err(Interrupt::DeadlinePassed));
+    let checked = problem.checked_path(vec![BOLT, COVER], PIN, &[start, lifted]);
+    assert!(matches!(checked, Ok(Ok(_))), "{checked:?}");
+    let outcome = search(Planner::Sbdp, problem, &mut Recorder::default());
+    assert_eq!((outcome.status, outcome.removals.len()), (PlanStatus::Timeout, 0));
+}

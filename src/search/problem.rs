@@ -130,7 +130,7 @@ impl Problem<'_> {
     }
 
     /// Thins a path and verifies it on the triangles. A path off a thread is tried in the middle of the
-    /// thread's play first: it has room there. Takes nothing of the termination's budget.
+    /// thread's play first: it has room there. Takes nothing of the planning time.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -142,7 +142,7 @@ impl Problem<'_> {
     ) -> Result<Checked, Interrupt> {
         let thin = self.thinned(part, path);
         let near = self.near(&standing, part, &thin);
-        let termination = &self.termination.without_budget();
+        let termination = &self.termination.without_planning_time();
         let centred = self.verifier.centred_on_thread(&self.scene, &near, part, &thin, termination)?;
         if let Some(centred) = centred {
             let thin = self.thinned(part, &centred);
@@ -169,7 +169,7 @@ impl Problem<'_> {
     /// Verifies a path against all parts that it may meet.
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
         let Self { scene, verifier, cache, verdicts, .. } = self;
-        let termination = &self.termination.without_budget();
+        let termination = &self.termination.without_planning_time();
         let past = |&other: &usize| {
             let pair_path = &PairPath::new(scene, &scene.allowed, [part, other], path);
             let question = &VerdictQuestion { pair_path, limit: verifier.limit_past(pair_path) };

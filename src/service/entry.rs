@@ -69,7 +69,7 @@ impl Entry {
         pools: Option<&Pools>,
     ) -> Result<Plan, ServiceError> {
         let started = Instant::now();
-        let limited = request.planning_timeout.map(|limit| termination.with_budget(limit));
+        let limited = request.planning_timeout.map(|limit| termination.with_planning_time(limit));
         let termination = limited.as_ref().unwrap_or(termination);
         let mut fixed = request.fixed.clone();
         fixed.extend(&self.assembly.fixed);
