@@ -5,7 +5,7 @@ mod silence;
 use std::cell::Cell;
 use std::panic::Location;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 pub use silence::{Silence, Watch};
@@ -26,8 +26,24 @@ pub enum Interrupt {
 pub struct Termination {
     cancelled: Arc<AtomicBool>,
     deadline: Option<Instant>,
+    planning_time: Option<PlanningTime>,
     race: Option<(Arc<AtomicUsize>, usize)>,
     watch: Option<Arc<Watch>>,
+}
+
+/// A span of time in which some of the work does not count. Copies count together.
+#[derive(Debug, Clone)]
+struct PlanningTime {
+    started: Instant,
+    limit: Duration,
+    /// Nanoseconds of work that does not count.
+    left_out: Arc<AtomicU64>,
+}
+
+impl PlanningTime {
+    fn spent(&self) -> Duration {
+        self.started.elapsed().saturating_sub(Duration::from_nanos(self.left_out.load(Ordering::Relaxed)))
+    }
 }
 
 impl Termination {
@@ -63,18 +79,45 @@ impl Termination {
         Self { deadline: earlier, ..self.clone() }
     }
 
+    /// The same with a limit of the time from now on in which work that is [left out](Self::leave_out) does not
+    /// count.
+    #[must_use]
+    pub fn with_planning_time(&self, limit: Duration) -> Self {
+        let planning_time = PlanningTime { started: Instant::now(), limit, left_out: Arc::default() };
+        Self { planning_time: Some(planning_time), ..self.clone() }
+    }
+
+    /// The same without that limit: for work that is to be left out of it.
+    #[must_use]
+    pub fn without_planning_time(&self) -> Self {
+        Self { planning_time: None, ..self.clone() }
+    }
+
+    /// Leaves work that took so long out of that limit, if there is one.
+    pub fn leave_out(&self, took: Duration) {
+        if let Some(planning_time) = &self.planning_time {
+            let nanoseconds = u64::try_from(took.as_nanos()).unwrap_or(u64::MAX);
+            planning_time.left_out.fetch_add(nanoseconds, Ordering::Relaxed);
+        }
+    }
+
     /// The same with half of the time that is left.
     #[must_use]
     pub fn halfway(&self) -> Self {
         let now = Instant::now();
         let half = |d: Instant| now + d.saturating_duration_since(now) / 2;
-        Self { deadline: self.deadline.map(half), ..self.clone() }
+        let half_time = |b: &PlanningTime| {
+            let spent = b.spent();
+            PlanningTime { limit: spent + b.limit.saturating_sub(spent) / 2, ..b.clone() }
+        };
+        let planning_time = self.planning_time.as_ref().map(half_time);
+        Self { deadline: self.deadline.map(half), planning_time, ..self.clone() }
     }
 
     /// Whether the clock can end the work.
     #[must_use]
     pub fn has_deadline(&self) -> bool {
-        self.deadline.is_some()
+        self.deadline.is_some() || self.planning_time.is_some()
     }
 
     /// # Errors
@@ -92,10 +135,11 @@ impl Termination {
         {
             return Err(Interrupt::Cancelled);
         }
-        match self.deadline {
-            Some(d) if Instant::now() >= d => Err(Interrupt::DeadlinePassed),
-            _ => Ok(()),
+        let is_late = self.deadline.is_some_and(|d| Instant::now() >= d);
+        if is_late || self.planning_time.as_ref().is_some_and(|b| b.spent() >= b.limit) {
+            return Err(Interrupt::DeadlinePassed);
         }
+        Ok(())
     }
 }
 
@@ -157,6 +201,23 @@ impl<'t> Poll<'t> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_left_out_takes_nothing_of_the_planning_time() {
+        let hour = Duration::from_secs(3600);
+        let none = Termination::default().with_planning_time(Duration::ZERO);
+        assert_eq!(none.check(), Err(Interrupt::DeadlinePassed));
+        assert_eq!(none.without_planning_time().check(), Ok(()));
+        // As if an hour had passed, all of it verification.
+        let mut late = Termination::default().with_planning_time(hour);
+        late.planning_time.as_mut().unwrap().started -= hour;
+        let copy = late.clone();
+        assert_eq!(late.check(), Err(Interrupt::DeadlinePassed));
+        copy.leave_out(hour);
+        assert_eq!((late.check(), late.halfway().check()), (Ok(()), Ok(())), "copies count together");
+        let half = late.halfway().planning_time.unwrap();
+        assert!(half.limit <= hour / 2 + half.spent() && half.limit > hour / 3, "{:?}", half.limit);
+    }
 
     #[test]
     fn a_poll_looks_now_and_then_and_stays_over() {

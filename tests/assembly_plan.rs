@@ -114,7 +114,7 @@ fn asked(client: &Client, handle: Handle, options: &PlanOptions) -> (Vec<(u32, V
             Event::Step(step) => steps.push((step.part, step.path.to_vec())),
             Event::Done(summary) => return (steps, summary),
             Event::Restarted => steps.clear(),
-            Event::Progress(_) => {}
+            Event::Progress(_) | Event::Trace(_) => {}
         }
     }
     panic!("no summary");

@@ -35,7 +35,7 @@ fn plan_through(client: &Client, boxes: &Boxes) -> (Steps, Summary, u32) {
     loop {
         match stream.next_event_within(HANG).unwrap() {
             Some(Event::Step(step)) => steps.push((step.part, step.path.to_vec())),
-            Some(Event::Progress(_)) => {}
+            Some(Event::Progress(_) | Event::Trace(_)) => {}
             Some(Event::Restarted) => {
                 steps.clear();
                 restarts += 1;

@@ -5,12 +5,15 @@ mod common;
 use std::time::Duration;
 
 use common::{Boxes, Daemon, HANG, plan};
+use sbdp::blocking_graph::StaticAnalysis;
 use sbdp::geometry::{SourceAssembly, SourceMesh, SourcePart};
 use sbdp::plan::PlanStep;
-use sbdp::search::{PlanRequest, PlanSink, Progress, Termination};
+use sbdp::search::{ActionSet, Engine, PlanRequest, PlanSink, Progress, Termination, TraceEvent};
 use sbdp::service::Service;
+use sbdp::simulation::PenaltyParameters;
 use sbdp_client::{
-    Assembly, Client, ErrorCode, Event, Handle, Part, PlanOptions, PlanStatus, Vertices, content_hash,
+    Assembly, Client, ErrorCode, Event, Handle, Part, PenaltyParameter, PlanOptions, PlanStatus, Summary,
+    Vertices, content_hash,
 };
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::endpoint::Endpoint;
@@ -119,27 +122,40 @@ fn a_plan_names_its_parts_and_says_how_it_went() {
     assert_eq!((status.numbers.requests, status.numbers.done), (1, 1));
 }
 
-/// Keeps nothing: the plan itself is compared.
-struct Deaf;
+/// Keeps the trace, if it is wanted; the plan itself is compared.
+#[derive(Default)]
+struct Traced {
+    wanted: bool,
+    lines: String,
+}
 
-impl PlanSink for Deaf {
+impl PlanSink for Traced {
     fn progress(&mut self, _: Progress) {}
     fn step(&mut self, _: &PlanStep) {}
+    fn traces(&self) -> bool {
+        self.wanted
+    }
+    fn traced(&mut self, event: TraceEvent) {
+        self.lines += &(serde_json::to_string(&event).unwrap() + "\n");
+    }
+}
+
+fn source_of(upload: &Assembly<'_>) -> SourceAssembly {
+    SourceAssembly {
+        units: upload.units.map(str::to_owned),
+        parts: upload.parts.iter().map(source_part).collect(),
+        ..SourceAssembly::default()
+    }
 }
 
 #[test]
 fn the_daemon_answers_to_the_bit_what_the_service_answers_in_process() {
     let boxes = Boxes::lattice(2);
     let upload = boxes.assembly();
-    let source = SourceAssembly {
-        units: upload.units.map(str::to_owned),
-        parts: upload.parts.iter().map(source_part).collect(),
-        ..SourceAssembly::default()
-    };
     let service = Service::default();
-    let id = service.admit(&source).unwrap().id;
+    let id = service.admit(&source_of(&upload)).unwrap().id;
     let request = PlanRequest { fixed: vec![0], ..PlanRequest::default() };
-    let here = service.plan(id, &request, &Termination::new(None), &mut Deaf).unwrap();
+    let here = service.plan(id, &request, &Termination::new(None), &mut Traced::default()).unwrap();
 
     let daemon = Daemon::start();
     let client = daemon.connect();
@@ -155,7 +171,7 @@ fn the_daemon_answers_to_the_bit_what_the_service_answers_in_process() {
                 assert_eq!(there.verified_depth.to_bits(), here.verified_depth.to_bits());
                 assert_eq!(there.blockers, numbers(&here.waited_for));
             }
-            Event::Progress(_) => {}
+            Event::Progress(_) | Event::Trace(_) => {}
             Event::Restarted => panic!("nothing was restarted"),
             Event::Done(there) => {
                 assert!(steps.next().is_none());
@@ -175,6 +191,90 @@ fn numbers(list: &[usize]) -> Vec<u32> {
 fn source_part(part: &Part<'_>) -> SourcePart {
     let mesh = SourceMesh { vertices: part.vertices.iter().collect(), triangles: part.triangles.to_vec() };
     SourcePart { name: part.name.to_owned(), origin: "upload".to_owned(), mesh }
+}
+
+/// The trace of a plan, and its summary.
+fn trace(client: &Client, handle: Handle, options: &PlanOptions) -> (String, Summary) {
+    let mut stream = client.plan(handle, options).unwrap();
+    let mut lines = String::new();
+    loop {
+        match stream.next_event_within(HANG).unwrap().unwrap() {
+            Event::Trace(more) => lines += &more,
+            Event::Progress(_) | Event::Step(_) => {}
+            Event::Restarted => panic!("nothing was restarted"),
+            Event::Done(summary) => return (lines, summary),
+        }
+    }
+}
+
+#[test]
+fn the_papers_planner_is_asked_for_over_the_wire_with_its_parameters_and_its_trace() {
+    let boxes = Boxes::lattice(2);
+    let upload = boxes.assembly();
+    let service = Service::default();
+    let id = service.admit(&source_of(&upload)).unwrap().id;
+    let here = |force: f64, rule| {
+        let request = PlanRequest {
+            engine: Engine::Penalty,
+            actions: ActionSet::Paper,
+            static_analysis: rule,
+            penalty: PenaltyParameters { force, ..PenaltyParameters::default() },
+            ..PlanRequest::default()
+        };
+        let mut sink = Traced { wanted: true, ..Traced::default() };
+        service.plan(id, &request, &Termination::default(), &mut sink).unwrap();
+        sink.lines
+    };
+    let daemon = Daemon::start();
+    let client = daemon.connect();
+    let handle = client.upload(&upload).unwrap();
+    let options = |penalty, static_analysis| PlanOptions {
+        engine: sbdp_client::Engine::Penalty,
+        actions: sbdp_client::ActionSet::Paper,
+        static_analysis,
+        penalty,
+        trace: true,
+        ..PlanOptions::default()
+    };
+    let (literal, sliding) = (sbdp_client::StaticAnalysis::Paper, sbdp_client::StaticAnalysis::Sliding);
+    let usual = trace(&client, handle, &options(vec![], literal)).0;
+    assert_eq!(usual, here(100.0, StaticAnalysis::Paper));
+    // A trace is not answered from memory.
+    assert_eq!(trace(&client, handle, &options(vec![], literal)).0, usual);
+    let weak = options(vec![(PenaltyParameter::Force, 50.0)], sliding);
+    let (weak, _) = trace(&client, handle, &weak);
+    assert_eq!(weak, here(50.0, StaticAnalysis::Sliding));
+    assert_ne!(weak, usual);
+    let (code, message) =
+        refusal(&client, handle, &options(vec![(PenaltyParameter::TimeStep, 0.0)], literal));
+    assert!(code == ErrorCode::Unsupported && message.contains("time-step"), "{message}");
+    for options in [
+        PlanOptions {
+            path_timeout: Some(Duration::ZERO),
+            actions: sbdp_client::ActionSet::Paper,
+            ..PlanOptions::default()
+        },
+        PlanOptions { planning_timeout: Some(Duration::ZERO), ..PlanOptions::default() },
+    ] {
+        let (lines, summary) = trace(&client, handle, &options);
+        assert_eq!((summary.status, summary.steps), (PlanStatus::Timeout, 0));
+        assert!(lines.is_empty(), "no trace was asked for");
+    }
+}
+
+#[test]
+fn the_status_counts_states_whose_graphs_were_answered_from_memory() {
+    let daemon = Daemon::start();
+    let client = daemon.connect();
+    let handle = client.upload(&Boxes::lattice(2).assembly()).unwrap();
+    let mut hits = 0;
+    for fixed in 0..3 {
+        let (_, summary) =
+            plan(&client, handle, &PlanOptions { fixed: vec![fixed], ..PlanOptions::default() });
+        hits += summary.stats.graph_hits;
+    }
+    assert!(hits >= 7, "the second question has the graphs of the first: {hits}");
+    assert_eq!(client.status().unwrap().numbers.graphs_remembered, hits);
 }
 
 fn refusal(client: &Client, handle: Handle, options: &PlanOptions) -> (ErrorCode, String) {

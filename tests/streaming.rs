@@ -143,7 +143,7 @@ fn read(client: &Client, options: &PlanOptions, pause: Duration) -> usize {
                 );
                 steps += 1;
             }
-            Some(Event::Progress(_)) => {}
+            Some(Event::Progress(_) | Event::Trace(_)) => {}
             Some(Event::Restarted) => panic!("nothing was restarted"),
             Some(Event::Done(summary)) => {
                 assert_eq!((summary.steps as usize, summary.parts.len()), (steps, steps));

@@ -54,13 +54,15 @@ pub enum ResponseKind {
     Handle = 5,
     /// The answer to `Metrics`: a JSON text.
     Metrics = 6,
+    /// Events of the search, as lines of JSON.
+    Trace = 7,
 }
 
 impl ResponseKind {
     /// The kind of a number on the wire.
     #[must_use]
     pub fn from_wire(kind: u32) -> Option<Self> {
-        [Self::Steps, Self::Summary, Self::Error, Self::Status, Self::Handle, Self::Metrics]
+        [Self::Steps, Self::Summary, Self::Error, Self::Status, Self::Handle, Self::Metrics, Self::Trace]
             .into_iter()
             .find(|k| *k as u32 == kind)
     }
@@ -72,7 +74,7 @@ pub const CONTROL_CANCEL: u32 = 1;
 /// Beside every request.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("sbdp/v2/RequestHeader")]
+#[type_name("sbdp/v3/RequestHeader")]
 pub struct RequestHeader {
     /// A [`RequestKind`].
     pub kind: u32,
@@ -90,7 +92,7 @@ pub struct RequestHeader {
 /// Beside every response.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("sbdp/v2/ResponseHeader")]
+#[type_name("sbdp/v3/ResponseHeader")]
 pub struct ResponseHeader {
     /// A [`ResponseKind`].
     pub kind: u32,

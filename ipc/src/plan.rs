@@ -28,15 +28,39 @@ pub const PLAN_ASSEMBLY: u32 = 32;
 /// with places given.
 pub const PLAN_NO_STAGING: u32 = 64;
 
+/// The events of the search are wanted, too: it runs whatever is remembered.
+pub const PLAN_TRACE: u32 = 128;
+
 /// Names of the planners; the wire carries the index.
 pub const PLANNERS: [&str; 5] = ["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star"];
 /// Names of the engines; the wire carries the index.
 pub const ENGINES: [&str; 2] = ["sliding", "penalty"];
 /// Names of the action sets; the wire carries the index.
 pub const ACTION_SETS: [&str; 2] = ["paper", "extended"];
+/// Names of the rules that begin blocking graphs; the wire carries the index.
+pub const STATIC_ANALYSES: [&str; 2] = ["sliding", "paper"];
+/// Names of the parameters of the engine `penalty`; the wire carries the index.
+pub const PENALTY_PARAMETERS: [&str; 16] = [
+    "time-step",
+    "planning-time-step",
+    "stiffness",
+    "damping",
+    "penetration-threshold",
+    "force",
+    "torque-factor",
+    "similar-translation",
+    "similar-rotation",
+    "longest-edge",
+    "yielding",
+    "share-of-extent",
+    "steps-per-waypoint",
+    "most-blocks",
+    "newton-iterations",
+    "newton-tolerance",
+];
 
 /// Header of a plan request; three lists of u32 part numbers follow: fixed, removed, targets; then
-/// [`MovedPart`]s: those that stand elsewhere, and those that wait at given places.
+/// [`MovedPart`]s: those that stand elsewhere, and those that wait at given places; then [`PenaltyRecord`]s.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct PlanRequestHeader {
@@ -49,7 +73,7 @@ pub struct PlanRequestHeader {
     /// Index into [`ACTION_SETS`].
     pub actions: u32,
     /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`], [`PLAN_SWEEPS`], [`PLAN_NO_SWEEPS`], [`PLAN_BATCH`],
-    /// [`PLAN_ASSEMBLY`], [`PLAN_NO_STAGING`].
+    /// [`PLAN_ASSEMBLY`], [`PLAN_NO_STAGING`], [`PLAN_TRACE`].
     pub flags: u32,
     /// Threads for this request; 0 leaves it to the daemon.
     pub threads: u32,
@@ -63,10 +87,31 @@ pub struct PlanRequestHeader {
     pub moved: u32,
     /// Parts of an assembly plan that wait at given places; the others are laid out.
     pub staged: u32,
+    /// Index into [`STATIC_ANALYSES`].
+    pub static_analysis: u32,
+    /// Parameters of the engine `penalty` that differ from the paper's.
+    pub penalty: u32,
     /// CLOCK_MONOTONIC nanoseconds; 0 for none.
     pub deadline_ns: u64,
     /// Simulations after which to give up; `u64::MAX` for no limit.
     pub max_simulations: u64,
+    /// Nanoseconds after which one motion, or a pdp planner's search for one part, is given up; `u64::MAX` for no limit.
+    pub path_timeout_ns: u64,
+    /// Nanoseconds of planning, verification not counted, after which to answer with what is there; `u64::MAX` for no
+    /// limit.
+    pub planning_timeout_ns: u64,
+}
+
+/// A parameter of the engine `penalty`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct PenaltyRecord {
+    /// Index into [`PENALTY_PARAMETERS`].
+    pub parameter: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
+    /// Its value.
+    pub value: f64,
 }
 
 /// A part that stands elsewhere, or waits somewhere.
@@ -117,10 +162,12 @@ pub struct StepsHeader {
 }
 
 const _: () = {
-    assert!(size_of::<PlanRequestHeader>() == 88 && align_of::<PlanRequestHeader>() == 8);
+    assert!(size_of::<PlanRequestHeader>() == 112 && align_of::<PlanRequestHeader>() == 8);
     assert!(offset_of!(PlanRequestHeader, planner) == 32);
     assert!(offset_of!(PlanRequestHeader, moved) == 64);
-    assert!(offset_of!(PlanRequestHeader, deadline_ns) == 72);
+    assert!(offset_of!(PlanRequestHeader, static_analysis) == 72);
+    assert!(offset_of!(PlanRequestHeader, deadline_ns) == 80);
+    assert!(size_of::<PenaltyRecord>() == 16 && offset_of!(PenaltyRecord, value) == 8);
     assert!(size_of::<MovedPart>() == 64 && offset_of!(MovedPart, motion) == 8);
     assert!(size_of::<StepRecord>() == 32 && align_of::<StepRecord>() == 8);
     assert!(offset_of!(StepRecord, first_blocker) == 16);
@@ -148,9 +195,15 @@ pub struct PlanRequest {
     pub engine: u32,
     /// Index into [`ACTION_SETS`].
     pub actions: u32,
+    /// Index into [`STATIC_ANALYSES`].
+    pub static_analysis: u32,
+    /// Parameters of the engine `penalty` that differ from the paper's.
+    pub penalty: Vec<PenaltyRecord>,
     /// Whether parts that leave straight are taken out without simulation; `None` leaves it to the
     /// daemon.
     pub sweeps: Option<bool>,
+    /// The events of the search are wanted, too.
+    pub trace: bool,
     /// Neither read nor write anything remembered.
     pub no_cache: bool,
     /// Others go first: nobody waits for this plan.
@@ -161,6 +214,10 @@ pub struct PlanRequest {
     pub deadline_ns: Option<u64>,
     /// Simulations after which to give up.
     pub max_simulations: Option<u64>,
+    /// Nanoseconds after which one motion, or a pdp planner's search for one part, is given up.
+    pub path_timeout_ns: Option<u64>,
+    /// Nanoseconds of planning, verification not counted, after which to answer with what is there.
+    pub planning_timeout_ns: Option<u64>,
     /// Parts that may not move.
     pub fixed: Vec<u32>,
     /// Parts that are gone already.
@@ -191,6 +248,7 @@ impl PlanRequest {
             actions: self.actions,
             flags: flag(self.no_cache, PLAN_NO_CACHE)
                 | flag(self.batch, PLAN_BATCH)
+                | flag(self.trace, PLAN_TRACE)
                 | flag(self.targets.is_some(), PLAN_HAS_TARGETS)
                 | flag(self.assembly.is_some(), PLAN_ASSEMBLY)
                 | flag(matches!(self.assembly, Some(Staging::None)), PLAN_NO_STAGING)
@@ -201,10 +259,15 @@ impl PlanRequest {
             targets: targets.len() as u32,
             moved: self.moved.len() as u32,
             staged: staged.len() as u32,
+            static_analysis: self.static_analysis,
+            penalty: self.penalty.len() as u32,
             deadline_ns: self.deadline_ns.unwrap_or(0),
             max_simulations: self.max_simulations.unwrap_or(u64::MAX),
+            path_timeout_ns: self.path_timeout_ns.unwrap_or(u64::MAX),
+            planning_timeout_ns: self.planning_timeout_ns.unwrap_or(u64::MAX),
         });
         writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.moved).array(staged);
+        writer.array(&self.penalty);
         writer.finish()
     }
 
@@ -220,13 +283,16 @@ impl PlanRequest {
         let targets = reader.array::<u32>("targets", u64::from(h.targets))?.to_vec();
         let moved = reader.array::<MovedPart>("moved", u64::from(h.moved))?.to_vec();
         let staged = reader.array::<MovedPart>("staged", u64::from(h.staged))?.to_vec();
+        let penalty = reader.array::<PenaltyRecord>("penalty", u64::from(h.penalty))?.to_vec();
         const KNOWN: u32 = PLAN_NO_CACHE
             | PLAN_HAS_TARGETS
             | PLAN_SWEEPS
             | PLAN_NO_SWEEPS
             | PLAN_BATCH
             | PLAN_ASSEMBLY
-            | PLAN_NO_STAGING;
+            | PLAN_NO_STAGING
+            | PLAN_TRACE;
+        let limit = |value: u64| (value != u64::MAX).then_some(value);
         let set = |bit: u32| h.flags & bit != 0;
         let astray = (set(PLAN_NO_STAGING) || !staged.is_empty()) && !set(PLAN_ASSEMBLY);
         let both = set(PLAN_NO_STAGING) && !staged.is_empty();
@@ -238,12 +304,17 @@ impl PlanRequest {
             planner: h.planner,
             engine: h.engine,
             actions: h.actions,
+            static_analysis: h.static_analysis,
+            penalty,
             sweeps: (set(PLAN_SWEEPS) || set(PLAN_NO_SWEEPS)).then_some(set(PLAN_SWEEPS)),
             no_cache: set(PLAN_NO_CACHE),
             batch: set(PLAN_BATCH),
+            trace: set(PLAN_TRACE),
             threads: h.threads,
             deadline_ns: (h.deadline_ns != 0).then_some(h.deadline_ns),
-            max_simulations: (h.max_simulations != u64::MAX).then_some(h.max_simulations),
+            max_simulations: limit(h.max_simulations),
+            path_timeout_ns: limit(h.path_timeout_ns),
+            planning_timeout_ns: limit(h.planning_timeout_ns),
             fixed,
             removed,
             targets: set(PLAN_HAS_TARGETS).then_some(targets),

@@ -36,6 +36,8 @@ pub struct StatusHeader {
     pub refused: u64,
     /// Failed.
     pub failed: u64,
+    /// States, over all plans, whose blocking graphs were answered from memory.
+    pub graphs_remembered: u64,
     /// Assemblies whose geometry was received (known ones are not sent again).
     pub uploads: u64,
     /// Preloaded assemblies.
@@ -56,7 +58,7 @@ pub struct PreloadRecord {
     pub name: Text,
 }
 
-const _: () = assert!(size_of::<StatusHeader>() == 112 && size_of::<PreloadRecord>() == 40);
+const _: () = assert!(size_of::<StatusHeader>() == 120 && size_of::<PreloadRecord>() == 40);
 
 /// A status, owned.
 #[derive(Debug, Clone, PartialEq, Eq)]

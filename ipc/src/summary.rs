@@ -46,6 +46,8 @@ pub struct Stats {
     pub sdf_hits: u64,
     /// Blocking relations that were there already.
     pub blocking_hits: u64,
+    /// States whose blocking graphs were there already.
+    pub graph_hits: u64,
     /// Motions that were there already.
     pub motion_hits: u64,
     /// 1 when the whole plan was there already.
@@ -131,7 +133,7 @@ pub struct WarningRecord {
 }
 
 const _: () = {
-    assert!(size_of::<Stats>() == 104 && size_of::<SummaryHeader>() == 192);
+    assert!(size_of::<Stats>() == 112 && size_of::<SummaryHeader>() == 200);
     assert!(std::mem::offset_of!(SummaryHeader, reason) == 56);
     assert!(std::mem::offset_of!(SummaryHeader, stats) == 88);
     assert!(size_of::<OverlapRecord>() == 16 && size_of::<BlockedRecord>() == 20);

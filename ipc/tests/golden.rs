@@ -7,7 +7,7 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, HandleResponse, Part, Vertices};
 use sbdp_ipc::headers::{RequestHeader, RequestKind, ResponseHeader, ResponseKind};
 use sbdp_ipc::layout;
-use sbdp_ipc::plan::{MovedPart, PlanRequest, Staging, Step, StepsView, encode_steps};
+use sbdp_ipc::plan::{MovedPart, PenaltyRecord, PlanRequest, Staging, Step, StepsView, encode_steps};
 use sbdp_ipc::progress::{ProgressSample, STAGE_SEARCH};
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
@@ -92,12 +92,12 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
     assert_eq!((ErrorCode::Busy as u32, ErrorCode::Cancelled as u32), (3, 12));
     assert_eq!(
         (PROTOCOL, layout::PLAN_SERVICE, layout::GEOMETRY_SERVICE),
-        (2, "sbdp/v2/plan", "sbdp/v2/geometry")
+        (3, "sbdp/v3/plan", "sbdp/v3/geometry")
     );
-    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v2/progress");
+    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v3/progress");
     assert_eq!(
         (layout::WAKE_SERVER_SERVICE, layout::WAKE_CLIENT_SERVICE),
-        ("sbdp/v2/wake/server", "sbdp/v2/wake/client")
+        ("sbdp/v3/wake/server", "sbdp/v3/wake/client")
     );
 }
 
@@ -108,12 +108,17 @@ fn a_plan_request() {
         planner: 1,
         engine: 1,
         actions: 1,
+        static_analysis: 1,
+        penalty: vec![PenaltyRecord { parameter: 2, reserved: 0, value: 0.5 }],
         sweeps: Some(true),
+        trace: true,
         no_cache: true,
         batch: true,
         threads: 4,
         deadline_ns: Some(0x0102_0304),
         max_simulations: Some(9),
+        path_timeout_ns: Some(10),
+        planning_timeout_ns: Some(11),
         fixed: vec![1, 2, 3],
         removed: vec![4],
         targets: Some(vec![5, 6]),
@@ -124,13 +129,14 @@ fn a_plan_request() {
         "plan request",
         &request.encode(),
         "\
-         abababababababab*4 0100000001000000 0100000017000000 0400000003000000 0100000002000000 \
-         0100000000000000 0403020100000000 0900000000000000 0100000002000000 0300000000000000 \
-         0400000000000000 0500000006000000 0700000000000000 000000000000f03f 0000000000000040 \
-         000000000000e0bf 000000000000f03f 0000000000000000*3",
+         abababababababab*4 0100000001000000 0100000097000000 0400000003000000 0100000002000000 \
+         0100000000000000 0100000001000000 0403020100000000 0900000000000000 0a00000000000000 \
+         0b00000000000000 0100000002000000 0300000000000000 0400000000000000 0500000006000000 \
+         0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf 000000000000f03f \
+         0000000000000000*3 0200000000000000 000000000000e03f",
     );
     assert_eq!(PlanRequest::decode(AlignedBytes::copy_of(&request.encode()).as_slice()), Ok(request));
-    check("plain plan request", &PlanRequest::default().encode(), "0000000000000000*10 ffffffffffffffff");
+    check("plain plan request", &PlanRequest::default().encode(), "0000000000000000*11 ffffffffffffffff*3");
 }
 
 #[test]
@@ -141,15 +147,15 @@ fn a_request_for_an_assembly_plan() {
         "assembly plan request",
         &request.encode(),
         "\
-         0000000000000000*5 0000000020000000 0000000000000000*2 0000000001000000 0000000000000000 \
-         ffffffffffffffff 0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf \
+         0000000000000000*5 0000000020000000 0000000000000000*2 0000000001000000 0000000000000000*2 \
+         ffffffffffffffff*3 0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf \
          000000000000f03f 0000000000000000*3",
     );
     let request = PlanRequest { assembly: Some(Staging::None), ..PlanRequest::default() };
     check(
         "assembly plan request without staging",
         &request.encode(),
-        "0000000000000000*5 0000000060000000 0000000000000000*4 ffffffffffffffff",
+        "0000000000000000*5 0000000060000000 0000000000000000*5 ffffffffffffffff*3",
     );
 }
 
@@ -200,6 +206,7 @@ fn a_summary() {
             total_time_s: 0.5,
             sdf_hits: 5,
             blocking_hits: 6,
+            graph_hits: 8,
             motion_hits: 7,
             plan_hit: 1,
         },
@@ -212,7 +219,8 @@ fn a_summary() {
          020000000f000000 0200000002000000 0100000001000000*2 0100000000000000 0100000001000000 \
          0d00000001000000 0600000003000000 0900000001000000 0a00000001000000 0b00000002000000 \
          0100000000000000 0200000000000000 0300000000000000 0400000000000000 000000000000e03f*5 \
-         0500000000000000 0600000000000000 0700000000000000 0100000000000000 0000000001000000 \
+         0500000000000000 0600000000000000 0800000000000000 0700000000000000 0100000000000000 \
+         0000000001000000 \
          0100000002000000 0000000001000000 000000000000d03f 0100000000000000 0100000003000000 \
          0200000000000000 ffffffff05000000 0100000000000000 0000000000000000 0100000000000000*2 \
          0000000000000000 0100000000000000 000000000000f03f 0000000000000040 000000000000e0bf \
@@ -276,7 +284,7 @@ fn status_and_progress() {
         "status",
         &status.encode(),
         "\
-         0100000001000000 0200000000000000 0000000000000000*2 0300000000000000 0000000000000000*7 \
+         0100000001000000 0200000000000000 0000000000000000*2 0300000000000000 0000000000000000*8 \
          010000000a000000 0000000005000000 0303030303030303*4 0500000005000000 302e312e30667261 \
          6d65000000000000",
     );

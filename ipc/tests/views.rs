@@ -4,7 +4,9 @@ use proptest::prelude::*;
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, Part, Vertices};
-use sbdp_ipc::plan::{MovedPart, PLAN_ASSEMBLY, PlanRequest, Staging, Step, StepsView, encode_steps};
+use sbdp_ipc::plan::{
+    MovedPart, PLAN_ASSEMBLY, PenaltyRecord, PlanRequest, Staging, Step, StepsView, encode_steps,
+};
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts, SummaryView};
@@ -152,6 +154,11 @@ fn requests_errors_and_status_come_back() {
         fixed: vec![1, 2, 3],
         targets: Some(vec![]),
         moved: vec![moved_part()],
+        static_analysis: 1,
+        penalty: vec![PenaltyRecord { parameter: 11, reserved: 0, value: f64::INFINITY }],
+        path_timeout_ns: Some(0),
+        planning_timeout_ns: Some(5),
+        trace: true,
         ..PlanRequest::default()
     };
     for sweeps in [None, Some(false), Some(true)] {
@@ -190,6 +197,7 @@ fn requests_errors_and_status_come_back() {
 fn messages() -> Vec<Vec<u8>> {
     let request = PlanRequest {
         fixed: vec![1, 2],
+        penalty: vec![PenaltyRecord { parameter: 0, reserved: 0, value: 1.0 }],
         targets: Some(vec![3]),
         moved: vec![moved_part()],
         assembly: Some(Staging::Beside(vec![moved_part()])),

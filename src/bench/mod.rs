@@ -100,7 +100,7 @@ pub struct Request {
     pub planners: Vec<String>,
     /// Of [`ENGINES`].
     pub engines: Vec<String>,
-    /// When a run is to answer.
+    /// After so much planning a run is to answer; verification does not count.
     pub timeout: Duration,
     /// When one motion, or one part's search of a pdp planner, is given up.
     pub path_timeout: Duration,
@@ -149,10 +149,11 @@ pub struct Summary {
     pub repeated: usize,
 }
 
-/// The time after its timeout that a run is given to end: verification of a last step, writing.
+/// The time after its timeout that a run is given to end: writing, and as long again for verification, which the
+/// timeout leaves out.
 #[must_use]
 pub fn grace(timeout: Duration) -> Duration {
-    Duration::from_secs(30).saturating_add(timeout / 5)
+    Duration::from_secs(30).saturating_add(timeout)
 }
 
 /// Runs what the output folder has no record of, and writes tables and figures. Once `cancel` is

@@ -16,7 +16,7 @@ pub struct Settings {
     pub version: String,
     /// The hash of the executable: times of two builds do not belong into one file.
     pub build: String,
-    /// After so long a run was to answer.
+    /// After so long, verification not counted, a run was to answer.
     pub timeout_s: f64,
     /// After so long one path was given up.
     pub path_timeout_s: f64,
@@ -110,7 +110,7 @@ pub struct Record {
     pub swept: u64,
     /// States kept.
     pub states: u64,
-    /// Simulation (the paper's PT).
+    /// The simulations that were used, each on its thread (the paper's PT).
     pub path_time_s: f64,
     /// Everything from the healed meshes on but thinning and verification, which the paper's
     /// planners do not do (its DT).

@@ -100,7 +100,7 @@ impl Runner<'_> {
         let mut command = Command::new(self.program);
         command.arg("plan").arg(&job.problem.folder).args(["--embedded", "--no-cache"]);
         command.args(["--planner", job.planner, "--engine", job.engine]);
-        command.args(["--timeout", &self.timeout.as_secs_f64().to_string()]);
+        command.args(["--planning-timeout", &self.timeout.as_secs_f64().to_string()]);
         command.args(["--path-timeout", &self.settings.path_timeout_s.to_string()]);
         command.args(["--actions", &self.settings.actions, "--dbg", &self.settings.dbg]);
         command.arg(if self.settings.sweeps { "--sweeps" } else { "--no-sweeps" });

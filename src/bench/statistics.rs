@@ -130,6 +130,14 @@ impl<'a> PlannerResults<'a> {
         self.runs.get(problem).is_some_and(|r| r.solved())
     }
 
+    /// When it solved some problems, earliest first; those that it did not solve are left out.
+    fn solving_times<'p>(&self, problems: impl IntoIterator<Item = &'p str>) -> Vec<f64> {
+        let runs = problems.into_iter().filter_map(|p| self.runs.get(p));
+        let mut times: Vec<f64> = runs.filter(|r| r.solved()).map(|r| r.total_time_s).collect();
+        times.sort_by(f64::total_cmp);
+        times
+    }
+
     fn of(planner: &'static str, records: &[&'a Record]) -> Self {
         let mine = records.iter().filter(|r| r.planner == planner);
         Self { planner, runs: mine.map(|r| (r.assembly.as_str(), *r)).collect() }
@@ -241,9 +249,11 @@ impl<'a> EngineResults<'a> {
 
     /// When a planner solved the problems of a group, earliest first.
     pub(super) fn solving_times(&self, planner: &PlannerResults<'_>, group: Group) -> Vec<f64> {
-        let runs = self.group(group).filter_map(|p| planner.runs.get(p));
-        let mut times: Vec<f64> = runs.filter(|r| r.solved()).map(|r| r.total_time_s).collect();
-        times.sort_by(f64::total_cmp);
-        times
+        planner.solving_times(self.group(group))
+    }
+
+    /// When a planner solved the commonly solved problems of a group, earliest first.
+    pub(super) fn common_times(&self, planner: &PlannerResults<'_>, group: Group) -> Vec<f64> {
+        planner.solving_times(self.common(group))
     }
 }

@@ -29,7 +29,11 @@ pub(super) fn document(records: &[Record], engines: &[EngineResults<'_>]) -> Str
         }
         text += &rotated::section(records, results);
         text += &format!("\n### How runs ended\n\n{}{}", endings(results), accidents(results));
-        text += &format!("\nCoverage over time: `coverage-{0}.svg`, `coverage-{0}.png`.\n", results.engine);
+        text += &format!(
+            "\nCoverage over time: `coverage-{0}.svg`, `coverage-{0}.png`; of commonly solved problems, in per cent: \
+             `coverage-common-{0}.svg`, `coverage-common-{0}.png`.\n",
+            results.engine
+        );
     }
     if let [first, second] = engines {
         text += &format!(

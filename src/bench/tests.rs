@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use super::statistics::{EngineResults, Group};
 use super::{Category, Record, Settings, report};
 
 /// Sim, PT and DT, or the status of a run that did not end well.
@@ -218,6 +219,13 @@ fn the_figure_has_a_line_per_planner_and_a_panel_per_category() {
     }
     // Five planners in five panels, and the frames.
     assert!(svg.matches("<polyline").count() >= 25, "{}", svg.matches("<polyline").count());
-    let png = fs::read(folder.path().join("coverage-sliding.png")).unwrap();
-    assert!(png.starts_with(b"\x89PNG") && png.len() > 10_000, "{} bytes", png.len());
+    let common = fs::read_to_string(folder.path().join("coverage-common-sliding.svg")).unwrap();
+    let solved = EngineResults::by_engine(&synthetic())[0].common(Group::All).len();
+    assert!(solved > 0 && solved < 5, "{solved} are solved by all");
+    assert!(common.contains(&format!("All, 3+ parts ({solved} solved by all)")));
+    assert!(common.contains("% of these solved") && common.contains("SBDP*") && !common.contains("PDP_t"));
+    for name in ["coverage-sliding.png", "coverage-common-sliding.png"] {
+        let png = fs::read(folder.path().join(name)).unwrap();
+        assert!(png.starts_with(b"\x89PNG") && png.len() > 10_000, "{} bytes", png.len());
+    }
 }

@@ -40,7 +40,7 @@ pub fn audit(
     // Asked about what is computed, not about what is remembered.
     let cache = RequestCache::default();
     let analysis = Analysis { rule, scene, translations: &translations, cache: &cache };
-    let blockages = analysis.initial_blockages(present, least, termination)?;
+    let graphs = analysis.assembled_graphs(present, least, termination)?;
     let everything = HullTree::new(scene, present.to_vec(), termination)?;
     let questions: Vec<_> =
         present.iter().flat_map(|&p| (0..translations.len()).map(move |a| (p, a))).collect();
@@ -58,7 +58,7 @@ pub fn audit(
         .collect::<Result<Vec<bool>, Interrupt>>()?;
     let mut out = Audit { actions: questions.len(), ..Audit::default() };
     for ((part, action), moves) in questions.into_iter().zip(moves) {
-        match (blockages[part].is_open(action), moves) {
+        match (graphs[part].blockage.is_open(action), moves) {
             (true, true) => {}
             (true, false) => out.overlooked += 1,
             (false, moves) => {

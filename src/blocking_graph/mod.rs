@@ -15,4 +15,4 @@ pub use audit::{Audit, audit};
 pub use blockage::{Blockage, Evaluation, Reopening};
 pub use graph::DirectionalGraph;
 pub(crate) use records::BLOCKING;
-pub use static_analysis::{Analysis, StaticAnalysis};
+pub use static_analysis::{Analysis, StateGraphs, StaticAnalysis};

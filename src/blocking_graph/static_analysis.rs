@@ -28,6 +28,9 @@ pub enum StaticAnalysis {
 }
 
 impl StaticAnalysis {
+    /// All rules, in the order of their numbers on the wire.
+    pub const ALL: [Self; 2] = [Self::Sliding, Self::Paper];
+
     /// The name on the command line and in records.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -52,18 +55,41 @@ pub struct Analysis<'a> {
     pub cache: &'a RequestCache,
 }
 
+/// The graphs of a state: one part at one pose.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateGraphs {
+    /// The part's outgoing edges.
+    pub blockage: Blockage,
+    /// There are pairs to ask about, and the answers of all were remembered.
+    pub remembered: bool,
+}
+
+impl StateGraphs {
+    /// Before any pair is asked about.
+    fn new(actions: usize) -> Self {
+        Self { blockage: Blockage::open(actions), remembered: false }
+    }
+}
+
+/// For each translation, whether the second part of a pair blocks the first.
+#[derive(Debug)]
+struct PairRelation {
+    blocks: Vec<bool>,
+    remembered: bool,
+}
+
 impl Analysis<'_> {
-    /// Blockages of all present parts (ascending) at their assembled poses. `least` is the travel of a part
+    /// The graphs of all present parts (ascending) at their assembled poses. `least` is the travel of a part
     /// that counts as motion. One entry per part; absent parts stay open.
     ///
     /// # Errors
     /// The termination condition became true.
-    pub fn initial_blockages(
+    pub fn assembled_graphs(
         &self,
         present: &[usize],
         least: &(impl Fn(usize) -> f64 + Sync),
         termination: &Termination,
-    ) -> Result<Vec<Blockage>, Interrupt> {
+    ) -> Result<Vec<StateGraphs>, Interrupt> {
         let Self { scene, translations, .. } = *self;
         let is_present = |part: usize| present.binary_search(&part).is_ok();
         let mut pairs = scene.broad_phase.pairs(NEAR);
@@ -87,37 +113,46 @@ impl Analysis<'_> {
                 self.pair_blocks(*key, pair, least(pair.parts[0]), termination)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
-        let mut out = vec![Blockage::open(translations.len()); scene.bodies.len()];
+        let mut out = vec![StateGraphs::new(translations.len()); scene.bodies.len()];
+        let mut unknown = vec![false; scene.bodies.len()];
         for ((_, CongruentPair { parts: [mover, other], .. }), group) in pairs.into_iter().zip(group_of) {
-            for a in (0..translations.len()).filter(|&a| relations[group].get(a) == Some(&true)) {
-                out[mover].block_single(a, other);
-                out[other].block_single(a ^ 1, mover);
+            let PairRelation { blocks, remembered } = &relations[group];
+            for a in (0..translations.len()).filter(|&a| blocks.get(a) == Some(&true)) {
+                out[mover].blockage.block_single(a, other);
+                out[other].blockage.block_single(a ^ 1, mover);
+            }
+            for part in [mover, other] {
+                unknown[part] |= !remembered;
+                out[part].remembered = !unknown[part];
             }
         }
         Ok(out)
     }
 
-    /// The blockage of one displaced part among the parts that stand.
+    /// The graphs of one displaced part among the parts that stand.
     ///
     /// # Errors
     /// The termination condition became true.
-    pub fn blocked_from(
+    pub fn displaced_graphs(
         &self,
         standing: &[usize],
         part: usize,
         pose: &Pose,
         least: f64,
         termination: &Termination,
-    ) -> Result<Blockage, Interrupt> {
+    ) -> Result<StateGraphs, Interrupt> {
         let Self { scene, translations, .. } = *self;
-        let mut out = Blockage::open(translations.len());
+        let mut out = StateGraphs::new(translations.len());
+        let mut unknown = false;
         let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(NEAR);
         for other in scene.broad_phase.meeting_of(standing, &bounds) {
             let (key, pair) = self.keyed(part, pose, other, least);
-            let blocked = self.pair_blocks(key, &pair, least, termination)?;
-            for a in (0..translations.len()).filter(|&a| blocked.get(a) == Some(&true)) {
-                out.block_single(a, other);
+            let PairRelation { blocks, remembered } = self.pair_blocks(key, &pair, least, termination)?;
+            for a in (0..translations.len()).filter(|&a| blocks.get(a) == Some(&true)) {
+                out.blockage.block_single(a, other);
             }
+            unknown |= !remembered;
+            out.remembered = !unknown;
         }
         Ok(out)
     }
@@ -127,15 +162,16 @@ impl Analysis<'_> {
         (blocking_key(self.scene, &pair, self.rule.name(), self.translations, least), pair)
     }
 
-    /// For each translation, whether the second part of a pair blocks the first.
     fn pair_blocks(
         &self,
         key: RecordKey,
         pair: &CongruentPair,
         least: f64,
         termination: &Termination,
-    ) -> Result<Vec<bool>, Interrupt> {
-        self.cache.get_or(key, || {
+    ) -> Result<PairRelation, Interrupt> {
+        let mut remembered = true;
+        let blocks = self.cache.get_or(key, || {
+            remembered = false;
             let (alone, pose) = (pair.scene(self.scene), &pair.poses[0]);
             match self.rule {
                 StaticAnalysis::Sliding => {
@@ -145,7 +181,8 @@ impl Analysis<'_> {
                     literal::pair_blocks(&alone, 0, pose, 1, self.translations, termination)
                 }
             }
-        })
+        })?;
+        Ok(PairRelation { blocks, remembered })
     }
 }
 
@@ -154,11 +191,14 @@ const NEAR: f64 = 0.2;
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
     use std::sync::atomic::Ordering;
 
     use nalgebra::Vector3;
 
+    use super::super::BLOCKING;
     use super::*;
+    use crate::cache::Cache;
     use crate::fixtures::{block_on_plate, cuboid, moved, peg_in_hole, scene};
 
     const UP: usize = 4;
@@ -173,7 +213,8 @@ mod tests {
     ) -> Result<Vec<Blockage>, Interrupt> {
         let (translations, cache) = (Action::translations(), RequestCache::default());
         let analysis = Analysis { rule: RULE, scene, translations: &translations, cache: &cache };
-        analysis.initial_blockages(present, &|_| LEAST, termination)
+        let graphs = analysis.assembled_graphs(present, &|_| LEAST, termination)?;
+        Ok(graphs.into_iter().map(|g| g.blockage).collect())
     }
 
     fn initial(scene: &Scene) -> Vec<Blockage> {
@@ -184,7 +225,7 @@ mod tests {
     fn from(scene: &Scene, standing: &[usize], part: usize, pose: &Pose) -> Blockage {
         let (translations, cache) = (Action::translations(), RequestCache::default());
         let analysis = Analysis { rule: RULE, scene, translations: &translations, cache: &cache };
-        analysis.blocked_from(standing, part, pose, LEAST, &Termination::default()).unwrap()
+        analysis.displaced_graphs(standing, part, pose, LEAST, &Termination::default()).unwrap().blockage
     }
 
     fn open(b: &Blockage) -> Vec<usize> {
@@ -290,6 +331,28 @@ mod tests {
         for a in 0..6 {
             assert_eq!(there.blockers(a), initially.blockers(a), "action {a}");
         }
+    }
+
+    #[test]
+    fn graphs_are_remembered_if_the_answers_of_all_their_pairs_are() {
+        let [plate, block] = block_on_plate();
+        let (scene, _) = scene([plate, block, cuboid([1.0, -1.0, 0.0], [2.0, 1.0, 1.0])]);
+        let translations = Action::translations();
+        let cache = RequestCache::of(Arc::new(Cache::in_memory(1 << 20, &[&BLOCKING])));
+        let analysis = Analysis { rule: RULE, scene: &scene, translations: &translations, cache: &cache };
+        let remembered = |present: &[usize]| {
+            let graphs = analysis.assembled_graphs(present, &|_| LEAST, &Termination::default()).unwrap();
+            graphs.into_iter().map(|g| g.remembered).collect::<Vec<_>>()
+        };
+        assert_eq!(remembered(&[0, 1]), [false; 3]);
+        assert_eq!(remembered(&[0, 1]), [true, true, false]);
+        assert_eq!(remembered(&[0, 1, 2]), [false; 3], "each has the third part beside it");
+        let at = |present: &[usize], x: f64| {
+            let pose = Pose::translation(0.0, 0.0, x) * scene.bodies[1].planning_from_shape;
+            analysis.displaced_graphs(present, 1, &pose, LEAST, &Termination::default()).unwrap().remembered
+        };
+        assert!(!at(&[0], 0.01) && at(&[0], 0.01));
+        assert!(!at(&[0], 5.0), "nothing is near");
     }
 
     #[test]

@@ -82,24 +82,27 @@ pub(super) struct PlanArguments {
     /// Which transition function
     #[arg(long, value_enum, default_value_t)]
     pub(super) engine: Engine,
-    /// A parameter of the engine `penalty`, as `stiffness=1e5` (repeatable); plans in this process
-    #[arg(long, value_name = "NAME=VALUE", conflicts_with = "daemon")]
+    /// A parameter of the engine `penalty`, as `stiffness=1e5` (repeatable)
+    #[arg(long, value_name = "NAME=VALUE")]
     pub(super) penalty: Vec<String>,
     /// Which actions [default: extended for sbdp-star, paper for all other planners]
     #[arg(long, value_enum)]
     pub(super) actions: Option<Actions>,
-    /// How blocking graphs are begun, before anything is simulated; plans in this process
-    /// [default: sliding]
-    #[arg(long, value_enum, conflicts_with = "daemon")]
+    /// How blocking graphs are begun, before anything is simulated [default: sliding]
+    #[arg(long, value_enum)]
     pub(super) dbg: Option<Dbg>,
     #[command(flatten)]
     pub(super) sweeps: Sweeps,
     /// Answer after so many seconds with what is there
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) timeout: Option<Duration>,
-    /// Give one motion, or one part's search of a pdp planner, up after so many seconds; plans in
-    /// this process [default: no limit; the paper has 360]
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, conflicts_with = "daemon")]
+    /// Answer after so many seconds of planning with what is there; verification does not count, for the
+    /// paper's planners do not verify
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
+    pub(super) planning_timeout: Option<Duration>,
+    /// Give one motion, or one part's search of a pdp planner, up after so many seconds [default: no limit;
+    /// the paper has 360]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(super) path_timeout: Option<Duration>,
     /// Give up after so many simulations
     #[arg(long, value_name = "N")]
@@ -135,9 +138,8 @@ pub(super) struct PlanArguments {
     /// the mesh from where it was given, turned or not (parts that it does not name are laid out)
     #[arg(long, value_name = "auto|none|FILE", requires = "together", default_value = "auto")]
     pub(super) staging: PathBuf,
-    /// Write there what the search did, one JSON object per line (see `sbdp explain`); plans in
-    /// this process
-    #[arg(long, value_name = "FILE", conflicts_with = "daemon")]
+    /// Write there what the search did, one JSON object per line (see `sbdp explain`)
+    #[arg(long, value_name = "FILE")]
     pub(super) trace: Option<PathBuf>,
     /// Neither read nor write anything remembered
     #[arg(long)]
@@ -228,7 +230,8 @@ pub(super) struct BenchRun {
     #[arg(long, value_name = "ENGINE,…", value_delimiter = ',', default_value = ENGINES[0],
         value_parser = PossibleValuesParser::new(ENGINES))]
     pub(super) engines: Vec<String>,
-    /// A run is to answer after so many seconds; one that does not is ended
+    /// A run is to answer after so many seconds of planning, verification not counted; one that does not is
+    /// ended
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "7200",
         allow_negative_numbers = true)]
     pub(super) timeout: Duration,
@@ -289,7 +292,8 @@ pub(super) struct BenchScale {
     /// With how many parts
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = PARTS)]
     pub(super) parts: Vec<usize>,
-    /// A run is to answer after so many seconds; one that does not is ended
+    /// A run is to answer after so many seconds of planning, verification not counted; one that does not is
+    /// ended
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "7200",
         allow_negative_numbers = true)]
     pub(super) timeout: Duration,

@@ -9,9 +9,11 @@ use sbdp_client::{Client, ClientError, ErrorCode, Event, PlanOptions, PlanStream
 
 use super::backend::{Backend, Question};
 use super::error::CliError;
+use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::{Revision, SourceAssembly, heal, waypoint_from_pose};
 use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
 use crate::search::{ActionSet, Engine, PlanSink, Planner, Progress, Stage, Staging};
+use crate::simulation::PenaltyParameters;
 use crate::upload::{wire_assembly, wire_mesh, wire_part};
 
 /// How long Ctrl-C may go unnoticed while the daemon has nothing to say.
@@ -40,7 +42,7 @@ impl Daemon {
         if !question.revision.is_empty() {
             handle = self.client.revise(handle, &change(&question.revision))?;
         }
-        let mut stream = self.client.plan(handle, &options(question))?;
+        let mut stream = self.client.plan(handle, &options(question, sink.traces()))?;
         receive(&mut stream, question, sink)
     }
 }
@@ -85,6 +87,12 @@ fn receive(
                 steps.push(plan_step(&step));
                 steps.last().into_iter().for_each(|s| sink.step(s));
             }
+            Ok(Some(Event::Trace(lines))) => {
+                for line in lines.lines() {
+                    let event = serde_json::from_str(line);
+                    sink.traced(event.map_err(|e| ClientError::Protocol(format!("trace: {e}")))?);
+                }
+            }
             Ok(Some(Event::Restarted)) => {
                 eprintln!("the daemon was restarted: the plan begins anew");
                 steps.clear();
@@ -111,7 +119,7 @@ fn change(revision: &Revision) -> client::Change<'_> {
     }
 }
 
-fn options(question: &Question<'_>) -> PlanOptions {
+fn options(question: &Question<'_>, trace: bool) -> PlanOptions {
     let request = &question.request;
     let numbers = |parts: &[usize]| parts.iter().map(|&p| p as u32).collect::<Vec<u32>>();
     PlanOptions {
@@ -130,6 +138,14 @@ fn options(question: &Question<'_>) -> PlanOptions {
             ActionSet::Paper => client::ActionSet::Paper,
             ActionSet::Extended => client::ActionSet::Extended,
         },
+        static_analysis: match request.static_analysis {
+            StaticAnalysis::Sliding => client::StaticAnalysis::Sliding,
+            StaticAnalysis::Paper => client::StaticAnalysis::Paper,
+        },
+        penalty: penalty(&request.penalty),
+        path_timeout: request.path_timeout,
+        planning_timeout: request.planning_timeout,
+        trace,
         timeout: question.deadline.map(|d| d.saturating_duration_since(Instant::now())),
         max_simulations: request.max_simulations,
         threads: u32::try_from(request.threads).unwrap_or(0),
@@ -142,6 +158,15 @@ fn options(question: &Question<'_>) -> PlanOptions {
         moved: Vec::new(),
         assembly: request.assembly.as_ref().map(staging),
     }
+}
+
+/// The parameters that differ from the paper's.
+fn penalty(parameters: &PenaltyParameters) -> Vec<(client::PenaltyParameter, f64)> {
+    let usual = PenaltyParameters::default().named();
+    let differ =
+        parameters.named().into_iter().zip(usual).map(|((_, value), (_, usual))| (value, value != usual));
+    let given = client::PenaltyParameter::ALL.into_iter().zip(differ);
+    given.filter_map(|(parameter, (value, differs))| differs.then_some((parameter, value))).collect()
 }
 
 fn staging(staging: &Staging) -> client::Staging {
@@ -235,6 +260,7 @@ fn stats(s: &client::Stats) -> PlanStats {
         total_time_s: s.total_time_s,
         sdf_hits: s.sdf_hits,
         blocking_hits: s.blocking_hits,
+        graph_hits: s.graph_hits,
         motion_hits: s.motion_hits,
         plan_hit: s.plan_hit != 0,
     }

@@ -95,6 +95,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         sweeps: arguments.sweeps.asked(),
         max_simulations: arguments.max_simulations,
         path_timeout: arguments.path_timeout,
+        planning_timeout: arguments.planning_timeout,
         penalty: penalty(&arguments.penalty)?,
         threads: arguments.threads as usize,
         fixed: resolve(assembly, "--fixed", &fixed)?,
@@ -125,25 +126,23 @@ fn revision(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<Revi
 
 /// The paper's parameters, but for those given.
 fn penalty(given: &[String]) -> Result<PenaltyParameters, CliError> {
-    let refused = |e: String| CliError::Refused(format!("--penalty: {}", e.trim_end()));
-    let parameters: PenaltyParameters =
-        toml::from_str(&given.join("\n")).map_err(|e| refused(e.to_string()))?;
-    parameters.validate().map_err(refused)?;
-    Ok(parameters)
+    let refused = |e: String| CliError::Refused(format!("--penalty: {e}"));
+    let parsed = given.iter().map(|text| {
+        let (name, value) = text.split_once('=')?;
+        Some((name.trim(), value.trim().parse().ok()?))
+    });
+    let not_parsed = || refused("a parameter is given as NAME=VALUE, as `stiffness=1e5`".to_owned());
+    let parsed: Vec<(&str, f64)> = parsed.collect::<Option<_>>().ok_or_else(not_parsed)?;
+    PenaltyParameters::with(parsed).map_err(refused)
 }
 
 /// The daemon if one runs, else this process; or what the user insists on.
 fn choose_backend(arguments: &PlanArguments) -> Result<Box<dyn Backend>, CliError> {
-    let only_here = arguments.trace.is_some()
-        || arguments.cache_dir.is_some()
-        || arguments.path_timeout.is_some()
-        || arguments.dbg.is_some()
-        || !arguments.penalty.is_empty();
     let embedded = || {
         let cache = (!arguments.no_cache).then(|| cache::embedded(arguments.cache_dir.as_deref()));
         Box::new(Embedded::new(cache))
     };
-    if arguments.embedded || only_here {
+    if arguments.embedded || arguments.cache_dir.is_some() {
         return Ok(embedded());
     }
     match Daemon::connect() {

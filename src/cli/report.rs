@@ -158,6 +158,7 @@ fn stats(plan: &Plan) -> String {
 fn reused(s: &PlanStats) -> String {
     let counts = [
         (s.blocking_hits, "relations"),
+        (s.graph_hits, "graphs of states"),
         (s.motion_hits, "motions"),
         (s.verdict_hits.unwrap_or(0), "verified paths"),
     ];

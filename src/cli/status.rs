@@ -36,6 +36,7 @@ fn describe(status: &Status) -> String {
         "sbdpd {} (protocol {}), pid {}, up {uptime} s\n\
          workers   {}, {} busy; {} of {} requests wait\n\
          requests  {}: {} answered ({} of them from memory), {} cancelled, {} expired, {} refused, {} failed\n\
+         graphs    {} states' blocking graphs answered from memory\n\
          uploads   {}; what is remembered: `sbdp status --json`\n",
         status.version,
         n.protocol,
@@ -51,6 +52,7 @@ fn describe(status: &Status) -> String {
         n.expired,
         n.refused,
         n.failed,
+        n.graphs_remembered,
         n.uploads
     );
     for (name, handle) in &status.preloaded {

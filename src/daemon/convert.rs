@@ -1,5 +1,7 @@
 //! The only place that sees both wire types and working types.
 
+use std::time::Duration;
+
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, Part};
@@ -30,9 +32,10 @@ pub(crate) fn plan_request(
         actions: actions(request.actions)?,
         sweeps: request.sweeps,
         max_simulations: request.max_simulations,
-        path_timeout: None,
-        static_analysis: StaticAnalysis::default(),
-        penalty: PenaltyParameters::default(),
+        path_timeout: request.path_timeout_ns.map(Duration::from_nanos),
+        planning_timeout: request.planning_timeout_ns.map(Duration::from_nanos),
+        static_analysis: static_analysis(request.static_analysis)?,
+        penalty: penalty(&request.penalty)?,
         threads: threads(request.threads as usize, most_threads),
         fixed: indices(&request.fixed),
         removed: indices(&request.removed),
@@ -87,6 +90,20 @@ fn engine(index: u32) -> Result<Engine, WireError> {
 
 fn actions(index: u32) -> Result<ActionSet, WireError> {
     chosen("action set", index, &ActionSet::ALL, &wire::ACTION_SETS)
+}
+
+fn static_analysis(index: u32) -> Result<StaticAnalysis, WireError> {
+    chosen("static analysis", index, &StaticAnalysis::ALL, &wire::STATIC_ANALYSES)
+}
+
+fn penalty(given: &[wire::PenaltyRecord]) -> Result<PenaltyParameters, WireError> {
+    let named = |r: &wire::PenaltyRecord| {
+        let name = wire::PENALTY_PARAMETERS.get(r.parameter as usize).copied();
+        Ok((name.ok_or_else(|| unsupported("penalty parameter", r.parameter, &[]))?, r.value))
+    };
+    let named = given.iter().map(named).collect::<Result<Vec<_>, WireError>>()?;
+    PenaltyParameters::with(named)
+        .map_err(|e| WireError::new(ErrorCode::Unsupported, format!("penalty: {e}")))
 }
 
 fn chosen<T: Copy>(what: &str, index: u32, all: &[T], names: &[&str]) -> Result<T, WireError> {
@@ -173,6 +190,7 @@ fn stats(s: &PlanStats) -> Stats {
         total_time_s: s.total_time_s,
         sdf_hits: s.sdf_hits,
         blocking_hits: s.blocking_hits,
+        graph_hits: s.graph_hits,
         motion_hits: s.motion_hits,
         plan_hit: u64::from(s.plan_hit),
     }

@@ -221,7 +221,8 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
         let class = if wire.batch { Class::Batch } else { Class::Interactive };
         let moved = convert::moved(&wire.moved);
         let received = Instant::now();
-        let job = PlanJob { key, owner, received, assembly, question, moved, request, termination };
+        let trace = wire.trace;
+        let job = PlanJob { key, owner, received, assembly, question, moved, request, trace, termination };
         let rejected = match self.queues.plans.push(Ticket { owner, class, bytes: 0 }, job) {
             Ok(()) => {
                 session.input(Input::Enqueue);
@@ -293,8 +294,10 @@ impl<L: Link, P: Planning> Dispatcher<L, P> {
                     self.outgoing.wakes.push(session.listener);
                 }
             }
-            WorkerEvent::Planned(key, summary, again) => {
+            WorkerEvent::Trace(key, lines) => self.with_session(key, |s| s.trace(lines)),
+            WorkerEvent::Planned { key, summary, again, graphs_remembered } => {
                 self.running.remove(&(key.client, key.request));
+                self.counters.graphs_remembered += graphs_remembered;
                 if let Some((question, answer)) = again {
                     self.remember(&question, answer);
                 }

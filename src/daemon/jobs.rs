@@ -29,6 +29,8 @@ pub(crate) struct PlanJob {
     /// Parts that the request moves.
     pub(crate) moved: Vec<(usize, Pose)>,
     pub(crate) request: PlanRequest,
+    /// The client wants the events of the search.
+    pub(crate) trace: bool,
     pub(crate) termination: Termination,
 }
 
@@ -44,6 +46,7 @@ impl PlanJob {
             question: None,
             moved: vec![],
             request,
+            trace: false,
             termination: Termination::default(),
         }
     }

@@ -132,6 +132,8 @@ pub(crate) struct Metrics {
     requests: u64,
     done: u64,
     plans_remembered: u64,
+    /// States whose blocking graphs were answered from memory.
+    graphs_remembered: u64,
     cancelled: u64,
     expired: u64,
     refused: u64,
@@ -189,6 +191,7 @@ impl Metrics {
             requests: n.requests,
             done: n.done,
             plans_remembered: n.remembered,
+            graphs_remembered: n.graphs_remembered,
             cancelled: n.cancelled,
             expired: n.expired,
             refused: n.refused,
@@ -241,6 +244,7 @@ impl Metrics {
         let (remembered, speculated) = (self.plans_remembered, self.cache.ahead.speculated);
         for (name, count) in [
             ("plans_remembered", remembered),
+            ("graphs_remembered", self.graphs_remembered),
             ("questions_speculated", speculated),
             ("uploads", self.uploads),
         ] {
@@ -315,7 +319,14 @@ mod tests {
     fn figures_are_told_as_json_and_as_prometheus_wants_them() {
         let mut latencies = Latencies::default();
         latencies.add(LatencyKind::Plan, Duration::from_millis(3));
-        let numbers = StatusHeader { pid: 7, requests: 5, done: 4, refused: 1, ..StatusHeader::default() };
+        let numbers = StatusHeader {
+            pid: 7,
+            requests: 5,
+            done: 4,
+            refused: 1,
+            graphs_remembered: 12,
+            ..StatusHeader::default()
+        };
         let figures = Metrics::of(
             &numbers,
             2,
@@ -335,6 +346,7 @@ mod tests {
         let text = figures.prometheus();
         for line in [
             "sbdp_plan_requests_total 5",
+            "sbdp_graphs_remembered_total 12",
             "sbdp_plan_requests_ended_total{end=\"refused\"} 1",
             "sbdp_request_seconds_count{kind=\"plan\"} 1",
             "sbdp_cache_hits_total{kind=\"motion\"} 0",

@@ -63,12 +63,19 @@ impl CachedResponse {
     }
 }
 
-/// The key of a request: requests that differ only in threads, priority and deadline have the same. `None` if the
-/// request forbids caching.
+/// The key of a request: requests that differ only in threads, priority, deadline and planning timeout have the same.
+/// `None` if the request forbids caching, wants to see the search, or its plan depends on the clock.
 pub(crate) fn question(request: &PlanRequest) -> Option<Vec<u8>> {
-    let PlanRequest { no_cache, .. } = *request;
-    (!no_cache)
-        .then(|| PlanRequest { threads: 0, batch: false, deadline_ns: None, ..request.clone() }.encode())
+    let PlanRequest { no_cache, trace, path_timeout_ns, .. } = *request;
+    let is_cached = !no_cache && !trace && path_timeout_ns.is_none();
+    let untimed = || PlanRequest {
+        threads: 0,
+        batch: false,
+        deadline_ns: None,
+        planning_timeout_ns: None,
+        ..request.clone()
+    };
+    is_cached.then(|| untimed().encode())
 }
 
 /// The size of the cache.
@@ -200,9 +207,18 @@ mod tests {
     #[test]
     fn threads_and_deadlines_make_no_other_question() {
         let request = PlanRequest { fixed: vec![1], ..PlanRequest::default() };
-        let same = PlanRequest { threads: 4, batch: true, deadline_ns: Some(9), ..request.clone() };
+        let same = PlanRequest {
+            threads: 4,
+            batch: true,
+            deadline_ns: Some(9),
+            planning_timeout_ns: Some(9),
+            ..request.clone()
+        };
         assert_eq!(question(&request), question(&same));
         assert_ne!(question(&request), question(&PlanRequest { fixed: vec![2], ..request.clone() }));
+        assert_ne!(question(&request), question(&PlanRequest { static_analysis: 1, ..request.clone() }));
+        assert_eq!(question(&PlanRequest { trace: true, ..request.clone() }), None);
+        assert_eq!(question(&PlanRequest { path_timeout_ns: Some(9), ..request.clone() }), None);
         assert_eq!(question(&PlanRequest { no_cache: true, ..request }), None);
     }
 }

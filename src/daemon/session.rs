@@ -198,6 +198,14 @@ impl<L: Link> Session<L> {
         }
     }
 
+    /// Events of the search, as lines of JSON.
+    pub(crate) fn trace(&mut self, lines: Vec<u8>) {
+        let is_running = self.state == SessionState::Running;
+        if is_running && self.outbox.push_whole(ResponseKind::Trace, Arc::new(lines)).is_err() {
+            self.lose("its outbox is full");
+        }
+    }
+
     /// Answers at once with what was answered before.
     pub(crate) fn answer(&mut self, answer: &CachedResponse) {
         if [Input::Enqueue, Input::Start].into_iter().all(|input| self.input(input)) {

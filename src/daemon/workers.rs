@@ -17,7 +17,7 @@ use super::shared_queue::Queues;
 use super::speculation::Speculation;
 use crate::geometry::load_assembly;
 use crate::plan::{Plan, PlanStep};
-use crate::search::{PlanSink, Progress, Termination};
+use crate::search::{PlanSink, Progress, Termination, TraceEvent};
 use crate::service::AssemblyId;
 
 /// What workers report.
@@ -25,9 +25,17 @@ use crate::service::AssemblyId;
 pub(crate) enum WorkerEvent {
     Started(SessionKey),
     Step(SessionKey, Step),
+    /// Events of the search, as lines of JSON.
+    Trace(SessionKey, Vec<u8>),
     Progress(SessionKey, Progress),
-    /// A plan's summary, and the response when the question is repeated.
-    Planned(SessionKey, Arc<Vec<u8>>, Option<(Vec<u8>, CachedResponse)>),
+    Planned {
+        key: SessionKey,
+        summary: Arc<Vec<u8>>,
+        /// The response when the question is repeated.
+        again: Option<(Vec<u8>, CachedResponse)>,
+        /// States whose blocking graphs were answered from memory.
+        graphs_remembered: u64,
+    },
     /// The question was answered before: its response comes from the disk.
     Answered(SessionKey, Vec<u8>, CachedResponse),
     Unplanned(SessionKey, WireError),
@@ -77,6 +85,20 @@ struct Sink<'r> {
     key: SessionKey,
     report: &'r Report,
     last_progress: Option<Instant>,
+    /// Events of the search that are not reported yet, if they are wanted.
+    trace: Option<Vec<u8>>,
+}
+
+/// Bytes of events that are reported together: a tenth of a chunk, so that a trace is read while the search runs. At
+/// half or twice as much, the port thread is woken twice or half as often.
+const TRACE_MESSAGE: usize = 24 << 10;
+
+impl Sink<'_> {
+    fn report_trace(&mut self) {
+        if let Some(trace) = self.trace.as_mut().filter(|trace| !trace.is_empty()) {
+            (self.report)(WorkerEvent::Trace(self.key, std::mem::take(trace)));
+        }
+    }
 }
 
 /// Progress is reported at most once in this time: each report wakes the port thread and the client.
@@ -91,7 +113,23 @@ impl PlanSink for Sink<'_> {
     }
 
     fn step(&mut self, step: &PlanStep) {
+        self.report_trace();
         (self.report)(WorkerEvent::Step(self.key, convert::step(step)));
+    }
+
+    fn traces(&self) -> bool {
+        self.trace.is_some()
+    }
+
+    fn traced(&mut self, event: TraceEvent) {
+        let Some(trace) = &mut self.trace else { return };
+        // Numbers and texts can always be written.
+        if serde_json::to_writer(&mut *trace, &event).is_ok() {
+            trace.push(b'\n');
+        }
+        if trace.len() >= TRACE_MESSAGE {
+            self.report_trace();
+        }
     }
 }
 
@@ -130,11 +168,13 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Repor
     if let Some((question, answer)) = before {
         return report(WorkerEvent::Answered(job.key, question.clone(), answer));
     }
-    let mut sink = Sink { key: job.key, report, last_progress: None };
+    let trace = job.trace.then(Vec::new);
+    let mut sink = Sink { key: job.key, report, last_progress: None, trace };
     let planned = contained(|| {
         let assembly = with_moved(service, job.assembly, &job.moved, &job.termination)?;
         service.plan(assembly, &job.request, &job.termination, &mut sink)
     });
+    sink.report_trace();
     report(match planned {
         Ok(Ok(plan)) => {
             log_plan(&plan);
@@ -146,7 +186,12 @@ fn plan<P: Planning>(service: &P, job: &PlanJob, queues: &Queues, report: &Repor
             if let Some((question, answer)) = &again {
                 service.remember(question, answer.messages());
             }
-            WorkerEvent::Planned(job.key, Arc::new(convert::summary(&plan, &plan.stats)), again)
+            WorkerEvent::Planned {
+                key: job.key,
+                summary: Arc::new(convert::summary(&plan, &plan.stats)),
+                again,
+                graphs_remembered: plan.stats.graph_hits,
+            }
         }
         Ok(Err(error)) => {
             tracing::info!(%error, "not planned");

@@ -176,6 +176,9 @@ pub struct CacheDocument {
     pub sdf_hits: u64,
     /// Overlaps and blocking relations of pairs, and planes that parts touch.
     pub blocking_hits: u64,
+    /// States whose blocking graphs needed no analysis.
+    #[serde(default)]
+    pub graph_hits: u64,
     /// Motions.
     pub motion_hits: u64,
     /// Verified paths; null where the daemon planned.
@@ -327,6 +330,7 @@ fn stats(stats: &PlanStats) -> StatsDocument {
         cache: CacheDocument {
             sdf_hits: stats.sdf_hits,
             blocking_hits: stats.blocking_hits,
+            graph_hits: stats.graph_hits,
             motion_hits: stats.motion_hits,
             verdict_hits: stats.verdict_hits,
             plan_hit: stats.plan_hit,
@@ -388,7 +392,7 @@ mod tests {
             r#""stats":{"simulations":7,"simulations_run":0,"sweeps":0,"states":0,"load_time_s":null,"#,
             r#""sdf_time_s":0.0,"overlap_time_s":0.5,"#,
             r#""static_analysis_time_s":0.0,"path_time_s":0.0,"verify_time_s":0.0,"transfer_time_s":null,"total_time_s":0.0,"#,
-            r#""cache":{"sdf_hits":0,"blocking_hits":0,"motion_hits":0,"verdict_hits":null,"plan_hit":true}}}"#,
+            r#""cache":{"sdf_hits":0,"blocking_hits":0,"graph_hits":0,"motion_hits":0,"verdict_hits":null,"plan_hit":true}}}"#,
         );
         assert_eq!(PlanDocument::new(&plan()).to_json().unwrap(), expected);
     }

@@ -106,7 +106,7 @@ pub struct PlanStats {
     pub overlap_time_s: Option<f64>,
     /// Building blocking graphs.
     pub static_analysis_time_s: f64,
-    /// Simulation (the paper's path-planning time).
+    /// Sweeps, and the simulations that were used, each on its thread (the paper's path-planning time).
     pub path_time_s: f64,
     /// Shortening and verification.
     pub verify_time_s: f64,
@@ -119,6 +119,8 @@ pub struct PlanStats {
     pub sdf_hits: u64,
     /// Overlaps and blocking relations of pairs, and planes that parts touch, that were there already.
     pub blocking_hits: u64,
+    /// States whose blocking graphs were there already: those of all pairs that they are about.
+    pub graph_hits: u64,
     /// Motions that were there already.
     pub motion_hits: u64,
     /// Verified paths that were there already; `None` where it is unknown, as from the daemon.

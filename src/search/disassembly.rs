@@ -201,19 +201,21 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         Ok(())
     }
 
-    /// Counts a motion that was remembered.
+    /// Counts a motion that the search uses: whether it was remembered, and its time. What was simulated ahead and is
+    /// thrown away has no time.
     pub(super) fn used(&mut self, motion: &Motion) {
         self.counters.recalled += u64::from(motion.recalled);
+        self.counters.simulation += motion.time;
     }
 
     /// The motions of some runs, in order, up to the first that leads out. It changes the scene of the later ones,
     /// so they are stopped.
     pub(super) fn simulate(&mut self, runs: &[Transition]) -> Result<Vec<Motion>, Stop> {
-        let started = Instant::now();
         let around = self.all_surroundings(runs)?;
         let problem = &self.problem;
         let winner = Arc::new(AtomicUsize::new(usize::MAX));
         let simulated = |(rank, run): (usize, &Transition)| {
+            let started = Instant::now();
             let around = &around[rank];
             let Transition { part, start, action } = run;
             let termination = problem.termination.unless_won(&winner, rank);
@@ -236,14 +238,13 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             if matches!(&motion, Ok(Motion { end: End::Disassembled(_), .. })) {
                 winner.fetch_min(rank, Ordering::Relaxed);
             }
-            motion
+            motion.map(|motion| Motion { time: started.elapsed(), ..motion })
         };
         let motions: Vec<_> = if runs.len() > 1 {
             runs.par_iter().enumerate().map(simulated).collect()
         } else {
             runs.iter().enumerate().map(simulated).collect()
         };
-        self.counters.simulation += started.elapsed();
         let no_time = |m: &Motion| matches!(&m.end, End::Undecided { reason, .. } if reason == NO_TIME);
         self.path_time_ran_out |= motions.iter().flatten().any(no_time);
         let wanted = winner.load(Ordering::Relaxed).saturating_add(1);
@@ -351,17 +352,25 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     }
 
     fn checked(&mut self, part: usize, path: &[Pose]) -> Result<Checked, Stop> {
-        let started = Instant::now();
-        let checked = self.problem.checked_path(&self.standing(part), part, path);
-        self.counters.verification += started.elapsed();
-        Ok(checked?)
+        self.timed_check(|problem, standing| problem.checked_path(standing, part, path), part)
     }
 
     /// The same for a path that is to be taken as it is.
     pub(super) fn checked_as_given(&mut self, part: usize, path: &[Pose]) -> Result<Checked, Stop> {
+        self.timed_check(|problem, standing| problem.checked_as_given(standing, part, path), part)
+    }
+
+    /// A check of a path of a part among those that stand; its time is verification.
+    fn timed_check(
+        &mut self,
+        check: impl FnOnce(&Problem<'a>, &[usize]) -> Result<Checked, Interrupt>,
+        part: usize,
+    ) -> Result<Checked, Stop> {
         let started = Instant::now();
-        let checked = self.problem.checked_as_given(&self.standing(part), part, path);
-        self.counters.verification += started.elapsed();
+        let checked = check(&self.problem, &self.standing(part));
+        let took = started.elapsed();
+        self.counters.verification += took;
+        self.problem.termination.leave_out(took);
         Ok(checked?)
     }
 
@@ -375,9 +384,10 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.removals.push(removal);
     }
 
-    /// A part that may move and whose hull is apart from all others': it needs no motion.
+    /// A part that may move and whose hull is apart from all others': it needs no motion. Without sweeps it is
+    /// simulated like all.
     pub(super) fn free_part(&mut self) -> Result<Option<usize>, Stop> {
-        if self.is_done() {
+        if self.is_done() || !self.problem.sweeps {
             return Ok(None);
         }
         for part in self.everything.standing().to_vec() {

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::blocking_graph::{Analysis, Blockage};
+use crate::blocking_graph::{Analysis, Blockage, StateGraphs};
 use crate::simulation::Action;
 use crate::termination::Interrupt;
 
@@ -14,16 +14,16 @@ use super::state::least_travel;
 ///
 /// # Errors
 /// The termination condition became true.
-pub fn initial_blockages(problem: &Problem<'_>) -> Result<Vec<Blockage>, Interrupt> {
+pub fn initial_graphs(problem: &Problem<'_>) -> Result<Vec<StateGraphs>, Interrupt> {
     let (translations, _) = problem.action_lists(&problem.directions()?);
-    assembled_blockages(problem, &translations)
+    assembled_graphs(problem, &translations)
 }
 
-fn assembled_blockages(problem: &Problem<'_>, translations: &[Action]) -> Result<Vec<Blockage>, Interrupt> {
+fn assembled_graphs(problem: &Problem<'_>, translations: &[Action]) -> Result<Vec<StateGraphs>, Interrupt> {
     let Problem { scene, present, static_analysis, termination, cache, .. } = problem;
     let least = |part| least_travel(scene, part);
     let analysis = Analysis { rule: *static_analysis, scene, translations, cache };
-    analysis.initial_blockages(present, &least, termination)
+    analysis.assembled_graphs(present, &least, termination)
 }
 
 /// The results of the analysis.
@@ -32,7 +32,7 @@ pub(super) struct InitialAnalysis {
     pub(super) translations: Vec<Action>,
     pub(super) rotations: Vec<Action>,
     /// Per part, as assembled.
-    pub(super) blockages: Vec<Blockage>,
+    pub(super) graphs: Vec<StateGraphs>,
     /// How long the analysis took.
     pub(super) duration: Duration,
 }
@@ -44,11 +44,12 @@ impl InitialAnalysis {
         let directions = problem.directions()?;
         let (translations, rotations) = problem.action_lists(&directions);
         let started = Instant::now();
-        let blockages = if guided {
-            assembled_blockages(problem, &translations)?
+        let graphs = if guided {
+            assembled_graphs(problem, &translations)?
         } else {
-            vec![Blockage::open(translations.len()); problem.scene.bodies.len()]
+            let open = StateGraphs { blockage: Blockage::open(translations.len()), remembered: false };
+            vec![open; problem.scene.bodies.len()]
         };
-        Ok(Self { directions, translations, rotations, blockages, duration: started.elapsed() })
+        Ok(Self { directions, translations, rotations, graphs, duration: started.elapsed() })
     }
 }

@@ -57,6 +57,7 @@ impl Invalidation {
 mod tests {
     use std::convert::Infallible;
 
+    use super::super::request::ActionSet;
     use super::super::state::StateNode;
     use super::super::strategy::Strategy;
     use super::super::trace::PlanningPhase;
@@ -67,7 +68,7 @@ mod tests {
     #[test]
     fn what_began_on_a_refuted_way_goes_with_it_and_its_action_is_tried_again_some_times() {
         let (scene, _) = scene(block_on_plate());
-        let strategy = Strategy { guided: true, separate_lists: false, distrust_static: false };
+        let strategy = Strategy::new(true, ActionSet::Extended);
         let (mut states, mut invalidation) = (States::new(&scene, strategy), Invalidation::default());
         let add = |states: &mut States, parent: Option<usize>, pose: Pose| {
             let mut path = parent.map_or(Vec::new(), |node| states.nodes[node].path.clone());

@@ -25,6 +25,8 @@ mod linked;
 mod novelty;
 mod order;
 mod outcome;
+#[cfg(test)]
+mod paper_tests;
 mod pdp;
 mod problem;
 mod rays;
@@ -44,7 +46,7 @@ mod unscrewing;
 
 pub use crate::termination::{Interrupt, Termination};
 pub use directions::axes_of;
-pub use initial_analysis::initial_blockages;
+pub use initial_analysis::initial_graphs;
 pub use outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal, SeparationProof};
 pub use problem::{Checked, Observer, Problem, VerifiedPath};
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging};

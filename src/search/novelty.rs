@@ -17,7 +17,6 @@ use crate::tolerances::TURNED;
 use super::disassembly::Disassembly;
 use super::state::coarseness;
 use super::states::PhaseStates;
-use super::strategy::Strategy;
 
 /// The decision which poses make new states.
 #[derive(Debug)]
@@ -80,9 +79,8 @@ impl Novelty {
         Ok(!hidden)
     }
 
-    /// The coarsest resolution used, as a multiple of the paper's; `most_states` is the largest number of
-    /// states of one part.
-    pub(super) fn coarsest(&self, strategy: Strategy, most_states: usize) -> f64 {
-        if strategy.is_extended() { self.coarsest } else { coarseness(most_states) }
+    /// The coarsest resolution used, as a multiple of the paper's.
+    pub(super) fn coarsest(&self) -> f64 {
+        self.coarsest
     }
 }

@@ -114,10 +114,13 @@ pub struct Counters {
     pub sweeps: u64,
     /// States kept.
     pub states: u64,
+    /// States whose blocking graphs were answered from memory.
+    #[serde(skip)]
+    pub graphs_recalled: u64,
     /// Time in static analysis.
     #[serde(skip)]
     pub static_analysis: Duration,
-    /// Time in simulation and sweeps.
+    /// Time in sweeps, and in the simulations that were used.
     #[serde(skip)]
     pub simulation: Duration,
     /// Time in thinning and verification.

@@ -6,7 +6,7 @@
 //! translations only, PDP_r only actions with rotational freedom; PDP* runs PDP_t, and PDP_r from
 //! the start if that failed.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use crate::geometry::Pose;
 use crate::plan::PlanStatus;
@@ -130,7 +130,6 @@ struct Pdp<'a, 'o> {
 
 impl Pdp<'_, '_> {
     fn run(&mut self) -> Result<(), Stop> {
-        self.take_free_parts()?;
         let mut limit = 1;
         while !self.disassembly.is_done() {
             let phase = self.phase();
@@ -143,10 +142,7 @@ impl Pdp<'_, '_> {
                 }
                 match self.search(part, limit)? {
                     TreeEnd::Nothing { cut: c } => cut |= c,
-                    TreeEnd::Out => {
-                        removed = true;
-                        self.take_free_parts()?;
-                    }
+                    TreeEnd::Out => removed = true,
                 }
                 if self.disassembly.is_done() {
                     return Ok(());
@@ -157,14 +153,6 @@ impl Pdp<'_, '_> {
                 (false, true) => limit += 1,
                 (false, false) => return Ok(()),
             }
-        }
-        Ok(())
-    }
-
-    fn take_free_parts(&mut self) -> Result<(), Stop> {
-        while let Some(part) = self.disassembly.free_part()? {
-            let pose = self.disassembly.assembled(part);
-            self.remove(part, vec![pose], 0.0);
         }
         Ok(())
     }
@@ -189,10 +177,12 @@ impl Pdp<'_, '_> {
         let mut tree = SearchTree { nodes: Vec::new(), known };
         tree.add(TreeNode { path: vec![self.disassembly.assembled(part)], depth: 0 });
         let (mut next, mut cut) = (0, false);
-        let started = Instant::now();
-        let too_long = |limit: Duration| started.elapsed() >= limit;
+        let (started, verified) = (Instant::now(), self.disassembly.counters.verification);
         while next < tree.nodes.len() {
-            if self.disassembly.problem.path_timeout.is_some_and(too_long) {
+            // The paper's planners do not verify.
+            let verification = self.disassembly.counters.verification - verified;
+            let took = started.elapsed().saturating_sub(verification);
+            if self.disassembly.problem.path_timeout.is_some_and(|limit| took >= limit) {
                 self.disassembly.path_time_ran_out = true;
                 break;
             }

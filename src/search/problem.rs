@@ -67,7 +67,7 @@ pub struct Problem<'a> {
     pub actions: ActionSet,
     /// The rule that fills blocking graphs before anything is simulated.
     pub static_analysis: StaticAnalysis,
-    /// Whether parts that leave straight are taken out without simulation.
+    /// Whether parts that leave straight, or are apart already, are taken out without simulation.
     pub sweeps: bool,
     /// The number of simulations after which the search gives up.
     pub max_simulations: Option<u64>,
@@ -130,14 +130,15 @@ impl Problem<'_> {
     }
 
     /// Thins a path and verifies it on the triangles. A path off a thread is tried in the middle of the
-    /// thread's play first: it has room there.
+    /// thread's play first: it has room there. Takes nothing of the planning time.
     ///
     /// # Errors
     /// The termination condition became true.
     pub fn checked_path(&self, standing: &[usize], part: usize, path: &[Pose]) -> Result<Checked, Interrupt> {
         let thin = self.thinned(part, path);
         let near = self.near(standing, part, &thin);
-        let centred = self.verifier.centred_on_thread(&self.scene, &near, part, &thin, &self.termination)?;
+        let termination = &self.termination.without_planning_time();
+        let centred = self.verifier.centred_on_thread(&self.scene, &near, part, &thin, termination)?;
         if let Some(centred) = centred
             && let Ok(verified) = self.checked_as_given(standing, part, &centred)?
         {
@@ -177,7 +178,8 @@ impl Problem<'_> {
 
     /// Verifies a path against all parts that it may meet.
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
-        let Self { scene, verifier, termination, cache, verdicts, .. } = self;
+        let Self { scene, verifier, cache, verdicts, .. } = self;
+        let termination = &self.termination.without_planning_time();
         let past = |&other: &usize| {
             let pair_path = &PairPath::new(scene, &scene.allowed, [part, other], path);
             let question = &VerdictQuestion { pair_path, limit: verifier.limit_past(pair_path) };

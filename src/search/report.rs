@@ -28,8 +28,7 @@ impl SearchReport<'_> {
     /// What was tried, for the log: a plan's reason leaves it out.
     pub(super) fn log(self, disassembly: &Disassembly<'_, '_>) {
         let stuck = disassembly.problem.wanted(disassembly.everything.standing());
-        let most = stuck.iter().map(|&p| self.states.known[p].len()).max().unwrap_or(0);
-        let coarse = self.novelty.coarsest(self.strategy, most);
+        let coarse = self.novelty.coarsest();
         tracing::debug!(
             stuck = stuck.len(),
             translations = self.actions.translations.all.len(),

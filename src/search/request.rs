@@ -125,14 +125,18 @@ pub struct PlanRequest {
     pub actions: ActionSet,
     /// The rule that fills blocking graphs before anything is simulated.
     pub static_analysis: StaticAnalysis,
-    /// Whether parts that leave straight are taken out by a sweep, without simulation, by the planners
-    /// `sbdp-star` and `sbdp`; `None` for the default of the actions: the paper has no sweeps.
+    /// Whether parts that leave straight, and those that are apart already, are taken out by a geometric test,
+    /// without simulation, by the planners `sbdp-star` and `sbdp`; `None` for the default of the actions: the paper
+    /// simulates all.
     pub sweeps: Option<bool>,
     /// Simulations after which the search gives up with `partial`.
     pub max_simulations: Option<u64>,
     /// Time after which one motion, or the search for one part, is given up (the paper's path
     /// planning timeout). Plans then depend on the clock.
     pub path_timeout: Option<Duration>,
+    /// Time after which the search ends as at its deadline, not counting thinning and verification: the
+    /// paper's timeout, as its planners do not verify.
+    pub planning_timeout: Option<Duration>,
     /// Worker threads for this request; 0 stands for all. Never changes the plan.
     pub threads: usize,
     /// Parts that may not move.

@@ -1,11 +1,11 @@
 //! SBDP and SBDP*: State-Based Disassembly Planning, without and with the guidance of directional blocking
 //! graphs.
 //!
-//! Source: the paper, Algorithm 1; for SBDP* with the evaluation functions (f_c, f_a) and the constraints of
-//! its section on blocking graphs. Departures, each for a reason given in DESIGN 6: a collision is about a set
-//! of parts; the search ends when nothing new can be found. Beyond the paper's action set, translational
-//! passes repeat while they find new states, since turning costs more, and both kinds of planning share their
-//! states, since a bayonet needs both.
+//! Source: the paper, Algorithm 1; for SBDP* with the evaluation functions (f_c, f_a), the constraints and the
+//! decisions of its sections on blocking graphs. With the paper's action set it differs from the paper as the table in
+//! `src/README.md` says. Beyond that set, a collision is about a set of parts, translational passes repeat while they
+//! find new states, since turning costs more, and both kinds of planning share their states, since a bayonet needs
+//! both.
 //!
 //! Before states are expanded with translations, every open action of every open state is swept, in the order
 //! of expansion. Sweeps are so much cheaper than simulations that parts which leave straight are all out
@@ -19,7 +19,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::blocking_graph::{Analysis, Blockage};
+use crate::blocking_graph::{Analysis, Blockage, StateGraphs};
 use crate::budgets::{REFINEMENTS, TRANSLATION_PASSES, WINDOW_PER_THREAD};
 use crate::geometry::Pose;
 use crate::simulation::{End, Motion, Sweep};
@@ -38,7 +38,6 @@ use super::order::Order;
 use super::outcome::Outcome;
 use super::problem::{Observer, Problem, VerifiedPath};
 use super::report::SearchReport;
-use super::request::ActionSet;
 use super::speculation::Speculation;
 use super::state::{StateAction, StateNode, least_travel};
 use super::states::{PhaseStates, States};
@@ -93,10 +92,9 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
 
 impl<'a, 'o> Sbdp<'a, 'o> {
     fn new(mut disassembly: Disassembly<'a, 'o>, initial: InitialAnalysis, guided: bool) -> Self {
-        let InitialAnalysis { directions, translations, rotations, blockages, duration } = initial;
+        let InitialAnalysis { directions, translations, rotations, graphs, duration } = initial;
         disassembly.counters.static_analysis += duration;
-        let separate_lists = disassembly.problem.actions == ActionSet::Paper;
-        let strategy = Strategy { guided, separate_lists, distrust_static: false };
+        let strategy = Strategy::new(guided, disassembly.problem.actions);
         let mut search = Self {
             strategy,
             states: States::new(&disassembly.problem.scene, strategy),
@@ -110,8 +108,9 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             speculation: Speculation::default(),
             disassembly,
         };
-        for (part, blockage) in blockages.into_iter().enumerate() {
+        for (part, StateGraphs { blockage, remembered }) in graphs.into_iter().enumerate() {
             if search.disassembly.problem.may_move(part) {
+                search.disassembly.counters.graphs_recalled += u64::from(remembered);
                 search.add_node(StateNode {
                     part,
                     path: vec![search.disassembly.assembled(part)],
@@ -165,14 +164,19 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             if self.disassembly.is_done() {
                 return Ok(());
             }
+            // States without graphs waited in this pass.
+            let some_waited = self.strategy.skips_analysis;
+            self.strategy.skips_analysis = turned.removed && self.of(PlanningPhase::Translation).decision_d();
             if gain.any()
                 || turned.any()
+                || some_waited
                 || self.actions.simulate_rays()
                 || self.actions.draw_all_twists(self.strategy)
             {
                 continue;
             }
-            if !self.strategy.guided {
+            // The paper trusts its graphs.
+            if !self.strategy.is_extended() {
                 return Ok(());
             }
             self.strategy.distrust_static = true;
@@ -263,11 +267,12 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 termination.check()?;
                 let node = &nodes[i];
                 let least = least_travel(scene, node.part);
-                analysis.blocked_from(&standing, node.part, node.pose(), least, termination)
+                analysis.displaced_graphs(&standing, node.part, node.pose(), least, termination)
             })
             .collect::<Result<Vec<_>, Interrupt>>()?;
-        for (&i, blockage) in todo.iter().zip(found) {
+        for (&i, StateGraphs { blockage, remembered }) in todo.iter().zip(found) {
             let node = &mut states.nodes[i];
+            self.disassembly.counters.graphs_recalled += u64::from(remembered);
             node.translation = Some(list.with_own(node.part, blockage));
         }
         self.disassembly.counters.static_analysis += started.elapsed();

@@ -49,6 +49,17 @@ impl PhaseStates<'_> {
         self.scene.bodies[part].shape.reach
     }
 
+    /// The paper's decision (d), after rotational planning took a part out: whether translational planning goes on with
+    /// the graphs that are there. It does if they leave an action open, and else begins with static analysis. States
+    /// that have no graphs yet do not count: as nothing is known to block them, the decision would hardly ever be no.
+    pub(super) fn decision_d(&self) -> bool {
+        let Strategy { guided, separate_lists, .. } = self.strategy;
+        let is_open = |b: &Blockage| b.evaluation().open_actions > 0;
+        let has_action =
+            |n: &StateNode| n.alive && self.lists(n) && n.blockage(self.phase).is_some_and(is_open);
+        guided && separate_lists && self.states.nodes.iter().any(has_action)
+    }
+
     pub(super) fn evaluation(&self, node: usize) -> Evaluation {
         let none = Evaluation { colliding_parts: 0, open_actions: 0 };
         self.states.nodes[node].blockage(self.phase).map_or(none, Blockage::evaluation)
@@ -118,12 +129,13 @@ mod tests {
     use crate::blocking_graph::Blockage;
     use crate::fixtures::{block_on_plate, scene};
     use crate::geometry::Pose;
+    use crate::search::request::ActionSet;
     use crate::search::trace::PlanningPhase;
 
     #[test]
     fn a_part_that_leaves_ends_its_states_and_is_in_nobodys_way() {
         let (scene, _) = scene(block_on_plate());
-        let strategy = Strategy { guided: true, separate_lists: false, distrust_static: false };
+        let strategy = Strategy::new(true, ActionSet::Extended);
         let mut states = States::new(&scene, strategy);
         let node = |part: usize, x: f64, origin| StateNode {
             part,

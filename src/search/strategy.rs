@@ -3,6 +3,7 @@
 use crate::blocking_graph::{Blockage, Reopening};
 
 use super::known_states::Resolution;
+use super::request::ActionSet;
 use super::state::StateNode;
 use super::trace::PlanningPhase;
 
@@ -15,12 +16,21 @@ pub(super) struct Strategy {
     pub(super) separate_lists: bool,
     /// Actions that only static analysis excludes are simulated, too: the last resort.
     pub(super) distrust_static: bool,
+    /// Translational planning goes on with the graphs that are there, and states without graphs wait: the paper's flow
+    /// from decision (d).
+    pub(super) skips_analysis: bool,
 }
 
 impl Strategy {
     /// Whether the search is guided and leaves the paper's rules where others find more.
     pub(super) fn is_extended(self) -> bool {
         self.guided && !self.separate_lists
+    }
+
+    /// The rules of a search at its start.
+    pub(super) fn new(guided: bool, actions: ActionSet) -> Self {
+        let separate_lists = actions == ActionSet::Paper;
+        Self { guided, separate_lists, distrust_static: false, skips_analysis: false }
     }
 
     /// How states are distinguished: the paper's way but for the extended search, which has free play to expect.
@@ -44,6 +54,11 @@ impl Strategy {
         !self.separate_lists || node.origin.is_none_or(|origin| origin.phase == phase)
     }
 
+    /// Whether a state is left for a later pass over its open list.
+    pub(super) fn waits(self, phase: PlanningPhase, node: &StateNode) -> bool {
+        self.skips_analysis && phase == PlanningPhase::Translation && node.translation.is_none()
+    }
+
     /// Whether an action may be tried, given what is known to block it.
     pub(super) fn allows(self, blockage: &Blockage, action: usize) -> bool {
         match (self.guided, self.distrust_static) {
@@ -65,7 +80,7 @@ mod tests {
         blockage.block_jointly(2, vec![7]);
         blockage.block_jointly(3, Vec::new());
         let allowed = |guided, distrust_static| {
-            let strategy = Strategy { guided, separate_lists: false, distrust_static };
+            let strategy = Strategy { distrust_static, ..Strategy::new(guided, ActionSet::Extended) };
             (0..4).filter(|&action| strategy.allows(&blockage, action)).collect::<Vec<_>>()
         };
         assert_eq!(allowed(true, false), [0]);

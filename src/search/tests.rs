@@ -1,4 +1,4 @@
-//! The paper's worked example (its figure of the process): a pin, a bolt and a cover.
+//! What searches find, prove and report. `paper_tests` has what the paper prescribes.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -11,39 +11,6 @@ use crate::geometry::SourceMesh;
 use crate::plan::{PlanStatus, Verifier};
 use crate::scene::Scene;
 use crate::simulation::SlidingEngine;
-
-const PIN: usize = 0;
-const BOLT: usize = 1;
-const COVER: usize = 2;
-
-/// A bolt along y with a head and, near its end, a hole through it along z; in the hole a pin that
-/// sticks out on both sides; on the shank a cover that can slide towards the pin, with walls above
-/// and below that stop the pin once it is clear of the bolt, and beside it there.
-fn pin_bolt_cover() -> [SourceMesh; 3] {
-    let pin = cells([&[-0.25, 0.25], &[0.5, 1.0], &[-1.0, 1.0]], |_| true);
-    let bolt = cells(
-        [&[-1.0, -0.5, -0.25, 0.25, 0.5, 1.0], &[-4.0, -3.0, 0.5, 1.0, 2.0], &[-1.0, -0.5, 0.5, 1.0]],
-        |[x, y, z]| {
-            let shank = (1..=3).contains(&x) && z == 1;
-            let hole = x == 2 && y == 2;
-            y == 0 || (shank && !hole)
-        },
-    );
-    let cover = cells(
-        [
-            &[-0.75, -0.5, -0.25, 0.25, 0.5, 0.75],
-            &[-3.0, -2.0, 1.5],
-            &[-3.25, -2.75, -1.1, -0.5, 0.5, 1.1, 2.75, 3.25],
-        ],
-        |[x, y, z]| {
-            let bore = (1..=3).contains(&x) && z == 3;
-            let end = z == 0 || z == 6;
-            let beside = (z == 1 || z == 5) && x != 2;
-            if y == 0 { !bore } else { end || beside }
-        },
-    );
-    [pin, bolt, cover]
-}
 
 #[derive(Default)]
 pub(super) struct Recorder(pub(super) Vec<TraceEvent>);
@@ -61,7 +28,7 @@ impl Observer for Recorder {
 
 pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
     Problem {
-        present: vec![PIN, BOLT, COVER],
+        present: (0..scene.bodies.len()).collect(),
         scene,
         verifier,
         engine: &SlidingEngine,
@@ -78,81 +45,6 @@ pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
         verdicts: Arc::default(),
         extra_points: HashMap::new(),
     }
-}
-
-fn traced(planner: Planner) -> (Outcome, Vec<TraceEvent>) {
-    let (scene, verifier) = scene(pin_bolt_cover());
-    let mut recorder = Recorder::default();
-    (search(planner, problem(scene, &verifier), &mut recorder), recorder.0)
-}
-
-/// Expansions and simulations as short texts, by pass.
-fn account(events: &[TraceEvent]) -> Vec<Vec<String>> {
-    let name = |p: usize| ["pin", "bolt", "cover"][p];
-    let mut out = Vec::new();
-    for event in events {
-        let line = match event {
-            TraceEvent::Pass { phase, .. } => {
-                out.push(vec![format!("{phase:?}")]);
-                continue;
-            }
-            TraceEvent::Expanded { state, part, evaluation, .. } => {
-                let [c, a] = evaluation.unwrap();
-                format!("expand s{state} {} ({c}, {a})", name(*part))
-            }
-            TraceEvent::Simulated { state, part, action, end, with, leads_to, .. } => {
-                let with: Vec<_> = with.iter().map(|&p| name(p)).collect();
-                let to = leads_to.map(|s| format!(" to s{s}")).unwrap_or_default();
-                format!("s{state} {} {action} {end} {}{to}", name(*part), with.join("+"))
-            }
-            TraceEvent::Removed { part, .. } => format!("{} is out", name(*part)),
-            _ => continue,
-        };
-        out.last_mut().unwrap().push(line);
-    }
-    out
-}
-
-#[test]
-fn the_worked_example_runs_as_in_the_paper() {
-    let (outcome, events) = traced(Planner::SbdpStar);
-    assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
-    let passes = account(&events);
-    // Static analysis overlooks that the pin stops the cover; the bolt has no open action.
-    assert_eq!(
-        passes[0],
-        [
-            "Translation",
-            "expand s0 cover (1, 1)",
-            "expand s0 pin (1, 2)",
-            "expand s0 bolt (2, 0)",
-            "s0 cover +y collision pin to s1",
-            "s0 pin +z collision cover to s2",
-            "s0 pin -z collision cover to s3",
-        ]
-    );
-    // Rotational planning begins at the initial state and takes nothing out.
-    assert_eq!(passes[1][0], "Rotation");
-    assert!(
-        passes[1].iter().all(|l| !l.ends_with("is out") && !l.contains("disassembled")),
-        "{:?}",
-        passes[1]
-    );
-    // Of the two states of the pin either may come first; ours is the older.
-    assert_eq!(
-        passes[2],
-        [
-            "Translation",
-            "expand s2 pin (1, 3)",
-            "s2 pin +y disassembled ",
-            "pin is out",
-            "expand s1 cover (1, 2)",
-            "s1 cover +y disassembled ",
-            "cover is out",
-        ]
-    );
-    assert_eq!(outcome.remaining, [BOLT]);
-    assert_eq!(outcome.removals[1].waited_for, [PIN]);
 }
 
 /// Plans two parts with the extended actions.
@@ -315,25 +207,8 @@ fn what_only_looks_linked_comes_apart() {
 }
 
 #[test]
-fn without_graphs_it_takes_more_simulations() {
-    let (guided, _) = traced(Planner::SbdpStar);
-    let (plain, events) = traced(Planner::Sbdp);
-    assert_eq!((plain.status, plain.removals[0].part), (guided.status, PIN));
-    let counts = (plain.counters.simulations, guided.counters.simulations);
-    assert!(counts.0 > counts.1, "{counts:?}");
-    for event in &events {
-        match event {
-            TraceEvent::Expanded { evaluation, excluded, .. } => {
-                assert!(evaluation.is_none() && excluded.is_empty());
-            }
-            other => assert!(!matches!(other, TraceEvent::Analysed { .. })),
-        }
-    }
-}
-
-#[test]
 fn a_motion_without_time_is_undecided_and_no_proof_of_anything() {
-    let (scene, verifier) = scene(pin_bolt_cover());
+    let (scene, verifier) = scene(paper_tests::pin_bolt_cover());
     for planner in Planner::ALL {
         let problem =
             Problem { path_timeout: Some(std::time::Duration::ZERO), ..problem(scene.clone(), &verifier) };

@@ -137,6 +137,7 @@ impl PlanFrame<'_> {
             total_time_s: times.total.as_secs_f64(),
             sdf_hits: found.fields,
             blocking_hits: found.blocking,
+            graph_hits: c.graphs_recalled,
             motion_hits: found.motions,
             verdict_hits: Some(found.verdicts),
             plan_hit: found.plan,

@@ -11,9 +11,7 @@ use crate::cache::{RecordKind, RequestCache};
 use crate::geometry::{Assembly, Shape};
 use crate::plan::{OVERLAP, Plan, PlanStatus, VERDICT, Verifier};
 use crate::scene::{HullTree, JoinedHulls};
-use crate::search::{
-    Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_blockages, search,
-};
+use crate::search::{Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_graphs, search};
 use crate::simulation::{
     MOTION, PenaltyEngine, PenaltyParameters, SlidingEngine, TOUCHING, TransitionFunction,
 };
@@ -71,6 +69,8 @@ impl Entry {
         pools: Option<&Pools>,
     ) -> Result<Plan, ServiceError> {
         let started = Instant::now();
+        let limited = request.planning_timeout.map(|limit| termination.with_planning_time(limit));
+        let termination = limited.as_ref().unwrap_or(termination);
         let mut fixed = request.fixed.clone();
         fixed.extend(&self.assembly.fixed);
         let mut removed = request.removed.clone();
@@ -271,7 +271,7 @@ impl Entry {
         let engine = engine_of(request.engine, request.penalty);
         let asked = SearchQuestion { question: &question, engine: &*engine, verifier: &prepared.verifier };
         // If it is interrupted, the blockages that were found are cached all the same.
-        let _ = initial_blockages(&self.problem(&prepared, &asked, termination, cache));
+        let _ = initial_graphs(&self.problem(&prepared, &asked, termination, cache));
         let all = (0..self.assembly.parts.len()).collect();
         let _ = HullTree::new(&prepared.scene, all, termination);
         let _ = prepared.build_fields(termination, &mut Discard);

@@ -372,8 +372,9 @@ impl Service {
         let Ok(axes) = found else { return Ok(None) };
         let translations = &Action::translations_along(&axes);
         let analysis = Analysis { rule: StaticAnalysis::default(), scene, translations, cache: &cache };
-        let blockages = analysis.initial_blockages(&present, &|part| least_travel(scene, part), termination);
-        Ok(blockages.ok().map(|b| DirectionalGraph::of(&b, translations)))
+        let graphs = analysis.assembled_graphs(&present, &|part| least_travel(scene, part), termination);
+        let blockages = graphs.ok().map(|g| g.into_iter().map(|g| g.blockage).collect::<Vec<_>>());
+        Ok(blockages.map(|b| DirectionalGraph::of(&b, translations)))
     }
 
     /// A known assembly, healed and in the planning frame.

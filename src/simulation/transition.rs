@@ -1,6 +1,7 @@
 //! The contract between search and the engines.
 
 use std::borrow::Cow;
+use std::time::Duration;
 
 use nalgebra::Vector3;
 
@@ -41,13 +42,15 @@ pub struct Motion {
     pub end: End,
     /// It was not simulated, but known.
     pub recalled: bool,
+    /// How long a search waited for it on one thread; zero until a search has measured it.
+    pub time: Duration,
 }
 
 impl Motion {
     /// A motion that was simulated.
     #[must_use]
     pub fn simulated(path: Vec<Pose>, asked: Vec<u32>, end: End) -> Self {
-        Self { path, asked, end, recalled: false }
+        Self { path, asked, end, recalled: false, time: Duration::ZERO }
     }
 }
 

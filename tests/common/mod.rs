@@ -243,7 +243,7 @@ pub fn plan(client: &Client, handle: Handle, options: &PlanOptions) -> (Vec<u32>
                 assert_eq!(step.number as usize, parts.len());
                 parts.push(step.part);
             }
-            Some(Event::Progress(_)) => {}
+            Some(Event::Progress(_) | Event::Trace(_)) => {}
             Some(Event::Restarted) => parts.clear(),
             Some(Event::Done(summary)) => {
                 assert_eq!(summary.steps as usize, parts.len());

@@ -6,7 +6,7 @@ use sbdp::hostile_input::{Reader, field_file};
 use sbdp_ipc::endpoint::Endpoint;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, Part, Vertices};
-use sbdp_ipc::plan::{MovedPart, PlanRequest, Staging, Step, encode_steps};
+use sbdp_ipc::plan::{MovedPart, PenaltyRecord, PlanRequest, Staging, Step, encode_steps};
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, SummaryParts};
@@ -124,6 +124,7 @@ fn messages() -> Vec<Vec<u8>> {
     };
     let request = PlanRequest {
         fixed: vec![1, 2],
+        penalty: vec![PenaltyRecord { parameter: 1, reserved: 0, value: 0.5 }],
         targets: Some(vec![0]),
         moved: vec![MovedPart { part: 1, ..MovedPart::default() }],
         assembly: Some(Staging::Beside(vec![MovedPart::default()])),

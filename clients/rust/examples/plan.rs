@@ -14,6 +14,7 @@ fn main() -> Result<(), ClientError> {
         match event {
             Event::Progress(progress) => eprintln!("{progress:?}"),
             Event::Step(step) => println!("part {} leaves along {:?}", step.part, step.path),
+            Event::Trace(lines) => print!("{lines}"),
             Event::Restarted => println!("the daemon was restarted: from the beginning"),
             Event::Done(summary) => println!("{}: {} steps", summary.status.name(), summary.steps),
         }

@@ -11,6 +11,7 @@
 //!     match event {
 //!         Event::Progress(progress) => eprintln!("{progress:?}"),
 //!         Event::Step(step) => println!("part {} along {} waypoints", step.part, step.path.len()),
+//!         Event::Trace(lines) => print!("{lines}"),
 //!         Event::Restarted => println!("another daemon: the steps come again"),
 //!         Event::Done(summary) => println!("{}", summary.status.name()),
 //!     }
@@ -35,7 +36,10 @@ mod upload;
 pub use client::Client;
 pub use content_hash::content_hash;
 pub use error::ClientError;
-pub use options::{ActionSet, ConnectOptions, Engine, Handle, PlanOptions, Planner, Staging};
+pub use options::{
+    ActionSet, ConnectOptions, Engine, Handle, PenaltyParameter, PlanOptions, Planner, Staging,
+    StaticAnalysis,
+};
 pub use sbdp_ipc::error::ErrorCode;
 pub use sbdp_ipc::geometry::{Assembly, Part, Vertices};
 pub use sbdp_ipc::plan::{StepView as Step, Waypoint};

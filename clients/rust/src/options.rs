@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use sbdp_ipc::clock;
-use sbdp_ipc::plan::{self, MovedPart, PlanRequest, Waypoint};
+use sbdp_ipc::plan::{self, MovedPart, PENALTY_PARAMETERS, PenaltyRecord, PlanRequest, Waypoint};
 use sbdp_ipc::polling;
 
 /// The name of an assembly: the hash of its content.
@@ -91,6 +91,82 @@ pub enum ActionSet {
     Extended,
 }
 
+/// How blocking graphs begin, before anything is simulated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum StaticAnalysis {
+    /// An edge where contact with the other part alone lets a part hardly move.
+    #[default]
+    Sliding,
+    /// The paper's rule, taken literally.
+    Paper,
+}
+
+/// A parameter of the engine `penalty`. Lengths are of an assembly whose longest side is between 5 and 10, times in
+/// seconds of the simulated motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PenaltyParameter {
+    /// Time of one step.
+    TimeStep,
+    /// Time after which the velocity is zeroed and the state compared with earlier ones.
+    PlanningTimeStep,
+    /// Force per depth at one contact point.
+    Stiffness,
+    /// Force per depth and speed of approach at one contact point.
+    Damping,
+    /// Depth beyond that at the assembled pose from which contact acts.
+    PenetrationThreshold,
+    /// Acceleration that an action's force gives.
+    Force,
+    /// Angular acceleration that an action's torque gives, as a multiple of `Force`.
+    TorqueFactor,
+    /// States closer than this in translation may be the same.
+    SimilarTranslation,
+    /// States closer than this in rotation may be the same, in radians.
+    SimilarRotation,
+    /// The longest edge between contact points.
+    LongestEdge,
+    /// How much deeper than `PenetrationThreshold` a pair may get before a motion is stopped.
+    Yielding,
+    /// The share of a part's smallest extent that the threshold may have.
+    ShareOfExtent,
+    /// Steps from one waypoint to the next, at most; a whole number.
+    StepsPerWaypoint,
+    /// Zeroings of the velocity after which a motion is given up; a whole number.
+    MostBlocks,
+    /// Newton iterations of one step, at most; a whole number.
+    NewtonIterations,
+    /// A Newton step that moves no point by more than this is the last.
+    NewtonTolerance,
+}
+
+impl PenaltyParameter {
+    /// All parameters, in the order of their numbers on the wire.
+    pub const ALL: [Self; 16] = [
+        Self::TimeStep,
+        Self::PlanningTimeStep,
+        Self::Stiffness,
+        Self::Damping,
+        Self::PenetrationThreshold,
+        Self::Force,
+        Self::TorqueFactor,
+        Self::SimilarTranslation,
+        Self::SimilarRotation,
+        Self::LongestEdge,
+        Self::Yielding,
+        Self::ShareOfExtent,
+        Self::StepsPerWaypoint,
+        Self::MostBlocks,
+        Self::NewtonIterations,
+        Self::NewtonTolerance,
+    ];
+
+    /// The name, as on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        PENALTY_PARAMETERS[self as usize]
+    }
+}
+
 /// Where the parts of an assembly plan begin.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Staging {
@@ -110,11 +186,20 @@ pub struct PlanOptions {
     pub engine: Engine,
     /// Which actions.
     pub actions: ActionSet,
-    /// Whether parts that leave straight are taken out without simulation; `None` leaves it to the
-    /// daemon: with extended actions they are.
+    /// How blocking graphs begin.
+    pub static_analysis: StaticAnalysis,
+    /// Parameters of the engine `penalty` that differ from the paper's.
+    pub penalty: Vec<(PenaltyParameter, f64)>,
+    /// Whether parts that leave straight, and those that are apart already, are taken out without simulation; `None`
+    /// leaves it to the daemon: with extended actions they are.
     pub sweeps: Option<bool>,
     /// Time from now until the daemon must answer with what it has.
     pub timeout: Option<Duration>,
+    /// Time of planning, waiting and verification not counted, after which the daemon answers with what it has.
+    pub planning_timeout: Option<Duration>,
+    /// Time after which one motion, or a pdp planner's search for one part, is given up. The plan then depends on the
+    /// clock and is not remembered.
+    pub path_timeout: Option<Duration>,
     /// Simulations after which to give up.
     pub max_simulations: Option<u64>,
     /// Threads for this request; 0 leaves it to the daemon.
@@ -135,6 +220,9 @@ pub struct PlanOptions {
     pub no_cache: bool,
     /// Others go first: nobody waits for this plan.
     pub batch: bool,
+    /// The events of the search are wanted, too ([`Event::Trace`](crate::Event::Trace)): it runs whatever is
+    /// remembered.
+    pub trace: bool,
 }
 
 impl PlanOptions {
@@ -144,12 +232,17 @@ impl PlanOptions {
             planner: self.planner as u32,
             engine: self.engine as u32,
             actions: self.actions as u32,
+            static_analysis: self.static_analysis as u32,
+            penalty: self.penalty.iter().map(penalty_record).collect(),
             sweeps: self.sweeps,
+            trace: self.trace,
             no_cache: self.no_cache,
             batch: self.batch,
             threads: self.threads,
             deadline_ns: self.timeout.map(clock::deadline_in),
             max_simulations: self.max_simulations,
+            path_timeout_ns: self.path_timeout.map(nanoseconds),
+            planning_timeout_ns: self.planning_timeout.map(nanoseconds),
             fixed: self.fixed.clone(),
             removed: self.removed.clone(),
             targets: self.targets.clone(),
@@ -162,6 +255,15 @@ impl PlanOptions {
     }
 }
 
+fn penalty_record(&(parameter, value): &(PenaltyParameter, f64)) -> PenaltyRecord {
+    PenaltyRecord { parameter: parameter as u32, reserved: 0, value }
+}
+
+/// What is too long for the wire (five hundred years) is shortened.
+fn nanoseconds(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos()).unwrap_or(u64::MAX).min(u64::MAX - 1)
+}
+
 pub(crate) fn moved_part(&(part, motion): &(u32, Waypoint)) -> MovedPart {
     MovedPart { part, reserved: 0, motion }
 }
@@ -169,7 +271,7 @@ pub(crate) fn moved_part(&(part, motion): &(u32, Waypoint)) -> MovedPart {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sbdp_ipc::plan::{ACTION_SETS, ENGINES, PLANNERS};
+    use sbdp_ipc::plan::{ACTION_SETS, ENGINES, PLANNERS, STATIC_ANALYSES};
 
     #[test]
     fn choices_travel_as_the_index_of_their_name() {
@@ -177,5 +279,11 @@ mod tests {
         assert_eq!(PLANNERS[Planner::PdpStar as usize], "pdp-star");
         assert_eq!(ENGINES[Engine::Penalty as usize], "penalty");
         assert_eq!(ACTION_SETS[ActionSet::Extended as usize], "extended");
+        assert_eq!(STATIC_ANALYSES[StaticAnalysis::Paper as usize], "paper");
+        let named = PenaltyParameter::ALL.map(|p| format!("{p:?}"));
+        let names = PENALTY_PARAMETERS.map(|name| name.replace('-', ""));
+        for ((parameter, variant), name) in PenaltyParameter::ALL.iter().zip(named).zip(names) {
+            assert_eq!(variant.to_lowercase(), name, "{}", parameter.name());
+        }
     }
 }

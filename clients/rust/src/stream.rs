@@ -58,7 +58,9 @@ pub enum Event<'s> {
     /// A verified step, in order; its slices lie in shared memory and live as long as the
     /// borrow of the stream, that is until the next event is asked for.
     Step(StepView<'s>),
-    /// The daemon went away, and another one has taken its place and was asked again: the steps so far
+    /// Events of the search, if the trace is wanted: whole lines, one JSON object each.
+    Trace(String),
+    /// The daemon went away, and another one has taken its place and was asked again: the steps and the trace so far
     /// are void, and all of them come again from the first.
     Restarted,
     /// The end: everything else about the plan.
@@ -121,6 +123,7 @@ enum Found {
     Restarted,
     Progress(Progress),
     Step(usize),
+    Trace(String),
     Done(Summary),
 }
 
@@ -295,6 +298,7 @@ impl PlanStream<'_> {
             Some(Found::Restarted) => Some(Event::Restarted),
             Some(Found::Progress(progress)) => Some(Event::Progress(progress)),
             Some(Found::Done(summary)) => Some(Event::Done(summary)),
+            Some(Found::Trace(lines)) => Some(Event::Trace(lines)),
             Some(Found::Step(index)) => {
                 let step = StepsView::new(self.message.bytes())?.get(index);
                 step.map(Event::Step)
@@ -401,6 +405,11 @@ impl PlanStream<'_> {
                 self.message = message;
                 self.next_step = 0;
                 Ok(None)
+            }
+            Some(ResponseKind::Trace) => {
+                let lines = String::from_utf8(message.bytes().to_vec());
+                let lines = lines.map_err(|_| ClientError::Protocol("a trace is not UTF-8".to_owned()))?;
+                Ok(Some(Found::Trace(lines)))
             }
             Some(ResponseKind::Summary) => {
                 // A copy: it outlives the stream, and nothing decoded may change behind our back.

@@ -1,15 +1,12 @@
 //! The hyper-parameters of the paper's simulation, and what its table leaves open.
 
-use serde::{Deserialize, Serialize};
-
 /// Parameters of the engine `penalty`. Lengths are in the planning frame (longest side of the
 /// assembly in (5, 10]), angles in radians, times in seconds of the simulated motion.
 ///
 /// "Table" means the table of hyper-parameters in the paper's appendix, "public code" what its
 /// public implementation was seen to do, "own" what neither fixes. The table's path planning
 /// timeout (360 s) is not here: deadlines reach an engine as a termination condition.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields, rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PenaltyParameters {
     /// Time of one implicit step, in s. Table: simulation time step, 1e-3.
     pub time_step: f64,
@@ -83,6 +80,69 @@ impl Default for PenaltyParameters {
 }
 
 impl PenaltyParameters {
+    /// All parameters by name, in the order of their numbers on the wire.
+    #[must_use]
+    pub fn named(&self) -> [(&'static str, f64); 16] {
+        [
+            ("time-step", self.time_step),
+            ("planning-time-step", self.planning_time_step),
+            ("stiffness", self.stiffness),
+            ("damping", self.damping),
+            ("penetration-threshold", self.penetration_threshold),
+            ("force", self.force),
+            ("torque-factor", self.torque_factor),
+            ("similar-translation", self.similar_translation),
+            ("similar-rotation", self.similar_rotation),
+            ("longest-edge", self.longest_edge),
+            ("yielding", self.yielding),
+            ("share-of-extent", self.share_of_extent),
+            ("steps-per-waypoint", f64::from(self.steps_per_waypoint)),
+            ("most-blocks", f64::from(self.most_blocks)),
+            ("newton-iterations", f64::from(self.newton_iterations)),
+            ("newton-tolerance", self.newton_tolerance),
+        ]
+    }
+
+    /// The paper's parameters, but for those given by name.
+    ///
+    /// # Errors
+    /// A name that is not known, a value that the parameter cannot have, or what [`Self::validate`] finds.
+    pub fn with<'n>(given: impl IntoIterator<Item = (&'n str, f64)>) -> Result<Self, String> {
+        let mut out = Self::default();
+        for (name, value) in given {
+            let whole = || {
+                let is_whole = value.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&value);
+                is_whole
+                    .then_some(value as u32)
+                    .ok_or(format!("`{name}` is {value}; it must be a whole number"))
+            };
+            match name {
+                "time-step" => out.time_step = value,
+                "planning-time-step" => out.planning_time_step = value,
+                "stiffness" => out.stiffness = value,
+                "damping" => out.damping = value,
+                "penetration-threshold" => out.penetration_threshold = value,
+                "force" => out.force = value,
+                "torque-factor" => out.torque_factor = value,
+                "similar-translation" => out.similar_translation = value,
+                "similar-rotation" => out.similar_rotation = value,
+                "longest-edge" => out.longest_edge = value,
+                "yielding" => out.yielding = value,
+                "share-of-extent" => out.share_of_extent = value,
+                "steps-per-waypoint" => out.steps_per_waypoint = whole()?,
+                "most-blocks" => out.most_blocks = whole()?,
+                "newton-iterations" => out.newton_iterations = whole()?,
+                "newton-tolerance" => out.newton_tolerance = value,
+                _ => {
+                    let known = out.named().map(|(name, _)| name).join(", ");
+                    return Err(format!("`{name}` is no parameter; there are {known}"));
+                }
+            }
+        }
+        out.validate()?;
+        Ok(out)
+    }
+
     /// # Errors
     /// The name and value of a parameter with which no motion could be simulated.
     pub fn validate(&self) -> Result<(), String> {

@@ -160,7 +160,8 @@ impl MotionQuestion<'_> {
             if let Some(direction) = out {
                 path.truncate(at + 1);
                 asked.truncate(i + 1);
-                return Some(Motion { path, asked, end: End::Disassembled(direction), recalled: true });
+                let end = End::Disassembled(direction);
+                return Some(Motion { recalled: true, ..Motion::simulated(path, asked, end) });
             }
         }
         let part = |place: &u32| parts.get(*place as usize).copied();
@@ -172,7 +173,7 @@ impl MotionQuestion<'_> {
                 End::Undecided { reason: reason.into(), touched: parts(&touched)? }
             }
         };
-        Some(Motion { path, asked, end, recalled: true })
+        Some(Motion { recalled: true, ..Motion::simulated(path, asked, end) })
     }
 }
 

@@ -196,7 +196,7 @@ impl Asking<'_> {
         let started = Instant::now();
         while let Some(event) = stream.next_event_within(PATIENCE.saturating_sub(started.elapsed()))? {
             match event {
-                Event::Progress(_) => {}
+                Event::Progress(_) | Event::Trace(_) => {}
                 Event::Restarted => {
                     hasher.reset();
                 }
