@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::budgets::EFFORT_BEFORE_SAMPLES;
 use crate::contact::PairPath;
 use crate::contact::course::{Course, Interval, turns_far};
-use crate::contact::helix_profile::{centred, depth_on_screw};
+use crate::contact::helix_profile::{depth_on_screw, path_on_thread};
 use crate::contact::region_cover::path::{DepthPrecision, PathDepth, PathQuestion};
 use crate::contact::sampled::along_path::{PathSamples, Penetration};
 use crate::geometry::{Pose, Shape};
@@ -224,7 +224,7 @@ impl Verifier {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub fn centred_on_thread(
+    pub fn path_on_thread(
         &self,
         scene: &Scene,
         standing: &[usize],
@@ -232,7 +232,7 @@ impl Verifier {
         path: &[Pose],
         termination: &Termination,
     ) -> Result<Option<Vec<Pose>>, Interrupt> {
-        centred(scene, standing, part, path, self.limit, termination)
+        path_on_thread(scene, standing, part, path, self.limit, termination)
     }
 
     /// Checks a path of a part (poses of its shape) among the parts that stand.

@@ -142,7 +142,7 @@ impl Problem<'_> {
     ) -> Result<Checked, Interrupt> {
         let thin = self.thinned(part, path);
         let near = self.near(&standing, part, &thin);
-        let centred = self.verifier.centred_on_thread(&self.scene, &near, part, &thin, &self.termination)?;
+        let centred = self.verifier.path_on_thread(&self.scene, &near, part, &thin, &self.termination)?;
         if let Some(centred) = centred {
             let thin = self.thinned(part, &centred);
             let verdict = self.verdict(&self.near(&standing, part, &thin), part, &thin)?;

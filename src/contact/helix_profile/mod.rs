@@ -4,16 +4,16 @@
 //! it: `path`), so one comparison bounds ten turns. If it does not, because the part strays too far or a head meets
 //! its seat, each half of the stretch is compared, where the part strays less. Short stretches that stay open are
 //! left to [`path`](super::region_cover::path), as far as its budget goes, and to samples; otherwise the answer is
-//! the same kind of bound. A path in the middle of a thread's play (`centred`, from the flanks that face each other:
+//! the same kind of bound. A path in the middle of a thread's play (`thread_path`, from the flanks that face each other:
 //! `slip`) leaves the room that such a bound needs.
 
 use crate::budgets::{EFFORT_BEFORE_PROFILES, PATH_EFFORT_IN_DOUBT};
 use crate::tolerances::{SCREW_TURN, SHORTEST_SCREW_STRETCH, STRAY_SHARE};
 
-mod centred;
 mod envelope;
 mod path;
 mod slip;
+mod thread_path;
 #[cfg(test)]
 mod tests;
 
@@ -22,7 +22,7 @@ use nalgebra::Point3;
 use crate::geometry::{Bounds, Pose, Surface};
 use crate::termination::{Interrupt, Termination};
 
-pub(crate) use centred::centred;
+pub(crate) use thread_path::path_on_thread;
 
 use super::course::{Course, Interval};
 use super::region_cover::cover;
