@@ -89,6 +89,6 @@ pub use samples::Spacing;
 pub use screw::Screw;
 pub use shape::Shape;
 pub use source::{SourceAssembly, SourceMesh, SourcePart};
-pub use surface::Surface;
+pub use surface::{SignedClosest, Surface};
 pub use surface_loops::surface_loops;
 pub use triangle::{Closest, Feature, area_normal, bisected, closest_on_triangle};

@@ -13,9 +13,9 @@ use crate::tolerances::{SCREW_TURN, SHORTEST_SCREW_STRETCH, STRAY_SHARE};
 mod envelope;
 mod path;
 mod slip;
-mod thread_path;
 #[cfg(test)]
 mod tests;
+mod thread_path;
 
 use nalgebra::Point3;
 

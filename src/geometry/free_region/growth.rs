@@ -25,13 +25,11 @@ pub(super) fn grown(
     seed: &Point3<f64>,
     radius: f64,
     wanted: Wanted<'_>,
-    spared: f64,
 ) -> Result<FreeRegion, NoRegion> {
     let reach = wanted.points.iter().map(|p| (p - seed).norm()).fold(0.0, f64::max);
     let mut growth = Growth {
         surface,
         wanted,
-        spared,
         cloud: Cloud::new(wanted.points, seed),
         inset: Vec::new(),
         least: (radius * 0.5).max(reach - wanted.most),
@@ -57,11 +55,6 @@ pub(super) fn grown(
 struct Growth<'a> {
     surface: &'a Surface,
     wanted: Wanted<'a>,
-    /// Wanted points may be this far behind a side as if they were before it. Without that, planes askew to
-    /// all faces are taken because they leave a little more room before the few points, two of which make a
-    /// wedge that is far from these: of a nut that is a hair too tight for its bolt all small pieces by its ends
-    /// were without a region.
-    spared: f64,
     /// The wanted points and the seed.
     cloud: Cloud,
     /// The wanted points, a little towards the seed, so that hulls which touch are apart: made when
@@ -105,7 +98,7 @@ impl Growth<'_> {
     /// The best half-space in front of a triangle, of those that are worth trying.
     fn best(&mut self, triangle: u32, corners: &[Point3<f64>], closest: &Closest) -> Candidate {
         let seed = self.region.centre;
-        let spared = self.spared;
+        let spared = self.wanted.spared;
         let enough = |best: Candidate| best.is_some_and(|(worth, _)| worth >= -spared);
         // The faces that meet where the triangle is nearest, and the way there.
         let mut best = None;

@@ -25,7 +25,8 @@ mod piece;
 mod search;
 
 use super::Halt;
-use super::surface_pair::{Obstacle, PlacedPiece, SurfacePair, WantedShift, Witness};
+use super::pieces::PlacedPiece;
+use super::surface_pair::{Obstacle, SurfacePair, WantedShift, Witness};
 use cache::{ShiftWay, StartCover, StartPair};
 use search::ShiftSearch;
 

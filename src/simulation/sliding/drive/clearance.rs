@@ -12,7 +12,7 @@ use crate::contact::sampled::MovingBody;
 use crate::geometry::Pose;
 use crate::scene::StandingParts;
 use crate::termination::Interrupt;
-use crate::tolerances::{DEPTH_TOLERANCE, CLEARANCE, CLEARANCE_REACH, CLEARANCE_SPEED};
+use crate::tolerances::{CLEARANCE, CLEARANCE_REACH, CLEARANCE_SPEED, DEPTH_TOLERANCE};
 
 use super::super::super::projection::project;
 use super::{Drive, KnownConstraints};

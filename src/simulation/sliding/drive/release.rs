@@ -11,7 +11,7 @@ use crate::budgets::{RELEASE_LOOKS, RELEASE_PLACES};
 use crate::contact::constraint::VelocityConstraint;
 use crate::contact::sampled::{Contact, ContactSet, ContactSource, MovingBody};
 use crate::termination::Interrupt;
-use crate::tolerances::{DEPTH_TOLERANCE, CLEARANCE, FREE_PULL, OPPOSED_PULL};
+use crate::tolerances::{CLEARANCE, DEPTH_TOLERANCE, FREE_PULL, OPPOSED_PULL};
 
 use super::super::super::projection::Projected;
 use super::{Attempt, Drive, Moved, Step};
