@@ -84,7 +84,7 @@ pub(crate) use records::{
 pub use repeated::Repetition;
 pub use revision::Revision;
 pub use rim::{Rim, RimEdge, WINDING_DOUBT};
-pub use sample_tree::{Ball, Look, Node as SampleNode, SampleTree};
+pub use sample_tree::{Look, SampleBall, SampleNode, SampleTree};
 pub use samples::Spacing;
 pub use screw::Screw;
 pub use shape::Shape;

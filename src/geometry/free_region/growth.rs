@@ -27,7 +27,7 @@ pub(super) fn grown(
     wanted: Wanted<'_>,
 ) -> Result<FreeRegion, NoRegion> {
     let reach = wanted.points.iter().map(|p| (p - seed).norm()).fold(0.0, f64::max);
-    let mut growth = Growth {
+    let mut growth = RegionGrowth {
         surface,
         wanted,
         cloud: Cloud::new(wanted.points, seed),
@@ -43,7 +43,7 @@ pub(super) fn grown(
         amid: None,
     };
     surface.nearest_first(seed, &mut growth);
-    let Growth { region, least, amid, .. } = growth;
+    let RegionGrowth { region, least, amid, .. } = growth;
     match amid {
         Some(triangle) => Err(NoRegion::Amid(triangle)),
         None if region.radius < least => Err(NoRegion::Cramped),
@@ -52,7 +52,7 @@ pub(super) fn grown(
 }
 
 /// A region as its planes are found.
-struct Growth<'a> {
+struct RegionGrowth<'a> {
     surface: &'a Surface,
     wanted: Wanted<'a>,
     /// The wanted points and the seed.
@@ -70,7 +70,7 @@ struct Growth<'a> {
 /// A half-space, and how far the worst of the wanted points is inside.
 type Candidate = Option<(f64, HalfSpace)>;
 
-impl Growth<'_> {
+impl RegionGrowth<'_> {
     /// The better of two half-spaces: that in front of some corners with this normal, and the best
     /// so far.
     fn better(
@@ -168,7 +168,7 @@ impl Growth<'_> {
     }
 }
 
-impl Visitor for Growth<'_> {
+impl Visitor for RegionGrowth<'_> {
     fn reach(&self) -> f64 {
         self.region.radius
     }
