@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Point3, Translation3, Vector3};
 
 use crate::budgets::PROBES;
 use crate::geometry::{FreeRegion, NoRegion, Pose, SignedClosest, Surface, Wanted, separating_direction};
-use crate::scene::Scene;
+use crate::scene::{PosedPart, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
     ENTRY_PROBE, ENTRY_SHARE, HELD, REGION_ROOM, STEEP_COSINE, TILT, TOUCH_INSET, TOUCHED,
@@ -68,7 +68,7 @@ impl<'a> SurfacePair<'a> {
     /// The termination condition became true.
     pub(crate) fn new(
         scene: &'a Scene,
-        (part, start): (usize, &Pose),
+        PosedPart { part, pose: start }: PosedPart<'_>,
         other: usize,
         covers_part: bool,
         termination: &Termination,
@@ -342,7 +342,8 @@ mod tests {
         let pin = cuboid([-0.5, -0.5, -4.0], [0.5, 0.5, 4.0]);
         let (scene, _) = scene([plate, pin]);
         let start = scene.bodies[1].planning_from_shape;
-        let pair = SurfacePair::new(&scene, (1, &start), 0, true, &Termination::default()).unwrap();
+        let pair =
+            SurfacePair::new(&scene, PosedPart::new(1, &start), 0, true, &Termination::default()).unwrap();
         let mut placed = PlacedPiece::default();
         let still = Vector3::zeros();
         pair.place(&pair.covered.root().unwrap(), &still, &mut placed);

@@ -9,7 +9,7 @@ use crate::budgets::{
     REGIONS_PER_LOOK, REGIONS_PER_MOTION, REGIONS_PER_STEP, RIGID_PIECES,
 };
 use crate::geometry::{Bounds, FreeRegion, NoRegion, Pose};
-use crate::scene::Scene;
+use crate::scene::{PosedPart, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
     BULGE_TOLERANCE, CONTACT_STEP, COVERED_OVERLAP, DEPTH_TOLERANCE, SMALL_BIT_ENTERED, SMALLEST_BIT,
@@ -63,20 +63,20 @@ impl<'a> RigidPair<'a> {
     /// Covers a pair with the part at a pose; `None` if regions cannot.
     pub(crate) fn new(
         scene: &'a Scene,
-        (part, pose): (usize, &Pose),
+        moving: PosedPart<'_>,
         other: usize,
         is_start: bool,
         termination: &Termination,
     ) -> Result<Option<Self>, Interrupt> {
-        if scene.allowed.of(part, other) > COVERED_OVERLAP {
+        if scene.allowed.of(moving.part, other) > COVERED_OVERLAP {
             return Ok(None);
         }
-        let gathered = starting(scene, (part, pose), other, (is_start, RIGID_PIECES), termination)?;
+        let gathered = starting(scene, moving, other, (is_start, RIGID_PIECES), termination)?;
         let pieces = gathered.pieces.as_ref().filter(|pieces| pieces.len() <= RIGID_PIECES);
         let Some(pieces) = pieces else { return Ok(None) };
-        let surfaces = SurfacePair::new(scene, (part, pose), other, gathered.covers_part, termination)?;
+        let surfaces = SurfacePair::new(scene, moving, other, gathered.covers_part, termination)?;
         let mut placed = PlacedPiece::default();
-        let here = surfaces.with_part_at(pose);
+        let here = surfaces.with_part_at(moving.pose);
         let pieces = pieces
             .iter()
             .map(|piece| RigidPiece::of_shift_piece(piece, &surfaces, &here, &mut placed))

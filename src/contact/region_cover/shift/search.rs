@@ -376,6 +376,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{peg_in_hole, scene, thread};
     use crate::geometry::SourceMesh;
+    use crate::scene::PosedPart;
 
     /// All pieces of one side of a pair, and the number of regions after each budget.
     fn gathered(meshes: [SourceMesh; 2], covers_part: bool, threads: usize) -> Vec<String> {
@@ -384,7 +385,8 @@ mod tests {
         pool.install(|| {
             let termination = Termination::default();
             let start = scene.bodies[1].planning_from_shape;
-            let surfaces = SurfacePair::new(&scene, (1, &start), 0, covers_part, &termination).unwrap();
+            let surfaces =
+                SurfacePair::new(&scene, PosedPart::new(1, &start), 0, covers_part, &termination).unwrap();
             let mut search = ShiftSearch::of_all(&surfaces, HELD_AT_FIRST, &termination);
             let mut told = Vec::new();
             for budget in [1, 5, 16, 64, 4096] {
