@@ -140,7 +140,7 @@ pub(crate) const STEP_HALVINGS: usize = 3;
 pub(crate) const PUSH_BENDS: usize = 64;
 /// Corrections that bring a part to the middle of its play.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.
-pub(crate) const LIFT_ROUNDS: usize = 3;
+pub(crate) const CLEARANCE_ROUNDS: usize = 3;
 /// Places of a step that are tested for a release: slots with less play than an eighth of a step are missed.
 /// Measured: at half and at double another plan of `bayonet`.
 pub(crate) const RELEASE_PLACES: u32 = 16;

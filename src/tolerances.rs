@@ -116,13 +116,13 @@ pub(crate) const LANDING: f64 = 4.0 * DEPTH_TOLERANCE;
 /// Length. A part with half this gap is in the middle of its play. A contact holds a pull back if the part, moved this
 /// far along it, is too deep there: in a slot nothing is, whatever its play.
 /// Measured: at half and at double another plan of 3 entries.
-pub(crate) const LIFT: f64 = 0.01;
+pub(crate) const CLEARANCE: f64 = 0.01;
 /// Length. Contacts this near hold a part in its play.
 /// Measured: at half another plan of `bolt_nut_m8_thread`; at double no effect.
-pub(crate) const LIFT_REACH: f64 = 0.04;
+pub(crate) const CLEARANCE_REACH: f64 = 0.04;
 /// Share. A contact that is along an axis by less does not hold a part there.
 /// Measured: no effect at half and double.
-pub(crate) const LIFT_SPEED: f64 = 0.1;
+pub(crate) const CLEARANCE_SPEED: f64 = 0.1;
 /// Share. A contact that opposes a pull by less does not hold it back: the part slides along it.
 /// Measured: no effect at half and double.
 pub(crate) const OPPOSED_PULL: f64 = 0.3;

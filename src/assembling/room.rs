@@ -7,7 +7,7 @@ use nalgebra::Point3;
 use crate::contact::seems_clear;
 use crate::geometry::{Bounds, Pose, interpolate, separating_direction, transformed};
 use crate::plan::{Verdict, Verifier};
-use crate::scene::Scene;
+use crate::scene::{PosedPart, Scene};
 use crate::termination::{Interrupt, Termination, try_all};
 
 /// Turns between two waypoints stay below this, so that the slerp is unambiguous.
@@ -114,7 +114,7 @@ impl Room {
             let count = (self.travel(part, glance) / step).ceil().max(1.0);
             let at = |i: usize| self.between(part, glance, i as f64 / count);
             try_all(0..=count as usize, |i| {
-                seems_clear(&self.scene, &near, (part, &at(i)), step / 2.0, termination)
+                seems_clear(&self.scene, &near, PosedPart::new(part, &at(i)), step / 2.0, termination)
             })
         };
         for glance in self.glances(part, piece) {

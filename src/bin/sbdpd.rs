@@ -16,7 +16,7 @@ use sbdp::{daemon, telemetry};
 /// Plans how assemblies come apart, for clients on this machine.
 #[derive(Debug, Parser)]
 #[command(name = "sbdpd", version)]
-struct Arguments {
+struct DaemonArguments {
     /// Configuration file; `config/default.toml` explains every key.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -38,7 +38,7 @@ struct Arguments {
 const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = DaemonArguments::parse();
     let config = match configuration(&arguments) {
         Ok(config) => config,
         Err(message) => {
@@ -77,13 +77,13 @@ fn cache(config: &Config) -> Cache {
 }
 
 /// The file's values, then what the command line says; logging runs afterwards.
-fn configuration(arguments: &Arguments) -> Result<Config, String> {
+fn configuration(arguments: &DaemonArguments) -> Result<Config, String> {
     let config = read(arguments)?;
     telemetry::start(&config.log).map_err(|e| e.to_string())?;
     Ok(config)
 }
 
-fn read(arguments: &Arguments) -> Result<Config, String> {
+fn read(arguments: &DaemonArguments) -> Result<Config, String> {
     let mut config = match &arguments.config {
         Some(path) => Config::load(path).map_err(|e| e.to_string())?,
         None => Config::default(),

@@ -31,8 +31,8 @@ pub(super) fn pair_blocks(
     translations: &[Action],
     termination: &Termination,
 ) -> Result<Vec<bool>, Interrupt> {
-    let mine = Placed::new(&scene.bodies[part], pose);
-    let theirs = Placed::new(&scene.bodies[other], &scene.bodies[other].planning_from_shape);
+    let mine = PosedBody::new(&scene.bodies[part], pose);
+    let theirs = PosedBody::new(&scene.bodies[other], &scene.bodies[other].planning_from_shape);
     if !mine.bounds.meets(&theirs.bounds) {
         return Ok(vec![false; translations.len()]);
     }
@@ -45,13 +45,13 @@ pub(super) fn pair_blocks(
 }
 
 /// A body at a pose.
-struct Placed<'a> {
+struct PosedBody<'a> {
     body: &'a Body,
     pose: Pose,
     bounds: Bounds,
 }
 
-impl<'a> Placed<'a> {
+impl<'a> PosedBody<'a> {
     fn new(body: &'a Body, pose: &Pose) -> Self {
         Self { body, pose: *pose, bounds: body.shape.bounds().transformed(pose) }
     }

@@ -78,10 +78,10 @@ pub(super) struct PlanArguments {
     pub(super) glb: Option<PathBuf>,
     /// Which search
     #[arg(long, value_enum, default_value_t)]
-    pub(super) planner: Planner,
+    pub(super) planner: PlannerArgument,
     /// Which transition function
     #[arg(long, value_enum, default_value_t)]
-    pub(super) engine: Engine,
+    pub(super) engine: EngineArgument,
     /// A parameter of the engine `penalty`, as `stiffness=1e5` (repeatable)
     #[arg(long, value_name = "NAME=VALUE")]
     pub(super) penalty: Vec<String>,
@@ -288,7 +288,7 @@ pub(super) struct BenchScale {
     /// Which kinds of assemblies
     #[arg(long, value_enum, value_name = "FAMILY,…", value_delimiter = ',',
         default_values = ["bolted-frame", "rack", "gear-train"])]
-    pub(super) families: Vec<Family>,
+    pub(super) families: Vec<FamilyArgument>,
     /// With how many parts
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = PARTS)]
     pub(super) parts: Vec<usize>,
@@ -309,7 +309,7 @@ pub(super) struct BenchScale {
 
 /// A kind of assembly.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-pub(super) enum Family {
+pub(super) enum FamilyArgument {
     /// Two layers of beams, bolted where they cross
     BoltedFrame,
     /// Uprights, shelves, trays and what lies in them
@@ -318,12 +318,12 @@ pub(super) enum Family {
     GearTrain,
 }
 
-impl From<Family> for bench::Family {
-    fn from(family: Family) -> Self {
+impl From<FamilyArgument> for bench::Family {
+    fn from(family: FamilyArgument) -> Self {
         match family {
-            Family::BoltedFrame => Self::BoltedFrame,
-            Family::Rack => Self::Rack,
-            Family::GearTrain => Self::GearTrain,
+            FamilyArgument::BoltedFrame => Self::BoltedFrame,
+            FamilyArgument::Rack => Self::Rack,
+            FamilyArgument::GearTrain => Self::GearTrain,
         }
     }
 }
@@ -341,7 +341,7 @@ pub(super) struct BenchReport {
 
 /// Which search.
 #[derive(Debug, Clone, Copy, Default, ValueEnum)]
-pub(super) enum Planner {
+pub(super) enum PlannerArgument {
     /// State-based planning guided by directional blocking graphs
     #[default]
     SbdpStar,
@@ -355,21 +355,21 @@ pub(super) enum Planner {
     PdpStar,
 }
 
-impl From<Planner> for search::Planner {
-    fn from(planner: Planner) -> Self {
+impl From<PlannerArgument> for search::Planner {
+    fn from(planner: PlannerArgument) -> Self {
         match planner {
-            Planner::SbdpStar => Self::SbdpStar,
-            Planner::Sbdp => Self::Sbdp,
-            Planner::PdpT => Self::PdpT,
-            Planner::PdpR => Self::PdpR,
-            Planner::PdpStar => Self::PdpStar,
+            PlannerArgument::SbdpStar => Self::SbdpStar,
+            PlannerArgument::Sbdp => Self::Sbdp,
+            PlannerArgument::PdpT => Self::PdpT,
+            PlannerArgument::PdpR => Self::PdpR,
+            PlannerArgument::PdpStar => Self::PdpStar,
         }
     }
 }
 
 /// Which transition function.
 #[derive(Debug, Clone, Copy, Default, ValueEnum)]
-pub(super) enum Engine {
+pub(super) enum EngineArgument {
     /// Contact-constrained sliding without inertia
     #[default]
     Sliding,
@@ -377,11 +377,11 @@ pub(super) enum Engine {
     Penalty,
 }
 
-impl From<Engine> for search::Engine {
-    fn from(engine: Engine) -> Self {
+impl From<EngineArgument> for search::Engine {
+    fn from(engine: EngineArgument) -> Self {
         match engine {
-            Engine::Sliding => Self::Sliding,
-            Engine::Penalty => Self::Penalty,
+            EngineArgument::Sliding => Self::Sliding,
+            EngineArgument::Penalty => Self::Penalty,
         }
     }
 }

@@ -12,7 +12,7 @@ use crate::search::{PlanRequest, PlanSink, Termination};
 use crate::service::Service;
 
 /// A question, ready to be asked.
-pub(super) struct Question<'a> {
+pub(super) struct CommandQuestion<'a> {
     /// The assembly.
     pub(super) assembly: &'a SourceAssembly,
     /// What differs from it.
@@ -32,7 +32,7 @@ pub(super) struct Question<'a> {
 /// Something that plans.
 pub(super) trait Backend {
     /// Plans; blocks until done.
-    fn plan(&self, question: &Question<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError>;
+    fn plan(&self, question: &CommandQuestion<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError>;
 }
 
 /// The service in this process.
@@ -48,7 +48,7 @@ impl Embedded {
 }
 
 impl Backend for Embedded {
-    fn plan(&self, question: &Question<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError> {
+    fn plan(&self, question: &CommandQuestion<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError> {
         let started = Instant::now();
         let admission = self.service.admit(question.assembly)?;
         let admitted = started.elapsed();

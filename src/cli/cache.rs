@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 
 use super::error::CliError;
 use super::print;
-use super::table::Table;
+use super::table::TextTable;
 use crate::cache::{Cache, CacheSettings, CacheStatistics, DiskError};
 use crate::service::RECORD_KINDS;
 
@@ -91,7 +91,7 @@ pub(super) fn run(arguments: &CacheArguments) -> Result<ExitCode, CliError> {
 }
 
 fn listed(cache: &Cache) -> String {
-    let mut table = Table::new(&["kind", "key", "bytes", "used"]);
+    let mut table = TextTable::new(&["kind", "key", "bytes", "used"]);
     for record in cache.list() {
         let hash: String = record.key.hash().iter().map(|b| format!("{b:02x}")).collect();
         let kind = record.key.kind().name.to_owned();
@@ -113,7 +113,7 @@ fn stats(cache: &Cache, json: Option<&Path>) -> Result<(), CliError> {
 }
 
 fn described(statistics: &CacheStatistics) -> String {
-    let mut table = Table::new(&["kind", "records", "bytes"]);
+    let mut table = TextTable::new(&["kind", "records", "bytes"]);
     for kind in &statistics.kinds {
         table.row([
             kind.kind.to_owned(),

@@ -4,7 +4,7 @@ use std::process::ExitCode;
 
 use super::args::CheckArguments;
 use super::error::CliError;
-use super::table::{Table, length};
+use super::table::{TextTable, length};
 use super::{interrupt, print};
 use crate::blocking_graph::Audit;
 use crate::geometry::{Healed, Solidity, SourceAssembly, heal, load_assembly};
@@ -81,7 +81,7 @@ fn headline(assembly: &SourceAssembly, healed: &[Healed]) -> String {
 }
 
 fn parts(assembly: &SourceAssembly, healed: &[Healed]) -> String {
-    let mut table = Table::new(&["part", "triangles", "size", "volume", "inside by", "from"]);
+    let mut table = TextTable::new(&["part", "triangles", "size", "volume", "inside by", "from"]);
     for (part, Healed { mesh, .. }) in assembly.parts.iter().zip(healed) {
         let (lo, hi) = mesh.bounds();
         let size: Vec<String> = (hi - lo).iter().map(|s| length(*s, None)).collect();

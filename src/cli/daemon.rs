@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use sbdp_client as client;
 use sbdp_client::{Client, ClientError, ErrorCode, Event, PlanOptions, PlanStream, Summary};
 
-use super::backend::{Backend, Question};
+use super::backend::{Backend, CommandQuestion};
 use super::error::CliError;
 use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::{Revision, SourceAssembly, heal, waypoint_from_pose};
@@ -37,7 +37,7 @@ impl Daemon {
         self.client.metrics()
     }
 
-    fn ask(&self, question: &Question<'_>, sink: &mut dyn PlanSink) -> Result<Plan, ClientError> {
+    fn ask(&self, question: &CommandQuestion<'_>, sink: &mut dyn PlanSink) -> Result<Plan, ClientError> {
         let mut handle = self.client.upload(&wire_assembly(question.assembly))?;
         if !question.revision.is_empty() {
             handle = self.client.revise(handle, &change(&question.revision))?;
@@ -48,7 +48,7 @@ impl Daemon {
 }
 
 impl Backend for Daemon {
-    fn plan(&self, question: &Question<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError> {
+    fn plan(&self, question: &CommandQuestion<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError> {
         let mut answer = self.ask(question, sink);
         if matches!(&answer, Err(e) if e.code() == Some(ErrorCode::UnknownHandle)) {
             // Evicted between the two requests.
@@ -72,7 +72,7 @@ fn refusal(assembly: &SourceAssembly, error: &ClientError) -> CliError {
 
 fn receive(
     stream: &mut PlanStream<'_>,
-    question: &Question<'_>,
+    question: &CommandQuestion<'_>,
     sink: &mut dyn PlanSink,
 ) -> Result<Plan, ClientError> {
     let cancel = question.termination.cancel_flag();
@@ -119,7 +119,7 @@ fn change(revision: &Revision) -> client::Change<'_> {
     }
 }
 
-fn options(question: &Question<'_>, trace: bool) -> PlanOptions {
+fn options(question: &CommandQuestion<'_>, trace: bool) -> PlanOptions {
     let request = &question.request;
     let numbers = |parts: &[usize]| parts.iter().map(|&p| p as u32).collect::<Vec<u32>>();
     PlanOptions {
@@ -272,7 +272,7 @@ fn indices(parts: &[u32]) -> Vec<usize> {
 
 /// The answer to a question that the daemon let go before planning began: everything stands
 /// where it stood.
-fn unplanned(question: &Question<'_>, status: PlanStatus, error: &ClientError) -> Plan {
+fn unplanned(question: &CommandQuestion<'_>, status: PlanStatus, error: &ClientError) -> Plan {
     let request = &question.request;
     let parts: Vec<String> = question.revised.parts.iter().map(|p| p.name.clone()).collect();
     let remaining = (0..parts.len()).filter(|p| !request.removed.contains(p)).collect();

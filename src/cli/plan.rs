@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use super::args::PlanArguments;
-use super::backend::{Backend, Embedded, Question};
+use super::backend::{Backend, CommandQuestion, Embedded};
 use super::daemon::Daemon;
 use super::error::{CliError, exit_code};
 use super::listener::Listener;
@@ -57,8 +57,15 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let revised = assembly.revised(&revision);
     let request = request(arguments, &revised)?;
     let backend = choose_backend(arguments)?;
-    let question =
-        Question { assembly: &assembly, revision, revised: &revised, read, request, deadline, termination };
+    let question = CommandQuestion {
+        assembly: &assembly,
+        revision,
+        revised: &revised,
+        read,
+        request,
+        deadline,
+        termination,
+    };
     let mut listener = Listener::new(arguments.trace.as_deref())?;
     let plan = backend.plan(&question, &mut listener);
     listener.finish()?;

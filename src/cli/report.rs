@@ -2,7 +2,7 @@
 
 use nalgebra::Point3;
 
-use super::table::{Table, length};
+use super::table::{TextTable, length};
 use crate::geometry::{SourceAssembly, SourceMesh, pose_from_waypoint};
 use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStep};
 
@@ -48,7 +48,7 @@ fn headline(assembly: &SourceAssembly, plan: &Plan) -> String {
 }
 
 fn steps(assembly: &SourceAssembly, plan: &Plan) -> String {
-    let mut table = Table::new(&["step", "part", "motion", "length", "waited for"]);
+    let mut table = TextTable::new(&["step", "part", "motion", "length", "waited for"]);
     for (number, step) in (1..).zip(&plan.steps) {
         let mesh = assembly.parts.get(step.part).map(|p| &p.mesh);
         table.row([

@@ -2,11 +2,11 @@
 
 /// Columns of text, each as wide as its widest cell.
 #[derive(Debug, Default)]
-pub(super) struct Table {
+pub(super) struct TextTable {
     rows: Vec<Vec<String>>,
 }
 
-impl Table {
+impl TextTable {
     pub(super) fn new(header: &[&str]) -> Self {
         Self { rows: vec![header.iter().map(|&h| h.to_owned()).collect()] }
     }
@@ -50,7 +50,7 @@ mod tests {
 
     #[test]
     fn columns_are_aligned() {
-        let mut table = Table::new(&["part", "length"]);
+        let mut table = TextTable::new(&["part", "length"]);
         table.row(["ä".into(), "1".into()]);
         table.row(["housing".into(), String::new()]);
         assert_eq!(table.render(), "part     length\nä        1\nhousing\n");

@@ -8,6 +8,8 @@
 //! | whether a sample is deeper than a limit, at a pose or on a way that is only tried | `sampled::penetration` | yes or no |
 //! | how long a stretch of others is in the way of a direction (to order turns) | [`obstruction`] | a length |
 //! | whether two threads pass each other along their helix | `helix_profile` | the stretches left open |
+//! | which path off a thread keeps its surfaces furthest apart | `helix_profile::path_on_thread` | a path |
+//! | which ways lead a part off the threads that it shares with others | `helix_profile::ways_off` | paths |
 //! | whether the hulls of a body and of all others are apart | [`exit_direction`](crate::scene::exit_direction) | a direction |
 //!
 //! `course` says how points move along a path, [`PairPath`] which way a body takes past another. Contact knows the scene

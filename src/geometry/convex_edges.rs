@@ -3,7 +3,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::leading::{Groups, Item};
+use super::leading::{Groups, LeadingItem};
 use super::samples::{Site, convex_edges};
 use super::surface::NO_TRIANGLE;
 use super::{Bounds, OrientedSamples, Pose, Surface};
@@ -57,7 +57,7 @@ impl ConvexEdges {
         }
         edges.shrink_to_fit();
         let ends = OrientedSamples::new(surface, &sited);
-        let item = |edge: &ConvexEdge| Item::new(edge.ends.map(|i| ends.at(i).0), &edge.normals);
+        let item = |edge: &ConvexEdge| LeadingItem::new(edge.ends.map(|i| ends.at(i).0), &edge.normals);
         let groups = Groups::new(&edges.iter().map(item).collect::<Vec<_>>());
         Self { ends, edges, groups }
     }

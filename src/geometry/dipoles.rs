@@ -16,7 +16,7 @@ const FAR: f64 = 2.5;
 const LEAF: usize = 8;
 
 #[derive(Debug, Clone)]
-struct Node {
+struct DipoleNode {
     centre: Point3<f64>,
     radius: f64,
     dipole: Vector3<f64>,
@@ -29,7 +29,7 @@ struct Node {
 /// Answers how often a triangle soup winds around a point (1 inside a closed outward mesh).
 #[derive(Debug, Clone)]
 pub(super) struct DipoleTree {
-    nodes: Vec<Node>,
+    nodes: Vec<DipoleNode>,
     corners: Vec<[Point3<f64>; 3]>,
 }
 
@@ -76,7 +76,7 @@ impl DipoleTree {
     }
 }
 
-fn build(corners: &mut [[Point3<f64>; 3]], offset: usize, end: usize, nodes: &mut Vec<Node>) {
+fn build(corners: &mut [[Point3<f64>; 3]], offset: usize, end: usize, nodes: &mut Vec<DipoleNode>) {
     let me = nodes.len();
     nodes.push(summary(&corners[offset..end], offset));
     if end - offset <= LEAF {
@@ -98,7 +98,7 @@ fn build(corners: &mut [[Point3<f64>; 3]], offset: usize, end: usize, nodes: &mu
     build(corners, mid, end, nodes);
 }
 
-fn summary(triangles: &[[Point3<f64>; 3]], offset: usize) -> Node {
+fn summary(triangles: &[[Point3<f64>; 3]], offset: usize) -> DipoleNode {
     let mut weight = 0.0;
     let mut centre = Vector3::zeros();
     let mut dipole = Vector3::zeros();
@@ -111,7 +111,7 @@ fn summary(triangles: &[[Point3<f64>; 3]], offset: usize) -> Node {
     }
     let centre = Point3::from(if weight > 0.0 { centre / weight } else { Vector3::zeros() });
     let radius = triangles.iter().flatten().map(|v| (v - centre).norm_squared()).fold(0.0, f64::max).sqrt();
-    Node { centre, radius, dipole, range: (offset as u32, (offset + triangles.len()) as u32), right: 0 }
+    DipoleNode { centre, radius, dipole, range: (offset as u32, (offset + triangles.len()) as u32), right: 0 }
 }
 
 #[cfg(test)]

@@ -71,7 +71,7 @@ impl Faces {
         let (normals, area) = normals(surface);
         let mut faces = Self { normals, area, candidates: Vec::new(), own: None, principal: Vec::new() };
         faces.candidates = faces.agreed();
-        let spread = Spread::of(surface);
+        let spread = NormalSpread::of(surface);
         if faces.candidates.is_empty() {
             let principal = (0..3).filter(|&i| spread.apart(i) > TURNED_APART).filter_map(|i| spread.axis(i));
             faces.principal =
@@ -125,12 +125,12 @@ impl Faces {
 }
 
 /// How the normals of a shape are spread: ∫nnᵀdA, and its eigenvalues as shares of their sum.
-struct Spread {
+struct NormalSpread {
     axes: Matrix3<f64>,
     shares: Vector3<f64>,
 }
 
-impl Spread {
+impl NormalSpread {
     fn of(surface: &Surface) -> Self {
         let mut spread = Matrix3::zeros();
         for t in 0..surface.triangles().len() as u32 {

@@ -11,7 +11,7 @@ mod growth;
 use nalgebra::{Point3, Vector3};
 
 use super::half_space::{Cloud, HalfSpace};
-use super::{Closest, Surface};
+use super::{SignedClosest, Surface};
 use growth::grown;
 
 /// A surface may reach so far into a region, in the planning frame: rounding of flush faces.
@@ -50,6 +50,10 @@ pub struct Wanted<'a> {
     pub from_behind: bool,
     /// A unit vector across the points, towards where they are free, if any is likely; else zero.
     pub facing: Vector3<f64>,
+    /// Points may be this far behind a side as if they were before it. Without that, planes askew to all faces are
+    /// taken because they leave a little more room before the few points, two of which make a wedge that is far from
+    /// these: of a nut that is a hair too tight for its bolt all small pieces by its ends were without a region.
+    pub spared: f64,
 }
 
 /// Why there is no region worth having.
@@ -108,13 +112,24 @@ impl FreeRegion {
         let sides = self.sides.iter().zip(gaps);
         let passed = sides.filter(|(side, gap)| **gap + side.normal.dot(shift) < -ROUNDING);
         let passed: Vec<&HalfSpace> = passed.map(|(side, _)| side).collect();
-        points.iter().try_fold(0.0, |farthest: f64, p| {
-            let p = p + shift;
-            let is_above = passed.iter().all(|side| side.above(&p) >= -ROUNDING);
-            if is_above && (p - self.centre).norm_squared() <= self.radius * self.radius {
-                return Some(farthest);
-            }
-            Some(farthest.max(self.distance_within(&p, most)?))
+        let is_inside = |p: &Point3<f64>| {
+            passed.iter().all(|side| side.above(p) >= -ROUNDING)
+                && (p - self.centre).norm_squared() <= self.radius * self.radius
+        };
+        self.furthest(points.iter().map(|p| p + shift).filter(|p| !is_inside(p)), most).map(|(far, _)| far)
+    }
+
+    /// The point that is furthest outside, and its [distance](Self::distance_within); `None` if that is more than
+    /// `most` of any.
+    #[must_use]
+    pub fn furthest(
+        &self,
+        points: impl IntoIterator<Item = Point3<f64>>,
+        most: f64,
+    ) -> Option<(f64, Point3<f64>)> {
+        points.into_iter().try_fold((0.0, Point3::origin()), |far, p| {
+            let d = self.distance_within(&p, most)?;
+            Some(if d > far.0 { (d, p) } else { far })
         })
     }
 
@@ -182,8 +197,7 @@ impl FreeRegion {
 
 impl Surface {
     /// A convex region that holds the middle of a ball, or what is outside nearest to that: as
-    /// [`Surface::free_region`]. `closest` is the surface's point nearest to the centre, `signed` its
-    /// signed distance.
+    /// [`Surface::free_region`]. `seen` is what of the surface is nearest to the centre.
     ///
     /// # Errors
     /// There is none worth having.
@@ -191,31 +205,16 @@ impl Surface {
         &self,
         centre: &Point3<f64>,
         radius: f64,
-        (closest, signed): (&Closest, f64),
+        seen: &SignedClosest,
         wanted: Wanted<'_>,
     ) -> Result<FreeRegion, NoRegion> {
-        self.free_region_sparing(centre, radius, (closest, signed), wanted, 0.0)
-    }
-
-    /// The same where it does not matter up to `spared` how far wanted points are from a side.
-    ///
-    /// # Errors
-    /// There is none worth having.
-    pub fn free_region_sparing(
-        &self,
-        centre: &Point3<f64>,
-        radius: f64,
-        (closest, signed): (&Closest, f64),
-        wanted: Wanted<'_>,
-        spared: f64,
-    ) -> Result<FreeRegion, NoRegion> {
-        let seed = if signed > SKIN {
+        let seed = if seen.signed > SKIN {
             *centre
         } else {
-            let outward = self.pseudo_normal(closest).try_normalize(0.0);
-            closest.point + outward.ok_or(NoRegion::Cramped)? * (closest.distance + SKIN)
+            let outward = self.pseudo_normal(&seen.closest).try_normalize(0.0);
+            seen.closest.point + outward.ok_or(NoRegion::Cramped)? * (seen.closest.distance + SKIN)
         };
-        self.region_from(&seed, radius + wanted.most + (seed - centre).norm(), wanted, spared)
+        self.free_region(&seed, radius + wanted.most + (seed - centre).norm(), wanted)
     }
 
     /// A convex region around `seed`, within `radius`, that the surface does not enter. If
@@ -230,24 +229,13 @@ impl Surface {
         radius: f64,
         wanted: Wanted<'_>,
     ) -> Result<FreeRegion, NoRegion> {
-        self.region_from(seed, radius, wanted, 0.0)
-    }
-
-    fn region_from(
-        &self,
-        seed: &Point3<f64>,
-        radius: f64,
-        wanted: Wanted<'_>,
-        spared: f64,
-    ) -> Result<FreeRegion, NoRegion> {
         let most = wanted.most;
-        let region = grown(self, seed, radius, wanted, spared)?;
+        let region = grown(self, seed, radius, wanted)?;
         let nearest = region.triangles.first().copied().unwrap_or(0);
         // No surface passes through: all of the region is where one point well inside is. (A region
         // too thin to have one may follow the plane of a face into the solid.)
         let inner = region.nearest_within(seed, most + 4.0 * INNER, INNER).ok_or(NoRegion::Cramped)?;
-        let closest = self.closest_from(&inner, nearest);
-        let is_outside = self.signed(&inner, &closest) > 0.0;
+        let is_outside = self.signed_closest(&inner, nearest).signed > 0.0;
         if is_outside { Ok(FreeRegion { inner, ..region }) } else { Err(NoRegion::Cramped) }
     }
 }
@@ -261,7 +249,7 @@ mod tests {
     use crate::geometry::SourceMesh;
 
     fn near(points: &[Point3<f64>]) -> Wanted<'_> {
-        Wanted { points, most: 0.1, from_behind: true, facing: Vector3::zeros() }
+        Wanted { points, most: 0.1, from_behind: true, facing: Vector3::zeros(), spared: 0.0 }
     }
 
     #[test]

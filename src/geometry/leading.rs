@@ -10,12 +10,12 @@ const GROUP: usize = 32;
 
 /// Where a point or an edge is, and the box of the normals of the faces that meet there, taken as points.
 #[derive(Debug, Clone)]
-pub(super) struct Item {
+pub(super) struct LeadingItem {
     pub(super) place: Bounds,
     pub(super) normals: Bounds,
 }
 
-impl Item {
+impl LeadingItem {
     pub(super) fn new<'a>(
         points: impl IntoIterator<Item = &'a Point3<f64>>,
         normals: &[Vector3<f64>],
@@ -30,14 +30,14 @@ impl Item {
 pub(super) struct Groups {
     /// Those of a group one after the other.
     numbers: Vec<u32>,
-    groups: Vec<Group>,
+    groups: Vec<HullGroup>,
 }
 
 #[derive(Debug, Clone)]
-struct Group {
+struct HullGroup {
     /// Where its numbers begin and end.
     range: [u32; 2],
-    all: Item,
+    all: LeadingItem,
 }
 
 impl Groups {
@@ -46,7 +46,7 @@ impl Groups {
         size_of_val(&*self.numbers) + size_of_val(&*self.groups)
     }
 
-    pub(super) fn new(items: &[Item]) -> Self {
+    pub(super) fn new(items: &[LeadingItem]) -> Self {
         let mut numbers: Vec<u32> = (0..items.len() as u32).collect();
         let mut groups = Vec::new();
         split(items, &mut numbers, 0, &mut groups);
@@ -65,7 +65,7 @@ impl Groups {
     ) -> impl Iterator<Item = u32> + 's {
         /// Boxes are rounded otherwise than the points in them.
         const ROUNDING: f64 = 1e-9;
-        let wanted = move |group: &&Group| {
+        let wanted = move |group: &&HullGroup| {
             group.all.normals.support(direction) > steepness - ROUNDING
                 && group.all.place.transformed(box_from_self).grown(ROUNDING).meets(within)
         };
@@ -75,9 +75,9 @@ impl Groups {
 }
 
 /// Halves a part of the numbers, which begins at `start`, until the halves are small.
-fn split(items: &[Item], numbers: &mut [u32], start: u32, groups: &mut Vec<Group>) {
-    let none = Item { place: Bounds::EMPTY, normals: Bounds::EMPTY };
-    let all = numbers.iter().map(|&i| &items[i as usize]).fold(none, |all, item| Item {
+fn split(items: &[LeadingItem], numbers: &mut [u32], start: u32, groups: &mut Vec<HullGroup>) {
+    let none = LeadingItem { place: Bounds::EMPTY, normals: Bounds::EMPTY };
+    let all = numbers.iter().map(|&i| &items[i as usize]).fold(none, |all, item| LeadingItem {
         place: all.place.union(&item.place),
         normals: all.normals.union(&item.normals),
     });
@@ -93,6 +93,6 @@ fn split(items: &[Item], numbers: &mut [u32], start: u32, groups: &mut Vec<Group
         split(items, low, start, groups);
         split(items, high, start + middle as u32, groups);
     } else if !numbers.is_empty() {
-        groups.push(Group { range: [start, start + numbers.len() as u32], all });
+        groups.push(HullGroup { range: [start, start + numbers.len() as u32], all });
     }
 }

@@ -84,11 +84,11 @@ pub(crate) use records::{
 pub use repeated::Repetition;
 pub use revision::Revision;
 pub use rim::{Rim, RimEdge, WINDING_DOUBT};
-pub use sample_tree::{Ball, Look, Node as SampleNode, SampleTree};
+pub use sample_tree::{Look, SampleBall, SampleNode, SampleTree};
 pub use samples::Spacing;
 pub use screw::Screw;
 pub use shape::Shape;
 pub use source::{SourceAssembly, SourceMesh, SourcePart};
-pub use surface::Surface;
+pub use surface::{SignedClosest, Surface};
 pub use surface_loops::surface_loops;
 pub use triangle::{Closest, Feature, area_normal, bisected, closest_on_triangle};

@@ -2,7 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use super::leading::{Groups, Item};
+use super::leading::{Groups, LeadingItem};
 use super::samples::{Site, Sited};
 use super::surface::NO_TRIANGLE;
 use super::{Bounds, Pose, Surface};
@@ -50,7 +50,7 @@ impl OrientedSamples {
         out.normals.shrink_to_fit();
         let item = |i: u32| {
             let (point, normals) = out.at(i);
-            Item::new([point], normals)
+            LeadingItem::new([point], normals)
         };
         out.groups = Groups::new(&(0..out.points.len() as u32).map(item).collect::<Vec<_>>());
         out

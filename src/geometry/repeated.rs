@@ -132,7 +132,7 @@ impl KnownRepetitions<'_> {
     }
 
     /// What a part holds, if neither it nor anything in it has changed.
-    fn held_by(&self, whole: usize, inner: &[usize]) -> Option<Option<Held>> {
+    fn held_by(&self, whole: usize, inner: &[usize]) -> Option<Option<HeldBodies>> {
         let is_changed = |part: &usize| self.changed.contains(part);
         if is_changed(&whole) || inner.iter().any(is_changed) {
             return None;
@@ -141,7 +141,7 @@ impl KnownRepetitions<'_> {
         match self.found.iter().find(of_whole) {
             Some(Repetition::Whole { bodies, is_all, .. }) if !bodies.iter().any(is_changed) => {
                 let parts = inner.iter().copied().filter(|part| bodies.contains(part)).collect();
-                Some(Some(Held { parts, is_all: *is_all }))
+                Some(Some(HeldBodies { parts, is_all: *is_all }))
             }
             Some(_) => None,
             None => Some(None),
@@ -150,7 +150,7 @@ impl KnownRepetitions<'_> {
 }
 
 /// What a part holds as its own bodies.
-struct Held {
+struct HeldBodies {
     parts: Vec<usize>,
     is_all: bool,
 }
@@ -170,7 +170,7 @@ pub(super) fn repetitions(
 ) -> Result<Vec<Repetition>, Interrupt> {
     let solids: Vec<Solid<'_>> = shapes.iter().map(|shape| Solid::new(shape)).collect();
     let bodies: Vec<_> = places
-        .map(|(shape, planning_from_shape, bounds)| Placed {
+        .map(|(shape, planning_from_shape, bounds)| BodyShape {
             solid: &solids[shape],
             planning_from_shape,
             bounds,
@@ -180,7 +180,7 @@ pub(super) fn repetitions(
     let copies = copies(&bodies, &nested, known, termination)?;
     // Of copies the first stands for all.
     let is_first = |part: usize| copies[part][0] == part;
-    let whole = |whole: usize| -> Result<Option<Held>, Interrupt> {
+    let whole = |whole: usize| -> Result<Option<HeldBodies>, Interrupt> {
         let inner: Vec<usize> = nested[whole].iter().copied().filter(|b| is_first(*b)).collect();
         if !is_first(whole) || inner.is_empty() {
             return Ok(None);
@@ -196,7 +196,7 @@ pub(super) fn repetitions(
         .map(|p| Repetition::Copies(copies[p].clone()))
         .collect();
     for (part, whole) in wholes.into_iter().enumerate() {
-        let Some(Held { parts, is_all }) = whole else { continue };
+        let Some(HeldBodies { parts, is_all }) = whole else { continue };
         let mut bodies: Vec<usize> = parts.iter().flat_map(|p| copies[*p].iter().copied()).collect();
         bodies.sort_unstable();
         let whole = |part: &usize| Repetition::Whole { part: *part, bodies: bodies.clone(), is_all };
@@ -206,7 +206,7 @@ pub(super) fn repetitions(
 }
 
 /// For each part the others, ascending, whose boxes are within its box.
-fn nested_boxes(bodies: &[Placed<'_>]) -> Vec<Vec<usize>> {
+fn nested_boxes(bodies: &[BodyShape<'_>]) -> Vec<Vec<usize>> {
     let all = bodies.iter().fold(Bounds::EMPTY, |all, body| all.union(&body.bounds));
     let axis = all.extents().imax();
     let mut sorted: Vec<usize> = (0..bodies.len()).collect();
@@ -232,7 +232,7 @@ fn nested_boxes(bodies: &[Placed<'_>]) -> Vec<Vec<usize>> {
 /// For each part all that are the same body in the same place, ascending and itself among them. They are compared with
 /// the first of each group only.
 fn copies(
-    bodies: &[Placed<'_>],
+    bodies: &[BodyShape<'_>],
     nested: &[Vec<usize>],
     known: Option<&KnownRepetitions<'_>>,
     termination: &Termination,
@@ -261,7 +261,7 @@ fn copies(
     Ok(first_of.iter().map(|first| members[*first].clone()).collect())
 }
 
-fn are_copies(a: &Placed<'_>, b: &Placed<'_>, termination: &Termination) -> Result<bool, Interrupt> {
+fn are_copies(a: &BodyShape<'_>, b: &BodyShape<'_>, termination: &Termination) -> Result<bool, Interrupt> {
     if std::ptr::eq(a.solid, b.solid) {
         let tolerance = a.solid.tolerance();
         let moved = |p: &Point3<f64>| (a.planning_from_shape * p - b.planning_from_shape * p).norm();
@@ -274,11 +274,11 @@ fn are_copies(a: &Placed<'_>, b: &Placed<'_>, termination: &Termination) -> Resu
 
 /// Those of the parts in `inner` that a part holds as its own bodies, if any.
 fn held_by(
-    bodies: &[Placed<'_>],
+    bodies: &[BodyShape<'_>],
     whole: usize,
     inner: &[usize],
     termination: &Termination,
-) -> Result<Option<Held>, Interrupt> {
+) -> Result<Option<HeldBodies>, Interrupt> {
     let mut lying = Vec::new();
     for &part in inner {
         termination.check()?;
@@ -289,14 +289,14 @@ fn held_by(
     if lying.len() > 1 {
         let parts: Vec<usize> = lying.iter().map(|(part, _)| *part).collect();
         if bodies[whole].is_surface_of(parts.iter().map(|part| &bodies[*part]), termination)? {
-            return Ok(Some(Held { parts, is_all: true }));
+            return Ok(Some(HeldBodies { parts, is_all: true }));
         }
     }
     // A sheet that is drawn as a surface on another part has no inside of its own.
     let is_sheet = |part: usize| bodies[part].solid.surface().rim().is_some();
     lying.retain(|(part, surface)| *surface >= BODY_SURFACE && !is_sheet(*part));
     let parts: Vec<usize> = lying.into_iter().map(|(part, _)| part).collect();
-    Ok((!parts.is_empty()).then_some(Held { parts, is_all: false }))
+    Ok((!parts.is_empty()).then_some(HeldBodies { parts, is_all: false }))
 }
 
 /// A shape, with what the comparison needs of it: derived once, and only where boxes are nested.
@@ -347,13 +347,13 @@ impl<'a> Solid<'a> {
 }
 
 /// A solid at its place.
-struct Placed<'a> {
+struct BodyShape<'a> {
     solid: &'a Solid<'a>,
     planning_from_shape: Pose,
     bounds: Bounds,
 }
 
-impl Placed<'_> {
+impl BodyShape<'_> {
     /// The share of the part's surface that is on the surface of another one in which it lies: 1 only if all of it is.
     /// `None` if it does not lie in that.
     fn lies_in(&self, other: &Self, termination: &Termination) -> Result<Option<f64>, Interrupt> {

@@ -29,12 +29,12 @@ const FAR: f64 = 4.0;
 pub struct Rim {
     /// Opening by opening.
     edges: Vec<RimEdge>,
-    openings: Vec<Opening>,
+    openings: Vec<RimOpening>,
 }
 
 /// Edges of the rim that hang together: as often as one leads to a vertex, another one leads away.
 #[derive(Debug, Clone)]
-struct Opening {
+struct RimOpening {
     edges: std::ops::Range<usize>,
     /// A ball that holds them.
     centre: Point3<f64>,
@@ -127,7 +127,7 @@ impl Rim {
                 b.cross(&a) * (0.5 * f64::from(e.times))
             };
             let weight = edges.clone().map(|e| e.weight).sum();
-            Opening {
+            RimOpening {
                 edges: start..start + some.len(),
                 centre,
                 radius,
@@ -177,7 +177,7 @@ impl Rim {
         if self.is_long() {
             return f64::INFINITY;
         }
-        let slope = |o: &Opening| {
+        let slope = |o: &RimOpening| {
             let far = o.slope(p, radius);
             // Edge by edge is no less where it is far.
             if far < FLAT {
@@ -195,7 +195,7 @@ impl Rim {
     }
 }
 
-impl Opening {
+impl RimOpening {
     /// The solid angle of the strips behind a ray, if the ray begins far from the opening and does not pass it:
     /// then it is that of whatever closes the opening.
     fn as_dipole(&self, ray: &Ray) -> Option<f64> {

@@ -9,7 +9,7 @@ use super::surface::Surface;
 
 /// A node: a sphere that holds the samples of its subtree.
 #[derive(Debug, Clone)]
-pub struct Node {
+pub struct SampleNode {
     /// Centre of the sphere.
     pub centre: Point3<f64>,
     /// Its radius.
@@ -24,7 +24,7 @@ pub struct Node {
 
 /// Some samples: those in a sphere of the tree, or a single one.
 #[derive(Debug, Clone, Copy)]
-pub struct Ball<'a> {
+pub struct SampleBall<'a> {
     /// Centre of the sphere that holds them.
     pub centre: &'a Point3<f64>,
     /// Its radius.
@@ -35,7 +35,7 @@ pub struct Ball<'a> {
 
 /// A node or a sample, by its index.
 #[derive(Debug, Clone, Copy)]
-enum Held {
+enum TreeEntry {
     Node(usize),
     Sample(usize),
 }
@@ -44,7 +44,7 @@ enum Held {
 #[derive(Debug, Clone, Default)]
 pub struct SampleTree {
     points: Vec<Point3<f64>>,
-    nodes: Vec<Node>,
+    nodes: Vec<SampleNode>,
 }
 
 const LEAF: usize = 6;
@@ -90,7 +90,7 @@ impl SampleTree {
     pub fn walk<T: Copy, E>(
         &self,
         root: T,
-        mut enter: impl FnMut(&Node, T) -> Result<Option<T>, E>,
+        mut enter: impl FnMut(&SampleNode, T) -> Result<Option<T>, E>,
         mut visit: impl FnMut(&Point3<f64>, T) -> Result<(), E>,
     ) -> Result<(), E> {
         let mut stack = Vec::with_capacity(48);
@@ -135,34 +135,34 @@ impl SampleTree {
         &self,
         moments: Range<usize>,
         root: T,
-        mut look: impl FnMut(Ball<'_>, &Range<usize>, T) -> Result<Look<T>, E>,
+        mut look: impl FnMut(SampleBall<'_>, &Range<usize>, T) -> Result<Look<T>, E>,
     ) -> Result<(), E> {
         let mut stack = Vec::with_capacity(64);
         if !self.nodes.is_empty() && !moments.is_empty() {
-            stack.push((Held::Node(0), moments, root));
+            stack.push((TreeEntry::Node(0), moments, root));
         }
         while let Some((held, moments, known)) = stack.pop() {
             let ball = match held {
-                Held::Node(i) => {
-                    Ball { centre: &self.nodes[i].centre, radius: self.nodes[i].radius, sample: None }
+                TreeEntry::Node(i) => {
+                    SampleBall { centre: &self.nodes[i].centre, radius: self.nodes[i].radius, sample: None }
                 }
-                Held::Sample(i) => Ball { centre: &self.points[i], radius: 0.0, sample: Some(i) },
+                TreeEntry::Sample(i) => SampleBall { centre: &self.points[i], radius: 0.0, sample: Some(i) },
             };
             match (look(ball, &moments, known)?, held) {
-                (Look::Out, _) | (Look::In(_), Held::Sample(_)) => {}
+                (Look::Out, _) | (Look::In(_), TreeEntry::Sample(_)) => {}
                 (Look::Halve(known), _) => {
                     let middle = moments.start.midpoint(moments.end);
                     stack.push((held, middle..moments.end, known));
                     stack.push((held, moments.start..middle, known));
                 }
-                (Look::In(known), Held::Node(i)) => {
+                (Look::In(known), TreeEntry::Node(i)) => {
                     let node = &self.nodes[i];
                     if node.right == 0 {
                         let samples = (node.start as usize..node.end as usize).rev();
-                        stack.extend(samples.map(|s| (Held::Sample(s), moments.clone(), known)));
+                        stack.extend(samples.map(|s| (TreeEntry::Sample(s), moments.clone(), known)));
                     } else {
-                        stack.push((Held::Node(node.right as usize), moments.clone(), known));
-                        stack.push((Held::Node(i + 1), moments, known));
+                        stack.push((TreeEntry::Node(node.right as usize), moments.clone(), known));
+                        stack.push((TreeEntry::Node(i + 1), moments, known));
                     }
                 }
             }
@@ -176,7 +176,7 @@ impl SampleTree {
     /// The first error of `enter` ends the walk.
     pub fn any<E>(
         &self,
-        enter: impl Fn(&Node) -> Result<bool, E>,
+        enter: impl Fn(&SampleNode) -> Result<bool, E>,
         test: impl Fn(&Point3<f64>) -> bool,
     ) -> Result<bool, E> {
         let mut next = 0;
@@ -195,13 +195,13 @@ impl SampleTree {
     }
 }
 
-fn build(points: &mut [Point3<f64>], offset: usize, end: usize, nodes: &mut Vec<Node>) {
+fn build(points: &mut [Point3<f64>], offset: usize, end: usize, nodes: &mut Vec<SampleNode>) {
     let me = nodes.len();
     let slice = &mut points[offset..end];
     let bounds = super::Bounds::of(slice.iter());
     let centre = bounds.centre();
     let radius = slice.iter().map(|p| (p - centre).norm_squared()).fold(0.0, f64::max).sqrt();
-    nodes.push(Node {
+    nodes.push(SampleNode {
         centre,
         radius,
         start: offset as u32,

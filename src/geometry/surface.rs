@@ -21,6 +21,15 @@ use derived::{Adjacency, Derived, Opening};
 /// No triangle.
 pub(super) const NO_TRIANGLE: u32 = u32::MAX;
 
+/// The point of a surface nearest to another point, and the signed distance (negative inside).
+#[derive(Debug, Clone, Copy)]
+pub struct SignedClosest {
+    /// The nearest point.
+    pub closest: Closest,
+    /// The signed distance.
+    pub signed: f64,
+}
+
 /// A triangle surface with its adjacency, normals and bounding-volume hierarchy.
 #[derive(Clone)]
 pub struct Surface {
@@ -204,6 +213,13 @@ impl Surface {
     pub fn closest_from(&self, p: &Point3<f64>, guess: u32) -> Closest {
         let near = self.closest_on(guess, p);
         self.closest(p, near.distance).unwrap_or(near)
+    }
+
+    /// The same with the signed distance.
+    #[must_use]
+    pub fn signed_closest(&self, p: &Point3<f64>, guess: u32) -> SignedClosest {
+        let closest = self.closest_from(p, guess);
+        SignedClosest { signed: self.signed(p, &closest), closest }
     }
 
     /// Shows `visitor` the triangles within its reach of `p`, nearest first.

@@ -17,7 +17,7 @@ use super::triangle::area_normal;
 use super::{Bounds, Closest};
 
 pub(super) use nearest_first::Visitor;
-use split::{Item, split};
+use split::{BoxedTriangle, split};
 
 /// Boxes in a node, and triangles in a leaf.
 pub(super) const WIDTH: usize = 8;
@@ -74,8 +74,9 @@ impl TriangleTree {
     /// The tree of some triangles, given by their corners.
     pub(super) fn new(triangles: &[[Point3<f64>; 3]]) -> Self {
         let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
-        let items: Vec<Item> = triangles.iter().map(|corners| Item::new(&Bounds::of(corners))).collect();
-        let all = Item::around(&items, &order).bounds();
+        let items: Vec<BoxedTriangle> =
+            triangles.iter().map(|corners| BoxedTriangle::new(&Bounds::of(corners))).collect();
+        let all = BoxedTriangle::around(&items, &order).bounds();
         let empty = triangles.is_empty();
         let origin = if empty { Point3::origin() } else { all.centre() };
         let radius = if empty { 0.0 } else { all.extents().max() * 0.5 };
@@ -88,7 +89,7 @@ impl TriangleTree {
         tree
     }
 
-    fn build(&mut self, triangles: &[[Point3<f64>; 3]], items: &[Item], order: &mut [u32]) -> u32 {
+    fn build(&mut self, triangles: &[[Point3<f64>; 3]], items: &[BoxedTriangle], order: &mut [u32]) -> u32 {
         if order.len() <= WIDTH {
             self.leaves.push(Leaf::new(triangles, order, &self.origin));
             return (self.leaves.len() - 1) as u32 | LEAF;
@@ -109,7 +110,7 @@ impl TriangleTree {
             child: [0; WIDTH],
         };
         for (k, group) in groups.into_iter().enumerate() {
-            let bounds = Item::around(items, group).bounds();
+            let bounds = BoxedTriangle::around(items, group).bounds();
             for a in 0..3 {
                 node.min[a][k] = (bounds.min[a] - self.origin[a]) as f32;
                 node.max[a][k] = (bounds.max[a] - self.origin[a]) as f32;

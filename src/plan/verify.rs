@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::budgets::EFFORT_BEFORE_SAMPLES;
 use crate::contact::PairPath;
 use crate::contact::course::{Course, Interval, turns_far};
-use crate::contact::helix_profile::{centred, depth_on_screw};
+use crate::contact::helix_profile::{depth_on_screw, path_on_thread};
 use crate::contact::region_cover::path::{DepthPrecision, PathDepth, PathQuestion};
 use crate::contact::sampled::along_path::{PathSamples, Penetration};
 use crate::geometry::{Pose, Shape};
@@ -63,7 +63,7 @@ impl Verdict {
 
 /// How far a path turns.
 #[derive(Debug, Clone, Copy)]
-enum Turning {
+enum PathTurning {
     None,
     Little,
     /// As a part that is unscrewed ([`turns_far`]).
@@ -140,11 +140,11 @@ impl Verifier {
     #[must_use]
     pub fn limit_past(&self, PairPath { shapes, path, .. }: &PairPath<'_>) -> f64 {
         let turning = if turns_far(path) {
-            Turning::Far
+            PathTurning::Far
         } else if path.iter().any(|pose| pose.rotation != path[0].rotation) {
-            Turning::Little
+            PathTurning::Little
         } else {
-            Turning::None
+            PathTurning::None
         };
         self.limit_of(*shapes, turning)
     }
@@ -152,10 +152,10 @@ impl Verifier {
     /// No path of one of two shapes past the other is accepted at this depth.
     #[must_use]
     pub fn largest_limit(&self, shapes: [&Shape; 2]) -> f64 {
-        self.limit_of(shapes, Turning::Far)
+        self.limit_of(shapes, PathTurning::Far)
     }
 
-    fn limit_of(&self, shapes: [&Shape; 2], turning: Turning) -> f64 {
+    fn limit_of(&self, shapes: [&Shape; 2], turning: PathTurning) -> f64 {
         if !self.is_by_pair {
             return self.limit;
         }
@@ -164,9 +164,9 @@ impl Verifier {
         let of_pair = (PAIR_LIMIT * size).min(THIN_LIMIT * thickness);
         // Poses of paths that turn are less exact than those of translations, and threads are bounded less precisely.
         let of_turns = match turning {
-            Turning::None => 0.0,
-            Turning::Little => BULGE_TOLERANCE.min(TURNING_THIN_LIMIT * thickness),
-            Turning::Far => TURNING_THIN_LIMIT * thickness,
+            PathTurning::None => 0.0,
+            PathTurning::Little => BULGE_TOLERANCE.min(TURNING_THIN_LIMIT * thickness),
+            PathTurning::Far => TURNING_THIN_LIMIT * thickness,
         };
         self.limit.min(of_pair.max(of_turns))
     }
@@ -224,7 +224,7 @@ impl Verifier {
     ///
     /// # Errors
     /// The termination condition became true.
-    pub fn centred_on_thread(
+    pub fn path_on_thread(
         &self,
         scene: &Scene,
         standing: &[usize],
@@ -232,7 +232,7 @@ impl Verifier {
         path: &[Pose],
         termination: &Termination,
     ) -> Result<Option<Vec<Pose>>, Interrupt> {
-        centred(scene, standing, part, path, self.limit, termination)
+        path_on_thread(scene, standing, part, path, self.limit, termination)
     }
 
     /// Checks a path of a part (poses of its shape) among the parts that stand.

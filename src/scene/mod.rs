@@ -32,6 +32,23 @@ pub use joined_hulls::{HullStore, JoinedHulls};
 pub use memo::Memo;
 pub(crate) use records::{HULL, add_pair, add_samples, add_standing};
 
+/// A part at a pose of its own, wherever it stands in the scene.
+#[derive(Debug, Clone, Copy)]
+pub struct PosedPart<'a> {
+    /// The index of the part.
+    pub part: usize,
+    /// Maps its shape's frame to the planning frame.
+    pub pose: &'a Pose,
+}
+
+impl<'a> PosedPart<'a> {
+    /// A part at a pose.
+    #[must_use]
+    pub fn new(part: usize, pose: &'a Pose) -> Self {
+        Self { part, pose }
+    }
+}
+
 /// A part with its field, at its place.
 #[derive(Debug, Clone)]
 pub struct Body {

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::geometry::{Closest, Surface};
 
-use super::facet::{ACROSS, Facet, Lanes, POINTS};
+use super::facet::{ACROSS, Facet, FacetLanes, POINTS};
 use super::nodes::{BAND, BRICK, CELLS, FAR_NODE, Lattice, NODES, Nodes, beside, place};
 use super::rim::sign;
 
@@ -64,7 +64,7 @@ impl Brick<'_> {
         let facets = self.facets(triangles);
         let mut out = Nodes { values: [f32::NAN; BRICK], nearest: [FAR_NODE; BRICK] };
         let around = |f: &Facet| f.squared_distances(&[0.0; 3], ACROSS as f32);
-        let distances: Vec<Lanes> = facets.facets.iter().map(around).collect();
+        let distances: Vec<FacetLanes> = facets.facets.iter().map(around).collect();
         let (mut left, mut squared) = (Vec::new(), Vec::new());
         for lattice in 0..POINTS {
             facets.may_be_nearest(&distances, lattice, &mut left);
@@ -99,7 +99,7 @@ impl Brick<'_> {
         facets: &Facets,
         lattice: usize,
         left: &[u32],
-        squared: &mut Vec<Lanes>,
+        squared: &mut Vec<FacetLanes>,
         out: &mut Nodes,
     ) {
         let corner = place(lattice, LATTICES) * ACROSS;
@@ -162,7 +162,7 @@ impl Brick<'_> {
 impl Facets {
     /// The facets that may be the nearest to a node of a lattice, given the distances of all from
     /// the middles of all lattices.
-    fn may_be_nearest(&self, distances: &[Lanes], lattice: usize, left: &mut Vec<u32>) {
+    fn may_be_nearest(&self, distances: &[FacetLanes], lattice: usize, left: &mut Vec<u32>) {
         /// From the middle of a lattice to its corner.
         const RADIUS: f32 = 1.732_051;
         let least = distances.iter().map(|d| d[lattice]).fold(f32::INFINITY, f32::min).sqrt();
@@ -173,7 +173,7 @@ impl Facets {
 }
 
 /// The points of a lattice at which a distance does not exceed its limit, in order.
-fn chosen(squared: &Lanes, limits: &Lanes) -> impl Iterator<Item = usize> {
+fn chosen(squared: &FacetLanes, limits: &FacetLanes) -> impl Iterator<Item = usize> {
     let within = |i: usize| u32::from(squared[i] <= limits[i]) << i;
     let mut left = (0..POINTS).fold(0, |all, i| all | within(i));
     std::iter::from_fn(move || {
@@ -184,8 +184,8 @@ fn chosen(squared: &Lanes, limits: &Lanes) -> impl Iterator<Item = usize> {
 }
 
 /// Up to where a triangle may be the nearest to each node, squared; nowhere beyond the band.
-fn limits(squared: &[Lanes], rounding: f32) -> Lanes {
-    let mut out = [f32::INFINITY; size_of::<Lanes>() / size_of::<f32>()];
+fn limits(squared: &[FacetLanes], rounding: f32) -> FacetLanes {
+    let mut out = [f32::INFINITY; size_of::<FacetLanes>() / size_of::<f32>()];
     for distances in squared {
         for (l, d) in out.iter_mut().zip(distances) {
             *l = if *d < *l { *d } else { *l };

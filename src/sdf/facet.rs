@@ -15,11 +15,11 @@ pub(super) const POINTS: usize = ACROSS * ACROSS * ACROSS;
 const WIDTH: usize = 28;
 
 /// A number for each point of the lattice, x fastest.
-pub(super) type Lanes = [f32; WIDTH];
+pub(super) type FacetLanes = [f32; WIDTH];
 
-const STEPS: [Lanes; 3] = steps();
+const STEPS: [FacetLanes; 3] = steps();
 
-const fn steps() -> [Lanes; 3] {
+const fn steps() -> [FacetLanes; 3] {
     let mut out = [[0.0; WIDTH]; 3];
     let mut i = 0;
     while i < POINTS {
@@ -32,17 +32,17 @@ const fn steps() -> [Lanes; 3] {
 }
 
 /// A coordinate along a unit vector: the vector, then what is added.
-type Axis = [f32; 4];
+type FacetAxis = [f32; 4];
 
 /// A triangle, in units of a cell and from the middle of a brick.
 #[derive(Debug, Clone)]
 pub(super) struct Facet {
     /// Height above its plane.
-    height: Axis,
+    height: FacetAxis,
     /// Per side, how far outside it is, in the plane.
-    beyond: [Axis; 3],
+    beyond: [FacetAxis; 3],
     /// Per side, how far along it, from its first corner.
-    along: [Axis; 3],
+    along: [FacetAxis; 3],
     length: [f32; 3],
     /// Height and the ways beyond the sides, in double precision.
     exact: [[f64; 4]; 4],
@@ -86,7 +86,7 @@ impl Facet {
 
     /// How far the corners reach from the middle: rounding grows with it.
     pub(super) fn extent(&self) -> f32 {
-        let far = |axes: &[Axis; 3]| axes.iter().map(|a| a[3].abs()).fold(0.0, f32::max);
+        let far = |axes: &[FacetAxis; 3]| axes.iter().map(|a| a[3].abs()).fold(0.0, f32::max);
         self.height[3].abs().max(far(&self.beyond)).max(far(&self.along))
             + self.length.iter().copied().fold(0.0, f32::max)
     }
@@ -97,7 +97,7 @@ impl Facet {
     /// there the distance is joined from the height, the way beyond the side in the plane, and the
     /// way beyond its ends.
     #[inline]
-    pub(super) fn squared_distances(&self, centre: &[f32; 3], spacing: f32) -> Lanes {
+    pub(super) fn squared_distances(&self, centre: &[f32; 3], spacing: f32) -> FacetLanes {
         let (mut side, mut beyond) = ([f32::INFINITY; WIDTH], [0.0f32; WIDTH]);
         for e in 0..3 {
             let off = coordinates(&self.beyond[e], centre, spacing);
@@ -120,7 +120,7 @@ impl Facet {
 }
 
 #[inline]
-fn coordinates(axis: &Axis, centre: &[f32; 3], spacing: f32) -> Lanes {
+fn coordinates(axis: &FacetAxis, centre: &[f32; 3], spacing: f32) -> FacetLanes {
     let base = axis[0] * centre[0] + axis[1] * centre[1] + axis[2] * centre[2] + axis[3];
     let [x, y, z] = [axis[0] * spacing, axis[1] * spacing, axis[2] * spacing];
     let mut out = [0.0; WIDTH];

@@ -75,7 +75,7 @@ impl Deref for BrickNodes {
 
 /// What a field knows about a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
+pub struct FieldEstimate {
     /// No surface point is nearer than this where it is positive; negative means "maybe inside".
     pub lower_bound: f64,
     /// Interpolated signed distance (in far bricks: the bound).
@@ -85,7 +85,7 @@ pub struct Estimate {
 /// The interpolated field at a point, with its derivatives inside the cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FieldSample {
-    /// Interpolated signed distance; where there are no nodes, the bound (see [`Estimate`]).
+    /// Interpolated signed distance; where there are no nodes, the bound (see [`FieldEstimate`]).
     pub value: f64,
     /// Its gradient; zero where there are no nodes.
     pub gradient: Vector3<f64>,
@@ -181,20 +181,20 @@ impl Grid {
 
     /// A bound and an estimate of the signed distance at `p`.
     #[must_use]
-    pub fn estimate(&self, p: &Point3<f64>) -> Estimate {
+    pub fn estimate(&self, p: &Point3<f64>) -> FieldEstimate {
         let Some((brick, local)) = self.locate(p) else {
             let d = self.bounds.distance(p);
-            return Estimate { lower_bound: d, value: d };
+            return FieldEstimate { lower_bound: d, value: d };
         };
         let slot = self.slots[brick];
         if slot == EMPTY {
             let d = self.far(brick);
-            return Estimate { lower_bound: d, value: d };
+            return FieldEstimate { lower_bound: d, value: d };
         }
         let (base, f) = corner(&local);
         let value = trilinear(around(self.nodes(slot), base), &f);
         let boxed = self.bounds.distance(p);
-        Estimate { lower_bound: (value - self.error_bound()).max(boxed), value }
+        FieldEstimate { lower_bound: (value - self.error_bound()).max(boxed), value }
     }
 
     /// The value of [`Grid::sample`], to the bit.

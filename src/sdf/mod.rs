@@ -27,4 +27,4 @@ pub use field::{Field, FieldStore};
 pub(crate) use field_files::{FIELD, keep_field, keep_rest_of_field};
 pub(crate) use file::hostile::{a_field_file, read_as_field};
 pub use file::is_intact;
-pub use grid::{Estimate, FieldSample, Grid};
+pub use grid::{FieldEstimate, FieldSample, Grid};

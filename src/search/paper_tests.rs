@@ -245,7 +245,7 @@ fn verification_takes_nothing_of_the_planning_time() {
     let termination = Termination::default().with_planning_time(std::time::Duration::ZERO);
     let problem = Problem { termination, ..problem(scene, &verifier) };
     assert_eq!(problem.termination.check(), Err(Interrupt::DeadlinePassed));
-    let checked = problem.checked_path(vec![BOLT, COVER], PIN, &[start, lifted]);
+    let checked = problem.checked_path(&[BOLT, COVER], PIN, &[start, lifted]);
     assert!(matches!(checked, Ok(Ok(_))), "{checked:?}");
     let outcome = search(Planner::Sbdp, problem, &mut Recorder::default());
     assert_eq!((outcome.status, outcome.removals.len()), (PlanStatus::Timeout, 0));

@@ -138,7 +138,7 @@ impl Problem<'_> {
         let thin = self.thinned(part, path);
         let near = self.near(standing, part, &thin);
         let termination = &self.termination.without_planning_time();
-        let centred = self.verifier.centred_on_thread(&self.scene, &near, part, &thin, termination)?;
+        let centred = self.verifier.path_on_thread(&self.scene, &near, part, &thin, termination)?;
         if let Some(centred) = centred
             && let Ok(verified) = self.checked_as_given(standing, part, &centred)?
         {

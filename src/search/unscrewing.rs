@@ -55,7 +55,7 @@ pub(super) fn unscrewed(
     let (ways, touched) = ways(&disassembly.problem, part, &disassembly.standing(part))?;
     let mut met: BTreeSet<usize> = touched.into_iter().collect();
     let surroundings = disassembly.surroundings(part);
-    for (way, action) in ways {
+    for way in ways {
         let Problem { scene, termination, .. } = &disassembly.problem;
         let question = SweepQuestion {
             scene,
@@ -76,7 +76,7 @@ pub(super) fn unscrewed(
             continue;
         }
         match disassembly.checked_as_given(part, &path)? {
-            Ok(verified) => return Ok(Ok(Unscrewed { verified, action })),
+            Ok(verified) => return Ok(Ok(Unscrewed { verified, action: action_along(&way) })),
             Err(refuted) => met.extend(refuted.iter().map(|penetration| penetration.other)),
         }
     }
@@ -99,12 +99,12 @@ fn clearly_enters(
     Ok(entered.collect::<Result<Vec<bool>, Interrupt>>()?.contains(&true))
 }
 
-/// The ways of a part off its threads, each with the pull and turn that it follows, and the parts near it.
+/// The ways of a part off its threads, and the parts near it.
 fn ways(
     problem: &Problem<'_>,
     part: usize,
     others: &[usize],
-) -> Result<(Vec<(ScrewWay, Action)>, Vec<usize>), Interrupt> {
+) -> Result<(Vec<ScrewWay>, Vec<usize>), Interrupt> {
     let Problem { scene, termination, .. } = problem;
     let pose = scene.bodies[part].planning_from_shape;
     let (mut ways, mut touched) = (Vec::new(), Vec::new());
@@ -120,13 +120,14 @@ fn ways(
             break;
         }
     }
-    let with_action = |way: ScrewWay| {
-        let axis = Axis::along(Unit::new_normalize(way.along));
-        let forward = axis.unit().dot(&way.along) > 0.0;
-        let action = Action::Screw(axis, forward, forward == way.is_right_handed);
-        (way, action)
-    };
-    Ok((ways.into_iter().map(with_action).collect(), touched))
+    Ok((ways, touched))
+}
+
+/// The pull and turn that a way off a thread follows.
+fn action_along(way: &ScrewWay) -> Action {
+    let axis = Axis::along(Unit::new_normalize(way.along));
+    let forward = axis.unit().dot(&way.along) > 0.0;
+    Action::Screw(axis, forward, forward == way.is_right_handed)
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ use pools::Pools;
 pub use records::RECORD_KINDS;
 pub(crate) use records::{AnsweredQuestion, recent_answers, remember_answer, remembered_answer};
 use relay::Discard;
-use store::Store;
+use store::AssemblyStore;
 pub use store::StoreStatistics;
 
 /// The name of an assembly: the hash of its content.
@@ -96,7 +96,7 @@ pub enum ServiceError {
 /// The service. Shared by all threads.
 #[derive(Debug)]
 pub struct Service {
-    store: Store,
+    store: AssemblyStore,
     cache: Arc<Cache>,
     pools: Pools,
     /// Bytes of responses that the caller keeps in memory.
@@ -128,7 +128,7 @@ impl Service {
     pub fn new(cache: Arc<Cache>, budget: usize) -> Self {
         let hulls = JoinedHulls::stored(Arc::clone(&cache) as Arc<dyn HullStore>);
         let fields = Arc::downgrade(&cache) as Weak<dyn FieldStore>;
-        let store = Store::new(budget, hulls, fields);
+        let store = AssemblyStore::new(budget, hulls, fields);
         Self { store, cache, pools: Pools::default(), answers: AtomicUsize::new(0) }
     }
 

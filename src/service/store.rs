@@ -32,7 +32,7 @@ pub struct StoreStatistics {
 
 /// The assemblies.
 #[derive(Debug)]
-pub(super) struct Store {
+pub(super) struct AssemblyStore {
     budget: usize,
     /// Bytes of the budget that records and responses take.
     left: AtomicUsize,
@@ -61,7 +61,7 @@ struct CountedShape {
     bytes: usize,
 }
 
-impl Store {
+impl AssemblyStore {
     /// Nothing yet; `budget` in bytes.
     pub(super) fn new(budget: usize, hulls: JoinedHulls, fields: Weak<dyn FieldStore>) -> Self {
         Self { budget, left: AtomicUsize::new(0), hulls: Arc::new(hulls), fields, held: Mutex::default() }

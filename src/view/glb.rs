@@ -20,7 +20,7 @@ use gltf::json::scene::UnitQuaternion;
 use gltf::json::validation::{Checked, USize64};
 use gltf::json::{self, Accessor, Animation, Asset, Index, Material, Mesh, Node, Root};
 
-use super::{Drawn, PALETTE, Placement, PlanScene, Rgb, SceneStep, Up, ViewError};
+use super::{DrawnPart, PALETTE, Placement, PlanScene, Rgb, SceneStep, Up, ViewError};
 
 /// The scene as the bytes of a `.glb` file.
 ///
@@ -75,11 +75,11 @@ struct Writer {
     scale: f64,
     /// Meshes by what is drawn and its colour; and what is drawn as accessors, which all colours share.
     meshes: HashMap<(usize, usize), Index<Mesh>>,
-    surfaces: HashMap<usize, Surface>,
+    surfaces: HashMap<usize, GlbSurface>,
 }
 
 #[derive(Clone, Copy)]
-struct Surface {
+struct GlbSurface {
     positions: Index<Accessor>,
     normals: Index<Accessor>,
     indices: Index<Accessor>,
@@ -107,7 +107,7 @@ impl Writer {
         nodes
     }
 
-    fn mesh(&mut self, drawn: usize, colour: usize, mesh: &Drawn) -> Index<Mesh> {
+    fn mesh(&mut self, drawn: usize, colour: usize, mesh: &DrawnPart) -> Index<Mesh> {
         if let Some(known) = self.meshes.get(&(drawn, colour)) {
             return *known;
         }
@@ -136,7 +136,7 @@ impl Writer {
         mesh
     }
 
-    fn surface(&mut self, mesh: &Drawn) -> Surface {
+    fn surface(&mut self, mesh: &DrawnPart) -> GlbSurface {
         let positions: Vec<[f32; 3]> =
             mesh.positions.iter().map(|p| p.map(|x| (f64::from(x) * self.scale) as f32)).collect();
         let at = self.view(bytemuck::cast_slice(&positions), Some((Target::ArrayBuffer, 12)));
@@ -159,7 +159,7 @@ impl Writer {
             )
         };
         let indices = self.accessor(at, indices.len(), component, Type::Scalar, None);
-        Surface { positions, normals, indices }
+        GlbSurface { positions, normals, indices }
     }
 
     fn scene(&mut self, scene: &PlanScene, parts: &[Index<Node>]) {

@@ -22,7 +22,7 @@ mod words;
 
 pub use colour::{PALETTE, Rgb};
 pub use document::{kind_of, read_plan};
-pub use scene::{Drawn, Keyframe, Placement, PlanScene, ScenePart, SceneStep, Up};
+pub use scene::{DrawnPart, Keyframe, Placement, PlanScene, ScenePart, SceneStep, Up};
 
 /// Why a plan cannot be shown.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

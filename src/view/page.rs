@@ -12,7 +12,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
 use super::layout::layout;
-use super::{Drawn, Keyframe, PALETTE, Placement, PlanScene, ScenePart, SceneStep, Up};
+use super::{DrawnPart, Keyframe, PALETTE, Placement, PlanScene, ScenePart, SceneStep, Up};
 use crate::blocking_graph::DirectionalGraph;
 use crate::plan::export::BlockedDocument;
 use nalgebra::Point3;
@@ -51,16 +51,16 @@ struct Data<'a> {
     reason: Option<&'a str>,
     duration: f64,
     palette: Vec<String>,
-    meshes: Vec<Mesh>,
-    parts: Vec<Part<'a>>,
-    steps: Vec<Step<'a>>,
+    meshes: Vec<PageMesh>,
+    parts: Vec<PagePart<'a>>,
+    steps: Vec<PageStep<'a>>,
     blocked: Vec<Stuck<'a>>,
     graphs: Vec<Graph>,
     bytes: String,
 }
 
 #[derive(Debug, Serialize)]
-struct Mesh {
+struct PageMesh {
     /// Length of a step, and where step 0 is.
     step: f64,
     origin: [f64; 3],
@@ -74,7 +74,7 @@ struct Mesh {
 }
 
 #[derive(Debug, Serialize)]
-struct Part<'a> {
+struct PagePart<'a> {
     name: &'a str,
     mesh: usize,
     colour: usize,
@@ -89,7 +89,7 @@ struct Part<'a> {
 }
 
 #[derive(Debug, Serialize)]
-struct Step<'a> {
+struct PageStep<'a> {
     part: usize,
     words: &'a str,
     waited: &'a [usize],
@@ -149,7 +149,7 @@ fn append(bytes: &mut Vec<u8>, numbers: &[u8]) -> usize {
     bytes.len() - numbers.len()
 }
 
-fn mesh(mesh: &Drawn, bytes: &mut Vec<u8>) -> Mesh {
+fn mesh(mesh: &DrawnPart, bytes: &mut Vec<u8>) -> PageMesh {
     let of =
         |pick: fn(f32, f32) -> f32, a: usize| mesh.positions.iter().map(|p| p[a]).reduce(pick).unwrap_or(0.0);
     let origin = [0, 1, 2].map(|a| of(f32::min, a));
@@ -172,7 +172,7 @@ fn mesh(mesh: &Drawn, bytes: &mut Vec<u8>) -> Mesh {
         }
     };
     let (triangles, edges) = (mesh.triangles.as_flattened(), mesh.edges.as_flattened());
-    Mesh {
+    PageMesh {
         step,
         origin: origin.map(f64::from),
         vertices: mesh.positions.len(),
@@ -190,8 +190,8 @@ fn placed(placement: &Placement, middle: &Point3<f64>) -> [f64; 7] {
     [x, y, z, i, j, k, w]
 }
 
-fn part<'a>(part: &'a ScenePart, middle: &Point3<f64>) -> Part<'a> {
-    Part {
+fn part<'a>(part: &'a ScenePart, middle: &Point3<f64>) -> PagePart<'a> {
+    PagePart {
         name: &part.name,
         mesh: part.drawn,
         colour: part.colour,
@@ -205,10 +205,10 @@ fn part<'a>(part: &'a ScenePart, middle: &Point3<f64>) -> Part<'a> {
     }
 }
 
-fn step<'a>(step: &'a SceneStep, middle: &Point3<f64>, bytes: &mut Vec<u8>) -> Step<'a> {
+fn step<'a>(step: &'a SceneStep, middle: &Point3<f64>, bytes: &mut Vec<u8>) -> PageStep<'a> {
     let numbers = |k: &Keyframe| placed(&k.placement, middle).map(|x| x as f32);
     let keys: Vec<u8> = step.keys.iter().flat_map(numbers).flat_map(f32::to_le_bytes).collect();
-    Step {
+    PageStep {
         part: step.part,
         words: &step.words,
         waited: &step.waited_for,

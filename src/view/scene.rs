@@ -36,7 +36,7 @@ pub struct Placement {
 
 /// A mesh as it is drawn, in the node frame: lengths of the input from the middle of the part's box.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Drawn {
+pub struct DrawnPart {
     /// Vertices; those on sharp edges are there once per side.
     pub positions: Vec<[f32; 3]>,
     /// Unit normals, outward, one per vertex.
@@ -123,7 +123,7 @@ pub struct PlanScene {
     /// What blocks the parts that should have moved; by name.
     pub blocked: Vec<BlockedDocument>,
     /// The meshes.
-    pub drawn: Vec<Drawn>,
+    pub drawn: Vec<DrawnPart>,
     /// The parts that are there, in the assembly's order.
     pub parts: Vec<ScenePart>,
     /// The steps in order.
@@ -137,7 +137,7 @@ impl PlanScene {
     /// The plan is about other parts.
     pub fn new(assembly: &Assembly, up: Up, plan: &PlanDocument) -> Result<Self, ViewError> {
         check_parts(assembly, plan)?;
-        let mut stage = Stage::new(assembly, plan);
+        let mut stage = SceneBuilder::new(assembly, plan);
         let parts: Vec<ScenePart> = stage.present.clone().iter().map(|&part| stage.part(part)).collect();
         let mut scene = Self {
             name: assembly.name.clone(),
@@ -222,17 +222,17 @@ fn check_parts(assembly: &Assembly, plan: &PlanDocument) -> Result<(), ViewError
 }
 
 /// What a scene is made from, and its meshes so far.
-struct Stage<'a> {
+struct SceneBuilder<'a> {
     assembly: &'a Assembly,
     plan: &'a PlanDocument,
     /// Places in the assembly of the scene's parts.
     present: Vec<usize>,
-    drawn: Vec<Drawn>,
+    drawn: Vec<DrawnPart>,
     /// Of each mesh: the shape, and the point of it that is the origin.
     origins: Vec<(usize, Point3<f64>)>,
 }
 
-impl<'a> Stage<'a> {
+impl<'a> SceneBuilder<'a> {
     fn new(assembly: &'a Assembly, plan: &'a PlanDocument) -> Self {
         let is_there = |i: &usize| !plan.initial.removed.contains(&assembly.parts[*i].name);
         let present = (0..assembly.parts.len()).filter(is_there).collect();
@@ -347,9 +347,9 @@ fn keys(path: &[Placement], begins: f64, size: f64) -> (Vec<Keyframe>, f64) {
     (keys, begins + lasts)
 }
 
-fn drawn(mesh: Shaded) -> Drawn {
+fn drawn(mesh: Shaded) -> DrawnPart {
     let single = |v: &Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32];
-    Drawn {
+    DrawnPart {
         positions: mesh.positions.iter().map(|p| single(&p.coords)).collect(),
         normals: mesh.normals.iter().map(single).collect(),
         triangles: mesh.triangles,

@@ -15,7 +15,7 @@ const MOST_NAMES: usize = 6;
 /// differ in a number only.
 #[must_use]
 pub fn markdown(plan: &PlanDocument, classes: Option<&[usize]>) -> String {
-    let account = Account { plan, classes, words: Words::of(plan), waited: waited_for(plan) };
+    let account = StepAccount { plan, classes, words: Words::of(plan), waited: waited_for(plan) };
     let mut text = account.headline();
     for group in account.groups() {
         text.push_str(&account.group(&group));
@@ -29,14 +29,14 @@ fn stem(name: &str) -> &str {
     name.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches(['-', '_', ' ', '.', '#'])
 }
 
-struct Account<'a> {
+struct StepAccount<'a> {
     plan: &'a PlanDocument,
     classes: Option<&'a [usize]>,
     words: Words<'a>,
     waited: Vec<Vec<&'a str>>,
 }
 
-impl Account<'_> {
+impl StepAccount<'_> {
     fn headline(&self) -> String {
         let steps = self.plan.steps.len();
         let count = if steps == 1 { "1 step".to_owned() } else { format!("{steps} steps") };

@@ -4,19 +4,19 @@
 //! it: `path`), so one comparison bounds ten turns. If it does not, because the part strays too far or a head meets
 //! its seat, each half of the stretch is compared, where the part strays less. Short stretches that stay open are
 //! left to [`path`](super::region_cover::path), as far as its budget goes, and to samples; otherwise the answer is
-//! the same kind of bound. A path in the middle of a thread's play (`centred`, from the flanks that face each other:
+//! the same kind of bound. A path in the middle of a thread's play (`thread_path`, from the flanks that face each other:
 //! `slip`) leaves the room that such a bound needs.
 
 use crate::budgets::{EFFORT_BEFORE_PROFILES, PATH_EFFORT_IN_DOUBT};
 use crate::tolerances::{SCREW_TURN, SHORTEST_SCREW_STRETCH, STRAY_SHARE};
 
-mod centred;
 mod envelope;
 mod helix_fit;
 mod path;
 mod slip;
 #[cfg(test)]
 mod tests;
+mod thread_path;
 mod unscrewing;
 
 use nalgebra::Point3;
@@ -24,7 +24,7 @@ use nalgebra::Point3;
 use crate::geometry::{Bounds, Pose, Surface};
 use crate::termination::{Interrupt, Termination};
 
-pub(crate) use centred::centred;
+pub(crate) use thread_path::path_on_thread;
 pub(crate) use unscrewing::{ScrewWay, ways_off};
 
 use super::course::{Course, Interval};

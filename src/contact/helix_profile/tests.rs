@@ -123,9 +123,9 @@ fn a_path_pressed_to_its_thread_is_brought_into_the_middle_of_the_play() {
     let wobble = |k: usize| Pose::translation(0.02 * (k as f64 * 1.7).sin(), 0.02 * (k as f64).sin(), 0.0);
     let path: Vec<Pose> = straight.iter().enumerate().map(|(k, p)| wobble(k) * p).collect();
     let t = Termination::default();
-    let centred = verifier.centred_on_thread(&scene, &[0], 1, &path, &t).unwrap().unwrap();
+    let centred = verifier.path_on_thread(&scene, &[0], 1, &path, &t).unwrap().unwrap();
     t.cancel_flag().store(true, std::sync::atomic::Ordering::Relaxed);
-    assert!(verifier.centred_on_thread(&scene, &[0], 1, &path, &t).is_err(), "half a profile tells nothing");
+    assert!(verifier.path_on_thread(&scene, &[0], 1, &path, &t).is_err(), "half a profile tells nothing");
     assert_eq!(centred[0], path[0]);
     assert_eq!(centred[centred.len() - 1], path[path.len() - 1]);
     assert!(checked(&scene, &verifier, &centred) <= LIMIT);
@@ -143,7 +143,7 @@ fn what_turns_beside_no_thread_is_left_as_it_is() {
     let peg = cuboid([-0.5, -0.5, 0.0], [0.5, 0.5, 4.0]);
     let (scene, verifier) = scene([cuboid([-3.0, -3.0, -1.0], [3.0, 3.0, 0.0]), peg]);
     let path = screwed(&scene, 2.0, PITCH, &Pose::identity());
-    assert_eq!(verifier.centred_on_thread(&scene, &[0], 1, &path, &Termination::default()), Ok(None));
+    assert_eq!(verifier.path_on_thread(&scene, &[0], 1, &path, &Termination::default()), Ok(None));
 }
 
 proptest! {

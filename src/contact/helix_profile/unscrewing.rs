@@ -12,9 +12,9 @@ use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{RISE_BY_RADIUS, RISE_RANGE};
 
-use super::centred::{SharedThread, ThreadPair};
 use super::helix_fit::{fitted_helix, fitted_rise};
 use super::slip::{FlankFacet, slipping};
+use super::thread_path::{SharedThread, ThreadPair};
 
 /// A way off a thread.
 #[derive(Debug, Clone)]

@@ -12,6 +12,7 @@
 //! | [`path`] | a whole path, between its poses too | the depth on the way |
 
 pub(crate) mod path;
+pub(crate) mod pieces;
 pub(crate) mod rigid;
 pub(crate) mod shift;
 pub(crate) mod surface_pair;

@@ -1,18 +1,16 @@
 //! Two surfaces that face each other. One is covered, in pieces; the other is measured, and no piece may enter it.
-//!
 
 use nalgebra::{Matrix3, Point3, Translation3, Vector3};
 
 use crate::budgets::PROBES;
-use crate::geometry::{
-    Closest, Cloud, FreeRegion, NoRegion, Parts, PatchTree, Pose, Surface, Wanted, bisected,
-    separating_direction,
-};
-use crate::scene::Scene;
+use crate::geometry::{FreeRegion, NoRegion, Pose, SignedClosest, Surface, Wanted, separating_direction};
+use crate::scene::{PosedPart, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
     ENTRY_PROBE, ENTRY_SHARE, HELD, REGION_ROOM, STEEP_COSINE, TILT, TOUCH_INSET, TOUCHED,
 };
+
+use super::pieces::{CoveredSurface, Piece, PlacedPiece};
 
 /// A plane that a part may not pass: its normal in the planning frame, and the standing part that it belongs to.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,8 +48,7 @@ pub(crate) struct Witness {
 #[derive(Clone)]
 pub(crate) struct SurfacePair<'a> {
     pub(crate) other: usize,
-    pub(crate) covered: &'a Surface,
-    tree: &'a PatchTree,
+    pub(crate) covered: CoveredSurface<'a>,
     pub(crate) measured: &'a Surface,
     /// Whether the covered surface is the moving part's.
     pub(crate) covers_part: bool,
@@ -71,7 +68,7 @@ impl<'a> SurfacePair<'a> {
     /// The termination condition became true.
     pub(crate) fn new(
         scene: &'a Scene,
-        (part, start): (usize, &Pose),
+        PosedPart { part, pose: start }: PosedPart<'_>,
         other: usize,
         covers_part: bool,
         termination: &Termination,
@@ -87,8 +84,7 @@ impl<'a> SurfacePair<'a> {
         let sense = if covers_part { 1.0 } else { -1.0 };
         Ok(Self {
             other,
-            covered: &covered.surface,
-            tree: covered.patches(termination)?,
+            covered: CoveredSurface { surface: &covered.surface, tree: covered.patches(termination)? },
             measured: &measured.surface,
             covers_part,
             stand,
@@ -114,14 +110,6 @@ impl<'a> SurfacePair<'a> {
         measured_from_covered(&self.stand, pose, self.covers_part)
     }
 
-    /// A corner of a piece in the covered surface's frame, by its index in [`PlacedPiece::points`].
-    pub(crate) fn corner(&self, piece: &Piece, number: usize) -> Point3<f64> {
-        match piece {
-            Piece::Patch(index) => self.tree.vertices(*index)[number],
-            Piece::Bit(corners) => corners[number],
-        }
-    }
-
     /// A convex region around a point in the measured surface's frame. It holds the given points, except that each
     /// may be outside by up to `most`, and it reaches beyond `radius` by some room.
     pub(crate) fn region(
@@ -131,79 +119,37 @@ impl<'a> SurfacePair<'a> {
         points: &[Point3<f64>],
         most: f64,
     ) -> Result<FreeRegion, NoRegion> {
-        let wanted = Wanted { points, most, from_behind: true, facing: Vector3::zeros() };
-        let closest = (&seen.closest, seen.signed);
-        self.measured.free_region_around(middle, radius * REGION_ROOM, closest, wanted)
-    }
-
-    /// The triangle of the measured surface that is nearest to a point in its frame, and the signed distance. The
-    /// search starts at the triangle `guess`.
-    pub(crate) fn look(&self, p: &Point3<f64>, guess: u32) -> SignedClosest {
-        let closest = self.measured.closest_from(p, guess);
-        SignedClosest { signed: self.measured.signed(p, &closest), closest }
-    }
-
-    /// A ball that holds a piece, in the covered surface's frame.
-    pub(crate) fn ball(&self, piece: &Piece) -> (Point3<f64>, f64) {
-        match piece {
-            Piece::Patch(index) => {
-                let patch = self.tree.patch(*index);
-                (patch.centre, patch.radius)
-            }
-            Piece::Bit(corners) => ball_of(corners),
-        }
-    }
-
-    /// A triangle of a piece, if the piece is a patch.
-    pub(crate) fn triangle_of(&self, piece: &Piece) -> Option<u32> {
-        match piece {
-            Piece::Patch(index) => self.tree.triangles(*index).first().copied(),
-            Piece::Bit(_) => None,
-        }
-    }
-
-    /// The whole covered surface, unless it has no triangles.
-    pub(crate) fn root(&self) -> Option<Piece> {
-        self.tree.root().map(Piece::Patch)
-    }
-
-    /// The parts of a piece.
-    pub(crate) fn parts(&self, piece: &Piece) -> Vec<Piece> {
-        match piece {
-            Piece::Bit(corners) => bisected(corners).1.map(Piece::Bit).to_vec(),
-            Piece::Patch(index) => match self.tree.parts(*index) {
-                Parts::Patches(children) => children.map(Piece::Patch).to_vec(),
-                Parts::Triangles(list) => list.iter().map(|&t| Piece::Bit(self.covered.corners(t))).collect(),
-            },
-        }
+        let wanted = Wanted { points, most, from_behind: true, facing: Vector3::zeros(), spared: 0.0 };
+        self.measured.free_region_around(middle, radius * REGION_ROOM, seen, wanted)
     }
 
     /// Places a piece against the measured surface, with the part shifted by `at`.
     pub(crate) fn place(&self, piece: &Piece, at: &Vector3<f64>, placed: &mut PlacedPiece) {
         let shift = Translation3::from(self.shifted * at);
-        self.place_at(piece, &(shift * self.measured_from_covered), placed);
+        self.covered.place(piece, &(shift * self.measured_from_covered), placed);
     }
 
-    /// Places a piece with the covered surface at a pose in the measured surface's frame.
-    pub(crate) fn place_at(&self, piece: &Piece, measured_from_covered: &Pose, placed: &mut PlacedPiece) {
-        let place = |p: &Point3<f64>| measured_from_covered * p;
-        placed.points.clear();
-        placed.extremes.clear();
-        match piece {
-            Piece::Patch(index) => {
-                let patch = self.tree.patch(*index);
-                placed.points.extend(self.tree.vertices(*index).iter().map(place));
-                placed.extremes.extend(self.tree.extremes(*index).map(place));
-                (placed.centre, placed.radius) = (place(&patch.centre), patch.radius);
+    /// The plane of the face nearest to a placed piece that leaves its centre the most room `ahead`: its normal, how far
+    /// above it the lowest corner is, and its triangle. It serves as the region of a small piece that is no deeper than
+    /// allowed, where surfaces cross and there are no regions. Unlike a region this is not certain; paths are verified.
+    pub(crate) fn before_face(
+        &self,
+        piece: &PlacedPiece,
+        guess: u32,
+        ahead: &Vector3<f64>,
+    ) -> Option<(Vector3<f64>, f64, u32)> {
+        let closest = self.measured.closest_from(&piece.centre, guess);
+        let mut best: Option<(f64, Vector3<f64>)> = None;
+        self.measured.feature_normals(&closest, |n| {
+            let ends = n.dot(&(piece.centre + ahead - closest.point));
+            if best.is_none_or(|(most, _)| ends > most) {
+                best = Some((ends, n));
             }
-            Piece::Bit(corners) => {
-                let corners = corners.map(|p| place(&p));
-                placed.points.extend(corners);
-                placed.extremes.extend(corners);
-                (placed.centre, placed.radius) = ball_of(&corners);
-            }
-        }
-        placed.cloud.refill(&placed.points);
+        });
+        let (_, normal) = best?;
+        let above = |p: &Point3<f64>| normal.dot(&(p - closest.point));
+        let gap = piece.points.iter().map(above).fold(f64::INFINITY, f64::min);
+        Some((normal, gap, closest.triangle))
     }
 
     /// Whether a plane separates a triangle of the measured surface from a placed piece, up to `most`.
@@ -274,14 +220,15 @@ impl<'a> SurfacePair<'a> {
         WantedShift { at, along }: &WantedShift,
         guess: u32,
     ) -> Option<Obstacle> {
-        if self.covered.is_open() {
+        if self.covered.surface.is_open() {
             return None;
         }
         let here = Translation3::from(self.shifted * at) * self.measured_from_covered;
         let ahead = -here.inverse_transform_vector(&(self.shifted * along));
         self.measured.corners_and_middles(triangle).iter().find_map(|p| {
             let p = here.inverse_transform_point(p);
-            let (normal, _) = entered(self.covered, (&p, &ahead), (guess, Slope::Steep), self.allowed)?;
+            let (normal, _) =
+                entered(self.covered.surface, (&p, &ahead), (guess, Slope::Steep), self.allowed)?;
             Some(Obstacle { normal: self.shifted.transpose() * (here * -normal), other: self.other })
         })
     }
@@ -294,7 +241,7 @@ impl<'a> SurfacePair<'a> {
         placed: &PlacedPiece,
         WantedShift { at, along }: &WantedShift,
     ) -> Vec<Point3<f64>> {
-        let Self { covered, tree, measured_from_covered, shifted, .. } = self;
+        let Self { covered: CoveredSurface { surface, tree }, measured_from_covered, shifted, .. } = self;
         let ahead = &(shifted * along);
         let mut probes = placed.points.clone();
         if probes.len() > PROBES {
@@ -312,7 +259,7 @@ impl<'a> SurfacePair<'a> {
             }
         };
         match *piece {
-            Piece::Patch(index) => tree.triangles(index).iter().for_each(|&t| middle(covered.corners(t))),
+            Piece::Patch(index) => tree.triangles(index).iter().for_each(|&t| middle(surface.corners(t))),
             Piece::Bit(corners) => middle(corners),
         }
         middles.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -329,11 +276,8 @@ fn entered(
     (guess, slope): (u32, Slope),
     allowed: f64,
 ) -> Option<(Vector3<f64>, u32)> {
-    let depth = |p: &Point3<f64>, guess: u32| {
-        let closest = surface.closest_from(p, guess);
-        (-surface.signed(p, &closest), closest)
-    };
-    let (now, closest) = depth(p, guess);
+    let SignedClosest { signed, closest } = surface.signed_closest(p, guess);
+    let now = -signed;
     let (mut least, mut most): (Option<Vector3<f64>>, Option<Vector3<f64>>) = (None, None);
     surface.feature_normals(&closest, |n| {
         let speed = n.dot(ahead);
@@ -352,30 +296,16 @@ fn entered(
     let touches = (-TOUCHED..=HELD).contains(&(now - allowed));
     let is_flat = slope == Slope::Any && touches && least.as_ref().is_some_and(blocking);
     let is_certain = is_flat || {
-        let (then, _) = depth(&(p + ahead * ENTRY_PROBE), closest.triangle);
-        then > now.max(allowed) + ENTRY_SHARE * ENTRY_PROBE
+        let then = surface.signed_closest(&(p + ahead * ENTRY_PROBE), closest.triangle);
+        -then.signed > now.max(allowed) + ENTRY_SHARE * ENTRY_PROBE
     };
     // At a convex edge it is enough to stay above either face. If neither stops the point, the edge is reentrant.
     let normal = is_certain.then_some(least.filter(blocking).or(most.filter(blocking))?)?;
     Some((normal, closest.triangle))
 }
 
-fn ball_of(corners: &[Point3<f64>; 3]) -> (Point3<f64>, f64) {
-    let centre = Point3::from(corners.iter().map(|p| p.coords).sum::<Vector3<f64>>() / 3.0);
-    (centre, corners.iter().map(|p| (p - centre).norm()).fold(0.0, f64::max))
-}
-
 fn measured_from_covered(stand: &Pose, part: &Pose, covers_part: bool) -> Pose {
     if covers_part { stand.inverse() * part } else { part.inverse() * stand }
-}
-
-/// A piece of the covered surface.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Piece {
-    /// A node of the patch tree.
-    Patch(u32),
-    /// A triangle, or a part of one, by its corners.
-    Bit([Point3<f64>; 3]),
 }
 
 /// The shift at which a piece is, and the direction in which it is to go on.
@@ -398,26 +328,6 @@ pub(crate) struct CoverPiece {
     pub(crate) held: f64,
 }
 
-/// What of the measured surface is nearest to a point, and its signed distance (negative inside).
-pub(crate) struct SignedClosest {
-    pub(crate) closest: Closest,
-    pub(crate) signed: f64,
-}
-
-/// A piece in the measured surface's frame.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct PlacedPiece {
-    /// Its corners.
-    pub(crate) points: Vec<Point3<f64>>,
-    /// The same points, grouped by four for vector instructions.
-    pub(crate) cloud: Cloud,
-    /// The points that reach furthest.
-    pub(crate) extremes: Vec<Point3<f64>>,
-    /// A ball that holds it.
-    pub(crate) centre: Point3<f64>,
-    pub(crate) radius: f64,
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -432,10 +342,11 @@ mod tests {
         let pin = cuboid([-0.5, -0.5, -4.0], [0.5, 0.5, 4.0]);
         let (scene, _) = scene([plate, pin]);
         let start = scene.bodies[1].planning_from_shape;
-        let pair = SurfacePair::new(&scene, (1, &start), 0, true, &Termination::default()).unwrap();
+        let pair =
+            SurfacePair::new(&scene, PosedPart::new(1, &start), 0, true, &Termination::default()).unwrap();
         let mut placed = PlacedPiece::default();
         let still = Vector3::zeros();
-        pair.place(&pair.root().unwrap(), &still, &mut placed);
+        pair.place(&pair.covered.root().unwrap(), &still, &mut placed);
         for u in [Vector3::x(), -Vector3::y(), Vector3::new(0.6, 0.8, 0.0), Vector3::z(), -Vector3::z()] {
             assert!(
                 pair.obstacles(

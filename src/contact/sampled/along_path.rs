@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::budgets::{FIRST_POSES_EVERY, LONG_PATH, LONG_STEPS_PER_POLL, POSES_AT_ONCE, SAMPLE_SHARES};
-use crate::geometry::{Ball, Bounds, Look, Pose, SampleTree, Shape, Spacing, Surface, interpolate};
+use crate::geometry::{Bounds, Look, Pose, SampleBall, SampleTree, Shape, Spacing, Surface, interpolate};
 use crate::termination::{Interrupt, Poll, Termination};
 use crate::tolerances::{HELPFUL, PATH_DENSITY};
 
@@ -220,7 +220,7 @@ impl PathSide<'_> {
         let inner = measured.bounds().grown(-allowed);
         let pose = |moment: usize| &self.to_measured[asked.moments[moment]];
         let mut out = Vec::new();
-        let look = |ball: Ball<'_>, moments: &Range<usize>, (guess, c, known): Known| {
+        let look = |ball: SampleBall<'_>, moments: &Range<usize>, (guess, c, known): Known| {
             let middle = moments.start.midpoint(moments.end);
             let at = pose(middle) * ball.centre;
             let ways = moments.clone().map(|moment| (pose(moment) * ball.centre - at).norm_squared());

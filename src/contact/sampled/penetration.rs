@@ -7,7 +7,7 @@ use nalgebra::Point3;
 
 use crate::budgets::{PASSAGE_POSES, SHORT_STEPS_PER_POLL};
 use crate::geometry::{Pose, SampleTree, interpolate};
-use crate::scene::{Body, Scene};
+use crate::scene::{Body, PosedPart, Scene};
 use crate::sdf::Grid;
 use crate::termination::{Interrupt, Poll, Termination, try_all};
 
@@ -160,7 +160,7 @@ pub fn passes_straight(
 pub fn seems_clear(
     scene: &Scene,
     standing: &[usize],
-    (part, pose): (usize, &Pose),
+    PosedPart { part, pose }: PosedPart<'_>,
     by: f64,
     termination: &Termination,
 ) -> Result<bool, Interrupt> {

@@ -25,13 +25,11 @@ pub(super) fn grown(
     seed: &Point3<f64>,
     radius: f64,
     wanted: Wanted<'_>,
-    spared: f64,
 ) -> Result<FreeRegion, NoRegion> {
     let reach = wanted.points.iter().map(|p| (p - seed).norm()).fold(0.0, f64::max);
-    let mut growth = Growth {
+    let mut growth = RegionGrowth {
         surface,
         wanted,
-        spared,
         cloud: Cloud::new(wanted.points, seed),
         inset: Vec::new(),
         least: (radius * 0.5).max(reach - wanted.most),
@@ -45,7 +43,7 @@ pub(super) fn grown(
         amid: None,
     };
     surface.nearest_first(seed, &mut growth);
-    let Growth { region, least, amid, .. } = growth;
+    let RegionGrowth { region, least, amid, .. } = growth;
     match amid {
         Some(triangle) => Err(NoRegion::Amid(triangle)),
         None if region.radius < least => Err(NoRegion::Cramped),
@@ -54,14 +52,9 @@ pub(super) fn grown(
 }
 
 /// A region as its planes are found.
-struct Growth<'a> {
+struct RegionGrowth<'a> {
     surface: &'a Surface,
     wanted: Wanted<'a>,
-    /// Wanted points may be this far behind a side as if they were before it. Without that, planes askew to
-    /// all faces are taken because they leave a little more room before the few points, two of which make a
-    /// wedge that is far from these: of a nut that is a hair too tight for its bolt all small pieces by its ends
-    /// were without a region.
-    spared: f64,
     /// The wanted points and the seed.
     cloud: Cloud,
     /// The wanted points, a little towards the seed, so that hulls which touch are apart: made when
@@ -77,7 +70,7 @@ struct Growth<'a> {
 /// A half-space, and how far the worst of the wanted points is inside.
 type Candidate = Option<(f64, HalfSpace)>;
 
-impl Growth<'_> {
+impl RegionGrowth<'_> {
     /// The better of two half-spaces: that in front of some corners with this normal, and the best
     /// so far.
     fn better(
@@ -105,7 +98,7 @@ impl Growth<'_> {
     /// The best half-space in front of a triangle, of those that are worth trying.
     fn best(&mut self, triangle: u32, corners: &[Point3<f64>], closest: &Closest) -> Candidate {
         let seed = self.region.centre;
-        let spared = self.spared;
+        let spared = self.wanted.spared;
         let enough = |best: Candidate| best.is_some_and(|(worth, _)| worth >= -spared);
         // The faces that meet where the triangle is nearest, and the way there.
         let mut best = None;
@@ -175,7 +168,7 @@ impl Growth<'_> {
     }
 }
 
-impl Visitor for Growth<'_> {
+impl Visitor for RegionGrowth<'_> {
     fn reach(&self) -> f64 {
         self.region.radius
     }

@@ -27,12 +27,12 @@ pub(super) fn drop_repeated(draft: &mut Draft, findings: &mut Findings) {
 
 /// Occurrences of one triangle, by direction of travel.
 #[derive(Default)]
-struct Group {
+struct EqualTriangles {
     forwards: Vec<usize>,
     backwards: Vec<usize>,
 }
 
-impl Group {
+impl EqualTriangles {
     /// The occurrence that stays.
     fn survivor(&self, walls: bool) -> Option<usize> {
         let balanced = self.forwards.len() == self.backwards.len();
@@ -57,8 +57,8 @@ fn any_repeated(triangles: &[[u32; 3]]) -> bool {
     corners.windows(2).any(|pair| pair[0] == pair[1])
 }
 
-fn groups(triangles: &[[u32; 3]]) -> HashMap<[u32; 3], Group> {
-    let mut groups: HashMap<[u32; 3], Group> = HashMap::with_capacity(triangles.len());
+fn groups(triangles: &[[u32; 3]]) -> HashMap<[u32; 3], EqualTriangles> {
+    let mut groups: HashMap<[u32; 3], EqualTriangles> = HashMap::with_capacity(triangles.len());
     for (index, &[a, b, c]) in triangles.iter().enumerate() {
         let [x, y, z] = match a.min(b).min(c) {
             least if least == a => [a, b, c],

@@ -37,10 +37,10 @@ pub(super) fn orient(draft: &Draft, findings: &mut Findings) -> Oriented {
 }
 
 /// The neighbours of a triangle over manifold edges, and whether they agree with it.
-type Neighbours = [Option<(u32, bool)>; 3];
+type EdgeNeighbours = [Option<(u32, bool)>; 3];
 
-fn neighbours(triangles: &[[u32; 3]]) -> Vec<Neighbours> {
-    let mut neighbours = vec![Neighbours::default(); triangles.len()];
+fn neighbours(triangles: &[[u32; 3]]) -> Vec<EdgeNeighbours> {
+    let mut neighbours = vec![EdgeNeighbours::default(); triangles.len()];
     let mut add = |to: u32, neighbour: (u32, bool)| {
         if let Some(free) = neighbours[to as usize].iter_mut().find(|n| n.is_none()) {
             *free = Some(neighbour);
@@ -62,7 +62,7 @@ struct Flood {
 
 impl Flood {
     /// The surface of a seed, its triangles marked by whether they must turn to agree with it.
-    fn run(&mut self, seed: usize, neighbours: &[Neighbours]) -> Vec<usize> {
+    fn run(&mut self, seed: usize, neighbours: &[EdgeNeighbours]) -> Vec<usize> {
         self.turned[seed] = Some(false);
         let mut surface = vec![seed];
         let mut next = 0;

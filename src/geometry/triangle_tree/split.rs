@@ -9,15 +9,15 @@ const LEAST_SHARE: usize = 16;
 
 /// A box whose corners fill vector registers; the last places are padding.
 #[derive(Clone, Copy)]
-pub(super) struct Item {
+pub(super) struct BoxedTriangle {
     min: [f64; 4],
     max: [f64; 4],
 }
 
 /// How many items there are, and the box of them all.
-type Counted = (usize, Item);
+type Counted = (usize, BoxedTriangle);
 
-impl Item {
+impl BoxedTriangle {
     const EMPTY: Self = Self { min: [f64::INFINITY; 4], max: [f64::NEG_INFINITY; 4] };
 
     pub(super) fn new(bounds: &Bounds) -> Self {
@@ -63,7 +63,7 @@ impl Item {
 
 /// Splits items in two where the boxes' areas times their counts get smallest (surface area
 /// heuristic), or in the middle if all centres coincide.
-pub(super) fn split<'a>(items: &[Item], order: &'a mut [u32]) -> (&'a mut [u32], &'a mut [u32]) {
+pub(super) fn split<'a>(items: &[BoxedTriangle], order: &'a mut [u32]) -> (&'a mut [u32], &'a mut [u32]) {
     let least = order.len().div_ceil(LEAST_SHARE).max(1);
     let (mut low, mut high) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
     for &i in order.iter() {
@@ -76,7 +76,7 @@ pub(super) fn split<'a>(items: &[Item], order: &'a mut [u32]) -> (&'a mut [u32],
     let scale: [f64; 4] = std::array::from_fn(|a| BINS as f64 / (high[a] - low[a]));
     let is_split = |a: usize| scale[a].is_finite() && high[a] > low[a];
     // All axes in one pass: what costs is to fetch the items. Along an axis that is not split, anything will do.
-    let mut bins = [[(0usize, Item::EMPTY); BINS]; 3];
+    let mut bins = [[(0usize, BoxedTriangle::EMPTY); BINS]; 3];
     for &i in order.iter() {
         let item = &items[i as usize];
         let middle = item.middle();
@@ -96,7 +96,7 @@ pub(super) fn split<'a>(items: &[Item], order: &'a mut [u32]) -> (&'a mut [u32],
             parted(order, |i| items[i as usize].middle()[axis] < at).clamp(least, order.len() - least)
         }
         None => {
-            let longest = Item::around(items, order).bounds().extents().imax();
+            let longest = BoxedTriangle::around(items, order).bounds().extents().imax();
             let centre = |i: u32| items[i as usize].middle()[longest];
             order.sort_by(|&i, &j| centre(i).total_cmp(&centre(j)));
             order.len() / 2
@@ -115,13 +115,13 @@ fn cheapest(bins: &[Counted; BINS], least: usize, known: Option<f64>) -> Option<
         count += 1;
     }
     let full = &full[..count];
-    let mut above = [(0usize, Item::EMPTY); BINS];
-    let mut rest = (0usize, Item::EMPTY);
+    let mut above = [(0usize, BoxedTriangle::EMPTY); BINS];
+    let mut rest = (0usize, BoxedTriangle::EMPTY);
     for &k in full.iter().rev() {
         above[k] = rest;
         rest = joined(&rest, &bins[k]);
     }
-    let mut below = (0usize, Item::EMPTY);
+    let mut below = (0usize, BoxedTriangle::EMPTY);
     let (mut known, mut best) = (known, None);
     for &k in full {
         below = joined(&below, &bins[k]);

@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use super::*;
 use crate::cache::CacheSettings;
 use crate::fixtures::{ball, cuboid, l_shape, open_box, spread, surface};
-use crate::sdf::Estimate;
+use crate::sdf::FieldEstimate;
 
 const FOLDER: &str = "fields";
 
@@ -46,7 +46,7 @@ impl Solid {
     }
 
     /// What a field says all over the lower part of its box.
-    fn told(&self, field: &Field, part: f64) -> Vec<(Estimate, Option<u32>)> {
+    fn told(&self, field: &Field, part: f64) -> Vec<(FieldEstimate, Option<u32>)> {
         let b = self.surface.bounds().grown(0.2);
         let to: Point3<f64> = b.min + b.extents() * part;
         let points = spread(b.min.into(), to.into(), 2000);
@@ -54,7 +54,7 @@ impl Solid {
     }
 
     /// What it says that was never in a file.
-    fn truth(&self) -> Vec<(Estimate, Option<u32>)> {
+    fn truth(&self) -> Vec<(FieldEstimate, Option<u32>)> {
         self.told(&Field::of(&self.surface), 1.0)
     }
 

@@ -7,7 +7,7 @@
 
 use crate::budgets::{EAGER_ROUNDS, LAZY_ROUNDS, STEP_HALVINGS, STEPS_PER_POLL};
 
-mod lift;
+mod clearance;
 mod release;
 #[cfg(test)]
 mod tests;

@@ -3,8 +3,7 @@
 //! Steps of equal displacement show a screw (a line, if nothing turns). It is followed as long as the fields show
 //! that nothing is entered and that what the part is pressed against is still there, so the part falls into a slot as
 //! it would in short steps. At the end of a long step everything is measured exactly. A part that is pressed to a
-//! thread of triangles wobbles; it is lifted into the middle of its play, and the mean screw of its steps is followed
-//! there. Each long step is twice as long as the one before: at its end, the screw is known twice as well.
+//! thread of triangles wobbles; it is given clearance, and the mean screw of its steps is followed there. Each long step is twice as long as the one before: at its end, the screw is known twice as well.
 
 use std::f64::consts::TAU;
 
@@ -142,7 +141,7 @@ impl<'a> HelixExtrapolation<'a> {
         let mut steps = telling(&screw, self.free_on_helix(mover, &screw, wanted, &pressing)?);
         while steps >= SHORTEST_HELIX_EXTRAPOLATION {
             let there = MovingBody { pose: screw.times(steps as f64) * mover.pose, ..*mover };
-            if let Some(pose) = self.drive.lifted(&there, &screw.axis(), self.standing_parts)? {
+            if let Some(pose) = self.drive.with_clearance(&there, &screw.axis(), self.standing_parts)? {
                 let angle = screw.angle() * steps as f64;
                 let screw = Screw::between_turning(&mover.pose, &pose, steps, &screw, angle);
                 let length = if steps == wanted { steps * 2 } else { steps };

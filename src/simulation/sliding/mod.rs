@@ -22,7 +22,7 @@ use crate::contact::region_cover::Halt;
 use crate::contact::region_cover::rigid::RigidCover;
 use crate::contact::sampled::MovingBody;
 use crate::geometry::Pose;
-use crate::scene::{Scene, StandingParts, exit_direction};
+use crate::scene::{PosedPart, Scene, StandingParts, exit_direction};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::BULGE_TOLERANCE;
 
@@ -63,7 +63,7 @@ impl TransitionFunction for SlidingEngine {
     ) -> Result<Motion, Interrupt> {
         let is_refined = is_refined(scene, standing_parts, part);
         if let (Action::Push(..), false) = (action, is_refined) {
-            match pushed(scene, standing_parts, (part, start), action, termination) {
+            match pushed(scene, standing_parts, PosedPart::new(part, start), action, termination) {
                 Err(Halt::Lost | Halt::Blocked) => {}
                 Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
                 Ok(motion) => return Ok(motion),
@@ -75,8 +75,14 @@ impl TransitionFunction for SlidingEngine {
         let mut turning = Turning::new(&mover);
         // A push comes here only if regions could not cover it.
         let by_samples = is_refined || !action.turns();
-        let mut around =
-            RigidCover::new(scene, standing_parts, (part, start), drive.reach(), by_samples, termination);
+        let mut around = RigidCover::new(
+            scene,
+            standing_parts,
+            PosedPart::new(part, start),
+            drive.reach(),
+            by_samples,
+            termination,
+        );
         let mut extrapolation = HelixExtrapolation::new(scene, standing_parts, part, &drive);
         let mut near = None;
         while path.len() < MOTION_POSES {
@@ -135,17 +141,17 @@ fn is_refined(scene: &Scene, standing_parts: &StandingParts, part: usize) -> boo
 fn pushed(
     scene: &Scene,
     standing_parts: &StandingParts,
-    (part, start): (usize, &Pose),
+    moving: PosedPart<'_>,
     action: Action,
     termination: &Termination,
 ) -> Result<Motion, Halt> {
-    let mut push = Push::new(scene, &standing_parts.standing, (part, start), action.force(), termination);
-    let (mut path, mut asked) = (vec![*start], Vec::new());
+    let mut push = Push::new(scene, &standing_parts.standing, moving, action.force(), termination);
+    let (mut path, mut asked) = (vec![*moving.pose], Vec::new());
     while path.len() < MOTION_POSES {
         let step = match push.step() {
             // If regions cannot cover the place where a flight landed, the push starts again without flights.
             Err(Halt::Lost) if push.begins_on_foot() => {
-                (path, asked) = (vec![*start], Vec::new());
+                (path, asked) = (vec![*moving.pose], Vec::new());
                 continue;
             }
             step => step?,
@@ -158,7 +164,7 @@ fn pushed(
         }
         let hint = asked_again(&action, asked.len());
         asked.push(path.len() as u32 - 1);
-        if let Some(d) = exit_direction(scene, standing_parts, part, &path[path.len() - 1], hint) {
+        if let Some(d) = exit_direction(scene, standing_parts, moving.part, &path[path.len() - 1], hint) {
             return Ok(Motion::simulated(path, asked, End::Disassembled(d)));
         }
     }

@@ -9,7 +9,7 @@ use crate::contact::region_cover::shift::ShiftCover;
 use crate::contact::region_cover::surface_pair::SurfacePair;
 use crate::contact::sampled::{ContactCache, MovingBody, StartContacts};
 use crate::geometry::Pose;
-use crate::scene::Scene;
+use crate::scene::{PosedPart, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::FREE_STEP;
 
@@ -109,10 +109,11 @@ fn translations_blocked(
     // time.
     let bounds = scene.bodies[part].shape.bounds().transformed(pose).grown(FREE_STEP);
     if !actions.is_empty() && !scene.broad_phase.meeting_of(&standing, &bounds).is_empty() {
-        ShiftCover::new(scene, (part, pose), termination).add(other, &Vector3::zeros())?;
+        ShiftCover::new(scene, PosedPart::new(part, pose), termination).add(other, &Vector3::zeros())?;
     }
     let blocked = |action: &Action| {
-        let mut push = Push::new(scene, &standing, (part, pose), action.force(), termination).short();
+        let mut push =
+            Push::new(scene, &standing, PosedPart::new(part, pose), action.force(), termination).short();
         for _ in 0..STATIC_PUSHES {
             if let push::PushStep::Stuck { .. } = push.step()? {
                 return Ok(true);

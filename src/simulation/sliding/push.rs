@@ -12,7 +12,7 @@ use crate::contact::region_cover::Halt;
 use crate::contact::region_cover::shift::ShiftCover;
 use crate::contact::region_cover::surface_pair::Obstacle;
 use crate::geometry::{Bounds, Pose};
-use crate::scene::Scene;
+use crate::scene::{PosedPart, Scene};
 use crate::termination::Termination;
 use crate::tolerances::{FREE_STEP, STALL, STUCK_SHARE};
 
@@ -50,7 +50,7 @@ impl<'a> Push<'a> {
     pub(super) fn new(
         scene: &'a Scene,
         standing: &'a [usize],
-        (part, start): (usize, &Pose),
+        PosedPart { part, pose: start }: PosedPart<'_>,
         force: Vector3<f64>,
         termination: &'a Termination,
     ) -> Self {
@@ -62,7 +62,7 @@ impl<'a> Push<'a> {
             bounds: shape.bounds().transformed(start),
             force,
             shift: Vector3::zeros(),
-            cover: ShiftCover::new(scene, (part, start), termination),
+            cover: ShiftCover::new(scene, PosedPart::new(part, start), termination),
             asked_at: None,
             stalls: 0,
             contact_step: contact_step(shape),
@@ -208,7 +208,7 @@ mod tests {
         let termination = Termination::default();
         let standing: Vec<usize> = (0..scene.bodies.len()).filter(|&i| i != 1).collect();
         let start = scene.bodies[1].planning_from_shape;
-        let mut push = Push::new(scene, &standing, (1, &start), force, &termination);
+        let mut push = Push::new(scene, &standing, PosedPart::new(1, &start), force, &termination);
         let mut shifts = vec![Vector3::zeros()];
         for _ in 0..steps {
             match push.step() {
@@ -254,7 +254,7 @@ mod tests {
         let (scene, _) = scene([plate, block, cuboid([3.0, -4.0, 0.0], [3.5, 4.0, 3.0])]);
         let termination = Termination::default();
         let start = scene.bodies[1].planning_from_shape;
-        let mut push = Push::new(&scene, &[0, 2], (1, &start), Vector3::x(), &termination);
+        let mut push = Push::new(&scene, &[0, 2], PosedPart::new(1, &start), Vector3::x(), &termination);
         let stopped = |push: &mut Push<'_>| {
             while let PushStep::Moved(_) = push.step().unwrap() {}
             push.travel()

@@ -12,7 +12,7 @@ use crate::contact::region_cover::rigid::RigidCover;
 use crate::contact::region_cover::shift::ShiftCover;
 use crate::contact::sampled::MovingBody;
 use crate::geometry::Pose;
-use crate::scene::{Memo, Scene, StandingParts};
+use crate::scene::{Memo, PosedPart, Scene, StandingParts};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::FREE_STEP;
 
@@ -60,15 +60,27 @@ pub fn step_costs(
     let mut costs = Vec::new();
     if !action.turns() {
         for pose in poses {
-            costs.extend(of_shift(scene, standing_parts, (part, pose), action.force(), termination)?);
+            costs.extend(of_shift(
+                scene,
+                standing_parts,
+                PosedPart::new(part, pose),
+                action.force(),
+                termination,
+            )?);
         }
         return Ok(costs);
     }
     let Some(start) = poses.first() else { return Ok(costs) };
     let drive = Drive::new(scene, part, start, action);
     for by_samples in [false, true] {
-        let mut around =
-            RigidCover::new(scene, standing_parts, (part, start), drive.reach(), by_samples, termination);
+        let mut around = RigidCover::new(
+            scene,
+            standing_parts,
+            PosedPart::new(part, start),
+            drive.reach(),
+            by_samples,
+            termination,
+        );
         for pose in poses {
             termination.check()?;
             // From some way on these would be the others.
@@ -97,17 +109,17 @@ pub fn step_costs(
 fn of_shift(
     scene: &Scene,
     standing_parts: &StandingParts,
-    (part, start): (usize, &Pose),
+    moving: PosedPart<'_>,
     force: Vector3<f64>,
     termination: &Termination,
 ) -> Result<Option<StepCost>, Interrupt> {
     let scene = Scene { memo: Memo::default(), ..scene.clone() };
-    let bounds = scene.bodies[part].shape.bounds().transformed(start).grown(FREE_STEP);
+    let bounds = scene.bodies[moving.part].shape.bounds().transformed(moving.pose).grown(FREE_STEP);
     let near = scene.broad_phase.meeting_of(&standing_parts.standing, &bounds);
     if near.is_empty() {
         return Ok(None);
     }
-    let mut cover = ShiftCover::new(&scene, (part, start), termination);
+    let mut cover = ShiftCover::new(&scene, moving, termination);
     let (here, mut obstacles) = (Vector3::zeros(), Vec::new());
     let cost = (|| {
         let (gathered, gather) = timed(|| near.iter().try_for_each(|&other| cover.add(other, &here)));

@@ -3,7 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use crate::budgets::{HULL_CORNERS, RECENT_REGIONS, REGION_EFFORT, REGIONS_OF_PLACE};
-use crate::geometry::{Closest, FreeRegion, HullDepth, Parts, PatchTree, Wanted};
+use crate::geometry::{FreeRegion, HullDepth, Parts, PatchTree, SignedClosest, Wanted};
 use crate::tolerances::SWEPT_ROOM;
 
 use super::super::super::course::Leg;
@@ -40,9 +40,9 @@ impl PathSearch<'_> {
                     && self.settled(depth + slack);
             }
         }
-        let closest = question.measured.closest_from(&swept.centre, hint.triangle);
-        hint.triangle = closest.triangle;
-        let signed = question.measured.signed(&swept.centre, &closest);
+        let seen = question.measured.signed_closest(&swept.centre, hint.triangle);
+        let signed = seen.signed;
+        hint.triangle = seen.closest.triangle;
         // Depth changes by no more than the distance, unless the surface has holes. Then its sign changes in mid-air,
         // too, where the winding number passes one half: a point far outside may lie next to one as far inside.
         if swept.radius - signed <= ignored {
@@ -67,8 +67,7 @@ impl PathSearch<'_> {
         }
         hint.is_vain = true;
         self.found.effort += REGION_EFFORT;
-        let seen = (&closest, signed);
-        let Some(mut free) = self.region(swept, seen, most, ignored) else { return false };
+        let Some(mut free) = self.region(swept, &seen, most, ignored) else { return false };
         let mut fit = fits(&free, most);
         // The planes that leave most room before a few corners may be askew to a wall along which all other corners
         // lie, as of a hole around a pin. One more region takes less time than the pieces that would follow.
@@ -78,7 +77,7 @@ impl PathSearch<'_> {
         {
             self.wanted = corners;
             self.found.effort += REGION_EFFORT;
-            if let Some(fitted) = self.region(swept, seen, most, ignored) {
+            if let Some(fitted) = self.region(swept, &seen, most, ignored) {
                 fit = fits(&fitted, most);
                 free = fitted;
             }
@@ -117,23 +116,18 @@ impl PathSearch<'_> {
     }
 
     /// A region for a piece: around its centre, or around the nearest point outside.
-    fn region(
-        &self,
-        swept: &SweptBall,
-        seen: (&Closest, f64),
-        most: f64,
-        ignored: f64,
-    ) -> Option<FreeRegion> {
+    fn region(&self, swept: &SweptBall, seen: &SignedClosest, most: f64, ignored: f64) -> Option<FreeRegion> {
         let SweptBall { centre, radius, .. } = swept;
-        let wanted = Wanted { points: &self.wanted, most, from_behind: false, facing: self.facing };
-        self.question.measured.free_region_sparing(centre, radius * SWEPT_ROOM, seen, wanted, ignored).ok()
+        let wanted =
+            Wanted { points: &self.wanted, most, from_behind: false, facing: self.facing, spared: ignored };
+        self.question.measured.free_region_around(centre, radius * SWEPT_ROOM, seen, wanted).ok()
     }
 
     /// Whether a depth is real, as measured at the worst corner, or too small to matter, and not the effect of a
     /// region that is too narrow.
     fn is_told(&mut self, swept: &SweptBall, depth: f64, worst: &Point3<f64>, guess: u32) -> bool {
         let SideQuestion { measured, allowed, precision, .. } = self.question;
-        let real = -measured.signed(worst, &measured.closest_from(worst, guess));
+        let real = -measured.signed_closest(worst, guess).signed;
         let beyond = depth - allowed;
         let small = swept.radius <= precision.coarse && beyond <= precision.deep / 2.0;
         let exact = real >= depth - precision.ignored.max(precision.margin_of(depth));
@@ -163,7 +157,7 @@ impl PathSearch<'_> {
     /// inside.
     fn is_outside(&self, swept: &SweptBall, most: f64, guess: u32) -> bool {
         let SideQuestion { measured, precision, .. } = self.question;
-        let depth = |p: &Point3<f64>| -measured.signed(p, &measured.closest_from(p, guess));
+        let depth = |p: &Point3<f64>| -measured.signed_closest(p, guess).signed;
         swept.radius <= precision.coarse && self.wanted.iter().all(|p| depth(p) <= most)
     }
 }
@@ -176,21 +170,14 @@ pub(super) fn swept(points: &[Point3<f64>], ball: f64) -> SweptBall {
     SweptBall { centre, radius: reach + ball }
 }
 
-/// The point that is furthest outside a region, and how far; `None` if that is more than `most`.
-pub(super) fn furthest(points: impl IntoIterator<Item = Point3<f64>>, region: &FreeRegion, most: f64) -> Fit {
-    points.into_iter().try_fold((0.0, Point3::origin()), |far, p| {
-        let d = region.distance_within(&p, most)?;
-        Some(if d > far.0 { (d, p) } else { far })
-    })
-}
-
-/// The same for the images of all vertices of a node; the region holds the balls of most of them.
+/// The image of a vertex of a node that is furthest outside a region, and how far; `None` if that is more than `most`.
+/// The region holds the balls of most of them.
 pub(super) fn furthest_of(tree: &PatchTree, index: u32, leg: &Leg, region: &FreeRegion, most: f64) -> Fit {
     if tree.vertices(index).len() <= HULL_CORNERS {
-        return furthest(leg.images(tree.vertices(index)), region, most);
+        return region.furthest(leg.images(tree.vertices(index)), most);
     }
     // If a point is outside, mostly one of these is.
-    let mut far = furthest(leg.images(tree.extremes(index)), region, most)?;
+    let mut far = region.furthest(leg.images(tree.extremes(index)), most)?;
     for map in &leg.maps {
         let mut stack = vec![index];
         while let Some(node) = stack.pop() {
@@ -202,7 +189,7 @@ pub(super) fn furthest_of(tree: &PatchTree, index: u32, leg: &Leg, region: &Free
                 Parts::Patches([left, right]) => stack.extend([right, left]),
                 Parts::Triangles(_) => {
                     let images = tree.vertices(node).iter().map(|p| map.apply(p));
-                    let (d, worst) = furthest(images, region, most)?;
+                    let (d, worst) = region.furthest(images, most)?;
                     if d > far.0 {
                         far = (d, worst);
                     }
@@ -240,12 +227,12 @@ mod tests {
             let path = [Pose::identity(), Pose::new(shift, turn)];
             let course = Course::new(&path, Point3::origin(), 1.0);
             let leg = CourseView::new(&course, true, 1e-3).leg(Interval::WHOLE);
-            let wanted = Wanted { points: &[], most: 0.0, from_behind: false, facing: Vector3::zeros() };
+            let wanted = Wanted { points: &[], most: 0.0, from_behind: false, facing: Vector3::zeros(), spared: 0.0 };
             let centre = Point3::from(centre);
             let Ok(region) = standing.free_region(&centre, radius, wanted) else { return Ok(()) };
             for node in [0, 1] {
                 let images = leg.images(tree.vertices(node));
-                let (all, by_tree) = (furthest(images, &region, most), furthest_of(&tree, node, &leg, &region, most));
+                let (all, by_tree) = (region.furthest(images, most), furthest_of(&tree, node, &leg, &region, most));
                 prop_assert_eq!(all.map(|(far, _)| far), by_tree.map(|(far, _)| far));
                 prop_assert!(tree.vertices(node).len() > 100);
             }

@@ -29,12 +29,13 @@ use nalgebra::{Point3, Vector3};
 use crate::budgets::{
     DEEP_POINTS, LONG_STEPS_PER_POLL, PATH_EFFORT, PATH_EFFORT_IN_DOUBT, RIM_EDGES_PER_EFFORT,
 };
-use crate::geometry::{FreeRegion, PatchTree, Surface};
+use crate::geometry::{FreeRegion, Surface};
 use crate::termination::{Interrupt, Poll, Termination};
 use crate::tolerances::DEPTH_SHARE;
 
 use super::super::course::{Course, CourseView, Interval};
 use super::super::pair_path::PairPath;
+use super::pieces::CoveredSurface;
 
 /// How precisely depth is computed, in the planning frame.
 #[derive(Debug, Clone, Copy)]
@@ -93,8 +94,7 @@ impl PathQuestion<'_> {
             return Ok(PathDepth::default());
         }
         let question = SideQuestion {
-            surface: &looked_at.surface,
-            tree: looked_at.patches(termination)?,
+            covered: CoveredSurface { surface: &looked_at.surface, tree: looked_at.patches(termination)? },
             measured: &measured.surface,
             allowed: pair_path.allowed,
             precision,
@@ -106,9 +106,7 @@ impl PathQuestion<'_> {
 
 /// How deep does one surface get into another?
 pub(crate) struct SideQuestion<'a> {
-    /// The covered surface and its patch tree.
-    pub(crate) surface: &'a Surface,
-    pub(crate) tree: &'a PatchTree,
+    pub(crate) covered: CoveredSurface<'a>,
     /// The measured surface.
     pub(crate) measured: &'a Surface,
     /// The allowed penetration.

@@ -14,7 +14,7 @@ mod piece;
 mod tests;
 
 use crate::geometry::Pose;
-use crate::scene::{Scene, StandingParts};
+use crate::scene::{PosedPart, Scene, StandingParts};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::DEPTH_TOLERANCE;
 
@@ -45,7 +45,7 @@ impl<'a> RigidCover<'a> {
     pub(crate) fn new(
         scene: &'a Scene,
         standing_parts: &'a StandingParts,
-        (part, start): (usize, &Pose),
+        PosedPart { part, pose: start }: PosedPart<'_>,
         reach: f64,
         all_sampled: bool,
         termination: &'a Termination,
@@ -112,7 +112,13 @@ impl<'a> RigidCover<'a> {
             return Ok(Some(known));
         }
         let is_start = self.base == self.start;
-        match RigidPair::new(self.scene, (self.part, &self.base), other, is_start, self.termination)? {
+        match RigidPair::new(
+            self.scene,
+            PosedPart::new(self.part, &self.base),
+            other,
+            is_start,
+            self.termination,
+        )? {
             Some(pair) => {
                 self.pairs.push(pair);
                 Ok(Some(self.pairs.len() - 1))

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 
 use crate::budgets::{
     CONTACTS_PER_LOOK, EDGE_SECTIONS, KEPT_CONTACTS, PASSED_TRIANGLES, PROBED_CORNERS, REGIONS_ON_APPROACH,
     REGIONS_PER_LOOK, REGIONS_PER_MOTION, REGIONS_PER_STEP, RIGID_PIECES,
 };
 use crate::geometry::{Bounds, FreeRegion, NoRegion, Pose};
-use crate::scene::Scene;
+use crate::scene::{PosedPart, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
     BULGE_TOLERANCE, CONTACT_STEP, COVERED_OVERLAP, DEPTH_TOLERANCE, SMALL_BIT_ENTERED, SMALLEST_BIT,
@@ -17,9 +17,10 @@ use crate::tolerances::{
 
 use super::super::super::sampled::{Contact, ContactSet, MovingBody};
 use super::super::cover;
+use super::super::pieces::{Piece, PlacedPiece};
 use super::super::shift::starting;
-use super::super::surface_pair::{CoverPiece, Piece, PlacedPiece, SurfacePair};
-use super::piece::{RigidPiece, StepPoses, slack_within};
+use super::super::surface_pair::{CoverPiece, SurfacePair};
+use super::piece::{RigidPiece, StepPoses};
 
 /// The inverse of the golden ratio.
 const GOLDEN: f64 = 0.618_033_988_749_895;
@@ -62,20 +63,20 @@ impl<'a> RigidPair<'a> {
     /// Covers a pair with the part at a pose; `None` if regions cannot.
     pub(crate) fn new(
         scene: &'a Scene,
-        (part, pose): (usize, &Pose),
+        moving: PosedPart<'_>,
         other: usize,
         is_start: bool,
         termination: &Termination,
     ) -> Result<Option<Self>, Interrupt> {
-        if scene.allowed.of(part, other) > COVERED_OVERLAP {
+        if scene.allowed.of(moving.part, other) > COVERED_OVERLAP {
             return Ok(None);
         }
-        let gathered = starting(scene, (part, pose), other, (is_start, RIGID_PIECES), termination)?;
+        let gathered = starting(scene, moving, other, (is_start, RIGID_PIECES), termination)?;
         let pieces = gathered.pieces.as_ref().filter(|pieces| pieces.len() <= RIGID_PIECES);
         let Some(pieces) = pieces else { return Ok(None) };
-        let surfaces = SurfacePair::new(scene, (part, pose), other, gathered.covers_part, termination)?;
+        let surfaces = SurfacePair::new(scene, moving, other, gathered.covers_part, termination)?;
         let mut placed = PlacedPiece::default();
-        let here = surfaces.with_part_at(pose);
+        let here = surfaces.with_part_at(moving.pose);
         let pieces = pieces
             .iter()
             .map(|piece| RigidPiece::of_shift_piece(piece, &surfaces, &here, &mut placed))
@@ -169,16 +170,16 @@ impl<'a> RigidPair<'a> {
         let Self { surfaces, pieces: all, placed, .. } = self;
         for &i in pieces {
             let piece = &mut all[i];
-            surfaces.place_at(&piece.spot.piece, there, placed);
+            surfaces.covered.place(&piece.spot.piece, there, placed);
             let slacks = placed.points.iter().map(|p| piece.region.slack(p)).enumerate();
             let mut out: Vec<(usize, f64)> = slacks.filter(|(_, slack)| *slack < -most).collect();
             out.sort_by(|a, b| a.1.total_cmp(&b.1));
             for (k, _) in out.into_iter().take(PROBED_CORNERS) {
-                let seen = surfaces.look(&placed.points[k], piece.spot.guess);
+                let seen = surfaces.measured.signed_closest(&placed.points[k], piece.spot.guess);
                 piece.spot.guess = seen.closest.triangle;
                 let gap = seen.signed + surfaces.allowed;
                 if gap < -most {
-                    let sample = surfaces.corner(&piece.spot.piece, k);
+                    let sample = surfaces.covered.corner(&piece.spot.piece, k);
                     let (is_moving, at) = (surfaces.covers_part, (gap, seen.closest));
                     inside.push(Contact::measured(surfaces.other, is_moving, sample, at, surfaces.allowed));
                 }
@@ -194,7 +195,7 @@ impl<'a> RigidPair<'a> {
         for &i in pieces {
             let Self { surfaces, pieces: all, placed, .. } = self;
             let piece = &all[i];
-            surfaces.place_at(&piece.spot.piece, there, placed);
+            surfaces.covered.place(&piece.spot.piece, there, placed);
             let passed = piece.region.passed(&placed.cloud, DEPTH_TOLERANCE).take(PASSED_TRIANGLES);
             for contact in passed.filter_map(|triangle| pierced(surfaces, piece, triangle, there)) {
                 if !inside.iter().any(|c: &Contact| c.is_of_same_point(&contact)) {
@@ -265,7 +266,7 @@ impl<'a> RigidPair<'a> {
                 let spot = CoverPiece { piece: part, ..piece.spot };
                 RigidPiece::new(spot, Arc::clone(&piece.region), &self.surfaces, &ends.here)
             };
-            rest.extend(self.surfaces.parts(&piece.spot.piece).into_iter().rev().map(part));
+            rest.extend(self.surfaces.covered.parts(&piece.spot.piece).into_iter().rev().map(part));
             Ok(())
         })
     }
@@ -307,7 +308,7 @@ impl<'a> RigidPair<'a> {
         if ends.here != ends.there && ends.between.iter().any(enters) {
             return Err(Uncovered::Crossed);
         }
-        Ok(Some(self.before_face(piece, ends)))
+        Ok(self.before_face(piece, ends))
     }
 
     /// A region that holds a piece at several poses.
@@ -315,18 +316,18 @@ impl<'a> RigidPair<'a> {
         let (surfaces, placed) = (&self.surfaces, &mut self.placed);
         let (mut wanted, mut centres) = (Vec::new(), Bounds::EMPTY);
         for pose in at {
-            surfaces.place_at(&piece.spot.piece, pose, placed);
+            surfaces.covered.place(&piece.spot.piece, pose, placed);
             wanted.extend_from_slice(&placed.extremes);
             centres = centres.with_point(&placed.centre);
         }
         let middle = centres.centre();
         let around = placed.radius + (centres.max - middle).norm() + CONTACT_STEP;
         let most = piece.most(surfaces);
-        let seen = surfaces.look(&middle, piece.spot.guess);
+        let seen = surfaces.measured.signed_closest(&middle, piece.spot.guess);
         let region = surfaces.region((&middle, &seen), around, &wanted, most)?;
         for pose in at {
-            surfaces.place_at(&piece.spot.piece, pose, placed);
-            slack_within(&region, placed, most).ok_or(NoRegion::Cramped)?;
+            surfaces.covered.place(&piece.spot.piece, pose, placed);
+            placed.slack_in(&region, most).ok_or(NoRegion::Cramped)?;
         }
         Ok(region)
     }
@@ -337,7 +338,7 @@ impl<'a> RigidPair<'a> {
     fn deepest_on_edges(&self, corners: &[Point3<f64>; 3], guess: u32, there: &Pose) -> Option<Contact> {
         let surfaces = &self.surfaces;
         let gap = |p: &Point3<f64>| {
-            let seen = surfaces.look(&(there * p), guess);
+            let seen = surfaces.measured.signed_closest(&(there * p), guess);
             (seen.signed + surfaces.allowed, seen.closest)
         };
         let at_corners = corners.map(|p| gap(&p).0);
@@ -375,17 +376,14 @@ impl<'a> RigidPair<'a> {
         Some(Contact::measured(surfaces.other, surfaces.covers_part, p, gap(&p), surfaces.allowed))
     }
 
-    /// A small bit that is not too deep, in front of the nearest face: where surfaces cross by less than the
-    /// tolerance, there are no regions. Unlike a region this is not certain; paths are verified.
-    fn before_face(&mut self, piece: &RigidPiece, ends: &StepPoses) -> RigidPiece {
+    /// A small bit that is not too deep, in front of the nearest face.
+    fn before_face(&mut self, piece: &RigidPiece, ends: &StepPoses) -> Option<RigidPiece> {
         let (surfaces, placed) = (&self.surfaces, &mut self.placed);
-        surfaces.place_at(&piece.spot.piece, &ends.there, placed);
-        let closest = surfaces.look(&placed.centre, piece.spot.guess).closest;
-        let normal = surfaces.measured.pseudo_normal(&closest).normalize();
-        let height = placed.points.iter().map(|p| normal.dot(&p.coords)).fold(f64::INFINITY, f64::min);
+        surfaces.covered.place(&piece.spot.piece, &ends.there, placed);
+        let (normal, _, triangle) = surfaces.before_face(placed, piece.spot.guess, &Vector3::zeros())?;
         let ball = (placed.centre, AROUND_SMALLEST);
-        let region = Arc::new(FreeRegion::known(ball, [(normal, height, closest.triangle)]));
-        RigidPiece { region, slack: 0.0, next: Some(0.0), ..piece.clone() }
+        let region = Arc::new(FreeRegion::known(ball, [(normal, placed.lowest(&normal), triangle)]));
+        Some(RigidPiece { region, slack: 0.0, next: Some(0.0), ..piece.clone() })
     }
 
     /// Keeps contacts for later steps.
@@ -443,16 +441,15 @@ impl<'a> RigidPair<'a> {
 
 /// The corner of a measured triangle, or the middle of one of its sides, that is too deep in the covered solid.
 fn pierced(surfaces: &SurfacePair<'_>, piece: &RigidPiece, triangle: u32, there: &Pose) -> Option<Contact> {
-    if surfaces.covered.is_open() {
+    if surfaces.covered.surface.is_open() {
         return None;
     }
-    let guess = surfaces.triangle_of(&piece.spot.piece).unwrap_or(0);
+    let guess = surfaces.covered.triangle_of(&piece.spot.piece).unwrap_or(0);
     surfaces.measured.corners_and_middles(triangle).into_iter().find_map(|point| {
         let p = there.inverse_transform_point(&point);
-        let closest = surfaces.covered.closest_from(&p, guess);
-        let gap = surfaces.covered.signed(&p, &closest) + surfaces.allowed;
-        let at = (gap, closest);
-        (gap < -DEPTH_TOLERANCE)
+        let seen = surfaces.covered.surface.signed_closest(&p, guess);
+        let at = (seen.signed + surfaces.allowed, seen.closest);
+        (at.0 < -DEPTH_TOLERANCE)
             .then(|| Contact::measured(surfaces.other, !surfaces.covers_part, point, at, surfaces.allowed))
     })
 }

@@ -2,14 +2,15 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 use crate::budgets::POSES_BETWEEN;
 use crate::geometry::{FreeRegion, Pose, Screw};
 use crate::tolerances::{DEPTH_TOLERANCE, STEPS_AHEAD};
 
+use super::super::pieces::PlacedPiece;
 use super::super::shift::ShiftPiece;
-use super::super::surface_pair::{CoverPiece, PlacedPiece, SurfacePair};
+use super::super::surface_pair::{CoverPiece, SurfacePair};
 
 /// A piece in its region.
 #[derive(Clone)]
@@ -61,7 +62,7 @@ impl RigidPiece {
         surfaces: &SurfacePair<'_>,
         here: &Pose,
     ) -> Self {
-        let (centre, radius) = surfaces.ball(&spot.piece);
+        let (centre, radius) = surfaces.covered.ball(&spot.piece);
         let stands = here * centre;
         Self { spot, region, centre, radius, stands, slack: f64::NEG_INFINITY, next: None }
     }
@@ -73,11 +74,10 @@ impl RigidPiece {
         here: &Pose,
         placed: &mut PlacedPiece,
     ) -> Self {
-        surfaces.place_at(&piece.spot.piece, here, placed);
+        surfaces.covered.place(&piece.spot.piece, here, placed);
         let sides = piece.limits.iter().map(|limit| {
             let normal = surfaces.shifted * limit.normal;
-            let lowest = placed.points.iter().map(|p| normal.dot(&p.coords)).fold(f64::INFINITY, f64::min);
-            (normal, lowest + limit.height, limit.triangle)
+            (normal, placed.lowest(&normal) + limit.height, limit.triangle)
         });
         let region = Arc::new(FreeRegion::known(piece.ball, sides));
         Self::new(piece.spot, region, surfaces, here)
@@ -101,21 +101,7 @@ impl RigidPiece {
         if of_ball > 0.0 {
             return Some(of_ball);
         }
-        surfaces.place_at(&self.spot.piece, there, placed);
-        slack_within(&self.region, placed, self.most(surfaces) + more)
+        surfaces.covered.place(&self.spot.piece, there, placed);
+        placed.slack_in(&self.region, self.most(surfaces) + more)
     }
-}
-
-/// How far inside a region all of a piece is: negative if it is outside by no more than `most`, `None` if it is
-/// further outside.
-pub(crate) fn slack_within(region: &FreeRegion, placed: &PlacedPiece, most: f64) -> Option<f64> {
-    let PlacedPiece { points, cloud, .. } = placed;
-    let gaps = region.gaps(cloud);
-    let farthest = points.iter().map(|p| (p - region.centre()).norm_squared()).fold(0.0, f64::max).sqrt();
-    let least = gaps.iter().copied().fold(region.radius() - farthest, f64::min);
-    if least >= 0.0 || least < -most {
-        return Some(least).filter(|least| *least >= 0.0);
-    }
-    let distance = region.distance_of_shifted(points, &gaps, &Vector3::zeros(), most)?;
-    Some(-distance)
 }

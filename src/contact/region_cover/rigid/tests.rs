@@ -15,7 +15,7 @@ fn a_loose_peg_turns_and_is_told_by_regions_all_the_way() {
     let around = StandingParts::new(&scene, vec![0]);
     let start = scene.bodies[1].planning_from_shape;
     let termination = Termination::default();
-    let mut holds = RigidCover::new(&scene, &around, (1, &start), 0.1, false, &termination);
+    let mut holds = RigidCover::new(&scene, &around, PosedPart::new(1, &start), 0.1, false, &termination);
     let mover = MovingBody::new(&scene, 1, start);
     let near = holds.settle(&mover, None).unwrap();
     assert!(near.contacts.iter().all(|c| c.gap >= 0.0) && !holds.samples());
@@ -39,7 +39,7 @@ fn a_long_pin_is_stopped_by_what_its_faces_get_over_without_another_region() {
     let start = scene.bodies[1].planning_from_shape;
     let termination = Termination::default();
     let mover = MovingBody::new(&scene, 1, start);
-    let mut pair = RigidPair::new(&scene, (1, &start), 0, true, &termination).unwrap().unwrap();
+    let mut pair = RigidPair::new(&scene, PosedPart::new(1, &start), 0, true, &termination).unwrap().unwrap();
     let mut looked = |pose: Pose| {
         let mut near = ContactSet { contacts: Vec::new(), clearance: f64::INFINITY };
         let left = pair.near(&start, &MovingBody { pose, ..mover }, 0.1, &mut near);
@@ -78,7 +78,8 @@ fn what_regions_let_pass_enters_nothing() {
         let around = StandingParts::new(&scene, vec![0, 2]);
         let mover = MovingBody::new(&scene, 1, start);
         for direction in spread([-1.0; 3], [1.0; 3], 12) {
-            let mut holds = RigidCover::new(&scene, &around, (1, &start), 0.12, false, &termination);
+            let mut holds =
+                RigidCover::new(&scene, &around, PosedPart::new(1, &start), 0.12, false, &termination);
             holds.settle(&mover, None).unwrap();
             // The way to the other solid, with a turn about another axis.
             let step = Pose::new(

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 use crate::budgets::REMEMBERED_SHIFT_PIECES;
 use crate::geometry::{Pose, Shape};
-use crate::scene::{CongruentPair, Scene, grouped};
+use crate::scene::{CongruentPair, PosedPart, Scene, grouped};
 use crate::termination::Interrupt;
 use crate::tolerances::CONGRUENT_PAIR_DISTANCE;
 
@@ -21,16 +21,15 @@ use super::piece::ShiftPiece;
 /// A part where its motion begins, and one standing part.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StartPair<'a> {
-    pub(crate) part: usize,
-    pub(crate) start: &'a Pose,
+    pub(crate) moving: PosedPart<'a>,
     pub(crate) other: usize,
     /// The key of its entry, if it stands for a canonical pair.
     kept_as: Option<StartKey>,
 }
 
 impl<'a> StartPair<'a> {
-    pub(crate) fn new(part: usize, start: &'a Pose, other: usize) -> Self {
-        Self { part, start, other, kept_as: None }
+    pub(crate) fn new(moving: PosedPart<'a>, other: usize) -> Self {
+        Self { moving, other, kept_as: None }
     }
 }
 
@@ -196,7 +195,7 @@ impl ShiftCoverCache {
     }
 
     fn canonical(&self, scene: &Scene, place: &StartPair<'_>) -> CanonicalStart {
-        let StartPair { part, start, other, kept_as } = *place;
+        let StartPair { moving: PosedPart { part, pose: start }, other, kept_as } = *place;
         if let Some(key) = kept_as {
             return CanonicalStart { key, alone: None, is_mirrored: false };
         }
@@ -207,7 +206,7 @@ impl ShiftCoverCache {
         let in_order = ordered(scene, part, other);
         let (part, other) = self.first_alike(scene, in_order);
         let alone = Some(CongruentPair::shifted(scene, part, &scene.bodies[part].planning_from_shape, other));
-        let is_mirrored = in_order != (place.part, place.other);
+        let is_mirrored = in_order != (place.moving.part, place.other);
         CanonicalStart { key: StartKey { part, other, start: None }, alone, is_mirrored }
     }
 
@@ -239,7 +238,7 @@ fn at_place<T>(
     let Some(pair) = alone else { return find(scene, place) };
     // Entries that are computed on the way go into the same cache.
     let alone = Scene { memo: scene.memo.clone(), ..pair.scene(scene) };
-    find(&alone, &StartPair { part: 0, start: &pair.poses[0], other: 1, kept_as: Some(key) })
+    find(&alone, &StartPair { moving: PosedPart::new(0, &pair.poses[0]), other: 1, kept_as: Some(key) })
 }
 
 /// What two congruent pairs have in common: shapes, poses and allowed penetration.

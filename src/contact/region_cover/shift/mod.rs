@@ -16,7 +16,7 @@ use nalgebra::Vector3;
 
 use crate::budgets::{FIRST_SIDE_REGIONS, REGIONS_PER_SHIFT, SHIFT_PIECES, SIDE_REGIONS, STALLS, WITNESSES};
 use crate::geometry::Pose;
-use crate::scene::Scene;
+use crate::scene::{PosedPart, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{COVERED_OVERLAP, FREE_STEP, HELD, HELD_AT_FIRST, STALL, TOUCHED};
 
@@ -25,7 +25,8 @@ mod piece;
 mod search;
 
 use super::Halt;
-use super::surface_pair::{Obstacle, PlacedPiece, SurfacePair, WantedShift, Witness};
+use super::pieces::PlacedPiece;
+use super::surface_pair::{Obstacle, SurfacePair, WantedShift, Witness};
 use cache::{ShiftWay, StartCover, StartPair};
 use search::ShiftSearch;
 
@@ -53,13 +54,17 @@ struct ShiftPair<'a> {
 }
 
 impl<'a> ShiftCover<'a> {
-    pub(crate) fn new(scene: &'a Scene, (part, start): (usize, &Pose), termination: &'a Termination) -> Self {
-        Self { scene, part, start: *start, termination, pairs: Vec::new(), regions: 0 }
+    pub(crate) fn new(scene: &'a Scene, moving: PosedPart<'_>, termination: &'a Termination) -> Self {
+        Self { scene, part: moving.part, start: *moving.pose, termination, pairs: Vec::new(), regions: 0 }
     }
 
     /// The same part and start, without pairs.
     pub(crate) fn anew(&self) -> Self {
-        Self::new(self.scene, (self.part, &self.start), self.termination)
+        Self::new(self.scene, self.moving(), self.termination)
+    }
+
+    fn moving(&self) -> PosedPart<'_> {
+        PosedPart::new(self.part, &self.start)
     }
 
     /// Whether a standing part is in one of the pairs.
@@ -74,13 +79,12 @@ impl<'a> ShiftCover<'a> {
             return Err(Halt::Lost);
         }
         let gathered = if at == &Vector3::zeros() {
-            starting(scene, (self.part, &self.start), other, (true, SHIFT_PIECES), termination)?
+            starting(scene, self.moving(), other, (true, SHIFT_PIECES), termination)?
         } else {
-            let place = StartPair::new(self.part, &self.start, other);
+            let place = StartPair::new(self.moving(), other);
             Arc::new(gathered(scene, &place, at, SHIFT_PIECES, termination)?)
         };
-        let surfaces =
-            SurfacePair::new(scene, (self.part, &self.start), other, gathered.covers_part, termination)?;
+        let surfaces = SurfacePair::new(scene, self.moving(), other, gathered.covers_part, termination)?;
         let pieces = gathered.pieces.clone().ok_or(Halt::Lost)?;
         self.pairs.push(ShiftPair { surfaces, pieces, witnesses: Vec::new() });
         self.count(gathered.regions)
@@ -158,7 +162,7 @@ impl<'a> ShiftCover<'a> {
     fn known_way(&mut self, i: usize, u: &Vector3<f64>) -> Result<(Vec<Vector3<f64>>, usize), Halt> {
         let (scene, termination) = (self.scene, self.termination);
         let pair = &mut self.pairs[i];
-        let place = StartPair::new(self.part, &self.start, pair.surfaces.other);
+        let place = StartPair::new(PosedPart::new(self.part, &self.start), pair.surfaces.other);
         let find = |scene: &Scene, place: &StartPair<'_>, u: &Vector3<f64>| way(scene, place, u, termination);
         let way = ShiftCoverCache::of(scene).way(scene, &place, (u, false), find)?;
         pair.pieces = Arc::clone(way.pieces.as_ref().ok_or(Halt::Lost)?);
@@ -171,7 +175,7 @@ impl<'a> ShiftCover<'a> {
         let find =
             |scene: &Scene, place: &StartPair<'_>, u: &Vector3<f64>| long_way(scene, place, u, termination);
         for i in 0..self.pairs.len() {
-            let place = StartPair::new(self.part, &self.start, self.pairs[i].surfaces.other);
+            let place = StartPair::new(PosedPart::new(self.part, &self.start), self.pairs[i].surfaces.other);
             let way = ShiftCoverCache::of(scene).way(scene, &place, (u, true), find)?;
             self.pairs[i].pieces = Arc::clone(way.pieces.as_ref().ok_or(Halt::Lost)?);
             self.count(way.regions)?;
@@ -209,12 +213,12 @@ impl<'a> ShiftCover<'a> {
 /// `most` pieces.
 pub(crate) fn starting(
     scene: &Scene,
-    (part, pose): (usize, &Pose),
+    moving: PosedPart<'_>,
     other: usize,
     (is_start, most): (bool, usize),
     termination: &Termination,
 ) -> Result<Arc<StartCover>, Interrupt> {
-    let place = StartPair::new(part, pose, other);
+    let place = StartPair::new(moving, other);
     if is_start {
         kept(scene, &place, termination)
     } else {
@@ -242,8 +246,7 @@ fn way(
     termination: &Termination,
 ) -> Result<ShiftWay, Interrupt> {
     let base = kept(scene, place, termination)?;
-    let surfaces =
-        SurfacePair::new(scene, (place.part, place.start), place.other, base.covers_part, termination)?;
+    let surfaces = SurfacePair::new(scene, place.moving, place.other, base.covers_part, termination)?;
     let lost = ShiftWay { blocked: Vec::new(), pieces: None, found: 0, regions: REGIONS_PER_SHIFT };
     let Some(base) = &base.pieces else { return Ok(lost) };
     let mut pieces = Arc::clone(base);
@@ -274,8 +277,7 @@ fn long_way(
     let short = ShiftCoverCache::of(scene)
         .way(scene, place, (u, false), |scene, place, u| way(scene, place, u, termination))?;
     let base = kept(scene, place, termination)?;
-    let surfaces =
-        SurfacePair::new(scene, (place.part, place.start), place.other, base.covers_part, termination)?;
+    let surfaces = SurfacePair::new(scene, place.moving, place.other, base.covers_part, termination)?;
     let mut search = ShiftSearch::new(&surfaces, REGIONS_PER_SHIFT, termination);
     let mut lengthened = |piece: &ShiftPiece| {
         termination.check()?;
@@ -302,9 +304,9 @@ fn gathered(
     most: usize,
     termination: &Termination,
 ) -> Result<StartCover, Interrupt> {
-    let &StartPair { part, start, other, .. } = place;
-    let surfaces = |covers_part| SurfacePair::new(scene, (part, start), other, covers_part, termination);
-    let coverable = SurfacePair::coverable_sides(scene, part, other);
+    let &StartPair { moving, other, .. } = place;
+    let surfaces = |covers_part| SurfacePair::new(scene, moving, other, covers_part, termination);
+    let coverable = SurfacePair::coverable_sides(scene, moving.part, other);
     // On its way no piece may get deeper than the engine allows.
     let held = if at == &Vector3::zeros() { HELD_AT_FIRST } else { HELD };
     // One side is mostly enough. The patch tree of the other, perhaps of a large part, is built when it is needed.

@@ -5,7 +5,8 @@ use nalgebra::{Point3, Vector3};
 use crate::budgets::LOWEST_POINTS;
 use crate::tolerances::{SAME_FACE, SHIFT_SUNK, TILT, TOUCHED};
 
-use super::super::surface_pair::{CoverPiece, Obstacle, PlacedPiece, Slope, SurfacePair, WantedShift};
+use super::super::pieces::PlacedPiece;
+use super::super::surface_pair::{CoverPiece, Obstacle, Slope, SurfacePair, WantedShift};
 
 /// A piece that is free while the shift stays within limits.
 #[derive(Debug, Clone)]
@@ -89,7 +90,7 @@ impl ShiftPiece {
         for limit in ahead() {
             let inward = pair.shifted * limit.normal;
             let heights = placed.points.iter().map(|p| (inward.dot(&p.coords), p));
-            let lowest = heights.clone().map(|(height, _)| height).fold(f64::INFINITY, f64::min);
+            let lowest = placed.lowest(&inward);
             let touching = heights.filter(|(height, _)| *height <= lowest + TOUCHED);
             probes.extend(touching.take(LOWEST_POINTS).map(|(_, p)| *p));
         }
@@ -101,7 +102,7 @@ impl ShiftPiece {
         if !by_points.is_empty() {
             return by_points;
         }
-        let guess = pair.triangle_of(piece).unwrap_or(0);
+        let guess = pair.covered.triangle_of(piece).unwrap_or(0);
         let by_triangle = |limit: &ShiftLimit| {
             pair.obstacle_of_triangle(limit.triangle, wish, guess).filter(|o| agrees(limit, o))
         };

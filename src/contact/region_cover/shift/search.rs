@@ -1,18 +1,17 @@
 //! Finds regions for the pieces of one surface that another surface does not enter.
 
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
-use crate::geometry::NoRegion;
+use crate::geometry::{NoRegion, SignedClosest};
 use crate::termination::Termination;
 use crate::tolerances::{
     CONTACT_STEP, HELD, HELD_AT_FIRST, LEAST_SHARE_AHEAD, ROUNDED, SHIFTS_AHEAD, SMALL_BIT_AHEAD,
     SMALLEST_BIT,
 };
 
-use super::super::surface_pair::{
-    CoverPiece, Obstacle, Piece, PlacedPiece, SignedClosest, Slope, SurfacePair, WantedShift, Witness,
-};
+use super::super::pieces::PlacedPiece;
+use super::super::surface_pair::{CoverPiece, Obstacle, Slope, SurfacePair, WantedShift, Witness};
 use super::super::{Halt, cover};
 use super::piece::{ShiftLimit, ShiftPiece};
 
@@ -66,7 +65,7 @@ impl<'a> ShiftSearch<'a> {
     /// A search that covers all of the surface, each piece outside its region by no more than `held`.
     pub(crate) fn of_all(pair: &'a SurfacePair<'a>, held: f64, termination: &'a Termination) -> Self {
         let mut search = Self::new(pair, 0, termination);
-        let all = pair.root().map(|piece| CoverPiece { piece, guess: 0, level: 0, held });
+        let all = pair.covered.root().map(|piece| CoverPiece { piece, guess: 0, level: 0, held });
         search.waiting.extend(all.map(|spot| PendingPiece { spot, share: 1.0, looked: None }));
         search
     }
@@ -110,7 +109,7 @@ impl<'a> ShiftSearch<'a> {
                 self.pair.place(&spot.piece, &wish.at, &mut self.placed);
                 self.end(&spot, &wish)?;
             } else {
-                let parts = self.pair.parts(&spot.piece);
+                let parts = self.pair.covered.parts(&spot.piece);
                 let share = next.share / parts.len() as f64;
                 let waiting = |piece| PendingPiece {
                     spot: CoverPiece { piece, level: 0, ..spot },
@@ -169,7 +168,7 @@ impl<'a> ShiftSearch<'a> {
     /// Makes a piece the current one, and looks at its centre.
     fn place(&mut self, spot: &mut CoverPiece, wish: &WantedShift) -> SignedClosest {
         self.pair.place(&spot.piece, &wish.at, &mut self.placed);
-        let seen = self.pair.look(&self.placed.centre, spot.guess);
+        let seen = self.pair.measured.signed_closest(&self.placed.centre, spot.guess);
         spot.guess = seen.closest.triangle;
         seen
     }
@@ -203,7 +202,7 @@ impl<'a> ShiftSearch<'a> {
             self.pieces.push(piece);
             return Ok(());
         }
-        let small = matches!(spot.piece, Piece::Bit(_)) && self.placed.radius < SMALL_BIT_AHEAD;
+        let small = spot.piece.is_bit_below(SMALL_BIT_AHEAD, self.placed.radius);
         let let_go = |pieces: &mut Self, level: usize| {
             pieces.held(&CoverPiece { level, ..spot }, &seen, wish, &(wish.along * SHIFTS_AHEAD[level]))
         };
@@ -260,7 +259,7 @@ impl<'a> ShiftSearch<'a> {
 
     /// Whether the current piece, without a region, is too small to be split.
     fn is_smallest(&self, spot: &CoverPiece) -> bool {
-        matches!(spot.piece, Piece::Bit(_)) && self.placed.radius < SMALLEST_BIT
+        spot.piece.is_bit_below(SMALLEST_BIT, self.placed.radius)
     }
 
     /// Covers the current piece, too small to be split, by the plane of a face, or gives the pair up.
@@ -285,42 +284,33 @@ impl<'a> ShiftSearch<'a> {
         if self.is_smallest(spot) {
             return self.end(spot, wish);
         }
-        let pieces = self.pair.parts(&spot.piece);
+        let pieces = self.pair.covered.parts(&spot.piece);
         parts.extend(pieces.into_iter().rev().map(|piece| CoverPiece { piece, level: 0, ..*spot }));
         Ok(())
     }
 
-    /// The current piece, a small bit no deeper than allowed, in front of the nearest face. Where facets with an
-    /// allowed penetration cross there are no regions. Unlike a region this is not certain; paths are verified.
+    /// The current piece, a small bit no deeper than allowed, in front of the nearest face.
     fn before_face(&self, spot: &CoverPiece, wish: &WantedShift) -> Option<ShiftPiece> {
-        let (pair, PlacedPiece { points, centre, .. }) = (self.pair, &self.placed);
+        let (pair, placed) = (self.pair, &self.placed);
         if pair.allowed == 0.0 {
             return None;
         }
         let held = pair.allowed + spot.held;
-        let depth = points.iter().map(|p| -pair.look(p, spot.guess).signed).fold(0.0, f64::max);
+        let deep = |p: &Point3<f64>| -pair.measured.signed_closest(p, spot.guess).signed;
+        let depth = placed.points.iter().map(deep).fold(0.0, f64::max);
         if depth > held {
             return None;
         }
-        let closest = pair.look(centre, spot.guess).closest;
         let ahead = pair.shifted * wish.along * SHIFTS_AHEAD[SHORT];
-        let mut best: Option<(f64, Vector3<f64>)> = None;
-        pair.measured.feature_normals(&closest, |n| {
-            let ends = n.dot(&(centre + ahead - closest.point));
-            if best.is_none_or(|(most, _)| ends > most) {
-                best = Some((ends, n));
-            }
-        });
-        let (_, inward) = best?;
-        let gap = points.iter().map(|p| inward.dot(&(p - closest.point))).fold(f64::INFINITY, f64::min);
+        let (inward, gap, triangle) = pair.before_face(placed, spot.guess, &ahead)?;
         let normal = pair.shifted.transpose() * inward;
         let height = normal.dot(&wish.at) - gap.max(0.0) - (held - depth) / 3f64.sqrt();
         Some(ShiftPiece {
             spot: *spot,
-            limits: vec![ShiftLimit { normal, height, triangle: closest.triangle }],
+            limits: vec![ShiftLimit { normal, height, triangle }],
             middle: wish.at,
             room: SHIFTS_AHEAD[SHORT],
-            ball: (*centre, self.placed.radius + SHIFTS_AHEAD[SHORT]),
+            ball: (placed.centre, placed.radius + SHIFTS_AHEAD[SHORT]),
         })
     }
 
@@ -342,7 +332,7 @@ impl<'a> ShiftSearch<'a> {
         } else {
             let wanted: Vec<_> = extremes.iter().copied().chain(extremes.iter().map(|p| p + ahead)).collect();
             let middle = centre + ahead / 2.0;
-            let seen = pair.look(&middle, spot.guess);
+            let seen = pair.measured.signed_closest(&middle, spot.guess);
             pair.region((&middle, &seen), radius + ahead.norm() / 2.0, &wanted, most)
         }?;
         let gaps = region.gaps(cloud);
@@ -364,8 +354,7 @@ impl<'a> ShiftSearch<'a> {
         let (middle, room) = if offset.norm() + radius < region.radius() {
             (wish.at - back * offset, region.radius() - radius)
         } else {
-            let squared = points.iter().map(|p| (p - region.centre()).norm_squared()).fold(0.0, f64::max);
-            (wish.at, region.radius() - squared.sqrt())
+            (wish.at, region.radius() - self.placed.reach_from(&region.centre()))
         };
         let held = if pair.allowed > 0.0 { HELD_AT_FIRST } else { HELD.max(depth + HELD / 10.0) };
         let held = held.min(spot.held);
@@ -387,6 +376,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{peg_in_hole, scene, thread};
     use crate::geometry::SourceMesh;
+    use crate::scene::PosedPart;
 
     /// All pieces of one side of a pair, and the number of regions after each budget.
     fn gathered(meshes: [SourceMesh; 2], covers_part: bool, threads: usize) -> Vec<String> {
@@ -395,7 +385,8 @@ mod tests {
         pool.install(|| {
             let termination = Termination::default();
             let start = scene.bodies[1].planning_from_shape;
-            let surfaces = SurfacePair::new(&scene, (1, &start), 0, covers_part, &termination).unwrap();
+            let surfaces =
+                SurfacePair::new(&scene, PosedPart::new(1, &start), 0, covers_part, &termination).unwrap();
             let mut search = ShiftSearch::of_all(&surfaces, HELD_AT_FIRST, &termination);
             let mut told = Vec::new();
             for budget in [1, 5, 16, 64, 4096] {

@@ -11,7 +11,7 @@ use crate::budgets::{RELEASE_LOOKS, RELEASE_PLACES};
 use crate::contact::constraint::VelocityConstraint;
 use crate::contact::sampled::{Contact, ContactSet, ContactSource, MovingBody};
 use crate::termination::Interrupt;
-use crate::tolerances::{DEPTH_TOLERANCE, FREE_PULL, LIFT, OPPOSED_PULL};
+use crate::tolerances::{CLEARANCE, DEPTH_TOLERANCE, FREE_PULL, OPPOSED_PULL};
 
 use super::super::super::projection::Projected;
 use super::{Attempt, Drive, Moved, Step};
@@ -79,7 +79,7 @@ impl Drive {
         if !step.result.active.iter().any(|(i, _)| opposes(&step.rows[*i])) {
             return Ok(None);
         }
-        let lift = Translation3::from(*pull * LIFT);
+        let lift = Translation3::from(*pull * CLEARANCE);
         let lifted = |place| MovingBody { pose: lift * self.at(step, place).0.pose, ..*step.mover };
         let lifted: Vec<MovingBody<'_>> = (0..=RELEASE_PLACES).map(lifted).collect();
         let known = step.rows.iter().zip(step.contacts).filter(|(row, _)| opposes(row)).map(|(_, c)| *c);

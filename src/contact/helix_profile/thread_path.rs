@@ -1,5 +1,9 @@
 //! Paths off a thread in the middle of its play.
 //!
+//! It answers which screw motion keeps the surfaces of two parts furthest apart, from both surfaces and for a whole
+//! path. Which displacement of one pose gives its contacts room, before all standing parts, the simulation computes:
+//! `simulation/sliding/drive/clearance.rs`.
+//!
 //! An engine that pushes a part off a thread presses it against the flanks: such a path leaves no room, and its
 //! wobble makes many waypoints. The two threads themselves determine a better one ([`slip`](super::slip)): both axes
 //! as one, the profiles as far apart as possible, and no motion but turning along the helix. It is a proposal,
@@ -24,7 +28,7 @@ use super::slip::{FlankFacet, slipping};
 ///
 /// # Errors
 /// The termination condition became true.
-pub(crate) fn centred(
+pub(crate) fn path_on_thread(
     scene: &Scene,
     standing: &[usize],
     part: usize,
