@@ -75,28 +75,40 @@ mod tests {
         turns.iter().enumerate().flat_map(pair).collect()
     }
 
-    #[test]
-    fn a_thread_that_no_axis_of_faces_knows_is_turned_along_its_own() {
+    /// The events of a search that takes all threads apart.
+    fn events(sweeps: bool) -> Vec<TraceEvent> {
         let (scene, verifier) = scene(many_askew());
         let mut recorder = Recorder::default();
         let present = (0..scene.bodies.len()).collect();
         let problem = Problem {
             present,
             actions: ActionSet::Extended,
-            sweeps: true,
-            max_simulations: Some(60),
+            sweeps,
+            max_simulations: Some(150),
             ..problem(scene, &verifier)
         };
         let outcome = search(Planner::SbdpStar, problem, &mut recorder);
         assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
-        let turned: Vec<_> = recorder
-            .0
-            .iter()
-            .filter_map(|e| match e {
-                TraceEvent::Simulated { action, end, .. } if action.contains('r') => Some((action, end)),
-                _ => None,
-            })
-            .collect();
-        assert_eq!(turned.len(), 6, "one turn a thread: {turned:?}");
+        recorder.0
+    }
+
+    fn simulated_turns(events: &[TraceEvent]) -> usize {
+        let is_turn =
+            |e: &&TraceEvent| matches!(e, TraceEvent::Simulated { action, .. } if action.contains('r'));
+        events.iter().filter(is_turn).count()
+    }
+
+    #[test]
+    fn a_thread_that_no_axis_of_faces_knows_is_turned_along_its_own() {
+        assert_eq!(simulated_turns(&events(false)), 6, "one turn a thread");
+    }
+
+    #[test]
+    fn threads_are_left_along_their_helices_without_simulation() {
+        let events = events(true);
+        assert_eq!(simulated_turns(&events), 0);
+        let along_thread =
+            |e: &&TraceEvent| matches!(e, TraceEvent::Swept { action, .. } if action.contains('r'));
+        assert_eq!(events.iter().filter(along_thread).count(), 6, "{events:?}");
     }
 }

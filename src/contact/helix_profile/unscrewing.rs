@@ -101,6 +101,9 @@ fn axes(pair: &ThreadPair, guess: f64) -> Option<[Helix; 2]> {
     let points = [points(&own, &flanks[0]), points(&others, &flanks[1])];
     let ranges = if guess == 0.0 {
         let radius = points.iter().flatten().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
+        if radius <= 0.0 {
+            return None;
+        }
         let [least, most] = RISE_BY_RADIUS.map(|share| share * radius);
         vec![[least, most], [-least, -most]]
     } else {
