@@ -291,9 +291,12 @@ pub(crate) const RISE_RANGES: usize = 24;
 /// Rounds of fitting the helix of a thread before the last one: the ends of the thread, which do not count, are known
 /// only with its pitch. With none, seats and bottoms of holes distort the fit; with double no effect.
 pub(crate) const HELIX_ROUNDS: usize = 1;
+/// Sweeps over the parameters of a helix when it is fitted; some dozens are needed. At half no effect; at double, what is
+/// no thread takes a little longer to be recognised as such.
+pub(crate) const HELIX_FIT_SWEEPS: usize = 200;
 /// Points of each surface from which the rise is fitted. At half it is less exact for fine meshes; at double it takes
 /// twice as long.
-pub(crate) const RISE_POINTS: usize = 4000;
+pub(crate) const RISE_POINTS: usize = 2500;
 /// Facets that make a thread.
 /// Measured: no effect at half and double.
 pub(crate) const FEWEST_FLANK_FACETS: usize = 24;

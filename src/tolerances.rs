@@ -253,7 +253,7 @@ pub(crate) const EQUAL_GAP: f64 = 0.02;
 /// Multiples of the least travel of a part within which its threads are sought, the first that shows one: flanks are as
 /// far apart as their play. With half of the largest, threads with a play of 0.2 are left to simulation; with double,
 /// what stands beside a thread is taken for a part of it.
-pub(crate) const THREAD_REACHES: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
+pub(crate) const THREAD_REACHES: [f64; 3] = [1.0, 3.0, 8.0];
 /// Share of the pitch by which points travel on one knot of a helix, about: then a head that is a quarter of the pitch
 /// from a nut is not taken for a part of the thread. At half, profiles take a little longer; at double, more stretches
 /// near a head are left to samples.

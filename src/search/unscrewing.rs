@@ -73,6 +73,8 @@ pub(super) fn unscrewed(
             None => continue,
         };
         if clearly_enters(&disassembly.problem, part, &surroundings.standing, &path)? {
+            let swept = scene.swept_bounds(part, &path);
+            met.extend(scene.broad_phase.meeting_of(&surroundings.standing, &swept));
             continue;
         }
         match disassembly.checked_as_given(part, &path)? {

@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use crate::budgets::{RISE_POINTS, RISE_RANGES};
+use crate::budgets::{HELIX_FIT_SWEEPS, RISE_POINTS, RISE_RANGES};
 use crate::geometry::Helix;
 use crate::tolerances::{HELIX_FIT_PRECISION, HELIX_FIT_STEP, RISE_PRECISION, RISE_STEP};
 
@@ -68,7 +68,10 @@ pub(super) fn fitted_helix(flanks: &[Point3<f64>], rise: f64) -> Helix {
     };
     let mut at = [0.0; 5];
     let (mut least, mut step) = (scatter(&at), HELIX_FIT_STEP);
-    while step > HELIX_FIT_PRECISION {
+    for _ in 0..HELIX_FIT_SWEEPS {
+        if step <= HELIX_FIT_PRECISION {
+            break;
+        }
         let mut is_better = false;
         for (of, sign) in (0..at.len()).flat_map(|of| [(of, 1.0), (of, -1.0)]) {
             let mut tried = at;

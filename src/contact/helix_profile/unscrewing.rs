@@ -6,7 +6,7 @@
 
 use nalgebra::{Point3, Vector3};
 
-use crate::budgets::HELIX_ROUNDS;
+use crate::budgets::{HELIX_ROUNDS, RISE_POINTS};
 use crate::geometry::{Helix, Pose};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
@@ -95,8 +95,10 @@ fn axes(pair: &ThreadPair, guess: f64) -> Option<[Helix; 2]> {
         return None;
     };
     let points = |axis: &Helix, facets: &[FlankFacet]| -> Vec<Point3<f64>> {
-        let flanks = facets.iter().filter(|f| f.is_flank());
-        flanks.flat_map(|f| f.corners).map(|p| axis.axis_from_frame * p).collect()
+        let flanks: Vec<&FlankFacet> = facets.iter().filter(|f| f.is_flank()).collect();
+        // Of a few large facets, points between their corners show how the flank slopes.
+        let rows = (2.0 * RISE_POINTS as f64 / flanks.len().max(1) as f64).sqrt().clamp(1.0, 8.0) as u32;
+        flanks.iter().flat_map(|f| grid(&f.corners, rows)).map(|p| axis.axis_from_frame * p).collect()
     };
     let points = [points(&own, &flanks[0]), points(&others, &flanks[1])];
     let ranges = if guess == 0.0 {
@@ -115,4 +117,11 @@ fn axes(pair: &ThreadPair, guess: f64) -> Option<[Helix; 2]> {
     let rise = f64::midpoint(own_fit.rise, other_fit.rise);
     let fits = [(own, own_fit), (others, other_fit)];
     Some(fits.map(|(axis, fit)| Helix { axis_from_frame: fit.axis_from_frame * axis.axis_from_frame, rise }))
+}
+
+/// The points of a triangle in rows along one side, corners included.
+fn grid([a, b, c]: &[Point3<f64>; 3], rows: u32) -> Vec<Point3<f64>> {
+    let share = |k: u32| f64::from(k) / f64::from(rows);
+    let row = |i: u32| (0..=rows - i).map(move |j| a + (b - a) * share(i) + (c - a) * share(j));
+    (0..=rows).flat_map(row).collect()
 }
