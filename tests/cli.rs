@@ -261,7 +261,7 @@ fn removed_parts_and_targets_are_respected() {
 
 #[test]
 fn a_spent_budget_exits_3_and_a_passed_deadline_4() {
-    let spent = plan("threaded-bolt-and-nut", &["--max-simulations", "0", "--json", "-"]);
+    let spent = plan("threaded-bolt-and-nut", &["--no-sweeps", "--max-simulations", "0", "--json", "-"]);
     assert_eq!(spent.status.code(), Some(3), "{}", stderr(&spent));
     assert_eq!(PlanDocument::from_json(&stdout(&spent)).unwrap().status, "partial");
     let late = plan("linked-rings", &["--timeout", "0", "--json", "-"]);
