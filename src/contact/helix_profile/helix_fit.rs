@@ -12,11 +12,19 @@ use rayon::prelude::*;
 
 use crate::budgets::{HELIX_FIT_SWEEPS, RISE_POINTS, RISE_RANGES};
 use crate::geometry::Helix;
+use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{HELIX_FIT_PRECISION, HELIX_FIT_STEP, RISE_PRECISION, RISE_STEP};
 
 /// Of the rises in some ranges (each of one sign, without zero), the one at which the flanks of some surfaces (points in the axis
 /// frame) scatter least.
-pub(super) fn fitted_rise(flanks: &[Vec<Point3<f64>>], ranges: &[[f64; 2]]) -> Option<f64> {
+///
+/// # Errors
+/// The termination condition became true.
+pub(super) fn fitted_rise(
+    flanks: &[Vec<Point3<f64>>],
+    ranges: &[[f64; 2]],
+    termination: &Termination,
+) -> Result<Option<f64>, Interrupt> {
     let some = |points: &Vec<Point3<f64>>| -> Vec<[f64; 3]> {
         points.iter().step_by(points.len().div_ceil(RISE_POINTS).max(1)).map(cylindrical).collect()
     };
@@ -34,22 +42,34 @@ pub(super) fn fitted_rise(flanks: &[Vec<Point3<f64>>], ranges: &[[f64; 2]]) -> O
             rise *= 1.0 + step(rise);
         }
     }
-    let best = |tried: Vec<f64>| {
-        let scatters = tried.into_par_iter().map(|rise| (scatter(rise), rise));
-        scatters.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(_, rise)| rise)
+    let best = |tried: Vec<f64>| -> Result<Option<f64>, Interrupt> {
+        let scatters = tried.into_par_iter().map(|rise| {
+            termination.check()?;
+            Ok((scatter(rise), rise))
+        });
+        let scatters: Vec<(f64, f64)> = scatters.collect::<Result<_, Interrupt>>()?;
+        let least = scatters.into_iter().min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        Ok(least.map(|(_, rise)| rise))
     };
-    let mut rise = best(tried)?;
+    let Some(mut rise) = best(tried)? else { return Ok(None) };
     let mut width = step(rise);
     while width > RISE_PRECISION {
-        rise = best((-3..=3).map(|k| rise * (1.0 + f64::from(k) / 3.0 * width)).collect())?;
+        rise = best((-3..=3).map(|k| rise * (1.0 + f64::from(k) / 3.0 * width)).collect())?.unwrap_or(rise);
         width /= 3.0;
     }
-    Some(rise)
+    Ok(Some(rise))
 }
 
 /// The helix near the z axis and of some rise at which the flanks of a surface (points in the frame of that axis) scatter
 /// least: axis and rise are changed in turn by steps that are halved when none is better (compass search).
-pub(super) fn fitted_helix(flanks: &[Point3<f64>], rise: f64) -> Helix {
+///
+/// # Errors
+/// The termination condition became true.
+pub(super) fn fitted_helix(
+    flanks: &[Point3<f64>],
+    rise: f64,
+    termination: &Termination,
+) -> Result<Helix, Interrupt> {
     let some: Vec<&Point3<f64>> = flanks.iter().step_by(flanks.len().div_ceil(RISE_POINTS).max(1)).collect();
     let count = some.len().max(1) as f64;
     let middle = Vector3::z() * (some.iter().map(|p| p.z).sum::<f64>() / count);
@@ -69,6 +89,7 @@ pub(super) fn fitted_helix(flanks: &[Point3<f64>], rise: f64) -> Helix {
     let mut at = [0.0; 5];
     let (mut least, mut step) = (scatter(&at), HELIX_FIT_STEP);
     for _ in 0..HELIX_FIT_SWEEPS {
+        termination.check()?;
         if step <= HELIX_FIT_PRECISION {
             break;
         }
@@ -85,7 +106,7 @@ pub(super) fn fitted_helix(flanks: &[Point3<f64>], rise: f64) -> Helix {
             step /= 2.0;
         }
     }
-    helix(&at)
+    Ok(helix(&at))
 }
 
 /// Angle, height and distance of a point.
@@ -149,7 +170,7 @@ mod tests {
         for mesh in thread(3.0, 0.5) {
             let surface = surface(mesh);
             let points: Vec<_> = flanks(&surface).iter().map(|p| place * p).collect();
-            let found = fitted_helix(&points, rise * 1.001);
+            let found = fitted_helix(&points, rise * 1.001, &Termination::default()).unwrap();
             let axis_from_thread = found.axis_from_frame * place;
             for z in [0.0, 3.0] {
                 let at = axis_from_thread * Point3::new(0.0, 0.0, z);
@@ -177,11 +198,11 @@ mod tests {
             for ranges in
                 [&[[0.4 * rise, 3.0 * rise]][..], &[[-10.0 * rise, -0.3 * rise], [0.3 * rise, 10.0 * rise]]]
             {
-                let found = fitted_rise(&flanks, ranges).unwrap() * TAU;
+                let found = fitted_rise(&flanks, ranges, &Termination::default()).unwrap().unwrap() * TAU;
                 // There are eight rows of points to a pitch.
                 assert!((found / pitch - 1.0).abs() < 5e-3, "{found} of {pitch}");
             }
-            assert_eq!(fitted_rise(&flanks, &[]), None);
+            assert_eq!(fitted_rise(&flanks, &[], &Termination::default()), Ok(None));
         }
     }
 }

@@ -4,13 +4,15 @@
 //! helix is fitted to the flanks of both parts, and the part turns along it in the middle of its play. Such a way is a
 //! proposal, verified like any path.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Point3, Vector3};
 
 use crate::budgets::{HELIX_ROUNDS, RISE_POINTS};
 use crate::geometry::{Helix, Pose};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{RISE_BY_RADIUS, RISE_RANGE};
+use crate::tolerances::{LEAST_PITCH, RISE_BY_RADIUS, RISE_RANGE};
 
 use super::helix_fit::{fitted_helix, fitted_rise};
 use super::slip::{FlankFacet, slipping};
@@ -80,19 +82,19 @@ fn fitted(
     for _ in 0..HELIX_ROUNDS {
         termination.check()?;
         let pair = ThreadPair::new(scene, parts, &helix, &(helix.axis_from_frame * pose));
-        let Some(axes) = axes(&pair, helix.rise) else { return Ok(None) };
+        let Some(axes) = axes(&pair, helix.rise, termination)? else { return Ok(None) };
         helix =
             Helix { axis_from_frame: axes[1].axis_from_frame * helix.axis_from_frame, rise: axes[1].rise };
     }
     let pair = ThreadPair::new(scene, parts, &helix, &(helix.axis_from_frame * pose));
-    Ok(axes(&pair, helix.rise).map(|axes| (pair, axes)))
+    Ok(axes(&pair, helix.rise, termination)?.map(|axes| (pair, axes)))
 }
 
 /// The helices of the flanks of two parts, in the frame of a helix near both.
-fn axes(pair: &ThreadPair, guess: f64) -> Option<[Helix; 2]> {
+fn axes(pair: &ThreadPair, guess: f64, termination: &Termination) -> Result<Option<[Helix; 2]>, Interrupt> {
     let flanks = pair.flanks();
     let [Some(own), Some(others)] = flanks.each_ref().map(|facets| slipping(facets, guess)) else {
-        return None;
+        return Ok(None);
     };
     let points = |axis: &Helix, facets: &[FlankFacet]| -> Vec<Point3<f64>> {
         let flanks: Vec<&FlankFacet> = facets.iter().filter(|f| f.is_flank()).collect();
@@ -101,22 +103,27 @@ fn axes(pair: &ThreadPair, guess: f64) -> Option<[Helix; 2]> {
         flanks.iter().flat_map(|f| grid(&f.corners, rows)).map(|p| axis.axis_from_frame * p).collect()
     };
     let points = [points(&own, &flanks[0]), points(&others, &flanks[1])];
-    let ranges = if guess == 0.0 {
-        let radius = points.iter().flatten().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
-        if radius <= 0.0 {
-            return None;
-        }
-        let [least, most] = RISE_BY_RADIUS.map(|share| share * radius);
+    let radius = points.iter().flatten().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
+    let [least, most] = RISE_BY_RADIUS.map(|share| share * radius);
+    let least = least.max(LEAST_PITCH / TAU);
+    // What hardly rises is a joint that turns, and no thread.
+    let ranges: Vec<[f64; 2]> = if guess == 0.0 {
         vec![[least, most], [-least, -most]]
     } else {
-        vec![RISE_RANGE.map(|share| share * guess)]
+        let [from, to] = RISE_RANGE.map(|share| share * guess.abs());
+        vec![[from.max(least), to].map(|rise| rise.copysign(guess))]
     };
-    let rise = fitted_rise(&points, &ranges)?;
-    let (own_fit, other_fit) =
-        rayon::join(|| fitted_helix(&points[0], rise), || fitted_helix(&points[1], rise));
+    let Some(rise) = fitted_rise(&points, &ranges, termination)? else { return Ok(None) };
+    let (own_fit, other_fit) = rayon::join(
+        || fitted_helix(&points[0], rise, termination),
+        || fitted_helix(&points[1], rise, termination),
+    );
+    let (own_fit, other_fit) = (own_fit?, other_fit?);
     let rise = f64::midpoint(own_fit.rise, other_fit.rise);
     let fits = [(own, own_fit), (others, other_fit)];
-    Some(fits.map(|(axis, fit)| Helix { axis_from_frame: fit.axis_from_frame * axis.axis_from_frame, rise }))
+    Ok(Some(
+        fits.map(|(axis, fit)| Helix { axis_from_frame: fit.axis_from_frame * axis.axis_from_frame, rise }),
+    ))
 }
 
 /// The points of a triangle in rows along one side, corners included.
