@@ -285,8 +285,8 @@ pub(crate) const FLANK_ROUNDS: usize = 6;
 /// looks take twice as long; at double a way into a thin obstacle is verified for seconds before it is refuted.
 pub(crate) const POSES_PER_LOOK: usize = 8;
 /// Ranges of heights within a pitch by which the rise of a thread is fitted. Within each the flank should be straight: at
-/// half, it has corners there; at double, coarse threads have a single row of points in each. No effect of either on
-/// threads of one to three starts with 36 rows of points a pitch.
+/// half, it has corners there; at double, there are few points in each. Measured on an M8 thread and on threads of one to
+/// three starts: no effect of either.
 pub(crate) const RISE_RANGES: usize = 24;
 /// Rounds of fitting the helix of a thread before the last one: the ends of the thread, which do not count, are known
 /// only with its pitch. With none, seats and bottoms of holes distort the fit; with double no effect.
@@ -294,9 +294,9 @@ pub(crate) const HELIX_ROUNDS: usize = 1;
 /// Sweeps over the parameters of a helix when it is fitted; some dozens are needed. At half no effect; at double, what is
 /// no thread takes a little longer to be recognised as such.
 pub(crate) const HELIX_FIT_SWEEPS: usize = 200;
-/// Points of each surface from which the rise is fitted. At half it is less exact for fine meshes; at double it takes
-/// twice as long.
-pub(crate) const RISE_POINTS: usize = 2500;
+/// Points of each surface from which the helix of a thread is fitted: a hundred to each of [`RISE_RANGES`]. At half the rise
+/// is less exact, by a thousandth where the thread has a single turn; at double it takes twice as long.
+pub(crate) const FLANK_POINTS: usize = 2500;
 /// Facets that make a thread.
 /// Measured: no effect at half and double.
 pub(crate) const FEWEST_FLANK_FACETS: usize = 24;

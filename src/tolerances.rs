@@ -274,7 +274,7 @@ pub(crate) const PROFILE_FINENESS: f64 = 2e-4;
 /// show: pitches from a twentieth of the radius to the radius. Coarser threads show their rise; finer ones are left to
 /// simulation.
 pub(crate) const RISE_BY_RADIUS: [f64; 2] = [0.05 / TAU, 1.0 / TAU];
-/// Share of the radius, radians, or share of the rise: the first step of the fit of a helix, about as far as the axis that
+/// Share of the radius, radians, or share of the rise over the turns: the first step of the fit of a helix, about as far as the axis that
 /// facets show is off. At half, one round more; at double, one less.
 pub(crate) const HELIX_FIT_STEP: f64 = 0.01;
 /// The same for the last step: a hundredth of a play that is a thousandth of the radius. At half it takes a little longer;

@@ -16,6 +16,8 @@ use crate::geometry::{Footprint, Helix, radii};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{EQUAL_GAP, PROFILE_FINENESS, PROFILE_MARGIN};
 
+use super::range;
+
 /// A range along an axis and a range of distances from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ProfileZone {
@@ -31,7 +33,7 @@ impl ProfileZone {
         let empty = [f64::INFINITY, f64::NEG_INFINITY];
         triangles.iter().fold(Self { along: empty, across: empty }, |zone, corners| {
             let [near, far] = radii(corners);
-            let [low, high] = min_max(corners.iter().map(|p| p.z));
+            let [low, high] = range(corners.iter().map(|p| p.z));
             Self {
                 along: [zone.along[0].min(low), zone.along[1].max(high)],
                 across: [zone.across[0].min(near), zone.across[1].max(far)],
@@ -63,7 +65,7 @@ impl ProfileZone {
     /// Whether part of a triangle may be in it.
     pub(super) fn meets(&self, corners: &[Point3<f64>; 3]) -> bool {
         let [near, far] = radii(corners);
-        let [low, high] = min_max(corners.iter().map(|p| p.z));
+        let [low, high] = range(corners.iter().map(|p| p.z));
         let meets = |[low, high]: [f64; 2], own: [f64; 2]| low <= own[1] && high >= own[0];
         meets([low, high], self.along) && meets([near, far], self.across)
     }
@@ -169,7 +171,7 @@ impl Envelope {
     fn add(&mut self, corners: &[Point3<f64>; 3], rise: f64, ProfileCut { stack, reaches }: &mut ProfileCut) {
         stack.push((*corners, 0));
         while let Some((corners, cuts)) = stack.pop() {
-            let [low, high] = min_max(corners.iter().map(|p| p.z));
+            let [low, high] = range(corners.iter().map(|p| p.z));
             if low > self.zone.along[1] || high < self.zone.along[0] {
                 continue;
             }
@@ -184,7 +186,7 @@ impl Envelope {
             match Footprint::of(&corners, rise) {
                 Some(print) if print.error <= self.finest || cuts >= TRIANGLE_HALVINGS => {
                     let heights = print.points.iter().zip(&corners);
-                    let beside = min_max(heights.map(|(p, c)| p.y - c.z));
+                    let beside = range(heights.map(|(p, c)| p.y - c.z));
                     self.enter(&print, [low, high], beside, reaches);
                 }
                 None if far <= 4.0 * self.finest || cuts >= TRIANGLE_HALVINGS => {
@@ -220,7 +222,7 @@ impl Envelope {
     /// something in `beside`.
     fn enter(&mut self, print: &Footprint, along: [f64; 2], beside: [f64; 2], reaches: &mut Reaches) {
         let (size, pitch, heights) = (self.finest, self.pitch, self.heights);
-        let [from, to] = min_max(print.points.iter().map(|p| p.y));
+        let [from, to] = range(print.points.iter().map(|p| p.y));
         let first = reached(print, size, reaches);
         let lowest = self.slab(along[0]);
         for (low, slab) in (lowest..).zip(self.slabs_between(lowest, self.slab(along[1]))) {
@@ -242,10 +244,10 @@ impl Envelope {
     /// The profile between two places along the axis.
     fn between(&self, [from, to]: [f64; 2]) -> Reaches {
         let within = |z: f64| self.slab(z).saturating_sub(self.first).clamp(-1, self.slabs.len() as i64);
-        let range = within(from).max(0)..=within(to).min(self.slabs.len() as i64 - 1);
+        let slabs = within(from).max(0)..=within(to).min(self.slabs.len() as i64 - 1);
         let mut all = vec![NOTHING; self.heights];
         let mut further = [false; 2];
-        for slab in range {
+        for slab in slabs {
             let slab = &self.slabs[slab as usize];
             (0..2).for_each(|side| further[side] |= slab.further[side]);
             all.iter_mut().zip(&slab.reaches).for_each(|(own, reach)| widen(own, reach));
@@ -320,7 +322,7 @@ impl Envelope {
 
 /// The range of a footprint across the axis, by bins of heights of some size, and the first bin.
 fn reached(print: &Footprint, size: f64, reaches: &mut Reaches) -> i64 {
-    let [low, high] = min_max(print.points.iter().map(|p| p.y));
+    let [low, high] = range(print.points.iter().map(|p| p.y));
     let bins =
         |low: f64, high: f64| [low - print.error, high + print.error].map(|y| (y / size).floor() as i64);
     let [first, last] = bins(low, high);
@@ -329,14 +331,14 @@ fn reached(print: &Footprint, size: f64, reaches: &mut Reaches) -> i64 {
     for i in 0..3 {
         let (a, b) = (print.points[i], print.points[(i + 1) % 3]);
         let (a, b) = if a.y <= b.y { (a, b) } else { (b, a) };
-        let [least, most] = min_max([a.x, b.x].into_iter());
+        let [least, most] = range([a.x, b.x].into_iter());
         let slope = (b.x - a.x) / (b.y - a.y);
         let at = |y: f64| (a.x + slope * (y - a.y)).clamp(least, most);
         let [from, to] = bins(a.y, b.y);
         for (bin, reach) in (from..=to).zip(&mut reaches[(from - first) as usize..]) {
             let low = bin as f64 * size - print.error;
             let ends = if slope.is_finite() {
-                min_max([at(low), at(low + size + 2.0 * print.error)].into_iter())
+                range([at(low), at(low + size + 2.0 * print.error)].into_iter())
             } else {
                 [least, most]
             };
@@ -352,10 +354,6 @@ fn reached(print: &Footprint, size: f64, reaches: &mut Reaches) -> i64 {
 /// Extends a range to hold another.
 fn widen(reach: &mut [f64; 2], other: &[f64; 2]) {
     *reach = [reach[0].min(other[0]), reach[1].max(other[1])];
-}
-
-fn min_max(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
 }
 
 /// The two halves of a triangle, cut across the side that is longest across the axis.

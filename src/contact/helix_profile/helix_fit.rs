@@ -10,10 +10,12 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use crate::budgets::{HELIX_FIT_SWEEPS, RISE_POINTS, RISE_RANGES};
+use crate::budgets::{HELIX_FIT_SWEEPS, RISE_RANGES};
 use crate::geometry::Helix;
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{HELIX_FIT_PRECISION, HELIX_FIT_STEP, RISE_PRECISION, RISE_STEP};
+
+use super::range;
 
 /// Of the rises in some ranges (each of one sign, without zero), the one at which the flanks of some surfaces (points in the axis
 /// frame) scatter least.
@@ -25,13 +27,10 @@ pub(super) fn fitted_rise(
     ranges: &[[f64; 2]],
     termination: &Termination,
 ) -> Result<Option<f64>, Interrupt> {
-    let some = |points: &Vec<Point3<f64>>| -> Vec<[f64; 3]> {
-        points.iter().step_by(points.len().div_ceil(RISE_POINTS).max(1)).map(cylindrical).collect()
-    };
-    let flanks: Vec<_> = flanks.iter().map(some).collect();
+    let flanks: Vec<Vec<[f64; 3]>> =
+        flanks.iter().map(|points| points.iter().map(cylindrical).collect()).collect();
     let scatter = |rise: f64| flanks.iter().map(|points| scatter(points, rise)).sum::<f64>();
-    let heights = flanks.iter().flatten().map(|[_, z, _]| *z);
-    let [low, high] = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], z| [l.min(z), h.max(z)]);
+    let [low, high] = range(flanks.iter().flatten().map(|[_, z, _]| *z));
     // An error of the rise adds up over the turns.
     let step = |rise: f64| RISE_STEP / (1.0 + ((high - low) / (TAU * rise)).abs());
     let mut tried = Vec::new();
@@ -70,20 +69,22 @@ pub(super) fn fitted_helix(
     rise: f64,
     termination: &Termination,
 ) -> Result<Helix, Interrupt> {
-    let some: Vec<&Point3<f64>> = flanks.iter().step_by(flanks.len().div_ceil(RISE_POINTS).max(1)).collect();
-    let count = some.len().max(1) as f64;
-    let middle = Vector3::z() * (some.iter().map(|p| p.z).sum::<f64>() / count);
-    let radius = some.iter().map(|p| p.xy().coords.norm()).sum::<f64>() / count;
-    // Shifts and tilts as shares of the radius, about the middle, and the logarithm of the rise.
+    let count = flanks.len().max(1) as f64;
+    let middle = Vector3::z() * (flanks.iter().map(|p| p.z).sum::<f64>() / count);
+    let radius = flanks.iter().map(|p| p.xy().coords.norm()).sum::<f64>() / count;
+    // An error of the rise adds up over the turns.
+    let [low, high] = range(flanks.iter().map(|p| p.z));
+    let turns = 1.0 + ((high - low) / (TAU * rise)).abs();
+    // Shifts and tilts as shares of the radius, about the middle, and the logarithm of the rise times the turns.
     let helix = |by: &[f64; 5]| {
         let tilt = UnitQuaternion::new(Vector3::new(by[2], by[3], 0.0));
         let shift = Translation3::from(Vector3::new(by[0], by[1], 0.0) * radius + middle);
         let axis_from_frame = shift * tilt * Translation3::from(-middle);
-        Helix { axis_from_frame, rise: rise * by[4].exp() }
+        Helix { axis_from_frame, rise: rise * (by[4] / turns).exp() }
     };
     let scatter = |by: &[f64; 5]| {
         let Helix { axis_from_frame, rise } = helix(by);
-        let points: Vec<_> = some.iter().map(|p| cylindrical(&(axis_from_frame * *p))).collect();
+        let points: Vec<_> = flanks.iter().map(|p| cylindrical(&(axis_from_frame * p))).collect();
         scatter(&points, rise)
     };
     let mut at = [0.0; 5];

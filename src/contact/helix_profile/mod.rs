@@ -167,3 +167,8 @@ fn taken_open(found: &mut [PathDepth; 2]) -> Vec<Interval> {
     apart.dedup();
     apart
 }
+
+/// The least and the largest of some numbers.
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+}

@@ -12,6 +12,7 @@ use crate::geometry::{Bounds, Helix, Pose, interpolate};
 use crate::tolerances::{KNOT_TRAVEL, LEAST_PITCH, OUTLIER};
 
 use super::super::course::{Course, Interval, PathSegment};
+use super::range;
 
 /// A short piece of the path.
 #[derive(Debug, Clone)]
@@ -308,8 +309,4 @@ fn knots(course: &Course, helix: &Helix, finest: f64) -> Vec<Knot> {
         angle += by;
     }
     knots
-}
-
-fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
 }

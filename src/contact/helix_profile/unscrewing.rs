@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::budgets::{HELIX_ROUNDS, RISE_POINTS};
+use crate::budgets::{FLANK_POINTS, HELIX_ROUNDS};
 use crate::geometry::{Helix, Pose};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
@@ -98,9 +98,7 @@ fn axes(pair: &ThreadPair, guess: f64, termination: &Termination) -> Result<Opti
     };
     let points = |axis: &Helix, facets: &[FlankFacet]| -> Vec<Point3<f64>> {
         let flanks: Vec<&FlankFacet> = facets.iter().filter(|f| f.is_flank()).collect();
-        // Of a few large facets, points between their corners show how the flank slopes.
-        let rows = (2.0 * RISE_POINTS as f64 / flanks.len().max(1) as f64).sqrt().clamp(1.0, 8.0) as u32;
-        flanks.iter().flat_map(|f| grid(&f.corners, rows)).map(|p| axis.axis_from_frame * p).collect()
+        spread(&flanks).into_iter().map(|p| axis.axis_from_frame * p).collect()
     };
     let points = [points(&own, &flanks[0]), points(&others, &flanks[1])];
     let radius = points.iter().flatten().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
@@ -126,9 +124,19 @@ fn axes(pair: &ThreadPair, guess: f64, termination: &Termination) -> Result<Opti
     ))
 }
 
-/// The points of a triangle in rows along one side, corners included.
-fn grid([a, b, c]: &[Point3<f64>; 3], rows: u32) -> Vec<Point3<f64>> {
-    let share = |k: u32| f64::from(k) / f64::from(rows);
-    let row = |i: u32| (0..=rows - i).map(move |j| a + (b - a) * share(i) + (c - a) * share(j));
-    (0..=rows).flat_map(row).collect()
+/// Points spread over some facets, as many on each: the corners alone lie in rows, which do not show how a flank slopes.
+/// On a facet they follow a sequence of low discrepancy (M. Roberts 2018, "The unreasonable effectiveness of quasirandom
+/// sequences"; the plastic number).
+fn spread(facets: &[&FlankFacet]) -> Vec<Point3<f64>> {
+    const PLASTIC: f64 = 1.324_717_957_244_746;
+    let point = |i: usize| {
+        let [a, b, c] = facets[i * facets.len() / FLANK_POINTS].corners;
+        let [mut u, mut v] = [PLASTIC, PLASTIC * PLASTIC].map(|step| (0.5 + i as f64 / step).fract());
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        a + (b - a) * u + (c - a) * v
+    };
+    let count = if facets.is_empty() { 0 } else { FLANK_POINTS };
+    (0..count).map(point).collect()
 }
