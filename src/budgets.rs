@@ -185,6 +185,12 @@ pub(crate) const FEWEST_NULL_CONTACTS: usize = 12;
 /// Planes of touching faces: round fits have many, threads more.
 /// Measured: no effect at half and double.
 pub(crate) const TOUCHED_PLANES: usize = 64;
+/// The most Newton iterations of a penalty step that a request may ask for, thirty times the default: between two steps
+/// nothing is interrupted. At double, a request is cancelled twice as late.
+pub(crate) const MOST_NEWTON_ITERATIONS: u32 = 1000;
+/// The most steps of a motion that a request may ask for, ten times the default. Each may add a waypoint of 56 bytes; at
+/// double, a motion may take twice the memory.
+pub(crate) const MOST_PENALTY_STEPS: u64 = 1_000_000;
 /// Evaluations of a penalty step, per Newton iteration. Smooth contact needs one each; a part wedged between points
 /// whose slopes all jump could go on for hundreds, and gain millionths.
 pub(crate) const EVALUATIONS_PER_ITERATION: u64 = 2;

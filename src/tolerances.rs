@@ -432,8 +432,9 @@ pub(crate) const PENALTY_REACH: f64 = 0.1;
 pub(crate) const PENALTY_TRAVEL: f64 = CONTACT_STEP / 2.0;
 /// Share of the depth tolerance that samples may use up; the rest is for what lies between them.
 pub(crate) const SAMPLED_DEPTH_SHARE: f64 = 0.9;
-/// Length. No edge is halved below this to get contact points.
-pub(crate) const SHORTEST_CONTACT_EDGE: f64 = 1e-3;
+/// Length. The least that a request may give as the longest edge between contact points, a tenth of the paper's: the
+/// faces of a cube as large as the assembly then have half a million points. At half, four times the memory.
+pub(crate) const SHORTEST_CONTACT_EDGE: f64 = 0.05;
 /// Share of its way. A step that is shorter is barred.
 pub(crate) const BARRED_SHARE: f64 = 0.01;
 /// Share to which a Newton step that does not lead down is shortened.

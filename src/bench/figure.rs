@@ -60,8 +60,8 @@ impl Coverage {
         }
     }
 
-    /// Where so many of `problems` are on the vertical axis, which has whole numbers: counts, or hundredths of a per
-    /// cent.
+    /// The place of a count of `problems` on the vertical axis, whose numbers are whole: the count itself, or its share in
+    /// hundredths of a per cent.
     fn height(self, count: usize, problems: usize) -> usize {
         match self {
             Self::All => count,

@@ -116,7 +116,7 @@ pub struct Request {
     pub threads: u32,
     /// Runs at a time. With more than one they take processor time from each other.
     pub jobs: usize,
-    /// Only assemblies of so many parts at most.
+    /// The largest number of parts of an assembly that is run.
     pub parts_up_to: Option<usize>,
     /// Beside as it is, under how many random rotations every assembly is planned.
     pub rotations: u32,
@@ -132,7 +132,7 @@ pub struct Request {
 
 /// Is told how a benchmark gets on.
 pub trait BenchObserver {
-    /// So many runs in all, of which so many had been done before.
+    /// The number of all runs, and of those that had been done before.
     fn begun(&mut self, total: usize, done: usize);
     /// A run ended and is recorded; `left` is an estimate for all that is still to do.
     fn ran(&mut self, record: &Record, done: usize, left: Option<Duration>);

@@ -93,18 +93,18 @@ pub(super) struct PlanArguments {
     pub(super) dbg: Option<Dbg>,
     #[command(flatten)]
     pub(super) sweeps: Sweeps,
-    /// Answer after so many seconds with what is there
+    /// Answer after this time with what is there
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) timeout: Option<Duration>,
-    /// Answer after so many seconds of planning with what is there; verification does not count, for the
-    /// paper's planners do not verify
+    /// Answer after this time of planning with what is there. Verification does not count: the paper's planners do
+    /// not verify
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) planning_timeout: Option<Duration>,
-    /// Give one motion, or one part's search of a pdp planner, up after so many seconds [default: no limit;
-    /// the paper has 360]
+    /// Give up one motion, or a pdp planner's search for one part, after this time [default: no limit; the paper
+    /// has 360]
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(super) path_timeout: Option<Duration>,
-    /// Give up after so many simulations
+    /// Give up after this number of simulations
     #[arg(long, value_name = "N")]
     pub(super) max_simulations: Option<u64>,
     /// Worker threads; never changes the plan [default: all processors]
@@ -230,12 +230,12 @@ pub(super) struct BenchRun {
     #[arg(long, value_name = "ENGINE,…", value_delimiter = ',', default_value = ENGINES[0],
         value_parser = PossibleValuesParser::new(ENGINES))]
     pub(super) engines: Vec<String>,
-    /// A run is to answer after so many seconds of planning, verification not counted; one that does not is
+    /// A run must answer after this time of planning. Verification does not count. A run that does not answer is
     /// ended
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "7200",
         allow_negative_numbers = true)]
     pub(super) timeout: Duration,
-    /// One motion, or one part's search of a pdp planner, is given up after so many seconds
+    /// One motion, or a pdp planner's search for one part, is given up after this time
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "360",
         allow_negative_numbers = true)]
     pub(super) path_timeout: Duration,
@@ -262,7 +262,7 @@ pub(super) struct BenchRun {
     /// Leave out assemblies of more parts
     #[arg(long, value_name = "N")]
     pub(super) parts_up_to: Option<usize>,
-    /// Run every assembly as it is, and then under so many random rotations of its own
+    /// Run every assembly as it is, and then under this number of random rotations of its own
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     pub(super) rotations: u32,
     /// Which rotations: the same seed gives the same ones
@@ -292,7 +292,7 @@ pub(super) struct BenchScale {
     /// With how many parts
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = PARTS)]
     pub(super) parts: Vec<usize>,
-    /// A run is to answer after so many seconds of planning, verification not counted; one that does not is
+    /// A run must answer after this time of planning. Verification does not count. A run that does not answer is
     /// ended
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "7200",
         allow_negative_numbers = true)]

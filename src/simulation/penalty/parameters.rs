@@ -1,5 +1,8 @@
 //! The hyper-parameters of the paper's simulation, and what its table leaves open.
 
+use crate::budgets::{MOST_NEWTON_ITERATIONS, MOST_PENALTY_STEPS};
+use crate::tolerances::SHORTEST_CONTACT_EDGE;
+
 /// Parameters of the engine `penalty`. Lengths are in the planning frame (longest side of the
 /// assembly in (5, 10]), angles in radians, times in seconds of the simulated motion.
 ///
@@ -181,6 +184,23 @@ impl PenaltyParameters {
         if self.planning_time_step < self.time_step {
             return Err("`planning-time-step` is shorter than `time-step`".to_owned());
         }
+        if self.longest_edge < SHORTEST_CONTACT_EDGE {
+            let given = self.longest_edge;
+            return Err(format!("`longest-edge` is {given}; it must be at least {SHORTEST_CONTACT_EDGE}"));
+        }
+        if self.newton_iterations > MOST_NEWTON_ITERATIONS {
+            let given = self.newton_iterations;
+            return Err(format!(
+                "`newton-iterations` is {given}; it must be at most {MOST_NEWTON_ITERATIONS}"
+            ));
+        }
+        let steps = u64::from(self.most_blocks) * u64::from(self.block_steps());
+        if steps > MOST_PENALTY_STEPS {
+            return Err(format!(
+                "`most-blocks` times the steps of a block, `planning-time-step` / `time-step`, is {steps}; \
+                 it must be at most {MOST_PENALTY_STEPS}"
+            ));
+        }
         Ok(())
     }
 
@@ -200,5 +220,24 @@ impl PenaltyParameters {
     #[must_use]
     pub(super) fn scale_for(&self, extent: f64) -> f64 {
         (extent * self.share_of_extent / self.penetration_threshold).min(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_would_take_all_memory_or_could_not_be_interrupted_is_refused_by_name() {
+        for (name, value, word) in [
+            ("longest-edge", 1e-4, "at least 0.05"),
+            ("newton-iterations", 1001.0, "at most 1000"),
+            ("most-blocks", 10_001.0, "at most 1000000"),
+            ("time-step", 1e-12, "at most 1000000"),
+        ] {
+            let refused = PenaltyParameters::with([(name, value)]).unwrap_err();
+            assert!(refused.contains(word), "{name}: {refused}");
+        }
+        assert!(PenaltyParameters::with([("most-blocks", 10_000.0), ("longest-edge", 0.05)]).is_ok());
     }
 }

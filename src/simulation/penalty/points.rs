@@ -10,12 +10,10 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use nalgebra::Point3;
 
 use crate::geometry::{SampleTree, Shape, Surface};
-use crate::tolerances::SHORTEST_CONTACT_EDGE;
 
 /// The vertices of a surface and, on edges and faces, further points so that no edge is longer
 /// than `longest`. Each point once.
 pub(super) fn contact_points(surface: &Surface, longest: f64) -> Vec<Point3<f64>> {
-    let longest = longest.max(SHORTEST_CONTACT_EDGE);
     let mut points = ContactPoints::default();
     for v in surface.vertices() {
         points.add(*v);

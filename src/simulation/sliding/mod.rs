@@ -62,8 +62,9 @@ impl TransitionFunction for SlidingEngine {
         termination: &Termination,
     ) -> Result<Motion, Interrupt> {
         let is_refined = is_refined(scene, standing_parts, part);
+        let at_start = PosedPart::new(part, start);
         if let (Action::Push(..), false) = (action, is_refined) {
-            match pushed(scene, standing_parts, PosedPart::new(part, start), action, termination) {
+            match pushed(scene, standing_parts, at_start, action, termination) {
                 Err(Halt::Lost | Halt::Blocked) => {}
                 Err(Halt::Interrupted(interrupt)) => return Err(interrupt),
                 Ok(motion) => return Ok(motion),
@@ -75,14 +76,8 @@ impl TransitionFunction for SlidingEngine {
         let mut turning = Turning::new(&mover);
         // A push comes here only if regions could not cover it.
         let by_samples = is_refined || !action.turns();
-        let mut around = RigidCover::new(
-            scene,
-            standing_parts,
-            PosedPart::new(part, start),
-            drive.reach(),
-            by_samples,
-            termination,
-        );
+        let mut around =
+            RigidCover::new(scene, standing_parts, at_start, drive.reach(), by_samples, termination);
         let mut extrapolation = HelixExtrapolation::new(scene, standing_parts, part, &drive);
         let mut near = None;
         while path.len() < MOTION_POSES {

@@ -73,14 +73,9 @@ pub fn step_costs(
     let Some(start) = poses.first() else { return Ok(costs) };
     let drive = Drive::new(scene, part, start, action);
     for by_samples in [false, true] {
-        let mut around = RigidCover::new(
-            scene,
-            standing_parts,
-            PosedPart::new(part, start),
-            drive.reach(),
-            by_samples,
-            termination,
-        );
+        let at_start = PosedPart::new(part, start);
+        let mut around =
+            RigidCover::new(scene, standing_parts, at_start, drive.reach(), by_samples, termination);
         for pose in poses {
             termination.check()?;
             // From some way on these would be the others.
