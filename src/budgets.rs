@@ -262,9 +262,10 @@ pub(crate) const STATE_LEVELS: usize = 10;
 
 // Helices and threads.
 
-/// Slabs along the axis per pitch; a profile is stored by slab.
-/// Measured: no effect at half and double.
-pub(crate) const SLABS_PER_PITCH: f64 = 4.0;
+/// Slabs along the axis per pitch; a profile is stored by slab. A head is told from the thread if it is a slab away. At a
+/// quarter, nuts near the head of a coarse bolt are checked at samples: 10 s, not 1 s, on a thread of two starts. At
+/// double, profiles take twice the memory.
+pub(crate) const SLABS_PER_PITCH: f64 = 16.0;
 /// Heights of a profile within a pitch: at first, and where these show no gap. The finest see a play of a
 /// hundredth of the pitch of a thread of three starts; at half, such threads are checked at samples, which takes seconds.
 /// The first measured: at half no effect; at double another plan of `bolt_nut_m8_thread`.

@@ -254,10 +254,10 @@ pub(crate) const EQUAL_GAP: f64 = 0.02;
 /// far apart as their play. With half of the largest, threads with a play of 0.2 are left to simulation; with double,
 /// what stands beside a thread is taken for a part of it.
 pub(crate) const THREAD_REACHES: [f64; 3] = [1.0, 3.0, 8.0];
-/// Share of the pitch by which points travel on one knot of a helix, about: then a head that is a quarter of the pitch
-/// from a nut is not taken for a part of the thread. At half, profiles take a little longer; at double, more stretches
-/// near a head are left to samples.
-pub(crate) const KNOT_TRAVEL: f64 = 0.125;
+/// Share of the pitch by which points travel on one knot of a helix, about: half of a slab of a profile, so that a head
+/// that is a slab away from a nut is not taken for a part of the thread. At four times as much, more stretches near a head
+/// are left to samples; at half, profiles take a little longer.
+pub(crate) const KNOT_TRAVEL: f64 = 1.0 / 32.0;
 /// Multiple. What is this many times further off the helix than most is left out of its fit.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const OUTLIER: f64 = 3.0;
