@@ -10,12 +10,13 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use crate::budgets::{HELIX_FIT_SWEEPS, RISE_RANGES};
-use crate::geometry::Helix;
+use crate::budgets::{FLANK_POINTS, HELIX_FIT_SWEEPS, RISE_RANGES};
+use crate::geometry::{Helix, Pose};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{HELIX_FIT_PRECISION, HELIX_FIT_STEP, RISE_PRECISION, RISE_STEP};
 
 use super::range;
+use super::slip::FlankFacet;
 
 /// Of the rises in some ranges (each of one sign, without zero), the one at which the flanks of some surfaces (points in the axis
 /// frame) scatter least.
@@ -59,55 +60,109 @@ pub(super) fn fitted_rise(
     Ok(Some(rise))
 }
 
-/// The helix near the z axis and of some rise at which the flanks of a surface (points in the frame of that axis) scatter
-/// least: axis and rise are changed in turn by steps that are halved when none is better (compass search).
+/// The helices near the z axis, of one rise near some rise, at which the flanks of two surfaces (points in the frame of
+/// that axis) scatter least: the axes and the rise are changed in turn by steps that are halved when none is better
+/// (compass search).
 ///
 /// # Errors
 /// The termination condition became true.
-pub(super) fn fitted_helix(
-    flanks: &[Point3<f64>],
+pub(super) fn fitted_helices(
+    flanks: &[Vec<Point3<f64>>; 2],
     rise: f64,
     termination: &Termination,
-) -> Result<Helix, Interrupt> {
-    let count = flanks.len().max(1) as f64;
-    let middle = Vector3::z() * (flanks.iter().map(|p| p.z).sum::<f64>() / count);
-    let radius = flanks.iter().map(|p| p.xy().coords.norm()).sum::<f64>() / count;
+) -> Result<[Helix; 2], Interrupt> {
+    let mut fits = flanks.each_ref().map(|flanks| AxisFit::new(flanks, rise));
     // An error of the rise adds up over the turns.
-    let [low, high] = range(flanks.iter().map(|p| p.z));
+    let [low, high] = range(flanks.iter().flatten().map(|p| p.z));
     let turns = 1.0 + ((high - low) / (TAU * rise)).abs();
-    // Shifts and tilts as shares of the radius, about the middle, and the logarithm of the rise times the turns.
-    let helix = |by: &[f64; 5]| {
-        let tilt = UnitQuaternion::new(Vector3::new(by[2], by[3], 0.0));
-        let shift = Translation3::from(Vector3::new(by[0], by[1], 0.0) * radius + middle);
-        let axis_from_frame = shift * tilt * Translation3::from(-middle);
-        Helix { axis_from_frame, rise: rise * (by[4] / turns).exp() }
-    };
-    let scatter = |by: &[f64; 5]| {
-        let Helix { axis_from_frame, rise } = helix(by);
-        let points: Vec<_> = flanks.iter().map(|p| cylindrical(&(axis_from_frame * p))).collect();
-        scatter(&points, rise)
-    };
-    let mut at = [0.0; 5];
-    let (mut least, mut step) = (scatter(&at), HELIX_FIT_STEP);
+    let (mut rise, mut step) = (rise, HELIX_FIT_STEP);
     for _ in 0..HELIX_FIT_SWEEPS {
         termination.check()?;
         if step <= HELIX_FIT_PRECISION {
             break;
         }
-        let mut is_better = false;
-        for (of, sign) in (0..at.len()).flat_map(|of| [(of, 1.0), (of, -1.0)]) {
-            let mut tried = at;
-            tried[of] += sign * step;
-            let found = scatter(&tried);
-            if found < least {
-                (at, least, is_better) = (tried, found, true);
+        let [own, other] = &mut fits;
+        let (own, other) = rayon::join(|| own.improve(step, rise), || other.improve(step, rise));
+        let mut is_better = own || other;
+        for sign in [1.0, -1.0] {
+            let tried = rise * (sign * step / turns).exp();
+            let scatters = fits.each_ref().map(|fit| fit.scatter(&fit.place(&fit.by), tried));
+            if scatters.iter().sum::<f64>() < fits.iter().map(|fit| fit.least).sum() {
+                (rise, is_better) = (tried, true);
+                fits.iter_mut().zip(scatters).for_each(|(fit, scatter)| fit.least = scatter);
             }
         }
         if !is_better {
             step /= 2.0;
         }
     }
-    Ok(helix(&at))
+    Ok(fits.map(|fit| Helix { axis_from_frame: fit.place(&fit.by), rise }))
+}
+
+/// The axis of the flanks of a surface, while it is fitted.
+#[derive(Debug)]
+struct AxisFit<'a> {
+    flanks: &'a [Point3<f64>],
+    middle: Vector3<f64>,
+    radius: f64,
+    /// Two shifts as shares of the radius, and two tilts about the middle.
+    by: [f64; 4],
+    /// How far the flanks scatter about that axis.
+    least: f64,
+}
+
+impl<'a> AxisFit<'a> {
+    fn new(flanks: &'a [Point3<f64>], rise: f64) -> Self {
+        let count = flanks.len().max(1) as f64;
+        let middle = Vector3::z() * (flanks.iter().map(|p| p.z).sum::<f64>() / count);
+        let radius = flanks.iter().map(|p| p.xy().coords.norm()).sum::<f64>() / count;
+        let mut fit = Self { flanks, middle, radius, by: [0.0; 4], least: 0.0 };
+        fit.least = fit.scatter(&fit.place(&fit.by), rise);
+        fit
+    }
+
+    /// `axis_from_frame`.
+    fn place(&self, by: &[f64; 4]) -> Pose {
+        let tilt = UnitQuaternion::new(Vector3::new(by[2], by[3], 0.0));
+        let shift = Translation3::from(Vector3::new(by[0], by[1], 0.0) * self.radius + self.middle);
+        shift * tilt * Translation3::from(-self.middle)
+    }
+
+    fn scatter(&self, axis_from_frame: &Pose, rise: f64) -> f64 {
+        let points: Vec<_> = self.flanks.iter().map(|p| cylindrical(&(axis_from_frame * p))).collect();
+        scatter(&points, rise)
+    }
+
+    /// Takes each step that lessens the scatter; whether there was one.
+    fn improve(&mut self, step: f64, rise: f64) -> bool {
+        let before = self.least;
+        for (of, sign) in (0..self.by.len()).flat_map(|of| [(of, 1.0), (of, -1.0)]) {
+            let mut tried = self.by;
+            tried[of] += sign * step;
+            let found = self.scatter(&self.place(&tried), rise);
+            if found < self.least {
+                (self.by, self.least) = (tried, found);
+            }
+        }
+        self.least < before
+    }
+}
+
+/// Points spread over some facets, as many on each: the corners alone lie in rows, which do not show how a flank slopes.
+/// On a facet they follow a sequence of low discrepancy (M. Roberts 2018, "The unreasonable effectiveness of quasirandom
+/// sequences"; the plastic number).
+pub(super) fn spread(facets: &[&FlankFacet]) -> Vec<Point3<f64>> {
+    const PLASTIC: f64 = 1.324_717_957_244_746;
+    let point = |i: usize| {
+        let [a, b, c] = facets[i * facets.len() / FLANK_POINTS].corners;
+        let [mut u, mut v] = [PLASTIC, PLASTIC * PLASTIC].map(|step| (0.5 + i as f64 / step).fract());
+        if u + v > 1.0 {
+            (u, v) = (1.0 - u, 1.0 - v);
+        }
+        a + (b - a) * u + (c - a) * v
+    };
+    let count = if facets.is_empty() { 0 } else { FLANK_POINTS };
+    (0..count).map(point).collect()
 }
 
 /// Angle, height and distance of a point.
@@ -115,22 +170,25 @@ fn cylindrical(p: &Point3<f64>) -> [f64; 3] {
     [p.y.atan2(p.x), p.z, p.xy().coords.norm()]
 }
 
-/// The sum of squared deviations of distances from the straight line through those of their range of heights.
+/// The sum of squared deviations of distances from the straight line through those about their height. A point counts for
+/// the lines of two ranges, by how near it is to the middle of each: so the sum changes steadily with the helix.
 fn scatter(points: &[[f64; 3]], rise: f64) -> f64 {
     let pitch = TAU * rise;
     let mut ranges = [Moments::default(); RISE_RANGES];
     for [angle, z, distance] in points {
         let height = ((z - rise * angle) / pitch).rem_euclid(1.0) * RISE_RANGES as f64;
         let range = (height as usize).min(RISE_RANGES - 1);
-        ranges[range].add(height - range as f64, *distance);
+        let above = height - range as f64;
+        ranges[range].add(1.0 - above, above, *distance);
+        ranges[(range + 1) % RISE_RANGES].add(above, above - 1.0, *distance);
     }
     ranges.iter().map(Moments::deviation).sum()
 }
 
-/// Sums over points (x, y).
+/// Weighted sums over points (x, y).
 #[derive(Debug, Clone, Copy, Default)]
 struct Moments {
-    count: f64,
+    weight: f64,
     x: f64,
     y: f64,
     xx: f64,
@@ -139,22 +197,26 @@ struct Moments {
 }
 
 impl Moments {
-    fn add(&mut self, x: f64, y: f64) {
-        self.count += 1.0;
-        (self.x, self.y) = (self.x + x, self.y + y);
-        (self.xx, self.xy, self.yy) = (self.xx + x * x, self.xy + x * y, self.yy + y * y);
+    fn add(&mut self, weight: f64, x: f64, y: f64) {
+        self.weight += weight;
+        (self.x, self.y) = (self.x + weight * x, self.y + weight * y);
+        self.xx += weight * x * x;
+        self.xy += weight * x * y;
+        self.yy += weight * y * y;
     }
 
-    /// The sum of squared deviations of y from its regression line on x.
+    /// The weighted sum of squared deviations of y from its regression line on x.
     fn deviation(&self) -> f64 {
-        let count = self.count.max(1.0);
+        if self.weight == 0.0 {
+            return 0.0;
+        }
         let [xx, xy, yy] = [
-            self.xx - self.x * self.x / count,
-            self.xy - self.x * self.y / count,
-            self.yy - self.y * self.y / count,
+            self.xx - self.x * self.x / self.weight,
+            self.xy - self.x * self.y / self.weight,
+            self.yy - self.y * self.y / self.weight,
         ];
         // Points of one height make no line.
-        yy - if xx > 1e-9 * count { xy * xy / xx } else { 0.0 }
+        yy - if xx > 1e-9 * self.weight { xy * xy / xx } else { 0.0 }
     }
 }
 
@@ -162,39 +224,41 @@ impl Moments {
 mod tests {
     use super::*;
     use crate::fixtures::{surface, thread};
-    use crate::geometry::{Pose, Surface};
+    use crate::geometry::Surface;
+    use crate::tolerances::FLANK_LEAN;
 
     #[test]
-    fn the_axis_of_a_displaced_thread_is_found() {
+    fn the_helix_of_a_displaced_thread_is_found() {
         let rise = 0.5 / TAU;
         let place = Pose::new(Vector3::new(0.03, -0.02, 0.01), Vector3::new(0.004, -0.006, 0.4));
-        for mesh in thread(3.0, 0.5) {
-            let surface = surface(mesh);
-            let points: Vec<_> = flanks(&surface).iter().map(|p| place * p).collect();
-            let found = fitted_helix(&points, rise * 1.001, &Termination::default()).unwrap();
-            let axis_from_thread = found.axis_from_frame * place;
+        let points = thread(3.0, 0.5).map(|mesh| flanks(&surface(mesh), &place));
+        let found = fitted_helices(&points, rise * 1.001, &Termination::default()).unwrap();
+        for helix in found {
+            let axis_from_thread = helix.axis_from_frame * place;
             for z in [0.0, 3.0] {
                 let at = axis_from_thread * Point3::new(0.0, 0.0, z);
                 assert!(at.xy().coords.norm() < 1e-3, "{at}");
             }
-            assert!((found.rise / rise - 1.0).abs() < 1e-4, "{}", found.rise / rise);
+            assert!((helix.rise / rise - 1.0).abs() < 1e-4, "{}", helix.rise / rise);
         }
     }
 
-    /// Corners of the flanks of a thread along z.
-    fn flanks(surface: &Surface) -> Vec<Point3<f64>> {
-        let corners = (0..surface.triangles().len() as u32).map(|t| surface.corners(t));
-        let is_flank = |c: &[Point3<f64>; 3]| {
-            let normal = (c[1] - c[0]).cross(&(c[2] - c[0])).normalize();
-            (0.15..0.97).contains(&normal.z.abs())
-        };
-        corners.filter(is_flank).flatten().collect()
+    /// Points of the flanks of a thread along z, at a pose.
+    fn flanks(surface: &Surface, pose: &Pose) -> Vec<Point3<f64>> {
+        let facets: Vec<FlankFacet> = (0..surface.triangles().len() as u32)
+            .filter(|t| {
+                let facet = FlankFacet::of(&surface.corners(*t));
+                facet.is_some_and(|f| (FLANK_LEAN[0]..FLANK_LEAN[1]).contains(&f.normal.z.abs()))
+            })
+            .filter_map(|t| FlankFacet::of(&surface.corners(t).map(|p| pose * p)))
+            .collect();
+        spread(&facets.iter().collect::<Vec<_>>())
     }
 
     #[test]
     fn the_rise_is_found_in_a_wide_range_of_either_sign() {
         for pitch in [0.3, 0.8] {
-            let flanks = thread(3.0, pitch).map(|mesh| flanks(&surface(mesh)));
+            let flanks = thread(3.0, pitch).map(|mesh| flanks(&surface(mesh), &Pose::default()));
             let rise = pitch / TAU;
             for ranges in
                 [&[[0.4 * rise, 3.0 * rise]][..], &[[-10.0 * rise, -0.3 * rise], [0.3 * rise, 10.0 * rise]]]

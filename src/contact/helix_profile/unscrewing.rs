@@ -8,13 +8,13 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Point3, Vector3};
 
-use crate::budgets::{FLANK_POINTS, HELIX_ROUNDS};
+use crate::budgets::HELIX_ROUNDS;
 use crate::geometry::{Helix, Pose};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{LEAST_PITCH, RISE_BY_RADIUS, RISE_RANGE};
 
-use super::helix_fit::{fitted_helix, fitted_rise};
+use super::helix_fit::{fitted_helices, fitted_rise, spread};
 use super::slip::{FlankFacet, slipping};
 use super::thread_path::{SharedThread, ThreadPair};
 
@@ -112,31 +112,9 @@ fn axes(pair: &ThreadPair, guess: f64, termination: &Termination) -> Result<Opti
         vec![[from.max(least), to].map(|rise| rise.copysign(guess))]
     };
     let Some(rise) = fitted_rise(&points, &ranges, termination)? else { return Ok(None) };
-    let (own_fit, other_fit) = rayon::join(
-        || fitted_helix(&points[0], rise, termination),
-        || fitted_helix(&points[1], rise, termination),
-    );
-    let (own_fit, other_fit) = (own_fit?, other_fit?);
-    let rise = f64::midpoint(own_fit.rise, other_fit.rise);
-    let fits = [(own, own_fit), (others, other_fit)];
-    Ok(Some(
-        fits.map(|(axis, fit)| Helix { axis_from_frame: fit.axis_from_frame * axis.axis_from_frame, rise }),
-    ))
-}
-
-/// Points spread over some facets, as many on each: the corners alone lie in rows, which do not show how a flank slopes.
-/// On a facet they follow a sequence of low discrepancy (M. Roberts 2018, "The unreasonable effectiveness of quasirandom
-/// sequences"; the plastic number).
-fn spread(facets: &[&FlankFacet]) -> Vec<Point3<f64>> {
-    const PLASTIC: f64 = 1.324_717_957_244_746;
-    let point = |i: usize| {
-        let [a, b, c] = facets[i * facets.len() / FLANK_POINTS].corners;
-        let [mut u, mut v] = [PLASTIC, PLASTIC * PLASTIC].map(|step| (0.5 + i as f64 / step).fract());
-        if u + v > 1.0 {
-            (u, v) = (1.0 - u, 1.0 - v);
-        }
-        a + (b - a) * u + (c - a) * v
-    };
-    let count = if facets.is_empty() { 0 } else { FLANK_POINTS };
-    (0..count).map(point).collect()
+    let fits = fitted_helices(&points, rise, termination)?;
+    Ok(Some(std::array::from_fn(|i| Helix {
+        axis_from_frame: fits[i].axis_from_frame * [&own, &others][i].axis_from_frame,
+        rise: fits[i].rise,
+    })))
 }
