@@ -370,3 +370,18 @@ pub(crate) const MOSTLY_STANDING: usize = 2;
 /// Points of a surface at which its thickness is measured. The quarter that is thinnest has a fourth of them; half of
 /// them misses thin flanges of large parts, double takes twice as long once for each shape (a closest point costs most).
 pub(crate) const THICKNESS_POINTS: usize = 200;
+/// Random poses towards which the tree of a part grows at first, in RRT and BK-RRT; twice as many whenever no part
+/// leaves. At half one more round; at double, parts that others block are tried longer in vain.
+pub(crate) const RRT_FIRST_SAMPLES: usize = 16;
+/// The most of them for one part: some times what parts that straight ways take out needed in the corpus. At half fewer
+/// parts leave; at double what never leaves takes twice as long.
+pub(crate) const RRT_SAMPLES: usize = 1024;
+/// Motions of BK-RRT that are simulated in parallel, enough for eight threads. At half threads idle; at double trees grow
+/// wider before they grow longer. Never the number of threads: plans may not depend on that.
+pub(crate) const RRT_BATCH: usize = 8;
+/// Cross-sections of a part along one axis in which discs and openings are looked for, amid the longest stretches that it
+/// does not change in. At half, the neck of a part with many steps is missed; at double it takes twice as long.
+pub(crate) const CROSS_SECTIONS: usize = 32;
+/// Cells in which a disc is checked to be inside a part: some thousands are needed for a disc whose rim is a hundredth of
+/// the radius inside. At half, some discs near a rim are not proved; at double no effect.
+pub(crate) const DISC_CELLS: usize = 20_000;

@@ -11,7 +11,7 @@ use std::{env, fs, io};
 
 /// Every stage, and the stages that its code imports. A stage comes after all that it depends on.
 /// `.ci/structure` compares this table with the imports.
-const STAGES: [(&str, &str); 18] = [
+const STAGES: [(&str, &str); 19] = [
     ("lru", ""),
     ("termination", ""),
     ("tolerances", ""),
@@ -22,12 +22,16 @@ const STAGES: [(&str, &str); 18] = [
     ("geometry", "budgets cache termination tolerances"),
     ("sdf", "cache geometry termination"),
     ("scene", "budgets cache geometry lru sdf termination tolerances"),
+    ("rrt", "geometry scene termination"),
     ("contact", "budgets geometry scene sdf termination tolerances"),
     ("simulation", "budgets cache contact geometry scene sdf termination tolerances"),
     ("blocking_graph", "cache geometry scene simulation termination"),
     ("plan", "budgets cache contact geometry scene termination tolerances"),
-    ("search", "blocking_graph budgets cache contact geometry plan scene simulation termination tolerances"),
-    ("assembling", "contact geometry plan scene search termination"),
+    (
+        "search",
+        "blocking_graph budgets cache contact geometry plan rrt scene simulation termination tolerances",
+    ),
+    ("assembling", "contact geometry plan rrt scene search termination"),
     (
         "service",
         "assembling blocking_graph cache contact geometry lru plan scene sdf search simulation termination",

@@ -15,6 +15,7 @@ pub mod geometry;
 pub mod hostile_input;
 mod lru;
 pub mod plan;
+mod rrt;
 pub mod scene;
 pub mod sdf;
 pub mod search;

@@ -441,3 +441,9 @@ pub(crate) const BARRED_SHARE: f64 = 0.01;
 pub(crate) const BACKTRACK_SHARE: f64 = 0.25;
 /// Share of the linear forecast by which the energy must fall (Armijo).
 pub(crate) const ARMIJO: f64 = 1e-4;
+/// Share of the random poses of RRT and BK-RRT that are out (a goal bias of 5 to 10 % is usual: S. LaValle, "Planning
+/// Algorithms", 2006, 5.5.1). At half ways out are found later; at double narrow ways are.
+pub(crate) const GOAL_BIAS: f64 = 0.1;
+/// Share of the radius of a disc inside a part that is checked to be inside: near the rim the check takes long. At half
+/// the difference from 1, it takes twice as long; at double, necks are missed whose ends are wider by less than 4%.
+pub(crate) const DISC_SHARE: f64 = 0.98;

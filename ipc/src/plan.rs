@@ -32,7 +32,7 @@ pub const PLAN_NO_STAGING: u32 = 64;
 pub const PLAN_TRACE: u32 = 128;
 
 /// Names of the planners; the wire carries the index.
-pub const PLANNERS: [&str; 5] = ["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star"];
+pub const PLANNERS: [&str; 7] = ["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star", "rrt", "bk-rrt"];
 /// Names of the engines; the wire carries the index.
 pub const ENGINES: [&str; 2] = ["sliding", "penalty"];
 /// Names of the action sets; the wire carries the index.
@@ -95,11 +95,13 @@ pub struct PlanRequestHeader {
     pub deadline_ns: u64,
     /// Simulations after which to give up; `u64::MAX` for no limit.
     pub max_simulations: u64,
-    /// Nanoseconds after which one motion, or a pdp planner's search for one part, is given up; `u64::MAX` for no limit.
+    /// Nanoseconds after which one motion, or a baseline's search for one part, is given up; `u64::MAX` for no limit.
     pub path_timeout_ns: u64,
     /// Nanoseconds of planning, verification not counted, after which to answer with what is there; `u64::MAX` for no
     /// limit.
     pub planning_timeout_ns: u64,
+    /// What the random poses of `rrt` and `bk-rrt` depend on.
+    pub seed: u64,
 }
 
 /// A parameter of the engine `penalty`.
@@ -162,7 +164,7 @@ pub struct StepsHeader {
 }
 
 const _: () = {
-    assert!(size_of::<PlanRequestHeader>() == 112 && align_of::<PlanRequestHeader>() == 8);
+    assert!(size_of::<PlanRequestHeader>() == 120 && align_of::<PlanRequestHeader>() == 8);
     assert!(offset_of!(PlanRequestHeader, planner) == 32);
     assert!(offset_of!(PlanRequestHeader, moved) == 64);
     assert!(offset_of!(PlanRequestHeader, static_analysis) == 72);
@@ -212,9 +214,11 @@ pub struct PlanRequest {
     pub threads: u32,
     /// CLOCK_MONOTONIC nanoseconds.
     pub deadline_ns: Option<u64>,
+    /// What the random poses of `rrt` and `bk-rrt` depend on.
+    pub seed: u64,
     /// Simulations after which to give up.
     pub max_simulations: Option<u64>,
-    /// Nanoseconds after which one motion, or a pdp planner's search for one part, is given up.
+    /// Nanoseconds after which one motion, or a baseline's search for one part, is given up.
     pub path_timeout_ns: Option<u64>,
     /// Nanoseconds of planning, verification not counted, after which to answer with what is there.
     pub planning_timeout_ns: Option<u64>,
@@ -265,6 +269,7 @@ impl PlanRequest {
             max_simulations: self.max_simulations.unwrap_or(u64::MAX),
             path_timeout_ns: self.path_timeout_ns.unwrap_or(u64::MAX),
             planning_timeout_ns: self.planning_timeout_ns.unwrap_or(u64::MAX),
+            seed: self.seed,
         });
         writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.moved).array(staged);
         writer.array(&self.penalty);
@@ -315,6 +320,7 @@ impl PlanRequest {
             max_simulations: limit(h.max_simulations),
             path_timeout_ns: limit(h.path_timeout_ns),
             planning_timeout_ns: limit(h.planning_timeout_ns),
+            seed: h.seed,
             fixed,
             removed,
             targets: set(PLAN_HAS_TARGETS).then_some(targets),

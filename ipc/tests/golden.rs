@@ -1,4 +1,4 @@
-//! The bytes of every message of protocol 2, written down once. A change to one of them breaks clients that
+//! The bytes of every message of protocol 4, written down once. A change to one of them breaks clients that
 //! are out there: a new layout needs a new version in the service names.
 
 use sbdp_ipc::PROTOCOL;
@@ -92,12 +92,12 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
     assert_eq!((ErrorCode::Busy as u32, ErrorCode::Cancelled as u32), (3, 12));
     assert_eq!(
         (PROTOCOL, layout::PLAN_SERVICE, layout::GEOMETRY_SERVICE),
-        (3, "sbdp/v3/plan", "sbdp/v3/geometry")
+        (4, "sbdp/v4/plan", "sbdp/v4/geometry")
     );
-    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v3/progress");
+    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v4/progress");
     assert_eq!(
         (layout::WAKE_SERVER_SERVICE, layout::WAKE_CLIENT_SERVICE),
-        ("sbdp/v3/wake/server", "sbdp/v3/wake/client")
+        ("sbdp/v4/wake/server", "sbdp/v4/wake/client")
     );
 }
 
@@ -119,6 +119,7 @@ fn a_plan_request() {
         max_simulations: Some(9),
         path_timeout_ns: Some(10),
         planning_timeout_ns: Some(11),
+        seed: 12,
         fixed: vec![1, 2, 3],
         removed: vec![4],
         targets: Some(vec![5, 6]),
@@ -131,12 +132,16 @@ fn a_plan_request() {
         "\
          abababababababab*4 0100000001000000 0100000097000000 0400000003000000 0100000002000000 \
          0100000000000000 0100000001000000 0403020100000000 0900000000000000 0a00000000000000 \
-         0b00000000000000 0100000002000000 0300000000000000 0400000000000000 0500000006000000 \
-         0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf 000000000000f03f \
+         0b00000000000000 0c00000000000000 0100000002000000 0300000000000000 0400000000000000 \
+         0500000006000000 0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf 000000000000f03f \
          0000000000000000*3 0200000000000000 000000000000e03f",
     );
     assert_eq!(PlanRequest::decode(AlignedBytes::copy_of(&request.encode()).as_slice()), Ok(request));
-    check("plain plan request", &PlanRequest::default().encode(), "0000000000000000*11 ffffffffffffffff*3");
+    check(
+        "plain plan request",
+        &PlanRequest::default().encode(),
+        "0000000000000000*11 ffffffffffffffff*3 0000000000000000",
+    );
 }
 
 #[test]
@@ -148,14 +153,14 @@ fn a_request_for_an_assembly_plan() {
         &request.encode(),
         "\
          0000000000000000*5 0000000020000000 0000000000000000*2 0000000001000000 0000000000000000*2 \
-         ffffffffffffffff*3 0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf \
-         000000000000f03f 0000000000000000*3",
+         ffffffffffffffff*3 0000000000000000 0700000000000000 000000000000f03f 0000000000000040 \
+         000000000000e0bf 000000000000f03f 0000000000000000*3",
     );
     let request = PlanRequest { assembly: Some(Staging::None), ..PlanRequest::default() };
     check(
         "assembly plan request without staging",
         &request.encode(),
-        "0000000000000000*5 0000000060000000 0000000000000000*5 ffffffffffffffff*3",
+        "0000000000000000*5 0000000060000000 0000000000000000*5 ffffffffffffffff*3 0000000000000000",
     );
 }
 

@@ -2,7 +2,7 @@
 //! begins (the paper's discussion: reverse the plan, link each part's start to it by RRT-Connect).
 //!
 //! Data flow: removals (from `search`) → where parts wait (`staging`) → all that stands and waits while one
-//! part moves (`room`) → its way through that (`transfer`, by `rrt_connect`) → [`Insertion`]s in order.
+//! part moves (`room`) → its way through that (`transfer`, by RRT-Connect) → [`Insertion`]s in order.
 //!
 //! A path in reverse passes the same places, so an insertion past what stands is as verified as the removal
 //! was. The rest is verified here, with the same check and no penetration allowed: the way to the insertion
@@ -11,7 +11,6 @@
 //! in the way of anything.
 
 mod room;
-mod rrt_connect;
 mod staging;
 #[cfg(test)]
 mod tests;
@@ -184,7 +183,8 @@ impl<'a> Assembling<'a> {
         let away = self.away(removal, &among);
         // Away from all that it touches first, as far as that is free: the way there is easier to find.
         let [start, goal] = ends;
-        let retreat = RETREAT * self.room.reach(part).max(LEAST_RETREAT * self.room.scene.longest_side);
+        let retreat =
+            RETREAT * self.room.metric(part).reach.max(LEAST_RETREAT * self.room.scene.longest_side);
         let clear = Translation3::from(away * retreat) * goal;
         let last = self.room.check(&among, part, &[clear, goal], self.termination)?;
         let (goal, last) =

@@ -5,13 +5,11 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 use crate::contact::seems_clear;
-use crate::geometry::{Bounds, Pose, interpolate, separating_direction, transformed};
+use crate::geometry::{Bounds, Pose, separating_direction, transformed};
 use crate::plan::{Verdict, Verifier};
-use crate::scene::{PosedPart, Scene};
+use crate::scene::{PartMetric, PosedPart, Scene};
 use crate::termination::{Interrupt, Termination, try_all};
 
-/// Turns between two waypoints stay below this, so that the slerp is unambiguous.
-const MOST_TURN: f64 = 1.5;
 /// The most pieces in which a way is checked.
 const MOST_GLANCES: f64 = 64.0;
 /// Looks are no closer and no further apart than these shares of the longest side.
@@ -26,8 +24,8 @@ pub(super) struct Room {
     parts: usize,
     /// By number: its hull where it stands or waits, in the planning frame.
     hulls: Vec<Vec<Point3<f64>>>,
-    /// By part: how far it reaches from the point that moves on lines.
-    reach: Vec<f64>,
+    /// By part.
+    metrics: Vec<PartMetric>,
     /// Holds every part at both places.
     pub(super) bounds: Bounds,
 }
@@ -49,7 +47,7 @@ impl Room {
             verifier: verifier.twice(),
             parts,
             hulls,
-            reach: (0..parts).map(|part| scene.reach(part)).collect(),
+            metrics: (0..parts).map(|part| PartMetric::of(scene, part)).collect(),
             bounds: all,
         }
     }
@@ -64,9 +62,8 @@ impl Room {
         number % self.parts
     }
 
-    /// How far a part reaches from the point that moves on lines.
-    pub(super) fn reach(&self, part: usize) -> f64 {
-        self.reach[part]
+    pub(super) fn metric(&self, part: usize) -> &PartMetric {
+        &self.metrics[part]
     }
 
     /// Checks a way of a part (poses of its shape) among some numbers (ascending), with no penetration allowed.
@@ -106,13 +103,14 @@ impl Room {
     ) -> Result<bool, Interrupt> {
         let thin = self.scene.bodies[part].shape.bounds().extents().min() / 2.0;
         let step = thin.clamp(FINE * self.scene.longest_side, COARSE * self.scene.longest_side);
-        let clear = |glance: &[Pose; 2]| {
+        let metric = self.metric(part);
+        let clear = |glance @ [from, to]: &[Pose; 2]| {
             let near = self.near(among, part, glance);
             if near.is_empty() {
                 return Ok(true);
             }
-            let count = (self.travel(part, glance) / step).ceil().max(1.0);
-            let at = |i: usize| self.between(part, glance, i as f64 / count);
+            let count = (metric.distance(from, to) / step).ceil().max(1.0);
+            let at = |i: usize| metric.between(from, to, i as f64 / count);
             try_all(0..=count as usize, |i| {
                 seems_clear(&self.scene, &near, PosedPart::new(part, &at(i)), step / 2.0, termination)
             })
@@ -126,34 +124,17 @@ impl Room {
         Ok(true)
     }
 
-    /// The poses of a straight way, so close that the rotation between two is unambiguous.
-    pub(super) fn way(&self, part: usize, from: &Pose, to: &Pose) -> Vec<Pose> {
-        let count = (from.rotation.angle_to(&to.rotation) / MOST_TURN).ceil().max(1.0);
-        let inner = (1..count as usize).map(|i| self.between(part, &[*from, *to], i as f64 / count));
-        std::iter::once(*from).chain(inner).chain([*to]).collect()
-    }
-
-    /// No point of a part moves further on a straight piece of its way.
-    fn travel(&self, part: usize, [from, to]: &[Pose; 2]) -> f64 {
-        let centre = self.scene.centre_in_shape(part);
-        let shift = (to * centre - from * centre).norm();
-        shift + self.reach(part) * from.rotation.angle_to(&to.rotation)
-    }
-
-    fn between(&self, part: usize, [from, to]: &[Pose; 2], share: f64) -> Pose {
-        interpolate(from, to, &self.scene.centre_in_shape(part), share)
-    }
-
     /// A straight piece of the way cut into pieces no longer than the part, if they are not too many.
     fn glances(&self, part: usize, [from, to]: [&Pose; 2]) -> Vec<[Pose; 2]> {
         let ends = [*from, *to];
-        let reach = self.reach(part).max(f64::MIN_POSITIVE);
-        let count = (self.travel(part, &ends) / reach).ceil().clamp(1.0, MOST_GLANCES);
+        let metric = self.metric(part);
+        let reach = metric.reach.max(f64::MIN_POSITIVE);
+        let count = (metric.distance(from, to) / reach).ceil().clamp(1.0, MOST_GLANCES);
         // The ends stay as they are to the bit.
         let at = |i: usize| match i {
             0 => ends[0],
             i if i as f64 >= count => ends[1],
-            i => self.between(part, &ends, i as f64 / count),
+            i => metric.between(from, to, i as f64 / count),
         };
         (0..count as usize).map(|i| [at(i), at(i + 1)]).collect()
     }

@@ -1,12 +1,13 @@
 //! The way of a part from where it waits to where its insertion begins.
 
-use nalgebra::{Point3, Translation3, Vector3};
+use nalgebra::{Translation3, Vector3};
 
-use crate::geometry::{Bounds, Pose, Uniform, interpolate};
+use crate::geometry::{Bounds, Pose};
+use crate::rrt::{PoseSampler, Space, rrt_connect, shortened};
+use crate::scene::PartMetric;
 use crate::termination::{Interrupt, Termination};
 
 use super::room::Room;
-use super::rrt_connect::{Space, rrt_connect, shortened};
 
 /// Random poses after which no way is looked for any more.
 pub(super) const MOST_SAMPLES: usize = 1000;
@@ -14,10 +15,8 @@ pub(super) const MOST_SAMPLES: usize = 1000;
 const FEW_SAMPLES: usize = 300;
 /// Shortcuts that are tried on a way.
 const SHORTCUTS: usize = 24;
-/// Mostly the part need not turn. So the first `SOME` poses, and then this share of them, have the rotation of one of
-/// the way's ends, or one between them.
-const SOME: usize = 100;
-const TURNED_ALIKE: f64 = 0.5;
+/// Mostly the part need not turn. So the first poses have the rotation of one of the way's ends, or one between them.
+const UNTURNED: usize = 100;
 /// Directions away from an end of the way.
 const LIFTS: [[f64; 3]; 6] =
     [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
@@ -31,12 +30,10 @@ pub(super) struct Transfer<'a> {
     ends: [Pose; 2],
     /// Where to leave the second end to, a unit vector.
     away: Vector3<f64>,
-    centre: Point3<f64>,
-    /// Of the part, from its centre.
-    reach: f64,
+    metric: PartMetric,
     /// Where its centre may be.
     bounds: Bounds,
-    uniform: Uniform,
+    sampler: PoseSampler,
     /// Poses sampled so far.
     sampled: usize,
     /// Ways are free that the check finds free, not those that seem clear.
@@ -53,13 +50,12 @@ impl<'a> Transfer<'a> {
         away: Vector3<f64>,
         termination: &'a Termination,
     ) -> Self {
-        let centre = room.scene.centre_in_shape(part);
-        let reach = room.reach(part);
-        let bounds =
-            ends.iter().fold(room.bounds, |b, pose| b.with_point(&(pose * centre))).grown(2.0 * reach);
-        let uniform = Uniform::seeded(&[]);
+        let metric = *room.metric(part);
+        let bounds = ends.iter().fold(room.bounds, |b, pose| b.with_point(&(pose * metric.centre)));
+        let bounds = bounds.grown(2.0 * metric.reach);
+        let sampler = sampler(part, metric, bounds, &ends);
         let (sampled, exact) = (0, false);
-        Self { room, among, part, ends, away, centre, reach, bounds, uniform, sampled, exact, termination }
+        Self { room, among, part, ends, away, metric, bounds, sampler, sampled, exact, termination }
     }
 
     /// The way with what its check found, if there is one: straight, else by RRT-Connect, shortened. It is
@@ -82,12 +78,12 @@ impl<'a> Transfer<'a> {
 
     fn tried(&mut self, most_samples: usize) -> Result<Option<Vec<Pose>>, Interrupt> {
         let [start, goal] = self.ends;
-        self.uniform = Uniform::seeded(&(self.part as u64).to_le_bytes());
+        self.sampler = sampler(self.part, self.metric, self.bounds, &self.ends);
         self.sampled = 0;
         let Some(path) = rrt_connect(self, &start, &goal, most_samples)? else { return Ok(None) };
-        let mut uniform = self.uniform.clone();
+        let mut uniform = self.sampler.uniform.clone();
         let path = shortened(self, path, SHORTCUTS, &mut uniform)?;
-        let pieces = path.windows(2).flat_map(|p| self.room.way(self.part, &p[0], &p[1]).into_iter().skip(1));
+        let pieces = path.windows(2).flat_map(|p| self.metric.way(&p[0], &p[1]).into_iter().skip(1));
         Ok(Some(std::iter::once(start).chain(pieces).collect()))
     }
 
@@ -97,40 +93,26 @@ impl<'a> Transfer<'a> {
         let (end, number) = (number % 2, number / 2);
         let (pose, away) = (self.ends[end], [Vector3::from(LIFTS[0]), self.away][end]);
         let direction = if number == 0 { away } else { Vector3::from(*LIFTS.get(number - 1)?) };
-        let at = (pose * self.centre).coords;
-        let far = self.room.bounds.support(&direction) + self.reach;
+        let at = (pose * self.metric.centre).coords;
+        let far = self.room.bounds.support(&direction) + self.metric.reach;
         Some(Translation3::from(direction * (far - at.dot(&direction)).max(0.0)) * pose)
-    }
-
-    fn random(&mut self) -> Pose {
-        let [from, to] = self.ends.map(|pose| pose.rotation);
-        let alike = if self.sampled < SOME { 1.0 } else { TURNED_ALIKE };
-        let rotation = if self.uniform.number() < alike {
-            from.try_slerp(&to, self.uniform.number(), 1e-9).unwrap_or(to)
-        } else {
-            self.uniform.rotation()
-        };
-        let extents = self.bounds.extents();
-        let at = self.bounds.min + extents.map(|side| side * self.uniform.number());
-        Pose::from_parts(Translation3::from(at - rotation * self.centre), rotation)
     }
 }
 
-impl Space for Transfer<'_> {
-    /// No point of the part moves further.
-    fn distance(&self, a: &Pose, b: &Pose) -> f64 {
-        (a * self.centre - b * self.centre).norm() + self.reach * a.rotation.angle_to(&b.rotation)
-    }
+fn sampler(part: usize, metric: PartMetric, bounds: Bounds, ends: &[Pose; 2]) -> PoseSampler {
+    PoseSampler::new(&(part as u64).to_le_bytes(), metric, bounds, ends.map(|pose| pose.rotation))
+}
 
-    fn between(&self, a: &Pose, b: &Pose, share: f64) -> Pose {
-        interpolate(a, b, &self.centre, share)
+impl Space for Transfer<'_> {
+    fn metric(&self) -> PartMetric {
+        self.metric
     }
 
     fn is_free(&self, from: &Pose, to: &Pose) -> Result<bool, Interrupt> {
         if !self.exact {
             return self.room.seems_clear(self.among, self.part, [from, to], self.termination);
         }
-        let way = self.room.way(self.part, from, to);
+        let way = self.metric.way(from, to);
         let verdict = self.room.check(self.among, self.part, &way, self.termination)?;
         Ok(verdict.penetrations.is_empty())
     }
@@ -138,7 +120,7 @@ impl Space for Transfer<'_> {
     fn sample(&mut self) -> Pose {
         let number = self.sampled;
         self.sampled += 1;
-        self.lifted(number).unwrap_or_else(|| self.random())
+        self.lifted(number).unwrap_or_else(|| self.sampler.pose(self.sampled >= UNTURNED))
     }
 
     fn extent(&self) -> f64 {

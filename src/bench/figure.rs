@@ -20,12 +20,14 @@ const CAPTION: i32 = 22;
 
 /// Colours that people with colour blindness tell apart (Okabe and Ito), in the order of the
 /// planners.
-const COLOURS: [RGBColor; 5] = [
+const COLOURS: [RGBColor; 7] = [
     RGBColor(213, 94, 0),
     RGBColor(230, 159, 0),
     RGBColor(0, 114, 178),
     RGBColor(0, 158, 115),
     RGBColor(120, 120, 120),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
 ];
 
 /// Which problems a figure is over.
@@ -33,7 +35,7 @@ const COLOURS: [RGBColor; 5] = [
 enum Coverage {
     /// All: how many of them each planner has solved.
     All,
-    /// Those that all planners but PDP_t solved: the percentage of them that each has solved.
+    /// Those that all planners of the paper but PDP_t solved: the percentage of them that each has solved.
     Common,
 }
 

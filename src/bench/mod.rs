@@ -47,9 +47,11 @@ use estimate::Estimate;
 use runner::{Job, Runner};
 use statistics::EngineResults;
 
-/// The planners of the paper, in the order of its tables. PDP* never runs by itself: it is what
-/// PDP_t solved and, of the rest, what PDP_r solved.
-pub const PLANNERS: [&str; 5] = ["sbdp-star", "sbdp", PDP_STAR, "pdp-r", PDP_T];
+/// The planners, in the order of the tables. PDP* never runs by itself: it is what PDP_t solved and, of the
+/// rest, what PDP_r solved.
+pub const PLANNERS: [&str; 7] = ["sbdp-star", "sbdp", PDP_STAR, "pdp-r", PDP_T, "bk-rrt", "rrt"];
+/// Those of the paper's tables.
+pub const PAPER_PLANNERS: [&str; 5] = ["sbdp-star", "sbdp", PDP_STAR, "pdp-r", PDP_T];
 /// The simulations.
 pub const ENGINES: [&str; 2] = ["sliding", "penalty"];
 
@@ -102,7 +104,7 @@ pub struct Request {
     pub engines: Vec<String>,
     /// After so much planning a run is to answer; verification does not count.
     pub timeout: Duration,
-    /// When one motion, or one part's search of a pdp planner, is given up.
+    /// When one motion, or one part's search of a baseline, is given up.
     pub path_timeout: Duration,
     /// The action set of all planners: their search spaces compare only then.
     pub actions: &'static str,
@@ -243,6 +245,8 @@ fn title(planner: &str) -> &str {
         PDP_STAR => "PDP*",
         "pdp-r" => "PDP_r",
         PDP_T => "PDP_t",
+        "bk-rrt" => "BK-RRT",
+        "rrt" => "RRT",
         other => other,
     }
 }

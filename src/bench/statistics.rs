@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 
 use super::corpus::Category;
 use super::record::Record;
-use super::{ENGINES, PDP_STAR, PDP_STAR_IS, PDP_T, PLANNERS};
+use super::{ENGINES, PAPER_PLANNERS, PDP_STAR, PDP_STAR_IS, PDP_T, PLANNERS};
 use crate::geometry::natural_order;
 
 /// The planner that the others are measured against.
@@ -195,8 +195,7 @@ impl<'a> EngineResults<'a> {
         self.problems.iter().filter(move |(_, category)| group.has(*category)).map(|(name, _)| *name)
     }
 
-    /// Problems of a group that all planners solved, PDP_t aside as in the paper: it solves too
-    /// few.
+    /// Problems of a group that all planners of the paper solved that ran, PDP_t aside as there: it solves too few.
     pub(super) fn common(&self, group: Group) -> BTreeSet<&'a str> {
         let counted: Vec<_> = self.counted().collect();
         let all = |p: &&str| !counted.is_empty() && counted.iter().all(|planner| planner.solves(p));
@@ -205,7 +204,7 @@ impl<'a> EngineResults<'a> {
 
     /// The planners that are compared over common problems.
     pub(super) fn counted(&self) -> impl Iterator<Item = &PlannerResults<'a>> {
-        self.planners.iter().filter(|p| p.planner != PDP_T)
+        self.planners.iter().filter(|p| p.planner != PDP_T && PAPER_PLANNERS.contains(&p.planner))
     }
 
     pub(super) fn solved(&self, planner: &PlannerResults<'_>, group: Group) -> usize {

@@ -8,7 +8,7 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use nalgebra::UnitQuaternion;
 
-use crate::bench::{self, ENGINES, PARTS, PLANNERS, Shard};
+use crate::bench::{self, ENGINES, PAPER_PLANNERS, PARTS, PLANNERS, Shard};
 use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::Waypoint;
 use crate::search;
@@ -100,11 +100,14 @@ pub(super) struct PlanArguments {
     /// not verify
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) planning_timeout: Option<Duration>,
-    /// Give up one motion, or a pdp planner's search for one part, after this time [default: no limit; the paper
+    /// Give up one motion, or a baseline's search for one part, after this time [default: no limit; the paper
     /// has 360]
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(super) path_timeout: Option<Duration>,
-    /// Give up after this number of simulations
+    /// What the random poses of rrt and bk-rrt depend on
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(super) seed: u64,
+    /// Give up after this number of simulations (of rrt: steps of a tree)
     #[arg(long, value_name = "N")]
     pub(super) max_simulations: Option<u64>,
     /// Worker threads; never changes the plan [default: all processors]
@@ -223,7 +226,7 @@ pub(super) struct BenchRun {
     #[arg(value_name = "DIR", required = true)]
     pub(super) corpora: Vec<PathBuf>,
     /// Which searches; `pdp-star` stands for `pdp-t` and `pdp-r`, which it is put together from
-    #[arg(long, value_name = "PLANNER,…", value_delimiter = ',', default_values = PLANNERS,
+    #[arg(long, value_name = "PLANNER,…", value_delimiter = ',', default_values = PAPER_PLANNERS,
         value_parser = PossibleValuesParser::new(PLANNERS))]
     pub(super) planners: Vec<String>,
     /// Which simulations
@@ -353,6 +356,10 @@ pub(super) enum PlannerArgument {
     PdpR,
     /// pdp-t, then pdp-r if that failed
     PdpStar,
+    /// A random tree per part, of straight ways
+    Rrt,
+    /// A random tree per part, of simulated motions
+    BkRrt,
 }
 
 impl From<PlannerArgument> for search::Planner {
@@ -363,6 +370,8 @@ impl From<PlannerArgument> for search::Planner {
             PlannerArgument::PdpT => Self::PdpT,
             PlannerArgument::PdpR => Self::PdpR,
             PlannerArgument::PdpStar => Self::PdpStar,
+            PlannerArgument::Rrt => Self::Rrt,
+            PlannerArgument::BkRrt => Self::BkRrt,
         }
     }
 }

@@ -129,6 +129,8 @@ fn options(question: &CommandQuestion<'_>, trace: bool) -> PlanOptions {
             Planner::PdpT => client::Planner::PdpT,
             Planner::PdpR => client::Planner::PdpR,
             Planner::PdpStar => client::Planner::PdpStar,
+            Planner::Rrt => client::Planner::Rrt,
+            Planner::BkRrt => client::Planner::BkRrt,
         },
         engine: match request.engine {
             Engine::Sliding => client::Engine::Sliding,
@@ -147,6 +149,7 @@ fn options(question: &CommandQuestion<'_>, trace: bool) -> PlanOptions {
         planning_timeout: request.planning_timeout,
         trace,
         timeout: question.deadline.map(|d| d.saturating_duration_since(Instant::now())),
+        seed: request.seed,
         max_simulations: request.max_simulations,
         threads: u32::try_from(request.threads).unwrap_or(0),
         fixed: numbers(&request.fixed),

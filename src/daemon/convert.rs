@@ -31,6 +31,7 @@ pub(crate) fn plan_request(
         engine: engine(request.engine)?,
         actions: actions(request.actions)?,
         sweeps: request.sweeps,
+        seed: request.seed,
         max_simulations: request.max_simulations,
         path_timeout: request.path_timeout_ns.map(Duration::from_nanos),
         planning_timeout: request.planning_timeout_ns.map(Duration::from_nanos),

@@ -26,6 +26,11 @@ impl Uniform {
         (u64::from_le_bytes(bytes) >> 11) as f64 / (1u64 << 53) as f64
     }
 
+    /// The next index below a count (at least 1), uniform.
+    pub fn below(&mut self, count: usize) -> usize {
+        ((self.number() * count as f64) as usize).min(count.saturating_sub(1))
+    }
+
     /// A rotation, uniform on SO(3) (Shoemake, "Uniform random rotations", Graphics Gems III, 1992).
     pub fn rotation(&mut self) -> UnitQuaternion<f64> {
         let (split, first, second) = (self.number(), TAU * self.number(), TAU * self.number());

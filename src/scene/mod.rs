@@ -3,6 +3,7 @@
 //! - [`BroadPhase`]: which bodies' boxes meet a box (parry's bounding-volume hierarchy);
 //! - [`CongruentPair`]: two bodies up to a motion of both, so that equal pairs are asked about once;
 //! - [`HullTree`]: the convex hull of all bodies that stand, kept up while they leave one by one;
+//! - `PartMetric`: distances between poses of a part, and straight ways;
 //! - [`exit_direction`]: hull separation, the paper's test for a part that is disassembled.
 //!
 //! Everything is in the planning frame. The scene knows nothing of contact, simulation and search; what these derive
@@ -14,6 +15,7 @@ mod hull_separation;
 mod hull_tree;
 mod joined_hulls;
 mod memo;
+mod part_metric;
 mod records;
 
 use std::collections::HashMap;
@@ -30,6 +32,7 @@ pub use hull_separation::{StandingParts, exit_direction};
 pub use hull_tree::HullTree;
 pub use joined_hulls::{HullStore, JoinedHulls};
 pub use memo::Memo;
+pub(crate) use part_metric::PartMetric;
 pub(crate) use records::{HULL, add_pair, add_samples, add_standing};
 
 /// A part at a pose of its own, wherever it stands in the scene.

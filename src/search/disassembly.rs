@@ -489,9 +489,10 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         known: &mut InseparablePairs,
     ) -> Result<Option<Inseparable>, Interrupt> {
         let wanted = self.problem.wanted(remaining);
-        known.find_linked(&self.problem, remaining)?;
-        if known.first(remaining, &wanted).is_none() {
-            known.find_enclosed(&self.problem, remaining)?;
+        for find in InseparablePairs::PROOFS {
+            if known.first(remaining, &wanted).is_none() {
+                find(known, &self.problem, remaining)?;
+            }
         }
         Ok(known.first(remaining, &wanted))
     }

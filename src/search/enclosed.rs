@@ -17,11 +17,12 @@ use std::collections::{BinaryHeap, HashMap};
 
 use nalgebra::{Point3, Vector3};
 
-use crate::budgets::{ENCLOSURE_CELLS, ENCLOSURE_GRIDS, INSCRIBED_BALL_CELLS, LONG_STEPS_PER_POLL};
+use crate::budgets::{ENCLOSURE_CELLS, ENCLOSURE_GRIDS, LONG_STEPS_PER_POLL};
 use crate::geometry::{Bounds, Surface, is_within_closed_shell};
 use crate::termination::{Interrupt, Poll};
-use crate::tolerances::{INSCRIBED_GAIN, ROUNDED};
+use crate::tolerances::ROUNDED;
 
+use super::deepest_point::deepest_point;
 use super::outcome::{Inseparable, SeparationProof};
 use super::problem::Problem;
 
@@ -87,41 +88,12 @@ pub(super) fn enclosed_pairs(
     Ok(enclosed)
 }
 
-/// A large ball inside a closed surface: the deepest place, but for a share of the depth or what the budget leaves
-/// open. Its radius is the measured depth of its centre, and 0 if no place inside was found.
+/// A large ball inside a closed surface. Its radius is the measured depth of its centre, and 0 if no place inside was
+/// found.
 fn inscribed_ball(surface: &Surface, poll: &Poll<'_>) -> Result<Ball, Interrupt> {
-    let bounds = surface.bounds();
-    let mut best = Ball { centre: bounds.centre(), radius: 0.0 };
-    // Of each open cell: the depth that none of its points exceeds, by which the most promising one is next; its
-    // number, by which the older of two equal ones is next.
-    let mut open = BinaryHeap::new();
-    let mut cells: Vec<(Point3<f64>, Vector3<f64>)> = Vec::new();
-    let mut new = vec![(bounds.centre(), bounds.extents() / 2.0)];
-    loop {
-        for (centre, half) in new.drain(..) {
-            poll.check()?;
-            let depth = -surface.signed_distance(&centre);
-            if depth > best.radius {
-                best = Ball { centre, radius: depth };
-            }
-            let bound = depth + half.norm();
-            if bound > 0.0 {
-                open.push((bound.to_bits(), Reverse(cells.len())));
-                cells.push((centre, half));
-            }
-        }
-        let Some((bound, Reverse(cell))) = open.pop() else { return Ok(best) };
-        if f64::from_bits(bound) <= best.radius * (1.0 + INSCRIBED_GAIN)
-            || cells.len() >= INSCRIBED_BALL_CELLS
-        {
-            return Ok(best);
-        }
-        let (centre, half) = cells[cell];
-        let half = half / 2.0;
-        let corner =
-            |i: usize| Vector3::from_fn(|axis, _| if i >> axis & 1 == 0 { -half[axis] } else { half[axis] });
-        new.extend((0..8).map(|i| (centre + corner(i), half)));
-    }
+    let depth = |p: &Point3<f64>| -surface.signed_distance(p);
+    let (centre, radius) = deepest_point(surface.bounds(), depth, poll)?;
+    Ok(Ball { centre, radius })
 }
 
 /// What proves that a ball, in the surface's frame, cannot get out of the surface's box without meeting the surface.

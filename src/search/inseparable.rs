@@ -8,6 +8,7 @@ use crate::termination::Interrupt;
 
 use super::enclosed::enclosed_pairs;
 use super::linked::linked_pairs;
+use super::necked::necked_pairs;
 use super::outcome::{Inseparable, SeparationProof};
 use super::problem::Problem;
 
@@ -17,9 +18,16 @@ pub(super) struct InseparablePairs {
     pairs: Vec<Inseparable>,
     knows_linked: bool,
     knows_enclosed: bool,
+    knows_necked: bool,
 }
 
+/// Looks for the pairs that one kind of proof shows, unless that was done; true if there are new ones.
+pub(super) type FindPairs = fn(&mut InseparablePairs, &Problem<'_>, &[usize]) -> Result<bool, Interrupt>;
+
 impl InseparablePairs {
+    /// All kinds of proof, the cheaper first.
+    pub(super) const PROOFS: [FindPairs; 3] = [Self::find_linked, Self::find_necked, Self::find_enclosed];
+
     /// Finds the linked pairs among some parts (ascending), unless that was done; true if there are new ones.
     ///
     /// # Errors
@@ -46,10 +54,26 @@ impl InseparablePairs {
         if self.knows_enclosed {
             return Ok(false);
         }
-        let is_known = |a: usize, b: usize| self.pairs.iter().any(|p| p.parts == [a, b] || p.parts == [b, a]);
-        let enclosed = enclosed_pairs(problem, parts, is_known)?;
+        let enclosed = enclosed_pairs(problem, parts, |a, b| self.has(a, b))?;
         self.knows_enclosed = true;
         Ok(self.add(enclosed))
+    }
+
+    /// The same for pairs of which one part has its neck in an opening of the other.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn find_necked(&mut self, problem: &Problem<'_>, parts: &[usize]) -> Result<bool, Interrupt> {
+        if self.knows_necked {
+            return Ok(false);
+        }
+        let necked = necked_pairs(problem, parts, |a, b| self.has(a, b))?;
+        self.knows_necked = true;
+        Ok(self.add(necked))
+    }
+
+    fn has(&self, a: usize, b: usize) -> bool {
+        self.pairs.iter().any(|p| p.parts == [a, b] || p.parts == [b, a])
     }
 
     fn add(&mut self, pairs: Vec<Inseparable>) -> bool {

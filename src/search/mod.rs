@@ -1,7 +1,7 @@
 //! Search: State-Based Disassembly Planning.
 //!
 //! Data flow: [`PlanRequest`] → [`Problem`] → a planner (`sbdp`: states and blocking graphs; `pdp`:
-//! one part after the other), which changes the `disassembly` → [`Outcome`].
+//! one part after the other; `rrt`: random trees), which changes the `disassembly` → [`Outcome`].
 //! Everything below the request is in the planning frame.
 //!
 //! A search by states has parts, each of its own type and file: `states`, `action_table`, `order`, `novelty`,
@@ -14,6 +14,7 @@ mod ball;
 mod blocked_actions;
 mod cell_decomposition;
 mod cell_memory;
+mod deepest_point;
 mod directions;
 mod disassembly;
 mod enclosed;
@@ -22,6 +23,7 @@ mod inseparable;
 mod invalidation;
 mod known_states;
 mod linked;
+mod necked;
 mod novelty;
 mod order;
 mod outcome;
@@ -32,10 +34,12 @@ mod problem;
 mod rays;
 mod report;
 mod request;
+mod rrt;
 mod sbdp;
 mod speculation;
 mod state;
 mod states;
+mod stopped_actions;
 mod strategy;
 mod sweep_memory;
 #[cfg(test)]
@@ -62,5 +66,7 @@ pub fn search(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observe
         Planner::PdpT => pdp::pdp(problem, observer, pdp::PdpMode::Translation),
         Planner::PdpR => pdp::pdp(problem, observer, pdp::PdpMode::Rotation),
         Planner::PdpStar => pdp::pdp_star(problem, observer),
+        Planner::Rrt => rrt::rrt(problem, observer, rrt::Extension::Straight),
+        Planner::BkRrt => rrt::rrt(problem, observer, rrt::Extension::Simulated),
     }
 }

@@ -15,8 +15,7 @@ use crate::tolerances::TOUCHED;
 use super::action_table::ActionTable;
 use super::ball::is_ball;
 use super::disassembly::{Disassembly, SceneVersion, Stop};
-use super::inseparable::InseparablePairs;
-use super::problem::Problem;
+use super::inseparable::{FindPairs, InseparablePairs};
 use super::state::{StateAction, StateNode, least_travel};
 use super::states::{PhaseStates, States};
 use super::strategy::Strategy;
@@ -61,7 +60,7 @@ impl Order {
         &mut self,
         strategy: Strategy,
         disassembly: &Disassembly<'_, '_>,
-        find: fn(&mut InseparablePairs, &Problem<'_>, &[usize]) -> Result<bool, Interrupt>,
+        find: FindPairs,
     ) -> Result<bool, Interrupt> {
         let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());
         Ok(strategy.is_extended() && find(&mut self.inseparable, problem, standing)?)

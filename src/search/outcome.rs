@@ -44,6 +44,8 @@ pub enum SeparationProof {
     Ball,
     /// The first one is in a closed void of the second one.
     Void,
+    /// The first one is wider than an opening of the second one on both sides of it.
+    Neck,
 }
 
 /// Two parts that never come apart one at a time.
@@ -86,6 +88,11 @@ impl Reason {
         let because = match proof {
             SeparationProof::Linked => "closed curves on the two are linked".to_owned(),
             SeparationProof::Ball => format!("a ball inside {a} fits through no opening of {b}"),
+            SeparationProof::Neck => {
+                format!(
+                    "{a} passes an opening of {b}, and on both sides of it there is a disc inside {a} that is wider"
+                )
+            }
             SeparationProof::Void => format!("{a} is in a closed void of {b}"),
         };
         format!("{remain}. It is proved that {a} and {b} never come apart: {because}.")

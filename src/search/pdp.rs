@@ -15,8 +15,9 @@ use crate::simulation::{Action, End, Motion};
 use super::disassembly::{Disassembly, Proof, Stop, Transition, joined};
 use super::inseparable::InseparablePairs;
 use super::known_states::{KnownStates, Resolution};
-use super::outcome::{BlockedAction, Outcome, Removal};
+use super::outcome::{Outcome, Removal};
 use super::problem::{Observer, Problem, VerifiedPath};
+use super::stopped_actions::StoppedActions;
 use super::trace::{PlanningPhase, TraceEvent};
 
 /// The actions of PDP.
@@ -28,7 +29,6 @@ pub(super) enum PdpMode {
 
 /// PDP_t or PDP_r.
 pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: PdpMode) -> Outcome {
-    let count = problem.scene.bodies.len();
     let (disassembly, actions) = Disassembly::beside(problem, observer, |problem| {
         let (translations, rotations) = problem.action_lists(&problem.directions()?);
         Ok(match mode {
@@ -42,9 +42,9 @@ pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: PdpMo
             return disassembly.outcome(Some(interrupt.into()), InseparablePairs::default(), Vec::new());
         }
     };
-    let mut search = Pdp { disassembly, mode, actions, stopped_by: vec![Vec::new(); count], states: 0 };
+    let mut search = Pdp { disassembly, mode, actions, stopped: StoppedActions::default(), states: 0 };
     let stop = search.run().err();
-    let blocked = search.blocked();
+    let blocked = search.stopped.blocked(&search.disassembly, |action| search.actions[action].to_string());
     search.disassembly.counters.states = search.states;
     search.disassembly.outcome(stop, InseparablePairs::default(), blocked)
 }
@@ -122,8 +122,7 @@ struct Pdp<'a, 'o> {
     disassembly: Disassembly<'a, 'o>,
     mode: PdpMode,
     actions: Vec<Action>,
-    /// Per part: each action from the assembled pose with the parts that stopped it, when last tried.
-    stopped_by: Vec<Vec<(usize, Vec<usize>)>>,
+    stopped: StoppedActions,
     /// Number of configurations, over all trees.
     states: u64,
 }
@@ -158,15 +157,7 @@ impl Pdp<'_, '_> {
     }
 
     fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) {
-        let standing = self.disassembly.everything.standing();
-        let mut gone: Vec<usize> = self.stopped_by[part]
-            .iter()
-            .flat_map(|(_, by)| by)
-            .copied()
-            .filter(|p| !standing.contains(p))
-            .collect();
-        gone.sort_unstable();
-        gone.dedup();
+        let gone = self.stopped.gone(part, self.disassembly.everything.standing());
         self.disassembly.remove(part, path, depth, gone);
     }
 
@@ -250,18 +241,12 @@ impl Pdp<'_, '_> {
     /// Adds the end of a motion to the tree, unless it is there.
     fn grow(&mut self, tree: &mut SearchTree, at: usize, run: &Transition, action: usize, motion: Motion) {
         let Motion { path, end, .. } = motion;
-        let (word, with) = match end {
-            End::Collision { with } => ("collision", with),
-            End::Undecided { touched, .. } => ("undecided", touched),
-            End::Disassembled(_) => ("disassembled", Vec::new()),
-        };
+        let (word, with) = end.described();
         let is_new = !tree.known.has_like(&path[path.len() - 1], |_| true);
         let leads_to = is_new.then_some(tree.nodes.len());
         self.disassembly.trace_simulation(at, run, word, &with, path.len(), leads_to);
         if tree.nodes[at].depth == 0 {
-            let list = &mut self.stopped_by[run.part];
-            list.retain(|(a, _)| *a != action);
-            list.push((action, with));
+            self.stopped.keep(run.part, action, with);
         }
         if is_new {
             self.states += 1;
@@ -276,21 +261,5 @@ impl Pdp<'_, '_> {
             PdpMode::Translation => PlanningPhase::Translation,
             PdpMode::Rotation => PlanningPhase::Rotation,
         }
-    }
-
-    fn blocked(&self) -> Vec<BlockedAction> {
-        let standing = self.disassembly.everything.standing();
-        let mut out = Vec::new();
-        for part in self.disassembly.problem.wanted(standing) {
-            let mut list: Vec<_> = self.stopped_by[part].iter().collect();
-            list.sort();
-            for (action, by) in list {
-                let by: Vec<_> = by.iter().copied().filter(|p| standing.contains(p)).collect();
-                if !by.is_empty() {
-                    out.push(BlockedAction { part, action: self.actions[*action].to_string(), by });
-                }
-            }
-        }
-        out
     }
 }

@@ -69,11 +69,13 @@ pub struct Problem<'a> {
     pub static_analysis: StaticAnalysis,
     /// Whether parts that leave straight, or are apart already, are taken out without simulation.
     pub sweeps: bool,
+    /// What random poses depend on.
+    pub seed: u64,
     /// The number of simulations after which the search gives up.
     pub max_simulations: Option<u64>,
     /// Simulations that an earlier search of the same question has used up.
     pub spent: u64,
-    /// Time after which one motion, or PDP's search for one part, is given up.
+    /// Time after which one motion, or PDP's or RRT's search for one part, is given up.
     pub path_timeout: Option<Duration>,
     /// Ends the search early.
     pub termination: Termination,

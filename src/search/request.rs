@@ -20,11 +20,16 @@ pub enum Planner {
     PdpR,
     /// PDP_t, then PDP_r from the start if that failed (PDP*).
     PdpStar,
+    /// A rapidly-exploring random tree per part, of straight ways (RRT).
+    Rrt,
+    /// A rapidly-exploring random tree per part, of motions of the transition function (BK-RRT).
+    BkRrt,
 }
 
 impl Planner {
     /// All planners, in the order of their numbers on the wire.
-    pub const ALL: [Self; 5] = [Self::SbdpStar, Self::Sbdp, Self::PdpT, Self::PdpR, Self::PdpStar];
+    pub const ALL: [Self; 7] =
+        [Self::SbdpStar, Self::Sbdp, Self::PdpT, Self::PdpR, Self::PdpStar, Self::Rrt, Self::BkRrt];
 
     /// The name in requests and plans.
     #[must_use]
@@ -35,6 +40,8 @@ impl Planner {
             Self::PdpT => "pdp-t",
             Self::PdpR => "pdp-r",
             Self::PdpStar => "pdp-star",
+            Self::Rrt => "rrt",
+            Self::BkRrt => "bk-rrt",
         }
     }
 
@@ -129,9 +136,11 @@ pub struct PlanRequest {
     /// without simulation, by the planners `sbdp-star` and `sbdp`; `None` for the default of the actions: the paper
     /// simulates all.
     pub sweeps: Option<bool>,
-    /// Simulations after which the search gives up with `partial`.
+    /// What the random poses of the planners `rrt` and `bk-rrt` depend on.
+    pub seed: u64,
+    /// Simulations (steps of a tree, in RRT) after which the search gives up with `partial`.
     pub max_simulations: Option<u64>,
-    /// Time after which one motion, or the search for one part, is given up (the paper's path
+    /// Time after which one motion, or PDP's or RRT's search for one part, is given up (the paper's path
     /// planning timeout). Plans then depend on the clock.
     pub path_timeout: Option<Duration>,
     /// Time after which the search ends as at its deadline, not counting thinning and verification: the

@@ -145,11 +145,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 }
             }
             // Before the searches that take longest.
-            if self.order.find_inseparable(
-                self.strategy,
-                &self.disassembly,
-                InseparablePairs::find_enclosed,
-            )? {
+            if self.find_inseparable()? {
                 continue;
             }
             if self.leave_along_threads()?
@@ -189,6 +185,16 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 return Ok(());
             }
         }
+    }
+
+    /// Looks for parts that never come apart, by one kind of proof after the other; true if there are new ones.
+    fn find_inseparable(&mut self) -> Result<bool, Stop> {
+        for find in InseparablePairs::PROOFS {
+            if self.order.find_inseparable(self.strategy, &self.disassembly, find)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// One run of Algorithm 1's `disassembly` over the open list.
@@ -509,15 +515,13 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         let run = self.transition(at);
         tracing::debug!(part = run.part, node = at.node, action = %run.action, steps = path.len(), ?end, "simulated");
         let state = self.states.number(at.node);
-        let (word, by) = match end {
-            End::Disassembled(_) => {
-                self.disassembly.trace_simulation(state, &run, "disassembled", &[], path.len(), None);
-                self.take_out(at, path, gain)?;
-                return Ok(true);
-            }
-            End::Collision { with } => ("collision", with),
-            End::Undecided { touched, .. } => ("undecided", touched),
-        };
+        let is_out = matches!(end, End::Disassembled(_));
+        let (word, by) = end.described();
+        if is_out {
+            self.disassembly.trace_simulation(state, &run, word, &by, path.len(), None);
+            self.take_out(at, path, gain)?;
+            return Ok(true);
+        }
         let is_new = match path.last() {
             Some(end) => {
                 let Self { novelty, strategy, states, disassembly, .. } = self;

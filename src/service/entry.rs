@@ -249,6 +249,7 @@ impl Entry {
             actions: request.actions,
             static_analysis: request.static_analysis,
             sweeps: request.sweeps(),
+            seed: request.seed,
             max_simulations: request.max_simulations,
             spent: 0,
             path_timeout: request.path_timeout,

@@ -30,6 +30,18 @@ pub enum End {
     },
 }
 
+impl End {
+    /// The word for it in traces, and the parts that it met.
+    #[must_use]
+    pub fn described(self) -> (&'static str, Vec<usize>) {
+        match self {
+            Self::Disassembled(_) => ("disassembled", Vec::new()),
+            Self::Collision { with } => ("collision", with),
+            Self::Undecided { touched, .. } => ("undecided", touched),
+        }
+    }
+}
+
 /// A part's motion under one action.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {

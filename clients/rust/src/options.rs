@@ -69,6 +69,10 @@ pub enum Planner {
     PdpR,
     /// `PdpT`, then `PdpR` if that failed.
     PdpStar,
+    /// A rapidly-exploring random tree per part, of straight ways.
+    Rrt,
+    /// A rapidly-exploring random tree per part, of simulated motions.
+    BkRrt,
 }
 
 /// Which transition function moves the parts.
@@ -197,10 +201,12 @@ pub struct PlanOptions {
     pub timeout: Option<Duration>,
     /// Time of planning, waiting and verification not counted, after which the daemon answers with what it has.
     pub planning_timeout: Option<Duration>,
-    /// Time after which one motion, or a pdp planner's search for one part, is given up. The plan then depends on the
+    /// Time after which one motion, or a baseline's search for one part, is given up. The plan then depends on the
     /// clock and is not remembered.
     pub path_timeout: Option<Duration>,
-    /// Simulations after which to give up.
+    /// What the random poses of [`Planner::Rrt`] and [`Planner::BkRrt`] depend on.
+    pub seed: u64,
+    /// Simulations (steps of a tree, in RRT) after which to give up.
     pub max_simulations: Option<u64>,
     /// Threads for this request; 0 leaves it to the daemon.
     pub threads: u32,
@@ -240,6 +246,7 @@ impl PlanOptions {
             batch: self.batch,
             threads: self.threads,
             deadline_ns: self.timeout.map(clock::deadline_in),
+            seed: self.seed,
             max_simulations: self.max_simulations,
             path_timeout_ns: self.path_timeout.map(nanoseconds),
             planning_timeout_ns: self.planning_timeout.map(nanoseconds),
@@ -277,6 +284,7 @@ mod tests {
     fn choices_travel_as_the_index_of_their_name() {
         assert_eq!(PLANNERS[Planner::SbdpStar as usize], "sbdp-star");
         assert_eq!(PLANNERS[Planner::PdpStar as usize], "pdp-star");
+        assert_eq!(PLANNERS[Planner::BkRrt as usize], "bk-rrt");
         assert_eq!(ENGINES[Engine::Penalty as usize], "penalty");
         assert_eq!(ACTION_SETS[ActionSet::Extended as usize], "extended");
         assert_eq!(STATIC_ANALYSES[StaticAnalysis::Paper as usize], "paper");

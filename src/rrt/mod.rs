@@ -1,12 +1,21 @@
-//! RRT-Connect (J. Kuffner and S. LaValle, "RRT-Connect: an efficient approach to single-query path
-//! planning", 2000): a tree of poses grows from the start and another from the goal, each in turn towards
-//! a random pose, and the other one greedily towards what was reached.
+//! Rapidly-exploring random trees: poses of a body, each reached from the one before, that grow towards random poses
+//! (S. LaValle, "Rapidly-exploring random trees: a new tool for path planning", 1998).
 //!
-//! Ways between poses are asked for as a whole, so a greedy try costs one question; where it fails, the tree
-//! goes as far as its shorter steps get.
+//! Stages give a [`Space`]: which ways between poses are free. The planners `rrt` and `bk-rrt` grow one tree until it
+//! is out; assembly plans link two poses by RRT-Connect (J. Kuffner and S. LaValle, "RRT-Connect: an efficient approach
+//! to single-query path planning", 2000): a tree grows from the start and another from the goal, each in turn towards a
+//! random pose, and the other one greedily towards what was reached.
+//!
+//! Ways between poses are asked for as a whole, so a greedy try costs one question; where it fails, the tree goes as far
+//! as its shorter steps get.
+
+mod pose_sampler;
 
 use crate::geometry::{Pose, Uniform};
+use crate::scene::PartMetric;
 use crate::termination::Interrupt;
+
+pub(crate) use pose_sampler::PoseSampler;
 
 /// A step towards a random pose goes all the way, or so much of it where something is in the way.
 const STEPS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
@@ -14,11 +23,9 @@ const STEPS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 const SAME: f64 = 1e-9;
 
 /// Where a body moves.
-pub(super) trait Space {
-    /// How far apart two poses are.
-    fn distance(&self, a: &Pose, b: &Pose) -> f64;
-    /// The pose at a share of the way from `a` to `b`.
-    fn between(&self, a: &Pose, b: &Pose, share: f64) -> Pose;
+pub(crate) trait Space {
+    /// How far apart poses are, and what lies between them.
+    fn metric(&self) -> PartMetric;
     /// Whether the way from one pose to another is free.
     ///
     /// # Errors
@@ -34,7 +41,7 @@ pub(super) trait Space {
 ///
 /// # Errors
 /// The termination condition became true.
-pub(super) fn rrt_connect(
+pub(crate) fn rrt_connect(
     space: &mut impl Space,
     start: &Pose,
     goal: &Pose,
@@ -46,7 +53,7 @@ pub(super) fn rrt_connect(
     let (mut growing, mut other) = (Tree::from(start), Tree::from(goal));
     for turn in 0..most_samples {
         let target = space.sample();
-        if let Some(new) = growing.extended(space, growing.nearest(space, &target), &target)? {
+        if let Some(new) = growing.extended(space, growing.nearest(&space.metric(), &target), &target)? {
             let reached = growing.poses[new];
             if let Some(meeting) = other.connected(space, &reached)? {
                 let (mut one, mut two) = (growing.way_to(new), other.way_to(meeting));
@@ -64,42 +71,50 @@ pub(super) fn rrt_connect(
 }
 
 /// Poses that are reached from the first one.
-struct Tree {
+#[derive(Debug)]
+pub(crate) struct Tree {
     poses: Vec<Pose>,
     /// From which pose each was reached; the first from itself.
     parents: Vec<usize>,
 }
 
 impl Tree {
-    fn from(root: &Pose) -> Self {
+    pub(crate) fn from(root: &Pose) -> Self {
         Self { poses: vec![*root], parents: vec![0] }
     }
 
-    fn nearest(&self, space: &impl Space, target: &Pose) -> usize {
-        let distances = self.poses.iter().map(|pose| space.distance(pose, target));
-        distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(node, _)| node)
+    pub(crate) fn poses(&self) -> &[Pose] {
+        &self.poses
     }
 
-    fn add(&mut self, pose: Pose, parent: usize) -> usize {
+    /// The node nearest to a pose.
+    pub(crate) fn nearest(&self, metric: &PartMetric, target: &Pose) -> usize {
+        metric.nearest(&self.poses, target)
+    }
+
+    pub(crate) fn add(&mut self, pose: Pose, parent: usize) -> usize {
         self.poses.push(pose);
         self.parents.push(parent);
         self.poses.len() - 1
     }
 
     /// A step from a node towards a pose, if there is a free one.
-    fn extended(
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(crate) fn extended(
         &mut self,
         space: &impl Space,
         from: usize,
         target: &Pose,
     ) -> Result<Option<usize>, Interrupt> {
         let start = self.poses[from];
-        let distance = space.distance(&start, target);
+        let distance = space.metric().distance(&start, target);
         if distance <= SAME * space.extent() {
             return Ok(None);
         }
         for step in STEPS {
-            let pose = if step < 1.0 { space.between(&start, target, step) } else { *target };
+            let pose = if step < 1.0 { space.metric().between(&start, target, step) } else { *target };
             if space.is_free(&start, &pose)? {
                 return Ok(Some(self.add(pose, from)));
             }
@@ -109,12 +124,12 @@ impl Tree {
 
     /// The node at a pose, if it can be reached from the nearest one without going round anything.
     fn connected(&mut self, space: &impl Space, target: &Pose) -> Result<Option<usize>, Interrupt> {
-        let mut node = self.nearest(space, target);
+        let mut node = self.nearest(&space.metric(), target);
         if space.is_free(&self.poses[node], target)? {
             return Ok(Some(self.add(*target, node)));
         }
         while let Some(next) = self.extended(space, node, target)? {
-            if space.distance(&self.poses[next], target) <= SAME * space.extent() {
+            if space.metric().distance(&self.poses[next], target) <= SAME * space.extent() {
                 return Ok(Some(next));
             }
             node = next;
@@ -122,16 +137,19 @@ impl Tree {
         Ok(None)
     }
 
-    /// The poses from the first one to a node.
-    fn way_to(&self, node: usize) -> Vec<Pose> {
-        let mut way = vec![self.poses[node]];
-        let mut at = node;
-        while self.parents[at] != at {
-            at = self.parents[at];
-            way.push(self.poses[at]);
+    /// The nodes from the first one to a node.
+    pub(crate) fn nodes_to(&self, node: usize) -> Vec<usize> {
+        let mut nodes = vec![node];
+        while self.parents[nodes[nodes.len() - 1]] != nodes[nodes.len() - 1] {
+            nodes.push(self.parents[nodes[nodes.len() - 1]]);
         }
-        way.reverse();
-        way
+        nodes.reverse();
+        nodes
+    }
+
+    /// The poses from the first one to a node.
+    pub(crate) fn way_to(&self, node: usize) -> Vec<Pose> {
+        self.nodes_to(node).into_iter().map(|node| self.poses[node]).collect()
     }
 }
 
@@ -140,7 +158,7 @@ impl Tree {
 ///
 /// # Errors
 /// The termination condition became true.
-pub(super) fn shortened(
+pub(crate) fn shortened(
     space: &impl Space,
     path: Vec<Pose>,
     tries: usize,
@@ -159,7 +177,7 @@ pub(super) fn shortened(
         }
         let at = |place: f64| {
             let piece = place as usize;
-            space.between(&path[piece], &path[piece + 1], place - piece as f64)
+            space.metric().between(&path[piece], &path[piece + 1], place - piece as f64)
         };
         let (from, to) = (at(places[0]), at(places[1]));
         if space.is_free(&from, &to)? {
@@ -190,7 +208,6 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::geometry::interpolate;
 
     /// A point in a square of side 10 with a wall at x = 5 that has a gap, or none.
     struct Walled {
@@ -199,12 +216,8 @@ mod tests {
     }
 
     impl Space for Walled {
-        fn distance(&self, a: &Pose, b: &Pose) -> f64 {
-            (a.translation.vector - b.translation.vector).norm()
-        }
-
-        fn between(&self, a: &Pose, b: &Pose, share: f64) -> Pose {
-            interpolate(a, b, &Point3::origin(), share)
+        fn metric(&self) -> PartMetric {
+            PartMetric { centre: Point3::new(0.0, 0.0, 0.0), reach: 0.0 }
         }
 
         fn is_free(&self, from: &Pose, to: &Pose) -> Result<bool, Interrupt> {
@@ -242,7 +255,7 @@ mod tests {
             let way = rrt_connect(&mut space, &start, &goal, 100_000).unwrap().expect("there is a gap");
             let mut uniform = Uniform::seeded(b"shortened");
             let short = shortened(&space, way.clone(), 30, &mut uniform).unwrap();
-            let length = |way: &[Pose]| way.windows(2).map(|w| space.distance(&w[0], &w[1])).sum::<f64>();
+            let length = |way: &[Pose]| way.windows(2).map(|w| space.metric().distance(&w[0], &w[1])).sum::<f64>();
             prop_assert!(length(&short) <= length(&way) + 1e-9);
             for way in [way, short] {
                 prop_assert_eq!((way[0], *way.last().unwrap()), (start, goal));
