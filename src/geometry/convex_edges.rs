@@ -4,6 +4,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::leading::{Groups, LeadingItem};
+use super::oriented::faces_at;
 use super::samples::{Site, convex_edges};
 use super::surface::NO_TRIANGLE;
 use super::{Bounds, OrientedSamples, Pose, Surface};
@@ -11,6 +12,8 @@ use super::{Bounds, OrientedSamples, Pose, Surface};
 /// The convex edges of a surface. Of a wall, all edges and rims, once for each side.
 #[derive(Debug, Clone, Default)]
 pub struct ConvexEdges {
+    /// Corners, where one direction leads below all faces that meet there. Where none does, solids meet in a point or
+    /// an edge: each edge has an end of its own, with its own faces alone.
     ends: OrientedSamples,
     edges: Vec<ConvexEdge>,
     groups: Groups,
@@ -44,7 +47,13 @@ impl ConvexEdges {
                 let number = &mut numbers[v as usize];
                 if *number == u32::MAX {
                     *number = sited.len() as u32;
-                    sited.push((surface.vertices()[v as usize], Site::Vertex(v)));
+                    let is_corner = surface.is_wall() || has_inside(surface, v);
+                    let site = if is_corner { Site::Vertex(v) } else { Site::Edge(t, e) };
+                    sited.push((surface.vertices()[v as usize], site));
+                    if !is_corner {
+                        // Each edge has an end of its own there.
+                        return std::mem::replace(number, u32::MAX);
+                    }
                 }
                 *number
             });
@@ -93,9 +102,42 @@ impl ConvexEdges {
     }
 }
 
+/// Whether a direction leads below all faces that meet at a vertex (perceptron).
+fn has_inside(surface: &Surface, vertex: u32) -> bool {
+    /// Cosine. Faces that leave less room make no corner. A knife of a tenth of a degree leaves as much.
+    const LEAST_ROOM: f64 = 1e-3;
+    /// Some thousand are needed for the sharpest corners, and a few for most.
+    const STEPS: usize = 2000;
+    let mut normals = Vec::new();
+    faces_at(surface, Site::Vertex(vertex), |t| normals.push(surface.face_normal(t)));
+    let mut inward = -normals.iter().sum::<Vector3<f64>>();
+    for _ in 0..STEPS {
+        let length = inward.norm();
+        match normals.iter().find(|n| n.dot(&inward) > -LEAST_ROOM * length) {
+            Some(normal) => inward -= normal,
+            None => return true,
+        }
+    }
+    false
+}
+
 #[cfg(test)]
 mod tests {
-    use crate::fixtures::{cuboid, healed, l_shape, shape_of};
+    use crate::fixtures::{cells, cuboid, healed, l_shape, shape_of};
+
+    #[test]
+    fn where_solids_meet_in_a_point_each_edge_has_an_end_of_its_own() {
+        // Two cells on a plate that meet in an edge: their corners on the plate and above are of two solids.
+        let lines: &[f64] = &[0.0, 1.0, 2.0];
+        let mesh = cells([lines, lines, &[0.0, 1.0, 2.0]], |[x, y, z]| z == 0 || x == y);
+        let shape = shape_of(&healed(mesh));
+        let found = shape.convex_edges();
+        let inside_out = |normals: &[nalgebra::Vector3<f64>]| {
+            normals.iter().any(|a| normals.iter().any(|b| a.dot(b) < -0.5))
+        };
+        let ends = || found.edges.iter().flat_map(|edge| found.ends_of(edge));
+        assert!(ends().count() > 40 && !ends().any(|(_, normals)| inside_out(normals)));
+    }
 
     #[test]
     fn edges_of_solids_are_convex_where_they_are_not_flat_or_reentrant() {

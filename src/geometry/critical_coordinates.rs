@@ -41,6 +41,12 @@ impl Neighbours {
     }
 }
 
+/// Whether an edge of a triangle is sharp, or at a rim.
+pub(super) fn is_sharp(surface: &Surface, triangle: u32, edge: u8) -> bool {
+    let beside = surface.neighbour(triangle, edge);
+    beside == NO_TRIANGLE || surface.face_normal(triangle).dot(&surface.face_normal(beside)) < SHARP
+}
+
 /// The critical coordinates of a surface along a unit vector in the surface's frame; not sorted, and often equal.
 #[must_use]
 pub fn critical_coordinates(surface: &Surface, axis: &Vector3<f64>) -> Vec<f64> {
@@ -55,8 +61,7 @@ pub fn critical_coordinates(surface: &Surface, axis: &Vector3<f64>) -> Vec<f64> 
             found.push(corners.iter().map(|&v| along[v as usize]).sum::<f64>() / 3.0);
         }
         for (edge, [a, b]) in (0u8..).zip(directed_edges(corners)) {
-            let beside = surface.neighbour(triangle, edge);
-            let is_sharp = beside == NO_TRIANGLE || normal.dot(&surface.face_normal(beside)) < SHARP;
+            let is_sharp = is_sharp(surface, triangle, edge);
             for [from, to] in [[a, b], [b, a]].map(|ends| ends.map(|v| v as usize)) {
                 let difference = along[to] - along[from];
                 on_surface[from].add(difference, equal);

@@ -79,7 +79,7 @@ impl OrientedSamples {
     }
 }
 
-fn faces_at(surface: &Surface, site: Site, mut visit: impl FnMut(u32)) {
+pub(super) fn faces_at(surface: &Surface, site: Site, mut visit: impl FnMut(u32)) {
     match site {
         Site::Face(t) => visit(t),
         Site::Edge(t, e) => {

@@ -5,7 +5,8 @@
 //! places, where a [critical coordinate](critical_coordinates) of the part passes one of the others: between them, the
 //! places make cells, and one place stands for each cell (exact cell decomposition: J.-C. Latombe, "Robot Motion
 //! Planning", 1991, chapter 5). A critical place is a cell of its own where the part fits in without play: there several
-//! critical coordinates fall together.
+//! critical coordinates fall together. So is one where the centres of round edges fall together: a round window is as
+//! narrow as its play there.
 //!
 //! Cells are found breadth first from the states of the part. Along each axis the part is cast as far as it goes in both
 //! senses, and the cells that it passes are new ones. For solids whose faces are along and across the axes this finds
@@ -18,7 +19,7 @@ use nalgebra::{Translation3, UnitQuaternion};
 use rayon::prelude::*;
 
 use crate::budgets::CELLS_PER_CAST;
-use crate::geometry::{Pose, critical_coordinates};
+use crate::geometry::{Pose, critical_coordinates, edge_centres};
 use crate::scene::{Scene, StandingParts};
 use crate::simulation::{Action, Axis, FreeTravel, SweepQuestion, free_travel};
 use crate::termination::{Interrupt, Termination};
@@ -60,8 +61,8 @@ pub(super) struct CellDecomposition<'a> {
     /// The axes along which the part is moved, in both senses.
     axes: Vec<Axis>,
     coordinates: &'a mut CriticalCoordinates,
-    /// Per axis: the critical coordinates of the standing parts, ascending; none until they are needed.
-    still: Vec<Option<Vec<f64>>>,
+    /// Per axis: the coordinates of the standing parts; none until they are needed.
+    still: Vec<Option<AxisCoordinates>>,
     /// The rotations of the states.
     rotations: Vec<Rotation>,
     cells: Vec<Cell>,
@@ -79,23 +80,58 @@ pub(super) struct CellDecomposition<'a> {
 /// A rotation of the part.
 struct Rotation {
     rotation: UnitQuaternion<f64>,
-    /// Per axis: the part's critical coordinates without translation, ascending; none until they are needed.
-    mine: Vec<Option<Vec<f64>>>,
+    /// Per axis: the part's coordinates without translation; none until they are needed.
+    mine: Vec<Option<AxisCoordinates>>,
 }
 
-/// The critical coordinates of parts at their assembled poses, by part and axis.
+/// Coordinates along an axis, each list ascending, and of equal ones the first.
+#[derive(Debug, Clone, Default)]
+struct AxisCoordinates {
+    critical: Vec<f64>,
+    /// Of the centres of round edges.
+    centres: Vec<f64>,
+}
+
+impl AxisCoordinates {
+    /// Those of a part at a pose.
+    fn of(scene: &Scene, part: usize, pose: &Pose, axis: Axis) -> Self {
+        let axis = axis.unit().into_inner();
+        let here = axis.dot(&pose.translation.vector);
+        let in_shape = pose.rotation.inverse() * axis;
+        let surface = &scene.bodies[part].shape.surface;
+        let critical = critical_coordinates(surface, &in_shape);
+        let centres = edge_centres(surface).into_iter().map(|p| in_shape.dot(&p.coords)).collect();
+        let [critical, centres] = [critical, centres].map(|mut found: Vec<f64>| {
+            found.iter_mut().for_each(|x| *x += here);
+            distinct(found)
+        });
+        Self { critical, centres }
+    }
+
+    /// The places between two coordinates of a translation at which a critical coordinate of the part (without
+    /// translation) is one of these, and those at which a centre is; ascending.
+    fn places(&self, mine: &Self, between: [f64; 2]) -> [Vec<f64>; 2] {
+        [
+            alignments(&self.critical, &mine.critical, between),
+            alignments(&self.centres, &mine.centres, between),
+        ]
+    }
+}
+
+/// The coordinates of parts at their assembled poses, by part and axis.
 #[derive(Debug, Default)]
-pub(super) struct CriticalCoordinates(HashMap<(usize, usize), Vec<f64>>);
+pub(super) struct CriticalCoordinates(HashMap<(usize, usize), AxisCoordinates>);
 
 impl CriticalCoordinates {
-    /// Of some parts, ascending, and of equal ones the first.
-    fn of_all(&mut self, scene: &Scene, parts: &[usize], (index, axis): (usize, Axis)) -> Vec<f64> {
-        let mut all = Vec::new();
+    fn of_all(&mut self, scene: &Scene, parts: &[usize], (index, axis): (usize, Axis)) -> AxisCoordinates {
+        let mut all = AxisCoordinates::default();
         for &part in parts {
-            let of_part = || coordinates(scene, part, &scene.bodies[part].planning_from_shape, axis);
-            all.extend_from_slice(self.0.entry((part, index)).or_insert_with(of_part));
+            let of_part = || AxisCoordinates::of(scene, part, &scene.bodies[part].planning_from_shape, axis);
+            let AxisCoordinates { critical, centres } = self.0.entry((part, index)).or_insert_with(of_part);
+            all.critical.extend_from_slice(critical);
+            all.centres.extend_from_slice(centres);
         }
-        distinct(all)
+        AxisCoordinates { critical: distinct(all.critical), centres: distinct(all.centres) }
     }
 }
 
@@ -206,9 +242,9 @@ impl<'a> CellDecomposition<'a> {
             .get_or_insert_with(|| self.coordinates.of_all(scene, &standing.standing, numbered));
         let Rotation { rotation: turned, mine } = &mut self.rotations[rotation];
         let turned = Pose::from_parts(Translation3::identity(), *turned);
-        let mine = mine[axis].get_or_insert_with(|| distinct(coordinates(scene, part, &turned, numbered.1)));
-        let critical = critical_places(still, mine, [low, high]);
-        for place in stops(&critical, low, high) {
+        let mine = mine[axis].get_or_insert_with(|| AxisCoordinates::of(scene, part, &turned, numbered.1));
+        let [critical, centred] = still.places(mine, [low, high]);
+        for place in stops(&critical, &centred, [low, high]) {
             let pose = Translation3::from(direction * (place - here)) * pose;
             self.add(Cell { pose, parent: Some(from), state, axis: Some(axis), rotation });
         }
@@ -251,16 +287,6 @@ struct AxisCast {
     free: FreeTravel,
 }
 
-/// The critical coordinates of a part at a pose along a unit vector.
-fn coordinates(scene: &Scene, part: usize, pose: &Pose, axis: Axis) -> Vec<f64> {
-    let axis = axis.unit().into_inner();
-    let here = axis.dot(&pose.translation.vector);
-    let in_shape = pose.rotation.inverse() * axis;
-    let mut found = critical_coordinates(&scene.bodies[part].shape.surface, &in_shape);
-    found.iter_mut().for_each(|x| *x += here);
-    found
-}
-
 fn sorted(mut list: Vec<f64>) -> Vec<f64> {
     list.sort_by(f64::total_cmp);
     list
@@ -273,9 +299,9 @@ fn distinct(list: Vec<f64>) -> Vec<f64> {
     list
 }
 
-/// The critical places between two coordinates of a translation, ascending: where a critical coordinate of the part
-/// is one of the standing parts'.
-fn critical_places(still: &[f64], mine: &[f64], [low, high]: [f64; 2]) -> Vec<f64> {
+/// The places between two coordinates of a translation, ascending, at which a coordinate of the part is one of the
+/// standing parts'.
+fn alignments(still: &[f64], mine: &[f64], [low, high]: [f64; 2]) -> Vec<f64> {
     let between = |&here: &f64| {
         let first = still.partition_point(|there| there - here <= low + ROUNDED);
         let last = still.partition_point(|there| there - here < high - ROUNDED);
@@ -284,10 +310,12 @@ fn critical_places(still: &[f64], mine: &[f64], [low, high]: [f64; 2]) -> Vec<f6
     sorted(mine.iter().flat_map(between).collect())
 }
 
-/// The places to stop at between two coordinates: the ends, the middles between critical places, and those where
-/// several of these fall together. Of too many, those amid the longest stretches are left out last.
-fn stops(critical: &[f64], low: f64, high: f64) -> Vec<f64> {
-    let mut stops = vec![(f64::INFINITY, low), (f64::INFINITY, high)];
+/// The places to stop at between two coordinates: the ends, those where centres fall together, the middles between
+/// critical places, and those where several of these fall together. Of too many, those amid the longest stretches are
+/// left out last.
+fn stops(critical: &[f64], centred: &[f64], [low, high]: [f64; 2]) -> Vec<f64> {
+    let mut stops: Vec<(f64, f64)> =
+        [low, high].iter().chain(centred).map(|&at| (f64::INFINITY, at)).collect();
     let mut from = low;
     for together in critical.chunk_by(|a, b| b - a < ROUNDED) {
         stops.push((together[0] - from, (from + together[0]) / 2.0));
@@ -309,11 +337,13 @@ mod tests {
     #[test]
     fn a_cast_stops_between_critical_places_and_where_several_fall_together() {
         // A slot from 0 to 10 with a window from 4 to 6, and a part from 0 to 1 in it.
-        let critical = critical_places(&[0.0, 4.0, 6.0, 10.0], &[0.0, 1.0], [0.0, 9.0]);
+        let critical = alignments(&[0.0, 4.0, 6.0, 10.0], &[0.0, 1.0], [0.0, 9.0]);
         assert_eq!(critical, [3.0, 4.0, 5.0, 6.0]);
-        assert_eq!(stops(&critical, 0.0, 9.0), [0.0, 1.5, 3.5, 4.5, 5.5, 7.5, 9.0]);
+        assert_eq!(stops(&critical, &[], [0.0, 9.0]), [0.0, 1.5, 3.5, 4.5, 5.5, 7.5, 9.0]);
         // The window is as wide as the part.
-        let critical = critical_places(&[0.0, 4.0, 5.0, 10.0], &[0.0, 1.0], [0.0, 9.0]);
-        assert_eq!(stops(&critical, 0.0, 9.0), [0.0, 1.5, 3.5, 4.0, 4.5, 7.0, 9.0]);
+        let critical = alignments(&[0.0, 4.0, 5.0, 10.0], &[0.0, 1.0], [0.0, 9.0]);
+        assert_eq!(stops(&critical, &[], [0.0, 9.0]), [0.0, 1.5, 3.5, 4.0, 4.5, 7.0, 9.0]);
+        // A round window has its centre at 4.6.
+        assert_eq!(stops(&critical, &[4.1], [0.0, 9.0]), [0.0, 1.5, 3.5, 4.0, 4.1, 4.5, 7.0, 9.0]);
     }
 }

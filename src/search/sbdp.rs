@@ -148,9 +148,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             if self.find_inseparable()? {
                 continue;
             }
-            if self.leave_along_threads()?
-                || (!gain.any() && self.leave_by_cells(CellStage::BeforeTurning)?)
-            {
+            if self.leave_along_threads()? || self.leave_by_cells(CellStage::BeforeTurning)? {
                 if self.disassembly.is_done() {
                     return Ok(());
                 }

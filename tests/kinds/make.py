@@ -50,6 +50,9 @@ def tilt_lid(rng, comes_apart):
     tongue, play = rng.uniform(0.06, 0.12) * length, play_of(rng)
     # The far end is above the wall once the tongue has turned by thickness / length.
     height = 0.5 * thickness + thickness * tongue / length * (rng.uniform(1.8, 3) if comes_apart else 0.3)
+    if comes_apart:
+        # While the far end rises, the upper edge at the tongue moves back by more than the lid gets shorter.
+        play = max(play, 0.35 * (1.5 * thickness - height) ** 2 / length)
     wall = 2.0
     outer = box([-tongue - wall - 1, -wall - play, -8], [length + wall + play, width + wall + play, thickness])
     room = box([0, -play, 0], [length + play, width + play, thickness + 1])
