@@ -447,3 +447,7 @@ pub(crate) const GOAL_BIAS: f64 = 0.1;
 /// Share of the radius of a disc inside a part that is checked to be inside: near the rim the check takes long. At half
 /// the difference from 1, it takes twice as long; at double, necks are missed whose ends are wider by less than 4%.
 pub(crate) const DISC_SHARE: f64 = 0.98;
+/// Share of a part's smallest extent below which a move from cell to cell is short, as one within its play is: in a grid,
+/// moves are as long as the part. At half, corridors with as much play are searched as a whole before what follows
+/// them; at double, moves in a grid count as short, too.
+pub(crate) const SHORT_MOVE: f64 = 0.9;

@@ -13,6 +13,8 @@
 //! that slides down a slope, and overlaps that grow on the way. Known miss: edges whose faces differ by less than a
 //! thousandth count as flat.
 
+use std::cell::Cell;
+
 use nalgebra::{Point3, Vector3};
 
 use crate::budgets::SHORT_STEPS_PER_POLL;
@@ -66,9 +68,18 @@ impl ShapeCast<'_> {
     /// # Errors
     /// The termination condition became true.
     pub(crate) fn way(&self, least: f64) -> Result<f64, Interrupt> {
+        Ok(self.counted_way(least)?.0)
+    }
+
+    /// The same, and the number of edges and corners that were cast: a measure of the effort.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(crate) fn counted_way(&self, least: f64) -> Result<(f64, usize), Interrupt> {
         let Self { scene, part, start, direction, other, travel, margins, termination } = *self;
         termination.check()?;
         let poll = &Poll::every(SHORT_STEPS_PER_POLL, Some(termination));
+        let count = &Cell::new(0);
         let [mine, theirs] = [part, other].map(|i| &scene.bodies[i].shape);
         let standing = &scene.bodies[other].planning_from_shape;
         let standing_from_moving = standing.inverse() * start;
@@ -80,14 +91,15 @@ impl ShapeCast<'_> {
         .map(|(edges, target, to_target, along)| {
             let (edges, target) = (edges.convex_edges(), &target.surface);
             let least = least.min(travel);
-            Cast { edges, target, to_target, along, travel, margins, least, poll }
+            Cast { edges, target, to_target, along, travel, margins, least, poll, count }
         });
         // Edges cost more than corners.
-        if forward.edges.count() <= backward.edges.count() {
-            backward.corners(forward.edges(travel)?)
+        let way = if forward.edges.count() <= backward.edges.count() {
+            backward.corners(forward.edges(travel)?)?
         } else {
-            forward.corners(backward.edges(travel)?)
-        }
+            forward.corners(backward.edges(travel)?)?
+        };
+        Ok((way, count.get()))
     }
 }
 
@@ -103,6 +115,8 @@ struct Cast<'a> {
     /// Below this length the result need not be exact.
     least: f64,
     poll: &'a Poll<'a>,
+    /// The number of edges and corners that were cast.
+    count: &'a Cell<usize>,
 }
 
 impl Cast<'_> {
@@ -148,6 +162,7 @@ impl Cast<'_> {
             if way < self.least {
                 break;
             }
+            self.count.set(self.count.get() + 1);
             // If nothing is met, the result is `travel` to the bit.
             way = met(&item, way + self.margins.back).map_or(way, |at| way.min(at - self.margins.back));
         }

@@ -8,12 +8,15 @@
 //! critical coordinates fall together. So is one where the centres of round edges fall together: a round window is as
 //! narrow as its play there.
 //!
-//! Cells are found breadth first from the states of the part. Along each axis the part is cast as far as it goes in both
+//! Cells are found from the states of the part, those that the fewest short moves lead to first, and of these breadth
+//! first: in a corridor with play, most cells differ by where in the play the part is, and few lead on. Along each axis the part is cast as far as it goes in both
 //! senses, and the cells that it passes are new ones. For solids whose faces are along and across the axes this finds
 //! every way by translations along the axes; for others it finds windows whose rims have their extreme points inside the
 //! cells. Rotations stay as the states have them.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::cmp::Reverse;
+use std::collections::binary_heap::PeekMut;
+use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet};
 
 use nalgebra::{Translation3, UnitQuaternion};
 use rayon::prelude::*;
@@ -23,7 +26,7 @@ use crate::geometry::{Pose, critical_coordinates, edge_centres};
 use crate::scene::{Scene, StandingParts};
 use crate::simulation::{Action, Axis, FreeTravel, SweepQuestion, free_travel};
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{ROUNDED, SAME_CELL};
+use crate::tolerances::{ROUNDED, SAME_CELL, SHORT_MOVE};
 
 /// Cells whose neighbours are searched in parallel, enough for 64 threads. An exit ends the search only after its batch:
 /// half of it idles threads, double casts more in vain.
@@ -41,6 +44,8 @@ struct Cell {
     axis: Option<usize>,
     /// The index of its rotation.
     rotation: usize,
+    /// The number of short moves on the way to it.
+    short_moves: u32,
 }
 
 /// A place from which the part leaves along a line.
@@ -67,8 +72,10 @@ pub(super) struct CellDecomposition<'a> {
     rotations: Vec<Rotation>,
     cells: Vec<Cell>,
     known: HashSet<(usize, [i64; 3])>,
-    /// The cells whose neighbours are not known, the next ones first.
-    next: usize,
+    /// The cells whose neighbours are not known, by their short moves and number.
+    open: BinaryHeap<Reverse<(u32, usize)>>,
+    /// Moves below this length are short.
+    short: f64,
     exits: Vec<CellExit>,
     /// The parts that stopped a cast.
     met: BTreeSet<usize>,
@@ -156,7 +163,8 @@ impl<'a> CellDecomposition<'a> {
             rotations: Vec::new(),
             cells: Vec::new(),
             known: HashSet::new(),
-            next: 0,
+            open: BinaryHeap::new(),
+            short: SHORT_MOVE * scene.bodies[part].shape.bounds().extents().min(),
             exits: Vec::new(),
             met: BTreeSet::new(),
             edges: 0,
@@ -164,7 +172,7 @@ impl<'a> CellDecomposition<'a> {
         };
         for (state, pose) in states {
             let rotation = search.rotation(&pose);
-            search.add(Cell { pose, parent: None, state, axis: None, rotation });
+            search.add(Cell { pose, parent: None, state, axis: None, rotation, short_moves: 0 });
         }
         search
     }
@@ -175,20 +183,34 @@ impl<'a> CellDecomposition<'a> {
     /// # Errors
     /// The termination condition became true.
     pub(super) fn next_exit(&mut self, termination: &Termination) -> Result<Option<CellExit>, Interrupt> {
-        while self.exits.is_empty() && self.next < self.cells.len() && self.edges < self.most_edges {
-            let batch = self.next..self.cells.len().min(self.next + CELLS_AT_ONCE);
-            self.next = batch.end;
+        while self.exits.is_empty() && self.edges < self.most_edges {
+            let batch = self.next_batch();
+            if batch.is_empty() {
+                break;
+            }
             let casts: Vec<_> = batch
-                .clone()
-                .into_par_iter()
-                .map(|cell| self.casts(&self.cells[cell], termination))
+                .par_iter()
+                .map(|&cell| self.casts(&self.cells[cell], termination))
                 .collect::<Result<_, Interrupt>>()?;
-            for (cell, casts) in batch.zip(casts) {
+            for (cell, casts) in batch.into_iter().zip(casts) {
                 casts.into_iter().for_each(|cast| self.pass(cell, &cast));
             }
             self.exits.reverse();
         }
         Ok(self.exits.pop())
+    }
+
+    /// The next cells, all with as many short moves.
+    fn next_batch(&mut self) -> Vec<usize> {
+        let mut batch = Vec::new();
+        let fewest = self.open.peek().map(|Reverse((short_moves, _))| *short_moves);
+        while batch.len() < CELLS_AT_ONCE
+            && let Some(next) = self.open.peek_mut()
+            && Some(next.0.0) == fewest
+        {
+            batch.push(PeekMut::pop(next).0.1);
+        }
+        batch
     }
 
     /// The number of cells that were reached, and the parts that stopped a cast.
@@ -223,7 +245,7 @@ impl<'a> CellDecomposition<'a> {
     fn pass(&mut self, from: usize, cast: &AxisCast) {
         let AxisCast { axis, forward, free: FreeTravel { length, met, edges } } = *cast;
         self.edges += edges;
-        let Cell { pose, state, rotation, .. } = self.cells[from];
+        let Cell { pose, state, rotation, short_moves, .. } = self.cells[from];
         let Some(met) = met else {
             let action = Action::Push(self.axes[axis], forward);
             self.exits.push(CellExit { state, way: self.way_to(from), action });
@@ -246,7 +268,8 @@ impl<'a> CellDecomposition<'a> {
         let [critical, centred] = still.places(mine, [low, high]);
         for place in stops(&critical, &centred, [low, high]) {
             let pose = Translation3::from(direction * (place - here)) * pose;
-            self.add(Cell { pose, parent: Some(from), state, axis: Some(axis), rotation });
+            let short_moves = short_moves + u32::from((place - here).abs() < self.short);
+            self.add(Cell { pose, parent: Some(from), state, axis: Some(axis), rotation, short_moves });
         }
     }
 
@@ -254,6 +277,7 @@ impl<'a> CellDecomposition<'a> {
     fn add(&mut self, cell: Cell) {
         let at = cell.pose.translation.vector / SAME_CELL;
         if self.known.insert((cell.rotation, at.map(|x| x.round() as i64).into())) {
+            self.open.push(Reverse((cell.short_moves, self.cells.len())));
             self.cells.push(cell);
         }
     }

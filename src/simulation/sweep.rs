@@ -90,7 +90,7 @@ pub struct FreeTravel {
     pub length: f64,
     /// The part that it meets there; none if it meets nothing.
     pub met: Option<usize>,
-    /// The number of edges that were cast, as a measure of the effort.
+    /// The number of edges and corners that were cast, as a measure of the effort.
     pub edges: usize,
 }
 
@@ -104,15 +104,15 @@ pub fn free_travel(
     travel: f64,
     termination: &Termination,
 ) -> Result<FreeTravel, Interrupt> {
-    let edges = |part: usize| question.scene.bodies[part].shape.convex_edges().count();
     let mut free = FreeTravel { length: travel, met: None, edges: 0 };
     for other in on_the_way(question, travel) {
         let cast = cast_at(question, other, free.length, termination);
-        let met = cast.way(0.0)?;
+        let (met, count) = cast.counted_way(0.0)?;
         if met < cast.travel {
             (free.length, free.met) = (met.max(0.0), Some(other));
         }
-        free.edges += edges(question.part) + edges(other);
+        // A cast that finds nothing leading is work, too.
+        free.edges += 1 + count;
     }
     Ok(free)
 }
