@@ -251,7 +251,7 @@ pub(crate) const WINDOW_PER_THREAD: usize = 4;
 pub(crate) const EDGES_CAST_BEFORE_TURNING: usize = 200_000;
 /// The same at the end of the search, when nothing else is left. Half of it misses ways through the largest mazes;
 /// double takes twice as long where there is no way.
-pub(crate) const EDGES_CAST_AT_LAST: usize = 2_000_000;
+pub(crate) const EDGES_CAST_AT_LAST: usize = 600_000;
 /// Cells that are kept of the line of one cast. A surface with thousands of critical coordinates (a thread) would fill
 /// the search with one line; half of it misses narrow windows among as many.
 pub(crate) const CELLS_PER_CAST: usize = 256;
