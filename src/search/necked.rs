@@ -181,11 +181,10 @@ impl Neck<'_> {
     fn is_held_by(&self, opening: &Opening, poll: &Poll<'_>) -> Result<bool, Interrupt> {
         let at = self.discs.partition_point(|disc| disc.height < opening.height);
         let (below, above) = self.discs.split_at(at);
-        let is_wider = |disc: &&Disc| 2.0 * disc.radius * DISC_SHARE > opening.diameter;
+        let is_wider = |disc: &Disc| 2.0 * disc.radius * DISC_SHARE > opening.diameter;
         // The nearest ones: what is between them is most likely straight.
-        let (below_count, above_count) = (below.len(), above.len());
-        let Some(first) = (0..below_count).rev().find(|&i| is_wider(&&below[i])) else { return Ok(false) };
-        let Some(last) = (0..above_count).find(|&i| is_wider(&&above[i])) else { return Ok(false) };
+        let ends = (below.iter().rposition(is_wider), above.iter().position(is_wider));
+        let (Some(first), Some(last)) = ends else { return Ok(false) };
         let through: Vec<Point3<f64>> =
             self.discs[first..=at + last].iter().map(|disc| disc.centre).collect();
         let straight = vec![through[0], through[through.len() - 1]];

@@ -26,8 +26,8 @@ pub enum PlanningPhase {
 }
 
 /// One event. Parts are indices into the list in the first one; state 0 is the assembled one,
-/// displaced states count from 1 in the order of their discovery (in PDP, within the tree of one part,
-/// which begins anew with every depth limit).
+/// displaced states count from 1 in the order of their discovery (in PDP and RRT, within the tree of one part,
+/// which in PDP begins anew with every depth limit).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum TraceEvent {
@@ -53,7 +53,7 @@ pub enum TraceEvent {
     Pass {
         /// With which actions.
         phase: PlanningPhase,
-        /// The depth limit of a breadth-first planner.
+        /// The depth limit of a breadth-first planner, or the samples of each tree.
         depth_limit: Option<usize>,
     },
     /// A state was taken off the open list.
