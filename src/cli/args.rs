@@ -238,7 +238,7 @@ pub(super) struct BenchRun {
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "7200",
         allow_negative_numbers = true)]
     pub(super) timeout: Duration,
-    /// One motion, or a pdp planner's search for one part, is given up after this time
+    /// One motion, or a baseline's search for one part, is given up after this time
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "360",
         allow_negative_numbers = true)]
     pub(super) path_timeout: Duration,

@@ -9,16 +9,16 @@
 //! narrow as its play there.
 //!
 //! Cells are found from the states of the part, those that the fewest short moves lead to first, and of these breadth
-//! first: in a corridor with play, most cells differ by where in the play the part is, and few lead on. Along each axis the part is cast as far as it goes in both
-//! senses, and the cells that it passes are new ones. For solids whose faces are along and across the axes this finds
-//! every way by translations along the axes; for others it finds windows whose rims have their extreme points inside the
-//! cells. Rotations stay as the states have them.
+//! first: in a corridor with play, most cells differ by where in the play the part is, and few lead on. Along each axis
+//! the part is cast as far as it goes in both senses, and the cells that it passes are new ones. For solids whose faces
+//! are along and across the axes this finds every way by translations along the axes; for others it finds windows whose
+//! rims have their extreme points inside the cells. Rotations stay as the states have them.
 
 use std::cmp::Reverse;
 use std::collections::binary_heap::PeekMut;
 use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet};
 
-use nalgebra::{Translation3, UnitQuaternion};
+use nalgebra::{Point3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
 
 use crate::budgets::CELLS_PER_CAST;
@@ -100,14 +100,13 @@ struct AxisCoordinates {
 }
 
 impl AxisCoordinates {
-    /// Those of a part at a pose.
-    fn of(scene: &Scene, part: usize, pose: &Pose, axis: Axis) -> Self {
+    /// Those of a part at a pose, given the centres of its round edges in its shape's frame.
+    fn of(scene: &Scene, part: usize, pose: &Pose, axis: Axis, centres: &[Point3<f64>]) -> Self {
         let axis = axis.unit().into_inner();
         let here = axis.dot(&pose.translation.vector);
         let in_shape = pose.rotation.inverse() * axis;
-        let surface = &scene.bodies[part].shape.surface;
-        let critical = critical_coordinates(surface, &in_shape);
-        let centres = edge_centres(surface).into_iter().map(|p| in_shape.dot(&p.coords)).collect();
+        let critical = critical_coordinates(&scene.bodies[part].shape.surface, &in_shape);
+        let centres = centres.iter().map(|p| in_shape.dot(&p.coords)).collect();
         let [critical, centres] = [critical, centres].map(|mut found: Vec<f64>| {
             found.iter_mut().for_each(|x| *x += here);
             distinct(found)
@@ -125,16 +124,32 @@ impl AxisCoordinates {
     }
 }
 
-/// The coordinates of parts at their assembled poses, by part and axis.
+/// The coordinates of parts.
 #[derive(Debug, Default)]
-pub(super) struct CriticalCoordinates(HashMap<(usize, usize), AxisCoordinates>);
+pub(super) struct CriticalCoordinates {
+    /// At their assembled poses, by part and axis.
+    assembled: HashMap<(usize, usize), AxisCoordinates>,
+    /// By part: the centres of its round edges, in its shape's frame.
+    centres: HashMap<usize, Vec<Point3<f64>>>,
+}
 
 impl CriticalCoordinates {
+    /// Those of a part at a pose.
+    fn of(&mut self, scene: &Scene, part: usize, pose: &Pose, axis: Axis) -> AxisCoordinates {
+        let found = || edge_centres(&scene.bodies[part].shape.surface);
+        let centres = self.centres.entry(part).or_insert_with(found);
+        AxisCoordinates::of(scene, part, pose, axis, centres)
+    }
+
+    /// Those of some parts as assembled.
     fn of_all(&mut self, scene: &Scene, parts: &[usize], (index, axis): (usize, Axis)) -> AxisCoordinates {
         let mut all = AxisCoordinates::default();
         for &part in parts {
-            let of_part = || AxisCoordinates::of(scene, part, &scene.bodies[part].planning_from_shape, axis);
-            let AxisCoordinates { critical, centres } = self.0.entry((part, index)).or_insert_with(of_part);
+            if !self.assembled.contains_key(&(part, index)) {
+                let own = self.of(scene, part, &scene.bodies[part].planning_from_shape, axis);
+                self.assembled.insert((part, index), own);
+            }
+            let AxisCoordinates { critical, centres } = &self.assembled[&(part, index)];
             all.critical.extend_from_slice(critical);
             all.centres.extend_from_slice(centres);
         }
@@ -264,7 +279,7 @@ impl<'a> CellDecomposition<'a> {
             .get_or_insert_with(|| self.coordinates.of_all(scene, &standing.standing, numbered));
         let Rotation { rotation: turned, mine } = &mut self.rotations[rotation];
         let turned = Pose::from_parts(Translation3::identity(), *turned);
-        let mine = mine[axis].get_or_insert_with(|| AxisCoordinates::of(scene, part, &turned, numbered.1));
+        let mine = mine[axis].get_or_insert_with(|| self.coordinates.of(scene, part, &turned, numbered.1));
         let [critical, centred] = still.places(mine, [low, high]);
         for place in stops(&critical, &centred, [low, high]) {
             let pose = Translation3::from(direction * (place - here)) * pose;

@@ -113,7 +113,7 @@ fn remain(remaining: &[usize], name: impl Fn(usize) -> String) -> String {
 /// Counts and times of a search.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
-    /// Transition functions used.
+    /// Transition functions used; of RRT, the steps of its trees.
     pub simulations: u64,
     /// Of them, those whose motion was remembered.
     pub recalled: u64,
