@@ -296,6 +296,9 @@ pub(crate) const POSES_PER_LOOK: usize = 8;
 /// half, it has corners there; at double, there are few points in each. Measured on an M8 thread and on threads of one to
 /// three starts: no effect of either.
 pub(crate) const RISE_RANGES: usize = 24;
+/// Heights within a pitch at which flanks are looked for, to see how much of it they take up: ten to each of
+/// [`RISE_RANGES`]. At half, a thin wire is taken for one twice as thick; at double, half of the heights have no point.
+pub(crate) const OCCUPIED_HEIGHTS: usize = 10 * RISE_RANGES;
 /// Rounds of fitting the helix of a thread before the last one: the ends of the thread, which do not count, are known
 /// only with its pitch. With none, seats and bottoms of holes distort the fit; with double no effect.
 pub(crate) const HELIX_ROUNDS: usize = 1;

@@ -238,6 +238,9 @@ pub(crate) const OFF_HELIX: f64 = 0.25;
 /// Pitches. What is no further from the end of a thread does not count: seats and bottoms of holes are there.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const THREAD_ENDS: f64 = 0.3;
+/// Share of the length of a thread that an end is at most. At half, a chamfer of a short nut distorts its fit; at double,
+/// a tenth of a turn less is left of a corkscrew of one turn, too little to fit its helix.
+pub(crate) const THREAD_END_SHARE: f64 = 0.1;
 /// Radians between two poses of a path that is turned off its thread, before thinning.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const SCREW_POSE_ANGLE: f64 = 0.1;
@@ -266,10 +269,18 @@ pub(crate) const FLANK_LEAN: [f64; 2] = [0.15, 0.97];
 /// Shares of a guess within which the rise of a thread is sought: null twists of flanks with play are wrong by half and
 /// by double. With half the range, these are missed; with double it takes a little longer.
 pub(crate) const RISE_RANGE: [f64; 2] = [0.4, 3.0];
-/// Length. Profiles are compared no finer, at a third of the depth at which paths past thin parts are refused: at half,
+/// Length. Profiles are compared no finer, a fifth of the depth at which paths past thin parts are refused: at half,
 /// fine threads that do not pass take four times as long to refute; at double, threads with a play of a thousandth of the
 /// longest side are checked at samples, which takes seconds.
-pub(crate) const PROFILE_FINENESS: f64 = 2e-4;
+pub(crate) const PROFILE_FINENESS: f64 = 1e-4;
+/// Share of the distance of two heights. How far the footprint of a facet on a profile may be off: halving a facet divides
+/// its error by four. At double, threads with a play of a hundredth of the radius are compared three times as finely; at
+/// half, profiles take twice as long.
+pub(crate) const FOOTPRINT_ERROR: f64 = 0.25;
+/// Heights of a profile. A gap across the axis between points of one surface is closed if it is narrower than this many:
+/// footprints of facets are only as exact as one. At half, profiles are in crumbs and take longer to compare; at double, a wire
+/// must have a play of a twentieth of the pitch, at the first fineness, not to be taken for its tunnel's walls.
+pub(crate) const PROFILE_JOINT: f64 = 4.0;
 /// Shares of the radius within which a rise is sought if a part turns and shifts independently, as far as its contacts
 /// show: pitches from a twentieth of the radius to the radius. Coarser threads show their rise; finer ones are left to
 /// simulation.

@@ -116,19 +116,26 @@ def loose(rng, comes_apart):
     return [walls - hole.translate((*shift, 0)), body.translate(floats)], dict(ball=bool(is_ball), size=size, play=play, room=room)
 
 
+def steps_per_turn(radius, play):
+    """So many that the facets of a twisted hole take half of the play at most, and what has play is not stopped: their
+    diagonals go two steps around the axis, and lie as far inside as an arc of two steps is high. A multiple of 6."""
+    return 6 * max(12, math.ceil(math.tau / math.acos(1 - play / 2 / radius) / 6))
+
+
 def thread(rng, comes_apart):
     """A nut on a bolt, one to three starts, right or left; captive with a second head above the nut."""
     starts, right, play = int(rng.integers(1, 4)), rng.random() < 0.5, play_of(rng)
     radius, pitch = rng.uniform(3, 6), rng.uniform(1, 2.5)
     lead, depth = starts * pitch, 0.4 * pitch
-    angles = np.arange(ROUND) * math.tau / ROUND
+    around = steps_per_turn(radius + play, play)
+    angles = np.arange(around) * math.tau / around
     ridge = 2 * np.abs((angles * starts / math.tau) % 1 - 0.5)
     outline = lambda extra: CrossSection([[((radius - depth * (1 - h) + extra) * math.cos(a), (radius - depth * (1 - h) + extra) * math.sin(a)) for a, h in zip(angles, ridge)]])
     turns = rng.uniform(1, 3)
     height = turns * lead
 
     def screw(section, low, high):
-        steps = max(1, math.ceil((high - low) / lead * 36))
+        steps = max(1, math.ceil((high - low) / lead * around))
         twist = (360 if right else -360) * (high - low) / lead
         begin = math.degrees((math.tau if right else -math.tau) * low / lead)
         return Manifold.extrude(section, high - low, steps, twist).rotate((0, 0, begin)).translate((0, 0, low))
@@ -175,10 +182,11 @@ def corkscrew(rng, comes_apart):
     height = turns * lead
 
     def helix(thick, low, high):
-        section = CrossSection.circle(thick, 24).translate((radius, 0))
+        sides = max(24, math.ceil(math.pi / math.acos(1 - play / 4 / thick)))
+        section = CrossSection.circle(thick, sides).translate((radius, 0))
         twist = (360 if right else -360) * (high - low) / lead
         begin = math.degrees((math.tau if right else -math.tau) * low / lead)
-        steps = math.ceil((high - low) / lead * 48)
+        steps = math.ceil((high - low) / lead * steps_per_turn(radius + thick, play))
         return Manifold.extrude(section, high - low, steps, twist).rotate((0, 0, begin)).translate((0, 0, low))
 
     grip = cylinder(1.5 * radius, height + 1, height + 4)

@@ -1,10 +1,10 @@
-//! The profile of a surface along a helix: how far it reaches from the axis, and how near it comes to it, by the
-//! height on the helix.
+//! The profile of a surface along a helix: its distances from the axis, by the height on the helix.
 //!
-//! There all turns of a thread lie on each other (see [`Helix`](crate::geometry::Helix)). If the profile of one part
-//! is beyond that of the other at every height, by more than the part strays from the helix, then the helical sheet
-//! between the profiles separates the parts at every angle. Exact profiles are needed only about as far from the axis
-//! as the other part is.
+//! There all turns of a thread lie on each other (see [`Helix`](crate::geometry::Helix)), and a part that is screwed
+//! along keeps its profile. If the profiles of two surfaces have no distance in common at any height, nor any within
+//! what the part strays from the helix, then the surfaces do not meet at any angle: neither those of a bolt in its nut
+//! nor those of a helical wire in its tunnel, which has walls on both sides of the wire. Exact profiles are needed only
+//! about as far from the axis as the other part is.
 
 use std::f64::consts::TAU;
 
@@ -14,8 +14,12 @@ use rayon::prelude::*;
 use crate::budgets::{HEIGHTS_PER_PITCH, SHORT_STEPS_PER_POLL, SLABS_PER_PITCH, TRIANGLE_HALVINGS};
 use crate::geometry::{Footprint, Helix, radii};
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{EQUAL_GAP, PROFILE_FINENESS, PROFILE_MARGIN};
+use crate::tolerances::{
+    EQUAL_GAP, FOOTPRINT_ERROR, PROFILE_FINENESS, PROFILE_JOINT, PROFILE_MARGIN, THREAD_END_SHARE,
+    THREAD_ENDS,
+};
 
+use super::distances::Distances;
 use super::range;
 
 /// A range along an axis and a range of distances from it.
@@ -52,9 +56,11 @@ impl ProfileZone {
         self.along[0] >= self.along[1] || self.across[0] >= self.across[1]
     }
 
-    /// The same, shorter by some length at both ends along the axis.
-    pub(super) fn trimmed(self, by: f64) -> Self {
-        Self { along: [self.along[0] + by, self.along[1] - by], ..self }
+    /// The same without the ends of a thread, which do not count.
+    pub(super) fn trimmed(self, pitch: f64) -> Self {
+        let [low, high] = self.along;
+        let end = (THREAD_ENDS * pitch).min(THREAD_END_SHARE * (high - low));
+        Self { along: [low + end, high - end], ..self }
     }
 
     /// The same at all heights.
@@ -76,17 +82,11 @@ impl ProfileZone {
     }
 }
 
-/// The least and the largest distance from the axis, by height on the helix.
-type Reaches = Vec<[f64; 2]>;
-
-/// An empty range.
-const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
-
 /// A piece of the profile along the axis.
 #[derive(Debug, Clone)]
 struct Slab {
-    /// Empty as long as there is nothing.
-    reaches: Reaches,
+    /// The distances by height on the helix. Empty as long as there is nothing.
+    profile: Vec<Distances>,
     /// Whether something is nearer to the axis, or further from it, than the profile is exact.
     further: [bool; 2],
 }
@@ -95,7 +95,7 @@ struct Slab {
 #[derive(Debug, Default)]
 struct ProfileCut {
     stack: Vec<([Point3<f64>; 3], u32)>,
-    reaches: Reaches,
+    print: Vec<[f64; 2]>,
 }
 
 /// The profile of a surface.
@@ -144,7 +144,7 @@ impl Envelope {
             triangles.iter().for_each(|corners| envelope.add(corners, helix.rise, &mut cut));
             Ok(envelope)
         };
-        // Minimum and maximum do not depend on how triangles are dealt out.
+        // What is joined does not depend on how triangles are dealt out.
         triangles
             .par_chunks(SHORT_STEPS_PER_POLL as usize)
             .try_fold(empty, add)
@@ -156,19 +156,26 @@ impl Envelope {
         if self.slabs.len() < other.slabs.len() {
             std::mem::swap(&mut self, &mut other);
         }
+        let joint = self.joint();
         for (slab, added) in (other.first..).zip(other.slabs) {
             let own = &mut self.slabs_between(slab, slab)[0];
             (0..2).for_each(|side| own.further[side] |= added.further[side]);
-            if own.reaches.is_empty() {
-                own.reaches = added.reaches;
+            if own.profile.is_empty() {
+                own.profile = added.profile;
             } else {
-                own.reaches.iter_mut().zip(&added.reaches).for_each(|(own, added)| widen(own, added));
+                own.profile.iter_mut().zip(&added.profile).for_each(|(own, added)| own.add_all(added, joint));
             }
         }
         self
     }
 
-    fn add(&mut self, corners: &[Point3<f64>; 3], rise: f64, ProfileCut { stack, reaches }: &mut ProfileCut) {
+    fn add(
+        &mut self,
+        corners: &[Point3<f64>; 3],
+        rise: f64,
+        ProfileCut { stack, print: scratch }: &mut ProfileCut,
+    ) {
+        let joint = self.joint();
         stack.push((*corners, 0));
         while let Some((corners, cuts)) = stack.pop() {
             let [low, high] = range(corners.iter().map(|p| p.z));
@@ -184,18 +191,25 @@ impl Envelope {
                 continue;
             }
             match Footprint::of(&corners, rise) {
-                Some(print) if print.error <= self.finest || cuts >= TRIANGLE_HALVINGS => {
+                Some(print) if print.error <= FOOTPRINT_ERROR * self.finest || cuts >= TRIANGLE_HALVINGS => {
                     let heights = print.points.iter().zip(&corners);
                     let beside = range(heights.map(|(p, c)| p.y - c.z));
-                    self.enter(&print, [low, high], beside, reaches);
+                    self.enter(&print, [low, high], beside, scratch);
                 }
                 None if far <= 4.0 * self.finest || cuts >= TRIANGLE_HALVINGS => {
-                    let whole = [f64::NEG_INFINITY, f64::INFINITY];
-                    self.enter(&Footprint::at_all_angles(&corners, rise), [low, high], whole, reaches);
+                    // It may hold points of the axis, and is as if it were at all angles.
+                    for slab in self.filled_slabs([low, high]) {
+                        slab.profile.iter_mut().for_each(|at| at.add([near, far], joint));
+                    }
                 }
                 _ => stack.extend(halves(&corners).map(|half| (half, cuts + 1))),
             }
         }
+    }
+
+    /// Gaps across the axis that are narrower than this count as none, or a profile of facets would be in crumbs.
+    fn joint(&self) -> f64 {
+        PROFILE_JOINT * self.finest
     }
 
     fn slab(&self, z: f64) -> i64 {
@@ -204,7 +218,7 @@ impl Envelope {
 
     /// The slabs from one index to another, made if missing.
     fn slabs_between(&mut self, low: i64, high: i64) -> &mut [Slab] {
-        let empty = || Slab { reaches: Vec::new(), further: [false; 2] };
+        let empty = || Slab { profile: Vec::new(), further: [false; 2] };
         if self.slabs.is_empty() {
             self.first = low;
         }
@@ -218,42 +232,58 @@ impl Envelope {
         &mut self.slabs[(low - self.first) as usize..needed]
     }
 
+    /// The slabs between two places along the axis, with a profile.
+    fn filled_slabs(&mut self, [low, high]: [f64; 2]) -> &mut [Slab] {
+        let heights = self.heights;
+        let slabs = self.slabs_between(self.slab(low), self.slab(high));
+        for slab in slabs.iter_mut().filter(|slab| slab.profile.is_empty()) {
+            slab.profile.resize(heights, Distances::default());
+        }
+        slabs
+    }
+
     /// Adds a footprint. Its heights on the helix differ from those along the axis, `along[0]` to `along[1]`, by
     /// something in `beside`.
-    fn enter(&mut self, print: &Footprint, along: [f64; 2], beside: [f64; 2], reaches: &mut Reaches) {
-        let (size, pitch, heights) = (self.finest, self.pitch, self.heights);
+    fn enter(&mut self, print: &Footprint, along: [f64; 2], beside: [f64; 2], scratch: &mut Vec<[f64; 2]>) {
+        let (size, pitch, heights, joint) = (self.finest, self.pitch, self.heights, self.joint());
         let [from, to] = range(print.points.iter().map(|p| p.y));
-        let first = reached(print, size, reaches);
-        let lowest = self.slab(along[0]);
-        for (low, slab) in (lowest..).zip(self.slabs_between(lowest, self.slab(along[1]))) {
-            if slab.reaches.is_empty() {
-                slab.reaches.resize(heights, NOTHING);
-            }
+        let first = reached(print, size, scratch);
+        for (low, slab) in (self.slab(along[0])..).zip(self.filled_slabs(along)) {
             let ends = [low as f64, (low + 1) as f64].map(|z| z / SLABS_PER_PITCH * pitch);
             let from = ((from.max(ends[0] + beside[0]) - print.error) / size).floor() as i64;
             let to = ((to.min(ends[1] + beside[1]) + print.error) / size).floor() as i64;
             let mut bin = from.rem_euclid(heights as i64) as usize;
-            let within = reaches.iter().skip((from - first) as usize).take((to - from + 1).max(0) as usize);
-            for reach in within {
-                widen(&mut slab.reaches[bin], reach);
+            let within = scratch.iter().skip((from - first) as usize).take((to - from + 1).max(0) as usize);
+            for range in within {
+                slab.profile[bin].add(*range, joint);
                 bin = if bin + 1 == heights { 0 } else { bin + 1 };
             }
         }
     }
 
-    /// The profile between two places along the axis.
-    fn between(&self, [from, to]: [f64; 2]) -> Reaches {
+    /// The profile between two places along the axis, and whether something is nearer to the axis or further from it.
+    fn exact_between(&self, [from, to]: [f64; 2]) -> (Vec<Distances>, [bool; 2]) {
         let within = |z: f64| self.slab(z).saturating_sub(self.first).clamp(-1, self.slabs.len() as i64);
         let slabs = within(from).max(0)..=within(to).min(self.slabs.len() as i64 - 1);
-        let mut all = vec![NOTHING; self.heights];
+        let joint = self.joint();
+        let mut all = vec![Distances::default(); self.heights];
         let mut further = [false; 2];
         for slab in slabs {
             let slab = &self.slabs[slab as usize];
             (0..2).for_each(|side| further[side] |= slab.further[side]);
-            all.iter_mut().zip(&slab.reaches).for_each(|(own, reach)| widen(own, reach));
+            all.iter_mut().zip(&slab.profile).for_each(|(own, added)| own.add_all(added, joint));
         }
-        for own in &mut all {
-            *own = [if further[0] { 0.0 } else { own[0] }, if further[1] { f64::INFINITY } else { own[1] }];
+        (all, further)
+    }
+
+    /// The same with all that is nearer to the axis or further from it, as if it were everywhere there.
+    fn between(&self, places: [f64; 2]) -> Vec<Distances> {
+        let (mut all, further) = self.exact_between(places);
+        let ([near, far], joint) = (self.zone.across, self.joint());
+        for (is_there, range) in further.into_iter().zip([[0.0, near], [far, f64::INFINITY]]) {
+            if is_there {
+                all.iter_mut().for_each(|own| own.add(range, joint));
+            }
         }
         all
     }
@@ -269,11 +299,11 @@ impl Envelope {
         stray: impl Fn(f64) -> f64,
     ) -> bool {
         let (one, other) = (self.between(places), other.between(other_places));
-        let widest = |r: &Reaches| r.iter().map(|[_, far]| *far).fold(0.0, f64::max);
-        let stray = stray(widest(&one).min(widest(&other)));
-        let narrowest = |r: &Reaches| r.iter().map(|[near, _]| *near).fold(f64::INFINITY, f64::min);
-        // Where one is around the other, that is no nearer to the axis than …
-        let inner = narrowest(&one).max(narrowest(&other));
+        let [from_axis, from_other] =
+            [&one, &other].map(|profile| range(profile.iter().flat_map(Distances::ends)));
+        let stray = stray(from_axis[1].min(from_other[1]));
+        // Where they may meet, they are no nearer to the axis than …
+        let inner = from_axis[0].max(from_other[0]);
         if !stray.is_finite() || inner <= 2.0 * stray {
             return false;
         }
@@ -285,49 +315,54 @@ impl Envelope {
             return false;
         }
         let wide = (margin / size).ceil() as i64 + 2;
-        let is_inside = |inner: &Reaches, outer: &Reaches, moved: i64| {
-            (0..bins).all(|i| {
-                let far = inner[i as usize][1];
-                far == f64::NEG_INFINITY
-                    || (-wide..=wide).all(|k| {
-                        let beside = (k.abs() - 2).max(0) as f64 * size;
-                        let across = (margin * margin - beside * beside).max(0.0).sqrt();
-                        outer[(i + k - moved).rem_euclid(bins) as usize][0] > far + across
-                    })
-            })
-        };
-        is_inside(&one, &other, moved) || is_inside(&other, &one, -moved)
+        (0..bins).all(|i| {
+            let own = &one[i as usize];
+            own.is_empty()
+                || (-wide..=wide).all(|k| {
+                    let beside = (k.abs() - 2).max(0) as f64 * size;
+                    let across = (margin * margin - beside * beside).max(0.0).sqrt();
+                    own.gap(&other[(i + k - moved).rem_euclid(bins) as usize]) > across
+                })
+        })
     }
 
     /// The shift of another profile along the axis, up to `most`, that makes the gap across the axis widest, and that
-    /// gap, if there is one.
+    /// gap, if there is one no wider. Of shifts that are interrupted by contact those nearest to none count, and only as
+    /// long as the two have half of their common heights: further on, what was in a tunnel is beside it.
     pub(super) fn widest_gap(&self, other: &Self, most: f64) -> Option<(f64, f64)> {
         let everywhere = [f64::NEG_INFINITY, f64::INFINITY];
-        let (one, other) = (self.between(everywhere), other.between(everywhere));
+        let [(one, _), (other, _)] = [self, other].map(|envelope| envelope.exact_between(everywhere));
         let (bins, size) = (self.heights as i64, self.finest);
-        let gap = |inner: &Reaches, outer: &Reaches, shift: i64| {
-            let at = |i: i64| outer[(i + shift).rem_euclid(bins) as usize][0] - inner[i as usize][1];
-            (0..bins).map(at).fold(f64::INFINITY, f64::min)
+        // The number of common heights, and the gap.
+        let compared = |shift: i64| {
+            let at = |i: i64| one[i as usize].gap(&other[(i - shift).rem_euclid(bins) as usize]);
+            let near = (0..bins).map(at).filter(|gap| *gap <= most);
+            near.fold((0, f64::INFINITY), |(count, least), gap| (count + 1, gap.min(least)))
         };
-        let most = (most / size) as i64;
-        let gaps: Vec<(f64, i64)> = (-most..=most)
-            .map(|shift| (gap(&one, &other, -shift).max(gap(&other, &one, shift)), shift))
-            .collect();
+        let furthest = (most / size) as i64;
+        let common = compared(0).0;
+        let gap = |shift: i64| {
+            let (count, gap) = compared(shift);
+            if 2 * count > common { gap } else { f64::NEG_INFINITY }
+        };
+        let gaps: Vec<(f64, i64)> = (-furthest..=furthest).map(|shift| (gap(shift), shift)).collect();
+        let runs = gaps.split(|(gap, _)| *gap <= 0.0).filter(|run| !run.is_empty());
+        let gaps = runs.min_by_key(|run| run.iter().map(|(_, shift)| shift.abs()).min())?;
         let widest = gaps.iter().map(|(gap, _)| *gap).fold(f64::NEG_INFINITY, f64::max);
         let as_wide = || gaps.iter().filter(|(gap, _)| *gap >= widest * (1.0 - EQUAL_GAP));
         let middle = as_wide().map(|(_, shift)| *shift as f64).sum::<f64>() / as_wide().count() as f64;
-        (widest > 0.0 && widest.is_finite()).then_some((widest, middle * size))
+        Some((widest, middle * size))
     }
 }
 
 /// The range of a footprint across the axis, by bins of heights of some size, and the first bin.
-fn reached(print: &Footprint, size: f64, reaches: &mut Reaches) -> i64 {
+fn reached(print: &Footprint, size: f64, ranges: &mut Vec<[f64; 2]>) -> i64 {
     let [low, high] = range(print.points.iter().map(|p| p.y));
     let bins =
         |low: f64, high: f64| [low - print.error, high + print.error].map(|y| (y / size).floor() as i64);
     let [first, last] = bins(low, high);
-    reaches.clear();
-    reaches.resize((last - first + 1) as usize, NOTHING);
+    ranges.clear();
+    ranges.resize((last - first + 1) as usize, [f64::INFINITY, f64::NEG_INFINITY]);
     for i in 0..3 {
         let (a, b) = (print.points[i], print.points[(i + 1) % 3]);
         let (a, b) = if a.y <= b.y { (a, b) } else { (b, a) };
@@ -335,25 +370,20 @@ fn reached(print: &Footprint, size: f64, reaches: &mut Reaches) -> i64 {
         let slope = (b.x - a.x) / (b.y - a.y);
         let at = |y: f64| (a.x + slope * (y - a.y)).clamp(least, most);
         let [from, to] = bins(a.y, b.y);
-        for (bin, reach) in (from..=to).zip(&mut reaches[(from - first) as usize..]) {
+        for (bin, known) in (from..=to).zip(&mut ranges[(from - first) as usize..]) {
             let low = bin as f64 * size - print.error;
             let ends = if slope.is_finite() {
                 range([at(low), at(low + size + 2.0 * print.error)].into_iter())
             } else {
                 [least, most]
             };
-            widen(reach, &ends);
+            *known = [known[0].min(ends[0]), known[1].max(ends[1])];
         }
     }
-    for [near, far] in reaches {
+    for [near, far] in ranges {
         (*near, *far) = (*near - print.error, *far + print.error);
     }
     first
-}
-
-/// Extends a range to hold another.
-fn widen(reach: &mut [f64; 2], other: &[f64; 2]) {
-    *reach = [reach[0].min(other[0]), reach[1].max(other[1])];
 }
 
 /// The two halves of a triangle, cut across the side that is longest across the axis.

@@ -2,7 +2,8 @@
 //!
 //! On the helix of the thread, all turns lie on each other: the distance of a flank's point from the axis depends on its
 //! height `u = z − rise · θ` alone. So the true rise is the one at which these distances scatter least about a straight
-//! line within each short range of heights, and the same holds for the axis. (Normals would give a false rise: facets on
+//! line within each short range of heights, and the same holds for the axis. A wire has two flanks at one height, which
+//! face towards the axis and away from it: each has a line of its own. (Normals would give a false rise: facets on
 //! a grid lean all the same way.)
 
 use std::f64::consts::TAU;
@@ -10,7 +11,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, Translation3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use crate::budgets::{FLANK_POINTS, HELIX_FIT_SWEEPS, RISE_RANGES};
+use crate::budgets::{FLANK_POINTS, HELIX_FIT_SWEEPS, OCCUPIED_HEIGHTS, RISE_RANGES};
 use crate::geometry::{Helix, Pose};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{HELIX_FIT_PRECISION, HELIX_FIT_STEP, RISE_PRECISION, RISE_STEP};
@@ -18,20 +19,53 @@ use crate::tolerances::{HELIX_FIT_PRECISION, HELIX_FIT_STEP, RISE_PRECISION, RIS
 use super::range;
 use super::slip::FlankFacet;
 
+/// A point of a flank.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FlankPoint {
+    at: Point3<f64>,
+    /// Whether the flank faces away from the axis there.
+    faces_out: bool,
+}
+
+impl FlankPoint {
+    /// The point in a frame about nearly the same axis.
+    pub(super) fn moved(&self, pose: &Pose) -> Self {
+        Self { at: pose * self.at, ..*self }
+    }
+
+    pub(super) fn radius(&self) -> f64 {
+        self.at.xy().coords.norm()
+    }
+
+    fn cylindrical(&self) -> CylindricalPoint {
+        let Self { at, faces_out } = *self;
+        CylindricalPoint { angle: at.y.atan2(at.x), z: at.z, distance: self.radius(), faces_out }
+    }
+}
+
+/// The same in coordinates about the axis.
+#[derive(Debug, Clone, Copy)]
+struct CylindricalPoint {
+    angle: f64,
+    z: f64,
+    distance: f64,
+    faces_out: bool,
+}
+
 /// Of the rises in some ranges (each of one sign, without zero), the one at which the flanks of some surfaces (points in the axis
 /// frame) scatter least.
 ///
 /// # Errors
 /// The termination condition became true.
 pub(super) fn fitted_rise(
-    flanks: &[Vec<Point3<f64>>],
+    flanks: &[Vec<FlankPoint>],
     ranges: &[[f64; 2]],
     termination: &Termination,
 ) -> Result<Option<f64>, Interrupt> {
-    let flanks: Vec<Vec<[f64; 3]>> =
-        flanks.iter().map(|points| points.iter().map(cylindrical).collect()).collect();
-    let scatter = |rise: f64| flanks.iter().map(|points| scatter(points, rise)).sum::<f64>();
-    let [low, high] = range(flanks.iter().flatten().map(|[_, z, _]| *z));
+    let flanks: Vec<Vec<CylindricalPoint>> =
+        flanks.iter().map(|points| points.iter().map(FlankPoint::cylindrical).collect()).collect();
+    let scatter = |rise: f64| flanks.iter().map(|points| scatter(points, rise, RISE_RANGES)).sum::<f64>();
+    let [low, high] = range(flanks.iter().flatten().map(|p| p.z));
     // An error of the rise adds up over the turns.
     let step = |rise: f64| RISE_STEP / (1.0 + ((high - low) / (TAU * rise)).abs());
     let mut tried = Vec::new();
@@ -67,13 +101,13 @@ pub(super) fn fitted_rise(
 /// # Errors
 /// The termination condition became true.
 pub(super) fn fitted_helices(
-    flanks: &[Vec<Point3<f64>>; 2],
+    flanks: &[Vec<FlankPoint>; 2],
     rise: f64,
     termination: &Termination,
 ) -> Result<[Helix; 2], Interrupt> {
     let mut fits = flanks.each_ref().map(|flanks| AxisFit::new(flanks, rise));
     // An error of the rise adds up over the turns.
-    let [low, high] = range(flanks.iter().flatten().map(|p| p.z));
+    let [low, high] = range(flanks.iter().flatten().map(|p| p.at.z));
     let turns = 1.0 + ((high - low) / (TAU * rise)).abs();
     let (mut rise, mut step) = (rise, HELIX_FIT_STEP);
     for _ in 0..HELIX_FIT_SWEEPS {
@@ -102,9 +136,11 @@ pub(super) fn fitted_helices(
 /// The axis of the flanks of a surface, while it is fitted.
 #[derive(Debug)]
 struct AxisFit<'a> {
-    flanks: &'a [Point3<f64>],
+    flanks: &'a [FlankPoint],
     middle: Vector3<f64>,
     radius: f64,
+    /// The number of ranges of heights within a pitch.
+    ranges: usize,
     /// Two shifts as shares of the radius, and two tilts about the middle.
     by: [f64; 4],
     /// How far the flanks scatter about that axis.
@@ -112,11 +148,12 @@ struct AxisFit<'a> {
 }
 
 impl<'a> AxisFit<'a> {
-    fn new(flanks: &'a [Point3<f64>], rise: f64) -> Self {
+    fn new(flanks: &'a [FlankPoint], rise: f64) -> Self {
         let count = flanks.len().max(1) as f64;
-        let middle = Vector3::z() * (flanks.iter().map(|p| p.z).sum::<f64>() / count);
-        let radius = flanks.iter().map(|p| p.xy().coords.norm()).sum::<f64>() / count;
-        let mut fit = Self { flanks, middle, radius, by: [0.0; 4], least: 0.0 };
+        let middle = Vector3::z() * (flanks.iter().map(|p| p.at.z).sum::<f64>() / count);
+        let radius = flanks.iter().map(FlankPoint::radius).sum::<f64>() / count;
+        let ranges = ranges(flanks, rise);
+        let mut fit = Self { flanks, middle, radius, ranges, by: [0.0; 4], least: 0.0 };
         fit.least = fit.scatter(&fit.place(&fit.by), rise);
         fit
     }
@@ -129,8 +166,8 @@ impl<'a> AxisFit<'a> {
     }
 
     fn scatter(&self, axis_from_frame: &Pose, rise: f64) -> f64 {
-        let points: Vec<_> = self.flanks.iter().map(|p| cylindrical(&(axis_from_frame * p))).collect();
-        scatter(&points, rise)
+        let points: Vec<_> = self.flanks.iter().map(|p| p.moved(axis_from_frame).cylindrical()).collect();
+        scatter(&points, rise, self.ranges)
     }
 
     /// Takes each step that lessens the scatter; whether there was one.
@@ -151,38 +188,51 @@ impl<'a> AxisFit<'a> {
 /// Points spread over some facets, as many on each: the corners alone lie in rows, which do not show how a flank slopes.
 /// On a facet they follow a sequence of low discrepancy (M. Roberts 2018, "The unreasonable effectiveness of quasirandom
 /// sequences"; the plastic number).
-pub(super) fn spread(facets: &[&FlankFacet]) -> Vec<Point3<f64>> {
+pub(super) fn spread(facets: &[&FlankFacet]) -> Vec<FlankPoint> {
     const PLASTIC: f64 = 1.324_717_957_244_746;
     let point = |i: usize| {
-        let [a, b, c] = facets[i * facets.len() / FLANK_POINTS].corners;
+        let facet = facets[i * facets.len() / FLANK_POINTS];
+        let [a, b, c] = facet.corners;
         let [mut u, mut v] = [PLASTIC, PLASTIC * PLASTIC].map(|step| (0.5 + i as f64 / step).fract());
         if u + v > 1.0 {
             (u, v) = (1.0 - u, 1.0 - v);
         }
-        a + (b - a) * u + (c - a) * v
+        let faces_out = facet.normal.xy().dot(&facet.middle.xy().coords) > 0.0;
+        FlankPoint { at: a + (b - a) * u + (c - a) * v, faces_out }
     };
     let count = if facets.is_empty() { 0 } else { FLANK_POINTS };
     (0..count).map(point).collect()
 }
 
-/// Angle, height and distance of a point.
-fn cylindrical(p: &Point3<f64>) -> [f64; 3] {
-    [p.y.atan2(p.x), p.z, p.xy().coords.norm()]
+/// Where a point is within the pitch, as a share of it.
+fn height_in_pitch(CylindricalPoint { angle, z, .. }: &CylindricalPoint, rise: f64) -> f64 {
+    ((z - rise * angle) / (TAU * rise)).rem_euclid(1.0)
+}
+
+/// A number of ranges within a pitch of which [`RISE_RANGES`] have points: a wire takes up little of a pitch.
+fn ranges(flanks: &[FlankPoint], rise: f64) -> usize {
+    let mut taken = [false; OCCUPIED_HEIGHTS];
+    for point in flanks {
+        let height = height_in_pitch(&point.cylindrical(), rise) * OCCUPIED_HEIGHTS as f64;
+        taken[(height as usize).min(OCCUPIED_HEIGHTS - 1)] = true;
+    }
+    let count = taken.iter().filter(|is_taken| **is_taken).count().max(1);
+    RISE_RANGES * OCCUPIED_HEIGHTS / count
 }
 
 /// The sum of squared deviations of distances from the straight line through those about their height. A point counts for
 /// the lines of two ranges, by how near it is to the middle of each: so the sum changes steadily with the helix.
-fn scatter(points: &[[f64; 3]], rise: f64) -> f64 {
-    let pitch = TAU * rise;
-    let mut ranges = [Moments::default(); RISE_RANGES];
-    for [angle, z, distance] in points {
-        let height = ((z - rise * angle) / pitch).rem_euclid(1.0) * RISE_RANGES as f64;
-        let range = (height as usize).min(RISE_RANGES - 1);
+fn scatter(points: &[CylindricalPoint], rise: f64, count: usize) -> f64 {
+    let mut sides = [vec![Moments::default(); count], vec![Moments::default(); count]];
+    for point in points {
+        let ranges = &mut sides[usize::from(point.faces_out)];
+        let height = height_in_pitch(point, rise) * count as f64;
+        let range = (height as usize).min(count - 1);
         let above = height - range as f64;
-        ranges[range].add(1.0 - above, above, *distance);
-        ranges[(range + 1) % RISE_RANGES].add(above, above - 1.0, *distance);
+        ranges[range].add(1.0 - above, above, point.distance);
+        ranges[(range + 1) % count].add(above, above - 1.0, point.distance);
     }
-    ranges.iter().map(Moments::deviation).sum()
+    sides.iter().flatten().map(Moments::deviation).sum()
 }
 
 /// Weighted sums over points (x, y).
@@ -244,7 +294,7 @@ mod tests {
     }
 
     /// Points of the flanks of a thread along z, at a pose.
-    fn flanks(surface: &Surface, pose: &Pose) -> Vec<Point3<f64>> {
+    fn flanks(surface: &Surface, pose: &Pose) -> Vec<FlankPoint> {
         let facets: Vec<FlankFacet> = (0..surface.triangles().len() as u32)
             .filter(|t| {
                 let facet = FlankFacet::of(&surface.corners(*t));

@@ -10,6 +10,7 @@
 use crate::budgets::{EFFORT_BEFORE_PROFILES, PATH_EFFORT_IN_DOUBT};
 use crate::tolerances::{SCREW_TURN, SHORTEST_SCREW_STRETCH, STRAY_SHARE};
 
+mod distances;
 mod envelope;
 mod helix_fit;
 mod path;

@@ -15,7 +15,7 @@ use crate::budgets::CENTRING_PIECES;
 use crate::geometry::{Helix, Pose, interpolate};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{OFF_HELIX, SCREW_POSE_ANGLE, STRAY_SHARE, THREAD_ENDS, UNSCREWING_ANGLE};
+use crate::tolerances::{OFF_HELIX, SCREW_POSE_ANGLE, STRAY_SHARE, UNSCREWING_ANGLE};
 
 use super::super::course::turns_far;
 use super::super::course::{Course, Interval};
@@ -109,7 +109,7 @@ impl ThreadPair {
         let standing = guess.axis_from_frame * scene.bodies[other].planning_from_shape;
         let triangles = [triangles(part, *reference), triangles(other, standing)];
         let zones = triangles.each_ref().map(|t| ProfileZone::of(t));
-        let zone = zones[0].common(&zones[1]).trimmed(THREAD_ENDS * guess.pitch().abs());
+        let zone = zones[0].common(&zones[1]).trimmed(guess.pitch().abs());
         Self { guess: *guess, reference: *reference, triangles, zones, zone }
     }
 

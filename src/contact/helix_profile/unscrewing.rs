@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 
 use crate::budgets::HELIX_ROUNDS;
 use crate::geometry::{Helix, Pose};
@@ -14,7 +14,7 @@ use crate::scene::Scene;
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{LEAST_PITCH, RISE_BY_RADIUS, RISE_RANGE};
 
-use super::helix_fit::{fitted_helices, fitted_rise, spread};
+use super::helix_fit::{FlankPoint, fitted_helices, fitted_rise, spread};
 use super::slip::{FlankFacet, slipping};
 use super::thread_path::{SharedThread, ThreadPair};
 
@@ -96,16 +96,16 @@ fn axes(pair: &ThreadPair, guess: f64, termination: &Termination) -> Result<Opti
     let [Some(own), Some(others)] = flanks.each_ref().map(|facets| slipping(facets, guess)) else {
         return Ok(None);
     };
-    let points = |axis: &Helix, facets: &[FlankFacet]| -> Vec<Point3<f64>> {
+    let points = |axis: &Helix, facets: &[FlankFacet]| -> Vec<FlankPoint> {
         let flanks: Vec<&FlankFacet> = facets.iter().filter(|f| f.is_flank()).collect();
-        spread(&flanks).into_iter().map(|p| axis.axis_from_frame * p).collect()
+        spread(&flanks).iter().map(|p| p.moved(&axis.axis_from_frame)).collect()
     };
     let points = [points(&own, &flanks[0]), points(&others, &flanks[1])];
-    let radius = points.iter().flatten().map(|p| p.xy().coords.norm()).fold(0.0, f64::max);
+    let radius = points.iter().flatten().map(FlankPoint::radius).fold(0.0, f64::max);
     let [least, most] = RISE_BY_RADIUS.map(|share| share * radius);
     let least = least.max(LEAST_PITCH / TAU);
-    // What hardly rises is a joint that turns, and no thread.
-    let ranges: Vec<[f64; 2]> = if guess == 0.0 {
+    // What hardly rises is a joint that turns, and no thread, or what it touches does not show how it rises.
+    let ranges: Vec<[f64; 2]> = if guess.abs() < least {
         vec![[least, most], [-least, -most]]
     } else {
         let [from, to] = RISE_RANGE.map(|share| share * guess.abs());
