@@ -74,6 +74,22 @@ pub(crate) fn thread(turns: f64, pitch: f64) -> [SourceMesh; 2] {
     [bolt, nut]
 }
 
+/// A helical tube about z, and a wire in it that is as long: 2.5 turns, right-handed, 2.5 high a turn, with a play of 0.03
+/// everywhere.
+pub(crate) fn wire_in_tube() -> [SourceMesh; 2] {
+    const TURNS: f64 = 2.5;
+    let coiled = |radii: &[&dyn Fn(f64, f64) -> f64; 2]| {
+        let mut straight = revolved([0.0, TURNS], 1.0 / 48.0, radii);
+        for vertex in &mut straight.vertices {
+            let [x, y, turns] = *vertex;
+            let (sin, cos) = (std::f64::consts::TAU * turns).sin_cos();
+            *vertex = [(1.0 + x) * cos - y * sin, (1.0 + x) * sin + y * cos, 2.5 * turns];
+        }
+        straight
+    };
+    [coiled(&[&|_, _| 0.33, &|_, _| 0.5]), coiled(&[&|_, _| 0.0, &|_, _| 0.3])]
+}
+
 /// The solid about z between an inner and an outer radius that depend on angle and height, in
 /// rows of a given height; an inner radius of zero means none.
 fn revolved(z: [f64; 2], row: f64, radii: &[&dyn Fn(f64, f64) -> f64; 2]) -> SourceMesh {

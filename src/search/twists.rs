@@ -49,7 +49,7 @@ mod tests {
     use super::super::request::{ActionSet, Planner};
     use super::super::tests::{Recorder, problem};
     use super::super::{TraceEvent, search};
-    use crate::fixtures::{moved, scene, thread};
+    use crate::fixtures::{moved, scene, thread, wire_in_tube};
     use crate::geometry::{Pose, SourceMesh};
     use crate::plan::PlanStatus;
 
@@ -75,9 +75,9 @@ mod tests {
         turns.iter().enumerate().flat_map(pair).collect()
     }
 
-    /// The events of a search that takes all threads apart.
-    fn events(sweeps: bool) -> Vec<TraceEvent> {
-        let (scene, verifier) = scene(many_askew());
+    /// The events of a search that takes parts apart.
+    fn events(meshes: Vec<SourceMesh>, sweeps: bool) -> Vec<TraceEvent> {
+        let (scene, verifier) = scene(meshes);
         let mut recorder = Recorder::default();
         let present = (0..scene.bodies.len()).collect();
         let problem = Problem {
@@ -100,15 +100,17 @@ mod tests {
 
     #[test]
     fn a_thread_that_no_axis_of_faces_knows_is_turned_along_its_own() {
-        assert_eq!(simulated_turns(&events(false)), 6, "one turn a thread");
+        assert_eq!(simulated_turns(&events(many_askew(), false)), 6, "one turn a thread");
     }
 
     #[test]
-    fn threads_are_left_along_their_helices_without_simulation() {
-        let events = events(true);
-        assert_eq!(simulated_turns(&events), 0);
-        let along_thread =
-            |e: &&TraceEvent| matches!(e, TraceEvent::Swept { action, .. } if action.contains('r'));
-        assert_eq!(events.iter().filter(along_thread).count(), 6, "{events:?}");
+    fn threads_and_tubes_are_left_along_their_helices_without_simulation() {
+        for (meshes, count) in [(many_askew(), 6), (wire_in_tube().into(), 1)] {
+            let events = events(meshes, true);
+            assert_eq!(simulated_turns(&events), 0);
+            let along_thread =
+                |e: &&TraceEvent| matches!(e, TraceEvent::Swept { action, .. } if action.contains('r'));
+            assert_eq!(events.iter().filter(along_thread).count(), count, "{events:?}");
+        }
     }
 }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Point3, Vector3};
 use proptest::prelude::*;
 
-use crate::fixtures::{LIMIT, cuboid, joined, open_box, scene, thread};
+use crate::fixtures::{LIMIT, cuboid, joined, open_box, scene, thread, wire_in_tube};
 use crate::geometry::{Bounds, Pose, SourceMesh, interpolate};
 use crate::plan::Verifier;
 use crate::scene::Scene;
@@ -74,6 +74,19 @@ fn a_thread_that_fits_is_settled_whole() {
     let path = screwed(&scene, TURNS, PITCH, &Pose::identity());
     assert_eq!(open(&scene, &path), []);
     assert!(checked(&scene, &verifier, &path) < LIMIT / 8.0);
+}
+
+#[test]
+fn a_wire_in_its_tube_is_settled_nearly_whole() {
+    let (scene, verifier) = scene(wire_in_tube());
+    let path = screwed(&scene, TURNS, 2.5, &Pose::identity());
+    // Its centre is off the axis and moves straight from one pose to the next, an eighth of a turn further.
+    let open_share: f64 = open(&scene, &path).iter().map(|i| i.of(1.0)).map(|[from, to]| to - from).sum();
+    assert!(open_share < 0.01, "{open_share}");
+    assert!(checked(&scene, &verifier, &path) < LIMIT);
+    // Up or down by more than its play, it is in a wall.
+    let path = screwed(&scene, 1.0, 2.5, &Pose::translation(0.0, 0.0, 0.05));
+    assert!(dense(&scene, &path) > LIMIT && checked(&scene, &verifier, &path) > LIMIT);
 }
 
 #[test]
