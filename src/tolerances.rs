@@ -229,6 +229,9 @@ pub(crate) const SCREW_TURN: f64 = 4.0;
 /// Radians. Stretches that turn less are not compared by profile any more.
 /// Measured: no effect at half and double.
 pub(crate) const SHORTEST_SCREW_STRETCH: f64 = 0.25;
+/// Radians. If the stretches that are left turn by less in all, no finer profiles are made for them: at half, a nut's first
+/// turn off its seat takes seconds; at double, half a turn of a wire is checked at samples, which takes as long.
+pub(crate) const LEAST_PROFILED_TURN: f64 = 1.0;
 /// Share of the limit by which a part may stray on a piece of the way that is looked at as one.
 /// Measured: at half and at double another plan of `bolt_nut_m8_thread`.
 pub(crate) const STRAY_SHARE: f64 = 0.5;
@@ -269,10 +272,10 @@ pub(crate) const FLANK_LEAN: [f64; 2] = [0.15, 0.97];
 /// Shares of a guess within which the rise of a thread is sought: null twists of flanks with play are wrong by half and
 /// by double. With half the range, these are missed; with double it takes a little longer.
 pub(crate) const RISE_RANGE: [f64; 2] = [0.4, 3.0];
-/// Length. Profiles are compared no finer, a fifth of the depth at which paths past thin parts are refused: at half,
+/// Length. Profiles are compared no finer, at a third of the depth at which paths past thin parts are refused: at half,
 /// fine threads that do not pass take four times as long to refute; at double, threads with a play of a thousandth of the
 /// longest side are checked at samples, which takes seconds.
-pub(crate) const PROFILE_FINENESS: f64 = 1e-4;
+pub(crate) const PROFILE_FINENESS: f64 = 2e-4;
 /// Share of the distance of two heights. How far the footprint of a facet on a profile may be off: halving a facet divides
 /// its error by four. At double, threads with a play of a hundredth of the radius are compared three times as finely; at
 /// half, profiles take twice as long.

@@ -63,9 +63,9 @@ impl ProfileZone {
         Self { along: [low + end, high - end], ..self }
     }
 
-    /// The same at all heights.
-    pub(super) fn everywhere(self) -> Self {
-        Self { along: [f64::NEG_INFINITY, f64::INFINITY], ..self }
+    /// The same between two places along the axis.
+    pub(super) fn between(self, along: [f64; 2]) -> Self {
+        Self { along, ..self }
     }
 
     /// Whether part of a triangle may be in it.
@@ -298,6 +298,12 @@ impl Envelope {
         shift: f64,
         stray: impl Fn(f64) -> f64,
     ) -> bool {
+        let has = |envelope: &Self, [from, to]: [f64; 2]| {
+            envelope.zone.along[0] <= from && to <= envelope.zone.along[1]
+        };
+        if !has(self, places) || !has(other, other_places) {
+            return false;
+        }
         let (one, other) = (self.between(places), other.between(other_places));
         let [from_axis, from_other] =
             [&one, &other].map(|profile| range(profile.iter().flat_map(Distances::ends)));

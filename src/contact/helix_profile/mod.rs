@@ -8,7 +8,7 @@
 //! `slip`) leaves the room that such a bound needs.
 
 use crate::budgets::{EFFORT_BEFORE_PROFILES, PATH_EFFORT_IN_DOUBT};
-use crate::tolerances::{SCREW_TURN, SHORTEST_SCREW_STRETCH, STRAY_SHARE};
+use crate::tolerances::{LEAST_PROFILED_TURN, SCREW_TURN, SHORTEST_SCREW_STRETCH, STRAY_SHARE};
 
 mod distances;
 mod envelope;
@@ -32,7 +32,7 @@ use super::course::{Course, Interval};
 use super::region_cover::cover;
 use super::region_cover::path::{PathDepth, PathQuestion};
 use envelope::{Envelope, ProfileZone};
-use path::{AxisBoxes, ScrewPath};
+use path::{AxisBoxes, ScrewPath, ScrewStretch};
 
 /// The stretches of a path on which the profiles of two surfaces, one screwed past the other, do not prove that they
 /// are apart.
@@ -58,15 +58,20 @@ fn unsettled(
     let standing = triangles(standing, &screw.helix.axis_from_frame);
     let [of_moving, of_standing] = [&moving, &standing].map(|t| Bounds::of(t.as_flattened()));
     let boxes = AxisBoxes { moving: of_moving, standing: of_standing };
-    let [one, other] = [&moving, &standing].map(|t| ProfileZone::of(t).everywhere());
+    let [one, other] = [&moving, &standing].map(|t| ProfileZone::of(t));
     let zone = one.common(&other);
     for heights in Envelope::finenesses(screw.helix.pitch()) {
-        let envelope = |triangles: &[[Point3<f64>; 3]]| {
+        let met: Vec<ScrewStretch> = stretches.iter().filter_map(|i| screw.stretch(*i, &boxes)).collect();
+        let envelope = |triangles: &[[Point3<f64>; 3]], places: fn(&ScrewStretch) -> [f64; 2]| {
+            let zone = zone.between(range(met.iter().flat_map(places)));
             Envelope::new(triangles, &screw.helix, &zone, heights, termination)
         };
-        let (moving, standing) = rayon::join(|| envelope(&moving), || envelope(&standing));
+        let (moving, standing) = rayon::join(
+            || envelope(&moving, |stretch| stretch.places_of_moving),
+            || envelope(&standing, |stretch| stretch.places_of_standing),
+        );
         stretches = uncovered(course, &screw, &boxes, [&moving?, &standing?], stretches, termination)?;
-        if stretches.is_empty() {
+        if stretches.iter().map(|i| course.turn(*i)).sum::<f64>() < LEAST_PROFILED_TURN {
             break;
         }
     }
