@@ -253,6 +253,15 @@ pub(crate) const EDGES_CAST_BEFORE_TURNING: usize = 200_000;
 /// The same at the end of the search, when nothing else is left. Half of it misses ways through the largest mazes; at
 /// three times as much, puzzles that end `exhausted` take 1 to 2 s longer (measured on four of the corpus).
 pub(crate) const EDGES_CAST_AT_LAST: usize = 600_000;
+/// States of a part that are turned in place before anything is simulated turning. At half, a part that has to be pushed
+/// aside before it turns is left to simulation more often; at double, parts that do not leave so take twice as long.
+pub(crate) const STARTS_TURNED: usize = 4;
+/// Centres of round edges about which a part is turned, beside its centre of mass. At half, hinges of parts with several
+/// round ends are missed; at double, plates with many holes take twice as long.
+pub(crate) const TURN_CENTRES: usize = 3;
+/// Angles by which a part is turned about one axis. At half, windows are missed among the edges of splines and gears; at
+/// double, these take twice as long.
+pub(crate) const TURNS_PER_AXIS: usize = 48;
 /// Cells that are kept of the line of one cast. A surface with thousands of critical coordinates (a thread) would fill
 /// the search with one line; half of it misses narrow windows among as many.
 pub(crate) const CELLS_PER_CAST: usize = 256;

@@ -62,6 +62,42 @@ pub(crate) fn rod(radius: f64, z: [f64; 2], count: u32) -> SourceMesh {
     mesh
 }
 
+/// A bearing about z with a slot towards +x, and in it a shaft of radius 1 with two flats, turned from where they are
+/// along the slot by an angle. It is `excess` wider across its flats than the slot where that is narrowest, has play
+/// otherwise, and a head at each end.
+pub(crate) fn flats_in_slot(turned: f64, play: f64, excess: f64) -> [SourceMesh; 2] {
+    const SLOT: f64 = 0.6;
+    const SIDES: u32 = 48;
+    let mut bearing = tube(1.0 + play, 3.0, [-1.0, 2.0], SIDES);
+    // All but the slot: the last side is left out, and the others share its angle.
+    let turn = |(i, v): (usize, &mut [f64; 3])| {
+        let angle = SLOT + (std::f64::consts::TAU - 2.0 * SLOT) * (i / 4) as f64 / f64::from(SIDES - 1);
+        let radius = v[0].hypot(v[1]);
+        (v[0], v[1]) = (radius * angle.cos(), radius * angle.sin());
+    };
+    bearing.vertices.iter_mut().enumerate().for_each(turn);
+    let last = 4 * (SIDES - 1);
+    bearing.triangles.retain(|t| !(t.iter().any(|v| *v < 4) && t.iter().any(|v| *v >= last)));
+    bearing.triangles.extend([[2, 0, 1], [2, 1, 3], [last, last + 2, last + 3], [last, last + 3, last + 1]]);
+
+    let flat = ((1.0 + play) * SLOT.sin() + excess / 2.0).asin();
+    let arc = |from: f64| (0..=8).map(move |k| from - flat + 2.0 * flat * f64::from(k) / 8.0 + turned);
+    let outline: Vec<f64> = arc(0.0).chain(arc(std::f64::consts::PI)).collect();
+    let count = outline.len() as u32;
+    let mut shaft = SourceMesh::default();
+    for angle in outline {
+        shaft.vertices.extend([-1.2, 2.2].map(|z| [angle.cos(), angle.sin(), z]));
+    }
+    for i in 0..count {
+        let (a, b) = (2 * i, 2 * ((i + 1) % count));
+        shaft.triangles.extend([[a, b, b + 1], [a, b + 1, a + 1]]);
+    }
+    for i in 1..count - 1 {
+        shaft.triangles.extend([[0, 2 * i + 2, 2 * i], [1, 2 * i + 1, 2 * i + 3]]);
+    }
+    [bearing, joined([shaft, rod(1.4, [2.1, 2.8], 24), rod(1.4, [-1.8, -1.1], 24)])]
+}
+
 /// A bolt along z with a rounded thread over its whole length of 6, and a nut of height 1 that has
 /// so many turns to go before it is off: right-handed, with a play of 0.03 everywhere.
 pub(crate) fn thread(turns: f64, pitch: f64) -> [SourceMesh; 2] {

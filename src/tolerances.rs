@@ -359,6 +359,17 @@ pub(crate) const INSCRIBED_GAIN: f64 = 0.01;
 /// play that is drawn on purpose. Half of it keeps cells twice that differ by rounding; double merges cells of fine play.
 pub(crate) const SAME_CELL: f64 = 10.0 * ROUNDED;
 
+/// Radians. Critical angles this near are one: coordinates in files are rounded by [`ROUNDED`], seen from a tenth of the
+/// longest side. At half, angles of rounded edges are tried twice; at double, the window of a play of as much is missed.
+pub(crate) const CRITICAL_ANGLE: f64 = 1e-4;
+/// Length. Centres of round edges this near to each other across an axis are one: a part lies in its play. At half, parts
+/// that lie at the side of a wide hole are turned about their centres of mass; at double, holes beside each other are
+/// taken for one.
+pub(crate) const SAME_CENTRE: f64 = 0.05;
+/// Radians between two poses of a turn in place: a centre a unit from the axis cuts a corner of 3e-4. At half, twice as many
+/// poses are looked at; at double, turns about edges are refused in tight fits.
+pub(crate) const TURN_POSE_ANGLE: f64 = 0.05;
+
 /// Divisor. Divides a part's largest extent: the least travel of a part smaller than `SHARE_OF_EXTENT *
 /// SAME_STATE_TRAVEL`, one length, is that share of its size. Chosen, not derived.
 pub(crate) const SHARE_OF_EXTENT: f64 = 20.0;

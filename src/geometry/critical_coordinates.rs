@@ -42,9 +42,18 @@ impl Neighbours {
 }
 
 /// Whether an edge of a triangle is sharp, or at a rim.
-pub(super) fn is_sharp(surface: &Surface, triangle: u32, edge: u8) -> bool {
+fn is_sharp(surface: &Surface, triangle: u32, edge: u8) -> bool {
     let beside = surface.neighbour(triangle, edge);
     beside == NO_TRIANGLE || surface.face_normal(triangle).dot(&surface.face_normal(beside)) < SHARP
+}
+
+/// The vertices at both ends of each sharp edge; an edge between two triangles comes once for each.
+pub fn sharp_edges(surface: &Surface) -> impl Iterator<Item = [u32; 2]> {
+    let triangles = (0u32..).zip(surface.triangles());
+    triangles.flat_map(move |(triangle, corners)| {
+        let edges = (0u8..).zip(directed_edges(corners));
+        edges.filter(move |(edge, _)| is_sharp(surface, triangle, *edge)).map(|(_, ends)| ends)
+    })
 }
 
 /// The critical coordinates of a surface along a unit vector in the surface's frame; not sorted, and often equal.

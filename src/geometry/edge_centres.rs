@@ -5,8 +5,7 @@ use std::collections::HashMap;
 use nalgebra::Point3;
 
 use super::Surface;
-use super::critical_coordinates::is_sharp;
-use super::mesh::directed_edges;
+use super::critical_coordinates::sharp_edges;
 
 /// Share of a radius by which the circles through successive triples of corners may differ. Rounded coordinates move
 /// the circle of a short arc by some 1e-6. At half no effect; at double, more corners of helices and spirals
@@ -21,15 +20,11 @@ const STRAIGHT: f64 = 0.006;
 pub fn edge_centres(surface: &Surface) -> Vec<Point3<f64>> {
     // Of each vertex: the vertices that sharp edges lead to.
     let mut sharp: HashMap<u32, Vec<u32>> = HashMap::new();
-    for (triangle, corners) in (0u32..).zip(surface.triangles()) {
-        for (edge, [a, b]) in (0u8..).zip(directed_edges(corners)) {
-            if is_sharp(surface, triangle, edge) {
-                for (from, to) in [(a, b), (b, a)] {
-                    let others = sharp.entry(from).or_default();
-                    if !others.contains(&to) {
-                        others.push(to);
-                    }
-                }
+    for [a, b] in sharp_edges(surface) {
+        for (from, to) in [(a, b), (b, a)] {
+            let others = sharp.entry(from).or_default();
+            if !others.contains(&to) {
+                others.push(to);
             }
         }
     }

@@ -60,7 +60,7 @@ pub use closed_shell::is_within_closed_shell;
 pub use cone::extreme_rays;
 pub use content_hash::content_hash;
 pub use convex_edges::{ConvexEdge, ConvexEdges, Corner};
-pub use critical_coordinates::critical_coordinates;
+pub use critical_coordinates::{critical_coordinates, sharp_edges};
 pub use cross_section::{Contour, across, cross_section, is_surrounded};
 pub use edge_centres::edge_centres;
 pub use error::GeometryError;

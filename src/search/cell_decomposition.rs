@@ -8,11 +8,12 @@
 //! critical coordinates fall together. So is one where the centres of round edges fall together: a round window is as
 //! narrow as its play there.
 //!
-//! Cells are found from the states of the part, those that the fewest short moves lead to first, and of these breadth
+//! Cells are found from some poses of the part, those that the fewest short moves lead to first, and of these breadth
 //! first: in a corridor with play, most cells differ by where in the play the part is, and few lead on. Along each axis
 //! the part is cast as far as it goes in both senses, and the cells that it passes are new ones. For solids whose faces
 //! are along and across the axes this finds every way by translations along the axes; for others it finds windows whose
-//! rims have their extreme points inside the cells. Rotations stay as the states have them.
+//! rims have their extreme points inside the cells. Rotations stay as the starts have them: those of states, or those of
+//! [turns in place](super::critical_turns).
 
 use std::cmp::Reverse;
 use std::collections::binary_heap::PeekMut;
@@ -36,10 +37,10 @@ const CELLS_AT_ONCE: usize = 64;
 #[derive(Clone, Copy)]
 struct Cell {
     pose: Pose,
-    /// From where it was reached; none for a state of the search.
+    /// From where it was reached; none for a start.
     parent: Option<usize>,
-    /// The number of the state that it was reached from.
-    state: usize,
+    /// The number of the start that it was reached from.
+    start: usize,
     /// The axis along which it was reached, and along which it has no new neighbours.
     axis: Option<usize>,
     /// The index of its rotation.
@@ -50,9 +51,9 @@ struct Cell {
 
 /// A place from which the part leaves along a line.
 pub(super) struct CellExit {
-    /// The number of the state from which the way begins, as it was given.
-    pub(super) state: usize,
-    /// The poses from that state to the place.
+    /// The number of the start from which the way begins, as it was given.
+    pub(super) start: usize,
+    /// The poses from there to the place.
     pub(super) way: Vec<Pose>,
     /// The push with which the part leaves.
     pub(super) action: Action,
@@ -68,7 +69,7 @@ pub(super) struct CellDecomposition<'a> {
     coordinates: &'a mut CriticalCoordinates,
     /// Per axis: the coordinates of the standing parts; none until they are needed.
     still: Vec<Option<AxisCoordinates>>,
-    /// The rotations of the states.
+    /// The rotations of the starts.
     rotations: Vec<Rotation>,
     cells: Vec<Cell>,
     known: HashSet<(usize, [i64; 3])>,
@@ -158,7 +159,7 @@ impl CriticalCoordinates {
 }
 
 impl<'a> CellDecomposition<'a> {
-    /// The search from some states of a part, each with its number.
+    /// The search from some poses of a part, each with a number.
     pub(super) fn new(
         scene: &'a Scene,
         standing: &'a StandingParts,
@@ -166,7 +167,7 @@ impl<'a> CellDecomposition<'a> {
         axes: &[Axis],
         coordinates: &'a mut CriticalCoordinates,
         most_edges: usize,
-        states: impl IntoIterator<Item = (usize, Pose)>,
+        starts: impl IntoIterator<Item = (usize, Pose)>,
     ) -> Self {
         let mut search = Self {
             scene,
@@ -185,9 +186,9 @@ impl<'a> CellDecomposition<'a> {
             edges: 0,
             most_edges,
         };
-        for (state, pose) in states {
+        for (start, pose) in starts {
             let rotation = search.rotation(&pose);
-            search.add(Cell { pose, parent: None, state, axis: None, rotation, short_moves: 0 });
+            search.add(Cell { pose, parent: None, start, axis: None, rotation, short_moves: 0 });
         }
         search
     }
@@ -235,15 +236,10 @@ impl<'a> CellDecomposition<'a> {
 
     /// How far the part goes from a cell along each axis that may lead to new cells, in both senses.
     fn casts(&self, cell: &Cell, termination: &Termination) -> Result<Vec<AxisCast>, Interrupt> {
-        let bounds = self.scene.bodies[self.part].shape.bounds().transformed(&cell.pose);
         let axes = (0..self.axes.len()).filter(|axis| cell.axis != Some(*axis));
         axes.flat_map(|axis| [true, false].map(|forward| (axis, forward)))
             .map(|(axis, forward)| {
                 let direction = Action::Push(self.axes[axis], forward).force();
-                // To where the part is past the hull of all others.
-                let reach =
-                    self.standing.hull.iter().map(|p| direction.dot(&p.coords)).fold(f64::MIN, f64::max);
-                let travel = (reach + bounds.support(&-direction)).max(0.0);
                 let question = SweepQuestion {
                     scene: self.scene,
                     standing_parts: self.standing,
@@ -251,7 +247,7 @@ impl<'a> CellDecomposition<'a> {
                     start: &cell.pose,
                     direction: &direction,
                 };
-                Ok(AxisCast { axis, forward, free: free_travel(&question, travel, termination)? })
+                Ok(AxisCast { axis, forward, free: free_travel(&question, termination)? })
             })
             .collect()
     }
@@ -260,10 +256,10 @@ impl<'a> CellDecomposition<'a> {
     fn pass(&mut self, from: usize, cast: &AxisCast) {
         let AxisCast { axis, forward, free: FreeTravel { length, met, edges } } = *cast;
         self.edges += edges;
-        let Cell { pose, state, rotation, short_moves, .. } = self.cells[from];
+        let Cell { pose, start, rotation, short_moves, .. } = self.cells[from];
         let Some(met) = met else {
             let action = Action::Push(self.axes[axis], forward);
-            self.exits.push(CellExit { state, way: self.way_to(from), action });
+            self.exits.push(CellExit { start, way: self.way_to(from), action });
             return;
         };
         self.met.insert(met);
@@ -284,7 +280,7 @@ impl<'a> CellDecomposition<'a> {
         for place in stops(&critical, &centred, [low, high]) {
             let pose = Translation3::from(direction * (place - here)) * pose;
             let short_moves = short_moves + u32::from((place - here).abs() < self.short);
-            self.add(Cell { pose, parent: Some(from), state, axis: Some(axis), rotation, short_moves });
+            self.add(Cell { pose, parent: Some(from), start, axis: Some(axis), rotation, short_moves });
         }
     }
 

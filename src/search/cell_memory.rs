@@ -10,10 +10,12 @@ use crate::budgets::{EDGES_CAST_AT_LAST, EDGES_CAST_BEFORE_TURNING};
 use super::cell_decomposition::CriticalCoordinates;
 
 /// When the cells of a part are searched.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) enum CellStage {
     /// Before anything is turned, from the states with the rotation of the assembled pose.
     BeforeTurning,
+    /// After that, from where turns of these states in place lead.
+    AfterCriticalTurn,
     /// When nothing else is left, from all states.
     Last,
 }
@@ -22,7 +24,7 @@ impl CellStage {
     /// The number of edges that may be cast.
     pub(super) fn most_edges(self) -> usize {
         match self {
-            Self::BeforeTurning => EDGES_CAST_BEFORE_TURNING,
+            Self::BeforeTurning | Self::AfterCriticalTurn => EDGES_CAST_BEFORE_TURNING,
             Self::Last => EDGES_CAST_AT_LAST,
         }
     }
@@ -31,7 +33,6 @@ impl CellStage {
 /// A search that found no way out.
 #[derive(Debug)]
 struct VainSearch {
-    stage: CellStage,
     /// The nodes of the states that it began at.
     starts: Vec<usize>,
     /// The parts that stopped its casts.
@@ -41,22 +42,20 @@ struct VainSearch {
 #[derive(Debug, Default)]
 pub(super) struct CellMemory {
     pub(super) coordinates: CriticalCoordinates,
-    /// By part: its last search.
-    vain: HashMap<usize, VainSearch>,
+    /// By part and stage: the last search.
+    vain: HashMap<(usize, CellStage), VainSearch>,
 }
 
 impl CellMemory {
     pub(super) fn keep(&mut self, part: usize, stage: CellStage, starts: Vec<usize>, met: BTreeSet<usize>) {
-        self.vain.insert(part, VainSearch { stage, starts, met });
+        self.vain.insert((part, stage), VainSearch { starts, met });
     }
 
     /// Whether a search of a part from some states is known to find no way out while some parts (ascending) stand.
     pub(super) fn holds(&self, part: usize, stage: CellStage, starts: &[usize], standing: &[usize]) -> bool {
-        self.vain.get(&part).is_some_and(|known| {
+        self.vain.get(&(part, stage)).is_some_and(|known| {
             let stands = |met: &usize| standing.binary_search(met).is_ok();
-            known.stage >= stage
-                && known.met.iter().all(stands)
-                && starts.iter().all(|start| known.starts.contains(start))
+            known.met.iter().all(stands) && starts.iter().all(|start| known.starts.contains(start))
         })
     }
 }

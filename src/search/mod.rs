@@ -14,6 +14,7 @@ mod ball;
 mod blocked_actions;
 mod cell_decomposition;
 mod cell_memory;
+mod critical_turns;
 mod deepest_point;
 mod directions;
 mod disassembly;

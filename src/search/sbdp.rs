@@ -20,8 +20,9 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::blocking_graph::{Analysis, Blockage, StateGraphs};
-use crate::budgets::{REFINEMENTS, TRANSLATION_PASSES, WINDOW_PER_THREAD};
+use crate::budgets::{REFINEMENTS, STARTS_TURNED, TRANSLATION_PASSES, WINDOW_PER_THREAD};
 use crate::geometry::Pose;
+use crate::scene::StandingParts;
 use crate::simulation::{End, Motion, Sweep};
 use crate::termination::Interrupt;
 use crate::tolerances::TURNED;
@@ -29,6 +30,7 @@ use crate::tolerances::TURNED;
 use super::action_table::ActionTable;
 use super::cell_decomposition::{CellDecomposition, CellExit};
 use super::cell_memory::{CellMemory, CellStage};
+use super::critical_turns::TurnQuestion;
 use super::disassembly::{Disassembly, Proof, Stop, Transition, joined};
 use super::initial_analysis::InitialAnalysis;
 use super::inseparable::InseparablePairs;
@@ -148,7 +150,10 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             if self.find_inseparable()? {
                 continue;
             }
-            if self.leave_along_threads()? || self.leave_by_cells(CellStage::BeforeTurning)? {
+            if self.leave_along_threads()?
+                || self.leave_by_cells(CellStage::BeforeTurning)?
+                || self.leave_by_cells(CellStage::AfterCriticalTurn)?
+            {
                 if self.disassembly.is_done() {
                     return Ok(());
                 }
@@ -385,20 +390,21 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         let standing = self.disassembly.surroundings(part);
         let Problem { scene, termination, .. } = &self.disassembly.problem;
         let (scene, termination) = (scene.clone(), termination.clone());
-        let poses: Vec<_> = starts.iter().map(|&node| (node, *self.states.nodes[node].pose())).collect();
+        let ways = self.ways_to_cells(part, stage, &starts, &standing)?;
+        let poses = ways.iter().enumerate().map(|(i, way)| (i, way[way.len() - 1]));
         let mut coordinates = std::mem::take(&mut self.cell_memory.coordinates);
         let axes = self.actions.axes();
         let most = stage.most_edges();
         let mut search = CellDecomposition::new(&scene, &standing, part, axes, &mut coordinates, most, poses);
         let (mut leaves, mut tries) = (false, 0);
         while !leaves && tries < REFINEMENTS {
-            let Some(CellExit { state, way, action }) = search.next_exit(&termination)? else { break };
+            let Some(CellExit { start, way, action }) = search.next_exit(&termination)? else { break };
             tries += 1;
             let run = Transition { part, start: way[way.len() - 1], action };
             let Some(Sweep::Clear { path, .. }) = self.disassembly.sweep(&[run])?.pop().flatten() else {
                 continue;
             };
-            let prefix = joined(&self.states.nodes[state].path, &way);
+            let prefix = joined(&ways[start], &way);
             if let Ok(VerifiedPath { path, depth }) = self.disassembly.prove_sweep(&run, &prefix, &path)? {
                 self.remove(part, path, depth);
                 leaves = true;
@@ -411,6 +417,29 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         tracing::debug!(part, cells, leaves, "cells searched");
         self.disassembly.trace(|| TraceEvent::CellsSearched { part, cells, leaves });
         Ok(leaves)
+    }
+
+    /// The paths of a part from its assembled pose to where a search of cells begins.
+    fn ways_to_cells(
+        &self,
+        part: usize,
+        stage: CellStage,
+        starts: &[usize],
+        standing: &StandingParts,
+    ) -> Result<Vec<Vec<Pose>>, Interrupt> {
+        let paths = starts.iter().map(|&node| &self.states.nodes[node].path);
+        if stage != CellStage::AfterCriticalTurn {
+            return Ok(paths.cloned().collect());
+        }
+        let Problem { scene, termination, verifier, .. } = &self.disassembly.problem;
+        let mut ways = Vec::new();
+        for path in paths.take(STARTS_TURNED) {
+            let (start, axes) = (path[path.len() - 1], self.actions.axes());
+            let question =
+                TurnQuestion { scene, standing, part, start, axes, limit: verifier.limit(), termination };
+            ways.extend(question.ways()?.iter().map(|turn| joined(path, turn)));
+        }
+        Ok(ways)
     }
 
     /// Verifies a path that a sweep claims to be clear, and takes the part out if it holds.

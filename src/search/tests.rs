@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::*;
 use crate::blocking_graph::StaticAnalysis;
 use crate::cache::RequestCache;
-use crate::fixtures::{cells, cuboid, moved, open_box, rod, scene, tube};
+use crate::fixtures::{cells, cuboid, flats_in_slot, moved, open_box, rod, scene, tube};
 use crate::geometry::SourceMesh;
 use crate::plan::{PlanStatus, Verifier};
 use crate::scene::Scene;
@@ -286,4 +286,17 @@ fn a_sweep_that_the_triangles_refute_takes_nothing_out_and_leaves_its_points_for
     assert!(disassembly.removals.is_empty());
     let told = |e: &TraceEvent| matches!(e, TraceEvent::Refuted { part: 1, by, .. } if by.contains(&0));
     assert!(recorder.0.iter().any(told));
+}
+
+#[test]
+fn a_shaft_with_flats_is_turned_until_they_are_along_its_slot() {
+    for (turned, play) in [(0.9, 0.05), (-0.7, 0.01), (2.0, 0.05)] {
+        let outcome = pair(flats_in_slot(turned, play, -play));
+        assert_eq!(outcome.status, PlanStatus::Complete, "{turned} {play}");
+        let [removal] = &outcome.removals[..] else { panic!("{:?}", outcome.removals) };
+        let (first, last) = (&removal.path[0], &removal.path[removal.path.len() - 1]);
+        assert!(last.rotation.angle_to(&first.rotation) > 0.3);
+    }
+    let captive = pair(flats_in_slot(0.9, 0.05, 0.05));
+    assert_eq!(captive.status, PlanStatus::Exhausted);
 }

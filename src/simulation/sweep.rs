@@ -94,16 +94,16 @@ pub struct FreeTravel {
     pub edges: usize,
 }
 
-/// How far a part goes along a line until it meets a standing part, at most `travel`. Like a sweep, this is a claim to
-/// be verified.
+/// How far a part goes along a line until it meets a standing part, or is past the hull of all. Like a sweep, this is a
+/// claim to be verified.
 ///
 /// # Errors
 /// The termination condition became true.
-pub fn free_travel(
-    question: &SweepQuestion<'_>,
-    travel: f64,
-    termination: &Termination,
-) -> Result<FreeTravel, Interrupt> {
+pub fn free_travel(question: &SweepQuestion<'_>, termination: &Termination) -> Result<FreeTravel, Interrupt> {
+    let SweepQuestion { scene, standing_parts, part, start, direction } = question;
+    let bounds = scene.bodies[*part].shape.bounds().transformed(start);
+    let reach = standing_parts.hull.iter().map(|p| direction.dot(&p.coords)).fold(f64::MIN, f64::max);
+    let travel = (reach + bounds.support(&-**direction)).max(0.0);
     let mut free = FreeTravel { length: travel, met: None, edges: 0 };
     for other in on_the_way(question, travel) {
         let cast = cast_at(question, other, free.length, termination);
