@@ -146,12 +146,17 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                     break;
                 }
             }
+            if self.leave_along_threads()? {
+                if self.disassembly.is_done() {
+                    return Ok(());
+                }
+                continue;
+            }
             // Before the searches that take longest.
             if self.find_inseparable()? {
                 continue;
             }
-            if self.leave_along_threads()?
-                || self.leave_by_cells(CellStage::BeforeTurning)?
+            if self.leave_by_cells(CellStage::BeforeTurning)?
                 || self.leave_by_cells(CellStage::AfterCriticalTurn)?
             {
                 if self.disassembly.is_done() {

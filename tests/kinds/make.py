@@ -175,6 +175,19 @@ def bayonet(rng, comes_apart):
     return [socket, pin], dict(lugs=lugs, play=play, inner=inner, outer=outer, half=half, turn=turn, all_round=bool(is_round))
 
 
+def flats(rng, comes_apart):
+    """A shaft with two flats in a bearing with a slot, a head at each end: it turns until they are along the slot."""
+    play, radius = play_of(rng), rng.uniform(3, 5)
+    slot = radius * rng.uniform(0.7, 1.4)
+    turned = rng.uniform(0.5, 2.6) * rng.choice([-1, 1])
+    across = slot - 2 * play if comes_apart else slot + rng.uniform(0.3, 0.8)
+    bearing = box([-9, -9, 0], [9, 9, 6]) - cylinder(radius + play, -1, 7) - box([0, -slot / 2, -1], [10, slot / 2, 7])
+    shaft = cylinder(radius, -2, 8) ^ box([-9, -across / 2, -3], [9, across / 2, 9])
+    shaft = shaft.rotate((0, 0, math.degrees(turned)))
+    shaft += cylinder(1.3 * radius, 6 + play, 8) + cylinder(1.3 * radius, -2, -play)
+    return [bearing, shaft], dict(play=play, radius=radius, slot=slot, across=across, turned=turned)
+
+
 def corkscrew(rng, comes_apart):
     """A helical wire in a block; captive with a foot below the block."""
     play, wire, radius = play_of(rng), rng.uniform(0.6, 1.2), rng.uniform(2.5, 4)
@@ -231,7 +244,7 @@ def snap_hook(rng, comes_apart):
     return [frame, body], dict(wide=wide, plate=plate, play=play, barb=barb)
 
 
-KINDS = [tilt_lid, keyhole, window, loose, thread, bayonet, corkscrew, rivet, snap_hook]
+KINDS = [tilt_lid, keyhole, window, loose, thread, bayonet, flats, corkscrew, rivet, snap_hook]
 # Of these kinds, mostly captive members are drawn; of the others, one in four.
 MOSTLY_CAPTIVE = {rivet, snap_hook}
 
