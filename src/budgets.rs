@@ -262,6 +262,9 @@ pub(crate) const TURN_CENTRES: usize = 3;
 /// Angles by which a part is turned about one axis. At half, windows are missed among the edges of splines and gears; at
 /// double, these take twice as long.
 pub(crate) const TURNS_PER_AXIS: usize = 48;
+/// Pairs of edges along one axis that give critical angles: a gear with a hundred teeth has as many with its like. Beyond,
+/// nothing is turned about that axis. At half, internal gears are left out; at double, knurls take seconds.
+pub(crate) const CRITICAL_ANGLES: usize = 200_000;
 /// Cells that are kept of the line of one cast. A surface with thousands of critical coordinates (a thread) would fill
 /// the search with one line; half of it misses narrow windows among as many.
 pub(crate) const CELLS_PER_CAST: usize = 256;

@@ -10,12 +10,13 @@
 //! edges of others, and through the centre of mass. A turn counts if the part then goes further along some axis than
 //! before. It is a claim, as samples alone were looked at on the way: the path on which it begins is verified as a whole.
 
+use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Point2, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use crate::budgets::{TURN_CENTRES, TURNS_PER_AXIS};
+use crate::budgets::{CRITICAL_ANGLES, EDGES_CAST_BEFORE_TURNING, TURN_CENTRES, TURNS_PER_AXIS};
 use crate::contact::sampled::MovingBody;
 use crate::geometry::{Bounds, Pose, edge_centres, sharp_edges};
 use crate::scene::{Scene, StandingParts};
@@ -23,22 +24,51 @@ use crate::simulation::{Action, Axis, FreeTravel, SweepQuestion, free_travel};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{CRITICAL_ANGLE, ONE_AXIS_COSINE, SAME_CENTRE, TURN_POSE_ANGLE, TURNED};
 
+use super::problem::Problem;
 use super::state::least_travel;
 
-/// A part at a pose, among others.
-pub(super) struct TurnQuestion<'a> {
-    pub(super) scene: &'a Scene,
-    pub(super) standing: &'a StandingParts,
-    pub(super) part: usize,
-    pub(super) start: Pose,
+/// Turns that are looked at in parallel, enough for 64 threads. The budget of casts is looked at after each batch.
+const TURNS_AT_ONCE: usize = 64;
+
+/// A part among others that may be turned in place.
+pub(super) struct TurningPart<'a> {
+    scene: &'a Scene,
+    standing: &'a StandingParts,
+    part: usize,
     /// The axes along which it is moved and about which it is turned.
-    pub(super) axes: &'a [Axis],
+    axes: &'a [Axis],
     /// The depth at which paths are refused.
-    pub(super) limit: f64,
-    pub(super) termination: &'a Termination,
+    limit: f64,
+    termination: &'a Termination,
+    /// Of the parts around it.
+    others: Features,
+}
+
+/// A turn about a line through a point.
+struct Turn {
+    angle: f64,
+    axis: Unit<Vector3<f64>>,
+    pivot: Point3<f64>,
+}
+
+impl Turn {
+    /// The pose after a share of the turn.
+    fn pose(&self, start: &Pose, share: f64) -> Pose {
+        let to_pivot = Translation3::from(self.pivot.coords);
+        let rotation = UnitQuaternion::from_axis_angle(&self.axis, self.angle * share);
+        to_pivot * rotation * to_pivot.inverse() * start
+    }
+}
+
+/// How far a part goes along each axis, in both senses; infinitely far where it leaves.
+struct Travels {
+    lengths: Vec<f64>,
+    /// The number of edges that were cast.
+    edges: usize,
 }
 
 /// The sharp edges and the centres of round edges of some parts, in the planning frame.
+#[derive(Default)]
 struct Features {
     edges: Vec<[Point3<f64>; 2]>,
     centres: Vec<Point3<f64>>,
@@ -73,70 +103,101 @@ impl Across {
     }
 }
 
-impl TurnQuestion<'_> {
-    /// The ways that begin with such a turn: the poses from the start to where the part goes further, those that turn
-    /// least first.
+impl<'a> TurningPart<'a> {
+    /// A part that stands at some poses.
+    pub(super) fn new(
+        problem: &'a Problem<'_>,
+        standing: &'a StandingParts,
+        part: usize,
+        axes: &'a [Axis],
+        starts: &[Pose],
+    ) -> Self {
+        let Problem { scene, termination, verifier, .. } = problem;
+        let shape = &scene.bodies[part].shape;
+        let near = |start: &Pose| {
+            let around = Bounds::of(&[start * shape.mass.centre]).grown(shape.reach);
+            scene.broad_phase.meeting_of(&standing.standing, &around)
+        };
+        let near: BTreeSet<usize> = starts.iter().flat_map(near).collect();
+        let features = |&other: &usize| Features::of(scene, other, &scene.bodies[other].planning_from_shape);
+        let others = near.iter().map(features).fold(Features::default(), Features::with);
+        Self { scene, standing, part, axes, limit: verifier.limit(), termination, others }
+    }
+
+    /// The ways that begin with such a turn: the poses from a start to where the part goes further, those that turn
+    /// least first; as many as a budget of casts finds.
     ///
     /// # Errors
     /// The termination condition became true.
-    pub(super) fn ways(&self) -> Result<Vec<Vec<Pose>>, Interrupt> {
-        let Self { scene, standing, part, start, axes, .. } = *self;
-        let shape = &scene.bodies[part].shape;
-        let own = Features::of(scene, part, &start);
-        let centre = start * shape.mass.centre;
-        let around = Bounds::of(&[centre]).grown(shape.reach);
-        let near = scene.broad_phase.meeting_of(&standing.standing, &around);
-        let others = near
-            .iter()
-            .map(|&other| Features::of(scene, other, &scene.bodies[other].planning_from_shape))
-            .reduce(Features::with);
-        let Some(others) = others else { return Ok(Vec::new()) };
-        let before = self.travels(&start)?;
+    pub(super) fn ways_from(&self, start: &Pose) -> Result<Vec<Vec<Pose>>, Interrupt> {
+        let own = Features::of(self.scene, self.part, start);
+        let centre = start * self.scene.bodies[self.part].shape.mass.centre;
+        let before = self.travels(start)?;
         let mut turns = Vec::new();
-        for axis in axes.iter().map(|axis| axis.unit()) {
-            for pivot in pivots(&axis, &own, &others, centre) {
-                let angles = critical_angles(&axis, &pivot, &own.edges, &others.edges);
-                turns.extend(stops(angles).into_iter().map(|angle| (angle, axis, pivot)));
+        for axis in self.axes.iter().map(|axis| axis.unit()) {
+            for pivot in pivots(&axis, &own, &self.others, centre) {
+                let angles = critical_angles(&axis, &pivot, &own.edges, &self.others.edges);
+                turns.extend(stops(&angles).into_iter().map(|angle| Turn { angle, axis, pivot }));
             }
         }
-        turns.sort_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
-        let ways = turns.par_iter().map(|(angle, axis, pivot)| {
-            self.termination.check()?;
-            let after = self.travels(&turned(&start, axis, pivot, *angle))?;
-            let least = least_travel(scene, part);
-            if !after.iter().zip(&before).any(|(after, before)| *after > before + least) {
-                return Ok(None);
+        turns.sort_by(|a, b| a.angle.abs().total_cmp(&b.angle.abs()));
+        let (mut ways, mut edges) = (Vec::new(), before.edges);
+        for turns in turns.chunks(TURNS_AT_ONCE) {
+            let found = turns.par_iter().map(|turn| self.way(start, turn, &before));
+            for (way, cast) in found.collect::<Result<Vec<_>, Interrupt>>()? {
+                ways.extend(way);
+                edges += cast;
             }
-            // The other way round, it may be free where it is not this way.
-            for angle in [*angle, angle - TAU.copysign(*angle)] {
-                let count = (angle.abs() / TURN_POSE_ANGLE).ceil() as usize;
-                let pose = |k: usize| turned(&start, axis, pivot, angle * k as f64 / count as f64);
-                if self.is_free((1..=count).map(pose))? {
-                    return Ok(Some((0..=count).map(pose).collect()));
-                }
+            if edges > EDGES_CAST_BEFORE_TURNING {
+                break;
             }
-            Ok(None)
-        });
-        Ok(ways.collect::<Result<Vec<_>, Interrupt>>()?.into_iter().flatten().collect())
+        }
+        Ok(ways)
     }
 
-    /// How far the part goes along each axis, in both senses; infinitely far where it leaves.
-    fn travels(&self, start: &Pose) -> Result<Vec<f64>, Interrupt> {
+    /// The poses of a turn, if the part then goes further than before and is not seen to enter others, and the number of
+    /// edges that were cast.
+    fn way(
+        &self,
+        start: &Pose,
+        turn: &Turn,
+        before: &Travels,
+    ) -> Result<(Option<Vec<Pose>>, usize), Interrupt> {
+        let end = turn.pose(start, 1.0);
+        let Travels { lengths, edges } = self.travels(&end)?;
+        let least = least_travel(self.scene, self.part);
+        let is_further = lengths.iter().zip(&before.lengths).any(|(after, before)| *after > before + least);
+        if !is_further || !self.is_free([end])? {
+            return Ok((None, edges));
+        }
+        // The other way round, it may be free where it is not this way.
+        for angle in [turn.angle, turn.angle - TAU.copysign(turn.angle)] {
+            let turn = Turn { angle, ..*turn };
+            let count = (angle.abs() / TURN_POSE_ANGLE).ceil();
+            let poses: Vec<Pose> = (0..=count as usize).map(|k| turn.pose(start, k as f64 / count)).collect();
+            if self.is_free(poses[1..].iter().copied())? {
+                return Ok((Some(poses), edges));
+            }
+        }
+        Ok((None, edges))
+    }
+
+    fn travels(&self, start: &Pose) -> Result<Travels, Interrupt> {
         let Self { scene, standing, part, axes, termination, .. } = *self;
-        let senses =
-            axes.iter().flat_map(|axis| [true, false].map(|forward| Action::Push(*axis, forward).force()));
-        senses
-            .map(|direction| {
-                let question =
-                    SweepQuestion { scene, standing_parts: standing, part, start, direction: &direction };
-                let FreeTravel { length, met, .. } = free_travel(&question, termination)?;
-                Ok(met.map_or(f64::INFINITY, |_| length))
-            })
-            .collect()
+        let mut travels = Travels { lengths: Vec::new(), edges: 0 };
+        for (axis, forward) in axes.iter().flat_map(|axis| [(*axis, true), (*axis, false)]) {
+            let direction = Action::Push(axis, forward).force();
+            let question =
+                SweepQuestion { scene, standing_parts: standing, part, start, direction: &direction };
+            let FreeTravel { length, met, edges } = free_travel(&question, termination)?;
+            travels.lengths.push(met.map_or(f64::INFINITY, |_| length));
+            travels.edges += edges;
+        }
+        Ok(travels)
     }
 
     /// Whether the part is seen to enter no other at any of some poses.
-    fn is_free(&self, poses: impl Iterator<Item = Pose>) -> Result<bool, Interrupt> {
+    fn is_free(&self, poses: impl IntoIterator<Item = Pose>) -> Result<bool, Interrupt> {
         for pose in poses {
             let body = MovingBody::new(self.scene, self.part, pose).until(self.termination);
             if body.enters_by(self.limit, &self.standing.standing)? {
@@ -145,12 +206,6 @@ impl TurnQuestion<'_> {
         }
         Ok(true)
     }
-}
-
-/// The pose after a turn about a line through a point.
-fn turned(start: &Pose, axis: &Unit<Vector3<f64>>, pivot: &Point3<f64>, angle: f64) -> Pose {
-    let to_pivot = Translation3::from(pivot.coords);
-    to_pivot * UnitQuaternion::from_axis_angle(axis, angle) * to_pivot.inverse() * start
 }
 
 /// The points about which a part may turn: centres that it has in common with others across the axis, those of the most
@@ -206,6 +261,9 @@ fn critical_angles(
         found
     };
     let (own, others) = (directions(own), directions(others));
+    if own.len() * others.len() > CRITICAL_ANGLES {
+        return Vec::new();
+    }
     let turns = |&there: &f64| own.iter().map(move |here| (there - here + PI).rem_euclid(TAU) - PI);
     let mut angles: Vec<f64> = others.iter().flat_map(turns).collect();
     angles.sort_by(f64::total_cmp);
@@ -214,7 +272,7 @@ fn critical_angles(
 
 /// The angles that stand for all: the middles between critical ones, and those at which several edges pass. Of too many,
 /// those of the narrowest ranges are left out.
-fn stops(angles: Vec<f64>) -> Vec<f64> {
+fn stops(angles: &[f64]) -> Vec<f64> {
     let groups: Vec<&[f64]> = angles.chunk_by(|a, b| b - a < CRITICAL_ANGLE).collect();
     let Some(last) = groups.last() else { return Vec::new() };
     let mut before = last[0] - TAU;
@@ -231,4 +289,35 @@ fn stops(angles: Vec<f64>) -> Vec<f64> {
     stops.sort_by(|a, b| b.0.total_cmp(&a.0));
     stops.truncate(TURNS_PER_AXIS);
     stops.into_iter().map(|(_, angle)| angle).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_angle_stands_for_all_between_two_critical_ones() {
+        // Two edges pass at 1 at once; the range across the half turn is one.
+        let found = stops(&[-2.0, 1.0, 1.0, 2.0]);
+        let mut sorted = found.clone();
+        sorted.sort_by(f64::total_cmp);
+        let across = f64::midpoint(2.0 - TAU, -2.0);
+        assert_eq!(sorted, [across, -0.5, 1.0, 1.5]);
+        assert_eq!(found[0], 1.0, "a fit without play comes first");
+        assert!(stops(&[]).is_empty());
+    }
+
+    #[test]
+    fn edges_along_the_axis_give_angles_and_others_do_not() {
+        let post = |angle: f64| {
+            let (sin, cos) = angle.sin_cos();
+            [Point3::new(cos, sin, 0.0), Point3::new(cos, sin, 1.0)]
+        };
+        let flat = [Point3::new(1.0, 0.0, 0.0), Point3::new(2.0, 0.0, 0.0)];
+        let far = post(0.7).map(|p| Point3::from(5.0 * p.coords));
+        let (own, others) = ([post(0.0), flat], [post(0.3), post(-1.0), flat, far]);
+        let found = critical_angles(&Vector3::z_axis(), &Point3::origin(), &own, &others);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!((found[0] + 1.0).abs() < 1e-9 && (found[1] - 0.3).abs() < 1e-9, "{found:?}");
+    }
 }

@@ -30,7 +30,7 @@ use crate::tolerances::TURNED;
 use super::action_table::ActionTable;
 use super::cell_decomposition::{CellDecomposition, CellExit};
 use super::cell_memory::{CellMemory, CellStage};
-use super::critical_turns::TurnQuestion;
+use super::critical_turns::TurningPart;
 use super::disassembly::{Disassembly, Proof, Stop, Transition, joined};
 use super::initial_analysis::InitialAnalysis;
 use super::inseparable::InseparablePairs;
@@ -436,13 +436,13 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         if stage != CellStage::AfterCriticalTurn {
             return Ok(paths.cloned().collect());
         }
-        let Problem { scene, termination, verifier, .. } = &self.disassembly.problem;
+        let paths: Vec<&Vec<Pose>> = paths.take(STARTS_TURNED).collect();
+        let starts: Vec<Pose> = paths.iter().map(|path| path[path.len() - 1]).collect();
+        let axes = self.actions.axes();
+        let turning = TurningPart::new(&self.disassembly.problem, standing, part, axes, &starts);
         let mut ways = Vec::new();
-        for path in paths.take(STARTS_TURNED) {
-            let (start, axes) = (path[path.len() - 1], self.actions.axes());
-            let question =
-                TurnQuestion { scene, standing, part, start, axes, limit: verifier.limit(), termination };
-            ways.extend(question.ways()?.iter().map(|turn| joined(path, turn)));
+        for (path, start) in paths.into_iter().zip(&starts) {
+            ways.extend(turning.ways_from(start)?.iter().map(|turn| joined(path, turn)));
         }
         Ok(ways)
     }
