@@ -246,7 +246,8 @@ pub(crate) const ENCLOSURE_CELLS: usize = 2_000_000;
 /// better. 1 leaves threads idle; more throws away more when one leads out. No plan depends on it.
 pub(crate) const WINDOW_PER_THREAD: usize = 4;
 
-/// Count of edges and corners that are cast to search the cells of one part before anything is turned: a serpentine of 40
+/// Count of edges and corners that are cast to search the cells of one part before anything is simulated turning (once
+/// from its states, once from where turns in place lead), and to find such turns from one state: a serpentine of 40
 /// rows is searched within it in 0.8 s; the play of a thread has cells without end. Half of it leaves large mazes to the
 /// end of the search.
 pub(crate) const EDGES_CAST_BEFORE_TURNING: usize = 200_000;

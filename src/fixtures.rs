@@ -66,6 +66,7 @@ pub(crate) fn rod(radius: f64, z: [f64; 2], count: u32) -> SourceMesh {
 /// along the slot by an angle. It is `excess` wider across its flats than the slot where that is narrowest, has play
 /// otherwise, and a head at each end.
 pub(crate) fn flats_in_slot(turned: f64, play: f64, excess: f64) -> [SourceMesh; 2] {
+    // Half of the angle of the slot, in radians; and the flat sides around all but the slot.
     const SLOT: f64 = 0.6;
     const SIDES: u32 = 48;
     let mut bearing = tube(1.0 + play, 3.0, [-1.0, 2.0], SIDES);
