@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::budgets::EFFORT_BEFORE_SAMPLES;
 use crate::contact::PairPath;
 use crate::contact::course::{Course, Interval, turns_far};
-use crate::contact::helix_profile::{depth_on_screw, path_on_thread};
+use crate::contact::helix_profile::{path_on_thread, screw_depth, screw_depth_soon};
 use crate::contact::region_cover::path::{DepthPrecision, PathDepth, PathQuestion};
 use crate::contact::sampled::along_path::{PathSamples, Penetration};
 use crate::geometry::{Pose, Shape};
@@ -264,24 +264,16 @@ impl Verifier {
     pub fn past(&self, pair_path: &PairPath<'_>, termination: &Termination) -> Result<Verdict, Interrupt> {
         let (samples, limit) = (&self.samples, &self.limit_past(pair_path));
         let course = &Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
-        let soon = if turns_far(&pair_path.path) {
-            None
-        } else {
-            let found = self.question(pair_path, course, termination).depth_within(EFFORT_BEFORE_SAMPLES)?;
-            if found.iter().all(|side| side.open.is_empty()) {
-                Some(found)
-            } else {
-                let seen = samples.sparse_penetrations_along(pair_path, *limit, termination)?;
-                if seen.iter().any(|e| e.over > *limit) {
-                    return Ok(Verdict::past(0.0, seen, *limit));
-                }
-                None
+        let question = self.question(pair_path, course, termination);
+        let mut found = depth_soon(&question)?;
+        if found.iter().any(|side| !side.open.is_empty()) {
+            // Most paths that are refused are refused here.
+            let seen = samples.early_penetrations_along(pair_path, *limit, termination)?;
+            if seen.iter().any(|e| e.over > *limit) {
+                return Ok(Verdict::past(0.0, seen, *limit));
             }
-        };
-        let found = match soon {
-            Some(found) => found,
-            None => self.bounds(pair_path, course, termination)?,
-        };
+            found = depth_after(&question, found, *limit)?;
+        }
         let bound = found.iter().map(|f| f.bound).fold(0.0, f64::max);
         let [part, other] = pair_path.parts;
         let effort = found.each_ref().map(|f| f.effort);
@@ -296,23 +288,14 @@ impl Verifier {
         Ok(Verdict::past(bound, penetrations, *limit))
     }
 
-    /// How deep the moving part gets into the standing one, and the other way round, as far as that can be
-    /// bounded.
-    ///
-    /// # Errors
-    /// The termination condition became true.
-    pub(crate) fn bounds(
-        &self,
-        pair_path: &PairPath<'_>,
-        course: &Course,
-        termination: &Termination,
-    ) -> Result<[PathDepth; 2], Interrupt> {
-        let question = self.question(pair_path, course, termination);
-        if turns_far(&pair_path.path) {
-            depth_on_screw(&question, self.limit_past(pair_path))
-        } else {
-            question.depth()
-        }
+    /// How deep the moving part gets into the standing one, and the other way round, as far as that can be bounded.
+    #[cfg(test)]
+    pub(crate) fn bounds(&self, pair_path: &PairPath<'_>) -> [PathDepth; 2] {
+        let course = Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
+        let termination = Termination::default();
+        let question = self.question(pair_path, &course, &termination);
+        let soon = depth_soon(&question).unwrap();
+        depth_after(&question, soon, self.limit_past(pair_path)).unwrap()
     }
 
     /// The question of how deep each of two parts gets into the other along a path.
@@ -333,6 +316,24 @@ impl Verifier {
         };
         PathQuestion { pair_path, course, precision, termination }
     }
+}
+
+/// How deep each of two parts gets into the other, as far as little effort bounds it.
+fn depth_soon(question: &PathQuestion<'_>) -> Result<[PathDepth; 2], Interrupt> {
+    if turns_far(&question.pair_path.path) {
+        screw_depth_soon(question)
+    } else {
+        question.depth_within(EFFORT_BEFORE_SAMPLES)
+    }
+}
+
+/// The same as far as it can be bounded, after [`depth_soon`] left some stretches open.
+fn depth_after(
+    question: &PathQuestion<'_>,
+    soon: [PathDepth; 2],
+    limit: f64,
+) -> Result<[PathDepth; 2], Interrupt> {
+    if turns_far(&question.pair_path.path) { screw_depth(question, soon, limit) } else { question.depth() }
 }
 
 /// Stretches of the path; those that touch each other become one.

@@ -4,8 +4,8 @@
 //! it: `path`), so one comparison bounds ten turns. If it does not, because the part strays too far or a head meets
 //! its seat, each half of the stretch is compared, where the part strays less. Short stretches that stay open are
 //! left to [`path`](super::region_cover::path), as far as its budget goes, and to samples; otherwise the answer is
-//! the same kind of bound. A path in the middle of a thread's play (`thread_path`, from the flanks that face each other:
-//! `slip`) leaves the room that such a bound needs.
+//! the same kind of bound. A path in the middle of a thread's play (`thread_path`, from the thread that both parts share:
+//! `shared_thread`) leaves the room that such a bound needs.
 
 use crate::budgets::{EFFORT_BEFORE_PROFILES, PATH_EFFORT_IN_DOUBT};
 use crate::tolerances::{LEAST_PROFILED_TURN, SCREW_TURN, SHORTEST_SCREW_STRETCH, STRAY_SHARE};
@@ -14,6 +14,7 @@ mod distances;
 mod envelope;
 mod helix_fit;
 mod path;
+mod shared_thread;
 mod slip;
 #[cfg(test)]
 mod tests;
@@ -107,35 +108,46 @@ fn uncovered(
     Ok(open)
 }
 
-/// How deep two parts get into each other along a screw: the moving one into the standing one, and the other way
-/// round. Stretches without a bound are in [`PathDepth::open`].
+/// How deep two parts get into each other along a screw, as far as little effort bounds it: the moving one into the
+/// standing one, and the other way round. Stretches without a bound are in [`PathDepth::open`]. A part that shares no
+/// thread with the moving one is soon bounded.
 ///
 /// # Errors
 /// The termination condition became true.
-pub(crate) fn depth_on_screw(way: &PathQuestion<'_>, limit: f64) -> Result<[PathDepth; 2], Interrupt> {
-    let surfaces = way.pair_path.surfaces();
+pub(crate) fn screw_depth_soon(way: &PathQuestion<'_>) -> Result<[PathDepth; 2], Interrupt> {
     // Only where there are holes, depth changes its sign in mid-air.
-    if surfaces.iter().any(|surface| surface.rim().is_some()) {
+    if has_holes(way) {
         let unknown = || PathDepth { open: vec![Interval::WHOLE], ..PathDepth::default() };
         return Ok([unknown(), unknown()]);
     }
-    // A part that shares no thread with the moving one is soon bounded.
-    let mut found = bounded(way, vec![Interval::WHOLE], EFFORT_BEFORE_PROFILES)?;
-    if way.pair_path.allowed > 0.0 {
-        // One part lies in the other: surfaces cross, and more effort would bound no more.
-        return Ok(found);
+    bounded(way, vec![Interval::WHOLE], EFFORT_BEFORE_PROFILES)
+}
+
+/// The same as far as profiles and more effort bound it, after [`screw_depth_soon`] left some stretches open.
+///
+/// # Errors
+/// The termination condition became true.
+pub(crate) fn screw_depth(
+    way: &PathQuestion<'_>,
+    mut soon: [PathDepth; 2],
+    limit: f64,
+) -> Result<[PathDepth; 2], Interrupt> {
+    // If one part lies in the other, surfaces cross, and more effort would bound no more.
+    if way.pair_path.allowed > 0.0 || has_holes(way) {
+        return Ok(soon);
     }
-    let open = taken_open(&mut found);
-    if open.is_empty() {
-        return Ok(found);
-    }
+    let open = taken_open(&mut soon);
     // They do not overlap at the start: where neither surface meets the other, they stay apart.
-    let open = unsettled(way.course, surfaces, open, limit, way.termination)?;
+    let open = unsettled(way.course, way.pair_path.surfaces(), open, limit, way.termination)?;
     let [more, others] = bounded(way, open, PATH_EFFORT_IN_DOUBT)?;
-    let [mut one, mut other] = found;
+    let [mut one, mut other] = soon;
     one.add(more);
     other.add(others);
     Ok([one, other])
+}
+
+fn has_holes(way: &PathQuestion<'_>) -> bool {
+    way.pair_path.surfaces().iter().any(|surface| surface.rim().is_some())
 }
 
 /// The deepest points of both surfaces on some stretches, with no more than some effort on each side. Long stretches

@@ -100,9 +100,7 @@ fn a_bolt_whose_head_crosses_its_shank_is_settled_as_others_are_and_one_with_hol
         let bolt = &scene.bodies[0].shape.surface;
         assert!(bolt.is_open() && bolt.rim().is_some() == open);
         let pair_path = PairPath::new(&scene, &scene.allowed, [1, 0], &path(&scene));
-        let course = Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
-        let t = Termination::default();
-        let found = verifier.bounds(&pair_path, &course, &t).unwrap();
+        let found = verifier.bounds(&pair_path);
         assert_eq!(found.iter().all(|f| f.open.is_empty()), !open, "{found:?}");
         assert!(checked(&scene, &verifier, &path(&scene)) < LIMIT / 8.0);
     }

@@ -22,6 +22,7 @@ use crate::geometry::{Bounds, Look, Pose, SampleBall, SampleTree, Shape, Spacing
 use crate::termination::{Interrupt, Poll, Termination};
 use crate::tolerances::{HELPFUL, PATH_DENSITY};
 
+use super::super::course::turns_far;
 use super::super::pair_path::PairPath;
 
 /// A point that gets too deep.
@@ -114,14 +115,15 @@ impl PathSamples {
         Ok(penetrations)
     }
 
-    /// The same along all of a path, at the coarse samples alone.
-    pub(crate) fn sparse_penetrations_along(
+    /// The same along all of a path, at the coarse samples alone, and at few poses if it turns far.
+    pub(crate) fn early_penetrations_along(
         &self,
         pair_path: &PairPath<'_>,
         limit: f64,
         termination: &Termination,
     ) -> Result<Vec<Penetration>, Interrupt> {
-        let poses = dense(pair_path, &pair_path.path);
+        let every = if turns_far(&pair_path.path) { FIRST_POSES_EVERY } else { 1 };
+        let poses: Vec<Pose> = dense(pair_path, &pair_path.path).into_iter().step_by(every).collect();
         self.penetrations_at(pair_path, &poses, limit, Closeness::Sparse, termination)
     }
 

@@ -108,8 +108,7 @@ fn where_holes_leave_nothing_to_be_settled_samples_are_asked_soon() {
     let (scene, verifier) = scene([basket, open_box([-2.0, -1.5, 1.0], [1.0, 2.0, 3.5])]);
     let path = [scene.bodies[1].planning_from_shape; 2];
     let pair_path = PairPath::new(&scene, &scene.allowed, [1, 0], &path);
-    let course = Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
-    let found = verifier.bounds(&pair_path, &course, &Termination::default()).unwrap();
+    let found = verifier.bounds(&pair_path);
     assert!(found.iter().any(|f| !f.open.is_empty() && f.effort < PATH_EFFORT_IN_DOUBT / 5));
 }
 
@@ -133,8 +132,7 @@ fn a_pin_in_a_round_hole_is_told_by_few_regions() {
     let start = scene.bodies[1].planning_from_shape;
     let path = [start, nalgebra::Translation3::from(turn * Vector3::z() * 8.0) * start];
     let pair_path = PairPath::new(&scene, &scene.allowed, [1, 0], &path);
-    let course = Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
-    let [pin, _] = verifier.bounds(&pair_path, &course, &Termination::default()).unwrap();
+    let [pin, _] = verifier.bounds(&pair_path);
     let triangles = scene.bodies[1].shape.surface.triangles().len();
     assert!(pin.bound < LIMIT && pin.open.is_empty());
     // A piece is one, a region 40.
@@ -206,8 +204,7 @@ fn a_nut_a_hair_too_tight_for_its_bolt_is_bounded_as_easily_as_one_that_fits() {
         let start = scene.bodies[1].planning_from_shape;
         let path = [start, Pose::translation(0.0, 0.0, 1.2) * start];
         let pair_path = &PairPath::new(&scene, &scene.allowed, [1, 0], &path);
-        let course = &Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
-        let found = verifier.bounds(pair_path, course, &Termination::default()).unwrap();
+        let found = verifier.bounds(pair_path);
         assert!(found.iter().all(|side| side.bound < LIMIT / 2.0 && side.open.is_empty()));
         found.iter().map(|side| side.effort).sum::<usize>()
     };
