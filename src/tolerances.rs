@@ -392,9 +392,6 @@ pub(crate) const PAIR_LIMIT: f64 = 8e-4;
 /// Share of the thickness of the thinner part of a pair. A path is refused at this depth: nothing passes through a wall
 /// unseen that is refused at half of it, and the independent check refuses at a quarter.
 pub(crate) const THIN_LIMIT: f64 = 0.2;
-/// The same for paths that turn, however small the parts are: their poses are only as exact as [`BULGE_TOLERANCE`], and a
-/// thread is bounded to about twice that. At a half, thin walls might be passed.
-pub(crate) const TURNING_THIN_LIMIT: f64 = 0.4;
 /// Share of the limit. Points deeper than this help in refining a motion that is refused.
 /// Measured: no effect at half and double.
 pub(crate) const HELPFUL: f64 = 1.0 / 2.0;

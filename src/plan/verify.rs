@@ -23,8 +23,8 @@ use crate::geometry::{Pose, Shape};
 use crate::scene::{AllowedPenetrations, CongruentPair, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{
-    BULGE_TOLERANCE, COARSE_SHARE, FINEST_SHARE, HELPFUL, IGNORED_SHARE, IGNORED_SHARE_IN_OVERLAP,
-    OVERLAP_FINEST, OVERLAP_IGNORED, OVERLAP_MARGIN, PAIR_LIMIT, THIN_LIMIT, TURNING_THIN_LIMIT,
+    COARSE_SHARE, FINEST_SHARE, HELPFUL, IGNORED_SHARE, IGNORED_SHARE_IN_OVERLAP, OVERLAP_FINEST,
+    OVERLAP_IGNORED, OVERLAP_MARGIN, PAIR_LIMIT, THIN_LIMIT,
 };
 
 use super::common_depth::common_depth;
@@ -59,15 +59,6 @@ impl Verdict {
         let helpful = |v: Self| v.penetrations.into_iter().filter(move |e| e.over > v.limit * HELPFUL);
         Self { depth, penetrations: past.into_iter().flat_map(helpful).collect(), limit }
     }
-}
-
-/// How far a path turns.
-#[derive(Debug, Clone, Copy)]
-enum PathTurning {
-    None,
-    Little,
-    /// As a part that is unscrewed ([`turns_far`]).
-    Far,
 }
 
 /// How deep two parts overlap as assembled, in the planning frame.
@@ -135,40 +126,16 @@ impl Verifier {
         self.limit
     }
 
-    /// The depth at which a path past a standing part is refused: it depends on the two parts, not on what else is in
-    /// the assembly.
+    /// The depth at which a path of one of two shapes past the other is refused: it depends on the two alone, not on what
+    /// else is in the assembly.
     #[must_use]
-    pub fn limit_past(&self, PairPath { shapes, path, .. }: &PairPath<'_>) -> f64 {
-        let turning = if turns_far(path) {
-            PathTurning::Far
-        } else if path.iter().any(|pose| pose.rotation != path[0].rotation) {
-            PathTurning::Little
-        } else {
-            PathTurning::None
-        };
-        self.limit_of(*shapes, turning)
-    }
-
-    /// No path of one of two shapes past the other is accepted at this depth.
-    #[must_use]
-    pub fn largest_limit(&self, shapes: [&Shape; 2]) -> f64 {
-        self.limit_of(shapes, PathTurning::Far)
-    }
-
-    fn limit_of(&self, shapes: [&Shape; 2], turning: PathTurning) -> f64 {
+    pub fn limit_past(&self, shapes: [&Shape; 2]) -> f64 {
         if !self.is_by_pair {
             return self.limit;
         }
         let least = |of: fn(&Shape) -> f64| of(shapes[0]).min(of(shapes[1]));
         let (size, thickness) = (least(|shape| shape.bounds().extents().max()), least(Shape::thickness));
-        let of_pair = (PAIR_LIMIT * size).min(THIN_LIMIT * thickness);
-        // Poses of paths that turn are less exact than those of translations, and threads are bounded less precisely.
-        let of_turns = match turning {
-            PathTurning::None => 0.0,
-            PathTurning::Little => BULGE_TOLERANCE.min(TURNING_THIN_LIMIT * thickness),
-            PathTurning::Far => TURNING_THIN_LIMIT * thickness,
-        };
-        self.limit.min(of_pair.max(of_turns))
+        self.limit.min(PAIR_LIMIT * size).min(THIN_LIMIT * thickness)
     }
 
     /// How deep the surface of one of two parts gets into the other as they stand.
@@ -182,7 +149,7 @@ impl Verifier {
         termination: &Termination,
     ) -> Result<f64, Interrupt> {
         let pair_path = PairPath::standing(scene, pair);
-        let limit = self.limit_past(&pair_path);
+        let limit = self.limit_past(pair_path.shapes);
         let precision = DepthPrecision {
             ignored: OVERLAP_IGNORED * limit,
             deep: f64::INFINITY,
@@ -262,7 +229,7 @@ impl Verifier {
     /// # Errors
     /// The termination condition became true.
     pub fn past(&self, pair_path: &PairPath<'_>, termination: &Termination) -> Result<Verdict, Interrupt> {
-        let (samples, limit) = (&self.samples, &self.limit_past(pair_path));
+        let (samples, limit) = (&self.samples, &self.limit_past(pair_path.shapes));
         let course = &Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
         let question = self.question(pair_path, course, termination);
         let mut found = depth_soon(&question)?;
@@ -295,7 +262,7 @@ impl Verifier {
         let termination = Termination::default();
         let question = self.question(pair_path, &course, &termination);
         let soon = depth_soon(&question).unwrap();
-        depth_after(&question, soon, self.limit_past(pair_path)).unwrap()
+        depth_after(&question, soon, self.limit_past(pair_path.shapes)).unwrap()
     }
 
     /// The question of how deep each of two parts gets into the other along a path.
@@ -305,7 +272,7 @@ impl Verifier {
         course: &'a Course,
         termination: &'a Termination,
     ) -> PathQuestion<'a> {
-        let limit = self.limit_past(pair_path);
+        let limit = self.limit_past(pair_path.shapes);
         let share = if pair_path.allowed > 0.0 { IGNORED_SHARE_IN_OVERLAP } else { IGNORED_SHARE };
         let precision = DepthPrecision {
             ignored: limit * share,

@@ -75,7 +75,7 @@ pub(super) fn enclosed_pairs(
             Entry::Occupied(known) => *known.get(),
             Entry::Vacant(new) => *new.insert(inscribed_ball(&body.shape.surface, &poll)?),
         };
-        let limit = problem.verifier.largest_limit([&body.shape, &other.shape]);
+        let limit = problem.verifier.limit_past([&body.shape, &other.shape]);
         let accepted = scene.allowed.of(held, holder) + limit;
         let ball = Ball {
             centre: other.planning_from_shape.inverse() * body.planning_from_shape * largest.centre,

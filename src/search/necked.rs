@@ -74,7 +74,7 @@ pub(super) fn necked_pairs(
                 continue;
             }
             let other = &scene.bodies[holder];
-            let limit = verifier.largest_limit([&body.shape, &other.shape]);
+            let limit = verifier.limit_past([&body.shape, &other.shape]);
             let least_depth = scene.allowed.of(necked, holder) + limit + ROUNDED;
             for (number, axis) in axes.iter().enumerate() {
                 poll.check()?;

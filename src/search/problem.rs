@@ -184,7 +184,7 @@ impl Problem<'_> {
         let termination = &self.termination.without_planning_time();
         let past = |&other: &usize| {
             let pair_path = &PairPath::new(scene, &scene.allowed, [part, other], path);
-            let question = &VerdictQuestion { pair_path, limit: verifier.limit_past(pair_path) };
+            let question = &VerdictQuestion { pair_path, limit: verifier.limit_past(pair_path.shapes) };
             verdicts.verdict(question, cache, || verifier.past(pair_path, termination))
         };
         let past: Vec<_> = near.par_iter().map(past).collect::<Result<_, _>>()?;
