@@ -304,6 +304,7 @@ pub(crate) fn plan_of(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
         poses: vec![],
         targets: None,
         fixed: vec![],
+        base: None,
         steps,
         remaining: vec![],
         blocked: vec![],
@@ -320,6 +321,8 @@ pub(crate) fn step_of(part: usize) -> PlanStep {
         motion: MotionKind::Translation,
         path: vec![[0.0; 7]],
         verified_depth: 0.0,
-        waited_for: vec![],
+        requires: vec![],
+        wave: 0,
+        direction: None,
     }
 }

@@ -132,7 +132,7 @@ fn messages(bytes: &[u8]) -> String {
     let error = said(WireError::decode(bytes).map_err(|e| e.to_string()));
     let status = said(Status::decode(bytes).map_err(|e| e.to_string()));
     let steps = said(StepsView::new(bytes).map_err(|e| e.to_string()).map(|steps| {
-        steps.iter().map(|s| s.path.len() + s.blockers.len()).sum::<usize>();
+        steps.iter().map(|s| s.path.len() + s.requires.len()).sum::<usize>();
     }));
     let summary = said(SummaryView::new(bytes).map_err(|e| e.to_string()).map(|view| {
         let _ = (view.part_names().count(), view.blocked().count(), view.warnings().count());

@@ -88,9 +88,11 @@ fn assert_sound(assembly: &SourceAssembly, request: &PlanRequest, plan: &Plan) {
     assert_eq!(plan.reason.is_none(), plan.status == PlanStatus::Complete, "{:?}", plan.reason);
     let mut gone: BTreeSet<usize> = request.removed.iter().copied().collect();
     assert_eq!(plan.removed, gone.iter().copied().collect::<Vec<_>>());
-    for step in &plan.steps {
+    for (i, step) in plan.steps.iter().enumerate() {
         assert!(!plan.fixed.contains(&step.part), "a fixed part moves");
-        assert!(step.waited_for.iter().all(|p| gone.contains(p)), "waited for a part that is still there");
+        let before = |&number: &usize| plan.steps.get(number).filter(|_| number < i);
+        let required: Vec<_> = step.requires.iter().map(|number| before(number).unwrap()).collect();
+        assert_eq!(step.wave, required.iter().map(|s| s.wave + 1).max().unwrap_or(0));
         assert!(gone.insert(step.part), "part {} leaves twice, or was gone", step.part);
         assert_path(step, depth(request.engine) * longest_side(assembly));
     }
@@ -192,7 +194,7 @@ fn removed_parts_are_absent() {
         assert_eq!(order(&plan), ["bolt", "cover"]);
         let bolt = part(&assembly, "bolt");
         let bolt = plan.steps.iter().find(|s| s.part == bolt).unwrap();
-        assert!(bolt.waited_for.is_empty(), "what was gone before was not waited for");
+        assert!(bolt.requires.is_empty(), "what was gone before is no step");
     }
 }
 

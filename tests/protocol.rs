@@ -169,7 +169,8 @@ fn the_daemon_answers_to_the_bit_what_the_service_answers_in_process() {
                 let here = steps.next().unwrap();
                 assert_eq!((there.part as usize, there.path), (here.part, here.path.as_slice()));
                 assert_eq!(there.verified_depth.to_bits(), here.verified_depth.to_bits());
-                assert_eq!(there.blockers, numbers(&here.waited_for));
+                assert_eq!(there.requires, numbers(&here.requires));
+                assert_eq!((there.wave as usize, there.direction), (here.wave, here.direction));
             }
             Event::Progress(_) | Event::Trace(_) => {}
             Event::Restarted => panic!("nothing was restarted"),

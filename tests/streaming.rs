@@ -61,7 +61,9 @@ impl Planning for Scripted {
                 motion: MotionKind::Rotation,
                 path: (0..request.threads).map(|i| waypoint(part, i)).collect(),
                 verified_depth: 0.5,
-                waited_for: vec![part],
+                requires: vec![part],
+                wave: part,
+                direction: Some([0.0, 0.6, -0.8]),
             };
             sink.step(&step);
             steps.push(step);
@@ -78,6 +80,7 @@ impl Planning for Scripted {
             poses: vec![],
             targets: None,
             fixed: vec![],
+            base: None,
             steps,
             remaining: vec![],
             blocked: vec![],
@@ -138,9 +141,10 @@ fn read(client: &Client, options: &PlanOptions, pause: Duration) -> usize {
                 assert_eq!(step.path.len(), options.threads as usize);
                 assert!(step.path.iter().enumerate().all(|(i, w)| *w == waypoint(steps, i)));
                 assert_eq!(
-                    (step.rotates, step.verified_depth, step.blockers),
+                    (step.rotates, step.verified_depth, step.requires),
                     (true, 0.5, &[steps as u32][..])
                 );
+                assert_eq!((step.wave, step.direction), (steps as u32, Some([0.0, 0.6, -0.8])));
                 steps += 1;
             }
             Some(Event::Progress(_) | Event::Trace(_)) => {}

@@ -265,7 +265,7 @@ fn a_plan_becomes_a_scene_a_page_and_words() {
         assert!(!page.contains(loading), "{loading}: the page must need nothing else");
     }
     let words = succeeded(&run(&["steps", &json]));
-    assert!(words.starts_with("# Taking apart: ") && words.contains("freed after"), "{words}");
+    assert!(words.starts_with("# Taking apart: ") && words.contains(", after "), "{words}");
     // Put together: the page of the plan and that of the assembly are the same.
     let (json, html) = (at("together.json"), at("together.html"));
     succeeded(&run(&["plan", &assembly, "--assembly", "--no-cache", "--json", &json]));

@@ -141,15 +141,21 @@ pub struct StepRecord {
     pub first_waypoint: u32,
     /// Waypoints of this step.
     pub waypoints: u32,
-    /// First part number in the message's blockers.
-    pub first_blocker: u32,
-    /// Blockers of this step.
-    pub blockers: u32,
+    /// First step number in the message's requirements.
+    pub first_requirement: u32,
+    /// Requirements of this step.
+    pub requirements: u32,
+    /// The earliest round in which the step can be done.
+    pub wave: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
     /// Deepest penetration found by verification beyond the assembled depth.
     pub verified_depth: f64,
+    /// The unit vector of the path's last leg, or zero.
+    pub direction: [f64; 3],
 }
 
-/// Header of a steps message; records, waypoints and blockers follow.
+/// Header of a steps message; records, waypoints and requirements follow.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct StepsHeader {
@@ -159,8 +165,8 @@ pub struct StepsHeader {
     pub first_step: u32,
     /// Waypoints in all.
     pub waypoints: u32,
-    /// Blockers in all.
-    pub blockers: u32,
+    /// Requirements in all.
+    pub requirements: u32,
 }
 
 const _: () = {
@@ -171,9 +177,10 @@ const _: () = {
     assert!(offset_of!(PlanRequestHeader, deadline_ns) == 80);
     assert!(size_of::<PenaltyRecord>() == 16 && offset_of!(PenaltyRecord, value) == 8);
     assert!(size_of::<MovedPart>() == 64 && offset_of!(MovedPart, motion) == 8);
-    assert!(size_of::<StepRecord>() == 32 && align_of::<StepRecord>() == 8);
-    assert!(offset_of!(StepRecord, first_blocker) == 16);
-    assert!(offset_of!(StepRecord, verified_depth) == 24);
+    assert!(size_of::<StepRecord>() == 64 && align_of::<StepRecord>() == 8);
+    assert!(offset_of!(StepRecord, first_requirement) == 16);
+    assert!(offset_of!(StepRecord, verified_depth) == 32);
+    assert!(offset_of!(StepRecord, direction) == 40);
     assert!(size_of::<StepsHeader>() == 16 && size_of::<Waypoint>() == 56);
 };
 
@@ -345,43 +352,51 @@ pub struct Step {
     pub path: Vec<Waypoint>,
     /// Deepest penetration beyond the assembled depth.
     pub verified_depth: f64,
-    /// Parts that had blocked this one and left before it.
-    pub blockers: Vec<u32>,
+    /// Numbers of the steps that must be done before this very path is free, ascending.
+    pub requires: Vec<u32>,
+    /// The earliest round, from 0, in which it can be done, if every step is done as soon as it can be.
+    pub wave: u32,
+    /// The unit vector of the path's last leg, in the input's frame; `None` where that only turns, or there is none.
+    pub direction: Option<[f64; 3]>,
 }
 
 impl Step {
     /// An upper bound of the bytes that this step adds to a steps message.
     #[must_use]
     pub fn wire_bytes(&self) -> usize {
-        size_of::<StepRecord>() + self.path.len() * size_of::<Waypoint>() + self.blockers.len() * 4 + 8
+        size_of::<StepRecord>() + self.path.len() * size_of::<Waypoint>() + self.requires.len() * 4 + 8
     }
 }
 
 /// The bytes of a steps message; `first_step` is the place of its first step in the plan.
 #[must_use]
 pub fn encode_steps<'s>(first_step: u32, steps: impl IntoIterator<Item = &'s Step>) -> Vec<u8> {
-    let (mut records, mut waypoints, mut blockers) = (Vec::new(), Vec::<Waypoint>::new(), Vec::<u32>::new());
+    let (mut records, mut waypoints, mut requirements) =
+        (Vec::new(), Vec::<Waypoint>::new(), Vec::<u32>::new());
     for step in steps {
         records.push(StepRecord {
             part: step.part,
             motion: u32::from(step.rotates),
             first_waypoint: waypoints.len() as u32,
             waypoints: step.path.len() as u32,
-            first_blocker: blockers.len() as u32,
-            blockers: step.blockers.len() as u32,
+            first_requirement: requirements.len() as u32,
+            requirements: step.requires.len() as u32,
+            wave: step.wave,
+            reserved: 0,
             verified_depth: step.verified_depth,
+            direction: step.direction.unwrap_or_default(),
         });
         waypoints.extend_from_slice(&step.path);
-        blockers.extend_from_slice(&step.blockers);
+        requirements.extend_from_slice(&step.requires);
     }
     let mut writer = Writer::default();
     writer.value(StepsHeader {
         steps: records.len() as u32,
         first_step,
         waypoints: waypoints.len() as u32,
-        blockers: blockers.len() as u32,
+        requirements: requirements.len() as u32,
     });
-    writer.array(&records).array(&waypoints).array(&blockers);
+    writer.array(&records).array(&waypoints).array(&requirements);
     writer.finish()
 }
 
@@ -391,7 +406,7 @@ pub struct StepsView<'a> {
     first_step: u32,
     records: &'a [StepRecord],
     waypoints: &'a [Waypoint],
-    blockers: &'a [u32],
+    requirements: &'a [u32],
 }
 
 /// One step read in place.
@@ -407,8 +422,12 @@ pub struct StepView<'a> {
     pub path: &'a [Waypoint],
     /// Deepest penetration beyond the assembled depth.
     pub verified_depth: f64,
-    /// Parts that had blocked this one and left before it.
-    pub blockers: &'a [u32],
+    /// Numbers of the steps that must be done before this very path is free, ascending.
+    pub requires: &'a [u32],
+    /// The earliest round, from 0, in which it can be done, if every step is done as soon as it can be.
+    pub wave: u32,
+    /// The unit vector of the path's last leg, in the input's frame; `None` where that only turns, or there is none.
+    pub direction: Option<[f64; 3]>,
 }
 
 impl<'a> StepsView<'a> {
@@ -423,11 +442,12 @@ impl<'a> StepsView<'a> {
             first_step: h.first_step,
             records: reader.array("step records", u64::from(h.steps))?,
             waypoints: reader.array("waypoints", u64::from(h.waypoints))?,
-            blockers: reader.array("blockers", u64::from(h.blockers))?,
+            requirements: reader.array("requirements", u64::from(h.requirements))?,
         };
         for record in view.records {
             check_range("step waypoints", record.first_waypoint, record.waypoints, view.waypoints.len())?;
-            check_range("step blockers", record.first_blocker, record.blockers, view.blockers.len())?;
+            let (first, count) = (record.first_requirement, record.requirements);
+            check_range("step requirements", first, count, view.requirements.len())?;
         }
         Ok(view)
     }
@@ -454,7 +474,9 @@ impl<'a> StepsView<'a> {
             rotates: r.motion != 0,
             path: slice_of(self.waypoints, r.first_waypoint, r.waypoints),
             verified_depth: r.verified_depth,
-            blockers: slice_of(self.blockers, r.first_blocker, r.blockers),
+            requires: slice_of(self.requirements, r.first_requirement, r.requirements),
+            wave: r.wave,
+            direction: (r.direction != [0.0; 3]).then_some(r.direction),
         })
     }
 

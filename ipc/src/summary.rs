@@ -86,6 +86,10 @@ pub struct SummaryHeader {
     pub text_bytes: u32,
     /// Parts that began elsewhere ([`MovedPart`]).
     pub poses: u32,
+    /// The part that the rest is taken off, or [`NO_PART`].
+    pub base: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
     /// Why the plan is not complete.
     pub reason: Text,
     /// The planner's name.
@@ -94,6 +98,8 @@ pub struct SummaryHeader {
     pub engine: Text,
     /// The unit of length.
     pub units: Text,
+    /// Why the base was chosen.
+    pub base_reason: Text,
     /// Counters and times.
     pub stats: Stats,
 }
@@ -133,9 +139,9 @@ pub struct WarningRecord {
 }
 
 const _: () = {
-    assert!(size_of::<Stats>() == 112 && size_of::<SummaryHeader>() == 200);
-    assert!(std::mem::offset_of!(SummaryHeader, reason) == 56);
-    assert!(std::mem::offset_of!(SummaryHeader, stats) == 88);
+    assert!(size_of::<Stats>() == 112 && size_of::<SummaryHeader>() == 216);
+    assert!(std::mem::offset_of!(SummaryHeader, reason) == 64);
+    assert!(std::mem::offset_of!(SummaryHeader, stats) == 104);
     assert!(size_of::<OverlapRecord>() == 16 && size_of::<BlockedRecord>() == 20);
     assert!(size_of::<WarningRecord>() == 12);
 };
@@ -182,6 +188,8 @@ pub struct SummaryParts<'a> {
     pub targets: Option<Vec<u32>>,
     /// Fixed parts.
     pub fixed: Vec<u32>,
+    /// The part that the rest is taken off, and why it was chosen.
+    pub base: Option<(u32, &'a str)>,
     /// Parts that remain.
     pub remaining: Vec<u32>,
     /// Parts that began elsewhere than where their mesh was given, and where, as in paths.
@@ -221,10 +229,13 @@ impl SummaryParts<'_> {
             remaining: self.remaining.len() as u32,
             blockers: blockers.len() as u32,
             poses: self.poses.len() as u32,
+            base: self.base.map_or(NO_PART, |(part, _)| part),
+            reserved: 0,
             reason: texts.add(self.reason.unwrap_or("")),
             planner: texts.add(self.planner),
             engine: texts.add(self.engine),
             units: texts.add(self.units.unwrap_or("")),
+            base_reason: texts.add(self.base.map_or("", |(_, reason)| reason)),
             text_bytes: texts.bytes().len() as u32,
             stats: self.stats,
         };
@@ -292,7 +303,7 @@ impl<'a> SummaryView<'a> {
         if h.status as usize >= STATUSES.len() {
             return Err(Malformed::OutOfRange { field: "status", value: u64::from(h.status) });
         }
-        for text in [h.reason, h.planner, h.engine, h.units].iter().chain(self.names) {
+        for text in [h.reason, h.planner, h.engine, h.units, h.base_reason].iter().chain(self.names) {
             self.texts.get(*text, "summary text")?;
         }
         for b in self.blocked {
@@ -311,7 +322,8 @@ impl<'a> SummaryView<'a> {
         let pairs = self.overlaps.iter().flat_map(|o| o.parts);
         let singles = self.blocked.iter().map(|b| b.part).chain(self.poses.iter().map(|p| p.part));
         let warned = self.warnings.iter().map(|w| w.part).filter(|p| *p != NO_PART);
-        let listed = lists.into_iter().flatten().copied();
+        let base = Some(self.header.base).filter(|p| *p != NO_PART);
+        let listed = lists.into_iter().flatten().copied().chain(base);
         match listed.chain(pairs).chain(singles).chain(warned).find(|p| *p as usize >= count) {
             Some(part) => Err(Malformed::OutOfRange { field: "part", value: u64::from(part) }),
             None => Ok(()),
@@ -362,6 +374,13 @@ impl<'a> SummaryView<'a> {
     #[must_use]
     pub fn units(&self) -> Option<&'a str> {
         self.optional(SUMMARY_HAS_UNITS, self.header.units)
+    }
+
+    /// The part that the rest is taken off, and why it was chosen.
+    #[must_use]
+    pub fn base(&self) -> Option<(u32, &'a str)> {
+        let part = Some(self.header.base).filter(|part| *part != NO_PART)?;
+        Some((part, self.texts.get_checked(self.header.base_reason)))
     }
 
     /// How many parts the assembly has.

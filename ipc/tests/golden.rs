@@ -166,15 +166,24 @@ fn a_request_for_an_assembly_plan() {
 
 #[test]
 fn steps() {
-    let first = Step { part: 3, path: vec![POSE], blockers: vec![1], verified_depth: 0.5, rotates: true };
+    let first = Step {
+        part: 3,
+        path: vec![POSE],
+        requires: vec![1],
+        wave: 2,
+        direction: Some([0.0, 0.0, 1.0]),
+        verified_depth: 0.5,
+        rotates: true,
+    };
     let second = Step { part: 2, ..Step::default() };
     let bytes = encode_steps(7, [&first, &second]);
     check(
         "steps",
         &bytes,
         "\
-         0200000007000000 0100000001000000 0300000001000000 0000000001000000*2 000000000000e03f \
-         0200000000000000 0100000000000000*2 0000000000000000 000000000000f03f 0000000000000040 \
+         0200000007000000 0100000001000000 0300000001000000 0000000001000000*2 0200000000000000 000000000000e03f \
+         0000000000000000*2 000000000000f03f \
+         0200000000000000 0100000000000000*2 0000000000000000*5 000000000000f03f 0000000000000040 \
          000000000000e0bf 000000000000f03f 0000000000000000*3 0100000000000000",
     );
     assert_eq!(StepsView::new(AlignedBytes::copy_of(&bytes).as_slice()).unwrap().len(), 2);
@@ -197,6 +206,7 @@ fn a_summary() {
         removed: vec![0],
         targets: Some(vec![1]),
         fixed: vec![],
+        base: Some((0, "big")),
         remaining: vec![1],
         poses: vec![MovedPart { part: 1, reserved: 0, motion: POSE }],
         stats: Stats {

@@ -20,7 +20,7 @@ fn read_everything(bytes: &[u8]) {
     let _ = Status::decode(bytes);
     if let Ok(steps) = StepsView::new(bytes) {
         for step in steps.iter() {
-            let _ = (step.path.len(), step.blockers.len());
+            let _ = (step.path.len(), step.requires.len());
         }
     }
     if let Ok(view) = SummaryView::new(bytes) {
@@ -42,7 +42,7 @@ fn two_steps() -> Vec<Step> {
         verified_depth: 0.001,
         ..Step::default()
     };
-    let second = Step { part: 0, rotates: true, blockers: vec![1], path: vec![[0.5; 7]; 3], ..first.clone() };
+    let second = Step { part: 0, rotates: true, requires: vec![1], path: vec![[0.5; 7]; 3], ..first.clone() };
     vec![first, second]
 }
 
@@ -62,6 +62,7 @@ fn summary() -> Vec<u8> {
         removed: vec![0],
         targets: Some(vec![]),
         fixed: vec![1],
+        base: Some((1, "it is the largest")),
         remaining: vec![1, 2],
         poses: vec![moved_part()],
         stats: Stats { simulations: 7, total_time_s: 1.5, plan_hit: 1, ..Stats::default() },
@@ -118,7 +119,7 @@ fn steps_come_back_in_place() {
     assert_eq!(steps.len(), 2);
     assert_eq!((steps[0].number, steps[0].part, steps[0].rotates), (4, 1, false));
     assert_eq!(steps[0].path, two_steps()[0].path);
-    assert_eq!((steps[1].number, steps[1].rotates, steps[1].blockers), (5, true, &[1][..]));
+    assert_eq!((steps[1].number, steps[1].rotates, steps[1].requires), (5, true, &[1][..]));
     assert_eq!(steps[1].path, two_steps()[1].path);
 }
 

@@ -53,8 +53,11 @@ pub struct Insertion {
     pub path: Vec<Pose>,
     /// Largest depth beyond what is allowed that verification found.
     pub depth: f64,
-    /// Parts that came before, since this one would have blocked them.
-    pub waited_for: Vec<usize>,
+    /// The insertions (their places in the order, ascending) that must come before, since this part, in place, would
+    /// block them from where they begin. Ways to there are verified in this order alone.
+    pub requires: Vec<usize>,
+    /// The earliest round, from 0, in which it can be done, if all insertions are done as soon as they can be.
+    pub wave: usize,
 }
 
 /// Why a part could not be put in.
@@ -91,7 +94,30 @@ pub struct Assembling<'a> {
     /// Where the others wait; `None` if they are not there before their turn.
     waiting: Option<Vec<(usize, Pose)>>,
     room: Room,
+    /// By insertion.
+    orders: Vec<Order>,
     termination: &'a Termination,
+}
+
+/// Which insertions one requires, and its wave.
+#[derive(Debug, Clone, Default)]
+struct Order {
+    requires: Vec<usize>,
+    wave: usize,
+}
+
+/// The order of the insertions that some removals become in reverse: what a removal requires to be out must come after
+/// it.
+fn reversed(removals: &[Removal]) -> Vec<Order> {
+    let number = |place: usize| removals.len() - 1 - place;
+    let mut orders: Vec<Order> = Vec::new();
+    for part in (0..removals.len()).rev() {
+        let required = |later: &usize| removals[*later].requires.contains(&part);
+        let requires: Vec<usize> = (part + 1..removals.len()).rev().filter(required).map(number).collect();
+        let wave = requires.iter().map(|&i| orders[i].wave + 1).max().unwrap_or(0);
+        orders.push(Order { requires, wave });
+    }
+    orders
 }
 
 impl<'a> Assembling<'a> {
@@ -113,7 +139,7 @@ impl<'a> Assembling<'a> {
         let room = Room::new(scene, verifier, waiting.as_deref().unwrap_or_default());
         let mut standing = remain.to_vec();
         standing.sort_unstable();
-        Self { removals, standing, waiting, room, termination }
+        Self { removals, standing, waiting, room, orders: reversed(removals), termination }
     }
 
     /// Where each part that will move begins, in the order in which they move.
@@ -162,9 +188,8 @@ impl<'a> Assembling<'a> {
             depth = depth.max(past.depth).max(to_there);
             path.splice(..1, way);
         }
-        let waited_for = self.removals[place + 1..].iter().filter(|later| later.waited_for.contains(&part));
-        let waited_for = waited_for.map(|later| later.part).collect();
-        Ok(Insertion { part, path, depth, waited_for })
+        let Order { requires, wave } = self.orders[self.removals.len() - 1 - place].clone();
+        Ok(Insertion { part, path, depth, requires, wave })
     }
 
     /// The way from where a part waits to where its insertion begins, and how deep it gets into anything.

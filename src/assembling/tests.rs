@@ -8,7 +8,7 @@ use crate::geometry::SourceMesh;
 fn out(scene: &Scene, part: usize, shift: [f64; 3]) -> Removal {
     let start = scene.bodies[part].planning_from_shape;
     let end = Pose::translation(shift[0], shift[1], shift[2]) * start;
-    Removal { part, path: vec![start, end], depth: 0.0, waited_for: Vec::new() }
+    Removal { part, path: vec![start, end], depth: 0.0, requires: Vec::new(), wave: 0 }
 }
 
 fn run(
@@ -38,8 +38,8 @@ fn stack() -> Vec<SourceMesh> {
 
 fn unstacked(scene: &Scene) -> Vec<Removal> {
     let mut removals: Vec<_> = (1..4).rev().map(|part| out(scene, part, [0.0, 0.0, 4.0])).collect();
-    removals[1].waited_for = vec![3];
-    removals[2].waited_for = vec![2, 3];
+    removals[1].requires = vec![0];
+    removals[2].requires = vec![0, 1];
     removals
 }
 
@@ -67,8 +67,8 @@ fn the_order_is_reversed_and_parts_come_from_where_they_wait() {
     let (scene, verifier, insertions, ended) = run(stack(), unstacked, |_| Waiting::Beside(Vec::new()));
     assert_eq!(ended, Ok(()));
     assert_eq!(insertions.iter().map(|i| i.part).collect::<Vec<_>>(), [1, 2, 3]);
-    let waited: Vec<_> = insertions.iter().map(|i| i.waited_for.clone()).collect();
-    assert_eq!(waited, [vec![], vec![1], vec![2, 1]]);
+    let order: Vec<_> = insertions.iter().map(|i| (i.requires.clone(), i.wave)).collect();
+    assert_eq!(order, [(vec![], 0), (vec![0], 1), (vec![0, 1], 2)]);
     for insertion in &insertions {
         let moved = insertion.path[0].translation.vector - insertion.path.last().unwrap().translation.vector;
         assert!(moved.y < -3.0 && insertion.path.len() > 2, "{moved}");

@@ -27,8 +27,6 @@ pub struct Blockage {
     single: Vec<BTreeSet<usize>>,
     /// Per action: sets that blocked it in a simulation.
     jointly: Vec<Vec<Vec<usize>>>,
-    /// Parts that blocked something once and are gone.
-    outlived: BTreeSet<usize>,
     /// All parts that block some action.
     parts: BTreeSet<usize>,
     /// How many actions, from the first, are open to all parts: these count in f_a.
@@ -44,7 +42,6 @@ impl Blockage {
         Self {
             single: vec![BTreeSet::new(); actions],
             jointly: vec![Vec::new(); actions],
-            outlived: BTreeSet::new(),
             parts: BTreeSet::new(),
             common: actions,
             open: actions,
@@ -118,14 +115,11 @@ impl Blockage {
             return;
         }
         for set in &mut self.single {
-            if set.remove(&part) {
-                self.outlived.insert(part);
-            }
+            set.remove(&part);
         }
         for sets in &mut self.jointly {
             sets.retain_mut(|set| {
                 let Some(at) = set.iter().position(|&p| p == part) else { return true };
-                self.outlived.insert(part);
                 set.remove(at);
                 reopening == Reopening::AllGone && !set.is_empty()
             });
@@ -143,12 +137,6 @@ impl Blockage {
     #[must_use]
     pub fn blockers(&self, action: usize) -> BTreeSet<usize> {
         self.single[action].iter().chain(self.jointly[action].iter().flatten()).copied().collect()
-    }
-
-    /// Parts that blocked something once and are gone.
-    #[must_use]
-    pub fn outlived(&self) -> &BTreeSet<usize> {
-        &self.outlived
     }
 }
 
@@ -171,7 +159,6 @@ mod tests {
         assert!(paper.is_open(0) && paper.is_open(1));
         b.remove(5, Reopening::AnyGone);
         assert_eq!(b.evaluation(), Evaluation { colliding_parts: 0, open_actions: 2 });
-        assert_eq!(b.outlived().iter().copied().collect::<Vec<_>>(), [3, 5]);
     }
 
     #[test]

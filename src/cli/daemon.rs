@@ -11,7 +11,9 @@ use super::backend::{Backend, CommandQuestion};
 use super::error::CliError;
 use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::{Revision, SourceAssembly, heal, waypoint_from_pose};
-use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
+use crate::plan::{
+    Base, Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning,
+};
 use crate::search::{ActionSet, Engine, PlanSink, Planner, Progress, Stage, Staging};
 use crate::simulation::PenaltyParameters;
 use crate::upload::{wire_assembly, wire_mesh, wire_part};
@@ -196,7 +198,9 @@ fn plan_step(step: &client::Step<'_>) -> PlanStep {
         motion: if step.rotates { MotionKind::Rotation } else { MotionKind::Translation },
         path: step.path.to_vec(),
         verified_depth: step.verified_depth,
-        waited_for: indices(step.blockers),
+        requires: indices(step.requires),
+        wave: step.wave as usize,
+        direction: step.direction,
     }
 }
 
@@ -213,6 +217,7 @@ fn plan(s: Summary, steps: Vec<PlanStep>) -> Plan {
         poses: s.poses.into_iter().map(|(part, pose)| (part as usize, pose)).collect(),
         targets: s.targets.as_deref().map(indices),
         fixed: indices(&s.fixed),
+        base: s.base.map(|base| Base { part: base.part as usize, reason: base.reason }),
         steps,
         remaining: indices(&s.remaining),
         blocked: s
@@ -291,6 +296,7 @@ fn unplanned(question: &CommandQuestion<'_>, status: PlanStatus, error: &ClientE
         poses: Vec::new(),
         targets: request.targets.clone(),
         fixed: request.fixed.clone(),
+        base: None,
         steps: Vec::new(),
         remaining,
         blocked: Vec::new(),

@@ -92,10 +92,10 @@ impl Account {
                 self.name(*part),
                 self.names(by)
             ),
-            TraceEvent::Removed { part, waited_for } => {
-                let after = match waited_for.as_slice() {
+            TraceEvent::Removed { part, requires } => {
+                let after = match requires.as_slice() {
                     [] => String::new(),
-                    parts => format!(", freed after {}", self.names(parts)),
+                    parts => format!(", which requires {} to be out", self.names(parts)),
                 };
                 format!("=== {} is out{after}; its edges are deleted from all graphs", self.name(*part))
             }

@@ -4,7 +4,8 @@ use nalgebra::Point3;
 
 use super::table::{TextTable, length};
 use crate::geometry::{SourceAssembly, SourceMesh, pose_from_waypoint};
-use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStep};
+use crate::plan::{Base, MotionKind, Plan, PlanKind, PlanStats, PlanStep};
+use crate::view::direction;
 
 /// The table of steps and everything there is to know about the rest.
 pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan) -> String {
@@ -14,6 +15,7 @@ pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan) -> String {
         text.push_str(&steps(assembly, plan));
     }
     let sections = [
+        ("base", base(plan)),
         ("remaining", remaining(plan)),
         ("blocked", blocked(plan)),
         ("overlaps at the assembled pose", overlaps(plan)),
@@ -48,7 +50,7 @@ fn headline(assembly: &SourceAssembly, plan: &Plan) -> String {
 }
 
 fn steps(assembly: &SourceAssembly, plan: &Plan) -> String {
-    let mut table = TextTable::new(&["step", "part", "motion", "length", "waited for"]);
+    let mut table = TextTable::new(&["step", "part", "motion", "length", "direction", "after step"]);
     for (number, step) in (1..).zip(&plan.steps) {
         let mesh = assembly.parts.get(step.part).map(|p| &p.mesh);
         table.row([
@@ -56,7 +58,8 @@ fn steps(assembly: &SourceAssembly, plan: &Plan) -> String {
             plan.part_name(step.part).to_owned(),
             step.motion.name().to_owned(),
             travelled(step, plan.kind, mesh, plan.units.as_deref()),
-            names(plan, &step.waited_for),
+            step.direction.map_or_else(String::new, |d| direction(&d.into())),
+            step.requires.iter().map(|number| format!("{}", number + 1)).collect::<Vec<_>>().join(", "),
         ]);
     }
     table.render()
@@ -89,6 +92,11 @@ fn box_middle(mesh: &SourceMesh) -> Point3<f64> {
         Some((lo, hi)) => Some((p.inf(&lo), p.sup(&hi))),
     });
     bounds.map_or_else(Point3::origin, |(lo, hi)| nalgebra::center(&lo, &hi))
+}
+
+fn base(plan: &Plan) -> Vec<String> {
+    let line = |base: &Base| format!("{}: {}", plan.part_name(base.part), base.reason);
+    plan.base.iter().map(line).collect()
 }
 
 fn remaining(plan: &Plan) -> Vec<String> {
@@ -192,8 +200,15 @@ mod tests {
         };
         let half_turn = [2.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0];
         let start = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
-        let step =
-            |part, motion, path| PlanStep { part, motion, path, verified_depth: 0.01, waited_for: vec![1] };
+        let step = |part, motion, path| PlanStep {
+            part,
+            motion,
+            path,
+            verified_depth: 0.01,
+            requires: vec![0],
+            wave: 1,
+            direction: None,
+        };
         let plan = Plan {
             kind: PlanKind::Disassembly,
             status: PlanStatus::Infeasible,
@@ -206,6 +221,7 @@ mod tests {
             poses: vec![],
             targets: None,
             fixed: vec![],
+            base: Some(Base { part: 1, reason: "it is the largest".into() }),
             steps: vec![
                 step(0, MotionKind::Rotation, vec![start, half_turn]),
                 step(2, MotionKind::Translation, vec![start]),
@@ -222,8 +238,9 @@ mod tests {
         let text = super::plan(&assembly, &plan);
         for line in [
             "vice: infeasible (exhausted); 2 of 3 parts come off",
-            "1     a     rotation     0 mm, turning 180°  b",
-            "2     c     translation  free already        b",
+            "1     a     rotation     0 mm, turning 180°             1",
+            "2     c     translation  free already                   1",
+            "  b: it is the largest",
             "  b: +x by a, c; -z by a",
             "  a and b: 0.5000 mm deep",
             "  c: open",

@@ -7,6 +7,7 @@
 //! | contacts at samples of both surfaces, for open surfaces and as a fallback | `sampled` | contacts |
 //! | whether a sample is deeper than a limit, at a pose or on a way that is only tried | `sampled::penetration` | yes or no |
 //! | how long a stretch of others is in the way of a direction (to order turns) | [`obstruction`] | a length |
+//! | whether a few points show that a path enters a part | [`is_seen_to_enter`] | yes, or nothing |
 //! | whether two threads pass each other along their helix | `helix_profile` | the stretches left open |
 //! | which path off a thread keeps its surfaces furthest apart | `helix_profile::path_on_thread` | a path |
 //! | which ways lead a part off the threads that it shares with others | `helix_profile::ways_off` | paths |
@@ -24,7 +25,7 @@ pub(crate) mod region_cover;
 pub(crate) mod sampled;
 mod shape_cast;
 
-pub use obstruction::obstruction;
+pub use obstruction::{is_seen_to_enter, obstruction};
 pub use pair_path::PairPath;
 pub use region_cover::ShiftCoverCache;
 pub use sampled::{passes_straight, seems_clear};

@@ -1,5 +1,8 @@
-//! How long a stretch of other parts is in the way of a straight motion: a hint at the direction in which a part is
-//! to be turned out. Past the flanks of a thread this is one tooth, past a head all of it.
+//! How long a stretch of other parts is in the way of a straight motion, by rays from some points.
+//!
+//! To a search it is a hint at the direction in which a part is to be turned out: past the flanks of a thread this is
+//! one tooth, past a head all of it. In the middle of such a stretch a point is mostly deep in the other part, which
+//! shows at little cost that a path enters it.
 
 use nalgebra::{Point3, Translation3, Vector3};
 
@@ -8,6 +11,8 @@ use crate::geometry::{Bounds, OrientedSamples, Pose, Surface};
 use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll};
 use crate::tolerances::WALL_STEEPNESS;
+
+use super::pair_path::PairPath;
 
 /// The longest stretch that a point of a part is inside another part, or a point of another inside of it, while the
 /// part goes from `start` along the unit vector `direction` past everything. Measured at some samples: small things
@@ -49,6 +54,35 @@ pub fn obstruction(
         .into_iter()
         .map(past)
         .try_fold(0.0, |longest: f64, way| Ok(longest.max(way?)))
+}
+
+/// Whether a few vertices show that one part of a pair gets deeper into the other, on a straight leg of the path, than
+/// allowed by more than `by` (planning frame). A yes is exact, and a no says nothing.
+#[must_use]
+pub fn is_seen_to_enter(pair_path: &PairPath<'_>, by: f64) -> bool {
+    let [moving, standing] = pair_path.surfaces();
+    let deepest = pair_path.allowed + by;
+    let enters = |[sampled, target]: [&Surface; 2], to_target: Pose, shift: Vector3<f64>| {
+        let length = shift.norm();
+        let every = sampled.vertices().len().div_ceil(OBSTRUCTION_RAYS).max(1);
+        let is_deep = |p: &Point3<f64>| {
+            let (p, along) = (to_target * p, shift / length);
+            let inside = target.inside_along(&p, &along, length, WALL_STEEPNESS);
+            inside.is_some_and(|[from, to]| {
+                to - from > 2.0 * deepest
+                    && -target.signed_distance(&(p + along * from.midpoint(to))) > deepest
+            })
+        };
+        target.has_inside_for(sampled) && sampled.vertices().iter().step_by(every).any(is_deep)
+    };
+    let legs = pair_path.path.iter().zip(pair_path.path.iter().skip(1));
+    legs.filter(|(from, to)| from.rotation == to.rotation).any(|(from, to)| {
+        let shift = to.translation.vector - from.translation.vector;
+        let back = from.inverse();
+        shift.norm() > 0.0
+            && (enters([moving, standing], *from, shift)
+                || enters([standing, moving], back, back.rotation * -shift))
+    })
 }
 
 /// Segments from samples of one surface through another.

@@ -123,7 +123,9 @@ pub(crate) fn step(step: &PlanStep) -> wire::Step {
         rotates: step.motion == MotionKind::Rotation,
         path: step.path.clone(),
         verified_depth: step.verified_depth,
-        blockers: numbers(&step.waited_for),
+        requires: numbers(&step.requires),
+        wave: step.wave as u32,
+        direction: step.direction,
     }
 }
 
@@ -156,6 +158,7 @@ pub(crate) fn summary(plan: &Plan, spent: &PlanStats) -> Vec<u8> {
         removed: numbers(&plan.removed),
         targets: plan.targets.as_deref().map(numbers),
         fixed: numbers(&plan.fixed),
+        base: plan.base.as_ref().map(|base| (base.part as u32, base.reason.as_str())),
         remaining: numbers(&plan.remaining),
         poses: plan
             .poses

@@ -1,4 +1,4 @@
-//! Plans as JSON: the contract `sbdp-plan/1`, written by `sbdp plan ASSEMBLY --json FILE` and
+//! Plans as JSON: the contract `sbdp-plan/1.1`, written by `sbdp plan ASSEMBLY --json FILE` and
 //! documented in the README. Parts go by their names there. Fields may be added; those that
 //! are here keep their meaning.
 
@@ -10,7 +10,7 @@ use super::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus,
 use crate::geometry::Waypoint;
 
 /// The name and version of the contract.
-pub const SCHEMA: &str = "sbdp-plan/1";
+pub const SCHEMA: &str = "sbdp-plan/1.1";
 
 /// A plan in the words of the contract.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,6 +41,10 @@ pub struct PlanDocument {
     pub targets: Option<Vec<String>>,
     /// Parts that may not move.
     pub fixed: Vec<String>,
+    /// The part that the rest is taken off, or built up on; empty where parts are fixed, or where it had to leave.
+    pub base: Vec<String>,
+    /// Why it was chosen.
+    pub base_reason: Option<String>,
     /// The removals, or insertions, in order.
     pub steps: Vec<StepDocument>,
     /// Parts that stand where they stood.
@@ -100,10 +104,14 @@ pub struct StepDocument {
     pub path: Vec<Waypoint>,
     /// Deepest penetration along the path beyond the pair's assembled depth.
     pub verified_depth: f64,
-    /// Parts that had blocked this one, in whichever direction, and left before it; in an assembly plan, parts
-    /// that this one would have blocked and that came before it.
-    #[serde(default)]
-    pub waited_for: Vec<String>,
+    /// Numbers of the steps, from 0, that must be done before this very path is free, ascending: necessary, and
+    /// sufficient with what these require in turn.
+    pub requires: Vec<usize>,
+    /// The earliest round, from 0, in which it can be done, if every step is done as soon as it can be.
+    pub wave: usize,
+    /// The unit vector along which the middle of the part's box moves on the last leg of the path; null where it does
+    /// not.
+    pub direction: Option<[f64; 3]>,
 }
 
 /// A part that remains and what blocks it.
@@ -254,6 +262,8 @@ impl PlanDocument {
             initial: InitialDocument { removed: plan.names(&plan.removed), poses: poses(plan) },
             targets: plan.targets.as_ref().map(|t| plan.names(t)),
             fixed: plan.names(&plan.fixed),
+            base: plan.base.iter().map(|base| plan.part_name(base.part).to_owned()).collect(),
+            base_reason: plan.base.as_ref().map(|base| base.reason.clone()),
             steps: plan.steps.iter().map(|s| step(plan, s)).collect(),
             remaining: plan.names(&plan.remaining),
             blocked: plan.blocked.iter().map(|b| blocked(plan, b)).collect(),
@@ -290,7 +300,9 @@ fn step(plan: &Plan, step: &PlanStep) -> StepDocument {
         motion: step.motion.name().to_owned(),
         path: step.path.clone(),
         verified_depth: step.verified_depth,
-        waited_for: plan.names(&step.waited_for),
+        requires: step.requires.clone(),
+        wave: step.wave,
+        direction: step.direction,
     }
 }
 
@@ -341,6 +353,7 @@ fn stats(stats: &PlanStats) -> StatsDocument {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plan::Base;
 
     fn plan() -> Plan {
         Plan {
@@ -355,12 +368,15 @@ mod tests {
             poses: vec![(1, [0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0])],
             targets: Some(vec![1]),
             fixed: vec![0],
+            base: Some(Base { part: 1, reason: "it is the largest".into() }),
             steps: vec![PlanStep {
                 part: 2,
                 motion: MotionKind::Rotation,
                 path: vec![[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0]],
                 verified_depth: 0.001,
-                waited_for: vec![1],
+                requires: vec![],
+                wave: 0,
+                direction: Some([0.0, 1.0, 0.0]),
             }],
             remaining: vec![0, 1],
             blocked: vec![Blocked { part: 1, by: vec![0], action: "+x".into() }],
@@ -381,11 +397,12 @@ mod tests {
     #[test]
     fn the_shape_is_the_contract_to_the_letter() {
         let expected = concat!(
-            r#"{"schema":"sbdp-plan/1","kind":"disassembly","status":"infeasible","reason":"nothing moves","#,
+            r#"{"schema":"sbdp-plan/1.1","kind":"disassembly","status":"infeasible","reason":"nothing moves","#,
             r#""planner":"sbdp-star","engine":"sliding","units":"mm","parts":["0","1","2","10"],"#,
             r#""initial":{"removed":["10"],"poses":{"1":[0.0,0.5,0.0,1.0,0.0,0.0,0.0]}},"targets":["1"],"fixed":["0"],"#,
+            r#""base":["1"],"base_reason":"it is the largest","#,
             r#""steps":[{"part":"2","motion":"rotation","#,
-            r#""path":[[0.0,0.0,0.0,1.0,0.0,0.0,0.0],[0.0,0.5,0.0,0.0,1.0,0.0,0.0]],"verified_depth":0.001,"waited_for":["1"]}],"#,
+            r#""path":[[0.0,0.0,0.0,1.0,0.0,0.0,0.0],[0.0,0.5,0.0,0.0,1.0,0.0,0.0]],"verified_depth":0.001,"requires":[],"wave":0,"direction":[0.0,1.0,0.0]}],"#,
             r#""remaining":["0","1"],"blocked":[{"part":"1","by":["0"],"action":"+x"}],"#,
             r#""overlaps":[{"parts":["0","1"],"depth":0.25}],"#,
             r#""warnings":[{"part":"2","message":"open"},{"part":null,"message":"small"}],"#,

@@ -7,7 +7,9 @@ mod records;
 mod shorten;
 mod verify;
 
-pub use model::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
+pub use model::{
+    Base, Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning,
+};
 pub use records::{KnownVerdicts, VerdictQuestion};
 pub(crate) use records::{OVERLAP, VERDICT, overlap_key};
 pub use shorten::thinned;

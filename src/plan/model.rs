@@ -52,9 +52,23 @@ pub struct PlanStep {
     pub path: Vec<Waypoint>,
     /// Deepest penetration found by verification beyond the pair's assembled depth.
     pub verified_depth: f64,
-    /// Parts that had blocked this one and left before it; in an assembly plan, parts that this one would
-    /// have blocked and that came before it.
-    pub waited_for: Vec<usize>,
+    /// Numbers of the steps, from 0, that must be done before this very path is free, ascending: necessary, and
+    /// sufficient with what these require in turn.
+    pub requires: Vec<usize>,
+    /// The earliest round, from 0, in which it can be done, if every step is done as soon as it can be.
+    pub wave: usize,
+    /// The unit vector along which the middle of the part's box moves on the last leg of the path; `None` where it does
+    /// not.
+    pub direction: Option<[f64; 3]>,
+}
+
+/// The part that stays, and that the rest is taken off.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Base {
+    /// The part.
+    pub part: usize,
+    /// Why it was chosen, in a few words.
+    pub reason: String,
 }
 
 /// Why a part that remains did not move.
@@ -154,6 +168,8 @@ pub struct Plan {
     pub targets: Option<Vec<usize>>,
     /// Parts that may not move.
     pub fixed: Vec<usize>,
+    /// The part that the rest is taken off, or built up on; none where parts are fixed, or where it had to leave.
+    pub base: Option<Base>,
     /// The removals, or insertions, in order.
     pub steps: Vec<PlanStep>,
     /// Parts that stand where they stood all the time.

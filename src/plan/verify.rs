@@ -47,13 +47,19 @@ impl Verdict {
         Self { depth: deepest(bound, &penetrations), penetrations, limit }
     }
 
+    /// Whether the path is refused.
+    #[must_use]
+    pub fn is_refused(&self) -> bool {
+        self.depth > self.limit
+    }
+
     /// Joins the results past each standing part. If none exceeds its limit, the path is good, and penetrations are
     /// dropped; of a refused path, those that are too shallow to help are dropped.
     #[must_use]
     pub fn of_all(past: Vec<Self>) -> Self {
         let depth = past.iter().map(|v| v.depth).fold(0.0, f64::max);
         let limit = past.iter().map(|v| v.limit).fold(f64::INFINITY, f64::min);
-        if past.iter().all(|v| v.depth <= v.limit) {
+        if !past.iter().any(Self::is_refused) {
             return Self { depth, penetrations: Vec::new(), limit };
         }
         let helpful = |v: Self| v.penetrations.into_iter().filter(move |e| e.over > v.limit * HELPFUL);

@@ -352,36 +352,40 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     }
 
     fn checked(&mut self, part: usize, path: &[Pose]) -> Result<Checked, Stop> {
-        self.timed_check(|problem, standing| problem.checked_path(standing, part, path), part)
+        let standing = self.standing(part);
+        self.timed(|problem| problem.checked_path(&standing, part, path))
     }
 
     /// The same for a path that is to be taken as it is.
     pub(super) fn checked_as_given(&mut self, part: usize, path: &[Pose]) -> Result<Checked, Stop> {
-        self.timed_check(|problem, standing| problem.checked_as_given(standing, part, path), part)
+        let standing = self.standing(part);
+        self.timed(|problem| problem.checked_as_given(&standing, part, path))
     }
 
-    /// A check of a path of a part among those that stand; its time is verification.
-    fn timed_check(
+    /// A check of a path; its time is verification.
+    pub(super) fn timed<T>(
         &mut self,
-        check: impl FnOnce(&Problem<'a>, &[usize]) -> Result<Checked, Interrupt>,
-        part: usize,
-    ) -> Result<Checked, Stop> {
+        check: impl FnOnce(&Problem<'a>) -> Result<T, Interrupt>,
+    ) -> Result<T, Stop> {
         let started = Instant::now();
-        let checked = check(&self.problem, &self.standing(part));
+        let checked = check(&self.problem);
         let took = started.elapsed();
         self.counters.verification += took;
         self.problem.termination.leave_out(took);
         Ok(checked?)
     }
 
-    /// Takes a part out; `waited_for` are those that had blocked it and left before.
-    pub(super) fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64, waited_for: Vec<usize>) {
+    /// Takes a part out along a path past all that stands.
+    pub(super) fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) -> Result<(), Stop> {
+        let removal = self.removal(part, path, depth)?;
         self.hull_changes += usize::from(self.everything.remove(&self.problem.scene, part));
         self.around.clear();
-        let removal = Removal { part, path, depth, waited_for };
         self.observer.removal(&removal);
-        self.trace(|| TraceEvent::Removed { part, waited_for: removal.waited_for.clone() });
+        let requires = || removal.requires.iter().map(|&i| self.removals[i].part).collect();
+        let requires = if self.observer.traces() { requires() } else { Vec::new() };
+        self.trace(|| TraceEvent::Removed { part, requires });
         self.removals.push(removal);
+        Ok(())
     }
 
     /// A part that may move and whose hull is apart from all others': it needs no motion. Without sweeps it is
@@ -477,6 +481,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             remaining,
             blocked: if status == PlanStatus::Complete { Vec::new() } else { few_of_each_part(blocked) },
             removals: self.removals,
+            base: None,
             counters: self.counters,
         }
     }

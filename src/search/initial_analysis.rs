@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use nalgebra::Vector3;
+
 use crate::blocking_graph::{Analysis, Blockage, StateGraphs};
 use crate::simulation::Action;
 use crate::termination::Interrupt;
@@ -38,6 +40,14 @@ pub(super) struct InitialAnalysis {
 }
 
 impl InitialAnalysis {
+    /// The direction in which most parts can go at first; of several, the one nearest to +z.
+    pub(super) fn upward(&self) -> Vector3<f64> {
+        let open = |i: usize| self.graphs.iter().filter(|graphs| graphs.blockage.is_open(i)).count();
+        let forces = self.translations.iter().map(|action| action.force()).enumerate();
+        let best = forces.max_by(|a, b| open(a.0).cmp(&open(b.0)).then(a.1.z.total_cmp(&b.1.z)));
+        best.map_or_else(Vector3::z, |(_, force)| force)
+    }
+
     /// # Errors
     /// The termination condition became true.
     pub(super) fn of(problem: &Problem<'_>, guided: bool) -> Result<Self, Interrupt> {

@@ -11,11 +11,13 @@
 mod action_list;
 mod action_table;
 mod ball;
+mod base;
 mod blocked_actions;
 mod cell_decomposition;
 mod cell_memory;
 mod critical_turns;
 mod deepest_point;
+mod deferred_removals;
 mod directions;
 mod disassembly;
 mod enclosed;
@@ -35,6 +37,7 @@ mod problem;
 mod rays;
 mod report;
 mod request;
+mod requirements;
 mod rrt;
 mod sbdp;
 mod speculation;
@@ -49,6 +52,9 @@ mod trace;
 mod twists;
 mod unscrewing;
 
+use crate::plan::PlanStatus;
+use deferred_removals::DeferredRemovals;
+
 pub use crate::termination::{Interrupt, Termination};
 pub use directions::axes_of;
 pub use initial_analysis::initial_graphs;
@@ -61,6 +67,18 @@ pub use trace::{BlockedBy, PlanningPhase, TraceEvent};
 /// Runs the planner that a request names.
 #[must_use]
 pub fn search(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
+    let Some(targets) = problem.targets.clone() else { return run(planner, problem, observer) };
+    // Only what the targets require is reported, and that is known at the end.
+    let mut deferred = DeferredRemovals::new(observer);
+    let mut outcome = run(planner, problem, &mut deferred);
+    if outcome.status == PlanStatus::Complete {
+        outcome = requirements::without_needless(outcome, &targets);
+    }
+    outcome.removals.iter().for_each(|r| observer.removal(r));
+    outcome
+}
+
+fn run(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
     match planner {
         Planner::SbdpStar => sbdp::sbdp(problem, observer, true),
         Planner::Sbdp => sbdp::sbdp(problem, observer, false),

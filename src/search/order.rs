@@ -93,7 +93,8 @@ impl Order {
         let in_vain =
             |n: &StateNode| (is_rotation && self.balls[n.part]) || self.holder(n.part, standing).is_some();
         let waits = |n: &StateNode| strategy.waits(phase, n);
-        let wanted = |n: &StateNode| n.alive && of.lists(n) && !waits(n) && !skipped(n) && !in_vain(n);
+        let may = |n: &StateNode| n.alive && problem.may_move(n.part);
+        let wanted = |n: &StateNode| may(n) && of.lists(n) && !waits(n) && !skipped(n) && !in_vain(n);
         (0..states.nodes.len()).filter(|&i| wanted(&states.nodes[i])).collect()
     }
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Pose;
-use crate::plan::PlanStatus;
+use crate::plan::{Base, PlanStatus};
 
 /// The most parts that a reason names as those that remain.
 const NAMED_PARTS: usize = 4;
@@ -17,10 +17,13 @@ pub struct Removal {
     pub part: usize,
     /// Poses of its shape, the assembled one first; thinned and verified.
     pub path: Vec<Pose>,
-    /// Largest depth beyond the pairs' allowed penetrations that verification found.
+    /// Largest depth beyond the pairs' allowed penetrations that verification found, past all parts but those that it
+    /// requires to be out.
     pub depth: f64,
-    /// Parts that had blocked it and left before.
-    pub waited_for: Vec<usize>,
+    /// The removals (their places in the order, ascending) whose parts this path would enter, assembled.
+    pub requires: Vec<usize>,
+    /// The earliest round, from 0, in which it can be done, if all removals are done as soon as they can be.
+    pub wave: usize,
 }
 
 /// An action of a part that remains, and the parts that block it.
@@ -144,6 +147,8 @@ pub struct Outcome {
     pub reason: Option<Reason>,
     /// Removals in order.
     pub removals: Vec<Removal>,
+    /// The part that the rest was taken off, if it was chosen.
+    pub base: Option<Base>,
     /// Parts that remain, ascending.
     pub remaining: Vec<usize>,
     /// The blocked actions of the parts that should have come out: a few of each part.

@@ -139,7 +139,7 @@ fn the_worked_example_has_the_papers_numbers() {
             engine.name()
         );
         assert_eq!(outcome.remaining, [BOLT]);
-        assert_eq!(outcome.removals[1].waited_for, [PIN]);
+        assert_eq!((outcome.removals[1].requires.as_slice(), outcome.removals[1].wave), (&[0][..], 1));
     }
 }
 

@@ -12,10 +12,11 @@ use crate::geometry::Pose;
 use crate::plan::PlanStatus;
 use crate::simulation::{Action, End, Motion};
 
+use super::deferred_removals::DeferredRemovals;
 use super::disassembly::{Disassembly, Proof, Stop, Transition, joined};
 use super::inseparable::InseparablePairs;
 use super::known_states::{KnownStates, Resolution};
-use super::outcome::{Outcome, Removal};
+use super::outcome::Outcome;
 use super::problem::{Observer, Problem, VerifiedPath};
 use super::stopped_actions::StoppedActions;
 use super::trace::{PlanningPhase, TraceEvent};
@@ -53,40 +54,14 @@ pub(super) fn pdp(problem: Problem<'_>, observer: &mut dyn Observer, mode: PdpMo
 /// it has succeeded. With a deadline, the first run has half of the time.
 pub(super) fn pdp_star(problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
     let first = Problem { termination: problem.termination.halfway(), ..problem.clone() };
-    let mut deferred = DeferredRemovals { observer, removals: Vec::new() };
-    let outcome = pdp(first, &mut deferred, PdpMode::Translation);
-    let DeferredRemovals { observer, removals } = deferred;
+    let outcome = pdp(first, &mut DeferredRemovals::new(observer), PdpMode::Translation);
     let spent = outcome.counters.simulations;
     let nothing_left = problem.max_simulations.is_some_and(|most| spent >= most);
     if matches!(outcome.status, PlanStatus::Complete | PlanStatus::Cancelled) || nothing_left {
-        removals.iter().for_each(|r| observer.removal(r));
+        outcome.removals.iter().for_each(|r| observer.removal(r));
         return outcome;
     }
     pdp(Problem { spent, ..problem }, observer, PdpMode::Rotation)
-}
-
-/// Keeps removals until the run has succeeded.
-struct DeferredRemovals<'o> {
-    observer: &'o mut dyn Observer,
-    removals: Vec<Removal>,
-}
-
-impl Observer for DeferredRemovals<'_> {
-    fn progress(&mut self, removed: usize, simulations: u64) {
-        self.observer.progress(removed, simulations);
-    }
-
-    fn removal(&mut self, removal: &Removal) {
-        self.removals.push(removal.clone());
-    }
-
-    fn traces(&self) -> bool {
-        self.observer.traces()
-    }
-
-    fn traced(&mut self, event: TraceEvent) {
-        self.observer.traced(event);
-    }
 }
 
 /// A configuration in the search tree of one part.
@@ -156,11 +131,6 @@ impl Pdp<'_, '_> {
         Ok(())
     }
 
-    fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) {
-        let gone = self.stopped.gone(part, self.disassembly.everything.standing());
-        self.disassembly.remove(part, path, depth, gone);
-    }
-
     /// Breadth-first search for a way out of one part.
     fn search(&mut self, part: usize, limit: usize) -> Result<TreeEnd, Stop> {
         let phase = self.phase();
@@ -217,7 +187,7 @@ impl Pdp<'_, '_> {
                         self.disassembly.trace_simulation(at, &run, "disassembled", &[], path.len(), None);
                         match self.disassembly.prove(run, &prefix, path)? {
                             Proof::Path(VerifiedPath { path, depth }) => {
-                                self.remove(part, path, depth);
+                                self.disassembly.remove(part, path, depth)?;
                                 return Ok(true);
                             }
                             Proof::Otherwise(motion) => Some(motion),

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 use crate::blocking_graph::StaticAnalysis;
 use crate::cache::RequestCache;
-use crate::contact::PairPath;
 use crate::contact::sampled::along_path::Penetration;
+use crate::contact::{PairPath, is_seen_to_enter};
 use crate::geometry::{Pose, SampleTree};
 use crate::plan::{KnownVerdicts, Verdict, VerdictQuestion, Verifier, thinned};
 use crate::scene::Scene;
@@ -61,6 +61,8 @@ pub struct Problem<'a> {
     pub present: Vec<usize>,
     /// Parts that may not move.
     pub fixed: Vec<usize>,
+    /// A part that stays as long as others leave.
+    pub base: Option<usize>,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<usize>>,
     /// Which actions are used.
@@ -114,15 +116,25 @@ impl Problem<'_> {
 
     /// Whether a part is present and not fixed.
     #[must_use]
-    pub fn may_move(&self, part: usize) -> bool {
+    pub fn is_movable(&self, part: usize) -> bool {
         self.present.binary_search(&part).is_ok() && !self.fixed.contains(&part)
+    }
+
+    /// Whether it may leave now: a base stays as long as others leave.
+    #[must_use]
+    pub fn may_move(&self, part: usize) -> bool {
+        self.is_movable(part) && self.base != Some(part)
     }
 
     /// Of the parts that remain, those that should come out.
     #[must_use]
     pub fn wanted(&self, remaining: &[usize]) -> Vec<usize> {
         let asked = |p: &usize| self.targets.as_ref().is_none_or(|t| t.contains(p));
-        remaining.iter().copied().filter(|p| !self.fixed.contains(p) && asked(p)).collect()
+        remaining
+            .iter()
+            .copied()
+            .filter(|&p| !self.fixed.contains(&p) && self.base != Some(p) && asked(&p))
+            .collect()
     }
 
     /// Whether nothing more has to come out: a last part alone is apart from all others.
@@ -180,15 +192,39 @@ impl Problem<'_> {
 
     /// Verifies a path against all parts that it may meet.
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
-        let Self { scene, verifier, cache, verdicts, .. } = self;
-        let termination = &self.termination.without_planning_time();
-        let past = |&other: &usize| {
-            let pair_path = &PairPath::new(scene, &scene.allowed, [part, other], path);
-            let question = &VerdictQuestion { pair_path, limit: verifier.limit_past(pair_path.shapes) };
-            verdicts.verdict(question, cache, || verifier.past(pair_path, termination))
+        let Scene { allowed, .. } = &self.scene;
+        let past = near
+            .par_iter()
+            .map(|&other| self.verdict_past(&PairPath::new(&self.scene, allowed, [part, other], path)));
+        Ok(Verdict::of_all(past.collect::<Result<_, _>>()?))
+    }
+
+    /// How deep a path gets past each of some parts that it may meet; `None` where it is refused.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn depths_past(
+        &self,
+        others: &[usize],
+        part: usize,
+        path: &[Pose],
+    ) -> Result<Vec<(usize, Option<f64>)>, Interrupt> {
+        let depth = |&other: &usize| {
+            let pair_path = PairPath::new(&self.scene, &self.scene.allowed, [part, other], path);
+            if is_seen_to_enter(&pair_path, self.verifier.limit_past(pair_path.shapes)) {
+                return Ok((other, None));
+            }
+            let verdict = self.verdict_past(&pair_path)?;
+            Ok((other, (!verdict.is_refused()).then_some(verdict.depth)))
         };
-        let past: Vec<_> = near.par_iter().map(past).collect::<Result<_, _>>()?;
-        Ok(Verdict::of_all(past))
+        self.near(others, part, path).par_iter().map(depth).collect()
+    }
+
+    fn verdict_past(&self, pair_path: &PairPath<'_>) -> Result<Verdict, Interrupt> {
+        let Self { verifier, cache, verdicts, .. } = self;
+        let termination = &self.termination.without_planning_time();
+        let question = &VerdictQuestion { pair_path, limit: verifier.limit_past(pair_path.shapes) };
+        verdicts.verdict(question, cache, || verifier.past(pair_path, termination))
     }
 
     /// Adds the points that refuted a path to the contact samples of their bodies.

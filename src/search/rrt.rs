@@ -158,7 +158,7 @@ impl RrtSearch<'_, '_> {
                 Extension::Straight => self.extend_straight(part, &mut tree)?,
                 Extension::Simulated => {
                     if let Some(VerifiedPath { path, depth }) = self.extend_by_motions(part, &mut tree)? {
-                        self.remove(part, path, depth);
+                        self.disassembly.remove(part, path, depth)?;
                         return Ok(true);
                     }
                 }
@@ -171,18 +171,13 @@ impl RrtSearch<'_, '_> {
             if let Ok(VerifiedPath { path, depth }) =
                 self.disassembly.checked_as_given(part, &tree.path_to(node))?
             {
-                self.remove(part, path, depth);
+                self.disassembly.remove(part, path, depth)?;
                 return Ok(true);
             }
             tree.restart();
         }
         self.trees[part] = Some(tree);
         Ok(false)
-    }
-
-    fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) {
-        let gone = self.stopped.gone(part, self.disassembly.everything.standing());
-        self.disassembly.remove(part, path, depth, gone);
     }
 
     /// One step towards a random pose.

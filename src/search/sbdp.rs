@@ -40,6 +40,7 @@ use super::order::Order;
 use super::outcome::Outcome;
 use super::problem::{Observer, Problem, VerifiedPath};
 use super::report::SearchReport;
+use super::request::ActionSet;
 use super::speculation::Speculation;
 use super::state::{StateAction, StateNode, least_travel};
 use super::states::{PhaseStates, States};
@@ -75,21 +76,29 @@ struct Sbdp<'a, 'o> {
     speculation: Speculation,
 }
 
-/// Searches until everything asked for is out, nothing more can be found, or a limit is met.
+/// Searches until everything asked for is out, nothing more can be found, or a limit is met. With the extended actions,
+/// a base stays as long as others leave.
 pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bool) -> Outcome {
-    let (disassembly, initial) = Disassembly::beside(problem, observer, |p| InitialAnalysis::of(p, guided));
+    let (mut disassembly, initial) =
+        Disassembly::beside(problem, observer, |p| InitialAnalysis::of(p, guided));
     let initial = match initial {
         Ok(initial) => initial,
         Err(interrupt) => {
             return disassembly.outcome(Some(interrupt.into()), InseparablePairs::default(), Vec::new());
         }
     };
+    let problem = &mut disassembly.problem;
+    let is_extended = problem.actions == ActionSet::Extended;
+    let base = if is_extended { problem.chosen_base(&initial.upward()) } else { None };
+    problem.base = base.as_ref().map(|base| base.part);
     let mut search = Sbdp::new(disassembly, initial, guided);
     let stop = search.run().err();
     let (report, disassembly) = search.report();
     report.log(disassembly);
     let blocked = report.blocked(disassembly);
-    search.disassembly.outcome(stop, search.order.into_inseparable(), blocked)
+    let outcome = search.disassembly.outcome(stop, search.order.into_inseparable(), blocked);
+    let base = base.filter(|base| outcome.remaining.contains(&base.part));
+    Outcome { base, ..outcome }
 }
 
 impl<'a, 'o> Sbdp<'a, 'o> {
@@ -111,7 +120,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             disassembly,
         };
         for (part, StateGraphs { blockage, remembered }) in graphs.into_iter().enumerate() {
-            if search.disassembly.problem.may_move(part) {
+            if search.disassembly.problem.is_movable(part) {
                 search.disassembly.counters.graphs_recalled += u64::from(remembered);
                 search.add_node(StateNode {
                     part,
@@ -150,6 +159,11 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 if self.disassembly.is_done() {
                     return Ok(());
                 }
+                continue;
+            }
+            // Others may leave once the base has: nothing more costly is tried before.
+            if self.disassembly.problem.base.take().is_some() {
+                self.take_free_parts()?;
                 continue;
             }
             // Before the searches that take longest.
@@ -355,7 +369,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                     self.disassembly.counters.sweeps += 1;
                     let action = action.to_string();
                     self.disassembly.trace(|| TraceEvent::Swept { state: 0, part, action });
-                    self.remove(part, path, depth);
+                    self.remove(part, path, depth)?;
                     self.take_free_parts()?;
                     return Ok(true);
                 }
@@ -411,7 +425,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             };
             let prefix = joined(&ways[start], &way);
             if let Ok(VerifiedPath { path, depth }) = self.disassembly.prove_sweep(&run, &prefix, &path)? {
-                self.remove(part, path, depth);
+                self.remove(part, path, depth)?;
                 leaves = true;
             }
         }
@@ -455,7 +469,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 let (state, part, action) = (self.states.number(at.node), run.part, run.action.to_string());
                 self.disassembly.counters.sweeps += 1;
                 self.disassembly.trace(|| TraceEvent::Swept { state, part, action });
-                self.remove(part, path, depth);
+                self.remove(part, path, depth)?;
                 Ok(true)
             }
             Err(refuted) => {
@@ -583,7 +597,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         let run = self.transition(at);
         match self.disassembly.prove(run, &self.states.nodes[at.node].path, motion)? {
             Proof::Path(VerifiedPath { path, depth }) => {
-                self.remove(run.part, path, depth);
+                self.remove(run.part, path, depth)?;
                 gain.removed = true;
             }
             Proof::PrefixRefuted => self.drop_way(at.node)?,
@@ -607,14 +621,15 @@ impl<'a, 'o> Sbdp<'a, 'o> {
     /// Parts whose hull is apart from all others' need no motion.
     fn take_free_parts(&mut self) -> Result<(), Stop> {
         while let Some(part) = self.disassembly.free_part()? {
-            self.remove(part, vec![self.disassembly.assembled(part)], 0.0);
+            self.remove(part, vec![self.disassembly.assembled(part)], 0.0)?;
         }
         Ok(())
     }
 
-    fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) {
-        let waited_for = self.states.remove(part);
-        self.disassembly.remove(part, path, depth, waited_for);
+    fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) -> Result<(), Stop> {
+        self.disassembly.remove(part, path, depth)?;
+        self.states.remove(part);
+        Ok(())
     }
 
     fn add_node(&mut self, node: StateNode) {

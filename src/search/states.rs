@@ -97,16 +97,10 @@ impl States {
         }
     }
 
-    /// Ends the states of a part that leaves and deletes it from all blockages. Returns the parts that had
-    /// blocked it as assembled and left before, ascending.
-    pub(super) fn remove(&mut self, part: usize) -> Vec<usize> {
-        let mut waited_for = Vec::new();
+    /// Ends the states of a part that leaves and deletes it from all blockages.
+    pub(super) fn remove(&mut self, part: usize) {
         for node in &mut self.nodes {
             if node.part == part {
-                if node.is_root() {
-                    let blockages = node.translation.iter().chain([&node.rotation]);
-                    waited_for.extend(blockages.flat_map(|b| b.outlived().iter().copied()));
-                }
                 node.alive = false;
                 // Its path is of no use any more.
                 node.path.truncate(1);
@@ -117,9 +111,6 @@ impl States {
             }
             node.rotation.remove(part, self.reopening);
         }
-        waited_for.sort_unstable();
-        waited_for.dedup();
-        waited_for
     }
 }
 
@@ -154,9 +145,9 @@ mod tests {
 
         states.block(at, vec![1]);
         assert!(!states.is_open(strategy, at));
-        assert!(states.remove(1).is_empty());
+        states.remove(1);
         assert!(states.is_open(strategy, at) && !states.nodes[1].alive);
-        assert_eq!(states.remove(0), [1], "it had waited for part 1");
+        states.remove(0);
         assert!(states.nodes.iter().all(|n| !n.alive && n.path.len() == 1));
     }
 }

@@ -19,11 +19,6 @@ impl StoppedActions {
         self.0.range((part, 0)..=(part, usize::MAX)).flat_map(|(_, with)| with).copied().collect()
     }
 
-    /// Of them, those that are gone, ascending.
-    pub(super) fn gone(&self, part: usize, standing: &[usize]) -> Vec<usize> {
-        self.of(part).into_iter().filter(|p| standing.binary_search(p).is_err()).collect()
-    }
-
     /// The blocked actions of the parts that should have come out, given how actions are named.
     pub(super) fn blocked(
         &self,

@@ -34,6 +34,7 @@ pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
         verifier,
         engine: &SlidingEngine,
         fixed: Vec::new(),
+        base: None,
         targets: None,
         actions: ActionSet::Paper,
         static_analysis: StaticAnalysis::default(),
@@ -299,4 +300,84 @@ fn a_shaft_with_flats_is_turned_until_they_are_along_its_slot() {
     }
     let captive = pair(flats_in_slot(0.9, 0.05, 0.05));
     assert_eq!(captive.status, PlanStatus::Exhausted);
+}
+
+/// A box without a lid, a slab on its floor, a block on the slab, and a bar across the box's mouth beside the block.
+fn packed_box() -> Vec<SourceMesh> {
+    let walls = cells([&[0.0, 0.5, 4.5, 5.0], &[0.0, 0.5, 4.5, 5.0], &[0.0, 0.5, 3.0]], |[x, y, z]| {
+        z == 0 || x != 1 || y != 1
+    });
+    let slab = cuboid([0.6, 0.6, 0.5], [4.4, 4.4, 1.0]);
+    let block = cuboid([1.0, 1.0, 1.0], [2.0, 2.0, 2.0]);
+    let bar = cuboid([-0.5, 3.0, 3.0], [5.5, 3.5, 3.4]);
+    vec![walls, slab, block, bar]
+}
+
+#[test]
+fn a_step_requires_what_its_path_would_enter_and_nothing_else() {
+    let (scene, verifier) = scene(packed_box());
+    for planner in [Planner::SbdpStar, Planner::PdpT, Planner::Rrt] {
+        let actions = if planner == Planner::SbdpStar { ActionSet::Extended } else { ActionSet::Paper };
+        let sweeps = actions == ActionSet::Extended;
+        let problem = Problem { actions, sweeps, ..problem(scene.clone(), &verifier) };
+        let Outcome { status, removals, .. } = search(planner, problem, &mut Recorder::default());
+        assert_eq!(status, PlanStatus::Complete);
+        for (i, Removal { part, path, requires, wave, .. }) in removals.iter().enumerate() {
+            let required: Vec<usize> = requires.iter().map(|&j| removals[j].part).collect();
+            let before = requires.iter().map(|&j| removals[j].wave + 1).max();
+            assert!(requires.iter().all(|&j| j < i) && *wave == before.unwrap_or(0));
+            let is_refused = |gone: &[usize]| {
+                let stands = |p: &usize| p != part && !gone.contains(p);
+                let standing: Vec<usize> = (0..scene.bodies.len()).filter(stands).collect();
+                let t = Termination::default();
+                verifier.check(&scene, &scene.allowed, &standing, *part, path, &t).unwrap().is_refused()
+            };
+            assert!(!is_refused(&required), "{part} after {required:?} with {}", planner.name());
+            for needed in &required {
+                let others: Vec<usize> = required.iter().copied().filter(|p| p != needed).collect();
+                assert!(is_refused(&others), "{part} does not need {needed} to be out");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_plan_for_a_target_has_what_that_requires_and_no_more() {
+    let (scene, verifier) = scene(packed_box());
+    let parts_out = |target: usize| {
+        let problem = Problem {
+            actions: ActionSet::Extended,
+            sweeps: true,
+            targets: Some(vec![target]),
+            ..problem(scene.clone(), &verifier)
+        };
+        let outcome = search(Planner::SbdpStar, problem, &mut Recorder::default());
+        assert_eq!(outcome.removals.len() + outcome.remaining.len(), scene.bodies.len());
+        outcome.removals.iter().map(|r| r.part).collect::<Vec<_>>()
+    };
+    assert_eq!(parts_out(3), [3]);
+    assert_eq!(parts_out(2), [2]);
+    // The slab is under the block and the bar.
+    let mut needed = parts_out(1);
+    assert_eq!(needed.pop(), Some(1));
+    needed.sort_unstable();
+    assert_eq!(needed, [2, 3]);
+}
+
+#[test]
+fn the_base_stays_as_long_as_others_leave() {
+    let (scene, verifier) = scene(packed_box());
+    let plan = |fixed: Vec<usize>| {
+        let problem = Problem {
+            actions: ActionSet::Extended,
+            sweeps: true,
+            fixed,
+            ..problem(scene.clone(), &verifier)
+        };
+        search(Planner::SbdpStar, problem, &mut Recorder::default())
+    };
+    let outcome = plan(Vec::new());
+    assert_eq!((outcome.base.map(|b| b.part), outcome.remaining), (Some(0), vec![0]));
+    let outcome = plan(vec![3]);
+    assert_eq!((outcome.base, outcome.remaining.contains(&3)), (None, true));
 }

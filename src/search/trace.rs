@@ -117,8 +117,8 @@ pub enum TraceEvent {
     Removed {
         /// The part.
         part: usize,
-        /// Parts that had blocked it and left before.
-        waited_for: Vec<usize>,
+        /// Parts that its path requires to be out.
+        requires: Vec<usize>,
     },
     /// The search ended.
     End {

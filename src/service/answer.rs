@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use nalgebra::{Point3, Vector3};
+
 use crate::assembling::Insertion;
 use crate::geometry::{Assembly, Pose, Waypoint, pose_from_waypoint, waypoint_from_pose};
 use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
@@ -9,20 +11,29 @@ use crate::search::{BlockedAction, Outcome, PlanRequest, Removal};
 
 /// Turns below this are rounding.
 const NO_TURN: f64 = 1e-9;
+/// Shifts below this, in the planning frame, are rounding.
+const NO_SHIFT: f64 = 1e-9;
 
 /// A removal as a step of a plan.
 pub(super) fn removal(assembly: &Assembly, removal: &Removal) -> PlanStep {
-    let Removal { part, path, depth, waited_for } = removal;
-    step(assembly, *part, path, *depth, waited_for)
+    let Removal { part, path, depth, requires, wave } = removal;
+    step(assembly, *part, path, *depth, (requires, *wave))
 }
 
 /// An insertion as a step of a plan.
 pub(super) fn insertion(assembly: &Assembly, insertion: &Insertion) -> PlanStep {
-    let Insertion { part, path, depth, waited_for } = insertion;
-    step(assembly, *part, path, *depth, waited_for)
+    let Insertion { part, path, depth, requires, wave } = insertion;
+    step(assembly, *part, path, *depth, (requires, *wave))
 }
 
-fn step(assembly: &Assembly, part: usize, path: &[Pose], depth: f64, waited_for: &[usize]) -> PlanStep {
+fn step(
+    assembly: &Assembly,
+    part: usize,
+    path: &[Pose],
+    depth: f64,
+    (requires, wave): (&[usize], usize),
+) -> PlanStep {
+    let direction = last_direction(path, &assembly.shapes[assembly.parts[part].shape].bounds().centre());
     let path: Vec<Waypoint> = path.iter().map(|pose| waypoint(assembly, part, pose)).collect();
     let turns = path.iter().any(|w| w[3..] != path[0][3..]);
     PlanStep {
@@ -30,8 +41,16 @@ fn step(assembly: &Assembly, part: usize, path: &[Pose], depth: f64, waited_for:
         motion: if turns { MotionKind::Rotation } else { MotionKind::Translation },
         path,
         verified_depth: depth / assembly.scale,
-        waited_for: waited_for.to_vec(),
+        requires: requires.to_vec(),
+        wave,
+        direction: direction.map(Into::into),
     }
+}
+
+/// The unit vector along which a point moves on the last leg of a path, unless it stays where it is.
+fn last_direction(path: &[Pose], point: &Point3<f64>) -> Option<Vector3<f64>> {
+    let [.., from, to] = path else { return None };
+    (to * point - from * point).try_normalize(NO_SHIFT)
 }
 
 /// The transform of a part's mesh from where it was given to where a pose of its shape puts it.
@@ -154,6 +173,7 @@ impl PlanFrame<'_> {
         let status = outcome.status;
         Plan {
             steps,
+            base: outcome.base,
             remaining: outcome.remaining,
             blocked: blocked.collect(),
             stats,
@@ -183,6 +203,7 @@ impl PlanFrame<'_> {
             removed: self.removed,
             targets: self.request.targets.clone(),
             fixed: self.fixed,
+            base: None,
             steps: Vec::new(),
             blocked: Vec::new(),
             overlaps: self.overlaps,

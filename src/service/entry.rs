@@ -245,6 +245,7 @@ impl Entry {
             engine: asked.engine,
             present: (0..self.assembly.parts.len()).filter(is_there).collect(),
             fixed: fixed.to_vec(),
+            base: None,
             targets: request.targets.clone(),
             actions: request.actions,
             static_analysis: request.static_analysis,

@@ -58,15 +58,16 @@ fn check(plan: &PlanDocument) -> Result<(), String> {
 
 /// All names of parts outside `parts`, with their fields.
 fn named(plan: &PlanDocument) -> impl Iterator<Item = (&'static str, &str)> {
-    let lists =
-        [("initial.removed", &plan.initial.removed), ("fixed", &plan.fixed), ("remaining", &plan.remaining)];
+    let lists = [
+        ("initial.removed", &plan.initial.removed),
+        ("fixed", &plan.fixed),
+        ("base", &plan.base),
+        ("remaining", &plan.remaining),
+    ];
     let lists = lists.into_iter().flat_map(|(field, list)| list.iter().map(move |n| (field, n)));
     let targets = plan.targets.iter().flatten().map(|n| ("targets", n));
     let poses = plan.initial.poses.keys().map(|n| ("initial.poses", n));
-    let steps = plan.steps.iter().flat_map(|s| {
-        std::iter::once(("steps[].part", &s.part))
-            .chain(s.waited_for.iter().map(|n| ("steps[].waited_for", n)))
-    });
+    let steps = plan.steps.iter().map(|s| ("steps[].part", &s.part));
     let blocked = plan.blocked.iter().flat_map(|b| {
         std::iter::once(("blocked[].part", &b.part)).chain(b.by.iter().map(|n| ("blocked[].by", n)))
     });
@@ -81,6 +82,9 @@ fn check_steps(plan: &PlanDocument) -> Result<(), String> {
         }
         if step.path.is_empty() {
             return Err(format!("`steps[{i}].path` is empty; a part that is free has one waypoint"));
+        }
+        if let Some(number) = step.requires.iter().find(|number| **number >= i) {
+            return Err(format!("`steps[{i}].requires` has {number}, which is no step before it"));
         }
         for (k, waypoint) in step.path.iter().enumerate() {
             check_waypoint(waypoint).map_err(|e| format!("`steps[{i}].path[{k}]` {e}"))?;
@@ -110,10 +114,11 @@ pub(super) mod tests {
 
     /// A plan of two parts, of which the second is lifted.
     pub(in crate::view) fn plan() -> PlanDocument {
-        let text = r#"{"schema":"sbdp-plan/1","status":"complete","reason":null,"planner":"sbdp-star",
+        let text = r#"{"schema":"sbdp-plan/1.1","status":"complete","reason":null,"planner":"sbdp-star",
             "engine":"sliding","units":"mm","parts":["0","1"],"initial":{"removed":[],"poses":{}},
-            "targets":null,"fixed":[],"steps":[{"part":"1","motion":"translation",
-            "path":[[0,0,0,1,0,0,0],[0,0,2,1,0,0,0]],"verified_depth":0}],"remaining":["0"],"blocked":[],
+            "targets":null,"fixed":[],"base":[],"base_reason":null,"steps":[{"part":"1","motion":"translation",
+            "path":[[0,0,0,1,0,0,0],[0,0,2,1,0,0,0]],"verified_depth":0,"requires":[],
+            "wave":0,"direction":[0,0,1]}],"remaining":["0"],"blocked":[],
             "overlaps":[],"warnings":[],"stats":{"simulations":0,"simulations_run":0,"sweeps":0,"states":0,
             "sdf_time_s":0,"static_analysis_time_s":0,"path_time_s":0,"verify_time_s":0,"total_time_s":0,
             "cache":{"sdf_hits":0,"blocking_hits":0,"motion_hits":0,"plan_hit":false}}}"#;
@@ -127,7 +132,9 @@ pub(super) mod tests {
             motion: "translation".into(),
             path: path.to_vec(),
             verified_depth: 0.0,
-            waited_for: vec![],
+            requires: vec![],
+            wave: 0,
+            direction: None,
         }
     }
 
@@ -145,6 +152,7 @@ pub(super) mod tests {
         assert!(refusal(|p| p.parts.push("1".into())).contains("`1` twice"));
         assert!(refusal(|p| p.steps[0].part = "x".into()).contains("`steps[].part` names `x`"));
         assert!(refusal(|p| p.steps.push(step("1", &[still]))).contains("`steps[1]` moves `1`"));
+        assert!(refusal(|p| p.steps[0].requires.push(0)).contains("`steps[0].requires` has 0"));
         assert!(refusal(|p| p.steps[0].path.clear()).contains("`steps[0].path` is empty"));
         assert!(refusal(|p| p.steps[0].path[1][3] = 3.0).contains("`steps[0].path[1]` has a quaternion"));
         assert!(refusal(|p| p.steps[0].path[1][2] = -1e300).contains("cannot be shown"));
@@ -159,7 +167,7 @@ pub(super) mod tests {
             let error = read_plan(text).unwrap_err().to_string();
             assert!(error.contains(reason) && error.contains("sbdp plan --json"), "{error}");
         }
-        let error = read_plan(r#"{"schema":"sbdp-plan/1","status":"complete"}"#).unwrap_err().to_string();
+        let error = read_plan(r#"{"schema":"sbdp-plan/1.1","status":"complete"}"#).unwrap_err().to_string();
         assert!(error.contains("missing field"), "{error}");
     }
 

@@ -23,6 +23,7 @@ mod words;
 pub use colour::{PALETTE, Rgb};
 pub use document::{kind_of, read_plan};
 pub use scene::{DrawnPart, Keyframe, Placement, PlanScene, ScenePart, SceneStep, Up};
+pub(crate) use words::direction;
 
 /// Why a plan cannot be shown.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

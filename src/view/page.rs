@@ -92,7 +92,7 @@ struct PagePart<'a> {
 struct PageStep<'a> {
     part: usize,
     words: &'a str,
-    waited: &'a [usize],
+    after: &'a [usize],
     ends: f64,
     times: Vec<f64>,
     /// Seven numbers per key, as of a part.
@@ -211,7 +211,7 @@ fn step<'a>(step: &'a SceneStep, middle: &Point3<f64>, bytes: &mut Vec<u8>) -> P
     PageStep {
         part: step.part,
         words: &step.words,
-        waited: &step.waited_for,
+        after: &step.after,
         ends: step.ends,
         times: step.keys.iter().map(|k| k.time).collect(),
         keys: append(bytes, &keys),

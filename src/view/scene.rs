@@ -7,7 +7,7 @@ use super::colour::colours;
 use super::document::kind_of;
 use super::explode::{Placed, exploded, way_out};
 use super::shading::{Shaded, shaded};
-use super::words::{Words, waited_for};
+use super::words::{Words, required};
 use super::{PALETTE, Rgb, ViewError};
 use crate::geometry::{Assembly, Bounds, Pose, Waypoint, pose_from_waypoint};
 use crate::plan::PlanKind;
@@ -90,8 +90,8 @@ pub struct SceneStep {
     pub keys: Vec<Keyframe>,
     /// When it is over.
     pub ends: f64,
-    /// Parts that it could not go before.
-    pub waited_for: Vec<usize>,
+    /// Parts that must have moved before.
+    pub after: Vec<usize>,
     /// The step in words.
     pub words: String,
 }
@@ -310,7 +310,6 @@ impl<'a> SceneBuilder<'a> {
     fn steps(&self) -> Vec<SceneStep> {
         let size = self.assembly.longest_side() / self.assembly.scale;
         let words = Words::of(self.plan);
-        let waited = waited_for(self.plan);
         let mut clock = 0.0;
         let mut steps = Vec::new();
         for (i, step) in self.plan.steps.iter().enumerate() {
@@ -318,8 +317,8 @@ impl<'a> SceneBuilder<'a> {
             let path: Vec<_> = step.path.iter().map(|w| self.placement(self.present[place], w)).collect();
             let (keys, ends) = keys(&path, clock, size);
             clock = ends + PAUSE;
-            let waited_for = waited[i].iter().filter_map(|name| self.place(name)).collect();
-            steps.push(SceneStep { part: place, keys, ends, waited_for, words: words.step(i) });
+            let after = required(self.plan, i).filter_map(|name| self.place(name)).collect();
+            steps.push(SceneStep { part: place, keys, ends, after, words: words.step(i) });
         }
         steps
     }

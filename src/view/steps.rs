@@ -3,11 +3,11 @@
 use std::fmt::Write;
 
 use super::document::kind_of;
-use super::words::{Words, waited_for};
+use super::words::{Words, required};
 use crate::plan::PlanKind;
 use crate::plan::export::{BlockedDocument, PlanDocument};
 
-/// So many parts that a step waited for are named, and the others counted.
+/// So many parts that a step requires are named, and the others counted.
 const MOST_NAMES: usize = 6;
 
 /// The instructions. Steps in a row that do the same with equal parts are told as one. Parts are equal if they
@@ -15,7 +15,7 @@ const MOST_NAMES: usize = 6;
 /// differ in a number only.
 #[must_use]
 pub fn markdown(plan: &PlanDocument, classes: Option<&[usize]>) -> String {
-    let account = StepAccount { plan, classes, words: Words::of(plan), waited: waited_for(plan) };
+    let account = StepAccount { plan, classes, words: Words::of(plan) };
     let mut text = account.headline();
     for group in account.groups() {
         text.push_str(&account.group(&group));
@@ -33,7 +33,6 @@ struct StepAccount<'a> {
     plan: &'a PlanDocument,
     classes: Option<&'a [usize]>,
     words: Words<'a>,
-    waited: Vec<Vec<&'a str>>,
 }
 
 impl StepAccount<'_> {
@@ -75,7 +74,7 @@ impl StepAccount<'_> {
                 let first = group[0];
                 self.is_equal(&self.plan.steps[first].part, &step.part)
                     && self.words.done(first, "") == self.words.done(i, "")
-                    && !group.iter().any(|&g| self.waited[i].contains(&self.plan.steps[g].part.as_str()))
+                    && !group.iter().any(|g| step.requires.contains(g))
             };
             match groups.last_mut().filter(joins) {
                 Some(group) => group.push(i),
@@ -101,16 +100,16 @@ impl StepAccount<'_> {
         format!("**{}–{}.** {told}, one by one: {list}{after}.\n\n", first + 1, first + group.len())
     }
 
-    /// The parts that the steps of a group could not go before.
+    /// The parts that the steps of a group require to have moved before.
     fn after(&self, group: &[usize]) -> String {
         let mut names: Vec<&str> = Vec::new();
-        for name in group.iter().flat_map(|&i| &self.waited[i]) {
-            if !names.contains(name) {
+        for name in group.iter().flat_map(|&i| required(self.plan, i)) {
+            if !names.contains(&name) {
                 names.push(name);
             }
         }
         let verb = match (kind_of(self.plan), group.len()) {
-            (PlanKind::Disassembly, _) => "freed after",
+            (PlanKind::Disassembly, _) => "after",
             (PlanKind::Assembly, 1) => "goes in after",
             (PlanKind::Assembly, _) => "go in after",
         };
@@ -165,9 +164,9 @@ mod tests {
     use super::super::document::tests::{plan, step};
     use super::*;
 
-    fn lifted(part: &str, by: f64, after: &[&str]) -> crate::plan::export::StepDocument {
+    fn lifted(part: &str, by: f64, requires: &[usize]) -> crate::plan::export::StepDocument {
         let mut step = step(part, &[[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, by, 1.0, 0.0, 0.0, 0.0]]);
-        step.waited_for = after.iter().map(|&n| n.to_owned()).collect();
+        step.requires = requires.to_vec();
         step
     }
 
@@ -177,7 +176,7 @@ mod tests {
             lifted("bolt-1", 14.0, &[]),
             lifted("bolt-2", 14.0, &[]),
             lifted("bolt-3", 14.0, &[]),
-            lifted("cover", 3.0, &names[..3]),
+            lifted("cover", 3.0, &[0, 1, 2]),
         ];
         PlanDocument {
             parts: names.map(String::from).into(),
@@ -194,7 +193,7 @@ mod tests {
             text,
             "# Taking apart: 4 steps\n\n\
              **1–3.** Take 3 × bolt out along +Z (14 mm), one by one: bolt-1, bolt-2, bolt-3.\n\n\
-             **4.** Take cover out along +Z (3 mm), freed after bolt-1, bolt-2, bolt-3.\n\n\
+             **4.** Take cover out along +Z (3 mm), after bolt-1, bolt-2, bolt-3.\n\n\
              Stays: base.\n\n"
         );
     }
@@ -207,8 +206,8 @@ mod tests {
         assert_eq!(told(&bolted(), Some(&[0, 1, 0, 2, 3])), 4, "bolt-2 is another kind of bolt");
         assert_eq!(told(&bolted(), Some(&[0, 0, 0, 0, 3])), 2, "the cover goes another way");
         let mut plan = bolted();
-        plan.steps[1] = lifted("bolt-2", 14.0, &["bolt-1"]);
-        assert_eq!(told(&plan, None), 3, "bolt-2 waited for bolt-1");
+        plan.steps[1] = lifted("bolt-2", 14.0, &[0]);
+        assert_eq!(told(&plan, None), 3, "bolt-2 requires bolt-1 to be out");
         let named = |n: &str| n.replace("bolt-", "");
         plan = bolted();
         plan.parts.iter_mut().for_each(|p| *p = named(p));

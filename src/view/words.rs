@@ -196,15 +196,14 @@ fn ended(whither: &str, last: &str) -> String {
     format!("{}{whither} {last}", if is_turn(last) { "turn it " } else { "" })
 }
 
-/// For each step, the parts that it could not go before. Of a disassembly: those that had blocked the part, in
-/// whichever direction, and left before it, as the plan has it. Of an assembly likewise, the other way round:
-/// those that stand there already and would have been blocked.
-pub(super) fn waited_for(plan: &PlanDocument) -> Vec<Vec<&str>> {
-    plan.steps.iter().map(|s| s.waited_for.iter().map(String::as_str).collect()).collect()
+/// The parts that the steps move which a step requires, in the order of the steps.
+pub(super) fn required(plan: &PlanDocument, step: usize) -> impl Iterator<Item = &str> {
+    let requires = plan.steps.get(step).into_iter().flat_map(|s| &s.requires);
+    requires.filter_map(|&number| plan.steps.get(number)).map(|s| s.part.as_str())
 }
 
 /// A direction by the axis of the frame that it is along, else by its coordinates.
-fn direction(d: &Vector3<f64>) -> String {
+pub(crate) fn direction(d: &Vector3<f64>) -> String {
     let axis = d.iamax();
     if d[axis].abs() > NEARLY {
         return format!("{}{}", if d[axis] > 0.0 { '+' } else { '−' }, ["X", "Y", "Z"][axis]);

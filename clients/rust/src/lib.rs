@@ -46,5 +46,5 @@ pub use sbdp_ipc::plan::{StepView as Step, Waypoint};
 pub use sbdp_ipc::status::Status;
 pub use sbdp_ipc::summary::Stats;
 pub use stream::{Event, PlanStream, Progress, Stage};
-pub use summary::{Blocked, Overlap, PlanStatus, Summary, Warning};
+pub use summary::{Base, Blocked, Overlap, PlanStatus, Summary, Warning};
 pub use upload::Change;

@@ -32,6 +32,15 @@ impl PlanStatus {
     }
 }
 
+/// The part that stays, and that the rest is taken off.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Base {
+    /// The part.
+    pub part: u32,
+    /// Why it was chosen, in a few words.
+    pub reason: String,
+}
+
 /// Why a part that remains did not move.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Blocked {
@@ -86,6 +95,8 @@ pub struct Summary {
     pub targets: Option<Vec<u32>>,
     /// Parts that may not move.
     pub fixed: Vec<u32>,
+    /// The part that the rest is taken off, or built up on; none where parts are fixed, or where it had to leave.
+    pub base: Option<Base>,
     /// Parts that stand where they stood.
     pub remaining: Vec<u32>,
     /// Parts that began elsewhere than where their mesh was given, and where: the rigid motion of the mesh,
@@ -118,6 +129,7 @@ impl Summary {
             removed: view.removed().to_vec(),
             targets: view.targets().map(<[u32]>::to_vec),
             fixed: view.fixed().to_vec(),
+            base: view.base().map(|(part, reason)| Base { part, reason: reason.to_owned() }),
             remaining: view.remaining().to_vec(),
             poses: view.poses().iter().map(|p| (p.part, p.motion)).collect(),
             blocked: view.blocked().map(blocked).collect(),

@@ -85,6 +85,18 @@ impl Surface {
         length: f64,
         steepness: f64,
     ) -> f64 {
+        self.inside_along(p, direction, length, steepness).map_or(0.0, |[from, to]| to - from)
+    }
+
+    /// Where that stretch begins and ends.
+    #[must_use]
+    pub fn inside_along(
+        &self,
+        p: &Point3<f64>,
+        direction: &Vector3<f64>,
+        length: f64,
+        steepness: f64,
+    ) -> Option<[f64; 2]> {
         let mut crossings: Vec<(f64, bool)> = Vec::new();
         self.tree().any_along(p, direction, length, |t| {
             let against = -self.face_normal(t).dot(direction);
@@ -95,18 +107,26 @@ impl Surface {
         crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
         // What is left first was entered before.
         let mut entered = crossings.first().and_then(|(_, enters)| (!enters).then_some(0.0));
-        let mut longest: f64 = 0.0;
+        let mut longest: Option<[f64; 2]> = None;
+        let mut add = |from: f64, to: f64| {
+            if longest.is_none_or(|[a, b]| b - a < to - from) {
+                longest = Some([from, to]);
+            }
+        };
         for (at, enters) in crossings {
             match (enters, entered) {
                 (true, None) => entered = Some(at),
                 (false, Some(from)) => {
-                    longest = longest.max(at - from);
+                    add(from, at);
                     entered = None;
                 }
                 _ => {}
             }
         }
-        entered.map_or(longest, |from| longest.max(length - from))
+        if let Some(from) = entered {
+            add(from, length);
+        }
+        longest
     }
 }
 

@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 use crate::cache::{Digest, RecordKey, RecordKind, RequestCache, Storage, Validity};
 use crate::geometry::{Assembly, add_bounds, add_pose};
 use crate::plan::PlanStatus;
-use crate::search::{Outcome, PlanRequest, Planner};
+use crate::search::{Outcome, PlanRequest, Planner, Removal};
 use crate::termination::Termination;
 
 /// What a search answered. The service prepares the scene and the limits that it searches with.
-pub(crate) static PLAN: RecordKind = RecordKind::of::<PlanAnswer>(6, "plan", Storage::MemoryAndDisk, SOURCES);
+pub(crate) static PLAN: RecordKind = RecordKind::of::<PlanAnswer>(7, "plan", Storage::MemoryAndDisk, SOURCES);
 const SOURCES: Validity = Validity::Sources(env!("SBDP_SOURCES_SERVICE"));
 
 /// A question about an assembly; lists are ascending.
@@ -65,7 +65,8 @@ impl PlanAnswer {
         let Outcome { removals, remaining, blocked, .. } = &self.outcome;
         let is_part = |part: &usize| *part < count;
         let are_parts = |list: &[usize]| list.iter().all(is_part);
-        removals.iter().all(|r| is_part(&r.part) && are_parts(&r.waited_for))
+        let is_step = |(i, r): (usize, &Removal)| is_part(&r.part) && r.requires.iter().all(|&j| j < i);
+        removals.iter().enumerate().all(is_step)
             && blocked.iter().all(|b| is_part(&b.part) && are_parts(&b.by))
             && self.overlaps.iter().all(|(a, b, _)| is_part(a) && is_part(b))
             && are_parts(remaining)

@@ -28,7 +28,7 @@
  * @typedef {object} Step
  * @property {number} part
  * @property {string} words
- * @property {number[]} waited parts that it could not go before
+ * @property {number[]} after parts that must have moved before
  * @property {number[]} times ascending
  * @property {Float32Array} keys a placement per time
  * @property {number} ends

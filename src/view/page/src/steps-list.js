@@ -1,5 +1,5 @@
 /**
- * The list of steps, with what each waited for; a click goes there.
+ * The list of steps, with the parts that must have moved before each; a click goes there.
  * @import { Player } from "./player.js"
  * @import { Selection } from "./selection.js"
  */
@@ -11,9 +11,9 @@ import { byId, element } from "./dom.js";
  */
 export function stepsList(player, selection) {
   const { scene } = player;
-  const verb = scene.kind === "assembly" ? "goes in after" : "freed after";
+  const verb = scene.kind === "assembly" ? "goes in after" : "after";
   const items = scene.steps.map((step, i) => {
-    const names = step.waited.map((p) => scene.parts[p].name).join(", ");
+    const names = step.after.map((p) => scene.parts[p].name).join(", ");
     const after = names ? element("span", { class: "after" }, `${verb} ${names}`) : "";
     const go = () => {
       selection.pick(step.part);

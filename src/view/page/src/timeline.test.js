@@ -13,7 +13,7 @@ function scene(kind = "disassembly") {
     times,
     ends: times.at(-1),
     keys: new Float32Array(keys),
-    waited: [],
+    after: [],
     words: "",
   });
   return {
