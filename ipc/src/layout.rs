@@ -8,15 +8,15 @@ use std::path::{Path, PathBuf};
 use iceoryx2::prelude::{Config, FileName, Path as IoxPath, SemanticString};
 
 /// Request-response: plans, credits, status.
-pub const PLAN_SERVICE: &str = "sbdp/v4/plan";
+pub const PLAN_SERVICE: &str = "sbdp/v5/plan";
 /// Request-response: meshes in, handle out.
-pub const GEOMETRY_SERVICE: &str = "sbdp/v4/geometry";
+pub const GEOMETRY_SERVICE: &str = "sbdp/v5/geometry";
 /// Publish-subscribe: progress.
-pub const PROGRESS_SERVICE: &str = "sbdp/v4/progress";
+pub const PROGRESS_SERVICE: &str = "sbdp/v5/progress";
 /// Event: wakes the daemon.
-pub const WAKE_SERVER_SERVICE: &str = "sbdp/v4/wake/server";
+pub const WAKE_SERVER_SERVICE: &str = "sbdp/v5/wake/server";
 /// Event: wakes one client.
-pub const WAKE_CLIENT_SERVICE: &str = "sbdp/v4/wake/client";
+pub const WAKE_CLIENT_SERVICE: &str = "sbdp/v5/wake/client";
 
 /// Clients at once.
 pub const MAX_CLIENTS: usize = 40;

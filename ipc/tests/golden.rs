@@ -92,12 +92,12 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
     assert_eq!((ErrorCode::Busy as u32, ErrorCode::Cancelled as u32), (3, 12));
     assert_eq!(
         (PROTOCOL, layout::PLAN_SERVICE, layout::GEOMETRY_SERVICE),
-        (4, "sbdp/v4/plan", "sbdp/v4/geometry")
+        (5, "sbdp/v5/plan", "sbdp/v5/geometry")
     );
-    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v4/progress");
+    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v5/progress");
     assert_eq!(
         (layout::WAKE_SERVER_SERVICE, layout::WAKE_CLIENT_SERVICE),
-        ("sbdp/v4/wake/server", "sbdp/v4/wake/client")
+        ("sbdp/v5/wake/server", "sbdp/v5/wake/client")
     );
 }
 
@@ -232,14 +232,15 @@ fn a_summary() {
         &bytes,
         "\
          020000000f000000 0200000002000000 0100000001000000*2 0100000000000000 0100000001000000 \
-         0d00000001000000 0600000003000000 0900000001000000 0a00000001000000 0b00000002000000 \
+         1000000001000000 0000000000000000 0600000003000000 0900000001000000 0a00000001000000 \
+         0b00000002000000 0d00000003000000 \
          0100000000000000 0200000000000000 0300000000000000 0400000000000000 000000000000e03f*5 \
          0500000000000000 0600000000000000 0800000000000000 0700000000000000 0100000000000000 \
          0000000001000000 \
          0100000002000000 0000000001000000 000000000000d03f 0100000000000000 0100000003000000 \
          0200000000000000 ffffffff05000000 0100000000000000 0000000000000000 0100000000000000*2 \
          0000000000000000 0100000000000000 000000000000f03f 0000000000000040 000000000000e0bf \
-         000000000000f03f 0000000000000000*3 6162632b78777768 7970656d6d000000",
+         000000000000f03f 0000000000000000*3 6162632b78777768 7970656d6d626967",
     );
     assert_eq!(SummaryView::new(AlignedBytes::copy_of(&bytes).as_slice()).unwrap().reason(), Some("why"));
 }
