@@ -53,15 +53,17 @@ impl Verdict {
         self.depth > self.limit
     }
 
-    /// Joins the results past each standing part. If none exceeds its limit, the path is good, and penetrations are
-    /// dropped; of a refused path, those that are too shallow to help are dropped.
+    /// Joins the results past each standing part. If none exceeds its limit, the path is good, penetrations are dropped,
+    /// and the limit is the largest; of a refused path, penetrations that are too shallow to help are dropped, and the
+    /// limit is the smallest.
     #[must_use]
     pub fn of_all(past: Vec<Self>) -> Self {
         let depth = past.iter().map(|v| v.depth).fold(0.0, f64::max);
-        let limit = past.iter().map(|v| v.limit).fold(f64::INFINITY, f64::min);
+        let limits = past.iter().map(|v| v.limit);
         if !past.iter().any(Self::is_refused) {
-            return Self { depth, penetrations: Vec::new(), limit };
+            return Self { depth, penetrations: Vec::new(), limit: limits.fold(0.0, f64::max) };
         }
+        let limit = limits.fold(f64::INFINITY, f64::min);
         let helpful = |v: Self| v.penetrations.into_iter().filter(move |e| e.over > v.limit * HELPFUL);
         Self { depth, penetrations: past.into_iter().flat_map(helpful).collect(), limit }
     }
