@@ -67,8 +67,8 @@ test("steps go on and back, by buttons, keys and the list", () =>
     await page.keyboard.press("Home");
     assert.equal(await time(page), 0);
     assert.match(await page.locator("#now").textContent(), /^Step 1 of/);
-    const waited = await page.evaluate(() => window.sbdp.scene.steps.some((s) => s.waited.length > 0));
-    assert.equal((await page.locator("#steps .after").count()) > 0, waited);
+    const after = await page.evaluate(() => window.sbdp.scene.steps.some((s) => s.after.length > 0));
+    assert.equal((await page.locator("#steps .after").count()) > 0, after);
   }));
 
 test("it explodes and comes together again", () =>
