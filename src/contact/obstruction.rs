@@ -101,7 +101,8 @@ impl Rays<'_> {
             if !corridor.contains(&p) {
                 return Ok(0.0);
             }
-            Ok(self.target.longest_inside_along(&p, &self.along, travel, WALL_STEEPNESS))
+            let inside = self.target.inside_along(&p, &self.along, travel, WALL_STEEPNESS);
+            Ok(inside.map_or(0.0, |[from, to]| to - from))
         };
         let every = samples.iter().count().div_ceil(OBSTRUCTION_RAYS).max(1);
         samples

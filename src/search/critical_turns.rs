@@ -27,7 +27,8 @@ use crate::tolerances::{CRITICAL_ANGLE, ONE_AXIS_COSINE, SAME_CENTRE, TURN_POSE_
 use super::problem::Problem;
 use super::state::least_travel;
 
-/// Turns that are looked at in parallel, enough for 64 threads. The budget of casts is looked at after each batch.
+/// Turns that are looked at in parallel, enough for 64 threads. The budget of casts is looked at after each batch: at
+/// double, a batch exceeds it by twice as much; at half, more than 32 threads wait for each other.
 const TURNS_AT_ONCE: usize = 64;
 
 /// A part among others that may be turned in place.

@@ -7,7 +7,7 @@ use super::words::{Words, required};
 use crate::plan::PlanKind;
 use crate::plan::export::{BlockedDocument, PlanDocument};
 
-/// So many parts that a step requires are named, and the others counted.
+/// Names. A step names at most this many of the parts that must have moved before it, and counts the rest.
 const MOST_NAMES: usize = 6;
 
 /// The instructions. Steps in a row that do the same with equal parts are told as one. Parts are equal if they

@@ -75,20 +75,9 @@ impl Surface {
         first.at
     }
 
-    /// The longest stretch of the segment of `length` from `p` along the unit vector `direction` that lies
-    /// inside; faces met at less than a grazing angle (`steepness`: sine of the angle) are no ends of it.
-    #[must_use]
-    pub fn longest_inside_along(
-        &self,
-        p: &Point3<f64>,
-        direction: &Vector3<f64>,
-        length: f64,
-        steepness: f64,
-    ) -> f64 {
-        self.inside_along(p, direction, length, steepness).map_or(0.0, |[from, to]| to - from)
-    }
-
-    /// Where that stretch begins and ends.
+    /// The begin and end, as lengths from `p`, of the longest stretch inside that the segment of `length` from `p` along
+    /// the unit vector `direction` has; faces met at less than a grazing angle (`steepness`: sine of the angle) are no
+    /// ends of it. `None` if it has none.
     #[must_use]
     pub fn inside_along(
         &self,
