@@ -402,3 +402,10 @@ pub(crate) const CROSS_SECTIONS: usize = 32;
 /// Cells in which a disc is checked to be inside a part: some thousands are needed for a disc whose rim is a hundredth of
 /// the radius inside. At half, some discs near a rim are not proved; at double no effect.
 pub(crate) const DISC_CELLS: usize = 20_000;
+/// Groups of one state that are searched for a way out by pushes. Six pieces have at most 31; at half, puzzles of five
+/// pieces are given up; at double, what never comes apart takes up to twice as long.
+pub(crate) const GROUPS_SEARCHED: usize = 64;
+/// The same with all that the planner knows, at the end of a search: each takes as long as a part that does not leave.
+/// At half, a group that turns out is missed where some smaller ones can begin to move; at double, a search that ends
+/// `exhausted` takes up to twice as long.
+pub(crate) const GROUPS_TURNED: usize = 8;

@@ -6,7 +6,8 @@
 //!
 //! A path in reverse passes the same places, so an insertion past what stands is as verified as the removal
 //! was. The rest is verified here, with the same check and no penetration allowed: the way to the insertion
-//! past all that stands and waits, and the insertion past all that waits. Ways are found by random poses:
+//! past all that stands and waits, and the insertion past all that waits. Groups, and the parts that are put together to
+//! groups, wait nowhere: each begins where its insertion does. Ways are found by random poses:
 //! the same for the same question, but a way that is not found is no proof that there is none. No floor is
 //! in the way of anything.
 
@@ -44,12 +45,14 @@ pub enum Waiting {
     Beside(Vec<(usize, Pose)>),
 }
 
-/// One part put in.
+/// A part put in, or several as one rigid body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Insertion {
-    /// The part.
-    pub part: usize,
-    /// Poses of its shape, the last one assembled; verified.
+    /// The parts, ascending.
+    pub parts: Vec<usize>,
+    /// The later insertion (its place in the order) that puts the group in to which they belong.
+    pub of: Option<usize>,
+    /// Poses of the part's shape, or of the body of all parts; the last one assembled; verified.
     pub path: Vec<Pose>,
     /// Largest depth beyond what is allowed that verification found.
     pub depth: f64,
@@ -145,14 +148,25 @@ impl<'a> Assembling<'a> {
     /// Where each part that will move begins, in the order in which they move.
     #[must_use]
     pub fn starts(&self) -> Vec<(usize, Pose)> {
-        let begin = |r: &Removal| (r.part, self.start_of(r));
-        self.removals.iter().rev().map(begin).collect()
+        let mut starts: Vec<(usize, Pose)> = Vec::new();
+        for &part in self.removals.iter().rev().flat_map(|r| &r.parts) {
+            if starts.iter().all(|(known, _)| *known != part) {
+                starts.push((part, self.start_of(part)));
+            }
+        }
+        starts
     }
 
-    fn start_of(&self, removal: &Removal) -> Pose {
-        let given = self.waiting.iter().flatten().find(|(part, _)| *part == removal.part);
-        let end = removal.path.last().copied().unwrap_or_default();
-        given.map_or(end, |(_, pose)| *pose)
+    /// Where a part waits, or else where its insertion begins: in a group, with the group where its own does.
+    fn start_of(&self, part: usize) -> Pose {
+        let given = self.waiting.iter().flatten().find(|(waits, _)| *waits == part);
+        // The group that a part is in leaves before it is taken apart.
+        let moves = self.removals.iter().filter(|r| r.parts.contains(&part));
+        let end = || {
+            let moved = moves.fold(Pose::identity(), |moved, removal| moved * removal.motion());
+            moved * self.room.scene.bodies[part].planning_from_shape
+        };
+        given.map_or_else(end, |(_, pose)| *pose)
     }
 
     /// Reports the insertions in order, as they are found.
@@ -173,39 +187,47 @@ impl<'a> Assembling<'a> {
     /// The reverse of the removal that was at some place in the order.
     fn insertion(&self, place: usize) -> Result<Insertion, Unfinished> {
         let removal = &self.removals[place];
-        let part = removal.part;
         let in_order: Vec<Pose> = removal.path.iter().rev().copied().collect();
         let (mut path, mut depth) = (in_order, removal.depth);
-        if self.waiting.is_some() {
-            let waits = self.removals[..place].iter().map(|r| self.room.waiting(r.part));
-            let mut waiting: Vec<usize> = waits.collect();
+        if self.waiting.is_some()
+            && let Some(part) = removal.alone()
+        {
+            let waits = self.removals[..place].iter().filter_map(Removal::alone);
+            let mut waiting: Vec<usize> = waits.map(|part| self.room.waiting(part)).collect();
             waiting.sort_unstable();
             let past = self.room.check(&waiting, part, &path, self.termination)?;
             if !past.penetrations.is_empty() {
                 return Err(self.hindered(part, Hindrance::InsertionMeets, &past));
             }
-            let (way, to_there) = self.transfer(place, waiting)?;
+            let (way, to_there) = self.transfer(place, part, waiting)?;
             depth = depth.max(past.depth).max(to_there);
             path.splice(..1, way);
         }
-        let Order { requires, wave } = self.orders[self.removals.len() - 1 - place].clone();
-        Ok(Insertion { part, path, depth, requires, wave })
+        let number = |place: usize| self.removals.len() - 1 - place;
+        let Order { requires, wave } = self.orders[number(place)].clone();
+        let (parts, of) = (removal.parts.clone(), removal.of.map(number));
+        Ok(Insertion { parts, of, path, depth, requires, wave })
     }
 
     /// The way from where a part waits to where its insertion begins, and how deep it gets into anything.
-    fn transfer(&self, place: usize, waiting: Vec<usize>) -> Result<(Vec<Pose>, f64), Unfinished> {
+    fn transfer(
+        &self,
+        place: usize,
+        part: usize,
+        waiting: Vec<usize>,
+    ) -> Result<(Vec<Pose>, f64), Unfinished> {
         let removal = &self.removals[place];
-        let part = removal.part;
         let mut among = self.standing.clone();
-        among.extend(self.removals[place + 1..].iter().map(|r| r.part));
+        let in_place = self.removals[place + 1..].iter().filter(|r| r.of.is_none());
+        among.extend(in_place.flat_map(|r| &r.parts));
         among.sort_unstable();
         among.extend(waiting);
-        let ends = [self.start_of(removal), removal.path.last().copied().unwrap_or_default()];
+        let ends = [self.start_of(part), removal.path.last().copied().unwrap_or_default()];
         let at_start = self.room.check(&among, part, &ends[..1], self.termination)?;
         if !at_start.penetrations.is_empty() {
             return Err(self.hindered(part, Hindrance::WaitsIn, &at_start));
         }
-        let away = self.away(removal, &among);
+        let away = self.away(removal, part, &among);
         // Away from all that it touches first, as far as that is free: the way there is easier to find.
         let [start, goal] = ends;
         let retreat =
@@ -222,7 +244,7 @@ impl<'a> Assembling<'a> {
     }
 
     /// Where a removal leads at its end, a unit vector: if it leads nowhere, away from what stands.
-    fn away(&self, removal: &Removal, among: &[usize]) -> Vector3<f64> {
+    fn away(&self, removal: &Removal, part: usize, among: &[usize]) -> Vector3<f64> {
         if let [.., from, to] = &removal.path[..]
             && let Some(direction) =
                 (to.translation.vector - from.translation.vector).try_normalize(f64::MIN_POSITIVE)
@@ -233,7 +255,7 @@ impl<'a> Assembling<'a> {
         let standing = among.iter().copied().filter(stands).collect();
         let around = StandingParts::new(&self.room.scene, standing);
         let pose = removal.path.last().copied().unwrap_or_default();
-        let out = exit_direction(&self.room.scene, &around, removal.part, &pose, None);
+        let out = exit_direction(&self.room.scene, &around, part, &pose, None);
         // It tells where the others lie.
         out.map_or_else(Vector3::z, |direction| -direction)
     }
@@ -249,13 +271,20 @@ impl<'a> Assembling<'a> {
 /// Where parts wait: those given where they are given, the others laid out beside these and all that any
 /// insertion passes.
 fn waiting_beside(scene: &Scene, removals: &[Removal], given: &[(usize, Pose)]) -> Vec<(usize, Pose)> {
-    let moves = |part: &usize| removals.iter().any(|r| r.part == *part);
+    let moves = |part: &usize| removals.iter().any(|r| r.alone() == Some(*part));
     let mut waiting: Vec<_> = given.iter().filter(|(part, _)| moves(part)).copied().collect();
-    let others: Vec<usize> = removals.iter().rev().map(|r| r.part).collect();
+    let others: Vec<usize> = removals.iter().rev().filter_map(Removal::alone).collect();
     let others: Vec<usize> = others.into_iter().filter(|p| given.iter().all(|(g, _)| g != p)).collect();
     let placed = waiting.iter().map(|(part, pose)| scene.bodies[*part].shape.bounds().transformed(pose));
     let assembled = scene.bodies.iter().map(|body| body.bounds);
-    let inserted = removals.iter().map(|r| scene.swept_bounds(r.part, &r.path));
+    let inserted = removals.iter().flat_map(|r| {
+        let bounds = |&part: &usize| {
+            let body_from_part = r.path[0].inverse() * scene.bodies[part].planning_from_shape;
+            let path: Vec<Pose> = r.path.iter().map(|pose| pose * body_from_part).collect();
+            scene.swept_bounds(part, &path)
+        };
+        r.parts.iter().map(bounds).collect::<Vec<Bounds>>()
+    });
     let occupied = placed.chain(assembled).chain(inserted).fold(Bounds::EMPTY, |all, b| all.union(&b));
     waiting.extend(staging::laid_out(scene, &others, &occupied));
     waiting

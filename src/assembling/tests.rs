@@ -8,7 +8,7 @@ use crate::geometry::SourceMesh;
 fn out(scene: &Scene, part: usize, shift: [f64; 3]) -> Removal {
     let start = scene.bodies[part].planning_from_shape;
     let end = Pose::translation(shift[0], shift[1], shift[2]) * start;
-    Removal { part, path: vec![start, end], depth: 0.0, requires: Vec::new(), wave: 0 }
+    Removal { parts: vec![part], of: None, path: vec![start, end], depth: 0.0, requires: Vec::new(), wave: 0 }
 }
 
 fn run(
@@ -18,14 +18,14 @@ fn run(
 ) -> (Scene, Verifier, Vec<Insertion>, Result<(), Unfinished>) {
     let (scene, verifier) = scene(meshes);
     let removals = removals(&scene);
-    let moves = |part: &usize| removals.iter().any(|r| r.part == *part);
+    let moves = |part: &usize| removals.iter().any(|r| r.parts == [*part]);
     let remain: Vec<usize> = (0..scene.bodies.len()).filter(|part| !moves(part)).collect();
     let termination = Termination::default();
     let assembling = Assembling::new(&scene, &verifier, &removals, &remain, &waiting(&scene), &termination);
     let mut insertions = Vec::new();
     let ended = assembling.run(|insertion| insertions.push(insertion));
     for (insertion, (part, start)) in insertions.iter().zip(assembling.starts()) {
-        assert_eq!((insertion.part, insertion.path[0]), (part, start));
+        assert_eq!((insertion.parts[0], insertion.path[0]), (part, start));
     }
     (scene, verifier, insertions, ended)
 }
@@ -48,17 +48,17 @@ fn assert_apart(scene: &Scene, verifier: &Verifier, insertions: &[Insertion]) {
     for (done, insertion) in insertions.iter().enumerate() {
         let mut bodies = scene.bodies.to_vec();
         for later in &insertions[done + 1..] {
-            let body = &mut bodies[later.part];
+            let body = &mut bodies[later.parts[0]];
             body.planning_from_shape = later.path[0];
             body.bounds = body.shape.bounds().transformed(&later.path[0]);
         }
         let there = Scene { bodies: std::sync::Arc::new(bodies), ..scene.clone() };
-        let others: Vec<usize> = (0..scene.bodies.len()).filter(|&p| p != insertion.part).collect();
+        let others: Vec<usize> = (0..scene.bodies.len()).filter(|&p| p != insertion.parts[0]).collect();
         let verdict = verifier
-            .check(&there, &scene.allowed, &others, insertion.part, &insertion.path, &Termination::default())
+            .check(&there, &scene.allowed, &others, insertion.parts[0], &insertion.path, &Termination::default())
             .unwrap();
-        assert!(verdict.penetrations.is_empty(), "part {}: {}", insertion.part, verdict.depth);
-        assert_eq!(insertion.path.last(), Some(&scene.bodies[insertion.part].planning_from_shape));
+        assert!(verdict.penetrations.is_empty(), "part {}: {}", insertion.parts[0], verdict.depth);
+        assert_eq!(insertion.path.last(), Some(&scene.bodies[insertion.parts[0]].planning_from_shape));
     }
 }
 
@@ -66,7 +66,7 @@ fn assert_apart(scene: &Scene, verifier: &Verifier, insertions: &[Insertion]) {
 fn the_order_is_reversed_and_parts_come_from_where_they_wait() {
     let (scene, verifier, insertions, ended) = run(stack(), unstacked, |_| Waiting::Beside(Vec::new()));
     assert_eq!(ended, Ok(()));
-    assert_eq!(insertions.iter().map(|i| i.part).collect::<Vec<_>>(), [1, 2, 3]);
+    assert_eq!(insertions.iter().map(|i| i.parts[0]).collect::<Vec<_>>(), [1, 2, 3]);
     let order: Vec<_> = insertions.iter().map(|i| (i.requires.clone(), i.wave)).collect();
     assert_eq!(order, [(vec![], 0), (vec![0], 1), (vec![0, 1], 2)]);
     for insertion in &insertions {
@@ -82,7 +82,7 @@ fn without_staging_paths_are_the_removals_reversed() {
     assert_eq!(ended, Ok(()));
     for (insertion, removal) in insertions.iter().zip(unstacked(&scene).iter().rev()) {
         let reversed: Vec<Pose> = removal.path.iter().rev().copied().collect();
-        assert_eq!((insertion.part, &insertion.path), (removal.part, &reversed));
+        assert_eq!((&insertion.parts, &insertion.path), (&removal.parts, &reversed));
     }
 }
 

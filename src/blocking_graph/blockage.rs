@@ -133,6 +133,11 @@ impl Blockage {
         Evaluation { colliding_parts: self.parts.len(), open_actions: self.open }
     }
 
+    /// The parts that each alone block an action, by static analysis.
+    pub fn single_blockers(&self, action: usize) -> &BTreeSet<usize> {
+        &self.single[action]
+    }
+
     /// The parts known to block an action.
     #[must_use]
     pub fn blockers(&self, action: usize) -> BTreeSet<usize> {

@@ -92,12 +92,20 @@ impl Account {
                 self.name(*part),
                 self.names(by)
             ),
-            TraceEvent::Removed { part, requires } => {
+            TraceEvent::GroupTried { parts, leaves } => {
+                let end = if *leaves { "they leave" } else { "no way out" };
+                format!("    {} together, as one body: {end}", self.names(parts))
+            }
+            TraceEvent::GroupOpened { parts } => {
+                format!("=== the group of {} is taken apart", self.names(parts))
+            }
+            TraceEvent::Removed { parts, requires } => {
                 let after = match requires.as_slice() {
                     [] => String::new(),
                     parts => format!(", which requires {} to be out", self.names(parts)),
                 };
-                format!("=== {} is out{after}; its edges are deleted from all graphs", self.name(*part))
+                let (are, their) = if parts.len() > 1 { ("are", "their") } else { ("is", "its") };
+                format!("=== {} {are} out{after}; {their} edges are deleted from all graphs", self.names(parts))
             }
             TraceEvent::End { status, reason, remaining, simulations, sweeps } => {
                 let text = reason.as_ref().map(|r| r.text(remaining, |part| self.name(part)));

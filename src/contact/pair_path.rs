@@ -33,6 +33,40 @@ impl<'a> PairPath<'a> {
     /// The part of a path (poses of the moving shape in the planning frame) that passes the standing part.
     #[must_use]
     pub fn new(scene: &'a Scene, allowed: &AllowedPenetrations, parts: [usize; 2], path: &[Pose]) -> Self {
+        Self::about(scene, allowed, parts, path, scene.centre_in_shape(parts[0]))
+    }
+
+    /// The pieces of a path of a body past a standing part: one for each part that the body stands for, with the pose of
+    /// that part's shape in the body's frame.
+    pub(crate) fn of_members(
+        scene: &'a Scene,
+        allowed: &'a AllowedPenetrations,
+        [body, other]: [usize; 2],
+        path: &'a [Pose],
+    ) -> impl Iterator<Item = (Self, Pose)> {
+        let assembled = scene.bodies[body].planning_from_shape;
+        let centre = scene.centre_in_shape(body);
+        let is_part = scene.bodies[body].members.is_empty();
+        let members: Vec<usize> = scene.members(&body).to_vec();
+        members.into_iter().map(move |part| {
+            if is_part {
+                return (Self::new(scene, allowed, [part, other], path), Pose::identity());
+            }
+            let body_from_part = assembled.inverse() * scene.bodies[part].planning_from_shape;
+            let path: Vec<Pose> = path.iter().map(|pose| pose * body_from_part).collect();
+            let centre = body_from_part.inverse_transform_point(&centre);
+            (Self::about(scene, allowed, [part, other], &path, centre), body_from_part)
+        })
+    }
+
+    /// The same where a point of the moving shape, in its frame, moves on a line between two poses.
+    fn about(
+        scene: &'a Scene,
+        allowed: &AllowedPenetrations,
+        parts: [usize; 2],
+        path: &[Pose],
+        centre: Point3<f64>,
+    ) -> Self {
         let [part, other] = parts;
         let shapes = shapes(scene, parts);
         let path = way_past(shapes, &scene.bodies[other].planning_from_shape, path);
@@ -41,8 +75,7 @@ impl<'a> PairPath<'a> {
             parts,
             shapes,
             // On a path that does not turn, any point moves on a line.
-            centre: if turns { scene.centre_in_shape(part) } else { shapes[0].bounds().centre() }
-                .map(rounded),
+            centre: if turns { centre } else { shapes[0].bounds().centre() }.map(rounded),
             allowed: allowed.of(part, other),
             longest_side: scene.longest_side,
             path,

@@ -28,6 +28,7 @@ mod hull;
 mod hull_depth;
 mod incidence;
 mod inner_points;
+mod joined;
 mod leading;
 mod linking_number;
 mod load;

@@ -62,6 +62,15 @@ pub struct PlanStep {
     pub direction: Option<[f64; 3]>,
 }
 
+/// Parts that could leave together where none leaves alone.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FreeGroup {
+    /// The parts, ascending.
+    pub parts: Vec<usize>,
+    /// The unit vector along which they begin.
+    pub direction: [f64; 3],
+}
+
 /// The part that stays, and that the rest is taken off.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Base {

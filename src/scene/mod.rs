@@ -25,6 +25,7 @@ use nalgebra::Point3;
 
 use crate::geometry::{Assembly, Bounds, Closest, Part, Pose, SampleTree, Shape};
 use crate::sdf::Field;
+use crate::termination::{Interrupt, Termination};
 
 pub use broad_phase::BroadPhase;
 pub use congruent_pairs::{CongruentPair, grouped, rounded, rounded_pose};
@@ -65,6 +66,8 @@ pub struct Body {
     pub bounds: Bounds,
     /// Further points to look for contact at, where verification found some missing.
     pub extra_samples: SampleTree,
+    /// The bodies that it stands for where these move as one, ascending; empty for a part.
+    pub members: Vec<usize>,
 }
 
 impl Body {
@@ -150,6 +153,7 @@ impl Scene {
             planning_from_shape: part.planning_from_shape,
             bounds: part.bounds,
             extra_samples: SampleTree::default(),
+            members: Vec::new(),
         };
         Self::of(assembly.parts.iter().map(body).collect(), resolution(assembly))
     }
@@ -167,6 +171,44 @@ impl Scene {
             hulls: Arc::default(),
             whole: Arc::default(),
         }
+    }
+
+    /// The scene with one more body, the last: some parts as one rigid body. The parts are still there. The body may
+    /// overlap another part as deep as any of its parts may.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(crate) fn with_joined(&self, parts: &[usize], termination: &Termination) -> Result<Self, Interrupt> {
+        let placed = parts.iter().map(|&part| {
+            let Body { shape, planning_from_shape, .. } = &self.bodies[part];
+            (&**shape, planning_from_shape)
+        });
+        let (shape, planning_from_shape) = Shape::joined(&placed.collect::<Vec<_>>(), termination)?;
+        let mut bodies = self.bodies.to_vec();
+        let joined = bodies.len();
+        bodies.push(Body {
+            field: Arc::new(Field::of(&shape.surface)),
+            shape: Arc::new(shape),
+            planning_from_shape,
+            bounds: parts.iter().fold(Bounds::EMPTY, |all, &part| all.union(&self.bodies[part].bounds)),
+            extra_samples: SampleTree::default(),
+            members: parts.to_vec(),
+        });
+        let mut scene = Self::of(bodies, self.longest_side);
+        (scene.hulls, scene.allowed) = (Arc::clone(&self.hulls), self.allowed.clone());
+        for other in 0..joined {
+            let most = parts.iter().map(|&part| self.allowed.of(part, other)).fold(0.0, f64::max);
+            if most > 0.0 {
+                scene.allowed.allow(joined, other, most);
+            }
+        }
+        Ok(scene)
+    }
+
+    /// The parts that a body stands for.
+    pub(crate) fn members<'s>(&'s self, body: &'s usize) -> &'s [usize] {
+        let members = &self.bodies[*body].members;
+        if members.is_empty() { std::slice::from_ref(body) } else { members }
     }
 
     /// The middle of a part's box at the assembled pose, in its shape's frame: the point that moves

@@ -7,17 +7,25 @@ use super::trace::TraceEvent;
 /// Passes on all events but removals.
 pub(super) struct DeferredRemovals<'o> {
     observer: &'o mut dyn Observer,
+    /// Removals and simulations of earlier searches for the same request.
+    before: (usize, u64),
 }
 
 impl<'o> DeferredRemovals<'o> {
     pub(super) fn new(observer: &'o mut dyn Observer) -> Self {
-        Self { observer }
+        Self::after(observer, 0, 0)
+    }
+
+    /// That of a search after others that made some removals and simulations.
+    pub(super) fn after(observer: &'o mut dyn Observer, removed: usize, simulations: u64) -> Self {
+        Self { observer, before: (removed, simulations) }
     }
 }
 
 impl Observer for DeferredRemovals<'_> {
     fn progress(&mut self, removed: usize, simulations: u64) {
-        self.observer.progress(removed, simulations);
+        let (earlier, spent) = self.before;
+        self.observer.progress(earlier + removed, spent + simulations);
     }
 
     fn removal(&mut self, _removal: &Removal) {}

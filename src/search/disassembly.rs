@@ -20,9 +20,11 @@ use crate::termination::Interrupt;
 use crate::tolerances::HULL_MARGIN;
 
 use super::blocked_actions::{few_of_each_part, of_inseparable};
+use super::contraction::Contraction;
 use super::inseparable::InseparablePairs;
 use super::outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal};
 use super::problem::{Checked, Observer, Problem, VerifiedPath};
+use super::requirements::Leaving;
 use super::trace::TraceEvent;
 
 /// The reason given for a motion that took too long.
@@ -369,23 +371,56 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     ) -> Result<T, Stop> {
         let started = Instant::now();
         let checked = check(&self.problem);
+        self.count_verification(started);
+        Ok(checked?)
+    }
+
+    fn count_verification(&mut self, started: Instant) {
         let took = started.elapsed();
         self.counters.verification += took;
         self.problem.termination.leave_out(took);
-        Ok(checked?)
     }
 
     /// Takes a part out along a path past all that stands.
     pub(super) fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) -> Result<(), Stop> {
-        let removal = self.removal(part, path, depth)?;
-        self.hull_changes += usize::from(self.everything.remove(&self.problem.scene, part));
+        let (started, around) = (Instant::now(), self.surroundings(part));
+        let leaving = Leaving { problem: &self.problem, body: part, around: &around };
+        let removal = leaving.removal(&self.removals, path, depth);
+        self.count_verification(started);
+        self.note(removal?);
+        Ok(())
+    }
+
+    /// Takes a group out along a verified path of its body.
+    pub(super) fn remove_group(
+        &mut self,
+        group: &Contraction<'_>,
+        VerifiedPath { path, depth }: VerifiedPath,
+    ) -> Result<(), Stop> {
+        let started = Instant::now();
+        let leaving = Leaving { problem: &group.problem, body: group.body, around: &group.around };
+        let removal = leaving.removal(&self.removals, path, depth);
+        self.count_verification(started);
+        self.note(removal?);
+        Ok(())
+    }
+
+    fn note(&mut self, removal: Removal) {
+        for &part in &removal.parts {
+            self.hull_changes += usize::from(self.everything.remove(&self.problem.scene, part));
+        }
         self.around.clear();
         self.observer.removal(&removal);
-        let requires = || removal.requires.iter().map(|&i| self.removals[i].part).collect();
-        let requires = if self.observer.traces() { requires() } else { Vec::new() };
-        self.trace(|| TraceEvent::Removed { part, requires });
+        self.trace_removal(&removal);
         self.removals.push(removal);
-        Ok(())
+    }
+
+    fn trace_removal(&mut self, removal: &Removal) {
+        if self.observer.traces() {
+            let required = removal.requires.iter().flat_map(|&i| &self.removals[i].parts);
+            let (parts, requires) = (removal.parts.clone(), required.copied().collect());
+            self.observer.traced(TraceEvent::Removed { parts, requires });
+        }
     }
 
     /// A part that may move and whose hull is apart from all others': it needs no motion. Without sweeps it is
@@ -478,8 +513,10 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         Outcome {
             status,
             reason,
+            unfinished: if status == PlanStatus::Complete { Vec::new() } else { remaining.clone() },
             remaining,
             blocked: if status == PlanStatus::Complete { Vec::new() } else { few_of_each_part(blocked) },
+            free_together: Vec::new(),
             removals: self.removals,
             base: None,
             counters: self.counters,
@@ -493,6 +530,9 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         remaining: &[usize],
         known: &mut InseparablePairs,
     ) -> Result<Option<Inseparable>, Interrupt> {
+        if self.problem.is_group {
+            return Ok(None);
+        }
         let wanted = self.problem.wanted(remaining);
         for find in InseparablePairs::PROOFS {
             if known.first(remaining, &wanted).is_none() {

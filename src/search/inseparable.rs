@@ -84,12 +84,16 @@ impl InseparablePairs {
 
     /// One of the parts that stand (ascending) from which a part never comes away.
     pub(super) fn holder(&self, part: usize, standing: &[usize]) -> Option<usize> {
-        let other = |pair: &Inseparable| match pair.parts {
+        self.held_with(part).find(|p| standing.binary_search(p).is_ok())
+    }
+
+    /// The parts from which a part never comes away.
+    pub(super) fn held_with(&self, part: usize) -> impl Iterator<Item = usize> + '_ {
+        self.pairs.iter().filter_map(move |pair| match pair.parts {
             [a, b] if a == part => Some(b),
             [a, b] if b == part => Some(a),
             _ => None,
-        };
-        self.pairs.iter().filter_map(other).find(|p| standing.binary_search(p).is_ok())
+        })
     }
 
     /// The first pair among the parts that stand (ascending) of which one is wanted (ascending).

@@ -15,12 +15,14 @@ mod base;
 mod blocked_actions;
 mod cell_decomposition;
 mod cell_memory;
+mod contraction;
 mod critical_turns;
 mod deepest_point;
 mod deferred_removals;
 mod directions;
 mod disassembly;
 mod enclosed;
+mod groups;
 mod initial_analysis;
 mod inseparable;
 mod invalidation;
@@ -45,6 +47,7 @@ mod state;
 mod states;
 mod stopped_actions;
 mod strategy;
+mod subassembly;
 mod sweep_memory;
 #[cfg(test)]
 mod tests;
@@ -59,7 +62,7 @@ pub use crate::termination::{Interrupt, Termination};
 pub use directions::axes_of;
 pub use initial_analysis::initial_graphs;
 pub use outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal, SeparationProof};
-pub use problem::{Checked, Observer, Problem, VerifiedPath};
+pub use problem::{Checked, Effort, Observer, Problem, VerifiedPath};
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging};
 pub use state::least_travel;
 pub use trace::{BlockedBy, PlanningPhase, TraceEvent};
@@ -78,7 +81,18 @@ pub fn search(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observe
     outcome
 }
 
+/// A search, with the groups that left taken apart.
 fn run(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
+    let mut outcome = run_once(planner, problem.clone(), observer);
+    for group in 0..outcome.removals.len() {
+        if outcome.removals[group].parts.len() > 1 {
+            subassembly::take_apart(planner, &problem, &mut outcome, group, observer);
+        }
+    }
+    outcome
+}
+
+fn run_once(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
     match planner {
         Planner::SbdpStar => sbdp::sbdp(problem, observer, true),
         Planner::Sbdp => sbdp::sbdp(problem, observer, false),

@@ -63,7 +63,12 @@ impl Order {
         find: FindPairs,
     ) -> Result<bool, Interrupt> {
         let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());
-        Ok(strategy.is_extended() && find(&mut self.inseparable, problem, standing)?)
+        Ok(strategy.is_extended() && !problem.is_group && find(&mut self.inseparable, problem, standing)?)
+    }
+
+    /// The pairs that were found.
+    pub(super) fn inseparable(&self) -> &InseparablePairs {
+        &self.inseparable
     }
 
     /// The pairs that were found.

@@ -5,25 +5,47 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Pose;
-use crate::plan::{Base, PlanStatus};
+use crate::plan::{Base, FreeGroup, PlanStatus};
 
 /// The most parts that a reason names as those that remain.
 const NAMED_PARTS: usize = 4;
 
-/// One part taken out.
+/// A part taken out, or several that move as one rigid body.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Removal {
-    /// The part.
-    pub part: usize,
-    /// Poses of its shape, the assembled one first; thinned and verified.
+    /// The parts, ascending.
+    pub parts: Vec<usize>,
+    /// The removal (its place in the order) that took the group out to which they belong; `None` where they leave the
+    /// assembly. A group is taken apart as it stood there.
+    pub of: Option<usize>,
+    /// Poses of the part's shape, or of the body of all parts; the assembled one first; thinned and verified.
     pub path: Vec<Pose>,
     /// Largest depth beyond the pairs' allowed penetrations that verification found, past all parts but those that it
     /// requires to be out.
     pub depth: f64,
-    /// The removals (their places in the order, ascending) whose parts this path would enter, assembled.
+    /// The removals (their places in the order, ascending) whose parts this path would enter, assembled; and the one that
+    /// took their group out.
     pub requires: Vec<usize>,
     /// The earliest round, from 0, in which it can be done, if all removals are done as soon as they can be.
     pub wave: usize,
+}
+
+impl Removal {
+    /// The part, if it leaves the assembly alone.
+    #[must_use]
+    pub fn alone(&self) -> Option<usize> {
+        match self.parts[..] {
+            [part] if self.of.is_none() => Some(part),
+            _ => None,
+        }
+    }
+
+    /// The rigid motion from the assembled pose to the end of the path.
+    #[must_use]
+    pub fn motion(&self) -> Pose {
+        let ends = self.path.first().zip(self.path.last());
+        ends.map_or_else(Pose::identity, |(assembled, end)| end * assembled.inverse())
+    }
 }
 
 /// An action of a part that remains, and the parts that block it.
@@ -138,6 +160,20 @@ pub struct Counters {
     pub verification: Duration,
 }
 
+impl Counters {
+    /// Adds those of another search for the same request.
+    pub(super) fn add(&mut self, other: &Self) {
+        self.simulations += other.simulations;
+        self.recalled += other.recalled;
+        self.sweeps += other.sweeps;
+        self.states += other.states;
+        self.graphs_recalled += other.graphs_recalled;
+        self.static_analysis += other.static_analysis;
+        self.simulation += other.simulation;
+        self.verification += other.verification;
+    }
+}
+
 /// How a search ended.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
@@ -149,12 +185,30 @@ pub struct Outcome {
     pub removals: Vec<Removal>,
     /// The part that the rest was taken off, if it was chosen.
     pub base: Option<Base>,
-    /// Parts that remain, ascending.
+    /// Parts that remain in the assembly, ascending.
     pub remaining: Vec<usize>,
+    /// The parts that stand together where the search ended before it was done: those that remain, or those of a group.
+    pub unfinished: Vec<usize>,
     /// The blocked actions of the parts that should have come out: a few of each part.
     pub blocked: Vec<BlockedAction>,
+    /// Where nothing leaves any more: groups that could begin to move.
+    pub free_together: Vec<FreeGroup>,
     /// Counts and times.
     pub counters: Counters,
+}
+
+impl Outcome {
+    /// The groups that left and were not taken apart, or not to the last part.
+    #[must_use]
+    pub fn kept_together(&self) -> Vec<Vec<usize>> {
+        let rest = |(group, removal): (usize, &Removal)| {
+            let inner = self.removals.iter().filter(|r| r.of == Some(group));
+            let gone: Vec<usize> = inner.flat_map(|r| r.parts.iter().copied()).collect();
+            removal.parts.iter().copied().filter(|part| !gone.contains(part)).collect::<Vec<usize>>()
+        };
+        let groups = self.removals.iter().enumerate().map(rest);
+        groups.filter(|rest| rest.len() > 1).collect()
+    }
 }
 
 #[cfg(test)]

@@ -75,7 +75,7 @@ fn account(events: &[TraceEvent]) -> Vec<Vec<String>> {
                 let to = leads_to.map(|s| format!(" to s{s}")).unwrap_or_default();
                 format!("s{state} {} {action} {end} {}{to}", name(*part), with.join("+"))
             }
-            TraceEvent::Removed { part, .. } => format!("{} is out", name(*part)),
+            TraceEvent::Removed { parts, .. } => format!("{} is out", name(parts[0])),
             _ => continue,
         };
         out.last_mut().unwrap().push(line);
@@ -147,7 +147,7 @@ fn the_worked_example_has_the_papers_numbers() {
 fn without_graphs_it_takes_more_simulations() {
     let (guided, _) = traced(Planner::SbdpStar, &SlidingEngine);
     let (plain, events) = traced(Planner::Sbdp, &SlidingEngine);
-    assert_eq!((plain.status, plain.removals[0].part), (guided.status, PIN));
+    assert_eq!((plain.status, plain.removals[0].parts[0]), (guided.status, PIN));
     let counts = (plain.counters.simulations, guided.counters.simulations);
     assert!(counts.0 > counts.1, "{counts:?}");
     for event in &events {
@@ -189,9 +189,9 @@ fn after_a_turned_part_translation_goes_on_without_analysis_if_it_left_an_action
         let problem =
             Problem { fixed: vec![0], static_analysis: StaticAnalysis::Paper, ..problem(scene, &verifier) };
         let outcome = search(Planner::SbdpStar, problem, &mut recorder);
-        assert_eq!(outcome.removals.iter().map(|r| r.part).collect::<Vec<_>>(), order);
+        assert_eq!(outcome.removals.iter().map(|r| r.parts[0]).collect::<Vec<_>>(), order);
         let events = recorder.0;
-        let peg_out = events.iter().position(|e| matches!(e, TraceEvent::Removed { part: 1, .. })).unwrap();
+        let peg_out = events.iter().position(|e| matches!(e, TraceEvent::Removed { parts, .. } if parts[..] == [1])).unwrap();
         let is_displaced = |e: &TraceEvent| matches!(e, TraceEvent::Analysed { state, .. } if *state > 0);
         let analysis = events.iter().position(is_displaced).expect("the cube has moved");
         assert!(

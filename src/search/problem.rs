@@ -48,6 +48,16 @@ pub struct VerifiedPath {
 /// A verified path, or the points that refute it.
 pub type Checked = Result<VerifiedPath, Vec<Penetration>>;
 
+/// How far a search goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
+pub enum Effort {
+    /// Pushes, threads, and the cells of places that are reached without turning.
+    Pushes,
+    /// All that the planner knows.
+    #[default]
+    All,
+}
+
 /// A planning question about one scene.
 #[derive(Clone)]
 pub struct Problem<'a> {
@@ -63,8 +73,16 @@ pub struct Problem<'a> {
     pub fixed: Vec<usize>,
     /// A part that stays as long as others leave.
     pub base: Option<usize>,
+    /// Whether the base may leave now, too.
+    pub releases_base: bool,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<usize>>,
+    /// Whether the only part that may move is the body of a group: nothing is proved about it, and it is in no group.
+    pub is_group: bool,
+    /// Whether groups leave where no part does.
+    pub groups: bool,
+    /// How far the search goes.
+    pub effort: Effort,
     /// Which actions are used.
     pub actions: ActionSet,
     /// The rule that fills blocking graphs before anything is simulated.
@@ -123,7 +141,12 @@ impl Problem<'_> {
     /// Whether it may leave now: a base stays as long as others leave.
     #[must_use]
     pub fn may_move(&self, part: usize) -> bool {
-        self.is_movable(part) && self.base != Some(part)
+        self.is_movable(part) && !self.keeps(part)
+    }
+
+    /// Whether a part is a base that may not leave yet.
+    fn keeps(&self, part: usize) -> bool {
+        self.base == Some(part) && !self.releases_base
     }
 
     /// Of the parts that remain, those that should come out.
@@ -133,7 +156,7 @@ impl Problem<'_> {
         remaining
             .iter()
             .copied()
-            .filter(|&p| !self.fixed.contains(&p) && self.base != Some(p) && asked(&p))
+            .filter(|&p| !self.fixed.contains(&p) && !self.keeps(p) && asked(&p))
             .collect()
     }
 
@@ -193,9 +216,14 @@ impl Problem<'_> {
     /// Verifies a path against all parts that it may meet.
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
         let Scene { allowed, .. } = &self.scene;
-        let past = near
-            .par_iter()
-            .map(|&other| self.verdict_past(&PairPath::new(&self.scene, allowed, [part, other], path)));
+        let past = near.par_iter().flat_map_iter(|&other| {
+            PairPath::of_members(&self.scene, allowed, [part, other], path).map(|(pair_path, body_from_part)| {
+                let mut verdict = self.verdict_past(&pair_path)?;
+                let on_moving = verdict.penetrations.iter_mut().filter(|e| e.on_moving);
+                on_moving.for_each(|e| e.point = body_from_part * e.point);
+                Ok(verdict)
+            })
+        });
         Ok(Verdict::of_all(past.collect::<Result<_, _>>()?))
     }
 
@@ -210,12 +238,18 @@ impl Problem<'_> {
         path: &[Pose],
     ) -> Result<Vec<(usize, Option<f64>)>, Interrupt> {
         let depth = |&other: &usize| {
-            let pair_path = PairPath::new(&self.scene, &self.scene.allowed, [part, other], path);
-            if is_seen_to_enter(&pair_path, self.verifier.limit_past(pair_path.shapes)) {
-                return Ok((other, None));
+            let mut deepest = 0.0f64;
+            for (pair_path, _) in PairPath::of_members(&self.scene, &self.scene.allowed, [part, other], path) {
+                if is_seen_to_enter(&pair_path, self.verifier.limit_past(pair_path.shapes)) {
+                    return Ok((other, None));
+                }
+                let verdict = self.verdict_past(&pair_path)?;
+                if verdict.is_refused() {
+                    return Ok((other, None));
+                }
+                deepest = deepest.max(verdict.depth);
             }
-            let verdict = self.verdict_past(&pair_path)?;
-            Ok((other, (!verdict.is_refused()).then_some(verdict.depth)))
+            Ok((other, Some(deepest)))
         };
         self.near(others, part, path).par_iter().map(depth).collect()
     }

@@ -107,7 +107,7 @@ mod tests {
                 removal.path[removal.path.len() - 1].translation.vector - removal.path[0].translation.vector;
             // Either part may be the one that leaves.
             let along = travel.normalize().dot(&(turn * WAY.normalize()));
-            assert!(along * (if removal.part == 1 { 1.0 } else { -1.0 }) > 1.0 - 1e-6, "{travel}");
+            assert!(along * (if removal.parts == [1] { 1.0 } else { -1.0 }) > 1.0 - 1e-6, "{travel}");
         }
     }
 

@@ -7,46 +7,65 @@
 use nalgebra::{Translation3, Vector3};
 
 use crate::geometry::{Pose, transformed};
-use crate::scene::exit_direction;
+use crate::scene::{StandingParts, exit_direction};
+use crate::termination::Interrupt;
 use crate::tolerances::HULL_MARGIN;
 
-use super::disassembly::{Disassembly, Stop};
 use super::outcome::{Outcome, Removal};
+use super::problem::Problem;
 
-impl Disassembly<'_, '_> {
-    /// A part's removal along a path past all that stands: led on until it is out of everything, with what it
-    /// requires.
-    pub(super) fn removal(&mut self, part: usize, path: Vec<Pose>, depth: f64) -> Result<Removal, Stop> {
-        let path = self.led_out(part, path);
-        let mut gone: Vec<usize> = self.removals.iter().map(|r| r.part).collect();
+/// A body that leaves what stands.
+#[derive(Clone, Copy)]
+pub(super) struct Leaving<'p, 'a> {
+    /// The question about the scene in which the body is.
+    pub(super) problem: &'p Problem<'a>,
+    /// A part, or the body of a group.
+    pub(super) body: usize,
+    /// All that stands beside it.
+    pub(super) around: &'p StandingParts,
+}
+
+impl Leaving<'_, '_> {
+    /// Its removal, after some others, along a path past all that stands: led on until it is out of everything, with
+    /// what it requires.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn removal(
+        self,
+        earlier: &[Removal],
+        path: Vec<Pose>,
+        depth: f64,
+    ) -> Result<Removal, Interrupt> {
+        let Self { problem, body, .. } = self;
+        let path = self.led_out(earlier, path);
+        let mut gone: Vec<usize> = earlier.iter().flat_map(|r| &r.parts).copied().collect();
         gone.sort_unstable();
-        let past = self.timed(|problem| problem.depths_past(&gone, part, &path))?;
-        let blocks = |gone: usize| past.contains(&(gone, None));
-        let requires: Vec<usize> =
-            (0..self.removals.len()).filter(|&i| blocks(self.removals[i].part)).collect();
+        let past = problem.depths_past(&gone, body, &path)?;
+        let blocks = |gone: &usize| past.contains(&(*gone, None));
+        let requires: Vec<usize> = (0..earlier.len()).filter(|&i| earlier[i].parts.iter().any(blocks)).collect();
         let depth = past.iter().filter_map(|(_, depth)| *depth).fold(depth, f64::max);
-        let wave = requires.iter().map(|&i| self.removals[i].wave + 1).max().unwrap_or(0);
-        Ok(Removal { part, path, depth, requires, wave })
+        let wave = requires.iter().map(|&i| earlier[i].wave + 1).max().unwrap_or(0);
+        Ok(Removal { parts: problem.scene.members(&body).to_vec(), of: None, path, depth, requires, wave })
     }
 
     /// A path that ends apart from the hull of all that stands, continued until it is apart from all that was there at
     /// the start. Away from that hull, nothing stands in the way.
-    fn led_out(&mut self, part: usize, mut path: Vec<Pose>) -> Vec<Pose> {
-        if self.removals.is_empty() {
+    fn led_out(self, earlier: &[Removal], mut path: Vec<Pose>) -> Vec<Pose> {
+        if earlier.is_empty() {
             return path;
         }
-        let around = self.surroundings(part);
-        let scene = &self.problem.scene;
+        let Self { problem: Problem { scene, .. }, body, around } = self;
         let Some(&end) = path.last() else { return path };
         let along = last_leg(&path);
         // It tells where the others lie.
-        let Some(towards) = exit_direction(scene, &around, part, &end, along.map(|d| -d)) else {
+        let Some(towards) = exit_direction(scene, around, body, &end, along.map(|d| -d)) else {
             return path;
         };
         let direction = -towards;
-        let hull = transformed(&scene.bodies[part].shape.hull, &end);
+        let hull = transformed(&scene.bodies[body].shape.hull, &end);
         let near = hull.iter().map(|p| p.coords.dot(&direction)).fold(f64::INFINITY, f64::min);
-        let gone = self.removals.iter().map(|r| scene.bodies[r.part].bounds.support(&direction));
+        let gone = earlier.iter().flat_map(|r| &r.parts).map(|&p| scene.bodies[p].bounds.support(&direction));
         let further = gone.fold(f64::NEG_INFINITY, f64::max) + HULL_MARGIN - near;
         if further > 0.0 {
             if along == Some(direction) {
@@ -68,9 +87,8 @@ fn last_leg(path: &[Pose]) -> Option<Vector3<f64>> {
 /// A complete outcome without the removals that no target requires: what is left stands as verified as before.
 pub(super) fn without_needless(outcome: Outcome, targets: &[usize]) -> Outcome {
     let Outcome { mut removals, mut remaining, .. } = outcome;
-    let mut needed = vec![false; removals.len()];
+    let mut needed: Vec<bool> = removals.iter().map(|removal| frees(removal, &removals, targets)).collect();
     for i in (0..removals.len()).rev() {
-        needed[i] |= targets.contains(&removals[i].part);
         if needed[i] {
             removals[i].requires.iter().for_each(|&j| needed[j] = true);
         }
@@ -78,10 +96,26 @@ pub(super) fn without_needless(outcome: Outcome, targets: &[usize]) -> Outcome {
     // The numbers that the needed ones get.
     let numbers: Vec<usize> =
         needed.iter().scan(0, |next, &is| Some(std::mem::replace(next, *next + usize::from(is)))).collect();
-    remaining.extend(removals.iter().zip(&needed).filter(|(_, is)| !**is).map(|(r, _)| r.part));
+    let needless = removals.iter().zip(&needed).filter(|(r, is)| !**is && r.of.is_none());
+    remaining.extend(needless.flat_map(|(r, _)| &r.parts));
     remaining.sort_unstable();
     let mut is_needed = needed.into_iter();
     removals.retain(|_| is_needed.next() == Some(true));
-    removals.iter_mut().flat_map(|r| &mut r.requires).for_each(|number| *number = numbers[*number]);
+    let referred = removals.iter_mut().flat_map(|r| r.requires.iter_mut().chain(&mut r.of));
+    referred.for_each(|number| *number = numbers[*number]);
     Outcome { removals, remaining, ..outcome }
+}
+
+/// Whether a removal takes a target out, or is one of those that leave a target behind alone.
+fn frees(removal: &Removal, removals: &[Removal], targets: &[usize]) -> bool {
+    let takes_alone = |r: &Removal, target: usize| r.parts[..] == [target];
+    let of_same_body = |r: &&Removal| r.of == removal.of;
+    targets.iter().any(|&target| {
+        let stands_there = match removal.of {
+            Some(group) => removals[group].parts.contains(&target),
+            None => true,
+        };
+        let leaves = |r: &Removal| r.parts.contains(&target);
+        takes_alone(removal, target) || stands_there && !removals.iter().filter(of_same_body).any(leaves)
+    })
 }

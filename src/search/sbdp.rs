@@ -27,18 +27,20 @@ use crate::simulation::{End, Motion, Sweep};
 use crate::termination::Interrupt;
 use crate::tolerances::TURNED;
 
+use super::action_list::ActionList;
 use super::action_table::ActionTable;
 use super::cell_decomposition::{CellDecomposition, CellExit};
 use super::cell_memory::{CellMemory, CellStage};
 use super::critical_turns::TurningPart;
 use super::disassembly::{Disassembly, Proof, Stop, Transition, joined};
 use super::initial_analysis::InitialAnalysis;
+use super::groups::{GroupMemory, Groups};
 use super::inseparable::InseparablePairs;
 use super::invalidation::Invalidation;
 use super::novelty::Novelty;
 use super::order::Order;
 use super::outcome::Outcome;
-use super::problem::{Observer, Problem, VerifiedPath};
+use super::problem::{Effort, Observer, Problem, VerifiedPath};
 use super::report::SearchReport;
 use super::request::ActionSet;
 use super::speculation::Speculation;
@@ -73,6 +75,7 @@ struct Sbdp<'a, 'o> {
     sweep_memory: SweepMemory,
     cell_memory: CellMemory,
     unscrewing_memory: UnscrewingMemory,
+    group_memory: GroupMemory,
     speculation: Speculation,
 }
 
@@ -96,9 +99,11 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
     let (report, disassembly) = search.report();
     report.log(disassembly);
     let blocked = report.blocked(disassembly);
+    let is_stuck = search.strategy.is_extended() && !search.disassembly.is_done();
+    let free_together = if is_stuck { search.groups().free_together() } else { Vec::new() };
     let outcome = search.disassembly.outcome(stop, search.order.into_inseparable(), blocked);
     let base = base.filter(|base| outcome.remaining.contains(&base.part));
-    Outcome { base, ..outcome }
+    Outcome { base, free_together, ..outcome }
 }
 
 impl<'a, 'o> Sbdp<'a, 'o> {
@@ -116,6 +121,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             sweep_memory: SweepMemory::default(),
             cell_memory: CellMemory::default(),
             unscrewing_memory: UnscrewingMemory::default(),
+            group_memory: GroupMemory::default(),
             speculation: Speculation::default(),
             disassembly,
         };
@@ -161,8 +167,15 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 }
                 continue;
             }
+            if self.leave_together(|groups| groups.leave_straight())? {
+                if self.disassembly.is_done() {
+                    return Ok(());
+                }
+                continue;
+            }
             // Others may leave once the base has: nothing more costly is tried before.
-            if self.disassembly.problem.base.take().is_some() {
+            let Problem { base, releases_base, .. } = &mut self.disassembly.problem;
+            if base.is_some() && !std::mem::replace(releases_base, true) {
                 self.take_free_parts()?;
                 continue;
             }
@@ -170,9 +183,14 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             if self.find_inseparable()? {
                 continue;
             }
-            if self.leave_by_cells(CellStage::BeforeTurning)?
-                || self.leave_by_cells(CellStage::AfterCriticalTurn)?
-            {
+            let mut left = self.leave_by_cells(CellStage::BeforeTurning)?;
+            if !left && self.disassembly.problem.effort == Effort::Pushes {
+                return Ok(());
+            }
+            left = left
+                || self.leave_together(|groups| groups.leave(Effort::Pushes))?
+                || self.leave_by_cells(CellStage::AfterCriticalTurn)?;
+            if left {
                 if self.disassembly.is_done() {
                     return Ok(());
                 }
@@ -200,7 +218,11 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             self.strategy.distrust_static = true;
             let last = self.pass(PlanningPhase::Translation);
             self.strategy.distrust_static = false;
-            if self.disassembly.is_done() || !(last?.any() || self.leave_by_cells(CellStage::Last)?) {
+            let left = self.disassembly.is_done()
+                || last?.any()
+                || self.leave_by_cells(CellStage::Last)?
+                || self.leave_together(|groups| groups.leave(Effort::All))?;
+            if !left {
                 return Ok(());
             }
             if self.disassembly.is_done() {
@@ -377,6 +399,34 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             }
         }
         Ok(false)
+    }
+
+    /// Takes a group out as `leave` finds one; true if one leaves.
+    fn leave_together(
+        &mut self,
+        leave: impl FnOnce(&mut Groups<'_, 'a, 'o>) -> Result<Option<Vec<usize>>, Stop>,
+    ) -> Result<bool, Stop> {
+        if !self.disassembly.problem.groups || !self.strategy.is_extended() || self.disassembly.is_done() {
+            return Ok(false);
+        }
+        let left = leave(&mut self.groups())?;
+        for &part in left.iter().flatten() {
+            self.states.remove(part);
+        }
+        self.take_free_parts()?;
+        Ok(left.is_some())
+    }
+
+    fn groups(&mut self) -> Groups<'_, 'a, 'o> {
+        let Self { disassembly, states, order, actions, group_memory, .. } = self;
+        let ActionList { all, common, .. } = &actions.translations;
+        Groups {
+            disassembly,
+            states,
+            inseparable: order.inseparable(),
+            translations: &all[..*common],
+            memory: group_memory,
+        }
     }
 
     /// Takes a part out through the cells of its places, if any leaves them; true if one does.

@@ -35,7 +35,11 @@ pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
         engine: &SlidingEngine,
         fixed: Vec::new(),
         base: None,
+        releases_base: false,
         targets: None,
+        is_group: false,
+        groups: true,
+        effort: Effort::All,
         actions: ActionSet::Paper,
         static_analysis: StaticAnalysis::default(),
         sweeps: false,
@@ -174,11 +178,11 @@ fn a_surface_is_a_wall_from_both_sides() {
             [open_box([-3.0; 3], [3.0; 3]), cuboid([-2.9, -2.9, -2.9], [2.9, 2.9, -1.0])]
                 .map(|mesh| moved(mesh, &turned)),
         );
-        let [Removal { part, path, .. }] = &tray.removals[..] else { panic!("{:?}", tray.reason) };
+        let [Removal { parts, path, .. }] = &tray.removals[..] else { panic!("{:?}", tray.reason) };
         let way = path[path.len() - 1].translation.vector - path[0].translation.vector;
         // The cuboid leaves upwards, or the tray downwards.
-        let up = turn.inverse() * way * if *part == 1 { 1.0 } else { -1.0 };
-        assert!(up.z > 1.9 && up.xy().norm() < 0.5 * up.z, "part {part} leaves by {up:?}");
+        let up = turn.inverse() * way * if parts[0] == 1 { 1.0 } else { -1.0 };
+        assert!(up.z > 1.9 && up.xy().norm() < 0.5 * up.z, "parts {parts:?} leaves by {up:?}");
     }
 }
 
@@ -245,7 +249,7 @@ fn with_sweeps(sweeps: bool) -> (Outcome, Vec<TraceEvent>) {
 fn what_leaves_straight_is_not_simulated() {
     let (swept, events) = with_sweeps(true);
     let (simulated, _) = with_sweeps(false);
-    let order = |o: &Outcome| o.removals.iter().map(|r| r.part).collect::<Vec<_>>();
+    let order = |o: &Outcome| o.removals.iter().map(|r| r.parts[0]).collect::<Vec<_>>();
     assert_eq!((swept.status, order(&swept)), (PlanStatus::Complete, order(&simulated)));
     assert_eq!((swept.counters.simulations, swept.counters.sweeps), (0, 3));
     assert_eq!((simulated.counters.simulations, simulated.counters.sweeps), (3, 0));
@@ -322,8 +326,9 @@ fn a_step_requires_what_its_path_would_enter_and_nothing_else() {
         let problem = Problem { actions, sweeps, ..problem(scene.clone(), &verifier) };
         let Outcome { status, removals, .. } = search(planner, problem, &mut Recorder::default());
         assert_eq!(status, PlanStatus::Complete);
-        for (i, Removal { part, path, requires, wave, .. }) in removals.iter().enumerate() {
-            let required: Vec<usize> = requires.iter().map(|&j| removals[j].part).collect();
+        for (i, Removal { parts, path, requires, wave, .. }) in removals.iter().enumerate() {
+            let part = &parts[0];
+            let required: Vec<usize> = requires.iter().map(|&j| removals[j].parts[0]).collect();
             let before = requires.iter().map(|&j| removals[j].wave + 1).max();
             assert!(requires.iter().all(|&j| j < i) && *wave == before.unwrap_or(0));
             let is_refused = |gone: &[usize]| {
@@ -353,7 +358,7 @@ fn a_plan_for_a_target_has_what_that_requires_and_no_more() {
         };
         let outcome = search(Planner::SbdpStar, problem, &mut Recorder::default());
         assert_eq!(outcome.removals.len() + outcome.remaining.len(), scene.bodies.len());
-        outcome.removals.iter().map(|r| r.part).collect::<Vec<_>>()
+        outcome.removals.iter().flat_map(|r| r.parts.clone()).collect::<Vec<_>>()
     };
     assert_eq!(parts_out(3), [3]);
     assert_eq!(parts_out(2), [2]);

@@ -113,11 +113,23 @@ pub enum TraceEvent {
         /// The parts that it entered.
         by: Vec<usize>,
     },
-    /// A part is out: its vertex and edges are deleted from all graphs.
+    /// A group of parts was tried as one rigid body.
+    GroupTried {
+        /// The parts.
+        parts: Vec<usize>,
+        /// Whether it leaves.
+        leaves: bool,
+    },
+    /// What follows takes a group apart that has left.
+    GroupOpened {
+        /// The parts.
+        parts: Vec<usize>,
+    },
+    /// Parts are out: their vertices and edges are deleted from all graphs.
     Removed {
-        /// The part.
-        part: usize,
-        /// Parts that its path requires to be out.
+        /// The parts; several left together.
+        parts: Vec<usize>,
+        /// Parts that their path requires to be out.
         requires: Vec<usize>,
     },
     /// The search ended.

@@ -17,14 +17,14 @@ const NO_SHIFT: f64 = 1e-9;
 
 /// A removal as a step of a plan.
 pub(super) fn removal(assembly: &Assembly, removal: &Removal) -> PlanStep {
-    let Removal { part, path, depth, requires, wave } = removal;
-    step(assembly, *part, path, *depth, (requires, *wave))
+    let Removal { parts, path, depth, requires, wave, .. } = removal;
+    step(assembly, parts[0], path, *depth, (requires, *wave))
 }
 
 /// An insertion as a step of a plan.
 pub(super) fn insertion(assembly: &Assembly, insertion: &Insertion) -> PlanStep {
-    let Insertion { part, path, depth, requires, wave } = insertion;
-    step(assembly, *part, path, *depth, (requires, *wave))
+    let Insertion { parts, path, depth, requires, wave, .. } = insertion;
+    step(assembly, parts[0], path, *depth, (requires, *wave))
 }
 
 fn step(
@@ -170,7 +170,7 @@ impl PlanFrame<'_> {
             action,
         });
         let name = |part: usize| self.assembly.parts[part].name.clone();
-        let reason = outcome.reason.map(|reason| reason.text(&outcome.remaining, name));
+        let reason = outcome.reason.map(|reason| reason.text(&outcome.unfinished, name));
         let status = outcome.status;
         Plan {
             steps,

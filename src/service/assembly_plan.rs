@@ -78,9 +78,9 @@ impl AssemblyPlanner<'_> {
     /// Warns of staging poses that were given for parts that do not move.
     fn unused(&self) -> Vec<Warning> {
         let Staging::Beside(given) = self.staging else { return Vec::new() };
-        let moves = |part: usize| self.removals.iter().any(|r| r.part == part);
+        let moves = |part: usize| self.removals.iter().any(|r| r.alone() == Some(part));
         let idle = given.iter().map(|(part, _)| *part).filter(|&part| !moves(part));
-        let message = "its staging pose is not used: the plan does not move it";
+        let message = "its staging pose is not used: the plan does not put it in alone";
         idle.map(|part| Warning { part: Some(part), message: message.to_owned() }).collect()
     }
 

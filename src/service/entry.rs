@@ -11,7 +11,7 @@ use crate::cache::{RecordKind, RequestCache};
 use crate::geometry::{Assembly, Shape};
 use crate::plan::{OVERLAP, Plan, PlanStatus, VERDICT, Verifier};
 use crate::scene::{HullTree, JoinedHulls};
-use crate::search::{Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_graphs, search};
+use crate::search::{Effort, Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_graphs, search};
 use crate::simulation::{
     MOTION, PenaltyEngine, PenaltyParameters, SlidingEngine, TOUCHING, TransitionFunction,
 };
@@ -246,7 +246,11 @@ impl Entry {
             present: (0..self.assembly.parts.len()).filter(is_there).collect(),
             fixed: fixed.to_vec(),
             base: None,
+            releases_base: false,
             targets: request.targets.clone(),
+            is_group: false,
+            groups: true,
+            effort: Effort::All,
             actions: request.actions,
             static_analysis: request.static_analysis,
             sweeps: request.sweeps(),

@@ -26,7 +26,8 @@ pub use null_twists::NullTwist;
 pub use penalty::{PenaltyEngine, PenaltyParameters};
 pub use records::MotionQuestion;
 pub(crate) use records::{
-    MOTION, SWEPT, TOUCHING, WITNESS, add_action, known_sweep, remembered_sweep, remembered_touching,
+    MOTION, SWEPT, TOUCHING, WITNESS, add_action, known_sweep, remembered_obstacles, remembered_sweep,
+    remembered_touching,
 };
 pub use sliding::{PairMethod, SlidingEngine, StepCost, pair_blocks, step_costs};
 pub use sweep::{FreeTravel, Sweep, SweepQuestion, free_travel, straight_sweep, straight_sweep_past};

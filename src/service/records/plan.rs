@@ -62,14 +62,19 @@ pub(crate) fn remember_plan(
 impl PlanAnswer {
     /// Whether all parts that it names are among the first `count`.
     fn names_only(&self, count: usize) -> bool {
-        let Outcome { removals, remaining, blocked, .. } = &self.outcome;
+        let Outcome { removals, remaining, unfinished, blocked, free_together, .. } = &self.outcome;
         let is_part = |part: &usize| *part < count;
         let are_parts = |list: &[usize]| list.iter().all(is_part);
-        let is_step = |(i, r): (usize, &Removal)| is_part(&r.part) && r.requires.iter().all(|&j| j < i);
+        let is_step = |(i, r): (usize, &Removal)| {
+            let refers = r.requires.iter().chain(&r.of);
+            !r.parts.is_empty() && are_parts(&r.parts) && !r.path.is_empty() && refers.into_iter().all(|&j| j < i)
+        };
         removals.iter().enumerate().all(is_step)
             && blocked.iter().all(|b| is_part(&b.part) && are_parts(&b.by))
             && self.overlaps.iter().all(|(a, b, _)| is_part(a) && is_part(b))
+            && free_together.iter().all(|group| are_parts(&group.parts))
             && are_parts(remaining)
+            && are_parts(unfinished)
     }
 }
 

@@ -6,7 +6,7 @@ mod touching;
 
 pub use motion::MotionQuestion;
 pub(crate) use motion::{MOTION, WITNESS};
-pub(crate) use swept::{SWEPT, known_sweep, remembered_sweep};
+pub(crate) use swept::{SWEPT, known_sweep, remembered_obstacles, remembered_sweep};
 pub(crate) use touching::{TOUCHING, remembered_touching};
 
 use crate::cache::{Digest, Validity};

@@ -61,6 +61,35 @@ pub(crate) fn remembered_sweep(
     question: &SweepQuestion<'_>,
     termination: &Termination,
 ) -> Result<Option<Sweep>, Interrupt> {
+    remembered_sweep_past(cache, question, termination, |_, enters| enters)
+}
+
+/// All parts that a part enters along a line on its way out of its surroundings, ascending; `None` where no way out
+/// along it is found.
+///
+/// # Errors
+/// The termination condition became true.
+pub(crate) fn remembered_obstacles(
+    cache: &RequestCache,
+    question: &SweepQuestion<'_>,
+    termination: &Termination,
+) -> Result<Option<Vec<usize>>, Interrupt> {
+    let mut obstacles = Vec::new();
+    let swept = remembered_sweep_past(cache, question, termination, |other, enters| {
+        obstacles.extend(enters.then_some(other));
+        false
+    })?;
+    Ok(swept.map(|_| obstacles))
+}
+
+/// What a straight sweep finds, with a function that says whether it ends at a part on the way, given whether it enters
+/// that part.
+fn remembered_sweep_past(
+    cache: &RequestCache,
+    question: &SweepQuestion<'_>,
+    termination: &Termination,
+    mut ends_at: impl FnMut(usize, bool) -> bool,
+) -> Result<Option<Sweep>, Interrupt> {
     let key = key(question);
     // Read when it is needed: mostly a part is out, or blocked by the first one on its way.
     let mut known: Option<SweptPast> = None;
@@ -69,12 +98,12 @@ pub(crate) fn remembered_sweep(
         let known = known.get_or_insert_with(|| cache.get(&key).unwrap_or_default());
         let place = place(question, cast);
         if let Some(entered) = entered(known, &place) {
-            return Ok(entered);
+            return Ok(ends_at(cast.other, entered));
         }
         let entered = cast.enters()?;
         known.push((place, entered));
         is_new = true;
-        Ok(entered)
+        Ok(ends_at(cast.other, entered))
     };
     let swept = straight_sweep_past(question, termination, enters);
     // Also of an interrupted sweep: each cast that ended holds.

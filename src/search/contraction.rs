@@ -1,0 +1,63 @@
+//! A group as one rigid body: the question whether it leaves the rest, which stays.
+
+use crate::scene::StandingParts;
+use crate::simulation::{Action, Sweep, SweepQuestion, straight_sweep_past};
+use crate::termination::Interrupt;
+
+use super::outcome::{Outcome, Removal};
+use super::problem::{Effort, Observer, Problem, VerifiedPath};
+use super::sbdp::sbdp;
+
+/// A problem in whose scene a group is one body, the only one that may move.
+pub(super) struct Contraction<'a> {
+    pub(super) problem: Problem<'a>,
+    pub(super) body: usize,
+    /// All that stands beside the group.
+    pub(super) around: StandingParts,
+}
+
+impl<'a> Contraction<'a> {
+    /// The question about a group among the parts that stand (both ascending).
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn new(problem: &Problem<'a>, standing: &[usize], group: &[usize]) -> Result<Self, Interrupt> {
+        let scene = problem.scene.with_joined(group, &problem.termination)?;
+        let body = scene.bodies.len() - 1;
+        let rest: Vec<usize> =
+            standing.iter().copied().filter(|part| group.binary_search(part).is_err()).collect();
+        let around = StandingParts::new(&scene, rest.clone());
+        let present = rest.iter().copied().chain([body]).collect();
+        let targets = Some(vec![body]);
+        let problem =
+            Problem { scene, present, fixed: rest, base: None, targets, is_group: true, ..problem.clone() };
+        Ok(Self { problem, body, around })
+    }
+
+    /// A verified way out along a line, where none of the parts enters any of the rest.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn straight(&self, action: &Action) -> Result<Option<VerifiedPath>, Interrupt> {
+        let Problem { scene, termination, .. } = &self.problem;
+        let (start, direction) = (&scene.bodies[self.body].planning_from_shape, &action.force());
+        let question =
+            SweepQuestion { scene, standing_parts: &self.around, part: self.body, start, direction };
+        let clear = straight_sweep_past(&question, termination, |_| Ok::<_, Interrupt>(false))?;
+        let Some(Sweep::Clear { path, .. }) = clear else { return Ok(None) };
+        Ok(self.problem.checked_path(&self.around.standing, self.body, &path)?.ok())
+    }
+
+    /// The outcome of a search for a way out of the body, with some effort.
+    pub(super) fn searched(&self, effort: Effort, spent: u64) -> Outcome {
+        sbdp(Problem { effort, spent, ..self.problem.clone() }, &mut Unobserved, true)
+    }
+}
+
+/// Receives nothing: bodies of groups are no parts that anyone knows.
+struct Unobserved;
+
+impl Observer for Unobserved {
+    fn progress(&mut self, _removed: usize, _simulations: u64) {}
+    fn removal(&mut self, _removal: &Removal) {}
+}

@@ -1,0 +1,55 @@
+//! Groups that left are taken apart: each by a search of its own, in which only its parts stand, where they stood in the
+//! assembly.
+
+use crate::plan::PlanStatus;
+
+use super::deferred_removals::DeferredRemovals;
+use super::outcome::{Outcome, Removal};
+use super::problem::{Observer, Problem};
+use super::request::Planner;
+use super::run;
+use super::trace::TraceEvent;
+
+/// Takes the group of a removal apart, as far as its parts are asked for, and adds the removals to an outcome. If it does
+/// not come apart, the outcome is that of this search, unless it was not complete before.
+pub(super) fn take_apart(
+    planner: Planner,
+    problem: &Problem<'_>,
+    outcome: &mut Outcome,
+    group: usize,
+    observer: &mut dyn Observer,
+) {
+    let present = outcome.removals[group].parts.clone();
+    let targets: Option<Vec<usize>> = problem
+        .targets
+        .as_ref()
+        .map(|targets| targets.iter().copied().filter(|target| present.contains(target)).collect());
+    if targets.as_ref().is_some_and(Vec::is_empty) {
+        return;
+    }
+    if observer.traces() {
+        observer.traced(TraceEvent::GroupOpened { parts: present.clone() });
+    }
+    let spent = problem.spent + outcome.counters.simulations;
+    let inner = Problem { present, targets, base: None, spent, ..problem.clone() };
+    let done = outcome.removals.len();
+    let mut deferred = DeferredRemovals::after(observer, done, outcome.counters.simulations);
+    let Outcome { status, reason, removals, unfinished, blocked, free_together, counters, .. } =
+        run(planner, inner, &mut deferred);
+    for removal in removals {
+        let of = Some(removal.of.map_or(group, |of| done + of));
+        let mut requires: Vec<usize> = removal.requires.iter().map(|i| done + i).collect();
+        if of == Some(group) {
+            requires.insert(0, group);
+        }
+        let wave = requires.iter().map(|&i| outcome.removals[i].wave + 1).max().unwrap_or(0);
+        let removal = Removal { of, requires, wave, ..removal };
+        observer.removal(&removal);
+        outcome.removals.push(removal);
+    }
+    outcome.counters.add(&counters);
+    if outcome.status == PlanStatus::Complete && status != PlanStatus::Complete {
+        (outcome.status, outcome.reason, outcome.unfinished) = (status, reason, unfinished);
+        (outcome.blocked, outcome.free_together) = (blocked, free_together);
+    }
+}
