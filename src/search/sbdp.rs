@@ -173,24 +173,25 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 }
                 continue;
             }
-            // Others may leave once the base has: nothing more costly is tried before.
+            // Before the searches that take longest.
+            if self.find_inseparable()? {
+                continue;
+            }
+            let left = self.leave_by_cells(CellStage::BeforeTurning)?
+                || self.leave_together(|groups| groups.leave(Effort::Pushes))?;
+            if self.disassembly.is_done() || (!left && self.disassembly.problem.effort == Effort::Pushes) {
+                return Ok(());
+            }
+            if left {
+                continue;
+            }
+            // Others may leave once the base has: nothing is turned before.
             let Problem { base, releases_base, .. } = &mut self.disassembly.problem;
             if base.is_some() && !std::mem::replace(releases_base, true) {
                 self.take_free_parts()?;
                 continue;
             }
-            // Before the searches that take longest.
-            if self.find_inseparable()? {
-                continue;
-            }
-            let mut left = self.leave_by_cells(CellStage::BeforeTurning)?;
-            if !left && self.disassembly.problem.effort == Effort::Pushes {
-                return Ok(());
-            }
-            left = left
-                || self.leave_together(|groups| groups.leave(Effort::Pushes))?
-                || self.leave_by_cells(CellStage::AfterCriticalTurn)?;
-            if left {
+            if self.leave_by_cells(CellStage::AfterCriticalTurn)? {
                 if self.disassembly.is_done() {
                     return Ok(());
                 }
