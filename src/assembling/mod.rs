@@ -7,7 +7,7 @@
 //! A path in reverse passes the same places, so an insertion past what stands is as verified as the removal
 //! was. The rest is verified here, with the same check and no penetration allowed: the way to the insertion
 //! past all that stands and waits, and the insertion past all that waits. Groups, and the parts that are put together to
-//! groups, wait nowhere: each begins where its insertion does. Ways are found by random poses:
+//! groups, wait nowhere: each begins where its insertion does; so do all parts where some are moved aside. Ways are found by random poses:
 //! the same for the same question, but a way that is not found is no proof that there is none. No floor is
 //! in the way of anything.
 
@@ -50,6 +50,8 @@ pub enum Waiting {
 pub struct Insertion {
     /// The parts, ascending.
     pub parts: Vec<usize>,
+    /// Whether they stay aside among the others until a later insertion.
+    pub aside: bool,
     /// The later insertion (its place in the order) that puts the group in to which they belong.
     pub of: Option<usize>,
     /// Poses of the part's shape, or of the body of all parts; the last one assembled; verified.
@@ -137,6 +139,8 @@ impl<'a> Assembling<'a> {
     ) -> Self {
         let waiting = match waiting {
             Waiting::Nowhere => None,
+            // Ways are looked for among parts in their places.
+            Waiting::Beside(_) if removals.iter().any(|r| r.aside) => None,
             Waiting::Beside(given) => Some(waiting_beside(scene, removals, given)),
         };
         let room = Room::new(scene, verifier, waiting.as_deref().unwrap_or_default());
@@ -160,11 +164,14 @@ impl<'a> Assembling<'a> {
     /// Where a part waits, or else where its insertion begins: in a group, with the group where its own does.
     fn start_of(&self, part: usize) -> Pose {
         let given = self.waiting.iter().flatten().find(|(waits, _)| *waits == part);
-        // The group that a part is in leaves before it is taken apart.
+        // The group that a part is in leaves before it is taken apart, as it stood then.
         let moves = self.removals.iter().filter(|r| r.parts.contains(&part));
         let end = || {
-            let moved = moves.fold(Pose::identity(), |moved, removal| moved * removal.motion());
-            moved * self.room.scene.bodies[part].planning_from_shape
+            let assembled = self.room.scene.bodies[part].planning_from_shape;
+            let (of_groups, stands) = moves.fold((Pose::identity(), assembled), |(of_groups, stands), r| {
+                if r.is_group() { (of_groups * r.motion(), stands) } else { (of_groups, r.motion() * stands) }
+            });
+            of_groups * stands
         };
         given.map_or_else(end, |(_, pose)| *pose)
     }
@@ -205,8 +212,9 @@ impl<'a> Assembling<'a> {
         }
         let number = |place: usize| self.removals.len() - 1 - place;
         let Order { requires, wave } = self.orders[number(place)].clone();
-        let (parts, of) = (removal.parts.clone(), removal.of.map(number));
-        Ok(Insertion { parts, of, path, depth, requires, wave })
+        let Removal { parts, of, aside, .. } = removal.clone();
+        let of = of.map(number);
+        Ok(Insertion { parts, of, aside, path, depth, requires, wave })
     }
 
     /// The way from where a part waits to where its insertion begins, and how deep it gets into anything.

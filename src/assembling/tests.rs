@@ -8,7 +8,7 @@ use crate::geometry::SourceMesh;
 fn out(scene: &Scene, part: usize, shift: [f64; 3]) -> Removal {
     let start = scene.bodies[part].planning_from_shape;
     let end = Pose::translation(shift[0], shift[1], shift[2]) * start;
-    Removal { parts: vec![part], of: None, path: vec![start, end], depth: 0.0, requires: Vec::new(), wave: 0 }
+    Removal { parts: vec![part], of: None, aside: false, path: vec![start, end], depth: 0.0, requires: Vec::new(), wave: 0 }
 }
 
 fn run(

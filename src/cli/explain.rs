@@ -96,6 +96,17 @@ impl Account {
                 let end = if *leaves { "they leave" } else { "no way out" };
                 format!("    {} together, as one body: {end}", self.names(parts))
             }
+            TraceEvent::PlacesSearched { places, leaves } => {
+                let end = if *leaves { "some leave after moves of others" } else { "nothing leaves" };
+                format!("    {places} places of all parts: {end}")
+            }
+            TraceEvent::MovedAside { parts, requires } => {
+                let after = match requires.as_slice() {
+                    [] => String::new(),
+                    parts => format!(", after {} moved", self.names(parts)),
+                };
+                format!("=== {} moved aside{after}", self.names(parts))
+            }
             TraceEvent::GroupOpened { parts } => {
                 format!("=== the group of {} is taken apart", self.names(parts))
             }

@@ -23,7 +23,7 @@ use std::sync::{Arc, OnceLock};
 
 use nalgebra::Point3;
 
-use crate::geometry::{Assembly, Bounds, Closest, Part, Pose, SampleTree, Shape};
+use crate::geometry::{Assembly, Bounds, Closest, Part, Pose, SampleTree, Shape, transformed};
 use crate::sdf::Field;
 use crate::termination::{Interrupt, Termination};
 
@@ -203,6 +203,22 @@ impl Scene {
             }
         }
         Ok(scene)
+    }
+
+    /// The scene with some parts at other poses of their shapes.
+    pub(crate) fn with_placed(&self, places: &[(usize, Pose)]) -> Self {
+        if places.is_empty() {
+            return self.clone();
+        }
+        let mut bodies = self.bodies.to_vec();
+        for (part, pose) in places {
+            let Body { shape, planning_from_shape, bounds, .. } = &mut bodies[*part];
+            *planning_from_shape = *pose;
+            *bounds = Bounds::of(&transformed(&shape.hull, pose));
+        }
+        let mut scene = Self::of(bodies, self.longest_side);
+        (scene.hulls, scene.allowed) = (Arc::clone(&self.hulls), self.allowed.clone());
+        scene
     }
 
     /// The parts that a body stands for.

@@ -7,7 +7,7 @@ use std::collections::{BTreeSet, HashMap};
 
 use crate::budgets::{EDGES_CAST_AT_LAST, EDGES_CAST_BEFORE_TURNING};
 
-use super::cell_decomposition::CriticalCoordinates;
+use super::critical_places::CriticalCoordinates;
 
 /// When the cells of a part are searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,11 +1,16 @@
-//! A group as one rigid body: the question whether it leaves the rest, which stays.
+//! A group as one rigid body, or a single part: the question whether it leaves the rest, which stays.
 
+use nalgebra::{Translation3, Vector3};
+
+use crate::geometry::Pose;
 use crate::scene::StandingParts;
 use crate::simulation::{Action, Sweep, SweepQuestion, straight_sweep_past};
 use crate::termination::Interrupt;
 
+use super::disassembly::joined;
 use super::outcome::{Outcome, Removal};
 use super::problem::{Effort, Observer, Problem, VerifiedPath};
+use super::requirements::Leaving;
 use super::sbdp::sbdp;
 
 /// A problem in whose scene a group is one body, the only one that may move.
@@ -22,30 +27,66 @@ impl<'a> Contraction<'a> {
     /// # Errors
     /// The termination condition became true.
     pub(super) fn new(problem: &Problem<'a>, standing: &[usize], group: &[usize]) -> Result<Self, Interrupt> {
-        let scene = problem.scene.with_joined(group, &problem.termination)?;
-        let body = scene.bodies.len() - 1;
+        let (scene, body) = match *group {
+            [part] => (problem.scene.clone(), part),
+            _ => {
+                let scene = problem.scene.with_joined(group, &problem.termination)?;
+                (scene, problem.scene.bodies.len())
+            }
+        };
         let rest: Vec<usize> =
             standing.iter().copied().filter(|part| group.binary_search(part).is_err()).collect();
         let around = StandingParts::new(&scene, rest.clone());
-        let present = rest.iter().copied().chain([body]).collect();
+        let mut present: Vec<usize> = rest.iter().copied().chain([body]).collect();
+        present.sort_unstable();
         let targets = Some(vec![body]);
         let problem =
             Problem { scene, present, fixed: rest, base: None, targets, is_group: true, ..problem.clone() };
         Ok(Self { problem, body, around })
     }
 
-    /// A verified way out along a line, where none of the parts enters any of the rest.
+    /// A verified way out along some legs and then along a line, where none of the parts enters any of the rest.
     ///
     /// # Errors
     /// The termination condition became true.
-    pub(super) fn straight(&self, action: &Action) -> Result<Option<VerifiedPath>, Interrupt> {
+    pub(super) fn way_out(
+        &self,
+        legs: &[Vector3<f64>],
+        action: &Action,
+    ) -> Result<Option<VerifiedPath>, Interrupt> {
         let Problem { scene, termination, .. } = &self.problem;
-        let (start, direction) = (&scene.bodies[self.body].planning_from_shape, &action.force());
+        let way = self.along(legs);
+        let (start, direction) = (&way[way.len() - 1], &action.force());
         let question =
             SweepQuestion { scene, standing_parts: &self.around, part: self.body, start, direction };
         let clear = straight_sweep_past(&question, termination, |_| Ok::<_, Interrupt>(false))?;
         let Some(Sweep::Clear { path, .. }) = clear else { return Ok(None) };
-        Ok(self.problem.checked_path(&self.around.standing, self.body, &path)?.ok())
+        self.verified(&joined(&way, &path))
+    }
+
+    /// A verified way along some legs.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn way(&self, legs: &[Vector3<f64>]) -> Result<Option<VerifiedPath>, Interrupt> {
+        self.verified(&self.along(legs))
+    }
+
+    fn along(&self, legs: &[Vector3<f64>]) -> Vec<Pose> {
+        let mut way = vec![self.problem.scene.bodies[self.body].planning_from_shape];
+        for leg in legs {
+            way.push(Translation3::from(*leg) * way[way.len() - 1]);
+        }
+        way
+    }
+
+    fn verified(&self, path: &[Pose]) -> Result<Option<VerifiedPath>, Interrupt> {
+        Ok(self.problem.checked_path(&self.around.standing, self.body, path)?.ok())
+    }
+
+    /// The body as it leaves.
+    pub(super) fn leaving(&self) -> Leaving<'_, 'a> {
+        Leaving { problem: &self.problem, body: self.body, around: &self.around, aside: false }
     }
 
     /// The outcome of a search for a way out of the body, with some effort.

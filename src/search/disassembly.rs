@@ -117,7 +117,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             entangled: vec![None; count],
             held_since: vec![None; count],
             hull_changes: 0,
-            removals: Vec::new(),
+            removals: problem.earlier.clone(),
             counters: Counters::default(),
             path_time_ran_out: false,
             problem,
@@ -384,7 +384,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     /// Takes a part out along a path past all that stands.
     pub(super) fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) -> Result<(), Stop> {
         let (started, around) = (Instant::now(), self.surroundings(part));
-        let leaving = Leaving { problem: &self.problem, body: part, around: &around };
+        let leaving = Leaving { problem: &self.problem, body: part, around: &around, aside: false };
         let removal = leaving.removal(&self.removals, path, depth);
         self.count_verification(started);
         self.note(removal?);
@@ -398,7 +398,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         VerifiedPath { path, depth }: VerifiedPath,
     ) -> Result<(), Stop> {
         let started = Instant::now();
-        let leaving = Leaving { problem: &group.problem, body: group.body, around: &group.around };
+        let leaving = group.leaving();
         let removal = leaving.removal(&self.removals, path, depth);
         self.count_verification(started);
         self.note(removal?);
@@ -411,17 +411,12 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         }
         self.around.clear();
         self.observer.removal(&removal);
-        self.trace_removal(&removal);
+        if self.observer.traces() {
+            self.observer.traced(removal.event(&self.removals));
+        }
         self.removals.push(removal);
     }
 
-    fn trace_removal(&mut self, removal: &Removal) {
-        if self.observer.traces() {
-            let required = removal.requires.iter().flat_map(|&i| &self.removals[i].parts);
-            let (parts, requires) = (removal.parts.clone(), required.copied().collect());
-            self.observer.traced(TraceEvent::Removed { parts, requires });
-        }
-    }
 
     /// A part that may move and whose hull is apart from all others': it needs no motion. Without sweeps it is
     /// simulated like all.
@@ -478,7 +473,6 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     ) -> Outcome {
         let remaining = self.everything.standing().to_vec();
         let mut blocked = blocked;
-        let limit = |status, words: &str| (status, Some(Reason::Limit(words.to_owned())));
         let ended = match stop {
             _ if self.is_done() => Ok((PlanStatus::Complete, None)),
             None if self.path_time_ran_out => Ok(limit(PlanStatus::Timeout, NO_TIME)),
@@ -498,10 +492,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
                 Ok(limit(PlanStatus::Partial, &format!("the budget of {n} simulations is used up")))
             }
         };
-        let (status, reason) = ended.unwrap_or_else(|interrupt| match interrupt {
-            Interrupt::Cancelled => limit(PlanStatus::Cancelled, "cancelled"),
-            Interrupt::DeadlinePassed => limit(PlanStatus::Timeout, "the deadline passed"),
-        });
+        let (status, reason) = ended.unwrap_or_else(interrupted);
         let Counters { simulations, sweeps, .. } = self.counters;
         self.trace(|| TraceEvent::End {
             status: status.name().to_owned(),
@@ -540,6 +531,18 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             }
         }
         Ok(known.first(remaining, &wanted))
+    }
+}
+
+fn limit(status: PlanStatus, words: &str) -> (PlanStatus, Option<Reason>) {
+    (status, Some(Reason::Limit(words.to_owned())))
+}
+
+/// How a search ends that is interrupted, and why.
+pub(super) fn interrupted(interrupt: Interrupt) -> (PlanStatus, Option<Reason>) {
+    match interrupt {
+        Interrupt::Cancelled => limit(PlanStatus::Cancelled, "cancelled"),
+        Interrupt::DeadlinePassed => limit(PlanStatus::Timeout, "the deadline passed"),
     }
 }
 

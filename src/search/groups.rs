@@ -67,7 +67,7 @@ impl Groups<'_, '_, '_> {
         for (_, group, direction) in candidates {
             let contraction = Contraction::new(&self.disassembly.problem, &standing, &group)?;
             let action = self.translations[direction];
-            let way = self.disassembly.timed(|_| contraction.straight(&action))?;
+            let way = self.disassembly.timed(|_| contraction.way_out(&[], &action))?;
             if self.tried(&contraction, &group, way)? {
                 self.disassembly.counters.sweeps += 1;
                 return Ok(Some(group));

@@ -10,12 +10,14 @@
 
 mod action_list;
 mod action_table;
+mod aside;
 mod ball;
 mod base;
 mod blocked_actions;
 mod cell_decomposition;
 mod cell_memory;
 mod contraction;
+mod critical_places;
 mod critical_turns;
 mod deepest_point;
 mod deferred_removals;
@@ -37,6 +39,7 @@ mod paper_tests;
 mod pdp;
 mod problem;
 mod rays;
+mod rearrangement;
 mod report;
 mod request;
 mod requirements;
@@ -81,11 +84,26 @@ pub fn search(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observe
     outcome
 }
 
-/// A search, with the groups that left taken apart.
+/// A search, with parts moved aside where nothing leaves, and the groups that left taken apart.
 fn run(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
     let mut outcome = run_once(planner, problem.clone(), observer);
+    let base = outcome.base.clone();
+    loop {
+        let next = match aside::moved_aside(planner, &problem, &outcome, observer) {
+            Ok(Some(next)) => next,
+            Ok(None) => break,
+            Err(interrupt) => {
+                (outcome.status, outcome.reason) = disassembly::interrupted(interrupt);
+                break;
+            }
+        };
+        let counters = outcome.counters;
+        outcome = run_once(planner, next, observer);
+        outcome.counters.add(&counters);
+    }
+    outcome.base = base.filter(|base| outcome.remaining.contains(&base.part));
     for group in 0..outcome.removals.len() {
-        if outcome.removals[group].parts.len() > 1 {
+        if outcome.removals[group].is_group() {
             subassembly::take_apart(planner, &problem, &mut outcome, group, observer);
         }
     }

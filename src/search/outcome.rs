@@ -7,6 +7,8 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::Pose;
 use crate::plan::{Base, FreeGroup, PlanStatus};
 
+use super::trace::TraceEvent;
+
 /// The most parts that a reason names as those that remain.
 const NAMED_PARTS: usize = 4;
 
@@ -18,7 +20,9 @@ pub struct Removal {
     /// The removal (its place in the order) that took the group out to which they belong; `None` where they leave the
     /// assembly. A group is taken apart as it stood there.
     pub of: Option<usize>,
-    /// Poses of the part's shape, or of the body of all parts; the assembled one first; thinned and verified.
+    /// Whether they are only moved aside, and stay among the others.
+    pub aside: bool,
+    /// Poses of the part's shape, or of the body of all parts; as they stand before comes first; thinned and verified.
     pub path: Vec<Pose>,
     /// Largest depth beyond the pairs' allowed penetrations that verification found, past all parts but those that it
     /// requires to be out.
@@ -35,12 +39,29 @@ impl Removal {
     #[must_use]
     pub fn alone(&self) -> Option<usize> {
         match self.parts[..] {
-            [part] if self.of.is_none() => Some(part),
+            [part] if self.of.is_none() && !self.aside => Some(part),
             _ => None,
         }
     }
 
-    /// The rigid motion from the assembled pose to the end of the path.
+    /// The event of a trace that it is, after earlier ones.
+    pub(super) fn event(&self, earlier: &[Self]) -> TraceEvent {
+        let required = self.requires.iter().flat_map(|&i| &earlier[i].parts);
+        let (parts, requires) = (self.parts.clone(), required.copied().collect());
+        if self.aside {
+            TraceEvent::MovedAside { parts, requires }
+        } else {
+            TraceEvent::Removed { parts, requires }
+        }
+    }
+
+    /// Whether several parts leave together.
+    #[must_use]
+    pub fn is_group(&self) -> bool {
+        self.parts.len() > 1 && !self.aside
+    }
+
+    /// The rigid motion from the beginning of the path to its end.
     #[must_use]
     pub fn motion(&self) -> Pose {
         let ends = self.path.first().zip(self.path.last());
@@ -202,11 +223,11 @@ impl Outcome {
     #[must_use]
     pub fn kept_together(&self) -> Vec<Vec<usize>> {
         let rest = |(group, removal): (usize, &Removal)| {
-            let inner = self.removals.iter().filter(|r| r.of == Some(group));
+            let inner = self.removals.iter().filter(|r| r.of == Some(group) && !r.aside);
             let gone: Vec<usize> = inner.flat_map(|r| r.parts.iter().copied()).collect();
             removal.parts.iter().copied().filter(|part| !gone.contains(part)).collect::<Vec<usize>>()
         };
-        let groups = self.removals.iter().enumerate().map(rest);
+        let groups = self.removals.iter().enumerate().filter(|(_, removal)| removal.is_group()).map(rest);
         groups.filter(|rest| rest.len() > 1).collect()
     }
 }

@@ -93,6 +93,8 @@ pub struct Problem<'a> {
     pub seed: u64,
     /// The number of simulations after which the search gives up.
     pub max_simulations: Option<u64>,
+    /// What has left or moved before, in order: of the search for what remains after parts were moved aside.
+    pub earlier: Vec<Removal>,
     /// Simulations that an earlier search of the same question has used up.
     pub spent: u64,
     /// Time after which one motion, or PDP's or RRT's search for one part, is given up.

@@ -3,11 +3,16 @@
 //! A path was verified past the parts that stood. Here it is verified past each part that had left, too, where that
 //! stood assembled: the path requires those that it enters to be out, and no other. For this to say something, the
 //! path leads out of all parts that were there at the start, and not only of those that still stand.
+//!
+//! A part that was moved aside had several places. Done is only what is required, in turn; so each part stands after as
+//! many of its moves as are required, and is required to make the next one where the path enters it there.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use nalgebra::{Translation3, Vector3};
 
 use crate::geometry::{Pose, transformed};
-use crate::scene::{StandingParts, exit_direction};
+use crate::scene::{Scene, StandingParts, exit_direction};
 use crate::termination::Interrupt;
 use crate::tolerances::HULL_MARGIN;
 
@@ -23,11 +28,13 @@ pub(super) struct Leaving<'p, 'a> {
     pub(super) body: usize,
     /// All that stands beside it.
     pub(super) around: &'p StandingParts,
+    /// Whether it is only moved aside.
+    pub(super) aside: bool,
 }
 
 impl Leaving<'_, '_> {
-    /// Its removal, after some others, along a path past all that stands: led on until it is out of everything, with
-    /// what it requires.
+    /// Its removal, after some others, along a path past all that stands, with what it requires. A path that leads out is
+    /// led on until it is out of everything.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -37,16 +44,38 @@ impl Leaving<'_, '_> {
         path: Vec<Pose>,
         depth: f64,
     ) -> Result<Removal, Interrupt> {
-        let Self { problem, body, .. } = self;
-        let path = self.led_out(earlier, path);
-        let mut gone: Vec<usize> = earlier.iter().flat_map(|r| &r.parts).copied().collect();
-        gone.sort_unstable();
-        let past = problem.depths_past(&gone, body, &path)?;
-        let blocks = |gone: &usize| past.contains(&(*gone, None));
-        let requires: Vec<usize> = (0..earlier.len()).filter(|&i| earlier[i].parts.iter().any(blocks)).collect();
-        let depth = past.iter().filter_map(|(_, depth)| *depth).fold(depth, f64::max);
-        let wave = requires.iter().map(|&i| earlier[i].wave + 1).max().unwrap_or(0);
-        Ok(Removal { parts: problem.scene.members(&body).to_vec(), of: None, path, depth, requires, wave })
+        let Self { problem, body, aside, .. } = self;
+        let path = if aside { path } else { self.led_out(earlier, path) };
+        let parts = problem.scene.members(&body).to_vec();
+        let places = EarlierPlaces::new(&problem.scene, earlier);
+        let moved_before = |i: &usize| earlier[*i].parts.iter().any(|part| parts.contains(part));
+        // Its path begins where the earlier ones of its parts end.
+        let mut requires: BTreeSet<usize> = (0..earlier.len()).filter(moved_before).collect();
+        let mut depths: HashMap<(usize, usize), Option<f64>> = HashMap::new();
+        loop {
+            let done = closed(&requires, earlier);
+            let others = places.moves.iter().filter(|(part, _)| !parts.contains(part));
+            // Where each part stands if only that is done; where all its moves are, the path was verified.
+            let standing = others.filter_map(|(&part, moves)| {
+                let count = moves.iter().filter(|&i| done.contains(i)).count();
+                (count < moves.len()).then_some((part, count))
+            });
+            let standing: Vec<(usize, usize)> = standing.collect();
+            let unknown: Vec<_> = standing.iter().filter(|at| !depths.contains_key(at)).copied().collect();
+            depths.extend(places.depths_past(self, &unknown, &path)?);
+            let entered: Vec<usize> = standing
+                .iter()
+                .filter(|at| depths.get(at) == Some(&None))
+                .map(|(part, count)| places.moves[part][*count])
+                .collect();
+            if entered.is_empty() {
+                let depth = standing.iter().filter_map(|at| *depths.get(at)?).fold(depth, f64::max);
+                let wave = done.iter().map(|&i| earlier[i].wave + 1).max().unwrap_or(0);
+                let requires = requires.into_iter().collect();
+                return Ok(Removal { parts, of: None, aside, path, depth, requires, wave });
+            }
+            requires.extend(entered);
+        }
     }
 
     /// A path that ends apart from the hull of all that stands, continued until it is apart from all that was there at
@@ -55,7 +84,7 @@ impl Leaving<'_, '_> {
         if earlier.is_empty() {
             return path;
         }
-        let Self { problem: Problem { scene, .. }, body, around } = self;
+        let Self { problem: Problem { scene, .. }, body, around, .. } = self;
         let Some(&end) = path.last() else { return path };
         let along = last_leg(&path);
         // It tells where the others lie.
@@ -77,6 +106,83 @@ impl Leaving<'_, '_> {
     }
 }
 
+/// All that some removals require, in turn, and these themselves.
+fn closed(removals: &BTreeSet<usize>, all: &[Removal]) -> BTreeSet<usize> {
+    let mut closure = BTreeSet::new();
+    let mut open: Vec<usize> = removals.iter().copied().collect();
+    while let Some(i) = open.pop() {
+        if closure.insert(i) {
+            open.extend(&all[i].requires);
+        }
+    }
+    closure
+}
+
+/// Where parts stood before they left, or were moved aside.
+struct EarlierPlaces<'s> {
+    scene: &'s Scene,
+    earlier: &'s [Removal],
+    /// By part: its removals, in order.
+    moves: BTreeMap<usize, Vec<usize>>,
+}
+
+impl<'s> EarlierPlaces<'s> {
+    /// Of a scene in which each part stands where it stood last.
+    fn new(scene: &'s Scene, earlier: &'s [Removal]) -> Self {
+        let mut moves: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (i, removal) in earlier.iter().enumerate() {
+            removal.parts.iter().for_each(|&part| moves.entry(part).or_default().push(i));
+        }
+        Self { scene, earlier, moves }
+    }
+
+    /// Where a part stood after some of its moves: in the scene, but for moves aside that came after these.
+    fn place(&self, part: usize, count: usize) -> Pose {
+        let undone = self.moves[&part][count..].iter().rev().map(|&i| &self.earlier[i]).filter(|r| r.aside);
+        undone.fold(self.scene.bodies[part].planning_from_shape, |at, removal| removal.motion().inverse() * at)
+    }
+
+    /// How deep a path gets past parts after some of their moves; `None` where it is refused.
+    fn depths_past(
+        &self,
+        leaving: Leaving<'_, '_>,
+        parts: &[(usize, usize)],
+        path: &[Pose],
+    ) -> Result<Vec<((usize, usize), Option<f64>)>, Interrupt> {
+        let mut depths = Vec::new();
+        let is_elsewhere = |(part, count): &&(usize, usize)| {
+            self.moves[part][*count..].iter().any(|&i| self.earlier[i].aside)
+        };
+        let (elsewhere, here): (Vec<_>, Vec<_>) = parts.iter().partition(is_elsewhere);
+        let here_parts: Vec<usize> = here.iter().map(|(part, _)| *part).collect();
+        let past = leaving.problem.depths_past(&here_parts, leaving.body, path)?;
+        depths.extend(here.into_iter().map(|at| {
+            // What is far from the path is not asked about.
+            let known = past.iter().find(|(part, _)| *part == at.0);
+            (at, known.map_or(Some(0.0), |(_, depth)| *depth))
+        }));
+        for at in elsewhere {
+            let scene = self.scene.with_placed(&[(at.0, self.place(at.0, at.1))]);
+            let problem = Problem { scene, ..leaving.problem.clone() };
+            let past = problem.depths_past(&[at.0], leaving.body, path)?;
+            depths.push((at, past.first().map_or(Some(0.0), |(_, depth)| *depth)));
+        }
+        Ok(depths)
+    }
+}
+
+/// Where parts stand after some removals that leave the assembly or are moved aside in it: those that were moved aside.
+pub(super) fn places_after(scene: &Scene, removals: &[Removal]) -> Vec<(usize, Pose)> {
+    let mut places: BTreeMap<usize, Pose> = BTreeMap::new();
+    for removal in removals.iter().filter(|r| r.aside && r.of.is_none()) {
+        for &part in &removal.parts {
+            let place = places.entry(part).or_insert(scene.bodies[part].planning_from_shape);
+            *place = removal.motion() * *place;
+        }
+    }
+    places.into_iter().collect()
+}
+
 /// The unit vector of the last leg of a path, if that does not turn.
 fn last_leg(path: &[Pose]) -> Option<Vector3<f64>> {
     let [.., from, to] = path else { return None };
@@ -96,7 +202,7 @@ pub(super) fn without_needless(outcome: Outcome, targets: &[usize]) -> Outcome {
     // The numbers that the needed ones get.
     let numbers: Vec<usize> =
         needed.iter().scan(0, |next, &is| Some(std::mem::replace(next, *next + usize::from(is)))).collect();
-    let needless = removals.iter().zip(&needed).filter(|(r, is)| !**is && r.of.is_none());
+    let needless = removals.iter().zip(&needed).filter(|(r, is)| !**is && r.of.is_none() && !r.aside);
     remaining.extend(needless.flat_map(|(r, _)| &r.parts));
     remaining.sort_unstable();
     let mut is_needed = needed.into_iter();
@@ -108,14 +214,14 @@ pub(super) fn without_needless(outcome: Outcome, targets: &[usize]) -> Outcome {
 
 /// Whether a removal takes a target out, or is one of those that leave a target behind alone.
 fn frees(removal: &Removal, removals: &[Removal], targets: &[usize]) -> bool {
-    let takes_alone = |r: &Removal, target: usize| r.parts[..] == [target];
+    let takes_alone = |r: &Removal, target: usize| r.parts[..] == [target] && !r.aside;
     let of_same_body = |r: &&Removal| r.of == removal.of;
     targets.iter().any(|&target| {
         let stands_there = match removal.of {
             Some(group) => removals[group].parts.contains(&target),
             None => true,
         };
-        let leaves = |r: &Removal| r.parts.contains(&target);
+        let leaves = |r: &Removal| r.parts.contains(&target) && !r.aside;
         takes_alone(removal, target) || stands_there && !removals.iter().filter(of_same_body).any(leaves)
     })
 }

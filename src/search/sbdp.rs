@@ -92,8 +92,10 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
     };
     let problem = &mut disassembly.problem;
     let is_extended = problem.actions == ActionSet::Extended;
-    let base = if is_extended { problem.chosen_base(&initial.upward()) } else { None };
-    problem.base = base.as_ref().map(|base| base.part);
+    // After parts were moved aside, the base is the same.
+    let is_first = problem.base.is_none() && problem.earlier.is_empty();
+    let base = if is_extended && is_first { problem.chosen_base(&initial.upward()) } else { None };
+    problem.base = base.as_ref().map(|base| base.part).or(problem.base);
     let mut search = Sbdp::new(disassembly, initial, guided);
     let stop = search.run().err();
     let (report, disassembly) = search.report();

@@ -7,6 +7,7 @@ use super::deferred_removals::DeferredRemovals;
 use super::outcome::{Outcome, Removal};
 use super::problem::{Observer, Problem};
 use super::request::Planner;
+use super::requirements::places_after;
 use super::run;
 use super::trace::TraceEvent;
 
@@ -31,7 +32,9 @@ pub(super) fn take_apart(
         observer.traced(TraceEvent::GroupOpened { parts: present.clone() });
     }
     let spent = problem.spent + outcome.counters.simulations;
-    let inner = Problem { present, targets, base: None, spent, ..problem.clone() };
+    let scene = problem.scene.with_placed(&places_after(&problem.scene, &outcome.removals[..group]));
+    let inner =
+        Problem { scene, present, targets, base: None, releases_base: false, spent, ..problem.clone() };
     let done = outcome.removals.len();
     let mut deferred = DeferredRemovals::after(observer, done, outcome.counters.simulations);
     let Outcome { status, reason, removals, unfinished, blocked, free_together, counters, .. } =

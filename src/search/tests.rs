@@ -44,6 +44,7 @@ pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
         static_analysis: StaticAnalysis::default(),
         sweeps: false,
         max_simulations: None,
+        earlier: Vec::new(),
         spent: 0,
         path_timeout: None,
         termination: Termination::default(),

@@ -120,6 +120,20 @@ pub enum TraceEvent {
         /// Whether it leaves.
         leaves: bool,
     },
+    /// The places of all parts were searched for one after which some leave.
+    PlacesSearched {
+        /// The number of places.
+        places: usize,
+        /// Whether such a one was found and confirmed.
+        leaves: bool,
+    },
+    /// Parts were moved aside, where they stay.
+    MovedAside {
+        /// The parts.
+        parts: Vec<usize>,
+        /// Parts that their path requires to have moved.
+        requires: Vec<usize>,
+    },
     /// What follows takes a group apart that has left.
     GroupOpened {
         /// The parts.

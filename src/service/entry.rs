@@ -256,6 +256,7 @@ impl Entry {
             sweeps: request.sweeps(),
             seed: request.seed,
             max_simulations: request.max_simulations,
+            earlier: Vec::new(),
             spent: 0,
             path_timeout: request.path_timeout,
             termination: termination.clone(),

@@ -117,6 +117,21 @@ pub fn free_travel(question: &SweepQuestion<'_>, termination: &Termination) -> R
     Ok(free)
 }
 
+/// How far a part goes along a line until it meets another one, if it does; and the number of edges and corners that
+/// were cast. The parts that stand do not count.
+///
+/// # Errors
+/// The termination condition became true.
+pub fn travel_to(
+    question: &SweepQuestion<'_>,
+    other: usize,
+    termination: &Termination,
+) -> Result<(Option<f64>, usize), Interrupt> {
+    let cast = cast_at(question, other, f64::INFINITY, termination);
+    let (met, count) = cast.counted_way(0.0)?;
+    Ok(((met < cast.travel).then(|| met.max(0.0)), 1 + count))
+}
+
 /// The standing parts whose boxes meet the box that a sweep passes, ascending.
 fn on_the_way(question: &SweepQuestion<'_>, travel: f64) -> Vec<usize> {
     let SweepQuestion { scene, standing_parts, part, start, direction } = *question;
