@@ -411,7 +411,7 @@ pub(crate) const GROUPS_SEARCHED: usize = 64;
 pub(crate) const GROUPS_TURNED: usize = 8;
 /// Places of all parts that are searched for one after which some leave. The puzzles of the corpus need some hundred; at
 /// half, those of more moves are given up; at double, what never comes apart takes up to twice as long.
-pub(crate) const PLACES_SEARCHED: usize = 4_000;
+pub(crate) const PLACES_SEARCHED: usize = 20_000;
 /// Ways to such places that are verified: casts seldom miss anything. At half, one that is refuted may hide the next; at
 /// double no effect.
 pub(crate) const PLACES_VERIFIED: usize = 8;

@@ -123,3 +123,82 @@ fn moves(found: &Rearrangement) -> Vec<Moves> {
     }
     moves
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::super::tests::{Recorder, problem};
+    use super::super::{TraceEvent, search};
+    use super::*;
+    use crate::fixtures::{cells, cuboid, moved as placed, scene};
+    use crate::geometry::{Pose, SourceMesh};
+
+    /// A box (part 0) with a closed channel along x, in which a slider (part 1) goes to and fro but does not leave. Under
+    /// the slider, in a blind hole, is a pin (part 2), which leaves through a hole in the roof that is too narrow for the
+    /// slider.
+    fn covered_pin() -> Vec<SourceMesh> {
+        let housing = cells(
+            [
+                &[0.0, 1.0, 1.4, 2.4, 7.0, 8.0],
+                &[0.0, 1.0, 1.5, 2.5, 3.0, 4.0],
+                &[0.0, 0.5, 1.0, 2.0, 3.0],
+            ],
+            |[x, y, z]| {
+                let is_channel = (1..=3).contains(&x) && (1..=3).contains(&y) && z == 2;
+                let is_hole = x == 2 && y == 2 && (z == 1 || z == 3);
+                !is_channel && !is_hole
+            },
+        );
+        let slider = cuboid([1.05, 1.05, 1.05], [3.0, 2.95, 1.95]);
+        let pin = cuboid([1.5, 1.6, 0.55], [2.3, 2.4, 0.95]);
+        vec![housing, slider, pin]
+    }
+
+    fn planned(parts: Vec<SourceMesh>, targets: Option<Vec<usize>>) -> (Outcome, Vec<TraceEvent>) {
+        let (scene, verifier) = scene(parts);
+        let mut recorder = Recorder::default();
+        let problem =
+            Problem { actions: ActionSet::Extended, sweeps: true, targets, ..problem(scene, &verifier) };
+        (search(Planner::SbdpStar, problem, &mut recorder), recorder.0)
+    }
+
+    #[test]
+    fn a_pin_leaves_after_what_covers_it_was_moved_aside() {
+        for turn in [Vector3::zeros(), Vector3::new(0.3, -0.5, 0.2)] {
+            let pose = Pose::rotation(turn);
+            let parts = covered_pin().into_iter().map(|mesh| placed(mesh, &pose)).collect();
+            let (outcome, events) = planned(parts, Some(vec![2]));
+            assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
+            let [aside, out] = &outcome.removals[..] else { panic!("{:?}", outcome.removals) };
+            assert_eq!((&aside.parts[..], aside.aside, aside.of, aside.wave), (&[1][..], true, None, 0));
+            let along = pose.inverse() * aside.motion().translation.vector;
+            assert!(along.x > 1.3 && along.yz().norm() < 1e-6, "{along}");
+            assert_eq!((&out.parts[..], out.aside, &out.requires[..], out.wave), (&[2][..], false, &[0][..], 1));
+            assert_eq!(outcome.remaining, [0, 1]);
+            assert!(events.iter().any(|e| matches!(e, TraceEvent::PlacesSearched { leaves: true, .. })));
+        }
+    }
+
+    #[test]
+    fn what_only_moves_aside_does_not_come_off() {
+        let (outcome, _) = planned(covered_pin(), None);
+        assert!(matches!(outcome.status, PlanStatus::Exhausted | PlanStatus::Infeasible));
+        assert_eq!((outcome.remaining, outcome.removals.len()), (vec![0, 1], 2));
+    }
+
+    #[test]
+    fn a_path_requires_what_was_moved_out_of_its_way_and_nothing_else() {
+        // Beside the channel, a second pin in a hole of its own: it leaves at once.
+        let mut parts = covered_pin();
+        let post = cuboid([3.5, 1.6, 3.0], [4.5, 2.4, 3.5]);
+        parts.push(post);
+        let (outcome, _) = planned(parts, None);
+        let of = |part: usize| {
+            outcome.removals.iter().find(|r| r.parts == [part] && !r.aside).map(|r| r.requires.clone())
+        };
+        assert_eq!(of(3), Some(vec![]), "{:?}", outcome.removals);
+        let aside = outcome.removals.iter().position(|r| r.aside);
+        assert_eq!(of(2), aside.map(|i| vec![i]));
+    }
+}

@@ -3,14 +3,14 @@
 //! A state is the shift of every part against one that stays. From a state, parts move together along an axis: a part
 //! with all that it would meet at once, and what these would meet in turn. They leave if they meet nothing. Else they
 //! stop where they meet another part, and at the critical places before (`critical_places`): where several of these fall
-//! together, as in a grid, and amid the longest stretches between them. States that few long moves lead to come first;
-//! short moves, within the play of parts, cost more.
+//! together, as in a grid, and amid the stretches between them. First come states that the fewest moves within the play of
+//! parts, or to amid a stretch, lead to; of these, those that the fewest moves lead to.
 //!
 //! How far one part goes past another depends on where the two stand against each other alone, and is remembered: of
 //! some thousand states, most need no new casts. What is found are claims, to be verified like every path.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet};
+use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet, VecDeque};
 
 use nalgebra::{Translation3, Vector3};
 use rayon::prelude::*;
@@ -24,13 +24,6 @@ use crate::tolerances::{ROUNDED, SHORT_MOVE};
 use super::critical_places::{AxisCoordinates, CriticalCoordinates, alignments};
 use super::problem::Problem;
 use super::state::least_travel;
-
-/// Costs of a move: to where parts meet or fit, amid a stretch, and within the play of parts. Chosen, not derived: a
-/// state amid a stretch is seldom needed, one within the play hardly ever. At half and double the same states are
-/// searched in another order.
-const LONG_MOVE_COST: u32 = 2;
-const MIDDLE_COST: u32 = 3;
-const SHORT_MOVE_COST: u32 = 6;
 
 /// Parts that move together along a line.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,7 +49,8 @@ struct PlaceState {
     shifts: Vec<Vector3<f64>>,
     /// The state that it was reached from, and how.
     parent: Option<(usize, Shift)>,
-    cost: u32,
+    /// The number of moves that led to it.
+    moves: u32,
 }
 
 /// A pair of parts, by their places among those that stand, an axis, and the rounded shift of the first against the
@@ -76,7 +70,10 @@ pub(super) struct PlaceSearch<'p, 'a> {
     travels: HashMap<TravelKey, Option<f64>>,
     states: Vec<PlaceState>,
     known: HashSet<Vec<[i64; 3]>>,
+    /// By the number of their moves.
     open: BinaryHeap<Reverse<(u32, usize)>>,
+    /// States of which only those moves were tried that lead to where parts meet or fit.
+    half_open: VecDeque<usize>,
     exits: Vec<Rearrangement>,
     edges: usize,
     searched: usize,
@@ -98,11 +95,12 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
             states: Vec::new(),
             known: HashSet::new(),
             open: BinaryHeap::new(),
+            half_open: VecDeque::new(),
             exits: Vec::new(),
             edges: 0,
             searched: 0,
         };
-        search.add(PlaceState { shifts: vec![Vector3::zeros(); standing.len()], parent: None, cost: 0 });
+        search.add(PlaceState { shifts: vec![Vector3::zeros(); standing.len()], parent: None, moves: 0 });
         search
     }
 
@@ -117,13 +115,22 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
     /// The termination condition became true.
     pub(super) fn next_exit(&mut self) -> Result<Option<Rearrangement>, Interrupt> {
         while self.exits.is_empty() && self.edges < EDGES_CAST_AT_LAST && self.searched < PLACES_SEARCHED {
-            let Some(Reverse((_, state))) = self.open.pop() else { break };
             self.problem.termination.check()?;
-            self.searched += 1;
-            self.cast(state)?;
+            let (state, fits) = match self.open.pop() {
+                Some(Reverse((_, state))) => (state, true),
+                None => match self.half_open.pop_front() {
+                    Some(state) => (state, false),
+                    None => break,
+                },
+            };
+            if fits {
+                self.searched += 1;
+                self.cast(state)?;
+                self.half_open.push_back(state);
+            }
             for axis in 0..self.axes.len() {
                 for forward in [true, false] {
-                    self.expand(state, axis, forward);
+                    self.expand(state, (axis, forward), fits);
                 }
             }
             // The smallest group first, and the last one is taken first.
@@ -173,8 +180,9 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
         self.travels.get(&key(p, q, axis, shifts)).copied().flatten()
     }
 
-    /// Adds the states that moves along an axis lead to, and exits.
-    fn expand(&mut self, state: usize, axis: usize, forward: bool) {
+    /// Adds the states that moves along an axis lead to, and exits: if it `fits`, those where parts meet or fit, and else
+    /// all others.
+    fn expand(&mut self, state: usize, (axis, forward): (usize, bool), fits: bool) {
         let count = self.standing.len();
         let mut groups: BTreeSet<Vec<usize>> = BTreeSet::new();
         for seed in 0..count {
@@ -195,17 +203,20 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
             let action = Action::Push(self.axes[axis], forward);
             let parts: Vec<usize> = moving.iter().map(|&p| self.standing[p]).collect();
             let Some(met) = met else {
+                if !fits {
+                    continue;
+                }
                 let shifts = self.shifts_to(state);
                 self.exits.push(Rearrangement { shifts, leaving: parts, action });
                 continue;
             };
-            for (length, cost) in self.stops(state, moving, (axis, forward), met) {
+            for length in self.stops(state, moving, (axis, forward), met, fits) {
                 let along = action.force() * length;
                 let mut shifts = self.states[state].shifts.clone();
                 moving.iter().for_each(|&p| shifts[p] += along);
-                let cost = self.states[state].cost + cost;
+                let moves = self.states[state].moves + 1;
                 let parent = Some((state, Shift { parts: parts.clone(), along }));
-                self.add(PlaceState { shifts, parent, cost });
+                self.add(PlaceState { shifts, parent, moves });
             }
         }
     }
@@ -235,17 +246,18 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
     }
 
     /// How far some parts move along an axis until they meet another or come to a place before that where several
-    /// critical places fall together, or amid the longest stretches between these; and the cost.
+    /// critical places fall together, beyond their play; or, unless it `fits`, within their play, and to amid the stretches
+    /// between these places.
     fn stops(
         &mut self,
         state: usize,
         moving: &[usize],
         (axis, forward): (usize, bool),
         met: f64,
-    ) -> Vec<(f64, u32)> {
+        fits: bool,
+    ) -> Vec<f64> {
         let short = moving.iter().map(|&p| self.short(p)).fold(f64::INFINITY, f64::min);
         let least = moving.iter().map(|&p| self.least(p)).fold(f64::INFINITY, f64::min);
-        let cost = |length: f64, cost: u32| if length < short { SHORT_MOVE_COST } else { cost };
         if met < least {
             return Vec::new();
         }
@@ -259,19 +271,19 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
             .map(f64::abs)
             .collect();
         places.sort_by(f64::total_cmp);
-        let mut stops = Vec::new();
-        let mut from = 0.0;
-        for together in places.chunk_by(|a, b| b - a < short / 2.0) {
-            let at = (together[0] + together[together.len() - 1]) / 2.0;
-            stops.push((at, cost(at, LONG_MOVE_COST)));
-            stops.push(((from + at) / 2.0, cost((at - from) / 2.0, MIDDLE_COST)));
-            from = at;
+        let together = places.chunk_by(|a, b| b - a < short / 2.0);
+        // Of places that count as one, the first that is added stays: where parts fit rather than where they meet.
+        let mut stops: Vec<f64> = together.map(|some| (some[0] + some[some.len() - 1]) / 2.0).collect();
+        stops.push(met);
+        if fits {
+            stops.retain(|length| *length >= short);
+        } else {
+            let from = [0.0].into_iter().chain(stops.iter().copied());
+            let amid = from.zip(&stops).map(|(from, to)| (from + to) / 2.0).collect::<Vec<_>>();
+            stops.retain(|length| *length < short);
+            stops.extend(amid);
         }
-        stops.push((met, cost(met, LONG_MOVE_COST)));
-        stops.push(((from + met) / 2.0, cost((met - from) / 2.0, MIDDLE_COST)));
-        stops.retain(|(length, _)| *length >= least && *length <= met);
-        // Of places that count as one, the first stays.
-        stops.sort_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
+        stops.retain(|length| *length >= least && *length <= met);
         stops
     }
 
@@ -299,7 +311,7 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
         };
         let places: Vec<[i64; 3]> = state.shifts.iter().enumerate().map(like).collect();
         if self.known.insert(places) {
-            self.open.push(Reverse((state.cost, self.states.len())));
+            self.open.push(Reverse((state.moves, self.states.len())));
             self.states.push(state);
         }
     }
@@ -316,9 +328,10 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
         shifts
     }
 
-    /// The length below which a move of a part is short.
+    /// The length below which a move of a part is within its play.
     fn short(&self, p: usize) -> f64 {
-        SHORT_MOVE * self.problem.scene.bodies[self.standing[p]].shape.bounds().extents().min()
+        let shape = &self.problem.scene.bodies[self.standing[p]].shape;
+        SHORT_MOVE * shape.thickness().min(shape.bounds().extents().min())
     }
 
     /// The length below which it is none.
