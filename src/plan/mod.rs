@@ -8,7 +8,8 @@ mod shorten;
 mod verify;
 
 pub use model::{
-    Base, Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning,
+    Base, Blocked, FreeGroup, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd,
+    Warning,
 };
 pub use records::{KnownVerdicts, VerdictQuestion};
 pub(crate) use records::{OVERLAP, VERDICT, overlap_key};
