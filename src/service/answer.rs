@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 
 use crate::assembling::Insertion;
 use crate::geometry::{Assembly, Pose, Waypoint, pose_from_waypoint, waypoint_from_pose};
-use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
+use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd, Warning};
 use crate::search::{BlockedAction, Outcome, PlanRequest, Removal};
 
 /// Turns below this are rounding.
@@ -18,27 +18,31 @@ const NO_SHIFT: f64 = 1e-9;
 /// A removal as a step of a plan.
 pub(super) fn removal(assembly: &Assembly, removal: &Removal) -> PlanStep {
     let Removal { part, path, depth, requires, wave } = removal;
-    step(assembly, *part, path, *depth, (requires, *wave))
+    step(assembly, (*part, StepEnd::Out), path, *depth, (requires, *wave))
 }
 
 /// An insertion as a step of a plan.
 pub(super) fn insertion(assembly: &Assembly, insertion: &Insertion) -> PlanStep {
     let Insertion { part, path, depth, requires, wave } = insertion;
-    step(assembly, *part, path, *depth, (requires, *wave))
+    step(assembly, (*part, StepEnd::In), path, *depth, (requires, *wave))
 }
 
 fn step(
     assembly: &Assembly,
-    part: usize,
+    (part, ends): (usize, StepEnd),
     path: &[Pose],
     depth: f64,
     (requires, wave): (&[usize], usize),
 ) -> PlanStep {
     let direction = last_direction(path, &assembly.shapes[assembly.parts[part].shape].bounds().centre());
-    let path: Vec<Waypoint> = path.iter().map(|pose| waypoint(assembly, part, pose)).collect();
+    let from = &assembly.parts[part].planning_from_shape;
+    let path: Vec<Waypoint> =
+        path.iter().map(|pose| waypoint_from_pose(&motion(assembly, from, pose))).collect();
     let turns = path.iter().any(|w| w[3..] != path[0][3..]);
     PlanStep {
-        part,
+        parts: vec![part],
+        of: None,
+        ends,
         motion: if turns { MotionKind::Rotation } else { MotionKind::Translation },
         path,
         verified_depth: depth / assembly.scale,
@@ -206,6 +210,8 @@ impl PlanFrame<'_> {
             fixed: self.fixed,
             base: None,
             steps: Vec::new(),
+            kept_together: Vec::new(),
+            free_together: Vec::new(),
             blocked: Vec::new(),
             overlaps: self.overlaps,
             warnings,
