@@ -231,7 +231,10 @@ mod tests {
         while speculation.plan_next(&service, &t) {}
         let asked: Vec<_> = service.asked().into_iter().map(|(_, fixed, removed)| (fixed, removed)).collect();
         let of = |fixed: &[usize], removed: &[usize]| (fixed.to_vec(), removed.to_vec());
-        assert_eq!(asked, [of(&[1, 2], &[]), of(&[], &[1, 2]), of(&[3], &[1, 2]), of(&[3], &[]), of(&[], &[3])]);
+        assert_eq!(
+            asked,
+            [of(&[1, 2], &[]), of(&[], &[1, 2]), of(&[3], &[1, 2]), of(&[3], &[]), of(&[], &[3])]
+        );
     }
 
     #[test]
