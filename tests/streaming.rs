@@ -143,7 +143,7 @@ fn read(client: &Client, options: &PlanOptions, pause: Duration) -> usize {
     let handle = client.upload(&Boxes::two().assembly()).unwrap();
     let mut stream = client.plan(handle, options).unwrap();
     std::thread::sleep(pause);
-    let mut steps = 0;
+    let mut steps = 0_usize;
     loop {
         match stream.next_event_within(HANG).unwrap() {
             Some(Event::Step(step)) => {

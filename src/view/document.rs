@@ -95,10 +95,8 @@ fn check_steps(plan: &PlanDocument) -> Result<(), String> {
         }
         check_start(kind_of(plan), step).map_err(|e| format!("`steps[{i}].path` {e}"))?;
         let motions = std::iter::once(&frame.body).chain(&frame.standing);
-        motions
-            .map(|motion| check_distance(&motion.translation.vector))
-            .collect::<Result<(), _>>()
-            .map_err(|e| format!("what `steps[{i}]` moves {e}"))?;
+        let mut shifts = motions.map(|motion| &motion.translation.vector);
+        shifts.try_for_each(check_distance).map_err(|e| format!("what `steps[{i}]` moves {e}"))?;
     }
     Ok(())
 }
