@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use crate::geometry::{
     Assembly, Mesh, Pose, Shape, Solidity, SourceAssembly, SourceMesh, SourcePart, Surface, heal,
 };
-use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Verifier};
+use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd, Verifier};
 use crate::scene::{CongruentPair, Scene};
 use crate::sdf::Field;
 use crate::termination::Termination;
@@ -307,6 +307,8 @@ pub(crate) fn plan_of(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
         base: None,
         steps,
         remaining: vec![],
+        kept_together: vec![],
+        free_together: vec![],
         blocked: vec![],
         overlaps: vec![],
         warnings: vec![],
@@ -317,7 +319,9 @@ pub(crate) fn plan_of(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
 /// A step of such a plan.
 pub(crate) fn step_of(part: usize) -> PlanStep {
     PlanStep {
-        part,
+        parts: vec![part],
+        of: None,
+        ends: StepEnd::Out,
         motion: MotionKind::Translation,
         path: vec![[0.0; 7]],
         verified_depth: 0.0,

@@ -38,12 +38,13 @@ fn here(name: &str, options: &[&str]) -> PlanDocument {
 fn assert_reverses(plan: &PlanDocument, apart: &PlanDocument) {
     assert_eq!((plan.kind.as_str(), apart.kind.as_str()), ("assembly", "disassembly"));
     assert_eq!(plan.status, "complete");
-    let order = |plan: &PlanDocument| plan.steps.iter().map(|s| s.part.clone()).collect::<Vec<_>>();
+    let order = |plan: &PlanDocument| plan.steps.iter().map(|s| s.parts.clone()).collect::<Vec<_>>();
     assert_eq!(order(plan), order(apart).into_iter().rev().collect::<Vec<_>>());
     for step in &plan.steps {
-        assert_eq!(plan.initial.poses[&step.part], step.path[0]);
+        assert_eq!((step.of, step.ends.as_str()), (None, "in"));
+        assert_eq!(plan.initial.poses[&step.parts[0]], step.path[0]);
         assert_eq!(step.path.last(), Some(&IN_PLACE));
-        let removal = apart.steps.iter().find(|s| s.part == step.part).unwrap();
+        let removal = apart.steps.iter().find(|s| s.parts == step.parts).unwrap();
         let end: Vec<_> = step.path.iter().rev().take(removal.path.len()).copied().collect();
         assert_eq!(end, removal.path, "the insertion is the removal");
         assert!(step.verified_depth >= removal.verified_depth);
@@ -73,7 +74,7 @@ fn parts_wait_where_a_file_says_or_nowhere() {
     let given = here("pin-bolt-cover", &["--staging", file.to_str().unwrap()]);
     assert_eq!(given.status, "complete");
     assert_eq!(given.initial.poses["pin"], turned);
-    let pin = given.steps.iter().find(|s| s.part == "pin").unwrap();
+    let pin = given.steps.iter().find(|s| s.parts == ["pin"]).unwrap();
     assert_eq!((pin.path[0], pin.motion.as_str()), (turned, "rotation"));
 
     let nowhere = here("pin-bolt-cover", &["--staging", "none"]);
@@ -111,7 +112,7 @@ fn asked(client: &Client, handle: Handle, options: &PlanOptions) -> (Vec<(u32, V
     let mut steps = Vec::new();
     while let Some(event) = stream.next_event().unwrap() {
         match event {
-            Event::Step(step) => steps.push((step.part, step.path.to_vec())),
+            Event::Step(step) => steps.push((step.parts[0], step.path.to_vec())),
             Event::Done(summary) => return (steps, summary),
             Event::Restarted => steps.clear(),
             Event::Progress(_) | Event::Trace(_) => {}

@@ -70,8 +70,8 @@ fn a_plan_is_remembered_by_the_next_process() {
     assert!(again.stats.cache.plan_hit && again.stats.simulations_run == 0);
     assert_eq!(again.stats.simulations, first.stats.simulations);
     // Another question about the same parts.
-    let changed = plan(&cache, &["--removed", &first.steps[0].part]);
-    let cold = plan(&cache, &["--removed", &first.steps[0].part, "--no-cache"]);
+    let changed = plan(&cache, &["--removed", &first.steps[0].parts[0]]);
+    let cold = plan(&cache, &["--removed", &first.steps[0].parts[0], "--no-cache"]);
     assert!(changed.stats.cache.blocking_hits > 0 && !changed.stats.cache.plan_hit);
     assert_eq!(cold.stats.cache.blocking_hits, 0);
     assert_eq!(without_stats(changed), without_stats(cold));

@@ -70,7 +70,7 @@ fn a_turned_assembly_comes_apart_in_turned_directions() {
     let first_displacement = |options: &[&str]| {
         let output = plan("bolt-washer-plate", &[options, &["--json", "-"]].concat());
         let plan = PlanDocument::from_json(&stdout(&output)).unwrap();
-        assert_eq!((plan.status.as_str(), plan.steps[0].part.as_str()), ("complete", "bolt"));
+        assert_eq!((plan.status.as_str(), plan.steps[0].parts.concat().as_str()), ("complete", "bolt"));
         let end = plan.steps[0].path.last().unwrap();
         nalgebra::Vector3::new(end[0], end[1], end[2]).normalize()
     };
@@ -231,7 +231,7 @@ fn the_pin_locks_the_bolt_and_the_bolt_the_cover() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let document = PlanDocument::from_json(&fs::read_to_string(file).unwrap()).unwrap();
     assert_eq!(document.status, "complete");
-    let order: Vec<&str> = document.steps.iter().map(|s| s.part.as_str()).collect();
+    let order: Vec<String> = document.steps.iter().map(|s| s.parts.join(" and ")).collect();
     assert_eq!(order, ["pin", "bolt", "cover"]);
     assert_eq!((document.fixed, document.remaining), (vec!["base".to_owned()], vec!["base".to_owned()]));
     let text = stdout(&output);
@@ -245,7 +245,7 @@ fn json_on_stdout_replaces_the_table() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let document = PlanDocument::from_json(&stdout(&output)).unwrap();
     assert_eq!(document.steps.len(), 1);
-    assert_eq!(document.steps[0].part, "peg");
+    assert_eq!(document.steps[0].parts, ["peg"]);
     assert_eq!(document.steps[0].path[0], [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
 }
 
@@ -256,7 +256,7 @@ fn removed_parts_and_targets_are_respected() {
     let document = PlanDocument::from_json(&stdout(&output)).unwrap();
     assert_eq!(document.initial.removed, ["pin"]);
     assert_eq!(document.targets, Some(vec!["bolt".to_owned()]));
-    assert_eq!(document.steps.last().map(|s| s.part.as_str()), Some("bolt"));
+    assert_eq!(document.steps.last().unwrap().parts, ["bolt"]);
 }
 
 #[test]

@@ -22,7 +22,12 @@ fn fingerprint(plan: &Plan) -> String {
     for step in &plan.steps {
         let path: Vec<Vec<u64>> = step.path.iter().map(|w| w.iter().map(|x| x.to_bits()).collect()).collect();
         let depth = step.verified_depth.to_bits();
-        text += &format!("{} {:?} {depth:x} {:?} {path:x?}\n", step.part, step.motion, step.requires);
+        text += &format!(
+            "{:?} {:?} {depth:x} {:?} {path:x?}\n",
+            (&step.parts, step.of, step.ends),
+            step.motion,
+            step.requires
+        );
     }
     text + &format!("{:?} {:?} {}", plan.remaining, plan.blocked, plan.stats.simulations)
 }

@@ -23,8 +23,8 @@ fn patient(daemon: &Daemon) -> Client {
     Client::connect_with(options).unwrap()
 }
 
-/// The part of every step, and its path.
-type Steps = Vec<(u32, Vec<[f64; 7]>)>;
+/// The parts of every step, and its path.
+type Steps = Vec<(Vec<u32>, Vec<[f64; 7]>)>;
 
 /// Plans an assembly whatever happens meanwhile: the steps, the summary, and how often the plan began anew.
 fn plan_through(client: &Client, boxes: &Boxes) -> (Steps, Summary, u32) {
@@ -34,7 +34,7 @@ fn plan_through(client: &Client, boxes: &Boxes) -> (Steps, Summary, u32) {
     let (mut steps, mut restarts) = (Vec::new(), 0);
     loop {
         match stream.next_event_within(HANG).unwrap() {
-            Some(Event::Step(step)) => steps.push((step.part, step.path.to_vec())),
+            Some(Event::Step(step)) => steps.push((step.parts.to_vec(), step.path.to_vec())),
             Some(Event::Progress(_) | Event::Trace(_)) => {}
             Some(Event::Restarted) => {
                 steps.clear();

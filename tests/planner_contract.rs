@@ -89,11 +89,12 @@ fn assert_sound(assembly: &SourceAssembly, request: &PlanRequest, plan: &Plan) {
     let mut gone: BTreeSet<usize> = request.removed.iter().copied().collect();
     assert_eq!(plan.removed, gone.iter().copied().collect::<Vec<_>>());
     for (i, step) in plan.steps.iter().enumerate() {
-        assert!(!plan.fixed.contains(&step.part), "a fixed part moves");
+        let [part] = step.parts[..] else { panic!("one part at a time: {:?}", step.parts) };
+        assert!(!plan.fixed.contains(&part), "a fixed part moves");
         let before = |&number: &usize| plan.steps.get(number).filter(|_| number < i);
         let required: Vec<_> = step.requires.iter().map(|number| before(number).unwrap()).collect();
         assert_eq!(step.wave, required.iter().map(|s| s.wave + 1).max().unwrap_or(0));
-        assert!(gone.insert(step.part), "part {} leaves twice, or was gone", step.part);
+        assert!(gone.insert(part), "part {part} leaves twice, or was gone");
         assert_path(step, depth(request.engine) * longest_side(assembly));
     }
     let left: Vec<usize> = (0..plan.parts.len()).filter(|p| !gone.contains(p)).collect();
@@ -126,7 +127,7 @@ fn requests() -> impl Iterator<Item = PlanRequest> {
 }
 
 fn order(plan: &Plan) -> Vec<&str> {
-    plan.steps.iter().map(|s| plan.part_name(s.part)).collect()
+    plan.steps.iter().map(|s| plan.part_name(s.parts[0])).collect()
 }
 
 #[test]
@@ -193,7 +194,7 @@ fn removed_parts_are_absent() {
         assert_eq!(plan.status, PlanStatus::Complete);
         assert_eq!(order(&plan), ["bolt", "cover"]);
         let bolt = part(&assembly, "bolt");
-        let bolt = plan.steps.iter().find(|s| s.part == bolt).unwrap();
+        let bolt = plan.steps.iter().find(|s| s.parts == [bolt]).unwrap();
         assert!(bolt.requires.is_empty(), "what was gone before is no step");
     }
 }

@@ -12,8 +12,8 @@ use sbdp::search::{ActionSet, Engine, PlanRequest, PlanSink, Progress, Terminati
 use sbdp::service::Service;
 use sbdp::simulation::PenaltyParameters;
 use sbdp_client::{
-    Assembly, Client, ErrorCode, Event, Handle, Part, PenaltyParameter, PlanOptions, PlanStatus, Summary,
-    Vertices, content_hash,
+    Assembly, Client, ErrorCode, Event, Handle, Part, PenaltyParameter, PlanOptions, PlanStatus, StepEnd,
+    Summary, Vertices, content_hash,
 };
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::endpoint::Endpoint;
@@ -167,7 +167,8 @@ fn the_daemon_answers_to_the_bit_what_the_service_answers_in_process() {
         match stream.next_event_within(HANG).unwrap().unwrap() {
             Event::Step(there) => {
                 let here = steps.next().unwrap();
-                assert_eq!((there.part as usize, there.path), (here.part, here.path.as_slice()));
+                assert_eq!((there.parts, there.path), (&numbers(&here.parts)[..], here.path.as_slice()));
+                assert_eq!((there.of, there.ends), (None, StepEnd::Out));
                 assert_eq!(there.verified_depth.to_bits(), here.verified_depth.to_bits());
                 assert_eq!(there.requires, numbers(&here.requires));
                 assert_eq!((there.wave as usize, there.direction), (here.wave, here.direction));

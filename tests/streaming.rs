@@ -10,9 +10,10 @@ use common::{Boxes, HANG, connect};
 use sbdp::config::Config;
 use sbdp::daemon::Planning;
 use sbdp::geometry::{Revision, SourceAssembly};
-use sbdp::plan::{MotionKind, Plan, PlanStats, PlanStatus, PlanStep};
+use sbdp::plan::{FreeGroup, MotionKind, Plan, PlanStats, PlanStatus, PlanStep, StepEnd};
 use sbdp::search::{PlanRequest, PlanSink, Progress, Stage, Termination};
 use sbdp::service::{Admission, AssemblyId, ServiceError};
+use sbdp_client as client;
 use sbdp_client::{Client, ErrorCode, Event, PlanOptions};
 use sbdp_ipc::endpoint::{Endpoint, default_prefix};
 use sbdp_ipc::layout::shared_memory_files;
@@ -22,6 +23,11 @@ struct Scripted;
 
 fn waypoint(step: usize, number: usize) -> [f64; 7] {
     [step as f64, number as f64, 0.0, 1.0, 0.0, 0.0, 0.0]
+}
+
+/// One, two or three parts.
+fn moved(step: usize) -> Vec<usize> {
+    (step..=step + step % 3).collect()
 }
 
 impl Planning for Scripted {
@@ -57,7 +63,9 @@ impl Planning for Scripted {
             let progress = Progress { stage: Stage::Search, done: part as u32, total: 0, simulations: 0 };
             sink.progress(progress);
             let step = PlanStep {
-                part,
+                parts: moved(part),
+                of: part.checked_sub(1),
+                ends: if part % 2 == 1 { StepEnd::Aside } else { StepEnd::Out },
                 motion: MotionKind::Rotation,
                 path: (0..request.threads).map(|i| waypoint(part, i)).collect(),
                 verified_depth: 0.5,
@@ -75,7 +83,7 @@ impl Planning for Scripted {
             planner: "sbdp-star".into(),
             engine: "sliding".into(),
             units: None,
-            parts: (0..count).map(|i| format!("part {i}")).collect(),
+            parts: (0..count + 2).map(|i| format!("part {i}")).collect(),
             removed: vec![],
             poses: vec![],
             targets: None,
@@ -83,6 +91,8 @@ impl Planning for Scripted {
             base: None,
             steps,
             remaining: vec![],
+            kept_together: vec![moved(1), moved(0)],
+            free_together: vec![FreeGroup { parts: moved(1), direction: [0.0, 0.0, 1.0] }],
             blocked: vec![],
             overlaps: vec![],
             warnings: vec![],
@@ -133,11 +143,17 @@ fn read(client: &Client, options: &PlanOptions, pause: Duration) -> usize {
     let handle = client.upload(&Boxes::two().assembly()).unwrap();
     let mut stream = client.plan(handle, options).unwrap();
     std::thread::sleep(pause);
-    let mut steps = 0;
+    let mut steps = 0_usize;
     loop {
         match stream.next_event_within(HANG).unwrap() {
             Some(Event::Step(step)) => {
-                assert_eq!((step.number, step.part), (steps as u32, steps as u32));
+                assert_eq!(
+                    (step.number as usize, step.of),
+                    (steps, steps.checked_sub(1).map(|of| of as u32))
+                );
+                assert!(step.parts.iter().map(|p| *p as usize).eq(moved(steps)));
+                let aside = steps % 2 == 1;
+                assert_eq!(step.ends, if aside { client::StepEnd::Aside } else { client::StepEnd::Out });
                 assert_eq!(step.path.len(), options.threads as usize);
                 assert!(step.path.iter().enumerate().all(|(i, w)| *w == waypoint(steps, i)));
                 assert_eq!(
@@ -150,7 +166,10 @@ fn read(client: &Client, options: &PlanOptions, pause: Duration) -> usize {
             Some(Event::Progress(_) | Event::Trace(_)) => {}
             Some(Event::Restarted) => panic!("nothing was restarted"),
             Some(Event::Done(summary)) => {
-                assert_eq!((summary.steps as usize, summary.parts.len()), (steps, steps));
+                assert_eq!((summary.steps as usize, summary.parts.len()), (steps, steps + 2));
+                assert_eq!(summary.kept_together, [vec![1, 2], vec![0]]);
+                let free = client::FreeGroup { parts: vec![1, 2], direction: [0.0, 0.0, 1.0] };
+                assert_eq!(summary.free_together, [free]);
                 assert_eq!(summary.reason.as_deref(), Some("scripted"));
                 return steps;
             }

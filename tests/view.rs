@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
-use sbdp::geometry::{Assembly, Pose, Revision, heal, interpolate, load_assembly, pose_from_waypoint};
-use sbdp::plan::PlanKind;
+use sbdp::geometry::{
+    Assembly, Pose, Revision, heal, interpolate, load_assembly, pose_from_waypoint, waypoint_from_pose,
+};
 use sbdp::plan::export::PlanDocument;
 use sbdp::search::{PlanRequest, Staging, Termination};
 use sbdp::service::Service;
@@ -39,7 +40,11 @@ fn asked(name: &str, moved: Vec<(usize, Pose)>, request: &PlanRequest) -> (Assem
 fn reversed(mut plan: PlanDocument) -> PlanDocument {
     plan.kind = "assembly".into();
     plan.steps.reverse();
-    plan.steps.iter_mut().for_each(|s| s.path.reverse());
+    for step in &mut plan.steps {
+        step.path.reverse();
+        step.ends = "in".into();
+        plan.initial.poses.insert(step.parts[0].clone(), step.path[0]);
+    }
     plan
 }
 
@@ -129,25 +134,25 @@ fn check_motion(name: &str, assembly: &Assembly, plan: &PlanDocument) {
         assert!(off < tolerance, "{name}: {part} is {off} off at {time}");
     };
     for (step, shown) in plan.steps.iter().zip(&scene.steps) {
+        let [place] = shown.parts[..] else { panic!("one part at a time") };
+        let part = &scene.parts[place];
+        assert_eq!((&step.parts, part.steps.len()), (&vec![part.name.clone()], 1));
+        // Waypoints are about the part as it stands assembled.
+        let stands = assembly.parts.iter().find(|p| p.name == part.name).unwrap().moved;
         let poses: Vec<Pose> = step.path.iter().map(pose_from_waypoint).collect();
-        check(&step.part, &poses[0], 0.0);
-        check(&step.part, &poses[poses.len() - 1], scene.duration());
-        // The middle of the box as the plan begins (or, of an assembly plan, ends) with it.
-        let stands = if scene.kind == PlanKind::Assembly { poses[poses.len() - 1] } else { poses[0] };
-        let centre = stands.inverse() * scene.parts[shown.part].bounds.centre();
-        for (pair, keys) in poses.windows(2).zip(shown.keys.windows(2)).take(12) {
-            check(
-                &step.part,
-                &interpolate(&pair[0], &pair[1], &centre, 0.3),
-                keys[0].time * 0.7 + keys[1].time * 0.3,
-            );
+        check(&part.name, &(poses[0] * stands), 0.0);
+        check(&part.name, &(poses[poses.len() - 1] * stands), scene.duration());
+        let centre = part.bounds.centre();
+        for (pair, keys) in poses.windows(2).zip(part.keys.windows(2)).take(12) {
+            let pose = interpolate(&pair[0], &pair[1], &centre, 0.3);
+            check(&part.name, &(pose * stands), keys[0].time * 0.7 + keys[1].time * 0.3);
         }
+        assert_eq!((part.keys.len() <= poses.len(), part.keys[0].time), (true, shown.begins));
     }
-    let times: Vec<f64> = scene.steps.iter().flat_map(|s| s.keys.iter().map(|k| k.time)).collect();
-    assert!(times.windows(2).all(|w| w[0] < w[1]), "{name}: one part at a time");
-    for part in scene.parts.iter().filter(|p| p.step.is_none()) {
-        let pose = plan.initial.poses.get(&part.name).map(pose_from_waypoint).unwrap_or_default();
-        check(&part.name, &pose, scene.duration());
+    let times: Vec<f64> = scene.steps.iter().flat_map(|s| [s.begins, s.ends]).collect();
+    assert!(times.windows(2).all(|w| w[0] < w[1]), "{name}: one step at a time");
+    for part in assembly.parts.iter().filter(|p| plan.remaining.contains(&p.name)) {
+        check(&part.name, &part.moved, scene.duration());
     }
 }
 
@@ -170,7 +175,7 @@ fn parts_that_wait_beside_the_assembly_are_put_in() {
         assert_eq!((plan.kind.as_str(), plan.status.as_str()), ("assembly", "complete"), "{:?}", plan.reason);
         check_motion(name, &assembly, &plan);
         let scene = PlanScene::new(&assembly, Up::Z, &plan).unwrap();
-        assert!(scene.parts.iter().all(|p| p.stays == p.step.is_none()));
+        assert!(scene.parts.iter().all(|p| p.stays == p.steps.is_empty()));
     }
 }
 
@@ -183,6 +188,56 @@ fn parts_that_stand_elsewhere_are_shown_there() {
     assert_eq!(plan.initial.poses.len(), source.parts.len());
     assert!(!plan.steps.is_empty(), "{:?}", plan.reason);
     check_motion("l-slot", &assembly, &plan);
+}
+
+/// Two parts of the bracket leave together, by a turn, and are then taken apart where they lie: the way in the scene is
+/// the motion of the group after that within it.
+#[test]
+fn a_group_is_taken_apart_where_it_lies() {
+    let (assembly, plan) = planned("pin-bolt-cover", Vec::new());
+    let [first, second] = ["pin", "bolt"].map(String::from);
+    let (turn, shift) = (
+        Pose::new(nalgebra::Vector3::new(5.0, -30.0, 80.0), nalgebra::Vector3::new(0.3, -0.9, 1.4)),
+        Pose::translation(60.0, 0.0, 0.0),
+    );
+    let mut group = plan.steps[0].clone();
+    group.parts = vec![second.clone(), first.clone()];
+    group.path = [Pose::identity(), turn].map(|pose| waypoint_from_pose(&pose)).to_vec();
+    let mut inner = group.clone();
+    (inner.parts, inner.of, inner.requires) = (vec![first.clone()], Some(0), vec![0]);
+    inner.path = [Pose::identity(), shift].map(|pose| waypoint_from_pose(&pose)).to_vec();
+    let plan = PlanDocument { steps: vec![group, inner], ..plan };
+    let scene = PlanScene::new(&assembly, Up::Z, &plan).unwrap();
+    let played = Played::new(&glb::glb(&scene).unwrap());
+    let source = load_assembly(&folder("pin-bolt-cover")).unwrap();
+    let size = assembly.longest_side() / assembly.scale;
+    let parts = &scene.parts;
+    let bounds = parts.iter().filter(|p| [&first, &second].contains(&&p.name)).map(|p| p.bounds);
+    let centre = bounds.fold(sbdp::geometry::Bounds::EMPTY, |all, b| all.union(&b)).centre();
+    let scale = glb::metres(scene.units.as_deref()).unwrap_or(1.0);
+    let check = |part: &String, pose: Pose, time: f64, tolerance: f64| {
+        let mesh = heal(source.parts.iter().find(|p| p.name == *part).unwrap()).unwrap().mesh;
+        let expected: Vec<_> = mesh.vertices.iter().map(|v| (pose * v) * scale).collect();
+        let off = apart(&expected, &played.points(part, time as f32));
+        assert!(off < tolerance * size * scale, "{part} is {off} off at {time}");
+    };
+    let [out, own] = [&scene.steps[0], &scene.steps[1]];
+    for part in [&first, &second] {
+        check(part, Pose::identity(), out.begins, 2e-6);
+        check(part, turn, out.ends, 2e-6);
+        for u in [0.1, 0.3, 0.5, 0.77] {
+            let pose = interpolate(&Pose::identity(), &turn, &centre, u);
+            check(part, pose, out.begins + (out.ends - out.begins) * u, 1.01e-3);
+        }
+    }
+    check(
+        &first,
+        turn * interpolate(&Pose::identity(), &shift, &centre, 0.5),
+        (own.begins + own.ends) / 2.0,
+        2e-6,
+    );
+    check(&first, turn * shift, scene.duration(), 2e-6);
+    check(&second, turn, scene.duration(), 2e-6);
 }
 
 #[test]

@@ -125,16 +125,25 @@ pub struct MovedPart {
     /// Reserved, 0.
     pub reserved: u32,
     /// The rigid motion of its mesh: of a part that stands elsewhere from where the assembly has it, of one
-    /// that waits from where it was given, as in paths.
+    /// that waits from where it was given.
     pub motion: Waypoint,
 }
+
+/// `of` of a step whose parts leave the assembly, or enter it.
+pub const NO_STEP: u32 = u32::MAX;
 
 /// One step's entry in the table.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct StepRecord {
-    /// The part that moves.
-    pub part: u32,
+    /// First of the parts that move, in the message's parts.
+    pub first_part: u32,
+    /// Parts that move in this step, at least one.
+    pub parts: u32,
+    /// The step that takes the group out, or puts it in, to which these parts belong; or [`NO_STEP`].
+    pub of: u32,
+    /// Where the step leaves its parts: 0 out, 1 aside, 2 in.
+    pub ends: u32,
     /// 0 translation, 1 rotation.
     pub motion: u32,
     /// First waypoint in the message's waypoints.
@@ -147,15 +156,13 @@ pub struct StepRecord {
     pub requirements: u32,
     /// The earliest round in which the step can be done.
     pub wave: u32,
-    /// Reserved, 0.
-    pub reserved: u32,
     /// Deepest penetration found by verification beyond the assembled depth.
     pub verified_depth: f64,
     /// The unit vector of the path's last leg, or zero.
     pub direction: [f64; 3],
 }
 
-/// Header of a steps message; records, waypoints and requirements follow.
+/// Header of a steps message; records, waypoints, requirements and parts follow.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct StepsHeader {
@@ -167,6 +174,10 @@ pub struct StepsHeader {
     pub waypoints: u32,
     /// Requirements in all.
     pub requirements: u32,
+    /// Parts in all; one that moves in several steps counts for each.
+    pub parts: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
 }
 
 const _: () = {
@@ -177,11 +188,13 @@ const _: () = {
     assert!(offset_of!(PlanRequestHeader, deadline_ns) == 80);
     assert!(size_of::<PenaltyRecord>() == 16 && offset_of!(PenaltyRecord, value) == 8);
     assert!(size_of::<MovedPart>() == 64 && offset_of!(MovedPart, motion) == 8);
-    assert!(size_of::<StepRecord>() == 64 && align_of::<StepRecord>() == 8);
-    assert!(offset_of!(StepRecord, first_requirement) == 16);
-    assert!(offset_of!(StepRecord, verified_depth) == 32);
-    assert!(offset_of!(StepRecord, direction) == 40);
-    assert!(size_of::<StepsHeader>() == 16 && size_of::<Waypoint>() == 56);
+    assert!(size_of::<StepRecord>() == 72 && align_of::<StepRecord>() == 8);
+    assert!(offset_of!(StepRecord, of) == 8);
+    assert!(offset_of!(StepRecord, first_requirement) == 28);
+    assert!(offset_of!(StepRecord, verified_depth) == 40);
+    assert!(offset_of!(StepRecord, direction) == 48);
+    assert!(size_of::<StepsHeader>() == 24 && offset_of!(StepsHeader, parts) == 16);
+    assert!(size_of::<Waypoint>() == 56);
 };
 
 /// Where the parts of an assembly plan begin.
@@ -341,12 +354,38 @@ impl PlanRequest {
     }
 }
 
+/// Where a step leaves its parts; the wire carries the number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(u32)]
+pub enum StepEnd {
+    /// Apart from all that they stood with.
+    #[default]
+    Out = 0,
+    /// Elsewhere among the others, where they stay until a later step moves them again.
+    Aside = 1,
+    /// In their places: in assembly plans.
+    In = 2,
+}
+
+impl StepEnd {
+    /// The end with a number, if it is known.
+    #[must_use]
+    pub fn from_wire(number: u32) -> Option<Self> {
+        [Self::Out, Self::Aside, Self::In].into_iter().find(|end| *end as u32 == number)
+    }
+}
+
 /// A step to be sent.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Step {
-    /// The part that moves.
-    pub part: u32,
-    /// The path turns the part.
+    /// The parts that move, as one rigid body; at least one.
+    pub parts: Vec<u32>,
+    /// The number of the step that takes the group out (of an assembly plan: puts it in) to which these parts belong;
+    /// `None` for parts that leave the assembly, or enter it.
+    pub of: Option<u32>,
+    /// Where the step leaves them.
+    pub ends: StepEnd,
+    /// The path turns the parts.
     pub rotates: bool,
     /// The path.
     pub path: Vec<Waypoint>,
@@ -364,30 +403,34 @@ impl Step {
     /// An upper bound of the bytes that this step adds to a steps message.
     #[must_use]
     pub fn wire_bytes(&self) -> usize {
-        size_of::<StepRecord>() + self.path.len() * size_of::<Waypoint>() + self.requires.len() * 4 + 8
+        let numbers = self.requires.len() + self.parts.len();
+        size_of::<StepRecord>() + self.path.len() * size_of::<Waypoint>() + numbers * 4 + 16
     }
 }
 
 /// The bytes of a steps message; `first_step` is the place of its first step in the plan.
 #[must_use]
 pub fn encode_steps<'s>(first_step: u32, steps: impl IntoIterator<Item = &'s Step>) -> Vec<u8> {
-    let (mut records, mut waypoints, mut requirements) =
-        (Vec::new(), Vec::<Waypoint>::new(), Vec::<u32>::new());
+    let (mut records, mut waypoints) = (Vec::new(), Vec::<Waypoint>::new());
+    let (mut requirements, mut parts) = (Vec::<u32>::new(), Vec::<u32>::new());
     for step in steps {
         records.push(StepRecord {
-            part: step.part,
+            first_part: parts.len() as u32,
+            parts: step.parts.len() as u32,
+            of: step.of.unwrap_or(NO_STEP),
+            ends: step.ends as u32,
             motion: u32::from(step.rotates),
             first_waypoint: waypoints.len() as u32,
             waypoints: step.path.len() as u32,
             first_requirement: requirements.len() as u32,
             requirements: step.requires.len() as u32,
             wave: step.wave,
-            reserved: 0,
             verified_depth: step.verified_depth,
             direction: step.direction.unwrap_or_default(),
         });
         waypoints.extend_from_slice(&step.path);
         requirements.extend_from_slice(&step.requires);
+        parts.extend_from_slice(&step.parts);
     }
     let mut writer = Writer::default();
     writer.value(StepsHeader {
@@ -395,8 +438,10 @@ pub fn encode_steps<'s>(first_step: u32, steps: impl IntoIterator<Item = &'s Ste
         first_step,
         waypoints: waypoints.len() as u32,
         requirements: requirements.len() as u32,
+        parts: parts.len() as u32,
+        reserved: 0,
     });
-    writer.array(&records).array(&waypoints).array(&requirements);
+    writer.array(&records).array(&waypoints).array(&requirements).array(&parts);
     writer.finish()
 }
 
@@ -407,6 +452,7 @@ pub struct StepsView<'a> {
     records: &'a [StepRecord],
     waypoints: &'a [Waypoint],
     requirements: &'a [u32],
+    parts: &'a [u32],
 }
 
 /// One step read in place.
@@ -414,11 +460,17 @@ pub struct StepsView<'a> {
 pub struct StepView<'a> {
     /// Its place in the plan.
     pub number: u32,
-    /// The part that moves.
-    pub part: u32,
-    /// The path turns the part.
+    /// The parts that move, as one rigid body, in shared memory; all others that stand with them stay where they are.
+    pub parts: &'a [u32],
+    /// The number of the step that takes the group out (of an assembly plan: puts it in) to which these parts belong;
+    /// `None` for parts that leave the assembly, or enter it. A group is taken apart as it stood in the assembly.
+    pub of: Option<u32>,
+    /// Where the step leaves them.
+    pub ends: StepEnd,
+    /// The path turns the parts.
     pub rotates: bool,
-    /// The path, in shared memory.
+    /// The path, in shared memory: rigid transforms of the parts as they stand when the step begins (of an assembly
+    /// plan: when it ends), so that the first (the last) is the identity.
     pub path: &'a [Waypoint],
     /// Deepest penetration beyond the assembled depth.
     pub verified_depth: f64,
@@ -431,7 +483,7 @@ pub struct StepView<'a> {
 }
 
 impl<'a> StepsView<'a> {
-    /// Checks all bounds.
+    /// Checks all bounds, and that each step moves a part, is not its own group, and ends in a known way.
     ///
     /// # Errors
     /// The message is malformed.
@@ -443,11 +495,23 @@ impl<'a> StepsView<'a> {
             records: reader.array("step records", u64::from(h.steps))?,
             waypoints: reader.array("waypoints", u64::from(h.waypoints))?,
             requirements: reader.array("requirements", u64::from(h.requirements))?,
+            parts: reader.array("step parts", u64::from(h.parts))?,
         };
-        for record in view.records {
+        for (number, record) in (u64::from(h.first_step)..).zip(view.records) {
             check_range("step waypoints", record.first_waypoint, record.waypoints, view.waypoints.len())?;
             let (first, count) = (record.first_requirement, record.requirements);
             check_range("step requirements", first, count, view.requirements.len())?;
+            check_range("step parts", record.first_part, record.parts, view.parts.len())?;
+            let illegal = |field, value: u32| Err(Malformed::OutOfRange { field, value: u64::from(value) });
+            if record.parts == 0 {
+                return illegal("parts of a step", 0);
+            }
+            if record.of != NO_STEP && u64::from(record.of) == number {
+                return illegal("of", record.of);
+            }
+            if StepEnd::from_wire(record.ends).is_none() {
+                return illegal("ends", record.ends);
+            }
         }
         Ok(view)
     }
@@ -470,7 +534,9 @@ impl<'a> StepsView<'a> {
         let r = *self.records.get(index)?;
         Some(StepView {
             number: self.first_step.saturating_add(index as u32),
-            part: r.part,
+            parts: slice_of(self.parts, r.first_part, r.parts),
+            of: (r.of != NO_STEP).then_some(r.of),
+            ends: StepEnd::from_wire(r.ends).unwrap_or_default(),
             rotates: r.motion != 0,
             path: slice_of(self.waypoints, r.first_waypoint, r.waypoints),
             verified_depth: r.verified_depth,

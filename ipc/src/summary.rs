@@ -88,8 +88,12 @@ pub struct SummaryHeader {
     pub poses: u32,
     /// The part that the rest is taken off, or [`NO_PART`].
     pub base: u32,
-    /// Reserved, 0.
-    pub reserved: u32,
+    /// Groups that left together and were not taken apart ([`GroupRecord`]).
+    pub kept_together: u32,
+    /// Groups that could leave ([`GroupRecord`]).
+    pub free_together: u32,
+    /// Parts that [`GroupRecord`]s point to (u32).
+    pub group_parts: u32,
     /// Why the plan is not complete.
     pub reason: Text,
     /// The planner's name.
@@ -128,6 +132,18 @@ pub struct BlockedRecord {
     pub action: Text,
 }
 
+/// Parts that belong together.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct GroupRecord {
+    /// First of its parts.
+    pub first_part: u32,
+    /// How many.
+    pub parts: u32,
+    /// Of a group that could leave, the unit vector along which it begins; else zero.
+    pub direction: [f64; 3],
+}
+
 /// Something the user should know about the input.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
@@ -139,9 +155,10 @@ pub struct WarningRecord {
 }
 
 const _: () = {
-    assert!(size_of::<Stats>() == 112 && size_of::<SummaryHeader>() == 216);
-    assert!(std::mem::offset_of!(SummaryHeader, reason) == 64);
-    assert!(std::mem::offset_of!(SummaryHeader, stats) == 104);
+    assert!(size_of::<Stats>() == 112 && size_of::<SummaryHeader>() == 224);
+    assert!(std::mem::offset_of!(SummaryHeader, reason) == 72);
+    assert!(std::mem::offset_of!(SummaryHeader, stats) == 112);
+    assert!(size_of::<GroupRecord>() == 32 && std::mem::offset_of!(GroupRecord, direction) == 8);
     assert!(size_of::<OverlapRecord>() == 16 && size_of::<BlockedRecord>() == 20);
     assert!(size_of::<WarningRecord>() == 12);
 };
@@ -155,6 +172,15 @@ pub struct Blocked<'a> {
     pub by: &'a [u32],
     /// The action, as `+x`.
     pub action: &'a str,
+}
+
+/// Parts that could leave together, as received.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FreeGroup<'a> {
+    /// The parts.
+    pub parts: &'a [u32],
+    /// The unit vector along which they begin, in the input's frame.
+    pub direction: [f64; 3],
 }
 
 /// A summary to be sent. Part numbers are indices into `parts`.
@@ -192,7 +218,11 @@ pub struct SummaryParts<'a> {
     pub base: Option<(u32, &'a str)>,
     /// Parts that remain.
     pub remaining: Vec<u32>,
-    /// Parts that began elsewhere than where their mesh was given, and where, as in paths.
+    /// Groups that left together and were not taken apart.
+    pub kept_together: Vec<Vec<u32>>,
+    /// Where nothing leaves any more: groups that could, and the unit vectors along which they begin.
+    pub free_together: Vec<(Vec<u32>, [f64; 3])>,
+    /// Parts that began elsewhere than where their mesh was given, and where: the rigid motion of the mesh.
     pub poses: Vec<MovedPart>,
     /// Counters and times.
     pub stats: Stats,
@@ -215,6 +245,14 @@ impl SummaryParts<'_> {
         let warnings: Vec<WarningRecord> =
             self.warnings.iter().map(|(p, m)| WarningRecord { part: *p, message: texts.add(m) }).collect();
         let targets = self.targets.as_deref().unwrap_or(&[]);
+        let mut group_parts = Vec::new();
+        let mut group = |parts: &[u32], direction| {
+            let first_part = group_parts.len() as u32;
+            group_parts.extend_from_slice(parts);
+            GroupRecord { first_part, parts: parts.len() as u32, direction }
+        };
+        let kept: Vec<_> = self.kept_together.iter().map(|parts| group(parts, [0.0; 3])).collect();
+        let free: Vec<_> = self.free_together.iter().map(|(parts, along)| group(parts, *along)).collect();
         let header = SummaryHeader {
             status: self.status,
             flags: self.flags(),
@@ -230,7 +268,9 @@ impl SummaryParts<'_> {
             blockers: blockers.len() as u32,
             poses: self.poses.len() as u32,
             base: self.base.map_or(NO_PART, |(part, _)| part),
-            reserved: 0,
+            kept_together: kept.len() as u32,
+            free_together: free.len() as u32,
+            group_parts: group_parts.len() as u32,
             reason: texts.add(self.reason.unwrap_or("")),
             planner: texts.add(self.planner),
             engine: texts.add(self.engine),
@@ -242,7 +282,8 @@ impl SummaryParts<'_> {
         let mut writer = Writer::default();
         writer.value(header).array(&names).array(&self.overlaps).array(&blocked).array(&warnings);
         writer.array(&self.removed).array(targets).array(&self.fixed).array(&self.remaining);
-        writer.array(&blockers).array(&self.poses).array(texts.bytes());
+        writer.array(&blockers).array(&self.poses).array(&kept).array(&free).array(&group_parts);
+        writer.array(texts.bytes());
         writer.finish()
     }
 
@@ -269,6 +310,9 @@ pub struct SummaryView<'a> {
     remaining: &'a [u32],
     blockers: &'a [u32],
     poses: &'a [MovedPart],
+    kept_together: &'a [GroupRecord],
+    free_together: &'a [GroupRecord],
+    group_parts: &'a [u32],
     texts: Texts<'a>,
 }
 
@@ -292,6 +336,9 @@ impl<'a> SummaryView<'a> {
             remaining: reader.array("remaining", u64::from(header.remaining))?,
             blockers: reader.array("blockers", u64::from(header.blockers))?,
             poses: reader.array("poses", u64::from(header.poses))?,
+            kept_together: reader.array("kept together", u64::from(header.kept_together))?,
+            free_together: reader.array("free together", u64::from(header.free_together))?,
+            group_parts: reader.array("parts of groups", u64::from(header.group_parts))?,
             texts: Texts(reader.array("texts", u64::from(header.text_bytes))?),
         };
         view.check()?;
@@ -313,12 +360,15 @@ impl<'a> SummaryView<'a> {
         for w in self.warnings {
             self.texts.get(w.message, "warning")?;
         }
+        for g in self.kept_together.iter().chain(self.free_together) {
+            check_range("parts of a group", g.first_part, g.parts, self.group_parts.len())?;
+        }
         self.check_part_numbers()
     }
 
     fn check_part_numbers(&self) -> Result<(), Malformed> {
         let count = self.names.len();
-        let lists = [self.removed, self.targets, self.fixed, self.remaining, self.blockers];
+        let lists = [self.removed, self.targets, self.fixed, self.remaining, self.blockers, self.group_parts];
         let pairs = self.overlaps.iter().flat_map(|o| o.parts);
         let singles = self.blocked.iter().map(|b| b.part).chain(self.poses.iter().map(|p| p.part));
         let warned = self.warnings.iter().map(|w| w.part).filter(|p| *p != NO_PART);
@@ -424,10 +474,24 @@ impl<'a> SummaryView<'a> {
         self.remaining
     }
 
-    /// Parts that began elsewhere than where their mesh was given, and where, as in paths.
+    /// Parts that began elsewhere than where their mesh was given, and where: the rigid motion of the mesh.
     #[must_use]
     pub fn poses(&self) -> &'a [MovedPart] {
         self.poses
+    }
+
+    fn group(&self, group: &GroupRecord) -> &'a [u32] {
+        slice_of(self.group_parts, group.first_part, group.parts)
+    }
+
+    /// Groups that left together and were not taken apart: nobody asked for it, or no way was found.
+    pub fn kept_together(&self) -> impl Iterator<Item = &'a [u32]> + '_ {
+        self.kept_together.iter().map(|group| self.group(group))
+    }
+
+    /// Where nothing leaves any more: groups that could.
+    pub fn free_together(&self) -> impl Iterator<Item = FreeGroup<'a>> + '_ {
+        self.free_together.iter().map(|g| FreeGroup { parts: self.group(g), direction: g.direction })
     }
 
     /// What blocks the parts that should have come off.

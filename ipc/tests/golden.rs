@@ -1,4 +1,4 @@
-//! The bytes of every message of protocol 4, written down once. A change to one of them breaks clients that
+//! The bytes of every message of protocol 6, written down once. A change to one of them breaks clients that
 //! are out there: a new layout needs a new version in the service names.
 
 use sbdp_ipc::PROTOCOL;
@@ -7,7 +7,9 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, HandleResponse, Part, Vertices};
 use sbdp_ipc::headers::{RequestHeader, RequestKind, ResponseHeader, ResponseKind};
 use sbdp_ipc::layout;
-use sbdp_ipc::plan::{MovedPart, PenaltyRecord, PlanRequest, Staging, Step, StepsView, encode_steps};
+use sbdp_ipc::plan::{
+    MovedPart, PenaltyRecord, PlanRequest, Staging, Step, StepEnd, StepsView, encode_steps,
+};
 use sbdp_ipc::progress::{ProgressSample, STAGE_SEARCH};
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
@@ -92,12 +94,12 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
     assert_eq!((ErrorCode::Busy as u32, ErrorCode::Cancelled as u32), (3, 12));
     assert_eq!(
         (PROTOCOL, layout::PLAN_SERVICE, layout::GEOMETRY_SERVICE),
-        (5, "sbdp/v5/plan", "sbdp/v5/geometry")
+        (6, "sbdp/v6/plan", "sbdp/v6/geometry")
     );
-    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v5/progress");
+    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v6/progress");
     assert_eq!(
         (layout::WAKE_SERVER_SERVICE, layout::WAKE_CLIENT_SERVICE),
-        ("sbdp/v5/wake/server", "sbdp/v5/wake/client")
+        ("sbdp/v6/wake/server", "sbdp/v6/wake/client")
     );
 }
 
@@ -167,7 +169,9 @@ fn a_request_for_an_assembly_plan() {
 #[test]
 fn steps() {
     let first = Step {
-        part: 3,
+        parts: vec![3, 5],
+        of: Some(6),
+        ends: StepEnd::Aside,
         path: vec![POSE],
         requires: vec![1],
         wave: 2,
@@ -175,16 +179,17 @@ fn steps() {
         verified_depth: 0.5,
         rotates: true,
     };
-    let second = Step { part: 2, ..Step::default() };
+    let second = Step { parts: vec![2], ..Step::default() };
     let bytes = encode_steps(7, [&first, &second]);
     check(
         "steps",
         &bytes,
         "\
-         0200000007000000 0100000001000000 0300000001000000 0000000001000000*2 0200000000000000 000000000000e03f \
+         0200000007000000 0100000001000000 0300000000000000 \
+         0000000002000000 0600000001000000 0100000000000000*2 0100000002000000 000000000000e03f \
          0000000000000000*2 000000000000f03f \
-         0200000000000000 0100000000000000*2 0000000000000000*5 000000000000f03f 0000000000000040 \
-         000000000000e0bf 000000000000f03f 0000000000000000*3 0100000000000000",
+         0200000001000000 ffffffff00000000 0000000001000000*2 0000000000000000*5 000000000000f03f 0000000000000040 \
+         000000000000e0bf 000000000000f03f 0000000000000000*3 0100000000000000 0300000005000000 0200000000000000",
     );
     assert_eq!(StepsView::new(AlignedBytes::copy_of(&bytes).as_slice()).unwrap().len(), 2);
 }
@@ -208,6 +213,8 @@ fn a_summary() {
         fixed: vec![],
         base: Some((0, "big")),
         remaining: vec![1],
+        kept_together: vec![vec![0, 1]],
+        free_together: vec![(vec![1], [0.0, 0.0, 1.0])],
         poses: vec![MovedPart { part: 1, reserved: 0, motion: POSE }],
         stats: Stats {
             simulations: 1,
@@ -232,7 +239,7 @@ fn a_summary() {
         &bytes,
         "\
          020000000f000000 0200000002000000 0100000001000000*2 0100000000000000 0100000001000000 \
-         1000000001000000 0000000000000000 0600000003000000 0900000001000000 0a00000001000000 \
+         1000000001000000 0000000001000000 0100000003000000 0600000003000000 0900000001000000 0a00000001000000 \
          0b00000002000000 0d00000003000000 \
          0100000000000000 0200000000000000 0300000000000000 0400000000000000 000000000000e03f*5 \
          0500000000000000 0600000000000000 0800000000000000 0700000000000000 0100000000000000 \
@@ -240,7 +247,9 @@ fn a_summary() {
          0100000002000000 0000000001000000 000000000000d03f 0100000000000000 0100000003000000 \
          0200000000000000 ffffffff05000000 0100000000000000 0000000000000000 0100000000000000*2 \
          0000000000000000 0100000000000000 000000000000f03f 0000000000000040 000000000000e0bf \
-         000000000000f03f 0000000000000000*3 6162632b78777768 7970656d6d626967",
+         000000000000f03f 0000000000000000*3 \
+         0000000002000000 0000000000000000*3 0200000001000000 0000000000000000*2 000000000000f03f \
+         0000000001000000 0100000000000000 6162632b78777768 7970656d6d626967",
     );
     assert_eq!(SummaryView::new(AlignedBytes::copy_of(&bytes).as_slice()).unwrap().reason(), Some("why"));
 }

@@ -5,7 +5,8 @@ use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, Part, Vertices};
 use sbdp_ipc::plan::{
-    MovedPart, PLAN_ASSEMBLY, PenaltyRecord, PlanRequest, Staging, Step, StepsView, encode_steps,
+    MovedPart, NO_STEP, PLAN_ASSEMBLY, PenaltyRecord, PlanRequest, Staging, Step, StepEnd, StepRecord,
+    StepsHeader, StepsView, encode_steps,
 };
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
@@ -20,11 +21,12 @@ fn read_everything(bytes: &[u8]) {
     let _ = Status::decode(bytes);
     if let Ok(steps) = StepsView::new(bytes) {
         for step in steps.iter() {
-            let _ = (step.path.len(), step.requires.len());
+            let _ = (step.path.len(), step.requires.len(), step.parts.len());
         }
     }
     if let Ok(view) = SummaryView::new(bytes) {
         let _ = (view.part_names().count(), view.blocked().count(), view.warnings().count());
+        let _ = view.kept_together().chain(view.free_together().map(|g| g.parts)).flatten().count();
         let _ = (view.reason(), view.units(), view.planner(), view.engine(), view.status());
     }
     if let Ok(revision) = Revision::decode(bytes) {
@@ -37,12 +39,15 @@ fn read_everything(bytes: &[u8]) {
 
 fn two_steps() -> Vec<Step> {
     let first = Step {
-        part: 1,
+        parts: vec![1, 2],
         path: vec![[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 5.0, 1.0, 0.0, 0.0, 0.0]],
         verified_depth: 0.001,
         ..Step::default()
     };
-    let second = Step { part: 0, rotates: true, requires: vec![1], path: vec![[0.5; 7]; 3], ..first.clone() };
+    let (parts, path) = (vec![2], vec![[0.5; 7]; 3]);
+    let of = Some(0);
+    let second =
+        Step { parts, of, ends: StepEnd::Aside, rotates: true, requires: vec![1], path, ..first.clone() };
     vec![first, second]
 }
 
@@ -64,6 +69,8 @@ fn summary() -> Vec<u8> {
         fixed: vec![1],
         base: Some((1, "it is the largest")),
         remaining: vec![1, 2],
+        kept_together: vec![vec![0, 2], vec![1, 2]],
+        free_together: vec![(vec![0, 1], [0.0, 0.6, 0.8])],
         poses: vec![moved_part()],
         stats: Stats { simulations: 7, total_time_s: 1.5, plan_hit: 1, ..Stats::default() },
     }
@@ -117,10 +124,46 @@ fn steps_come_back_in_place() {
     let view = StepsView::new(bytes.as_slice()).unwrap();
     let steps: Vec<_> = view.iter().collect();
     assert_eq!(steps.len(), 2);
-    assert_eq!((steps[0].number, steps[0].part, steps[0].rotates), (4, 1, false));
+    assert_eq!((steps[0].number, steps[0].parts, steps[0].rotates), (4, &[1, 2][..], false));
+    assert_eq!((steps[0].of, steps[0].ends), (None, StepEnd::Out));
+    assert_eq!((steps[1].parts, steps[1].of, steps[1].ends), (&[2][..], Some(0), StepEnd::Aside));
     assert_eq!(steps[0].path, two_steps()[0].path);
     assert_eq!((steps[1].number, steps[1].rotates, steps[1].requires), (5, true, &[1][..]));
     assert_eq!(steps[1].path, two_steps()[1].path);
+}
+
+/// Of a steps message, a number in the record of its second step.
+fn with_number_in_second_record(offset: usize, number: u32) -> Vec<u8> {
+    let mut bytes = encode_steps(4, &two_steps());
+    let at = size_of::<StepsHeader>() + size_of::<StepRecord>() + offset;
+    bytes[at..at + 4].copy_from_slice(&number.to_le_bytes());
+    bytes
+}
+
+#[test]
+fn steps_that_contradict_themselves_are_refused() {
+    use std::mem::offset_of;
+    let read = |offset: usize, number: u32| {
+        let bytes = AlignedBytes::copy_of(&with_number_in_second_record(offset, number));
+        StepsView::new(bytes.as_slice()).map(|view| view.get(1).unwrap().of).map_err(|e| e.to_string())
+    };
+    let (of, ends) = (offset_of!(StepRecord, of), offset_of!(StepRecord, ends));
+    assert_eq!(read(of, NO_STEP), Ok(None));
+    assert_eq!(
+        (read(of, 4), read(of, 6)),
+        (Ok(Some(4)), Ok(Some(6))),
+        "of an assembly plan it is a later step"
+    );
+    assert_eq!(read(ends, StepEnd::In as u32), Ok(Some(0)));
+    let refused = |offset: usize, number: u32, field: &str| {
+        let error = read(offset, number).unwrap_err();
+        assert!(error.contains(field), "{error}");
+    };
+    refused(of, 5, "`of` has the illegal value 5");
+    refused(ends, 3, "`ends` has the illegal value 3");
+    refused(offset_of!(StepRecord, parts), 0, "`parts of a step` has the illegal value 0");
+    refused(offset_of!(StepRecord, parts), 2, "`step parts` ends at byte 4");
+    refused(offset_of!(StepRecord, first_part), u32::MAX, "`step parts`");
 }
 
 #[test]
@@ -137,12 +180,21 @@ fn a_summary_carries_everything_of_a_plan_but_its_steps() {
     assert_eq!(blocked[1].action, "-rz");
     assert_eq!(view.warnings().collect::<Vec<_>>(), [(None, "whole"), (Some(1), "one")]);
     assert_eq!((view.stats().simulations, view.stats().plan_hit), (7, 1));
+    assert_eq!(view.kept_together().collect::<Vec<_>>(), [[0, 2], [1, 2]]);
+    let free: Vec<_> = view.free_together().map(|g| (g.parts, g.direction)).collect();
+    assert_eq!(free, [(&[0, 1][..], [0.0, 0.6, 0.8])]);
 }
 
 #[test]
 fn a_summary_that_names_a_part_out_of_range_is_refused() {
-    let bytes = SummaryParts { parts: vec!["0"], remaining: vec![1], ..SummaryParts::default() }.encode();
-    assert!(SummaryView::new(AlignedBytes::copy_of(&bytes).as_slice()).is_err());
+    let is_refused = |summary: SummaryParts<'_>| {
+        let bytes = SummaryParts { parts: vec!["0"], ..summary }.encode();
+        SummaryView::new(AlignedBytes::copy_of(&bytes).as_slice()).is_err()
+    };
+    assert!(!is_refused(SummaryParts { kept_together: vec![vec![0]], ..SummaryParts::default() }));
+    assert!(is_refused(SummaryParts { remaining: vec![1], ..SummaryParts::default() }));
+    assert!(is_refused(SummaryParts { kept_together: vec![vec![0], vec![1]], ..SummaryParts::default() }));
+    assert!(is_refused(SummaryParts { free_together: vec![(vec![1], [0.0; 3])], ..SummaryParts::default() }));
 }
 
 #[test]

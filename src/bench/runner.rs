@@ -11,7 +11,8 @@ use super::BenchError;
 use super::corpus::{Category, CorpusProblem};
 use super::record::{Record, RunKey, Settings};
 use super::rotation::random_rotation;
-use crate::plan::export::PlanDocument;
+use crate::plan::StepEnd;
+use crate::plan::export::{PlanDocument, StepDocument};
 
 /// `sbdp plan` exits with these when it has written a plan.
 const PLAN_CODES: [i32; 3] = [0, 3, 4];
@@ -239,8 +240,10 @@ fn verified(plan: &PlanDocument) -> bool {
     let checked = plan.steps.iter().all(|s| s.verified_depth.is_finite() && !s.path.is_empty());
     let movable = plan.remaining.iter().filter(|p| !plan.fixed.contains(p)).count();
     // A last part has nothing to leave; fixed ones stay.
-    let all_out = movable == 0 || plan.remaining.len() <= 1;
-    let counted = plan.steps.len() + plan.remaining.len() == plan.parts.len();
+    let all_out = (movable == 0 || plan.remaining.len() <= 1) && plan.kept_together.is_empty();
+    let leaves = |s: &&StepDocument| s.of.is_none() && s.ends == StepEnd::Out.name();
+    let out: usize = plan.steps.iter().filter(leaves).map(|s| s.parts.len()).sum();
+    let counted = out + plan.remaining.len() == plan.parts.len();
     checked && counted && if plan.status == "complete" { all_out } else { !plan.steps.is_empty() }
 }
 

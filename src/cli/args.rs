@@ -70,7 +70,7 @@ pub(super) struct PlanArguments {
     /// is that of the turned assembly, in its frame
     #[arg(long, value_name = "W,X,Y,Z", value_parser = rotation, allow_hyphen_values = true)]
     pub(super) rotate: Option<UnitQuaternion<f64>>,
-    /// Write the plan there as JSON (contract sbdp-plan/1.1); `-` writes it to stdout in place of the table
+    /// Write the plan there as JSON (contract sbdp-plan/2); `-` writes it to stdout in place of the table
     #[arg(long, value_name = "FILE")]
     pub(super) json: Option<PathBuf>,
     /// Also write the plan there as a glTF scene in motion (GLB)

@@ -12,7 +12,8 @@ use super::error::CliError;
 use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::{Revision, SourceAssembly, heal, waypoint_from_pose};
 use crate::plan::{
-    Base, Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning,
+    Base, Blocked, FreeGroup, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd,
+    Warning,
 };
 use crate::search::{ActionSet, Engine, PlanSink, Planner, Progress, Stage, Staging};
 use crate::simulation::PenaltyParameters;
@@ -194,7 +195,13 @@ fn progress(p: client::Progress) -> Progress {
 
 fn plan_step(step: &client::Step<'_>) -> PlanStep {
     PlanStep {
-        part: step.part as usize,
+        parts: indices(step.parts),
+        of: step.of.map(|number| number as usize),
+        ends: match step.ends {
+            client::StepEnd::Out => StepEnd::Out,
+            client::StepEnd::Aside => StepEnd::Aside,
+            client::StepEnd::In => StepEnd::In,
+        },
         motion: if step.rotates { MotionKind::Rotation } else { MotionKind::Translation },
         path: step.path.to_vec(),
         verified_depth: step.verified_depth,
@@ -220,6 +227,12 @@ fn plan(s: Summary, steps: Vec<PlanStep>) -> Plan {
         base: s.base.map(|base| Base { part: base.part as usize, reason: base.reason }),
         steps,
         remaining: indices(&s.remaining),
+        kept_together: s.kept_together.iter().map(|group| indices(group)).collect(),
+        free_together: s
+            .free_together
+            .iter()
+            .map(|g| FreeGroup { parts: indices(&g.parts), direction: g.direction })
+            .collect(),
         blocked: s
             .blocked
             .into_iter()
@@ -299,6 +312,8 @@ fn unplanned(question: &CommandQuestion<'_>, status: PlanStatus, error: &ClientE
         base: None,
         steps: Vec::new(),
         remaining,
+        kept_together: Vec::new(),
+        free_together: Vec::new(),
         blocked: Vec::new(),
         overlaps: Vec::new(),
         warnings: Vec::new(),

@@ -3,9 +3,15 @@
 use nalgebra::Point3;
 
 use super::table::{TextTable, length};
-use crate::geometry::{SourceAssembly, SourceMesh, pose_from_waypoint};
-use crate::plan::{Base, MotionKind, Plan, PlanKind, PlanStats, PlanStep};
+use crate::geometry::{Bounds, Pose, SourceAssembly, SourceMesh, pose_from_waypoint};
+use crate::plan::export::PlanDocument;
+use crate::plan::{
+    Base, FreeGroup, MotionKind, Placements, Plan, PlanKind, PlanStats, PlanStep, StepEnd, StepFrame,
+};
 use crate::view::direction;
+
+/// A step names at most this many of its parts in the table, and counts the rest.
+const MOST_NAMES: usize = 4;
 
 /// The table of steps and everything there is to know about the rest.
 pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan) -> String {
@@ -17,6 +23,8 @@ pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan) -> String {
     let sections = [
         ("base", base(plan)),
         ("remaining", remaining(plan)),
+        ("left together and not taken apart", plan.kept_together.iter().map(|g| names(plan, g)).collect()),
+        ("could leave together", free_together(plan)),
         ("blocked", blocked(plan)),
         ("overlaps at the assembled pose", overlaps(plan)),
         ("warnings", warnings(plan)),
@@ -39,10 +47,11 @@ fn headline(assembly: &SourceAssembly, plan: &Plan) -> String {
         PlanKind::Disassembly => "come off",
         PlanKind::Assembly => "are put in",
     };
+    let crosses = plan.steps.iter().filter(|step| step.of.is_none() && step.ends != StepEnd::Aside);
     format!(
         "{name}: {}{reason}; {} of {} parts {done}, planner {}, engine {}\n",
         plan.status.name(),
-        plan.steps.len(),
+        crosses.map(|step| step.parts.len()).sum::<usize>(),
         plan.parts.len().saturating_sub(plan.removed.len()),
         plan.planner,
         plan.engine
@@ -50,24 +59,37 @@ fn headline(assembly: &SourceAssembly, plan: &Plan) -> String {
 }
 
 fn steps(assembly: &SourceAssembly, plan: &Plan) -> String {
-    let mut table = TextTable::new(&["step", "part", "motion", "length", "direction", "after step"]);
-    for (number, step) in (1..).zip(&plan.steps) {
-        let mesh = assembly.parts.get(step.part).map(|p| &p.mesh);
-        table.row([
-            format!("{number}"),
-            plan.part_name(step.part).to_owned(),
-            step.motion.name().to_owned(),
-            travelled(step, plan.kind, mesh, plan.units.as_deref()),
+    let has_groups = plan.steps.iter().any(|step| step.of.is_some());
+    let group = has_groups.then_some("group of");
+    let header =
+        ["step", "part"].into_iter().chain(group).chain(["motion", "length", "direction", "after step"]);
+    let mut table = TextTable::new(&header.collect::<Vec<_>>());
+    let middles = middles(assembly, plan);
+    for ((number, step), middle) in (1..).zip(&plan.steps).zip(middles) {
+        let of = has_groups.then(|| step.of.map_or_else(String::new, |of| format!("step {}", of + 1)));
+        let aside = if step.ends == StepEnd::Aside { ", aside" } else { "" };
+        let cells = [format!("{number}"), moved(plan, step)].into_iter().chain(of).chain([
+            format!("{}{aside}", step.motion.name()),
+            travelled(step, plan.kind, &middle, plan.units.as_deref()),
             step.direction.map_or_else(String::new, |d| direction(&d.into())),
             step.requires.iter().map(|number| format!("{}", number + 1)).collect::<Vec<_>>().join(", "),
         ]);
+        table.row(cells);
     }
     table.render()
 }
 
-/// How far the middle of the part's box goes, and how far the part turns on the way.
-fn travelled(step: &PlanStep, kind: PlanKind, mesh: Option<&SourceMesh>, units: Option<&str>) -> String {
-    let middle = mesh.map_or_else(Point3::origin, box_middle);
+/// The parts of a step.
+fn moved(plan: &Plan, step: &PlanStep) -> String {
+    let shown = step.parts.len().min(MOST_NAMES);
+    match step.parts.len() - shown {
+        0 => names(plan, &step.parts),
+        more => format!("{} and {more} more", names(plan, &step.parts[..shown])),
+    }
+}
+
+/// How far the middle of the box of what moves goes, and how far it turns on the way.
+fn travelled(step: &PlanStep, kind: PlanKind, middle: &Point3<f64>, units: Option<&str>) -> String {
     let poses: Vec<_> = step.path.iter().map(pose_from_waypoint).collect();
     let distance: f64 = poses.windows(2).map(|w| (w[1] * middle - w[0] * middle).norm()).sum();
     if distance == 0.0 && step.motion == MotionKind::Translation {
@@ -84,14 +106,35 @@ fn travelled(step: &PlanStep, kind: PlanKind, mesh: Option<&SourceMesh>, units: 
     }
 }
 
+/// By step, the middle of the box of the parts that it moves, where its path is the identity. Steps that contradict each
+/// other have the middle of the parts as given.
+fn middles(assembly: &SourceAssembly, plan: &Plan) -> Vec<Point3<f64>> {
+    let placements = Placements::new(plan.kind, &PlanDocument::new(plan)).ok();
+    let assembled = |part: usize| {
+        let start = plan.poses.iter().find(|(p, _)| *p == part);
+        let start = start.map_or_else(Pose::identity, |(_, pose)| pose_from_waypoint(pose));
+        match (plan.kind, &placements) {
+            (PlanKind::Assembly, Some(placements)) => placements.apart[part].inverse() * start,
+            _ => start,
+        }
+    };
+    let middle = |number: usize, step: &PlanStep| {
+        let frame: Option<&StepFrame> = placements.as_ref().map(|p| &p.steps[number]);
+        let bounds = step.parts.iter().enumerate().map(|(k, &part)| {
+            let standing = frame.map_or_else(Pose::identity, |frame| frame.standing[k]);
+            let mesh = assembly.parts.get(part).map(|p| &p.mesh);
+            mesh.map_or(Bounds::EMPTY, |mesh| box_of(mesh, &(standing * assembled(part))))
+        });
+        let bounds = bounds.fold(Bounds::EMPTY, |all, bounds| all.union(&bounds));
+        if bounds == Bounds::EMPTY { Point3::origin() } else { bounds.centre() }
+    };
+    plan.steps.iter().enumerate().map(|(number, step)| middle(number, step)).collect()
+}
+
 /// Vertices that no triangle uses do not belong to the part.
-fn box_middle(mesh: &SourceMesh) -> Point3<f64> {
+fn box_of(mesh: &SourceMesh, pose: &Pose) -> Bounds {
     let used = mesh.triangles.iter().flatten().filter_map(|&v| mesh.vertices.get(v as usize));
-    let bounds = used.map(|p| Point3::from(*p)).fold(None, |bounds, p| match bounds {
-        None => Some((p, p)),
-        Some((lo, hi)) => Some((p.inf(&lo), p.sup(&hi))),
-    });
-    bounds.map_or_else(Point3::origin, |(lo, hi)| nalgebra::center(&lo, &hi))
+    used.fold(Bounds::EMPTY, |bounds, p| bounds.with_point(&(pose * Point3::from(*p))))
 }
 
 fn base(plan: &Plan) -> Vec<String> {
@@ -101,6 +144,11 @@ fn base(plan: &Plan) -> Vec<String> {
 
 fn remaining(plan: &Plan) -> Vec<String> {
     if plan.remaining.is_empty() { Vec::new() } else { vec![names(plan, &plan.remaining)] }
+}
+
+fn free_together(plan: &Plan) -> Vec<String> {
+    let line = |g: &FreeGroup| format!("{} along {}", names(plan, &g.parts), direction(&g.direction.into()));
+    plan.free_together.iter().map(line).collect()
 }
 
 /// One line per part: what it met in each direction.
@@ -183,6 +231,7 @@ fn names(plan: &Plan, parts: &[usize]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::{plan_of, step_of};
     use crate::geometry::SourcePart;
     use crate::plan::{Blocked, Overlap, PlanStatus, Warning};
 
@@ -201,7 +250,9 @@ mod tests {
         let half_turn = [2.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0];
         let start = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
         let step = |part, motion, path| PlanStep {
-            part,
+            parts: vec![part],
+            of: None,
+            ends: StepEnd::Out,
             motion,
             path,
             verified_depth: 0.01,
@@ -227,6 +278,8 @@ mod tests {
                 step(2, MotionKind::Translation, vec![start]),
             ],
             remaining: vec![1],
+            kept_together: vec![],
+            free_together: vec![FreeGroup { parts: vec![0, 1], direction: [0.0, 1.0, 0.0] }],
             blocked: vec![
                 Blocked { part: 1, by: vec![0, 2], action: "+x".into() },
                 Blocked { part: 1, by: vec![0], action: "-z".into() },
@@ -241,11 +294,57 @@ mod tests {
             "1     a     rotation     0 mm, turning 180°             1",
             "2     c     translation  free already                   1",
             "  b: it is the largest",
+            "could leave together:\n  a, b along +Y",
             "  b: +x by a, c; -z by a",
             "  a and b: 0.5000 mm deep",
             "  c: open",
             "0 states, remembered: 3 motions, 2 verified paths; fields",
             "verified to 0.0100 mm",
+        ] {
+            assert!(text.contains(line), "{line}\n{text}");
+        }
+    }
+
+    #[test]
+    fn groups_are_told() {
+        let boxes = [[0.0, 2.0], [2.0, 4.0], [0.0, 1.0], [0.0, 1.0], [0.0, 1.0], [0.0, 1.0], [0.0, 1.0]];
+        let part = |(i, x): (usize, &[f64; 2])| SourcePart {
+            name: i.to_string(),
+            origin: String::new(),
+            mesh: crate::fixtures::cuboid([x[0], 0.0, 0.0], [x[1], 2.0, 2.0]),
+        };
+        let parts: Vec<SourcePart> = boxes.iter().enumerate().map(part).collect();
+        let names = parts.iter().map(|p| p.name.clone()).collect();
+        let assembly = SourceAssembly { name: "box".into(), parts, ..Default::default() };
+        let start = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+        let step = |parts: &[usize], of, ends, path: Vec<[f64; 7]>| PlanStep {
+            parts: parts.to_vec(),
+            of,
+            ends,
+            path,
+            ..step_of(0)
+        };
+        let half_turn = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+        let turned = PlanStep {
+            motion: MotionKind::Rotation,
+            ..step(&[0, 1], None, StepEnd::Out, vec![start, half_turn])
+        };
+        let steps = vec![
+            turned,
+            step(&[1], Some(0), StepEnd::Aside, vec![start, [0.0, 0.0, 3.0, 1.0, 0.0, 0.0, 0.0]]),
+            step(&[2, 3, 4, 5, 6], None, StepEnd::Out, vec![start]),
+        ];
+        let plan =
+            Plan { parts: names, kept_together: vec![vec![0, 1]], ..plan_of(PlanStatus::Complete, steps) };
+        let text = super::plan(&assembly, &plan);
+        // The middle of both boxes is at (2, 1): half a turn about the origin brings it to (−2, −1).
+        for line in [
+            "step  part                   group of  motion              length",
+            "1     0, 1                           rotation            4.47, turning 180°",
+            "2     1                    step 1    translation, aside  3.00",
+            "3     2, 3, 4, 5 and 1 more            translation",
+            "left together and not taken apart:\n  0, 1\n",
+            "box: complete; 7 of 7 parts come off",
         ] {
             assert!(text.contains(line), "{line}\n{text}");
         }

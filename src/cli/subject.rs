@@ -1,6 +1,5 @@
 //! A plan with the assembly that it is about, for what shows plans.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use nalgebra::{Quaternion, UnitQuaternion};
@@ -9,14 +8,17 @@ use super::error::CliError;
 use super::part_names::part_named;
 use crate::blocking_graph::DirectionalGraph;
 use crate::geometry::{
-    Assembly, Pose, Revision, SourceAssembly, SourceMesh, Waypoint, content_hash, load_assembly,
-    pose_from_waypoint,
+    Assembly, Pose, Revision, SourceAssembly, SourceMesh, content_hash, load_assembly, pose_from_waypoint,
 };
-use crate::plan::PlanKind;
 use crate::plan::export::{PlanDocument, SourceDocument};
+use crate::plan::{Placements, PlanKind};
 use crate::search::Termination;
 use crate::service::{AssemblyId, Service};
 use crate::view::{PlanScene, Up, ViewError, glb, kind_of, page, read_plan};
+
+/// A part whose steps bring it to where it was given, but for this angle (radians) and this share of the way there, is
+/// not moved: the product of its motions is rounded.
+const ROUNDING: f64 = 1e-9;
 
 /// A plan, and the meshes that it moves.
 pub(super) struct Subject {
@@ -176,12 +178,19 @@ fn revision(base: &SourceAssembly, source: &SourceDocument) -> Result<Revision, 
 }
 
 /// The parts that stand assembled elsewhere than where they were given, and where. Those that an assembly plan
-/// puts in begin elsewhere, too, but belong where their paths end.
+/// puts in begin elsewhere, too, but belong where their steps bring them from there. Of a plan whose steps contradict
+/// each other there are none; it is refused where it is shown.
 fn assembled_poses(plan: &PlanDocument) -> Vec<(&String, Pose)> {
-    let mut poses: BTreeMap<&String, Waypoint> = plan.initial.poses.iter().map(|(n, w)| (n, *w)).collect();
-    if kind_of(plan) == PlanKind::Assembly {
-        poses.extend(plan.steps.iter().filter_map(|s| Some((&s.part, *s.path.last()?))));
-    }
-    let is_moved = |w: &Waypoint| *w != [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
-    poses.into_iter().filter(|(_, w)| is_moved(w)).map(|(n, w)| (n, pose_from_waypoint(&w))).collect()
+    let Ok(Placements { apart, .. }) = Placements::new(kind_of(plan), plan) else { return Vec::new() };
+    let assembled = |(name, apart): (_, Pose)| {
+        let start = plan.initial.poses.get(name).map(pose_from_waypoint).unwrap_or_default();
+        let (pose, farthest) = match kind_of(plan) {
+            PlanKind::Disassembly => (start, 0.0),
+            PlanKind::Assembly => (apart.inverse() * start, start.translation.vector.norm()),
+        };
+        let is_moved =
+            pose.rotation.angle() > ROUNDING || pose.translation.vector.norm() > ROUNDING * farthest;
+        is_moved.then_some((name, pose))
+    };
+    plan.parts.iter().zip(apart).filter_map(assembled).collect()
 }

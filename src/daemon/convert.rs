@@ -14,7 +14,7 @@ use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::{
     GeometryError, Pose, Revision, SourceAssembly, SourceMesh, SourcePart, pose_from_waypoint,
 };
-use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep};
+use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd};
 use crate::search::{ActionSet, Engine, PlanRequest, Planner, Progress, Stage, Staging};
 use crate::service::{AssemblyId, ServiceError};
 use crate::simulation::PenaltyParameters;
@@ -119,7 +119,13 @@ fn unsupported(what: &str, index: u32, names: &[&str]) -> WireError {
 /// A step as it travels.
 pub(crate) fn step(step: &PlanStep) -> wire::Step {
     wire::Step {
-        part: step.part as u32,
+        parts: numbers(&step.parts),
+        of: step.of.map(|number| number as u32),
+        ends: match step.ends {
+            StepEnd::Out => wire::StepEnd::Out,
+            StepEnd::Aside => wire::StepEnd::Aside,
+            StepEnd::In => wire::StepEnd::In,
+        },
         rotates: step.motion == MotionKind::Rotation,
         path: step.path.clone(),
         verified_depth: step.verified_depth,
@@ -160,6 +166,8 @@ pub(crate) fn summary(plan: &Plan, spent: &PlanStats) -> Vec<u8> {
         fixed: numbers(&plan.fixed),
         base: plan.base.as_ref().map(|base| (base.part as u32, base.reason.as_str())),
         remaining: numbers(&plan.remaining),
+        kept_together: plan.kept_together.iter().map(|group| numbers(group)).collect(),
+        free_together: plan.free_together.iter().map(|g| (numbers(&g.parts), g.direction)).collect(),
         poses: plan
             .poses
             .iter()

@@ -228,7 +228,7 @@ mod tests {
     use sbdp_ipc::plan::StepsView;
 
     fn step(part: u32, waypoints: usize) -> Step {
-        Step { part, path: vec![[f64::from(part); 7]; waypoints], ..Step::default() }
+        Step { parts: vec![part], path: vec![[f64::from(part); 7]; waypoints], ..Step::default() }
     }
 
     /// Reads like a client that grants credit as it goes.
@@ -311,7 +311,7 @@ mod tests {
             for (_, message) in read_all(&mut outbox) {
                 let bytes = AlignedBytes::copy_of(&message);
                 for step in StepsView::new(bytes.as_slice()).unwrap().iter() {
-                    prop_assert_eq!((step.number, step.part), (next, next));
+                    prop_assert_eq!((step.number, step.parts), (next, &[next][..]));
                     prop_assert_eq!(step.path.len(), sizes[next as usize]);
                     next += 1;
                 }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::jobs::PlanJob;
 use super::planning::{Planning, contained, with_moved};
 use crate::geometry::Pose;
-use crate::plan::{Plan, PlanStatus};
+use crate::plan::{Plan, PlanStatus, StepEnd};
 use crate::search::{PlanRequest, Planner};
 use crate::service::AssemblyId;
 use crate::termination::Termination;
@@ -16,35 +16,35 @@ use crate::termination::Termination;
 /// With less time left than this, no question is planned.
 const LEAST_TIME: Duration = Duration::from_millis(1);
 
-/// What may happen to a part, by its place in the plan.
+/// What may happen to the parts that leave the assembly together, mostly one, by their place in the plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Contingency {
-    /// It does not move when its turn comes: the parts before it are gone.
+    /// They do not move when their turn comes: the parts before them are gone.
     StuckInTurn(usize),
-    /// It does not move.
+    /// They do not move.
     Stuck(usize),
-    /// It is gone.
+    /// They are gone.
     Gone(usize),
 }
 
 impl Contingency {
-    /// All that may happen to a part, the earliest first.
+    /// All that may happen to them, the earliest first.
     fn all(place: usize) -> impl Iterator<Item = Self> {
         // No part is before the first.
         let in_turn = (place > 0).then_some(Self::StuckInTurn(place));
         in_turn.into_iter().chain([Self::Stuck(place), Self::Gone(place)])
     }
 
-    /// The question that asks about it, for a request whose plan takes the parts out in `order`.
-    fn question(self, request: &PlanRequest, order: &[usize]) -> PlanRequest {
+    /// The question that asks about it, for a request whose plan takes parts out of the assembly in `order`.
+    fn question(self, request: &PlanRequest, order: &[Vec<usize>]) -> PlanRequest {
         let mut request = request.clone();
         match self {
             Self::StuckInTurn(place) => {
-                request.removed.extend(&order[..place]);
-                request.fixed.push(order[place]);
+                request.removed.extend(order[..place].iter().flatten());
+                request.fixed.extend(&order[place]);
             }
-            Self::Stuck(place) => request.fixed.push(order[place]),
-            Self::Gone(place) => request.removed.push(order[place]),
+            Self::Stuck(place) => request.fixed.extend(&order[place]),
+            Self::Gone(place) => request.removed.extend(&order[place]),
         }
         request
     }
@@ -57,8 +57,8 @@ pub(super) struct Speculation {
     /// Parts that stand elsewhere than in it.
     moved: Vec<(usize, Pose)>,
     request: PlanRequest,
-    /// The parts that its plan takes out, in order.
-    order: Vec<usize>,
+    /// The parts that its plan takes out of the assembly, in order; those that leave together in one.
+    order: Vec<Vec<usize>>,
     left: VecDeque<Contingency>,
     /// The time that is left for them.
     time: Duration,
@@ -74,7 +74,9 @@ impl Speculation {
         if !is_for_use || !is_wanted || plan.steps.is_empty() || time.is_zero() {
             return None;
         }
-        let order: Vec<usize> = plan.steps.iter().map(|step| step.part).collect();
+        // No question is about a group that lies beside the assembly.
+        let leaves = plan.steps.iter().filter(|step| step.of.is_none() && step.ends == StepEnd::Out);
+        let order: Vec<Vec<usize>> = leaves.map(|step| step.parts.clone()).collect();
         let left = (0..order.len()).flat_map(Contingency::all).collect();
         let (moved, request) = (job.moved.clone(), job.request.clone());
         Some(Self { assembly: job.assembly, moved, request, order, left, time })
@@ -124,6 +126,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{plan_of, step_of};
     use crate::geometry::{Revision, SourceAssembly};
+    use crate::plan::PlanStep;
     use crate::search::{PlanSink, Staging};
     use crate::service::{Admission, ServiceError};
 
@@ -215,6 +218,23 @@ mod tests {
         let first = [of(&[7, 2], &[5]), of(&[7], &[5, 2])];
         let second = [of(&[7, 0], &[5, 2]), of(&[7, 0], &[5]), of(&[7], &[5, 0])];
         assert_eq!((service.asked(), planned, speculation.left()), ([&first[..], &second].concat(), 5, 0));
+    }
+
+    #[test]
+    fn a_group_is_stuck_or_gone_as_a_whole() {
+        let group = PlanStep { parts: vec![1, 2], ..step_of(1) };
+        let inner = PlanStep { of: Some(0), ..step_of(2) };
+        let aside = PlanStep { ends: StepEnd::Aside, ..step_of(3) };
+        let plan = plan_of(PlanStatus::Complete, vec![group, inner, aside, step_of(3)]);
+        let (service, t) = (Scripted::default(), Termination::default());
+        let mut speculation = Speculation::after(&job(PlanRequest::default()), &plan, TIME).unwrap();
+        while speculation.plan_next(&service, &t) {}
+        let asked: Vec<_> = service.asked().into_iter().map(|(_, fixed, removed)| (fixed, removed)).collect();
+        let of = |fixed: &[usize], removed: &[usize]| (fixed.to_vec(), removed.to_vec());
+        assert_eq!(
+            asked,
+            [of(&[1, 2], &[]), of(&[], &[1, 2]), of(&[3], &[1, 2]), of(&[3], &[]), of(&[], &[3])]
+        );
     }
 
     #[test]

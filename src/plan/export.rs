@@ -1,4 +1,4 @@
-//! Plans as JSON: the contract `sbdp-plan/1.1`, written by `sbdp plan ASSEMBLY --json FILE` and
+//! Plans as JSON: the contract `sbdp-plan/2`, written by `sbdp plan ASSEMBLY --json FILE` and
 //! documented in the README. Parts go by their names there. Fields may be added; those that
 //! are here keep their meaning.
 
@@ -6,11 +6,14 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
+use super::{
+    Blocked, FreeGroup, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd,
+    Warning,
+};
 use crate::geometry::Waypoint;
 
 /// The name and version of the contract.
-pub const SCHEMA: &str = "sbdp-plan/1.1";
+pub const SCHEMA: &str = "sbdp-plan/2";
 
 /// A plan in the words of the contract.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -47,8 +50,12 @@ pub struct PlanDocument {
     pub base_reason: Option<String>,
     /// The removals, or insertions, in order.
     pub steps: Vec<StepDocument>,
-    /// Parts that stand where they stood.
+    /// Parts that stand in the assembly in the end (of an assembly plan: from the start).
     pub remaining: Vec<String>,
+    /// Groups that left together and were not taken apart: nobody asked for it, or no way was found.
+    pub kept_together: Vec<Vec<String>>,
+    /// Where nothing leaves any more: groups that could.
+    pub free_together: Vec<FreeGroupDocument>,
     /// What blocks the parts that should have come off.
     pub blocked: Vec<BlockedDocument>,
     /// Overlaps at the assembled pose.
@@ -92,15 +99,22 @@ pub struct InitialDocument {
     pub poses: BTreeMap<String, Waypoint>,
 }
 
-/// One removal or insertion.
+/// Parts that move as one rigid body.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StepDocument {
-    /// The part that moves.
-    pub part: String,
+    /// The parts that move.
+    pub parts: Vec<String>,
+    /// The number of the step that takes the group out (of an assembly plan: puts it in) to which these parts belong;
+    /// null for parts that leave the assembly. A group is taken apart as it stood in the assembly.
+    pub of: Option<usize>,
+    /// `out`: apart from all that they stood with; `aside`: elsewhere among the others; `in`: in their places (assembly
+    /// plans).
+    pub ends: String,
     /// `translation`, or `rotation` if any waypoint is turned against the first.
     pub motion: String,
-    /// Rigid transforms x′ = q·x + t of the assembled mesh, `[x, y, z, qw, qx, qy, qz]`;
-    /// between them the centre of the part's box moves on a line and its rotation slerps.
+    /// Rigid transforms x′ = q·x + t, `[x, y, z, qw, qx, qy, qz]`, of the parts as they stand when the step begins (of an
+    /// assembly plan: when it ends), so that the first (the last) is the identity; between two, the centre of the box of
+    /// all these parts, axis-aligned as they stand then, moves on a line, and the rotation slerps.
     pub path: Vec<Waypoint>,
     /// Deepest penetration along the path beyond the pair's assembled depth.
     pub verified_depth: f64,
@@ -112,6 +126,15 @@ pub struct StepDocument {
     /// The unit vector along which the middle of the part's box moves on the last leg of the path; null where it does
     /// not.
     pub direction: Option<[f64; 3]>,
+}
+
+/// Parts that could leave together where none leaves alone.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FreeGroupDocument {
+    /// The parts.
+    pub parts: Vec<String>,
+    /// The unit vector along which they begin.
+    pub direction: [f64; 3],
 }
 
 /// A part that remains and what blocks it.
@@ -233,6 +256,18 @@ impl MotionKind {
     }
 }
 
+impl StepEnd {
+    /// The end in the words of the contract.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Out => "out",
+            Self::Aside => "aside",
+            Self::In => "in",
+        }
+    }
+}
+
 impl Plan {
     /// The name of a part.
     #[must_use]
@@ -266,6 +301,8 @@ impl PlanDocument {
             base_reason: plan.base.as_ref().map(|base| base.reason.clone()),
             steps: plan.steps.iter().map(|s| step(plan, s)).collect(),
             remaining: plan.names(&plan.remaining),
+            kept_together: plan.kept_together.iter().map(|group| plan.names(group)).collect(),
+            free_together: plan.free_together.iter().map(|group| free_group(plan, group)).collect(),
             blocked: plan.blocked.iter().map(|b| blocked(plan, b)).collect(),
             overlaps: plan.overlaps.iter().map(|o| overlap(plan, o)).collect(),
             warnings: plan.warnings.iter().map(|w| warning(plan, w)).collect(),
@@ -296,7 +333,9 @@ fn poses(plan: &Plan) -> BTreeMap<String, Waypoint> {
 
 fn step(plan: &Plan, step: &PlanStep) -> StepDocument {
     StepDocument {
-        part: plan.part_name(step.part).to_owned(),
+        parts: plan.names(&step.parts),
+        of: step.of,
+        ends: step.ends.name().to_owned(),
         motion: step.motion.name().to_owned(),
         path: step.path.clone(),
         verified_depth: step.verified_depth,
@@ -304,6 +343,10 @@ fn step(plan: &Plan, step: &PlanStep) -> StepDocument {
         wave: step.wave,
         direction: step.direction,
     }
+}
+
+fn free_group(plan: &Plan, group: &FreeGroup) -> FreeGroupDocument {
+    FreeGroupDocument { parts: plan.names(&group.parts), direction: group.direction }
 }
 
 fn blocked(plan: &Plan, blocked: &Blocked) -> BlockedDocument {
@@ -370,7 +413,9 @@ mod tests {
             fixed: vec![0],
             base: Some(Base { part: 1, reason: "it is the largest".into() }),
             steps: vec![PlanStep {
-                part: 2,
+                parts: vec![2],
+                of: None,
+                ends: StepEnd::Out,
                 motion: MotionKind::Rotation,
                 path: vec![[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0]],
                 verified_depth: 0.001,
@@ -379,6 +424,8 @@ mod tests {
                 direction: Some([0.0, 1.0, 0.0]),
             }],
             remaining: vec![0, 1],
+            kept_together: vec![vec![2, 3]],
+            free_together: vec![FreeGroup { parts: vec![0, 1], direction: [1.0, 0.0, 0.0] }],
             blocked: vec![Blocked { part: 1, by: vec![0], action: "+x".into() }],
             overlaps: vec![Overlap { parts: [0, 1], depth: 0.25 }],
             warnings: vec![
@@ -397,13 +444,14 @@ mod tests {
     #[test]
     fn the_shape_is_the_contract_to_the_letter() {
         let expected = concat!(
-            r#"{"schema":"sbdp-plan/1.1","kind":"disassembly","status":"infeasible","reason":"nothing moves","#,
+            r#"{"schema":"sbdp-plan/2","kind":"disassembly","status":"infeasible","reason":"nothing moves","#,
             r#""planner":"sbdp-star","engine":"sliding","units":"mm","parts":["0","1","2","10"],"#,
             r#""initial":{"removed":["10"],"poses":{"1":[0.0,0.5,0.0,1.0,0.0,0.0,0.0]}},"targets":["1"],"fixed":["0"],"#,
             r#""base":["1"],"base_reason":"it is the largest","#,
-            r#""steps":[{"part":"2","motion":"rotation","#,
+            r#""steps":[{"parts":["2"],"of":null,"ends":"out","motion":"rotation","#,
             r#""path":[[0.0,0.0,0.0,1.0,0.0,0.0,0.0],[0.0,0.5,0.0,0.0,1.0,0.0,0.0]],"verified_depth":0.001,"requires":[],"wave":0,"direction":[0.0,1.0,0.0]}],"#,
-            r#""remaining":["0","1"],"blocked":[{"part":"1","by":["0"],"action":"+x"}],"#,
+            r#""remaining":["0","1"],"kept_together":[["2","10"]],"#,
+            r#""free_together":[{"parts":["0","1"],"direction":[1.0,0.0,0.0]}],"blocked":[{"part":"1","by":["0"],"action":"+x"}],"#,
             r#""overlaps":[{"parts":["0","1"],"depth":0.25}],"#,
             r#""warnings":[{"part":"2","message":"open"},{"part":null,"message":"small"}],"#,
             r#""stats":{"simulations":7,"simulations_run":0,"sweeps":0,"states":0,"load_time_s":null,"#,

@@ -3,13 +3,16 @@
 mod common_depth;
 pub mod export;
 mod model;
+mod placements;
 mod records;
 mod shorten;
 mod verify;
 
 pub use model::{
-    Base, Blocked, FreeGroup, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning,
+    Base, Blocked, FreeGroup, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd,
+    Warning,
 };
+pub use placements::{Placements, StepFrame};
 pub use records::{KnownVerdicts, VerdictQuestion};
 pub(crate) use records::{OVERLAP, VERDICT, overlap_key};
 pub use shorten::thinned;

@@ -40,24 +40,41 @@ pub enum MotionKind {
     Rotation,
 }
 
-/// One part leaves, or comes in, along a path.
+/// Where a step leaves its parts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StepEnd {
+    /// Apart from all that they stood with.
+    Out,
+    /// Elsewhere among the others, where they stay until a later step moves them again.
+    Aside,
+    /// In their places: in assembly plans.
+    In,
+}
+
+/// Parts that move along a path, as one rigid body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanStep {
-    /// Index of the part that moves; all others that are there stand still.
-    pub part: usize,
-    /// Whether the path turns the part.
+    /// Indices of the parts that move, ascending; all others that stand with them stay where they are.
+    pub parts: Vec<usize>,
+    /// The number of the step that takes the group out (of an assembly plan: puts it in) to which these parts belong;
+    /// `None` for parts that leave the assembly. A group is taken apart as it stood in the assembly.
+    pub of: Option<usize>,
+    /// Where they are in the end.
+    pub ends: StepEnd,
+    /// Whether the path turns them.
     pub motion: MotionKind,
-    /// Transforms of the mesh from where it was given; the first is the part's pose at the start, the
-    /// identity but for parts that stand elsewhere. In an assembly plan the last is the assembled pose.
+    /// Rigid transforms x′ = q·x + t of the parts as they stand when the step begins (of an assembly plan: when it
+    /// ends), so that the first (the last) is the identity. Between two, the centre of the box of all these parts,
+    /// axis-aligned as they stand then, moves on a line, and the rotation slerps.
     pub path: Vec<Waypoint>,
     /// Deepest penetration found by verification beyond the pair's assembled depth.
     pub verified_depth: f64,
-    /// Numbers of the steps, from 0, that must be done before this very path is free, ascending: necessary, and
-    /// sufficient with what these require in turn.
+    /// Numbers of the steps that must be done before this very path is free, ascending: necessary, and sufficient with
+    /// what these require in turn. All are smaller than the step's own number.
     pub requires: Vec<usize>,
     /// The earliest round, from 0, in which it can be done, if every step is done as soon as it can be.
     pub wave: usize,
-    /// The unit vector along which the middle of the part's box moves on the last leg of the path; `None` where it does
+    /// The unit vector along which the middle of the parts' box moves on the last leg of the path; `None` where it does
     /// not.
     pub direction: Option<[f64; 3]>,
 }
@@ -181,8 +198,12 @@ pub struct Plan {
     pub base: Option<Base>,
     /// The removals, or insertions, in order.
     pub steps: Vec<PlanStep>,
-    /// Parts that stand where they stood all the time.
+    /// Parts that stand in the assembly in the end (of an assembly plan: from the start).
     pub remaining: Vec<usize>,
+    /// Groups that left together and were not taken apart: nobody asked for it, or no way was found.
+    pub kept_together: Vec<Vec<usize>>,
+    /// Where nothing leaves any more: groups that could.
+    pub free_together: Vec<FreeGroup>,
     /// What blocks the parts that should have come off.
     pub blocked: Vec<Blocked>,
     /// Overlaps at the assembled pose.

@@ -5,8 +5,10 @@ use std::time::Duration;
 use nalgebra::{Point3, Vector3};
 
 use crate::assembling::Insertion;
-use crate::geometry::{Assembly, Pose, Waypoint, pose_from_waypoint, waypoint_from_pose};
-use crate::plan::{Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, Warning};
+use crate::geometry::{Assembly, Part, Pose, Waypoint, pose_from_waypoint, waypoint_from_pose};
+use crate::plan::{
+    Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd, Warning,
+};
 use crate::search::{BlockedAction, Outcome, PlanRequest, Removal};
 
 /// Turns below this are rounding.
@@ -17,34 +19,58 @@ const NO_SHIFT: f64 = 1e-9;
 
 /// A removal as a step of a plan.
 pub(super) fn removal(assembly: &Assembly, removal: &Removal) -> PlanStep {
-    let Removal { parts, path, depth, requires, wave, .. } = removal;
-    step(assembly, parts[0], path, *depth, (requires, *wave))
+    let Removal { parts, of, aside, path, depth, requires, wave } = removal;
+    let ends = if *aside { StepEnd::Aside } else { StepEnd::Out };
+    let stands = &path[0];
+    Moved { parts, of: *of, ends, path, stands, depth: *depth, requires, wave: *wave }.step(assembly)
 }
 
 /// An insertion as a step of a plan.
 pub(super) fn insertion(assembly: &Assembly, insertion: &Insertion) -> PlanStep {
-    let Insertion { parts, path, depth, requires, wave, .. } = insertion;
-    step(assembly, parts[0], path, *depth, (requires, *wave))
+    let Insertion { parts, of, aside, path, depth, requires, wave } = insertion;
+    let ends = if *aside { StepEnd::Aside } else { StepEnd::In };
+    let stands = &path[path.len() - 1];
+    Moved { parts, of: *of, ends, path, stands, depth: *depth, requires, wave: *wave }.step(assembly)
 }
 
-fn step(
-    assembly: &Assembly,
-    part: usize,
-    path: &[Pose],
+/// A step in the planning frame.
+struct Moved<'a> {
+    parts: &'a [usize],
+    of: Option<usize>,
+    ends: StepEnd,
+    /// Poses of the part's shape, or of the body of all parts.
+    path: &'a [Pose],
+    /// The pose that the path of the step is relative to.
+    stands: &'a Pose,
     depth: f64,
-    (requires, wave): (&[usize], usize),
-) -> PlanStep {
-    let direction = last_direction(path, &assembly.shapes[assembly.parts[part].shape].bounds().centre());
-    let path: Vec<Waypoint> = path.iter().map(|pose| waypoint(assembly, part, pose)).collect();
-    let turns = path.iter().any(|w| w[3..] != path[0][3..]);
-    PlanStep {
-        part,
-        motion: if turns { MotionKind::Rotation } else { MotionKind::Translation },
-        path,
-        verified_depth: depth / assembly.scale,
-        requires: requires.to_vec(),
-        wave,
-        direction: direction.map(Into::into),
+    requires: &'a [usize],
+    wave: usize,
+}
+
+impl Moved<'_> {
+    fn step(&self, assembly: &Assembly) -> PlanStep {
+        // A body of several parts has the middle of their box as origin, and is not turned.
+        let middle = match *self.parts {
+            [part] => {
+                let Part { planning_from_shape, bounds, .. } = &assembly.parts[part];
+                planning_from_shape.inverse_transform_point(&bounds.centre())
+            }
+            _ => Point3::origin(),
+        };
+        let waypoint = |pose| waypoint_from_pose(&motion(assembly, self.stands, pose));
+        let path: Vec<Waypoint> = self.path.iter().map(waypoint).collect();
+        let turns = path.iter().any(|w| w[3..] != path[0][3..]);
+        PlanStep {
+            parts: self.parts.to_vec(),
+            of: self.of,
+            ends: self.ends,
+            motion: if turns { MotionKind::Rotation } else { MotionKind::Translation },
+            path,
+            verified_depth: self.depth / assembly.scale,
+            requires: self.requires.to_vec(),
+            wave: self.wave,
+            direction: last_direction(self.path, &middle).map(Into::into),
+        }
     }
 }
 
@@ -163,6 +189,7 @@ impl PlanFrame<'_> {
             plan_hit: found.plan,
             ..PlanStats::default()
         };
+        let kept_together = outcome.kept_together();
         let steps = outcome.removals.iter().map(|r| removal(self.assembly, r)).collect();
         let blocked = outcome.blocked.into_iter().map(|BlockedAction { part, action, by }| Blocked {
             part,
@@ -176,6 +203,8 @@ impl PlanFrame<'_> {
             steps,
             base: outcome.base,
             remaining: outcome.remaining,
+            kept_together,
+            free_together: outcome.free_together,
             blocked: blocked.collect(),
             stats,
             ..self.empty(status, reason)
@@ -206,6 +235,8 @@ impl PlanFrame<'_> {
             fixed: self.fixed,
             base: None,
             steps: Vec::new(),
+            kept_together: Vec::new(),
+            free_together: Vec::new(),
             blocked: Vec::new(),
             overlaps: self.overlaps,
             warnings,

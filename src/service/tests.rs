@@ -284,7 +284,7 @@ fn where_a_part_is_out_is_asked_afresh() {
     let post = cuboid([-3.9, -3.9, 0.0], [-3.5, -3.5, 6.0]);
     let (low, high) = (vec![plate.clone(), block.clone()], vec![plate, block, post]);
     let request = PlanRequest { targets: Some(vec![1]), fixed: vec![0], ..simulated() };
-    let length = |plan: &Plan| plan.steps.iter().find(|s| s.part == 1).map(|s| s.path.last().unwrap()[2]);
+    let length = |plan: &Plan| plan.steps.iter().find(|s| s.parts == [1]).map(|s| s.path.last().unwrap()[2]);
     for order in [[&low, &high, &low], [&high, &low, &high]] {
         let service = Service::default();
         for meshes in order {

@@ -2,13 +2,18 @@
 
 use std::collections::HashSet;
 
+use nalgebra::Vector3;
+
 use super::ViewError;
 use crate::geometry::Waypoint;
-use crate::plan::PlanKind;
-use crate::plan::export::{PlanDocument, SCHEMA};
+use crate::plan::export::{PlanDocument, SCHEMA, StepDocument};
+use crate::plan::{Placements, PlanKind};
 
 /// Quaternions of waypoints are this close to unit length.
 const UNIT: f64 = 1e-3;
+/// A path begins where its parts stand: the vector of its quaternion there is smaller than this, and its translation
+/// than this share of the path's largest.
+const ROUNDING: f64 = 1e-9;
 /// Coordinates of waypoints are smaller: squares of single floats must be finite.
 const FURTHEST: f64 = 1e18;
 
@@ -18,8 +23,9 @@ pub fn kind_of(plan: &PlanDocument) -> PlanKind {
     if plan.kind == PlanKind::Assembly.name() { PlanKind::Assembly } else { PlanKind::Disassembly }
 }
 
-/// Reads a plan and checks that it holds together: known schema and kind, all names those of parts, no part
-/// moved twice, paths of at least one rigid transform.
+/// Reads a plan and checks that it holds together: known schema and kind, all names those of parts, each step moves
+/// parts that stand in the body that it names, paths of at least one rigid transform, of which the first (of an assembly
+/// plan: the last) is the identity.
 ///
 /// # Errors
 /// It is no plan, or does not hold together; the error names the place.
@@ -67,28 +73,54 @@ fn named(plan: &PlanDocument) -> impl Iterator<Item = (&'static str, &str)> {
     let lists = lists.into_iter().flat_map(|(field, list)| list.iter().map(move |n| (field, n)));
     let targets = plan.targets.iter().flatten().map(|n| ("targets", n));
     let poses = plan.initial.poses.keys().map(|n| ("initial.poses", n));
-    let steps = plan.steps.iter().map(|s| ("steps[].part", &s.part));
+    let steps = plan.steps.iter().flat_map(|s| s.parts.iter().map(|n| ("steps[].parts", n)));
+    let kept = plan.kept_together.iter().flatten().map(|n| ("kept_together", n));
+    let free = plan.free_together.iter().flat_map(|g| g.parts.iter().map(|n| ("free_together[].parts", n)));
+    let groups = kept.chain(free);
     let blocked = plan.blocked.iter().flat_map(|b| {
         std::iter::once(("blocked[].part", &b.part)).chain(b.by.iter().map(|n| ("blocked[].by", n)))
     });
-    lists.chain(targets).chain(poses).chain(steps).chain(blocked).map(|(field, name)| (field, name.as_str()))
+    let listed = lists.chain(targets).chain(poses).chain(steps).chain(groups).chain(blocked);
+    listed.map(|(field, name)| (field, name.as_str()))
 }
 
 fn check_steps(plan: &PlanDocument) -> Result<(), String> {
-    let mut gone: HashSet<&str> = plan.initial.removed.iter().map(String::as_str).collect();
-    for (i, step) in plan.steps.iter().enumerate() {
-        if !gone.insert(&step.part) {
-            return Err(format!("`steps[{i}]` moves `{}`, which moved or was gone before", step.part));
-        }
-        if step.path.is_empty() {
-            return Err(format!("`steps[{i}].path` is empty; a part that is free has one waypoint"));
-        }
+    let placements = Placements::new(kind_of(plan), plan)?;
+    for (i, (step, frame)) in plan.steps.iter().zip(&placements.steps).enumerate() {
         if let Some(number) = step.requires.iter().find(|number| **number >= i) {
             return Err(format!("`steps[{i}].requires` has {number}, which is no step before it"));
         }
         for (k, waypoint) in step.path.iter().enumerate() {
             check_waypoint(waypoint).map_err(|e| format!("`steps[{i}].path[{k}]` {e}"))?;
         }
+        check_start(kind_of(plan), step).map_err(|e| format!("`steps[{i}].path` {e}"))?;
+        let motions = std::iter::once(&frame.body).chain(&frame.standing);
+        let mut shifts = motions.map(|motion| &motion.translation.vector);
+        shifts.try_for_each(check_distance).map_err(|e| format!("what `steps[{i}]` moves {e}"))?;
+    }
+    Ok(())
+}
+
+/// A path begins with the identity; that of an insertion ends with it.
+fn check_start(kind: PlanKind, step: &StepDocument) -> Result<(), String> {
+    let (waypoint, what) = match kind {
+        PlanKind::Disassembly => (step.path.first(), "first"),
+        PlanKind::Assembly => (step.path.last(), "last"),
+    };
+    let Some([shift @ .., _, i, j, k]) = waypoint else { return Ok(()) };
+    let largest = step.path.iter().flat_map(|w| &w[..3]).fold(0.0, |a: f64, x| a.max(x.abs()));
+    let is_shifted = shift.iter().any(|x| x.abs() > ROUNDING * largest);
+    if is_shifted || [i, j, k].iter().any(|x| x.abs() > ROUNDING) {
+        return Err(format!("has a {what} waypoint other than the identity"));
+    }
+    Ok(())
+}
+
+fn check_distance(shift: &Vector3<f64>) -> Result<(), String> {
+    let far = shift.amax();
+    // Infinity minus infinity is no number.
+    if far.is_nan() || far > FURTHEST {
+        return Err(format!("is {far:e} away; more than {FURTHEST:e} cannot be shown"));
     }
     Ok(())
 }
@@ -98,9 +130,7 @@ fn check_waypoint(waypoint: &Waypoint) -> Result<(), String> {
     if !waypoint.iter().all(|x| x.is_finite()) {
         return Err("is not finite".to_owned());
     }
-    if let Some(far) = waypoint[..3].iter().find(|x| x.abs() > FURTHEST) {
-        return Err(format!("is {far:e} away; more than {FURTHEST:e} cannot be shown"));
-    }
+    check_distance(&Vector3::from_column_slice(&waypoint[..3]))?;
     if (norm - 1.0).abs() > UNIT {
         return Err(format!("has a quaternion of length {norm:.3} instead of 1"));
     }
@@ -110,15 +140,15 @@ fn check_waypoint(waypoint: &Waypoint) -> Result<(), String> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::plan::export::StepDocument;
+    use crate::plan::export::FreeGroupDocument;
 
     /// A plan of two parts, of which the second is lifted.
     pub(in crate::view) fn plan() -> PlanDocument {
-        let text = r#"{"schema":"sbdp-plan/1.1","status":"complete","reason":null,"planner":"sbdp-star",
+        let text = r#"{"schema":"sbdp-plan/2","status":"complete","reason":null,"planner":"sbdp-star",
             "engine":"sliding","units":"mm","parts":["0","1"],"initial":{"removed":[],"poses":{}},
-            "targets":null,"fixed":[],"base":[],"base_reason":null,"steps":[{"part":"1","motion":"translation",
+            "targets":null,"fixed":[],"base":[],"base_reason":null,"steps":[{"parts":["1"],"of":null,"ends":"out","motion":"translation",
             "path":[[0,0,0,1,0,0,0],[0,0,2,1,0,0,0]],"verified_depth":0,"requires":[],
-            "wave":0,"direction":[0,0,1]}],"remaining":["0"],"blocked":[],
+            "wave":0,"direction":[0,0,1]}],"remaining":["0"],"kept_together":[],"free_together":[],"blocked":[],
             "overlaps":[],"warnings":[],"stats":{"simulations":0,"simulations_run":0,"sweeps":0,"states":0,
             "sdf_time_s":0,"static_analysis_time_s":0,"path_time_s":0,"verify_time_s":0,"total_time_s":0,
             "cache":{"sdf_hits":0,"blocking_hits":0,"motion_hits":0,"plan_hit":false}}}"#;
@@ -128,7 +158,9 @@ pub(super) mod tests {
     /// A step along some waypoints.
     pub(in crate::view) fn step(part: &str, path: &[Waypoint]) -> StepDocument {
         StepDocument {
-            part: part.into(),
+            parts: vec![part.into()],
+            of: None,
+            ends: "out".into(),
             motion: "translation".into(),
             path: path.to_vec(),
             verified_depth: 0.0,
@@ -146,17 +178,121 @@ pub(super) mod tests {
 
     #[test]
     fn what_is_wrong_is_named() {
-        let still = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
         assert!(refusal(|p| p.schema = "sbdp-plan/9".into()).contains("`sbdp-plan/9`"));
         assert!(refusal(|p| p.kind = "repair".into()).contains("`repair`"));
         assert!(refusal(|p| p.parts.push("1".into())).contains("`1` twice"));
-        assert!(refusal(|p| p.steps[0].part = "x".into()).contains("`steps[].part` names `x`"));
-        assert!(refusal(|p| p.steps.push(step("1", &[still]))).contains("`steps[1]` moves `1`"));
+        assert!(refusal(|p| p.steps[0].parts[0] = "x".into()).contains("`steps[].parts` names `x`"));
+        assert!(refusal(|p| p.kept_together.push(vec!["x".into()])).contains("`kept_together` names `x`"));
+        let free = FreeGroupDocument { parts: vec!["x".into()], direction: [0.0; 3] };
+        assert!(refusal(|p| p.free_together.push(free)).contains("`free_together[].parts` names `x`"));
         assert!(refusal(|p| p.steps[0].requires.push(0)).contains("`steps[0].requires` has 0"));
         assert!(refusal(|p| p.steps[0].path.clear()).contains("`steps[0].path` is empty"));
         assert!(refusal(|p| p.steps[0].path[1][3] = 3.0).contains("`steps[0].path[1]` has a quaternion"));
         assert!(refusal(|p| p.steps[0].path[1][2] = -1e300).contains("cannot be shown"));
         assert!(refusal(|p| p.initial.poses.extend([("0".into(), [0.0; 7])])).contains("initial.poses.0"));
+    }
+
+    /// Takes 0, 1 and 2 out together, moves 1 aside in this group, takes 1 and 2 out of it as a group of their own, and
+    /// then these apart; 3 stays.
+    pub(in crate::view) fn nested() -> PlanDocument {
+        let still = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+        let moved = |parts: &[&str], of: Option<usize>, ends: &str, along: [f64; 3]| StepDocument {
+            parts: parts.iter().map(|&name| name.to_owned()).collect(),
+            of,
+            ends: ends.into(),
+            requires: of.into_iter().collect(),
+            ..step("0", &[still, [along[0], along[1], along[2], 1.0, 0.0, 0.0, 0.0]])
+        };
+        let steps = vec![
+            moved(&["0", "1", "2"], None, "out", [0.0, 0.0, 8.0]),
+            moved(&["1"], Some(0), "aside", [1.0, 0.0, 0.0]),
+            moved(&["1", "2"], Some(0), "out", [0.0, 5.0, 0.0]),
+            moved(&["2"], Some(2), "out", [6.0, 0.0, 0.0]),
+        ];
+        let parts = ["0", "1", "2", "3"].map(String::from).into();
+        PlanDocument { parts, steps, remaining: vec!["3".into()], ..plan() }
+    }
+
+    /// A plan backwards.
+    pub(in crate::view) fn reversed(mut plan: PlanDocument) -> PlanDocument {
+        let last = plan.steps.len() - 1;
+        plan.kind = "assembly".into();
+        plan.steps.reverse();
+        for step in &mut plan.steps {
+            step.path.reverse();
+            step.of = step.of.map(|of| last - of);
+            step.ends = step.ends.replace("out", "in");
+        }
+        let groups: Vec<Option<usize>> = plan.steps.iter().map(|step| step.of).collect();
+        for (number, step) in plan.steps.iter_mut().enumerate() {
+            step.requires = (0..number).filter(|inner| groups[*inner] == Some(number)).collect();
+        }
+        plan
+    }
+
+    #[test]
+    fn groups_and_parts_aside_hold_together_either_way() {
+        for plan in [nested(), reversed(nested())] {
+            let text = plan.to_json().unwrap();
+            assert_eq!(read_plan(&text).unwrap(), plan);
+        }
+    }
+
+    #[test]
+    fn parts_move_only_where_they_stand() {
+        let refused = |plan: PlanDocument, change: fn(&mut Vec<StepDocument>)| {
+            let mut plan = plan;
+            change(&mut plan.steps);
+            read_plan(&plan.to_json().unwrap()).unwrap_err().to_string()
+        };
+        let apart = |change: fn(&mut Vec<StepDocument>)| refused(nested(), change);
+        let together = |change: fn(&mut Vec<StepDocument>)| refused(reversed(nested()), change);
+        for (error, words) in [
+            (apart(|s| s[1].parts.clear()), "`steps[1].parts` is empty"),
+            (apart(|s| s[2].parts.push("1".into())), "`steps[2].parts` names `1` twice"),
+            (
+                apart(|s| s[3].parts = vec!["0".into()]),
+                "moves `0`, which does not stand in the group of `steps[2]` before it",
+            ),
+            (
+                apart(|s| s[3].of = Some(0)),
+                "moves `2`, which does not stand in the group of `steps[0]` before it",
+            ),
+            (apart(|s| s[3].of = None), "moves `2`, which does not stand in the assembly before it"),
+            (
+                apart(|s| s[1].of = Some(2)),
+                "`steps[1].of` is 2, which is no step that takes several parts out before it",
+            ),
+            (apart(|s| s[2].of = Some(1)), "`steps[2].of` is 1"),
+            (apart(|s| s[2].of = Some(9)), "`steps[2].of` is 9"),
+            (apart(|s| s[2].ends = "in".into()), "`steps[2].ends` is `in`; known here are `out` and `aside`"),
+            (
+                apart(|s| s[2].path[0][1] = 0.1),
+                "`steps[2].path` has a first waypoint other than the identity",
+            ),
+            (
+                apart(|s| s.iter_mut().for_each(|s| s.path[1][2] = 9e17)),
+                "what `steps[3]` moves is 1.8e18 away",
+            ),
+            (
+                together(|s| s[1].ends = "out".into()),
+                "`steps[1].ends` is `out`; known here are `in` and `aside`",
+            ),
+            (
+                together(|s| s[0].of = Some(0)),
+                "`steps[0].of` is 0, which is no step that puts several parts in after it",
+            ),
+            (
+                together(|s| s[0].of = Some(3)),
+                "moves `2`, which does not stand in the group of `steps[3]` after it",
+            ),
+            (
+                together(|s| s[1].path[1][4] = 1e-6),
+                "`steps[1].path` has a last waypoint other than the identity",
+            ),
+        ] {
+            assert!(error.contains(words), "{words}: {error}");
+        }
     }
 
     #[test]
@@ -167,14 +303,14 @@ pub(super) mod tests {
             let error = read_plan(text).unwrap_err().to_string();
             assert!(error.contains(reason) && error.contains("sbdp plan --json"), "{error}");
         }
-        let error = read_plan(r#"{"schema":"sbdp-plan/1.1","status":"complete"}"#).unwrap_err().to_string();
+        let error = read_plan(r#"{"schema":"sbdp-plan/2","status":"complete"}"#).unwrap_err().to_string();
         assert!(error.contains("missing field"), "{error}");
     }
 
     #[test]
     fn a_plan_without_a_kind_takes_apart() {
         assert_eq!(kind_of(&plan()), PlanKind::Disassembly);
-        let assembly = PlanDocument { kind: "assembly".into(), ..plan() };
+        let assembly = reversed(plan());
         assert_eq!(kind_of(&read_plan(&assembly.to_json().unwrap()).unwrap()), PlanKind::Assembly);
     }
 }

@@ -1,5 +1,7 @@
 //! Where parts stand in an exploded view: along their own ways out, just so far that boxes are apart.
 
+use std::collections::{HashMap, HashSet};
+
 use nalgebra::{Point3, Vector3};
 
 use crate::geometry::Bounds;
@@ -9,11 +11,51 @@ const GAP: f64 = 0.15;
 /// Ways shorter than this share of the part's longest side are none.
 const NO_WAY: f64 = 1e-6;
 
+/// Parts that leave a body together.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Leaving {
+    /// The number of the step.
+    pub(super) number: usize,
+    /// The step that took the body out which they leave; `None` for the assembly.
+    pub(super) of: Option<usize>,
+    /// The parts.
+    pub(super) parts: Vec<usize>,
+    /// Where the middle of the box of all of them goes.
+    pub(super) centres: Vec<Point3<f64>>,
+}
+
 /// A part that has its place: its box when assembled, and how it is shifted.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Placed {
-    pub(super) bounds: Bounds,
-    pub(super) shift: Vector3<f64>,
+struct Placed {
+    bounds: Bounds,
+    shift: Vector3<f64>,
+}
+
+/// How each part is shifted, by their boxes when assembled and who leaves whom, first to last. Parts go out along their
+/// own ways, those that leave last the least far; parts of a group along their ways out of the group, and along that of
+/// the group.
+pub(super) fn exploded_parts(boxes: &[Bounds], leaving: &[Leaving]) -> Vec<Vector3<f64>> {
+    let mut shifts = vec![Vector3::zeros(); boxes.len()];
+    // Of each body, the parts that have their places; at first those that never leave it.
+    let mut placed: HashMap<Option<usize>, Vec<usize>> = HashMap::from([(None, (0..boxes.len()).collect())]);
+    placed.extend(leaving.iter().map(|l| (Some(l.number), l.parts.clone())));
+    for l in leaving {
+        let left: HashSet<usize> = l.parts.iter().copied().collect();
+        placed.entry(l.of).or_default().retain(|part| !left.contains(part));
+    }
+    // Backwards, so that a group is arranged before it is shifted.
+    for l in leaving.iter().rev() {
+        let at = |part: &usize| Placed { bounds: boxes[*part], shift: shifts[*part] };
+        let around: Vec<Placed> = placed.get(&l.of).into_iter().flatten().map(at).collect();
+        let assembled = l.parts.iter().fold(Bounds::EMPTY, |all, part| all.union(&boxes[*part]));
+        let shown = l.parts.iter().fold(Bounds::EMPTY, |all, part| all.union(&at(part).shown()));
+        // Parts that were moved aside go from there.
+        let centres: Vec<_> = std::iter::once(assembled.centre()).chain(l.centres.iter().copied()).collect();
+        let shift = exploded(&shown, &around, &way_out(&assembled, &around, &centres));
+        l.parts.iter().for_each(|part| shifts[*part] += shift);
+        placed.entry(l.of).or_default().extend(&l.parts);
+    }
+    shifts
 }
 
 impl Placed {
@@ -29,7 +71,7 @@ fn shifted(bounds: &Bounds, shift: &Vector3<f64>) -> Bounds {
 /// The unit direction of a part's way out: to the first of the points along its path (of the middle of its box,
 /// from the assembled place) where its box is clear of all others as assembled, else to the last. Zero if it
 /// does not move.
-pub(super) fn way_out(part: &Bounds, around: &[Placed], centres: &[Point3<f64>]) -> Vector3<f64> {
+fn way_out(part: &Bounds, around: &[Placed], centres: &[Point3<f64>]) -> Vector3<f64> {
     let Some(first) = centres.first() else { return Vector3::zeros() };
     let size = part.extents().max();
     let is_clear = |c: &&Point3<f64>| {
@@ -43,7 +85,7 @@ pub(super) fn way_out(part: &Bounds, around: &[Placed], centres: &[Point3<f64>])
 
 /// How a part is shifted along the unit vector `way` so that its box is clear of the others where these are shown,
 /// and no part that was behind it comes to stand before it.
-pub(super) fn exploded(part: &Bounds, around: &[Placed], way: &Vector3<f64>) -> Vector3<f64> {
+fn exploded(part: &Bounds, around: &[Placed], way: &Vector3<f64>) -> Vector3<f64> {
     if *way == Vector3::zeros() {
         return *way;
     }

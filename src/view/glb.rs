@@ -2,7 +2,7 @@
 //!
 //! One node per part, with its name, under a root node named after the assembly; one animation with all steps in
 //! order, interpolated linearly. A node's origin is the middle of its part's box, so what glTF does between key
-//! frames is exactly what the plan promises. Parts stay where their paths end: glTF cannot hide nodes.
+//! frames is what the plan promises (of a group that turns, but for a thousandth of the longest side). Parts stay where their paths end: glTF cannot hide nodes.
 //!
 //! Lengths are metres where the input's unit is known, else one metre per unit; `asset.extras` says which. The
 //! nodes of parts are in the input's frame; where z is up there, the root node turns it so that y is.
@@ -20,7 +20,7 @@ use gltf::json::scene::UnitQuaternion;
 use gltf::json::validation::{Checked, USize64};
 use gltf::json::{self, Accessor, Animation, Asset, Index, Material, Mesh, Node, Root};
 
-use super::{DrawnPart, PALETTE, Placement, PlanScene, Rgb, SceneStep, Up, ViewError};
+use super::{DrawnPart, Keyframe, PALETTE, Placement, PlanScene, Rgb, Up, ViewError};
 
 /// The scene as the bytes of a `.glb` file.
 ///
@@ -187,8 +187,8 @@ impl Writer {
             extensions: None,
             extras: None,
         };
-        for step in &scene.steps {
-            self.step(step, nodes[step.part], &mut animation);
+        for (part, node) in scene.parts.iter().zip(nodes) {
+            self.motion(&part.keys, *node, &mut animation);
         }
         // One without channels is not valid: nothing moves then.
         if !animation.channels.is_empty() {
@@ -196,10 +196,10 @@ impl Writer {
         }
     }
 
-    fn step(&mut self, step: &SceneStep, node: Index<Node>, animation: &mut Animation) {
+    fn motion(&mut self, moments: &[Keyframe], node: Index<Node>, animation: &mut Animation) {
         // Moments that are one as single floats would not ascend.
         let mut keys: Vec<(f32, &Placement)> = Vec::new();
-        for key in &step.keys {
+        for key in moments {
             match keys.last_mut() {
                 Some(last) if last.0 >= key.time as f32 => last.1 = &key.placement,
                 _ => keys.push((key.time as f32, &key.placement)),

@@ -80,7 +80,12 @@ struct PagePart<'a> {
     colour: usize,
     fixed: bool,
     stays: bool,
-    step: Option<usize>,
+    steps: &'a [usize],
+    crosses: Option<f64>,
+    handled: Option<[f64; 2]>,
+    times: Vec<f64>,
+    /// Seven numbers per time, as of `start`.
+    keys: usize,
     /// `[x, y, z, qx, qy, qz, qw]`.
     assembled: [f64; 7],
     start: [f64; 7],
@@ -90,13 +95,11 @@ struct PagePart<'a> {
 
 #[derive(Debug, Serialize)]
 struct PageStep<'a> {
-    part: usize,
+    parts: &'a [usize],
     words: &'a str,
     after: &'a [usize],
+    begins: f64,
     ends: f64,
-    times: Vec<f64>,
-    /// Seven numbers per key, as of a part.
-    keys: usize,
 }
 
 #[derive(Debug, Serialize)]
@@ -120,7 +123,7 @@ fn data<'a>(scene: &'a PlanScene, names: &[String], graphs: &[DirectionalGraph])
     let middle = scene.bounds().centre();
     let mut bytes = Vec::new();
     let meshes = scene.drawn.iter().map(|m| mesh(m, &mut bytes)).collect();
-    let steps = scene.steps.iter().map(|s| step(s, &middle, &mut bytes)).collect();
+    let parts = scene.parts.iter().map(|p| part(p, &middle, &mut bytes)).collect();
     Data {
         name: &scene.name,
         units: scene.units.as_deref(),
@@ -134,8 +137,8 @@ fn data<'a>(scene: &'a PlanScene, names: &[String], graphs: &[DirectionalGraph])
         duration: scene.duration(),
         palette: PALETTE.iter().map(|[r, g, b]| format!("#{r:02x}{g:02x}{b:02x}")).collect(),
         meshes,
-        parts: scene.parts.iter().map(|p| part(p, &middle)).collect(),
-        steps,
+        parts,
+        steps: scene.steps.iter().map(step).collect(),
         blocked: scene.blocked.iter().map(|b| stuck(scene, b)).collect(),
         graphs: graphs.iter().map(|g| graph(scene, names, g)).collect(),
         bytes: STANDARD.encode(&bytes),
@@ -190,14 +193,20 @@ fn placed(placement: &Placement, middle: &Point3<f64>) -> [f64; 7] {
     [x, y, z, i, j, k, w]
 }
 
-fn part<'a>(part: &'a ScenePart, middle: &Point3<f64>) -> PagePart<'a> {
+fn part<'a>(part: &'a ScenePart, middle: &Point3<f64>, bytes: &mut Vec<u8>) -> PagePart<'a> {
+    let numbers = |k: &Keyframe| placed(&k.placement, middle).map(|x| x as f32);
+    let keys: Vec<u8> = part.keys.iter().flat_map(numbers).flat_map(f32::to_le_bytes).collect();
     PagePart {
         name: &part.name,
         mesh: part.drawn,
         colour: part.colour,
         fixed: part.fixed,
         stays: part.stays,
-        step: part.step,
+        steps: &part.steps,
+        crosses: part.crosses,
+        handled: part.handled,
+        times: part.keys.iter().map(|k| k.time).collect(),
+        keys: append(bytes, &keys),
         assembled: placed(&part.assembled, middle),
         start: placed(&part.start, middle),
         exploded: part.exploded.into(),
@@ -205,16 +214,13 @@ fn part<'a>(part: &'a ScenePart, middle: &Point3<f64>) -> PagePart<'a> {
     }
 }
 
-fn step<'a>(step: &'a SceneStep, middle: &Point3<f64>, bytes: &mut Vec<u8>) -> PageStep<'a> {
-    let numbers = |k: &Keyframe| placed(&k.placement, middle).map(|x| x as f32);
-    let keys: Vec<u8> = step.keys.iter().flat_map(numbers).flat_map(f32::to_le_bytes).collect();
+fn step(step: &SceneStep) -> PageStep<'_> {
     PageStep {
-        part: step.part,
+        parts: &step.parts,
         words: &step.words,
         after: &step.after,
+        begins: step.begins,
         ends: step.ends,
-        times: step.keys.iter().map(|k| k.time).collect(),
-        keys: append(bytes, &keys),
     }
 }
 
@@ -283,8 +289,8 @@ mod tests {
         }
         assert_eq!(data["graphs"][0]["edges"], serde_json::json!([[0, 1]]));
         assert_eq!(
-            (data["parts"][1]["step"].as_u64(), data["kind"].as_str()),
-            (Some(0), Some("disassembly"))
+            (&data["parts"][1]["steps"], &data["steps"][0]["parts"], data["kind"].as_str()),
+            (&serde_json::json!([0]), &serde_json::json!([1]), Some("disassembly"))
         );
     }
 

@@ -3,12 +3,9 @@
 use std::fmt::Write;
 
 use super::document::kind_of;
-use super::words::{Words, required};
+use super::words::{Moved, Words, direction, required, told_names};
 use crate::plan::PlanKind;
 use crate::plan::export::{BlockedDocument, PlanDocument};
-
-/// Names. A step names at most this many of the parts that must have moved before it, and counts the rest.
-const MOST_NAMES: usize = 6;
 
 /// The instructions. Steps in a row that do the same with equal parts are told as one. Parts are equal if they
 /// are of one `class` (one per part of the plan); without classes, if their names
@@ -17,8 +14,8 @@ const MOST_NAMES: usize = 6;
 pub fn markdown(plan: &PlanDocument, classes: Option<&[usize]>) -> String {
     let account = StepAccount { plan, classes, words: Words::of(plan) };
     let mut text = account.headline();
-    for group in account.groups() {
-        text.push_str(&account.group(&group));
+    for run in account.runs() {
+        text.push_str(&account.run(&run));
     }
     text.push_str(&account.rest());
     text
@@ -66,58 +63,61 @@ impl StepAccount<'_> {
         }
     }
 
-    /// Runs of steps that are told as one.
-    fn groups(&self) -> Vec<Vec<usize>> {
-        let mut groups: Vec<Vec<usize>> = Vec::new();
+    /// Runs of steps that are told as one: of single parts of the same body.
+    fn runs(&self) -> Vec<Vec<usize>> {
+        let mut runs: Vec<Vec<usize>> = Vec::new();
         for (i, step) in self.plan.steps.iter().enumerate() {
-            let joins = |group: &&mut Vec<usize>| {
-                let first = group[0];
-                self.is_equal(&self.plan.steps[first].part, &step.part)
-                    && self.words.done(first, "") == self.words.done(i, "")
-                    && !group.iter().any(|g| step.requires.contains(g))
+            let joins = |run: &&mut Vec<usize>| {
+                let first = &self.plan.steps[run[0]];
+                let ([a], [b]) = (&first.parts[..], &step.parts[..]) else { return false };
+                (first.of, &first.ends) == (step.of, &step.ends)
+                    && self.is_equal(a, b)
+                    && self.words.done(run[0], &Moved::one("")) == self.words.done(i, &Moved::one(""))
+                    && !run.iter().any(|g| step.requires.contains(g))
             };
-            match groups.last_mut().filter(joins) {
-                Some(group) => group.push(i),
-                None => groups.push(vec![i]),
+            match runs.last_mut().filter(joins) {
+                Some(run) => run.push(i),
+                None => runs.push(vec![i]),
             }
         }
-        groups
+        runs
     }
 
-    fn group(&self, group: &[usize]) -> String {
-        let names: Vec<&str> = group.iter().map(|&i| self.plan.steps[i].part.as_str()).collect();
-        let first = group[0];
-        let after = self.after(group);
-        if let [only] = names[..] {
-            return format!("**{}.** {}{after}.\n\n", first + 1, self.words.done(first, only));
+    fn run(&self, run: &[usize]) -> String {
+        let first = run[0];
+        let after = self.after(run);
+        if let [only] = run {
+            return format!("**{}.** {}{after}.\n\n", first + 1, self.words.step(*only));
         }
+        let names: Vec<&str> =
+            run.iter().flat_map(|&i| &self.plan.steps[i].parts).map(String::as_str).collect();
         let what = format!("{} × {}", names.len(), common_name(&names));
-        let (told, list) = (self.words.done(first, &what), names.join(", "));
+        let (told, list) = (self.words.done(first, &Moved::one(&what)), names.join(", "));
         // One by one: of several "it" would be wrong.
         let told = told
             .replace("nothing holds it", "nothing holds them")
             .replace("in its place: it touches", "in place: they touch");
-        format!("**{}–{}.** {told}, one by one: {list}{after}.\n\n", first + 1, first + group.len())
+        format!("**{}–{}.** {told}, one by one: {list}{after}.\n\n", first + 1, first + run.len())
     }
 
-    /// The parts that the steps of a group require to have moved before.
-    fn after(&self, group: &[usize]) -> String {
+    /// The parts that the steps of a run require to have moved before.
+    fn after(&self, run: &[usize]) -> String {
         let mut names: Vec<&str> = Vec::new();
-        for name in group.iter().flat_map(|&i| required(self.plan, i)) {
+        for name in run.iter().flat_map(|&i| required(self.plan, i)) {
             if !names.contains(&name) {
                 names.push(name);
             }
         }
-        let verb = match (kind_of(self.plan), group.len()) {
+        if names.is_empty() {
+            return String::new();
+        }
+        let parts = run.iter().map(|&i| self.plan.steps[i].parts.len()).sum();
+        let verb = match (kind_of(self.plan), parts) {
             (PlanKind::Disassembly, _) => "after",
             (PlanKind::Assembly, 1) => "goes in after",
             (PlanKind::Assembly, _) => "go in after",
         };
-        match names.len() {
-            0 => String::new(),
-            n if n <= MOST_NAMES => format!(", {verb} {}", names.join(", ")),
-            n => format!(", {verb} {} and {} more", names[..MOST_NAMES].join(", "), n - MOST_NAMES),
-        }
+        format!(", {verb} {}", told_names(&names, ", "))
     }
 
     /// What stays, and what keeps it.
@@ -130,6 +130,17 @@ impl StepAccount<'_> {
         };
         if !plan.remaining.is_empty() {
             let _ = writeln!(text, "{stays}: {}.\n", plan.remaining.join(", "));
+        }
+        for group in &plan.kept_together {
+            let _ = writeln!(text, "Not taken apart: {}.\n", told_names(group, " and "));
+        }
+        for group in &plan.free_together {
+            let along = direction(&group.direction.into());
+            let _ = writeln!(
+                text,
+                "Could leave together along {along}: {}.\n",
+                told_names(&group.parts, " and ")
+            );
         }
         if !plan.blocked.is_empty() {
             text.push_str("## What is stuck\n\n");
@@ -163,8 +174,9 @@ fn common_name<'a>(names: &[&'a str]) -> &'a str {
 mod tests {
     use super::super::document::tests::{plan, step};
     use super::*;
+    use crate::plan::export::{FreeGroupDocument, StepDocument};
 
-    fn lifted(part: &str, by: f64, requires: &[usize]) -> crate::plan::export::StepDocument {
+    fn lifted(part: &str, by: f64, requires: &[usize]) -> StepDocument {
         let mut step = step(part, &[[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, by, 1.0, 0.0, 0.0, 0.0]]);
         step.requires = requires.to_vec();
         step
@@ -211,9 +223,57 @@ mod tests {
         let named = |n: &str| n.replace("bolt-", "");
         plan = bolted();
         plan.parts.iter_mut().for_each(|p| *p = named(p));
-        plan.steps.iter_mut().for_each(|s| s.part = named(&s.part));
+        plan.steps.iter_mut().flat_map(|s| &mut s.parts).for_each(|part| *part = named(part));
         assert_eq!(told(&plan, None), 4, "numbers alone say nothing");
         assert!(markdown(&plan, Some(&[0, 0, 0, 1, 2])).contains("3 × equal parts"));
+    }
+
+    #[test]
+    fn steps_of_groups_and_of_other_bodies_are_told_one_by_one() {
+        let bolts = |change: fn(&mut PlanDocument)| {
+            let mut plan = bolted();
+            change(&mut plan);
+            markdown(&plan, None)
+        };
+        let with_group: fn(&mut PlanDocument) = |plan| {
+            plan.steps =
+                vec![lifted("bolt-1", 14.0, &[]), lifted("bolt-2", 14.0, &[]), lifted("bolt-3", 14.0, &[])];
+            plan.steps[0].parts.push("cover".into());
+            plan.steps[0].parts.push("bolt-3".into());
+            plan.steps[2].of = Some(0);
+            plan.steps[2].requires = vec![0];
+        };
+        let text = bolts(with_group);
+        let expected = "**1.** Take bolt-1, cover and bolt-3 together out along +Z (14 mm).\n\n\
+             **2.** Take bolt-2 out along +Z (14 mm).\n\n\
+             **3.** Of the group of step 1: take bolt-3 out along +Z (14 mm).\n\n";
+        assert!(text.contains(expected), "{text}");
+        let text = bolts(|plan| {
+            let group = lifted("cover", 14.0, &[]);
+            plan.steps.insert(
+                0,
+                StepDocument { parts: ["bolt-1", "bolt-2", "cover"].map(String::from).into(), ..group },
+            );
+            plan.steps.truncate(3);
+            plan.steps[1..].iter_mut().for_each(|step| step.of = Some(0));
+        });
+        let expected = "**2–3.** Of the group of step 1: take 2 × bolt out along +Z (14 mm), one by one: bolt-1, bolt-2.";
+        assert!(text.contains(expected), "{text}");
+        let text = bolts(|plan| plan.steps[1].ends = "aside".into());
+        assert!(text.contains("**2.** Move bolt-2 aside along +Z (14 mm).\n"), "{text}");
+    }
+
+    #[test]
+    fn groups_that_stayed_together_are_told() {
+        let free = FreeGroupDocument {
+            parts: ["cover", "base"].map(String::from).into(),
+            direction: [0.0, 0.0, -1.0],
+        };
+        let kept = vec![["bolt-1", "bolt-2"].map(String::from).into()];
+        let text =
+            markdown(&PlanDocument { kept_together: kept, free_together: vec![free], ..bolted() }, None);
+        assert!(text.contains("Not taken apart: bolt-1 and bolt-2.\n"), "{text}");
+        assert!(text.contains("Could leave together along −Z: cover and base.\n"), "{text}");
     }
 
     #[test]

@@ -8,8 +8,8 @@ use nalgebra::Vector3;
 
 use super::document::kind_of;
 use crate::geometry::{Pose, pose_from_waypoint};
-use crate::plan::PlanKind;
 use crate::plan::export::{PlanDocument, StepDocument};
+use crate::plan::{PlanKind, StepEnd};
 
 /// Turns below this (radians) are none.
 const NO_TURN: f64 = 0.01;
@@ -21,6 +21,8 @@ const NEARLY: f64 = 0.9994;
 const SLIGHT: f64 = 0.03;
 /// … and no more than so many.
 const MOST: usize = 3;
+/// At most this many names are told, and the rest counted.
+const MOST_NAMES: usize = 6;
 
 /// One move of a part, as it is told.
 #[derive(Debug, Clone, PartialEq)]
@@ -123,60 +125,132 @@ pub(super) struct Words<'a> {
     kind: PlanKind,
 }
 
+/// What a step moves, as it is told.
+pub(super) struct Moved {
+    what: String,
+    /// It is several parts.
+    is_several: bool,
+}
+
+impl Moved {
+    /// One part, or what stands for one.
+    pub(super) fn one(what: &str) -> Self {
+        Self { what: what.to_owned(), is_several: false }
+    }
+
+    /// The parts of a step.
+    fn all(names: &[String]) -> Self {
+        match names {
+            [only] => Self::one(only),
+            names => Self { what: format!("{} together", told_names(names, " and ")), is_several: true },
+        }
+    }
+
+    fn it(&self) -> &'static str {
+        if self.is_several { "them" } else { "it" }
+    }
+}
+
+/// Names in a row, of many the first and a count; `last` is between the last two.
+pub(super) fn told_names<S: AsRef<str>>(names: &[S], last: &str) -> String {
+    let shown: Vec<&str> = names.iter().take(MOST_NAMES).map(AsRef::as_ref).collect();
+    match (names.len() - shown.len(), &shown[..]) {
+        (0, [first @ .., end]) if !first.is_empty() => format!("{}{last}{end}", first.join(", ")),
+        (0, _) => shown.join(", "),
+        (more, _) => format!("{} and {more} more", shown.join(", ")),
+    }
+}
+
 impl<'a> Words<'a> {
     pub(super) fn of(plan: &'a PlanDocument) -> Self {
         Self { plan, kind: kind_of(plan) }
     }
 
-    /// A step: what is done, and after what it could be done.
+    /// A step: what is done, and of which group if it is not of the assembly.
     pub(super) fn step(&self, step: usize) -> String {
-        self.done(step, &self.plan.steps[step].part)
+        self.done(step, &Moved::all(&self.plan.steps[step].parts))
     }
 
     /// What is done in a step to what goes by some name.
-    pub(super) fn done(&self, step: usize, what: &str) -> String {
+    pub(super) fn done(&self, step: usize, moved: &Moved) -> String {
         let units = self.plan.units.as_deref();
+        let StepDocument { of, ends, .. } = &self.plan.steps[step];
         let all = moves(&self.plan.steps[step]);
-        let brought = if self.kind == PlanKind::Assembly { brought_up(&all) } else { 0 };
+        let is_aside = *ends == StepEnd::Aside.name();
+        let brought = if self.kind == PlanKind::Assembly && !is_aside { brought_up(&all) } else { 0 };
         let moves = telling(&all[brought..]);
         let told: Vec<String> = moves.iter().map(|m| m.told(units)).collect();
         let turns = moves.iter().any(|m| m.angle > 0.0);
-        match self.kind {
-            PlanKind::Disassembly => out(what, &told, turns),
-            PlanKind::Assembly => into(what, &told, turns, brought > 0),
+        let done = match self.kind {
+            _ if is_aside => aside(moved, &told, turns),
+            PlanKind::Disassembly => out(moved, &told, turns),
+            PlanKind::Assembly => into(moved, &told, turns, brought > 0),
+        };
+        match (of, self.kind) {
+            (None, _) => done,
+            (Some(of), PlanKind::Disassembly) => format!("Of the group of step {}: {}", of + 1, lower(&done)),
+            (Some(of), PlanKind::Assembly) => format!("For the group of step {}: {}", of + 1, lower(&done)),
         }
     }
 }
 
-fn out(what: &str, moves: &[String], turns: bool) -> String {
+/// With a small first letter.
+fn lower(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
+}
+
+fn out(moved: &Moved, moves: &[String], turns: bool) -> String {
+    let Moved { what, .. } = moved;
     match moves {
-        [] => format!("Lift {what} away: nothing holds it"),
+        [] => format!("Lift {what} away: nothing holds {}", moved.it()),
         [only] if turns => format!("Turn {what} out {only}"),
         [only] => format!("Take {what} out {only}"),
-        [first, .., last] if moves.len() > MOST => {
-            let (begun, left) = (begun(what, first), moves.len() - 2);
-            format!("{begun}, go on in {left} moves, then {}", ended("out", last))
-        }
-        [first, between @ .., last] => {
-            format!("{}{}, then {}", begun(what, first), gone_on(between), ended("out", last))
-        }
+        moves => led("out", moved, moves),
     }
 }
 
-fn into(what: &str, moves: &[String], turns: bool, brought: bool) -> String {
+fn aside(moved: &Moved, moves: &[String], turns: bool) -> String {
+    let Moved { what, .. } = moved;
+    match moves {
+        [] => format!("Leave {what} where {}", if moved.is_several { "they are" } else { "it is" }),
+        [only] if turns => format!("Turn {what} aside {only}"),
+        [only] => format!("Move {what} aside {only}"),
+        moves => led("aside", moved, moves),
+    }
+}
+
+/// Several moves, the last one of which leads out or aside.
+fn led(whither: &str, moved: &Moved, moves: &[String]) -> String {
+    match moves {
+        [first, .., last] if moves.len() > MOST => {
+            let (begun, left) = (begun(moved, first), moves.len() - 2);
+            format!("{begun}, go on in {left} moves, then {}", ended(moved, whither, last))
+        }
+        [first, between @ .., last] => {
+            let begun = begun(moved, first);
+            format!("{begun}{}, then {}", gone_on(moved, between), ended(moved, whither, last))
+        }
+        _ => moves.concat(),
+    }
+}
+
+fn into(moved: &Moved, moves: &[String], turns: bool, brought: bool) -> String {
+    let Moved { what, .. } = moved;
     let up = format!("Bring {what} up");
     match moves {
+        [] if moved.is_several => format!("Put {what} in their places: they touch nothing on the way"),
         [] => format!("Put {what} in its place: it touches nothing on the way"),
-        [only] if brought => format!("{up}, then {}", ended("in", only)),
+        [only] if brought => format!("{up}, then {}", ended(moved, "in", only)),
         [only] if turns => format!("Turn {what} in {only}"),
         [only] => format!("Put {what} in {only}"),
         [before @ .., last] if moves.len() > MOST => {
-            format!("{up} in {} moves, then {}", before.len(), ended("in", last))
+            format!("{up} in {} moves, then {}", before.len(), ended(moved, "in", last))
         }
-        [before @ .., last] if brought => format!("{up}{}, then {}", gone_on(before), ended("in", last)),
-        [first, between @ .., last] => {
-            format!("{}{}, then {}", begun(what, first), gone_on(between), ended("in", last))
+        [before @ .., last] if brought => {
+            format!("{up}{}, then {}", gone_on(moved, before), ended(moved, "in", last))
         }
+        moves => led("in", moved, moves),
     }
 }
 
@@ -184,22 +258,35 @@ fn is_turn(told: &str) -> bool {
     told.starts_with("by")
 }
 
-fn begun(what: &str, first: &str) -> String {
-    format!("{} {what} {first}", if is_turn(first) { "Turn" } else { "Move" })
+fn begun(moved: &Moved, first: &str) -> String {
+    format!("{} {} {first}", if is_turn(first) { "Turn" } else { "Move" }, moved.what)
 }
 
-fn gone_on(between: &[String]) -> String {
-    between.iter().map(|m| format!(", then {}{m}", if is_turn(m) { "turn it " } else { "" })).collect()
+fn turned_on(moved: &Moved, told: &str) -> String {
+    if is_turn(told) { format!("turn {} ", moved.it()) } else { String::new() }
 }
 
-fn ended(whither: &str, last: &str) -> String {
-    format!("{}{whither} {last}", if is_turn(last) { "turn it " } else { "" })
+fn gone_on(moved: &Moved, between: &[String]) -> String {
+    between.iter().map(|m| format!(", then {}{m}", turned_on(moved, m))).collect()
 }
 
-/// The parts that the steps move which a step requires, in the order of the steps.
-pub(super) fn required(plan: &PlanDocument, step: usize) -> impl Iterator<Item = &str> {
-    let requires = plan.steps.get(step).into_iter().flat_map(|s| &s.requires);
-    requires.filter_map(|&number| plan.steps.get(number)).map(|s| s.part.as_str())
+fn ended(moved: &Moved, whither: &str, last: &str) -> String {
+    format!("{}{whither} {last}", turned_on(moved, last))
+}
+
+/// The other parts that the steps move which a step requires, in the order of the steps. That the group of a step is out
+/// goes without saying.
+pub(super) fn required(plan: &PlanDocument, step: usize) -> Vec<&str> {
+    let Some(own) = plan.steps.get(step) else { return Vec::new() };
+    let others = own.requires.iter().filter(|number| Some(**number) != own.of);
+    let parts = others.filter_map(|&number| plan.steps.get(number)).flat_map(|s| &s.parts);
+    let mut names: Vec<&str> = Vec::new();
+    for name in parts.filter(|name| !own.parts.contains(name)) {
+        if !names.contains(&name.as_str()) {
+            names.push(name);
+        }
+    }
+    names
 }
 
 /// A direction by the axis of the frame that it is along, else by its coordinates.
@@ -246,7 +333,7 @@ pub(super) fn length(value: f64, units: Option<&str>) -> String {
 mod tests {
     use std::f64::consts::{PI, TAU};
 
-    use super::super::document::tests::{plan, step};
+    use super::super::document::tests::{nested, plan, reversed, step};
     use super::*;
     use crate::geometry::{Waypoint, waypoint_from_pose};
 
@@ -284,6 +371,61 @@ mod tests {
             "Move 1 along +X (5 mm), then out along (0.00, 0.60, 0.80) (10 mm)"
         );
         assert_eq!(told("disassembly", &[start]), "Lift 1 away: nothing holds it");
+    }
+
+    #[test]
+    fn groups_and_parts_aside_are_told_as_such() {
+        let all = |plan: &PlanDocument| -> Vec<String> {
+            (0..plan.steps.len()).map(|step| Words::of(plan).step(step)).collect()
+        };
+        assert_eq!(
+            all(&nested()),
+            [
+                "Take 0, 1 and 2 together out along +Z (8 mm)",
+                "Of the group of step 1: move 1 aside along +X (1 mm)",
+                "Of the group of step 1: take 1 and 2 together out along +Y (5 mm)",
+                "Of the group of step 3: take 2 out along +X (6 mm)",
+            ]
+        );
+        assert_eq!(
+            all(&reversed(nested())),
+            [
+                "For the group of step 2: put 2 in along −X (6 mm)",
+                "For the group of step 4: put 1 and 2 together in along −Y (5 mm)",
+                "For the group of step 4: move 1 aside along −X (1 mm)",
+                "Put 0, 1 and 2 together in along −Z (8 mm)",
+            ]
+        );
+        let parts: Vec<String> = (0..8).map(|i| i.to_string()).collect();
+        let turn = [at([0.0; 3], [0.0; 3]), at([0.0; 3], [0.0, 0.0, PI / 4.0])];
+        let path = [turn[0], at([0.0, 0.0, 3.0], [0.0; 3]), at([0.0, 0.0, 3.0], [0.0, 0.0, PI / 4.0])];
+        let several = |ends: &str, path: &[Waypoint]| {
+            let step = StepDocument { parts: parts.clone(), ends: ends.into(), ..step("0", path) };
+            let plan = PlanDocument { steps: vec![step], parts: parts.clone(), ..plan() };
+            Words::of(&plan).step(0)
+        };
+        let who = "0, 1, 2, 3, 4, 5 and 2 more together";
+        assert_eq!(several("out", &path[..1]), format!("Lift {who} away: nothing holds them"));
+        assert_eq!(several("aside", &turn), format!("Turn {who} aside by 45° about +Z"));
+        assert_eq!(
+            several("out", &path),
+            format!("Move {who} along +Z (3 mm), then turn them out by 45° about +Z")
+        );
+    }
+
+    #[test]
+    fn what_goes_without_saying_is_not_required() {
+        let mut plan = nested();
+        plan.steps[2].requires = vec![0, 1];
+        plan.steps[3].requires = vec![1, 2];
+        let all = |plan: &PlanDocument| -> Vec<Vec<String>> {
+            (0..4).map(|step| required(plan, step).into_iter().map(String::from).collect()).collect()
+        };
+        let none: [&str; 0] = [];
+        assert_eq!(all(&plan), [&none[..], &none, &none, &["1"]]);
+        let together = reversed(nested());
+        assert_eq!(together.steps[3].requires, [1, 2]);
+        assert_eq!(all(&together), [none; 4], "a group has in it what was put into it");
     }
 
     #[test]

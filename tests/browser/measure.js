@@ -48,7 +48,7 @@ async function shots(page, name) {
     page.evaluate((u) => {
       const { player, scene } = window.sbdp;
       const step = scene.steps[Math.floor(scene.steps.length / 2)];
-      player.seek(u === 0 ? 0 : step ? step.times[0] + (step.ends - step.times[0]) * u : 0);
+      player.seek(u === 0 ? 0 : step ? step.begins + (step.ends - step.begins) * u : 0);
     }, share);
   await seek(0);
   await shot("begin");

@@ -204,7 +204,7 @@ test("an assembly plan puts parts in", { skip: !existsSync(assembly) && "there i
   visited(assembly, async (page) => {
     const [start, end] = await page.evaluate(() => {
       const { scene, stage, player } = window.sbdp;
-      const moved = scene.steps[0].part;
+      const [moved] = scene.steps[0].parts;
       const at = (time) => {
         player.seek(time);
         stage.draw();
@@ -224,6 +224,6 @@ test("an assembly plan puts parts in", { skip: !existsSync(assembly) && "there i
       page.evaluate(() => (window.sbdp.stage.draw(), window.sbdp.stage.bodies.filter((b) => b.group.visible).length));
     const all = await seen();
     await page.getByLabel("Show parts that wait").uncheck();
-    assert.equal(await seen(), all - (await page.evaluate(() => window.sbdp.scene.steps.length)));
+    assert.equal(await seen(), all - (await page.evaluate(() => window.sbdp.scene.parts.filter((p) => p.steps.length > 0).length)));
   }),
 );

@@ -235,18 +235,19 @@ pub fn ring(link: u32) -> String {
 /// Plans to the end; the steps' parts and the summary.
 pub fn plan(client: &Client, handle: Handle, options: &PlanOptions) -> (Vec<u32>, Summary) {
     let mut stream = client.plan(handle, options).unwrap();
-    let mut parts = Vec::new();
+    let (mut steps, mut parts) = (0, Vec::new());
     loop {
         match stream.next_event_within(HANG).unwrap() {
             Some(Event::Step(step)) => {
                 assert!(!step.path.is_empty());
-                assert_eq!(step.number as usize, parts.len());
-                parts.push(step.part);
+                assert_eq!(step.number as usize, steps);
+                steps += 1;
+                parts.extend(step.parts);
             }
             Some(Event::Progress(_) | Event::Trace(_)) => {}
-            Some(Event::Restarted) => parts.clear(),
+            Some(Event::Restarted) => (steps, parts) = (0, Vec::new()),
             Some(Event::Done(summary)) => {
-                assert_eq!(summary.steps as usize, parts.len());
+                assert_eq!(summary.steps as usize, steps);
                 return (parts, summary);
             }
             None => panic!("a stream ends with `Done`"),

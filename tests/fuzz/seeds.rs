@@ -26,8 +26,8 @@ fn readers(path: &Path) -> &'static [Reader] {
     }
 }
 
-/// A plan of three parts: one goes out by a screw, one is stuck.
-const PLAN: &str = r#"{"schema":"sbdp-plan/1.1","kind":"disassembly","status":"infeasible","reason":"stuck","planner":"sbdp-star","engine":"sliding","units":"mm","parts":["a","b-1","b-2"],"initial":{"removed":[],"poses":{"b-1":[0.0,0.0,1.0,1.0,0.0,0.0,0.0]}},"targets":null,"fixed":["a"],"base":["b-2"],"base_reason":"it is the largest","steps":[{"part":"b-1","motion":"rotation","path":[[0.0,0.0,1.0,1.0,0.0,0.0,0.0],[0.0,0.0,2.0,0.6,0.0,0.0,0.8],[0.0,0.0,3.0,-0.28,0.0,0.0,0.96]],"verified_depth":0.0,"requires":[],"wave":0,"direction":[0.0,0.0,1.0]}],"remaining":["a","b-2"],"blocked":[{"part":"b-2","by":["a"],"action":"+x"}],"overlaps":[],"warnings":[],"stats":{"simulations":0,"simulations_run":0,"sweeps":0,"states":0,"sdf_time_s":0.0,"static_analysis_time_s":0.0,"path_time_s":0.0,"verify_time_s":0.0,"total_time_s":0.0,"cache":{"sdf_hits":0,"blocking_hits":0,"motion_hits":0,"plan_hit":false}}}"#;
+/// A plan of four parts: two go out by a screw, and then apart, one of them aside first; one is stuck.
+const PLAN: &str = r#"{"schema":"sbdp-plan/2","kind":"disassembly","status":"infeasible","reason":"stuck","planner":"sbdp-star","engine":"sliding","units":"mm","parts":["a","b-1","b-2","b-3"],"initial":{"removed":[],"poses":{"b-1":[0.0,0.0,1.0,1.0,0.0,0.0,0.0]}},"targets":null,"fixed":["a"],"base":["b-2"],"base_reason":"it is the largest","steps":[{"parts":["b-1","b-3"],"of":null,"ends":"out","motion":"rotation","path":[[0.0,0.0,0.0,1.0,0.0,0.0,0.0],[0.0,0.0,2.0,0.6,0.0,0.0,0.8],[0.0,0.0,3.0,-0.28,0.0,0.0,0.96]],"verified_depth":0.0,"requires":[],"wave":0,"direction":[0.0,0.0,1.0]},{"parts":["b-3"],"of":0,"ends":"aside","motion":"translation","path":[[0.0,0.0,0.0,1.0,0.0,0.0,0.0],[1.0,0.0,0.0,1.0,0.0,0.0,0.0]],"verified_depth":0.0,"requires":[0],"wave":1,"direction":[1.0,0.0,0.0]},{"parts":["b-3"],"of":0,"ends":"out","motion":"translation","path":[[0.0,0.0,0.0,1.0,0.0,0.0,0.0],[0.0,9.0,0.0,1.0,0.0,0.0,0.0]],"verified_depth":0.0,"requires":[0,1],"wave":2,"direction":[0.0,1.0,0.0]}],"remaining":["a","b-2"],"kept_together":[["a","b-2"]],"free_together":[{"parts":["a","b-2"],"direction":[0.0,0.0,1.0]}],"blocked":[{"part":"b-2","by":["a"],"action":"+x"}],"overlaps":[],"warnings":[],"stats":{"simulations":0,"simulations_run":0,"sweeps":0,"states":0,"sdf_time_s":0.0,"static_analysis_time_s":0.0,"path_time_s":0.0,"verify_time_s":0.0,"total_time_s":0.0,"cache":{"sdf_hits":0,"blocking_hits":0,"motion_hits":0,"plan_hit":false}}}"#;
 
 /// Seeds for a reader: those built in, and those among the files below some folders.
 pub(crate) fn seeds(reader: Reader, folders: &[std::path::PathBuf]) -> Vec<Vec<u8>> {
@@ -106,7 +106,14 @@ fn records() -> Vec<Vec<u8>> {
 
 fn messages() -> Vec<Vec<u8>> {
     let path = vec![[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 5.0, 1.0, 0.0, 0.0, 0.0]];
-    let step = Step { part: 1, path, requires: vec![0, 2], verified_depth: 1e-4, ..Step::default() };
+    let step = Step {
+        parts: vec![1, 2],
+        of: Some(2),
+        path,
+        requires: vec![0, 2],
+        verified_depth: 1e-4,
+        ..Step::default()
+    };
     let summary = SummaryParts {
         reason: Some("exhausted"),
         planner: "sbdp-star",
@@ -119,6 +126,8 @@ fn messages() -> Vec<Vec<u8>> {
         removed: vec![0],
         targets: Some(vec![1]),
         remaining: vec![1, 2],
+        kept_together: vec![vec![0, 1]],
+        free_together: vec![(vec![1, 2], [0.0, 0.0, 1.0])],
         poses: vec![MovedPart { part: 1, ..MovedPart::default() }],
         ..SummaryParts::default()
     };

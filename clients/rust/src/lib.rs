@@ -10,7 +10,7 @@
 //! while let Some(event) = stream.next_event()? {
 //!     match event {
 //!         Event::Progress(progress) => eprintln!("{progress:?}"),
-//!         Event::Step(step) => println!("part {} along {} waypoints", step.part, step.path.len()),
+//!         Event::Step(step) => println!("parts {:?} along {} waypoints", step.parts, step.path.len()),
 //!         Event::Trace(lines) => print!("{lines}"),
 //!         Event::Restarted => println!("another daemon: the steps come again"),
 //!         Event::Done(summary) => println!("{}", summary.status.name()),
@@ -42,9 +42,9 @@ pub use options::{
 };
 pub use sbdp_ipc::error::ErrorCode;
 pub use sbdp_ipc::geometry::{Assembly, Part, Vertices};
-pub use sbdp_ipc::plan::{StepView as Step, Waypoint};
+pub use sbdp_ipc::plan::{StepEnd, StepView as Step, Waypoint};
 pub use sbdp_ipc::status::Status;
 pub use sbdp_ipc::summary::Stats;
 pub use stream::{Event, PlanStream, Progress, Stage};
-pub use summary::{Base, Blocked, Overlap, PlanStatus, Summary, Warning};
+pub use summary::{Base, Blocked, FreeGroup, Overlap, PlanStatus, Summary, Warning};
 pub use upload::Change;

@@ -52,6 +52,15 @@ pub struct Blocked {
     pub action: String,
 }
 
+/// Parts that could leave together where none leaves alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeGroup {
+    /// The parts.
+    pub parts: Vec<u32>,
+    /// The unit vector along which they begin, in the input's frame.
+    pub direction: [f64; 3],
+}
+
 /// A pair that overlaps at the assembled pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Overlap {
@@ -97,10 +106,13 @@ pub struct Summary {
     pub fixed: Vec<u32>,
     /// The part that the rest is taken off, or built up on; none where parts are fixed, or where it had to leave.
     pub base: Option<Base>,
-    /// Parts that stand where they stood.
+    /// Parts that stand in the assembly in the end (of an assembly plan: from the start).
     pub remaining: Vec<u32>,
-    /// Parts that began elsewhere than where their mesh was given, and where: the rigid motion of the mesh,
-    /// as in paths. Parts of an assembly plan that wait are among them.
+    /// Groups that left together and were not taken apart: nobody asked for it, or no way was found.
+    pub kept_together: Vec<Vec<u32>>,
+    /// Where nothing leaves any more: groups that could.
+    pub free_together: Vec<FreeGroup>,
+    /// Parts that began elsewhere than where their mesh was given, and where: the rigid motion of the mesh. Parts of an assembly plan that wait are among them.
     pub poses: Vec<(u32, Waypoint)>,
     /// What blocks the parts that should have come off.
     pub blocked: Vec<Blocked>,
@@ -131,6 +143,8 @@ impl Summary {
             fixed: view.fixed().to_vec(),
             base: view.base().map(|(part, reason)| Base { part, reason: reason.to_owned() }),
             remaining: view.remaining().to_vec(),
+            kept_together: view.kept_together().map(<[u32]>::to_vec).collect(),
+            free_together: view.free_together().map(free_group).collect(),
             poses: view.poses().iter().map(|p| (p.part, p.motion)).collect(),
             blocked: view.blocked().map(blocked).collect(),
             overlaps: view.overlaps().iter().map(|o| Overlap { parts: o.parts, depth: o.depth }).collect(),
@@ -146,6 +160,31 @@ impl Summary {
     }
 }
 
+fn free_group(group: sbdp_ipc::summary::FreeGroup<'_>) -> FreeGroup {
+    FreeGroup { parts: group.parts.to_vec(), direction: group.direction }
+}
+
 fn blocked(b: sbdp_ipc::summary::Blocked<'_>) -> Blocked {
     Blocked { part: b.part, by: b.by.to_vec(), action: b.action.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sbdp_ipc::bytes::AlignedBytes;
+    use sbdp_ipc::summary::SummaryParts;
+
+    #[test]
+    fn groups_come_as_they_were_sent() {
+        let sent = SummaryParts {
+            parts: vec!["a", "b", "c"],
+            kept_together: vec![vec![0, 1], vec![1, 2]],
+            free_together: vec![(vec![0, 2], [0.0, 0.0, -1.0])],
+            ..SummaryParts::default()
+        };
+        let summary = Summary::decode(AlignedBytes::copy_of(&sent.encode()).as_slice()).unwrap();
+        assert_eq!(summary.kept_together, sent.kept_together);
+        let group = FreeGroup { parts: vec![0, 2], direction: [0.0, 0.0, -1.0] };
+        assert_eq!(summary.free_together, [group]);
+    }
 }

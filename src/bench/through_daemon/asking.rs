@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use nalgebra::Point3;
-use sbdp_client::{Client, Event, Handle, PlanOptions, PlanStatus, Summary};
+use sbdp_client::{Client, Event, Handle, PlanOptions, PlanStatus, Step, StepEnd, Summary};
 
 use super::BenchError;
 use crate::geometry::{Pose, Waypoint, interpolate, pose_from_waypoint, waypoint_from_pose};
@@ -12,7 +12,30 @@ use crate::geometry::{Pose, Waypoint, interpolate, pose_from_waypoint, waypoint_
 #[derive(Debug, PartialEq)]
 pub(super) struct Answered {
     pub(super) status: PlanStatus,
-    pub(super) steps: Vec<(usize, Vec<[f64; 7]>)>,
+    pub(super) steps: Vec<AnsweredStep>,
+}
+
+/// A step of it.
+#[derive(Debug, PartialEq)]
+pub(super) struct AnsweredStep {
+    parts: Vec<u32>,
+    of: Option<u32>,
+    ends: StepEnd,
+    path: Vec<Waypoint>,
+}
+
+impl AnsweredStep {
+    fn of(step: &Step<'_>) -> Self {
+        Self { parts: step.parts.to_vec(), of: step.of, ends: step.ends, path: step.path.to_vec() }
+    }
+
+    /// The part that leaves the assembly alone in this step, if it is such a step.
+    pub(super) fn leaves_alone(&self) -> Option<usize> {
+        match (&self.parts[..], self.of, self.ends) {
+            ([part], None, StepEnd::Out) => Some(*part as usize),
+            _ => None,
+        }
+    }
 }
 
 /// Plans to the end.
@@ -23,7 +46,7 @@ pub(super) fn plan(
 ) -> Result<(Answered, Summary), BenchError> {
     let mut steps = Vec::new();
     let summary = follow(client, handle, options, |event| match event {
-        Event::Step(step) => steps.push((step.part as usize, step.path.to_vec())),
+        Event::Step(step) => steps.push(AnsweredStep::of(&step)),
         Event::Restarted => steps.clear(),
         _ => {}
     })?;
@@ -74,17 +97,21 @@ impl Answered {
     /// Where a part is that begins to leave, when the middle of its box has gone so far; of a short first stretch
     /// of its way, when it has done half as large a share. One in a thread turns with that.
     pub(super) fn on_its_way(&self, part: usize, centre: &Point3<f64>, by: f64) -> Waypoint {
-        let path = self.steps.iter().find(|(p, _)| *p == part).map(|(_, path)| path.as_slice());
-        let Some([from, to, ..]) = path else { return waypoint_from_pose(&Pose::identity()) };
+        let Some([from, to, ..]) = self.path_of(part) else { return waypoint_from_pose(&Pose::identity()) };
         let (from, to) = (pose_from_waypoint(from), pose_from_waypoint(to));
         let length = (to * centre - from * centre).norm();
         waypoint_from_pose(&interpolate(&from, &to, centre, by / length.max(2.0)))
     }
 
+    fn path_of(&self, part: usize) -> Option<&[Waypoint]> {
+        let step = self.steps.iter().find(|step| step.leaves_alone() == Some(part));
+        step.map(|step| step.path.as_slice())
+    }
+
     /// The unit vector along which a part begins to leave.
     pub(super) fn outward(&self, part: usize) -> [f64; 3] {
-        let path = self.steps.iter().find(|(p, _)| *p == part).map(|(_, path)| path.as_slice());
-        let way = path.and_then(|path| path.iter().find(|w| w[..3].iter().any(|x| x.abs() > 1e-9)));
+        let way =
+            self.path_of(part).and_then(|path| path.iter().find(|w| w[..3].iter().any(|x| x.abs() > 1e-9)));
         let [x, y, z] = way.map_or([0.0, 0.0, 1.0], |w| [w[0], w[1], w[2]]);
         let length = (x * x + y * y + z * z).sqrt();
         [x, y, z].map(|x| x / length)

@@ -8,7 +8,7 @@ use sbdp_client::{Change, Client, Handle, PlanOptions};
 use serde::Serialize;
 
 use super::BenchError;
-use super::asking::{Answered, leave_alone, plan};
+use super::asking::{Answered, AnsweredStep, leave_alone, plan};
 use super::server::{Place, Server};
 use crate::geometry::{SourceAssembly, SourceMesh, load_assembly};
 use crate::upload::{wire_assembly, wire_part};
@@ -136,9 +136,9 @@ impl Asked {
     }
 }
 
-/// A part that comes off and is called a bolt or screw, else the first that comes off.
+/// A part that comes off alone and is called a bolt or screw, else the first that does.
 pub(super) fn fastener(source: &SourceAssembly, plan: &Answered) -> Option<usize> {
-    let leaves = || plan.steps.iter().map(|(part, _)| *part);
+    let leaves = || plan.steps.iter().filter_map(AnsweredStep::leaves_alone);
     let is_fastener = |&part: &usize| {
         let name = source.parts[part].name.to_lowercase();
         ["bolt", "screw"].iter().any(|kind| name.contains(kind))

@@ -201,7 +201,9 @@ impl Asking<'_> {
                     hasher.reset();
                 }
                 Event::Step(step) => {
-                    hasher.update(&step.part.to_le_bytes());
+                    for number in step.parts.iter().chain(&step.of) {
+                        hasher.update(&number.to_le_bytes());
+                    }
                     for x in step.path.iter().flatten() {
                         hasher.update(&x.to_le_bytes());
                     }

@@ -19,18 +19,22 @@
  * @property {number} colour place in the palette
  * @property {boolean} fixed
  * @property {boolean} stays it stands in the assembly all the time
- * @property {number | null} step
+ * @property {number[]} steps that move it, ascending
+ * @property {number | null} crosses when it has left the assembly, or is in it
+ * @property {[number, number] | null} handled from when to when something is done to it, or to the group that it belongs
+ *   to outside the assembly
+ * @property {number[]} times ascending
+ * @property {Float32Array} keys a placement per time
  * @property {Placement} assembled
- * @property {Placement} start where it stands before its step
+ * @property {Placement} start where it stands before its first step
  * @property {number[]} exploded from its assembled place to that in the exploded view
  * @property {number[]} size of its box
  *
  * @typedef {object} Step
- * @property {number} part
+ * @property {number[]} parts
  * @property {string} words
- * @property {number[]} after parts that must have moved before
- * @property {number[]} times ascending
- * @property {Float32Array} keys a placement per time
+ * @property {number[]} after other parts that must have moved before
+ * @property {number} begins
  * @property {number} ends
  *
  * @typedef {object} Graph
@@ -64,7 +68,7 @@
 export function decode(text) {
   const { bytes, ...scene } = JSON.parse(text);
   const buffer = Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0)).buffer;
-  return { ...scene, meshes: scene.meshes.map((m) => mesh(m, buffer)), steps: scene.steps.map((s) => step(s, buffer)) };
+  return { ...scene, meshes: scene.meshes.map((m) => mesh(m, buffer)), parts: scene.parts.map((p) => part(p, buffer)) };
 }
 
 function mesh(m, buffer) {
@@ -79,6 +83,6 @@ function mesh(m, buffer) {
   };
 }
 
-function step(s, buffer) {
-  return { ...s, keys: new Float32Array(buffer, s.keys, s.times.length * 7) };
+function part(p, buffer) {
+  return { ...p, keys: new Float32Array(buffer, p.keys, p.times.length * 7) };
 }

@@ -17,7 +17,7 @@ export function partsList(scene, selection) {
       style: `background:${scene.palette[part.colour]}`,
       "aria-hidden": true,
     });
-    const notes = [part.fixed && "fixed", stuck.has(i) && "stuck", part.step === null && part.stays && "stays"].filter(
+    const notes = [part.fixed && "fixed", stuck.has(i) && "stuck", part.steps.length === 0 && part.stays && "stays"].filter(
       Boolean,
     );
     const note = notes.length ? element("span", { class: "after" }, notes.join(", ")) : "";

@@ -11,12 +11,14 @@ import { byId, element } from "./dom.js";
  */
 export function stepsList(player, selection) {
   const { scene } = player;
-  const verb = scene.kind === "assembly" ? "goes in after" : "after";
   const items = scene.steps.map((step, i) => {
+    const goes = step.parts.length > 1 ? "go" : "goes";
+    const verb = scene.kind === "assembly" ? `${goes} in after` : "after";
     const names = step.after.map((p) => scene.parts[p].name).join(", ");
     const after = names ? element("span", { class: "after" }, `${verb} ${names}`) : "";
     const go = () => {
-      selection.pick(step.part);
+      // Those of a group stand out as they move.
+      selection.pick(step.parts.length === 1 ? step.parts[0] : null);
       player.playStep(i);
     };
     return element("button", { type: "button", onclick: go }, element("span", {}, step.words), after);

@@ -1,13 +1,10 @@
 /**
  * Where parts are at a time. Pure: knows nothing of what is drawn.
- * @import { Scene, Step, Placement } from "./data.js"
+ * @import { Scene, Part, Placement } from "./data.js"
  */
 
-/** Seconds that a part which is out takes to fade. */
+/** Seconds that a part to which nothing more is done takes to fade. */
 const FADE = 0.5;
-
-/** @param {Step} step */
-export const begins = (step) => step.times[0];
 
 /**
  * The first step that is not over at a time; as many as there are steps, once all are.
@@ -25,7 +22,7 @@ export function stepAt(scene, time) {
  * @param {number} step
  */
 export function timeOf(scene, step) {
-  return step < scene.steps.length ? begins(scene.steps[Math.max(step, 0)]) : scene.duration;
+  return step < scene.steps.length ? scene.steps[Math.max(step, 0)].begins : scene.duration;
 }
 
 /**
@@ -36,20 +33,34 @@ export function timeOf(scene, step) {
  * @returns {Placement}
  */
 export function placementAt(scene, part, time) {
-  const { step, start } = scene.parts[part];
-  if (step === null || time <= begins(scene.steps[step])) return start;
-  return between(scene.steps[step], time);
+  const { times, start } = scene.parts[part];
+  return times.length === 0 || time <= times[0] ? start : between(scene.parts[part], time);
 }
 
 /**
- * @param {Step} step
+ * How many of ascending times are not after a time.
+ * @param {number[]} times
  * @param {number} time
+ */
+function passed(times, time) {
+  let [low, high] = [0, times.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (times[middle] <= time) low = middle + 1;
+    else high = middle;
+  }
+  return low;
+}
+
+/**
+ * @param {Part} part
+ * @param {number} time not before its first
  * @returns {Placement}
  */
 function between({ times, keys }, time) {
   const key = (i) => keys.subarray(i * 7, i * 7 + 7);
-  let next = times.findIndex((t) => t > time);
-  if (next < 0) return key(times.length - 1);
+  const next = passed(times, time);
+  if (next === times.length) return key(times.length - 1);
   const [a, b] = [key(next - 1), key(next)];
   const u = (time - times[next - 1]) / (times[next] - times[next - 1]);
   const at = [0, 1, 2].map((i) => a[i] + (b[i] - a[i]) * u);
@@ -72,17 +83,17 @@ export function slerp(a, b, u) {
 }
 
 /**
- * Whether a part stands in the assembly (or may still come out of it): of a disassembly until its step is over,
- * of an assembly from when it is over.
+ * Whether a part stands in the assembly (or may still come out of it): of a disassembly until the step is over that
+ * takes it out, of an assembly from when the step is over that puts it in.
  * @param {Scene} scene
  * @param {number} part
  * @param {number} time
  */
 export function stands(scene, part, time) {
-  const { step, stays } = scene.parts[part];
+  const { crosses, stays } = scene.parts[part];
   // What could not be put in waits for ever.
-  if (step === null) return stays || scene.kind === "disassembly";
-  const over = time >= scene.steps[step].ends;
+  if (crosses === null) return stays || scene.kind === "disassembly";
+  const over = time >= crosses;
   return scene.kind === "assembly" ? over : !over;
 }
 
@@ -93,29 +104,30 @@ export function stands(scene, part, time) {
  * @param {number} time
  */
 export function isMoving(scene, part, time) {
-  const { step } = scene.parts[part];
-  return step !== null && time > begins(scene.steps[step]) && time < scene.steps[step].ends;
+  const { steps } = scene.parts[part];
+  return steps.some((step) => time > scene.steps[step].begins && time < scene.steps[step].ends);
 }
 
 /**
- * Whether a part of an assembly plan waits for its turn, or in vain.
+ * Whether a part of an assembly plan waits for its turn, or in vain. A group that is being put together does not.
  * @param {Scene} scene
  * @param {number} part
  * @param {number} time
  */
 export function isWaiting(scene, part, time) {
-  const { step, stays } = scene.parts[part];
-  return step === null ? !stays : time <= begins(scene.steps[step]);
+  const { crosses, handled, stays } = scene.parts[part];
+  return crosses === null ? !stays : time <= handled[0];
 }
 
 /**
- * How much of a part is seen, 0 to 1: what is out fades, what is not in yet is seen where it waits.
+ * How much of a part is seen, 0 to 1: what is out, and not taken apart any further, fades; what is not in yet is seen
+ * where it waits.
  * @param {Scene} scene
  * @param {number} part
  * @param {number} time
  */
 export function visibility(scene, part, time) {
-  const { step } = scene.parts[part];
-  if (scene.kind === "assembly" || step === null) return 1;
-  return Math.min(1, Math.max(0, 1 - (time - scene.steps[step].ends) / FADE));
+  const { crosses, handled } = scene.parts[part];
+  if (scene.kind === "assembly" || crosses === null) return 1;
+  return Math.min(1, Math.max(0, 1 - (time - handled[1]) / FADE));
 }
