@@ -8,7 +8,15 @@ use crate::geometry::SourceMesh;
 fn out(scene: &Scene, part: usize, shift: [f64; 3]) -> Removal {
     let start = scene.bodies[part].planning_from_shape;
     let end = Pose::translation(shift[0], shift[1], shift[2]) * start;
-    Removal { parts: vec![part], of: None, aside: false, path: vec![start, end], depth: 0.0, requires: Vec::new(), wave: 0 }
+    Removal {
+        parts: vec![part],
+        of: None,
+        aside: false,
+        path: vec![start, end],
+        depth: 0.0,
+        requires: Vec::new(),
+        wave: 0,
+    }
 }
 
 fn run(
@@ -55,7 +63,14 @@ fn assert_apart(scene: &Scene, verifier: &Verifier, insertions: &[Insertion]) {
         let there = Scene { bodies: std::sync::Arc::new(bodies), ..scene.clone() };
         let others: Vec<usize> = (0..scene.bodies.len()).filter(|&p| p != insertion.parts[0]).collect();
         let verdict = verifier
-            .check(&there, &scene.allowed, &others, insertion.parts[0], &insertion.path, &Termination::default())
+            .check(
+                &there,
+                &scene.allowed,
+                &others,
+                insertion.parts[0],
+                &insertion.path,
+                &Termination::default(),
+            )
             .unwrap();
         assert!(verdict.penetrations.is_empty(), "part {}: {}", insertion.parts[0], verdict.depth);
         assert_eq!(insertion.path.last(), Some(&scene.bodies[insertion.parts[0]].planning_from_shape));

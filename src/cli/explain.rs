@@ -116,7 +116,10 @@ impl Account {
                     parts => format!(", which requires {} to be out", self.names(parts)),
                 };
                 let (are, their) = if parts.len() > 1 { ("are", "their") } else { ("is", "its") };
-                format!("=== {} {are} out{after}; {their} edges are deleted from all graphs", self.names(parts))
+                format!(
+                    "=== {} {are} out{after}; {their} edges are deleted from all graphs",
+                    self.names(parts)
+                )
             }
             TraceEvent::End { status, reason, remaining, simulations, sweeps } => {
                 let text = reason.as_ref().map(|r| r.text(remaining, |part| self.name(part)));

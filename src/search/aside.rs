@@ -40,8 +40,7 @@ pub(super) fn moved_aside<'a>(
     let base = outcome.base.as_ref().map(|base| base.part);
     let spent = problem.spent + outcome.counters.simulations;
     let (present, earlier) = (outcome.remaining.clone(), outcome.removals.clone());
-    let here =
-        Problem { scene, present, base, releases_base: true, spent, earlier, ..problem.clone() };
+    let here = Problem { scene, present, base, releases_base: true, spent, earlier, ..problem.clone() };
     let mut search =
         PlaceSearch::new(&here, &here.present, axes_of(&here.scene, &here.present, &here.termination)?);
     let mut next = None;
@@ -72,11 +71,8 @@ fn verified<'a>(problem: &Problem<'a>, found: &Rearrangement) -> Result<Option<P
     let mut here = problem.clone();
     for Moves { parts, legs, is_last } in moves(found) {
         let contraction = Contraction::new(&here, &here.present, &parts)?;
-        let way = if is_last {
-            contraction.way_out(&legs, &found.action)?
-        } else {
-            contraction.way(&legs)?
-        };
+        let way =
+            if is_last { contraction.way_out(&legs, &found.action)? } else { contraction.way(&legs)? };
         let Some(VerifiedPath { path, depth }) = way else { return Ok(None) };
         let leaving = Leaving { aside: !is_last, ..contraction.leaving() };
         let removal = leaving.removal(&here.earlier, path, depth)?;
@@ -139,11 +135,7 @@ mod tests {
     /// slider.
     fn covered_pin() -> Vec<SourceMesh> {
         let housing = cells(
-            [
-                &[0.0, 1.0, 1.4, 2.4, 7.0, 8.0],
-                &[0.0, 1.0, 1.5, 2.5, 3.0, 4.0],
-                &[0.0, 0.5, 1.0, 2.0, 3.0],
-            ],
+            [&[0.0, 1.0, 1.4, 2.4, 7.0, 8.0], &[0.0, 1.0, 1.5, 2.5, 3.0, 4.0], &[0.0, 0.5, 1.0, 2.0, 3.0]],
             |[x, y, z]| {
                 let is_channel = (1..=3).contains(&x) && (1..=3).contains(&y) && z == 2;
                 let is_hole = x == 2 && y == 2 && (z == 1 || z == 3);
@@ -174,7 +166,10 @@ mod tests {
             assert_eq!((&aside.parts[..], aside.aside, aside.of, aside.wave), (&[1][..], true, None, 0));
             let along = pose.inverse() * aside.motion().translation.vector;
             assert!(along.x > 1.3 && along.yz().norm() < 1e-6, "{along}");
-            assert_eq!((&out.parts[..], out.aside, &out.requires[..], out.wave), (&[2][..], false, &[0][..], 1));
+            assert_eq!(
+                (&out.parts[..], out.aside, &out.requires[..], out.wave),
+                (&[2][..], false, &[0][..], 1)
+            );
             assert_eq!(outcome.remaining, [0, 1]);
             assert!(events.iter().any(|e| matches!(e, TraceEvent::PlacesSearched { leaves: true, .. })));
         }

@@ -62,7 +62,12 @@ impl CriticalCoordinates {
     }
 
     /// Those of some parts as assembled.
-    pub(super) fn of_all(&mut self, scene: &Scene, parts: &[usize], (index, axis): (usize, Axis)) -> AxisCoordinates {
+    pub(super) fn of_all(
+        &mut self,
+        scene: &Scene,
+        parts: &[usize],
+        (index, axis): (usize, Axis),
+    ) -> AxisCoordinates {
         let mut all = AxisCoordinates::default();
         for &part in parts {
             if !self.assembled.contains_key(&(part, index)) {

@@ -417,7 +417,6 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.removals.push(removal);
     }
 
-
     /// A part that may move and whose hull is apart from all others': it needs no motion. Without sweeps it is
     /// simulated like all.
     pub(super) fn free_part(&mut self) -> Result<Option<usize>, Stop> {

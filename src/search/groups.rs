@@ -318,7 +318,10 @@ mod tests {
             assert_eq!(outcome.base.as_ref().map(|base| base.part), Some(0));
             let [group, inner] = &outcome.removals[..] else { panic!("{:?}", left(&outcome)) };
             assert_eq!((&group.parts[..], group.of, group.wave), (&[1, 2][..], None, 0));
-            assert_eq!((inner.parts.len(), inner.of, &inner.requires[..], inner.wave), (1, Some(0), &[0][..], 1));
+            assert_eq!(
+                (inner.parts.len(), inner.of, &inner.requires[..], inner.wave),
+                (1, Some(0), &[0][..], 1)
+            );
             assert_eq!((&outcome.remaining[..], outcome.kept_together().len()), (&[0][..], 0));
             let way = group.motion().translation.vector.normalize();
             assert!(way.dot(&(pose * nalgebra::Vector3::z())) > 0.99, "it leaves along {way}");
@@ -341,10 +344,8 @@ mod tests {
     #[test]
     fn a_group_in_which_nothing_is_wanted_is_kept_together() {
         let target = |part: usize| {
-            let (outcome, _) = planned(pinned_block_in_sleeve(), |problem| Problem {
-                targets: Some(vec![part]),
-                ..problem
-            });
+            let (outcome, _) =
+                planned(pinned_block_in_sleeve(), |problem| Problem { targets: Some(vec![part]), ..problem });
             assert_eq!(outcome.status, PlanStatus::Complete, "{part}: {:?}", outcome.reason);
             outcome
         };
@@ -365,7 +366,8 @@ mod tests {
             ..problem
         });
         assert_eq!((outcome.status, outcome.removals.len()), (PlanStatus::Partial, 0));
-        let free: Vec<_> = outcome.free_together.iter().map(|group| (&group.parts[..], group.direction)).collect();
+        let free: Vec<_> =
+            outcome.free_together.iter().map(|group| (&group.parts[..], group.direction)).collect();
         assert!(free.contains(&(&[1, 2][..], [0.0, 0.0, 1.0])), "{free:?}");
     }
 
@@ -393,11 +395,7 @@ mod tests {
     fn a_group_leaves_by_several_moves() {
         // A slot that goes up, and then along y: what is in it cannot leave straight.
         let slot = cells(
-            [
-                &[-2.0, -1.5, 1.5, 2.0],
-                &[-2.0, -1.5, 1.5, 6.0],
-                &[-1.5, -1.0, 1.0, 3.1, 3.6],
-            ],
+            [&[-2.0, -1.5, 1.5, 2.0], &[-2.0, -1.5, 1.5, 6.0], &[-1.5, -1.0, 1.0, 3.1, 3.6]],
             |[x, y, z]| {
                 let is_shaft = x == 1 && y == 1 && (z == 1 || z == 2);
                 let is_exit = x == 1 && y == 2 && z == 2;

@@ -191,7 +191,10 @@ fn after_a_turned_part_translation_goes_on_without_analysis_if_it_left_an_action
         let outcome = search(Planner::SbdpStar, problem, &mut recorder);
         assert_eq!(outcome.removals.iter().map(|r| r.parts[0]).collect::<Vec<_>>(), order);
         let events = recorder.0;
-        let peg_out = events.iter().position(|e| matches!(e, TraceEvent::Removed { parts, .. } if parts[..] == [1])).unwrap();
+        let peg_out = events
+            .iter()
+            .position(|e| matches!(e, TraceEvent::Removed { parts, .. } if parts[..] == [1]))
+            .unwrap();
         let is_displaced = |e: &TraceEvent| matches!(e, TraceEvent::Analysed { state, .. } if *state > 0);
         let analysis = events.iter().position(is_displaced).expect("the cube has moved");
         assert!(

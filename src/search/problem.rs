@@ -219,12 +219,14 @@ impl Problem<'_> {
     fn verdict(&self, near: &[usize], part: usize, path: &[Pose]) -> Result<Verdict, Interrupt> {
         let Scene { allowed, .. } = &self.scene;
         let past = near.par_iter().flat_map_iter(|&other| {
-            PairPath::of_members(&self.scene, allowed, [part, other], path).map(|(pair_path, body_from_part)| {
-                let mut verdict = self.verdict_past(&pair_path)?;
-                let on_moving = verdict.penetrations.iter_mut().filter(|e| e.on_moving);
-                on_moving.for_each(|e| e.point = body_from_part * e.point);
-                Ok(verdict)
-            })
+            PairPath::of_members(&self.scene, allowed, [part, other], path).map(
+                |(pair_path, body_from_part)| {
+                    let mut verdict = self.verdict_past(&pair_path)?;
+                    let on_moving = verdict.penetrations.iter_mut().filter(|e| e.on_moving);
+                    on_moving.for_each(|e| e.point = body_from_part * e.point);
+                    Ok(verdict)
+                },
+            )
         });
         Ok(Verdict::of_all(past.collect::<Result<_, _>>()?))
     }
@@ -241,7 +243,8 @@ impl Problem<'_> {
     ) -> Result<Vec<(usize, Option<f64>)>, Interrupt> {
         let depth = |&other: &usize| {
             let mut deepest = 0.0f64;
-            for (pair_path, _) in PairPath::of_members(&self.scene, &self.scene.allowed, [part, other], path) {
+            for (pair_path, _) in PairPath::of_members(&self.scene, &self.scene.allowed, [part, other], path)
+            {
                 if is_seen_to_enter(&pair_path, self.verifier.limit_past(pair_path.shapes)) {
                     return Ok((other, None));
                 }

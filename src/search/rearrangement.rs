@@ -15,7 +15,7 @@ use std::collections::{BTreeSet, BinaryHeap, HashMap, HashSet, VecDeque};
 use nalgebra::{Translation3, Vector3};
 use rayon::prelude::*;
 
-use crate::budgets::{EDGES_CAST_AT_LAST, PLACES_SEARCHED};
+use crate::budgets::{EDGES_CAST_FOR_PLACES, PLACES_SEARCHED};
 use crate::scene::StandingParts;
 use crate::simulation::{Action, Axis, SweepQuestion, travel_to};
 use crate::termination::Interrupt;
@@ -84,7 +84,8 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
     pub(super) fn new(problem: &'p Problem<'a>, standing: &[usize], axes: Vec<Axis>) -> Self {
         let size = |&i: &usize| problem.scene.bodies[standing[i]].shape.mass.volume;
         let rank = |i: &usize| (!problem.may_move(standing[*i]), problem.base == Some(standing[*i]));
-        let still = (0..standing.len()).max_by(|a, b| rank(a).cmp(&rank(b)).then(size(a).total_cmp(&size(b))));
+        let still =
+            (0..standing.len()).max_by(|a, b| rank(a).cmp(&rank(b)).then(size(a).total_cmp(&size(b))));
         let mut search = Self {
             problem,
             standing: standing.to_vec(),
@@ -114,7 +115,7 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
     /// # Errors
     /// The termination condition became true.
     pub(super) fn next_exit(&mut self) -> Result<Option<Rearrangement>, Interrupt> {
-        while self.exits.is_empty() && self.edges < EDGES_CAST_AT_LAST && self.searched < PLACES_SEARCHED {
+        while self.exits.is_empty() && self.edges < EDGES_CAST_FOR_PLACES && self.searched < PLACES_SEARCHED {
             self.problem.termination.check()?;
             let (state, fits) = match self.open.pop() {
                 Some(Reverse((_, state))) => (state, true),
@@ -235,7 +236,8 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
         let mut open = vec![seed];
         while let Some(p) = open.pop() {
             for q in (0..count).filter(|q| !group.contains(q)).collect::<Vec<_>>() {
-                let near = if play { self.short(p).min(self.short(q)) } else { self.least(p).min(self.least(q)) };
+                let near =
+                    if play { self.short(p).min(self.short(q)) } else { self.least(p).min(self.least(q)) };
                 if self.travel(state, [p, q], axis, forward).is_some_and(|met| met < near) {
                     group.insert(q);
                     open.push(q);
@@ -292,7 +294,8 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
         let along = self.axes[axis].unit().into_inner();
         let mut all = AxisCoordinates::default();
         for &p in parts {
-            let own = self.coordinates.of_all(&self.problem.scene, &[self.standing[p]], (axis, self.axes[axis]));
+            let own =
+                self.coordinates.of_all(&self.problem.scene, &[self.standing[p]], (axis, self.axes[axis]));
             let shift = along.dot(&self.states[state].shifts[p]);
             all.critical.extend(own.critical.iter().map(|x| x + shift));
             all.centres.extend(own.centres.iter().map(|x| x + shift));

@@ -139,7 +139,8 @@ impl<'s> EarlierPlaces<'s> {
     /// Where a part stood after some of its moves: in the scene, but for moves aside that came after these.
     fn place(&self, part: usize, count: usize) -> Pose {
         let undone = self.moves[&part][count..].iter().rev().map(|&i| &self.earlier[i]).filter(|r| r.aside);
-        undone.fold(self.scene.bodies[part].planning_from_shape, |at, removal| removal.motion().inverse() * at)
+        undone
+            .fold(self.scene.bodies[part].planning_from_shape, |at, removal| removal.motion().inverse() * at)
     }
 
     /// How deep a path gets past parts after some of their moves; `None` where it is refused.

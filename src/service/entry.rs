@@ -11,7 +11,9 @@ use crate::cache::{RecordKind, RequestCache};
 use crate::geometry::{Assembly, Shape};
 use crate::plan::{OVERLAP, Plan, PlanStatus, VERDICT, Verifier};
 use crate::scene::{HullTree, JoinedHulls};
-use crate::search::{Effort, Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_graphs, search};
+use crate::search::{
+    Effort, Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_graphs, search,
+};
 use crate::simulation::{
     MOTION, PenaltyEngine, PenaltyParameters, SlidingEngine, TOUCHING, TransitionFunction,
 };

@@ -30,6 +30,8 @@ pub(crate) use records::{
     remembered_touching,
 };
 pub use sliding::{PairMethod, SlidingEngine, StepCost, pair_blocks, step_costs};
-pub use sweep::{FreeTravel, Sweep, SweepQuestion, free_travel, straight_sweep, straight_sweep_past, travel_to};
+pub use sweep::{
+    FreeTravel, Sweep, SweepQuestion, free_travel, straight_sweep, straight_sweep_past, travel_to,
+};
 pub use touching::Touching;
 pub use transition::{End, Motion, TransitionFunction, asked_again};

@@ -67,7 +67,10 @@ impl PlanAnswer {
         let are_parts = |list: &[usize]| list.iter().all(is_part);
         let is_step = |(i, r): (usize, &Removal)| {
             let refers = r.requires.iter().chain(&r.of);
-            !r.parts.is_empty() && are_parts(&r.parts) && !r.path.is_empty() && refers.into_iter().all(|&j| j < i)
+            !r.parts.is_empty()
+                && are_parts(&r.parts)
+                && !r.path.is_empty()
+                && refers.into_iter().all(|&j| j < i)
         };
         removals.iter().enumerate().all(is_step)
             && blocked.iter().all(|b| is_part(&b.part) && are_parts(&b.by))
