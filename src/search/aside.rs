@@ -60,7 +60,7 @@ pub(super) fn moved_aside<'a>(
     for (i, removal) in next.earlier.iter().enumerate().skip(here.earlier.len()) {
         observer.removal(removal);
         if observer.traces() {
-            observer.traced(removal.event(&next.earlier[..i]));
+            observer.traced(TraceEvent::of(removal, &next.earlier[..i]));
         }
     }
     Ok(Some(Problem { releases_base: false, ..next }))

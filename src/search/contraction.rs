@@ -11,7 +11,9 @@ use super::disassembly::joined;
 use super::outcome::{Outcome, Removal};
 use super::problem::{Effort, Observer, Problem, VerifiedPath};
 use super::requirements::Leaving;
-use super::sbdp::sbdp;
+
+/// A search for what leaves.
+pub(super) type Search = fn(Problem<'_>, &mut dyn Observer) -> Outcome;
 
 /// A problem in whose scene a group is one body, the only one that may move.
 pub(super) struct Contraction<'a> {
@@ -90,8 +92,8 @@ impl<'a> Contraction<'a> {
     }
 
     /// The outcome of a search for a way out of the body, with some effort.
-    pub(super) fn searched(&self, effort: Effort, spent: u64) -> Outcome {
-        sbdp(Problem { effort, spent, ..self.problem.clone() }, &mut Unobserved, true)
+    pub(super) fn searched(&self, search: Search, effort: Effort, spent: u64) -> Outcome {
+        search(Problem { effort, spent, ..self.problem.clone() }, &mut Unobserved)
     }
 }
 

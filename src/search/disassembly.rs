@@ -20,7 +20,6 @@ use crate::termination::Interrupt;
 use crate::tolerances::HULL_MARGIN;
 
 use super::blocked_actions::{few_of_each_part, of_inseparable};
-use super::contraction::Contraction;
 use super::inseparable::InseparablePairs;
 use super::outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal};
 use super::problem::{Checked, Observer, Problem, VerifiedPath};
@@ -394,12 +393,11 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     /// Takes a group out along a verified path of its body.
     pub(super) fn remove_group(
         &mut self,
-        group: &Contraction<'_>,
+        group: Leaving<'_, '_>,
         VerifiedPath { path, depth }: VerifiedPath,
     ) -> Result<(), Stop> {
         let started = Instant::now();
-        let leaving = group.leaving();
-        let removal = leaving.removal(&self.removals, path, depth);
+        let removal = group.removal(&self.removals, path, depth);
         self.count_verification(started);
         self.note(removal?);
         Ok(())
@@ -412,7 +410,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.around.clear();
         self.observer.removal(&removal);
         if self.observer.traces() {
-            self.observer.traced(removal.event(&self.removals));
+            self.observer.traced(TraceEvent::of(&removal, &self.removals));
         }
         self.removals.push(removal);
     }

@@ -18,7 +18,7 @@ use crate::plan::{FreeGroup, PlanStatus};
 use crate::simulation::{Action, SweepQuestion, remembered_obstacles};
 use crate::termination::Interrupt;
 
-use super::contraction::Contraction;
+use super::contraction::{Contraction, Search};
 use super::disassembly::{Disassembly, Stop};
 use super::inseparable::InseparablePairs;
 use super::outcome::Outcome;
@@ -50,6 +50,8 @@ pub(super) struct Groups<'s, 'a, 'o> {
     /// The translations that all parts have.
     pub(super) translations: &'s [Action],
     pub(super) memory: &'s mut GroupMemory,
+    /// Searches for a way out of the body of a group.
+    pub(super) search: Search,
 }
 
 impl Groups<'_, '_, '_> {
@@ -132,7 +134,7 @@ impl Groups<'_, '_, '_> {
         tracing::debug!(?group, leaves, "group tried");
         self.disassembly.trace(|| TraceEvent::GroupTried { parts: group.to_vec(), leaves });
         if let Some(way) = way {
-            self.disassembly.remove_group(contraction, way)?;
+            self.disassembly.remove_group(contraction.leaving(), way)?;
         }
         Ok(leaves)
     }
@@ -140,7 +142,8 @@ impl Groups<'_, '_, '_> {
     /// A search for a way out of a group. It counts as a part of this one.
     fn searched(&mut self, contraction: &Contraction<'_>, effort: Effort) -> Result<Outcome, Stop> {
         let Disassembly { problem, counters, .. } = &mut *self.disassembly;
-        let outcome = contraction.searched(effort, problem.spent + counters.simulations);
+        let spent = problem.spent + counters.simulations;
+        let outcome = contraction.searched(self.search, effort, spent);
         counters.add(&outcome.counters);
         problem.termination.check()?;
         match (outcome.status, problem.max_simulations) {

@@ -7,8 +7,6 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::Pose;
 use crate::plan::{Base, FreeGroup, PlanStatus};
 
-use super::trace::TraceEvent;
-
 /// The most parts that a reason names as those that remain.
 const NAMED_PARTS: usize = 4;
 
@@ -41,17 +39,6 @@ impl Removal {
         match self.parts[..] {
             [part] if self.of.is_none() && !self.aside => Some(part),
             _ => None,
-        }
-    }
-
-    /// The event of a trace that it is, after earlier ones.
-    pub(super) fn event(&self, earlier: &[Self]) -> TraceEvent {
-        let required = self.requires.iter().flat_map(|&i| &earlier[i].parts);
-        let (parts, requires) = (self.parts.clone(), required.copied().collect());
-        if self.aside {
-            TraceEvent::MovedAside { parts, requires }
-        } else {
-            TraceEvent::Removed { parts, requires }
         }
     }
 

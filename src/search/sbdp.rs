@@ -429,6 +429,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             inseparable: order.inseparable(),
             translations: &all[..*common],
             memory: group_memory,
+            search: |problem, observer| sbdp(problem, observer, true),
         }
     }
 

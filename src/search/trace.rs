@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::outcome::Reason;
+use super::outcome::{Reason, Removal};
 
 /// The parts that block an action: those that the outgoing edges of one vertex lead to, in the blocking graph of
 /// one direction.
@@ -160,4 +160,16 @@ pub enum TraceEvent {
         #[serde(default)]
         sweeps: u64,
     },
+}
+
+impl TraceEvent {
+    /// The event of a removal after earlier ones.
+    pub(super) fn of(removal: &Removal, earlier: &[Removal]) -> Self {
+        let Removal { parts, aside, requires, .. } = removal;
+        let mut required: Vec<usize> = requires.iter().flat_map(|&i| &earlier[i].parts).copied().collect();
+        required.sort_unstable();
+        required.dedup();
+        let (parts, requires) = (parts.clone(), required);
+        if *aside { Self::MovedAside { parts, requires } } else { Self::Removed { parts, requires } }
+    }
 }
