@@ -340,9 +340,9 @@ mod tests {
         // The middle of both boxes is at (2, 1): half a turn about the origin brings it to (−2, −1).
         for line in [
             "step  part                   group of  motion              length",
-            "1     0, 1                           rotation            4.47, turning 180°",
-            "2     1                    step 1    translation, aside  3.00",
-            "3     2, 3, 4, 5 and 1 more            translation",
+            "1     0, 1                             rotation            4.47, turning 180°",
+            "2     1                      step 1    translation, aside  3.00",
+            "3     2, 3, 4, 5 and 1 more            translation         free already",
             "left together and not taken apart:\n  0, 1\n",
             "box: complete; 7 of 7 parts come off",
         ] {

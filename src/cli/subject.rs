@@ -194,3 +194,48 @@ fn assembled_poses(plan: &PlanDocument) -> Vec<(&String, Pose)> {
     };
     plan.parts.iter().zip(apart).filter_map(assembled).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{plan_of, step_of};
+    use crate::geometry::waypoint_from_pose;
+    use crate::plan::{Plan, PlanStatus, PlanStep, StepEnd};
+
+    /// Part 1 is put to part 0 by the first step, and both are put in by the second, from beside where they were given.
+    fn assembly_plan(starts: [Pose; 2]) -> PlanDocument {
+        let step = |parts: &[usize], of: Option<usize>, from: &Pose| PlanStep {
+            parts: parts.to_vec(),
+            of,
+            ends: StepEnd::In,
+            path: [*from, Pose::identity()].map(|pose| waypoint_from_pose(&pose)).to_vec(),
+            ..step_of(0)
+        };
+        let poses = starts.map(|pose| waypoint_from_pose(&pose)).into_iter().enumerate().collect();
+        let (group, own) = ways();
+        PlanDocument::new(&Plan {
+            kind: PlanKind::Assembly,
+            parts: ["a", "b"].map(String::from).into(),
+            poses,
+            ..plan_of(PlanStatus::Complete, vec![step(&[1], Some(1), &own), step(&[0, 1], None, &group)])
+        })
+    }
+
+    fn ways() -> (Pose, Pose) {
+        let group = Pose::new([30.0, -200.0, 7.0].into(), [0.3, 1.1, -0.4].into());
+        (group, Pose::new([0.0, 5.0, 0.1].into(), [0.0, 0.2, 0.0].into()))
+    }
+
+    #[test]
+    fn parts_of_a_group_stand_assembled_where_all_their_steps_bring_them() {
+        let (group, own) = ways();
+        assert_eq!(assembled_poses(&assembly_plan([group, group * own])), []);
+        let moved = Pose::new([1.0, 2.0, 3.0].into(), [0.0, 0.0, 0.5].into());
+        let plan = assembly_plan([group, group * own * moved]);
+        let found = assembled_poses(&plan);
+        let [(name, pose)] = found[..] else { panic!("{found:?}") };
+        assert_eq!(name, "b");
+        assert!((pose.inverse() * moved).rotation.angle() < 1e-9, "{pose}");
+        assert!((pose.translation.vector - moved.translation.vector).norm() < 1e-9, "{pose}");
+    }
+}
