@@ -104,25 +104,37 @@ pub struct Assembling<'a> {
     termination: &'a Termination,
 }
 
-/// Which insertions one requires, and its wave.
+/// An insertion: of which removal it is the reverse, which insertions it requires, and its wave.
 #[derive(Debug, Clone, Default)]
 struct Order {
+    place: usize,
     requires: Vec<usize>,
     wave: usize,
 }
 
-/// The order of the insertions that some removals become in reverse: what a removal requires to be out must come after
-/// it.
+/// The insertions that some removals become in reverse: what a removal requires to be out comes after it. A group is put
+/// together right before it is put in.
 fn reversed(removals: &[Removal]) -> Vec<Order> {
-    let number = |place: usize| removals.len() - 1 - place;
+    let mut order = Vec::new();
+    put_in(None, removals, &mut order);
     let mut orders: Vec<Order> = Vec::new();
-    for part in (0..removals.len()).rev() {
-        let required = |later: &usize| removals[*later].requires.contains(&part);
-        let requires: Vec<usize> = (part + 1..removals.len()).rev().filter(required).map(number).collect();
+    for &place in &order {
+        let required = |(number, earlier): (usize, &usize)| {
+            removals[*earlier].requires.contains(&place).then_some(number)
+        };
+        let requires: Vec<usize> = order[..orders.len()].iter().enumerate().filter_map(required).collect();
         let wave = requires.iter().map(|&i| orders[i].wave + 1).max().unwrap_or(0);
-        orders.push(Order { requires, wave });
+        orders.push(Order { place, requires, wave });
     }
     orders
+}
+
+/// Adds the removals out of the assembly or a group in reverse, behind those that put each one's group together.
+fn put_in(of: Option<usize>, removals: &[Removal], order: &mut Vec<usize>) {
+    for place in (0..removals.len()).rev().filter(|&place| removals[place].of == of) {
+        put_in(Some(place), removals, order);
+        order.push(place);
+    }
 }
 
 impl<'a> Assembling<'a> {
@@ -153,7 +165,7 @@ impl<'a> Assembling<'a> {
     #[must_use]
     pub fn starts(&self) -> Vec<(usize, Pose)> {
         let mut starts: Vec<(usize, Pose)> = Vec::new();
-        for &part in self.removals.iter().rev().flat_map(|r| &r.parts) {
+        for &part in self.orders.iter().flat_map(|order| &self.removals[order.place].parts) {
             if starts.iter().all(|(known, _)| *known != part) {
                 starts.push((part, self.start_of(part)));
             }
@@ -181,18 +193,26 @@ impl<'a> Assembling<'a> {
     /// # Errors
     /// A part could not be put in; those reported before it are in place.
     pub fn run(&self, mut report: impl FnMut(Insertion)) -> Result<(), Unfinished> {
-        let order: Vec<usize> = (0..self.removals.len()).rev().collect();
-        for some in order.chunks(AT_ONCE) {
-            let found: Vec<_> = some.par_iter().map(|&place| self.insertion(place)).collect();
+        // What is put together to a group is reported with the group.
+        let mut within = Vec::new();
+        for some in self.orders.chunks(AT_ONCE) {
+            let found: Vec<_> = some.par_iter().map(|order| self.insertion(order)).collect();
             for insertion in found {
-                report(insertion?);
+                let insertion = insertion?;
+                if insertion.of.is_some() {
+                    within.push(insertion);
+                } else {
+                    within.drain(..).for_each(&mut report);
+                    report(insertion);
+                }
             }
         }
         Ok(())
     }
 
-    /// The reverse of the removal that was at some place in the order.
-    fn insertion(&self, place: usize) -> Result<Insertion, Unfinished> {
+    /// The reverse of a removal.
+    fn insertion(&self, Order { place, requires, wave }: &Order) -> Result<Insertion, Unfinished> {
+        let place = *place;
         let removal = &self.removals[place];
         let in_order: Vec<Pose> = removal.path.iter().rev().copied().collect();
         let (mut path, mut depth) = (in_order, removal.depth);
@@ -210,11 +230,9 @@ impl<'a> Assembling<'a> {
             depth = depth.max(past.depth).max(to_there);
             path.splice(..1, way);
         }
-        let number = |place: usize| self.removals.len() - 1 - place;
-        let Order { requires, wave } = self.orders[number(place)].clone();
         let Removal { parts, of, aside, .. } = removal.clone();
-        let of = of.map(number);
-        Ok(Insertion { parts, of, aside, path, depth, requires, wave })
+        let of = of.and_then(|group| self.orders.iter().position(|order| order.place == group));
+        Ok(Insertion { parts, of, aside, path, depth, requires: requires.clone(), wave: *wave })
     }
 
     /// The way from where a part waits to where its insertion begins, and how deep it gets into anything.

@@ -155,3 +155,40 @@ fn a_cancelled_request_is_told_so() {
     let assembling = Assembling::new(&scene, &verifier, &removals, &[0], &waiting, &termination);
     assert_eq!(assembling.run(|_| {}), Err(Unfinished::Interrupted(Interrupt::Cancelled)));
 }
+
+#[test]
+fn a_group_is_put_together_right_before_it_is_put_in() {
+    // Of the slabs, the middle one and the top one leave together, and then each other.
+    let removals = |scene: &Scene| {
+        let group = scene.with_joined(&[2, 3], &Termination::default()).unwrap();
+        let mut together = out(&group, 4, [0.0, 0.0, 4.0]);
+        together.parts = vec![2, 3];
+        let mut last = out(scene, 1, [0.0, 0.0, 4.0]);
+        (last.requires, last.wave) = (vec![0], 1);
+        let mut within = out(scene, 3, [5.0, 0.0, 0.0]);
+        (within.of, within.requires, within.wave) = (Some(0), vec![0], 1);
+        vec![together, last, within]
+    };
+    let (scene, verifier) = scene(stack());
+    let (removals, termination) = (removals(&scene), Termination::default());
+    for waiting in [Waiting::Nowhere, Waiting::Beside(Vec::new())] {
+        let assembling = Assembling::new(&scene, &verifier, &removals, &[0], &waiting, &termination);
+        let mut insertions = Vec::new();
+        assert_eq!(assembling.run(|insertion| insertions.push(insertion)), Ok(()));
+        let order: Vec<_> =
+            insertions.iter().map(|i| (i.parts.clone(), i.of, i.requires.clone(), i.wave)).collect();
+        assert_eq!(
+            order,
+            [(vec![1], None, vec![], 0), (vec![3], Some(2), vec![], 0), (vec![2, 3], None, vec![0, 1], 1),]
+        );
+        // The one within begins where its insertion into the group does, and the group where its own does.
+        let start = |part: usize| assembling.starts().into_iter().find(|(p, _)| *p == part).unwrap().1;
+        let shift = |part: usize| {
+            (start(part).translation.vector - scene.bodies[part].planning_from_shape.translation.vector)
+                .into()
+        };
+        let (middle, top): ([f64; 3], [f64; 3]) = (shift(2), shift(3));
+        assert_eq!((middle, top), ([0.0, 0.0, 4.0], [5.0, 0.0, 4.0]));
+        assert_eq!(insertions[0].path.len() > 2, waiting != Waiting::Nowhere, "only the slab below waits");
+    }
+}

@@ -143,7 +143,8 @@ mod tests {
 
     use super::*;
     use crate::fixtures::{block_on_plate, cuboid, moved, scene};
-    use crate::geometry::Bounds;
+    use crate::geometry::{Bounds, interpolate};
+    use crate::termination::Termination;
 
     fn straight(start: &Pose, shift: Vector3<f64>) -> [Pose; 2] {
         [*start, Translation3::from(shift) * *start]
@@ -175,6 +176,27 @@ mod tests {
         let [from, to] = <[Pose; 2]>::try_from(way(0.1, 2)).unwrap();
         let short = (to.translation.vector - from.translation.vector).norm();
         assert!((short - 0.1).abs() < 1e-8, "a path that ends before is looked at as it is");
+    }
+
+    #[test]
+    fn the_parts_of_a_body_go_with_it() {
+        let place = Pose::new(Vector3::new(1.0, 0.5, 0.0), Vector3::new(0.2, 0.3, 0.7));
+        let foot = moved(cuboid([-1.0, -1.5, 0.0], [2.0, 1.0, 0.5]), &place);
+        let post = moved(cuboid([0.0, 0.0, 0.5], [1.0, 0.75, 3.0]), &place);
+        let (scene, _) = scene([foot, post, cuboid([3.0, -3.0, 0.0], [4.0, 3.0, 6.0])]);
+        let scene = scene.with_joined(&[0, 1], &Termination::default()).unwrap();
+        let body = 3;
+        let start = scene.bodies[body].planning_from_shape;
+        let turned = Pose::new(Vector3::new(0.3, -0.4, 2.0), Vector3::new(0.1, 0.9, -0.2)) * start;
+        let path = [start, turned];
+        let half = interpolate(&start, &turned, &scene.centre_in_shape(body), 0.5);
+        for (pair, body_from_part) in PairPath::of_members(&scene, &scene.allowed, [body, 2], &path) {
+            let into = scene.bodies[2].planning_from_shape.inverse();
+            let there = interpolate(&pair.path[0], &pair.path[1], &pair.centre, 0.5);
+            let expected = into * half * body_from_part;
+            let off = (there.translation.vector - expected.translation.vector).norm();
+            assert!(off < 1e-8 && there.rotation.angle_to(&expected.rotation) < 1e-8, "{:?}", pair.parts);
+        }
     }
 
     #[test]
