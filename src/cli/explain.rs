@@ -113,7 +113,7 @@ impl Account {
             TraceEvent::Removed { parts, requires } => {
                 let after = match requires.as_slice() {
                     [] => String::new(),
-                    parts => format!(", which requires {} to be out", self.names(parts)),
+                    parts => format!(", which requires {} to have moved", self.names(parts)),
                 };
                 let (are, their) = if parts.len() > 1 { ("are", "their") } else { ("is", "its") };
                 format!(

@@ -210,7 +210,7 @@ impl Problem<'_> {
     }
 
     /// Those of the standing parts that a path may meet.
-    fn near(&self, standing: &[usize], part: usize, path: &[Pose]) -> Vec<usize> {
+    pub(super) fn near(&self, standing: &[usize], part: usize, path: &[Pose]) -> Vec<usize> {
         let swept = self.scene.swept_bounds(part, path).grown(self.verifier.limit());
         self.scene.broad_phase.meeting_of(standing, &swept)
     }

@@ -47,11 +47,11 @@ impl Leaving<'_, '_> {
         let Self { problem, body, aside, .. } = self;
         let path = if aside { path } else { self.led_out(earlier, path) };
         let parts = problem.scene.members(&body).to_vec();
-        let places = EarlierPlaces::new(&problem.scene, earlier);
+        let places = EarlierPlaces::new(problem, body, &path, earlier);
         let moved_before = |i: &usize| earlier[*i].parts.iter().any(|part| parts.contains(part));
         // Its path begins where the earlier ones of its parts end.
         let mut requires: BTreeSet<usize> = (0..earlier.len()).filter(moved_before).collect();
-        let mut depths: HashMap<(usize, usize), Option<f64>> = HashMap::new();
+        let mut depths = Depths::new();
         loop {
             let done = closed(&requires, earlier);
             let others = places.moves.iter().filter(|(part, _)| !parts.contains(part));
@@ -60,7 +60,7 @@ impl Leaving<'_, '_> {
                 let count = moves.iter().filter(|&i| done.contains(i)).count();
                 (count < moves.len()).then_some((part, count))
             });
-            let standing: Vec<(usize, usize)> = standing.collect();
+            let standing: Vec<EarlierPlace> = standing.collect();
             let unknown: Vec<_> = standing.iter().filter(|at| !depths.contains_key(at)).copied().collect();
             depths.extend(places.depths_past(self, &unknown, &path)?);
             let entered: Vec<usize> = standing
@@ -118,22 +118,37 @@ fn closed(removals: &BTreeSet<usize>, all: &[Removal]) -> BTreeSet<usize> {
     closure
 }
 
+/// A part, and how many of its moves are done.
+type EarlierPlace = (usize, usize);
+
+/// How deep a path gets past parts at earlier places; `None` where it is refused.
+type Depths = HashMap<EarlierPlace, Option<f64>>;
+
 /// Where parts stood before they left, or were moved aside.
 struct EarlierPlaces<'s> {
     scene: &'s Scene,
     earlier: &'s [Removal],
-    /// By part: its removals, in order.
+    /// By part that the path may meet where it stood last, or that was moved aside: its removals, in order.
     moves: BTreeMap<usize, Vec<usize>>,
 }
 
 impl<'s> EarlierPlaces<'s> {
-    /// Of a scene in which each part stands where it stood last.
-    fn new(scene: &'s Scene, earlier: &'s [Removal]) -> Self {
-        let mut moves: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    /// Of a scene in which each part stands where it stood last, and the path of a body.
+    fn new(problem: &'s Problem<'_>, body: usize, path: &[Pose], earlier: &'s [Removal]) -> Self {
+        let parts_of = |of: fn(&&Removal) -> bool| earlier.iter().filter(of).flat_map(|r| &r.parts).copied();
+        let mut gone: Vec<usize> = parts_of(|r| !r.aside).collect();
+        gone.sort_unstable();
+        let mut met = problem.near(&gone, body, path);
+        met.extend(parts_of(|r| r.aside));
+        let mut moves: BTreeMap<usize, Vec<usize>> = met.into_iter().map(|part| (part, Vec::new())).collect();
         for (i, removal) in earlier.iter().enumerate() {
-            removal.parts.iter().for_each(|&part| moves.entry(part).or_default().push(i));
+            for part in &removal.parts {
+                if let Some(moves) = moves.get_mut(part) {
+                    moves.push(i);
+                }
+            }
         }
-        Self { scene, earlier, moves }
+        Self { scene: &problem.scene, earlier, moves }
     }
 
     /// Where a part stood after some of its moves: in the scene, but for moves aside that came after these.
@@ -147,13 +162,12 @@ impl<'s> EarlierPlaces<'s> {
     fn depths_past(
         &self,
         leaving: Leaving<'_, '_>,
-        parts: &[(usize, usize)],
+        parts: &[EarlierPlace],
         path: &[Pose],
-    ) -> Result<Vec<((usize, usize), Option<f64>)>, Interrupt> {
-        let mut depths = Vec::new();
-        let is_elsewhere = |(part, count): &&(usize, usize)| {
-            self.moves[part][*count..].iter().any(|&i| self.earlier[i].aside)
-        };
+    ) -> Result<Depths, Interrupt> {
+        let mut depths = Depths::new();
+        let is_elsewhere =
+            |(part, count): &&EarlierPlace| self.moves[part][*count..].iter().any(|&i| self.earlier[i].aside);
         let (elsewhere, here): (Vec<_>, Vec<_>) = parts.iter().partition(is_elsewhere);
         let here_parts: Vec<usize> = here.iter().map(|(part, _)| *part).collect();
         let past = leaving.problem.depths_past(&here_parts, leaving.body, path)?;
@@ -166,7 +180,7 @@ impl<'s> EarlierPlaces<'s> {
             let scene = self.scene.with_placed(&[(at.0, self.place(at.0, at.1))]);
             let problem = Problem { scene, ..leaving.problem.clone() };
             let past = problem.depths_past(&[at.0], leaving.body, path)?;
-            depths.push((at, past.first().map_or(Some(0.0), |(_, depth)| *depth)));
+            depths.insert(at, past.first().map_or(Some(0.0), |(_, depth)| *depth));
         }
         Ok(depths)
     }
