@@ -281,7 +281,7 @@ fn a_trace_is_explained_in_words() {
     for words in [
         "sbdp-star with sliding on 4 parts",
         "static analysis of pin",
-        "=== bolt is out, which requires pin to be out",
+        "=== bolt is out, which requires pin to have moved",
         "complete",
     ] {
         assert!(text.contains(words), "{words}: {text}");
