@@ -42,8 +42,17 @@ impl<'a> Contraction<'a> {
         let mut present: Vec<usize> = rest.iter().copied().chain([body]).collect();
         present.sort_unstable();
         let targets = Some(vec![body]);
-        let (fixed, base, earlier, is_group) = (rest, None, Vec::new(), true);
-        let problem = Problem { scene, present, fixed, base, targets, earlier, is_group, ..problem.clone() };
+        let problem = Problem {
+            scene,
+            present,
+            fixed: rest,
+            base: None,
+            targets,
+            is_group: true,
+            groups: false,
+            earlier: Vec::new(),
+            ..problem.clone()
+        };
         Ok(Self { problem, body, around })
     }
 

@@ -13,7 +13,8 @@ pub(super) struct Relay<'a> {
 
 impl Observer for Relay<'_> {
     fn progress(&mut self, removed: usize, simulations: u64) {
-        let (done, total) = (removed as u32, self.total);
+        // A part that leaves in a group, or is moved aside, is in several removals.
+        let (done, total) = (self.total.min(removed as u32), self.total);
         self.sink.progress(Progress { stage: Stage::Search, done, total, simulations });
     }
 
