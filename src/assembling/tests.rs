@@ -183,12 +183,11 @@ fn a_group_is_put_together_right_before_it_is_put_in() {
         );
         // The one within begins where its insertion into the group does, and the group where its own does.
         let start = |part: usize| assembling.starts().into_iter().find(|(p, _)| *p == part).unwrap().1;
-        let shift = |part: usize| {
-            (start(part).translation.vector - scene.bodies[part].planning_from_shape.translation.vector)
-                .into()
-        };
-        let (middle, top): ([f64; 3], [f64; 3]) = (shift(2), shift(3));
-        assert_eq!((middle, top), ([0.0, 0.0, 4.0], [5.0, 0.0, 4.0]));
+        for (part, [x, z]) in [(2, [0.0, 4.0]), (3, [5.0, 4.0])] {
+            let assembled = scene.bodies[part].planning_from_shape.translation.vector;
+            let shift = start(part).translation.vector - assembled;
+            assert!((shift - Vector3::new(x, 0.0, z)).norm() < 1e-9, "part {part}: {shift}");
+        }
         assert_eq!(insertions[0].path.len() > 2, waiting != Waiting::Nowhere, "only the slab below waits");
     }
 }
