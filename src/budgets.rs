@@ -410,7 +410,7 @@ pub(crate) const GROUPS_SEARCHED: usize = 64;
 /// `exhausted` takes up to twice as long.
 pub(crate) const GROUPS_TURNED: usize = 8;
 /// Places of all parts that are searched for one after which some leave, some 2,000 in a second on one core. A cube in a cage
-/// needs 57; at half, puzzles of more moves are given up; at double, what never comes apart takes up to twice as long.
+/// needs 57 to its first piece; at half, puzzles of more moves are given up; at double, what never comes apart takes up to twice as long.
 /// Measured: `puzzle-pelikanburr` (126 moves) needs more than 100,000.
 pub(crate) const PLACES_SEARCHED: usize = 20_000;
 /// Count of edges and corners that are cast for that, some seconds: parts with fine facets are given up sooner.
