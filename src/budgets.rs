@@ -402,19 +402,20 @@ pub(crate) const CROSS_SECTIONS: usize = 32;
 /// Cells in which a disc is checked to be inside a part: some thousands are needed for a disc whose rim is a hundredth of
 /// the radius inside. At half, some discs near a rim are not proved; at double no effect.
 pub(crate) const DISC_CELLS: usize = 20_000;
-/// Groups of one state that are searched for a way out by pushes. Six pieces have at most 31; at half, puzzles of five
+/// Count of groups of one state that are searched for a way out by pushes. Six pieces have at most 31; at half, puzzles of five
 /// pieces are given up; at double, what never comes apart takes up to twice as long.
 pub(crate) const GROUPS_SEARCHED: usize = 64;
 /// The same with all that the planner knows, at the end of a search: each takes as long as a part that does not leave.
 /// At half, a group that turns out is missed where some smaller ones can begin to move; at double, a search that ends
 /// `exhausted` takes up to twice as long.
 pub(crate) const GROUPS_TURNED: usize = 8;
-/// Places of all parts that are searched for one after which some leave, some 2,000 in a second on one core. A cube in a cage
+/// Count of places of all parts that are searched for one after which some leave, some 2,000 in a second on one core. A cube in a cage
 /// needs 57 to its first piece; at half, puzzles of more moves are given up; at double, what never comes apart takes up to twice as long.
 /// Measured: `puzzle-pelikanburr` (126 moves) needs more than 100,000.
 pub(crate) const PLACES_SEARCHED: usize = 20_000;
-/// Count of edges and corners that are cast for that, some seconds: parts with fine facets are given up sooner.
+/// Count of edges and corners that are cast for that, some seconds: parts with fine facets are given up sooner. At half, a
+/// cage of round bars is; at double, what never comes apart takes up to twice as long.
 pub(crate) const EDGES_CAST_FOR_PLACES: usize = 6_000_000;
-/// Ways to such places that are verified: casts seldom miss anything. At half, one that is refuted may hide the next; at
+/// Count of ways to such places that are verified: casts seldom miss anything. At half, one that is refuted may hide the next; at
 /// double no effect.
 pub(crate) const PLACES_VERIFIED: usize = 8;

@@ -40,6 +40,8 @@ fn every_part_is_closed_and_needs_no_healing() {
         ("threaded-bolt-and-nut", 2),
         ("linked-rings", 2),
         ("bolted-bracket-20", 20),
+        ("pinned-block", 4),
+        ("covered-pin", 3),
         ("translated", 3),
         ("peg-stl", 2),
         ("pegs.glb", 3),

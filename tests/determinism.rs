@@ -66,6 +66,13 @@ fn bolted_bracket_is_planned_the_same_again() {
 }
 
 #[test]
+fn groups_and_parts_moved_aside_are_planned_the_same_again() {
+    for name in ["pinned-block", "covered-pin"] {
+        assert_deterministic(name, &PlanRequest::default());
+    }
+}
+
+#[test]
 fn a_search_cut_short_by_its_budget_stops_at_the_same_place() {
     let request = PlanRequest { max_simulations: Some(20), ..PlanRequest::default() };
     assert_deterministic("linked-rings", &request);

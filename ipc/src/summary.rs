@@ -90,7 +90,7 @@ pub struct SummaryHeader {
     pub base: u32,
     /// Groups that left together and were not taken apart ([`GroupRecord`]).
     pub kept_together: u32,
-    /// Groups that could leave ([`GroupRecord`]).
+    /// Groups that can begin to move ([`GroupRecord`]).
     pub free_together: u32,
     /// Parts that [`GroupRecord`]s point to (u32).
     pub group_parts: u32,
@@ -140,7 +140,7 @@ pub struct GroupRecord {
     pub first_part: u32,
     /// How many.
     pub parts: u32,
-    /// Of a group that could leave, the unit vector along which it begins; else zero.
+    /// Of a group that can begin to move, the unit vector along which it begins; else zero.
     pub direction: [f64; 3],
 }
 
@@ -174,7 +174,7 @@ pub struct Blocked<'a> {
     pub action: &'a str,
 }
 
-/// Parts that could leave together, as received.
+/// Parts that can begin to move together, as received.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FreeGroup<'a> {
     /// The parts.
@@ -220,7 +220,7 @@ pub struct SummaryParts<'a> {
     pub remaining: Vec<u32>,
     /// Groups that left together and were not taken apart.
     pub kept_together: Vec<Vec<u32>>,
-    /// Where nothing leaves any more: groups that could, and the unit vectors along which they begin.
+    /// Where nothing leaves any more: groups that can begin to move, and along which unit vectors.
     pub free_together: Vec<(Vec<u32>, [f64; 3])>,
     /// Parts that began elsewhere than where their mesh was given, and where: the rigid motion of the mesh.
     pub poses: Vec<MovedPart>,
@@ -489,7 +489,7 @@ impl<'a> SummaryView<'a> {
         self.kept_together.iter().map(|group| self.group(group))
     }
 
-    /// Where nothing leaves any more: groups that could.
+    /// Where nothing leaves any more: groups that can begin to move.
     pub fn free_together(&self) -> impl Iterator<Item = FreeGroup<'a>> + '_ {
         self.free_together.iter().map(|g| FreeGroup { parts: self.group(g), direction: g.direction })
     }

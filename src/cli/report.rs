@@ -10,7 +10,8 @@ use crate::plan::{
 };
 use crate::view::direction;
 
-/// A step names at most this many of its parts in the table, and counts the rest.
+/// Count of parts that a row of the table names; more are counted. With names of ten letters, the row still fits 120
+/// columns. At half, pairs alone are named; at double, rows wrap.
 const MOST_NAMES: usize = 4;
 
 /// The table of steps and everything there is to know about the rest.
@@ -24,7 +25,7 @@ pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan) -> String {
         ("base", base(plan)),
         ("remaining", remaining(plan)),
         ("left together and not taken apart", plan.kept_together.iter().map(|g| names(plan, g)).collect()),
-        ("could leave together", free_together(plan)),
+        ("can begin to move together", free_together(plan)),
         ("blocked", blocked(plan)),
         ("overlaps at the assembled pose", overlaps(plan)),
         ("warnings", warnings(plan)),
@@ -294,7 +295,7 @@ mod tests {
             "1     a     rotation     0 mm, turning 180°             1",
             "2     c     translation  free already                   1",
             "  b: it is the largest",
-            "could leave together:\n  a, b along +Y",
+            "can begin to move together:\n  a, b along +Y",
             "  b: +x by a, c; -z by a",
             "  a and b: 0.5000 mm deep",
             "  c: open",

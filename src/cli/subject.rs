@@ -11,14 +11,10 @@ use crate::geometry::{
     Assembly, Pose, Revision, SourceAssembly, SourceMesh, content_hash, load_assembly, pose_from_waypoint,
 };
 use crate::plan::export::{PlanDocument, SourceDocument};
-use crate::plan::{Placements, PlanKind};
+use crate::plan::{MOTION_ROUNDING, Placements, PlanKind};
 use crate::search::Termination;
 use crate::service::{AssemblyId, Service};
 use crate::view::{PlanScene, Up, ViewError, glb, kind_of, page, read_plan};
-
-/// A part whose steps bring it to where it was given, but for this angle (radians) and this share of the way there, is
-/// not moved: the product of its motions is rounded.
-const ROUNDING: f64 = 1e-9;
 
 /// A plan, and the meshes that it moves.
 pub(super) struct Subject {
@@ -188,8 +184,8 @@ fn assembled_poses(plan: &PlanDocument) -> Vec<(&String, Pose)> {
             PlanKind::Disassembly => (start, 0.0),
             PlanKind::Assembly => (apart.inverse() * start, start.translation.vector.norm()),
         };
-        let is_moved =
-            pose.rotation.angle() > ROUNDING || pose.translation.vector.norm() > ROUNDING * farthest;
+        let is_moved = pose.rotation.angle() > MOTION_ROUNDING
+            || pose.translation.vector.norm() > MOTION_ROUNDING * farthest;
         is_moved.then_some((name, pose))
     };
     plan.parts.iter().zip(apart).filter_map(assembled).collect()

@@ -54,7 +54,7 @@ pub struct PlanDocument {
     pub remaining: Vec<String>,
     /// Groups that left together and were not taken apart: nobody asked for it, or no way was found.
     pub kept_together: Vec<Vec<String>>,
-    /// Where nothing leaves any more: groups that could.
+    /// Where nothing leaves any more: groups that can begin to move.
     pub free_together: Vec<FreeGroupDocument>,
     /// What blocks the parts that should have come off.
     pub blocked: Vec<BlockedDocument>,
@@ -128,7 +128,7 @@ pub struct StepDocument {
     pub direction: Option<[f64; 3]>,
 }
 
-/// Parts that could leave together where none leaves alone.
+/// Parts that can begin to move together where nothing leaves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FreeGroupDocument {
     /// The parts.

@@ -12,6 +12,7 @@ pub use model::{
     Base, Blocked, FreeGroup, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd,
     Warning,
 };
+pub(crate) use placements::MOTION_ROUNDING;
 pub use placements::{Placements, StepFrame};
 pub use records::{KnownVerdicts, VerdictQuestion};
 pub(crate) use records::{OVERLAP, VERDICT, overlap_key};

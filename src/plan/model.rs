@@ -21,7 +21,7 @@ pub enum PlanStatus {
     Complete,
     /// A budget ran out (the reason names it); the steps are the best so far.
     Partial,
-    /// It is proved that parts which were asked for cannot come off one at a time.
+    /// It is proved that parts which were asked for cannot come off.
     Infeasible,
     /// The deadline passed.
     Timeout,
@@ -79,7 +79,7 @@ pub struct PlanStep {
     pub direction: Option<[f64; 3]>,
 }
 
-/// Parts that could leave together where none leaves alone.
+/// Parts that can begin to move together where nothing leaves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FreeGroup {
     /// The parts, ascending.
@@ -202,7 +202,7 @@ pub struct Plan {
     pub remaining: Vec<usize>,
     /// Groups that left together and were not taken apart: nobody asked for it, or no way was found.
     pub kept_together: Vec<Vec<usize>>,
-    /// Where nothing leaves any more: groups that could.
+    /// Where nothing leaves any more: groups that can begin to move.
     pub free_together: Vec<FreeGroup>,
     /// What blocks the parts that should have come off.
     pub blocked: Vec<Blocked>,

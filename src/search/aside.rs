@@ -4,6 +4,8 @@
 //! of the same parts in a row are one path. The search for what remains then begins anew, in a scene in which the parts
 //! stand where they were moved to.
 
+use std::time::Instant;
+
 use nalgebra::Vector3;
 
 use crate::budgets::PLACES_VERIFIED;
@@ -12,7 +14,7 @@ use crate::termination::Interrupt;
 
 use super::contraction::Contraction;
 use super::directions::axes_of;
-use super::outcome::{Outcome, Removal};
+use super::outcome::Outcome;
 use super::problem::{Observer, Problem, VerifiedPath};
 use super::rearrangement::{PlaceSearch, Rearrangement};
 use super::request::{ActionSet, Planner};
@@ -20,20 +22,20 @@ use super::requirements::{Leaving, places_after};
 use super::trace::TraceEvent;
 
 /// The question about what remains after an outcome that is not complete, with some parts moved aside and others out;
-/// none where no moves are found after which any leaves.
+/// none where no moves are found after which any leaves. The time that this takes is added to the outcome's.
 ///
 /// # Errors
 /// The termination condition became true.
 pub(super) fn moved_aside<'a>(
     planner: Planner,
     problem: &Problem<'a>,
-    outcome: &Outcome,
+    outcome: &mut Outcome,
     observer: &mut dyn Observer,
 ) -> Result<Option<Problem<'a>>, Interrupt> {
     let is_over = matches!(outcome.status, PlanStatus::Exhausted | PlanStatus::Infeasible);
     let is_extended = planner == Planner::SbdpStar && problem.actions == ActionSet::Extended;
     // Of two parts, one moves aside only to leave.
-    if !is_over || !is_extended || !problem.groups || outcome.remaining.len() < 3 {
+    if !is_over || !is_extended || outcome.remaining.len() < 3 {
         return Ok(None);
     }
     let scene = problem.scene.with_placed(&places_after(&problem.scene, &outcome.removals));
@@ -45,8 +47,14 @@ pub(super) fn moved_aside<'a>(
         PlaceSearch::new(&here, &here.present, axes_of(&here.scene, &here.present, &here.termination)?);
     let mut next = None;
     for _ in 0..PLACES_VERIFIED {
-        let Some(found) = search.next_exit()? else { break };
+        let started = Instant::now();
+        let found = search.next_exit()?;
+        outcome.counters.simulation += started.elapsed();
+        let Some(found) = found else { break };
+        let started = Instant::now();
         next = verified(&here, &found)?;
+        outcome.counters.verification += started.elapsed();
+        here.termination.leave_out(started.elapsed());
         if next.is_some() {
             break;
         }
@@ -76,23 +84,11 @@ fn verified<'a>(problem: &Problem<'a>, found: &Rearrangement) -> Result<Option<P
         let Some(VerifiedPath { path, depth }) = way else { return Ok(None) };
         let leaving = Leaving { aside: !is_last, ..contraction.leaving() };
         let removal = leaving.removal(&here.earlier, path, depth)?;
-        let mut earlier = here.earlier.clone();
-        if is_last {
-            here.present.retain(|part| !removal.parts.contains(part));
-        } else {
-            here.scene = moved(&here, &removal);
-        }
-        earlier.push(removal);
-        here.earlier = earlier;
+        here.scene = here.scene.with_placed(&places_after(&here.scene, std::slice::from_ref(&removal)));
+        here.present.retain(|part| !is_last || !removal.parts.contains(part));
+        here.earlier.push(removal);
     }
     Ok(Some(here))
-}
-
-/// The scene with the parts of a move at its end.
-fn moved(problem: &Problem<'_>, removal: &Removal) -> crate::scene::Scene {
-    let motion = removal.motion();
-    let place = |&part: &usize| (part, motion * problem.scene.bodies[part].planning_from_shape);
-    problem.scene.with_placed(&removal.parts.iter().map(place).collect::<Vec<_>>())
 }
 
 /// Moves of the same parts in a row.

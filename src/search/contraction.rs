@@ -49,7 +49,6 @@ impl<'a> Contraction<'a> {
             base: None,
             targets,
             is_group: true,
-            groups: false,
             earlier: Vec::new(),
             ..problem.clone()
         };

@@ -154,7 +154,7 @@ impl Groups<'_, '_, '_> {
         Ok(outcome)
     }
 
-    /// The groups that could begin to move, the smallest of each direction.
+    /// The groups that can begin to move, the smallest of each direction.
     pub(super) fn free_together(&self) -> Vec<FreeGroup> {
         let mut free: Vec<FreeGroup> = Vec::new();
         for (direction, action) in self.translations.iter().enumerate() {
@@ -361,13 +361,12 @@ mod tests {
     }
 
     #[test]
-    fn without_groups_it_is_said_which_ones_are_free_together() {
-        let (outcome, _) = planned(pinned_block_in_sleeve(), |problem| Problem {
-            groups: false,
-            fixed: vec![3],
-            max_simulations: Some(100),
-            ..problem
-        });
+    fn where_nothing_leaves_it_is_said_which_parts_are_free_together() {
+        // Over the mouth of the box, with play above the block, lies a lid. Neither holds the block alone.
+        let mut parts = pinned_block();
+        parts.push(cuboid([-3.0, -2.0, 1.3], [3.0, 2.0, 2.0]));
+        let (outcome, _) =
+            planned(parts, |problem| Problem { fixed: vec![0, 3], max_simulations: Some(100), ..problem });
         assert_eq!((outcome.status, outcome.removals.len()), (PlanStatus::Partial, 0));
         let free: Vec<_> =
             outcome.free_together.iter().map(|group| (&group.parts[..], group.direction)).collect();

@@ -1,8 +1,8 @@
-//! Pairs of parts that are proved never to come apart one at a time.
+//! Pairs of parts that are proved never to come apart.
 //!
 //! A proof is about two parts alone. If no motion of one takes it away from the other, no motion of the other does
-//! either, since only their relative motion counts, and further parts are only in the way. So both stay, whatever
-//! else is removed, and a request that wants one of them out has no plan.
+//! either, since only their relative motion counts, and further parts are only in the way. So they stay together,
+//! whatever else is removed, and a request that wants them apart has no plan. They may leave the rest together.
 
 use crate::termination::Interrupt;
 

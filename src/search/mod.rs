@@ -89,7 +89,7 @@ fn run(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> O
     let mut outcome = run_once(planner, problem.clone(), observer);
     let base = outcome.base.clone();
     loop {
-        let next = match aside::moved_aside(planner, &problem, &outcome, observer) {
+        let next = match aside::moved_aside(planner, &problem, &mut outcome, observer) {
             Ok(Some(next)) => next,
             Ok(None) => break,
             Err(interrupt) => {

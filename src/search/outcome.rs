@@ -81,7 +81,7 @@ pub enum SeparationProof {
     Neck,
 }
 
-/// Two parts that never come apart one at a time.
+/// Two parts that never come apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Inseparable {
     /// The two.
@@ -199,7 +199,7 @@ pub struct Outcome {
     pub unfinished: Vec<usize>,
     /// The blocked actions of the parts that should have come out: a few of each part.
     pub blocked: Vec<BlockedAction>,
-    /// Where nothing leaves any more: groups that could begin to move.
+    /// Where nothing leaves any more: groups that can begin to move.
     pub free_together: Vec<FreeGroup>,
     /// Counts and times.
     pub counters: Counters,

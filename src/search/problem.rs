@@ -79,8 +79,6 @@ pub struct Problem<'a> {
     pub targets: Option<Vec<usize>>,
     /// Whether the only part that may move is the body of a group: nothing is proved about it, and it is in no group.
     pub is_group: bool,
-    /// Whether groups leave where no part does.
-    pub groups: bool,
     /// How far the search goes.
     pub effort: Effort,
     /// Which actions are used.

@@ -14,26 +14,23 @@
 //! Simulations run ahead in parallel, but their results are used in the order of the serial algorithm and
 //! thrown away where an earlier one changed the question: plans do not depend on the number of threads.
 
+mod stages;
+
 use std::collections::HashSet;
 use std::time::Instant;
 
 use rayon::prelude::*;
 
 use crate::blocking_graph::{Analysis, Blockage, StateGraphs};
-use crate::budgets::{REFINEMENTS, STARTS_TURNED, TRANSLATION_PASSES, WINDOW_PER_THREAD};
+use crate::budgets::{TRANSLATION_PASSES, WINDOW_PER_THREAD};
 use crate::geometry::Pose;
-use crate::scene::StandingParts;
 use crate::simulation::{End, Motion, Sweep};
 use crate::termination::Interrupt;
-use crate::tolerances::TURNED;
 
-use super::action_list::ActionList;
 use super::action_table::ActionTable;
-use super::cell_decomposition::{CellDecomposition, CellExit};
 use super::cell_memory::{CellMemory, CellStage};
-use super::critical_turns::TurningPart;
 use super::disassembly::{Disassembly, Proof, Stop, Transition, joined};
-use super::groups::{GroupMemory, Groups};
+use super::groups::GroupMemory;
 use super::initial_analysis::InitialAnalysis;
 use super::inseparable::InseparablePairs;
 use super::invalidation::Invalidation;
@@ -49,7 +46,7 @@ use super::states::{PhaseStates, States};
 use super::strategy::Strategy;
 use super::sweep_memory::{BlockedSweep, SweepMemory};
 use super::trace::{PlanningPhase, TraceEvent};
-use super::unscrewing::{Unscrewed, UnscrewingMemory, unscrewed};
+use super::unscrewing::UnscrewingMemory;
 
 /// The results of a pass.
 #[derive(Debug, Clone, Copy, Default)]
@@ -104,7 +101,6 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
     let is_stuck = search.strategy.is_extended() && !search.disassembly.is_done();
     let free_together = if is_stuck { search.groups().free_together() } else { Vec::new() };
     let outcome = search.disassembly.outcome(stop, search.order.into_inseparable(), blocked);
-    let base = base.filter(|base| outcome.remaining.contains(&base.part));
     Outcome { base, free_together, ..outcome }
 }
 
@@ -232,16 +228,6 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 return Ok(());
             }
         }
-    }
-
-    /// Looks for parts that never come apart, by one kind of proof after the other; true if there are new ones.
-    fn find_inseparable(&mut self) -> Result<bool, Stop> {
-        for find in InseparablePairs::PROOFS {
-            if self.order.find_inseparable(self.strategy, &self.disassembly, find)? {
-                return Ok(true);
-            }
-        }
-        Ok(false)
     }
 
     /// One run of Algorithm 1's `disassembly` over the open list.
@@ -372,147 +358,6 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             }
         }
         Ok(removed)
-    }
-
-    /// Takes a part out along a thread, if one leaves so; true if one does.
-    fn leave_along_threads(&mut self) -> Result<bool, Stop> {
-        if !self.strategy.is_extended() || !self.disassembly.problem.sweeps {
-            return Ok(false);
-        }
-        let open = self.expandable(PlanningPhase::Translation);
-        for part in self.order.parts(&self.of(PlanningPhase::Translation), &open) {
-            if self.unscrewing_memory.holds(part, self.disassembly.everything.standing()) {
-                continue;
-            }
-            let (started, verified) = (Instant::now(), self.disassembly.counters.verification);
-            let unscrewed = unscrewed(&mut self.disassembly, part)?;
-            let counters = &mut self.disassembly.counters;
-            // The verification of the ways counts as such.
-            counters.simulation += started.elapsed().saturating_sub(counters.verification - verified);
-            match unscrewed {
-                Ok(Unscrewed { verified: VerifiedPath { path, depth }, action }) => {
-                    self.disassembly.counters.sweeps += 1;
-                    let action = action.to_string();
-                    self.disassembly.trace(|| TraceEvent::Swept { state: 0, part, action });
-                    self.remove(part, path, depth)?;
-                    self.take_free_parts()?;
-                    return Ok(true);
-                }
-                Err(met) => self.unscrewing_memory.keep(part, met),
-            }
-        }
-        Ok(false)
-    }
-
-    /// Takes a group out as `leave` finds one; true if one leaves.
-    fn leave_together(
-        &mut self,
-        leave: impl FnOnce(&mut Groups<'_, 'a, 'o>) -> Result<Option<Vec<usize>>, Stop>,
-    ) -> Result<bool, Stop> {
-        if !self.disassembly.problem.groups || !self.strategy.is_extended() || self.disassembly.is_done() {
-            return Ok(false);
-        }
-        let left = leave(&mut self.groups())?;
-        for &part in left.iter().flatten() {
-            self.states.remove(part);
-        }
-        self.take_free_parts()?;
-        Ok(left.is_some())
-    }
-
-    fn groups(&mut self) -> Groups<'_, 'a, 'o> {
-        let Self { disassembly, states, order, actions, group_memory, .. } = self;
-        let ActionList { all, common, .. } = &actions.translations;
-        Groups {
-            disassembly,
-            states,
-            inseparable: order.inseparable(),
-            translations: &all[..*common],
-            memory: group_memory,
-            search: |problem, observer| sbdp(problem, observer, true),
-        }
-    }
-
-    /// Takes a part out through the cells of its places, if any leaves them; true if one does.
-    fn leave_by_cells(&mut self, stage: CellStage) -> Result<bool, Stop> {
-        if !self.strategy.is_extended() {
-            return Ok(false);
-        }
-        let open = self.expandable(PlanningPhase::Translation);
-        for part in self.order.parts(&self.of(PlanningPhase::Translation), &open) {
-            let is_start = |&node: &usize| {
-                let node = &self.states.nodes[node];
-                node.part == part && (stage == CellStage::Last || !self.is_turned(node))
-            };
-            let starts: Vec<usize> = open.iter().copied().filter(is_start).collect();
-            let known = self.cell_memory.holds(part, stage, &starts, self.disassembly.everything.standing());
-            if !known && self.leaves_by_cells(part, stage, starts)? {
-                self.take_free_parts()?;
-                return Ok(true);
-            }
-        }
-        Ok(false)
-    }
-
-    fn is_turned(&self, node: &StateNode) -> bool {
-        node.pose().rotation.angle_to(&self.disassembly.assembled(node.part).rotation) > TURNED
-    }
-
-    fn leaves_by_cells(&mut self, part: usize, stage: CellStage, starts: Vec<usize>) -> Result<bool, Stop> {
-        let started = Instant::now();
-        let standing = self.disassembly.surroundings(part);
-        let Problem { scene, termination, .. } = &self.disassembly.problem;
-        let (scene, termination) = (scene.clone(), termination.clone());
-        let ways = self.ways_to_cells(part, stage, &starts, &standing)?;
-        let poses = ways.iter().enumerate().map(|(i, way)| (i, way[way.len() - 1]));
-        let mut coordinates = std::mem::take(&mut self.cell_memory.coordinates);
-        let axes = self.actions.axes();
-        let most = stage.most_edges();
-        let mut search = CellDecomposition::new(&scene, &standing, part, axes, &mut coordinates, most, poses);
-        let (mut leaves, mut tries) = (false, 0);
-        while !leaves && tries < REFINEMENTS {
-            let Some(CellExit { start, way, action }) = search.next_exit(&termination)? else { break };
-            tries += 1;
-            let run = Transition { part, start: way[way.len() - 1], action };
-            let Some(Sweep::Clear { path, .. }) = self.disassembly.sweep(&[run])?.pop().flatten() else {
-                continue;
-            };
-            let prefix = joined(&ways[start], &way);
-            if let Ok(VerifiedPath { path, depth }) = self.disassembly.prove_sweep(&run, &prefix, &path)? {
-                self.remove(part, path, depth)?;
-                leaves = true;
-            }
-        }
-        let (cells, met) = search.ended();
-        self.cell_memory.coordinates = coordinates;
-        self.cell_memory.keep(part, stage, starts, met);
-        self.disassembly.counters.simulation += started.elapsed();
-        tracing::debug!(part, cells, leaves, "cells searched");
-        self.disassembly.trace(|| TraceEvent::CellsSearched { part, cells, leaves });
-        Ok(leaves)
-    }
-
-    /// The paths of a part from its assembled pose to where a search of cells begins.
-    fn ways_to_cells(
-        &self,
-        part: usize,
-        stage: CellStage,
-        starts: &[usize],
-        standing: &StandingParts,
-    ) -> Result<Vec<Vec<Pose>>, Interrupt> {
-        let paths = starts.iter().map(|&node| &self.states.nodes[node].path);
-        if stage != CellStage::AfterCriticalTurn {
-            return Ok(paths.cloned().collect());
-        }
-        let paths: Vec<&Vec<Pose>> = paths.take(STARTS_TURNED).collect();
-        let starts: Vec<Pose> = paths.iter().map(|path| path[path.len() - 1]).collect();
-        let axes = self.actions.axes();
-        let turning = TurningPart::new(&self.disassembly.problem, standing, part, axes, &starts);
-        let mut ways = Vec::new();
-        for (path, start) in paths.into_iter().zip(&starts) {
-            ways.extend(turning.ways_from(start)?.iter().map(|turn| joined(path, turn)));
-        }
-        Ok(ways)
     }
 
     /// Verifies a path that a sweep claims to be clear, and takes the part out if it holds.

@@ -38,7 +38,6 @@ pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
         releases_base: false,
         targets: None,
         is_group: false,
-        groups: true,
         effort: Effort::All,
         actions: ActionSet::Paper,
         static_analysis: StaticAnalysis::default(),

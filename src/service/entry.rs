@@ -251,7 +251,6 @@ impl Entry {
             releases_base: false,
             targets: request.targets.clone(),
             is_group: false,
-            groups: true,
             effort: Effort::All,
             actions: request.actions,
             static_analysis: request.static_analysis,

@@ -7,13 +7,10 @@ use nalgebra::Vector3;
 use super::ViewError;
 use crate::geometry::Waypoint;
 use crate::plan::export::{PlanDocument, SCHEMA, StepDocument};
-use crate::plan::{Placements, PlanKind};
+use crate::plan::{MOTION_ROUNDING, Placements, PlanKind};
 
 /// Quaternions of waypoints are this close to unit length.
 const UNIT: f64 = 1e-3;
-/// A path begins where its parts stand: the vector of its quaternion there is smaller than this, and its translation
-/// than this share of the path's largest.
-const ROUNDING: f64 = 1e-9;
 /// Coordinates of waypoints are smaller: squares of single floats must be finite.
 const FURTHEST: f64 = 1e18;
 
@@ -109,8 +106,8 @@ fn check_start(kind: PlanKind, step: &StepDocument) -> Result<(), String> {
     };
     let Some([shift @ .., _, i, j, k]) = waypoint else { return Ok(()) };
     let largest = step.path.iter().flat_map(|w| &w[..3]).fold(0.0, |a: f64, x| a.max(x.abs()));
-    let is_shifted = shift.iter().any(|x| x.abs() > ROUNDING * largest);
-    if is_shifted || [i, j, k].iter().any(|x| x.abs() > ROUNDING) {
+    let is_shifted = shift.iter().any(|x| x.abs() > MOTION_ROUNDING * largest);
+    if is_shifted || [i, j, k].iter().any(|x| x.abs() > MOTION_ROUNDING) {
         return Err(format!("has a {what} waypoint other than the identity"));
     }
     Ok(())

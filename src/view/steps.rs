@@ -63,7 +63,7 @@ impl StepAccount<'_> {
         }
     }
 
-    /// Runs of steps that are told as one: of single parts of the same body.
+    /// Runs of steps that become one instruction: each moves a single part, all out of the same body.
     fn runs(&self) -> Vec<Vec<usize>> {
         let mut runs: Vec<Vec<usize>> = Vec::new();
         for (i, step) in self.plan.steps.iter().enumerate() {

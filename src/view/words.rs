@@ -21,7 +21,8 @@ const NEARLY: f64 = 0.9994;
 const SLIGHT: f64 = 0.03;
 /// … and no more than so many.
 const MOST: usize = 3;
-/// At most this many names are told, and the rest counted.
+/// Count of names in a sentence; more are counted, since a longer list hides the verb. At half a row of four screws is not
+/// named; at double a sentence fills two lines.
 const MOST_NAMES: usize = 6;
 
 /// One move of a part, as it is told.
@@ -125,7 +126,7 @@ pub(super) struct Words<'a> {
     kind: PlanKind,
 }
 
-/// What a step moves, as it is told.
+/// The subject of a sentence: what a step moves.
 pub(super) struct Moved {
     what: String,
     /// It is several parts.

@@ -11,7 +11,7 @@ pub enum PlanStatus {
     Complete,
     /// A budget ran out; the steps are the best so far.
     Partial,
-    /// It is proved that some parts cannot come off one at a time.
+    /// It is proved that some parts cannot come off.
     Infeasible,
     /// The deadline passed.
     Timeout,
@@ -52,7 +52,7 @@ pub struct Blocked {
     pub action: String,
 }
 
-/// Parts that could leave together where none leaves alone.
+/// Parts that can begin to move together where nothing leaves.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeGroup {
     /// The parts.
@@ -110,7 +110,7 @@ pub struct Summary {
     pub remaining: Vec<u32>,
     /// Groups that left together and were not taken apart: nobody asked for it, or no way was found.
     pub kept_together: Vec<Vec<u32>>,
-    /// Where nothing leaves any more: groups that could.
+    /// Where nothing leaves any more: groups that can begin to move.
     pub free_together: Vec<FreeGroup>,
     /// Parts that began elsewhere than where their mesh was given, and where: the rigid motion of the mesh. Parts of an assembly plan that wait are among them.
     pub poses: Vec<(u32, Waypoint)>,

@@ -99,6 +99,38 @@ fn threaded_nut(ridge: &Ridge, low: f64, high: f64) -> Solid {
     solid
 }
 
+/// A block with a pin through it in a box, in a sleeve that is open at one end: nothing but groups leaves at first.
+pub(super) fn pinned_block() -> Assembly {
+    let sleeve =
+        grid(&[[[-30.0, -21.0, -25.0], [30.0, 30.0, 25.0]]], &[[[-20.5, -20.5, -15.5], [20.5, 30.0, 10.5]]]);
+    let housing =
+        grid(&[[[-20.0, -20.0, -15.0], [20.0, 20.0, 10.0]]], &[[[-15.0, -15.0, -10.0], [15.0, 15.0, 10.0]]]);
+    let block =
+        grid(&[[[-14.0, -14.0, -10.0], [14.0, 14.0, 9.0]]], &[[[-14.0, -4.0, -4.0], [14.0, 4.0, 4.0]]]);
+    let pin = grid(&[[[-14.0, -3.5, -3.5], [14.0, 3.5, 3.5]]], &[]);
+    Assembly::new("pinned-block", "box, block and pin leave the sleeve together, block and pin the box")
+        .with("sleeve", sleeve)
+        .with("box", housing)
+        .with("block", block)
+        .with("pin", pin)
+        .on("sleeve")
+}
+
+/// A pin in a blind hole under a slider that stays in its channel.
+pub(super) fn covered_pin() -> Assembly {
+    let housing = grid(
+        &[[[0.0, 0.0, 0.0], [80.0, 40.0, 30.0]]],
+        &[[[10.0, 10.0, 10.0], [70.0, 30.0, 20.0]], [[14.0, 15.0, 5.0], [24.0, 25.0, 30.0]]],
+    );
+    let slider = grid(&[[[10.5, 10.5, 10.5], [30.0, 29.5, 19.5]]], &[]);
+    let pin = grid(&[[[15.0, 16.0, 5.5], [23.0, 24.0, 9.5]]], &[]);
+    Assembly::new("covered-pin", "the slider is moved aside and stays, then the pin leaves")
+        .with("housing", housing)
+        .with("slider", slider)
+        .with("pin", pin)
+        .on("housing")
+}
+
 /// Two closed rings, linked.
 pub(super) fn linked_rings() -> Assembly {
     let flat = ring(5.0, 2.0, 24, 12);

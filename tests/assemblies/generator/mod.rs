@@ -45,6 +45,8 @@ pub(crate) fn all_files() -> Vec<(String, Vec<u8>)> {
         machines::threaded_bolt_and_nut(),
         machines::linked_rings(),
         machines::bolted_bracket_20(),
+        machines::pinned_block(),
+        machines::covered_pin(),
     ];
     let mut files: Vec<_> = assemblies.iter().flat_map(formats::obj_folder).collect();
     files.extend(formats::translated_folder(&machines::bolt_washer_plate()));
