@@ -1,15 +1,15 @@
 //! Puzzles with exactly known answers: random partitions of a box into polycubes.
 //!
-//! The pieces fill the box without play, so each moves along the axes by whole cells or not at all, and a search over
-//! these shifts says whether a piece comes out of the others. Taking out whatever comes out is exact: a piece that is
-//! gone is in nobody's way.
+//! The pieces fill the box without play, so they move along the axes by whole cells or not at all (of a way by parts of a
+//! cell, the coordinates rounded down are one as well), and a search over the shifts of all pieces says which come apart.
+//! Only turns are beyond it.
 
 use std::collections::{BTreeSet, HashSet};
 
 use nalgebra::UnitQuaternion;
 use proptest::prelude::*;
 use sbdp::geometry::{SourceAssembly, SourceMesh, SourcePart};
-use sbdp::plan::PlanStatus;
+use sbdp::plan::{MotionKind, Plan, PlanStatus};
 use sbdp::search::{PlanRequest, PlanSink, Progress};
 use sbdp::service::Service;
 use sbdp::termination::Termination;
@@ -49,36 +49,74 @@ fn pieces(count: usize, choices: &[usize]) -> Vec<BTreeSet<Cell>> {
     pieces
 }
 
-/// Whether a piece, shifted by whole cells, comes out of those that stand.
-fn comes_out(piece: &BTreeSet<Cell>, standing: &HashSet<Cell>) -> bool {
-    let (mut seen, mut open) = (HashSet::from([[0; 3]]), vec![[0; 3]]);
-    while let Some(shift) = open.pop() {
-        if shift.iter().any(|x: &i32| x.abs() >= SIDE) {
-            return true;
-        }
-        for step in STEPS {
-            let next = plus(shift, step);
-            let is_free = piece.iter().all(|&cell| !standing.contains(&plus(cell, next)));
-            if is_free && seen.insert(next) {
-                open.push(next);
+/// Where pieces stand: how far each was shifted.
+type Shifts = Vec<Cell>;
+
+/// Whether some of the pieces (the bits of `moved`) overlap others that stand.
+fn overlap(pieces: &[&BTreeSet<Cell>], shifts: &Shifts, moved: usize) -> bool {
+    let cells = |is_moved: usize| {
+        let numbers = (0..pieces.len()).filter(move |n| moved >> n & 1 == is_moved);
+        numbers.flat_map(|n| pieces[n].iter().map(move |&cell| plus(cell, shifts[n])))
+    };
+    let standing: HashSet<Cell> = cells(0).collect();
+    cells(1).any(|cell| standing.contains(&cell))
+}
+
+/// Two groups that pieces come apart into, by any shifts of any groups of them one after the other, as the bits of one
+/// group; 0 if they never do.
+fn separated(pieces: &[&BTreeSet<Cell>]) -> usize {
+    let start = vec![[0; 3]; pieces.len()];
+    let (mut seen, mut open) = (HashSet::from([start.clone()]), vec![start]);
+    while let Some(shifts) = open.pop() {
+        // The last piece stays: of two groups that part, it does not matter which moves.
+        for (moved, step) in (1..1 << (pieces.len() - 1)).flat_map(|moved| STEPS.map(|step| (moved, step))) {
+            let shifted = |by: i32| -> Shifts {
+                let shift = |(n, &at): (usize, &Cell)| {
+                    if moved >> n & 1 == 1 { plus(at, step.map(|x| x * by)) } else { at }
+                };
+                shifts.iter().enumerate().map(shift).collect()
+            };
+            // In the box, everything is within its side of everything; outside, pieces stay within reach of each other.
+            let reach = 2 * SIDE * pieces.len() as i32;
+            let free = (1..=reach).take_while(|&by| !overlap(pieces, &shifted(by), moved)).count() as i32;
+            if free == reach {
+                return moved;
+            }
+            if free > 0 && seen.insert(shifted(1)) {
+                open.push(shifted(1));
             }
         }
     }
-    false
+    0
 }
 
-/// The pieces that stay when whatever comes out is taken out.
-fn remaining(pieces: &[BTreeSet<Cell>]) -> Vec<usize> {
-    let mut left: Vec<usize> = (0..pieces.len()).collect();
-    let others = |left: &[usize], piece: usize| -> HashSet<Cell> {
-        left.iter().filter(|&&p| p != piece).flat_map(|&p| pieces[p].iter().copied()).collect()
-    };
-    while left.len() > 1
-        && let Some(out) = left.iter().position(|&p| comes_out(&pieces[p], &others(&left, p)))
-    {
-        left.remove(out);
+/// The pieces in groups that do not come apart. Where one way apart ends does not depend on the way: pieces that never
+/// part among themselves do not part among more.
+fn inseparable(pieces: &[BTreeSet<Cell>]) -> Vec<Vec<usize>> {
+    let (mut open, mut found) = (vec![(0..pieces.len()).collect::<Vec<_>>()], Vec::new());
+    while let Some(group) = open.pop() {
+        let bits = separated(&group.iter().map(|&n| &pieces[n]).collect::<Vec<_>>());
+        if bits == 0 {
+            found.push(group);
+            continue;
+        }
+        let side = |side: usize| {
+            group.iter().enumerate().filter(|(i, _)| bits >> i & 1 == side).map(|(_, &n)| n).collect()
+        };
+        open.extend([side(0), side(1)]);
     }
-    left
+    found.sort();
+    found
+}
+
+/// The groups that a plan leaves together, single parts among them.
+fn left_together(plan: &Plan) -> Vec<Vec<usize>> {
+    let together: Vec<&Vec<usize>> = plan.kept_together.iter().chain([&plan.remaining]).collect();
+    let alone = (0..plan.parts.len()).filter(|n| !together.iter().any(|group| group.contains(n)));
+    let mut groups: Vec<Vec<usize>> = alone.map(|n| vec![n]).collect();
+    groups.extend(together.into_iter().cloned());
+    groups.sort();
+    groups
 }
 
 /// Whether a surface around the cells is a manifold: around no corner of the grid two cells, or two gaps, touch along an
@@ -159,8 +197,12 @@ proptest! {
         let service = Service::default();
         let id = service.admit(&assembly).unwrap().id;
         let plan = service.plan(id, &PlanRequest::default(), &Termination::default(), &mut Silent).unwrap();
-        let left = remaining(&pieces);
-        prop_assert_eq!(plan.remaining.len(), left.len(), "{:?} of {:?}", plan.reason, pieces);
-        prop_assert_eq!(plan.status == PlanStatus::Complete, left.len() == 1);
+        let (left, exact) = (left_together(&plan), inseparable(&pieces));
+        prop_assert_eq!(plan.status == PlanStatus::Complete, left.len() == pieces.len());
+        let is_within = |group: &Vec<usize>| exact.iter().any(|g| group.iter().all(|n| g.contains(n)));
+        prop_assert!(left.iter().all(is_within), "{:?}, not {:?}: {:?} of {:?}", left, exact, plan.reason, pieces);
+        if plan.steps.iter().all(|step| step.motion == MotionKind::Translation) {
+            prop_assert_eq!(left, exact, "{:?}", pieces);
+        }
     }
 }
