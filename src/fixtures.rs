@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use crate::geometry::{
     Assembly, Mesh, Pose, Shape, Solidity, SourceAssembly, SourceMesh, SourcePart, Surface, heal,
 };
-use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd, Verifier};
+use crate::plan::{Base, MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd, Verifier};
 use crate::scene::{CongruentPair, Scene};
 use crate::sdf::Field;
 use crate::termination::Termination;
@@ -304,7 +304,7 @@ pub(crate) fn plan_of(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
         poses: vec![],
         targets: None,
         fixed: vec![],
-        base: None,
+        base: Base::default(),
         steps,
         remaining: vec![],
         kept_together: vec![],

@@ -36,6 +36,7 @@ fn source(units: Option<&str>) -> SourceAssembly {
         units: units.map(str::to_owned),
         parts: vec![part("0"), part("10")],
         fixed: vec!["10".to_owned()],
+        ..SourceAssembly::default()
     }
 }
 

@@ -10,7 +10,7 @@ use common::{Boxes, HANG, connect};
 use sbdp::config::Config;
 use sbdp::daemon::Planning;
 use sbdp::geometry::{Revision, SourceAssembly};
-use sbdp::plan::{FreeGroup, MotionKind, Plan, PlanStats, PlanStatus, PlanStep, StepEnd};
+use sbdp::plan::{Base, FreeGroup, MotionKind, Plan, PlanStats, PlanStatus, PlanStep, StepEnd};
 use sbdp::search::{PlanRequest, PlanSink, Progress, Stage, Termination};
 use sbdp::service::{Admission, AssemblyId, ServiceError};
 use sbdp_client as client;
@@ -88,7 +88,7 @@ impl Planning for Scripted {
             poses: vec![],
             targets: None,
             fixed: vec![],
-            base: None,
+            base: Base::default(),
             steps,
             remaining: vec![],
             kept_together: vec![moved(1), moved(0)],

@@ -59,7 +59,7 @@ pub const PENALTY_PARAMETERS: [&str; 16] = [
     "newton-tolerance",
 ];
 
-/// Header of a plan request; three lists of u32 part numbers follow: fixed, removed, targets; then
+/// Header of a plan request; four lists of u32 part numbers follow: fixed, removed, targets, base; then
 /// [`MovedPart`]s: those that stand elsewhere, and those that wait at given places; then [`PenaltyRecord`]s.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
@@ -83,6 +83,8 @@ pub struct PlanRequestHeader {
     pub removed: u32,
     /// Parts that must come out.
     pub targets: u32,
+    /// Parts that stay as long as others leave.
+    pub base: u32,
     /// Parts that stand elsewhere than in the assembly.
     pub moved: u32,
     /// Parts of an assembly plan that wait at given places; the others are laid out.
@@ -91,6 +93,8 @@ pub struct PlanRequestHeader {
     pub static_analysis: u32,
     /// Parameters of the engine `penalty` that differ from the paper's.
     pub penalty: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
     /// CLOCK_MONOTONIC nanoseconds; 0 for none.
     pub deadline_ns: u64,
     /// Simulations after which to give up; `u64::MAX` for no limit.
@@ -181,11 +185,11 @@ pub struct StepsHeader {
 }
 
 const _: () = {
-    assert!(size_of::<PlanRequestHeader>() == 120 && align_of::<PlanRequestHeader>() == 8);
+    assert!(size_of::<PlanRequestHeader>() == 128 && align_of::<PlanRequestHeader>() == 8);
     assert!(offset_of!(PlanRequestHeader, planner) == 32);
-    assert!(offset_of!(PlanRequestHeader, moved) == 64);
-    assert!(offset_of!(PlanRequestHeader, static_analysis) == 72);
-    assert!(offset_of!(PlanRequestHeader, deadline_ns) == 80);
+    assert!(offset_of!(PlanRequestHeader, moved) == 68);
+    assert!(offset_of!(PlanRequestHeader, static_analysis) == 76);
+    assert!(offset_of!(PlanRequestHeader, deadline_ns) == 88);
     assert!(size_of::<PenaltyRecord>() == 16 && offset_of!(PenaltyRecord, value) == 8);
     assert!(size_of::<MovedPart>() == 64 && offset_of!(MovedPart, motion) == 8);
     assert!(size_of::<StepRecord>() == 72 && align_of::<StepRecord>() == 8);
@@ -248,6 +252,8 @@ pub struct PlanRequest {
     pub removed: Vec<u32>,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<u32>>,
+    /// Parts that stay as long as others leave; if there are none, the daemon chooses one.
+    pub base: Vec<u32>,
     /// Parts that stand elsewhere than in the assembly.
     pub moved: Vec<MovedPart>,
     /// An assembly plan is wanted, with parts that begin there.
@@ -281,18 +287,20 @@ impl PlanRequest {
             fixed: self.fixed.len() as u32,
             removed: self.removed.len() as u32,
             targets: targets.len() as u32,
+            base: self.base.len() as u32,
             moved: self.moved.len() as u32,
             staged: staged.len() as u32,
             static_analysis: self.static_analysis,
             penalty: self.penalty.len() as u32,
+            reserved: 0,
             deadline_ns: self.deadline_ns.unwrap_or(0),
             max_simulations: self.max_simulations.unwrap_or(u64::MAX),
             path_timeout_ns: self.path_timeout_ns.unwrap_or(u64::MAX),
             planning_timeout_ns: self.planning_timeout_ns.unwrap_or(u64::MAX),
             seed: self.seed,
         });
-        writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.moved).array(staged);
-        writer.array(&self.penalty);
+        writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.base);
+        writer.array(&self.moved).array(staged).array(&self.penalty);
         writer.finish()
     }
 
@@ -306,6 +314,7 @@ impl PlanRequest {
         let fixed = reader.array::<u32>("fixed", u64::from(h.fixed))?.to_vec();
         let removed = reader.array::<u32>("removed", u64::from(h.removed))?.to_vec();
         let targets = reader.array::<u32>("targets", u64::from(h.targets))?.to_vec();
+        let base = reader.array::<u32>("base", u64::from(h.base))?.to_vec();
         let moved = reader.array::<MovedPart>("moved", u64::from(h.moved))?.to_vec();
         let staged = reader.array::<MovedPart>("staged", u64::from(h.staged))?.to_vec();
         let penalty = reader.array::<PenaltyRecord>("penalty", u64::from(h.penalty))?.to_vec();
@@ -344,6 +353,7 @@ impl PlanRequest {
             fixed,
             removed,
             targets: set(PLAN_HAS_TARGETS).then_some(targets),
+            base,
             moved,
             assembly: set(PLAN_ASSEMBLY).then_some(if set(PLAN_NO_STAGING) {
                 Staging::None

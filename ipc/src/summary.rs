@@ -16,6 +16,8 @@ pub const SUMMARY_HAS_UNITS: u32 = 2;
 pub const SUMMARY_HAS_TARGETS: u32 = 4;
 /// It is an assembly plan.
 pub const SUMMARY_ASSEMBLY: u32 = 8;
+/// The base was chosen, and why is given.
+pub const SUMMARY_HAS_BASE_REASON: u32 = 16;
 
 /// A warning about the assembly as a whole, not about a part.
 pub const NO_PART: u32 = u32::MAX;
@@ -86,7 +88,7 @@ pub struct SummaryHeader {
     pub text_bytes: u32,
     /// Parts that began elsewhere ([`MovedPart`]).
     pub poses: u32,
-    /// The part that the rest is taken off, or [`NO_PART`].
+    /// Parts that the rest is taken off (u32).
     pub base: u32,
     /// Groups that left together and were not taken apart ([`GroupRecord`]).
     pub kept_together: u32,
@@ -102,7 +104,7 @@ pub struct SummaryHeader {
     pub engine: Text,
     /// The unit of length.
     pub units: Text,
-    /// Why the base was chosen.
+    /// Why the base was chosen; empty where the request gave it.
     pub base_reason: Text,
     /// Counters and times.
     pub stats: Stats,
@@ -214,8 +216,8 @@ pub struct SummaryParts<'a> {
     pub targets: Option<Vec<u32>>,
     /// Fixed parts.
     pub fixed: Vec<u32>,
-    /// The part that the rest is taken off, and why it was chosen.
-    pub base: Option<(u32, &'a str)>,
+    /// The parts that the rest is taken off, and why they were chosen; without a reason where the request gave them.
+    pub base: (Vec<u32>, Option<&'a str>),
     /// Parts that remain.
     pub remaining: Vec<u32>,
     /// Groups that left together and were not taken apart.
@@ -267,7 +269,7 @@ impl SummaryParts<'_> {
             remaining: self.remaining.len() as u32,
             blockers: blockers.len() as u32,
             poses: self.poses.len() as u32,
-            base: self.base.map_or(NO_PART, |(part, _)| part),
+            base: self.base.0.len() as u32,
             kept_together: kept.len() as u32,
             free_together: free.len() as u32,
             group_parts: group_parts.len() as u32,
@@ -275,13 +277,14 @@ impl SummaryParts<'_> {
             planner: texts.add(self.planner),
             engine: texts.add(self.engine),
             units: texts.add(self.units.unwrap_or("")),
-            base_reason: texts.add(self.base.map_or("", |(_, reason)| reason)),
+            base_reason: texts.add(self.base.1.unwrap_or("")),
             text_bytes: texts.bytes().len() as u32,
             stats: self.stats,
         };
         let mut writer = Writer::default();
         writer.value(header).array(&names).array(&self.overlaps).array(&blocked).array(&warnings);
-        writer.array(&self.removed).array(targets).array(&self.fixed).array(&self.remaining);
+        writer.array(&self.removed).array(targets).array(&self.fixed).array(&self.base.0);
+        writer.array(&self.remaining);
         writer.array(&blockers).array(&self.poses).array(&kept).array(&free).array(&group_parts);
         writer.array(texts.bytes());
         writer.finish()
@@ -292,6 +295,7 @@ impl SummaryParts<'_> {
         flag(self.reason.is_some(), SUMMARY_HAS_REASON)
             | flag(self.units.is_some(), SUMMARY_HAS_UNITS)
             | flag(self.targets.is_some(), SUMMARY_HAS_TARGETS)
+            | flag(self.base.1.is_some(), SUMMARY_HAS_BASE_REASON)
             | flag(self.assembly, SUMMARY_ASSEMBLY)
     }
 }
@@ -307,6 +311,7 @@ pub struct SummaryView<'a> {
     removed: &'a [u32],
     targets: &'a [u32],
     fixed: &'a [u32],
+    base: &'a [u32],
     remaining: &'a [u32],
     blockers: &'a [u32],
     poses: &'a [MovedPart],
@@ -333,6 +338,7 @@ impl<'a> SummaryView<'a> {
             removed: reader.array("removed", u64::from(header.removed))?,
             targets: reader.array("targets", u64::from(header.targets))?,
             fixed: reader.array("fixed", u64::from(header.fixed))?,
+            base: reader.array("base", u64::from(header.base))?,
             remaining: reader.array("remaining", u64::from(header.remaining))?,
             blockers: reader.array("blockers", u64::from(header.blockers))?,
             poses: reader.array("poses", u64::from(header.poses))?,
@@ -368,12 +374,12 @@ impl<'a> SummaryView<'a> {
 
     fn check_part_numbers(&self) -> Result<(), Malformed> {
         let count = self.names.len();
-        let lists = [self.removed, self.targets, self.fixed, self.remaining, self.blockers, self.group_parts];
+        let Self { removed, targets, fixed, base, remaining, blockers, group_parts, .. } = *self;
+        let lists = [removed, targets, fixed, base, remaining, blockers, group_parts];
         let pairs = self.overlaps.iter().flat_map(|o| o.parts);
         let singles = self.blocked.iter().map(|b| b.part).chain(self.poses.iter().map(|p| p.part));
         let warned = self.warnings.iter().map(|w| w.part).filter(|p| *p != NO_PART);
-        let base = Some(self.header.base).filter(|p| *p != NO_PART);
-        let listed = lists.into_iter().flatten().copied().chain(base);
+        let listed = lists.into_iter().flatten().copied();
         match listed.chain(pairs).chain(singles).chain(warned).find(|p| *p as usize >= count) {
             Some(part) => Err(Malformed::OutOfRange { field: "part", value: u64::from(part) }),
             None => Ok(()),
@@ -426,11 +432,16 @@ impl<'a> SummaryView<'a> {
         self.optional(SUMMARY_HAS_UNITS, self.header.units)
     }
 
-    /// The part that the rest is taken off, and why it was chosen.
+    /// The parts that the rest is taken off.
     #[must_use]
-    pub fn base(&self) -> Option<(u32, &'a str)> {
-        let part = Some(self.header.base).filter(|part| *part != NO_PART)?;
-        Some((part, self.texts.get_checked(self.header.base_reason)))
+    pub fn base(&self) -> &'a [u32] {
+        self.base
+    }
+
+    /// Why the base was chosen; none where the request gave it.
+    #[must_use]
+    pub fn base_reason(&self) -> Option<&'a str> {
+        self.optional(SUMMARY_HAS_BASE_REASON, self.header.base_reason)
     }
 
     /// How many parts the assembly has.

@@ -1,4 +1,4 @@
-//! The bytes of every message of protocol 6, written down once. A change to one of them breaks clients that
+//! The bytes of every message of protocol 7, written down once. A change to one of them breaks clients that
 //! are out there: a new layout needs a new version in the service names.
 
 use sbdp_ipc::PROTOCOL;
@@ -94,12 +94,12 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
     assert_eq!((ErrorCode::Busy as u32, ErrorCode::Cancelled as u32), (3, 12));
     assert_eq!(
         (PROTOCOL, layout::PLAN_SERVICE, layout::GEOMETRY_SERVICE),
-        (6, "sbdp/v6/plan", "sbdp/v6/geometry")
+        (6, "sbdp/v7/plan", "sbdp/v7/geometry")
     );
-    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v6/progress");
+    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v7/progress");
     assert_eq!(
         (layout::WAKE_SERVER_SERVICE, layout::WAKE_CLIENT_SERVICE),
-        ("sbdp/v6/wake/server", "sbdp/v6/wake/client")
+        ("sbdp/v7/wake/server", "sbdp/v7/wake/client")
     );
 }
 
@@ -125,6 +125,7 @@ fn a_plan_request() {
         fixed: vec![1, 2, 3],
         removed: vec![4],
         targets: Some(vec![5, 6]),
+        base: vec![8],
         moved: vec![MovedPart { part: 7, reserved: 0, motion: POSE }],
         assembly: None,
     };
@@ -133,16 +134,16 @@ fn a_plan_request() {
         &request.encode(),
         "\
          abababababababab*4 0100000001000000 0100000097000000 0400000003000000 0100000002000000 \
-         0100000000000000 0100000001000000 0403020100000000 0900000000000000 0a00000000000000 \
+         0100000001000000 0000000001000000 0100000000000000 0403020100000000 0900000000000000 0a00000000000000 \
          0b00000000000000 0c00000000000000 0100000002000000 0300000000000000 0400000000000000 \
-         0500000006000000 0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf 000000000000f03f \
+         0500000006000000 0800000000000000 0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf 000000000000f03f \
          0000000000000000*3 0200000000000000 000000000000e03f",
     );
     assert_eq!(PlanRequest::decode(AlignedBytes::copy_of(&request.encode()).as_slice()), Ok(request));
     check(
         "plain plan request",
         &PlanRequest::default().encode(),
-        "0000000000000000*11 ffffffffffffffff*3 0000000000000000",
+        "0000000000000000*12 ffffffffffffffff*3 0000000000000000",
     );
 }
 
@@ -154,7 +155,7 @@ fn a_request_for_an_assembly_plan() {
         "assembly plan request",
         &request.encode(),
         "\
-         0000000000000000*5 0000000020000000 0000000000000000*2 0000000001000000 0000000000000000*2 \
+         0000000000000000*5 0000000020000000 0000000000000000*3 0100000000000000 0000000000000000*2 \
          ffffffffffffffff*3 0000000000000000 0700000000000000 000000000000f03f 0000000000000040 \
          000000000000e0bf 000000000000f03f 0000000000000000*3",
     );
@@ -162,7 +163,7 @@ fn a_request_for_an_assembly_plan() {
     check(
         "assembly plan request without staging",
         &request.encode(),
-        "0000000000000000*5 0000000060000000 0000000000000000*5 ffffffffffffffff*3 0000000000000000",
+        "0000000000000000*5 0000000060000000 0000000000000000*6 ffffffffffffffff*3 0000000000000000",
     );
 }
 
@@ -211,7 +212,7 @@ fn a_summary() {
         removed: vec![0],
         targets: Some(vec![1]),
         fixed: vec![],
-        base: Some((0, "big")),
+        base: (vec![0], Some("big")),
         remaining: vec![1],
         kept_together: vec![vec![0, 1]],
         free_together: vec![(vec![1], [0.0, 0.0, 1.0])],
@@ -238,15 +239,15 @@ fn a_summary() {
         "summary",
         &bytes,
         "\
-         020000000f000000 0200000002000000 0100000001000000*2 0100000000000000 0100000001000000 \
-         1000000001000000 0000000001000000 0100000003000000 0600000003000000 0900000001000000 0a00000001000000 \
+         020000001f000000 0200000002000000 0100000001000000*2 0100000000000000 0100000001000000 \
+         1000000001000000 0100000001000000 0100000003000000 0600000003000000 0900000001000000 0a00000001000000 \
          0b00000002000000 0d00000003000000 \
          0100000000000000 0200000000000000 0300000000000000 0400000000000000 000000000000e03f*5 \
          0500000000000000 0600000000000000 0800000000000000 0700000000000000 0100000000000000 \
          0000000001000000 \
          0100000002000000 0000000001000000 000000000000d03f 0100000000000000 0100000003000000 \
-         0200000000000000 ffffffff05000000 0100000000000000 0000000000000000 0100000000000000*2 \
-         0000000000000000 0100000000000000 000000000000f03f 0000000000000040 000000000000e0bf \
+         0200000000000000 ffffffff05000000 0100000000000000 0000000000000000 0100000000000000 \
+         0000000000000000 0100000000000000 0000000000000000 0100000000000000 000000000000f03f 0000000000000040 000000000000e0bf \
          000000000000f03f 0000000000000000*3 \
          0000000002000000 0000000000000000*3 0200000001000000 0000000000000000*2 000000000000f03f \
          0000000001000000 0100000000000000 6162632b78777768 7970656d6d626967",

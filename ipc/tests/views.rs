@@ -67,7 +67,7 @@ fn summary() -> Vec<u8> {
         removed: vec![0],
         targets: Some(vec![]),
         fixed: vec![1],
-        base: Some((1, "it is the largest")),
+        base: (vec![1], Some("it is the largest")),
         remaining: vec![1, 2],
         kept_together: vec![vec![0, 2], vec![1, 2]],
         free_together: vec![(vec![0, 1], [0.0, 0.6, 0.8])],
@@ -174,6 +174,7 @@ fn a_summary_carries_everything_of_a_plan_but_its_steps() {
     assert_eq!((view.planner(), view.engine(), view.units()), ("sbdp-star", "sliding", Some("mm")));
     assert_eq!(view.part_names().collect::<Vec<_>>(), ["0", "1", "größer"]);
     assert_eq!((view.removed(), view.targets(), view.fixed()), (&[0][..], Some(&[][..]), &[1][..]));
+    assert_eq!((view.base(), view.base_reason()), (&[1][..], Some("it is the largest")));
     assert_eq!((view.remaining(), view.overlaps()[0].depth), (&[1, 2][..], 0.25));
     let blocked: Vec<_> = view.blocked().collect();
     assert_eq!((blocked[0].part, blocked[0].by, blocked[0].action), (2, &[0, 1][..], "+x"));
@@ -193,6 +194,7 @@ fn a_summary_that_names_a_part_out_of_range_is_refused() {
     };
     assert!(!is_refused(SummaryParts { kept_together: vec![vec![0]], ..SummaryParts::default() }));
     assert!(is_refused(SummaryParts { remaining: vec![1], ..SummaryParts::default() }));
+    assert!(is_refused(SummaryParts { base: (vec![1], None), ..SummaryParts::default() }));
     assert!(is_refused(SummaryParts { kept_together: vec![vec![0], vec![1]], ..SummaryParts::default() }));
     assert!(is_refused(SummaryParts { free_together: vec![(vec![1], [0.0; 3])], ..SummaryParts::default() }));
 }
@@ -205,6 +207,7 @@ fn requests_errors_and_status_come_back() {
         deadline_ns: Some(12),
         max_simulations: Some(0),
         fixed: vec![1, 2, 3],
+        base: vec![4],
         targets: Some(vec![]),
         moved: vec![moved_part()],
         static_analysis: 1,
@@ -250,6 +253,7 @@ fn requests_errors_and_status_come_back() {
 fn messages() -> Vec<Vec<u8>> {
     let request = PlanRequest {
         fixed: vec![1, 2],
+        base: vec![4],
         penalty: vec![PenaltyRecord { parameter: 0, reserved: 0, value: 1.0 }],
         targets: Some(vec![3]),
         moved: vec![moved_part()],

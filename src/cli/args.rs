@@ -116,6 +116,9 @@ pub(super) struct PlanArguments {
     /// A part that may not move (repeatable)
     #[arg(long, value_name = "PART")]
     pub(super) fixed: Vec<String>,
+    /// A part that stays as long as others leave: what the rest is taken off (repeatable) [default: chosen]
+    #[arg(long, value_name = "PART")]
+    pub(super) base: Vec<String>,
     /// A part that is gone already (repeatable)
     #[arg(long, value_name = "PART")]
     pub(super) removed: Vec<String>,

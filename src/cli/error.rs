@@ -36,7 +36,9 @@ impl From<GeometryError> for CliError {
 impl From<ServiceError> for CliError {
     fn from(error: ServiceError) -> Self {
         match error {
-            ServiceError::Geometry(_) | ServiceError::NoSuchPart { .. } => Self::Refused(error.to_string()),
+            ServiceError::Geometry(_)
+            | ServiceError::NoSuchPart { .. }
+            | ServiceError::TargetStays { .. } => Self::Refused(error.to_string()),
             // The stages behind the service may come to name other failures.
             other => Self::Failed(other.to_string()),
         }

@@ -93,6 +93,7 @@ fn source(arguments: &PlanArguments, content: String) -> SourceDocument {
 fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanRequest, CliError> {
     let fixed = [&assembly.fixed[..], &arguments.fixed[..]].concat();
     let targets = resolve(assembly, "--target", &arguments.target)?;
+    let base = if arguments.base.is_empty() { &assembly.base } else { &arguments.base };
     let planner = Planner::from(arguments.planner);
     Ok(PlanRequest {
         planner,
@@ -108,6 +109,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         threads: arguments.threads as usize,
         fixed: resolve(assembly, "--fixed", &fixed)?,
         removed: resolve(assembly, "--removed", &arguments.removed)?,
+        base: resolve(assembly, "--base", base)?,
         targets: (!arguments.target.is_empty()).then_some(targets),
         assembly: arguments.together.then(|| staging(assembly, &arguments.staging)).transpose()?,
         no_cache: arguments.no_cache,

@@ -139,8 +139,9 @@ fn box_of(mesh: &SourceMesh, pose: &Pose) -> Bounds {
 }
 
 fn base(plan: &Plan) -> Vec<String> {
-    let line = |base: &Base| format!("{}: {}", plan.part_name(base.part), base.reason);
-    plan.base.iter().map(line).collect()
+    let Base { parts, reason } = &plan.base;
+    let reason = reason.as_deref().unwrap_or("as given");
+    if parts.is_empty() { Vec::new() } else { vec![format!("{}: {reason}", names(plan, parts))] }
 }
 
 fn remaining(plan: &Plan) -> Vec<String> {
@@ -273,7 +274,7 @@ mod tests {
             poses: vec![],
             targets: None,
             fixed: vec![],
-            base: Some(Base { part: 1, reason: "it is the largest".into() }),
+            base: Base { parts: vec![1], reason: Some("it is the largest".into()) },
             steps: vec![
                 step(0, MotionKind::Rotation, vec![start, half_turn]),
                 step(2, MotionKind::Translation, vec![start]),

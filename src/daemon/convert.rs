@@ -41,6 +41,7 @@ pub(crate) fn plan_request(
         fixed: indices(&request.fixed),
         removed: indices(&request.removed),
         targets: request.targets.as_deref().map(indices),
+        base: indices(&request.base),
         assembly: request.assembly.as_ref().map(staging),
         no_cache: request.no_cache,
     })
@@ -164,7 +165,7 @@ pub(crate) fn summary(plan: &Plan, spent: &PlanStats) -> Vec<u8> {
         removed: numbers(&plan.removed),
         targets: plan.targets.as_deref().map(numbers),
         fixed: numbers(&plan.fixed),
-        base: plan.base.as_ref().map(|base| (base.part as u32, base.reason.as_str())),
+        base: (numbers(&plan.base.parts), plan.base.reason.as_deref()),
         remaining: numbers(&plan.remaining),
         kept_together: plan.kept_together.iter().map(|group| numbers(group)).collect(),
         free_together: plan.free_together.iter().map(|g| (numbers(&g.parts), g.direction)).collect(),
@@ -234,6 +235,7 @@ pub(crate) fn source_assembly(bytes: &AlignedBytes) -> Result<SourceAssembly, Wi
         units: upload.units.map(str::to_owned),
         fixed: upload.fixed.iter().map(|n| (*n).to_owned()).collect(),
         parts: upload.parts.iter().map(source_part).collect(),
+        ..SourceAssembly::default()
     })
 }
 
@@ -250,6 +252,7 @@ pub(crate) fn service_error(error: &ServiceError) -> WireError {
     let code = match error {
         ServiceError::UnknownAssembly => ErrorCode::UnknownHandle,
         ServiceError::NoSuchPart { .. } => ErrorCode::NoSuchPart,
+        ServiceError::TargetStays { .. } => ErrorCode::Unsupported,
         ServiceError::Geometry(GeometryError::Interrupted(Interrupt::Cancelled)) => ErrorCode::Cancelled,
         ServiceError::Geometry(GeometryError::Interrupted(Interrupt::DeadlinePassed)) => ErrorCode::Expired,
         ServiceError::Geometry(_) => ErrorCode::Geometry,

@@ -34,6 +34,10 @@ pub struct SourceAssembly {
     pub parts: Vec<SourcePart>,
     /// Names of parts that the assembly's own description declares fixed.
     pub fixed: Vec<String>,
+    /// Names of parts that stay as long as others leave, if the description says so. They belong to questions about the
+    /// assembly, not to its content.
+    #[serde(skip)]
+    pub base: Vec<String>,
 }
 
 impl SourceAssembly {

@@ -88,13 +88,23 @@ pub struct FreeGroup {
     pub direction: [f64; 3],
 }
 
-/// The part that stays, and that the rest is taken off.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+/// The parts that stay, and that the rest is taken off.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Base {
-    /// The part.
-    pub part: usize,
-    /// Why it was chosen, in a few words.
-    pub reason: String,
+    /// The parts.
+    pub parts: Vec<usize>,
+    /// Why they were chosen, in a few words; none where the request gave them.
+    pub reason: Option<String>,
+}
+
+impl Base {
+    /// Those of its parts that are among some, ascending.
+    #[must_use]
+    pub fn among(&self, parts: &[usize]) -> Self {
+        let kept: Vec<usize> =
+            self.parts.iter().copied().filter(|part| parts.binary_search(part).is_ok()).collect();
+        if kept.is_empty() { Self::default() } else { Self { parts: kept, reason: self.reason.clone() } }
+    }
 }
 
 /// Why a part that remains did not move.
@@ -194,8 +204,9 @@ pub struct Plan {
     pub targets: Option<Vec<usize>>,
     /// Parts that may not move.
     pub fixed: Vec<usize>,
-    /// The part that the rest is taken off, or built up on; none where parts are fixed, or where it had to leave.
-    pub base: Option<Base>,
+    /// The parts that the rest is taken off, or built up on; none where parts are fixed and no others were given, or where
+    /// all others had to leave too.
+    pub base: Base,
     /// The removals, or insertions, in order.
     pub steps: Vec<PlanStep>,
     /// Parts that stand in the assembly in the end (of an assembly plan: from the start).

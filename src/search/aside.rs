@@ -39,7 +39,7 @@ pub(super) fn moved_aside<'a>(
         return Ok(None);
     }
     let scene = problem.scene.with_placed(&places_after(&problem.scene, &outcome.removals));
-    let base = outcome.base.as_ref().map(|base| base.part);
+    let base = outcome.base.clone();
     let spent = problem.spent + outcome.counters.simulations;
     let (present, earlier) = (outcome.remaining.clone(), outcome.removals.clone());
     let here = Problem { scene, present, base, releases_base: true, spent, earlier, ..problem.clone() };

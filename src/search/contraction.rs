@@ -3,6 +3,7 @@
 use nalgebra::{Translation3, Vector3};
 
 use crate::geometry::Pose;
+use crate::plan::Base;
 use crate::scene::StandingParts;
 use crate::simulation::{Action, Sweep, SweepQuestion, straight_sweep_past};
 use crate::termination::Interrupt;
@@ -46,7 +47,7 @@ impl<'a> Contraction<'a> {
             scene,
             present,
             fixed: rest,
-            base: None,
+            base: Base::default(),
             targets,
             is_group: true,
             earlier: Vec::new(),
@@ -92,6 +93,11 @@ impl<'a> Contraction<'a> {
 
     fn verified(&self, path: &[Pose]) -> Result<Option<VerifiedPath>, Interrupt> {
         Ok(self.problem.checked_path(&self.around.standing, self.body, path)?.ok())
+    }
+
+    /// The parts of the group.
+    pub(super) fn members(&self) -> &[usize] {
+        self.problem.scene.members(&self.body)
     }
 
     /// The body as it leaves.

@@ -490,6 +490,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             }
         };
         let (status, reason) = ended.unwrap_or_else(interrupted);
+        let base = self.problem.base.among(&remaining);
         let Counters { simulations, sweeps, .. } = self.counters;
         self.trace(|| TraceEvent::End {
             status: status.name().to_owned(),
@@ -506,7 +507,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             blocked: if status == PlanStatus::Complete { Vec::new() } else { few_of_each_part(blocked) },
             free_together: Vec::new(),
             removals: self.removals,
-            base: None,
+            base,
             counters: self.counters,
         }
     }

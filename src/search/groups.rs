@@ -54,9 +54,9 @@ pub(super) struct Groups<'s, 'a, 'o> {
     pub(super) search: Search,
 }
 
-impl Groups<'_, '_, '_> {
-    /// Takes out a group that leaves along a line; its parts, if there is one.
-    pub(super) fn leave_straight(&mut self) -> Result<Option<Vec<usize>>, Stop> {
+impl<'a> Groups<'_, 'a, '_> {
+    /// A group that leaves along a line, and its way.
+    pub(super) fn leave_straight(&mut self) -> Result<Option<(Contraction<'a>, VerifiedPath)>, Stop> {
         let standing = self.disassembly.everything.standing().to_vec();
         if self.memory.swept.as_ref() == Some(&standing) {
             return Ok(None);
@@ -70,17 +70,18 @@ impl Groups<'_, '_, '_> {
             let contraction = Contraction::new(&self.disassembly.problem, &standing, &group)?;
             let action = self.translations[direction];
             let way = self.disassembly.timed(|_| contraction.way_out(&[], &action))?;
-            if self.tried(&contraction, &group, way)? {
+            self.trace_tried(&group, way.is_some());
+            if let Some(way) = way {
                 self.disassembly.counters.sweeps += 1;
-                return Ok(Some(group));
+                return Ok(Some((contraction, way)));
             }
         }
         self.memory.swept = Some(standing);
         Ok(None)
     }
 
-    /// Takes out a group that a search with some effort finds a way for; its parts, if there is one.
-    pub(super) fn leave(&mut self, effort: Effort) -> Result<Option<Vec<usize>>, Stop> {
+    /// A group that a search with some effort finds a way for, and the way.
+    pub(super) fn leave(&mut self, effort: Effort) -> Result<Option<(Contraction<'a>, VerifiedPath)>, Stop> {
         let mut candidates: BTreeSet<Candidate> = BTreeSet::new();
         for direction in 0..self.translations.len() {
             candidates.extend(self.closures(&self.met_in(direction), direction));
@@ -107,8 +108,9 @@ impl Groups<'_, '_, '_> {
             let contraction = Contraction::new(&self.disassembly.problem, &standing, &group)?;
             let mut outcome = self.searched(&contraction, effort)?;
             let way = outcome.removals.pop().map(|r| VerifiedPath { path: r.path, depth: r.depth });
-            if self.tried(&contraction, &group, way)? {
-                return Ok(Some(group));
+            self.trace_tried(&group, way.is_some());
+            if let Some(way) = way {
+                return Ok(Some((contraction, way)));
             }
             self.memory.searched.insert(key);
             let free: BlockingGraph = vec![Some(Vec::new()); self.disassembly.problem.scene.bodies.len()];
@@ -123,20 +125,9 @@ impl Groups<'_, '_, '_> {
         Ok(None)
     }
 
-    /// Takes a group out along a way, if there is one; whether there is.
-    fn tried(
-        &mut self,
-        contraction: &Contraction<'_>,
-        group: &[usize],
-        way: Option<VerifiedPath>,
-    ) -> Result<bool, Stop> {
-        let leaves = way.is_some();
+    fn trace_tried(&mut self, group: &[usize], leaves: bool) {
         tracing::debug!(?group, leaves, "group tried");
         self.disassembly.trace(|| TraceEvent::GroupTried { parts: group.to_vec(), leaves });
-        if let Some(way) = way {
-            self.disassembly.remove_group(contraction.leaving(), way)?;
-        }
-        Ok(leaves)
     }
 
     /// A search for a way out of a group. It counts as a part of this one.
@@ -225,7 +216,7 @@ impl Groups<'_, '_, '_> {
         let Disassembly { problem, everything, .. } = &*self.disassembly;
         let is_rest = |part: &usize| group.binary_search(part).is_err();
         let rest: Vec<usize> = everything.standing().iter().copied().filter(is_rest).collect();
-        let has_base = |parts: &[usize]| problem.base.is_some_and(|base| parts.contains(&base));
+        let has_base = |parts: &[usize]| problem.base.parts.iter().any(|part| parts.contains(part));
         let rank = |parts: &[usize]| (has_base(parts), parts.len(), parts[0]);
         let may_move = |parts: &[usize]| parts.iter().all(|&part| problem.may_move(part));
         let is_tried = |parts: &[usize]| parts.len() == 1 && may_move(parts);
@@ -318,7 +309,7 @@ mod tests {
             let parts = pinned_block().into_iter().map(|mesh| moved(scale(mesh), &pose)).collect();
             let (outcome, events) = planned(parts, |problem| problem);
             assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
-            assert_eq!(outcome.base.as_ref().map(|base| base.part), Some(0));
+            assert_eq!(outcome.base.parts, [0]);
             let [group, inner] = &outcome.removals[..] else { panic!("{:?}", left(&outcome)) };
             assert_eq!((&group.parts[..], group.of, group.wave), (&[1, 2][..], None, 0));
             assert_eq!(

@@ -87,7 +87,6 @@ pub fn search(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observe
 /// A search, with parts moved aside where nothing leaves, and the groups that left taken apart.
 fn run(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
     let mut outcome = run_once(planner, problem.clone(), observer);
-    let base = outcome.base.clone();
     loop {
         let next = match aside::moved_aside(planner, &problem, &mut outcome, observer) {
             Ok(Some(next)) => next,
@@ -101,7 +100,6 @@ fn run(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> O
         outcome = run_once(planner, next, observer);
         outcome.counters.add(&counters);
     }
-    outcome.base = base.filter(|base| outcome.remaining.contains(&base.part));
     for group in 0..outcome.removals.len() {
         if outcome.removals[group].is_group() {
             subassembly::take_apart(planner, &problem, &mut outcome, group, observer);

@@ -191,8 +191,8 @@ pub struct Outcome {
     pub reason: Option<Reason>,
     /// Removals in order.
     pub removals: Vec<Removal>,
-    /// The part that the rest was taken off, if it was chosen.
-    pub base: Option<Base>,
+    /// The parts that the rest was taken off, and that did not leave.
+    pub base: Base,
     /// Parts that remain in the assembly, ascending.
     pub remaining: Vec<usize>,
     /// The parts that stand together where the search ended before it was done: those that remain, or those of a group.

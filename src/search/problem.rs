@@ -12,7 +12,7 @@ use crate::cache::RequestCache;
 use crate::contact::sampled::along_path::Penetration;
 use crate::contact::{PairPath, is_seen_to_enter};
 use crate::geometry::{Pose, SampleTree};
-use crate::plan::{KnownVerdicts, Verdict, VerdictQuestion, Verifier, thinned};
+use crate::plan::{Base, KnownVerdicts, Verdict, VerdictQuestion, Verifier, thinned};
 use crate::scene::Scene;
 use crate::simulation::{Action, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
@@ -71,8 +71,8 @@ pub struct Problem<'a> {
     pub present: Vec<usize>,
     /// Parts that may not move.
     pub fixed: Vec<usize>,
-    /// A part that stays as long as others leave.
-    pub base: Option<usize>,
+    /// Parts that stay as long as others leave.
+    pub base: Base,
     /// Whether the base may leave now, too.
     pub releases_base: bool,
     /// Parts that must come out; `None` for all.
@@ -146,7 +146,7 @@ impl Problem<'_> {
 
     /// Whether a part is a base that may not leave yet.
     fn keeps(&self, part: usize) -> bool {
-        self.base == Some(part) && !self.releases_base
+        self.base.parts.contains(&part) && !self.releases_base
     }
 
     /// Of the parts that remain, those that should come out.

@@ -154,6 +154,9 @@ pub struct PlanRequest {
     pub removed: Vec<usize>,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<usize>>,
+    /// Parts that stay as long as others leave: what the rest is taken off. With the extended actions, SBDP and SBDP* choose
+    /// one if there are none; for the other planners they are as fixed ones.
+    pub base: Vec<usize>,
     /// Set for an assembly plan (the disassembly reversed): where its parts begin.
     pub assembly: Option<Staging>,
     /// Whether the cache is neither read nor written.

@@ -19,6 +19,7 @@ mod stages;
 use std::collections::HashSet;
 use std::time::Instant;
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::blocking_graph::{Analysis, Blockage, StateGraphs};
@@ -74,6 +75,10 @@ struct Sbdp<'a, 'o> {
     unscrewing_memory: UnscrewingMemory,
     group_memory: GroupMemory,
     speculation: Speculation,
+    /// The direction in which most parts can go at first.
+    up: Vector3<f64>,
+    /// Parts that were the base until another one was.
+    former_bases: Vec<usize>,
 }
 
 /// Searches until everything asked for is out, nothing more can be found, or a limit is met. With the extended actions,
@@ -88,12 +93,12 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
         }
     };
     let problem = &mut disassembly.problem;
-    let is_extended = problem.actions == ActionSet::Extended;
-    // After parts were moved aside, the base is the same.
-    let is_first = problem.base.is_none() && problem.earlier.is_empty();
-    let base = if is_extended && is_first { problem.chosen_base(&initial.upward()) } else { None };
-    problem.base = base.as_ref().map(|base| base.part).or(problem.base);
-    let mut search = Sbdp::new(disassembly, initial, guided);
+    let up = initial.upward();
+    // Of a search that others came before, the base is known.
+    if problem.actions == ActionSet::Extended && problem.base.parts.is_empty() {
+        problem.base = problem.chosen_base(&problem.present, &up);
+    }
+    let mut search = Sbdp::new(disassembly, initial, up, guided);
     let stop = search.run().err();
     let (report, disassembly) = search.report();
     report.log(disassembly);
@@ -101,11 +106,16 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
     let is_stuck = search.strategy.is_extended() && !search.disassembly.is_done();
     let free_together = if is_stuck { search.groups().free_together() } else { Vec::new() };
     let outcome = search.disassembly.outcome(stop, search.order.into_inseparable(), blocked);
-    Outcome { base, free_together, ..outcome }
+    Outcome { free_together, ..outcome }
 }
 
 impl<'a, 'o> Sbdp<'a, 'o> {
-    fn new(mut disassembly: Disassembly<'a, 'o>, initial: InitialAnalysis, guided: bool) -> Self {
+    fn new(
+        mut disassembly: Disassembly<'a, 'o>,
+        initial: InitialAnalysis,
+        up: Vector3<f64>,
+        guided: bool,
+    ) -> Self {
         let InitialAnalysis { directions, translations, rotations, graphs, duration } = initial;
         disassembly.counters.static_analysis += duration;
         let strategy = Strategy::new(guided, disassembly.problem.actions);
@@ -121,6 +131,8 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             unscrewing_memory: UnscrewingMemory::default(),
             group_memory: GroupMemory::default(),
             speculation: Speculation::default(),
+            up,
+            former_bases: Vec::new(),
             disassembly,
         };
         for (part, StateGraphs { blockage, remembered }) in graphs.into_iter().enumerate() {
@@ -185,7 +197,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             }
             // Others may leave once the base has: nothing is turned before.
             let Problem { base, releases_base, .. } = &mut self.disassembly.problem;
-            if base.is_some() && !std::mem::replace(releases_base, true) {
+            if !base.parts.is_empty() && !std::mem::replace(releases_base, true) {
                 self.take_free_parts()?;
                 continue;
             }
@@ -528,6 +540,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
     fn remove(&mut self, part: usize, path: Vec<Pose>, depth: f64) -> Result<(), Stop> {
         self.disassembly.remove(part, path, depth)?;
         self.states.remove(part);
+        self.renew_base();
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! Groups that left are taken apart: each by a search of its own, in which only its parts stand, where they stood in the
 //! assembly.
 
-use crate::plan::PlanStatus;
+use crate::plan::{Base, PlanStatus};
 
 use super::deferred_removals::DeferredRemovals;
 use super::outcome::{Outcome, Removal};
@@ -33,8 +33,8 @@ pub(super) fn take_apart(
     }
     let spent = problem.spent + outcome.counters.simulations;
     let scene = problem.scene.with_placed(&places_after(&problem.scene, &outcome.removals[..group]));
-    let inner =
-        Problem { scene, present, targets, base: None, releases_base: false, spent, ..problem.clone() };
+    let base = Base::default();
+    let inner = Problem { scene, present, targets, base, releases_base: false, spent, ..problem.clone() };
     let done = outcome.removals.len();
     let mut deferred = DeferredRemovals::after(observer, done, outcome.counters.simulations);
     let Outcome { status, reason, removals, unfinished, blocked, free_together, counters, .. } =

@@ -8,7 +8,7 @@ use crate::blocking_graph::StaticAnalysis;
 use crate::cache::RequestCache;
 use crate::fixtures::{cells, cuboid, flats_in_slot, moved, open_box, rod, scene, tube};
 use crate::geometry::SourceMesh;
-use crate::plan::{PlanStatus, Verifier};
+use crate::plan::{Base, PlanStatus, Verifier};
 use crate::scene::Scene;
 use crate::simulation::SlidingEngine;
 
@@ -34,7 +34,7 @@ pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
         verifier,
         engine: &SlidingEngine,
         fixed: Vec::new(),
-        base: None,
+        base: Base::default(),
         releases_base: false,
         targets: None,
         is_group: false,
@@ -382,7 +382,7 @@ fn the_base_stays_as_long_as_others_leave() {
         search(Planner::SbdpStar, problem, &mut Recorder::default())
     };
     let outcome = plan(Vec::new());
-    assert_eq!((outcome.base.map(|b| b.part), outcome.remaining), (Some(0), vec![0]));
+    assert_eq!((outcome.base.parts, outcome.remaining), (vec![0], vec![0]));
     let outcome = plan(vec![3]);
-    assert_eq!((outcome.base, outcome.remaining.contains(&3)), (None, true));
+    assert_eq!((outcome.base, outcome.remaining.contains(&3)), (Base::default(), true));
 }

@@ -7,7 +7,7 @@ use nalgebra::{Point3, Vector3};
 use crate::assembling::Insertion;
 use crate::geometry::{Assembly, Part, Pose, Waypoint, pose_from_waypoint, waypoint_from_pose};
 use crate::plan::{
-    Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd, Warning,
+    Base, Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd, Warning,
 };
 use crate::search::{BlockedAction, Outcome, PlanRequest, Removal};
 
@@ -131,6 +131,8 @@ pub(super) struct PlanFrame<'a> {
     pub(super) request: &'a PlanRequest,
     pub(super) fixed: Vec<usize>,
     pub(super) removed: Vec<usize>,
+    /// Parts that were given as the base and are there.
+    pub(super) base: Vec<usize>,
     pub(super) overlaps: Vec<Overlap>,
     /// What else the reader of the plan should know.
     pub(super) notes: Vec<String>,
@@ -190,6 +192,13 @@ impl PlanFrame<'_> {
             ..PlanStats::default()
         };
         let kept_together = outcome.kept_together();
+        let is_gone = |part: &usize| outcome.remaining.binary_search(part).is_err();
+        let left = self.base.iter().copied().filter(is_gone);
+        let left = left.map(|part| Warning {
+            part: Some(part),
+            message: "it was given as a base, and left: nothing else did any more".to_owned(),
+        });
+        let left: Vec<Warning> = left.collect();
         let steps = outcome.removals.iter().map(|r| removal(self.assembly, r)).collect();
         let blocked = outcome.blocked.into_iter().map(|BlockedAction { part, action, by }| Blocked {
             part,
@@ -199,6 +208,7 @@ impl PlanFrame<'_> {
         let name = |part: usize| self.assembly.parts[part].name.clone();
         let reason = outcome.reason.map(|reason| reason.text(&outcome.unfinished, name));
         let status = outcome.status;
+        let empty = self.empty(status, reason);
         Plan {
             steps,
             base: outcome.base,
@@ -207,7 +217,8 @@ impl PlanFrame<'_> {
             free_together: outcome.free_together,
             blocked: blocked.collect(),
             stats,
-            ..self.empty(status, reason)
+            warnings: empty.warnings.into_iter().chain(left).collect(),
+            ..empty
         }
     }
 
@@ -233,7 +244,7 @@ impl PlanFrame<'_> {
             removed: self.removed,
             targets: self.request.targets.clone(),
             fixed: self.fixed,
-            base: None,
+            base: Base::default(),
             steps: Vec::new(),
             kept_together: Vec::new(),
             free_together: Vec::new(),

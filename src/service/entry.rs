@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::blocking_graph::{BLOCKING, StaticAnalysis};
 use crate::cache::{RecordKind, RequestCache};
 use crate::geometry::{Assembly, Shape};
-use crate::plan::{OVERLAP, Plan, PlanStatus, VERDICT, Verifier};
+use crate::plan::{Base, OVERLAP, Plan, PlanStatus, VERDICT, Verifier};
 use crate::scene::{HullTree, JoinedHulls};
 use crate::search::{
     Effort, Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_graphs, search,
@@ -75,22 +75,32 @@ impl Entry {
         let termination = limited.as_ref().unwrap_or(termination);
         let mut fixed = request.fixed.clone();
         fixed.extend(&self.assembly.fixed);
-        let mut removed = request.removed.clone();
-        for list in [&mut fixed, &mut removed] {
+        let (mut removed, mut base) = (request.removed.clone(), request.base.clone());
+        for list in [&mut fixed, &mut removed, &mut base] {
             list.sort_unstable();
             list.dedup();
         }
-        fixed.retain(|p| removed.binary_search(p).is_err());
+        for list in [&mut fixed, &mut base] {
+            list.retain(|p| removed.binary_search(p).is_err());
+        }
+        for (field, list) in [("fixed", &fixed), ("base", &base)] {
+            if let Some(&part) = request.targets.iter().flatten().find(|&p| list.binary_search(p).is_ok()) {
+                let name = self.assembly.parts[part].name.clone();
+                return Err(ServiceError::TargetStays { name, field });
+            }
+        }
         let frame = PlanFrame {
             assembly: &self.assembly,
             request,
             fixed,
             removed,
+            base,
             overlaps: Vec::new(),
             notes: Vec::new(),
         };
-        let (fixed, removed) = (frame.fixed.clone(), frame.removed.clone());
-        let question = PlanQuestion { assembly: &self.assembly, request, fixed: &fixed, removed: &removed };
+        let (fixed, removed, base) = (frame.fixed.clone(), frame.removed.clone(), frame.base.clone());
+        let assembly = &self.assembly;
+        let question = PlanQuestion { assembly, request, fixed: &fixed, removed: &removed, base: &base };
         // A trace shows what the search does, so the search must run.
         let known = if sink.traces() { None } else { remembered_plan(cache, &question) };
         let known = match known {
@@ -239,7 +249,7 @@ impl Entry {
         termination: &Termination,
         cache: &RequestCache,
     ) -> Problem<'a> {
-        let PlanQuestion { request, fixed, removed, .. } = *asked.question;
+        let PlanQuestion { request, fixed, removed, base, .. } = *asked.question;
         let is_there = |part: &usize| removed.binary_search(part).is_err();
         Problem {
             scene: prepared.scene.clone(),
@@ -247,7 +257,7 @@ impl Entry {
             engine: asked.engine,
             present: (0..self.assembly.parts.len()).filter(is_there).collect(),
             fixed: fixed.to_vec(),
-            base: None,
+            base: Base { parts: base.to_vec(), reason: None },
             releases_base: false,
             targets: request.targets.clone(),
             is_group: false,
@@ -275,7 +285,8 @@ impl Entry {
         }
         let Ok((prepared, _)) = self.prepared(termination, cache) else { return };
         let request = PlanRequest::default();
-        let question = PlanQuestion { assembly: &self.assembly, request: &request, fixed: &[], removed: &[] };
+        let (assembly, request) = (&self.assembly, &request);
+        let question = PlanQuestion { assembly, request, fixed: &[], removed: &[], base: &[] };
         let engine = engine_of(request.engine, request.penalty);
         let asked = SearchQuestion { question: &question, engine: &*engine, verifier: &prepared.verifier };
         // If it is interrupted, the blockages that were found are cached all the same.

@@ -85,6 +85,14 @@ pub enum ServiceError {
         /// How many there are.
         count: usize,
     },
+    /// A target is among the parts that stay.
+    #[error("part `{name}` is a target and in `{field}`: name it in one of them")]
+    TargetStays {
+        /// The part.
+        name: String,
+        /// Which list.
+        field: &'static str,
+    },
     /// The worker threads for the request could not be started.
     #[error("cannot start worker threads: {0}")]
     Threads(String),
@@ -431,14 +439,20 @@ impl Drop for Service {
 /// Parts that a request or a revision names, by field.
 type Named = [(&'static str, Vec<usize>)];
 
-fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 4] {
-    let PlanRequest { fixed, removed, targets, assembly, .. } = request;
+fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 5] {
+    let PlanRequest { fixed, removed, targets, base, assembly, .. } = request;
     let staged = match assembly {
         Some(Staging::Beside(given)) => given.iter().map(|(part, _)| *part).collect(),
         _ => Vec::new(),
     };
     let targets = targets.clone().unwrap_or_default();
-    [("fixed", fixed.clone()), ("removed", removed.clone()), ("targets", targets), ("staged", staged)]
+    [
+        ("fixed", fixed.clone()),
+        ("removed", removed.clone()),
+        ("targets", targets),
+        ("base", base.clone()),
+        ("staged", staged),
+    ]
 }
 
 fn revised_parts(revision: &Revision) -> [(&'static str, Vec<usize>); 2] {

@@ -73,6 +73,7 @@ enum Edit {
     /// Two parts change their names.
     Swapped(usize, usize),
     Fixed(usize),
+    Base(usize),
     Target(usize),
 }
 
@@ -90,6 +91,7 @@ fn edit() -> impl Strategy<Value = Edit> {
         2 => prop::array::uniform3(-3.9..3.0f64).prop_map(Edit::Post),
         1 => (part(), part()).prop_map(|(p, q)| Edit::Swapped(p, q)),
         1 => part().prop_map(Edit::Fixed),
+        1 => part().prop_map(Edit::Base),
         1 => part().prop_map(Edit::Target),
     ]
 }
@@ -120,12 +122,17 @@ impl Question {
             Edit::Post([x, y, z]) => meshes.push(cuboid([x, y, z], [x + 0.3, y + 0.3, z + 1.5])),
             Edit::Swapped(p, q) => meshes.swap(p % count, q % count),
             Edit::Fixed(p) => request.fixed = vec![p % count],
+            Edit::Base(p) => request.base = vec![p % count],
             Edit::Target(p) => request.targets = Some(vec![p % count]),
         }
         let count = meshes.len();
-        for list in [&mut request.removed, &mut request.fixed].into_iter().chain(&mut request.targets) {
+        let PlanRequest { removed, fixed, base, targets, .. } = request;
+        for list in [&mut *removed, fixed, base].into_iter().chain(&mut *targets) {
             list.retain(|&p| p < count);
         }
+        // What stays is no target.
+        let stay = [&fixed[..], base].concat();
+        targets.iter_mut().for_each(|targets| targets.retain(|p| !stay.contains(p)));
         next
     }
 

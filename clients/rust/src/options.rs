@@ -216,6 +216,8 @@ pub struct PlanOptions {
     pub removed: Vec<u32>,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<u32>>,
+    /// Parts that stay as long as others leave: what the rest is taken off. If there are none, the daemon chooses one.
+    pub base: Vec<u32>,
     /// Parts that stand elsewhere than in the assembly, with the rigid motion of their mesh from there
     /// (input units and frame).
     pub moved: Vec<(u32, Waypoint)>,
@@ -253,6 +255,7 @@ impl PlanOptions {
             fixed: self.fixed.clone(),
             removed: self.removed.clone(),
             targets: self.targets.clone(),
+            base: self.base.clone(),
             moved: self.moved.iter().map(moved_part).collect(),
             assembly: self.assembly.as_ref().map(|staging| match staging {
                 Staging::None => plan::Staging::None,

@@ -32,13 +32,13 @@ impl PlanStatus {
     }
 }
 
-/// The part that stays, and that the rest is taken off.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// The parts that stay, and that the rest is taken off.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Base {
-    /// The part.
-    pub part: u32,
-    /// Why it was chosen, in a few words.
-    pub reason: String,
+    /// The parts.
+    pub parts: Vec<u32>,
+    /// Why they were chosen, in a few words; none where the request gave them.
+    pub reason: Option<String>,
 }
 
 /// Why a part that remains did not move.
@@ -104,8 +104,9 @@ pub struct Summary {
     pub targets: Option<Vec<u32>>,
     /// Parts that may not move.
     pub fixed: Vec<u32>,
-    /// The part that the rest is taken off, or built up on; none where parts are fixed, or where it had to leave.
-    pub base: Option<Base>,
+    /// The parts that the rest is taken off, or built up on; none where parts are fixed and no others were given, or where
+    /// all others had to leave too.
+    pub base: Base,
     /// Parts that stand in the assembly in the end (of an assembly plan: from the start).
     pub remaining: Vec<u32>,
     /// Groups that left together and were not taken apart: nobody asked for it, or no way was found.
@@ -141,7 +142,7 @@ impl Summary {
             removed: view.removed().to_vec(),
             targets: view.targets().map(<[u32]>::to_vec),
             fixed: view.fixed().to_vec(),
-            base: view.base().map(|(part, reason)| Base { part, reason: reason.to_owned() }),
+            base: Base { parts: view.base().to_vec(), reason: view.base_reason().map(owned) },
             remaining: view.remaining().to_vec(),
             kept_together: view.kept_together().map(<[u32]>::to_vec).collect(),
             free_together: view.free_together().map(free_group).collect(),

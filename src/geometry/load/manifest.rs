@@ -19,6 +19,9 @@ pub(super) struct Manifest {
     /// Parts that may not move, by name.
     #[serde(default)]
     pub(super) fixed: Vec<String>,
+    /// Parts that stay as long as others leave, by name.
+    #[serde(default)]
+    pub(super) base: Vec<String>,
     /// Mass per volume, by part name. Checked, but no engine uses masses yet: motion without
     /// inertia depends on the shape alone.
     #[serde(default)]

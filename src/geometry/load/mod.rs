@@ -160,8 +160,9 @@ fn apply(
         })
     };
     let fixed = manifest.fixed.iter().map(|n| resolve(n)).collect::<Result<Vec<_>, _>>()?;
+    let base = manifest.base.iter().map(|n| resolve(n)).collect::<Result<Vec<_>, _>>()?;
     manifest.densities.keys().try_for_each(|n| resolve(n).map(drop))?;
-    assembly.fixed = fixed;
+    (assembly.fixed, assembly.base) = (fixed, base);
     assembly.name = manifest.name.unwrap_or(assembly.name);
     assembly.units = manifest.units.or(assembly.units);
     Ok(assembly)

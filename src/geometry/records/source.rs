@@ -133,9 +133,10 @@ mod tests {
             moved: vec![(9, moved)],
             added: vec![part.clone()],
         };
-        let fixed = vec!["0".to_owned()];
+        // The base is not recorded.
+        let (fixed, base) = (vec!["0".to_owned()], vec!["0".to_owned()]);
         let source =
-            SourceAssembly { name: "name".into(), units: Some("mm".into()), parts: vec![part], fixed };
+            SourceAssembly { name: "name".into(), units: Some("mm".into()), parts: vec![part], fixed, base };
         assert_eq!(payload(&AssemblySource::Given(source)), Some(given.concat()));
         assert_eq!(payload(&AssemblySource::Revised([7; 32], revision)), Some(revised.concat()));
     }

@@ -12,8 +12,9 @@ use crate::tolerances::TURNED;
 use super::super::action_list::ActionList;
 use super::super::cell_decomposition::{CellDecomposition, CellExit};
 use super::super::cell_memory::CellStage;
+use super::super::contraction::Contraction;
 use super::super::critical_turns::TurningPart;
-use super::super::disassembly::{Stop, Transition, joined};
+use super::super::disassembly::{Disassembly, Stop, Transition, joined};
 use super::super::groups::Groups;
 use super::super::inseparable::InseparablePairs;
 use super::super::problem::{Problem, VerifiedPath};
@@ -63,20 +64,48 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         Ok(false)
     }
 
-    /// Takes a group out as `leave` finds one; true if one leaves.
+    /// Takes a group out as `leave` finds one, or, if the rest is rather what leaves, makes one of the group the base; true
+    /// if there is such a group.
     pub(super) fn leave_together(
         &mut self,
-        leave: impl FnOnce(&mut Groups<'_, 'a, 'o>) -> Result<Option<Vec<usize>>, Stop>,
+        leave: impl FnOnce(&mut Groups<'_, 'a, 'o>) -> Result<Option<(Contraction<'a>, VerifiedPath)>, Stop>,
     ) -> Result<bool, Stop> {
         if self.disassembly.problem.is_group || !self.strategy.is_extended() || self.disassembly.is_done() {
             return Ok(false);
         }
-        let left = leave(&mut self.groups())?;
-        for &part in left.iter().flatten() {
-            self.states.remove(part);
+        let Some((contraction, way)) = leave(&mut self.groups())? else { return Ok(false) };
+        if self.becomes_base(contraction.members()) {
+            return Ok(true);
         }
+        self.disassembly.remove_group(contraction.leaving(), way)?;
+        contraction.members().iter().for_each(|&part| self.states.remove(part));
+        self.renew_base();
         self.take_free_parts()?;
-        Ok(left.is_some())
+        Ok(true)
+    }
+
+    /// Makes one of some parts that leave the base together the base, if they are rather what stays.
+    fn becomes_base(&mut self, leaving: &[usize]) -> bool {
+        let Self { disassembly: Disassembly { problem, everything, .. }, former_bases, up, .. } = self;
+        let Some(base) = problem.base_among(leaving, everything.standing(), up) else { return false };
+        if base.parts.iter().any(|part| former_bases.contains(part)) {
+            return false;
+        }
+        former_bases.append(&mut problem.base.parts);
+        problem.base = base;
+        true
+    }
+
+    /// Where a base has left, others stay: those that were given and still stand, or else another one is chosen.
+    pub(super) fn renew_base(&mut self) {
+        let Disassembly { problem, everything, .. } = &mut self.disassembly;
+        let base = problem.base.among(everything.standing());
+        if base == problem.base {
+            return;
+        }
+        let is_chosen = base.parts.is_empty() && self.strategy.is_extended();
+        problem.base = if is_chosen { problem.chosen_base(everything.standing(), &self.up) } else { base };
+        problem.releases_base = false;
     }
 
     pub(super) fn groups(&mut self) -> Groups<'_, 'a, 'o> {

@@ -23,6 +23,8 @@ pub(crate) struct PlanQuestion<'a> {
     pub fixed: &'a [usize],
     /// Parts that are gone already.
     pub removed: &'a [usize],
+    /// Parts that were given as the base.
+    pub base: &'a [usize],
 }
 
 /// A remembered answer, in the planning frame.
@@ -62,7 +64,7 @@ pub(crate) fn remember_plan(
 impl PlanAnswer {
     /// Whether all parts that it names are among the first `count`.
     fn names_only(&self, count: usize) -> bool {
-        let Outcome { removals, remaining, unfinished, blocked, free_together, .. } = &self.outcome;
+        let Outcome { removals, base, remaining, unfinished, blocked, free_together, .. } = &self.outcome;
         let is_part = |part: &usize| *part < count;
         let are_parts = |list: &[usize]| list.iter().all(is_part);
         let is_step = |(i, r): (usize, &Removal)| {
@@ -76,6 +78,7 @@ impl PlanAnswer {
             && blocked.iter().all(|b| is_part(&b.part) && are_parts(&b.by))
             && self.overlaps.iter().all(|(a, b, _)| is_part(a) && is_part(b))
             && free_together.iter().all(|group| are_parts(&group.parts))
+            && are_parts(&base.parts)
             && are_parts(remaining)
             && are_parts(unfinished)
     }
@@ -83,7 +86,7 @@ impl PlanAnswer {
 
 impl PlanQuestion<'_> {
     fn key(&self) -> RecordKey {
-        let Self { assembly, request, fixed, removed } = *self;
+        let Self { assembly, request, fixed, removed, base } = *self;
         let mut digest = Digest::new();
         digest.integer(assembly.parts.len() as u64);
         for part in &assembly.parts {
@@ -101,7 +104,7 @@ impl PlanQuestion<'_> {
             targets.dedup();
         }
         digest.integer(u64::from(targets.is_some()));
-        for list in [fixed, removed, &targets.unwrap_or_default()] {
+        for list in [fixed, removed, base, &targets.unwrap_or_default()] {
             digest.integer(list.len() as u64);
             list.iter().for_each(|&part| {
                 digest.integer(part as u64);
