@@ -30,6 +30,8 @@ pub const PLAN_NO_STAGING: u32 = 64;
 
 /// The events of the search are wanted, too: it runs whatever is remembered.
 pub const PLAN_TRACE: u32 = 128;
+/// The clearance is given.
+pub const PLAN_HAS_CLEARANCE: u32 = 256;
 
 /// Names of the planners; the wire carries the index.
 pub const PLANNERS: [&str; 7] = ["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star", "rrt", "bk-rrt"];
@@ -62,7 +64,7 @@ pub const PENALTY_PARAMETERS: [&str; 16] = [
 /// Header of a plan request; four lists of u32 part numbers follow: fixed, removed, targets, base; then
 /// [`MovedPart`]s: those that stand elsewhere, and those that wait at given places; then [`PenaltyRecord`]s.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct PlanRequestHeader {
     /// Which assembly.
     pub handle: [u8; 32],
@@ -73,7 +75,7 @@ pub struct PlanRequestHeader {
     /// Index into [`ACTION_SETS`].
     pub actions: u32,
     /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`], [`PLAN_SWEEPS`], [`PLAN_NO_SWEEPS`], [`PLAN_BATCH`],
-    /// [`PLAN_ASSEMBLY`], [`PLAN_NO_STAGING`], [`PLAN_TRACE`].
+    /// [`PLAN_ASSEMBLY`], [`PLAN_NO_STAGING`], [`PLAN_TRACE`], [`PLAN_HAS_CLEARANCE`].
     pub flags: u32,
     /// Threads for this request; 0 leaves it to the daemon.
     pub threads: u32,
@@ -106,6 +108,8 @@ pub struct PlanRequestHeader {
     pub planning_timeout_ns: u64,
     /// What the random poses of `rrt` and `bk-rrt` depend on.
     pub seed: u64,
+    /// The gap between hulls where a way out ends, in the input's units; ignored without [`PLAN_HAS_CLEARANCE`].
+    pub clearance: f64,
 }
 
 /// A parameter of the engine `penalty`.
@@ -185,7 +189,7 @@ pub struct StepsHeader {
 }
 
 const _: () = {
-    assert!(size_of::<PlanRequestHeader>() == 128 && align_of::<PlanRequestHeader>() == 8);
+    assert!(size_of::<PlanRequestHeader>() == 136 && align_of::<PlanRequestHeader>() == 8);
     assert!(offset_of!(PlanRequestHeader, planner) == 32);
     assert!(offset_of!(PlanRequestHeader, moved) == 68);
     assert!(offset_of!(PlanRequestHeader, static_analysis) == 76);
@@ -240,6 +244,9 @@ pub struct PlanRequest {
     pub deadline_ns: Option<u64>,
     /// What the random poses of `rrt` and `bk-rrt` depend on.
     pub seed: u64,
+    /// The gap between a part's hull and that of all that stands where its way out ends, in the input's units; `None` leaves
+    /// it to the daemon.
+    pub clearance: Option<f64>,
     /// Simulations after which to give up.
     pub max_simulations: Option<u64>,
     /// Nanoseconds after which one motion, or a baseline's search for one part, is given up.
@@ -279,6 +286,7 @@ impl PlanRequest {
             flags: flag(self.no_cache, PLAN_NO_CACHE)
                 | flag(self.batch, PLAN_BATCH)
                 | flag(self.trace, PLAN_TRACE)
+                | flag(self.clearance.is_some(), PLAN_HAS_CLEARANCE)
                 | flag(self.targets.is_some(), PLAN_HAS_TARGETS)
                 | flag(self.assembly.is_some(), PLAN_ASSEMBLY)
                 | flag(matches!(self.assembly, Some(Staging::None)), PLAN_NO_STAGING)
@@ -298,6 +306,7 @@ impl PlanRequest {
             path_timeout_ns: self.path_timeout_ns.unwrap_or(u64::MAX),
             planning_timeout_ns: self.planning_timeout_ns.unwrap_or(u64::MAX),
             seed: self.seed,
+            clearance: self.clearance.unwrap_or(0.0),
         });
         writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.base);
         writer.array(&self.moved).array(staged).array(&self.penalty);
@@ -325,7 +334,8 @@ impl PlanRequest {
             | PLAN_BATCH
             | PLAN_ASSEMBLY
             | PLAN_NO_STAGING
-            | PLAN_TRACE;
+            | PLAN_TRACE
+            | PLAN_HAS_CLEARANCE;
         let limit = |value: u64| (value != u64::MAX).then_some(value);
         let set = |bit: u32| h.flags & bit != 0;
         let astray = (set(PLAN_NO_STAGING) || !staged.is_empty()) && !set(PLAN_ASSEMBLY);
@@ -350,6 +360,7 @@ impl PlanRequest {
             path_timeout_ns: limit(h.path_timeout_ns),
             planning_timeout_ns: limit(h.planning_timeout_ns),
             seed: h.seed,
+            clearance: set(PLAN_HAS_CLEARANCE).then_some(h.clearance),
             fixed,
             removed,
             targets: set(PLAN_HAS_TARGETS).then_some(targets),

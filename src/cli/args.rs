@@ -110,6 +110,10 @@ pub(super) struct PlanArguments {
     /// Give up after this number of simulations (of rrt: steps of a tree)
     #[arg(long, value_name = "N")]
     pub(super) max_simulations: Option<u64>,
+    /// How far a part's hull is from that of the rest where its way ends, in the input's units [default: a hundredth of the
+    /// part's longest side]
+    #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
+    pub(super) clearance: Option<f64>,
     /// Worker threads; never changes the plan [default: all processors]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     pub(super) threads: u32,

@@ -152,6 +152,7 @@ fn options(question: &CommandQuestion<'_>, trace: bool) -> PlanOptions {
         planning_timeout: request.planning_timeout,
         trace,
         timeout: question.deadline.map(|d| d.saturating_duration_since(Instant::now())),
+        clearance: request.clearance,
         seed: request.seed,
         max_simulations: request.max_simulations,
         threads: u32::try_from(request.threads).unwrap_or(0),

@@ -38,7 +38,8 @@ impl From<ServiceError> for CliError {
         match error {
             ServiceError::Geometry(_)
             | ServiceError::NoSuchPart { .. }
-            | ServiceError::TargetStays { .. } => Self::Refused(error.to_string()),
+            | ServiceError::TargetStays { .. }
+            | ServiceError::NoLength { .. } => Self::Refused(error.to_string()),
             // The stages behind the service may come to name other failures.
             other => Self::Failed(other.to_string()),
         }

@@ -101,6 +101,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         actions: arguments.actions.map_or_else(|| planner.default_actions(), Into::into),
         static_analysis: arguments.dbg.map(Into::into).unwrap_or_default(),
         sweeps: arguments.sweeps.asked(),
+        clearance: arguments.clearance,
         seed: arguments.seed,
         max_simulations: arguments.max_simulations,
         path_timeout: arguments.path_timeout,

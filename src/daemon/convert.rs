@@ -31,6 +31,7 @@ pub(crate) fn plan_request(
         engine: engine(request.engine)?,
         actions: actions(request.actions)?,
         sweeps: request.sweeps,
+        clearance: request.clearance,
         seed: request.seed,
         max_simulations: request.max_simulations,
         path_timeout: request.path_timeout_ns.map(Duration::from_nanos),
@@ -252,7 +253,7 @@ pub(crate) fn service_error(error: &ServiceError) -> WireError {
     let code = match error {
         ServiceError::UnknownAssembly => ErrorCode::UnknownHandle,
         ServiceError::NoSuchPart { .. } => ErrorCode::NoSuchPart,
-        ServiceError::TargetStays { .. } => ErrorCode::Unsupported,
+        ServiceError::TargetStays { .. } | ServiceError::NoLength { .. } => ErrorCode::Unsupported,
         ServiceError::Geometry(GeometryError::Interrupted(Interrupt::Cancelled)) => ErrorCode::Cancelled,
         ServiceError::Geometry(GeometryError::Interrupted(Interrupt::DeadlinePassed)) => ErrorCode::Expired,
         ServiceError::Geometry(_) => ErrorCode::Geometry,

@@ -24,6 +24,7 @@ use super::inseparable::InseparablePairs;
 use super::outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal};
 use super::problem::{Checked, Observer, Problem, VerifiedPath};
 use super::requirements::Leaving;
+use super::support::Supports;
 use super::trace::TraceEvent;
 
 /// The reason given for a motion that took too long.
@@ -84,6 +85,8 @@ pub(super) struct Disassembly<'a, 'o> {
     around: HashMap<usize, Arc<StandingParts>>,
     /// Per part: another part whose hull meets this part's, both assembled: a proof that it is not free.
     entangled: Vec<Option<usize>>,
+    /// What carries what: unknown for planners other than SBDP*.
+    pub(super) supports: Supports,
     /// Per part that does not shape the hull: the number of hull changes when it was found not to be free.
     held_since: Vec<Option<usize>>,
     hull_changes: usize,
@@ -115,6 +118,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             around: HashMap::new(),
             entangled: vec![None; count],
             held_since: vec![None; count],
+            supports: Supports::default(),
             hull_changes: 0,
             removals: problem.earlier.clone(),
             counters: Counters::default(),
@@ -415,13 +419,25 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.removals.push(removal);
     }
 
+    /// Which parts leave after others where both can: first the base, then parts that carry others.
+    pub(super) fn leaving_late(&self) -> impl Fn(usize) -> (bool, bool) + use<> {
+        let (problem, standing) = (&self.problem, self.everything.standing());
+        let is_base = |part: usize| problem.base.parts.contains(&part);
+        let carriers = self.supports.carriers(standing, |part| is_base(part) || !problem.is_movable(part));
+        let base = problem.base.parts.clone();
+        move |part| (base.contains(&part), carriers.contains(&part))
+    }
+
     /// A part that may move and whose hull is apart from all others': it needs no motion. Without sweeps it is
     /// simulated like all.
     pub(super) fn free_part(&mut self) -> Result<Option<usize>, Stop> {
         if self.is_done() || !self.problem.sweeps {
             return Ok(None);
         }
-        for part in self.everything.standing().to_vec() {
+        let mut parts = self.everything.standing().to_vec();
+        let late = self.leaving_late();
+        parts.sort_by_key(|&part| late(part));
+        for part in parts {
             self.problem.termination.check()?;
             if self.problem.may_move(part) && self.is_free(part) {
                 return Ok(Some(part));

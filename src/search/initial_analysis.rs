@@ -40,12 +40,17 @@ pub(super) struct InitialAnalysis {
 }
 
 impl InitialAnalysis {
-    /// The direction in which most parts can go at first; of several, the one nearest to +z.
-    pub(super) fn upward(&self) -> Vector3<f64> {
+    /// The number of the translation along which most parts can go at first; of several, the one nearest to +z.
+    pub(super) fn upward(&self) -> usize {
         let open = |i: usize| self.graphs.iter().filter(|graphs| graphs.blockage.is_open(i)).count();
         let forces = self.translations.iter().map(|action| action.force()).enumerate();
         let best = forces.max_by(|a, b| open(a.0).cmp(&open(b.0)).then(a.1.z.total_cmp(&b.1.z)));
-        best.map_or_else(Vector3::z, |(_, force)| force)
+        best.map_or(0, |(up, _)| up)
+    }
+
+    /// The direction of this translation.
+    pub(super) fn up(&self) -> Vector3<f64> {
+        self.translations.get(self.upward()).map_or_else(Vector3::z, |action| action.force())
     }
 
     /// # Errors

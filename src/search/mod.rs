@@ -51,6 +51,7 @@ mod states;
 mod stopped_actions;
 mod strategy;
 mod subassembly;
+mod support;
 mod sweep_memory;
 #[cfg(test)]
 mod tests;

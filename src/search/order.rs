@@ -21,6 +21,10 @@ use super::states::{PhaseStates, States};
 use super::strategy::Strategy;
 use super::trace::PlanningPhase;
 
+/// Cosine of the angle to the direction up within which a direction is upward (45 degrees): half of the way to sideways.
+/// From 60 degrees on, at half, parts go askew that a fitter takes out sideways; at 1 only exactly up is.
+const UPWARD: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 /// How much is in the way of a push from a state.
 #[derive(Debug, Clone, Copy)]
 struct Obstruction {
@@ -38,16 +42,19 @@ pub(super) struct Order {
     inseparable: InseparablePairs,
     /// By state and push.
     obstructions: HashMap<StateAction, Obstruction>,
+    /// The direction in which most parts can go at first.
+    pub(super) up: Vector3<f64>,
 }
 
 impl Order {
-    pub(super) fn new(scene: &Scene, strategy: Strategy) -> Self {
+    pub(super) fn new(scene: &Scene, strategy: Strategy, up: Vector3<f64>) -> Self {
         let bodies = scene.bodies.iter().enumerate();
         let is_ball = |(part, shape)| strategy.is_extended() && is_ball(shape, least_travel(scene, part));
         Self {
             balls: bodies.map(|(part, b)| is_ball((part, &*b.shape))).collect(),
             inseparable: InseparablePairs::default(),
             obstructions: HashMap::new(),
+            up,
         }
     }
 
@@ -82,14 +89,15 @@ impl Order {
     }
 
     /// The states to expand, the initial one included. Of two last parts it does not matter which one moves
-    /// against the other: beyond the first push, only the smaller one does. A part that is proved to stay is not moved,
+    /// against the other: beyond the first push, only the smaller one does, or the one that is no base. A part that is proved to stay is not moved,
     /// and a ball not turned.
     pub(super) fn expandable(&self, of: &PhaseStates<'_>, disassembly: &Disassembly<'_, '_>) -> Vec<usize> {
         let PhaseStates { strategy, phase, states, .. } = *of;
         let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());
         let still = match standing[..] {
             [a, b] if !strategy.separate_lists && problem.may_move(a) && problem.may_move(b) => {
-                Some(if of.reach(a) < of.reach(b) { b } else { a })
+                let size = |part: usize| (problem.base.parts.contains(&part), of.reach(part));
+                Some(if size(a) < size(b) { b } else { a })
             }
             _ => None,
         };
@@ -104,8 +112,13 @@ impl Order {
     }
 
     /// The parts of open states, in the order in which they are expanded as assembled.
-    pub(super) fn parts(&self, of: &PhaseStates<'_>, open: &[usize]) -> Vec<usize> {
-        let roots = self.ordered_roots(of, &mut open.to_vec());
+    pub(super) fn parts(
+        &self,
+        of: &PhaseStates<'_>,
+        open: &[usize],
+        disassembly: &Disassembly<'_, '_>,
+    ) -> Vec<usize> {
+        let roots = self.ordered_roots(of, &mut open.to_vec(), disassembly);
         roots.into_iter().map(|node| of.states.nodes[node].part).collect()
     }
 
@@ -114,10 +127,15 @@ impl Order {
     /// count as infinite) and stands for all its parts in their order. Without guidance the first comes first:
     /// the initial state, then displaced ones by age. Where actions have an order of their own, all states are
     /// taken at once.
-    pub(super) fn extract(&self, of: &PhaseStates<'_>, open: &mut Vec<usize>) -> Vec<usize> {
+    pub(super) fn extract(
+        &self,
+        of: &PhaseStates<'_>,
+        open: &mut Vec<usize>,
+        disassembly: &Disassembly<'_, '_>,
+    ) -> Vec<usize> {
         let PhaseStates { strategy, phase, states, .. } = *of;
         if strategy.orders_actions(phase) {
-            return self.ranked(of, std::mem::take(open));
+            return self.ranked(of, std::mem::take(open), disassembly);
         }
         let displaced = |i: &usize| !states.nodes[*i].is_root();
         let next = if strategy.guided {
@@ -130,13 +148,18 @@ impl Order {
                 open.retain(|&i| i != best);
                 vec![best]
             }
-            None => self.ordered_roots(of, open),
+            None => self.ordered_roots(of, open, disassembly),
         }
     }
 
     /// Open states in the order of expansion.
-    fn ranked(&self, of: &PhaseStates<'_>, mut open: Vec<usize>) -> Vec<usize> {
-        let roots = self.ordered_roots(of, &mut open);
+    fn ranked(
+        &self,
+        of: &PhaseStates<'_>,
+        mut open: Vec<usize>,
+        disassembly: &Disassembly<'_, '_>,
+    ) -> Vec<usize> {
+        let roots = self.ordered_roots(of, &mut open, disassembly);
         if of.strategy.guided {
             open.sort_by_cached_key(|&i| of.rank(i));
         }
@@ -144,7 +167,12 @@ impl Order {
         open
     }
 
-    fn ordered_roots(&self, of: &PhaseStates<'_>, open: &mut Vec<usize>) -> Vec<usize> {
+    fn ordered_roots(
+        &self,
+        of: &PhaseStates<'_>,
+        open: &mut Vec<usize>,
+        disassembly: &Disassembly<'_, '_>,
+    ) -> Vec<usize> {
         let PhaseStates { strategy, phase, states, .. } = *of;
         let (mut roots, rest) = open.iter().partition::<Vec<usize>, _>(|&&i| states.nodes[i].is_root());
         *open = rest;
@@ -159,12 +187,14 @@ impl Order {
             PlanningPhase::Translation => (of.evaluation(i), None, 0, i),
             PlanningPhase::Rotation => (of.evaluation(i), other(i), reach(i), i),
         });
+        let late = disassembly.leaving_late();
+        roots.sort_by_key(|&i| late(states.nodes[i].part));
         roots
     }
 
     /// The sweeps along translations from some open states, in the order of expansion: displaced states first, then all parts as
-    /// assembled; each along the shorter ways out first. Such a plan takes less room, and less is to be
-    /// verified.
+    /// assembled; each upward before sideways before downward, and there along the shorter ways out first: such a plan takes
+    /// less room, and less is to be verified.
     pub(super) fn sweeps(
         &self,
         of: &PhaseStates<'_>,
@@ -185,10 +215,20 @@ impl Order {
             let way = |action: &usize| reaches[*action] + bounds.support(&-forces[*action]);
             let mut actions: Vec<usize> = (0..forces.len()).collect();
             // Lengths are compared in half powers of two: rounding of the input must not change the order.
-            actions.sort_by_cached_key(|action| (way(action).max(TOUCHED).log2() * 2.0).floor() as i32);
+            let length = |action: &usize| (way(action).max(TOUCHED).log2() * 2.0).floor() as i32;
+            actions.sort_by_cached_key(|action| (self.tier(&forces[*action]), length(action)));
             actions.into_iter().map(move |action| StateAction { node, phase, action })
         };
-        self.ranked(of, open.to_vec()).into_iter().flat_map(sweeps).collect()
+        self.ranked(of, open.to_vec(), disassembly).into_iter().flat_map(sweeps).collect()
+    }
+
+    /// The place of a direction in the order of preference: upward, sideways, downward.
+    fn tier(&self, direction: &Vector3<f64>) -> u8 {
+        match direction.dot(&self.up) {
+            up if up > UPWARD => 0,
+            up if up < -UPWARD => 2,
+            _ => 1,
+        }
     }
 
     /// Measures what is in the way of some actions along their parts' own axes, unless it is known.

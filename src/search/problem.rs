@@ -87,6 +87,8 @@ pub struct Problem<'a> {
     pub static_analysis: StaticAnalysis,
     /// Whether parts that leave straight, or are apart already, are taken out without simulation.
     pub sweeps: bool,
+    /// The gap between the hulls where a part's way out ends; `None` for the usual share of the part.
+    pub clearance: Option<f64>,
     /// What random poses depend on.
     pub seed: u64,
     /// The number of simulations after which the search gives up.

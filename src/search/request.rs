@@ -136,6 +136,9 @@ pub struct PlanRequest {
     /// without simulation, by the planners `sbdp-star` and `sbdp`; `None` for the default of the actions: the paper
     /// simulates all.
     pub sweeps: Option<bool>,
+    /// The gap between a part's hull and that of all that stands where its way out ends, in the input's units, at least 0;
+    /// `None` for a hundredth of the longest side of the part's box.
+    pub clearance: Option<f64>,
     /// What the random poses of the planners `rrt` and `bk-rrt` depend on.
     pub seed: u64,
     /// Simulations (steps of a tree, in RRT) after which the search gives up with `partial`.

@@ -11,10 +11,10 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use nalgebra::{Translation3, Vector3};
 
-use crate::geometry::{Pose, transformed};
+use crate::geometry::{Pose, gap_along, transformed};
 use crate::scene::{Scene, StandingParts, exit_direction};
 use crate::termination::Interrupt;
-use crate::tolerances::HULL_MARGIN;
+use crate::tolerances::{ALONG_HULL, HULL_CLEARANCE, HULL_MARGIN};
 
 use super::outcome::{Outcome, Removal};
 use super::problem::Problem;
@@ -78,29 +78,32 @@ impl Leaving<'_, '_> {
         }
     }
 
-    /// A path that ends apart from the hull of all that stands, continued until it is apart from all that was there at
-    /// the start. Away from that hull, nothing stands in the way.
+    /// A path that ends apart from the hull of all that stands, continued until that is as far away as asked for, and until
+    /// it is apart from all that was there at the start. It goes on as it came, or straight away from the hull where it
+    /// came along it. On both ways, nothing of the hull is met.
     fn led_out(self, earlier: &[Removal], mut path: Vec<Pose>) -> Vec<Pose> {
-        if earlier.is_empty() {
-            return path;
-        }
-        let Self { problem: Problem { scene, .. }, body, around, .. } = self;
+        let Self { problem: Problem { scene, clearance, .. }, body, around, .. } = self;
         let Some(&end) = path.last() else { return path };
-        let along = last_leg(&path);
-        // It tells where the others lie.
-        let Some(towards) = exit_direction(scene, around, body, &end, along.map(|d| -d)) else {
+        let last = last_leg(&path);
+        // It points to where the others lie.
+        let Some(towards) = exit_direction(scene, around, body, &end, last.map(|d| -d)) else {
             return path;
         };
-        let direction = -towards;
+        let away = -towards;
+        let along = last.filter(|d| d.dot(&away) >= ALONG_HULL).unwrap_or(away);
         let hull = transformed(&scene.bodies[body].shape.hull, &end);
-        let near = hull.iter().map(|p| p.coords.dot(&direction)).fold(f64::INFINITY, f64::min);
-        let gone = earlier.iter().flat_map(|r| &r.parts).map(|&p| scene.bodies[p].bounds.support(&direction));
-        let further = gone.fold(f64::NEG_INFINITY, f64::max) + HULL_MARGIN - near;
+        let gap = gap_along(&towards, &hull, &around.hull);
+        let clearance =
+            clearance.unwrap_or_else(|| HULL_CLEARANCE * scene.bodies[body].bounds.extents().amax());
+        let near = hull.iter().map(|p| p.coords.dot(&along)).fold(f64::INFINITY, f64::min);
+        let gone = earlier.iter().flat_map(|r| &r.parts).map(|&p| scene.bodies[p].bounds.support(&along));
+        let past_gone = gone.fold(f64::NEG_INFINITY, f64::max) + HULL_MARGIN - near;
+        let further = past_gone.max((clearance - gap) / along.dot(&away));
         if further > 0.0 {
-            if along == Some(direction) {
+            if last == Some(along) {
                 path.pop();
             }
-            path.push(Translation3::from(direction * further) * end);
+            path.push(Translation3::from(along * further) * end);
         }
         path
     }

@@ -19,7 +19,6 @@ mod stages;
 use std::collections::HashSet;
 use std::time::Instant;
 
-use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::blocking_graph::{Analysis, Blockage, StateGraphs};
@@ -45,6 +44,7 @@ use super::speculation::Speculation;
 use super::state::{StateAction, StateNode, least_travel};
 use super::states::{PhaseStates, States};
 use super::strategy::Strategy;
+use super::support::Supports;
 use super::sweep_memory::{BlockedSweep, SweepMemory};
 use super::trace::{PlanningPhase, TraceEvent};
 use super::unscrewing::UnscrewingMemory;
@@ -75,8 +75,6 @@ struct Sbdp<'a, 'o> {
     unscrewing_memory: UnscrewingMemory,
     group_memory: GroupMemory,
     speculation: Speculation,
-    /// The direction in which most parts can go at first.
-    up: Vector3<f64>,
     /// Parts that were the base until another one was.
     former_bases: Vec<usize>,
 }
@@ -93,12 +91,11 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
         }
     };
     let problem = &mut disassembly.problem;
-    let up = initial.upward();
     // Of a search that others came before, the base is known.
     if problem.actions == ActionSet::Extended && problem.base.parts.is_empty() {
-        problem.base = problem.chosen_base(&problem.present, &up);
+        problem.base = problem.chosen_base(&problem.present, &initial.up());
     }
-    let mut search = Sbdp::new(disassembly, initial, up, guided);
+    let mut search = Sbdp::new(disassembly, initial, guided);
     let stop = search.run().err();
     let (report, disassembly) = search.report();
     report.log(disassembly);
@@ -110,20 +107,20 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
 }
 
 impl<'a, 'o> Sbdp<'a, 'o> {
-    fn new(
-        mut disassembly: Disassembly<'a, 'o>,
-        initial: InitialAnalysis,
-        up: Vector3<f64>,
-        guided: bool,
-    ) -> Self {
+    fn new(mut disassembly: Disassembly<'a, 'o>, initial: InitialAnalysis, guided: bool) -> Self {
+        let (upward, up) = (initial.upward(), initial.up());
         let InitialAnalysis { directions, translations, rotations, graphs, duration } = initial;
         disassembly.counters.static_analysis += duration;
         let strategy = Strategy::new(guided, disassembly.problem.actions);
+        if strategy.is_extended() {
+            // Opposite translations are neighbours.
+            disassembly.supports = Supports::of(&graphs, upward ^ 1);
+        }
         let mut search = Self {
             strategy,
             states: States::new(&disassembly.problem.scene, strategy),
             actions: ActionTable::new(directions, translations, rotations),
-            order: Order::new(&disassembly.problem.scene, strategy),
+            order: Order::new(&disassembly.problem.scene, strategy, up),
             novelty: Novelty::default(),
             invalidation: Invalidation::default(),
             sweep_memory: SweepMemory::default(),
@@ -131,7 +128,6 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             unscrewing_memory: UnscrewingMemory::default(),
             group_memory: GroupMemory::default(),
             speculation: Speculation::default(),
-            up,
             former_bases: Vec::new(),
             disassembly,
         };
@@ -264,7 +260,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 open = self.expandable(phase);
                 continue;
             }
-            let batch = self.order.extract(&self.of(phase), &mut open);
+            let batch = self.order.extract(&self.of(phase), &mut open, &self.disassembly);
             let result = self.expand(phase, &batch)?;
             gain.new_states |= result.new_states;
             if result.new_states && self.strategy.orders_actions(phase) {
@@ -345,9 +341,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         let (mut next, mut removed) = (0, false);
         while next < sweeps.len() && !self.disassembly.is_done() {
             let standing = self.disassembly.everything.standing();
-            let is_wanted = |at: StateAction| {
-                self.states.is_open(self.strategy, at) && !self.sweep_memory.is_blocked(at, standing)
-            };
+            let is_wanted = |at: StateAction| self.may_try(at) && !self.sweep_memory.is_blocked(at, standing);
             let (window, end) = window(&sweeps, next, rayon::current_num_threads(), is_wanted);
             next = end;
             let runs: Vec<Transition> = window.iter().map(|&i| self.transition(sweeps[i])).collect();
@@ -411,8 +405,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         let mut expanded = HashSet::new();
         while next < jobs.len() {
             let size = self.window_size(jobs[next]);
-            let is_open = |at: StateAction| self.states.is_open(self.strategy, at);
-            let (window, end) = window(&jobs, next, size, is_open);
+            let (window, end) = window(&jobs, next, size, |at| self.may_try(at));
             next = end;
             let mut motions = self.simulated(&jobs, &window)?.into_iter();
             while let Some((i, motion)) = motions.next() {
@@ -459,6 +452,12 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         let mut fresh = self.disassembly.simulate(&runs)?.into_iter();
         let mut known = |&i: &usize| Some((i, self.speculation.take(jobs[i]).or_else(|| fresh.next())?));
         Ok(window.iter().map_while(&mut known).collect())
+    }
+
+    /// Whether an action is open and its part may leave.
+    fn may_try(&self, at: StateAction) -> bool {
+        let part = self.states.nodes[at.node].part;
+        self.disassembly.problem.may_move(part) && self.states.is_open(self.strategy, at)
     }
 
     fn transition(&self, at: StateAction) -> Transition {

@@ -28,6 +28,7 @@ impl Observer for Recorder {
 
 pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
     Problem {
+        clearance: None,
         seed: 0,
         present: (0..scene.bodies.len()).collect(),
         scene,

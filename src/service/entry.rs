@@ -83,6 +83,9 @@ impl Entry {
         for list in [&mut fixed, &mut base] {
             list.retain(|p| removed.binary_search(p).is_err());
         }
+        if let Some(value) = request.clearance.filter(|length| !length.is_finite() || *length < 0.0) {
+            return Err(ServiceError::NoLength { field: "clearance", value });
+        }
         for (field, list) in [("fixed", &fixed), ("base", &base)] {
             if let Some(&part) = request.targets.iter().flatten().find(|&p| list.binary_search(p).is_ok()) {
                 let name = self.assembly.parts[part].name.clone();
@@ -265,6 +268,7 @@ impl Entry {
             actions: request.actions,
             static_analysis: request.static_analysis,
             sweeps: request.sweeps(),
+            clearance: request.clearance.map(|length| length * self.assembly.scale),
             seed: request.seed,
             max_simulations: request.max_simulations,
             earlier: Vec::new(),

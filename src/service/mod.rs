@@ -93,6 +93,14 @@ pub enum ServiceError {
         /// Which list.
         field: &'static str,
     },
+    /// A length is negative or not finite.
+    #[error("`{field}` is {value}: give a length of at least 0")]
+    NoLength {
+        /// Which one.
+        field: &'static str,
+        /// What was given.
+        value: f64,
+    },
     /// The worker threads for the request could not be started.
     #[error("cannot start worker threads: {0}")]
     Threads(String),

@@ -206,6 +206,9 @@ pub struct PlanOptions {
     pub path_timeout: Option<Duration>,
     /// What the random poses of [`Planner::Rrt`] and [`Planner::BkRrt`] depend on.
     pub seed: u64,
+    /// The gap between a part's hull and that of all that stands where its way out ends, in the input's units, at least 0;
+    /// `None` for a hundredth of the longest side of the part's box.
+    pub clearance: Option<f64>,
     /// Simulations (steps of a tree, in RRT) after which to give up.
     pub max_simulations: Option<u64>,
     /// Threads for this request; 0 leaves it to the daemon.
@@ -249,6 +252,7 @@ impl PlanOptions {
             threads: self.threads,
             deadline_ns: self.timeout.map(clock::deadline_in),
             seed: self.seed,
+            clearance: self.clearance,
             max_simulations: self.max_simulations,
             path_timeout_ns: self.path_timeout.map(nanoseconds),
             planning_timeout_ns: self.planning_timeout.map(nanoseconds),

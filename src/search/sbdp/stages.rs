@@ -40,7 +40,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             return Ok(false);
         }
         let open = self.expandable(PlanningPhase::Translation);
-        for part in self.order.parts(&self.of(PlanningPhase::Translation), &open) {
+        for part in self.order.parts(&self.of(PlanningPhase::Translation), &open, &self.disassembly) {
             if self.unscrewing_memory.holds(part, self.disassembly.everything.standing()) {
                 continue;
             }
@@ -86,8 +86,8 @@ impl<'a, 'o> Sbdp<'a, 'o> {
 
     /// Makes one of some parts that leave the base together the base, if they are rather what stays.
     fn becomes_base(&mut self, leaving: &[usize]) -> bool {
-        let Self { disassembly: Disassembly { problem, everything, .. }, former_bases, up, .. } = self;
-        let Some(base) = problem.base_among(leaving, everything.standing(), up) else { return false };
+        let Self { disassembly: Disassembly { problem, everything, .. }, former_bases, order, .. } = self;
+        let Some(base) = problem.base_among(leaving, everything.standing(), &order.up) else { return false };
         if base.parts.iter().any(|part| former_bases.contains(part)) {
             return false;
         }
@@ -96,16 +96,18 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         true
     }
 
-    /// Where a base has left, others stay: those that were given and still stand, or else another one is chosen.
+    /// After a removal: where a base has left, others stay: those that were given and still stand, or else another one is chosen.
     pub(super) fn renew_base(&mut self) {
         let Disassembly { problem, everything, .. } = &mut self.disassembly;
+        // What else left may have freed others.
+        problem.releases_base = false;
         let base = problem.base.among(everything.standing());
         if base == problem.base {
             return;
         }
         let is_chosen = base.parts.is_empty() && self.strategy.is_extended();
-        problem.base = if is_chosen { problem.chosen_base(everything.standing(), &self.up) } else { base };
-        problem.releases_base = false;
+        problem.base =
+            if is_chosen { problem.chosen_base(everything.standing(), &self.order.up) } else { base };
     }
 
     pub(super) fn groups(&mut self) -> Groups<'_, 'a, 'o> {
@@ -127,7 +129,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             return Ok(false);
         }
         let open = self.expandable(PlanningPhase::Translation);
-        for part in self.order.parts(&self.of(PlanningPhase::Translation), &open) {
+        for part in self.order.parts(&self.of(PlanningPhase::Translation), &open, &self.disassembly) {
             let is_start = |&node: &usize| {
                 let node = &self.states.nodes[node];
                 node.part == part && (stage == CellStage::Last || !self.is_turned(node))

@@ -97,7 +97,7 @@ impl PlanQuestion<'_> {
         digest.text(request.planner.name()).text(request.engine.name()).text(request.actions.name());
         digest.text(request.static_analysis.name()).text(&format!("{:?}", request.penalty));
         digest.integer(u64::from(request.sweeps())).integer(request.seed);
-        digest.text(&format!("{:?}", request.max_simulations));
+        digest.text(&format!("{:?} {:?}", request.max_simulations, request.clearance));
         let mut targets = request.targets.clone();
         if let Some(targets) = &mut targets {
             targets.sort_unstable();
