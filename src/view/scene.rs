@@ -2,12 +2,14 @@
 //! frame; times in seconds.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
+use serde::Serialize;
 
 use super::colour::colours;
 use super::document::kind_of;
 use super::explode::{Leaving, exploded_parts};
 use super::shading::{Shaded, shaded};
-use super::words::{Words, required};
+use super::verdict::verdict;
+use super::words::{Words, free_together, kept_together, required};
 use super::{PALETTE, Rgb, ViewError};
 use crate::geometry::{Assembly, Bounds, Pose, interpolate, pose_from_waypoint};
 use crate::plan::export::{BlockedDocument, PlanDocument};
@@ -108,6 +110,15 @@ pub struct SceneStep {
     pub words: String,
 }
 
+/// Parts that belong together.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SceneGroup {
+    /// Indices of the parts, in the order of the plan.
+    pub parts: Vec<usize>,
+    /// What there is to say about them.
+    pub words: String,
+}
+
 /// Which way is up in the input's frame, by the custom of the files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Up {
@@ -130,8 +141,12 @@ pub struct PlanScene {
     pub kind: PlanKind,
     /// How planning ended.
     pub status: String,
-    /// Why it is not complete.
-    pub reason: Option<String>,
+    /// Why it is not complete, in two sentences.
+    pub verdict: Option<String>,
+    /// Groups that left together and were not taken apart.
+    pub kept_together: Vec<SceneGroup>,
+    /// Where nothing leaves any more: groups that can begin to move.
+    pub free_together: Vec<SceneGroup>,
     /// What blocks the parts that should have moved; by name.
     pub blocked: Vec<BlockedDocument>,
     /// The meshes.
@@ -159,13 +174,21 @@ impl PlanScene {
         for (part, shift) in parts.iter_mut().zip(exploded_parts(&boxes, &leaving)) {
             part.exploded = shift;
         }
+        let group = |names: &[String], words: String| {
+            let parts = names.iter().filter_map(|name| parts.iter().position(|p| p.name == *name));
+            SceneGroup { parts: parts.collect(), words }
+        };
+        let kept = plan.kept_together.iter().map(|g| group(g, kept_together(g))).collect();
+        let free = plan.free_together.iter().map(|g| group(&g.parts, free_together(g))).collect();
         let mut scene = Self {
             name: assembly.name.clone(),
             units: plan.units.clone().or_else(|| assembly.units.clone()),
             up,
             kind: kind_of(plan),
             status: plan.status.clone(),
-            reason: plan.reason.clone(),
+            verdict: verdict(plan),
+            kept_together: kept,
+            free_together: free,
             blocked: plan.blocked.clone(),
             steps,
             drawn: stage.drawn,
