@@ -484,7 +484,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{cuboid, source};
     use crate::geometry::{Waypoint, waypoint_from_pose};
-    use crate::plan::export::StepDocument;
+    use crate::plan::export::{FreeGroupDocument, StepDocument};
 
     const STILL: Waypoint = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
@@ -660,6 +660,21 @@ mod tests {
         });
         assert!(!shown[0].grown(-1e-9).meets(&shown[1]), "{shown:?}");
         assert!(shown.iter().all(|bounds| bounds.min.z > 0.0), "{shown:?}");
+    }
+
+    #[test]
+    fn groups_are_of_parts_of_the_scene() {
+        let free = FreeGroupDocument { parts: vec!["0".into(), "2".into()], direction: [0.0, -1.0, 0.0] };
+        let mut plan = PlanDocument { free_together: vec![free], ..group() };
+        plan.kept_together = vec![vec!["2".into(), "1".into()]];
+        (plan.status, plan.reason) = ("timeout".into(), Some("the deadline passed".into()));
+        let PlanScene { kept_together, free_together, verdict, .. } = scene(&plan);
+        let kept = SceneGroup { parts: vec![2, 1], words: "Not taken apart: parts 2 and 1".into() };
+        assert_eq!(kept_together, [kept]);
+        let words = "Can begin to move together along −Y: parts 0 and 2".to_owned();
+        assert_eq!(free_together, [SceneGroup { parts: vec![0, 2], words }]);
+        let verdict = verdict.unwrap();
+        assert!(verdict.ends_with("remain. The deadline passed; nothing is proved."), "{verdict}");
     }
 
     #[test]

@@ -21,19 +21,20 @@ pub(crate) fn verdict(plan: &PlanDocument) -> Option<String> {
     }
     let is_search_over = [PlanStatus::Infeasible, PlanStatus::Exhausted].map(PlanStatus::name);
     let is_hindered = plan.blocked.iter().any(|b| b.action == INSERTION);
-    let reason = plan.reason.as_deref().unwrap_or("the search ended");
-    if is_search_over.contains(&plan.status.as_str()) && !is_hindered {
+    match plan.reason.as_deref() {
         // The search's own words: what remains, and what is proved.
-        return Some(reason.to_owned());
+        Some(own) if is_search_over.contains(&plan.status.as_str()) && !is_hindered => Some(own.to_owned()),
+        reason => {
+            let reason = capital(reason.unwrap_or("the search ended").trim_end_matches('.'));
+            Some(format!("{}. {reason}; nothing is proved.", left(plan)))
+        }
     }
-    let reason = capital(reason.trim_end_matches('.'));
-    Some(format!("{}. {reason}; nothing is proved.", left(plan)))
 }
 
 /// The parts that a plan leaves where they are.
 fn left(plan: &PlanDocument) -> String {
     let (parts, [one, many]) = match kind_of(plan) {
-        PlanKind::Disassembly if plan.remaining.len() < 2 => {
+        PlanKind::Disassembly if plan.remaining.len() < 2 && !plan.kept_together.is_empty() => {
             (plan.kept_together.concat(), ["remains", "remain"])
         }
         PlanKind::Disassembly => (plan.remaining.clone(), ["remains", "remain"]),
@@ -110,6 +111,8 @@ mod tests {
         assert_eq!(verdict(&plan()), None);
         let proved = "Parts 0 and 1 remain. It is proved that 0 and 1 never come apart: they are linked.";
         assert_eq!(verdict(&stuck("infeasible", proved)).unwrap(), proved);
+        let silent = PlanDocument { reason: None, ..stuck("exhausted", "") };
+        assert_eq!(verdict(&silent).unwrap(), "Part 0 remains. The search ended; nothing is proved.");
         let cut = PlanDocument { remaining: named(3), ..stuck("timeout", "the deadline passed") };
         assert_eq!(
             verdict(&cut).unwrap(),

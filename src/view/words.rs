@@ -137,9 +137,9 @@ struct ToldMove {
 }
 
 impl ToldMove {
-    /// Moves that are alike: where to, and how far. What turns is a screw if whoever looks from the side where the part
-    /// is out would see it come nearer or go away while it turns.
-    fn of(alike: &[&Move], plan: PlanKind, is_aside: bool, units: Option<&str>) -> Self {
+    /// Moves that are alike: where to, and how far. The sense of a screw is that which is seen from the side where the part
+    /// is when it is out: a turn about a direction is counter-clockwise for who looks against it.
+    fn of(alike: &[&Move], plan: PlanKind, may_screw: bool, units: Option<&str>) -> Self {
         let (first, kind) = (alike[0], alike[0].kind());
         let of = |value: fn(&Move) -> f64| {
             let values = alike.iter().map(|m| value(m));
@@ -150,7 +150,7 @@ impl ToldMove {
             MoveKind::Straight => {
                 Self { kind, text: format!("along {} ({length})", direction(&first.along)) }
             }
-            MoveKind::Screw if !is_aside => {
+            MoveKind::Screw if may_screw => {
                 let viewer = match plan {
                     PlanKind::Disassembly => first.sense(),
                     PlanKind::Assembly => -first.sense(),
@@ -326,7 +326,9 @@ impl<'a> Words<'a> {
         let is_aside = *ends == StepEnd::Aside.name();
         let told = |k: usize| {
             let alike: Vec<&Move> = steps.iter().map(|&step| &self.courses[step].moves[k]).collect();
-            ToldMove::of(&alike, self.kind, is_aside, units)
+            // Where a part is inserted it may have turned on its way to there, too.
+            let may_screw = !is_aside && (self.kind == PlanKind::Disassembly || k + 1 == moves.len());
+            ToldMove::of(&alike, self.kind, may_screw, units)
         };
         let told: Vec<ToldMove> = (0..moves.len()).map(told).collect();
         let whither = match self.kind {
@@ -627,6 +629,11 @@ mod tests {
             told("disassembly", &drift),
             "Turn part 1 by ½ turn about +Z, then take it out along +Z (9 mm)"
         );
+        // On its way to where it is put in.
+        let way =
+            [at([0.0, 9.0, 0.0], [0.0, 0.0, PI]), at([0.0, 9.0, -3.0], [0.0; 3]), at([0.0; 3], [0.0; 3])];
+        let text = told("assembly", &way);
+        assert!(text.starts_with("Turn part 1 by ½ turn along −Z (3 mm)"), "{text}");
         let tilt = [at([0.0; 3], [0.0; 3]), at([0.0, 0.0, 2.0], [0.0, 0.0, PI / 2.0])];
         assert_eq!(told("disassembly", &tilt), "Turn part 1 out by ¼ turn along +Z (2 mm)");
     }

@@ -12,22 +12,22 @@ import { byId, element } from "./dom.js";
  * @param {(time: number) => void} seek
  */
 export function groupLists(scene, selection, seek) {
-  const row = (time) => (group) => {
+  const row = (group) => {
     const show = () => {
-      seek(time(group));
+      seek(shownAt(scene, group));
       selection.pickGroup(group.parts);
     };
     return element("li", {}, element("button", { type: "button", onclick: show }, group.words));
   };
-  byId("kept").append(...scene.kept_together.map(row((group) => putDown(scene, group))));
-  byId("free-groups").append(...scene.free_together.map(row(() => scene.duration)));
+  byId("kept").append(...scene.kept_together.map(row));
+  byId("free-groups").append(...scene.free_together.map(row));
 }
 
-/** When a group is put down for the last time: afterwards it fades.
+/** The last time at which all of a group is seen: what is out fades when nothing more is done to it.
  * @param {Scene} scene
  * @param {Group} group */
-export function putDown(scene, group) {
-  const ends = group.parts.map((part) => scene.parts[part].handled?.[1] ?? scene.duration);
+export function shownAt(scene, group) {
+  const ends = group.parts.map((p) => scene.parts[p]).map((p) => (p.crosses === null ? scene.duration : p.handled[1]));
   return Math.min(...ends);
 }
 
