@@ -164,6 +164,9 @@ pub(super) struct PlanArguments {
     /// Plan in the daemon, which must be running
     #[arg(long)]
     pub(super) daemon: bool,
+    /// In the table, list all overlaps and all blocked actions
+    #[arg(short, long)]
+    pub(super) verbose: bool,
 }
 
 /// Arguments of `sbdp check`.

@@ -23,7 +23,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     let planned = planned(arguments)?;
     write_files(arguments, &planned)?;
     if arguments.json.as_deref() != Some(Path::new(STDOUT)) {
-        print(&report::plan(&planned.revised, &planned.plan))?;
+        print(&report::plan(&planned.revised, &planned.plan, arguments.verbose))?;
     }
     Ok(exit_code(planned.plan.status))
 }

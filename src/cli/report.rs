@@ -6,28 +6,34 @@ use super::table::{TextTable, length};
 use crate::geometry::{Bounds, Pose, SourceAssembly, SourceMesh, pose_from_waypoint};
 use crate::plan::export::PlanDocument;
 use crate::plan::{
-    Base, FreeGroup, MotionKind, Placements, Plan, PlanKind, PlanStats, PlanStep, StepEnd, StepFrame,
+    Base, FreeGroup, MotionKind, Overlap, Placements, Plan, PlanKind, PlanStats, PlanStep, StepEnd, StepFrame,
 };
-use crate::view::direction;
+use crate::view::{blockers, direction, part_word, part_words, verdict};
 
 /// Count of parts that a row of the table names; more are counted. With names of ten letters, the row still fits 120
 /// columns. At half, pairs alone are named; at double, rows wrap.
 const MOST_NAMES: usize = 4;
 
-/// The table of steps and everything there is to know about the rest.
-pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan) -> String {
+/// The table of steps, and what there is to know about the rest: all overlaps and blocked actions if it is `verbose`,
+/// else the worst and the few that matter, with a count of what is left out.
+pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan, verbose: bool) -> String {
+    let document = PlanDocument::new(plan);
     let mut text = headline(assembly, plan);
     if !plan.steps.is_empty() {
         text.push('\n');
-        text.push_str(&steps(assembly, plan));
+        text.push_str(&steps(assembly, plan, &document));
     }
     let sections = [
         ("base", base(plan)),
         ("remaining", remaining(plan)),
-        ("left together and not taken apart", plan.kept_together.iter().map(|g| names(plan, g)).collect()),
+        (
+            "left together and not taken apart",
+            plan.kept_together.iter().map(|g| words(plan, g, ", ")).collect(),
+        ),
+        ("not complete", verdict(&document).into_iter().collect()),
         ("can begin to move together", free_together(plan)),
-        ("blocked", blocked(plan)),
-        ("overlaps at the assembled pose", overlaps(plan)),
+        ("blocked", blocked(&document, verbose)),
+        ("overlaps at the assembled pose", overlaps(plan, verbose)),
         ("warnings", warnings(plan)),
     ];
     for (title, lines) in sections {
@@ -42,7 +48,6 @@ pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan) -> String {
 }
 
 fn headline(assembly: &SourceAssembly, plan: &Plan) -> String {
-    let reason = plan.reason.as_ref().map_or(String::new(), |r| format!(" ({r})"));
     let name = if assembly.name.is_empty() { "assembly" } else { &assembly.name };
     let done = match plan.kind {
         PlanKind::Disassembly => "come off",
@@ -50,7 +55,7 @@ fn headline(assembly: &SourceAssembly, plan: &Plan) -> String {
     };
     let crosses = plan.steps.iter().filter(|step| step.of.is_none() && step.ends != StepEnd::Aside);
     format!(
-        "{name}: {}{reason}; {} of {} parts {done}, planner {}, engine {}\n",
+        "{name}: {}; {} of {} parts {done}, planner {}, engine {}\n",
         plan.status.name(),
         crosses.map(|step| step.parts.len()).sum::<usize>(),
         plan.parts.len().saturating_sub(plan.removed.len()),
@@ -59,13 +64,13 @@ fn headline(assembly: &SourceAssembly, plan: &Plan) -> String {
     )
 }
 
-fn steps(assembly: &SourceAssembly, plan: &Plan) -> String {
+fn steps(assembly: &SourceAssembly, plan: &Plan, document: &PlanDocument) -> String {
     let has_groups = plan.steps.iter().any(|step| step.of.is_some());
     let group = has_groups.then_some("group of");
     let header =
         ["step", "part"].into_iter().chain(group).chain(["motion", "length", "direction", "after step"]);
     let mut table = TextTable::new(&header.collect::<Vec<_>>());
-    let middles = middles(assembly, plan);
+    let middles = middles(assembly, plan, document);
     for ((number, step), middle) in (1..).zip(&plan.steps).zip(middles) {
         let of = has_groups.then(|| step.of.map_or_else(String::new, |of| format!("step {}", of + 1)));
         let aside = if step.ends == StepEnd::Aside { ", aside" } else { "" };
@@ -109,8 +114,8 @@ fn travelled(step: &PlanStep, kind: PlanKind, middle: &Point3<f64>, units: Optio
 
 /// By step, the middle of the box of the parts that it moves, where its path is the identity. Steps that contradict each
 /// other have the middle of the parts as given.
-fn middles(assembly: &SourceAssembly, plan: &Plan) -> Vec<Point3<f64>> {
-    let placements = Placements::new(plan.kind, &PlanDocument::new(plan)).ok();
+fn middles(assembly: &SourceAssembly, plan: &Plan, document: &PlanDocument) -> Vec<Point3<f64>> {
+    let placements = Placements::new(plan.kind, document).ok();
     let assembled = |part: usize| {
         let start = plan.poses.iter().find(|(p, _)| *p == part);
         let start = start.map_or_else(Pose::identity, |(_, pose)| pose_from_waypoint(pose));
@@ -141,47 +146,44 @@ fn box_of(mesh: &SourceMesh, pose: &Pose) -> Bounds {
 fn base(plan: &Plan) -> Vec<String> {
     let Base { parts, reason } = &plan.base;
     let reason = reason.as_deref().unwrap_or("as given");
-    if parts.is_empty() { Vec::new() } else { vec![format!("{}: {reason}", names(plan, parts))] }
+    if parts.is_empty() { Vec::new() } else { vec![format!("{}: {reason}", words(plan, parts, ", "))] }
 }
 
 fn remaining(plan: &Plan) -> Vec<String> {
-    if plan.remaining.is_empty() { Vec::new() } else { vec![names(plan, &plan.remaining)] }
+    if plan.remaining.is_empty() { Vec::new() } else { vec![words(plan, &plan.remaining, ", ")] }
 }
 
 fn free_together(plan: &Plan) -> Vec<String> {
-    let line = |g: &FreeGroup| format!("{} along {}", names(plan, &g.parts), direction(&g.direction.into()));
+    let line =
+        |g: &FreeGroup| format!("{} along {}", words(plan, &g.parts, ", "), direction(&g.direction.into()));
     plan.free_together.iter().map(line).collect()
 }
 
-/// One line per part: what it met in each direction.
-fn blocked(plan: &Plan) -> Vec<String> {
-    let mut lines: Vec<(usize, String)> = Vec::new();
-    for blocked in &plan.blocked {
-        let what = format!("{} by {}", blocked.action, names(plan, &blocked.by));
-        match lines.last_mut() {
-            Some((part, line)) if *part == blocked.part => line.push_str(&format!("; {what}")),
-            _ => lines.push((blocked.part, format!("{}: {what}", plan.part_name(blocked.part)))),
-        }
-    }
-    lines.into_iter().map(|(_, line)| line).collect()
+/// What keeps each part, and how much of it is left out.
+fn blocked(document: &PlanDocument, verbose: bool) -> Vec<String> {
+    let (mut lines, left_out) = blockers(document, verbose);
+    lines.extend(left_out.map(|left_out| format!("{left_out} (-v lists them)")));
+    lines
 }
 
-fn overlaps(plan: &Plan) -> Vec<String> {
-    let units = plan.units.as_deref();
-    let line = |o: &crate::plan::Overlap| {
-        format!(
-            "{} and {}: {} deep",
-            plan.part_name(o.parts[0]),
-            plan.part_name(o.parts[1]),
-            length(o.depth, units)
-        )
+/// How many pairs overlap, and the deepest; or each pair.
+fn overlaps(plan: &Plan, verbose: bool) -> Vec<String> {
+    let line = |o: &Overlap| {
+        let pair = words(plan, &o.parts, " and ");
+        format!("{pair}: {} deep", length(o.depth, plan.units.as_deref()))
     };
-    plan.overlaps.iter().map(line).collect()
+    let deepest = plan.overlaps.iter().max_by(|a, b| a.depth.total_cmp(&b.depth));
+    match (deepest, plan.overlaps.len()) {
+        (Some(deepest), count) if count > 1 && !verbose => {
+            vec![format!("{count} pairs, the deepest {} (-v lists them)", line(deepest))]
+        }
+        _ => plan.overlaps.iter().map(line).collect(),
+    }
 }
 
 fn warnings(plan: &Plan) -> Vec<String> {
     let line = |w: &crate::plan::Warning| match w.part {
-        Some(part) => format!("{}: {}", plan.part_name(part), w.message),
+        Some(part) => format!("{}: {}", part_word(plan.part_name(part)), w.message),
         None => w.message.clone(),
     };
     plan.warnings.iter().map(line).collect()
@@ -225,9 +227,16 @@ fn reused(s: &PlanStats) -> String {
     if told.is_empty() { String::new() } else { format!(", remembered: {}", told.join(", ")) }
 }
 
+/// Names in a cell of the table.
 fn names(plan: &Plan, parts: &[usize]) -> String {
     let names: Vec<&str> = parts.iter().map(|&p| plan.part_name(p)).collect();
     names.join(", ")
+}
+
+/// Names beside the table.
+fn words(plan: &Plan, parts: &[usize], last: &str) -> String {
+    let names: Vec<&str> = parts.iter().map(|&p| plan.part_name(p)).collect();
+    part_words(&names, last)
 }
 
 #[cfg(test)]
@@ -265,7 +274,7 @@ mod tests {
         let plan = Plan {
             kind: PlanKind::Disassembly,
             status: PlanStatus::Infeasible,
-            reason: Some("exhausted".into()),
+            reason: Some("Parts a and b remain. Nothing is proved.".into()),
             planner: "sbdp-star".into(),
             engine: "sliding".into(),
             units: Some("mm".into()),
@@ -286,25 +295,43 @@ mod tests {
                 Blocked { part: 1, by: vec![0, 2], action: "+x".into() },
                 Blocked { part: 1, by: vec![0], action: "-z".into() },
             ],
-            overlaps: vec![Overlap { parts: [0, 1], depth: 0.5 }],
+            overlaps: [(1, 0.25), (2, 0.5), (2, 0.125)]
+                .map(|(b, depth)| Overlap { parts: [0, b], depth })
+                .into(),
             warnings: vec![Warning { part: Some(2), message: "open".into() }],
             stats: PlanStats { motion_hits: 3, verdict_hits: Some(2), ..PlanStats::default() },
         };
-        let text = super::plan(&assembly, &plan);
-        for line in [
-            "vice: infeasible (exhausted); 2 of 3 parts come off",
+        let told = |verbose: bool, lines: &[&str]| {
+            let text = super::plan(&assembly, &plan, verbose);
+            lines.iter().for_each(|line| assert!(text.contains(line), "{line}\n{text}"));
+        };
+        let always = [
+            "vice: infeasible; 2 of 3 parts come off",
             "1     a     rotation     0 mm, turning 180°             1",
             "2     c     translation  free already                   1",
             "  b: it is the largest",
-            "can begin to move together:\n  a, b along +Y",
-            "  b: +x by a, c; -z by a",
-            "  a and b: 0.5000 mm deep",
+            "not complete:\n  Parts a and b remain. Nothing is proved.\n\ncan begin to move together:\n  a, b along +Y\n\nblocked",
             "  c: open",
             "0 states, remembered: 3 motions, 2 verified paths; fields",
             "verified to 0.0100 mm",
-        ] {
-            assert!(text.contains(line), "{line}\n{text}");
+        ];
+        for verbose in [false, true] {
+            told(verbose, &always);
         }
+        told(
+            false,
+            &[
+                "blocked:\n  b: -z by a\n  1 more blocked action of these parts (-v lists them)\n\n",
+                "pose:\n  3 pairs, the deepest a and c: 0.5000 mm deep (-v lists them)\n\n",
+            ],
+        );
+        told(
+            true,
+            &[
+                "blocked:\n  b: +x by a, c; -z by a\n\n",
+                "  a and b: 0.2500 mm deep\n  a and c: 0.5000 mm deep\n  a and c: 0.1250 mm deep\n\n",
+            ],
+        );
     }
 
     #[test]
@@ -338,14 +365,14 @@ mod tests {
         ];
         let plan =
             Plan { parts: names, kept_together: vec![vec![0, 1]], ..plan_of(PlanStatus::Complete, steps) };
-        let text = super::plan(&assembly, &plan);
+        let text = super::plan(&assembly, &plan, false);
         // The middle of both boxes is at (2, 1): half a turn about the origin brings it to (−2, −1).
         for line in [
             "step  part                   group of  motion              length",
             "1     0, 1                             rotation            4.47, turning 180°",
             "2     1                      step 1    translation, aside  3.00",
             "3     2, 3, 4, 5 and 1 more            translation         free already",
-            "left together and not taken apart:\n  0, 1\n",
+            "left together and not taken apart:\n  parts 0, 1\n",
             "box: complete; 7 of 7 parts come off",
         ] {
             assert!(text.contains(line), "{line}\n{text}");

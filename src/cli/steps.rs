@@ -7,6 +7,7 @@ use super::error::CliError;
 use super::print;
 use super::subject::{Subject, plan_in};
 use crate::plan::export::PlanDocument;
+use crate::view::equal_parts;
 use crate::view::steps::markdown;
 
 pub(super) fn run(arguments: &StepsArguments) -> Result<ExitCode, CliError> {
@@ -24,12 +25,14 @@ pub(super) fn run(arguments: &StepsArguments) -> Result<ExitCode, CliError> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Of each part of a plan, its shape.
+/// Of each part of a plan, its class: parts of one class are equal.
 fn classes(plan: &PlanDocument, arguments: &StepsArguments) -> Result<Vec<usize>, CliError> {
     let assembly = Subject::of(plan.clone(), arguments.meshes.as_deref())?.assembly()?;
-    let shape = |name: &String| {
-        let part = assembly.parts.iter().find(|p| p.name == *name);
-        part.map(|p| p.shape).ok_or_else(|| CliError::Refused(format!("the assembly has no part `{name}`")))
+    let classes = equal_parts(&assembly);
+    let class = |name: &String| {
+        let part = assembly.parts.iter().position(|p| p.name == *name);
+        part.map(|p| classes[p])
+            .ok_or_else(|| CliError::Refused(format!("the assembly has no part `{name}`")))
     };
-    plan.parts.iter().map(shape).collect()
+    plan.parts.iter().map(class).collect()
 }

@@ -10,6 +10,7 @@
 
 mod colour;
 mod document;
+mod equal_parts;
 mod explode;
 pub mod glb;
 pub mod layout;
@@ -18,12 +19,15 @@ pub mod picture;
 mod scene;
 mod shading;
 pub mod steps;
+mod verdict;
 mod words;
 
 pub use colour::{PALETTE, Rgb};
 pub use document::{kind_of, read_plan};
-pub use scene::{DrawnPart, Keyframe, Placement, PlanScene, ScenePart, SceneStep, Up};
-pub(crate) use words::direction;
+pub(crate) use equal_parts::equal_parts;
+pub use scene::{DrawnPart, Keyframe, Placement, PlanScene, SceneGroup, ScenePart, SceneStep, Up};
+pub(crate) use verdict::{blockers, verdict};
+pub(crate) use words::{direction, part_word, part_words};
 
 /// Why a plan cannot be shown.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

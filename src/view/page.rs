@@ -12,7 +12,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
 use super::layout::layout;
-use super::{DrawnPart, Keyframe, PALETTE, Placement, PlanScene, ScenePart, SceneStep, Up};
+use super::{DrawnPart, Keyframe, PALETTE, Placement, PlanScene, SceneGroup, ScenePart, SceneStep, Up};
 use crate::blocking_graph::DirectionalGraph;
 use crate::plan::export::BlockedDocument;
 use nalgebra::Point3;
@@ -48,12 +48,14 @@ struct Data<'a> {
     up: &'static str,
     kind: &'static str,
     status: &'a str,
-    reason: Option<&'a str>,
+    verdict: Option<&'a str>,
     duration: f64,
     palette: Vec<String>,
     meshes: Vec<PageMesh>,
     parts: Vec<PagePart<'a>>,
     steps: Vec<PageStep<'a>>,
+    kept_together: &'a [SceneGroup],
+    free_together: &'a [SceneGroup],
     blocked: Vec<Stuck<'a>>,
     graphs: Vec<Graph>,
     bytes: String,
@@ -96,6 +98,7 @@ struct PagePart<'a> {
 #[derive(Debug, Serialize)]
 struct PageStep<'a> {
     parts: &'a [usize],
+    of: Option<usize>,
     words: &'a str,
     after: &'a [usize],
     begins: f64,
@@ -133,12 +136,14 @@ fn data<'a>(scene: &'a PlanScene, names: &[String], graphs: &[DirectionalGraph])
         },
         kind: scene.kind.name(),
         status: &scene.status,
-        reason: scene.reason.as_deref(),
+        verdict: scene.verdict.as_deref(),
         duration: scene.duration(),
         palette: PALETTE.iter().map(|[r, g, b]| format!("#{r:02x}{g:02x}{b:02x}")).collect(),
         meshes,
         parts,
         steps: scene.steps.iter().map(step).collect(),
+        kept_together: &scene.kept_together,
+        free_together: &scene.free_together,
         blocked: scene.blocked.iter().map(|b| stuck(scene, b)).collect(),
         graphs: graphs.iter().map(|g| graph(scene, names, g)).collect(),
         bytes: STANDARD.encode(&bytes),
@@ -217,6 +222,7 @@ fn part<'a>(part: &'a ScenePart, middle: &Point3<f64>, bytes: &mut Vec<u8>) -> P
 fn step(step: &SceneStep) -> PageStep<'_> {
     PageStep {
         parts: &step.parts,
+        of: step.of,
         words: &step.words,
         after: &step.after,
         begins: step.begins,

@@ -2,12 +2,14 @@
 //! frame; times in seconds.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3};
+use serde::Serialize;
 
 use super::colour::colours;
 use super::document::kind_of;
 use super::explode::{Leaving, exploded_parts};
 use super::shading::{Shaded, shaded};
-use super::words::{Words, required};
+use super::verdict::verdict;
+use super::words::{Words, free_together, kept_together, required};
 use super::{PALETTE, Rgb, ViewError};
 use crate::geometry::{Assembly, Bounds, Pose, interpolate, pose_from_waypoint};
 use crate::plan::export::{BlockedDocument, PlanDocument};
@@ -108,6 +110,15 @@ pub struct SceneStep {
     pub words: String,
 }
 
+/// Parts that belong together.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SceneGroup {
+    /// Indices of the parts, in the order of the plan.
+    pub parts: Vec<usize>,
+    /// What there is to say about them.
+    pub words: String,
+}
+
 /// Which way is up in the input's frame, by the custom of the files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Up {
@@ -130,8 +141,12 @@ pub struct PlanScene {
     pub kind: PlanKind,
     /// How planning ended.
     pub status: String,
-    /// Why it is not complete.
-    pub reason: Option<String>,
+    /// Why it is not complete, in two sentences.
+    pub verdict: Option<String>,
+    /// Groups that left together and were not taken apart.
+    pub kept_together: Vec<SceneGroup>,
+    /// Where nothing leaves any more: groups that can begin to move.
+    pub free_together: Vec<SceneGroup>,
     /// What blocks the parts that should have moved; by name.
     pub blocked: Vec<BlockedDocument>,
     /// The meshes.
@@ -159,13 +174,21 @@ impl PlanScene {
         for (part, shift) in parts.iter_mut().zip(exploded_parts(&boxes, &leaving)) {
             part.exploded = shift;
         }
+        let group = |names: &[String], words: String| {
+            let parts = names.iter().filter_map(|name| parts.iter().position(|p| p.name == *name));
+            SceneGroup { parts: parts.collect(), words }
+        };
+        let kept = plan.kept_together.iter().map(|g| group(g, kept_together(g))).collect();
+        let free = plan.free_together.iter().map(|g| group(&g.parts, free_together(g))).collect();
         let mut scene = Self {
             name: assembly.name.clone(),
             units: plan.units.clone().or_else(|| assembly.units.clone()),
             up,
             kind: kind_of(plan),
             status: plan.status.clone(),
-            reason: plan.reason.clone(),
+            verdict: verdict(plan),
+            kept_together: kept,
+            free_together: free,
             blocked: plan.blocked.clone(),
             steps,
             drawn: stage.drawn,
@@ -461,7 +484,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{cuboid, source};
     use crate::geometry::{Waypoint, waypoint_from_pose};
-    use crate::plan::export::StepDocument;
+    use crate::plan::export::{FreeGroupDocument, StepDocument};
 
     const STILL: Waypoint = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
@@ -637,6 +660,21 @@ mod tests {
         });
         assert!(!shown[0].grown(-1e-9).meets(&shown[1]), "{shown:?}");
         assert!(shown.iter().all(|bounds| bounds.min.z > 0.0), "{shown:?}");
+    }
+
+    #[test]
+    fn groups_are_of_parts_of_the_scene() {
+        let free = FreeGroupDocument { parts: vec!["0".into(), "2".into()], direction: [0.0, -1.0, 0.0] };
+        let mut plan = PlanDocument { free_together: vec![free], ..group() };
+        plan.kept_together = vec![vec!["2".into(), "1".into()]];
+        (plan.status, plan.reason) = ("timeout".into(), Some("the deadline passed".into()));
+        let PlanScene { kept_together, free_together, verdict, .. } = scene(&plan);
+        let kept = SceneGroup { parts: vec![2, 1], words: "Not taken apart: parts 2 and 1".into() };
+        assert_eq!(kept_together, [kept]);
+        let words = "Can begin to move together along −Y: parts 0 and 2".to_owned();
+        assert_eq!(free_together, [SceneGroup { parts: vec![0, 2], words }]);
+        let verdict = verdict.unwrap();
+        assert!(verdict.ends_with("remain. The deadline passed; nothing is proved."), "{verdict}");
     }
 
     #[test]

@@ -3,9 +3,10 @@
 use std::fmt::Write;
 
 use super::document::kind_of;
-use super::words::{Moved, Words, direction, required, told_names};
+use super::verdict::{blockers, verdict};
+use super::words::{Moved, Words, capital, free_together, kept_together, part_words, required, told_names};
 use crate::plan::PlanKind;
-use crate::plan::export::{BlockedDocument, PlanDocument};
+use crate::plan::export::PlanDocument;
 
 /// The instructions. Steps in a row that do the same with equal parts are told as one. Parts are equal if they
 /// are of one `class` (one per part of the plan); without classes, if their names
@@ -41,13 +42,12 @@ impl StepAccount<'_> {
             PlanKind::Assembly => "Putting together",
         };
         let mut text = format!("# {what}: {count}\n\n");
-        if self.plan.status != "complete" {
-            let reason = self.plan.reason.as_ref().map(|r| format!(": {r}")).unwrap_or_default();
-            let _ = writeln!(text, "**Not complete ({}){reason}**\n", self.plan.status);
+        if let Some(verdict) = verdict(self.plan) {
+            let _ = writeln!(text, "**Not complete ({}).** {verdict}\n", self.plan.status);
         }
         let gone = &self.plan.initial.removed;
         if !gone.is_empty() {
-            let _ = writeln!(text, "Gone before: {}.\n", gone.join(", "));
+            let _ = writeln!(text, "Gone before: {}.\n", part_words(gone, ", "));
         }
         text
     }
@@ -70,9 +70,8 @@ impl StepAccount<'_> {
             let joins = |run: &&mut Vec<usize>| {
                 let first = &self.plan.steps[run[0]];
                 let ([a], [b]) = (&first.parts[..], &step.parts[..]) else { return false };
-                (first.of, &first.ends) == (step.of, &step.ends)
-                    && self.is_equal(a, b)
-                    && self.words.done(run[0], &Moved::one("")) == self.words.done(i, &Moved::one(""))
+                self.is_equal(a, b)
+                    && run.iter().all(|&other| self.words.is_alike(other, i))
                     && !run.iter().any(|g| step.requires.contains(g))
             };
             match runs.last_mut().filter(joins) {
@@ -92,7 +91,7 @@ impl StepAccount<'_> {
         let names: Vec<&str> =
             run.iter().flat_map(|&i| &self.plan.steps[i].parts).map(String::as_str).collect();
         let what = format!("{} × {}", names.len(), common_name(&names));
-        let (told, list) = (self.words.done(first, &Moved::one(&what)), names.join(", "));
+        let (told, list) = (self.words.done(run, &Moved::one(&what)), part_words(&names, ", "));
         // One by one: of several "it" would be wrong.
         let told = told
             .replace("nothing holds it", "nothing holds them")
@@ -129,40 +128,26 @@ impl StepAccount<'_> {
             PlanKind::Assembly => "Stands from the start",
         };
         if !plan.remaining.is_empty() {
-            let _ = writeln!(text, "{stays}: {}.\n", plan.remaining.join(", "));
+            let _ = writeln!(text, "{stays}: {}.\n", part_words(&plan.remaining, ", "));
         }
         for group in &plan.kept_together {
-            let _ = writeln!(text, "Not taken apart: {}.\n", told_names(group, " and "));
+            let _ = writeln!(text, "{}.\n", kept_together(group));
         }
         for group in &plan.free_together {
-            let along = direction(&group.direction.into());
-            let _ = writeln!(
-                text,
-                "Could leave together along {along}: {}.\n",
-                told_names(&group.parts, " and ")
-            );
+            let _ = writeln!(text, "{}.\n", free_together(group));
         }
-        if !plan.blocked.is_empty() {
+        let (blockers, left_out) = blockers(plan, false);
+        if !blockers.is_empty() {
             text.push_str("## What is stuck\n\n");
         }
-        for some in plan.blocked.chunk_by(|a, b| a.part == b.part) {
-            let _ = writeln!(text, "- {}: {}", some[0].part, kept(some));
+        for line in blockers {
+            let _ = writeln!(text, "- {line}");
+        }
+        if let Some(left_out) = left_out {
+            let _ = writeln!(text, "\n{}: the plan's JSON has them.", capital(&left_out));
         }
         text
     }
-}
-
-/// What keeps one part. Straight ways are told one by one, ways with turns counted: they are many, and mostly
-/// kept by the same.
-fn kept(blocked: &[BlockedDocument]) -> String {
-    let is_straight = |b: &&BlockedDocument| !["+r", "-r", "~"].iter().any(|turn| b.action.contains(turn));
-    let mut told: Vec<String> =
-        blocked.iter().filter(is_straight).map(|b| format!("{} by {}", b.action, b.by.join(", "))).collect();
-    let turns = blocked.len() - told.len();
-    if turns > 0 {
-        told.push(format!("and {turns} ways with turns"));
-    }
-    told.join("; ")
 }
 
 fn common_name<'a>(names: &[&'a str]) -> &'a str {
@@ -174,7 +159,7 @@ fn common_name<'a>(names: &[&'a str]) -> &'a str {
 mod tests {
     use super::super::document::tests::{plan, step};
     use super::*;
-    use crate::plan::export::{FreeGroupDocument, StepDocument};
+    use crate::plan::export::{BlockedDocument, FreeGroupDocument, StepDocument};
 
     fn lifted(part: &str, by: f64, requires: &[usize]) -> StepDocument {
         let mut step = step(part, &[[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, by, 1.0, 0.0, 0.0, 0.0]]);
@@ -229,6 +214,29 @@ mod tests {
     }
 
     #[test]
+    fn lengths_that_differ_a_bit_are_a_range() {
+        let mut plan = bolted();
+        (plan.steps[1], plan.steps[2]) = (lifted("bolt-2", 14.4, &[]), lifted("bolt-3", 13.2, &[]));
+        let text = markdown(&plan, None);
+        assert!(text.contains("**1–3.** Take 3 × bolt out along +Z (13.2–14.4 mm), one by one: "), "{text}");
+        plan.steps[2] = lifted("bolt-3", 10.7, &[]);
+        let text = markdown(&plan, None);
+        assert!(
+            text.contains("**1–2.** Take 2 × bolt out along +Z (14.0–14.4 mm)"),
+            "too far from the second: {text}"
+        );
+        plan.steps[2] = lifted("bolt-3", 14.0, &[]);
+        let tilted = |degrees: f64| {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            [14.0 * sin, 0.0, 14.0 * cos, 1.0, 0.0, 0.0, 0.0]
+        };
+        for (degrees, steps) in [(2.5, "**1–3.**"), (3.5, "**1–2.**")] {
+            plan.steps[2].path[1] = tilted(degrees);
+            assert!(markdown(&plan, None).contains(steps), "{degrees} degrees");
+        }
+    }
+
+    #[test]
     fn steps_of_groups_and_of_other_bodies_are_told_one_by_one() {
         let bolts = |change: fn(&mut PlanDocument)| {
             let mut plan = bolted();
@@ -273,7 +281,7 @@ mod tests {
         let text =
             markdown(&PlanDocument { kept_together: kept, free_together: vec![free], ..bolted() }, None);
         assert!(text.contains("Not taken apart: bolt-1 and bolt-2.\n"), "{text}");
-        assert!(text.contains("Could leave together along −Z: cover and base.\n"), "{text}");
+        assert!(text.contains("Can begin to move together along −Z: cover and base.\n"), "{text}");
     }
 
     #[test]
@@ -285,19 +293,17 @@ mod tests {
         };
         let plan = PlanDocument {
             status: "infeasible".into(),
-            reason: Some("linked".into()),
-            blocked: vec![
-                blocked("cover", "+x"),
-                blocked("cover", "+rx"),
-                blocked("cover", "-x~"),
-                blocked("bolt-1", "insertion"),
-            ],
+            reason: Some("They are linked.".into()),
+            blocked: vec![blocked("cover", "+x"), blocked("cover", "+rx"), blocked("bolt-1", "-z")],
             ..bolted()
         };
         let text = markdown(&plan, None);
-        assert!(text.contains("**Not complete (infeasible): linked**"), "{text}");
+        assert!(text.contains("**Not complete (infeasible).** They are linked.\n\n"), "{text}");
         assert!(
-            text.ends_with("- cover: +x by base; and 2 ways with turns\n- bolt-1: insertion by base\n"),
+            text.ends_with(
+                "## What is stuck\n\n- cover: +x by base\n- bolt-1: -z by base\n\n\
+                 1 more blocked action of these parts: the plan's JSON has them.\n"
+            ),
             "{text}"
         );
     }

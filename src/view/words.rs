@@ -3,12 +3,16 @@
 //! The displacement from one waypoint to the next is a turn about some axis in space with a shift along it
 //! (Chasles); both are the same for all points of the part. Displacements in a row that are alike are told as
 //! one: a straight way by its direction and length, a screw by its turns and how far they bring the part.
+//!
+//! Several steps whose moves are alike share one sentence, with the range of their lengths and turns.
+
+use std::f64::consts::{PI, TAU};
 
 use nalgebra::Vector3;
 
 use super::document::kind_of;
 use crate::geometry::{Pose, pose_from_waypoint};
-use crate::plan::export::{PlanDocument, StepDocument};
+use crate::plan::export::{FreeGroupDocument, PlanDocument, StepDocument};
 use crate::plan::{PlanKind, StepEnd};
 
 /// Turns below this (radians) are none.
@@ -17,10 +21,24 @@ const NO_TURN: f64 = 0.01;
 const ALIKE: f64 = 0.9986;
 /// … and within which one is told as an axis of the frame (2 degrees).
 const NEARLY: f64 = 0.9994;
+/// Share of the larger one by which two lengths or turns of alike moves differ at most. Copies of a screw in holes of a
+/// plate leave by paths that differ by a few hundredths. At half, screws under a sloping cover are told one by one; at
+/// double, a range such as 5–10 mm says little.
+const ALIKE_LENGTH: f64 = 0.25;
 /// Moves shorter than this share of the whole way are not told …
 const SLIGHT: f64 = 0.03;
 /// … and no more than so many.
 const MOST: usize = 3;
+/// Share of the whole way. A turn that brings the part less far along its axis is told without a shift: half a turn of a
+/// fine thread, before a way out a hundred times as long, still is one. At half, what a bayonet drifts in its play is
+/// told; at double, the shift of such a thread is not.
+const NO_SHIFT: f64 = 2e-3;
+/// Radians: half a turn, from which on a turn with a shift along its axis is a screw. At half, lids that are tilted out
+/// by a right angle are screws; at double, caps with half a turn are none.
+const SCREW: f64 = PI;
+/// Turns within which a turn is told in quarters: 7 degrees. At half, threads whose ends were rounded to facets have
+/// decimals; at double, 76 degrees are a quarter.
+const QUARTERLY: f64 = 0.02;
 /// Count of names in a sentence; more are counted, since a longer list hides the verb. At half a row of four screws is not
 /// named; at double a sentence fills two lines.
 const MOST_NAMES: usize = 6;
@@ -34,6 +52,14 @@ struct Move {
     length: f64,
     /// How far it turns, radians; 0 for straight moves.
     angle: f64,
+}
+
+/// The kinds of moves that have verbs of their own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum MoveKind {
+    Straight,
+    Turn,
+    Screw,
 }
 
 impl Move {
@@ -63,27 +89,84 @@ impl Move {
         same
     }
 
+    fn kind(&self) -> MoveKind {
+        match self.angle {
+            0.0 => MoveKind::Straight,
+            angle if self.length != 0.0 && angle > SCREW * (1.0 - QUARTERLY) => MoveKind::Screw,
+            _ => MoveKind::Turn,
+        }
+    }
+
     /// Whether it is too short to be told, of a way of some length.
     fn is_slight(&self, whole: f64) -> bool {
         self.length.abs() < whole * SLIGHT && self.angle < 0.1
     }
 
-    /// Whether it is along no axis of the frame, as ways are that only bring a part up from where it waits.
+    /// Without the shift of a turn, if that is too short to be told.
+    fn without_slight_shift(&self, whole: f64) -> Self {
+        let is_shift = self.length.abs() > (NO_SHIFT * whole).max(1e-6);
+        let length = if self.angle == 0.0 || is_shift { self.length } else { 0.0 };
+        Self { length, ..*self }
+    }
+
+    /// Whether it is along no axis of the frame, as ways are that only bring a part near from where it waits.
     fn is_oblique(&self) -> bool {
         self.along.amax() < NEARLY
     }
 
-    /// Where to, and how far.
-    fn told(&self, units: Option<&str>) -> String {
-        let sense = if self.length < 0.0 { -self.along } else { self.along };
-        if self.angle == 0.0 {
-            return format!("along {} ({})", direction(&sense), length(self.length, units));
+    /// The direction in which it brings the part.
+    fn sense(&self) -> Vector3<f64> {
+        if self.length < 0.0 { -self.along } else { self.along }
+    }
+
+    /// Whether one sentence tells both.
+    fn is_alike(&self, other: &Self) -> bool {
+        let close = |a: f64, b: f64| (a - b).abs() <= ALIKE_LENGTH * a.max(b);
+        self.kind() == other.kind()
+            && self.along.dot(&other.along) > ALIKE
+            && (self.length < 0.0) == (other.length < 0.0)
+            && close(self.length.abs(), other.length.abs())
+            && close(self.angle, other.angle)
+    }
+}
+
+/// A move in words, without its verb.
+struct ToldMove {
+    kind: MoveKind,
+    text: String,
+}
+
+impl ToldMove {
+    /// Moves that are alike: where to, and how far. The sense of a screw is that which is seen from the side where the part
+    /// is when it is out: a turn about a direction is counter-clockwise for who looks against it.
+    fn of(alike: &[&Move], plan: PlanKind, may_screw: bool, units: Option<&str>) -> Self {
+        let (first, kind) = (alike[0], alike[0].kind());
+        let of = |value: fn(&Move) -> f64| {
+            let values = alike.iter().map(|m| value(m));
+            (values.clone().fold(f64::INFINITY, f64::min), values.fold(0.0, f64::max))
+        };
+        let (length, turned) = (lengths(of(|m| m.length.abs()), units), turned(of(|m| m.angle)));
+        match kind {
+            MoveKind::Straight => {
+                Self { kind, text: format!("along {} ({length})", direction(&first.along)) }
+            }
+            MoveKind::Screw if may_screw => {
+                let viewer = match plan {
+                    PlanKind::Disassembly => first.sense(),
+                    PlanKind::Assembly => -first.sense(),
+                };
+                let is_counter = first.along.dot(&viewer) > 0.0;
+                let hand = if is_counter { "counter-clockwise" } else { "clockwise" };
+                Self { kind, text: format!("{hand} seen from {}, {turned} ({length})", direction(&viewer)) }
+            }
+            _ if first.length == 0.0 => {
+                Self { kind: MoveKind::Turn, text: format!("by {turned} about {}", direction(&first.along)) }
+            }
+            _ => Self {
+                kind: MoveKind::Turn,
+                text: format!("by {turned} along {} ({length})", direction(&first.sense())),
+            },
         }
-        let turned = turned(self.angle);
-        if self.length.abs() < 1e-6 {
-            return format!("by {turned} about {}", direction(&self.along));
-        }
-        format!("by {turned} along {} ({})", direction(&sense), length(self.length.abs(), units))
     }
 }
 
@@ -108,13 +191,14 @@ fn whole(moves: &[Move]) -> f64 {
 /// The moves that are worth telling.
 fn telling(moves: &[Move]) -> Vec<Move> {
     let whole = whole(moves);
-    let telling: Vec<Move> = moves.iter().filter(|m| !m.is_slight(whole)).cloned().collect();
-    if telling.is_empty() { moves.to_vec() } else { telling }
+    let is_all_slight = moves.iter().all(|m| m.is_slight(whole));
+    let telling = moves.iter().filter(|m| is_all_slight || !m.is_slight(whole));
+    telling.map(|m| m.without_slight_shift(whole)).collect()
 }
 
-/// How many of the first moves only bring a part up from where it waits: those up to the last one that is along
+/// How many of the first moves only bring a part near from where it waits: those up to the last one that is along
 /// no axis, as random ways are.
-fn brought_up(moves: &[Move]) -> usize {
+fn brought_near(moves: &[Move]) -> usize {
     let whole = whole(moves);
     let before = &moves[..moves.len().saturating_sub(1)];
     before.iter().rposition(|m| m.is_oblique() && !m.is_slight(whole)).map_or(0, |last| last + 1)
@@ -124,6 +208,8 @@ fn brought_up(moves: &[Move]) -> usize {
 pub(super) struct Words<'a> {
     plan: &'a PlanDocument,
     kind: PlanKind,
+    /// One per step.
+    courses: Vec<Course>,
 }
 
 /// The subject of a sentence: what a step moves.
@@ -142,7 +228,7 @@ impl Moved {
     /// The parts of a step.
     fn all(names: &[String]) -> Self {
         match names {
-            [only] => Self::one(only),
+            [only] => Self::one(&part_word(only)),
             names => Self { what: format!("{} together", told_names(names, " and ")), is_several: true },
         }
     }
@@ -152,41 +238,105 @@ impl Moved {
     }
 }
 
+fn is_number(name: &str) -> bool {
+    !name.is_empty() && name.bytes().all(|b| b.is_ascii_digit())
+}
+
+/// A part in a sentence: its name, after the word `part` if it is digits alone.
+pub(crate) fn part_word(name: &str) -> String {
+    if is_number(name) { format!("part {name}") } else { name.to_owned() }
+}
+
+/// All names in a row; `last` is between the last two.
+pub(crate) fn part_words<S: AsRef<str>>(names: &[S], last: &str) -> String {
+    let are_numbers = names.len() > 1 && names.iter().all(|name| is_number(name.as_ref()));
+    let word = |name: &S| if are_numbers { name.as_ref().to_owned() } else { part_word(name.as_ref()) };
+    let words: Vec<String> = names.iter().map(word).collect();
+    let row = match &words[..] {
+        [first @ .., end] if !first.is_empty() => format!("{}{last}{end}", first.join(", ")),
+        _ => words.concat(),
+    };
+    if are_numbers { format!("parts {row}") } else { row }
+}
+
 /// Names in a row, of many the first and a count; `last` is between the last two.
 pub(super) fn told_names<S: AsRef<str>>(names: &[S], last: &str) -> String {
-    let shown: Vec<&str> = names.iter().take(MOST_NAMES).map(AsRef::as_ref).collect();
-    match (names.len() - shown.len(), &shown[..]) {
-        (0, [first @ .., end]) if !first.is_empty() => format!("{}{last}{end}", first.join(", ")),
-        (0, _) => shown.join(", "),
-        (more, _) => format!("{} and {more} more", shown.join(", ")),
+    match names.split_at_checked(MOST_NAMES) {
+        Some((shown, rest)) if !rest.is_empty() => {
+            format!("{} and {} more", part_words(shown, ", "), rest.len())
+        }
+        _ => part_words(names, last),
     }
+}
+
+/// That a group was not taken apart.
+pub(super) fn kept_together(group: &[String]) -> String {
+    format!("Not taken apart: {}", told_names(group, " and "))
+}
+
+/// That a group can begin to move.
+pub(super) fn free_together(group: &FreeGroupDocument) -> String {
+    let along = direction(&group.direction.into());
+    format!("Can begin to move together along {along}: {}", told_names(&group.parts, " and "))
+}
+
+/// What a step does, of the path alone.
+#[derive(Debug)]
+struct Course {
+    /// Whether the part is brought near before the moves, from where it waits.
+    is_brought: bool,
+    /// The moves that are told.
+    moves: Vec<Move>,
 }
 
 impl<'a> Words<'a> {
     pub(super) fn of(plan: &'a PlanDocument) -> Self {
-        Self { plan, kind: kind_of(plan) }
+        let kind = kind_of(plan);
+        let course = |step: &StepDocument| {
+            let all = moves(step);
+            let brought = match kind {
+                PlanKind::Assembly if step.ends != StepEnd::Aside.name() => brought_near(&all),
+                _ => 0,
+            };
+            Course { is_brought: brought > 0, moves: telling(&all[brought..]) }
+        };
+        Self { plan, kind, courses: plan.steps.iter().map(course).collect() }
     }
 
     /// A step: what is done, and of which group if it is not of the assembly.
     pub(super) fn step(&self, step: usize) -> String {
-        self.done(step, &Moved::all(&self.plan.steps[step].parts))
+        self.done(&[step], &Moved::all(&self.plan.steps[step].parts))
     }
 
-    /// What is done in a step to what goes by some name.
-    pub(super) fn done(&self, step: usize, moved: &Moved) -> String {
+    /// Whether one sentence tells what two steps do, but for their parts.
+    pub(super) fn is_alike(&self, a: usize, b: usize) -> bool {
+        let (of, ends) = (&self.plan.steps[a].of, &self.plan.steps[a].ends);
+        let (own, other) = (&self.courses[a], &self.courses[b]);
+        (of, ends) == (&self.plan.steps[b].of, &self.plan.steps[b].ends)
+            && own.is_brought == other.is_brought
+            && own.moves.len() == other.moves.len()
+            && own.moves.iter().zip(&other.moves).all(|(a, b)| a.is_alike(b))
+    }
+
+    /// What is done in steps that are alike to what goes by some name.
+    pub(super) fn done(&self, steps: &[usize], moved: &Moved) -> String {
         let units = self.plan.units.as_deref();
-        let StepDocument { of, ends, .. } = &self.plan.steps[step];
-        let all = moves(&self.plan.steps[step]);
+        let StepDocument { of, ends, .. } = &self.plan.steps[steps[0]];
+        let Course { is_brought, moves } = &self.courses[steps[0]];
         let is_aside = *ends == StepEnd::Aside.name();
-        let brought = if self.kind == PlanKind::Assembly && !is_aside { brought_up(&all) } else { 0 };
-        let moves = telling(&all[brought..]);
-        let told: Vec<String> = moves.iter().map(|m| m.told(units)).collect();
-        let turns = moves.iter().any(|m| m.angle > 0.0);
-        let done = match self.kind {
-            _ if is_aside => aside(moved, &told, turns),
-            PlanKind::Disassembly => out(moved, &told, turns),
-            PlanKind::Assembly => into(moved, &told, turns, brought > 0),
+        let told = |k: usize| {
+            let alike: Vec<&Move> = steps.iter().map(|&step| &self.courses[step].moves[k]).collect();
+            // Where a part is inserted it may have turned on its way to there, too.
+            let may_screw = !is_aside && (self.kind == PlanKind::Disassembly || k + 1 == moves.len());
+            ToldMove::of(&alike, self.kind, may_screw, units)
         };
+        let told: Vec<ToldMove> = (0..moves.len()).map(told).collect();
+        let whither = match self.kind {
+            _ if is_aside => ASIDE,
+            PlanKind::Disassembly => OUT,
+            PlanKind::Assembly => IN,
+        };
+        let done = sentence(whither, moved, &told, *is_brought);
         match (of, self.kind) {
             (None, _) => done,
             (Some(of), PlanKind::Disassembly) => format!("Of the group of step {}: {}", of + 1, lower(&done)),
@@ -195,84 +345,76 @@ impl<'a> Words<'a> {
     }
 }
 
+/// With a capital first letter.
+pub(super) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 /// With a small first letter.
 fn lower(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
 }
 
-fn out(moved: &Moved, moves: &[String], turns: bool) -> String {
-    let Moved { what, .. } = moved;
+/// Where the last move of a step leads, by its verb and adverb.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Whither(&'static str, &'static str);
+
+const OUT: Whither = Whither("take", "out");
+const ASIDE: Whither = Whither("move", "aside");
+const IN: Whither = Whither("put", "in");
+
+fn sentence(whither: Whither, moved: &Moved, moves: &[ToldMove], is_brought: bool) -> String {
+    let (Moved { what, is_several }, it) = (moved, moved.it());
     match moves {
-        [] => format!("Lift {what} away: nothing holds {}", moved.it()),
-        [only] if turns => format!("Turn {what} out {only}"),
-        [only] => format!("Take {what} out {only}"),
-        moves => led("out", moved, moves),
+        [] => match (whither, is_several) {
+            (OUT, _) => format!("Lift {what} away: nothing holds {it}"),
+            (IN, true) => format!("Put {what} in their places: they touch nothing on the way"),
+            (IN, false) => format!("Put {what} in its place: it touches nothing on the way"),
+            (_, true) => format!("Leave {what} where they are"),
+            (_, false) => format!("Leave {what} where it is"),
+        },
+        [only] if !is_brought => capital(&ended(whither, what, only)),
+        [before @ .., last] => {
+            let last = ended(whither, it, last);
+            let is_long = moves.len() > MOST;
+            let (begun, between) = match before {
+                [first, between @ ..] if !(is_brought || is_long && whither == IN) => {
+                    (capital(&on_the_way(whither, what, first)), between)
+                }
+                _ => (format!("Bring {what} near"), before),
+            };
+            let between = match is_long {
+                true if whither == IN => format!(" in {} moves", between.len()),
+                true => format!(", go on in {} moves", between.len()),
+                false => between.iter().map(|m| format!(", then {}", on_the_way(whither, it, m))).collect(),
+            };
+            format!("{begun}{between}, then {last}")
+        }
     }
 }
 
-fn aside(moved: &Moved, moves: &[String], turns: bool) -> String {
-    let Moved { what, .. } = moved;
-    match moves {
-        [] => format!("Leave {what} where {}", if moved.is_several { "they are" } else { "it is" }),
-        [only] if turns => format!("Turn {what} aside {only}"),
-        [only] => format!("Move {what} aside {only}"),
-        moves => led("aside", moved, moves),
+/// A move before the last.
+fn on_the_way(whither: Whither, what: &str, told: &ToldMove) -> String {
+    let ToldMove { kind, text } = told;
+    match kind {
+        MoveKind::Straight => format!("move {what} {text}"),
+        MoveKind::Turn => format!("turn {what} {text}"),
+        MoveKind::Screw => ended(whither, what, told),
     }
 }
 
-/// Several moves, the last one of which leads out or aside.
-fn led(whither: &str, moved: &Moved, moves: &[String]) -> String {
-    match moves {
-        [first, .., last] if moves.len() > MOST => {
-            let (begun, left) = (begun(moved, first), moves.len() - 2);
-            format!("{begun}, go on in {left} moves, then {}", ended(moved, whither, last))
-        }
-        [first, between @ .., last] => {
-            let begun = begun(moved, first);
-            format!("{begun}{}, then {}", gone_on(moved, between), ended(moved, whither, last))
-        }
-        _ => moves.concat(),
+/// The last move.
+fn ended(whither: Whither, what: &str, ToldMove { kind, text }: &ToldMove) -> String {
+    let Whither(verb, adverb) = whither;
+    match kind {
+        MoveKind::Straight => format!("{verb} {what} {adverb} {text}"),
+        MoveKind::Turn => format!("turn {what} {adverb} {text}"),
+        MoveKind::Screw if whither != IN => format!("unscrew {what} {text}"),
+        MoveKind::Screw if ["it", "them"].contains(&what) => format!("screw {what} in {text}"),
+        MoveKind::Screw => format!("screw in {what} {text}"),
     }
-}
-
-fn into(moved: &Moved, moves: &[String], turns: bool, brought: bool) -> String {
-    let Moved { what, .. } = moved;
-    let up = format!("Bring {what} up");
-    match moves {
-        [] if moved.is_several => format!("Put {what} in their places: they touch nothing on the way"),
-        [] => format!("Put {what} in its place: it touches nothing on the way"),
-        [only] if brought => format!("{up}, then {}", ended(moved, "in", only)),
-        [only] if turns => format!("Turn {what} in {only}"),
-        [only] => format!("Put {what} in {only}"),
-        [before @ .., last] if moves.len() > MOST => {
-            format!("{up} in {} moves, then {}", before.len(), ended(moved, "in", last))
-        }
-        [before @ .., last] if brought => {
-            format!("{up}{}, then {}", gone_on(moved, before), ended(moved, "in", last))
-        }
-        moves => led("in", moved, moves),
-    }
-}
-
-fn is_turn(told: &str) -> bool {
-    told.starts_with("by")
-}
-
-fn begun(moved: &Moved, first: &str) -> String {
-    format!("{} {} {first}", if is_turn(first) { "Turn" } else { "Move" }, moved.what)
-}
-
-fn turned_on(moved: &Moved, told: &str) -> String {
-    if is_turn(told) { format!("turn {} ", moved.it()) } else { String::new() }
-}
-
-fn gone_on(moved: &Moved, between: &[String]) -> String {
-    between.iter().map(|m| format!(", then {}{m}", turned_on(moved, m))).collect()
-}
-
-fn ended(moved: &Moved, whither: &str, last: &str) -> String {
-    format!("{}{whither} {last}", turned_on(moved, last))
 }
 
 /// The other parts that the steps move which a step requires, in the order of the steps. That the group of a step is out
@@ -301,31 +443,42 @@ pub(crate) fn direction(d: &Vector3<f64>) -> String {
     format!("({x:.2}, {y:.2}, {z:.2})")
 }
 
-/// Whole and half turns from one turn on, else degrees.
-fn turned(angle: f64) -> String {
-    let turns = angle / std::f64::consts::TAU;
-    if turns < 0.995 {
-        return format!("{:.0}°", angle.to_degrees());
+/// Turns from the least to the most (radians): quarters of a turn where they are near, else turns with a decimal from one
+/// turn on, else degrees.
+fn turned((least, most): (f64, f64)) -> String {
+    let [(a, unit_a), (b, unit_b)] = [least, most].map(|angle| {
+        let turns = angle / TAU;
+        let quarters = (turns * 4.0).round() as usize;
+        let is_near = quarters > 0 && (turns - quarters as f64 / 4.0).abs() < QUARTERLY;
+        match (is_near, quarters / 4) {
+            (true, 0) => (["", "¼", "½", "¾"][quarters % 4].to_owned(), " turn"),
+            (true, 1) if quarters == 4 => ("1".to_owned(), " turn"),
+            (true, whole) => (format!("{whole}{}", ["", "¼", "½", "¾"][quarters % 4]), " turns"),
+            (false, _) if turns < 1.0 => (format!("{:.0}", angle.to_degrees()), "°"),
+            (false, _) => (format!("{turns:.1}"), " turns"),
+        }
+    });
+    match (a == b, unit_a == unit_b) {
+        (true, true) => format!("{a}{unit_a}"),
+        (false, true) => format!("{a}–{b}{unit_b}"),
+        (_, false) => format!("{a}{unit_a}–{b}{unit_b}"),
     }
-    let turns = (turns * 10.0).round() / 10.0;
-    if turns == 1.0 { "1 turn".to_owned() } else { format!("{turns} turns") }
 }
 
-/// A length in three digits, with its unit if known.
-pub(super) fn length(value: f64, units: Option<&str>) -> String {
-    let digits = 2 - value.abs().max(f64::MIN_POSITIVE).log10().floor() as i32;
-    let number = match digits {
+/// Lengths from the least to the most in three digits of the latter, with their unit if known; one number if both are the
+/// same then.
+fn lengths((least, most): (f64, f64), units: Option<&str>) -> String {
+    let digits = 2 - most.max(f64::MIN_POSITIVE).log10().floor() as i32;
+    let [a, b] = [least, most].map(|value| match digits {
         _ if value == 0.0 => "0".to_owned(),
         8.. | ..=-5 => format!("{value:.2e}"),
-        0..=7 => {
-            let fixed = format!("{value:.*}", digits as usize);
-            if fixed.contains('.') {
-                fixed.trim_end_matches('0').trim_end_matches('.').to_owned()
-            } else {
-                fixed
-            }
-        }
-        _ => format!("{value:.0}"),
+        _ => format!("{value:.*}", digits.max(0) as usize),
+    });
+    let is_decimal = b.contains('.') && !b.contains('e');
+    let number = match a == b {
+        true if is_decimal => b.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        true => b,
+        false => format!("{a}–{b}"),
     };
     format!("{number} {}", units.unwrap_or("units"))
 }
@@ -347,14 +500,17 @@ mod tests {
         Words::of(&plan).step(0)
     }
 
-    /// Down a right-handed thread of pitch 1.25 about a line off the origin.
-    fn thread(turns: f64) -> Vec<Waypoint> {
+    /// Off a thread of pitch 1.25 about a line off the origin, along +z.
+    fn thread(turns: f64, is_right_handed: bool) -> Vec<Waypoint> {
         let axis = Pose::translation(20.0, 5.0, 0.0);
         let count = (turns * 8.0) as usize;
+        // A nut on a right-handed thread that turns counter-clockwise about +z, as the hand's fingers point, goes along +z,
+        // as its thumb points.
+        let sense = if is_right_handed { 1.0 } else { -1.0 };
         (0..=count)
             .map(|i| {
-                let turn = -(i as f64) * turns / count as f64;
-                let screw = Pose::new(Vector3::z() * turn * -1.25, Vector3::z() * turn * TAU);
+                let turn = i as f64 * turns / count as f64;
+                let screw = Pose::new(Vector3::z() * turn * 1.25, Vector3::z() * sense * turn * TAU);
                 waypoint_from_pose(&(axis * screw * axis.inverse()))
             })
             .collect()
@@ -364,14 +520,14 @@ mod tests {
     fn straight_ways_are_told_by_direction_and_length() {
         let start = at([0.0; 3], [0.0; 3]);
         let path = [start, at([0.0, 0.0, 4.0], [0.0; 3]), at([0.0, 0.0, 13.5], [0.0; 3])];
-        assert_eq!(told("disassembly", &path), "Take 1 out along +Z (13.5 mm)");
-        assert_eq!(told("assembly", &[path[2], path[0]]), "Put 1 in along −Z (13.5 mm)");
+        assert_eq!(told("disassembly", &path), "Take part 1 out along +Z (13.5 mm)");
+        assert_eq!(told("assembly", &[path[2], path[0]]), "Put part 1 in along −Z (13.5 mm)");
         let slot = [start, at([5.0, 0.0, 0.0], [0.0; 3]), at([5.0, 6.0, 8.0], [0.0; 3])];
         assert_eq!(
             told("disassembly", &slot),
-            "Move 1 along +X (5 mm), then out along (0.00, 0.60, 0.80) (10 mm)"
+            "Move part 1 along +X (5 mm), then take it out along (0.00, 0.60, 0.80) (10 mm)"
         );
-        assert_eq!(told("disassembly", &[start]), "Lift 1 away: nothing holds it");
+        assert_eq!(told("disassembly", &[start]), "Lift part 1 away: nothing holds it");
     }
 
     #[test]
@@ -382,19 +538,19 @@ mod tests {
         assert_eq!(
             all(&nested()),
             [
-                "Take 0, 1 and 2 together out along +Z (8 mm)",
-                "Of the group of step 1: move 1 aside along +X (1 mm)",
-                "Of the group of step 1: take 1 and 2 together out along +Y (5 mm)",
-                "Of the group of step 3: take 2 out along +X (6 mm)",
+                "Take parts 0, 1 and 2 together out along +Z (8 mm)",
+                "Of the group of step 1: move part 1 aside along +X (1 mm)",
+                "Of the group of step 1: take parts 1 and 2 together out along +Y (5 mm)",
+                "Of the group of step 3: take part 2 out along +X (6 mm)",
             ]
         );
         assert_eq!(
             all(&reversed(nested())),
             [
-                "For the group of step 2: put 2 in along −X (6 mm)",
-                "For the group of step 4: put 1 and 2 together in along −Y (5 mm)",
-                "For the group of step 4: move 1 aside along −X (1 mm)",
-                "Put 0, 1 and 2 together in along −Z (8 mm)",
+                "For the group of step 2: put part 2 in along −X (6 mm)",
+                "For the group of step 4: put parts 1 and 2 together in along −Y (5 mm)",
+                "For the group of step 4: move part 1 aside along −X (1 mm)",
+                "Put parts 0, 1 and 2 together in along −Z (8 mm)",
             ]
         );
         let parts: Vec<String> = (0..8).map(|i| i.to_string()).collect();
@@ -405,7 +561,7 @@ mod tests {
             let plan = PlanDocument { steps: vec![step], parts: parts.clone(), ..plan() };
             Words::of(&plan).step(0)
         };
-        let who = "0, 1, 2, 3, 4, 5 and 2 more together";
+        let who = "parts 0, 1, 2, 3, 4, 5 and 2 more together";
         assert_eq!(several("out", &path[..1]), format!("Lift {who} away: nothing holds them"));
         assert_eq!(several("aside", &turn), format!("Turn {who} aside by 45° about +Z"));
         assert_eq!(
@@ -430,19 +586,92 @@ mod tests {
     }
 
     #[test]
-    fn screws_are_told_in_turns_wherever_their_axis_is() {
-        assert_eq!(told("disassembly", &thread(11.5)), "Turn 1 out by 11.5 turns along +Z (14.4 mm)");
-        let mut back = thread(11.5);
-        back.reverse();
-        assert_eq!(told("assembly", &back), "Turn 1 in by 11.5 turns along −Z (14.4 mm)");
-        let mut path = thread(2.0);
-        let last = pose_from_waypoint(&path[path.len() - 1]);
-        path.push(waypoint_from_pose(&(Pose::translation(0.0, 0.0, 30.0) * last)));
-        let text = told("disassembly", &path);
-        assert_eq!(text, "Turn 1 by 2 turns along +Z (2.5 mm), then out along +Z (30 mm)");
-        path.reverse();
-        let text = told("assembly", &path);
-        assert_eq!(text, "Move 1 along −Z (30 mm), then turn it in by 2 turns along −Z (2.5 mm)");
+    fn screws_are_told_by_hand_and_turns_wherever_their_axis_is() {
+        for (is_right_handed, out, back) in
+            [(true, "counter-clockwise", "clockwise"), (false, "clockwise", "counter-clockwise")]
+        {
+            let mut path = thread(11.5, is_right_handed);
+            let text = told("disassembly", &path);
+            assert_eq!(text, format!("Unscrew part 1 {out} seen from +Z, 11½ turns (14.4 mm)"));
+            path.reverse();
+            let text = told("assembly", &path);
+            assert_eq!(text, format!("Screw in part 1 {back} seen from +Z, 11½ turns (14.4 mm)"));
+            path = thread(2.0, is_right_handed);
+            let last = pose_from_waypoint(&path[path.len() - 1]);
+            path.push(waypoint_from_pose(&(Pose::translation(0.0, 0.0, 30.0) * last)));
+            let text = told("disassembly", &path);
+            let unscrewed = format!("Unscrew part 1 {out} seen from +Z, 2 turns (2.5 mm)");
+            assert_eq!(text, format!("{unscrewed}, then take it out along +Z (30 mm)"));
+            path.reverse();
+            let text = told("assembly", &path);
+            let screwed = format!("then screw it in {back} seen from +Z, 2 turns (2.5 mm)");
+            assert_eq!(text, format!("Move part 1 along −Z (30 mm), {screwed}"));
+        }
+    }
+
+    #[test]
+    fn a_nut_that_leaves_downwards_is_seen_from_below() {
+        let flip = Pose::new(Vector3::zeros(), Vector3::x() * PI);
+        let down = thread(3.25, true).into_iter().map(|w| flip * pose_from_waypoint(&w) * flip.inverse());
+        let down: Vec<Waypoint> = down.map(|pose| waypoint_from_pose(&pose)).collect();
+        let text = told("disassembly", &down);
+        assert_eq!(text, "Unscrew part 1 counter-clockwise seen from −Z, 3¼ turns (4.06 mm)");
+    }
+
+    #[test]
+    fn what_drifts_while_it_turns_or_turns_little_is_no_screw() {
+        let drift = [
+            at([0.0; 3], [0.0; 3]),
+            at([0.0, 0.0, 0.003], [0.0, 0.0, PI]),
+            at([0.0, 0.0, 9.0], [0.0, 0.0, PI]),
+        ];
+        assert_eq!(
+            told("disassembly", &drift),
+            "Turn part 1 by ½ turn about +Z, then take it out along +Z (9 mm)"
+        );
+        // On its way to where it is put in.
+        let way =
+            [at([0.0, 9.0, 0.0], [0.0, 0.0, PI]), at([0.0, 9.0, -3.0], [0.0; 3]), at([0.0; 3], [0.0; 3])];
+        let text = told("assembly", &way);
+        assert!(text.starts_with("Turn part 1 by ½ turn along −Z (3 mm)"), "{text}");
+        let tilt = [at([0.0; 3], [0.0; 3]), at([0.0, 0.0, 2.0], [0.0, 0.0, PI / 2.0])];
+        assert_eq!(told("disassembly", &tilt), "Turn part 1 out by ¼ turn along +Z (2 mm)");
+    }
+
+    #[test]
+    fn turns_are_told_in_quarters_where_they_are_near() {
+        for (turns, text) in [
+            (0.125, "45°"),
+            (0.249, "¼ turn"),
+            (0.5, "½ turn"),
+            (0.8, "288°"),
+            (1.01, "1 turn"),
+            (1.25, "1¼ turns"),
+            (8.485, "8½ turns"),
+            (8.4, "8.4 turns"),
+        ] {
+            assert_eq!(turned((turns * TAU, turns * TAU)), text);
+        }
+        for (range, text) in
+            [((8.0, 8.5), "8–8½ turns"), ((0.1, 0.111), "36–40°"), ((0.75, 1.5), "¾ turn–1½ turns")]
+        {
+            assert_eq!(turned((range.0 * TAU, range.1 * TAU)), text);
+        }
+    }
+
+    #[test]
+    fn names_of_digits_alone_are_parts() {
+        for (names, text) in [
+            (&["4"][..], "part 4"),
+            (&["4", "12"], "parts 4 and 12"),
+            (&["4", "nut 4", "m8"], "part 4, nut 4 and m8"),
+            (&["nut 4"], "nut 4"),
+            (&["-4"], "-4"),
+        ] {
+            assert_eq!(part_words(names, " and "), text);
+        }
+        let many: Vec<String> = (0..8).map(|i| i.to_string()).collect();
+        assert_eq!(told_names(&many, " and "), "parts 0, 1, 2, 3, 4, 5 and 2 more");
     }
 
     #[test]
@@ -450,7 +679,7 @@ mod tests {
         let start = at([0.0; 3], [0.0; 3]);
         let turned = at([0.0; 3], [0.0, 0.0, PI / 4.0]);
         let text = told("disassembly", &[start, turned, at([0.0, 0.0, 9.0], [0.0, 0.0, PI / 4.0])]);
-        assert_eq!(text, "Turn 1 by 45° about +Z, then out along +Z (9 mm)");
+        assert_eq!(text, "Turn part 1 by 45° about +Z, then take it out along +Z (9 mm)");
     }
 
     #[test]
@@ -458,8 +687,8 @@ mod tests {
         let corner = |i: usize| at([(i / 2) as f64 * 5.0, i.div_ceil(2) as f64 * 5.0, 0.0], [0.0; 3]);
         let path: Vec<_> = (0..=6).map(corner).collect();
         let text = told("disassembly", &path);
-        assert_eq!(text, "Move 1 along +Y (5 mm), go on in 4 moves, then out along +X (5 mm)");
-        assert_eq!(told("assembly", &path), "Bring 1 up in 5 moves, then in along +X (5 mm)");
+        assert_eq!(text, "Move part 1 along +Y (5 mm), go on in 4 moves, then take it out along +X (5 mm)");
+        assert_eq!(told("assembly", &path), "Bring part 1 near in 5 moves, then put it in along +X (5 mm)");
     }
 
     #[test]
@@ -470,22 +699,28 @@ mod tests {
         let path = [&waits[..], &slot[..]].concat();
         assert_eq!(
             told("assembly", &path),
-            "Bring 1 up, then along −Y (1 mm), then along −Z (22 mm), then in along −X (5 mm)"
+            "Bring part 1 near, then move it along −Y (1 mm), then move it along −Z (22 mm), then put it in along −X (5 mm)"
         );
         assert_eq!(
             told("assembly", &[&waits[..3], &[at(5.0, 1.0, 0.0)]].concat()),
-            "Bring 1 up, then in along −Z (30 mm)"
+            "Bring part 1 near, then put it in along −Z (30 mm)"
         );
-        assert_eq!(told("disassembly", &[waits[0], waits[1]]), "Take 1 out along +Z (40 mm)");
+        assert_eq!(told("disassembly", &[waits[0], waits[1]]), "Take part 1 out along +Z (40 mm)");
     }
 
     #[test]
     fn lengths_have_three_digits() {
+        let one = |value: f64, units| lengths((value, value), units);
         for (value, text) in
             [(14.0, "14 mm"), (13.456, "13.5 mm"), (0.02, "0.02 mm"), (1234.5, "1234 mm"), (0.0, "0 mm")]
         {
-            assert_eq!(length(value, Some("mm")), text);
+            assert_eq!(one(value, Some("mm")), text);
         }
-        assert_eq!(length(100.0, None), "100 units");
+        assert_eq!(one(100.0, None), "100 units");
+        for (range, text) in
+            [((12.0, 12.4), "12.0–12.4 mm"), ((12.001, 12.004), "12 mm"), ((980.0, 1020.0), "980–1020 mm")]
+        {
+            assert_eq!(lengths(range, Some("mm")), text);
+        }
     }
 }

@@ -59,8 +59,8 @@ async function shots(page, name) {
   await page.keyboard.press("e");
   await page.getByRole("tab", { name: "Blocking" }).click();
   await shot("graph");
-  if (await page.locator("#verdict button").count()) {
-    await page.locator("#verdict button").first().click();
+  if (await page.locator("#stuck button").count()) {
+    await page.locator("#stuck button").first().click();
     await shot("stuck");
   }
 }

@@ -1,5 +1,6 @@
 // The page in a headless browser: `SBDP_PAGES=FOLDER node --test`. The folder holds pages that `sbdp view` wrote:
-// complete.html and infeasible.html; assembly.html too, if there are assembly plans.
+// complete.html, infeasible.html, groups.html (a group is taken apart) and kept.html (one is not, and one can begin to
+// move); assembly.html too, if there are assembly plans.
 import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
 import { join } from "node:path";
@@ -152,7 +153,7 @@ test("what is stuck stands out, with what blocks it", () =>
   visited(infeasible, async (page) => {
     assert.match(await page.locator("#verdict").textContent(), /Not complete: infeasible/);
     const before = await pixels(page);
-    await page.locator("#verdict button").first().click();
+    await page.locator("#stuck button").first().click();
     const { part, others } = await page.evaluate(() => ({
       part: window.sbdp.selection.part,
       others: [...window.sbdp.selection.others],
@@ -160,6 +161,38 @@ test("what is stuck stands out, with what blocks it", () =>
     const blocked = await page.evaluate(() => window.sbdp.scene.blocked);
     assert.deepEqual(new Set(others), new Set(blocked.filter((b) => b.part === part).flatMap((b) => b.by)));
     assert.ok(difference(before, await pixels(page)) > 0.001);
+  }));
+
+test("steps within a group stand further in, and groups are pointed out", () =>
+  visited(join(folder, "groups.html"), async (page) => {
+    const steps = await page.evaluate(() => window.sbdp.scene.steps);
+    const left = (i) => page.locator("#steps button").nth(i).evaluate((e) => e.getBoundingClientRect().left);
+    const inner = steps.findIndex((s) => s.of !== null);
+    assert.ok(inner > 0, "the plan has no group that is taken apart");
+    assert.ok((await left(inner)) > (await left(steps[inner].of)), "the step is no further in than its group");
+    const before = await pixels(page);
+    await page.evaluate((i) => window.sbdp.selection.pickGroup(window.sbdp.scene.steps[i].parts), steps[inner].of);
+    assert.ok(difference(before, await pixels(page)) > 0.001, "the group is not pointed out");
+  }));
+
+test("groups that were kept together, or can begin to move, are listed and shown", () =>
+  visited(join(folder, "kept.html"), async (page) => {
+    const { kept_together, free_together } = await page.evaluate(() => window.sbdp.scene);
+    for (const [list, groups] of [["#kept", kept_together], ["#free-groups", free_together]]) {
+      const rows = page.locator(`${list} button`);
+      assert.deepEqual(await rows.allTextContents(), groups.map((g) => g.words));
+      for (const [i, { parts }] of groups.entries()) {
+        await rows.nth(i).click();
+        await pixels(page);
+        const [group, opacities] = await page.evaluate(() => [
+          [...window.sbdp.selection.group],
+          window.sbdp.stage.bodies.map((b) => (b.group.visible ? b.opacity : 0)),
+        ]);
+        assert.deepEqual(group, parts);
+        assert.ok(parts.every((p) => opacities[p] === 1), `${opacities}`);
+        assert.ok(opacities.every((o, p) => parts.includes(p) || o < 1), `${opacities}`);
+      }
+    }
   }));
 
 test("without motion, steps are shown by their ends", () =>

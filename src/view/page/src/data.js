@@ -32,10 +32,15 @@
  *
  * @typedef {object} Step
  * @property {number[]} parts
+ * @property {number | null} of the step that takes out, or puts in, the group to which they belong
  * @property {string} words
  * @property {number[]} after other parts that must have moved before
  * @property {number} begins
  * @property {number} ends
+ *
+ * @typedef {object} Group
+ * @property {number[]} parts
+ * @property {string} words
  *
  * @typedef {object} Graph
  * @property {string} direction
@@ -50,12 +55,14 @@
  * @property {"y" | "z"} up
  * @property {"assembly" | "disassembly"} kind
  * @property {string} status
- * @property {string | null} reason
+ * @property {string | null} verdict why it is not complete
  * @property {number} duration seconds
  * @property {string[]} palette
  * @property {Mesh[]} meshes
  * @property {Part[]} parts
  * @property {Step[]} steps
+ * @property {Group[]} kept_together that left together and were not taken apart
+ * @property {Group[]} free_together that can begin to move where nothing leaves any more
  * @property {{part: number | null, by: number[], action: string}[]} blocked
  * @property {Graph[]} graphs
  */

@@ -2,6 +2,7 @@
 import { controls } from "./controls.js";
 import { decode } from "./data.js";
 import { byId } from "./dom.js";
+import { groupLists } from "./groups.js";
 import { graphPanel } from "./graph-panel.js";
 import { keyboard } from "./keyboard.js";
 import { partsList, stuckList } from "./parts-list.js";
@@ -29,6 +30,7 @@ function start() {
   stepsList(player, selection);
   partsList(scene, selection);
   stuckList(scene, selection, () => player.seek(scene.duration));
+  groupLists(scene, selection, (time) => player.seek(time));
   graphPanel(player, selection);
   keyboard(player, selection, stage);
   picking(byId("canvas"), stage, selection);

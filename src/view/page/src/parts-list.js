@@ -4,6 +4,7 @@
  * @import { Selection } from "./selection.js"
  */
 import { byId, element } from "./dom.js";
+import { partWord, partWords } from "./names.js";
 
 /**
  * @param {Scene} scene
@@ -53,7 +54,8 @@ export function stuckList(scene, selection, look) {
   banner.hidden = scene.status === "complete";
   if (banner.hidden) return;
   const parts = [...new Set(scene.blocked.map((b) => b.part))].filter((p) => p !== null);
-  banner.append(element("strong", {}, `Not complete: ${scene.status}`), scene.reason ? ` – ${scene.reason}` : "");
+  const verdict = scene.verdict ? ` – ${scene.verdict}` : "";
+  byId("reason").append(element("strong", {}, `Not complete: ${scene.status}`), verdict);
   const rows = parts.map((part) => {
     const blocked = scene.blocked.filter((b) => b.part === part);
     const by = new Set(blocked.flatMap((b) => b.by));
@@ -62,10 +64,10 @@ export function stuckList(scene, selection, look) {
       look();
       selection.pick(part, by);
     };
-    const name = element("span", { class: "stuck" }, `${scene.parts[part].name} is stuck`);
+    const name = element("span", { class: "stuck" }, `${partWord(scene.parts[part].name)} is stuck`);
     return element("button", { type: "button", onclick: point }, name, element("span", { class: "after" }, told));
   });
-  if (rows.length) banner.append(element("ul", { class: "list" }, ...rows.map((row) => element("li", {}, row))));
+  byId("stuck").append(...rows.map((row) => element("li", {}, row)));
 }
 
 /** Straight ways are told one by one, ways with turns counted: they are many, and mostly kept by the same.
@@ -74,7 +76,7 @@ export function stuckList(scene, selection, look) {
 function kept(scene, blocked) {
   const straight = blocked.filter((b) => !/[+-]r|~/.test(b.action));
   const way = ({ action, by }) => {
-    const names = by.map((p) => scene.parts[p].name).join(", ");
+    const names = partWords(by.map((p) => scene.parts[p].name));
     return `${action === "any" ? "whichever way" : action}: kept by ${names}`;
   };
   const turns = blocked.length - straight.length;

@@ -13,6 +13,8 @@ export class Selection extends EventTarget {
     this.part = null;
     /** @type {Set<number>} parts pointed out beside it, as what blocks it */
     this.others = new Set();
+    /** @type {Set<number>} parts that belong together, pointed out instead */
+    this.group = new Set();
     /** @type {Set<number>} */
     this.hidden = new Set();
     /** @type {Set<number>} */
@@ -30,6 +32,18 @@ export class Selection extends EventTarget {
   pick(part, others = []) {
     this.part = part;
     this.others = new Set(others);
+    this.group = new Set();
+    this.changed();
+  }
+
+  /**
+   * Points out parts that belong together.
+   * @param {Iterable<number>} parts
+   */
+  pickGroup(parts) {
+    this.part = null;
+    this.others = new Set();
+    this.group = new Set(parts);
     this.changed();
   }
 

@@ -225,21 +225,22 @@ export class Stage {
    * @param {number} part */
   dress(body, part) {
     const { selection, scene } = this;
-    const pointed = selection.part === part || selection.others.has(part);
+    const picked = selection.part === part || selection.group.has(part);
+    const pointed = picked || selection.others.has(part);
     let opacity = selection.explode > 0 ? 1 : visibility(scene, part, this.time);
     const waits = selection.explode === 0 && scene.kind === "assembly" && isWaiting(scene, part, this.time);
     if (selection.hidden.has(part) || (waits && !selection.waiting)) opacity = 0;
     else if (selection.through.has(part)) opacity *= THROUGH;
     else if (selection.others.has(part)) opacity *= BLOCKER;
-    else if (selection.others.size > 0 && !pointed) opacity *= BESIDE;
+    else if (selection.others.size + selection.group.size > 0 && !pointed) opacity *= BESIDE;
     body.fade(opacity);
     const moving = selection.explode === 0 && isMoving(scene, part, this.time);
-    body.outline(moving || selection.part === part);
+    body.outline(moving || picked);
     // Where it is told what blocks one, the others that are stuck are but blockers.
-    if (this.stuck.has(part) && (selection.others.size === 0 || selection.part === part)) {
+    if (this.stuck.has(part) && (selection.others.size === 0 || picked)) {
       body.paint(STUCK.colour, pointed ? "#7a0022" : STUCK.glow, STUCK.edge);
     } else {
-      const glow = selection.part === part || moving ? "#2c3a55" : selection.others.has(part) ? "#332a10" : "#000000";
+      const glow = picked || moving ? "#2c3a55" : selection.others.has(part) ? "#332a10" : "#000000";
       body.paint(scene.palette[scene.parts[part].colour], glow, pointed || moving ? "#000000" : "#1b2330");
     }
   }

@@ -1,9 +1,11 @@
 /**
- * The list of steps, with the parts that must have moved before each; a click goes there.
+ * The list of steps, those within a group further in, with the parts that must have moved before each; a click goes there.
  * @import { Player } from "./player.js"
  * @import { Selection } from "./selection.js"
  */
 import { byId, element } from "./dom.js";
+import { depth } from "./groups.js";
+import { partWords } from "./names.js";
 
 /**
  * @param {Player} player
@@ -14,7 +16,7 @@ export function stepsList(player, selection) {
   const items = scene.steps.map((step, i) => {
     const goes = step.parts.length > 1 ? "go" : "goes";
     const verb = scene.kind === "assembly" ? `${goes} in after` : "after";
-    const names = step.after.map((p) => scene.parts[p].name).join(", ");
+    const names = partWords(step.after.map((p) => scene.parts[p].name));
     const after = names ? element("span", { class: "after" }, `${verb} ${names}`) : "";
     const go = () => {
       // Those of a group stand out as they move.
@@ -23,7 +25,7 @@ export function stepsList(player, selection) {
     };
     return element("button", { type: "button", onclick: go }, element("span", {}, step.words), after);
   });
-  byId("steps").append(...items.map((button) => element("li", {}, button)));
+  byId("steps").append(...items.map((button, i) => element("li", { style: `--depth:${depth(scene, i)}` }, button)));
   let current = -1;
   const mark = () => {
     const step = player.step;
