@@ -260,6 +260,20 @@ fn removed_parts_and_targets_are_respected() {
 }
 
 #[test]
+fn a_given_base_stays_and_what_contradicts_itself_is_refused() {
+    let told = stdout(&plan("pin-bolt-cover", &["--base", "cover"]));
+    assert!(
+        told.contains("base:\n  cover: as given\n") && told.contains("remaining:\n  base, cover\n"),
+        "{told}"
+    );
+    refused(
+        &plan("pin-bolt-cover", &["--base", "cover", "--target", "cover"]),
+        &["part `cover` is a target and in `base`"],
+    );
+    refused(&plan("pin-bolt-cover", &["--clearance", "-1"]), &["`clearance` is -1"]);
+}
+
+#[test]
 fn a_spent_budget_exits_3_and_a_passed_deadline_4() {
     let spent = plan("threaded-bolt-and-nut", &["--no-sweeps", "--max-simulations", "0", "--json", "-"]);
     assert_eq!(spent.status.code(), Some(3), "{}", stderr(&spent));

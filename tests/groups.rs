@@ -150,16 +150,21 @@ fn a_changed_question_is_answered_as_by_a_service_that_knows_nothing() {
     for name in ["pinned-block", "covered-pin"] {
         let service = Service::default();
         planned(&service, name, &PlanRequest::default());
-        let count = assembly(name).parts.len();
+        let SourceAssembly { parts, fixed: stay, .. } = assembly(name);
         let one = |part: usize| {
-            let (removed, fixed, targets) = (vec![part], vec![part], Some(vec![part]));
+            let (removed, fixed, base, targets) = (vec![part], vec![part], vec![part], Some(vec![part]));
             [
                 PlanRequest { removed, ..PlanRequest::default() },
                 PlanRequest { fixed, ..PlanRequest::default() },
+                PlanRequest { base, ..PlanRequest::default() },
                 PlanRequest { targets, ..PlanRequest::default() },
             ]
         };
-        for request in (0..count).flat_map(one) {
+        // A target that may not move is refused.
+        let is_sound = |request: &PlanRequest| {
+            request.targets.iter().flatten().all(|&part| !stay.contains(&parts[part].name))
+        };
+        for request in (0..parts.len()).flat_map(one).filter(is_sound) {
             let warm = planned(&service, name, &request);
             let cold = planned(&Service::default(), name, &request);
             assert_eq!(told(&warm), told(&cold), "{name}, {request:?}");

@@ -93,7 +93,7 @@ impl Account {
                 self.names(by)
             ),
             TraceEvent::GroupTried { parts, leaves } => {
-                let end = if *leaves { "they leave" } else { "no way out" };
+                let end = if *leaves { "they can leave" } else { "no way out" };
                 format!("    {} together, as one body: {end}", self.names(parts))
             }
             TraceEvent::PlacesSearched { places, leaves } => {

@@ -135,3 +135,43 @@ impl Candidate {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::problem;
+    use super::*;
+    use crate::fixtures::{cuboid, scene};
+
+    /// Three cubes in a row; the one in the middle touches both others.
+    fn chosen(leaving: &[usize], base: Base) -> Option<Vec<usize>> {
+        let cube = |x: f64| cuboid([x, 0.0, 0.0], [x + 2.0, 2.0, 2.0]);
+        let (scene, verifier) = scene(vec![cube(0.0), cube(2.0), cube(4.0)]);
+        let problem = Problem { base, ..problem(scene, &verifier) };
+        problem.base_among(leaving, &[0, 1, 2], &Vector3::z()).map(|base| base.parts)
+    }
+
+    #[test]
+    fn the_larger_side_stays_if_it_has_as_good_a_base() {
+        let base = |part: usize| Base { parts: vec![part], reason: Some("it is the largest".into()) };
+        assert_eq!(chosen(&[1, 2], base(0)), Some(vec![1]));
+        assert_eq!(chosen(&[2], base(0)), None, "two cubes stay");
+        assert_eq!(chosen(&[1, 2], Base { reason: None, ..base(0) }), None, "the request gave it");
+    }
+
+    #[test]
+    fn a_part_in_touch_with_more_is_chosen() {
+        let cube = |x: f64| cuboid([x, 0.0, 0.0], [x + 2.0, 2.0, 2.0]);
+        let (scene, verifier) = scene(vec![cube(0.0), cube(2.0), cube(4.0)]);
+        let problem = problem(scene, &verifier);
+        let base = problem.chosen_base(&[0, 1, 2], &Vector3::z());
+        assert_eq!(base.parts, [1]);
+        assert_eq!(
+            base.reason.as_deref(),
+            Some("it is the largest, no other lies lower, it touches 2 others")
+        );
+        let wanted = Problem { targets: Some(vec![1]), ..problem.clone() };
+        assert_eq!(wanted.chosen_base(&[0, 1, 2], &Vector3::z()).parts, [0]);
+        let fixed = Problem { fixed: vec![2], ..problem };
+        assert_eq!(fixed.chosen_base(&[0, 1, 2], &Vector3::z()), Base::default());
+    }
+}

@@ -193,8 +193,8 @@ impl Order {
     }
 
     /// The sweeps along translations from some open states, in the order of expansion: displaced states first, then all parts as
-    /// assembled; each upward before sideways before downward, and there along the shorter ways out first: such a plan takes
-    /// less room, and less is to be verified.
+    /// assembled; each along the shorter ways out first: such a plan takes less room, and less is to be verified. Of ways of
+    /// about one length, those upward come first, then those sideways.
     pub(super) fn sweeps(
         &self,
         of: &PhaseStates<'_>,
@@ -216,14 +216,17 @@ impl Order {
             let mut actions: Vec<usize> = (0..forces.len()).collect();
             // Lengths are compared in half powers of two: rounding of the input must not change the order.
             let length = |action: &usize| (way(action).max(TOUCHED).log2() * 2.0).floor() as i32;
-            actions.sort_by_cached_key(|action| (self.tier(&forces[*action]), length(action)));
+            actions.sort_by_cached_key(|action| {
+                // A way sideways counts as half a power of two longer than it is, and one downward as twice as long.
+                (length(action) + self.tier(&forces[*action]), length(action))
+            });
             actions.into_iter().map(move |action| StateAction { node, phase, action })
         };
         self.ranked(of, open.to_vec(), disassembly).into_iter().flat_map(sweeps).collect()
     }
 
     /// The place of a direction in the order of preference: upward, sideways, downward.
-    fn tier(&self, direction: &Vector3<f64>) -> u8 {
+    fn tier(&self, direction: &Vector3<f64>) -> i32 {
         match direction.dot(&self.up) {
             up if up > UPWARD => 0,
             up if up < -UPWARD => 2,

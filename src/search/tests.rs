@@ -3,14 +3,17 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use nalgebra::Vector3;
+
 use super::*;
 use crate::blocking_graph::StaticAnalysis;
 use crate::cache::RequestCache;
 use crate::fixtures::{cells, cuboid, flats_in_slot, moved, open_box, rod, scene, tube};
-use crate::geometry::SourceMesh;
+use crate::geometry::{Pose, SourceMesh};
 use crate::plan::{Base, PlanStatus, Verifier};
 use crate::scene::Scene;
 use crate::simulation::SlidingEngine;
+use crate::tolerances::{HULL_CLEARANCE, HULL_MARGIN};
 
 #[derive(Default)]
 pub(super) struct Recorder(pub(super) Vec<TraceEvent>);
@@ -386,4 +389,53 @@ fn the_base_stays_as_long_as_others_leave() {
     assert_eq!((outcome.base.parts, outcome.remaining), (vec![0], vec![0]));
     let outcome = plan(vec![3]);
     assert_eq!((outcome.base, outcome.remaining.contains(&3)), (Base::default(), true));
+}
+
+/// A plate (part 0), a slab that rests on it (part 1), and a block on the slab (part 2): all may go sideways at once.
+fn stack() -> Vec<SourceMesh> {
+    let slab = |low: f64, half: f64| cuboid([-half, -half, low], [half, half, low + 1.0]);
+    vec![slab(0.0, 3.0), slab(1.0, 2.0), slab(2.0, 1.0)]
+}
+
+fn planned(meshes: Vec<SourceMesh>, change: impl FnOnce(Problem<'_>) -> Problem<'_>) -> Outcome {
+    let (scene, verifier) = scene(meshes);
+    let problem = Problem { actions: ActionSet::Extended, sweeps: true, ..problem(scene, &verifier) };
+    search(Planner::SbdpStar, change(problem), &mut Recorder::default())
+}
+
+fn order(outcome: &Outcome) -> Vec<usize> {
+    outcome.removals.iter().flat_map(|r| r.parts.clone()).collect()
+}
+
+#[test]
+fn what_carries_another_part_leaves_after_it() {
+    for turn in [Vector3::zeros(), Vector3::new(0.4, -0.3, 0.7)] {
+        let meshes = stack().into_iter().map(|mesh| moved(mesh, &Pose::rotation(turn))).collect();
+        assert_eq!(order(&planned(meshes, |p| p)), [2, 1]);
+    }
+}
+
+#[test]
+fn a_given_base_stays_and_leaves_only_where_nothing_else_does() {
+    let given = |part: usize| Base { parts: vec![part], reason: None };
+    let outcome = planned(stack(), |p| Problem { base: given(2), ..p });
+    assert_eq!((outcome.remaining, outcome.base), (vec![2], given(2)));
+    // The block leaves beside the bar, the slab only after it.
+    let wanted = |part: usize| {
+        let targets = Some(vec![part]);
+        planned(packed_box(), |p| Problem { base: given(3), fixed: vec![0], targets, ..p })
+    };
+    let (block, slab) = (wanted(2), wanted(1));
+    assert_eq!((order(&block), block.base), (vec![2], given(3)));
+    assert_eq!((slab.status, slab.remaining, slab.base), (PlanStatus::Complete, vec![0], Base::default()));
+}
+
+#[test]
+fn ways_end_as_far_off_as_asked_for() {
+    let gap = |clearance: Option<f64>| {
+        let outcome = planned(stack(), |p| Problem { clearance, ..p });
+        outcome.removals[0].motion().translation.vector.norm()
+    };
+    assert!((gap(Some(0.5)) - 0.5).abs() < 1e-9 && (gap(Some(0.0)) - HULL_MARGIN).abs() < HULL_MARGIN);
+    assert!((gap(None) - 2.0 * HULL_CLEARANCE).abs() < 1e-9, "a hundredth of its longest side");
 }

@@ -34,13 +34,17 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         Ok(false)
     }
 
-    /// Takes a part out along a thread, if one leaves so; true if one does.
+    /// Takes a part out along a thread, if one leaves so; true if one does. Small parts come first: a nut is turned off its
+    /// bolt and not the bolt out of the nut, which has the longer way.
     pub(super) fn leave_along_threads(&mut self) -> Result<bool, Stop> {
         if !self.strategy.is_extended() || !self.disassembly.problem.sweeps {
             return Ok(false);
         }
         let open = self.expandable(PlanningPhase::Translation);
-        for part in self.order.parts(&self.of(PlanningPhase::Translation), &open, &self.disassembly) {
+        let of = self.of(PlanningPhase::Translation);
+        let mut parts = self.order.parts(&of, &open, &self.disassembly);
+        parts.sort_by(|&a, &b| of.reach(a).total_cmp(&of.reach(b)));
+        for part in parts {
             if self.unscrewing_memory.holds(part, self.disassembly.everything.standing()) {
                 continue;
             }
