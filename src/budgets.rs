@@ -402,6 +402,13 @@ pub(crate) const CROSS_SECTIONS: usize = 32;
 /// Cells in which a disc is checked to be inside a part: some thousands are needed for a disc whose rim is a hundredth of
 /// the radius inside. At half, some discs near a rim are not proved; at double no effect.
 pub(crate) const DISC_CELLS: usize = 20_000;
+/// Count of sets of parts that are looked at for the smallest one from which targets leave straight. In assemblies of twelve
+/// parts a hundred are enough; at half or double, a target of a large frame may take more or fewer steps.
+pub(crate) const TARGET_SETS: usize = 2000;
+/// Count of searches for fewer removals that take targets out. Each has few parts that may move, and asks for the blocking
+/// graph of all; at half, plans of more than six removals are left longer than they need to be; at double, such questions take
+/// longer.
+pub(crate) const TARGET_SEARCHES: usize = 12;
 /// Count of groups of one state that are searched for a way out by pushes. Six pieces have at most 31; at half, puzzles of five
 /// pieces are given up; at double, what never comes apart takes up to twice as long.
 pub(crate) const GROUPS_SEARCHED: usize = 64;

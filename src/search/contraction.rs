@@ -111,8 +111,8 @@ impl<'a> Contraction<'a> {
     }
 }
 
-/// Receives nothing: bodies of groups are no parts that anyone knows.
-struct Unobserved;
+/// Receives nothing: bodies of groups are no parts that anyone knows, and what is tried in vain is no result.
+pub(super) struct Unobserved;
 
 impl Observer for Unobserved {
     fn progress(&mut self, _removed: usize, _simulations: u64) {}

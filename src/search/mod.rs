@@ -53,6 +53,7 @@ mod strategy;
 mod subassembly;
 mod support;
 mod sweep_memory;
+mod targets;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -77,9 +78,9 @@ pub fn search(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observe
     let Some(targets) = problem.targets.clone() else { return run(planner, problem, observer) };
     // Only what the targets require is reported, and that is known at the end.
     let mut deferred = DeferredRemovals::new(observer);
-    let mut outcome = run(planner, problem, &mut deferred);
+    let mut outcome = run(planner, problem.clone(), &mut deferred);
     if outcome.status == PlanStatus::Complete {
-        outcome = requirements::without_needless(outcome, &targets);
+        outcome = targets::with_fewest(planner, &problem, outcome, &targets);
     }
     outcome.removals.iter().for_each(|r| observer.removal(r));
     outcome

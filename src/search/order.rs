@@ -89,8 +89,8 @@ impl Order {
     }
 
     /// The states to expand, the initial one included. Of two last parts it does not matter which one moves
-    /// against the other: beyond the first push, only the smaller one does, or the one that is no base. A part that is proved to stay is not moved,
-    /// and a ball not turned.
+    /// against the other: beyond the first push, only the smaller one does, or the one that is no base. A part that is
+    /// proved to stay is not moved, and a ball not turned.
     pub(super) fn expandable(&self, of: &PhaseStates<'_>, disassembly: &Disassembly<'_, '_>) -> Vec<usize> {
         let PhaseStates { strategy, phase, states, .. } = *of;
         let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());

@@ -439,3 +439,19 @@ fn ways_end_as_far_off_as_asked_for() {
     assert!((gap(Some(0.5)) - 0.5).abs() < 1e-9 && (gap(Some(0.0)) - HULL_MARGIN).abs() < HULL_MARGIN);
     assert!((gap(None) - 2.0 * HULL_CLEARANCE).abs() < 1e-9, "a hundredth of its longest side");
 }
+
+#[test]
+fn a_target_leaves_on_the_way_that_fewest_block() {
+    // A tube, and rods in it one above the other: one below the target, three above it.
+    let rods = [[-3.9, -2.0], [-2.0, 0.0], [0.0, 1.0], [1.0, 2.0], [2.0, 3.9]].map(|at| rod(0.9, at, 24));
+    let meshes: Vec<SourceMesh> = [tube(1.0, 2.0, [-4.0, 4.0], 24)].into_iter().chain(rods).collect();
+    let wanted = |targets: &[usize]| {
+        let outcome = planned(meshes.clone(), |p| Problem { targets: Some(targets.to_vec()), ..p });
+        assert_eq!(outcome.status, PlanStatus::Complete);
+        assert_eq!(outcome.removals.len() + outcome.remaining.len(), meshes.len());
+        order(&outcome)
+    };
+    assert_eq!(wanted(&[2]), [1, 2]);
+    assert_eq!(wanted(&[4]), [5, 4]);
+    assert_eq!(wanted(&[2, 4]).len(), 4);
+}
