@@ -43,7 +43,7 @@ pub(crate) const ON_SURFACE: f64 = 1e-4;
 pub(crate) const HULL_MARGIN: f64 = 1e-3;
 /// Share of the longest side of a part's box: the gap between its hull and that of all that stands where its way ends, if
 /// the request gives none. So no way out is shorter than this, and a part that leaves is seen to be off. Chosen: at half, a
-/// way is a hair's breadth on a picture of the whole; at double, small parts end far from where they were freed.
+/// way cannot be seen on a picture of the whole; at double, ways of long parts are visibly longer than they need to be.
 pub(crate) const HULL_CLEARANCE: f64 = 0.01;
 /// Cosine of the angle between a part's last leg and the way straight off the hull of what stands up to which the leg is
 /// continued (60 degrees): the leg is then at most twice as long. At half, four times; at 1 most ways end with a bend.

@@ -23,9 +23,8 @@ use super::problem::Problem;
 /// the plate that stands on it; at half, of two equal plates the upper one, for a few neighbours more.
 const LOW_WEIGHT: f64 = 0.5;
 /// Share of the score of a base from which on another part is about as good. Chosen, not derived: the pieces of a burr,
-/// which differ in how low they lie alone, are above it; a small part that a machine is lifted off is below it only if it
-/// is small in size or in neighbours. At half, a plate is pulled from under the machine that stands on it, if the machine
-/// has a part of its size; above 1, a burr is lifted off its key.
+/// which differ mainly in how low they lie, are above it; the parts of a machine on a large plate are below it. At half, the
+/// plate is pulled from under that machine; above 1, a burr is lifted off its key.
 const AS_GOOD: f64 = 0.75;
 
 /// A part as a base.

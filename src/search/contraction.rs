@@ -111,7 +111,7 @@ impl<'a> Contraction<'a> {
     }
 }
 
-/// Receives nothing: bodies of groups are no parts that anyone knows, and what is tried in vain is no result.
+/// Ignores all events: bodies of groups are no parts of the assembly, and a search that may fail has no results yet.
 pub(super) struct Unobserved;
 
 impl Observer for Unobserved {

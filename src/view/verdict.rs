@@ -5,8 +5,8 @@ use super::words::{capital, part_word, part_words};
 use crate::plan::export::{BlockedDocument, PlanDocument};
 use crate::plan::{PlanKind, PlanStatus, StepEnd};
 
-/// Count of parts whose blocked action is told unless all are asked for: those that the fewest parts block. At half, a
-/// frame whose four screws are stuck is not told whole; at double, a terminal of 24 lines shows nothing else.
+/// Count of blocked parts that a short list names: those that the fewest parts block. At half, the list of a frame with four
+/// stuck screws lacks one; at double, the list fills a terminal of 24 lines.
 const MOST_BLOCKED: usize = 6;
 /// Count of parts that a verdict names; more are counted. As many as the search names in its reasons.
 const MOST_NAMED: usize = 4;

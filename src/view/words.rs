@@ -22,28 +22,28 @@ const ALIKE: f64 = 0.9986;
 /// … and within which one is told as an axis of the frame (2 degrees).
 const NEARLY: f64 = 0.9994;
 /// Share of the larger one by which two lengths or turns of alike moves differ at most. Copies of a screw in holes of a
-/// plate leave by paths that differ by a few hundredths. At half, screws under a sloping cover are told one by one; at
-/// double, a range such as 5–10 mm says little.
+/// plate leave by paths that differ by a few hundredths. At half, each screw under a sloping cover gets a sentence of its
+/// own; at double, sentences have ranges as wide as 5–10 mm.
 const ALIKE_LENGTH: f64 = 0.25;
 /// Moves shorter than this share of the whole way are not told …
 const SLIGHT: f64 = 0.03;
 /// … and no more than so many.
 const MOST: usize = 3;
-/// Share of the whole way. A turn that brings the part less far along its axis is told without a shift: half a turn of a
-/// fine thread, before a way out a hundred times as long, still is one. At half, what a bayonet drifts in its play is
-/// told; at double, the shift of such a thread is not.
+/// Share of the whole way. The sentence of a turn leaves out a shift along the axis that is shorter: half a turn of a fine
+/// thread before a way out a hundred times as long keeps its shift. At half, a bayonet's drift in its play becomes a shift;
+/// at double, that thread loses its shift.
 const NO_SHIFT: f64 = 2e-3;
 /// Radians: half a turn, from which on a turn with a shift along its axis is a screw. At half, lids that are tilted out
 /// by a right angle are screws; at double, caps with half a turn are none.
 const SCREW: f64 = PI;
-/// Turns within which a turn is told in quarters: 7 degrees. At half, threads whose ends were rounded to facets have
-/// decimals; at double, 76 degrees are a quarter.
+/// Turns. An angle this near to a quarter turn is written as one (7 degrees). At half, threads that end at a facet get
+/// decimals; at double, 76 degrees become a quarter.
 const QUARTERLY: f64 = 0.02;
 /// Count of names in a sentence; more are counted, since a longer list hides the verb. At half a row of four screws is not
 /// named; at double a sentence fills two lines.
 const MOST_NAMES: usize = 6;
 
-/// One move of a part, as it is told.
+/// One move of a part.
 #[derive(Debug, Clone, PartialEq)]
 struct Move {
     /// Unit direction: of the way, or of the axis that the part turns about counter-clockwise.
@@ -119,7 +119,7 @@ impl Move {
         if self.length < 0.0 { -self.along } else { self.along }
     }
 
-    /// Whether one sentence tells both.
+    /// Whether one sentence describes both.
     fn is_alike(&self, other: &Self) -> bool {
         let close = |a: f64, b: f64| (a - b).abs() <= ALIKE_LENGTH * a.max(b);
         self.kind() == other.kind()
@@ -285,7 +285,7 @@ pub(super) fn free_together(group: &FreeGroupDocument) -> String {
 struct Course {
     /// Whether the part is brought near before the moves, from where it waits.
     is_brought: bool,
-    /// The moves that are told.
+    /// The moves that the sentence names.
     moves: Vec<Move>,
 }
 
