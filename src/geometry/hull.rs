@@ -10,12 +10,72 @@ use parry3d_f64::query::gjk::CsoPoint;
 use parry3d_f64::query::gjk::{GJKResult, VoronoiSimplex, closest_points};
 use parry3d_f64::shape::SupportMap;
 use parry3d_f64::transformation::try_convex_hull;
+use rayon::prelude::*;
 
-use super::{Cloud, Pose};
+use super::{Bounds, Cloud, Pose};
 
-/// The vertices of the convex hull of `points`; all points where they are too flat for a hull.
+/// Quickhull takes ever longer per point where most points are on the hull: of 10,000 such points 1.9 µs each on a slow
+/// core, of 1,000 0.7 µs, of half a million 19 µs. At half of this, chunks are used where the whole takes no longer; at
+/// double, a hull takes more than 1 µs per triangle.
+const WHOLE: usize = 10_000;
+/// Points of a chunk. At half, more points of the chunks' borders are left; at double, each point takes a fifth longer.
+const CHUNK: usize = 1_000;
+/// The next pass is worth its time if the last one left no more than this share.
+const SHRUNK: f64 = 0.8;
+
+/// The vertices of the convex hull of `points`; all points where they are too flat for a hull. Of very many there may be
+/// some points among them that are no vertices, but none that is missing.
 #[must_use]
 pub fn hull_vertices(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
+    if points.len() <= WHOLE {
+        return hull_of_few(points);
+    }
+    let mut left = points.to_vec();
+    loop {
+        let count = left.len();
+        let found = hulls_of_chunks(left);
+        if found.len() <= WHOLE {
+            return hull_of_few(&found);
+        }
+        if found.len() as f64 > SHRUNK * count as f64 {
+            return found;
+        }
+        left = found;
+    }
+}
+
+/// The points that are vertices of the hull of a chunk of points near each other and the centre of all. A vertex of the
+/// hull of all points is one of the hull of any of them; and the centre, which lies within the hull of all, keeps the
+/// inner side of a chunk from being left.
+fn hulls_of_chunks(mut points: Vec<Point3<f64>>) -> Vec<Point3<f64>> {
+    let sum: Vector3<f64> = points.iter().map(|p| p.coords).sum();
+    let centre = Point3::from(sum / points.len() as f64);
+    let mut chunks = vec![&mut *points];
+    while chunks.first().is_some_and(|chunk| chunk.len() > CHUNK) {
+        chunks = chunks.into_par_iter().flat_map_iter(halves).collect();
+    }
+    let hull = |chunk: &mut [Point3<f64>]| {
+        let mut hull = hull_of_few(&[&*chunk, &[centre]].concat());
+        hull.retain(|p| *p != centre);
+        hull
+    };
+    chunks.into_par_iter().flat_map_iter(hull).collect()
+}
+
+/// Halves of some points, apart along the longest side of their box.
+fn halves(points: &mut [Point3<f64>]) -> [&mut [Point3<f64>]; 2] {
+    let axis = Bounds::of(&*points).extents().imax();
+    let middle = points.len() / 2;
+    // By all coordinates: so the halves do not depend on the order of equal ones.
+    let order = |p: &Point3<f64>, q: &Point3<f64>| {
+        let by = |k: usize| p[(axis + k) % 3].total_cmp(&q[(axis + k) % 3]);
+        by(0).then_with(|| by(1)).then_with(|| by(2))
+    };
+    points.select_nth_unstable_by(middle, order);
+    points.split_at_mut(middle).into()
+}
+
+fn hull_of_few(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
     let input: Vec<ParryVector> = points.iter().map(|p| ParryVector::new(p.x, p.y, p.z)).collect();
     match try_convex_hull(&input) {
         Ok((vertices, _)) if covers(&vertices, points) => {
@@ -28,7 +88,7 @@ pub fn hull_vertices(points: &[Point3<f64>]) -> Vec<Point3<f64>> {
 /// Whether a computed hull reaches as far as the points it is meant to hold, in 26 directions.
 /// Guards against numerical failure of the hull algorithm on coplanar input.
 fn covers(hull: &[ParryVector], points: &[Point3<f64>]) -> bool {
-    let size = super::Bounds::of(points).extents().norm();
+    let size = Bounds::of(points).extents().norm();
     (0..27).filter(|i| *i != 13).all(|i| {
         let d = Vector3::new(f64::from(i % 3 - 1), f64::from(i / 3 % 3 - 1), f64::from(i / 9 - 1));
         let reach = points.iter().map(|p| p.coords.dot(&d)).fold(f64::NEG_INFINITY, f64::max);

@@ -101,7 +101,7 @@ impl Rim {
     #[must_use]
     pub fn of(vertices: &[Point3<f64>], triangles: &[[u32; 3]]) -> Self {
         let used = |(edge, sides): ([u32; 2], &[Side])| {
-            let excess = sides.iter().map(|s| if s.upwards { 1i32 } else { -1 }).sum::<i32>();
+            let excess = sides.iter().map(|s| if s.upwards() { 1i32 } else { -1 }).sum::<i32>();
             let [low, high] = edge.map(|i| vertices[i as usize]);
             let ends = if excess > 0 { [low, high] } else { [high, low] };
             let (times, length) = (excess.unsigned_abs(), (high - low).norm());

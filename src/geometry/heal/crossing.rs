@@ -2,16 +2,17 @@
 
 use std::sync::OnceLock;
 
+use nalgebra::Point3;
 use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::math::{Pose, Vector};
-use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy};
 use parry3d_f64::query;
 use parry3d_f64::shape::Triangle;
 use rayon::prelude::*;
 
 use super::Draft;
+use super::box_tree::{BoxTree, LooseBox};
 use crate::geometry::mesh;
-use crate::termination::{Interrupt, Poll, Termination, try_all};
+use crate::termination::{Interrupt, Poll, Termination};
 
 /// Surfaces nearer than this (of the part's size) touch: their nearest points could be
 /// confused.
@@ -21,9 +22,6 @@ const TOUCH: f64 = 1e-7;
 /// the part's size); less is rounding between neighbours.
 const PIERCE: f64 = 1e-6;
 
-/// Fewer triangles are not worth another thread.
-const FEW: usize = 512;
-
 /// Triangles between two looks at the termination condition.
 const CROSSING_POLL: u32 = 256;
 
@@ -31,22 +29,22 @@ const CROSSING_POLL: u32 = 256;
 pub(super) struct Surfaces<'a> {
     termination: &'a Termination,
     shells: &'a [Vec<u32>],
-    corners: Vec<[Vector; 3]>,
-    indices: Vec<[u32; 3]>,
-    trees: Vec<OnceLock<Bvh>>,
+    triangles: &'a [[u32; 3]],
+    vertices: Vec<Vector>,
+    trees: Vec<OnceLock<BoxTree>>,
 }
 
 impl<'a> Surfaces<'a> {
-    pub(super) fn new(draft: &Draft, shells: &'a [Vec<u32>], termination: &'a Termination) -> Self {
+    pub(super) fn new(draft: &'a Draft, shells: &'a [Vec<u32>], termination: &'a Termination) -> Self {
         let (lo, hi) = mesh::bounds(&draft.vertices);
         let scale = (hi - lo).amax().max(f64::MIN_POSITIVE);
-        let unit = |v: u32| {
-            let p = (draft.vertices[v as usize] - lo) / scale;
+        let unit = |p: &Point3<f64>| {
+            let p = (p - lo) / scale;
             Vector::new(p.x, p.y, p.z)
         };
-        let corners = draft.triangles.iter().map(|t| t.map(unit)).collect();
+        let vertices = draft.vertices.iter().map(unit).collect();
         let trees = shells.iter().map(|_| OnceLock::new()).collect();
-        Self { termination, shells, corners, indices: draft.triangles.clone(), trees }
+        Self { termination, shells, triangles: &draft.triangles, vertices, trees }
     }
 
     /// Whether two shells cross or touch.
@@ -56,12 +54,18 @@ impl<'a> Surfaces<'a> {
     pub(super) fn meet(&self, a: usize, b: usize) -> Result<bool, Interrupt> {
         let (few, many) = if self.shells[a].len() <= self.shells[b].len() { (a, b) } else { (b, a) };
         let poll = Poll::every(CROSSING_POLL, Some(self.termination));
-        let are_apart = try_all(&self.shells[few], |&t| {
+        for &t in &self.shells[few] {
             poll.check()?;
             let region = self.aabb(t).loosened(TOUCH);
-            Ok(!self.within(many, &region).any(|u| self.touch(t, u)))
-        })?;
-        Ok(!are_apart)
+            let touches = |place: u32| {
+                let u = self.shells[many][place as usize];
+                Ok(region.intersects(&self.aabb(u)) && self.touch(t, u))
+            };
+            if self.tree(many).any_meeting(&LooseBox::of(&region), touches)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Whether a shell crosses itself. Triangles with a common vertex are taken on trust.
@@ -70,44 +74,45 @@ impl<'a> Surfaces<'a> {
     /// The termination condition became true.
     pub(super) fn crosses_itself(&self, shell: usize) -> Result<bool, Interrupt> {
         let apart = |t: u32, u: u32| {
-            let (t, u) = (&self.indices[t as usize], &self.indices[u as usize]);
+            let (t, u) = (&self.triangles[t as usize], &self.triangles[u as usize]);
             !t.iter().any(|v| u.contains(v))
         };
-        let is_free = |some: &[u32]| {
+        let tree = self.tree(shell);
+        let is_crossing = |group: usize| {
             let poll = Poll::every(CROSSING_POLL, Some(self.termination));
-            try_all(some, |&t| {
+            tree.any_pair(group, |i, j| {
+                let [t, u] = [i, j].map(|place| self.shells[shell][place as usize]);
+                if !apart(t, u) {
+                    return Ok(false);
+                }
                 poll.check()?;
-                let region = self.aabb(t);
-                Ok(!self.within(shell, &region).any(|u| u > t && apart(t, u) && self.cross(t, u)))
+                Ok(self.aabb(t).intersects(&self.aabb(u)) && self.cross(t, u))
             })
         };
-        // The first chunk that crosses, or was interrupted, ends the search.
-        let ended = self.shells[shell].par_chunks(FEW).map(is_free).find_any(|free| *free != Ok(true));
-        Ok(!ended.unwrap_or(Ok(true))?)
+        // The first group that crosses, or was interrupted, ends the search.
+        let ended = (0..tree.groups()).into_par_iter().map(is_crossing).find_any(|found| *found != Ok(false));
+        ended.unwrap_or(Ok(false))
     }
 
-    /// A shell's triangles whose boxes meet a region.
-    fn within<'s>(&'s self, shell: usize, region: &'s Aabb) -> impl Iterator<Item = u32> + 's {
-        let triangles = &self.shells[shell];
-        self.tree(shell).intersect_aabb(region).map(|place| triangles[place as usize])
-    }
-
-    fn tree(&self, shell: usize) -> &Bvh {
+    fn tree(&self, shell: usize) -> &BoxTree {
         self.trees[shell].get_or_init(|| {
-            // By their places in the shell: of one or two leaves parry panics on other numbers than 0 and 1.
-            let leaves = self.shells[shell].iter().map(|&t| self.aabb(t)).enumerate();
-            Bvh::from_iter(BvhBuildStrategy::Binned, leaves)
+            let boxes = self.shells[shell].iter().map(|&t| LooseBox::of(&self.aabb(t)));
+            BoxTree::new(&boxes.collect::<Vec<_>>())
         })
     }
 
+    fn corners(&self, triangle: u32) -> [Vector; 3] {
+        self.triangles[triangle as usize].map(|v| self.vertices[v as usize])
+    }
+
     fn aabb(&self, triangle: u32) -> Aabb {
-        let [a, b, c] = self.corners[triangle as usize];
+        let [a, b, c] = self.corners(triangle);
         Aabb::new(a.min(b).min(c), a.max(b).max(c))
     }
 
     fn touch(&self, t: u32, u: u32) -> bool {
         let shape = |t: u32| {
-            let [a, b, c] = self.corners[t as usize];
+            let [a, b, c] = self.corners(t);
             Triangle::new(a, b, c)
         };
         let distance = query::distance(&Pose::IDENTITY, &shape(t), &Pose::IDENTITY, &shape(u));
@@ -116,7 +121,7 @@ impl<'a> Surfaces<'a> {
     }
 
     fn cross(&self, t: u32, u: u32) -> bool {
-        let (t, u) = (&self.corners[t as usize], &self.corners[u as usize]);
+        let (t, u) = (&self.corners(t), &self.corners(u));
         pierces(t, u) || pierces(u, t)
     }
 }

@@ -54,9 +54,9 @@ fn remove_slivers(draft: &mut Draft) -> usize {
             continue;
         }
         let belongs = others(p, q) == 1 && others(p, middle) % 2 == 1 && others(middle, q) % 2 == 1;
-        let across = sides.at(p, q).iter().find(|s| s.triangle != triangle);
+        let across = sides.at(p, q).iter().find(|s| s.triangle() != triangle);
         if let (true, Some(across)) = (belongs, across) {
-            let n = across.triangle as usize;
+            let n = across.triangle() as usize;
             if touched[n] {
                 continue;
             }
@@ -76,9 +76,9 @@ fn remove_slivers(draft: &mut Draft) -> usize {
 }
 
 fn as_sliver(draft: &Draft, triangle: u32, t: &[u32; 3]) -> Option<Sliver> {
-    let length = |[a, b]: [u32; 2]| (draft.vertices[a as usize] - draft.vertices[b as usize]).norm();
     let edges = directed_edges(t);
-    let longest = (0..3).max_by(|&a, &b| length(edges[a]).total_cmp(&length(edges[b])))?;
+    let lengths = edges.map(|[a, b]| (draft.vertices[a as usize] - draft.vertices[b as usize]).norm());
+    let longest = (0..3).max_by(|&a, &b| lengths[a].total_cmp(&lengths[b]))?;
     let (ends, middle) = (edges[longest], t[(longest + 2) % 3]);
     let [p, q] = ends.map(|v| draft.vertices[v as usize]);
     let on_it = distance_to_line(&draft.vertices[middle as usize], &p, &q) <= draft.tolerance;
@@ -104,32 +104,39 @@ fn split(t: &[u32; 3], ends: [u32; 2], middle: u32) -> Vec<[u32; 3]> {
 
 /// Where the border of an open surface runs along one long edge on one side and several
 /// short ones on the other, splits the long one at the vertices between.
-pub(super) fn split_at_junctions(draft: &mut Draft, tolerance: f64, findings: &mut Findings) {
+pub(super) fn split_at_junctions(
+    draft: &mut Draft,
+    given: Sides,
+    tolerance: f64,
+    findings: &mut Findings,
+) -> Sides {
     let tolerance = tolerance.max(draft.tolerance);
-    let before = super::open_edges(&draft.triangles);
-    if before == 0 {
-        return;
-    }
     let original = draft.triangles.clone();
-    let mut splits = 0;
+    let (mut splits, mut split) = (0, None);
     for _ in 0..MAX_ROUNDS {
-        let found = split_round(draft, tolerance);
+        let found = split_round(draft, split.as_ref().unwrap_or(&given), tolerance);
         splits += found;
         if found == 0 {
             break;
         }
+        split = Some(Sides::of(&draft.triangles));
     }
-    if splits > 0 && super::open_edges(&draft.triangles) >= before {
-        draft.triangles = original;
-        return;
+    match split {
+        Some(sides) if sides.open_edges() < given.open_edges() => {
+            findings.add(splits, "edge", "split where a vertex of a neighbour lies on it");
+            sides
+        }
+        _ => {
+            draft.triangles = original;
+            given
+        }
     }
-    findings.add(splits, "edge", "split where a vertex of a neighbour lies on it");
 }
 
-fn split_round(draft: &mut Draft, tolerance: f64) -> usize {
-    let border: Vec<([u32; 2], u32)> = Sides::of(&draft.triangles)
+fn split_round(draft: &mut Draft, sides: &Sides, tolerance: f64) -> usize {
+    let border: Vec<([u32; 2], u32)> = sides
         .iter()
-        .filter_map(|(edge, sides)| Some((edge, <[_; 1]>::try_from(sides).ok()?[0].triangle)))
+        .filter_map(|(edge, sides)| Some((edge, <[_; 1]>::try_from(sides).ok()?[0].triangle())))
         .collect();
     let vertices = BorderVertices::new(draft, &border, tolerance);
     let mut touched = vec![false; draft.triangles.len()];

@@ -3,14 +3,14 @@
 use std::collections::HashMap;
 
 use super::{Draft, Findings};
-use crate::geometry::incidence::open_edges;
+use crate::geometry::incidence::Sides;
 
-/// Drops repetitions of triangles. Two that face each other are either one triangle given
-/// with both orientations, or the wall between two bodies that touch: what leaves fewer edges
-/// open decides.
-pub(super) fn drop_repeated(draft: &mut Draft, findings: &mut Findings) {
-    if !any_repeated(&draft.triangles) {
-        return;
+/// Drops repetitions of triangles; the sides of those that are left. Two that face each other are either one triangle
+/// given with both orientations, or the wall between two bodies that touch: what leaves fewer edges open decides.
+pub(super) fn drop_repeated(draft: &mut Draft, findings: &mut Findings) -> Sides {
+    let sides = Sides::of(&draft.triangles);
+    if !any_repeated(&draft.triangles, &sides) {
+        return sides;
     }
     let groups = groups(&draft.triangles);
     let before = draft.triangles.len();
@@ -20,9 +20,12 @@ pub(super) fn drop_repeated(draft: &mut Draft, findings: &mut Findings) {
         kept.into_iter().map(|i| draft.triangles[i]).collect()
     };
     let (with, without) = (keep(true), keep(false));
-    let annihilate = !without.is_empty() && open_edges(&without) <= open_edges(&with);
-    draft.triangles = if annihilate { without } else { with };
+    let (sides_with, sides_without) = (Sides::of(&with), Sides::of(&without));
+    let annihilate = !without.is_empty() && sides_without.open_edges() <= sides_with.open_edges();
+    let sides;
+    (draft.triangles, sides) = if annihilate { (without, sides_without) } else { (with, sides_with) };
     findings.add(before - draft.triangles.len(), "duplicate triangle", "dropped");
+    sides
 }
 
 /// Occurrences of one triangle, by direction of travel.
@@ -45,16 +48,16 @@ impl EqualTriangles {
     }
 }
 
-/// Whether any two triangles have the same corners.
-fn any_repeated(triangles: &[[u32; 3]]) -> bool {
-    let sorted = |t: &[u32; 3]| {
-        let mut corners = *t;
-        corners.sort_unstable();
-        corners
-    };
-    let mut corners: Vec<[u32; 3]> = triangles.iter().map(sorted).collect();
-    corners.sort_unstable();
-    corners.windows(2).any(|pair| pair[0] == pair[1])
+/// Whether any two triangles have the same corners: they have their edges in common, too.
+fn any_repeated(triangles: &[[u32; 3]], sides: &Sides) -> bool {
+    let mut apexes = Vec::new();
+    sides.iter().filter(|(_, at_edge)| at_edge.len() > 1).any(|([low, high], at_edge)| {
+        apexes.clear();
+        let apex = |t: [u32; 3]| t[0] ^ t[1] ^ t[2] ^ low ^ high;
+        apexes.extend(at_edge.iter().map(|side| apex(triangles[side.triangle() as usize])));
+        apexes.sort_unstable();
+        apexes.windows(2).any(|pair| pair[0] == pair[1])
+    })
 }
 
 fn groups(triangles: &[[u32; 3]]) -> HashMap<[u32; 3], EqualTriangles> {

@@ -5,6 +5,7 @@
 //! outward (voids inward). What cannot be made closed keeps its gaps and is signed by winding
 //! number. Lengths below [`RELATIVE_TOLERANCE`] of the part's size count as nothing.
 
+mod box_tree;
 mod crossing;
 mod degenerate;
 mod duplicate;
@@ -18,7 +19,7 @@ mod tests;
 
 use nalgebra::Point3;
 
-use super::incidence::open_edges;
+use super::incidence::Sides;
 use super::{GeometryError, Mesh, Solidity, SourcePart};
 use crate::termination::{Interrupt, Termination};
 
@@ -90,12 +91,11 @@ struct Draft {
 fn heal_mesh(part: &SourcePart, termination: &Termination) -> Result<Healed, Unhealed> {
     let mut findings = Findings::default();
     let draft = validate::usable(&part.mesh, &mut findings)?;
-    let mut draft = welded_and_clean(draft, &mut findings, termination)?;
+    let (mut draft, mut sides) = welded_and_clean(draft, &mut findings, termination)?;
     termination.check()?;
-    let mut oriented = orientation::orient(&draft, &mut findings);
+    let one_sided = orientation::orient(&mut draft, &mut sides, &mut findings);
     termination.check()?;
-    let gaps = open_edges(&oriented.triangles);
-    draft.triangles = std::mem::take(&mut oriented.triangles);
+    let gaps = sides.open_edges();
     let solidity = if gaps > 0 {
         findings.add(
             gaps,
@@ -105,48 +105,62 @@ fn heal_mesh(part: &SourcePart, termination: &Termination) -> Result<Healed, Unh
         orientation::face_outward(&mut draft);
         Solidity::Wall
     } else {
-        shells::settle(&mut draft, oriented.one_sided, &mut findings, termination)?
+        shells::settle(&mut draft, sides, one_sided, &mut findings, termination)?
     };
     let mesh = compact(draft, solidity);
     Ok(Healed { mesh, findings: findings.list })
 }
 
+/// A way to weld and clean a part.
+struct Attempt {
+    triangles: Vec<[u32; 3]>,
+    sides: Sides,
+    gaps: usize,
+    notes: Findings,
+    tolerance: f64,
+}
+
 /// Welds and cleans, coarser where that closes the part.
 fn welded_and_clean(
-    draft: Draft,
+    mut draft: Draft,
     findings: &mut Findings,
     termination: &Termination,
-) -> Result<Draft, Unhealed> {
+) -> Result<(Draft, Sides), Unhealed> {
     let size = draft.tolerance / RELATIVE_TOLERANCE;
-    let attempt = |tolerance: f64| -> Result<_, Interrupt> {
+    let given = std::mem::take(&mut draft.triangles);
+    let mut attempt = |tolerance: f64| -> Result<_, Interrupt> {
         let mut notes = Findings::default();
         termination.check()?;
-        let mut attempt = weld::weld(&draft, tolerance, &mut notes);
+        draft.triangles = weld::weld(&draft.vertices, &given, tolerance, &mut notes);
         termination.check()?;
-        degenerate::drop_degenerate(&mut attempt, &mut notes);
+        degenerate::drop_degenerate(&mut draft, &mut notes);
         termination.check()?;
-        duplicate::drop_repeated(&mut attempt, &mut notes);
+        let sides = duplicate::drop_repeated(&mut draft, &mut notes);
         termination.check()?;
-        Ok((open_edges(&attempt.triangles), attempt, notes, tolerance))
+        let (triangles, gaps) = (std::mem::take(&mut draft.triangles), sides.open_edges());
+        Ok(Attempt { triangles, sides, gaps, notes, tolerance })
     };
     // Welding by distance could only harm where equal coordinates close the part already.
     let mut best = attempt(0.0)?;
     for tolerance in [RELATIVE_TOLERANCE].into_iter().chain(CLOSING_TOLERANCES) {
-        if best.0 == 0 {
+        if best.gaps == 0 {
             break;
         }
         let other = attempt(tolerance * size)?;
-        if other.0 == 0 || (tolerance == RELATIVE_TOLERANCE && other.0 < best.0) {
+        if other.gaps == 0 || (tolerance == RELATIVE_TOLERANCE && other.gaps < best.gaps) {
             best = other;
         }
     }
-    let (_, mut draft, mut notes, tolerance) = best;
-    degenerate::split_at_junctions(&mut draft, tolerance, &mut notes);
+    let Attempt { triangles, mut sides, gaps, mut notes, tolerance } = best;
+    draft.triangles = triangles;
+    if gaps > 0 {
+        sides = degenerate::split_at_junctions(&mut draft, sides, tolerance, &mut notes);
+    }
     findings.list.extend(notes.list);
     if draft.triangles.is_empty() {
         return Err("no triangle has an area; export the part as a solid".to_owned().into());
     }
-    Ok(draft)
+    Ok((draft, sides))
 }
 
 /// Drops vertices that no triangle uses.

@@ -3,24 +3,21 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{Draft, Findings};
-use crate::geometry::incidence::Sides;
+use crate::geometry::incidence::{Side, Sides};
 use crate::geometry::mesh;
 
-/// Triangles made consistent.
-pub(super) struct Oriented {
-    pub(super) triangles: Vec<[u32; 3]>,
-    /// Some surface has one side only (a Möbius strip): no orientation is consistent.
-    pub(super) one_sided: bool,
-}
-
-/// Floods each surface over the edges where exactly two triangles meet and turns the minority
-/// of its triangles.
-pub(super) fn orient(draft: &Draft, findings: &mut Findings) -> Oriented {
-    let neighbours = neighbours(&draft.triangles);
+/// Floods each surface over the edges where exactly two triangles meet and turns the minority of its triangles. Whether
+/// some surface has one side only (a Möbius strip): no orientation is consistent.
+pub(super) fn orient(draft: &mut Draft, sides: &mut Sides, findings: &mut Findings) -> bool {
+    let agree = |sides: &[Side]| !matches!(sides, [a, b] if a.upwards() == b.upwards());
+    if sides.iter().all(|(_, sides)| agree(sides)) {
+        return false;
+    }
+    let neighbours = neighbours(draft.triangles.len(), sides);
     let mut flood = Flood { turned: vec![None; draft.triangles.len()], one_sided: false };
-    let mut triangles = draft.triangles.clone();
+    let mut is_turned = vec![false; draft.triangles.len()];
     let mut count = 0;
-    for seed in 0..triangles.len() {
+    for seed in 0..draft.triangles.len() {
         if flood.turned[seed].is_some() {
             continue;
         }
@@ -28,29 +25,31 @@ pub(super) fn orient(draft: &Draft, findings: &mut Findings) -> Oriented {
         let turned = surface.iter().filter(|&&t| flood.turned[t] == Some(true)).count();
         let minority = 2 * turned <= surface.len();
         for &t in surface.iter().filter(|&&t| flood.turned[t] == Some(minority)) {
-            triangles[t].swap(1, 2);
+            draft.triangles[t].swap(1, 2);
+            is_turned[t] = true;
             count += 1;
         }
     }
+    sides.turn(|t| is_turned[t as usize]);
     findings.add(count, "triangle", "turned to agree with their neighbours");
-    Oriented { triangles, one_sided: flood.one_sided }
+    flood.one_sided
 }
 
 /// The neighbours of a triangle over manifold edges, and whether they agree with it.
 type EdgeNeighbours = [Option<(u32, bool)>; 3];
 
-fn neighbours(triangles: &[[u32; 3]]) -> Vec<EdgeNeighbours> {
-    let mut neighbours = vec![EdgeNeighbours::default(); triangles.len()];
+fn neighbours(triangles: usize, sides: &Sides) -> Vec<EdgeNeighbours> {
+    let mut neighbours = vec![EdgeNeighbours::default(); triangles];
     let mut add = |to: u32, neighbour: (u32, bool)| {
         if let Some(free) = neighbours[to as usize].iter_mut().find(|n| n.is_none()) {
             *free = Some(neighbour);
         }
     };
-    for (_, sides) in Sides::of(triangles).iter() {
+    for (_, sides) in sides.iter() {
         let [a, b] = sides else { continue };
-        let agree = a.upwards != b.upwards;
-        add(a.triangle, (b.triangle, agree));
-        add(b.triangle, (a.triangle, agree));
+        let agree = a.upwards() != b.upwards();
+        add(a.triangle(), (b.triangle(), agree));
+        add(b.triangle(), (a.triangle(), agree));
     }
     neighbours
 }

@@ -19,6 +19,7 @@ use crate::termination::{Interrupt, Termination};
 /// The termination condition became true.
 pub(super) fn settle(
     draft: &mut Draft,
+    mut sides: Sides,
     one_sided: bool,
     findings: &mut Findings,
     termination: &Termination,
@@ -29,9 +30,9 @@ pub(super) fn settle(
         return Ok(Solidity::Winding);
     }
     let given = draft.triangles.clone();
-    turn_patches_outward(draft);
+    let patch_of = turn_patches_outward(draft, &mut sides);
     termination.check()?;
-    let Some(pairs) = paired_sides(draft) else {
+    let Some(pairs) = paired_sides(draft, &sides) else {
         findings.list.push(
             "edges where more than two triangles meet without order; inside and outside by winding number"
                 .into(),
@@ -41,26 +42,37 @@ pub(super) fn settle(
         return Ok(Solidity::Winding);
     };
     termination.check()?;
-    let shell_of = components(draft.triangles.len(), pairs.iter().map(|p| p.triangles));
+    drop(sides);
+    let shell_of = patch_of.unwrap_or_else(|| {
+        components(draft.triangles.len(), pairs.iter().map(|p| p.triangles))
+    });
     separate_vertices(draft, &pairs);
     termination.check()?;
     let shells = Shells::new(draft, &shell_of);
     shells.settle(draft, &given, findings, termination)
 }
 
-/// The orientation that makes the volume positive, for every patch of surface over manifold
-/// edges. A patch that closes only together with others keeps what it has: it is judged again
-/// as part of its shell.
-fn turn_patches_outward(draft: &mut Draft) {
-    let sides = Sides::of(&draft.triangles);
-    let two = |sides: &[Side]| Some(<[Side; 2]>::try_from(sides).ok()?.map(|s| s.triangle));
-    let manifold = sides.iter().filter_map(|(_, sides)| two(sides));
-    let patch_of = components(draft.triangles.len(), manifold);
+/// The orientation that makes the volume positive, for every patch of surface over manifold edges. A patch that closes
+/// only together with others keeps what it has: it is judged again as part of its shell. Where there are no others, the
+/// patches are the shells: by the least triangle of each.
+fn turn_patches_outward(draft: &mut Draft, sides: &mut Sides) -> Option<Vec<u32>> {
+    let two = |sides: &[Side]| Some(<[Side; 2]>::try_from(sides).ok()?.map(Side::triangle));
+    let manifold = || sides.iter().filter_map(|(_, sides)| two(sides));
+    let patch_of = components(draft.triangles.len(), manifold());
+    let is_manifold = 2 * manifold().count() == 3 * draft.triangles.len();
+    let mut is_turned = vec![false; draft.triangles.len()];
     for patch in members(&patch_of).values() {
         if volume(draft, patch) < 0.0 {
-            patch.iter().for_each(|&t| draft.triangles[t as usize].swap(1, 2));
+            for &t in patch {
+                draft.triangles[t as usize].swap(1, 2);
+                is_turned[t as usize] = true;
+            }
         }
     }
+    if is_turned.contains(&true) {
+        sides.turn(|t| is_turned[t as usize]);
+    }
+    is_manifold.then_some(patch_of)
 }
 
 /// The volume of some of the triangles, seen from one of their corners.
@@ -79,8 +91,7 @@ struct Pair {
 
 /// Pairs the triangles at every edge so that solid lies between the two of a pair. `None` if
 /// at some edge inside and outside do not alternate.
-fn paired_sides(draft: &Draft) -> Option<Vec<Pair>> {
-    let all = Sides::of(&draft.triangles);
+fn paired_sides(draft: &Draft, all: &Sides) -> Option<Vec<Pair>> {
     let mut pairs = Vec::with_capacity(draft.triangles.len() * 3 / 2);
     for (edge, sides) in all.iter() {
         let mut sides = Cow::Borrowed(sides);
@@ -89,15 +100,15 @@ fn paired_sides(draft: &Draft) -> Option<Vec<Pair>> {
             sort_around(draft, edge, sides);
             // Upwards, the inside lies clockwise of the triangle: a pair begins with a side
             // that travels down.
-            let first_down = sides.iter().position(|s| !s.upwards)?;
+            let first_down = sides.iter().position(|s| !s.upwards())?;
             sides.rotate_left(first_down);
         }
         for couple in sides.chunks(2) {
             let [a, b] = couple else { return None };
-            if a.upwards == b.upwards || (sides.len() > 2 && a.upwards) {
+            if a.upwards() == b.upwards() || (sides.len() > 2 && a.upwards()) {
                 return None;
             }
-            pairs.push(Pair { edge, triangles: [a.triangle, b.triangle] });
+            pairs.push(Pair { edge, triangles: [a.triangle(), b.triangle()] });
         }
     }
     Some(pairs)
@@ -108,7 +119,7 @@ fn sort_around(draft: &Draft, [low, high]: [u32; 2], sides: &mut [Side]) {
     let at = |v: u32| draft.vertices[v as usize];
     let axis = at(high) - at(low);
     let away = |side: &Side| -> Vector3<f64> {
-        let apex = draft.triangles[side.triangle as usize].into_iter().find(|v| *v != low && *v != high);
+        let apex = draft.triangles[side.triangle() as usize].into_iter().find(|v| *v != low && *v != high);
         let arm = apex.map_or_else(Vector3::zeros, |v| at(v) - at(low));
         arm - axis * (arm.dot(&axis) / axis.norm_squared())
     };
@@ -118,7 +129,7 @@ fn sort_around(draft: &Draft, [low, high]: [u32; 2], sides: &mut [Side]) {
         let arm = away(side);
         arm.dot(&side_axis).atan2(arm.dot(&zero)).rem_euclid(std::f64::consts::TAU)
     };
-    sides.sort_by(|a, b| angle(a).total_cmp(&angle(b)).then(a.triangle.cmp(&b.triangle)));
+    sides.sort_by(|a, b| angle(a).total_cmp(&angle(b)).then(a.triangle().cmp(&b.triangle())));
 }
 
 /// The least index that each of `count` things is linked to.
@@ -204,9 +215,9 @@ impl Shells {
                 self.flip(draft, shell);
             }
         }
-        let surfaces = Surfaces::new(draft, &self.triangles, termination);
         let mut depth = vec![0; count];
         let mut meet = vec![false; count];
+        let surfaces = Surfaces::new(draft, &self.triangles, termination);
         for (i, j) in (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))) {
             if !overlap(&self.boxes[i], &self.boxes[j]) {
                 continue;
@@ -220,16 +231,16 @@ impl Shells {
                 depth[i] += 1;
             }
         }
+        let mut crossing = 0;
+        for shell in 0..count {
+            crossing += usize::from(surfaces.crosses_itself(shell)?);
+        }
         let voids: Vec<usize> = (0..count).filter(|&i| depth[i] % 2 == 1).collect();
         voids.iter().for_each(|&i| self.flip(draft, i));
         findings.add(voids.len(), "inner shell", "taken as a void");
         findings.add(self.turned(draft, given), "shell", "turned, for it was inside out");
         let meeting = meet.iter().filter(|m| **m).count();
         findings.add(meeting, "shell", "that cross or touch; inside and outside by winding number");
-        let mut crossing = 0;
-        for shell in 0..count {
-            crossing += usize::from(surfaces.crosses_itself(shell)?);
-        }
         if crossing > 0 {
             let shells = plural(crossing, "shell");
             let verb = if crossing == 1 { "crosses itself" } else { "cross themselves" };

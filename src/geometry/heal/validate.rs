@@ -3,6 +3,7 @@
 use nalgebra::{Point3, Vector3};
 
 use super::{Draft, Findings, RELATIVE_TOLERANCE};
+use crate::geometry::incidence::Sides;
 use crate::geometry::{SourceMesh, mesh};
 
 /// Products of three lengths must stay finite and normal.
@@ -16,6 +17,9 @@ pub(super) fn usable(source: &SourceMesh, findings: &mut Findings) -> Result<Dra
     }
     if source.triangles.is_empty() {
         return Err("it has no triangles; export the part as a triangle mesh".into());
+    }
+    if source.triangles.len() > Sides::MOST_TRIANGLES {
+        return Err(format!("it has more than {} triangles; simplify it", Sides::MOST_TRIANGLES));
     }
     let (vertices, triangles) = used_vertices(source)?;
     findings.add(source.vertices.len() - vertices.len(), "vertex", "that no triangle uses dropped");

@@ -138,14 +138,14 @@ fn across(mesh: &Mesh) -> (Vec<[u32; 3]>, Vec<[bool; 3]>) {
         // Edges of more than two faces are paired in order: there, any pairing is as good.
         for pair in sides.chunks_exact(2) {
             for (side, other) in [(pair[0], pair[1]), (pair[1], pair[0])] {
-                if let Some(at) = place(side.triangle, edge) {
-                    neighbours[side.triangle as usize][at] = other.triangle;
+                if let Some(at) = place(side.triangle(), edge) {
+                    neighbours[side.triangle() as usize][at] = other.triangle();
                 }
             }
         }
         for side in sides.iter().filter(|_| sides.len() > 2) {
-            if let Some(at) = place(side.triangle, edge) {
-                shared[side.triangle as usize][at] = true;
+            if let Some(at) = place(side.triangle(), edge) {
+                shared[side.triangle() as usize][at] = true;
             }
         }
     }
