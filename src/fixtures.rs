@@ -212,7 +212,7 @@ pub(crate) fn healed(mesh: SourceMesh) -> Mesh {
 
 /// The shape of a healed mesh.
 pub(crate) fn shape_of(mesh: &Mesh) -> Shape {
-    Shape::of(mesh, &Termination::default()).unwrap()
+    Shape::of(mesh.clone(), &Termination::default()).unwrap()
 }
 
 /// Vectors of no more than some size along each axis.

@@ -7,19 +7,19 @@ use super::error::CliError;
 use super::table::{TextTable, length};
 use super::{interrupt, print};
 use crate::blocking_graph::Audit;
-use crate::geometry::{Healed, Solidity, SourceAssembly, heal, load_assembly};
+use crate::geometry::{Assembly, Solidity, SourceAssembly, load_assembly};
 use crate::search::{Engine, Termination};
 use crate::service::{Admission, Service};
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
     let assembly = load_assembly(&arguments.assembly)?;
-    let healed = assembly.parts.iter().map(heal).collect::<Result<Vec<_>, _>>()?;
     let service = Service::default();
     let admission = service.admit(&assembly)?;
+    let healed = service.assembly(admission.id)?;
     let overlaps = service.overlaps(admission.id)?;
     let mut text = headline(&assembly, &healed);
     text.push_str(&parts(&assembly, &healed));
-    text.push_str(&findings(&assembly, &healed));
+    text.push_str(&findings(&healed));
     text.push_str(&given_twice(&admission));
     text.push_str("\noverlaps at the assembled pose:\n");
     let name = |part: usize| assembly.parts.get(part).map_or("?", |p| p.name.as_str());
@@ -69,46 +69,47 @@ fn given_twice(admission: &Admission) -> String {
     text
 }
 
-fn headline(assembly: &SourceAssembly, healed: &[Healed]) -> String {
-    let triangles: usize = healed.iter().map(|h| h.mesh.triangles.len()).sum();
+fn headline(assembly: &SourceAssembly, healed: &Assembly) -> String {
+    let triangles: usize = (0..healed.parts.len()).map(|p| healed.shape(p).mesh().triangles.len()).sum();
     let units = assembly.units.as_deref().unwrap_or("unknown");
     let fixed = if assembly.fixed.is_empty() { "none".to_owned() } else { assembly.fixed.join(", ") };
     format!(
         "{}: {} parts, {triangles} triangles; units {units}; fixed {fixed}\n\n",
         assembly.name,
-        healed.len()
+        healed.parts.len()
     )
 }
 
-fn parts(assembly: &SourceAssembly, healed: &[Healed]) -> String {
+fn parts(assembly: &SourceAssembly, healed: &Assembly) -> String {
     let mut table = TextTable::new(&["part", "triangles", "size", "volume", "inside by", "from"]);
-    for (part, Healed { mesh, .. }) in assembly.parts.iter().zip(healed) {
-        let (lo, hi) = mesh.bounds();
-        let size: Vec<String> = (hi - lo).iter().map(|s| length(*s, None)).collect();
+    for (i, (given, part)) in assembly.parts.iter().zip(&healed.parts).enumerate() {
+        let mesh = healed.shape(i).mesh();
+        let size = part.bounds.extents() / healed.scale;
+        let size: Vec<String> = size.iter().map(|s| length(*s, None)).collect();
         let sign = match mesh.solidity {
             Solidity::Closed => "closed surface",
             Solidity::Winding => "winding number",
             Solidity::Wall => "none: a wall",
         };
         table.row([
-            part.name.clone(),
+            given.name.clone(),
             mesh.triangles.len().to_string(),
             size.join(" × "),
-            length(mesh.volume(), None),
+            length(mesh.volume() / healed.scale.powi(3), None),
             sign.to_owned(),
-            part.origin.clone(),
+            given.origin.clone(),
         ]);
     }
     table.render()
 }
 
-fn findings(assembly: &SourceAssembly, healed: &[Healed]) -> String {
+fn findings(healed: &Assembly) -> String {
     let mut text = String::from("\nfound in healing:\n");
-    let found = assembly.parts.iter().zip(healed).flat_map(|(p, h)| h.findings.iter().map(move |f| (p, f)));
-    let mut lines = found.map(|(part, finding)| format!("  {}: {finding}\n", part.name)).peekable();
-    if lines.peek().is_none() {
+    if healed.findings.is_empty() {
         text.push_str("  nothing\n");
     }
-    text.extend(lines);
+    for (part, finding) in &healed.findings {
+        text.push_str(&format!("  {}: {finding}\n", healed.parts[*part].name));
+    }
     text
 }

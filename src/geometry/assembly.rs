@@ -197,8 +197,13 @@ fn share_shapes(
         Ok(Part { name, shape, planning_from_shape, bounds, moved: Pose::identity() })
     };
     let parts = names.into_iter().enumerate().map(place).collect::<Result<_, Interrupt>>()?;
-    let shape = |(i, frame): &(usize, OwnFrame)| Shape::within(&meshes[*i], frame, termination);
-    let shapes = originals.par_iter().map(|o| shape(o).map(Arc::new)).collect::<Result<_, _>>()?;
+    // Each mesh goes where its shape is made: of one large part, all that comes after it is in memory beside it.
+    let mut meshes: Vec<_> = meshes.into_iter().map(Some).collect();
+    let made_of = |(i, frame): (usize, OwnFrame)| Some((meshes[i].take()?, frame));
+    let originals: Vec<_> = originals.into_iter().filter_map(made_of).collect();
+    drop(meshes);
+    let shape = |(mesh, frame): (Mesh, OwnFrame)| Shape::within(mesh, &frame, termination).map(Arc::new);
+    let shapes = originals.into_par_iter().map(shape).collect::<Result<_, _>>()?;
     Ok((shapes, parts))
 }
 

@@ -1,7 +1,6 @@
 //! Where a surface faces: the directions that most of it is parallel or at right angles to.
 
-use std::collections::HashMap;
-
+use hashbrown::HashMap;
 use nalgebra::{Matrix3, Unit, Vector3};
 
 use super::Surface;
@@ -177,11 +176,17 @@ fn normals(surface: &Surface) -> (Vec<WeightedDirection>, f64) {
         let key = direction.map(|x| (x * BUCKETS).round() as i16).into();
         buckets.entry(key).or_insert(WeightedDirection { direction, weight: 0.0 }).weight += weight;
     }
-    let mut largest: Vec<([i16; 3], WeightedDirection)> = buckets.into_iter().collect();
+    let mut largest: Vec<_> = buckets.into_iter().collect();
     // The keys decide among equals, so that the order of the map does not.
-    largest.sort_by(|(k, a), (l, b)| b.weight.total_cmp(&a.weight).then(k.cmp(l)));
+    type Bucket = ([i16; 3], WeightedDirection);
+    let order = |(k, a): &Bucket, (l, b): &Bucket| b.weight.total_cmp(&a.weight).then(k.cmp(l));
+    if largest.len() > MOST_BUCKETS {
+        largest.select_nth_unstable_by(MOST_BUCKETS, order);
+        largest.truncate(MOST_BUCKETS);
+    }
+    largest.sort_by(order);
     let mut out = Vec::new();
-    for (_, c) in largest.into_iter().take(MOST_BUCKETS) {
+    for (_, c) in largest {
         c.count_among(&mut out);
     }
     out.sort_by(|a, b| b.weight.total_cmp(&a.weight));

@@ -222,6 +222,7 @@ pub fn transformed(points: &[Point3<f64>], pose: &Pose) -> Vec<Point3<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::spread;
 
     fn cube(at: f64) -> Vec<Point3<f64>> {
         (0..8).map(|i| Point3::new(at + f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2))).collect()
@@ -239,6 +240,25 @@ mod tests {
         let inner: Vec<_> =
             cube(0.0).iter().map(|p| Point3::from(p.coords * 0.2 + Vector3::repeat(0.4))).collect();
         assert!(separating_direction(&cube(0.0), &inner, 0.0, None).is_none());
+    }
+
+    #[test]
+    fn hulls_of_many_points_reach_as_far_as_these() {
+        let ball: Vec<_> = spread([-1.0; 3], [1.0; 3], 30_000).collect();
+        let on_sphere: Vec<_> = ball.iter().map(|p| Point3::from(p.coords.normalize())).collect();
+        let flat: Vec<_> = ball.iter().map(|p| Point3::new(p.x, p.y, 0.3)).collect();
+        let cup = [on_sphere.clone(), cube(-0.5), ball.clone()].concat();
+        let found = [&ball, &on_sphere, &flat, &cup].map(|points| hull_vertices(points));
+        for (points, hull) in [&ball, &on_sphere, &flat, &cup].into_iter().zip(&found) {
+            assert!(hull.iter().all(|p| points.contains(p)));
+            let reach = |of: &[Point3<f64>], d: &Vector3<f64>| Few(of).furthest(d).0;
+            let along = spread([-1.0; 3], [1.0; 3], 200).map(|p| p.coords);
+            for d in along.chain([Vector3::x(), Vector3::y(), -Vector3::z()]) {
+                assert!((reach(points, &d) - reach(hull, &d)).abs() < 1e-12, "{} along {d}", hull.len());
+            }
+        }
+        let [ball, on_sphere, _, cup] = found.map(|hull| hull.len());
+        assert!(ball < 2000 && on_sphere == 30_000 && cup < 33_000, "{ball}, {on_sphere}, {cup}");
     }
 
     #[test]

@@ -25,7 +25,7 @@ impl Shape {
             }
         }
         let frame = OwnFrame::as_given(&mesh);
-        Ok((Self::within(&mesh, &frame, termination)?, frame.pose()))
+        Ok((Self::within(mesh, &frame, termination)?, frame.pose()))
     }
 }
 

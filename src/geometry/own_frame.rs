@@ -57,19 +57,20 @@ impl OwnFrame {
             all = copies.iter().map(as_given).collect();
         }
         if all.len() > 1 {
-            all.sort_by_cached_key(|(_, mesh, frame)| mesh_hash(&frame.framed(mesh)));
+            all.sort_by_cached_key(|(_, mesh, frame)| mesh_hash(&frame.framed((*mesh).clone())));
         }
         all.into_iter().next().map(|(i, _, frame)| (i, frame))
     }
 
     /// The mesh in its frame.
     #[must_use]
-    pub(super) fn framed(&self, mesh: &Mesh) -> Mesh {
+    pub(super) fn framed(&self, mut mesh: Mesh) -> Mesh {
         // Adding zero makes zeros positive.
         let onto_grid = |x: f64| (x / GRID).round() * GRID + 0.0;
-        let vertices =
-            mesh.vertices.iter().map(|p| Point3::from((self.turn * (p - self.origin)).map(onto_grid)));
-        Mesh { vertices: vertices.collect(), ..mesh.clone() }
+        for p in &mut mesh.vertices {
+            *p = (self.turn * (*p - self.origin)).map(onto_grid).into();
+        }
+        mesh
     }
 
     /// Where the shape stands in the frame in which the mesh is given.
@@ -125,7 +126,7 @@ mod tests {
         let content = |by: Vector3<f64>| {
             let mesh = turned(by);
             let frame = OwnFrame::along_faces(&mesh).unwrap();
-            *Shape::within(&mesh, &frame, &Termination::default()).unwrap().content()
+            *Shape::within(mesh, &frame, &Termination::default()).unwrap().content()
         };
         let turns = [Vector3::x() * FRAC_PI_2, Vector3::y() * -FRAC_PI_2, Vector3::z() * PI];
         let third = Vector3::new(1.0, 1.0, 1.0).normalize() * (2.0 * PI / 3.0);

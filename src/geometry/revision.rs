@@ -186,7 +186,7 @@ impl Assembly {
             Some(copy) => copy,
             None => {
                 let frame = OwnFrame::of(&mesh);
-                self.shapes.push(Arc::new(Shape::within(&mesh, &frame, termination)?));
+                self.shapes.push(Arc::new(Shape::within(mesh, &frame, termination)?));
                 (self.shapes.len() - 1, frame.pose())
             }
         };

@@ -47,23 +47,20 @@ impl Shape {
     ///
     /// # Errors
     /// The termination condition became true before there was one.
-    pub(super) fn within(
-        mesh: &Mesh,
-        frame: &OwnFrame,
-        termination: &Termination,
-    ) -> Result<Self, Interrupt> {
-        Self::of(&frame.framed(mesh), termination)
+    pub(super) fn within(mesh: Mesh, frame: &OwnFrame, termination: &Termination) -> Result<Self, Interrupt> {
+        Self::of(frame.framed(mesh), termination)
     }
 
     /// Derives everything from a mesh that is not said to be derived later.
     ///
     /// # Errors
     /// The termination condition became true before that was done.
-    pub fn of(mesh: &Mesh, termination: &Termination) -> Result<Self, Interrupt> {
+    pub fn of(mesh: Mesh, termination: &Termination) -> Result<Self, Interrupt> {
         termination.check()?;
         let hull = hull_vertices(&mesh.vertices);
         termination.check()?;
-        let shape = Self::over(Surface::new(mesh), hull, OnceLock::new());
+        let shape = Self::over(Surface::deferred(mesh), hull, OnceLock::new());
+        shape.surface.prepare();
         termination.check()?;
         shape.convex_edges();
         Ok(shape)
@@ -265,7 +262,8 @@ mod tests {
         let content = |by: f64| {
             let vertices = ball.vertices.iter().map(|v| v + Vector3::new(by, -by / 3.0, by * by)).collect();
             let moved = Mesh { vertices, ..ball.clone() };
-            *Shape::within(&moved, &OwnFrame::as_given(&moved), &Termination::default()).unwrap().content()
+            let frame = OwnFrame::as_given(&moved);
+            *Shape::within(moved, &frame, &Termination::default()).unwrap().content()
         };
         let there = [0.1, 1.0 / 3.0, -2.7].map(content);
         assert_eq!(there, [content(0.0); 3]);

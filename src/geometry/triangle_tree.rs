@@ -14,7 +14,7 @@ mod split;
 use nalgebra::{Point3, Vector3, center};
 
 use super::triangle::area_normal;
-use super::{Bounds, Closest};
+use super::{Bounds, Closest, Mesh};
 
 pub(super) use nearest_first::Visitor;
 use split::{BoxedTriangle, split};
@@ -71,37 +71,37 @@ impl TriangleTree {
         size_of_val(&*self.nodes) + size_of_val(&*self.leaves)
     }
 
-    /// The tree of some triangles, given by their corners.
-    pub(super) fn new(triangles: &[[Point3<f64>; 3]]) -> Self {
-        let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
-        let items: Vec<BoxedTriangle> =
-            triangles.iter().map(|corners| BoxedTriangle::new(&Bounds::of(corners))).collect();
-        let all = BoxedTriangle::around(&items, &order).bounds();
-        let empty = triangles.is_empty();
+    /// The tree of a mesh's triangles.
+    pub(super) fn new(mesh: &Mesh) -> Self {
+        let count = mesh.triangles.len();
+        let boxed = |t| BoxedTriangle::new(t, &Bounds::of(&mesh.corners(t as usize)));
+        let mut items: Vec<BoxedTriangle> = (0..count as u32).map(boxed).collect();
+        let all = BoxedTriangle::around(&items).bounds();
+        let empty = count == 0;
         let origin = if empty { Point3::origin() } else { all.centre() };
         let radius = if empty { 0.0 } else { all.extents().max() * 0.5 };
         // Leaves are large: to move them as they become more took a third of the time.
-        let leaves = Vec::with_capacity(triangles.len().div_ceil(FILLED));
+        let leaves = Vec::with_capacity(count.div_ceil(FILLED));
         let mut tree = Self { origin, radius, root: 0, nodes: Vec::new(), leaves };
-        tree.root = tree.build(triangles, &items, &mut order);
+        tree.root = tree.build(mesh, &mut items);
         tree.nodes.shrink_to_fit();
         tree.leaves.shrink_to_fit();
         tree
     }
 
-    fn build(&mut self, triangles: &[[Point3<f64>; 3]], items: &[BoxedTriangle], order: &mut [u32]) -> u32 {
-        if order.len() <= WIDTH {
-            self.leaves.push(Leaf::new(triangles, order, &self.origin));
+    fn build(&mut self, mesh: &Mesh, items: &mut [BoxedTriangle]) -> u32 {
+        if items.len() <= WIDTH {
+            self.leaves.push(Leaf::new(mesh, items, &self.origin));
             return (self.leaves.len() - 1) as u32 | LEAF;
         }
-        let mut groups = vec![&mut *order];
+        let mut groups = vec![items];
         while groups.len() < WIDTH {
             let largest = (0..groups.len()).max_by_key(|&i| groups[i].len()).unwrap_or(0);
             if groups[largest].len() <= WIDTH {
                 break;
             }
             let group = groups.swap_remove(largest);
-            let (left, right) = split(items, group);
+            let (left, right) = split(group);
             groups.extend([left, right]);
         }
         let mut node = Node {
@@ -110,12 +110,12 @@ impl TriangleTree {
             child: [0; WIDTH],
         };
         for (k, group) in groups.into_iter().enumerate() {
-            let bounds = BoxedTriangle::around(items, group).bounds();
+            let bounds = BoxedTriangle::around(group).bounds();
             for a in 0..3 {
                 node.min[a][k] = (bounds.min[a] - self.origin[a]) as f32;
                 node.max[a][k] = (bounds.max[a] - self.origin[a]) as f32;
             }
-            node.child[k] = self.build(triangles, items, group);
+            node.child[k] = self.build(mesh, group);
         }
         self.nodes.push(node);
         (self.nodes.len() - 1) as u32
@@ -285,7 +285,7 @@ impl Node {
 }
 
 impl Leaf {
-    fn new(triangles: &[[Point3<f64>; 3]], members: &[u32], origin: &Point3<f64>) -> Self {
+    fn new(mesh: &Mesh, members: &[BoxedTriangle], origin: &Point3<f64>) -> Self {
         let mut leaf = Self {
             normal: [[0.0; WIDTH]; 3],
             // No point is near the plane of an empty place.
@@ -295,9 +295,9 @@ impl Leaf {
             corners: [[[0.0; WIDTH]; 3]; 3],
             triangle: [0; WIDTH],
         };
-        for (k, &t) in members.iter().enumerate() {
-            let corners = triangles[t as usize].map(|p| p - origin);
-            let [a, b, c] = triangles[t as usize];
+        for (k, t) in members.iter().map(BoxedTriangle::triangle).enumerate() {
+            let [a, b, c] = mesh.corners(t as usize);
+            let corners = [a, b, c].map(|p| p - origin);
             // Planes that rounding makes doubtful are left out: the bound becomes weaker.
             let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
             let normal = area_normal(&a, &b, &c);
@@ -315,7 +315,7 @@ impl Leaf {
                 let outward = along.cross(&normal).try_normalize(0.0).unwrap_or_else(Vector3::zeros);
                 put(outward, &mut leaf.sides[e], &mut leaf.limits[e], &corners[e]);
             }
-            for (lanes, p) in leaf.corners.iter_mut().zip(&triangles[t as usize]) {
+            for (lanes, p) in leaf.corners.iter_mut().zip(&[a, b, c]) {
                 (0..3).for_each(|axis| lanes[axis][k] = p[axis]);
             }
             leaf.triangle[k] = t;

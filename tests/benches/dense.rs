@@ -15,15 +15,21 @@ use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
 use sbdp::geometry::{
-    Assembly, Shape, SourceAssembly, SourceMesh, SourcePart, Surface, Uniform, content_hash, heal, hull_vertices,
-    load_assembly,
+    Assembly, Shape, SourceAssembly, SourceMesh, SourcePart, Surface, Uniform, content_hash, heal,
+    hull_vertices, load_assembly,
 };
 use sbdp::sdf::Field;
 use sbdp::termination::Termination;
 
 const SIZES: [usize; 4] = [10_000, 100_000, 1_000_000, 4_000_000];
-const KINDS: [(&str, fn(usize) -> SourceMesh); 4] =
-    [("sphere", sphere), ("scan", scan), ("knurl", knurl), ("holes", holes)];
+const KINDS: [(&str, fn(usize) -> SourceMesh); 6] = [
+    ("sphere", sphere),
+    ("scan", scan),
+    ("knurl", knurl),
+    ("holes", holes),
+    ("open", open),
+    ("pieces", pieces),
+];
 
 fn main() {
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("the pool is built once");
@@ -46,7 +52,7 @@ fn measure(mesh: SourceMesh, table: &mut Table) {
     for name in ["part.stl", "part.obj"] {
         let path = std::env::temp_dir().join(format!("sbdp-dense-{}-{name}", std::process::id()));
         write(&path, &mesh);
-        table.add(&format!("read {name}"), || load_assembly(&path));
+        table.add(&format!("read {name}"), || load_assembly(&path)).expect("it was just written");
         fs::remove_file(&path).expect("it was written");
     }
     let part = SourcePart { name: "part".into(), origin: "bench".into(), mesh };
@@ -55,16 +61,16 @@ fn measure(mesh: SourceMesh, table: &mut Table) {
     let surface = table.add("trees", || Surface::new(&healed));
     table.add("mass", || surface.mass_properties());
     drop(surface);
-    let shape = table.add("shape", || Shape::of(&healed, &never)).expect("nothing interrupts it");
+    let shape = table.add("shape", || Shape::of(healed, &never)).expect("nothing interrupts it");
     table.add("content", || *shape.content());
     table.add("faces", || shape.faces().candidates.len());
-    table.add("patches", || shape.patches(&never).map(|p| p.root()));
+    table.add("patches", || shape.patches(&never).map(|p| p.root())).expect("nothing interrupts it");
     table.add("oriented", || shape.oriented().iter().count());
     table.add("samples", || shape.samples().points().len());
     table.add("thickness", || shape.thickness());
     table.add("inner points", || shape.inner_points().len());
     table.add("field", || Field::build(&shape.surface, &never)).expect("nothing interrupts it");
-    drop((shape, healed));
+    drop(shape);
     let source = SourceAssembly { name: "bench".into(), parts: vec![part], ..Default::default() };
     table.add("handle", || content_hash(&source));
     table.add("admission", || Assembly::new(&source)).expect("it can be taken in");
@@ -101,8 +107,12 @@ impl Table {
                 let per = |cost: f64| cost / *size as f64;
                 _ = write!(text, " {:.2} µs, {:.0} B |", per(*seconds) * 1e6, per(*bytes));
             }
-            let points: Vec<_> =
-                self.sizes.iter().zip(costs).map(|(n, (s, _))| ((*n as f64).ln(), s.max(1e-6).ln())).collect();
+            let points: Vec<_> = self
+                .sizes
+                .iter()
+                .zip(costs)
+                .map(|(n, (s, _))| ((*n as f64).ln(), s.max(1e-6).ln()))
+                .collect();
             _ = writeln!(text, " {:.2} |", slope(&points));
         }
         text
@@ -125,7 +135,9 @@ fn processor_time() -> Duration {
 /// Bytes of this process, by their name in its status.
 fn resident(name: &str) -> f64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|line| line.strip_prefix(name)?.split_whitespace().nth(1)?.parse::<f64>().ok());
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix(name)?.split_whitespace().nth(1)?.parse::<f64>().ok());
     line.unwrap_or(0.0) * 1024.0
 }
 
@@ -162,9 +174,37 @@ fn sphere(triangles: usize) -> SourceMesh {
 fn scan(triangles: usize) -> SourceMesh {
     let mut random = Uniform::seeded(b"scan");
     round(triangles, |[x, y, z]| {
-        let r = 1.0 + 0.1 * (3.0 * x).sin() * (4.0 * y).cos() + 0.002 * (random.number() - 0.5) + 0.05 * (5.0 * z).sin();
+        let r = 1.0
+            + 0.1 * (3.0 * x).sin() * (4.0 * y).cos()
+            + 0.002 * (random.number() - 0.5)
+            + 0.05 * (5.0 * z).sin();
         [x * r, y * r, z * r]
     })
+}
+
+/// A sphere with a hole.
+fn open(triangles: usize) -> SourceMesh {
+    let mut mesh = sphere(triangles);
+    mesh.triangles.retain(|t| t.iter().any(|v| mesh.vertices[*v as usize][2] < 0.9));
+    mesh
+}
+
+/// Many small boxes.
+fn pieces(triangles: usize) -> SourceMesh {
+    let count = (triangles as f64 / 12.0).cbrt().round() as i64;
+    let mut mesh = SourceMesh::default();
+    for at in 0..count.pow(3) {
+        let at = [at % count, at / count % count, at / count.pow(2)].map(|x| x as f64);
+        let first = mesh.vertices.len() as u32;
+        let corner = |i: usize| [0, 1, 2].map(|a| at[a] + if i >> a & 1 == 1 { 0.7 } else { 0.0 });
+        mesh.vertices.extend((0..8).map(corner));
+        for [a, b, c, d] in
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]]
+        {
+            mesh.triangles.extend([[a, b, c], [a, c, d]].map(|t| t.map(|v| first + v)));
+        }
+    }
+    mesh
 }
 
 /// The faces of an octahedron in small triangles, each corner brought to the unit sphere and then moved.
@@ -201,10 +241,14 @@ fn round(triangles: usize, mut moved: impl FnMut([f64; 3]) -> [f64; 3]) -> Sourc
 
 /// A plate with pyramids on it, each of some hundred triangles.
 fn knurl(triangles: usize) -> SourceMesh {
-    plate(triangles, |_, _| true, |x, y| {
-        let rise = |t: f64| (t * 40.0).fract().min(1.0 - (t * 40.0).fract());
-        0.1 + 0.02 * rise(x).min(rise(y))
-    })
+    plate(
+        triangles,
+        |_, _| true,
+        |x, y| {
+            let rise = |t: f64| (t * 40.0).fract().min(1.0 - (t * 40.0).fract());
+            0.1 + 0.02 * rise(x).min(rise(y))
+        },
+    )
 }
 
 /// A plate with square holes.

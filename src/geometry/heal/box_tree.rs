@@ -59,7 +59,8 @@ impl BoxTree {
     /// The tree of some boxes, fewer than 2³¹.
     pub(super) fn new(boxes: &[LooseBox]) -> Self {
         let number_bits = u64::BITS - 3 * BITS;
-        let mut keys: Vec<u64> = (0..).zip(boxes).map(|(i, b): (u64, _)| b.code() << number_bits | i).collect();
+        let mut keys: Vec<u64> =
+            (0..).zip(boxes).map(|(i, b): (u64, _)| b.code() << number_bits | i).collect();
         keys.sort_unstable();
         let order: Vec<u32> = keys.into_iter().map(|key| (key & ((1 << number_bits) - 1)) as u32).collect();
         let mut level: Vec<_> = order.iter().map(|&i| boxes[i as usize]).collect();

@@ -31,6 +31,8 @@ pub(super) struct Surfaces<'a> {
     shells: &'a [Vec<u32>],
     triangles: &'a [[u32; 3]],
     vertices: Vec<Vector>,
+    lo: Point3<f64>,
+    scale: f64,
     trees: Vec<OnceLock<BoxTree>>,
 }
 
@@ -38,13 +40,37 @@ impl<'a> Surfaces<'a> {
     pub(super) fn new(draft: &'a Draft, shells: &'a [Vec<u32>], termination: &'a Termination) -> Self {
         let (lo, hi) = mesh::bounds(&draft.vertices);
         let scale = (hi - lo).amax().max(f64::MIN_POSITIVE);
-        let unit = |p: &Point3<f64>| {
-            let p = (p - lo) / scale;
-            Vector::new(p.x, p.y, p.z)
-        };
-        let vertices = draft.vertices.iter().map(unit).collect();
+        let vertices = draft.vertices.iter().map(|p| unit(p, &lo, scale)).collect();
         let trees = shells.iter().map(|_| OnceLock::new()).collect();
-        Self { termination, shells, triangles: &draft.triangles, vertices, trees }
+        Self { termination, shells, triangles: &draft.triangles, vertices, lo, scale, trees }
+    }
+
+    /// The pairs of shells whose boxes, as given, have a point in common, ascending.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn overlapping(
+        &self,
+        boxes: &[(Point3<f64>, Point3<f64>)],
+    ) -> Result<Vec<[usize; 2]>, Interrupt> {
+        let corner = |p: &Point3<f64>| unit(p, &self.lo, self.scale);
+        let loose = |(lo, hi): &_| LooseBox::of(&Aabb::new(corner(lo), corner(hi)));
+        let tree = BoxTree::new(&boxes.iter().map(loose).collect::<Vec<_>>());
+        let overlap = |i: u32, j: u32| {
+            let (a, b) = (&boxes[i as usize], &boxes[j as usize]);
+            (0..3).all(|k| a.0[k] <= b.1[k] && b.0[k] <= a.1[k])
+        };
+        let poll = Poll::every(CROSSING_POLL, Some(self.termination));
+        let mut pairs = Vec::new();
+        for group in 0..tree.groups() {
+            tree.any_pair(group, |i, j| {
+                poll.check()?;
+                pairs.extend(overlap(i, j).then_some([i.min(j) as usize, i.max(j) as usize]));
+                Ok(false)
+            })?;
+        }
+        pairs.sort_unstable();
+        Ok(pairs)
     }
 
     /// Whether two shells cross or touch.
@@ -124,6 +150,12 @@ impl<'a> Surfaces<'a> {
         let (t, u) = (&self.corners(t), &self.corners(u));
         pierces(t, u) || pierces(u, t)
     }
+}
+
+/// A point in units of the part's size.
+fn unit(p: &Point3<f64>, lo: &Point3<f64>, scale: f64) -> Vector {
+    let p = (p - lo) / scale;
+    Vector::new(p.x, p.y, p.z)
 }
 
 /// Whether an edge of `t` goes through the inside of `u`.

@@ -128,25 +128,32 @@ fn welded_and_clean(
 ) -> Result<(Draft, Sides), Unhealed> {
     let size = draft.tolerance / RELATIVE_TOLERANCE;
     let given = std::mem::take(&mut draft.triangles);
+    let mut last_welded = Vec::new();
     let mut attempt = |tolerance: f64| -> Result<_, Interrupt> {
         let mut notes = Findings::default();
         termination.check()?;
         draft.triangles = weld::weld(&draft.vertices, &given, tolerance, &mut notes);
         termination.check()?;
+        // The same comes out of what was not welded further.
+        if draft.triangles == last_welded {
+            return Ok(None);
+        }
+        last_welded.clone_from(&draft.triangles);
         degenerate::drop_degenerate(&mut draft, &mut notes);
         termination.check()?;
         let sides = duplicate::drop_repeated(&mut draft, &mut notes);
         termination.check()?;
         let (triangles, gaps) = (std::mem::take(&mut draft.triangles), sides.open_edges());
-        Ok(Attempt { triangles, sides, gaps, notes, tolerance })
+        Ok(Some(Attempt { triangles, sides, gaps, notes, tolerance }))
     };
     // Welding by distance could only harm where equal coordinates close the part already.
-    let mut best = attempt(0.0)?;
+    let no_triangle = || "no triangle has an area; export the part as a solid".to_owned();
+    let mut best = attempt(0.0)?.ok_or_else(no_triangle)?;
     for tolerance in [RELATIVE_TOLERANCE].into_iter().chain(CLOSING_TOLERANCES) {
         if best.gaps == 0 {
             break;
         }
-        let other = attempt(tolerance * size)?;
+        let Some(other) = attempt(tolerance * size)? else { continue };
         if other.gaps == 0 || (tolerance == RELATIVE_TOLERANCE && other.gaps < best.gaps) {
             best = other;
         }
@@ -158,7 +165,7 @@ fn welded_and_clean(
     }
     findings.list.extend(notes.list);
     if draft.triangles.is_empty() {
-        return Err("no triangle has an area; export the part as a solid".to_owned().into());
+        return Err(no_triangle().into());
     }
     Ok((draft, sides))
 }

@@ -43,9 +43,8 @@ pub(super) fn settle(
     };
     termination.check()?;
     drop(sides);
-    let shell_of = patch_of.unwrap_or_else(|| {
-        components(draft.triangles.len(), pairs.iter().map(|p| p.triangles))
-    });
+    let shell_of =
+        patch_of.unwrap_or_else(|| components(draft.triangles.len(), pairs.iter().map(|p| p.triangles)));
     separate_vertices(draft, &pairs);
     termination.check()?;
     let shells = Shells::new(draft, &shell_of);
@@ -218,10 +217,7 @@ impl Shells {
         let mut depth = vec![0; count];
         let mut meet = vec![false; count];
         let surfaces = Surfaces::new(draft, &self.triangles, termination);
-        for (i, j) in (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j))) {
-            if !overlap(&self.boxes[i], &self.boxes[j]) {
-                continue;
-            }
+        for [i, j] in surfaces.overlapping(&self.boxes)? {
             termination.check()?;
             if surfaces.meet(i, j)? {
                 (meet[i], meet[j]) = (true, true);
@@ -273,8 +269,4 @@ impl Shells {
         let same = |t: u32| place(draft.triangles[t as usize][1]) == place(given[t as usize][1]);
         self.triangles.iter().filter(|shell| shell.first().is_some_and(|&t| !same(t))).count()
     }
-}
-
-fn overlap(a: &(Point3<f64>, Point3<f64>), b: &(Point3<f64>, Point3<f64>)) -> bool {
-    (0..3).all(|k| a.0[k] <= b.1[k] && b.0[k] <= a.1[k])
 }

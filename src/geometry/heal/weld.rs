@@ -1,14 +1,17 @@
 //! Welding: vertices in the same place become one.
 
-use std::collections::HashMap;
 use std::hash::BuildHasher;
 
 use hashbrown::hash_table::Entry;
-use hashbrown::{DefaultHashBuilder, HashTable};
-use nalgebra::Point3;
+use hashbrown::{DefaultHashBuilder, HashMap, HashTable};
+use nalgebra::{Point3, Vector3};
 
 use super::Findings;
 use crate::geometry::mesh;
+
+/// Sides of cells in which near vertices are looked for, in tolerances. At half, twice as many cells are looked at for
+/// each vertex; at double, eight times as many vertices may have to be looked at in one.
+const CELL: f64 = 8.0;
 
 /// Triangles with vertices merged that are no farther apart than `tolerance` (0: equal coordinates only). Each vertex
 /// goes to the first before it that is near enough, so chains of close vertices do not collapse.
@@ -40,19 +43,34 @@ fn exact(vertices: &[Point3<f64>]) -> Vec<u32> {
 
 fn near(vertices: &[Point3<f64>], tolerance: f64) -> Vec<u32> {
     let (lo, _) = mesh::bounds(vertices);
-    let cell = |p: &Point3<f64>| (p - lo).map(|c| (c / (2.0 * tolerance)) as i64);
-    let mut kept: HashMap<[i64; 3], Vec<u32>> = HashMap::with_capacity(vertices.len());
+    let cell = |p: Point3<f64>| (p - lo).map(|c| (c / (CELL * tolerance)).floor() as i64);
+    // What is nearer than the tolerance, and what rounding makes of that.
+    let reach = Vector3::repeat(tolerance * 1.01);
+    // The last vertex that was kept in a cell, and for each kept one the one before it.
+    let mut last: HashMap<[i64; 3], u32> = HashMap::with_capacity(vertices.len());
+    let mut before = vec![u32::MAX; vertices.len()];
     let mut target = Vec::with_capacity(vertices.len());
     for (index, p) in (0u32..).zip(vertices) {
-        let home = cell(p);
-        let close = |i: &u32| (vertices[*i as usize] - p).norm() <= tolerance;
-        let around = (-1..=1).flat_map(|x| (-1..=1).flat_map(move |y| (-1..=1).map(move |z| [x, y, z])));
-        let cells = around.filter_map(|d: [i64; 3]| kept.get(&[home.x + d[0], home.y + d[1], home.z + d[2]]));
-        let found = cells.flatten().copied().filter(close).min();
-        if found.is_none() {
-            kept.entry([home.x, home.y, home.z]).or_default().push(index);
+        let (from, to) = (cell(p - reach), cell(p + reach));
+        let mut found = u32::MAX;
+        for x in from.x..=to.x {
+            for y in from.y..=to.y {
+                for z in from.z..=to.z {
+                    let mut kept = last.get(&[x, y, z]).copied().unwrap_or(u32::MAX);
+                    while let Some(other) = vertices.get(kept as usize) {
+                        if (other - p).norm() <= tolerance {
+                            found = found.min(kept);
+                        }
+                        kept = before[kept as usize];
+                    }
+                }
+            }
         }
-        target.push(found.unwrap_or(index));
+        if found == u32::MAX {
+            before[index as usize] = last.insert(cell(*p).into(), index).unwrap_or(u32::MAX);
+            found = index;
+        }
+        target.push(found);
     }
     target
 }

@@ -58,11 +58,7 @@ impl Derived {
 
     #[inline]
     pub(super) fn tree(&self, mesh: &Mesh) -> &TriangleTree {
-        let build = || {
-            let corners: Vec<_> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
-            TriangleTree::new(&corners)
-        };
-        self.tree.get_or_init(build)
+        self.tree.get_or_init(|| TriangleTree::new(mesh))
     }
 
     pub(super) fn opening(&self, mesh: &Mesh) -> &Opening {

@@ -7,7 +7,8 @@ const BINS: usize = 16;
 /// The smaller side of a split holds at least this share: bounds the depth.
 const LEAST_SHARE: usize = 16;
 
-/// A box whose corners fill vector registers; the last places are padding.
+/// A triangle's box. Its corners fill vector registers: the last place of one has the triangle's number, that of the other
+/// is padding. Boxes are moved, and not their numbers: what costs is to fetch boxes from all over.
 #[derive(Clone, Copy)]
 pub(super) struct BoxedTriangle {
     min: [f64; 4],
@@ -20,9 +21,13 @@ type Counted = (usize, BoxedTriangle);
 impl BoxedTriangle {
     const EMPTY: Self = Self { min: [f64::INFINITY; 4], max: [f64::NEG_INFINITY; 4] };
 
-    pub(super) fn new(bounds: &Bounds) -> Self {
-        let padded = |p: [f64; 3]| [p[0], p[1], p[2], 0.0];
-        Self { min: padded(bounds.min.into()), max: padded(bounds.max.into()) }
+    pub(super) fn new(triangle: u32, bounds: &Bounds) -> Self {
+        let padded = |p: [f64; 3], last: f64| [p[0], p[1], p[2], last];
+        Self { min: padded(bounds.min.into(), f64::from(triangle)), max: padded(bounds.max.into(), 0.0) }
+    }
+
+    pub(super) fn triangle(&self) -> u32 {
+        self.min[3] as u32
     }
 
     pub(super) fn bounds(&self) -> Bounds {
@@ -31,8 +36,8 @@ impl BoxedTriangle {
     }
 
     /// The box of some items.
-    pub(super) fn around(items: &[Self], order: &[u32]) -> Self {
-        order.iter().fold(Self::EMPTY, |all, &i| all.union(&items[i as usize]))
+    pub(super) fn around(items: &[Self]) -> Self {
+        items.iter().fold(Self::EMPTY, |all, item| all.union(item))
     }
 
     #[inline]
@@ -63,11 +68,11 @@ impl BoxedTriangle {
 
 /// Splits items in two where the boxes' areas times their counts get smallest (surface area
 /// heuristic), or in the middle if all centres coincide.
-pub(super) fn split<'a>(items: &[BoxedTriangle], order: &'a mut [u32]) -> (&'a mut [u32], &'a mut [u32]) {
-    let least = order.len().div_ceil(LEAST_SHARE).max(1);
+pub(super) fn split(items: &mut [BoxedTriangle]) -> (&mut [BoxedTriangle], &mut [BoxedTriangle]) {
+    let least = items.len().div_ceil(LEAST_SHARE).max(1);
     let (mut low, mut high) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
-    for &i in order.iter() {
-        let middle = items[i as usize].middle();
+    for item in items.iter() {
+        let middle = item.middle();
         for a in 0..4 {
             low[a] = if middle[a] < low[a] { middle[a] } else { low[a] };
             high[a] = if middle[a] > high[a] { middle[a] } else { high[a] };
@@ -75,10 +80,9 @@ pub(super) fn split<'a>(items: &[BoxedTriangle], order: &'a mut [u32]) -> (&'a m
     }
     let scale: [f64; 4] = std::array::from_fn(|a| BINS as f64 / (high[a] - low[a]));
     let is_split = |a: usize| scale[a].is_finite() && high[a] > low[a];
-    // All axes in one pass: what costs is to fetch the items. Along an axis that is not split, anything will do.
+    // All axes in one pass. Along an axis that is not split, anything will do.
     let mut bins = [[(0usize, BoxedTriangle::EMPTY); BINS]; 3];
-    for &i in order.iter() {
-        let item = &items[i as usize];
+    for item in items.iter() {
         let middle = item.middle();
         for (a, bins) in bins.iter_mut().enumerate() {
             let bin = &mut bins[(((middle[a] - low[a]) * scale[a]) as usize).min(BINS - 1)];
@@ -93,16 +97,15 @@ pub(super) fn split<'a>(items: &[BoxedTriangle], order: &'a mut [u32]) -> (&'a m
     }
     let middle = match best {
         Some((_, axis, at)) => {
-            parted(order, |i| items[i as usize].middle()[axis] < at).clamp(least, order.len() - least)
+            parted(items, |item| item.middle()[axis] < at).clamp(least, items.len() - least)
         }
         None => {
-            let longest = BoxedTriangle::around(items, order).bounds().extents().imax();
-            let centre = |i: u32| items[i as usize].middle()[longest];
-            order.sort_by(|&i, &j| centre(i).total_cmp(&centre(j)));
-            order.len() / 2
+            let longest = BoxedTriangle::around(items).bounds().extents().imax();
+            items.sort_by(|a, b| a.middle()[longest].total_cmp(&b.middle()[longest]));
+            items.len() / 2
         }
     };
-    order.split_at_mut(middle)
+    items.split_at_mut(middle)
 }
 
 /// The first bin beyond the cheapest split along an axis, and its cost, if that is less than a known one.
@@ -144,12 +147,12 @@ fn joined(a: &Counted, b: &Counted) -> Counted {
 }
 
 /// Brings items that pass a test before those that do not, each in the order that they had; how many pass.
-fn parted(items: &mut [u32], passes: impl Fn(u32) -> bool) -> usize {
-    let mut rest = Vec::with_capacity(items.len());
+fn parted(items: &mut [BoxedTriangle], passes: impl Fn(&BoxedTriangle) -> bool) -> usize {
+    let mut rest = Vec::new();
     let mut count = 0;
     for at in 0..items.len() {
         let item = items[at];
-        if passes(item) {
+        if passes(&item) {
             items[count] = item;
             count += 1;
         } else {
