@@ -35,7 +35,7 @@ const STAGES: [(&str, &str); 20] = [
     ("assembling", "contact geometry plan rrt scene search termination"),
     (
         "service",
-        "assembling blocking_graph cache contact geometry lru plan scene sdf search simulation termination",
+        "assembling blocking_graph cache contact geometry lru plan scene sdf search simulation termination tolerances",
     ),
     (
         "daemon",

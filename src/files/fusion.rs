@@ -79,6 +79,8 @@ fn yes() -> bool {
 
 /// An occurrence that is nested deeper is none: the tree is walked by recursion.
 const MAX_DEPTH: usize = 200;
+/// More bodies are no assembly.
+const MAX_BODIES: usize = 20_000;
 
 /// Reads a folder of this layout: none if its `assembly.json` is another one.
 ///
@@ -89,59 +91,71 @@ pub(super) fn read(folder: &Path) -> Result<Option<Content>, GeometryError> {
     if !path.exists() {
         return Ok(None);
     }
-    let Ok(value) = serde_json::from_str::<Value>(&read_text(&path)?) else { return Ok(None) };
+    let file = |name: &str| {
+        let content = read_file(&folder.join(name)).map_err(|e| e.to_string())?;
+        Ok(content.bodies.into_iter().next().unwrap_or_default().mesh)
+    };
+    content(&read_text(&path)?, file).map_err(|reason| assembly_error(&path, &reason))
+}
+
+/// What a description of this layout says; `file` reads a mesh file by its name.
+fn content(
+    text: &str,
+    file: impl FnMut(&str) -> Result<SourceMesh, String>,
+) -> Result<Option<Content>, String> {
+    let Ok(value) = serde_json::from_str::<Value>(text) else { return Ok(None) };
     if ["tree", "root", "bodies"].iter().any(|key| value.get(key).is_none()) {
         return Ok(None);
     }
-    let document = Document::deserialize(value).map_err(|e| assembly_error(&path, &e.to_string()))?;
-    let mut reader = Reader {
-        folder,
-        path: &path,
-        document: &document,
-        meshes: HashMap::new(),
-        hidden: Vec::new(),
-        bodies: Vec::new(),
-    };
+    let document = Document::deserialize(value).map_err(|e| e.to_string())?;
+    let mut reader =
+        Reader { document: &document, file, meshes: HashMap::new(), hidden: Vec::new(), bodies: Vec::new() };
     for (id, shown) in &document.root.bodies {
         reader.body(id, shown, &[], &Matrix4::identity(), true)?;
     }
     reader.walk(&document.tree.root, &mut Vec::new(), &Matrix4::identity())?;
     let Reader { bodies, hidden, .. } = reader;
     if bodies.is_empty() {
-        return Err(assembly_error(&path, "it shows no body"));
+        return Err("it shows no body".to_owned());
     }
     let hidden =
         (!hidden.is_empty()).then(|| format!("{} not visible in the assembly and not read", listed(&hidden)));
     Ok(Some(Content { bodies, units: Some("cm".to_owned()), notes: hidden.into_iter().collect() }))
 }
 
-struct Reader<'a> {
-    folder: &'a Path,
-    path: &'a Path,
+/// Reads a text as such a description, without its files; what came of it, in words.
+pub(super) fn parse(text: &str) -> String {
+    let mesh = |_: &str| Ok(SourceMesh { vertices: vec![[0.0; 3]], triangles: Vec::new() });
+    match content(text, mesh) {
+        Ok(Some(content)) => content.notes.join("; "),
+        Ok(None) => "another layout".to_owned(),
+        Err(reason) => reason,
+    }
+}
+
+struct Reader<'a, F> {
     document: &'a Document,
+    file: F,
     /// By file.
     meshes: HashMap<&'a str, SourceMesh>,
     hidden: Vec<String>,
     bodies: Vec<Body>,
 }
 
-impl<'a> Reader<'a> {
+impl<'a, F: FnMut(&str) -> Result<SourceMesh, String>> Reader<'a, F> {
     fn walk(
         &mut self,
         tree: &'a Map<String, Value>,
         above: &mut Vec<String>,
         pose: &Matrix4<f64>,
-    ) -> Result<(), GeometryError> {
-        if above.len() >= MAX_DEPTH {
-            return Err(assembly_error(
-                self.path,
-                &format!("occurrences are nested more than {MAX_DEPTH} levels deep"),
-            ));
+    ) -> Result<(), String> {
+        if above.len() >= MAX_DEPTH || self.bodies.len() >= MAX_BODIES {
+            return Err(format!("more than {MAX_DEPTH} levels of occurrences, or {MAX_BODIES} bodies"));
         }
         for (id, below) in tree {
+            let occurrence = self.document.occurrences.get(id);
             let undescribed = || format!("`tree` names the occurrence {id}, which is not in `occurrences`");
-            let occurrence =
-                self.document.occurrences.get(id).ok_or_else(|| assembly_error(self.path, &undescribed()))?;
+            let occurrence = occurrence.ok_or_else(undescribed)?;
             if !occurrence.is_visible {
                 self.hidden.push(occurrence.name.clone());
                 continue;
@@ -168,9 +182,9 @@ impl<'a> Reader<'a> {
         above: &[String],
         pose: &Matrix4<f64>,
         is_named: bool,
-    ) -> Result<(), GeometryError> {
+    ) -> Result<(), String> {
         let undescribed = || format!("it names the body {id}, which is not in `bodies`");
-        let body = self.document.bodies.get(id).ok_or_else(|| assembly_error(self.path, &undescribed()))?;
+        let body = self.document.bodies.get(id).ok_or_else(undescribed)?;
         if !shown.is_visible {
             self.hidden.push(body.name.clone());
             return Ok(());
@@ -179,13 +193,10 @@ impl<'a> Reader<'a> {
             Some(mesh) => mesh.clone(),
             None => {
                 // Only a name: a description may not lead out of its folder.
-                let is_name = Path::new(&body.obj).file_name().is_some_and(|name| name == body.obj.as_str());
-                if !is_name {
-                    let reason = format!("the file `{}` of body {id} is not in this folder", body.obj);
-                    return Err(assembly_error(self.path, &reason));
+                if Path::new(&body.obj).file_name().is_none_or(|name| name != body.obj.as_str()) {
+                    return Err(format!("the file `{}` of body {id} is not in this folder", body.obj));
                 }
-                let content = read_file(&self.folder.join(&body.obj))?;
-                let mesh = content.bodies.into_iter().next().unwrap_or_default().mesh;
+                let mesh = (self.file)(&body.obj)?;
                 self.meshes.entry(&body.obj).or_insert(mesh).clone()
             }
         };

@@ -7,6 +7,7 @@
 
 mod content;
 mod description;
+mod doubts;
 mod folder;
 mod format;
 mod fusion;
@@ -57,6 +58,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<SourceAssembly, Geomet
         return Err(assembly_error(path, "there is no such file or folder"));
     };
     assembly.parts.sort_by(|a, b| natural_order(&a.name, &b.name));
+    let doubts = doubts::doubts(&assembly);
+    assembly.notes.extend(doubts);
     if let [part] = &assembly.parts[..] {
         // Of a surface that cannot be healed it is said later.
         let advice = match bodies(part).map_or(1, |bodies| bodies.len()) {
@@ -152,7 +155,7 @@ pub(crate) fn parse_file(name: &str, bytes: &[u8], split: Option<Split>) -> Resu
 
 /// Reads a text as each of the descriptions that a folder may hold; what came of it, in words.
 pub(crate) fn parse_notes(text: &str) -> String {
-    format!("{}; {}", description::parse(text), poses::parse(text))
+    format!("{}; {}; {}", description::parse(text), poses::parse(text), fusion::parse(text))
 }
 
 fn stem(path: &Path) -> String {
