@@ -7,18 +7,19 @@ use super::error::CliError;
 use super::table::{TextTable, length};
 use super::{interrupt, print};
 use crate::blocking_graph::Audit;
-use crate::geometry::{Assembly, Solidity, SourceAssembly, load_assembly};
+use crate::geometry::{Assembly, Solidity, SourceAssembly};
 use crate::search::{Engine, Termination};
 use crate::service::{Admission, Service};
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
-    let assembly = load_assembly(&arguments.assembly)?;
+    let assembly = arguments.input.read()?;
     let service = Service::default();
     let admission = service.admit(&assembly)?;
     let healed = service.assembly(admission.id)?;
     let overlaps = service.overlaps(admission.id)?;
     let mut text = headline(&assembly, &healed);
     text.push_str(&parts(&assembly, &healed));
+    text.push_str(&list("found in reading", assembly.notes.iter().map(String::clone)));
     text.push_str(&findings(&healed));
     text.push_str(&given_twice(&admission));
     text.push_str("\noverlaps at the assembled pose:\n");
@@ -60,13 +61,14 @@ fn graphs<'a>(audit: &Audit, name: impl Fn(usize) -> &'a str) -> String {
 
 /// Warnings of the whole assembly: those of single parts are findings of healing.
 fn given_twice(admission: &Admission) -> String {
-    let mut text = String::from("\ngiven twice:\n");
-    let mut lines = admission.warnings.iter().filter(|w| w.part.is_none()).peekable();
-    if lines.peek().is_none() {
-        text.push_str("  nothing\n");
-    }
-    text.extend(lines.map(|w| format!("  {}\n", w.message)));
-    text
+    list("given twice", admission.warnings.iter().filter(|w| w.part.is_none()).map(|w| w.message.clone()))
+}
+
+/// A paragraph of lines under a heading.
+fn list(heading: &str, lines: impl Iterator<Item = String>) -> String {
+    let lines: Vec<String> = lines.map(|line| format!("  {line}\n")).collect();
+    let lines = if lines.is_empty() { "  nothing\n".to_owned() } else { lines.concat() };
+    format!("\n{heading}:\n{lines}")
 }
 
 fn headline(assembly: &SourceAssembly, healed: &Assembly) -> String {
@@ -104,12 +106,6 @@ fn parts(assembly: &SourceAssembly, healed: &Assembly) -> String {
 }
 
 fn findings(healed: &Assembly) -> String {
-    let mut text = String::from("\nfound in healing:\n");
-    if healed.findings.is_empty() {
-        text.push_str("  nothing\n");
-    }
-    for (part, finding) in &healed.findings {
-        text.push_str(&format!("  {}: {finding}\n", healed.parts[*part].name));
-    }
-    text
+    let found = healed.findings.iter().map(|(part, finding)| (&healed.parts[*part].name, finding));
+    list("found in healing", found.map(|(part, finding)| format!("{part}: {finding}")))
 }

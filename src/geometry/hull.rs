@@ -258,7 +258,7 @@ mod tests {
             }
         }
         let [ball, on_sphere, _, cup] = found.map(|hull| hull.len());
-        assert!(ball < 2000 && on_sphere == 30_000 && cup < 33_000, "{ball}, {on_sphere}, {cup}");
+        assert!(ball < 2000 && on_sphere > 29_000 && cup < 2000, "{ball}, {on_sphere}, {cup}");
     }
 
     #[test]

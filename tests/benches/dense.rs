@@ -14,9 +14,10 @@ use std::path::Path;
 use std::time::Duration;
 
 use rustix::time::{ClockId, clock_gettime};
+use sbdp::files::load_assembly;
 use sbdp::geometry::{
     Assembly, Shape, SourceAssembly, SourceMesh, SourcePart, Surface, Uniform, content_hash, heal,
-    hull_vertices, load_assembly,
+    hull_vertices,
 };
 use sbdp::sdf::Field;
 use sbdp::termination::Termination;

@@ -19,6 +19,9 @@ mod tests;
 
 use nalgebra::Point3;
 
+pub(in crate::geometry) use shells::{components, members};
+pub(in crate::geometry) use weld::exact;
+
 use super::incidence::Sides;
 use super::{GeometryError, Mesh, Solidity, SourcePart};
 use crate::termination::{Interrupt, Termination};

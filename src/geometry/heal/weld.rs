@@ -27,11 +27,13 @@ pub(super) fn weld(
     triangles.iter().map(|t| t.map(|v| target[v as usize])).collect()
 }
 
-fn exact(vertices: &[Point3<f64>]) -> Vec<u32> {
-    let bits = |v: u32| vertices[v as usize].coords.map(f64::to_bits);
+/// For each vertex the first with equal coordinates.
+pub(in crate::geometry) fn exact<P: Copy + Into<[f64; 3]>>(vertices: &[P]) -> Vec<u32> {
+    // Adding zero makes one zero of both.
+    let bits = |v: u32| vertices[v as usize].into().map(|c: f64| (c + 0.0).to_bits());
     // Seeded at random: no file can have coordinates that collide.
     let hasher = DefaultHashBuilder::default();
-    let hash = |v: &u32| hasher.hash_one(<[u64; 3]>::from(bits(*v)));
+    let hash = |v: &u32| hasher.hash_one(bits(*v));
     // Numbers alone: a table of coordinates would be several times as large as the mesh.
     let mut first: HashTable<u32> = HashTable::with_capacity(vertices.len());
     let place = |v: u32| match first.entry(hash(&v), |other| bits(*other) == bits(v), hash) {
