@@ -35,7 +35,7 @@ pub(super) fn load(folder: &Path, options: &LoadOptions) -> Result<SourceAssembl
         }
         files => several(folder, files, split)?,
     };
-    poses::place(folder, &mut assembly.parts, &mut notes)?;
+    poses::place(folder, &mut assembly, &mut notes)?;
     assembly.notes.extend(notes);
     ignore(&mut assembly, &patterns, &listing.ignored)?;
     if let Some(described) = described {
