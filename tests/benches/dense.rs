@@ -23,7 +23,10 @@ use sbdp::sdf::Field;
 use sbdp::termination::Termination;
 
 const SIZES: [usize; 4] = [10_000, 100_000, 1_000_000, 4_000_000];
-const KINDS: [(&str, fn(usize) -> SourceMesh); 6] = [
+/// What a part is called, and the part with about so many triangles.
+type Kind = (&'static str, fn(usize) -> SourceMesh);
+
+const KINDS: [Kind; 6] = [
     ("sphere", sphere),
     ("scan", scan),
     ("knurl", knurl),
