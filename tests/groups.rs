@@ -4,6 +4,7 @@
 mod common;
 
 use common::{Daemon, HANG, assembly};
+use sbdp::geometry::SourceAssembly;
 use sbdp::plan::{Plan, PlanStatus, PlanStep, StepEnd};
 use sbdp::search::PlanRequest;
 use sbdp::service::Service;

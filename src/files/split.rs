@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::content::{Body, Content, Pieces};
+use super::content::{Body, Content, PieceKind, Pieces};
 use super::names::{shown_path, unique_names};
 use super::options::Split;
 use super::text::printable;
@@ -98,9 +98,11 @@ fn taken_apart(
         return Ok(named);
     }
     let names: Vec<String> = named.iter().map(|(name, _)| name.clone()).collect();
-    let what = format!("{} {} ({})", named.len(), pieces.what, listed(&names));
-    // Where the whole is closed and its pieces are not, they are faces of one body.
-    let are_bodies = named.iter().all(|(_, piece)| is_closed(piece) || is_flat(piece)) || !is_closed(&mesh);
+    let what = format!("{} {} ({})", named.len(), pieces.kind.plural(), listed(&names));
+    // Open pieces of a closed surface are faces of one body, and so may be open groups and primitives of any: a mesh of a
+    // primitive per face is hardly ever closed to the last digit.
+    let are_closed = named.iter().all(|(_, piece)| is_closed(piece) || is_flat(piece));
+    let are_bodies = are_closed || pieces.kind.is_thing() && !is_closed(&mesh);
     if file.is_whole && are_bodies {
         notes.push(format!("{what} taken as a part each (`--split none` makes one part of them)"));
         return Ok(named);
@@ -109,7 +111,7 @@ fn taken_apart(
         notes.push(format!("{what} taken as one part (`--split objects` makes a part of each)"));
     } else if file.is_whole {
         let advice = "`--split bodies` makes a part of each separate body";
-        notes.push(format!("{what} are pieces of one closed surface and taken as one part ({advice})"));
+        notes.push(format!("{what} are pieces of one surface and taken as one part ({advice})"));
     }
     Ok(vec![(own, mesh)])
 }
@@ -121,7 +123,8 @@ fn joined(mut bodies: Vec<Body>) -> Body {
         return Body { path: Vec::new(), ..body };
     }
     let names = unique_names(&bodies.iter().map(|b| b.path.clone()).collect::<Vec<_>>());
-    let mut all = Body { pieces: Pieces { what: "nodes", names, of: Vec::new() }, ..Body::default() };
+    let mut all =
+        Body { pieces: Pieces { kind: PieceKind::Nodes, names, of: Vec::new() }, ..Body::default() };
     for (number, body) in (0..).zip(bodies) {
         let first = all.mesh.vertices.len() as u32;
         all.mesh.vertices.extend(body.mesh.vertices);
