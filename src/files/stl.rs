@@ -1,10 +1,8 @@
 //! STL, binary and text.
 
-use std::collections::HashMap;
-
 use super::content::{Body, Content, PieceKind, Pieces};
 use super::text::{decimal_comma, decoded, excerpt};
-use crate::geometry::SourceMesh;
+use crate::geometry::{SourceMesh, same_places};
 
 const HEADER: usize = 84;
 const RECORD: usize = 50;
@@ -72,7 +70,7 @@ fn parse_binary(bytes: &[u8]) -> Result<Content, String> {
             count
         }
     };
-    let mut surface = Welded::default();
+    let mut surface = Soup::default();
     for record in records.chunks_exact(RECORD).take(count) {
         // The normal comes first; it follows from the corners.
         let number = |i: usize| f32::from_le_bytes([record[i], record[i + 1], record[i + 2], record[i + 3]]);
@@ -82,40 +80,38 @@ fn parse_binary(bytes: &[u8]) -> Result<Content, String> {
     Ok(surface.content(notes, Pieces::default()))
 }
 
-/// A surface whose equal vertices are one.
+/// Triangles as they come, each with vertices of its own.
 #[derive(Default)]
-struct Welded {
-    mesh: SourceMesh,
-    vertices: HashMap<[u64; 3], u32>,
-}
+struct Soup(Vec<[f64; 3]>);
 
-impl Welded {
+impl Soup {
     fn add(&mut self, corners: [[f64; 3]; 3]) {
-        let vertices = corners.map(|p| {
-            *self.vertices.entry(p.map(f64::to_bits)).or_insert_with(|| {
-                self.mesh.vertices.push(p);
-                (self.mesh.vertices.len() - 1) as u32
-            })
-        });
-        self.mesh.triangles.push(vertices);
+        self.0.extend(corners);
     }
 
+    /// One surface, in which vertices in the same place are one.
     fn content(self, notes: Vec<String>, mut pieces: Pieces) -> Content {
+        let mut mesh = SourceMesh::default();
+        let mut numbers: Vec<u32> = Vec::with_capacity(self.0.len());
+        for (vertex, first) in self.0.iter().zip(same_places(&self.0)) {
+            let number = numbers.get(first as usize).copied().unwrap_or_else(|| {
+                mesh.vertices.push(*vertex);
+                mesh.vertices.len() as u32 - 1
+            });
+            numbers.push(number);
+        }
+        mesh.triangles = numbers.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
         pieces.kind = PieceKind::Solids;
-        pieces.of.resize(self.mesh.triangles.len(), 0);
+        pieces.of.resize(mesh.triangles.len(), 0);
         if pieces.names.is_empty() {
             pieces.names.push(String::new());
         }
-        Content {
-            bodies: vec![Body { path: Vec::new(), mesh: self.mesh, pieces }],
-            notes,
-            ..Content::default()
-        }
+        Content { bodies: vec![Body { path: Vec::new(), mesh, pieces }], notes, ..Content::default() }
     }
 }
 
 fn parse_text(text: &str) -> Result<Content, String> {
-    let mut surface = Welded::default();
+    let mut surface = Soup::default();
     let mut pieces = Pieces::default();
     let mut notes = Vec::new();
     let mut corners: Vec<[f64; 3]> = Vec::with_capacity(3);
@@ -158,7 +154,7 @@ fn parse_text(text: &str) -> Result<Content, String> {
     if facet.is_some() || !corners.is_empty() {
         return Err("truncated: the file ends within a facet; export the part again".into());
     }
-    if surface.mesh.triangles.is_empty() {
+    if surface.0.is_empty() {
         if text.lines().any(|line| line.starts_with("v ")) {
             return Err("this is the text of an OBJ file; rename it to .obj".into());
         }

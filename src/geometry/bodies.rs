@@ -1,11 +1,10 @@
 //! The separate bodies of a surface.
 
-use std::collections::HashMap;
 use std::f64::consts::TAU;
 
 use nalgebra::Point3;
 
-use super::heal::{components, exact, members};
+use super::heal::{components, members, same_places};
 use super::incidence::{Side, Sides};
 use super::mesh::signed_volume;
 use super::solid_angle::SolidAngle;
@@ -56,7 +55,7 @@ pub fn is_closed(mesh: &SourceMesh) -> bool {
 
 /// The triangles with the first vertex in each place in the stead of all there; none if a vertex does not exist.
 fn welded(mesh: &SourceMesh) -> Option<Vec<[u32; 3]>> {
-    let welded = exact(&mesh.vertices);
+    let welded = same_places(&mesh.vertices);
     let weld = |v: u32| welded.get(v as usize).copied();
     let triangles = mesh.triangles.iter().map(|&[a, b, c]| Some([weld(a)?, weld(b)?, weld(c)?]));
     triangles.filter(|t| t.is_none_or(|[a, b, c]| a != b && b != c && c != a)).collect()
@@ -158,21 +157,16 @@ fn winds_around(mesh: &Mesh, shell: &[u32], point: &Point3<f64>) -> bool {
 }
 
 impl SourceMesh {
-    /// Some of the triangles, with the vertices that these use, in their order.
+    /// Some of the triangles, with the vertices that these use, in the order of the whole.
     #[must_use]
     pub fn some(&self, triangles: &[u32]) -> Self {
-        let mut renamed: HashMap<u32, u32> = HashMap::new();
-        let mut some = Self::default();
-        for &triangle in triangles {
-            let corners = self.triangles[triangle as usize].map(|vertex| {
-                *renamed.entry(vertex).or_insert_with(|| {
-                    some.vertices.push(self.vertices[vertex as usize]);
-                    (some.vertices.len() - 1) as u32
-                })
-            });
-            some.triangles.push(corners);
-        }
-        some
+        let corners = || triangles.iter().map(|&triangle| self.triangles[triangle as usize]);
+        let mut used: Vec<u32> = corners().flatten().collect();
+        used.sort_unstable();
+        used.dedup();
+        let vertices = used.iter().map(|&v| self.vertices[v as usize]).collect();
+        let renamed = |v: u32| used.partition_point(|&other| other < v) as u32;
+        Self { vertices, triangles: corners().map(|t| t.map(renamed)).collect() }
     }
 }
 

@@ -69,6 +69,7 @@ pub use error::GeometryError;
 pub use faces::{Faces, NEAR_AXIS, SQUARE, WeightedDirection, oriented};
 pub use free_region::{FreeRegion, NoRegion, Wanted};
 pub use half_space::Cloud;
+pub(crate) use heal::same_places;
 pub use heal::{Healed, heal, heal_until};
 pub use helix::{Footprint, Helix, radii};
 pub use hull::{Support, gap_along, hull_vertices, separating, separating_direction, transformed};

@@ -20,7 +20,7 @@ mod tests;
 use nalgebra::Point3;
 
 pub(in crate::geometry) use shells::{components, members};
-pub(in crate::geometry) use weld::exact;
+pub(crate) use weld::same_places;
 
 use super::incidence::Sides;
 use super::{GeometryError, Mesh, Solidity, SourcePart};

@@ -21,14 +21,14 @@ pub(super) fn weld(
     tolerance: f64,
     findings: &mut Findings,
 ) -> Vec<[u32; 3]> {
-    let target = if tolerance == 0.0 { exact(vertices) } else { near(vertices, tolerance) };
+    let target = if tolerance == 0.0 { same_places(vertices) } else { near(vertices, tolerance) };
     let merged = target.iter().enumerate().filter(|(i, t)| *i != **t as usize).count();
     findings.add(merged, "duplicate vertex", "merged");
     triangles.iter().map(|t| t.map(|v| target[v as usize])).collect()
 }
 
 /// For each vertex the first with equal coordinates.
-pub(in crate::geometry) fn exact<P: Copy + Into<[f64; 3]>>(vertices: &[P]) -> Vec<u32> {
+pub(crate) fn same_places<P: Copy + Into<[f64; 3]>>(vertices: &[P]) -> Vec<u32> {
     // Adding zero makes one zero of both.
     let bits = |v: u32| vertices[v as usize].into().map(|c: f64| (c + 0.0).to_bits());
     // Seeded at random: no file can have coordinates that collide.
