@@ -11,7 +11,7 @@ use std::{env, fs, io};
 
 /// Every stage, and the stages that its code imports. A stage comes after all that it depends on.
 /// `.ci/structure` compares this table with the imports.
-const STAGES: [(&str, &str); 19] = [
+const STAGES: [(&str, &str); 20] = [
     ("lru", ""),
     ("termination", ""),
     ("tolerances", ""),
@@ -20,6 +20,7 @@ const STAGES: [(&str, &str); 19] = [
     ("cache", "lru"),
     ("config", "cache ipc"),
     ("geometry", "budgets cache termination tolerances"),
+    ("files", "geometry"),
     ("sdf", "cache geometry termination"),
     ("scene", "budgets cache geometry lru sdf termination tolerances"),
     ("rrt", "geometry scene termination"),
@@ -34,9 +35,12 @@ const STAGES: [(&str, &str); 19] = [
     ("assembling", "contact geometry plan rrt scene search termination"),
     (
         "service",
-        "assembling blocking_graph cache contact geometry lru plan scene sdf search simulation termination",
+        "assembling blocking_graph cache contact geometry lru plan scene sdf search simulation termination tolerances",
     ),
-    ("daemon", "blocking_graph cache config geometry ipc lru plan search service simulation termination"),
+    (
+        "daemon",
+        "blocking_graph cache config files geometry ipc lru plan search service simulation termination",
+    ),
 ];
 
 fn main() -> io::Result<()> {

@@ -14,6 +14,7 @@ use sbdp_ipc::summary::SummaryView;
 use crate::cache::can_be_read;
 use crate::config::Config;
 use crate::daemon::uploaded_assembly;
+use crate::files::{self, Split};
 use crate::geometry::{self, Assembly, SourceAssembly, SourceMesh, SourcePart, Surface};
 use crate::sdf;
 use crate::service::RECORD_KINDS;
@@ -75,19 +76,16 @@ impl Reader {
             Self::Messages => messages(bytes),
             Self::Meshes => meshes(bytes),
             Self::Admission => admission(bytes),
-            Self::Obj => mesh(geometry::parse_part("a.obj", bytes)),
-            Self::Stl => mesh(geometry::parse_part("a.stl", bytes)),
-            // No buffers are there to be found.
-            Self::Gltf => said(geometry::parse_scene(bytes, Path::new("/nowhere"))),
-            Self::Healing => match geometry::parse_part("a.obj", bytes) {
-                Ok(mesh) => admitted(&SourceAssembly {
-                    parts: vec![SourcePart { name: "a".into(), origin: "a.obj".into(), mesh }],
-                    ..SourceAssembly::default()
-                }),
+            Self::Obj => file("a.obj", bytes),
+            Self::Stl => file("a.stl", bytes),
+            Self::Gltf => file("a.gltf", bytes),
+            Self::Healing => match files::parse_file("a.obj", bytes, Some(Split::None)) {
+                Ok(assembly) => admitted(&assembly),
                 Err(reason) => reason,
             },
-            Self::Manifest => String::from_utf8(bytes.to_vec())
-                .map_or_else(|e| e.to_string(), |t| geometry::parse_notes(&t)),
+            Self::Manifest => {
+                String::from_utf8(bytes.to_vec()).map_or_else(|e| e.to_string(), |t| files::parse_notes(&t))
+            }
             Self::Config => String::from_utf8(bytes.to_vec()).map_or_else(|e| e.to_string(), |t| config(&t)),
             Self::Records => records(bytes),
             Self::Fields => SOLID.as_ref().map_or_else(String::new, |solid| sdf::read_as_field(solid, bytes)),
@@ -121,8 +119,13 @@ fn said<T>(result: Result<T, String>) -> String {
     result.map_or_else(|reason| reason, |_| "fine".to_owned())
 }
 
-fn mesh(parsed: Result<SourceMesh, String>) -> String {
-    said(parsed)
+/// A file, taken apart in every way.
+fn file(name: &str, bytes: &[u8]) -> String {
+    let read = |split| match files::parse_file(name, bytes, split) {
+        Ok(assembly) => assembly.notes.join("; "),
+        Err(reason) => reason,
+    };
+    [None, Some(Split::Objects), Some(Split::Bodies), Some(Split::None)].map(read).join("; ")
 }
 
 fn messages(bytes: &[u8]) -> String {

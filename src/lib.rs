@@ -9,6 +9,7 @@ pub mod cli;
 pub mod config;
 pub mod contact;
 pub mod daemon;
+pub mod files;
 #[cfg(test)]
 mod fixtures;
 pub mod geometry;

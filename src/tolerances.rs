@@ -31,6 +31,10 @@ pub(crate) const HELD_AT_FIRST: f64 = 1e-3;
 /// Length. A plane nearer than this is touched; lengths below it count as none.
 /// Measured: no effect at half and double.
 pub(crate) const TOUCHED: f64 = 1e-6;
+/// Share of the smallest extent of the smaller part of a pair. A deeper overlap as assembled gets a warning of its own:
+/// press fits and threads are drawn some hundredths deep, and a part in a wrong place about half. At half, parts of
+/// coarse meshes are warned of; at double, only parts whose middle is inside another.
+pub(crate) const DEEP_OVERLAP: f64 = 0.25;
 /// Length. Coordinates in files are rounded by up to this.
 /// Measured: no effect at half and double.
 pub(crate) const ROUNDED: f64 = 1e-5;

@@ -8,7 +8,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use sbdp::geometry::{Solidity, heal, load_assembly};
+use sbdp::files::load_assembly;
+use sbdp::geometry::{Solidity, heal};
 
 fn here() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/assemblies")

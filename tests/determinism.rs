@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use sbdp::geometry::load_assembly;
+use sbdp::files::load_assembly;
 use sbdp::plan::{Plan, PlanStep};
 use sbdp::search::{PlanRequest, PlanSink, Progress};
 use sbdp::service::Service;

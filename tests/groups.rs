@@ -6,7 +6,8 @@ mod common;
 use std::path::Path;
 
 use common::{Daemon, HANG};
-use sbdp::geometry::{SourceAssembly, load_assembly};
+use sbdp::files::load_assembly;
+use sbdp::geometry::SourceAssembly;
 use sbdp::plan::{Plan, PlanStatus, PlanStep, StepEnd};
 use sbdp::search::{PlanRequest, PlanSink, Progress};
 use sbdp::service::Service;

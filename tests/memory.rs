@@ -8,7 +8,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicIsize, Ordering};
 
 use sbdp::cache::Cache;
-use sbdp::geometry::{SourceAssembly, load_assembly};
+use sbdp::files::load_assembly;
+use sbdp::geometry::SourceAssembly;
 use sbdp::plan::{Plan, PlanStatus, PlanStep};
 use sbdp::search::{PlanRequest, PlanSink, Progress, Termination};
 use sbdp::service::{AssemblyId, RECORD_KINDS, Service, ServiceError};

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use sbdp::geometry::{SourceAssembly, Waypoint, load_assembly};
+use sbdp::files::load_assembly;
+use sbdp::geometry::{SourceAssembly, Waypoint};
 use sbdp::plan::{MotionKind, Plan, PlanStatus, PlanStep};
 use sbdp::search::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress};
 use sbdp::service::Service;

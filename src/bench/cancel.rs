@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 
 use super::BenchError;
-use crate::geometry::load_assembly;
+use crate::files::load_assembly;
 use crate::plan::PlanStep;
 use crate::search::{PlanRequest, PlanSink, Progress};
 use crate::service::{AssemblyId, Service};

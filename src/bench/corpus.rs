@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use super::BenchError;
-use crate::geometry::natural_order;
+use crate::files::natural_order;
 
 /// The paper's groups of problems by their number of parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -5,7 +5,7 @@ use std::collections::{BTreeSet, HashMap};
 use super::corpus::Category;
 use super::record::Record;
 use super::{ENGINES, PAPER_PLANNERS, PDP_STAR, PDP_STAR_IS, PDP_T, PLANNERS};
-use crate::geometry::natural_order;
+use crate::files::natural_order;
 
 /// The planner that the others are measured against.
 pub(super) const REFERENCE: &str = PLANNERS[0];

@@ -13,6 +13,7 @@ use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::Waypoint;
 use crate::search;
 
+mod input;
 mod load;
 mod poses;
 mod through_daemon;
@@ -20,6 +21,7 @@ mod view;
 
 use poses::{moved, rotation};
 
+pub(super) use input::Input;
 pub(super) use load::{BenchCancel, BenchLoad, BenchLoadClient, BenchSoak};
 pub(super) use poses::placed;
 pub(super) use through_daemon::{BenchChurn, BenchLatency, BenchRawPeer, BenchReplan, BenchRestart};
@@ -64,8 +66,8 @@ pub(super) enum Command {
 /// Arguments of `sbdp plan`.
 #[derive(Debug, Args)]
 pub(super) struct PlanArguments {
-    /// A folder of OBJ and STL files in assembled pose, one such file, or a glTF or GLB scene
-    pub(super) assembly: PathBuf,
+    #[command(flatten)]
+    pub(super) input: Input,
     /// Turn the assembly by the quaternion W,X,Y,Z about the origin before anything else; the plan
     /// is that of the turned assembly, in its frame
     #[arg(long, value_name = "W,X,Y,Z", value_parser = rotation, allow_hyphen_values = true)]
@@ -172,8 +174,8 @@ pub(super) struct PlanArguments {
 /// Arguments of `sbdp check`.
 #[derive(Debug, Args)]
 pub(super) struct CheckArguments {
-    /// A folder of OBJ and STL files in assembled pose, one such file, or a glTF or GLB scene
-    pub(super) assembly: PathBuf,
+    #[command(flatten)]
+    pub(super) input: Input,
     /// Also simulate every translation from the assembled pose, and compare with what the blocking
     /// graphs exclude
     #[arg(long)]

@@ -7,18 +7,19 @@ use super::error::CliError;
 use super::table::{TextTable, length};
 use super::{interrupt, print};
 use crate::blocking_graph::Audit;
-use crate::geometry::{Healed, Solidity, SourceAssembly, heal, load_assembly};
+use crate::geometry::{Healed, Solidity, SourceAssembly, heal};
 use crate::search::{Engine, Termination};
 use crate::service::{Admission, Service};
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
-    let assembly = load_assembly(&arguments.assembly)?;
+    let assembly = arguments.input.read()?;
     let healed = assembly.parts.iter().map(heal).collect::<Result<Vec<_>, _>>()?;
     let service = Service::default();
     let admission = service.admit(&assembly)?;
     let overlaps = service.overlaps(admission.id)?;
     let mut text = headline(&assembly, &healed);
     text.push_str(&parts(&assembly, &healed));
+    text.push_str(&list("found in reading", assembly.notes.iter().map(String::clone)));
     text.push_str(&findings(&assembly, &healed));
     text.push_str(&given_twice(&admission));
     text.push_str("\noverlaps at the assembled pose:\n");
@@ -60,13 +61,14 @@ fn graphs<'a>(audit: &Audit, name: impl Fn(usize) -> &'a str) -> String {
 
 /// Warnings of the whole assembly: those of single parts are findings of healing.
 fn given_twice(admission: &Admission) -> String {
-    let mut text = String::from("\ngiven twice:\n");
-    let mut lines = admission.warnings.iter().filter(|w| w.part.is_none()).peekable();
-    if lines.peek().is_none() {
-        text.push_str("  nothing\n");
-    }
-    text.extend(lines.map(|w| format!("  {}\n", w.message)));
-    text
+    list("given twice", admission.warnings.iter().filter(|w| w.part.is_none()).map(|w| w.message.clone()))
+}
+
+/// A paragraph of lines under a heading.
+fn list(heading: &str, lines: impl Iterator<Item = String>) -> String {
+    let lines: Vec<String> = lines.map(|line| format!("  {line}\n")).collect();
+    let lines = if lines.is_empty() { "  nothing\n".to_owned() } else { lines.concat() };
+    format!("\n{heading}:\n{lines}")
 }
 
 fn headline(assembly: &SourceAssembly, healed: &[Healed]) -> String {
@@ -103,12 +105,6 @@ fn parts(assembly: &SourceAssembly, healed: &[Healed]) -> String {
 }
 
 fn findings(assembly: &SourceAssembly, healed: &[Healed]) -> String {
-    let mut text = String::from("\nfound in healing:\n");
     let found = assembly.parts.iter().zip(healed).flat_map(|(p, h)| h.findings.iter().map(move |f| (p, f)));
-    let mut lines = found.map(|(part, finding)| format!("  {}: {finding}\n", part.name)).peekable();
-    if lines.peek().is_none() {
-        text.push_str("  nothing\n");
-    }
-    text.extend(lines);
-    text
+    list("found in healing", found.map(|(part, finding)| format!("{}: {finding}", part.name)))
 }

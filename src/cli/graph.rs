@@ -6,7 +6,6 @@ use super::args::GraphArguments;
 use super::error::CliError;
 use super::part_names::resolve;
 use super::{interrupt, print, written};
-use crate::geometry::load_assembly;
 use crate::search::Termination;
 use crate::service::Service;
 use crate::simulation::{Action, Axis};
@@ -14,7 +13,8 @@ use crate::view::picture::Picture;
 
 pub(super) fn run(arguments: &GraphArguments) -> Result<ExitCode, CliError> {
     let draw = form(arguments)?;
-    let assembly = load_assembly(&arguments.assembly)?;
+    let assembly = arguments.input.read()?;
+    assembly.notes.iter().for_each(|note| eprintln!("warning: {note}"));
     let removed = resolve(&assembly, "--removed", &arguments.removed)?;
     let service = Service::default();
     let id = service.admit(&assembly)?.id;

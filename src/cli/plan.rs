@@ -13,9 +13,10 @@ use super::part_names::{part_named, resolve};
 use super::staging::staging;
 use super::subject::{Subject, content_of, only_mesh};
 use super::{cache, interrupt, print, report, written};
-use crate::geometry::{Revision, SourceAssembly, content_hash, load_assembly, pose_from_waypoint};
-use crate::plan::Plan;
+use crate::files::load_assembly;
+use crate::geometry::{Revision, SourceAssembly, content_hash, pose_from_waypoint};
 use crate::plan::export::{PlanDocument, SourceDocument};
+use crate::plan::{Plan, Warning};
 use crate::search::{PlanRequest, Planner, Termination};
 use crate::simulation::PenaltyParameters;
 
@@ -47,7 +48,7 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let termination = Termination::new(deadline);
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
     let started = Instant::now();
-    let mut assembly = load_assembly(&arguments.assembly)?;
+    let mut assembly = arguments.input.read()?;
     let read = started.elapsed();
     let content = content_hash(&assembly);
     if let Some(rotation) = &arguments.rotate {
@@ -69,7 +70,9 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let mut listener = Listener::new(arguments.trace.as_deref())?;
     let plan = backend.plan(&question, &mut listener);
     listener.finish()?;
-    let plan = plan?;
+    let mut plan = plan?;
+    let notes = assembly.notes.iter().map(|note| Warning { part: None, message: note.clone() });
+    plan.warnings.splice(0..0, notes);
     let revision = question.revision;
     let source = source(arguments, content_of(&content, &revision));
     let document = PlanDocument { source: Some(source), ..PlanDocument::new(&plan) };
@@ -82,11 +85,13 @@ fn source(arguments: &PlanArguments, content: String) -> SourceDocument {
         |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone()).display().to_string();
     let replaced = arguments.replaced.iter().map(|(part, file)| (part.clone(), absolute(file)));
     SourceDocument {
-        assembly: absolute(&arguments.assembly),
+        assembly: absolute(&arguments.input.assembly),
         content,
         rotate: arguments.rotate.map(|q| [q.w, q.i, q.j, q.k]),
         replaced: replaced.collect(),
         added: arguments.added.iter().map(absolute).collect(),
+        split: arguments.input.split.map(|split| split.to_string()),
+        ignore: arguments.input.ignore.iter().map(|pattern| pattern.as_str().to_owned()).collect(),
     }
 }
 

@@ -7,8 +7,9 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use super::error::CliError;
 use super::part_names::part_named;
 use crate::blocking_graph::DirectionalGraph;
+use crate::files::{LoadOptions, load, load_assembly};
 use crate::geometry::{
-    Assembly, Pose, Revision, SourceAssembly, SourceMesh, content_hash, load_assembly, pose_from_waypoint,
+    Assembly, Pose, Revision, SourceAssembly, SourceMesh, content_hash, pose_from_waypoint,
 };
 use crate::plan::export::{PlanDocument, SourceDocument};
 use crate::plan::{MOTION_ROUNDING, Placements, PlanKind};
@@ -69,7 +70,7 @@ impl Subject {
                 path.display()
             )));
         }
-        let mut base = load_assembly(&path)?;
+        let mut base = load(&path, &options(&source)?)?;
         let content = content_hash(&base);
         if let Some([w, x, y, z]) = source.rotate {
             base.rotate(&UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)));
@@ -158,6 +159,14 @@ pub(super) fn only_mesh(file: &Path, option: &str) -> Result<SourceMesh, CliErro
             rest + 1
         ))),
     }
+}
+
+/// How the files were read.
+fn options(source: &SourceDocument) -> Result<LoadOptions, CliError> {
+    let refused = |e: String| CliError::Refused(format!("`source` in the plan: {e}"));
+    let split = source.split.as_deref().map(str::parse).transpose().map_err(refused)?;
+    let ignore = source.ignore.iter().map(|text| text.parse().map_err(refused)).collect::<Result<_, _>>()?;
+    Ok(LoadOptions { split, ignore })
 }
 
 /// What was changed before the plan began, but for parts that were moved.

@@ -12,7 +12,7 @@ use super::{interrupt, plan, print, written};
 use crate::search::Termination;
 
 pub(super) fn run(arguments: &ViewArguments) -> Result<ExitCode, CliError> {
-    let file = &arguments.plan.assembly;
+    let file = &arguments.plan.input.assembly;
     let is_plan = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
     let (subject, code, termination) = if is_plan {
         refuse_options_of_planning()?;

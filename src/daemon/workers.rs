@@ -15,7 +15,7 @@ use super::planning::{Planning, contained, with_moved};
 use super::response_cache::CachedResponse;
 use super::shared_queue::Queues;
 use super::speculation::Speculation;
-use crate::geometry::load_assembly;
+use crate::files::load_assembly;
 use crate::plan::{Plan, PlanStep};
 use crate::search::{PlanSink, Progress, Termination, TraceEvent};
 use crate::service::AssemblyId;

@@ -125,22 +125,28 @@ impl Assembly {
     }
 }
 
-/// Parts so much larger than all others that their unit of length is likely another one.
-fn odd_sizes(meshes: &[Mesh]) -> Option<(usize, String)> {
+/// A part so much larger, and one so much smaller, than all others that its unit of length is likely another one.
+fn odd_sizes(meshes: &[Mesh]) -> Vec<(usize, String)> {
+    /// How many times. A washer is 100 times smaller than its machine, but not than the next smallest part. At half,
+    /// machines with one large frame are warned of; at double, inches among millimetres still are not (25).
     const SUSPICIOUS: f64 = 100.0;
     let size = |m: &Mesh| Bounds::of(&m.vertices).extents().max();
     let mut sizes: Vec<(f64, usize)> = meshes.iter().map(size).zip(0..).collect();
     sizes.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let [(largest, part), (next, _), ..] = sizes[..] else { return None };
-    let ratio = largest / next;
-    (ratio > SUSPICIOUS).then(|| {
-        (
-            part,
-            format!(
-                "{ratio:.0} times as large as the next largest part: check that all parts have the same unit"
-            ),
-        )
-    })
+    let odd = |ratio: f64, part: usize, what: &str| {
+        let advice = "check that all parts have the same unit";
+        (ratio > SUSPICIOUS).then(|| (part, format!("{ratio:.0} times as {what} part: {advice}")))
+    };
+    let largest = match sizes[..] {
+        [(largest, part), (next, _), ..] => odd(largest / next, part, "large as the next largest"),
+        _ => None,
+    };
+    let smallest = match sizes[..] {
+        // Of two, the larger one is odd already.
+        [_, .., (next, _), (smallest, part)] => odd(next / smallest, part, "small as the next smallest"),
+        _ => None,
+    };
+    largest.into_iter().chain(smallest).collect()
 }
 
 /// The power of two that brings the longest side of the box of all parts into (5, 10].

@@ -1,4 +1,4 @@
-//! Geometry: from files or uploads to healed meshes in the planning frame.
+//! Geometry: from meshes as given to healed ones in the planning frame.
 //!
 //! Conventions, fixed here for the whole project: right-handed frames; radians; triangles
 //! counter-clockwise from outside; signed distances negative inside; a pose `a_from_b` maps
@@ -7,6 +7,7 @@
 //! assembly's longest side falls in (5, 10].
 
 mod assembly;
+mod bodies;
 mod bounds;
 mod closed_shell;
 mod cone;
@@ -31,7 +32,6 @@ mod inner_points;
 mod joined;
 mod leading;
 mod linking_number;
-mod load;
 mod mass;
 mod mesh;
 mod oriented;
@@ -56,6 +56,7 @@ mod triangle;
 mod triangle_tree;
 
 pub use assembly::{Assembly, Part};
+pub use bodies::{bodies, is_closed};
 pub use bounds::Bounds;
 pub use closed_shell::is_within_closed_shell;
 pub use cone::extreme_rays;
@@ -74,8 +75,6 @@ pub use hull::{Support, gap_along, hull_vertices, separating, separating_directi
 pub use hull_depth::HullDepth;
 pub use inner_points::SurfacePoint;
 pub use linking_number::linking_number;
-pub use load::{load_assembly, natural_order};
-pub(crate) use load::{parse_notes, parse_part, parse_scene};
 pub use mass::MassProperties;
 pub use mesh::{Edge, Mesh, Solidity};
 pub use oriented::OrientedSamples;
@@ -93,7 +92,7 @@ pub use sample_tree::{Look, SampleBall, SampleNode, SampleTree};
 pub use samples::Spacing;
 pub use screw::Screw;
 pub use shape::Shape;
-pub use source::{SourceAssembly, SourceMesh, SourcePart};
+pub use source::{SourceAssembly, SourceGroup, SourceMesh, SourcePart};
 pub use surface::{SignedClosest, Surface};
 pub use surface_loops::surface_loops;
 pub use triangle::{Closest, Feature, area_normal, bisected, closest_on_triangle};

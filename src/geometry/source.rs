@@ -23,6 +23,15 @@ pub struct SourcePart {
     pub mesh: SourceMesh,
 }
 
+/// Parts that belong together where the assembly comes from: a node of a scene, a product of a CAD program.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SourceGroup {
+    /// Its name; of nested groups the names from the outside in, with slashes between.
+    pub name: String,
+    /// The names of all parts in it, of nested groups, too. At least two.
+    pub parts: Vec<String>,
+}
+
 /// An assembly as given. Parts stand in natural order of their names ("2" before "10").
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SourceAssembly {
@@ -38,6 +47,12 @@ pub struct SourceAssembly {
     /// assembly, not to its content.
     #[serde(skip)]
     pub base: Vec<String>,
+    /// Which parts belong together, outer groups before inner ones. Not content, either.
+    #[serde(skip)]
+    pub groups: Vec<SourceGroup>,
+    /// What was left out, chosen or in doubt when the files were read, in sentences that name the file. Not content, either.
+    #[serde(skip)]
+    pub notes: Vec<String>,
 }
 
 impl SourceAssembly {

@@ -88,6 +88,12 @@ pub struct SourceDocument {
     /// Files and folders of further parts (`--added`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub added: Vec<String>,
+    /// What was taken as a part in files that hold several (`--split`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub split: Option<String>,
+    /// Patterns of the names of parts and files that were left out (`--ignore`).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ignore: Vec<String>,
 }
 
 /// The state that planning began with, where it differs from the assembly as given.

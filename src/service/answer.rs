@@ -10,6 +10,7 @@ use crate::plan::{
     Base, Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd, Warning,
 };
 use crate::search::{BlockedAction, Outcome, PlanRequest, Removal};
+use crate::tolerances::DEEP_OVERLAP;
 
 /// Turns below this are rounding.
 const NO_TURN: f64 = 1e-9;
@@ -115,6 +116,21 @@ fn poses(assembly: &Assembly) -> Vec<(usize, Waypoint)> {
 
 pub(super) fn overlaps(assembly: &Assembly, found: &[(usize, usize, f64)]) -> Vec<Overlap> {
     found.iter().map(|&(a, b, d)| Overlap { parts: [a, b], depth: d / assembly.scale }).collect()
+}
+
+/// Overlaps so deep that a part is likely in a wrong place.
+pub(super) fn deep_overlaps(assembly: &Assembly, found: &[(usize, usize, f64)]) -> Vec<String> {
+    let thickness = |part: usize| assembly.parts[part].bounds.extents().min();
+    let doubt = |&(a, b, depth): &(usize, usize, f64)| {
+        let (smaller, larger) = if thickness(a) <= thickness(b) { (a, b) } else { (b, a) };
+        let share = depth / thickness(smaller);
+        let [smaller, larger] = [smaller, larger].map(|part| &assembly.parts[part].name);
+        (share >= DEEP_OVERLAP).then(|| {
+            let percent = 100.0 * share;
+            format!("{smaller} is in {larger} by {percent:.0} % of its smallest side as assembled: check where it stands")
+        })
+    };
+    found.iter().filter_map(doubt).collect()
 }
 
 /// The findings about the input. The one about parts that are given twice is left out if enough of them are removed.

@@ -185,6 +185,7 @@ impl Entry {
     ) -> (PlanFrame<'f>, SearchAnswer) {
         let PlanAnswer { outcome, overlaps } = answered;
         frame.overlaps = answer::overlaps(&self.assembly, &overlaps);
+        frame.notes.extend(answer::deep_overlaps(&self.assembly, &overlaps));
         let engine = engine_of(frame.request.engine, frame.request.penalty);
         frame.notes.extend(accepted(&*engine, prepared::depth_limit(&self.assembly), &self.assembly).1);
         for removal in &outcome.removals {
@@ -205,6 +206,7 @@ impl Entry {
         let Time { started, termination } = time;
         let SearchInput { prepared, hit, fields, cache, question } = *ready;
         frame.overlaps = answer::overlaps(&self.assembly, &prepared.overlaps);
+        frame.notes.extend(answer::deep_overlaps(&self.assembly, &prepared.overlaps));
         let engine = engine_of(request.engine, request.penalty);
         let (limit, note) = accepted(&*engine, prepared.verifier.limit(), &self.assembly);
         let verifier = prepared.verifier.with_limit(limit);

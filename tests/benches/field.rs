@@ -16,7 +16,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use nalgebra::{Point3, Vector3};
-use sbdp::geometry::{Assembly, Bounds, SourceAssembly, SourceMesh, SourcePart, Surface, load_assembly};
+use sbdp::files::load_assembly;
+use sbdp::geometry::{Assembly, Bounds, SourceAssembly, SourceMesh, SourcePart, Surface};
 use sbdp::sdf::Field;
 use sbdp::termination::Termination;
 

@@ -3,7 +3,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use sbdp::geometry::{Assembly, load_assembly};
+use sbdp::files::load_assembly;
+use sbdp::geometry::Assembly;
 use sbdp::plan::Verifier;
 use sbdp::scene::{CongruentPair, Scene};
 use sbdp::sdf::Field;

@@ -63,6 +63,9 @@ fn built_in(reader: Reader) -> Vec<Vec<u8>> {
             b"name = \"a\"\nfixed = [\"0\"]\n[densities]\n0 = 1.5\n[[parts]]\nfile = \"0.obj\"\n".to_vec(),
             br#"{"0": [1.0, 2.0, 3.0]}"#.to_vec(),
             b"[[1.0, 2.0, 3.0]]".to_vec(),
+            br#"{"parts": ["0.obj", {"file": "1.obj"}], "split": "objects", "ignore": ["*bolt*", "[ab]?"]}"#.to_vec(),
+            br#"{"0": {"initial_state": [1, 2, 3], "final_state": [1, 2, 3, 0.5, 0.25, 1.5]}, "1": {"final_state": [0, 0, 1]}}"#.to_vec(),
+            br#"{"tree": {"root": {"o": {"p": {}}}}, "root": {"bodies": {"b": {"is_visible": true}}}, "occurrences": {"o": {"name": "x", "is_visible": true, "bodies": {"b": {}, "c": {"is_visible": false}}, "transform": {"origin": {"x": 1, "y": 2, "z": 3}, "x_axis": {"x": 1, "y": 0, "z": 0}, "y_axis": {"x": 0, "y": 1, "z": 0}, "z_axis": {"x": 0, "y": 0, "z": 1}}}, "p": {"name": "y"}}, "bodies": {"b": {"name": "B", "obj": "b.obj"}, "c": {"name": "C", "obj": "c.obj"}}}"#.to_vec(),
         ],
         Reader::Records => records(),
         Reader::Fields => vec![field_file()],
@@ -73,9 +76,10 @@ fn built_in(reader: Reader) -> Vec<Vec<u8>> {
         Reader::Obj | Reader::Healing => vec![
             b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n".to_vec(),
             b"o a\nv 0 0 0\nvn 0 0 1\nvt 0 0\nf -1/1/1 1//1 1\n".to_vec(),
+            b"o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\no b\ng c d\nl 1 2\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\nsurf 1\n".to_vec(),
         ],
-        Reader::Stl => vec![b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), binary_stl()],
-        Reader::Gltf => vec![],
+        Reader::Stl => vec![b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nsolid b\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 0 1\nendloop\nendfacet\nendsolid\n".to_vec(), b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), binary_stl()],
+        Reader::Gltf => vec![br#"{"asset":{"version":"2.0","extras":{"units":"mm"}},"scenes":[{"nodes":[0]}],"extensionsRequired":["EXT_mesh_gpu_instancing","KHR_mesh_quantization"],"nodes":[{"name":"a","mesh":0,"scale":[1,1,-1],"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":2}}}}],"meshes":[{"weights":[1],"primitives":[{"attributes":{"POSITION":0},"indices":1},{"attributes":{"POSITION":0},"mode":1}]}],"accessors":[{"bufferView":0,"componentType":5123,"normalized":true,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},{"bufferView":1,"componentType":5121,"count":3,"type":"SCALAR"},{"bufferView":2,"componentType":5126,"count":2,"type":"VEC3"}],"bufferViews":[{"buffer":0,"byteLength":24,"byteStride":8},{"buffer":0,"byteOffset":24,"byteLength":4},{"buffer":0,"byteOffset":28,"byteLength":24}],"buffers":[{"byteLength":52,"uri":"data:;base64,AAAAAAAAAAD//wAAAAAAAAAA//8AAAAAAAECAAAAAAAAAAAAAAAAAAAAoEAAAAAAAAAAAA=="}]}"#.to_vec()],
         Reader::Plan => vec![PLAN.as_bytes().to_vec()],
     }
 }

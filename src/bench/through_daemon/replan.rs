@@ -10,7 +10,8 @@ use serde::Serialize;
 use super::BenchError;
 use super::asking::{Answered, AnsweredStep, leave_alone, plan};
 use super::server::{Place, Server};
-use crate::geometry::{SourceAssembly, SourceMesh, load_assembly};
+use crate::files::load_assembly;
+use crate::geometry::{SourceAssembly, SourceMesh};
 use crate::upload::{wire_assembly, wire_part};
 
 /// One question, cold or after the change.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use nalgebra::{Unit, Vector3};
 
-use super::PlanArguments;
+use super::{Input, PlanArguments};
 use crate::simulation::{Action, Axis};
 
 /// Arguments of `sbdp view`.
@@ -27,8 +27,8 @@ pub(in crate::cli) struct ViewArguments {
 /// Arguments of `sbdp graph`.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct GraphArguments {
-    /// A folder of OBJ and STL files in assembled pose, one such file, or a glTF or GLB scene
-    pub(in crate::cli) assembly: PathBuf,
+    #[command(flatten)]
+    pub(in crate::cli) input: Input,
     /// +x, -x, +y, -y, +z, -z or X,Y,Z (repeatable) [default: both ways along the axes that a search of
     /// this assembly uses]
     #[arg(long, value_name = "DIRECTION", value_parser = direction, allow_hyphen_values = true)]

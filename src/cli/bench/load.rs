@@ -9,7 +9,8 @@ use super::super::print;
 use super::THIS_PROGRAM;
 use super::through_daemon::{frame, written};
 use crate::bench::{self, CancelRequest, Load, LoadClient, LoadRequest, Phase, SoakRequest};
-use crate::geometry::{SourceAssembly, load_assembly};
+use crate::files::load_assembly;
+use crate::geometry::SourceAssembly;
 
 pub(super) fn load(arguments: &BenchLoad) -> Result<ExitCode, CliError> {
     let request = LoadRequest {

@@ -12,7 +12,8 @@ use super::super::error::CliError;
 use super::super::print;
 use super::THIS_PROGRAM;
 use crate::bench::{self, ChurnRequest, Cost, Family, LatencyRequest, Percentiles, ReplanRecord};
-use crate::geometry::{SourceAssembly, SourcePart, load_assembly};
+use crate::files::load_assembly;
+use crate::geometry::{SourceAssembly, SourcePart};
 
 /// Parts of the assembly that is planned by default.
 const PARTS: usize = 20;

@@ -18,6 +18,8 @@ mod tests;
 
 use nalgebra::Point3;
 
+pub(in crate::geometry) use shells::{components, members};
+
 use super::incidence::open_edges;
 use super::{GeometryError, Mesh, Solidity, SourcePart};
 use crate::termination::{Interrupt, Termination};

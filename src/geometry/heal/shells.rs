@@ -122,7 +122,7 @@ fn sort_around(draft: &Draft, [low, high]: [u32; 2], sides: &mut [Side]) {
 }
 
 /// The least index that each of `count` things is linked to.
-fn components(count: usize, links: impl Iterator<Item = [u32; 2]>) -> Vec<u32> {
+pub(in crate::geometry) fn components(count: usize, links: impl Iterator<Item = [u32; 2]>) -> Vec<u32> {
     let mut parent: Vec<u32> = (0..count as u32).collect();
     for [a, b] in links {
         let (a, b) = (root(&mut parent, a), root(&mut parent, b));
@@ -140,7 +140,7 @@ fn root(parent: &mut [u32], mut of: u32) -> u32 {
 }
 
 /// The things of each component, by its least index.
-fn members(component_of: &[u32]) -> BTreeMap<u32, Vec<u32>> {
+pub(in crate::geometry) fn members(component_of: &[u32]) -> BTreeMap<u32, Vec<u32>> {
     let mut members: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (thing, &component) in (0u32..).zip(component_of) {
         members.entry(component).or_default().push(thing);

@@ -135,8 +135,14 @@ mod tests {
         };
         // The base is not recorded.
         let (fixed, base) = (vec!["0".to_owned()], vec!["0".to_owned()]);
-        let source =
-            SourceAssembly { name: "name".into(), units: Some("mm".into()), parts: vec![part], fixed, base };
+        let source = SourceAssembly {
+            name: "name".into(),
+            units: Some("mm".into()),
+            parts: vec![part],
+            fixed,
+            base,
+            ..SourceAssembly::default()
+        };
         assert_eq!(payload(&AssemblySource::Given(source)), Some(given.concat()));
         assert_eq!(payload(&AssemblySource::Revised([7; 32], revision)), Some(revised.concat()));
     }
