@@ -3,6 +3,7 @@
 import json
 import struct
 from array import array
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import Optional
 
@@ -115,9 +116,9 @@ class Writer:
             self.known_materials[colour] = len(self.materials) - 1
         return self.known_materials[colour]
 
-    def node(self, node):
+    def node(self, node, name):
         at = len(self.nodes)
-        self.nodes.append({"name": node.name})
+        self.nodes.append({"name": name})
         written = self.nodes[at]
         extras = {key: value for key, value in (("product", node.product), ("instance", node.instance)) if value}
         if extras:
@@ -127,19 +128,26 @@ class Writer:
         if node.mesh:
             written["mesh"] = self.mesh(node.mesh)
         if children := [child for child in node.children if child.has_mesh()]:
-            written["children"] = [self.node(child) for child in children]
+            written["children"] = [self.node(child, name) for child, name in told_apart(children)]
         return at
 
 
-def glb(roots, name, unit, metres):
-    """The bytes of a GLB: lengths in the file's unit below a root node that scales them to metres."""
+def told_apart(siblings):
+    """The names of nodes below one node: the product's, or where several have it the instance's, if these differ."""
+    products, instances = Counter(node.name for node in siblings), Counter(node.instance for node in siblings)
+    for node in siblings:
+        is_better = node.instance and instances[node.instance] == 1 and node.instance not in products.keys() - {node.name}
+        yield node, node.instance if products[node.name] > 1 and is_better else node.name
+
+
+def glb(roots, unit):
+    """The bytes of a GLB whose lengths are in the file's unit."""
     writer = Writer()
-    writer.nodes.append({"name": name, "scale": [metres] * 3, "extras": {"unit": unit}})
-    writer.nodes[0]["children"] = [writer.node(root) for root in roots if root.has_mesh()]
+    tops = [writer.node(root, name) for root, name in told_apart([root for root in roots if root.has_mesh()])]
     document = {
         "asset": {"version": "2.0", "generator": "sbdp-step", "extras": {"unit": unit, "up": "z"}},
         "scene": 0,
-        "scenes": [{"nodes": [0]}],
+        "scenes": [{"nodes": tops}],
         "nodes": writer.nodes,
         "meshes": writer.meshes,
         "accessors": writer.accessors,

@@ -30,7 +30,7 @@ COMPLEX = re.compile(rb"#(\d+)\s*=\s*\(((?:'(?:[^']|'')*'|[^;'])*)\)\s*;")
 TOKEN = re.compile(r"'(?:[^']|'')*'|#\d+|\$|\*|\(|\)|[^,()'#\s]+")
 METRES = {"": 1.0, "EXA": 1e18, "KILO": 1e3, "CENTI": 1e-2, "DECI": 1e-1, "MILLI": 1e-3, "MICRO": 1e-6, "NANO": 1e-9}
 # Names of units as sbdp writes them, by metres.
-UNITS = {1.0: "m", 1e-2: "cm", 1e-3: "mm", 1e-6: "um", 1e3: "km", 0.0254: "in", 0.3048: "ft"}
+UNITS = {1.0: "m", 1e-2: "cm", 1e-3: "mm", 1e-6: "µm", 0.0254: "in", 0.3048: "ft"}
 
 
 @dataclass

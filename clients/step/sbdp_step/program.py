@@ -89,7 +89,7 @@ def convert(package, given):
     found = products(roots)
     if not found:
         raise Refusal("there is no solid and no face in the file that could be tessellated")
-    bytes_ = glb(roots, given.input.stem, structure.unit, structure.metres)
+    bytes_ = glb(roots, structure.unit)
     given.output.write_bytes(bytes_)
     return {
         "sbdp-step": 1,

@@ -96,7 +96,8 @@ def write(folder, out):
         name = part["name"].split("#")[0]
         vertices, triangles = read_obj(folder / part["file"])
         volume, centroid = volume_and_centroid(vertices, triangles)
-        bodies.append(Body(name, name, part["name"], volume, centroid))
+        # The first of equal products has the product's name in the corpus, all others a number.
+        bodies.append(Body(part["name"], name, part["name"], volume, centroid))
         for known, their_vertices, key in made:
             if known == name and (found := motion(their_vertices, vertices)):
                 break

@@ -7,6 +7,7 @@ import json
 import math
 import re
 import sys
+from collections import Counter
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -135,7 +136,14 @@ class Document:
         placement = placement or gp_Trsf()
         _, solids, children = self.products[root]
         if solids is None:
-            return [b for product, name, own in children for b in self.bodies(product, placement.Multiplied(own), name)]
+            uses = Counter(product for product, _, _ in children)
+            found = []
+            for product, name, own in children:
+                below = self.bodies(product, placement.Multiplied(own), name)
+                if uses[product] > 1 and self.products[product][1] and len(below) == 1:
+                    below[0].name = name
+                found += below
+            return found
         found = []
         for number, solid in enumerate(solids, 1):
             volume, centroid = volume_and_centroid(BRepBuilderAPI_Transform(solid, placement, True).Shape())

@@ -24,11 +24,11 @@ CORPUS_ENTRIES = ["gallery/caxif-as1-oc-214", "gallery/caxif-dm1-id-214", "galle
 # 1.3e-3 of its volume at worst, half of it as the kernel works.
 VOLUME, PLACE = 1e-3, 1e-3
 DEFLECTION = 0.002
-METRES = {"mm": 1e-3, "m": 1.0, "in": 0.0254}
+MILLIMETRES = {"mm": 1.0, "m": 1000.0, "in": 25.4}
 
 
 class Glb:
-    """A GLB as a reader sees it: bodies in the frame of the scene, in metres."""
+    """A GLB as a reader sees it: bodies in the frame of the scene, in the unit that its extras name."""
 
     def __init__(self, data):
         magic, version, length = struct.unpack_from("<4sII", data)
@@ -45,8 +45,7 @@ class Glb:
         self.seen.append(number)
         node = self.document["nodes"][number]
         m = node.get("matrix", [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])
-        scale = node.get("scale", [1, 1, 1])
-        own = [[m[4 * c + r] * (scale[c] if c < 3 else 1) for c in range(4)] for r in range(3)]
+        own = [[m[4 * c + r] for c in range(4)] for r in range(3)]
         here = [[sum(above[r][k] * own[k][c] for k in range(3)) + (above[r][3] if c == 3 else 0) for c in range(4)] for r in range(3)]
         extras = node.get("extras", {})
         own_product = extras.get("product", product and product[0]), extras.get("instance", product and product[1])
@@ -153,15 +152,15 @@ class Conformance:
             self.assertEqual(report["warnings"], [])
         bodies = [b for b in scene.bodies if b[5]]
         self.assertEqual(len(bodies), len(wanted["bodies"]), "closed bodies")
-        left = list(bodies)
+        left, unit = list(bodies), MILLIMETRES[wanted["unit"]]
         for want in wanted["bodies"]:
-            size = (want["volume"] * 1e-9) ** (1 / 3)
-            off = lambda body: math.dist(body[4], [x * 1e-3 for x in want["centroid"]])
+            size = want["volume"] ** (1 / 3)
+            off = lambda body: math.dist([x * unit for x in body[4]], want["centroid"])
             same = [b for b in left if b[0] == want["name"] and b[1] == want["product"]]
             self.assertTrue(same, f"{want['name']}: {sorted(b[0] for b in left)}")
             body = min(same, key=off)
             self.assertLess(off(body), PLACE * size, want["name"])
-            self.assertLess(abs(body[3] / (want["volume"] * 1e-9) - 1), VOLUME, want["name"])
+            self.assertLess(abs(body[3] * unit**3 / want["volume"] - 1), VOLUME, want["name"])
             self.assertEqual(body[2] or "", want["instance"] or "", want["name"])
             left.remove(body)
         counts = {p["name"]: p["instances"] * p["solids"] for p in report["products"]}

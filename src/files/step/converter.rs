@@ -39,7 +39,8 @@ impl Converter {
             return Self::named(&named, "SBDP_STEP", &path);
         }
         let beside = env::current_exe().ok().and_then(|exe| Some(exe.parent()?.join(PROGRAM)));
-        let found = beside.into_iter().filter(|file| is_program(file)).chain(on_path(PROGRAM.as_ref(), &path)).next();
+        let found =
+            beside.into_iter().filter(|file| is_program(file)).chain(on_path(PROGRAM.as_ref(), &path)).next();
         found.map(Self).ok_or_else(|| {
             "STEP files need a converter: install one with `pip install \"clients/step[ocp]\"` in sbdp's sources, or \
              name one with --converter; or export the assembly from the CAD program as GLB"
@@ -49,7 +50,8 @@ impl Converter {
 
     /// A path, or a name on `$PATH`.
     fn named(named: &Path, by: &str, path: &OsStr) -> Result<Self, String> {
-        let is_name = named.components().count() == 1 && !named.as_os_str().as_encoded_bytes().contains(&b'/');
+        let is_name =
+            named.components().count() == 1 && !named.as_os_str().as_encoded_bytes().contains(&b'/');
         let found = if is_program(named) {
             // The program is started in another folder.
             std::path::absolute(named).ok()
@@ -73,14 +75,16 @@ impl Converter {
 
     /// What the output depends on beside the file: the line of `--version`. Each program is asked once in a process.
     pub(super) fn version(&self, settings: &StepSettings) -> Result<String, String> {
-        static KNOWN: LazyLock<Mutex<HashMap<PathBuf, Result<String, String>>>> = LazyLock::new(Mutex::default);
+        static KNOWN: LazyLock<Mutex<HashMap<PathBuf, Result<String, String>>>> =
+            LazyLock::new(Mutex::default);
         // Held while the program is asked: files of a folder are read at the same time.
         let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
         known.entry(self.0.clone()).or_insert_with(|| self.ask_version(settings)).clone()
     }
 
     fn ask_version(&self, settings: &StepSettings) -> Result<String, String> {
-        let folder = TemporaryFolder::new().map_err(|e| format!("no temporary files for the converter: {e}"))?;
+        let folder =
+            TemporaryFolder::new().map_err(|e| format!("no temporary files for the converter: {e}"))?;
         let limits = Limits {
             deadline: settings.deadline.min(Duration::from_secs(STEP_VERSION_SECONDS)),
             memory_bytes: settings.memory_bytes,
@@ -96,7 +100,11 @@ impl Converter {
     }
 
     /// What it wrote to stdout, if it ended well; else what went wrong and what to do.
-    pub(super) fn outcome(&self, finished: Result<Finished, Stopped>, limits: &Limits) -> Result<Vec<u8>, String> {
+    pub(super) fn outcome(
+        &self,
+        finished: Result<Finished, Stopped>,
+        limits: &Limits,
+    ) -> Result<Vec<u8>, String> {
         let program = self.shown();
         let finished = finished.map_err(|stopped| match stopped {
             Stopped::NotStarted(e) => format!("the converter {program} cannot be started: {e}"),
@@ -115,7 +123,9 @@ impl Converter {
         let reason = shortened(&printable(&finished.complaint));
         Err(match (finished.code, finished.signal) {
             (Some(REFUSED), _) if !reason.is_empty() => format!("the converter refuses it: {reason}"),
-            (Some(code), _) => format!("the converter {program} failed with exit code {code}{}", after(&reason)),
+            (Some(code), _) => {
+                format!("the converter {program} failed with exit code {code}{}", after(&reason))
+            }
             (None, signal) => format!(
                 "the converter {program} crashed (signal {}); it may use {} MB of memory, and this file may need more, \
                  or it is damaged: export parts of the assembly, or give a larger --deflection{}",
@@ -144,5 +154,8 @@ fn is_program(file: &Path) -> bool {
 
 /// The programs of a name in the folders of `$PATH`.
 fn on_path(name: &OsStr, path: &OsStr) -> impl Iterator<Item = PathBuf> {
-    env::split_paths(path).filter(|folder| folder.is_absolute()).map(move |folder| folder.join(name)).filter(|f| is_program(f))
+    env::split_paths(path)
+        .filter(|folder| folder.is_absolute())
+        .map(move |folder| folder.join(name))
+        .filter(|f| is_program(f))
 }

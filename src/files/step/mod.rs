@@ -15,7 +15,7 @@ mod tests;
 
 use std::ffi::OsString;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use self::converter::Converter;
@@ -69,7 +69,7 @@ pub(crate) struct ConvertedStep {
     pub(crate) warnings: Vec<String>,
 }
 
-/// Converts the bytes of a STEP file, or finds what was made of them before. `path` is for messages.
+/// Converts the bytes of a STEP file, or finds what was made of them before.
 ///
 /// # Errors
 /// No converter; a file that is too large, or that the converter refuses; a converter that does not end in time, needs too
@@ -99,7 +99,8 @@ pub(crate) fn convert(bytes: &[u8], settings: &StepSettings) -> Result<Converted
 
 /// Has the converter convert a copy of the file: it sees no other file, and what was hashed is what is converted.
 fn run(converter: &Converter, bytes: &[u8], settings: &StepSettings) -> Result<ConvertedStep, String> {
-    let unusable = |e: std::io::Error| format!("no temporary files for the converter: {e}; is the disk full?");
+    let unusable =
+        |e: std::io::Error| format!("no temporary files for the converter: {e}; is the disk full?");
     let folder = TemporaryFolder::new().map_err(unusable)?;
     let (input, output) = (folder.path().join("input.step"), folder.path().join("output.glb"));
     fs::write(&input, bytes).map_err(unusable)?;
@@ -111,8 +112,11 @@ fn run(converter: &Converter, bytes: &[u8], settings: &StepSettings) -> Result<C
         "--angle".into(),
         STEP_ANGLE.to_string().into(),
     ];
-    let limits =
-        Limits { deadline: settings.deadline, memory_bytes: settings.memory_bytes, file_bytes: STEP_OUTPUT_BYTES };
+    let limits = Limits {
+        deadline: settings.deadline,
+        memory_bytes: settings.memory_bytes,
+        file_bytes: STEP_OUTPUT_BYTES,
+    };
     let finished = process::run(converter.program(), &arguments, folder.path(), &limits);
     let stdout = converter.outcome(finished, &limits)?;
     let broken = |what: &str| format!("the converter {} {what}", converter.shown());

@@ -100,7 +100,12 @@ pub(super) struct Group {
 }
 
 impl Group {
-    pub(super) fn start(program: &Path, arguments: &[OsString], folder: &Path, limits: &Limits) -> io::Result<Self> {
+    pub(super) fn start(
+        program: &Path,
+        arguments: &[OsString],
+        folder: &Path,
+        limits: &Limits,
+    ) -> io::Result<Self> {
         let child = Command::new("/bin/sh")
             .args(["-c", LIMITED, "sbdp-converter"])
             .arg((limits.file_bytes / 512).to_string())

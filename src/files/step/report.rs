@@ -9,8 +9,8 @@ use crate::files::text::printable;
 const CONTRACT: u32 = 1;
 
 /// Units of length, with their millimetres.
-const UNITS: [(&str, f64); 7] =
-    [("um", 1e-3), ("mm", 1.0), ("cm", 10.0), ("m", 1e3), ("km", 1e6), ("in", 25.4), ("ft", 304.8)];
+const UNITS: [(&str, f64); 6] =
+    [("µm", 1e-3), ("mm", 1.0), ("cm", 10.0), ("m", 1e3), ("in", 25.4), ("ft", 304.8)];
 
 /// Warnings of a converter that are kept. One for each product of a large assembly would hide all others.
 const MOST_WARNINGS: usize = 200;
@@ -36,7 +36,10 @@ impl Report {
         let report: Self = serde_json::from_str(line)
             .map_err(|e| format!("wrote a line to stdout that is not the contract's JSON ({e})"))?;
         if report.contract != CONTRACT {
-            return Err(format!("keeps version {} of the contract, not {CONTRACT}; install another one", report.contract));
+            return Err(format!(
+                "keeps version {} of the contract, not {CONTRACT}; install another one",
+                report.contract
+            ));
         }
         Ok(report)
     }
@@ -44,8 +47,9 @@ impl Report {
     /// The report with the scene that belongs to it.
     pub(super) fn into_converted(self, glb: Vec<u8>) -> Result<ConvertedStep, String> {
         let known = UNITS.iter().find(|(name, _)| *name == self.unit);
-        let (_, millimetres) =
-            known.ok_or_else(|| format!("names the unit `{}`, which is none of the contract's", printable(&self.unit)))?;
+        let (_, millimetres) = known.ok_or_else(|| {
+            format!("names the unit `{}`, which is none of the contract's", printable(&self.unit))
+        })?;
         if !(self.deflection.is_finite() && self.deflection > 0.0) {
             return Err(format!("tells a deflection of {}", self.deflection));
         }

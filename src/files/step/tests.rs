@@ -62,7 +62,9 @@ impl Script {
 
 /// A script that keeps the contract, and counts how often it was run.
 fn good() -> Script {
-    Script::new(&format!("echo run >> $here/runs\nprintf 'glTF%s' \"$4 $6\" > \"$2\"\ncat >&2 \"$1\"\necho '{LINE}'"))
+    Script::new(&format!(
+        "echo run >> $here/runs\nprintf 'glTF%s' \"$4 $6\" > \"$2\"\ncat >&2 \"$1\"\necho '{LINE}'"
+    ))
 }
 
 fn refusal(body: &str) -> String {
@@ -77,7 +79,10 @@ fn says(reason: &str, words: &[&str]) {
 fn what_a_converter_writes_is_read() {
     let converted = good().convert().unwrap();
     assert_eq!(converted.glb, b"glTF0.01 0.5");
-    assert_eq!((converted.unit.as_str(), converted.warnings.as_slice()), ("in", &["`a` is odd".to_owned()][..]));
+    assert_eq!(
+        (converted.unit.as_str(), converted.warnings.as_slice()),
+        ("in", &["`a` is odd".to_owned()][..])
+    );
     assert!((converted.resolution - 0.001).abs() < 1e-12, "{}", converted.resolution);
 }
 
@@ -149,9 +154,18 @@ fn converters_that_break_the_contract_are_named() {
         (&format!("echo garbage > \"$2\"; {line}"), &["something else than a GLB"]),
         ("printf glTF > \"$2\"", &["line of JSON"]),
         ("printf glTF > \"$2\"; echo fine", &["not the contract's JSON"]),
-        ("printf glTF > \"$2\"; echo '{\"sbdp-step\": 2, \"unit\": \"mm\", \"deflection\": 1}'", &["version 2"]),
-        ("printf glTF > \"$2\"; echo '{\"sbdp-step\": 1, \"unit\": \"ell\", \"deflection\": 1}'", &["unit `ell`"]),
-        ("printf glTF > \"$2\"; echo '{\"sbdp-step\": 1, \"unit\": \"mm\", \"deflection\": -1}'", &["deflection"]),
+        (
+            "printf glTF > \"$2\"; echo '{\"sbdp-step\": 2, \"unit\": \"mm\", \"deflection\": 1}'",
+            &["version 2"],
+        ),
+        (
+            "printf glTF > \"$2\"; echo '{\"sbdp-step\": 1, \"unit\": \"ell\", \"deflection\": 1}'",
+            &["unit `ell`"],
+        ),
+        (
+            "printf glTF > \"$2\"; echo '{\"sbdp-step\": 1, \"unit\": \"mm\", \"deflection\": -1}'",
+            &["deflection"],
+        ),
         ("echo 'no such option' >&2; exit 2", &["exit code 2", "no such option"]),
         ("exit 3", &["exit code 3"]),
         ("kill -SEGV $$", &["crashed", "signal 11", "256 MB"]),
@@ -177,7 +191,9 @@ fn a_converter_that_hangs_is_killed_with_its_children() {
 fn is_gone(process: &str) -> bool {
     let runs = || {
         let stat = fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
-        stat.rsplit(')').next().is_some_and(|rest| !rest.is_empty() && !rest.trim_start().starts_with(['Z', 'X']))
+        stat.rsplit(')')
+            .next()
+            .is_some_and(|rest| !rest.is_empty() && !rest.trim_start().starts_with(['Z', 'X']))
     };
     (0..100).any(|_| {
         thread::sleep(Duration::from_millis(20));
@@ -221,8 +237,13 @@ fn a_converter_does_not_outlive_sbdp() {
     let file = script.folder.path().join("pid");
     let text = format!("echo $$ > {}; exec sleep 1000", file.display());
     let limits = Limits { deadline: Duration::from_secs(60), memory_bytes: 1 << 30, file_bytes: 1 << 20 };
-    let mut group =
-        process::Group::start(Path::new("/bin/sh"), &["-c".into(), text.into()], script.folder.path(), &limits).unwrap();
+    let mut group = process::Group::start(
+        Path::new("/bin/sh"),
+        &["-c".into(), text.into()],
+        script.folder.path(),
+        &limits,
+    )
+    .unwrap();
     let until = Instant::now() + Duration::from_secs(10);
     while !fs::read_to_string(&file).is_ok_and(|pid| pid.ends_with('\n')) && Instant::now() < until {
         thread::sleep(Duration::from_millis(10));
@@ -244,8 +265,7 @@ fn output_that_a_daemon_holds_open_is_not_waited_for() {
 #[test]
 fn what_is_no_program_is_named() {
     let script = Script::new("");
-    let settings =
-        |path: &Path| StepSettings { converter: Some(path.to_owned()), ..StepSettings::default() };
+    let settings = |path: &Path| StepSettings { converter: Some(path.to_owned()), ..StepSettings::default() };
     for path in [Path::new("/no/such/program"), script.folder.path(), Path::new("no-such-name-on-the-path")] {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         says(&convert(b"x", &settings(path)).unwrap_err(), &["--converter", &name, "not there"]);
