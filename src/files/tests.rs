@@ -329,7 +329,7 @@ fn converter(folder: &Path, unit: &str) -> StepSettings {
         r#"{{"asset":{{"version":"2.0","extras":{{"unit":"{unit}"}}}},"scenes":[{{"nodes":[0]}}],
 "nodes":[{{"name":"group","children":[1]}},{{"name":"a","mesh":0}}],
 "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],
-"accessors":[{{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"}},
+"accessors":[{{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[1,1,1]}},
 {{"bufferView":1,"componentType":5121,"count":12,"type":"SCALAR"}}],
 "bufferViews":[{{"buffer":0,"byteLength":48}},{{"buffer":0,"byteOffset":48,"byteLength":12}}],
 "buffers":[{{"byteLength":60,"uri":"data:application/octet-stream;base64,{data}"}}]}}"#

@@ -27,6 +27,9 @@ DEFLECTION = 0.002
 MILLIMETRES = {"mm": 1.0, "m": 1000.0, "in": 25.4}
 
 
+IDENTITY = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]
+
+
 class Glb:
     """A GLB as a reader sees it: bodies in the frame of the scene, in the unit that its extras name."""
 
@@ -38,15 +41,20 @@ class Glb:
         self.binary = data[28 + size :]
         self.bodies, self.seen = [], []
         for root in self.document["scenes"][0]["nodes"]:
-            self.visit(root, [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]], None)
+            self.visit(root, IDENTITY, None)
+
+    @staticmethod
+    def below(above, node):
+        """The pose of a node in the scene."""
+        m = node.get("matrix", [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])
+        own = [[m[4 * c + r] for c in range(4)] for r in range(3)]
+        return [[sum(above[r][k] * own[k][c] for k in range(3)) + (above[r][3] if c == 3 else 0) for c in range(4)] for r in range(3)]
 
     def visit(self, number, above, product):
         assert number not in self.seen, "a node in two places"
         self.seen.append(number)
         node = self.document["nodes"][number]
-        m = node.get("matrix", [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])
-        own = [[m[4 * c + r] for c in range(4)] for r in range(3)]
-        here = [[sum(above[r][k] * own[k][c] for k in range(3)) + (above[r][3] if c == 3 else 0) for c in range(4)] for r in range(3)]
+        here = self.below(above, node)
         extras = node.get("extras", {})
         own_product = extras.get("product", product and product[0]), extras.get("instance", product and product[1])
         if "mesh" in node:
@@ -54,17 +62,36 @@ class Glb:
         for child in node.get("children", []):
             self.visit(child, here, own_product)
 
+    def meshes(self):
+        """The path of names and the OBJ text of every body."""
+
+        def visit(number, above, path):
+            node = self.document["nodes"][number]
+            here, path = self.below(above, node), [*path, node["name"]]
+            if "mesh" in node:
+                points, indices = self.mesh(node["mesh"], here)
+                faces = (f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in zip(indices[0::3], indices[1::3], indices[2::3]))
+                yield "/".join(path), "".join([*(f"v {x!r} {y!r} {z!r}\n" for x, y, z in points), *faces])
+            for child in node.get("children", []):
+                yield from visit(child, here, path)
+
+        for root in self.document["scenes"][0]["nodes"]:
+            yield from visit(root, IDENTITY, [])
+
     def numbers(self, number, code, width):
         accessor = self.document["accessors"][number]
         view = self.document["bufferViews"][accessor["bufferView"]]
         start = view["byteOffset"]
         return array(code, self.binary[start : start + 4 * width * accessor["count"]])
 
-    def measured(self, number, pose):
+    def mesh(self, number, pose):
         (primitive,) = self.document["meshes"][number]["primitives"]
         flat = self.numbers(primitive["attributes"]["POSITION"], "f", 3)
         points = [[sum(pose[r][k] * flat[at + k] for k in range(3)) + pose[r][3] for r in range(3)] for at in range(0, len(flat), 3)]
-        indices = self.numbers(primitive["indices"], "I", 1)
+        return points, self.numbers(primitive["indices"], "I", 1)
+
+    def measured(self, number, pose):
+        points, indices = self.mesh(number, pose)
         edges, volume, moment = {}, 0.0, [0.0, 0.0, 0.0]
         origin = points[0]
         for at in range(0, len(indices), 3):
