@@ -205,6 +205,53 @@ fn parts_that_are_given_twice_are_named_by_check_and_in_plans() {
 }
 
 #[test]
+fn a_file_of_a_whole_assembly_is_taken_apart_and_shown_as_it_was_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let lower = box_obj([0.0; 3], [4.0, 4.0, 1.0], 0);
+    let upper = box_obj([0.0, 0.0, 1.0], [4.0, 4.0, 2.0], 8);
+    let spare = box_obj([9.0; 3], [10.0; 3], 16);
+    let named = folder.path().join("named.obj");
+    fs::write(&named, format!("o lower\n{lower}o upper\n{upper}o spare screw\n{spare}")).unwrap();
+    let (named, json) = (named.to_str().unwrap(), folder.path().join("plan.json"));
+    let json = json.to_str().unwrap();
+    let page = folder.path().join("page.html");
+    for (options, parts, warning) in [
+        (
+            &[][..],
+            &["lower", "spare screw", "upper"][..],
+            "3 objects (`lower`, `upper`, `spare screw`) taken as a part each",
+        ),
+        (&["--ignore", "*screw*"], &["lower", "upper"], "`spare screw` ignored, as asked"),
+        (&["--split", "bodies"], &["1", "2", "3"], ""),
+        (
+            &["--split", "none"],
+            &["named"],
+            "nothing to take apart; it has 3 separate bodies, and `--split bodies`",
+        ),
+    ] {
+        let output = run(&[&["plan", named, "--embedded", "--json", json], options].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        assert!(stdout(&output).contains(warning), "{}", stdout(&output));
+        let plan = PlanDocument::from_json(&fs::read_to_string(json).unwrap()).unwrap();
+        assert_eq!(plan.parts, parts);
+        assert_eq!(plan.warnings.iter().any(|w| w.message.contains(warning)), !plan.warnings.is_empty());
+        // The plan says how its files were read.
+        let shown = run(&["view", json, "-o", page.to_str().unwrap()]);
+        assert_eq!(shown.status.code(), Some(0), "{}", stderr(&shown));
+    }
+    let text = stdout(&run(&["check", named]));
+    assert!(text.contains("found in reading:\n  named.obj: 3 objects"), "{text}");
+    refused(&run(&["plan", named, "--split", "all"]), &["--split", "objects, bodies, none"]);
+    refused(&run(&["plan", named, "--ignore", "[a"]), &["--ignore", "[a"]);
+    refused(&run(&["plan", named, "--ignore", "*"]), &["all parts are ignored"]);
+    // What overlaps this deeply is hardly meant.
+    let deep = box_obj([0.0, 0.0, 0.5], [4.0, 4.0, 2.0], 8);
+    fs::write(named, format!("o lower\n{lower}o upper\n{deep}")).unwrap();
+    let output = stdout(&run(&["plan", named, "--embedded"]));
+    assert!(output.contains("lower is in upper by 50 % of its smallest side as assembled"), "{output}");
+}
+
+#[test]
 fn check_compares_the_blocking_graphs_with_simulation() {
     // How many are excluded is kept here: fewer make searches longer, and nobody would see it.
     for (name, excluded) in [

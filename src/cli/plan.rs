@@ -15,8 +15,8 @@ use super::subject::{Subject, content_of, further, only_mesh};
 use super::{cache, interrupt, print, report, written};
 use crate::cache::CacheSettings;
 use crate::files::{LoadOptions, load};
-use crate::geometry::{Revision, SourceAssembly, content_hash, pose_from_waypoint};
-use crate::plan::export::{PlanDocument, SourceDocument};
+use crate::geometry::{Revision, SourceAssembly, SourceGroup, content_hash, pose_from_waypoint};
+use crate::plan::export::{GroupDocument, PlanDocument, SourceDocument};
 use crate::plan::{Plan, Warning};
 use crate::search::{PlanRequest, Planner, Termination};
 use crate::simulation::PenaltyParameters;
@@ -77,7 +77,9 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     plan.warnings.splice(0..0, notes);
     let revision = question.revision;
     let source = source(arguments, content_of(&content, &revision));
-    let document = PlanDocument { source: Some(source), ..PlanDocument::new(&plan) };
+    let group = |g: &SourceGroup| GroupDocument { name: g.name.clone(), parts: g.parts.clone() };
+    let groups = assembly.groups.iter().map(group).collect();
+    let document = PlanDocument { source: Some(source), groups, ..PlanDocument::new(&plan) };
     Ok(Planned { plan, revised, subject: Subject::new(assembly, revision, document) })
 }
 

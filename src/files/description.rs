@@ -6,8 +6,9 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::options::{IgnorePattern, Split};
+use super::text::printable;
 use super::{assembly_error, read_text, shown};
-use crate::geometry::{GeometryError, SourceAssembly};
+use crate::geometry::{GeometryError, SourceAssembly, SourceGroup};
 
 /// The optional description of an assembly. Keys that are not known here are left alone:
 /// people keep notes of their own there.
@@ -23,6 +24,9 @@ pub(super) struct Description {
     /// Parts that stay as long as others leave, by name.
     #[serde(default)]
     base: Vec<String>,
+    /// Parts that belong together, by the group's name.
+    #[serde(default)]
+    groups: BTreeMap<String, Vec<String>>,
     /// Mass per volume, by part name. Checked, but no engine uses masses yet: motion without
     /// inertia depends on the shape alone.
     #[serde(default)]
@@ -141,7 +145,13 @@ impl Described {
         let fixed = description.fixed.iter().map(resolve).collect::<Result<Vec<_>, _>>()?;
         let base = description.base.iter().map(resolve).collect::<Result<Vec<_>, _>>()?;
         description.densities.keys().try_for_each(|n| resolve(n).map(drop))?;
+        let group = |(name, parts): (&String, &Vec<String>)| {
+            let parts = parts.iter().map(resolve).collect::<Result<Vec<_>, _>>()?;
+            Ok(SourceGroup { name: printable(name), parts })
+        };
+        let groups = description.groups.iter().map(group).collect::<Result<Vec<_>, GeometryError>>()?;
         (assembly.fixed, assembly.base) = (fixed, base);
+        assembly.groups.extend(groups);
         if let Some(name) = &description.name {
             assembly.name.clone_from(name);
         }

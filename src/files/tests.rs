@@ -259,12 +259,11 @@ fn files_that_are_something_else_say_what() {
 
 #[test]
 fn poses_of_the_asap_data_set_are_read() {
-    let config =
-        r#"{"a": {"initial_state": [9, 9, 9], "final_state": [10, 20, 30, 0, 0, 1.5707963267948966]}}"#;
+    let config = r#"{"a": {"initial_state": [9, 9, 9], "final_state": [1, 2, 3, 0, 0, 1.5707963267948966]}}"#;
     let assembly =
         loaded(&[("a.obj", TETRA), ("b.obj", TETRA), ("config.json", config)], &LoadOptions::default());
     let second = assembly.parts[0].mesh.vertices[1];
-    assert!(second.iter().zip([10.0, 21.0, 30.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{second:?}");
+    assert!(second.iter().zip([1.0, 3.0, 3.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{second:?}");
     assert_eq!(assembly.notes, ["config.json does not name `b`: taken where the mesh stands"]);
     let other = loaded(
         &[("a.obj", TETRA), ("b.obj", TETRA), ("config.json", "{\"robot\": 1}")],

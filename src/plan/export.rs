@@ -38,6 +38,9 @@ pub struct PlanDocument {
     pub units: Option<String>,
     /// All parts, in natural order.
     pub parts: Vec<String>,
+    /// Which parts belong together where the assembly comes from, outer groups before inner ones.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub groups: Vec<GroupDocument>,
     /// What had happened before.
     pub initial: InitialDocument,
     /// Parts that must come out, or all.
@@ -97,6 +100,15 @@ pub struct SourceDocument {
     /// mm: how far triangles made of STEP files may be from the surfaces (`--deflection`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deflection: Option<f64>,
+}
+
+/// Parts that belong together where the assembly comes from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GroupDocument {
+    /// The group's name; of nested groups with the names of the outer ones before it, and slashes between.
+    pub name: String,
+    /// All parts in it, of nested groups, too.
+    pub parts: Vec<String>,
 }
 
 /// The state that planning began with, where it differs from the assembly as given.
@@ -303,6 +315,7 @@ impl PlanDocument {
             engine: plan.engine.clone(),
             units: plan.units.clone(),
             parts: plan.parts.clone(),
+            groups: Vec::new(),
             initial: InitialDocument { removed: plan.names(&plan.removed), poses: poses(plan) },
             targets: plan.targets.as_ref().map(|t| plan.names(t)),
             fixed: plan.names(&plan.fixed),

@@ -6,7 +6,7 @@ use super::document::kind_of;
 use super::verdict::{blockers, verdict};
 use super::words::{Moved, Words, capital, free_together, kept_together, part_words, required, told_names};
 use crate::plan::PlanKind;
-use crate::plan::export::PlanDocument;
+use crate::plan::export::{GroupDocument, PlanDocument, StepDocument};
 
 /// The instructions. Steps in a row that do the same with equal parts are told as one. Parts are equal if they
 /// are of one `class` (one per part of the plan); without classes, if their names
@@ -15,8 +15,11 @@ use crate::plan::export::PlanDocument;
 pub fn markdown(plan: &PlanDocument, classes: Option<&[usize]>) -> String {
     let account = StepAccount { plan, classes, words: Words::of(plan) };
     let mut text = account.headline();
-    for run in account.runs() {
-        text.push_str(&account.run(&run));
+    let runs = account.runs();
+    let headings = account.headings(&runs);
+    for (run, heading) in runs.iter().zip(headings) {
+        text.push_str(&heading);
+        text.push_str(&account.run(run));
     }
     text.push_str(&account.rest());
     text
@@ -71,6 +74,7 @@ impl StepAccount<'_> {
                 let first = &self.plan.steps[run[0]];
                 let ([a], [b]) = (&first.parts[..], &step.parts[..]) else { return false };
                 self.is_equal(a, b)
+                    && self.group(first) == self.group(step)
                     && run.iter().all(|&other| self.words.is_alike(other, i))
                     && !run.iter().any(|g| step.requires.contains(g))
             };
@@ -80,6 +84,27 @@ impl StepAccount<'_> {
             }
         }
         runs
+    }
+
+    /// The innermost group that has all parts of a step.
+    fn group(&self, step: &StepDocument) -> Option<&str> {
+        let holds = |group: &&GroupDocument| step.parts.iter().all(|part| group.parts.contains(part));
+        let innermost = self.plan.groups.iter().filter(holds).min_by_key(|group| group.parts.len());
+        innermost.map(|group| group.name.as_str())
+    }
+
+    /// A heading before each run that is of another group than the one before; none at all if groups alternate, for
+    /// headings of single instructions only tear them apart.
+    fn headings(&self, runs: &[Vec<usize>]) -> Vec<String> {
+        let groups: Vec<Option<&str>> = runs.iter().map(|run| self.group(&self.plan.steps[run[0]])).collect();
+        let is_new = |i: usize| if i == 0 { groups[i].is_some() } else { groups[i] != groups[i - 1] };
+        let changes = (0..runs.len()).filter(|&i| is_new(i)).count();
+        let heading = |i: usize| match groups[i] {
+            _ if 2 * changes > runs.len() || !is_new(i) => String::new(),
+            Some(name) => format!("## {name}\n\n"),
+            None => "## Other parts\n\n".to_owned(),
+        };
+        (0..runs.len()).map(heading).collect()
     }
 
     fn run(&self, run: &[usize]) -> String {
@@ -159,7 +184,7 @@ fn common_name<'a>(names: &[&'a str]) -> &'a str {
 mod tests {
     use super::super::document::tests::{plan, step};
     use super::*;
-    use crate::plan::export::{BlockedDocument, FreeGroupDocument, StepDocument};
+    use crate::plan::export::{BlockedDocument, FreeGroupDocument};
 
     fn lifted(part: &str, by: f64, requires: &[usize]) -> StepDocument {
         let mut step = step(part, &[[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, by, 1.0, 0.0, 0.0, 0.0]]);
@@ -193,6 +218,26 @@ mod tests {
              **4.** Take cover out along +Z (3 mm), after bolt-1, bolt-2, bolt-3.\n\n\
              Stays: base.\n\n"
         );
+    }
+
+    #[test]
+    fn groups_of_the_input_are_headings_unless_they_alternate() {
+        let group = |name: &str, parts: &[&str]| GroupDocument {
+            name: name.into(),
+            parts: parts.iter().map(|p| (*p).to_owned()).collect(),
+        };
+        let mut plan = bolted();
+        plan.steps.extend([lifted("pin", 1.0, &[]), lifted("cap", 2.0, &[]), lifted("lid", 3.0, &[])]);
+        plan.groups = vec![
+            group("frame", &["bolt-1", "bolt-2", "bolt-3", "cover"]),
+            group("frame/bolts", &["bolt-1", "bolt-2"]),
+        ];
+        let text = markdown(&plan, None);
+        assert!(text.contains("steps\n\n## frame/bolts\n\n**1–2.**"), "{text}");
+        assert!(text.contains("## frame\n\n**3.** Take bolt-3"), "{text}");
+        assert!(text.contains("## Other parts\n\n**5.** Take pin"), "{text}");
+        plan.groups = vec![group("odd", &["bolt-1", "bolt-3", "pin", "lid"])];
+        assert!(!markdown(&plan, None).contains("##"), "{}", markdown(&plan, None));
     }
 
     #[test]
