@@ -441,11 +441,11 @@ pub(crate) const STEP_VERSION_SECONDS: u64 = 20;
 pub(crate) const STEP_MEMORY_BYTES: u64 = 8 << 30;
 /// Bytes of a STEP file. All are in memory, and would take longer than the deadline if there were twice as many.
 pub(crate) const STEP_FILE_BYTES: u64 = 512 << 20;
-/// Bytes of a file that a converter writes: 60 million triangles. At double, a GLB is as large as the format allows.
+/// Bytes of a file that a converter writes: 100 million triangles. At double, a GLB is as large as the format allows.
 pub(crate) const STEP_OUTPUT_BYTES: u64 = 2 << 30;
 /// Bytes of a converter's stdout: a line with 50,000 products. At half, fewer; at double, a flood is read longer.
 pub(crate) const STEP_STDOUT_BYTES: u64 = 4 << 20;
 /// Bytes of a converter's stderr, of which the end is kept: kernels write a line for each face that they mend.
 pub(crate) const STEP_STDERR_BYTES: u64 = 64 << 20;
-/// Bytes of remembered outputs: 30 million triangles. At half, large assemblies push each other out sooner.
+/// Bytes of remembered outputs: 50 million triangles. At half, large assemblies push each other out sooner.
 pub(crate) const STEP_CACHE_BYTES: u64 = 1 << 30;

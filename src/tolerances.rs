@@ -494,5 +494,5 @@ pub(crate) const SHORT_MOVE: f64 = 0.9;
 pub(crate) const STEP_DEFLECTION: f64 = 0.01;
 /// Radians. The angle between neighbouring chords of a curve in a STEP file, for small radii where the deflection alone
 /// would leave a circle three sides: at least 13. At half, at least 26, and threads and fillets have twice as many
-/// triangles; at double, small bores are hexagons, whose volume is 17 % less.
+/// triangles; at double, at least 7, and small bores are 13 % narrower in area.
 pub(crate) const STEP_ANGLE: f64 = 0.5;

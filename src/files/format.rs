@@ -93,7 +93,7 @@ pub(super) fn mismatch(format: Format, bytes: &[u8]) -> Option<String> {
         return Some(format!("this is XML and not {expected}; export the part again"));
     }
     let utf16 = bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]);
-    if utf16 && format != Format::Stl || utf16 && !super::stl::is_binary_by_length(bytes) {
+    if utf16 && (format != Format::Stl || !super::stl::is_binary_by_length(bytes)) {
         return Some("this is text as UTF-16; save it as UTF-8 (or plain ASCII)".into());
     }
     let magic = [

@@ -391,7 +391,7 @@ mod tests {
     #[test]
     fn a_concave_polygon_keeps_its_area_and_turn() {
         let arrow = "v 0 0 0\nv 4 2 0\nv 0 4 0\nv 1 2 0\nv 0.5 1 0\nf 2 3 4 5 1\n";
-        let mesh = read(&arrow).unwrap();
+        let mesh = read(arrow).unwrap();
         assert_eq!(mesh.triangles.len(), 3);
         let doubled: Vec<f64> = mesh
             .triangles
