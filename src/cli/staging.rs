@@ -6,16 +6,21 @@ use std::path::Path;
 use super::args::placed;
 use super::error::CliError;
 use super::part_names::part_named;
-use crate::geometry::SourceAssembly;
+use crate::geometry::{Pose, SourceAssembly, waypoint_from_pose};
 use crate::search::Staging;
 
-/// What `--staging` means: `auto`, `none` or a file.
+/// What `--staging` means: `auto` (where the assembly's files say, else beside it), `none` or a file.
 ///
 /// # Errors
 /// The file cannot be read, is no object of poses, or names a part that there is not.
 pub(super) fn staging(assembly: &SourceAssembly, given: &Path) -> Result<Staging, CliError> {
     match given.to_str() {
-        Some("auto") => Ok(Staging::Beside(Vec::new())),
+        Some("auto") => {
+            let place = |(name, pose): &(String, Pose)| {
+                Ok((part_named(assembly, "--staging", name)?, waypoint_from_pose(pose)))
+            };
+            Ok(Staging::Beside(assembly.waiting.iter().map(place).collect::<Result<_, CliError>>()?))
+        }
         Some("none") => Ok(Staging::None),
         _ => from_file(assembly, given),
     }

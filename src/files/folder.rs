@@ -37,7 +37,7 @@ pub(super) fn load(folder: &Path, options: &LoadOptions) -> Result<SourceAssembl
         }
         files => several(folder, files, split, options.step.as_ref())?,
     };
-    poses::place(folder, &mut assembly.parts, &mut notes)?;
+    poses::place(folder, &mut assembly, &mut notes)?;
     assembly.notes.extend(notes);
     ignore(&mut assembly, &patterns, &listing.ignored)?;
     if let Some(described) = described {

@@ -123,6 +123,7 @@ fn ignore(
             group.parts.retain(|part| !left.contains(part));
         }
         assembly.groups.retain(|group| group.parts.len() > 1);
+        assembly.waiting.retain(|(part, _)| !left.contains(part));
     }
     Ok(())
 }

@@ -4,12 +4,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+use nalgebra::{Point3, Translation3, UnitQuaternion};
 use serde::Deserialize;
 
 use super::split::listed;
 use super::{assembly_error, read_text};
-use crate::geometry::{GeometryError, SourceMesh, SourcePart};
+use crate::geometry::{GeometryError, Pose, SourceAssembly, SourceMesh, SourcePart};
 
 /// Offsets by part name, or one per part in their order.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -22,8 +22,14 @@ enum Offsets {
 /// Where a part of the ASAP data set stands: a shift, and angles (radians) about the fixed axes x, y and z, in this order.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 struct Configured {
+    /// Assembled.
     final_state: Vec<f64>,
+    /// Before it is put in.
+    initial_state: Option<Vec<f64>>,
 }
+
+/// Where a part stands, and where it waits before.
+type Placement = (Pose, Option<Pose>);
 
 /// Places the parts of a folder as its files of poses say, and notes what these leave out.
 ///
@@ -31,9 +37,10 @@ struct Configured {
 /// A file is damaged, names a part that there is not, or there are two.
 pub(super) fn place(
     folder: &Path,
-    parts: &mut [SourcePart],
+    assembly: &mut SourceAssembly,
     notes: &mut Vec<String>,
 ) -> Result<(), GeometryError> {
+    let parts = &mut assembly.parts;
     let (offsets, config) = (folder.join("translation.json"), folder.join("config.json"));
     let (path, poses) = match (offsets.exists(), config.exists()) {
         (false, false) => return Ok(()),
@@ -56,11 +63,14 @@ pub(super) fn place(
             (config, poses)
         }
     };
-    let poses: Vec<(usize, Isometry3<f64>)> = poses.map_err(|reason| assembly_error(&path, &reason))?;
+    let poses: Vec<(usize, Placement)> = poses.map_err(|reason| assembly_error(&path, &reason))?;
     let mut is_placed = vec![false; parts.len()];
-    for (part, pose) in poses {
+    for (part, (pose, waiting)) in poses {
         is_placed[part] = true;
         moved(&mut parts[part].mesh, &pose);
+        if let Some(waiting) = waiting {
+            assembly.waiting.push((parts[part].name.clone(), waiting * pose.inverse()));
+        }
     }
     let left: Vec<String> = parts
         .iter()
@@ -75,7 +85,7 @@ pub(super) fn place(
     Ok(())
 }
 
-fn moved(mesh: &mut SourceMesh, pose: &Isometry3<f64>) {
+fn moved(mesh: &mut SourceMesh, pose: &Pose) {
     if pose.rotation == UnitQuaternion::identity() {
         let shift = pose.translation.vector;
         mesh.vertices.iter_mut().for_each(|v| v.iter_mut().zip(&shift).for_each(|(x, s)| *x += s));
@@ -90,9 +100,8 @@ fn parse_offsets(text: &str) -> Result<Offsets, String> {
     Offsets::deserialize(value).map_err(|_| r#"expected {"part": [x, y, z], …} or [[x, y, z], …]"#.into())
 }
 
-fn by_part(offsets: Offsets, parts: &[SourcePart]) -> Result<Vec<(usize, Isometry3<f64>)>, String> {
-    let pose =
-        |[x, y, z]: [f64; 3]| Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::identity());
+fn by_part(offsets: Offsets, parts: &[SourcePart]) -> Result<Vec<(usize, Placement)>, String> {
+    let pose = |[x, y, z]: [f64; 3]| (Pose::translation(x, y, z), None);
     match offsets {
         Offsets::InOrder(offsets) if offsets.len() == parts.len() => {
             Ok(offsets.into_iter().map(pose).enumerate().collect())
@@ -104,8 +113,8 @@ fn by_part(offsets: Offsets, parts: &[SourcePart]) -> Result<Vec<(usize, Isometr
     }
 }
 
-/// The assembled poses; none if the file is a configuration of something else.
-fn parse_config(text: &str) -> Result<Option<BTreeMap<String, Isometry3<f64>>>, String> {
+/// The poses by part; none if the file is a configuration of something else.
+fn parse_config(text: &str) -> Result<Option<BTreeMap<String, Placement>>, String> {
     let value: serde_json::Value = serde_json::from_str(text).map_err(|e| e.to_string())?;
     let is_state = |value: &serde_json::Value| value.get("final_state").is_some();
     if !value.as_object().is_some_and(|parts| parts.values().any(is_state)) {
@@ -113,17 +122,19 @@ fn parse_config(text: &str) -> Result<Option<BTreeMap<String, Isometry3<f64>>>, 
     }
     let expected = r#"expected {"part": {"final_state": [x, y, z] or [x, y, z, rx, ry, rz]}, …}"#;
     let parts = BTreeMap::<String, Configured>::deserialize(value).map_err(|e| format!("{e}; {expected}"))?;
-    let pose = |(name, part): (String, Configured)| match part.final_state[..] {
-        [x, y, z] => {
-            Ok((name, Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::identity())))
-        }
-        [x, y, z, rx, ry, rz] => {
-            let turn = UnitQuaternion::from_euler_angles(rx, ry, rz);
-            Ok((name, Isometry3::from_parts(Translation3::new(x, y, z), turn)))
-        }
-        _ => Err(format!("`{name}` has {} numbers; {expected}", part.final_state.len())),
+    let placement = |(name, part): (String, Configured)| {
+        let pose = |state: &Vec<f64>| match state[..] {
+            [x, y, z] => Ok(Pose::translation(x, y, z)),
+            [x, y, z, rx, ry, rz] => Ok(Pose::from_parts(
+                Translation3::new(x, y, z),
+                UnitQuaternion::from_euler_angles(rx, ry, rz),
+            )),
+            _ => Err(format!("`{name}` has {} numbers; {expected}", state.len())),
+        };
+        let placement = (pose(&part.final_state)?, part.initial_state.as_ref().map(pose).transpose()?);
+        Ok((name, placement))
     };
-    parts.into_iter().map(pose).collect::<Result<_, _>>().map(Some)
+    parts.into_iter().map(placement).collect::<Result<_, String>>().map(Some)
 }
 
 fn find(name: &str, parts: &[SourcePart]) -> Result<usize, String> {

@@ -264,6 +264,9 @@ fn poses_of_the_asap_data_set_are_read() {
         loaded(&[("a.obj", TETRA), ("b.obj", TETRA), ("config.json", config)], &LoadOptions::default());
     let second = assembly.parts[0].mesh.vertices[1];
     assert!(second.iter().zip([1.0, 3.0, 3.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{second:?}");
+    let [(waiting, pose)] = &assembly.waiting[..] else { panic!("{:?}", assembly.waiting) };
+    let waits = pose * nalgebra::Point3::from(second);
+    assert!(waiting == "a" && (waits - nalgebra::Point3::new(10.0, 9.0, 9.0)).norm() < 1e-12, "{waits}");
     assert_eq!(assembly.notes, ["config.json does not name `b`: taken where the mesh stands"]);
     let other = loaded(
         &[("a.obj", TETRA), ("b.obj", TETRA), ("config.json", "{\"robot\": 1}")],

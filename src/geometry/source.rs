@@ -3,6 +3,8 @@
 use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
+use super::Pose;
+
 /// A triangle mesh as given: nothing is known to be valid yet.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SourceMesh {
@@ -54,6 +56,10 @@ pub struct SourceAssembly {
     /// Which parts belong together, outer groups before inner ones. Not content, either.
     #[serde(skip)]
     pub groups: Vec<SourceGroup>,
+    /// Where parts wait before they are put in, if the description says so: the motion of the mesh from where it stands
+    /// assembled. Not content, either.
+    #[serde(skip)]
+    pub waiting: Vec<(String, Pose)>,
     /// What was left out, chosen or in doubt when the files were read, in sentences that name the file. Not content, either.
     #[serde(skip)]
     pub notes: Vec<String>,
@@ -62,6 +68,8 @@ pub struct SourceAssembly {
 impl SourceAssembly {
     /// Turns all parts together about the origin of the input's frame.
     pub fn rotate(&mut self, rotation: &UnitQuaternion<f64>) {
+        let turn = Pose::from_parts(Default::default(), *rotation);
+        self.waiting.iter_mut().for_each(|(_, pose)| *pose = turn * *pose * turn.inverse());
         let matrix = rotation.to_rotation_matrix();
         for vertex in self.parts.iter_mut().flat_map(|p| &mut p.mesh.vertices) {
             *vertex = (matrix * Point3::from(*vertex)).coords.into();
