@@ -103,7 +103,7 @@ def convert(package, given):
 
 def fail(code, reason):
     """The last line on stderr says why."""
-    print(f"{Path(sys.argv[0]).name}: {reason}", file=sys.stderr, flush=True)
+    print(reason, file=sys.stderr, flush=True)
     leave(code)
 
 

@@ -169,7 +169,7 @@ def nut():
 
 
 def bolt():
-    return BRepAlgoAPI_Fuse(cylinder(7.5, 4, z=30), cylinder(5, 30)).Shape()
+    return BRepAlgoAPI_Fuse(cylinder(7.5, 4, z=30), cylinder(5, 34, z=-4)).Shape()
 
 
 def bracket_assembly():
@@ -186,7 +186,7 @@ def bracket_assembly():
     right = [cylinder(5, 40, 155 - dx, 75 - dy, -10) for dx, dy in holes]
     d.part("plate", cut(box((180, 150, 20)), *left, *right))
     d.part("rod", cylinder(5, 200))
-    d.assembly("nut-bolt-assembly", ("bolt", "bolt_1", placed()), ("nut", "nut_1", placed()))
+    d.assembly("nut-bolt-assembly", ("bolt", "bolt_1", placed()), ("nut", "nut_1", placed(z=-3)))
     bolts = [("nut-bolt-assembly", f"nut-bolt-assembly_{k}", placed(20 + dx, 50 + dy, -20)) for k, (dx, dy) in enumerate(holes, 1)]
     d.assembly("l-bracket-assembly", ("l-bracket", "l-bracket_1", placed()), *bolts)
     d.assembly("rod-assembly", ("rod", "rod_1", placed()), ("nut", "nut_2", placed(z=7)), ("nut", "nut_3", placed(z=190)))
