@@ -4,17 +4,10 @@
 use std::path::Path;
 
 use sbdp::files::load_assembly;
-use sbdp::plan::{Plan, PlanStep};
-use sbdp::search::{PlanRequest, PlanSink, Progress};
+use sbdp::plan::Plan;
+use sbdp::search::PlanRequest;
 use sbdp::service::Service;
 use sbdp::termination::Termination;
-
-struct Silent;
-
-impl PlanSink for Silent {
-    fn progress(&mut self, _: Progress) {}
-    fn step(&mut self, _: &PlanStep) {}
-}
 
 /// All of a plan but its times; numbers as bits, so that `-0.0` differs from `0.0`.
 fn fingerprint(plan: &Plan) -> String {
@@ -42,7 +35,7 @@ fn assert_deterministic(name: &str, request: &PlanRequest) {
         let id = service.admit(&assembly).unwrap().id;
         for no_cache in [false, false, true] {
             let request = PlanRequest { threads, no_cache, ..request.clone() };
-            let plan = service.plan(id, &request, &Termination::default(), &mut Silent).unwrap();
+            let plan = service.plan(id, &request, &Termination::default(), &mut ()).unwrap();
             let found = fingerprint(&plan);
             let expected = first.get_or_insert_with(|| found.clone());
             assert!(*expected == found, "{name}, {threads} threads:\n{expected}\n{found}");

@@ -3,32 +3,18 @@
 
 mod common;
 
-use std::path::Path;
-
-use common::{Daemon, HANG};
-use sbdp::files::load_assembly;
+use common::{Daemon, HANG, assembly};
 use sbdp::geometry::SourceAssembly;
 use sbdp::plan::{Plan, PlanStatus, PlanStep, StepEnd};
-use sbdp::search::{PlanRequest, PlanSink, Progress};
+use sbdp::search::PlanRequest;
 use sbdp::service::Service;
 use sbdp::termination::Termination;
 use sbdp_client as client;
 use sbdp_client::{Client, Event, Handle, Part, PlanOptions, Summary, Vertices};
 
-struct Silent;
-
-impl PlanSink for Silent {
-    fn progress(&mut self, _: Progress) {}
-    fn step(&mut self, _: &PlanStep) {}
-}
-
-fn assembly(name: &str) -> SourceAssembly {
-    load_assembly(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/assemblies").join(name)).unwrap()
-}
-
 fn planned(service: &Service, name: &str, request: &PlanRequest) -> Plan {
     let id = service.admit(&assembly(name)).unwrap().id;
-    service.plan(id, request, &Termination::default(), &mut Silent).unwrap()
+    service.plan(id, request, &Termination::default(), &mut ()).unwrap()
 }
 
 /// What moves out of what, and how it ends, by name.

@@ -2,16 +2,17 @@
 
 #![allow(missing_docs)]
 
+mod common;
+
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicIsize, Ordering};
 
+use common::assembly;
 use sbdp::cache::Cache;
-use sbdp::files::load_assembly;
 use sbdp::geometry::SourceAssembly;
-use sbdp::plan::{Plan, PlanStatus, PlanStep};
-use sbdp::search::{PlanRequest, PlanSink, Progress, Termination};
+use sbdp::plan::{Plan, PlanStatus};
+use sbdp::search::{PlanRequest, Termination};
 use sbdp::service::{AssemblyId, RECORD_KINDS, Service, ServiceError};
 
 /// The system's, counting what is taken and not given back.
@@ -38,17 +39,6 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-struct Silent;
-
-impl PlanSink for Silent {
-    fn progress(&mut self, _: Progress) {}
-    fn step(&mut self, _: &PlanStep) {}
-}
-
-fn assembly(name: &str) -> SourceAssembly {
-    load_assembly(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/assemblies").join(name)).unwrap()
-}
-
 /// A service that keeps nothing but assemblies.
 fn service(budget: usize) -> Service {
     Service::new(Arc::new(Cache::in_memory(0, &RECORD_KINDS)), budget)
@@ -57,7 +47,7 @@ fn service(budget: usize) -> Service {
 fn plan(service: &Service, assembly: &SourceAssembly) -> (AssemblyId, Plan) {
     let id = service.admit(assembly).unwrap().id;
     let request = PlanRequest { threads: 1, ..PlanRequest::default() };
-    let plan = service.plan(id, &request, &Termination::default(), &mut Silent).unwrap();
+    let plan = service.plan(id, &request, &Termination::default(), &mut ()).unwrap();
     assert_eq!(plan.status, PlanStatus::Complete);
     (id, plan)
 }
@@ -159,7 +149,7 @@ fn the_budget_is_kept_whatever_comes() {
         gone.iter().all(|known| !known) && kept.iter().all(|known| *known),
         "the last ones stay: {known:?}"
     );
-    let forgotten = service.plan(ids[0], &PlanRequest::default(), &Termination::default(), &mut Silent);
+    let forgotten = service.plan(ids[0], &PlanRequest::default(), &Termination::default(), &mut ());
     assert!(matches!(forgotten, Err(ServiceError::UnknownAssembly)));
     plan(&service, &base);
 }

@@ -10,7 +10,7 @@ use nalgebra::UnitQuaternion;
 use proptest::prelude::*;
 use sbdp::geometry::{SourceAssembly, SourceMesh, SourcePart};
 use sbdp::plan::{MotionKind, Plan, PlanStatus};
-use sbdp::search::{PlanRequest, PlanSink, Progress};
+use sbdp::search::PlanRequest;
 use sbdp::service::Service;
 use sbdp::termination::Termination;
 
@@ -165,13 +165,6 @@ fn mesh(piece: &BTreeSet<Cell>) -> SourceMesh {
     mesh
 }
 
-struct Silent;
-
-impl PlanSink for Silent {
-    fn progress(&mut self, _: Progress) {}
-    fn step(&mut self, _: &sbdp::plan::PlanStep) {}
-}
-
 proptest! {
     #![proptest_config(ProptestConfig { cases: 150, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -196,7 +189,7 @@ proptest! {
         }
         let service = Service::default();
         let id = service.admit(&assembly).unwrap().id;
-        let plan = service.plan(id, &PlanRequest::default(), &Termination::default(), &mut Silent).unwrap();
+        let plan = service.plan(id, &PlanRequest::default(), &Termination::default(), &mut ()).unwrap();
         let (left, exact) = (left_together(&plan), inseparable(&pieces));
         prop_assert_eq!(plan.status == PlanStatus::Complete, left.len() == pieces.len());
         let is_within = |group: &Vec<usize>| exact.iter().any(|g| group.iter().all(|n| g.contains(n)));

@@ -16,12 +16,6 @@ fn folder(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/assemblies").join(name)
 }
 
-struct Silent;
-impl sbdp::search::PlanSink for Silent {
-    fn step(&mut self, _: &sbdp::plan::PlanStep) {}
-    fn progress(&mut self, _: sbdp::search::Progress) {}
-}
-
 /// The plan of an assembly with some parts standing elsewhere, and the assembly as the plan begins with it.
 fn planned(name: &str, moved: Vec<(usize, Pose)>) -> (Assembly, PlanDocument) {
     asked(name, moved, &PlanRequest::default())
@@ -31,7 +25,7 @@ fn asked(name: &str, moved: Vec<(usize, Pose)>, request: &PlanRequest) -> (Assem
     let service = Service::default();
     let base = service.admit(&load_assembly(&folder(name)).unwrap()).unwrap().id;
     let id = service.revise(base, &Revision { moved, ..Revision::default() }).unwrap().id;
-    let plan = service.plan(id, request, &Termination::default(), &mut Silent).unwrap();
+    let plan = service.plan(id, request, &Termination::default(), &mut ()).unwrap();
     (service.assembly(id).unwrap(), PlanDocument::new(&plan))
 }
 

@@ -26,11 +26,44 @@ pub(super) struct Body {
     pub(super) pieces: Pieces,
 }
 
+/// What a file calls pieces of a surface.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) enum PieceKind {
+    /// Of an OBJ file (`o`).
+    #[default]
+    Objects,
+    /// Of an OBJ file (`g`): often the faces of a body.
+    Groups,
+    /// Of an STL file.
+    Solids,
+    /// Of a glTF mesh: often what has one material.
+    Primitives,
+    /// Of a scene among other files.
+    Nodes,
+}
+
+impl PieceKind {
+    pub(super) fn plural(self) -> &'static str {
+        match self {
+            Self::Objects => "objects",
+            Self::Groups => "groups",
+            Self::Solids => "solids",
+            Self::Primitives => "primitives",
+            Self::Nodes => "nodes",
+        }
+    }
+
+    /// Whether each is meant as a thing of its own, even if its surface has holes.
+    pub(super) fn is_thing(self) -> bool {
+        matches!(self, Self::Objects | Self::Solids | Self::Nodes)
+    }
+}
+
 /// Which triangle belongs to which piece.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Pieces {
-    /// What the file calls them: `objects`, `groups`, `solids`, `primitives`.
-    pub(super) what: &'static str,
+    /// What the file calls them.
+    pub(super) kind: PieceKind,
     /// Their names, some of them empty.
     pub(super) names: Vec<String>,
     /// By triangle, its piece's place in `names`.

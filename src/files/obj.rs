@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use earcut::Earcut;
 use nalgebra::{Point3, Vector3};
 
-use super::content::{Body, Content, Pieces};
+use super::content::{Body, Content, PieceKind, Pieces};
 use super::text::{decimal_comma, decoded, excerpt};
 use crate::geometry::SourceMesh;
 
@@ -195,8 +195,8 @@ impl Obj<'_> {
         // Faces before the first name are a piece without one.
         let mut names = vec![String::new()];
         names.extend(self.names.into_iter().nth(kind).unwrap_or_default().list);
-        let what = ["objects", "groups"][kind];
-        let pieces = Pieces { what, names, of };
+        let kinds = [PieceKind::Objects, PieceKind::Groups];
+        let pieces = Pieces { kind: kinds[kind], names, of };
         Content { bodies: vec![Body { path: Vec::new(), mesh, pieces }], notes, ..Content::default() }
     }
 }
@@ -344,17 +344,17 @@ mod tests {
 
     #[test]
     fn objects_or_groups_are_pieces_of_one_surface() {
-        for (lines, what, names, of) in [
-            (["g a", "g b", "g a"], "groups", vec!["", "a", "b"], [1, 2, 1]),
-            (["o x\ng a", "o y", "g b"], "objects", vec!["", "x", "y"], [1, 2, 2]),
-            (["o x\ng a", "g b", "g"], "groups", vec!["", "a", "b", ""], [1, 2, 3]),
-            (["", "o x", "s 1"], "objects", vec!["", "x"], [0, 1, 1]),
+        for (lines, kind, names, of) in [
+            (["g a", "g b", "g a"], PieceKind::Groups, vec!["", "a", "b"], [1, 2, 1]),
+            (["o x\ng a", "o y", "g b"], PieceKind::Objects, vec!["", "x", "y"], [1, 2, 2]),
+            (["o x\ng a", "g b", "g"], PieceKind::Groups, vec!["", "a", "b", ""], [1, 2, 3]),
+            (["", "o x", "s 1"], PieceKind::Objects, vec!["", "x"], [0, 1, 1]),
         ] {
             let [a, b, c] = lines;
             let text = format!("{SQUARE}{a}\nusemtl red\nf 1 2 3\n{b}\nf 1 3 4\n{c}\nf 1 2 4\n");
             let body = parse_obj(text.as_bytes()).unwrap().bodies.remove(0);
             assert_eq!((body.mesh.vertices.len(), body.mesh.triangles.len()), (4, 3));
-            assert_eq!((body.pieces.what, &body.pieces.of[..]), (what, &of[..]), "{text}");
+            assert_eq!((body.pieces.kind, &body.pieces.of[..]), (kind, &of[..]), "{text}");
             assert_eq!(body.pieces.names, names);
         }
     }

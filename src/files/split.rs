@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::content::{Body, Content, Pieces};
+use super::content::{Body, Content, PieceKind, Pieces};
 use super::names::{shown_path, unique_names};
 use super::options::Split;
 use super::text::printable;
@@ -39,12 +39,19 @@ pub(super) fn parts_of(
     let Content { bodies, mut notes, .. } = content;
     let bodies = if file.is_whole { bodies } else { vec![joined(bodies)] };
     let mut found: Vec<(Vec<String>, SourceMesh)> = Vec::new();
+    let mut split_nodes: Vec<String> = Vec::new();
+    let count = bodies.len();
     for body in bodies {
         let is_node = !body.path.is_empty();
         let path = if is_node { body.path.clone() } else { vec![file.stem.to_owned()] };
         let own = path.last().cloned().unwrap_or_default();
-        let pieces = taken_apart(body, file, split, &mut notes)?;
+        let (pieces, note) = taken_apart(body, file, split)?;
         let is_split = pieces.len() > 1;
+        if count == 1 {
+            notes.extend(note);
+        } else if is_split && split.is_none() {
+            split_nodes.push(own.clone());
+        }
         for (name, mesh) in pieces {
             let mut path = path.clone();
             if is_split {
@@ -57,6 +64,12 @@ pub(super) fn parts_of(
             }
             found.push((path, mesh));
         }
+    }
+    if !split_nodes.is_empty() {
+        let nodes = listed(&split_nodes);
+        notes.push(format!(
+            "the primitives of {nodes} taken as a part each (`--split none` makes a part of each node)"
+        ));
     }
     if found.len() > 1 {
         let flat: Vec<String> = found
@@ -77,41 +90,47 @@ pub(super) fn parts_of(
     Ok(FileParts { parts, groups, notes })
 }
 
-/// The pieces of a body that are parts, with their names.
+/// The pieces of a body that are parts, with their names, and what was decided without being asked.
 fn taken_apart(
     body: Body,
     file: &FileNames<'_>,
     split: Option<Split>,
-    notes: &mut Vec<String>,
-) -> Result<Vec<(String, SourceMesh)>, GeometryError> {
+) -> Result<(Vec<(String, SourceMesh)>, Option<String>), GeometryError> {
     let Body { mesh, pieces, path } = body;
     let own = path.last().map_or(file.stem, String::as_str).to_owned();
-    if split == Some(Split::Bodies) {
+    if split == Some(Split::Bodies) && !is_flat(&mesh) {
         let part = SourcePart { name: own, origin: file.origin.to_owned(), mesh };
-        return Ok((1..).zip(bodies(&part)?).map(|(n, mesh)| (n.to_string(), mesh)).collect());
+        return Ok(((1..).zip(bodies(&part)?).map(|(n, mesh)| (n.to_string(), mesh)).collect(), None));
     }
     let named = pieces.meshes(&mesh);
-    if split == Some(Split::None) || named.len() < 2 {
-        return Ok(vec![(own, mesh)]);
-    }
-    if split == Some(Split::Objects) {
-        return Ok(named);
+    match split {
+        _ if named.len() < 2 => return Ok((vec![(own, mesh)], None)),
+        Some(Split::Objects) => return Ok((named, None)),
+        Some(Split::None | Split::Bodies) => return Ok((vec![(own, mesh)], None)),
+        None => {}
     }
     let names: Vec<String> = named.iter().map(|(name, _)| name.clone()).collect();
-    let what = format!("{} {} ({})", named.len(), pieces.what, listed(&names));
-    // Where the whole is closed and its pieces are not, they are faces of one body.
-    let are_bodies = named.iter().all(|(_, piece)| is_closed(piece) || is_flat(piece)) || !is_closed(&mesh);
-    if file.is_whole && are_bodies {
-        notes.push(format!("{what} taken as a part each (`--split none` makes one part of them)"));
-        return Ok(named);
-    }
-    if are_bodies {
-        notes.push(format!("{what} taken as one part (`--split objects` makes a part of each)"));
-    } else if file.is_whole {
-        let advice = "`--split bodies` makes a part of each separate body";
-        notes.push(format!("{what} are pieces of one closed surface and taken as one part ({advice})"));
-    }
-    Ok(vec![(own, mesh)])
+    let what = format!("{} {} ({})", named.len(), pieces.kind.plural(), listed(&names));
+    // Open pieces of a closed surface are faces of one body, and so may be open groups and primitives of any: a mesh of a
+    // primitive per face is hardly ever closed to the last digit.
+    let are_closed = named.iter().all(|(_, piece)| is_closed(piece) || is_flat(piece));
+    let are_bodies = are_closed || pieces.kind.is_thing() && !is_closed(&mesh);
+    Ok(match (are_bodies, file.is_whole) {
+        (true, true) => {
+            let note = format!("{what} taken as a part each (`--split none` makes one part of them)");
+            (named, Some(note))
+        }
+        (true, false) => {
+            let note = format!("{what} taken as one part (`--split objects` makes a part of each)");
+            (vec![(own, mesh)], Some(note))
+        }
+        (false, true) => {
+            let advice = "`--split bodies` makes a part of each separate body";
+            let note = format!("{what} are pieces of one surface and taken as one part ({advice})");
+            (vec![(own, mesh)], Some(note))
+        }
+        (false, false) => (vec![(own, mesh)], None),
+    })
 }
 
 /// All bodies as one, whose pieces they are.
@@ -121,7 +140,8 @@ fn joined(mut bodies: Vec<Body>) -> Body {
         return Body { path: Vec::new(), ..body };
     }
     let names = unique_names(&bodies.iter().map(|b| b.path.clone()).collect::<Vec<_>>());
-    let mut all = Body { pieces: Pieces { what: "nodes", names, of: Vec::new() }, ..Body::default() };
+    let mut all =
+        Body { pieces: Pieces { kind: PieceKind::Nodes, names, of: Vec::new() }, ..Body::default() };
     for (number, body) in (0..).zip(bodies) {
         let first = all.mesh.vertices.len() as u32;
         all.mesh.vertices.extend(body.mesh.vertices);

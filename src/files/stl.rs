@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::content::{Body, Content, Pieces};
+use super::content::{Body, Content, PieceKind, Pieces};
 use super::text::{decimal_comma, decoded, excerpt};
 use crate::geometry::SourceMesh;
 
@@ -101,7 +101,7 @@ impl Welded {
     }
 
     fn content(self, notes: Vec<String>, mut pieces: Pieces) -> Content {
-        pieces.what = "solids";
+        pieces.kind = PieceKind::Solids;
         pieces.of.resize(self.mesh.triangles.len(), 0);
         if pieces.names.is_empty() {
             pieces.names.push(String::new());

@@ -134,6 +134,8 @@ fn what_a_file_of_the_whole_assembly_names_is_a_part_each() {
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\ng face 1\nf 1 3 2\ng face 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
     let unnamed = format!("{}{}", tetra(0.0, 0), tetra(5.0, 4));
     let sheet = format!("{two}o sheet\nv 9 0 0\nv 9 1 0\nv 9 0 1\nf 9 10 11\n");
+    // Without one face.
+    let open = two.replacen("f 1 3 2\n", "", 1);
     for (text, options, expected, note) in [
         (
             &two,
@@ -145,8 +147,10 @@ fn what_a_file_of_the_whole_assembly_names_is_a_part_each() {
         (&two, split(Split::Bodies), vec!["1", "2"], ""),
         (&unnamed, LoadOptions::default(), vec!["all"], "2 separate bodies"),
         (&unnamed, split(Split::Bodies), vec!["1", "2"], ""),
-        (&faces.to_owned(), LoadOptions::default(), vec!["all"], "pieces of one closed surface"),
+        (&faces.to_owned(), LoadOptions::default(), vec!["all"], "pieces of one surface"),
         (&faces.to_owned(), split(Split::Objects), vec!["face 2"], "`face 1` skipped: no volume"),
+        (&open, LoadOptions::default(), vec!["left", "right"], "2 objects"),
+        (&open.replace("o ", "g "), LoadOptions::default(), vec!["all"], "pieces of one surface"),
         (&sheet, LoadOptions::default(), vec!["left", "right"], "`sheet` skipped: no volume"),
     ] {
         let assembly = loaded(&[("all.obj", text)], &options);

@@ -212,3 +212,9 @@ pub trait PlanSink: Send {
     /// An event of the search, if it wants them.
     fn traced(&mut self, _event: super::TraceEvent) {}
 }
+
+/// Receives nothing: for callers that take the plan alone.
+impl PlanSink for () {
+    fn progress(&mut self, _: Progress) {}
+    fn step(&mut self, _: &crate::plan::PlanStep) {}
+}

@@ -14,6 +14,7 @@ mod equal_parts;
 mod explode;
 pub mod glb;
 pub mod layout;
+mod moves;
 pub mod page;
 pub mod picture;
 mod scene;

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use sbdp::files::load_assembly;
+use sbdp::geometry::SourceAssembly;
 use sbdp_client::{Assembly, Client, ConnectOptions, Event, Handle, Part, PlanOptions, Summary, Vertices};
 use sbdp_ipc::endpoint::{Endpoint, default_prefix};
 use sbdp_ipc::layout::shared_memory_files;
@@ -14,6 +16,12 @@ use sbdp_ipc::layout::shared_memory_files;
 pub const HANG: Duration = Duration::from_secs(120);
 /// Environment variable that turns a test into a client process.
 const ROLE: &str = "SBDP_TEST_ROLE";
+
+/// An assembly of `tests/assemblies`.
+pub fn assembly(name: &str) -> SourceAssembly {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/assemblies");
+    load_assembly(&folder.join(name)).unwrap()
+}
 
 /// A daemon of its own, killed (by its id) and cleaned up after when dropped.
 pub struct Daemon {

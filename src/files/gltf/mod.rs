@@ -17,6 +17,7 @@ use super::content::Content;
 /// # Errors
 /// What is wrong and what to do, without the file's name.
 pub(super) fn parse_gltf(bytes: &[u8], folder: &Path) -> Result<Content, String> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let beyond = check_glb_length(bytes)?;
     let again = |e: gltf::Error| format!("{e}; export the scene again");
     let gltf = gltf::Gltf::from_slice_without_validation(bytes).map_err(again)?;
@@ -100,7 +101,7 @@ mod tests {
 
     #[test]
     fn nodes_are_bodies_with_poses_and_paths() {
-        for bytes in [scene().into_bytes(), glb(&scene())] {
+        for bytes in [scene().into_bytes(), format!("\u{feff}{}", scene()).into_bytes(), glb(&scene())] {
             let bodies = parse_gltf(&bytes, Path::new("/nowhere")).unwrap().bodies;
             assert_eq!(bodies[0].path, ["frame", "bolt"]);
             assert_eq!(bodies[1].path, ["bolt"]);

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use gltf::mesh::Mode;
 use nalgebra::{Matrix4, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use super::super::content::{Body, Content, Pieces};
+use super::super::content::{Body, Content, PieceKind, Pieces};
 use super::super::split::listed;
 use super::super::text::printable;
 use super::buffers::Buffers;
@@ -196,7 +196,7 @@ impl SceneReader<'_> {
     /// A mesh in its own frame.
     fn local(&self, mesh: &gltf::Mesh<'_>) -> Result<(SourceMesh, Pieces), String> {
         let mut local = SourceMesh::default();
-        let mut pieces = Pieces { what: "primitives", ..Pieces::default() };
+        let mut pieces = Pieces { kind: PieceKind::Primitives, ..Pieces::default() };
         for (number, primitive) in (0..).zip(mesh.primitives()) {
             pieces.names.push(primitive.material().name().unwrap_or_default().to_owned());
             let first = u32::try_from(local.vertices.len()).map_err(|_| "too many vertices")?;
