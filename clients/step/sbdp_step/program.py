@@ -67,6 +67,8 @@ def run(package):
         line = convert(package, given)
     except Refusal as refusal:
         fail(REFUSED, refusal)
+    except ImportError as error:
+        fail(UNUSABLE, f"{package} cannot be loaded: {error}; install it again")
     except MemoryError:
         fail(REFUSED, "the memory that the converter may use is not enough for this file")
     except OSError as error:
