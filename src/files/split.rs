@@ -90,12 +90,15 @@ pub(super) fn parts_of(
     Ok(FileParts { parts, groups, notes })
 }
 
+/// A surface with the name that it has in its file.
+type Named = (String, SourceMesh);
+
 /// The pieces of a body that are parts, with their names, and what was decided without being asked.
 fn taken_apart(
     body: Body,
     file: &FileNames<'_>,
     split: Option<Split>,
-) -> Result<(Vec<(String, SourceMesh)>, Option<String>), GeometryError> {
+) -> Result<(Vec<Named>, Option<String>), GeometryError> {
     let Body { mesh, pieces, path } = body;
     let own = path.last().map_or(file.stem, String::as_str).to_owned();
     if split == Some(Split::Bodies) && !is_flat(&mesh) {
