@@ -426,3 +426,26 @@ pub(crate) const EDGES_CAST_FOR_PLACES: usize = 6_000_000;
 /// Count of ways to such places that are verified: casts seldom miss anything. At half, one that is refuted may hide the next; at
 /// double no effect.
 pub(crate) const PLACES_VERIFIED: usize = 8;
+
+// Converters of STEP files. Measured with the converters in `clients/step` (OCCT 8.0, November 2026, two slow cores):
+// 0.6 s to start, 0.4 s and 14 MB of memory per MB of plane faces, 1 s per MB of curved ones.
+
+/// Seconds after which a converter is killed. At half, files of 500 MB with plane faces are given up; at double, a
+/// converter that hangs is waited for for twenty minutes.
+pub(crate) const STEP_CONVERSION_SECONDS: u64 = 600;
+/// Seconds that a converter may take to say its version: 0.06 measured; a cold disk and a busy machine take a hundred
+/// times that. At half or double nothing is known to change.
+pub(crate) const STEP_VERSION_SECONDS: u64 = 20;
+/// Bytes of data of a process of a converter: as much as the largest file needs. At half, files above 300 MB fail; at
+/// double, a converter that fills the memory takes that of most machines.
+pub(crate) const STEP_MEMORY_BYTES: u64 = 8 << 30;
+/// Bytes of a STEP file. All are in memory, and would take longer than the deadline if there were twice as many.
+pub(crate) const STEP_FILE_BYTES: u64 = 512 << 20;
+/// Bytes of a file that a converter writes: 100 million triangles. At double, a GLB is as large as the format allows.
+pub(crate) const STEP_OUTPUT_BYTES: u64 = 2 << 30;
+/// Bytes of a converter's stdout: a line with 50,000 products. At half, fewer; at double, a flood is read longer.
+pub(crate) const STEP_STDOUT_BYTES: u64 = 4 << 20;
+/// Bytes of a converter's stderr, of which the end is kept: kernels write a line for each face that they mend.
+pub(crate) const STEP_STDERR_BYTES: u64 = 64 << 20;
+/// Bytes of remembered outputs: 50 million triangles. At half, large assemblies push each other out sooner.
+pub(crate) const STEP_CACHE_BYTES: u64 = 1 << 30;

@@ -20,7 +20,7 @@ const STAGES: [(&str, &str); 20] = [
     ("cache", "lru"),
     ("config", "cache ipc"),
     ("geometry", "budgets cache termination tolerances"),
-    ("files", "geometry"),
+    ("files", "budgets geometry tolerances"),
     ("sdf", "cache geometry termination"),
     ("scene", "budgets cache geometry lru sdf termination tolerances"),
     ("rrt", "geometry scene termination"),

@@ -484,3 +484,15 @@ pub(crate) const DISC_SHARE: f64 = 0.98;
 /// moves are as long as the part. At half, corridors with as much play are searched as a whole before what follows
 /// them; at double, moves in a grid count as short, too.
 pub(crate) const SHORT_MOVE: f64 = 0.9;
+
+// Tessellation of STEP files.
+
+/// mm. How far the triangles of a STEP file may be from its surfaces, if the user does not say: the smallest play that is
+/// drawn on purpose in most assemblies, the radial play of a running fit (ISO 286 H8/e8 at 10 mm: 0.0125 to 0.0345). A
+/// hole's chords lie inside the hole, by this at most, so fits with less play would overlap. At double, such fits
+/// overlap; at half, curved faces have 1.4 times as many triangles in one direction, twice as many in two.
+pub(crate) const STEP_DEFLECTION: f64 = 0.01;
+/// Radians. The angle between neighbouring chords of a curve in a STEP file, for small radii where the deflection alone
+/// would leave a circle three sides: at least 13. At half, at least 26, and threads and fillets have twice as many
+/// triangles; at double, at least 7, and small bores are 13 % narrower in area.
+pub(crate) const STEP_ANGLE: f64 = 0.5;

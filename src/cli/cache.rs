@@ -10,6 +10,7 @@ use super::error::CliError;
 use super::print;
 use super::table::TextTable;
 use crate::cache::{Cache, CacheSettings, CacheStatistics, DiskError};
+use crate::files::forget_converted;
 use crate::service::RECORD_KINDS;
 
 /// Arguments of `sbdp cache`.
@@ -35,9 +36,9 @@ pub(super) enum CacheCommand {
     },
     /// Check all files and every record, and take out what is damaged; exits with 1 if anything was
     Verify,
-    /// Take out the records and distance fields used least recently
+    /// Take out the records and distance fields used least recently, and converted STEP files likewise
     Evict {
-        /// Until so many megabytes of both are left
+        /// Until so many megabytes are left, and as many of converted STEP files
         #[arg(long, value_name = "MB")]
         to_mb: u64,
     },
@@ -84,8 +85,8 @@ pub(super) fn run(arguments: &CacheArguments) -> Result<ExitCode, CliError> {
         CacheCommand::Ls => print(&listed(&cache))?,
         CacheCommand::Stats { json } => stats(&cache, json.as_deref())?,
         CacheCommand::Verify => return verify(&cache),
-        CacheCommand::Evict { to_mb } => evict(&cache, to_mb.saturating_mul(MEGABYTE))?,
-        CacheCommand::Clear => evict(&cache, 0)?,
+        CacheCommand::Evict { to_mb } => evict(&cache, folder, to_mb.saturating_mul(MEGABYTE))?,
+        CacheCommand::Clear => evict(&cache, folder, 0)?,
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -140,10 +141,12 @@ fn verify(cache: &Cache) -> Result<ExitCode, CliError> {
     Ok(if fine { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn evict(cache: &Cache, bytes: u64) -> Result<(), CliError> {
+fn evict(cache: &Cache, folder: &Path, bytes: u64) -> Result<(), CliError> {
     let evicted = cache.evict(bytes);
+    let converted = forget_converted(folder, bytes);
     let CacheStatistics { file_bytes, field_file_bytes, .. } = cache.counters();
     print(&format!(
-        "{evicted} records taken out; the file has {file_bytes} bytes, distance fields {field_file_bytes}\n"
+        "{evicted} records taken out; the file has {file_bytes} bytes, distance fields {field_file_bytes}, converted STEP \
+         files {converted}\n"
     ))
 }

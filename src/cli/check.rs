@@ -7,7 +7,9 @@ use super::error::CliError;
 use super::table::{TextTable, length};
 use super::{interrupt, print};
 use crate::blocking_graph::Audit;
+use crate::files::is_tessellated;
 use crate::geometry::{Assembly, Solidity, SourceAssembly};
+use crate::plan::Overlap;
 use crate::search::{Engine, Termination};
 use crate::service::{Admission, Service};
 
@@ -27,7 +29,8 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
     for overlap in &overlaps {
         let [a, b] = overlap.parts.map(name);
         let depth = length(overlap.depth, assembly.units.as_deref());
-        text.push_str(&format!("  {a} and {b}: {depth} deep\n"));
+        let cause = if is_of_triangles(&assembly, overlap) { ", from tessellation" } else { "" };
+        text.push_str(&format!("  {a} and {b}: {depth} deep{cause}\n"));
     }
     if overlaps.is_empty() {
         text.push_str("  none\n");
@@ -42,6 +45,14 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<ExitCode, CliError> {
     }
     print(&text)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Whether an overlap may be of the triangles alone, as it is no deeper than these may be off: chords of a hole lie inside
+/// it.
+fn is_of_triangles(assembly: &SourceAssembly, overlap: &Overlap) -> bool {
+    let parts = overlap.parts.iter().filter_map(|&part| assembly.parts.get(part));
+    assembly.resolution.is_some_and(|resolution| overlap.depth <= resolution)
+        && parts.into_iter().any(|part| is_tessellated(&part.origin))
 }
 
 /// What static analysis says of the translations, against simulation.
@@ -75,8 +86,12 @@ fn headline(assembly: &SourceAssembly, healed: &Assembly) -> String {
     let triangles: usize = (0..healed.parts.len()).map(|p| healed.shape(p).mesh().triangles.len()).sum();
     let units = assembly.units.as_deref().unwrap_or("unknown");
     let fixed = if assembly.fixed.is_empty() { "none".to_owned() } else { assembly.fixed.join(", ") };
+    let resolution = assembly.resolution.map_or_else(String::new, |resolution| {
+        let off = length(resolution, assembly.units.as_deref());
+        format!("; triangles made of curved surfaces, up to {off} off")
+    });
     format!(
-        "{}: {} parts, {triangles} triangles; units {units}; fixed {fixed}\n\n",
+        "{}: {} parts, {triangles} triangles; units {units}; fixed {fixed}{resolution}\n\n",
         assembly.name,
         healed.parts.len()
     )

@@ -11,9 +11,10 @@ use super::error::{CliError, exit_code};
 use super::listener::Listener;
 use super::part_names::{part_named, resolve};
 use super::staging::staging;
-use super::subject::{Subject, content_of, only_mesh};
+use super::subject::{Subject, content_of, further, only_mesh};
 use super::{cache, interrupt, print, report, written};
-use crate::files::load_assembly;
+use crate::cache::CacheSettings;
+use crate::files::{LoadOptions, load};
 use crate::geometry::{Revision, SourceAssembly, SourceGroup, content_hash, pose_from_waypoint};
 use crate::plan::export::{GroupDocument, PlanDocument, SourceDocument};
 use crate::plan::{Plan, Warning};
@@ -48,13 +49,14 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let termination = Termination::new(deadline);
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
     let started = Instant::now();
-    let mut assembly = arguments.input.read()?;
+    let options = load_options(arguments);
+    let mut assembly = load(&arguments.input.assembly, &options)?;
     let read = started.elapsed();
     let content = content_hash(&assembly);
     if let Some(rotation) = &arguments.rotate {
         assembly.rotate(rotation);
     }
-    let revision = revision(arguments, &assembly)?;
+    let revision = revision(arguments, &assembly, &further(&options))?;
     let revised = assembly.revised(&revision);
     let request = request(arguments, &revised)?;
     let backend = choose_backend(arguments)?;
@@ -94,6 +96,7 @@ fn source(arguments: &PlanArguments, content: String) -> SourceDocument {
         added: arguments.added.iter().map(absolute).collect(),
         split: arguments.input.split.map(|split| split.to_string()),
         ignore: arguments.input.ignore.iter().map(|pattern| pattern.as_str().to_owned()).collect(),
+        deflection: arguments.input.deflection,
     }
 }
 
@@ -124,17 +127,26 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
     })
 }
 
-/// What differs from the files.
-fn revision(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<Revision, CliError> {
+/// How the files are read, and where converted ones are remembered.
+fn load_options(arguments: &PlanArguments) -> LoadOptions {
+    let folder = arguments.cache_dir.clone().or_else(CacheSettings::default_folder);
+    arguments.input.options(folder.filter(|_| !arguments.no_cache))
+}
+
+/// What differs from the files; `options` is how further files are read.
+fn revision(
+    arguments: &PlanArguments,
+    assembly: &SourceAssembly,
+    options: &LoadOptions,
+) -> Result<Revision, CliError> {
     let moved = arguments
         .moved
         .iter()
         .map(|(name, motion)| Ok((part_named(assembly, "--moved", name)?, pose_from_waypoint(motion))));
-    let replaced = arguments
-        .replaced
-        .iter()
-        .map(|(name, file)| Ok((part_named(assembly, "--replaced", name)?, only_mesh(file, "--replaced")?)));
-    let added = arguments.added.iter().map(|path| Ok(load_assembly(path)?.parts));
+    let replaced = arguments.replaced.iter().map(|(name, file)| {
+        Ok((part_named(assembly, "--replaced", name)?, only_mesh(file, "--replaced", options)?))
+    });
+    let added = arguments.added.iter().map(|path| Ok(load(path, options)?.parts));
     Ok(Revision {
         moved: moved.collect::<Result<_, CliError>>()?,
         replaced: replaced.collect::<Result<_, CliError>>()?,

@@ -7,7 +7,8 @@ use nalgebra::{Quaternion, UnitQuaternion};
 use super::error::CliError;
 use super::part_names::part_named;
 use crate::blocking_graph::DirectionalGraph;
-use crate::files::{LoadOptions, load, load_assembly};
+use crate::cache::CacheSettings;
+use crate::files::{LoadOptions, StepSettings, load};
 use crate::geometry::{
     Assembly, Pose, Revision, SourceAssembly, SourceMesh, content_hash, pose_from_waypoint,
 };
@@ -70,12 +71,13 @@ impl Subject {
                 path.display()
             )));
         }
-        let mut base = load(&path, &options(&source)?)?;
+        let options = options(&source)?;
+        let mut base = load(&path, &options)?;
         let content = content_hash(&base);
         if let Some([w, x, y, z]) = source.rotate {
             base.rotate(&UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)));
         }
-        let revision = revision(&base, &source)?;
+        let revision = revision(&base, &source, &options)?;
         if !source.content.is_empty() && content_of(&content, &revision) != source.content {
             let other = format!("the meshes in {} are not those that were planned", path.display());
             match meshes {
@@ -149,8 +151,8 @@ pub(super) fn plan_in(file: &Path) -> Result<PlanDocument, CliError> {
 }
 
 /// The mesh of a file that has just one.
-pub(super) fn only_mesh(file: &Path, option: &str) -> Result<SourceMesh, CliError> {
-    let mut parts = load_assembly(file)?.parts;
+pub(super) fn only_mesh(file: &Path, option: &str, options: &LoadOptions) -> Result<SourceMesh, CliError> {
+    let mut parts = load(file, options)?.parts;
     match (parts.pop(), parts.len()) {
         (Some(part), 0) => Ok(part.mesh),
         (_, rest) => Err(CliError::Refused(format!(
@@ -166,18 +168,31 @@ fn options(source: &SourceDocument) -> Result<LoadOptions, CliError> {
     let refused = |e: String| CliError::Refused(format!("`source` in the plan: {e}"));
     let split = source.split.as_deref().map(str::parse).transpose().map_err(refused)?;
     let ignore = source.ignore.iter().map(|text| text.parse().map_err(refused)).collect::<Result<_, _>>()?;
-    Ok(LoadOptions { split, ignore })
+    // Which converter ran is not in the plan: a plan from elsewhere must not name a program to run.
+    let step = StepSettings { cache_folder: CacheSettings::default_folder(), ..StepSettings::default() };
+    let step = StepSettings { deflection: source.deflection.unwrap_or(step.deflection), ..step };
+    Ok(LoadOptions { split, ignore, step: Some(step) })
+}
+
+/// How files of further parts are read: as they say themselves, STEP files like those of the assembly.
+pub(super) fn further(options: &LoadOptions) -> LoadOptions {
+    LoadOptions { step: options.step.clone(), ..LoadOptions::default() }
 }
 
 /// What was changed before the plan began, but for parts that were moved.
-fn revision(base: &SourceAssembly, source: &SourceDocument) -> Result<Revision, CliError> {
+fn revision(
+    base: &SourceAssembly,
+    source: &SourceDocument,
+    options: &LoadOptions,
+) -> Result<Revision, CliError> {
+    let options = further(options);
     let mut revision = Revision::default();
     for (name, file) in &source.replaced {
         let place = part_named(base, "source.replaced", name)?;
-        revision.replaced.push((place, only_mesh(Path::new(file), "source.replaced")?));
+        revision.replaced.push((place, only_mesh(Path::new(file), "source.replaced", &options)?));
     }
     for path in &source.added {
-        revision.added.extend(load_assembly(Path::new(path))?.parts);
+        revision.added.extend(load(Path::new(path), &options)?.parts);
     }
     Ok(revision)
 }

@@ -9,6 +9,8 @@ pub(super) struct Content {
     pub(super) bodies: Vec<Body>,
     /// The unit of length, if the file says it.
     pub(super) units: Option<String>,
+    /// How far triangles may be from the surfaces that they stand for, in that unit, if the file has others than triangles.
+    pub(super) resolution: Option<f64>,
     /// What was skipped or is in doubt, in whole sentences without the file's name.
     pub(super) notes: Vec<String>,
 }

@@ -10,6 +10,7 @@ use super::description::{self, Described};
 use super::format::{self, Format};
 use super::options::{IgnorePattern, LoadOptions};
 use super::split::{FileNames, FileParts, listed, parts_of};
+use super::step::StepSettings;
 use super::text::printable;
 use super::{assembly_error, fusion, ignore, notes_on, poses, read_file, shown, stem, unreadable, whole};
 use crate::geometry::{GeometryError, SourceAssembly};
@@ -29,11 +30,12 @@ pub(super) fn load(folder: &Path, options: &LoadOptions) -> Result<SourceAssembl
     let mut notes = listing.notes(folder);
     let mut assembly = match &listing.meshes[..] {
         [file] => {
-            let mut assembly = whole(read_file(file)?, file, split)?;
+            let content = read_file(file, options.step.as_ref());
+            let mut assembly = whole(content.map_err(|e| listing.with_advice(e))?, file, split)?;
             assembly.name = stem(folder);
             assembly
         }
-        files => several(folder, files, split)?,
+        files => several(folder, files, split, options.step.as_ref())?,
     };
     poses::place(folder, &mut assembly, &mut notes)?;
     assembly.notes.extend(notes);
@@ -49,14 +51,29 @@ fn several(
     folder: &Path,
     files: &[PathBuf],
     split: Option<super::Split>,
+    step: Option<&StepSettings>,
 ) -> Result<SourceAssembly, GeometryError> {
     // Of several that cannot be read always the first is named.
     let contents: Vec<Result<Content, GeometryError>> =
-        files.par_iter().map(|file| read_file(file)).collect();
+        files.par_iter().map(|file| read_file(file, step)).collect();
+    // What lies beside meshes and cannot be converted may be the source of them: it is left out with a note. Alone it is
+    // what the user means.
+    let has_mesh = files.iter().any(|file| Format::of(file) != Some(Format::Step));
     let mut assembly = SourceAssembly { name: stem(folder), ..SourceAssembly::default() };
     let mut unit_of: Option<(String, &Path)> = None;
+    let mut silent: Option<&Path> = None;
     for (file, content) in files.iter().zip(contents) {
-        let content = content?;
+        let content = match content {
+            Err(e) if has_mesh && Format::of(file) == Some(Format::Step) => {
+                let reason = reason(e);
+                assembly.notes.push(format!("{} is not read: {reason}", printable(&name(file))));
+                continue;
+            }
+            content => content?,
+        };
+        if let Some(length) = content.resolution {
+            assembly.resolution = Some(assembly.resolution.map_or(length, |known| known.max(length)));
+        }
         if let Some(unit) = &content.units {
             match &unit_of {
                 Some((first, named)) if first != unit => {
@@ -67,6 +84,8 @@ fn several(
                 }
                 _ => unit_of = Some((unit.clone(), file)),
             }
+        } else {
+            silent.get_or_insert(file.as_path());
         }
         let names = FileNames { stem: &stem(file), origin: &shown(file), is_whole: false };
         let FileParts { parts, groups, notes } = parts_of(content, &names, split)?;
@@ -75,6 +94,10 @@ fn several(
         assembly.notes.extend(notes_on(file, notes));
     }
     assembly.parts.sort_by(|a, b| super::natural_order(&a.name, &b.name));
+    if let (Some((unit, named)), Some(silent)) = (&unit_of, silent) {
+        let [a, b] = [*named, silent].map(|f| printable(&name(f)));
+        assembly.notes.push(format!("{a} is in {unit}; {b} names no unit and is taken to be in {unit}, too"));
+    }
     assembly.units = unit_of.map(|(unit, _)| unit);
     Ok(assembly)
 }
@@ -174,20 +197,32 @@ impl Listing {
 
     /// Why there is no part.
     fn nothing(&self) -> String {
-        let mut reason = "the folder holds no .obj, .stl, .gltf or .glb file".to_owned();
+        let mut reason = "the folder holds no .obj, .stl, .gltf, .glb or .step file".to_owned();
         if !self.ignored.is_empty() {
             reason.push_str(" that is not ignored");
         }
-        for file in &self.unread {
-            if let Some(advice) = format::advice(file) {
-                reason.push_str(&format!("; {}: {advice}", printable(&name(file))));
-            }
-        }
+        reason.push_str(&self.advice());
         if let Some((first, _)) = self.below.first() {
             let count = self.below.len();
             reason.push_str(&format!("; {count} folders in it do: give one of them, as {first}"));
         }
         reason
+    }
+
+    /// What to do with the files that are not read.
+    fn advice(&self) -> String {
+        let advised = self.unread.iter().filter_map(|file| Some((file, format::advice(file)?)));
+        advised.map(|(file, advice)| format!("; {}: {advice}", printable(&name(file)))).collect()
+    }
+
+    /// An error of the only file, with what to do with those beside it.
+    fn with_advice(&self, error: GeometryError) -> GeometryError {
+        match error {
+            GeometryError::Assembly { origin, reason } => {
+                GeometryError::Assembly { origin, reason: reason + &self.advice() }
+            }
+            other => other,
+        }
     }
 
     fn notes(&self, folder: &Path) -> Vec<String> {
@@ -202,6 +237,14 @@ impl Listing {
             notes.push(format!("the folder {below} is not read, with {}; {advice}", listed(meshes)));
         }
         notes
+    }
+}
+
+/// Why a file was refused, without its path.
+fn reason(error: GeometryError) -> String {
+    match error {
+        GeometryError::Assembly { reason, .. } => reason,
+        other => other.to_string(),
     }
 }
 

@@ -11,6 +11,8 @@ pub(super) enum Format {
     Stl,
     /// glTF or GLB.
     Gltf,
+    /// STEP (ISO 10303-21).
+    Step,
 }
 
 impl Format {
@@ -20,6 +22,7 @@ impl Format {
             "obj" => Some(Self::Obj),
             "stl" => Some(Self::Stl),
             "gltf" | "glb" => Some(Self::Gltf),
+            "step" | "stp" | "p21" => Some(Self::Step),
             _ => None,
         }
     }
@@ -29,6 +32,7 @@ impl Format {
             Self::Obj => "an OBJ file",
             Self::Stl => "an STL file",
             Self::Gltf => "a glTF file",
+            Self::Step => "a STEP file",
         }
     }
 }
@@ -41,9 +45,7 @@ pub(super) fn extension(path: &Path) -> String {
 /// What to do with a file of geometry that has no reader here, by its extension.
 pub(super) fn advice(path: &Path) -> Option<&'static str> {
     Some(match extension(path).as_str() {
-        "step" | "stp" | "p21" | "stpz" => {
-            "STEP is not a mesh: export the assembly from the CAD program as GLB, or each part as STL"
-        }
+        "stpz" => "unpack it, as by `gunzip -S .stpz FILE`, and name it .step",
         "iges" | "igs" => "IGES is not a mesh: open it in a CAD program and export GLB, or each part as STL",
         "brep" | "brp" | "fcstd" => "open it in FreeCAD, select the parts and export them as glTF (.glb)",
         "sldasm" | "sldprt" | "ipt" | "iam" | "f3d" | "f3z" | "catpart" | "catproduct" | "prt" | "asm"
@@ -106,7 +108,8 @@ pub(super) fn mismatch(format: Format, bytes: &[u8]) -> Option<String> {
     ];
     let found = magic.iter().find(|(magic, ..)| bytes.starts_with(magic))?;
     let (_, what, advice) = found;
-    if format == Format::Gltf && found.0 == b"glTF" || super::stl::is_binary_by_length(bytes) {
+    let own = [(Format::Gltf, &b"glTF"[..]), (Format::Step, b"ISO-10303-21")];
+    if own.contains(&(format, found.0)) || super::stl::is_binary_by_length(bytes) {
         return None;
     }
     Some(format!("this is {what} and not {expected}; {advice}"))

@@ -92,7 +92,7 @@ pub(super) fn read(folder: &Path) -> Result<Option<Content>, GeometryError> {
         return Ok(None);
     }
     let file = |name: &str| {
-        let content = read_file(&folder.join(name)).map_err(|e| e.to_string())?;
+        let content = read_file(&folder.join(name), None).map_err(|e| e.to_string())?;
         Ok(content.bodies.into_iter().next().unwrap_or_default().mesh)
     };
     content(&read_text(&path)?, file).map_err(|reason| assembly_error(&path, &reason))
@@ -120,7 +120,8 @@ fn content(
     }
     let hidden =
         (!hidden.is_empty()).then(|| format!("{} not visible in the assembly and not read", listed(&hidden)));
-    Ok(Some(Content { bodies, units: Some("cm".to_owned()), notes: hidden.into_iter().collect() }))
+    let notes = hidden.into_iter().collect();
+    Ok(Some(Content { bodies, units: Some("cm".to_owned()), notes, ..Content::default() }))
 }
 
 /// Reads a text as such a description, without its files; what came of it, in words.

@@ -1,7 +1,7 @@
 //! Assemblies from files as people have them: folders of OBJ, STL and GLB files, one file of a whole assembly, the
 //! layouts of public data sets.
 //!
-//! A reader turns bytes into a [`content::Content`]: surfaces with the names that the file gives to them and their
+//! A reader turns bytes into a `content::Content`: surfaces with the names that the file gives to them and their
 //! pieces. `split.rs` decides which of these is a part. What is not read, or decided without being asked, is a note of
 //! the assembly ([`SourceAssembly::notes`]): nothing is left out without one.
 
@@ -18,6 +18,7 @@ mod obj;
 mod options;
 mod poses;
 mod split;
+mod step;
 mod stl;
 mod text;
 
@@ -33,6 +34,8 @@ use crate::geometry::{GeometryError, SourceAssembly, bodies};
 
 pub use self::natural_order::natural_order;
 pub use self::options::{IgnorePattern, LoadOptions, Split};
+pub use self::step::StepSettings;
+pub(crate) use self::step::forget as forget_converted;
 
 /// Reads an assembly as its files say themselves; see [`load`].
 ///
@@ -75,7 +78,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<SourceAssembly, Geomet
 
 /// A file that holds a whole assembly.
 fn single_file(path: &Path, options: &LoadOptions) -> Result<SourceAssembly, GeometryError> {
-    let content = read_file(path)?;
+    let content = read_file(path, options.step.as_ref())?;
     let mut assembly = whole(content, path, options.split)?;
     ignore(&mut assembly, &options.ignore, &[])?;
     Ok(assembly)
@@ -84,11 +87,11 @@ fn single_file(path: &Path, options: &LoadOptions) -> Result<SourceAssembly, Geo
 /// The assembly in a file that holds all of it, or in a folder that one file describes.
 fn whole(mut content: Content, path: &Path, split: Option<Split>) -> Result<SourceAssembly, GeometryError> {
     let (name, origin) = (stem(path), shown(path));
-    let units = content.units.take();
+    let (units, resolution) = (content.units.take(), content.resolution);
     let FileParts { parts, groups, notes } =
         parts_of(content, &FileNames { stem: &name, origin: &origin, is_whole: true }, split)?;
     let notes = notes_on(path, notes);
-    Ok(SourceAssembly { name, units, parts, groups, notes, ..SourceAssembly::default() })
+    Ok(SourceAssembly { name, units, parts, groups, notes, resolution, ..SourceAssembly::default() })
 }
 
 fn notes_on(path: &Path, notes: Vec<String>) -> Vec<String> {
@@ -126,10 +129,11 @@ fn ignore(
 }
 
 /// What a file of this name with these bytes holds; what is wrong with it, without its name. `folder` is where files
-/// beside it are looked for.
-fn parse(name: &Path, bytes: &[u8], folder: &Path) -> Result<Content, String> {
+/// beside it are looked for, and `step` how STEP files are converted, if they are.
+fn parse(name: &Path, bytes: &[u8], folder: &Path, step: Option<&StepSettings>) -> Result<Content, String> {
     let Some(format) = Format::of(name) else {
-        let advice = format::advice(name).unwrap_or("give a folder, or an .obj, .stl, .gltf or .glb file");
+        let advice =
+            format::advice(name).unwrap_or("give a folder, or an .obj, .stl, .gltf, .glb or .step file");
         return Err(format!("not a mesh that can be read; {advice}"));
     };
     if let Some(reason) = format::mismatch(format, bytes) {
@@ -139,18 +143,42 @@ fn parse(name: &Path, bytes: &[u8], folder: &Path) -> Result<Content, String> {
         Format::Obj => obj::parse_obj(bytes),
         Format::Stl => stl::parse_stl(bytes),
         Format::Gltf => gltf::parse_gltf(bytes, folder),
+        Format::Step => parse_step(bytes, step),
     }
 }
 
-fn read_file(path: &Path) -> Result<Content, GeometryError> {
+/// A STEP file, by the scene that a converter makes of it.
+fn parse_step(bytes: &[u8], settings: Option<&StepSettings>) -> Result<Content, String> {
+    let settings = settings.ok_or(
+        "STEP files are converted by a program of their own, which is not run here; convert it to GLB before",
+    )?;
+    let step::ConvertedStep { glb, unit, resolution, warnings } = step::convert(bytes, settings)?;
+    let scene = gltf::parse_gltf(&glb, Path::new("/nowhere"));
+    let mut content =
+        scene.map_err(|reason| format!("the converter wrote a scene that cannot be read: {reason}"))?;
+    if content.units.as_ref() != Some(&unit) {
+        let other = content.units.as_deref().unwrap_or_default();
+        return Err(format!("the converter says that the unit is {unit}, and its scene that it is {other}"));
+    }
+    content.resolution = Some(resolution);
+    content.notes.extend(warnings);
+    Ok(content)
+}
+
+/// Whether a file's triangles stand for other surfaces.
+pub(crate) fn is_tessellated(origin: &str) -> bool {
+    Format::of(Path::new(origin)) == Some(Format::Step)
+}
+
+fn read_file(path: &Path, step: Option<&StepSettings>) -> Result<Content, GeometryError> {
     let folder = path.parent().unwrap_or(Path::new("."));
-    parse(path, &read_bytes(path)?, folder).map_err(|reason| assembly_error(path, &reason))
+    parse(path, &read_bytes(path)?, folder, step).map_err(|reason| assembly_error(path, &reason))
 }
 
 /// Reads bytes as a file of this name, and takes all of it apart; what came of it, in words. No files are beside it.
 pub(crate) fn parse_file(name: &str, bytes: &[u8], split: Option<Split>) -> Result<SourceAssembly, String> {
     let path = Path::new(name);
-    let content = parse(path, bytes, Path::new("/nowhere"))?;
+    let content = parse(path, bytes, Path::new("/nowhere"), None)?;
     whole(content, path, split).map_err(|e| e.to_string())
 }
 

@@ -2,6 +2,8 @@
 
 use glob::{MatchOptions, Pattern};
 
+use super::step::StepSettings;
+
 /// What is a part in a file that holds several.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Split {
@@ -37,12 +39,14 @@ impl std::fmt::Display for Split {
 }
 
 /// How files are read; by default as they say themselves.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct LoadOptions {
     /// What is a part in a file that holds several [default: what a file of a whole assembly tells apart by name].
     pub split: Option<Split>,
     /// Patterns of file and part names that are left out.
     pub ignore: Vec<IgnorePattern>,
+    /// How STEP files are converted; if it is not said, they are not: that runs a program.
+    pub step: Option<StepSettings>,
 }
 
 /// A pattern of names: `*` stands for any characters, `?` for one, `[ab]` for one of some.

@@ -90,14 +90,15 @@ pub(super) fn parts_of(
     Ok(FileParts { parts, groups, notes })
 }
 
-type NamedMeshes = Vec<(String, SourceMesh)>;
+/// A surface with the name that it has in its file.
+type Named = (String, SourceMesh);
 
 /// The pieces of a body that are parts, with their names, and what was decided without being asked.
 fn taken_apart(
     body: Body,
     file: &FileNames<'_>,
     split: Option<Split>,
-) -> Result<(NamedMeshes, Option<String>), GeometryError> {
+) -> Result<(Vec<Named>, Option<String>), GeometryError> {
     let Body { mesh, pieces, path } = body;
     let own = path.last().map_or(file.stem, String::as_str).to_owned();
     if split == Some(Split::Bodies) && !is_flat(&mesh) {
@@ -179,7 +180,7 @@ fn groups(paths: &[Vec<String>], names: &[String]) -> Vec<SourceGroup> {
 
 impl Pieces {
     /// The pieces that have triangles, in the order of their names; what has no name gets a number.
-    fn meshes(&self, mesh: &SourceMesh) -> NamedMeshes {
+    fn meshes(&self, mesh: &SourceMesh) -> Vec<Named> {
         let mut of: Vec<Vec<u32>> = vec![Vec::new(); self.names.len()];
         for (triangle, &piece) in (0..).zip(&self.of) {
             if let Some(list) = of.get_mut(piece as usize) {

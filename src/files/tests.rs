@@ -1,6 +1,7 @@
 //! Folders and single files, and what is said about them.
 
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
 use super::*;
@@ -102,9 +103,7 @@ fn one_file_is_an_assembly_of_one_part() {
     let assembly = load_assembly(&folder.path().join("bolt.obj")).unwrap();
     assert_eq!((assembly.name.as_str(), assembly.parts.len()), ("bolt", 1));
     assert!(assembly.notes[0].contains("nothing to take apart"), "{:?}", assembly.notes);
-    assert!(
-        load_assembly(&folder.path().join("x.step")).unwrap_err().to_string().contains("STEP is not a mesh")
-    );
+    assert!(load_assembly(&folder.path().join("x.step")).unwrap_err().to_string().contains("0 bytes"));
 }
 
 /// A tetrahedron elsewhere, whose vertices come after `before` others.
@@ -203,7 +202,7 @@ fn patterns_leave_parts_out() {
 fn files_that_are_not_read_are_named() {
     let a = [("a.obj", TETRA), ("b.obj", TETRA)];
     for (file, note) in [
-        ("plate.step", Some("plate.step is not read: STEP")),
+        ("plate.step", Some("plate.step is not read: STEP files are converted")),
         ("plate.xyz", Some("plate.xyz is not read: not a file that sbdp knows")),
         ("scene.bin", Some("scene.bin is not read")),
         ("a.mtl", None),
@@ -325,4 +324,71 @@ fn the_layout_of_the_fusion_data_set_is_read() {
         let error = refusal(&[("assembly.json", &changed), files[1], files[2]]);
         assert!(error.contains(reason), "{reason}: {error}");
     }
+}
+
+/// A converter that makes of every file one tetrahedron, as the node `a` below `group`, in a unit.
+fn converter(folder: &Path, unit: &str) -> StepSettings {
+    let positions = [0f32, 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1.].map(f32::to_le_bytes).concat();
+    let indices = [0u8, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2];
+    let data = base64::Engine::encode(&base64::prelude::BASE64_STANDARD, [&positions[..], &indices].concat());
+    let scene = format!(
+        r#"{{"asset":{{"version":"2.0","extras":{{"unit":"{unit}"}}}},"scenes":[{{"nodes":[0]}}],
+"nodes":[{{"name":"group","children":[1]}},{{"name":"a","mesh":0}}],
+"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],
+"accessors":[{{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[1,1,1]}},
+{{"bufferView":1,"componentType":5121,"count":12,"type":"SCALAR"}}],
+"bufferViews":[{{"buffer":0,"byteLength":48}},{{"buffer":0,"byteOffset":48,"byteLength":12}}],
+"buffers":[{{"byteLength":60,"uri":"data:application/octet-stream;base64,{data}"}}]}}"#
+    );
+    let mut glb = b"glTF\x02\0\0\0".to_vec();
+    let padded = scene.len().next_multiple_of(4);
+    glb.extend((padded as u32 + 20).to_le_bytes());
+    glb.extend((padded as u32).to_le_bytes());
+    glb.extend(b"JSON");
+    glb.extend(scene.bytes().chain(std::iter::repeat_n(b' ', padded - scene.len())));
+    let (output, program) = (folder.join("made.glb"), folder.join("converter"));
+    fs::write(&output, glb).unwrap();
+    let script = format!(
+        "#!/bin/sh\n[ \"$1\" = --version ] && echo 1 && exit\ngrep -q broken \"$1\" && echo 'it is broken' >&2 && exit 3\n\
+         cp {} \"$2\"\necho '{{\"sbdp-step\": 1, \"unit\": \"mm\", \"deflection\": 0.02, \"warnings\": [\"`b` is odd\"]}}'\n",
+        output.display()
+    );
+    fs::write(&program, script).unwrap();
+    fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
+    StepSettings { converter: Some(program), ..StepSettings::default() }
+}
+
+#[test]
+fn step_files_are_read_through_a_converter() {
+    let programs = tempfile::tempdir().unwrap();
+    let options = LoadOptions { step: Some(converter(programs.path(), "mm")), ..LoadOptions::default() };
+    let step = "ISO-10303-21;";
+    let files = folder(&[("x.STP", step)]);
+    for path in [files.path().to_owned(), files.path().join("x.STP")] {
+        let assembly = load(&path, &options).unwrap();
+        assert_eq!(names(&assembly), ["a"]);
+        assert_eq!((assembly.units.as_deref(), assembly.resolution), (Some("mm"), Some(0.02)));
+        assert!(assembly.notes.iter().any(|n| n.contains("x.STP: `b` is odd")), "{:?}", assembly.notes);
+    }
+    // Beside meshes it is one part; what cannot be converted is left out by name.
+    let beside =
+        loaded(&[("bolt.obj", TETRA), ("x.step", step), ("y.step", "ISO-10303-21; broken")], &options);
+    assert_eq!(names(&beside), ["bolt", "x"]);
+    assert_eq!((beside.units.as_deref(), beside.resolution), (Some("mm"), Some(0.02)));
+    let notes = beside.notes.join("; ");
+    for note in ["y.step is not read: the converter refuses it: it is broken", "bolt.obj names no unit"] {
+        assert!(notes.contains(note), "{note}: {notes}");
+    }
+    // Alone it is refused, with what to do with all that is there.
+    let alone = folder(&[("y.step", "ISO-10303-21; broken"), ("a.3mf", "x")]);
+    let error = load(alone.path(), &options).unwrap_err().to_string();
+    assert!(
+        ["y.step", "it is broken", "a.3mf: open it"].iter().all(|words| error.contains(words)),
+        "{error}"
+    );
+    // The line and the scene must agree.
+    let other = tempfile::tempdir().unwrap();
+    let options = LoadOptions { step: Some(converter(other.path(), "in")), ..LoadOptions::default() };
+    let error = load(&files.path().join("x.STP"), &options).unwrap_err().to_string();
+    assert!(error.contains("unit is mm") && error.contains("it is in"), "{error}");
 }

@@ -49,6 +49,10 @@ pub struct SourceAssembly {
     /// assembly, not to its content.
     #[serde(skip)]
     pub base: Vec<String>,
+    /// How far triangles may be from the surfaces that they stand for, where these were made from others (STEP): overlaps
+    /// up to that depth may be of the triangles alone. In the assembly's units. Not content, either.
+    #[serde(skip)]
+    pub resolution: Option<f64>,
     /// Which parts belong together, outer groups before inner ones. Not content, either.
     #[serde(skip)]
     pub groups: Vec<SourceGroup>,

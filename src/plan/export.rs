@@ -97,6 +97,9 @@ pub struct SourceDocument {
     /// Patterns of the names of parts and files that were left out (`--ignore`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ignore: Vec<String>,
+    /// mm: how far triangles made of STEP files may be from the surfaces (`--deflection`).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deflection: Option<f64>,
 }
 
 /// Parts that belong together where the assembly comes from.

@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::files::{IgnorePattern, LoadOptions, Split, load};
+use crate::cache::CacheSettings;
+use crate::files::{IgnorePattern, LoadOptions, Split, StepSettings, load};
 use crate::geometry::{GeometryError, SourceAssembly};
 
 /// An assembly, and how its files are read.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Input {
-    /// A folder of OBJ, STL or GLB files in assembled pose, or one such file with the whole assembly in it
+    /// A folder of OBJ, STL, GLB or STEP files in assembled pose, or one such file with the whole assembly in it
     pub(in crate::cli) assembly: PathBuf,
     /// What is a part in a file that holds several: each object, group, solid or primitive; each separate body; or all of
     /// it (of a scene each node) [default: what a file of the whole assembly names, if these are bodies]
@@ -19,14 +20,34 @@ pub(in crate::cli) struct Input {
     /// Leave out the parts whose names, or whose files' names, fit a pattern, as '*bolt*' (repeatable)
     #[arg(long, value_name = "GLOB")]
     pub(in crate::cli) ignore: Vec<IgnorePattern>,
+    /// The program that makes GLB of STEP files (see clients/step) [default: $SBDP_STEP, else `sbdp-step` beside this
+    /// program or on PATH]
+    #[arg(long, value_name = "PROGRAM")]
+    pub(in crate::cli) converter: Option<PathBuf>,
+    /// How far the triangles made of a STEP file may be from its surfaces, in mm [default: 0.01]
+    #[arg(long, value_name = "MM", value_parser = deflection)]
+    pub(in crate::cli) deflection: Option<f64>,
+}
+
+fn deflection(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|mm: &f64| mm.is_finite() && *mm > 0.0);
+    number.ok_or_else(|| format!("`{text}` is no positive number of millimetres"))
 }
 
 impl Input {
-    /// Reads the assembly.
+    /// Reads the assembly; converted STEP files are remembered in the default folder.
     ///
     /// # Errors
     /// As [`load`].
     pub(in crate::cli) fn read(&self) -> Result<SourceAssembly, GeometryError> {
-        load(&self.assembly, &LoadOptions { split: self.split, ignore: self.ignore.clone() })
+        load(&self.assembly, &self.options(CacheSettings::default_folder()))
+    }
+
+    /// How the files are read. Converted STEP files are remembered in the folder, if there is one.
+    pub(in crate::cli) fn options(&self, cache_folder: Option<PathBuf>) -> LoadOptions {
+        let step =
+            StepSettings { converter: self.converter.clone(), cache_folder, ..StepSettings::default() };
+        let step = StepSettings { deflection: self.deflection.unwrap_or(step.deflection), ..step };
+        LoadOptions { split: self.split, ignore: self.ignore.clone(), step: Some(step) }
     }
 }
