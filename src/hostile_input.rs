@@ -125,7 +125,8 @@ fn file(name: &str, bytes: &[u8]) -> String {
         Ok(assembly) => assembly.notes.join("; "),
         Err(reason) => reason,
     };
-    [None, Some(Split::Objects), Some(Split::Bodies), Some(Split::None)].map(read).join("; ")
+    let words = [None, Some(Split::Objects), Some(Split::Bodies), Some(Split::None)].map(read);
+    if words.iter().all(String::is_empty) { "fine".to_owned() } else { words.join("; ") }
 }
 
 fn messages(bytes: &[u8]) -> String {

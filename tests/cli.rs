@@ -107,7 +107,7 @@ fn refused_geometry_names_file_part_and_reason() {
         fs::write(folder.path().join("lid.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
         refused(&run(&[command, path]), &["lid.obj", "part `lid`", "one plane"]);
         fs::write(folder.path().join("lid.obj"), "").unwrap();
-        refused(&run(&[command, path]), &["lid.obj", "part `lid`", "0 bytes"]);
+        refused(&run(&[command, path]), &["lid.obj", "0 bytes"]);
         fs::remove_file(folder.path().join("lid.obj")).unwrap();
     }
 }

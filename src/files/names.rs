@@ -1,6 +1,6 @@
 //! Names of parts from the names in a file's tree.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::text::printable;
 
@@ -12,13 +12,16 @@ pub(super) fn unique_names(paths: &[Vec<String>]) -> Vec<String> {
     let mut names: Vec<String> = paths.iter().map(|path| tail(path, 1)).collect();
     let deepest = paths.iter().map(Vec::len).max().unwrap_or(0);
     for length in 2..=deepest {
-        let equal = counts(&names);
-        let is_equal = |name: &String| equal.get(name).is_some_and(|&n| n > 1);
-        names = names
-            .iter()
-            .zip(&paths)
-            .map(|(n, p)| if is_equal(n) { tail(p, length) } else { n.clone() })
-            .collect();
+        let mut by_name: HashMap<&str, HashSet<&[String]>> = HashMap::new();
+        for (name, path) in names.iter().zip(&paths) {
+            by_name.entry(name).or_default().insert(path);
+        }
+        // Where all paths are the same, too, no name above tells anything apart.
+        let lengthened = |(name, path): (&String, &Vec<String>)| match by_name.get(name.as_str()) {
+            Some(paths) if paths.len() > 1 => tail(path, length),
+            _ => name.clone(),
+        };
+        names = names.iter().zip(&paths).map(lengthened).collect();
     }
     let equal = counts(&names);
     let mut taken: HashMap<String, usize> = HashMap::new();
@@ -73,7 +76,8 @@ mod tests {
             (vec!["a/bolt", "a/nut"], vec!["bolt", "nut"]),
             (vec!["a/bolt", "b/bolt", "a/nut"], vec!["a/bolt", "b/bolt", "nut"]),
             (vec!["x/a/bolt", "y/a/bolt"], vec!["x/a/bolt", "y/a/bolt"]),
-            (vec!["a/bolt", "a/bolt", "a/bolt"], vec!["a/bolt", "a/bolt-2", "a/bolt-3"]),
+            (vec!["a/bolt", "a/bolt", "a/bolt"], vec!["bolt", "bolt-2", "bolt-3"]),
+            (vec!["a/bolt", "a/bolt", "b/bolt"], vec!["a/bolt", "a/bolt-2", "b/bolt"]),
             (vec!["bolt", "bolt", "bolt-2"], vec!["bolt", "bolt-3", "bolt-2"]),
             (vec!["bolt/=>[0:1:1:3]", "nut/=>[0:1:1]"], vec!["bolt", "nut"]),
             (vec!["=>[0:1]", " "], vec!["part", "part-2"]),

@@ -5,7 +5,7 @@ use std::time::Duration;
 use nalgebra::{Point3, Vector3};
 
 use crate::assembling::Insertion;
-use crate::geometry::{Assembly, Part, Pose, Waypoint, pose_from_waypoint, waypoint_from_pose};
+use crate::geometry::{Assembly, Part, Pose, Repetition, Waypoint, pose_from_waypoint, waypoint_from_pose};
 use crate::plan::{
     Base, Blocked, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd, Warning,
 };
@@ -118,7 +118,7 @@ pub(super) fn overlaps(assembly: &Assembly, found: &[(usize, usize, f64)]) -> Ve
     found.iter().map(|&(a, b, d)| Overlap { parts: [a, b], depth: d / assembly.scale }).collect()
 }
 
-/// Overlaps so deep that a part is likely in a wrong place.
+/// Overlaps so deep that a part is likely in a wrong place. Of parts that are given twice it is known why.
 pub(super) fn deep_overlaps(assembly: &Assembly, found: &[(usize, usize, f64)]) -> Vec<String> {
     let thickness = |part: usize| assembly.parts[part].bounds.extents().min();
     let doubt = |&(a, b, depth): &(usize, usize, f64)| {
@@ -130,7 +130,12 @@ pub(super) fn deep_overlaps(assembly: &Assembly, found: &[(usize, usize, f64)]) 
             format!("{smaller} is in {larger} by {percent:.0} % of its smallest side as assembled: check where it stands")
         })
     };
-    found.iter().filter_map(doubt).collect()
+    let is_repeated = |a: usize, b: usize| {
+        let has_both =
+            |repetition: &Repetition| [a, b].iter().all(|part| repetition.parts().any(|p| p == *part));
+        assembly.repetitions.iter().any(has_both)
+    };
+    found.iter().filter(|&&(a, b, _)| !is_repeated(a, b)).filter_map(doubt).collect()
 }
 
 /// The findings about the input. The one about parts that are given twice is left out if enough of them are removed.
