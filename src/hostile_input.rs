@@ -49,11 +49,13 @@ pub enum Reader {
     Endpoint,
     /// Plans as JSON, told and drawn.
     Plan,
+    /// What a converter of STEP files writes to stdout.
+    StepReport,
 }
 
 impl Reader {
     /// All of them.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Messages,
         Self::Meshes,
         Self::Admission,
@@ -67,6 +69,7 @@ impl Reader {
         Self::Fields,
         Self::Endpoint,
         Self::Plan,
+        Self::StepReport,
     ];
 
     /// Reads bytes. What came of it, in words: different words for different ways through the reader.
@@ -93,6 +96,7 @@ impl Reader {
                 said(serde_json::from_slice::<sbdp_ipc::endpoint::Endpoint>(bytes).map_err(|e| e.to_string()))
             }
             Self::Plan => String::from_utf8(bytes.to_vec()).map_or_else(|e| e.to_string(), |t| plan(&t)),
+            Self::StepReport => said(files::parse_step_report(bytes)),
         }
     }
 }

@@ -182,6 +182,11 @@ pub(crate) fn parse_file(name: &str, bytes: &[u8], split: Option<Split>) -> Resu
     whole(content, path, split).map_err(|e| e.to_string())
 }
 
+/// Reads what a converter of STEP files writes to stdout.
+pub(crate) fn parse_step_report(stdout: &[u8]) -> Result<(), String> {
+    step::parse_report(stdout)
+}
+
 /// Reads a text as each of the descriptions that a folder may hold; what came of it, in words.
 pub(crate) fn parse_notes(text: &str) -> String {
     format!("{}; {}; {}", description::parse(text), poses::parse(text), fusion::parse(text))

@@ -35,7 +35,7 @@ pub(in crate::geometry) struct Sides {
 }
 
 impl Sides {
-    /// So many triangles have sides; healing refuses more.
+    /// The most triangles of a mesh: sides are numbered by 32 bits. Healing refuses more.
     pub(in crate::geometry) const MOST_TRIANGLES: usize = 1 << 30;
 
     pub(in crate::geometry) fn of(triangles: &[[u32; 3]]) -> Self {

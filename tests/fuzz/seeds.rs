@@ -80,6 +80,9 @@ fn built_in(reader: Reader) -> Vec<Vec<u8>> {
         ],
         Reader::Stl => vec![b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nsolid b\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 0 1\nendloop\nendfacet\nendsolid\n".to_vec(), b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), binary_stl()],
         Reader::Gltf => vec![br#"{"asset":{"version":"2.0","extras":{"units":"mm"}},"scenes":[{"nodes":[0]}],"extensionsRequired":["EXT_mesh_gpu_instancing","KHR_mesh_quantization"],"nodes":[{"name":"a","mesh":0,"scale":[1,1,-1],"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":2}}}}],"meshes":[{"weights":[1],"primitives":[{"attributes":{"POSITION":0},"indices":1},{"attributes":{"POSITION":0},"mode":1}]}],"accessors":[{"bufferView":0,"componentType":5123,"normalized":true,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},{"bufferView":1,"componentType":5121,"count":3,"type":"SCALAR"},{"bufferView":2,"componentType":5126,"count":2,"type":"VEC3"}],"bufferViews":[{"buffer":0,"byteLength":24,"byteStride":8},{"buffer":0,"byteOffset":24,"byteLength":4},{"buffer":0,"byteOffset":28,"byteLength":24}],"buffers":[{"byteLength":52,"uri":"data:;base64,AAAAAAAAAAD//wAAAAAAAAAA//8AAAAAAAECAAAAAAAAAAAAAAAAAAAAoEAAAAAAAAAAAA=="}]}"#.to_vec()],
+        Reader::StepReport => vec![
+            br#"{"sbdp-step":1,"unit":"mm","deflection":0.01,"products":3,"parts":2,"warnings":["a: no geometry"]}"#.to_vec(),
+        ],
         Reader::Plan => vec![PLAN.as_bytes().to_vec()],
     }
 }

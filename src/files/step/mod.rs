@@ -97,6 +97,11 @@ pub(crate) fn convert(bytes: &[u8], settings: &StepSettings) -> Result<Converted
     Ok(converted)
 }
 
+/// Reads what a converter writes to stdout, as for a scene without nodes.
+pub(super) fn parse_report(stdout: &[u8]) -> Result<(), String> {
+    Report::parse(stdout)?.into_converted(Vec::new()).map(drop)
+}
+
 /// Has the converter convert a copy of the file: it sees no other file, and what was hashed is what is converted.
 fn run(converter: &Converter, bytes: &[u8], settings: &StepSettings) -> Result<ConvertedStep, String> {
     let unusable =

@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 use super::ConvertedStep;
 
 const MAGIC: &[u8; 8] = b"SBDPSTEP";
-/// Raised when the format or what is asked of a converter changes.
+/// The version of the format; it also changes with the arguments of converters.
 const FORMAT: u32 = 1;
 const HASH: usize = 32;
 const HEADER: usize = MAGIC.len() + HASH + 4;
@@ -140,7 +140,7 @@ fn evict(folder: &Path, most_bytes: u64) -> io::Result<()> {
     Ok(())
 }
 
-/// Removes outputs, those used least recently first, until so many bytes are left. The number of bytes that are left.
+/// Removes outputs, those used least recently first, until no more than these bytes are left. Returns the bytes left.
 pub(crate) fn forget(cache_folder: &Path, to_bytes: u64) -> u64 {
     let folder = place(cache_folder);
     // Without a folder there is nothing.

@@ -51,7 +51,7 @@ impl Report {
             format!("names the unit `{}`, which is none of the contract's", printable(&self.unit))
         })?;
         if !(self.deflection.is_finite() && self.deflection > 0.0) {
-            return Err(format!("tells a deflection of {}", self.deflection));
+            return Err(format!("has a deflection of {}", self.deflection));
         }
         let mut warnings: Vec<String> =
             self.warnings.iter().take(MOST_WARNINGS).map(|w| printable(w)).collect();
