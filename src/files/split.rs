@@ -55,12 +55,8 @@ pub(super) fn parts_of(
         for (name, mesh) in pieces {
             let mut path = path.clone();
             if is_split {
-                // A number alone says something only of a file that holds nothing else.
-                path.push(if is_node && name.parse::<u32>().is_ok() {
-                    format!("{own}-{name}")
-                } else {
-                    name
-                });
+                // Primitives have the names of materials, or numbers: these say something only together with the node's.
+                path.push(if is_node { format!("{own}-{name}") } else { name });
             }
             found.push((path, mesh));
         }
@@ -154,16 +150,14 @@ fn joined(mut bodies: Vec<Body>) -> Body {
     all
 }
 
-/// Names of the parts of a file among others.
+/// Names of the parts of a file among others: the file's, before that of the piece if there are several.
 fn names_under(stem: &str, paths: &[Vec<String>]) -> Vec<String> {
     let own = printable(stem);
-    match paths {
-        [_] => vec![own],
-        _ => unique_names(paths)
-            .into_iter()
-            .map(|n| if n.starts_with(&own) { n } else { format!("{own}/{n}") })
-            .collect(),
+    if let [_] = paths {
+        return vec![own];
     }
+    let pieces: Vec<Vec<String>> = paths.iter().map(|path| path[1..].to_vec()).collect();
+    unique_names(&pieces).into_iter().map(|name| format!("{own}/{name}")).collect()
 }
 
 /// The nodes that several parts are under, outer ones first.
