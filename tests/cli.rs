@@ -385,7 +385,9 @@ fn start_long(daemon: Option<&Daemon>, place: &[&str], assembly: &Path) -> Child
     let trace = tempfile::NamedTempFile::new().unwrap();
     fs::remove_file(trace.path()).unwrap();
     let mut command = sbdp();
-    daemon.inspect(|daemon| drop(command.env("SBDP_RUNTIME_DIR", daemon.runtime_dir())));
+    if let Some(daemon) = daemon {
+        command.env("SBDP_RUNTIME_DIR", daemon.runtime_dir());
+    }
     command.arg("plan").arg(assembly).args(place).args(["--json", "-", "--trace"]).arg(trace.path());
     let planning = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     // The trace is begun when all files are read.

@@ -125,7 +125,13 @@ impl Client {
         let subject = subject.into();
         let handle = match &subject {
             Subject::Handle(handle) => *handle,
-            Subject::Meshes(meshes) => self.upload(&meshes.assembly())?,
+            Subject::Meshes(meshes) => {
+                let handle = meshes.handle();
+                if !self.has_uploaded(handle) {
+                    self.upload(&meshes.assembly())?;
+                }
+                handle
+            }
         };
         let bytes = options.to_wire(handle).encode();
         if bytes.len() > PLAN_REQUEST {

@@ -5,12 +5,18 @@ use std::sync::Arc;
 
 use sbdp_ipc::geometry::Assembly;
 
+use crate::content_hash::content_hash;
 use crate::options::Handle;
 
 /// Meshes that are kept, to be uploaded whenever the daemon does not know them.
 pub trait Meshes: Send + Sync {
     /// The assembly that they are; the same whenever it is asked.
     fn assembly(&self) -> Assembly<'_>;
+
+    /// The handle of that assembly. It is asked for every plan: remember it where meshes are large.
+    fn handle(&self) -> Handle {
+        content_hash(&self.assembly())
+    }
 }
 
 /// What a plan is about: an assembly that the daemon knows, or meshes that it gets when it does not know them (any more).

@@ -34,6 +34,7 @@ impl Client {
     pub fn upload(&self, assembly: &Assembly<'_>) -> Result<Handle, ClientError> {
         let handle = content_hash(assembly);
         if self.knows(handle)? {
+            self.note_uploaded(handle);
             return Ok(handle);
         }
         let answered = self.send_meshes(assembly)?;
@@ -42,6 +43,7 @@ impl Client {
                 "it names the assembly {answered} where the content gives {handle}"
             )));
         }
+        self.note_uploaded(handle);
         Ok(handle)
     }
 

@@ -1,0 +1,90 @@
+"""Starting a daemon."""
+
+import os
+import shutil
+import subprocess
+import sysconfig
+import time
+from pathlib import Path
+
+from . import _native
+from .errors import NoDaemonError
+
+# Longest time until a daemon takes clients: it reads what it remembers before. Half of this is not enough on machines that
+# are busy, and twice as much keeps callers waiting for a daemon that hangs.
+READY = 30.0
+# Pause between two looks whether it does.
+LOOK = 0.01
+
+
+def program() -> str:
+    """The program `sbdpd`: that of `$SBDPD`, else the one of this package, else the one on `$PATH`."""
+    named = os.environ.get("SBDPD")
+    if named:
+        return named
+    beside = Path(sysconfig.get_path("scripts")) / "sbdpd"
+    found = str(beside) if os.access(beside, os.X_OK) else shutil.which("sbdpd")
+    if not found:
+        raise NoDaemonError("there is no program `sbdpd`: install it, put it on $PATH, or name it in $SBDPD")
+    return found
+
+
+class Daemon:
+    """A daemon that this process starts, and stops at the end of a `with` block.
+
+    `runtime_dir` is where clients find it (default: that of the user), `config` a file of settings, and `arguments` go to
+    the program as they are. Raises `NoDaemonError` if it does not become ready; its own message is on stderr.
+    """
+
+    def __init__(self, runtime_dir=None, *, config=None, arguments=()):
+        command = [program()]
+        if runtime_dir is not None:
+            command += ["--runtime-dir", os.fspath(runtime_dir)]
+        if config is not None:
+            command += ["--config", os.fspath(config)]
+        # Ctrl-C is for the caller; the daemon is stopped when it is not wanted any more.
+        self._process = subprocess.Popen([*command, *arguments], stdin=subprocess.DEVNULL, start_new_session=True)
+        self._runtime_dir = runtime_dir
+        try:
+            self._wait_until_ready()
+        except BaseException:
+            self.stop()
+            raise
+
+    def _wait_until_ready(self):
+        until = time.monotonic() + READY
+        while True:
+            try:
+                with _native.Client(self._runtime_dir, reconnect=0.0) as client:
+                    # Another one may have been there first: then ours leaves, and that one serves.
+                    if client.pid == self.pid or self._process.poll() is not None:
+                        return
+            except NoDaemonError as error:
+                if self._process.poll() is not None:
+                    raise NoDaemonError(f"`sbdpd` ended at once, with code {self._process.returncode}") from error
+            if time.monotonic() >= until:
+                raise NoDaemonError(f"`sbdpd` (pid {self.pid}) does not become ready within {READY:.0f} s")
+            time.sleep(LOOK)
+
+    @property
+    def pid(self) -> int:
+        """The process."""
+        return self._process.pid
+
+    def stop(self):
+        """Stops it, if it still runs, and waits for its end: it answers what it has first."""
+        if self._process.poll() is None:
+            self._process.terminate()
+        self._process.wait()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
+
+
+def leave_running(daemon: Daemon):
+    """Lets a daemon stay when this process ends."""
+    # `Popen` would warn of a child that still runs.
+    daemon._process.returncode = 0
