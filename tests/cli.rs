@@ -319,6 +319,32 @@ fn a_given_base_stays_and_what_contradicts_itself_is_refused() {
         &["part `cover` is a target and in `base`"],
     );
     refused(&plan("pin-bolt-cover", &["--clearance", "-1"]), &["`clearance` is -1"]);
+    refused(&plan("pin-bolt-cover", &["--up", "0,0,0"]), &["--up", "+z", "0,0,0"]);
+}
+
+#[test]
+fn groups_of_the_input_leave_as_wholes_if_they_are_preferred() {
+    refused(&plan("pin-bolt-cover", &["--groups", "prefer"]), &["names no groups", "assembly.json"]);
+    let folder = tempfile::tempdir().unwrap();
+    for file in fs::read_dir(assembly("pin-bolt-cover")).unwrap().map(Result::unwrap) {
+        fs::copy(file.path(), folder.path().join(file.file_name())).unwrap();
+    }
+    fs::write(folder.path().join("assembly.json"), r#"{"groups": {"lid": ["cover", "bolt"]}}"#).unwrap();
+    let path = folder.path().to_str().unwrap();
+    let steps = |options: &[&str]| {
+        let output = run(&[&["plan", path, "--embedded", "--base", "base", "--json", "-"], options].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let steps = PlanDocument::from_json(&stdout(&output)).unwrap().steps.into_iter();
+        steps.map(|step| (step.parts.join(" "), step.of)).collect::<Vec<_>>()
+    };
+    assert!(steps(&[]).iter().all(|(parts, of)| !parts.contains(' ') && of.is_none()));
+    let preferred = steps(&["--groups", "prefer"]);
+    let lid = preferred.iter().position(|(parts, of)| parts == "bolt cover" && of.is_none());
+    assert!(lid.is_some() && preferred.iter().any(|(_, of)| *of == lid), "{preferred:?}");
+    refused(
+        &run(&["plan", path, "--embedded", "--groups", "prefer", "--planner", "pdp-t"]),
+        &["`groups`", "sbdp-star", "pdp-t"],
+    );
 }
 
 #[test]

@@ -32,6 +32,8 @@ pub const PLAN_NO_STAGING: u32 = 64;
 pub const PLAN_TRACE: u32 = 128;
 /// The clearance is given.
 pub const PLAN_HAS_CLEARANCE: u32 = 256;
+/// The direction up is given.
+pub const PLAN_HAS_UP: u32 = 512;
 
 /// Names of the planners; the wire carries the index.
 pub const PLANNERS: [&str; 7] = ["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star", "rrt", "bk-rrt"];
@@ -61,8 +63,9 @@ pub const PENALTY_PARAMETERS: [&str; 16] = [
     "newton-tolerance",
 ];
 
-/// Header of a plan request; four lists of u32 part numbers follow: fixed, removed, targets, base; then
-/// [`MovedPart`]s: those that stand elsewhere, and those that wait at given places; then [`PenaltyRecord`]s.
+/// Header of a plan request; four lists of u32 part numbers follow: fixed, removed, targets, base; then the sizes of the
+/// groups (u32) and their parts (u32), group after group; then [`MovedPart`]s: those that stand elsewhere, and those that
+/// wait at given places; then [`PenaltyRecord`]s.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct PlanRequestHeader {
@@ -75,7 +78,7 @@ pub struct PlanRequestHeader {
     /// Index into [`ACTION_SETS`].
     pub actions: u32,
     /// [`PLAN_NO_CACHE`], [`PLAN_HAS_TARGETS`], [`PLAN_SWEEPS`], [`PLAN_NO_SWEEPS`], [`PLAN_BATCH`],
-    /// [`PLAN_ASSEMBLY`], [`PLAN_NO_STAGING`], [`PLAN_TRACE`], [`PLAN_HAS_CLEARANCE`].
+    /// [`PLAN_ASSEMBLY`], [`PLAN_NO_STAGING`], [`PLAN_TRACE`], [`PLAN_HAS_CLEARANCE`], [`PLAN_HAS_UP`].
     pub flags: u32,
     /// Threads for this request; 0 leaves it to the daemon.
     pub threads: u32,
@@ -95,8 +98,8 @@ pub struct PlanRequestHeader {
     pub static_analysis: u32,
     /// Parameters of the engine `penalty` that differ from the paper's.
     pub penalty: u32,
-    /// Reserved, 0.
-    pub reserved: u32,
+    /// Groups that rather leave as wholes.
+    pub groups: u32,
     /// CLOCK_MONOTONIC nanoseconds; 0 for none.
     pub deadline_ns: u64,
     /// Simulations after which to give up; `u64::MAX` for no limit.
@@ -110,6 +113,8 @@ pub struct PlanRequestHeader {
     pub seed: u64,
     /// The gap between hulls where a way out ends, in the input's units; ignored without [`PLAN_HAS_CLEARANCE`].
     pub clearance: f64,
+    /// The direction up, in the input's frame, of any length but 0; ignored without [`PLAN_HAS_UP`].
+    pub up: [f64; 3],
 }
 
 /// A parameter of the engine `penalty`.
@@ -189,11 +194,12 @@ pub struct StepsHeader {
 }
 
 const _: () = {
-    assert!(size_of::<PlanRequestHeader>() == 136 && align_of::<PlanRequestHeader>() == 8);
+    assert!(size_of::<PlanRequestHeader>() == 160 && align_of::<PlanRequestHeader>() == 8);
     assert!(offset_of!(PlanRequestHeader, planner) == 32);
     assert!(offset_of!(PlanRequestHeader, moved) == 68);
     assert!(offset_of!(PlanRequestHeader, static_analysis) == 76);
     assert!(offset_of!(PlanRequestHeader, deadline_ns) == 88);
+    assert!(offset_of!(PlanRequestHeader, up) == 136);
     assert!(size_of::<PenaltyRecord>() == 16 && offset_of!(PenaltyRecord, value) == 8);
     assert!(size_of::<MovedPart>() == 64 && offset_of!(MovedPart, motion) == 8);
     assert!(size_of::<StepRecord>() == 72 && align_of::<StepRecord>() == 8);
@@ -247,6 +253,8 @@ pub struct PlanRequest {
     /// The gap between a part's hull and that of all that stands where its way out ends, in the input's units; `None` leaves
     /// it to the daemon.
     pub clearance: Option<f64>,
+    /// The direction up, in the input's frame, of any length but 0; `None` leaves it to the daemon.
+    pub up: Option<[f64; 3]>,
     /// Simulations after which to give up.
     pub max_simulations: Option<u64>,
     /// Nanoseconds after which one motion, or a baseline's search for one part, is given up.
@@ -261,6 +269,8 @@ pub struct PlanRequest {
     pub targets: Option<Vec<u32>>,
     /// Parts that stay as long as others leave; if there are none, the daemon chooses one.
     pub base: Vec<u32>,
+    /// Groups that rather leave as wholes, to be taken apart then.
+    pub groups: Vec<Vec<u32>>,
     /// Parts that stand elsewhere than in the assembly.
     pub moved: Vec<MovedPart>,
     /// An assembly plan is wanted, with parts that begin there.
@@ -287,6 +297,7 @@ impl PlanRequest {
                 | flag(self.batch, PLAN_BATCH)
                 | flag(self.trace, PLAN_TRACE)
                 | flag(self.clearance.is_some(), PLAN_HAS_CLEARANCE)
+                | flag(self.up.is_some(), PLAN_HAS_UP)
                 | flag(self.targets.is_some(), PLAN_HAS_TARGETS)
                 | flag(self.assembly.is_some(), PLAN_ASSEMBLY)
                 | flag(matches!(self.assembly, Some(Staging::None)), PLAN_NO_STAGING)
@@ -300,15 +311,18 @@ impl PlanRequest {
             staged: staged.len() as u32,
             static_analysis: self.static_analysis,
             penalty: self.penalty.len() as u32,
-            reserved: 0,
+            groups: self.groups.len() as u32,
             deadline_ns: self.deadline_ns.unwrap_or(0),
             max_simulations: self.max_simulations.unwrap_or(u64::MAX),
             path_timeout_ns: self.path_timeout_ns.unwrap_or(u64::MAX),
             planning_timeout_ns: self.planning_timeout_ns.unwrap_or(u64::MAX),
             seed: self.seed,
             clearance: self.clearance.unwrap_or(0.0),
+            up: self.up.unwrap_or_default(),
         });
+        let sizes: Vec<u32> = self.groups.iter().map(|group| group.len() as u32).collect();
         writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.base);
+        writer.array(&sizes).array(&self.groups.concat());
         writer.array(&self.moved).array(staged).array(&self.penalty);
         writer.finish()
     }
@@ -324,6 +338,15 @@ impl PlanRequest {
         let removed = reader.array::<u32>("removed", u64::from(h.removed))?.to_vec();
         let targets = reader.array::<u32>("targets", u64::from(h.targets))?.to_vec();
         let base = reader.array::<u32>("base", u64::from(h.base))?.to_vec();
+        let sizes = reader.array::<u32>("groups", u64::from(h.groups))?;
+        let in_groups = sizes.iter().map(|&size| u64::from(size)).sum();
+        let mut in_groups = reader.array::<u32>("parts of groups", in_groups)?;
+        let groups = sizes.iter().map(|&size| {
+            let (group, rest) = in_groups.split_at(size as usize);
+            in_groups = rest;
+            group.to_vec()
+        });
+        let groups = groups.collect();
         let moved = reader.array::<MovedPart>("moved", u64::from(h.moved))?.to_vec();
         let staged = reader.array::<MovedPart>("staged", u64::from(h.staged))?.to_vec();
         let penalty = reader.array::<PenaltyRecord>("penalty", u64::from(h.penalty))?.to_vec();
@@ -335,7 +358,8 @@ impl PlanRequest {
             | PLAN_ASSEMBLY
             | PLAN_NO_STAGING
             | PLAN_TRACE
-            | PLAN_HAS_CLEARANCE;
+            | PLAN_HAS_CLEARANCE
+            | PLAN_HAS_UP;
         let limit = |value: u64| (value != u64::MAX).then_some(value);
         let set = |bit: u32| h.flags & bit != 0;
         let astray = (set(PLAN_NO_STAGING) || !staged.is_empty()) && !set(PLAN_ASSEMBLY);
@@ -361,10 +385,12 @@ impl PlanRequest {
             planning_timeout_ns: limit(h.planning_timeout_ns),
             seed: h.seed,
             clearance: set(PLAN_HAS_CLEARANCE).then_some(h.clearance),
+            up: set(PLAN_HAS_UP).then_some(h.up),
             fixed,
             removed,
             targets: set(PLAN_HAS_TARGETS).then_some(targets),
             base,
+            groups,
             moved,
             assembly: set(PLAN_ASSEMBLY).then_some(if set(PLAN_NO_STAGING) {
                 Staging::None

@@ -1,4 +1,4 @@
-//! The bytes of every message of protocol 7, written down once. A change to one of them breaks clients that
+//! The bytes of every message of protocol 8, written down once. A change to one of them breaks clients that
 //! are out there: a new layout needs a new version in the service names.
 
 use sbdp_ipc::PROTOCOL;
@@ -94,12 +94,12 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
     assert_eq!((ErrorCode::Busy as u32, ErrorCode::Cancelled as u32), (3, 12));
     assert_eq!(
         (PROTOCOL, layout::PLAN_SERVICE, layout::GEOMETRY_SERVICE),
-        (6, "sbdp/v7/plan", "sbdp/v7/geometry")
+        (8, "sbdp/v8/plan", "sbdp/v8/geometry")
     );
-    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v7/progress");
+    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v8/progress");
     assert_eq!(
         (layout::WAKE_SERVER_SERVICE, layout::WAKE_CLIENT_SERVICE),
-        ("sbdp/v7/wake/server", "sbdp/v7/wake/client")
+        ("sbdp/v8/wake/server", "sbdp/v8/wake/client")
     );
 }
 
@@ -123,10 +123,12 @@ fn a_plan_request() {
         planning_timeout_ns: Some(11),
         seed: 12,
         clearance: Some(1.0),
+        up: Some([0.0, -1.0, 0.5]),
         fixed: vec![1, 2, 3],
         removed: vec![4],
         targets: Some(vec![5, 6]),
         base: vec![8],
+        groups: vec![vec![1, 2], vec![9, 10, 11]],
         moved: vec![MovedPart { part: 7, reserved: 0, motion: POSE }],
         assembly: None,
     };
@@ -134,17 +136,18 @@ fn a_plan_request() {
         "plan request",
         &request.encode(),
         "\
-         abababababababab*4 0100000001000000 0100000097010000 0400000003000000 0100000002000000 \
-         0100000001000000 0000000001000000 0100000000000000 0403020100000000 0900000000000000 0a00000000000000 \
-         0b00000000000000 0c00000000000000 000000000000f03f 0100000002000000 0300000000000000 0400000000000000 \
-         0500000006000000 0800000000000000 0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf 000000000000f03f \
+         abababababababab*4 0100000001000000 0100000097030000 0400000003000000 0100000002000000 \
+         0100000001000000 0000000001000000 0100000002000000 0403020100000000 0900000000000000 0a00000000000000 \
+         0b00000000000000 0c00000000000000 000000000000f03f 0000000000000000 000000000000f0bf 000000000000e03f \
+         0100000002000000 0300000000000000 0400000000000000 0500000006000000 0800000000000000 \
+         0200000003000000 0100000002000000 090000000a000000 0b00000000000000 0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf 000000000000f03f \
          0000000000000000*3 0200000000000000 000000000000e03f",
     );
     assert_eq!(PlanRequest::decode(AlignedBytes::copy_of(&request.encode()).as_slice()), Ok(request));
     check(
         "plain plan request",
         &PlanRequest::default().encode(),
-        "0000000000000000*12 ffffffffffffffff*3 0000000000000000*2",
+        "0000000000000000*12 ffffffffffffffff*3 0000000000000000*5",
     );
 }
 
@@ -157,14 +160,14 @@ fn a_request_for_an_assembly_plan() {
         &request.encode(),
         "\
          0000000000000000*5 0000000020000000 0000000000000000*3 0100000000000000 0000000000000000*2 \
-         ffffffffffffffff*3 0000000000000000*2 0700000000000000 000000000000f03f 0000000000000040 \
+         ffffffffffffffff*3 0000000000000000*5 0700000000000000 000000000000f03f 0000000000000040 \
          000000000000e0bf 000000000000f03f 0000000000000000*3",
     );
     let request = PlanRequest { assembly: Some(Staging::None), ..PlanRequest::default() };
     check(
         "assembly plan request without staging",
         &request.encode(),
-        "0000000000000000*5 0000000060000000 0000000000000000*6 ffffffffffffffff*3 0000000000000000*2",
+        "0000000000000000*5 0000000060000000 0000000000000000*6 ffffffffffffffff*3 0000000000000000*5",
     );
 }
 

@@ -208,6 +208,8 @@ fn requests_errors_and_status_come_back() {
         max_simulations: Some(0),
         fixed: vec![1, 2, 3],
         base: vec![4],
+        groups: vec![vec![], vec![5, 6], vec![7]],
+        up: Some([0.0, 0.0, 2.0]),
         targets: Some(vec![]),
         moved: vec![moved_part()],
         static_analysis: 1,
@@ -254,6 +256,7 @@ fn messages() -> Vec<Vec<u8>> {
     let request = PlanRequest {
         fixed: vec![1, 2],
         base: vec![4],
+        groups: vec![vec![5, 6], vec![7]],
         penalty: vec![PenaltyRecord { parameter: 0, reserved: 0, value: 1.0 }],
         targets: Some(vec![3]),
         moved: vec![moved_part()],

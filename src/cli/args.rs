@@ -19,7 +19,7 @@ mod poses;
 mod through_daemon;
 mod view;
 
-use poses::{moved, rotation};
+use poses::{direction, moved, rotation};
 
 pub(super) use input::Input;
 pub(super) use load::{BenchCancel, BenchLoad, BenchLoadClient, BenchSoak};
@@ -116,6 +116,13 @@ pub(super) struct PlanArguments {
     /// part's longest side]
     #[arg(long, value_name = "LENGTH", allow_negative_numbers = true)]
     pub(super) clearance: Option<f64>,
+    /// The direction up, as +z or as a vector: ways up come before ways sideways, and those before ways down [default:
+    /// where most parts can go at first]
+    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
+    pub(super) up: Option<[f64; 3]>,
+    /// When parts leave together, to be taken apart then
+    #[arg(long, value_enum, default_value_t)]
+    pub(super) groups: GroupsArgument,
     /// Worker threads; never changes the plan [default: all processors]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     pub(super) threads: u32,
@@ -386,6 +393,16 @@ impl From<PlannerArgument> for search::Planner {
             PlannerArgument::BkRrt => Self::BkRrt,
         }
     }
+}
+
+/// When parts leave together.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub(super) enum GroupsArgument {
+    /// Where none leaves alone
+    #[default]
+    Needed,
+    /// Also those that belong together where the assembly comes from, as long as anything else leaves
+    Prefer,
 }
 
 /// Which transition function.

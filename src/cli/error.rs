@@ -39,7 +39,9 @@ impl From<ServiceError> for CliError {
             ServiceError::Geometry(_)
             | ServiceError::NoSuchPart { .. }
             | ServiceError::TargetStays { .. }
-            | ServiceError::NoLength { .. } => Self::Refused(error.to_string()),
+            | ServiceError::NoLength { .. }
+            | ServiceError::NoDirection { .. }
+            | ServiceError::NoGroups { .. } => Self::Refused(error.to_string()),
             // The stages behind the service may come to name other failures.
             other => Self::Failed(other.to_string()),
         }

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use super::args::PlanArguments;
+use super::args::{GroupsArgument, PlanArguments};
 use super::backend::{Backend, CommandQuestion, Embedded};
 use super::daemon::{Daemon, concluded, went_away};
 use super::error::{CliError, exit_code};
@@ -111,6 +111,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         static_analysis: arguments.dbg.map(Into::into).unwrap_or_default(),
         sweeps: arguments.sweeps.asked(),
         clearance: arguments.clearance,
+        up: arguments.up,
         seed: arguments.seed,
         max_simulations: arguments.max_simulations,
         path_timeout: arguments.path_timeout,
@@ -120,10 +121,29 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         fixed: resolve(assembly, "--fixed", &fixed)?,
         removed: resolve(assembly, "--removed", &arguments.removed)?,
         base: resolve(assembly, "--base", base)?,
+        groups: preferred_groups(arguments, assembly)?,
         targets: (!arguments.target.is_empty()).then_some(targets),
         assembly: arguments.together.then(|| staging(assembly, &arguments.staging)).transpose()?,
         no_cache: arguments.no_cache,
     })
+}
+
+/// The groups that the assembly names, if they are preferred.
+fn preferred_groups(
+    arguments: &PlanArguments,
+    assembly: &SourceAssembly,
+) -> Result<Vec<Vec<usize>>, CliError> {
+    if arguments.groups == GroupsArgument::Needed {
+        return Ok(Vec::new());
+    }
+    if assembly.groups.is_empty() {
+        return Err(CliError::Refused(format!(
+            "--groups prefer: `{}` names no groups; they come from the tree of a STEP or glTF file, or from `groups` in \
+             assembly.json",
+            assembly.name
+        )));
+    }
+    assembly.groups.iter().map(|group| resolve(assembly, "--groups", &group.parts)).collect()
 }
 
 /// How the files are read, and where converted ones are remembered.

@@ -32,6 +32,7 @@ pub(crate) fn plan_request(
         actions: actions(request.actions)?,
         sweeps: request.sweeps,
         clearance: request.clearance,
+        up: request.up,
         seed: request.seed,
         max_simulations: request.max_simulations,
         path_timeout: request.path_timeout_ns.map(Duration::from_nanos),
@@ -43,6 +44,7 @@ pub(crate) fn plan_request(
         removed: indices(&request.removed),
         targets: request.targets.as_deref().map(indices),
         base: indices(&request.base),
+        groups: request.groups.iter().map(|group| indices(group)).collect(),
         assembly: request.assembly.as_ref().map(staging),
         no_cache: request.no_cache,
     })
@@ -253,7 +255,10 @@ pub(crate) fn service_error(error: &ServiceError) -> WireError {
     let code = match error {
         ServiceError::UnknownAssembly => ErrorCode::UnknownHandle,
         ServiceError::NoSuchPart { .. } => ErrorCode::NoSuchPart,
-        ServiceError::TargetStays { .. } | ServiceError::NoLength { .. } => ErrorCode::Unsupported,
+        ServiceError::TargetStays { .. }
+        | ServiceError::NoLength { .. }
+        | ServiceError::NoDirection { .. }
+        | ServiceError::NoGroups { .. } => ErrorCode::Unsupported,
         ServiceError::Geometry(GeometryError::Interrupted(Interrupt::Cancelled)) => ErrorCode::Cancelled,
         ServiceError::Geometry(GeometryError::Interrupted(Interrupt::DeadlinePassed)) => ErrorCode::Expired,
         ServiceError::Geometry(_) => ErrorCode::Geometry,

@@ -10,6 +10,7 @@ use crate::termination::Interrupt;
 
 use super::disassembly::joined;
 use super::outcome::{Outcome, Removal};
+use super::preferred::PreferredGroups;
 use super::problem::{Effort, Observer, Problem, VerifiedPath};
 use super::requirements::Leaving;
 
@@ -48,6 +49,7 @@ impl<'a> Contraction<'a> {
             present,
             fixed: rest,
             base: Base::default(),
+            preferred: PreferredGroups::default(),
             targets,
             is_group: true,
             earlier: Vec::new(),

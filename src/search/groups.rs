@@ -20,9 +20,10 @@ use crate::termination::Interrupt;
 
 use super::contraction::{Contraction, Search};
 use super::disassembly::{Disassembly, Stop};
-use super::inseparable::InseparablePairs;
+use super::order::Order;
 use super::outcome::Outcome;
-use super::problem::{Effort, VerifiedPath};
+use super::preferred::PreferredGroups;
+use super::problem::{Effort, Problem, VerifiedPath};
 use super::state::StateNode;
 use super::states::States;
 use super::trace::TraceEvent;
@@ -31,7 +32,14 @@ use super::trace::TraceEvent;
 #[derive(Debug, Default)]
 pub(super) struct GroupMemory {
     /// The parts that stood when no group left along a line.
-    swept: Option<Vec<usize>>,
+    swept: Option<(Vec<usize>, PreferredGroups)>,
+    /// By translation: what the parts entered on their way out when preferred groups were looked at first. What stands
+    /// later is fewer.
+    first_swept: Vec<BlockingGraph>,
+    /// By part: those that it hangs together with.
+    pub(super) links: Vec<BTreeSet<usize>>,
+    /// Preferred groups whose way along a translation was refused, with what stood.
+    refused: HashSet<(Vec<usize>, usize, Vec<usize>)>,
     /// Groups that were searched, with what stood beside them.
     searched: HashSet<(Effort, Vec<usize>, Vec<usize>)>,
 }
@@ -42,11 +50,20 @@ type BlockingGraph = Vec<Option<Vec<usize>>>;
 /// A group, smaller ones first, and the number of the translation that it begins with.
 type Candidate = (usize, Vec<usize>, usize);
 
+/// A preferred group, and members that hold it in some direction.
+#[derive(Debug, PartialEq)]
+pub(super) struct HeldGroup {
+    pub(super) group: Vec<usize>,
+    pub(super) holders: Vec<usize>,
+    /// Whether a base or a fixed part is in it.
+    pub(super) has_base: bool,
+}
+
 /// Looks for groups among the parts that stand.
 pub(super) struct Groups<'s, 'a, 'o> {
     pub(super) disassembly: &'s mut Disassembly<'a, 'o>,
     pub(super) states: &'s States,
-    pub(super) inseparable: &'s InseparablePairs,
+    pub(super) order: &'s Order,
     /// The translations that all parts have.
     pub(super) translations: &'s [Action],
     pub(super) memory: &'s mut GroupMemory,
@@ -58,7 +75,9 @@ impl<'a> Groups<'_, 'a, '_> {
     /// A group that leaves along a line, and its way.
     pub(super) fn leave_straight(&mut self) -> Result<Option<(Contraction<'a>, VerifiedPath)>, Stop> {
         let standing = self.disassembly.everything.standing().to_vec();
-        if self.memory.swept.as_ref() == Some(&standing) {
+        let preferred = self.disassembly.problem.preferred.clone();
+        let asked = Some((standing.clone(), preferred));
+        if self.memory.swept == asked {
             return Ok(None);
         }
         let mut candidates = BTreeSet::new();
@@ -67,17 +86,132 @@ impl<'a> Groups<'_, 'a, '_> {
             candidates.extend(self.closures(&graph, direction));
         }
         for (_, group, direction) in candidates {
-            let contraction = Contraction::new(&self.disassembly.problem, &standing, &group)?;
-            let action = self.translations[direction];
-            let way = self.disassembly.timed(|_| contraction.way_out(&[], &action))?;
-            self.trace_tried(&group, way.is_some());
-            if let Some(way) = way {
-                self.disassembly.counters.sweeps += 1;
-                return Ok(Some((contraction, way)));
+            if let Some(found) = self.leaves_along(&standing, &group, direction)? {
+                return Ok(Some(found));
             }
         }
-        self.memory.swept = Some(standing);
+        self.memory.swept = asked;
         Ok(None)
+    }
+
+    /// A group and its way along a translation, if it leaves so.
+    fn leaves_along(
+        &mut self,
+        standing: &[usize],
+        group: &[usize],
+        direction: usize,
+    ) -> Result<Option<(Contraction<'a>, VerifiedPath)>, Stop> {
+        let contraction = Contraction::new(&self.disassembly.problem, standing, group)?;
+        let action = self.translations[direction];
+        let way = self.disassembly.timed(|_| contraction.way_out(&[], &action))?;
+        self.trace_tried(group, way.is_some());
+        self.disassembly.counters.sweeps += u64::from(way.is_some());
+        Ok(way.map(|way| (contraction, way)))
+    }
+
+    /// A preferred group that leaves along a line, and its way. Up comes before sideways, and that before down.
+    pub(super) fn leave_preferred(&mut self) -> Result<Option<(Contraction<'a>, VerifiedPath)>, Stop> {
+        let groups = self.leaving_preferred();
+        if groups.is_empty() {
+            return Ok(None);
+        }
+        let standing = self.disassembly.everything.standing().to_vec();
+        let mut directions: Vec<usize> = (0..self.translations.len()).collect();
+        directions.sort_by_key(|&direction| self.order.tier(&self.translations[direction].force()));
+        for group in groups {
+            for &direction in &directions {
+                if !self.holders(&group, direction).is_empty() {
+                    continue;
+                }
+                let key = (group.clone(), direction, standing.clone());
+                if self.memory.refused.contains(&key) {
+                    continue;
+                }
+                if let Some(found) = self.leaves_along(&standing, &group, direction)? {
+                    return Ok(Some(found));
+                }
+                self.memory.refused.insert(key);
+            }
+        }
+        Ok(None)
+    }
+
+    /// The outermost preferred groups that may leave.
+    fn leaving_preferred(&self) -> Vec<Vec<usize>> {
+        let problem = &self.disassembly.problem;
+        problem.preferred.outermost().filter(|group| problem.may_all_join(group)).cloned().collect()
+    }
+
+    /// The preferred groups, each with the members that hold it in one direction or another, and with all members. Those
+    /// that few hold come first, of these those that small ones do (the nut is taken off the bolt), and those with a base
+    /// last.
+    pub(super) fn held_preferred(&self) -> Vec<HeldGroup> {
+        let problem = &self.disassembly.problem;
+        let held = |group: &Vec<usize>| {
+            let has_base = !problem.may_all_join(group);
+            let directions = if has_base { 0 } else { self.translations.len() };
+            let holders = (0..directions).map(|direction| self.holders(group, direction));
+            // All together are tried anyway: the others where one seems to leave.
+            let leaves = |holders: &Vec<usize>| holders.iter().any(|&part| self.seems_free(part));
+            let holders = holders.filter(leaves).chain([group.clone()]);
+            holders.map(|holders| HeldGroup { has_base, group: group.clone(), holders }).collect::<Vec<_>>()
+        };
+        let mut held: Vec<_> = problem.preferred.outermost().flat_map(held).collect();
+        let sides = problem.scene.bodies.iter().map(|body| body.bounds.extents().max()).collect::<Vec<f64>>();
+        let size = |h: &HeldGroup| h.holders.iter().map(|&part| sides[part]).sum::<f64>().to_bits();
+        held.sort_by_cached_key(|h| {
+            (h.has_base, h.holders.len(), size(h), h.group.clone(), h.holders.clone())
+        });
+        held.dedup();
+        held
+    }
+
+    /// The members of a group that enter others on their way along a translation, or that do not leave along it at all.
+    fn holders(&self, group: &[usize], direction: usize) -> Vec<usize> {
+        let standing = self.disassembly.everything.standing();
+        let is_in_way =
+            |part: &usize| standing.binary_search(part).is_ok() && group.binary_search(part).is_err();
+        let holds = |part: &usize| {
+            let obstacles = self.memory.first_swept[direction][*part].as_ref();
+            obstacles.is_none_or(|obstacles| obstacles.iter().any(is_in_way))
+        };
+        group.iter().copied().filter(holds).collect()
+    }
+
+    /// Whether a part enters none of those that stand on its way along some translation.
+    fn seems_free(&self, part: usize) -> bool {
+        (0..self.translations.len()).any(|direction| self.holders(&[part], direction).is_empty())
+    }
+
+    /// Sweeps all parts along all translations, once, and finds which hang together.
+    pub(super) fn sweep_first(&mut self) -> Result<(), Stop> {
+        for direction in self.memory.first_swept.len()..self.translations.len() {
+            let graph = self.sweeps(direction)?;
+            self.memory.first_swept.push(graph);
+        }
+        if self.memory.links.is_empty() {
+            self.memory.links = self.links();
+        }
+        Ok(())
+    }
+
+    /// Per part, those that stop it at once along some translation, and those that it enters on its way both along one and
+    /// against it: they enclose it.
+    fn links(&self) -> Vec<BTreeSet<usize>> {
+        let mut links = vec![BTreeSet::new(); self.disassembly.problem.scene.bodies.len()];
+        for direction in 0..self.translations.len() {
+            let stopped = self.stopped_in(direction);
+            // Opposite translations are neighbours.
+            let [along, against] = [direction, direction ^ 1].map(|d| self.memory.first_swept.get(d));
+            for (part, links) in links.iter_mut().enumerate() {
+                links.extend(stopped[part].iter().flatten());
+                let [along, against] =
+                    [along, against].map(|graph| graph.and_then(|graph| graph[part].as_ref()));
+                let (Some(along), Some(against)) = (along, against) else { continue };
+                links.extend(along.iter().filter(|other| against.contains(other)));
+            }
+        }
+        links
     }
 
     /// A group that a search with some effort finds a way for, and the way.
@@ -87,6 +221,9 @@ impl<'a> Groups<'_, 'a, '_> {
             candidates.extend(self.closures(&self.met_in(direction), direction));
             candidates.extend(self.closures(&self.stopped_in(direction), direction));
         }
+        // Of the translations any does: a search tries all.
+        let preferred = self.leaving_preferred().into_iter();
+        candidates.extend(preferred.map(|group| (group.len(), group, 0)));
         let mut seen: HashSet<Vec<usize>> = HashSet::new();
         let most = match effort {
             Effort::Pushes => GROUPS_SEARCHED,
@@ -166,7 +303,7 @@ impl<'a> Groups<'_, 'a, '_> {
         let problem = &self.disassembly.problem;
         let along = self.translations[direction].force();
         let swept = standing.par_iter().zip(around).map(|(&part, around)| {
-            if !problem.may_move(part) {
+            if !problem.may_join(part) {
                 return Ok((part, None));
             }
             let question = SweepQuestion {
@@ -218,7 +355,7 @@ impl<'a> Groups<'_, 'a, '_> {
         let rest: Vec<usize> = everything.standing().iter().copied().filter(is_rest).collect();
         let has_base = |parts: &[usize]| problem.base.parts.iter().any(|part| parts.contains(part));
         let rank = |parts: &[usize]| (has_base(parts), parts.len(), parts[0]);
-        let may_move = |parts: &[usize]| parts.iter().all(|&part| problem.may_move(part));
+        let may_move = |parts: &[usize]| problem.may_all_join(parts);
         let is_tried = |parts: &[usize]| parts.len() == 1 && may_move(parts);
         if rest.is_empty() || is_tried(&group) || is_tried(&rest) {
             return None;
@@ -237,7 +374,8 @@ impl<'a> Groups<'_, 'a, '_> {
         let mut group = BTreeSet::new();
         let mut open: Vec<usize> = parts.into_iter().collect();
         while let Some(part) = open.pop() {
-            if !self.disassembly.problem.may_move(part) {
+            let Problem { preferred, .. } = &self.disassembly.problem;
+            if !self.disassembly.problem.may_join(part) {
                 return None;
             }
             if standing.binary_search(&part).is_err() || !group.insert(part) {
@@ -247,160 +385,11 @@ impl<'a> Groups<'_, 'a, '_> {
                 return None;
             }
             open.extend(graph[part].as_ref()?);
-            open.extend(self.inseparable.held_with(part));
+            if preferred.keeps(part) {
+                open.extend(preferred.around(part).into_iter().flatten());
+            }
+            open.extend(self.order.inseparable().held_with(part));
         }
         Some(group.into_iter().collect())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::outcome::Removal;
-    use super::super::problem::Problem;
-    use super::super::request::{ActionSet, Planner};
-    use super::super::tests::{Recorder, problem};
-    use super::super::{Outcome, Reason, TraceEvent, search};
-    use crate::fixtures::{cells, cuboid, moved, scene};
-    use crate::geometry::{Pose, SourceMesh};
-    use crate::plan::PlanStatus;
-
-    /// A box (part 0) that is open at the top, in it a block (part 1) with a hole through it along x, and in the hole a
-    /// pin (part 2) as long as the block is wide: the block cannot leave the pin, nor the pin the box.
-    fn pinned_block() -> Vec<SourceMesh> {
-        let walls: &[f64] = &[-2.0, -1.5, 1.5, 2.0];
-        let housing = cells([walls, walls, &[-1.5, -1.0, 1.0]], |c| c[2] == 0 || c[0] != 1 || c[1] != 1);
-        let across: &[f64] = &[-1.4, -0.4, 0.4, 1.4];
-        let block = cells([&[-1.4, 1.4], across, &[-1.0, -0.4, 0.4, 0.9]], |c| c[1] != 1 || c[2] != 1);
-        vec![housing, block, cuboid([-1.4, -0.35, -0.35], [1.4, 0.35, 0.35])]
-    }
-
-    /// The same in a sleeve (part 3) that is closed but for its end at +y.
-    fn pinned_block_in_sleeve() -> Vec<SourceMesh> {
-        let sleeve = cells(
-            [&[-3.0, -2.05, 2.05, 3.0], &[-3.0, -2.05, 3.0], &[-2.5, -1.55, 1.05, 2.5]],
-            |[x, y, z]| x != 1 || y != 1 || z != 1,
-        );
-        pinned_block().into_iter().chain([sleeve]).collect()
-    }
-
-    fn planned(
-        parts: Vec<SourceMesh>,
-        change: impl FnOnce(Problem<'_>) -> Problem<'_>,
-    ) -> (Outcome, Vec<TraceEvent>) {
-        let (scene, verifier) = scene(parts);
-        let mut recorder = Recorder::default();
-        let problem = Problem { actions: ActionSet::Extended, sweeps: true, ..problem(scene, &verifier) };
-        (search(Planner::SbdpStar, change(problem), &mut recorder), recorder.0)
-    }
-
-    fn left(outcome: &Outcome) -> Vec<(&[usize], Option<usize>)> {
-        outcome.removals.iter().map(|r: &Removal| (&r.parts[..], r.of)).collect()
-    }
-
-    #[test]
-    fn what_holds_together_leaves_the_base_together_and_is_then_taken_apart() {
-        let turn = Pose::rotation(nalgebra::Vector3::new(0.3, -0.5, 0.2));
-        let scale = |mesh: SourceMesh| {
-            let mut mesh = mesh;
-            mesh.vertices.iter_mut().flatten().for_each(|x| *x *= 1.4);
-            mesh
-        };
-        for pose in [Pose::identity(), turn] {
-            let parts = pinned_block().into_iter().map(|mesh| moved(scale(mesh), &pose)).collect();
-            let (outcome, events) = planned(parts, |problem| problem);
-            assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
-            assert_eq!(outcome.base.parts, [0]);
-            let [group, inner] = &outcome.removals[..] else { panic!("{:?}", left(&outcome)) };
-            assert_eq!((&group.parts[..], group.of, group.wave), (&[1, 2][..], None, 0));
-            assert_eq!(
-                (inner.parts.len(), inner.of, &inner.requires[..], inner.wave),
-                (1, Some(0), &[0][..], 1)
-            );
-            assert_eq!((&outcome.remaining[..], outcome.kept_together().len()), (&[0][..], 0));
-            let way = group.motion().translation.vector.normalize();
-            assert!(way.dot(&(pose * nalgebra::Vector3::z())) > 0.99, "it leaves along {way}");
-            let tried = TraceEvent::GroupTried { parts: vec![1, 2], leaves: true };
-            assert!(events.contains(&tried));
-        }
-    }
-
-    #[test]
-    fn groups_are_taken_apart_in_groups() {
-        let (outcome, _) = planned(pinned_block_in_sleeve(), |problem| problem);
-        assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
-        let left = left(&outcome);
-        assert_eq!(left[..2], [(&[0, 1, 2][..], None), (&[1, 2][..], Some(0))]);
-        assert_eq!((left.len(), left[2].0.len(), left[2].1), (3, 1, Some(1)));
-        assert_eq!(outcome.removals.iter().map(|r| r.wave).collect::<Vec<_>>(), [0, 1, 2]);
-        assert_eq!(outcome.removals[2].requires, [1]);
-    }
-
-    #[test]
-    fn a_group_in_which_nothing_is_wanted_is_kept_together() {
-        let target = |part: usize| {
-            let (outcome, _) =
-                planned(pinned_block_in_sleeve(), |problem| Problem { targets: Some(vec![part]), ..problem });
-            assert_eq!(outcome.status, PlanStatus::Complete, "{part}: {:?}", outcome.reason);
-            outcome
-        };
-        // The sleeve is pulled off the others.
-        assert_eq!(left(&target(3)), [(&[3][..], None)]);
-        // To get the box out, what is in it is not taken apart.
-        let housing = target(0);
-        assert!(housing.kept_together().contains(&vec![1, 2]), "{:?}", left(&housing));
-        assert_eq!(target(2).removals.len(), 3);
-    }
-
-    #[test]
-    fn where_nothing_leaves_it_is_said_which_parts_are_free_together() {
-        // Over the mouth of the box, with play above the block, lies a lid. Neither holds the block alone.
-        let mut parts = pinned_block();
-        parts.push(cuboid([-3.0, -2.0, 1.3], [3.0, 2.0, 2.0]));
-        let (outcome, _) =
-            planned(parts, |problem| Problem { fixed: vec![0, 3], max_simulations: Some(100), ..problem });
-        assert_eq!((outcome.status, outcome.removals.len()), (PlanStatus::Partial, 0));
-        let free: Vec<_> =
-            outcome.free_together.iter().map(|group| (&group.parts[..], group.direction)).collect();
-        assert!(free.contains(&(&[1, 2][..], [0.0, 0.0, 1.0])), "{free:?}");
-    }
-
-    #[test]
-    fn what_never_comes_apart_leaves_together() {
-        // A ring about a bar of another ring, both in a box.
-        let ring = || {
-            let across: &[f64] = &[-1.2, -0.8, 0.8, 1.2];
-            cells([across, across, &[-0.2, 0.2]], |c| c[0] != 1 || c[1] != 1)
-        };
-        let turned = Pose::new(
-            nalgebra::Vector3::new(1.0, 0.0, 0.0),
-            nalgebra::Vector3::new(std::f64::consts::FRAC_PI_2, 0.0, 0.0),
-        );
-        let walls: &[f64] = &[-3.0, -2.5, 2.5, 3.0];
-        let housing = cells([walls, walls, &[-2.0, -1.5, 1.5]], |c| c[2] == 0 || c[0] != 1 || c[1] != 1);
-        let (outcome, _) = planned(vec![housing, ring(), moved(ring(), &turned)], |problem| problem);
-        assert_eq!(outcome.status, PlanStatus::Infeasible, "{:?}", outcome.reason);
-        assert!(matches!(outcome.reason, Some(Reason::Inseparable(pair)) if pair.parts == [1, 2]));
-        assert_eq!(left(&outcome), [(&[1, 2][..], None)]);
-        assert_eq!((outcome.kept_together(), outcome.unfinished), (vec![vec![1, 2]], vec![1, 2]));
-    }
-
-    #[test]
-    fn a_group_leaves_by_several_moves() {
-        // A slot that goes up, and then along y: what is in it cannot leave straight.
-        let slot = cells(
-            [&[-2.0, -1.5, 1.5, 2.0], &[-2.0, -1.5, 1.5, 6.0], &[-1.5, -1.0, 1.0, 3.1, 3.6]],
-            |[x, y, z]| {
-                let is_shaft = x == 1 && y == 1 && (z == 1 || z == 2);
-                let is_exit = x == 1 && y == 2 && z == 2;
-                !is_shaft && !is_exit
-            },
-        );
-        let mut parts = pinned_block();
-        parts[0] = slot;
-        let (outcome, events) = planned(parts, |problem| problem);
-        assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
-        assert_eq!(left(&outcome)[0], (&[1, 2][..], None));
-        assert!(outcome.removals[0].path.len() > 2, "it turns a corner");
-        assert!(events.iter().any(|e| matches!(e, TraceEvent::GroupTried { leaves: true, .. })));
     }
 }

@@ -35,21 +35,31 @@ pub(super) struct InitialAnalysis {
     pub(super) rotations: Vec<Action>,
     /// Per part, as assembled.
     pub(super) graphs: Vec<StateGraphs>,
+    /// The direction up, if it is given.
+    given_up: Option<Vector3<f64>>,
     /// How long the analysis took.
     pub(super) duration: Duration,
 }
 
 impl InitialAnalysis {
-    /// The number of the translation along which most parts can go at first; of several, the one nearest to +z.
+    /// The number of the translation upward: the one nearest to the given direction, or else the one along which most
+    /// parts can go at first; of several, the one nearest to +z.
     pub(super) fn upward(&self) -> usize {
-        let open = |i: usize| self.graphs.iter().filter(|graphs| graphs.blockage.is_open(i)).count();
-        let forces = self.translations.iter().map(|action| action.force()).enumerate();
-        let best = forces.max_by(|a, b| open(a.0).cmp(&open(b.0)).then(a.1.z.total_cmp(&b.1.z)));
+        let open = |i: usize| match self.given_up {
+            Some(_) => 0,
+            None => self.graphs.iter().filter(|graphs| graphs.blockage.is_open(i)).count(),
+        };
+        let near = self.given_up.unwrap_or_else(Vector3::z);
+        let forces = self.translations.iter().map(|action| action.force().dot(&near)).enumerate();
+        let best = forces.max_by(|a, b| open(a.0).cmp(&open(b.0)).then(a.1.total_cmp(&b.1)));
         best.map_or(0, |(up, _)| up)
     }
 
-    /// The direction of this translation.
+    /// The direction up.
     pub(super) fn up(&self) -> Vector3<f64> {
+        if let Some(up) = self.given_up {
+            return up;
+        }
         self.translations.get(self.upward()).map_or_else(Vector3::z, |action| action.force())
     }
 
@@ -65,6 +75,7 @@ impl InitialAnalysis {
             let open = StateGraphs { blockage: Blockage::open(translations.len()), remembered: false };
             vec![open; problem.scene.bodies.len()]
         };
-        Ok(Self { directions, translations, rotations, graphs, duration: started.elapsed() })
+        let given_up = problem.up;
+        Ok(Self { directions, translations, rotations, graphs, given_up, duration: started.elapsed() })
     }
 }

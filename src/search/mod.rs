@@ -25,6 +25,8 @@ mod directions;
 mod disassembly;
 mod enclosed;
 mod groups;
+#[cfg(test)]
+mod groups_tests;
 mod initial_analysis;
 mod inseparable;
 mod invalidation;
@@ -37,6 +39,7 @@ mod outcome;
 #[cfg(test)]
 mod paper_tests;
 mod pdp;
+mod preferred;
 mod problem;
 mod rays;
 mod rearrangement;
@@ -67,6 +70,7 @@ pub use crate::termination::{Interrupt, Termination};
 pub use directions::axes_of;
 pub use initial_analysis::initial_graphs;
 pub use outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal, SeparationProof};
+pub use preferred::PreferredGroups;
 pub use problem::{Checked, Effort, Observer, Problem, VerifiedPath};
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging};
 pub use state::least_travel;
@@ -89,8 +93,10 @@ pub fn search(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observe
 /// A search, with parts moved aside where nothing leaves, and the groups that left taken apart.
 fn run(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
     let mut outcome = run_once(planner, problem.clone(), observer);
+    // What is moved aside is so because nothing leaves: no group was left whole then.
+    let alone = Problem { preferred: PreferredGroups::default(), ..problem.clone() };
     loop {
-        let next = match aside::moved_aside(planner, &problem, &mut outcome, observer) {
+        let next = match aside::moved_aside(planner, &alone, &mut outcome, observer) {
             Ok(Some(next)) => next,
             Ok(None) => break,
             Err(interrupt) => {

@@ -226,7 +226,7 @@ impl Order {
     }
 
     /// The place of a direction in the order of preference: upward, sideways, downward.
-    fn tier(&self, direction: &Vector3<f64>) -> i32 {
+    pub(super) fn tier(&self, direction: &Vector3<f64>) -> i32 {
         match direction.dot(&self.up) {
             up if up > UPWARD => 0,
             up if up < -UPWARD => 2,

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::blocking_graph::StaticAnalysis;
@@ -19,6 +19,7 @@ use crate::termination::{Interrupt, Termination};
 
 use super::directions::Directions;
 use super::outcome::Removal;
+use super::preferred::PreferredGroups;
 use super::request::ActionSet;
 use super::trace::TraceEvent;
 
@@ -75,6 +76,8 @@ pub struct Problem<'a> {
     pub base: Base,
     /// Whether the base may leave now, too.
     pub releases_base: bool,
+    /// Groups that leave as wholes as long as others leave.
+    pub preferred: PreferredGroups,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<usize>>,
     /// Whether the only part that may move is the body of a group: nothing is proved about it, and it is in no group.
@@ -89,6 +92,8 @@ pub struct Problem<'a> {
     pub sweeps: bool,
     /// The gap between the hulls where a part's way out ends; `None` for the usual share of the part.
     pub clearance: Option<f64>,
+    /// The direction up; `None` for the one in which most parts can go at first.
+    pub up: Option<Vector3<f64>>,
     /// What random poses depend on.
     pub seed: u64,
     /// The number of simulations after which the search gives up.
@@ -140,10 +145,20 @@ impl Problem<'_> {
         self.present.binary_search(&part).is_ok() && !self.fixed.contains(&part)
     }
 
-    /// Whether it may leave now: a base stays as long as others leave.
+    /// Whether it may leave now by itself: a base, and what is in a preferred group, stay as long as others leave.
     #[must_use]
     pub fn may_move(&self, part: usize) -> bool {
+        self.may_join(part) && !self.preferred.keeps(part)
+    }
+
+    /// Whether it may leave now, by itself or in a group.
+    pub(super) fn may_join(&self, part: usize) -> bool {
         self.is_movable(part) && !self.keeps(part)
+    }
+
+    /// Whether all parts of a group may leave now.
+    pub(super) fn may_all_join(&self, group: &[usize]) -> bool {
+        group.iter().all(|&part| self.may_join(part))
     }
 
     /// Whether a part is a base that may not leave yet.

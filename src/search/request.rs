@@ -139,6 +139,9 @@ pub struct PlanRequest {
     /// The gap between a part's hull and that of all that stands where its way out ends, in the input's units, at least 0;
     /// `None` for a hundredth of the longest side of the part's box.
     pub clearance: Option<f64>,
+    /// The direction up, in the input's frame, of any length but 0: ways up come before ways sideways, and those before
+    /// ways down. `None` for the direction in which most parts can go at first.
+    pub up: Option<[f64; 3]>,
     /// What the random poses of the planners `rrt` and `bk-rrt` depend on.
     pub seed: u64,
     /// Simulations (steps of a tree, in RRT) after which the search gives up with `partial`.
@@ -160,6 +163,9 @@ pub struct PlanRequest {
     /// Parts that stay as long as others leave: what the rest is taken off. With the extended actions, SBDP and SBDP* choose
     /// one if there are none; for the other planners they are as fixed ones.
     pub base: Vec<usize>,
+    /// Groups that rather leave as wholes, and are taken apart then. A part may be in several, if one lies in the other.
+    /// Heeded by SBDP* with the extended actions.
+    pub groups: Vec<Vec<usize>>,
     /// Set for an assembly plan (the disassembly reversed): where its parts begin.
     pub assembly: Option<Staging>,
     /// Whether the cache is neither read nor written.
@@ -167,6 +173,12 @@ pub struct PlanRequest {
 }
 
 impl PlanRequest {
+    /// Whether its search heeds preferred groups.
+    #[must_use]
+    pub fn prefers_groups(&self) -> bool {
+        self.planner == Planner::SbdpStar && self.actions == ActionSet::Extended
+    }
+
     /// Whether its search sweeps.
     #[must_use]
     pub fn sweeps(&self) -> bool {

@@ -96,7 +96,7 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
         problem.base = problem.chosen_base(&problem.present, &initial.up());
     }
     let mut search = Sbdp::new(disassembly, initial, guided);
-    let stop = search.run().err();
+    let stop = search.settle_preferred().and_then(|()| search.run()).err();
     let (report, disassembly) = search.report();
     report.log(disassembly);
     let blocked = report.blocked(disassembly);
@@ -109,7 +109,7 @@ pub(super) fn sbdp(problem: Problem<'_>, observer: &mut dyn Observer, guided: bo
 impl<'a, 'o> Sbdp<'a, 'o> {
     fn new(mut disassembly: Disassembly<'a, 'o>, initial: InitialAnalysis, guided: bool) -> Self {
         let (upward, up) = (initial.upward(), initial.up());
-        let InitialAnalysis { directions, translations, rotations, graphs, duration } = initial;
+        let InitialAnalysis { directions, translations, rotations, graphs, duration, .. } = initial;
         disassembly.counters.static_analysis += duration;
         let strategy = Strategy::new(guided, disassembly.problem.actions);
         if strategy.is_extended() {
@@ -173,7 +173,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 }
                 continue;
             }
-            if self.leave_together(|groups| groups.leave_straight())? {
+            if self.leave_together(|groups| groups.leave_straight())? || self.loosen_preferred()? {
                 if self.disassembly.is_done() {
                     return Ok(());
                 }
@@ -189,6 +189,9 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 return Ok(());
             }
             if left {
+                continue;
+            }
+            if self.give_up_preferred() {
                 continue;
             }
             // Others may leave once the base has: nothing is turned before.
@@ -245,7 +248,9 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         let mut open: Vec<usize> = self.expandable(phase);
         while !open.is_empty() && !self.disassembly.is_done() {
             self.analyse(phase, &open)?;
-            if self.sweep_out(phase, &open)? {
+            let left =
+                self.sweep_out(phase, &open)? || self.leave_together(|groups| groups.leave_preferred())?;
+            if left {
                 gain.removed = true;
                 self.take_free_parts()?;
                 open = self.expandable(phase);
@@ -540,7 +545,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         self.disassembly.remove(part, path, depth)?;
         self.states.remove(part);
         self.renew_base();
-        Ok(())
+        self.settle_preferred()
     }
 
     fn add_node(&mut self, node: StateNode) {

@@ -32,6 +32,8 @@ impl Observer for Recorder {
 pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
     Problem {
         clearance: None,
+        preferred: PreferredGroups::default(),
+        up: None,
         seed: 0,
         present: (0..scene.bodies.len()).collect(),
         scene,
@@ -428,6 +430,19 @@ fn a_given_base_stays_and_leaves_only_where_nothing_else_does() {
     let (block, slab) = (wanted(2), wanted(1));
     assert_eq!((order(&block), block.base), (vec![2], given(3)));
     assert_eq!((slab.status, slab.remaining, slab.base), (PlanStatus::Complete, vec![0], Base::default()));
+}
+
+#[test]
+fn a_way_up_comes_first_wherever_up_is_said_to_be() {
+    // A cube on a plate of the same footprint: five ways of about one length.
+    let meshes =
+        || vec![cuboid([-1.0, -1.0, -2.0], [1.0, 1.0, 0.0]), cuboid([-1.0, -1.0, 0.0], [1.0, 1.0, 1.9])];
+    for up in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]].map(Vector3::from) {
+        let outcome = planned(meshes(), |problem| Problem { up: Some(up), ..problem });
+        let way = outcome.removals[0].motion().translation.vector.normalize();
+        assert_eq!(outcome.removals[0].parts.len(), 1);
+        assert!(way.dot(&up) > 0.99, "{up:?}: {way:?}");
+    }
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex, TryLockError};
 use std::time::{Duration, Instant};
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::blocking_graph::{BLOCKING, StaticAnalysis};
@@ -12,7 +13,8 @@ use crate::geometry::{Assembly, Shape};
 use crate::plan::{Base, OVERLAP, Plan, PlanStatus, VERDICT, Verifier};
 use crate::scene::{HullTree, JoinedHulls};
 use crate::search::{
-    Effort, Engine, Observer, PlanRequest, PlanSink, Problem, TraceEvent, initial_graphs, search,
+    Effort, Engine, Observer, PlanRequest, PlanSink, PreferredGroups, Problem, TraceEvent, initial_graphs,
+    search,
 };
 use crate::simulation::{
     MOTION, PenaltyEngine, PenaltyParameters, SlidingEngine, TOUCHING, TransitionFunction,
@@ -27,6 +29,25 @@ use super::prepared::{self, Prepared};
 use super::records::{PlanAnswer, PlanQuestion, remember_plan, remembered_plan};
 use super::relay::{Discard, Relay, WithoutSteps};
 use super::shared_shape::SharedShape;
+
+/// Refuses values of a request that are none.
+fn check_values(request: &PlanRequest) -> Result<(), ServiceError> {
+    if let Some(value) = request.clearance.filter(|length| !length.is_finite() || *length < 0.0) {
+        return Err(ServiceError::NoLength { field: "clearance", value });
+    }
+    let is_direction = |up: &[f64; 3]| {
+        let length = Vector3::from(*up).norm();
+        length.is_finite() && length > 0.0
+    };
+    if let Some(value) = request.up.filter(|up| !is_direction(up)) {
+        return Err(ServiceError::NoDirection { field: "up", value });
+    }
+    if !request.groups.is_empty() && !request.prefers_groups() {
+        let (planner, actions) = (request.planner.name(), request.actions.name());
+        return Err(ServiceError::NoGroups { planner, actions });
+    }
+    Ok(())
+}
 
 /// An admitted assembly. Overlaps are measured, and fields built, when they are first needed.
 #[derive(Debug)]
@@ -83,9 +104,7 @@ impl Entry {
         for list in [&mut fixed, &mut base] {
             list.retain(|p| removed.binary_search(p).is_err());
         }
-        if let Some(value) = request.clearance.filter(|length| !length.is_finite() || *length < 0.0) {
-            return Err(ServiceError::NoLength { field: "clearance", value });
-        }
+        check_values(request)?;
         for (field, list) in [("fixed", &fixed), ("base", &base)] {
             if let Some(&part) = request.targets.iter().flatten().find(|&p| list.binary_search(p).is_ok()) {
                 let name = self.assembly.parts[part].name.clone();
@@ -264,6 +283,8 @@ impl Entry {
             fixed: fixed.to_vec(),
             base: Base { parts: base.to_vec(), reason: None },
             releases_base: false,
+            preferred: PreferredGroups::new(&request.groups),
+            up: request.up.map(|up| Vector3::from(up).normalize()),
             targets: request.targets.clone(),
             is_group: false,
             effort: Effort::All,

@@ -101,6 +101,24 @@ pub enum ServiceError {
         /// What was given.
         value: f64,
     },
+    /// A direction has no length, or is not finite.
+    #[error("`{field}` is {value:?}: give a finite vector that is not zero")]
+    NoDirection {
+        /// Which one.
+        field: &'static str,
+        /// What was given.
+        value: [f64; 3],
+    },
+    /// Preferred groups were given to a planner that knows none.
+    #[error(
+        "`groups` are for the planner sbdp-star with the extended actions, not for {planner} with the {actions} ones"
+    )]
+    NoGroups {
+        /// The planner.
+        planner: &'static str,
+        /// Its actions.
+        actions: &'static str,
+    },
     /// The worker threads for the request could not be started.
     #[error("cannot start worker threads: {0}")]
     Threads(String),
@@ -447,8 +465,8 @@ impl Drop for Service {
 /// Parts that a request or a revision names, by field.
 type Named = [(&'static str, Vec<usize>)];
 
-fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 5] {
-    let PlanRequest { fixed, removed, targets, base, assembly, .. } = request;
+fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 6] {
+    let PlanRequest { fixed, removed, targets, base, groups, assembly, .. } = request;
     let staged = match assembly {
         Some(Staging::Beside(given)) => given.iter().map(|(part, _)| *part).collect(),
         _ => Vec::new(),
@@ -459,6 +477,7 @@ fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 5] {
         ("removed", removed.clone()),
         ("targets", targets),
         ("base", base.clone()),
+        ("groups", groups.concat()),
         ("staged", staged),
     ]
 }

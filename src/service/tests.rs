@@ -74,6 +74,8 @@ enum Edit {
     Swapped(usize, usize),
     Fixed(usize),
     Base(usize),
+    /// Two parts rather leave together.
+    Group(usize, usize),
     Target(usize),
 }
 
@@ -92,6 +94,7 @@ fn edit() -> impl Strategy<Value = Edit> {
         1 => (part(), part()).prop_map(|(p, q)| Edit::Swapped(p, q)),
         1 => part().prop_map(Edit::Fixed),
         1 => part().prop_map(Edit::Base),
+        2 => (part(), part()).prop_map(|(p, q)| Edit::Group(p, q)),
         1 => part().prop_map(Edit::Target),
     ]
 }
@@ -123,11 +126,12 @@ impl Question {
             Edit::Swapped(p, q) => meshes.swap(p % count, q % count),
             Edit::Fixed(p) => request.fixed = vec![p % count],
             Edit::Base(p) => request.base = vec![p % count],
+            Edit::Group(p, q) => request.groups.push(vec![p % count, q % count]),
             Edit::Target(p) => request.targets = Some(vec![p % count]),
         }
         let count = meshes.len();
-        let PlanRequest { removed, fixed, base, targets, .. } = request;
-        for list in [&mut *removed, fixed, base].into_iter().chain(&mut *targets) {
+        let PlanRequest { removed, fixed, base, targets, groups, .. } = request;
+        for list in [&mut *removed, fixed, base].into_iter().chain(&mut *targets).chain(groups) {
             list.retain(|&p| p < count);
         }
         // What stays is no target.

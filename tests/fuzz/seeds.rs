@@ -141,6 +141,8 @@ fn messages() -> Vec<Vec<u8>> {
     let request = PlanRequest {
         fixed: vec![1, 2],
         base: vec![3],
+        groups: vec![vec![0, 1], vec![2]],
+        up: Some([0.0, 1.0, 0.0]),
         penalty: vec![PenaltyRecord { parameter: 1, reserved: 0, value: 0.5 }],
         targets: Some(vec![0]),
         moved: vec![MovedPart { part: 1, ..MovedPart::default() }],

@@ -215,6 +215,9 @@ pub struct PlanOptions {
     /// The gap between a part's hull and that of all that stands where its way out ends, in the input's units, at least 0;
     /// `None` for a hundredth of the longest side of the part's box.
     pub clearance: Option<f64>,
+    /// The direction up, in the input's frame, of any length but 0: ways up come before ways sideways, and those before
+    /// ways down. `None` for the direction in which most parts can go at first.
+    pub up: Option<[f64; 3]>,
     /// Simulations (steps of a tree, in RRT) after which to give up.
     pub max_simulations: Option<u64>,
     /// Threads for this request; 0 leaves it to the daemon.
@@ -227,6 +230,8 @@ pub struct PlanOptions {
     pub targets: Option<Vec<u32>>,
     /// Parts that stay as long as others leave: what the rest is taken off. If there are none, the daemon chooses one.
     pub base: Vec<u32>,
+    /// Groups that rather leave as wholes, and are taken apart then. A part may be in several, if one lies in the other.
+    pub groups: Vec<Vec<u32>>,
     /// Parts that stand elsewhere than in the assembly, with the rigid motion of their mesh from there
     /// (input units and frame).
     pub moved: Vec<(u32, Waypoint)>,
@@ -259,6 +264,7 @@ impl PlanOptions {
             deadline_ns: self.timeout.map(clock::deadline_in),
             seed: self.seed,
             clearance: self.clearance,
+            up: self.up,
             max_simulations: self.max_simulations,
             path_timeout_ns: self.path_timeout.map(nanoseconds),
             planning_timeout_ns: self.planning_timeout.map(nanoseconds),
@@ -266,6 +272,7 @@ impl PlanOptions {
             removed: self.removed.clone(),
             targets: self.targets.clone(),
             base: self.base.clone(),
+            groups: self.groups.clone(),
             moved: self.moved.iter().map(moved_part).collect(),
             assembly: self.assembly.as_ref().map(|staging| match staging {
                 Staging::None => plan::Staging::None,

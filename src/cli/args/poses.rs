@@ -1,6 +1,6 @@
 //! Poses as the user writes them.
 
-use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use crate::geometry::{Pose, Waypoint, waypoint_from_pose};
 
@@ -29,6 +29,24 @@ pub(super) fn rotation(text: &str) -> Result<UnitQuaternion<f64>, String> {
     let numbers: Vec<f64> = text.split(',').map(str::parse).collect::<Result<_, _>>().map_err(|_| wrong())?;
     let numbers: [f64; 4] = numbers.try_into().map_err(|_| wrong())?;
     quaternion(numbers).ok_or_else(wrong)
+}
+
+/// One of the six axes by name, or a vector that is not 0.
+pub(super) fn direction(text: &str) -> Result<[f64; 3], String> {
+    let (sign, axis) = match text.strip_prefix('-') {
+        Some(axis) => (-1.0, axis),
+        None => (1.0, text.strip_prefix('+').unwrap_or(text)),
+    };
+    if let Some(axis) = ["x", "y", "z"].iter().position(|name| axis.eq_ignore_ascii_case(name)) {
+        let mut direction = [0.0; 3];
+        direction[axis] = sign;
+        return Ok(direction);
+    }
+    let wrong = || "neither an axis, as +z, nor three numbers X,Y,Z of which one is not 0".to_owned();
+    let numbers: Vec<f64> = text.split(',').map(str::parse).collect::<Result<_, _>>().map_err(|_| wrong())?;
+    let direction: [f64; 3] = numbers.try_into().map_err(|_| wrong())?;
+    let length = Vector3::from(direction).norm();
+    if length.is_finite() && length > 0.0 { Ok(direction) } else { Err(wrong()) }
 }
 
 fn quaternion([w, x, y, z]: [f64; 4]) -> Option<UnitQuaternion<f64>> {

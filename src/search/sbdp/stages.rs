@@ -15,7 +15,7 @@ use super::super::cell_memory::CellStage;
 use super::super::contraction::Contraction;
 use super::super::critical_turns::TurningPart;
 use super::super::disassembly::{Disassembly, Stop, Transition, joined};
-use super::super::groups::Groups;
+use super::super::groups::{Groups, HeldGroup};
 use super::super::inseparable::InseparablePairs;
 use super::super::problem::{Problem, VerifiedPath};
 use super::super::state::StateNode;
@@ -84,8 +84,39 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         self.disassembly.remove_group(contraction.leaving(), way)?;
         contraction.members().iter().for_each(|&part| self.states.remove(part));
         self.renew_base();
+        self.settle_preferred()?;
         self.take_free_parts()?;
         Ok(true)
+    }
+
+    /// Takes a member out that holds a preferred group, if one leaves along a line or a thread; true if one does.
+    pub(super) fn loosen_preferred(&mut self) -> Result<bool, Stop> {
+        if self.disassembly.problem.preferred.is_empty() {
+            return Ok(false);
+        }
+        for HeldGroup { holders, .. } in self.groups().held_preferred() {
+            self.disassembly.problem.preferred.loosen(holders);
+            let open = self.expandable(PlanningPhase::Translation);
+            self.analyse(PlanningPhase::Translation, &open)?;
+            if self.sweep_out(PlanningPhase::Translation, &open)? {
+                self.take_free_parts()?;
+                return Ok(true);
+            }
+            if self.leave_along_threads()? {
+                return Ok(true);
+            }
+        }
+        self.disassembly.problem.preferred.loosen(Vec::new());
+        Ok(false)
+    }
+
+    /// Gives a preferred group up; false if there is none.
+    pub(super) fn give_up_preferred(&mut self) -> bool {
+        let held = self.groups().held_preferred();
+        let with_base = held.iter().find(|held| held.has_base);
+        let Some(HeldGroup { group, .. }) = with_base.or(held.first()) else { return false };
+        self.disassembly.problem.preferred.give_up(group);
+        true
     }
 
     /// Makes one of some parts that leave the base together the base, if they are rather what stays.
@@ -100,18 +131,29 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         true
     }
 
-    /// After a removal: where a base has left, others stay: those that were given and still stand, or else another one is chosen.
+    /// After a removal: where a base has left, others stay: those that were given and still stand, or else another one is
+    /// chosen.
     pub(super) fn renew_base(&mut self) {
         let Disassembly { problem, everything, .. } = &mut self.disassembly;
         // What else left may have freed others.
         problem.releases_base = false;
         let base = problem.base.among(everything.standing());
-        if base == problem.base {
-            return;
+        if base != problem.base {
+            let is_chosen = base.parts.is_empty() && self.strategy.is_extended();
+            problem.base =
+                if is_chosen { problem.chosen_base(everything.standing(), &self.order.up) } else { base };
         }
-        let is_chosen = base.parts.is_empty() && self.strategy.is_extended();
-        problem.base =
-            if is_chosen { problem.chosen_base(everything.standing(), &self.order.up) } else { base };
+    }
+
+    /// At first, and after a removal: settles which preferred groups there are.
+    pub(super) fn settle_preferred(&mut self) -> Result<(), Stop> {
+        if self.disassembly.problem.preferred.is_empty() {
+            return Ok(());
+        }
+        self.groups().sweep_first()?;
+        let Disassembly { problem, everything, .. } = &mut self.disassembly;
+        problem.preferred.retain(everything.standing(), &self.group_memory.links);
+        Ok(())
     }
 
     pub(super) fn groups(&mut self) -> Groups<'_, 'a, 'o> {
@@ -120,7 +162,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         Groups {
             disassembly,
             states,
-            inseparable: order.inseparable(),
+            order,
             translations: &all[..*common],
             memory: group_memory,
             search: |problem, observer| sbdp(problem, observer, true),

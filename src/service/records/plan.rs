@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 use crate::cache::{Digest, RecordKey, RecordKind, RequestCache, Storage, Validity};
 use crate::geometry::{Assembly, add_bounds, add_pose};
 use crate::plan::PlanStatus;
-use crate::search::{Outcome, PlanRequest, Planner, Removal};
+use crate::search::{Outcome, PlanRequest, Planner, PreferredGroups, Removal};
 use crate::termination::Termination;
 
 /// What a search answered. The service prepares the scene and the limits that it searches with.
-pub(crate) static PLAN: RecordKind = RecordKind::of::<PlanAnswer>(6, "plan", Storage::MemoryAndDisk, SOURCES);
+pub(crate) static PLAN: RecordKind = RecordKind::of::<PlanAnswer>(7, "plan", Storage::MemoryAndDisk, SOURCES);
 const SOURCES: Validity = Validity::Sources(env!("SBDP_SOURCES_SERVICE"));
 
 /// A question about an assembly; lists are ascending.
@@ -98,6 +98,7 @@ impl PlanQuestion<'_> {
         digest.text(request.static_analysis.name()).text(&format!("{:?}", request.penalty));
         digest.integer(u64::from(request.sweeps())).integer(request.seed);
         digest.text(&format!("{:?} {:?}", request.max_simulations, request.clearance));
+        digest.text(&format!("{:?} {:?}", request.up, PreferredGroups::new(&request.groups)));
         let mut targets = request.targets.clone();
         if let Some(targets) = &mut targets {
             targets.sort_unstable();
