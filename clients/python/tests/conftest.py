@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import tempfile
 from pathlib import Path
 
 import numpy
@@ -19,10 +20,16 @@ def start(folder):
 
 
 @pytest.fixture(scope="session")
-def runtime_dir(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("daemon")
-    with start(folder):
-        yield folder / "run"
+def runtime_dir():
+    with tempfile.TemporaryDirectory() as folder, start(Path(folder)):
+        yield Path(folder) / "run"
+
+
+@pytest.fixture
+def place():
+    """A folder with a short path: sockets lie in it."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder)
 
 
 @pytest.fixture
@@ -32,11 +39,11 @@ def client(runtime_dir):
 
 
 @pytest.fixture
-def own_daemon(tmp_path):
+def own_daemon(place):
     """One that a test may kill: (daemon, runtime folder)."""
-    daemon = start(tmp_path)
+    daemon = start(place)
     try:
-        yield daemon, tmp_path / "run"
+        yield daemon, place / "run"
     finally:
         daemon.stop()
 

@@ -14,18 +14,18 @@ from conftest import ASSEMBLIES, lattice
 import sbdp
 
 
-def test_without_a_daemon_the_error_says_to_start_one(tmp_path):
+def test_without_a_daemon_the_error_says_to_start_one(place):
     with pytest.raises(sbdp.NoDaemonError, match="`sbdpd`"):
-        sbdp.connect(tmp_path / "run")
+        sbdp.connect(place / "run")
 
 
-def test_a_daemon_is_started_where_none_runs_and_left_running(tmp_path):
+def test_a_daemon_is_started_where_none_runs_and_left_running(place):
     program = "import sbdp, sys; print(sbdp.connect(sys.argv[1], start=True).pid)"
-    environment = {**os.environ, "SBDP_CACHE_DIR": str(tmp_path / "cache")}
-    command = [sys.executable, "-c", program, str(tmp_path / "run")]
+    environment = {**os.environ, "SBDP_CACHE_DIR": str(place / "cache")}
+    command = [sys.executable, "-c", program, str(place / "run")]
     pid = int(subprocess.run(command, env=environment, check=True, capture_output=True).stdout)
     try:
-        with sbdp.connect(tmp_path / "run", start=True) as client:
+        with sbdp.connect(place / "run", start=True) as client:
             assert client.pid == pid
             assert client.plan(lattice(2)).result().status == "complete"
     finally:
@@ -45,7 +45,7 @@ def test_a_daemon_that_is_killed_is_an_error(own_daemon):
         client.metrics()
 
 
-def test_a_daemon_that_is_restarted_is_followed(own_daemon, tmp_path):
+def test_a_daemon_that_is_restarted_is_followed(own_daemon, place):
     from conftest import start
 
     daemon, runtime_dir = own_daemon
@@ -56,7 +56,7 @@ def test_a_daemon_that_is_restarted_is_followed(own_daemon, tmp_path):
     next(stream)
     os.kill(daemon.pid, signal.SIGKILL)
     daemon.stop()
-    with start(tmp_path):
+    with start(place):
         plan = stream.result()
         assert [step.parts for step in plan.steps] == whole
         assert (stream.restarts, client.restarts) == (1, 1)

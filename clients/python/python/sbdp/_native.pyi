@@ -44,6 +44,10 @@ class Options(TypedDict, total=False):
     """How it is put together, not apart."""
     staging: Literal["auto", "none"] | Mapping[str, Pose]
     """Where parts of an assembly plan wait: where the files say, else beside the assembly; nowhere; or at these poses."""
+    up: Literal["+x", "-x", "+y", "-y", "+z", "-z"] | Sequence[float] | None
+    """Ways up come before ways sideways, and those before ways down."""
+    groups: Literal["needed", "prefer"]
+    """Whether parts that belong together where the assembly comes from leave together as long as anything else leaves."""
     no_cache: bool
     batch: bool
 

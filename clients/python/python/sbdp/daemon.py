@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sysconfig
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from . import _native
@@ -36,7 +37,13 @@ class Daemon:
     the program as they are. Raises `NoDaemonError` if it does not become ready; its own message is on stderr.
     """
 
-    def __init__(self, runtime_dir=None, *, config=None, arguments=()):
+    def __init__(
+        self,
+        runtime_dir: str | os.PathLike[str] | None = None,
+        *,
+        config: str | os.PathLike[str] | None = None,
+        arguments: Sequence[str] = (),
+    ) -> None:
         command = [program()]
         if runtime_dir is not None:
             command += ["--runtime-dir", os.fspath(runtime_dir)]
@@ -51,7 +58,7 @@ class Daemon:
             self.stop()
             raise
 
-    def _wait_until_ready(self):
+    def _wait_until_ready(self) -> None:
         until = time.monotonic() + READY
         while True:
             try:
@@ -71,20 +78,20 @@ class Daemon:
         """The process."""
         return self._process.pid
 
-    def stop(self):
+    def stop(self) -> None:
         """Stops it, if it still runs, and waits for its end: it answers what it has first."""
         if self._process.poll() is None:
             self._process.terminate()
         self._process.wait()
 
-    def __enter__(self):
+    def __enter__(self) -> "Daemon":
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
 
-def leave_running(daemon: Daemon):
+def leave_running(daemon: Daemon) -> None:
     """Lets a daemon stay when this process ends."""
     # `Popen` would warn of a child that still runs.
     daemon._process.returncode = 0
