@@ -84,7 +84,7 @@ impl Client {
     }
 
     /// Asks for a plan.
-    #[pyo3(signature = (assembly, *, views=false, **keywords))]
+    #[pyo3(signature = (assembly, /, *, views=false, **keywords))]
     fn plan(
         &self,
         py: Python<'_>,
@@ -99,7 +99,7 @@ impl Client {
     }
 
     /// Begins a session.
-    #[pyo3(signature = (assembly, **keywords))]
+    #[pyo3(signature = (assembly, /, **keywords))]
     fn session(
         &self,
         py: Python<'_>,

@@ -126,7 +126,7 @@ def test_closing_frees_client_and_daemon(client):
         break
     gc.collect()
     client.plan(lattice(2)).result()
-    while client.metrics()["requests"]["running"]:
+    while client.metrics()["running"]:
         pass
 
 

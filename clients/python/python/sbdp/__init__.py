@@ -68,5 +68,5 @@ def connect(
     except NoDaemonError:
         if not start:
             raise
-    leave_running(Daemon(runtime_dir))
+    leave_running(Daemon(runtime_dir, quiet=True))
     return Client(runtime_dir, **options)

@@ -228,9 +228,9 @@ class Client:
         reconnect: float = 10.0,
         busy_wait: float = 0.0,
     ) -> None: ...
-    def plan(self, assembly: Assembly, *, views: bool = False, **options: Unpack[Options]) -> PlanStream:
+    def plan(self, assembly: Assembly, /, *, views: bool = False, **options: Unpack[Options]) -> PlanStream:
         """Asks for a plan; the meshes are uploaded if the daemon does not know them."""
-    def session(self, assembly: Assembly, **options: Unpack[Options]) -> Session:
+    def session(self, assembly: Assembly, /, **options: Unpack[Options]) -> Session:
         """Begins a session about how an assembly comes apart."""
     def upload(self, assembly: Assembly) -> bytes:
         """Hands an assembly over ahead of the first plan; returns its handle."""
