@@ -1,7 +1,7 @@
 //! The state of a disassembly: which parts stand and which are out. All planners use it to simulate a motion,
 //! to prove a path, and to take parts out that nothing holds.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -419,12 +419,17 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.removals.push(removal);
     }
 
-    /// Which parts leave after others where both can: first the base, then parts that carry others.
-    pub(super) fn leaving_late(&self) -> impl Fn(usize) -> (bool, bool) + use<> {
+    /// The parts that alone carry another one, as they stand.
+    pub(super) fn carriers(&self) -> BTreeSet<usize> {
         let (problem, standing) = (&self.problem, self.everything.standing());
         let is_base = |part: usize| problem.base.parts.contains(&part);
-        let carriers = self.supports.carriers(standing, |part| is_base(part) || !problem.is_movable(part));
-        let base = problem.base.parts.clone();
+        self.supports.carriers(standing, |part| is_base(part) || !problem.is_movable(part))
+    }
+
+    /// Which parts leave after others where both can: first the base, then parts that carry others.
+    pub(super) fn leaving_late(&self) -> impl Fn(usize) -> (bool, bool) + use<> {
+        let carriers = self.carriers();
+        let base = self.problem.base.parts.clone();
         move |part| (base.contains(&part), carriers.contains(&part))
     }
 

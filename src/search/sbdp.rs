@@ -16,7 +16,7 @@
 
 mod stages;
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -344,9 +344,14 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         }
         let sweeps = self.order.sweeps(&self.of(phase), open, &self.actions, &self.disassembly);
         let (mut next, mut removed) = (0, false);
+        // Where other parts carry than when the order was made, those that do now wait for the next run and its order.
+        let (mut carriers, mut waiting) = (self.disassembly.carriers(), BTreeSet::new());
         while next < sweeps.len() && !self.disassembly.is_done() {
             let standing = self.disassembly.everything.standing();
-            let is_wanted = |at: StateAction| self.may_try(at) && !self.sweep_memory.is_blocked(at, standing);
+            let waits = |at: StateAction| waiting.contains(&self.states.nodes[at.node].part);
+            let is_wanted = |at: StateAction| {
+                self.may_try(at) && !waits(at) && !self.sweep_memory.is_blocked(at, standing)
+            };
             let (window, end) = window(&sweeps, next, rayon::current_num_threads(), is_wanted);
             next = end;
             let runs: Vec<Transition> = window.iter().map(|&i| self.transition(sweeps[i])).collect();
@@ -358,6 +363,11 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                         if self.states.nodes[at.node].alive && self.prove_sweep(at, run, &path)? {
                             // Later results answer a question that has changed.
                             (next, removed) = (i + 1, true);
+                            carriers.remove(&run.part);
+                            let carry_now = self.disassembly.carriers();
+                            if carry_now != carriers {
+                                waiting = carry_now;
+                            }
                             break;
                         }
                         BlockedSweep::ForGood

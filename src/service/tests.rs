@@ -126,7 +126,11 @@ impl Question {
             Edit::Swapped(p, q) => meshes.swap(p % count, q % count),
             Edit::Fixed(p) => request.fixed = vec![p % count],
             Edit::Base(p) => request.base = vec![p % count],
-            Edit::Group(p, q) => request.groups.push(vec![p % count, q % count]),
+            Edit::Group(p, q) if request.prefers_groups() => {
+                request.groups.push(vec![p % count, q % count]);
+            }
+            // Other planners refuse it.
+            Edit::Group(..) => {}
             Edit::Target(p) => request.targets = Some(vec![p % count]),
         }
         let count = meshes.len();

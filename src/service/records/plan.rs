@@ -9,7 +9,7 @@ use crate::search::{Outcome, PlanRequest, Planner, PreferredGroups, Removal};
 use crate::termination::Termination;
 
 /// What a search answered. The service prepares the scene and the limits that it searches with.
-pub(crate) static PLAN: RecordKind = RecordKind::of::<PlanAnswer>(7, "plan", Storage::MemoryAndDisk, SOURCES);
+pub(crate) static PLAN: RecordKind = RecordKind::of::<PlanAnswer>(6, "plan", Storage::MemoryAndDisk, SOURCES);
 const SOURCES: Validity = Validity::Sources(env!("SBDP_SOURCES_SERVICE"));
 
 /// A question about an assembly; lists are ascending.
