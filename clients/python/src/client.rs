@@ -7,38 +7,13 @@ use std::time::Duration;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sbdp_client::{Client as SharedClient, ClientError, ConnectOptions, Interrupt};
+use sbdp_client::{Client as SharedClient, ClientError, ConnectOptions};
 
 use crate::assembly::{Assembly, Data};
-use crate::error::raised;
 use crate::options::options;
 use crate::session::Session;
+use crate::signals::Signals;
 use crate::stream::PlanStream;
-
-/// What signal handlers of Python raised while a call waited for the daemon.
-#[derive(Clone, Default)]
-pub(crate) struct Signals(Arc<Mutex<Option<PyErr>>>);
-
-impl Signals {
-    /// Asks Python now and then whether a signal came, as Ctrl-C.
-    fn interrupt(&self) -> Interrupt {
-        let raised = Arc::clone(&self.0);
-        Interrupt::new(move || {
-            let Err(error) = Python::attach(|py| py.check_signals()) else { return false };
-            *raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
-            true
-        })
-    }
-
-    /// What the client says, as an exception; that of the handler if it was one that ended the call.
-    pub(crate) fn raised(&self, py: Python<'_>, error: &ClientError) -> PyErr {
-        let by_handler = match error {
-            ClientError::Interrupted => self.0.lock().unwrap_or_else(PoisonError::into_inner).take(),
-            _ => None,
-        };
-        by_handler.unwrap_or_else(|| raised(py, error))
-    }
-}
 
 /// A connection to the daemon. Threads may share it; it receives one plan at a time.
 #[pyclass(frozen, module = "sbdp")]
@@ -109,7 +84,7 @@ impl Client {
     }
 
     /// Asks for a plan.
-    #[pyo3(signature = (assembly, *, views=false, **keywords))]
+    #[pyo3(signature = (assembly, /, *, views=false, **keywords))]
     fn plan(
         &self,
         py: Python<'_>,
@@ -124,7 +99,7 @@ impl Client {
     }
 
     /// Begins a session.
-    #[pyo3(signature = (assembly, **keywords))]
+    #[pyo3(signature = (assembly, /, **keywords))]
     fn session(
         &self,
         py: Python<'_>,

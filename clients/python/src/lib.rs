@@ -8,6 +8,7 @@ mod error;
 mod options;
 mod plan;
 mod session;
+mod signals;
 mod step;
 mod stream;
 

@@ -63,6 +63,39 @@ fn poses(data: &Data, value: &Bound<'_, PyAny>) -> PyResult<Vec<(u32, Waypoint)>
     entries.map(|(name, motion)| Ok((data.part(py, &name.extract::<String>()?)?, pose(&motion)?))).collect()
 }
 
+/// One of the six axes by name, or a vector; `None` leaves it to the daemon.
+fn direction(value: &Bound<'_, PyAny>) -> PyResult<Option<[f64; 3]>> {
+    if value.is_none() {
+        return Ok(None);
+    }
+    if value.cast::<PyString>().is_err() {
+        return value.extract().map(Some);
+    }
+    let axes = [
+        ("+x", [1.0, 0.0, 0.0]),
+        ("-x", [-1.0, 0.0, 0.0]),
+        ("+y", [0.0, 1.0, 0.0]),
+        ("-y", [0.0, -1.0, 0.0]),
+        ("+z", [0.0, 0.0, 1.0]),
+        ("-z", [0.0, 0.0, -1.0]),
+    ];
+    one_of("up", value, &axes).map(Some)
+}
+
+/// The groups that the assembly's files name.
+fn groups(py: Python<'_>, data: &Data) -> PyResult<Vec<Vec<u32>>> {
+    let named = data.files().map(|(assembly, _)| &assembly.groups[..]).unwrap_or_default();
+    if named.is_empty() {
+        return Err(PyValueError::new_err("groups: the assembly names none"));
+    }
+    let numbers = |group: &sbdp::geometry::SourceGroup| {
+        let mut parts = group.parts.iter().map(|part| data.part(py, part)).collect::<PyResult<Vec<u32>>>()?;
+        parts.sort_unstable();
+        Ok(parts)
+    };
+    named.iter().map(numbers).collect()
+}
+
 fn penalty(value: &Bound<'_, PyAny>) -> PyResult<Vec<(PenaltyParameter, f64)>> {
     let words: Vec<(&str, PenaltyParameter)> = PenaltyParameter::ALL.iter().map(|p| (p.name(), *p)).collect();
     let entries = value.cast::<PyDict>()?.iter();
@@ -121,6 +154,12 @@ pub(crate) fn options(
             "moved" => options.moved = poses(data, &value)?,
             "assembly" => together = value.extract()?,
             "staging" => staging = Some(value),
+            "up" => options.up = direction(&value)?,
+            "groups" => {
+                if one_of(&key, &value, &[("needed", false), ("prefer", true)])? {
+                    options.groups = groups(py, data)?;
+                }
+            }
             "no_cache" => options.no_cache = value.extract()?,
             "batch" => options.batch = value.extract()?,
             _ => return Err(PyTypeError::new_err(format!("there is no option `{key}`"))),

@@ -6,8 +6,8 @@ use pyo3::prelude::*;
 use sbdp_client::Session as ClientSession;
 
 use crate::assembly::Data;
-use crate::client::Signals;
 use crate::options::{parts, pose, seconds};
+use crate::signals::Signals;
 use crate::step::Step;
 use crate::stream::PlanStream;
 

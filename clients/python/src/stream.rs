@@ -14,9 +14,9 @@ use sbdp_client::{
 };
 
 use crate::assembly::{Data, SLICE};
-use crate::client::Signals;
 use crate::options::seconds;
 use crate::plan::{Plan, document, json};
+use crate::signals::Signals;
 use crate::step::{Lent, Step};
 
 /// Steps as they are found. It is an iterator, and closing it cancels the request.

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import tempfile
 from pathlib import Path
 
 import numpy
@@ -19,10 +20,16 @@ def start(folder):
 
 
 @pytest.fixture(scope="session")
-def runtime_dir(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("daemon")
-    with start(folder):
-        yield folder / "run"
+def runtime_dir():
+    with tempfile.TemporaryDirectory() as folder, start(Path(folder)):
+        yield Path(folder) / "run"
+
+
+@pytest.fixture
+def place():
+    """A folder with a short path: sockets lie in it."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder)
 
 
 @pytest.fixture
@@ -32,11 +39,11 @@ def client(runtime_dir):
 
 
 @pytest.fixture
-def own_daemon(tmp_path):
+def own_daemon(place):
     """One that a test may kill: (daemon, runtime folder)."""
-    daemon = start(tmp_path)
+    daemon = start(place)
     try:
-        yield daemon, tmp_path / "run"
+        yield daemon, place / "run"
     finally:
         daemon.stop()
 
@@ -53,6 +60,29 @@ def lattice(n):
     """n × n × n boxes, each touching its neighbours."""
     cells = [(x, y, z) for x in range(n) for y in range(n) for z in range(n)]
     return sbdp.assembly({str(i): box(cell) for i, cell in enumerate(cells)}, units="mm")
+
+
+def chain(links):
+    """Rings through each other, cut open by less than they are thick: nothing but a long search shows that the chain does
+    not come apart."""
+    around, across = 24, 12
+    i, j = (grid.ravel() for grid in numpy.meshgrid(range(around), range(across), indexing="ij"))
+    turn, roll = 2 * numpy.pi * i / around, 2 * numpy.pi * j / across
+    radius = 5 + 1.5 * numpy.cos(roll)
+    x, side, off = radius * numpy.cos(turn), radius * numpy.sin(turn), 1.5 * numpy.sin(roll)
+    i, j = i[: -across], j[: -across]
+    a, b = across * i + j, across * (i + 1) + j
+    c, d = across * (i + 1) + (j + 1) % across, across * i + (j + 1) % across
+    faces = [numpy.stack([a, b, c], 1), numpy.stack([a, c, d], 1)]
+    fan = numpy.array([[0, n + 1, n] for n in range(1, across - 1)])
+    faces += [fan, (around - 1) * across + fan[:, ::-1]]
+    triangles = numpy.concatenate(faces).astype(numpy.uint32)
+
+    def link(number):
+        y, z = (side, off) if number % 2 == 0 else (-off, side)
+        return numpy.stack([x + 6.75 * number, y, z], 1), triangles
+
+    return sbdp.assembly({str(number): link(number) for number in range(links)})
 
 
 def command_line(runtime_dir, *arguments):

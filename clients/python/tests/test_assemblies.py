@@ -31,8 +31,8 @@ def test_what_cannot_be_read_is_refused_with_its_name(tmp_path):
 
 
 def test_names_are_left_out_by_patterns():
-    whole = sbdp.load(ASSEMBLIES / "pin-bolt-cover")
-    without = sbdp.load(ASSEMBLIES / "pin-bolt-cover", ignore=[whole.parts[0]])
+    whole = sbdp.load(ASSEMBLIES / "bolted-bracket-20")
+    without = sbdp.load(ASSEMBLIES / "bolted-bracket-20", ignore=[whole.parts[0]])
     assert set(without.parts) == set(whole.parts[1:])
     assert any("ignored" in note for note in without.notes)
 

@@ -5,7 +5,7 @@ import json
 
 import numpy
 import pytest
-from conftest import ASSEMBLIES, box, command_line, lattice
+from conftest import ASSEMBLIES, box, chain, command_line, lattice
 
 import sbdp
 
@@ -126,7 +126,7 @@ def test_closing_frees_client_and_daemon(client):
         break
     gc.collect()
     client.plan(lattice(2)).result()
-    while client.metrics()["requests"]["running"]:
+    while client.metrics()["running"]:
         pass
 
 
@@ -140,7 +140,7 @@ def test_polling_misses_nothing(client):
         else:
             waited += 1
     assert steps_of(polled) == whole and waited
-    stream = client.plan(lattice(6), no_cache=True)
+    stream = client.plan(chain(60), no_cache=True)
     with pytest.raises(TimeoutError):
         stream.result(timeout=0.0)
     assert not stream.done

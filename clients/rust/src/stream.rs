@@ -122,6 +122,7 @@ impl Client {
         subject: impl Into<Subject>,
         options: &PlanOptions,
     ) -> Result<PlanStream, ClientError> {
+        self.check_process()?;
         let subject = subject.into();
         let handle = match &subject {
             Subject::Handle(handle) => *handle,

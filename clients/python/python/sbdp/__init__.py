@@ -10,6 +10,8 @@
 Lengths and poses are in the input's units and frame; a pose is [x, y, z, qw, qx, qy, qz]. Parts go by their names.
 """
 
+import os
+
 from . import errors
 from ._native import VERSION as __version__
 from ._native import Assembly, Client, Plan, PlanStream, Session, Step, load
@@ -39,8 +41,14 @@ __all__ += [name for name in vars(errors) if name.endswith("Error")] + ["Error"]
 
 
 def connect(
-    runtime_dir=None, *, start=False, timeout=10.0, upload_timeout=300.0, reconnect=10.0, busy_wait=0.0
-):
+    runtime_dir: str | os.PathLike[str] | None = None,
+    *,
+    start: bool = False,
+    timeout: float = 10.0,
+    upload_timeout: float = 300.0,
+    reconnect: float = 10.0,
+    busy_wait: float = 0.0,
+) -> Client:
     """Connects to the daemon of this user, or of a runtime folder.
 
     With `start=True` one is started where none runs, and left running. All times are in seconds: `timeout` for answers that
@@ -60,5 +68,5 @@ def connect(
     except NoDaemonError:
         if not start:
             raise
-    leave_running(Daemon(runtime_dir))
+    leave_running(Daemon(runtime_dir, quiet=True))
     return Client(runtime_dir, **options)

@@ -44,6 +44,10 @@ class Options(TypedDict, total=False):
     """How it is put together, not apart."""
     staging: Literal["auto", "none"] | Mapping[str, Pose]
     """Where parts of an assembly plan wait: where the files say, else beside the assembly; nowhere; or at these poses."""
+    up: Literal["+x", "-x", "+y", "-y", "+z", "-z"] | Sequence[float] | None
+    """Ways up come before ways sideways, and those before ways down."""
+    groups: Literal["needed", "prefer"]
+    """Whether parts that belong together where the assembly comes from leave together as long as anything else leaves."""
     no_cache: bool
     batch: bool
 
@@ -224,9 +228,9 @@ class Client:
         reconnect: float = 10.0,
         busy_wait: float = 0.0,
     ) -> None: ...
-    def plan(self, assembly: Assembly, *, views: bool = False, **options: Unpack[Options]) -> PlanStream:
+    def plan(self, assembly: Assembly, /, *, views: bool = False, **options: Unpack[Options]) -> PlanStream:
         """Asks for a plan; the meshes are uploaded if the daemon does not know them."""
-    def session(self, assembly: Assembly, **options: Unpack[Options]) -> Session:
+    def session(self, assembly: Assembly, /, **options: Unpack[Options]) -> Session:
         """Begins a session about how an assembly comes apart."""
     def upload(self, assembly: Assembly) -> bytes:
         """Hands an assembly over ahead of the first plan; returns its handle."""

@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sysconfig
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 from . import _native
@@ -33,17 +34,32 @@ class Daemon:
     """A daemon that this process starts, and stops at the end of a `with` block.
 
     `runtime_dir` is where clients find it (default: that of the user), `config` a file of settings, and `arguments` go to
-    the program as they are. Raises `NoDaemonError` if it does not become ready; its own message is on stderr.
+    the program as they are. Its log goes to stderr, unless `quiet`. Raises `NoDaemonError` if it does not become ready.
     """
 
-    def __init__(self, runtime_dir=None, *, config=None, arguments=()):
+    def __init__(
+        self,
+        runtime_dir: str | os.PathLike[str] | None = None,
+        *,
+        config: str | os.PathLike[str] | None = None,
+        arguments: Sequence[str] = (),
+        quiet: bool = False,
+    ) -> None:
         command = [program()]
         if runtime_dir is not None:
             command += ["--runtime-dir", os.fspath(runtime_dir)]
         if config is not None:
             command += ["--config", os.fspath(config)]
-        # Ctrl-C is for the caller; the daemon is stopped when it is not wanted any more.
-        self._process = subprocess.Popen([*command, *arguments], stdin=subprocess.DEVNULL, start_new_session=True)
+        nowhere = subprocess.DEVNULL
+        # Ctrl-C is for the caller; the daemon is stopped when it is not wanted any more. Whoever reads what the caller
+        # writes must not wait for the daemon's end.
+        self._process = subprocess.Popen(
+            [*command, *arguments],
+            stdin=nowhere,
+            stdout=nowhere,
+            stderr=nowhere if quiet else None,
+            start_new_session=True,
+        )
         self._runtime_dir = runtime_dir
         try:
             self._wait_until_ready()
@@ -51,7 +67,7 @@ class Daemon:
             self.stop()
             raise
 
-    def _wait_until_ready(self):
+    def _wait_until_ready(self) -> None:
         until = time.monotonic() + READY
         while True:
             try:
@@ -61,7 +77,9 @@ class Daemon:
                         return
             except NoDaemonError as error:
                 if self._process.poll() is not None:
-                    raise NoDaemonError(f"`sbdpd` ended at once, with code {self._process.returncode}") from error
+                    code = self._process.returncode
+                    text = f"`sbdpd` ended at once, with code {code}: run it in a terminal to see why"
+                    raise NoDaemonError(text) from error
             if time.monotonic() >= until:
                 raise NoDaemonError(f"`sbdpd` (pid {self.pid}) does not become ready within {READY:.0f} s")
             time.sleep(LOOK)
@@ -71,20 +89,20 @@ class Daemon:
         """The process."""
         return self._process.pid
 
-    def stop(self):
+    def stop(self) -> None:
         """Stops it, if it still runs, and waits for its end: it answers what it has first."""
         if self._process.poll() is None:
             self._process.terminate()
         self._process.wait()
 
-    def __enter__(self):
+    def __enter__(self) -> "Daemon":
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
 
-def leave_running(daemon: Daemon):
+def leave_running(daemon: Daemon) -> None:
     """Lets a daemon stay when this process ends."""
     # `Popen` would warn of a child that still runs.
     daemon._process.returncode = 0

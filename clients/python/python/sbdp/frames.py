@@ -1,7 +1,14 @@
 """Plans as tables of pandas, where it is installed."""
 
+from typing import TYPE_CHECKING
 
-def steps_frame(plan):
+from ._native import Plan
+
+if TYPE_CHECKING:
+    import pandas
+
+
+def steps_frame(plan: Plan) -> "pandas.DataFrame":
     """The steps of a plan, a row each, indexed by number: parts, of, ends, motion, waypoints (their count), verified_depth,
     requires, wave, and dx, dy, dz (the direction; NaN where there is none). Needs the package pandas."""
     import pandas
@@ -28,7 +35,7 @@ def steps_frame(plan):
     return frame
 
 
-def path_frame(plan):
+def path_frame(plan: Plan) -> "pandas.DataFrame":
     """All waypoints of a plan, a row each, indexed by step and waypoint: x, y, z, qw, qx, qy, qz. Needs the package
     pandas."""
     import numpy

@@ -1,6 +1,7 @@
 """Meshes as callers have them, as arrays that are uploaded without a copy."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy
 
@@ -36,7 +37,9 @@ def _part(name, mesh):
     return name, _vertices(name, vertices), _triangles(name, triangles)
 
 
-def assembly(parts, *, units=None, name="", fixed=()):
+def assembly(
+    parts: Mapping[str, Any] | Any, *, units: str | None = None, name: str = "", fixed: Iterable[str] = ()
+) -> _native.Assembly:
     """An assembly of meshes, given where they stand assembled.
 
     `parts` are meshes by name: each `(vertices, triangles)`, of shapes (n, 3) and (m, 3), or an object with `vertices` and
@@ -65,7 +68,7 @@ def _of_scene(scene):
     return meshes
 
 
-def to_trimesh(assembly, part):
+def to_trimesh(assembly: _native.Assembly, part: str) -> Any:
     """A part of an assembly as `trimesh.Trimesh`. Needs the package trimesh."""
     import trimesh
 
