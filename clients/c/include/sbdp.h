@@ -1,0 +1,2005 @@
+/* The client of the sbdp daemon for C. README.md says how to build, link and use it.
+ *
+ * Lengths are in the input's units, in the input's frame. A motion is seven doubles: the shift x, y, z, then the unit
+ * quaternion w, x, y, z. Part numbers are places in the uploaded assembly. Times are nanoseconds.
+ *
+ * Functions that can fail return SBDP_CODE_OK or why not, and write the same with a message to `error`, which may be null.
+ * What they give out is null then. Free functions set the pointer to null; to free null is no error.
+ *
+ * Made by cbindgen from clients/c/src: do not edit. */
+
+#ifndef SBDP_H
+#define SBDP_H
+
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+/**
+ * Why something was not done. A number keeps its meaning for ever. Below 100 are the daemon's codes.
+ */
+enum SbdpCode
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * It was done.
+     */
+    SBDP_CODE_OK = 0,
+    /**
+     * The daemon cannot read the request.
+     */
+    SBDP_CODE_MALFORMED = 1,
+    /**
+     * The daemon has no assembly of this handle: upload it (again).
+     */
+    SBDP_CODE_UNKNOWN_HANDLE = 2,
+    /**
+     * The daemon's queue is full: try again after `retry_ms`.
+     */
+    SBDP_CODE_BUSY = 3,
+    /**
+     * The deadline passed before planning began.
+     */
+    SBDP_CODE_EXPIRED = 4,
+    /**
+     * The geometry was refused; the message names part and reason.
+     */
+    SBDP_CODE_GEOMETRY = 5,
+    /**
+     * There is no such part.
+     */
+    SBDP_CODE_NO_SUCH_PART = 6,
+    /**
+     * This daemon does not offer what was asked for.
+     */
+    SBDP_CODE_UNSUPPORTED = 7,
+    /**
+     * The daemon failed; its log says more.
+     */
+    SBDP_CODE_FAILED = 8,
+    /**
+     * The plan was not read, and the daemon ended it.
+     */
+    SBDP_CODE_SLOW_READER = 9,
+    /**
+     * The daemon is shutting down.
+     */
+    SBDP_CODE_SHUTTING_DOWN = 10,
+    /**
+     * The message exceeds a limit of the daemon, or what memory is left.
+     */
+    SBDP_CODE_TOO_LARGE = 11,
+    /**
+     * It was cancelled before planning began.
+     */
+    SBDP_CODE_CANCELLED = 12,
+    /**
+     * No daemon runs at this place.
+     */
+    SBDP_CODE_NO_DAEMON = 100,
+    /**
+     * The daemon went away before it had answered.
+     */
+    SBDP_CODE_DAEMON_DIED = 101,
+    /**
+     * The daemon speaks another version, or its folder or files cannot be used.
+     */
+    SBDP_CODE_UNUSABLE = 102,
+    /**
+     * The daemon serves as many clients as it can.
+     */
+    SBDP_CODE_TOO_MANY_CLIENTS = 103,
+    /**
+     * Shared memory could not be set up.
+     */
+    SBDP_CODE_SETUP = 104,
+    /**
+     * No answer in time to what needs no planning.
+     */
+    SBDP_CODE_TIMEOUT = 105,
+    /**
+     * This client receives a plan already.
+     */
+    SBDP_CODE_STREAM_OPEN = 106,
+    /**
+     * Steps of two messages are kept in place: free them, then go on.
+     */
+    SBDP_CODE_VIEWS_HELD = 107,
+    /**
+     * The interrupt function ended the wait.
+     */
+    SBDP_CODE_INTERRUPTED = 108,
+    /**
+     * The client belongs to the process that this one was forked from.
+     */
+    SBDP_CODE_FORKED = 109,
+    /**
+     * An argument cannot be used; the message names it.
+     */
+    SBDP_CODE_ARGUMENT = 110,
+    /**
+     * `/dev/shm` is too small.
+     */
+    SBDP_CODE_SHARED_MEMORY = 111,
+    /**
+     * The request names too many parts for one message.
+     */
+    SBDP_CODE_REQUEST_TOO_LONG = 112,
+    /**
+     * The daemon's answer is wrong or cannot be read.
+     */
+    SBDP_CODE_PROTOCOL = 113,
+    /**
+     * A fault of this library: free the handles of this call, and please report it.
+     */
+    SBDP_CODE_INTERNAL = 114,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum SbdpCode SbdpCode;
+#else
+typedef uint32_t SbdpCode;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Which search runs.
+ */
+enum SbdpPlanner
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * `SBDP_PLANNER_SBDP_STAR`.
+     */
+    SBDP_PLANNER_DEFAULT = 0,
+    /**
+     * State-based planning guided by directional blocking graphs.
+     */
+    SBDP_PLANNER_SBDP_STAR = 1,
+    /**
+     * State-based planning without blocking graphs.
+     */
+    SBDP_PLANNER_SBDP = 2,
+    /**
+     * Breadth-first search per part, translations.
+     */
+    SBDP_PLANNER_PDP_T = 3,
+    /**
+     * Breadth-first search per part, translations and rotations.
+     */
+    SBDP_PLANNER_PDP_R = 4,
+    /**
+     * `SBDP_PLANNER_PDP_T`, then `SBDP_PLANNER_PDP_R` if that failed.
+     */
+    SBDP_PLANNER_PDP_STAR = 5,
+    /**
+     * A rapidly-exploring random tree per part, of straight ways.
+     */
+    SBDP_PLANNER_RRT = 6,
+    /**
+     * A rapidly-exploring random tree per part, of simulated motions.
+     */
+    SBDP_PLANNER_BK_RRT = 7,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum SbdpPlanner SbdpPlanner;
+#else
+typedef uint32_t SbdpPlanner;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Which transition function moves the parts.
+ */
+enum SbdpEngine
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * `SBDP_ENGINE_SLIDING`.
+     */
+    SBDP_ENGINE_DEFAULT = 0,
+    /**
+     * Contact-constrained sliding without inertia.
+     */
+    SBDP_ENGINE_SLIDING = 1,
+    /**
+     * The paper's penalty-based simulation.
+     */
+    SBDP_ENGINE_PENALTY = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum SbdpEngine SbdpEngine;
+#else
+typedef uint32_t SbdpEngine;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Which actions the search may use.
+ */
+enum SbdpActions
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * `SBDP_ACTIONS_EXTENDED`.
+     */
+    SBDP_ACTIONS_DEFAULT = 0,
+    /**
+     * The paper's.
+     */
+    SBDP_ACTIONS_PAPER = 1,
+    /**
+     * The paper's and pulling while turning.
+     */
+    SBDP_ACTIONS_EXTENDED = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum SbdpActions SbdpActions;
+#else
+typedef uint32_t SbdpActions;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How blocking graphs begin, before anything is simulated.
+ */
+enum SbdpStaticAnalysis
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * `SBDP_STATIC_ANALYSIS_SLIDING`.
+     */
+    SBDP_STATIC_ANALYSIS_DEFAULT = 0,
+    /**
+     * An edge where contact with the other part alone lets a part hardly move.
+     */
+    SBDP_STATIC_ANALYSIS_SLIDING = 1,
+    /**
+     * The paper's rule, taken literally.
+     */
+    SBDP_STATIC_ANALYSIS_PAPER = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum SbdpStaticAnalysis SbdpStaticAnalysis;
+#else
+typedef uint32_t SbdpStaticAnalysis;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Yes, no, or as the daemon chooses.
+ */
+enum SbdpChoice
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * As the daemon chooses.
+     */
+    SBDP_CHOICE_DEFAULT = 0,
+    /**
+     * No.
+     */
+    SBDP_CHOICE_NO = 1,
+    /**
+     * Yes.
+     */
+    SBDP_CHOICE_YES = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum SbdpChoice SbdpChoice;
+#else
+typedef uint32_t SbdpChoice;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Whether a plan takes apart or puts together, and from where.
+ */
+enum SbdpStaging
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * The plan takes apart.
+     */
+    SBDP_STAGING_DISASSEMBLY = 0,
+    /**
+     * The plan puts together; a part is not there before its turn, and begins where its insertion begins.
+     */
+    SBDP_STAGING_NONE = 1,
+    /**
+     * The plan puts together; parts begin laid out beside the assembly, but for those in `staged`.
+     */
+    SBDP_STAGING_BESIDE = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum SbdpStaging SbdpStaging;
+#else
+typedef uint32_t SbdpStaging;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * What comes.
+ */
+enum SbdpEventKind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Nothing more will come.
+     */
+    SBDP_EVENT_KIND_END = 0,
+    /**
+     * Nothing came in time; the stream goes on.
+     */
+    SBDP_EVENT_KIND_PENDING = 1,
+    /**
+     * Something moved on: see `progress`.
+     */
+    SBDP_EVENT_KIND_PROGRESS = 2,
+    /**
+     * A step, in order: see `step`.
+     */
+    SBDP_EVENT_KIND_STEP = 3,
+    /**
+     * Events of the search: see `trace`.
+     */
+    SBDP_EVENT_KIND_TRACE = 4,
+    /**
+     * Another daemon was asked again: the steps and the trace so far are void, and come again from the first.
+     */
+    SBDP_EVENT_KIND_RESTARTED = 5,
+    /**
+     * The end of the plan: see `summary`.
+     */
+    SBDP_EVENT_KIND_DONE = 6,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum SbdpEventKind SbdpEventKind;
+#else
+typedef uint32_t SbdpEventKind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * The stages of a request.
+ */
+enum SbdpStage
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Building distance fields.
+     */
+    SBDP_STAGE_SDF = 0,
+    /**
+     * Searching and verifying.
+     */
+    SBDP_STAGE_SEARCH = 1,
+    /**
+     * Finding the ways to where insertions begin.
+     */
+    SBDP_STAGE_TRANSFER = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum SbdpStage SbdpStage;
+#else
+typedef uint32_t SbdpStage;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * Where a step leaves its parts.
+ */
+enum SbdpStepEnd
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Apart from all that they stood with.
+     */
+    SBDP_STEP_END_OUT = 0,
+    /**
+     * Elsewhere among the others, where they stay until a later step moves them again.
+     */
+    SBDP_STEP_END_ASIDE = 1,
+    /**
+     * In their places: in plans that put together.
+     */
+    SBDP_STEP_END_IN = 2,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum SbdpStepEnd SbdpStepEnd;
+#else
+typedef uint32_t SbdpStepEnd;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * How planning ended.
+ */
+enum SbdpPlanStatus
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    /**
+     * Every part that was asked for is out.
+     */
+    SBDP_PLAN_STATUS_COMPLETE = 0,
+    /**
+     * A budget ran out; the steps are the best so far.
+     */
+    SBDP_PLAN_STATUS_PARTIAL = 1,
+    /**
+     * It is proved that some parts cannot come off.
+     */
+    SBDP_PLAN_STATUS_INFEASIBLE = 2,
+    /**
+     * The deadline passed.
+     */
+    SBDP_PLAN_STATUS_TIMEOUT = 3,
+    /**
+     * The request was cancelled.
+     */
+    SBDP_PLAN_STATUS_CANCELLED = 4,
+    /**
+     * The search found nothing more to try, and nothing was proved.
+     */
+    SBDP_PLAN_STATUS_EXHAUSTED = 5,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum SbdpPlanStatus SbdpPlanStatus;
+#else
+typedef uint32_t SbdpPlanStatus;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+/**
+ * A client of the daemon of one place. Threads may share it. It receives one plan at a time: connect several for more.
+ */
+typedef struct SbdpClient SbdpClient;
+
+/**
+ * Meshes that are kept, to be uploaded whenever the daemon does not know them, as after a restart.
+ */
+typedef struct SbdpMeshes SbdpMeshes;
+
+/**
+ * A plan that has come to its end. Threads may read it at the same time.
+ */
+typedef struct SbdpPlan SbdpPlan;
+
+/**
+ * An assembly that is being taken apart: what has happened to it, and plans for the rest. For one thread at a time.
+ */
+typedef struct SbdpSession SbdpSession;
+
+/**
+ * A plan as it comes in, for one thread at a time. To free it cancels the request. It may outlive its client.
+ */
+typedef struct SbdpStream SbdpStream;
+
+/**
+ * How to find and treat the daemon. All zero but for `struct_size` is the default; so is a null pointer to it.
+ */
+typedef struct SbdpConnectOptions {
+    /**
+     * `sizeof` this struct. What it leaves out has its default.
+     */
+    uint32_t struct_size;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * The daemon's runtime folder; null for `$SBDP_RUNTIME_DIR`, else `$XDG_RUNTIME_DIR/sbdp`, else `/tmp/sbdp-UID`.
+     */
+    const char *runtime_dir;
+    /**
+     * How long the daemon may take for an answer that needs no planning; null for 10 s.
+     */
+    const uint64_t *timeout_ns;
+    /**
+     * How long the daemon may take to check and heal an upload; null for 300 s.
+     */
+    const uint64_t *upload_timeout_ns;
+    /**
+     * How long to wait for a new daemon when the one that was asked went away; null for 10 s, 0 to report it at once.
+     */
+    const uint64_t *reconnect_ns;
+    /**
+     * How long to come again by itself while the daemon is busy; null for not at all.
+     */
+    const uint64_t *busy_wait_ns;
+    /**
+     * How long to look for an answer before going to sleep; null for the usual, 0 for not at all.
+     */
+    const uint64_t *poll_ns;
+    /**
+     * Asked at least every 50 ms by calls that wait for the daemon, on their thread; not by `sbdp_stream_poll` and
+     * `sbdp_stream_next` while the daemon plans. Not 0 ends the call with `SBDP_CODE_INTERRUPTED`. It must not throw, and
+     * must live as long as the client and its streams and sessions. May be null.
+     */
+    int32_t (*interrupt)(void *data);
+    /**
+     * What `interrupt` is given.
+     */
+    void *interrupt_data;
+} SbdpConnectOptions;
+
+/**
+ * What went wrong. The caller owns it; its size never changes.
+ */
+typedef struct SbdpError {
+    /**
+     * A `SbdpCode`.
+     */
+    uint32_t code;
+    /**
+     * Of `SBDP_CODE_BUSY`: milliseconds after which asking again makes sense; else 0.
+     */
+    uint32_t retry_ms;
+    /**
+     * What happened and what to do: UTF-8, ended by a zero byte, empty if all went well. One that is too long is cut, and
+     * ends in `...`.
+     */
+    char message[2040];
+} SbdpError;
+
+/**
+ * A part: a closed mesh at its assembled pose. The arrays are read during the call alone, and written once, into shared
+ * memory.
+ */
+typedef struct SbdpPart {
+    /**
+     * Its name, unique in the assembly, in UTF-8.
+     */
+    const char *name;
+    /**
+     * Vertices in double precision, x, y, z each; or null.
+     */
+    const double *vertices_f64;
+    /**
+     * Vertices in single precision, where those in double precision are null.
+     */
+    const float *vertices_f32;
+    /**
+     * How many vertices: a third of the numbers.
+     */
+    size_t vertex_count;
+    /**
+     * Three vertices each, counter-clockwise from outside.
+     */
+    const uint32_t *triangles;
+    /**
+     * How many triangles: a third of the numbers.
+     */
+    size_t triangle_count;
+} SbdpPart;
+
+/**
+ * An assembly. The parts' places are their numbers everywhere; list them in natural order of their names.
+ */
+typedef struct SbdpAssembly {
+    /**
+     * `sizeof` this struct. What it leaves out is as if it were zero.
+     */
+    uint32_t struct_size;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * A name for people, or null. It is not part of the content.
+     */
+    const char *name;
+    /**
+     * The unit of length, as `mm`, or null.
+     */
+    const char *units;
+    /**
+     * The parts.
+     */
+    const struct SbdpPart *parts;
+    /**
+     * How many.
+     */
+    size_t part_count;
+    /**
+     * Names of parts that may not move.
+     */
+    const char *const *fixed;
+    /**
+     * How many.
+     */
+    size_t fixed_count;
+} SbdpAssembly;
+
+/**
+ * The name of an assembly: the hash of its content.
+ */
+typedef struct SbdpHandle {
+    /**
+     * The hash.
+     */
+    uint8_t bytes[32];
+} SbdpHandle;
+
+/**
+ * A part that stands elsewhere: the rigid motion of its mesh from where it was uploaded.
+ */
+typedef struct SbdpMovedPart {
+    /**
+     * The part.
+     */
+    uint32_t part;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * The shift x, y, z, then the unit quaternion w, x, y, z.
+     */
+    double motion[7];
+} SbdpMovedPart;
+
+/**
+ * What differs from an assembly that the daemon knows.
+ */
+typedef struct SbdpChange {
+    /**
+     * `sizeof` this struct. What it leaves out is as if it were zero.
+     */
+    uint32_t struct_size;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * Numbers of the parts with another mesh.
+     */
+    const uint32_t *replaced;
+    /**
+     * Their meshes, given where they stand assembled; the names stay, whatever these say.
+     */
+    const struct SbdpPart *replaced_by;
+    /**
+     * How many of both.
+     */
+    size_t replaced_count;
+    /**
+     * Further parts; they get the places after all others.
+     */
+    const struct SbdpPart *added;
+    /**
+     * How many.
+     */
+    size_t added_count;
+    /**
+     * Parts that stand elsewhere: the motion of the (new) mesh from where it was.
+     */
+    const struct SbdpMovedPart *moved;
+    /**
+     * How many.
+     */
+    size_t moved_count;
+} SbdpChange;
+
+/**
+ * A verified step. The library owns it and all that it points to; it may get further fields at its end, so copy fields,
+ * not the struct.
+ */
+typedef struct SbdpStep {
+    /**
+     * Its number; the first is 0.
+     */
+    uint32_t number;
+    /**
+     * The number of the step that takes the group out (of a plan that puts together: puts it in) to which these parts
+     * belong; `UINT32_MAX` for none. A group is taken apart as it stood in the assembly.
+     */
+    uint32_t of;
+    /**
+     * A `SbdpStepEnd`.
+     */
+    uint32_t ends;
+    /**
+     * The earliest round, from 0, in which it can be done, if every step is done as soon as it can be.
+     */
+    uint32_t wave;
+    /**
+     * The way turns.
+     */
+    bool rotates;
+    /**
+     * The last leg of the way has a `direction`: it does not only turn.
+     */
+    bool has_direction;
+    /**
+     * The parts that move, as one body.
+     */
+    const uint32_t *parts;
+    /**
+     * How many.
+     */
+    size_t part_count;
+    /**
+     * Their motions from where they stand when the step begins (of a plan that puts together: when it ends), so that the
+     * first (the last) is the identity. A motion is the shift x, y, z, then the unit quaternion w, x, y, z.
+     */
+    const double (*path)[7];
+    /**
+     * How many.
+     */
+    size_t waypoint_count;
+    /**
+     * Numbers of the steps that must be done before this very path is free, ascending.
+     */
+    const uint32_t *required;
+    /**
+     * How many.
+     */
+    size_t required_count;
+    /**
+     * The deepest overlap along the way beyond that of the assembled pose, in the input's units.
+     */
+    double verified_depth;
+    /**
+     * The unit vector of the way's last leg, in the input's frame.
+     */
+    double direction[3];
+} SbdpStep;
+
+/**
+ * Several parts.
+ */
+typedef struct SbdpGroup {
+    /**
+     * The parts.
+     */
+    const uint32_t *parts;
+    /**
+     * How many.
+     */
+    size_t part_count;
+} SbdpGroup;
+
+/**
+ * Parts that can begin to move together where nothing leaves.
+ */
+typedef struct SbdpFreeGroup {
+    /**
+     * The parts.
+     */
+    const uint32_t *parts;
+    /**
+     * How many.
+     */
+    size_t part_count;
+    /**
+     * The unit vector along which they begin, in the input's frame.
+     */
+    double direction[3];
+} SbdpFreeGroup;
+
+/**
+ * Why a part that remains did not move.
+ */
+typedef struct SbdpBlocked {
+    /**
+     * The part.
+     */
+    uint32_t part;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * The parts that it met.
+     */
+    const uint32_t *by;
+    /**
+     * How many.
+     */
+    size_t by_count;
+    /**
+     * The action, as `+x`.
+     */
+    const char *action;
+} SbdpBlocked;
+
+/**
+ * A pair that overlaps at the assembled pose.
+ */
+typedef struct SbdpOverlap {
+    /**
+     * The two parts, smaller number first.
+     */
+    uint32_t parts[2];
+    /**
+     * How deep, in the input's units.
+     */
+    double depth;
+} SbdpOverlap;
+
+/**
+ * Something to know about the input.
+ */
+typedef struct SbdpWarning {
+    /**
+     * The part it is about; `UINT32_MAX` for none.
+     */
+    uint32_t part;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * What was found and what was done about it.
+     */
+    const char *message;
+} SbdpWarning;
+
+/**
+ * Counters, and times in seconds.
+ */
+typedef struct SbdpStats {
+    /**
+     * Transition functions that the search used, remembered ones included.
+     */
+    uint64_t simulations;
+    /**
+     * Transition functions really computed.
+     */
+    uint64_t simulations_run;
+    /**
+     * Straight sweeps that proved a removal without simulation.
+     */
+    uint64_t sweeps;
+    /**
+     * States kept.
+     */
+    uint64_t states;
+    /**
+     * Building or loading distance fields.
+     */
+    double sdf_time_s;
+    /**
+     * Building blocking graphs.
+     */
+    double static_analysis_time_s;
+    /**
+     * Simulation.
+     */
+    double path_time_s;
+    /**
+     * Shortening and verification.
+     */
+    double verify_time_s;
+    /**
+     * From admission to the last step.
+     */
+    double total_time_s;
+    /**
+     * Distance fields that were there already.
+     */
+    uint64_t sdf_hits;
+    /**
+     * Blocking relations that were there already.
+     */
+    uint64_t blocking_hits;
+    /**
+     * States whose blocking graphs were there already.
+     */
+    uint64_t graph_hits;
+    /**
+     * Motions that were there already.
+     */
+    uint64_t motion_hits;
+    /**
+     * 1 when the whole plan was there already.
+     */
+    uint64_t plan_hit;
+} SbdpStats;
+
+/**
+ * Everything about a plan except its steps. The library owns it and all that it points to; it may get further fields at
+ * its end. Texts are UTF-8.
+ */
+typedef struct SbdpSummary {
+    /**
+     * A `SbdpPlanStatus`.
+     */
+    uint32_t status;
+    /**
+     * How many steps there were.
+     */
+    uint32_t steps;
+    /**
+     * The plan puts together.
+     */
+    bool assembly;
+    /**
+     * The request named targets.
+     */
+    bool has_targets;
+    /**
+     * Why it is not complete, or null.
+     */
+    const char *reason;
+    /**
+     * The planner's name.
+     */
+    const char *planner;
+    /**
+     * The engine's name.
+     */
+    const char *engine;
+    /**
+     * The unit of length, or null.
+     */
+    const char *units;
+    /**
+     * Part names.
+     */
+    const char *const *parts;
+    /**
+     * How many.
+     */
+    size_t part_count;
+    /**
+     * Parts that had been removed before.
+     */
+    const uint32_t *removed;
+    /**
+     * How many.
+     */
+    size_t removed_count;
+    /**
+     * Parts that must come out.
+     */
+    const uint32_t *targets;
+    /**
+     * How many.
+     */
+    size_t target_count;
+    /**
+     * Parts that may not move.
+     */
+    const uint32_t *fixed;
+    /**
+     * How many.
+     */
+    size_t fixed_count;
+    /**
+     * The parts that the rest is taken off.
+     */
+    const uint32_t *base;
+    /**
+     * How many.
+     */
+    size_t base_count;
+    /**
+     * Why the base was chosen; null where the request gave it.
+     */
+    const char *base_reason;
+    /**
+     * Parts that stand in the assembly in the end (of a plan that puts together: from the start).
+     */
+    const uint32_t *remaining;
+    /**
+     * How many.
+     */
+    size_t remaining_count;
+    /**
+     * Groups that left together and were not taken apart.
+     */
+    const struct SbdpGroup *kept_together;
+    /**
+     * How many.
+     */
+    size_t kept_together_count;
+    /**
+     * Where nothing leaves any more: groups that can begin to move.
+     */
+    const struct SbdpFreeGroup *free_together;
+    /**
+     * How many.
+     */
+    size_t free_together_count;
+    /**
+     * Parts that began elsewhere than where their mesh was given.
+     */
+    const struct SbdpMovedPart *poses;
+    /**
+     * How many.
+     */
+    size_t pose_count;
+    /**
+     * What blocks the parts that should have come off.
+     */
+    const struct SbdpBlocked *blocked;
+    /**
+     * How many.
+     */
+    size_t blocked_count;
+    /**
+     * Overlaps at the assembled pose.
+     */
+    const struct SbdpOverlap *overlaps;
+    /**
+     * How many.
+     */
+    size_t overlap_count;
+    /**
+     * Findings about the input.
+     */
+    const struct SbdpWarning *warnings;
+    /**
+     * How many.
+     */
+    size_t warning_count;
+    /**
+     * Counters and times.
+     */
+    struct SbdpStats stats;
+} SbdpSummary;
+
+/**
+ * A parameter of the engine `penalty`.
+ */
+typedef struct SbdpPenalty {
+    /**
+     * Its place among `time-step`, `planning-time-step`, `stiffness`, `damping`, `penetration-threshold`, `force`,
+     * `torque-factor`, `similar-translation`, `similar-rotation`, `longest-edge`, `yielding`, `share-of-extent`,
+     * `steps-per-waypoint`, `most-blocks`, `newton-iterations`, `newton-tolerance`; the first is 0.
+     */
+    uint32_t parameter;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * Its value.
+     */
+    double value;
+} SbdpPenalty;
+
+/**
+ * What to plan. All zero but for `struct_size` is the default; so is a null pointer to it. Where zero would mean something
+ * of its own, the field is a pointer, and null is the default.
+ */
+typedef struct SbdpPlanOptions {
+    /**
+     * `sizeof` this struct. What it leaves out has its default.
+     */
+    uint32_t struct_size;
+    /**
+     * A `SbdpPlanner`.
+     */
+    uint32_t planner;
+    /**
+     * A `SbdpEngine`.
+     */
+    uint32_t engine;
+    /**
+     * A `SbdpActions`.
+     */
+    uint32_t actions;
+    /**
+     * A `SbdpStaticAnalysis`.
+     */
+    uint32_t static_analysis;
+    /**
+     * A `SbdpChoice`: whether parts that leave straight are taken out without simulation.
+     */
+    uint32_t sweeps;
+    /**
+     * A `SbdpStaging`.
+     */
+    uint32_t staging;
+    /**
+     * Threads for this request; 0 leaves it to the daemon.
+     */
+    uint32_t threads;
+    /**
+     * Not 0: neither read nor write anything remembered.
+     */
+    uint32_t no_cache;
+    /**
+     * Not 0: others go first.
+     */
+    uint32_t batch;
+    /**
+     * Not 0: the events of the search are wanted, too; it runs whatever is remembered.
+     */
+    uint32_t trace;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * What the random poses of the planners with trees depend on.
+     */
+    uint64_t seed;
+    /**
+     * Time from now until the daemon must answer with what it has; null for none.
+     */
+    const uint64_t *timeout_ns;
+    /**
+     * Time of planning, waiting not counted, after which the daemon answers with what it has; null for none.
+     */
+    const uint64_t *planning_timeout_ns;
+    /**
+     * Time after which one motion is given up; null for none. The plan is not remembered.
+     */
+    const uint64_t *path_timeout_ns;
+    /**
+     * Simulations after which to give up; null for no limit.
+     */
+    const uint64_t *max_simulations;
+    /**
+     * The gap that a way out ends with, in the input's units; null for a hundredth of the part's longest side.
+     */
+    const double *clearance;
+    /**
+     * The direction up, three numbers, of any length but 0; null for the one in which most parts can go at first.
+     */
+    const double *up;
+    /**
+     * Parts that may not move.
+     */
+    const uint32_t *fixed;
+    /**
+     * How many.
+     */
+    size_t fixed_count;
+    /**
+     * Parts that are gone already.
+     */
+    const uint32_t *removed;
+    /**
+     * How many.
+     */
+    size_t removed_count;
+    /**
+     * Parts that must come out; null for all.
+     */
+    const uint32_t *targets;
+    /**
+     * How many.
+     */
+    size_t target_count;
+    /**
+     * Parts that stay as long as others leave; none to have the daemon choose.
+     */
+    const uint32_t *base;
+    /**
+     * How many.
+     */
+    size_t base_count;
+    /**
+     * Groups that rather leave as wholes, and are taken apart then.
+     */
+    const struct SbdpGroup *groups;
+    /**
+     * How many.
+     */
+    size_t group_count;
+    /**
+     * Parts that stand elsewhere than in the assembly.
+     */
+    const struct SbdpMovedPart *moved;
+    /**
+     * How many.
+     */
+    size_t moved_count;
+    /**
+     * With `SBDP_STAGING_BESIDE`: parts that wait at places of your choice.
+     */
+    const struct SbdpMovedPart *staged;
+    /**
+     * How many.
+     */
+    size_t staged_count;
+    /**
+     * Parameters of the engine `penalty` that differ from the paper's.
+     */
+    const struct SbdpPenalty *penalty;
+    /**
+     * How many.
+     */
+    size_t penalty_count;
+} SbdpPlanOptions;
+
+/**
+ * What the daemon is doing; some of these are lost on purpose.
+ */
+typedef struct SbdpProgress {
+    /**
+     * A `SbdpStage`.
+     */
+    uint32_t stage;
+    /**
+     * Units of the stage done.
+     */
+    uint32_t done;
+    /**
+     * Units of the stage in all.
+     */
+    uint32_t total;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * Simulations so far.
+     */
+    uint64_t simulations;
+} SbdpProgress;
+
+/**
+ * What came. It and all that it points to is valid until the next call on the stream. It may get further fields at its end.
+ */
+typedef struct SbdpEvent {
+    /**
+     * A `SbdpEventKind`.
+     */
+    uint32_t kind;
+    /**
+     * Zero.
+     */
+    uint32_t reserved;
+    /**
+     * The step, or null.
+     */
+    const struct SbdpStep *step;
+    /**
+     * Whole lines, one JSON object each, or null.
+     */
+    const char *trace;
+    /**
+     * The summary, or null. It is valid until the stream is freed.
+     */
+    const struct SbdpSummary *summary;
+    /**
+     * The progress, all zero if it is another event.
+     */
+    struct SbdpProgress progress;
+} SbdpEvent;
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+/**
+ * Connects to a daemon. `options` may be null.
+ *
+ * # Safety
+ * `options` and what it points to is as it says; `client` and `error` can be written.
+ */
+SbdpCode sbdp_client_connect(const struct SbdpConnectOptions *options,
+                             struct SbdpClient **client,
+                             struct SbdpError *error);
+
+/**
+ * Frees a client. Its streams and sessions go on.
+ *
+ * # Safety
+ * `client` is null, or leads to null or to a client of this library that no other call uses.
+ */
+void sbdp_client_free(struct SbdpClient **client);
+
+/**
+ * Hands an assembly over; one that the daemon knows is not copied again.
+ *
+ * # Safety
+ * All pointers lead to what they say; `handle` and `error` can be written.
+ */
+SbdpCode sbdp_client_upload(const struct SbdpClient *client,
+                            const struct SbdpAssembly *assembly,
+                            struct SbdpHandle *handle,
+                            struct SbdpError *error);
+
+/**
+ * Whether the daemon knows an assembly.
+ *
+ * # Safety
+ * All pointers lead to what they say; `known` and `error` can be written.
+ */
+SbdpCode sbdp_client_knows(const struct SbdpClient *client,
+                           const struct SbdpHandle *handle,
+                           bool *known,
+                           struct SbdpError *error);
+
+/**
+ * Hands over what differs from an assembly that the daemon knows. `revised` gets the handle of what becomes of it.
+ *
+ * # Safety
+ * All pointers lead to what they say; `revised` and `error` can be written.
+ */
+SbdpCode sbdp_client_revise(const struct SbdpClient *client,
+                            const struct SbdpHandle *base,
+                            const struct SbdpChange *change,
+                            struct SbdpHandle *revised,
+                            struct SbdpError *error);
+
+/**
+ * All metrics of the daemon: a JSON object, to be freed by `sbdp_text_free`.
+ *
+ * # Safety
+ * `client` is one of this library's; `metrics` and `error` can be written.
+ */
+SbdpCode sbdp_client_metrics(const struct SbdpClient *client, char **metrics, struct SbdpError *error);
+
+/**
+ * Frees a text of this library.
+ *
+ * # Safety
+ * `text` is null, or leads to null or to a text of `sbdp_client_metrics`.
+ */
+void sbdp_text_free(char **text);
+
+/**
+ * The daemon's process id; 0 for a null client.
+ *
+ * # Safety
+ * `client` is null or one of this library's.
+ */
+uint32_t sbdp_client_daemon_pid(const struct SbdpClient *client);
+
+/**
+ * How often this client has followed a daemon that was restarted at the same place; 0 for a null client.
+ *
+ * # Safety
+ * `client` is null or one of this library's.
+ */
+uint32_t sbdp_client_restarts(const struct SbdpClient *client);
+
+/**
+ * Copies an assembly, to be planned by `sbdp_client_plan_meshes` without thinking of uploads.
+ *
+ * # Safety
+ * `assembly` and what it points to is as it says; `meshes` and `error` can be written.
+ */
+SbdpCode sbdp_meshes_copy(const struct SbdpAssembly *assembly, struct SbdpMeshes **meshes, struct SbdpError *error);
+
+/**
+ * The handle of kept meshes.
+ *
+ * # Safety
+ * `meshes` is one of this library's; `handle` and `error` can be written.
+ */
+SbdpCode sbdp_meshes_handle(const struct SbdpMeshes *meshes, struct SbdpHandle *handle, struct SbdpError *error);
+
+/**
+ * Frees meshes; plans and sessions about them go on.
+ *
+ * # Safety
+ * `meshes` is null, or leads to null or to meshes of this library.
+ */
+void sbdp_meshes_free(struct SbdpMeshes **meshes);
+
+/**
+ * How many steps a plan has; 0 for a null plan.
+ *
+ * # Safety
+ * `plan` is null or one of this library's.
+ */
+size_t sbdp_plan_step_count(const struct SbdpPlan *plan);
+
+/**
+ * A step, valid until the plan is freed; null if there is none of this number.
+ *
+ * # Safety
+ * `plan` is null or one of this library's.
+ */
+const struct SbdpStep *sbdp_plan_step(const struct SbdpPlan *plan, size_t number);
+
+/**
+ * Everything about a plan but its steps, valid until it is freed; null for a null plan.
+ *
+ * # Safety
+ * `plan` is null or one of this library's.
+ */
+const struct SbdpSummary *sbdp_plan_summary(const struct SbdpPlan *plan);
+
+/**
+ * Events of the search, if they were wanted: whole lines, one JSON object each, valid until the plan is freed; null for a
+ * null plan.
+ *
+ * # Safety
+ * `plan` is null or one of this library's.
+ */
+const char *sbdp_plan_trace(const struct SbdpPlan *plan);
+
+/**
+ * Frees a plan.
+ *
+ * # Safety
+ * `plan` is null, or leads to null or to a plan of this library.
+ */
+void sbdp_plan_free(struct SbdpPlan **plan);
+
+/**
+ * Begins a session about an assembly that was uploaded. Nothing is asked yet. `options` may be null.
+ *
+ * # Safety
+ * All pointers lead to what they say; `session` and `error` can be written.
+ */
+SbdpCode sbdp_client_session(const struct SbdpClient *client,
+                             const struct SbdpHandle *handle,
+                             const struct SbdpPlanOptions *options,
+                             struct SbdpSession **session,
+                             struct SbdpError *error);
+
+/**
+ * Begins a session about meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
+ *
+ * # Safety
+ * All pointers lead to what they say; `session` and `error` can be written.
+ */
+SbdpCode sbdp_client_session_meshes(const struct SbdpClient *client,
+                                    const struct SbdpMeshes *meshes,
+                                    const struct SbdpPlanOptions *options,
+                                    struct SbdpSession **session,
+                                    struct SbdpError *error);
+
+/**
+ * The number of a part, of a session about meshes.
+ *
+ * # Safety
+ * All pointers lead to what they say; `part` and `error` can be written.
+ */
+SbdpCode sbdp_session_part(const struct SbdpSession *session,
+                           const char *name,
+                           uint32_t *part,
+                           struct SbdpError *error);
+
+/**
+ * These parts are out.
+ *
+ * # Safety
+ * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ */
+SbdpCode sbdp_session_executed(struct SbdpSession *session,
+                               const uint32_t *parts,
+                               size_t part_count,
+                               struct SbdpError *error);
+
+/**
+ * A step of the last plan was done: its parts are out, or stand where it left them.
+ *
+ * # Safety
+ * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ */
+SbdpCode sbdp_session_performed(struct SbdpSession *session, const struct SbdpStep *step, struct SbdpError *error);
+
+/**
+ * This part does not move: until it is freed, plans do without moving it, and it is no target any more.
+ *
+ * # Safety
+ * `session` is one of this library's that no other call uses; `error` can be written.
+ */
+SbdpCode sbdp_session_stuck(struct SbdpSession *session, uint32_t part, struct SbdpError *error);
+
+/**
+ * This part moves again.
+ *
+ * # Safety
+ * `session` is one of this library's that no other call uses; `error` can be written.
+ */
+SbdpCode sbdp_session_freed(struct SbdpSession *session, uint32_t part, struct SbdpError *error);
+
+/**
+ * This part stands elsewhere.
+ *
+ * # Safety
+ * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ */
+SbdpCode sbdp_session_moved(struct SbdpSession *session, const struct SbdpMovedPart *moved, struct SbdpError *error);
+
+/**
+ * From the next plan on: time until the daemon must answer with what it has; null for none.
+ *
+ * # Safety
+ * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ */
+SbdpCode sbdp_session_set_timeout(struct SbdpSession *session, const uint64_t *timeout_ns, struct SbdpError *error);
+
+/**
+ * Asks how the rest comes apart from how it stands now.
+ *
+ * # Safety
+ * `session` is one of this library's that no other call uses; `stream` and `error` can be written.
+ */
+SbdpCode sbdp_session_replan(struct SbdpSession *session, struct SbdpStream **stream, struct SbdpError *error);
+
+/**
+ * Frees a session; its streams go on.
+ *
+ * # Safety
+ * `session` is null, or leads to null or to a session of this library that no other call uses.
+ */
+void sbdp_session_free(struct SbdpSession **session);
+
+/**
+ * Keeps a step beyond the next call on its stream, or beyond its plan; to be freed by `sbdp_step_free`. Nothing is copied.
+ *
+ * # Safety
+ * `step` is one of this library's that is still valid; `kept` and `error` can be written.
+ */
+SbdpCode sbdp_step_keep(const struct SbdpStep *step,
+                        struct SbdpStep **kept,
+                        struct SbdpError *error);
+
+/**
+ * Frees a step that was kept.
+ *
+ * # Safety
+ * `step` is null, or leads to null or to a step of `sbdp_step_keep`.
+ */
+void sbdp_step_free(struct SbdpStep **step);
+
+/**
+ * Asks for a plan of an assembly that was uploaded. `options` may be null.
+ *
+ * # Safety
+ * All pointers lead to what they say; `stream` and `error` can be written.
+ */
+SbdpCode sbdp_client_plan(const struct SbdpClient *client,
+                          const struct SbdpHandle *handle,
+                          const struct SbdpPlanOptions *options,
+                          struct SbdpStream **stream,
+                          struct SbdpError *error);
+
+/**
+ * Asks for a plan of meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
+ *
+ * # Safety
+ * All pointers lead to what they say; `stream` and `error` can be written.
+ */
+SbdpCode sbdp_client_plan_meshes(const struct SbdpClient *client,
+                                 const struct SbdpMeshes *meshes,
+                                 const struct SbdpPlanOptions *options,
+                                 struct SbdpStream **stream,
+                                 struct SbdpError *error);
+
+/**
+ * From now on steps are read in shared memory, without a copy. Steps of two messages may then be kept; a call that needs a
+ * third fails with `SBDP_CODE_VIEWS_HELD`, and nothing is lost by it.
+ *
+ * # Safety
+ * `stream` is one of this library's; `error` can be written.
+ */
+SbdpCode sbdp_stream_read_in_place(struct SbdpStream *stream,
+                                   struct SbdpError *error);
+
+/**
+ * Waits for the next event, as long as the daemon lives; `SBDP_EVENT_KIND_END` after the end. After an error the stream
+ * is over, except after `SBDP_CODE_VIEWS_HELD`.
+ *
+ * # Safety
+ * `stream` is one of this library's that no other call uses; `event` and `error` can be written.
+ */
+SbdpCode sbdp_stream_next(struct SbdpStream *stream, const struct SbdpEvent **event, struct SbdpError *error);
+
+/**
+ * The next event if it comes within a time, which may be 0; else `SBDP_EVENT_KIND_PENDING`.
+ *
+ * # Safety
+ * As `sbdp_stream_next`.
+ */
+SbdpCode sbdp_stream_poll(struct SbdpStream *stream,
+                          uint64_t within_ns,
+                          const struct SbdpEvent **event,
+                          struct SbdpError *error);
+
+/**
+ * Asks the daemon to stop soon. The stream goes on until its end, whose summary then says so, unless the plan was ready
+ * before.
+ *
+ * # Safety
+ * `stream` is one of this library's that no other call uses; `error` can be written.
+ */
+SbdpCode sbdp_stream_cancel(struct SbdpStream *stream, struct SbdpError *error);
+
+/**
+ * Waits for the end and keeps all that comes until then. The stream is freed, also after an error.
+ *
+ * # Safety
+ * `stream` leads to a stream of this library that no other call uses; `plan` and `error` can be written.
+ */
+SbdpCode sbdp_stream_to_end(struct SbdpStream **stream, struct SbdpPlan **plan, struct SbdpError *error);
+
+/**
+ * Frees a stream, and cancels its request if it has not ended.
+ *
+ * # Safety
+ * `stream` is null, or leads to null or to a stream of this library that no other call uses.
+ */
+void sbdp_stream_free(struct SbdpStream **stream);
+
+/**
+ * Connects to a daemon. `options` may be null.
+ *
+ * # Safety
+ * `options` and what it points to is as it says; `client` and `error` can be written.
+ */
+SbdpCode sbdp_client_connect(const struct SbdpConnectOptions *options,
+                             struct SbdpClient **client,
+                             struct SbdpError *error);
+
+/**
+ * Frees a client. Its streams and sessions go on.
+ *
+ * # Safety
+ * `client` is null, or leads to null or to a client of this library that no other call uses.
+ */
+void sbdp_client_free(struct SbdpClient **client);
+
+/**
+ * Hands an assembly over; one that the daemon knows is not copied again.
+ *
+ * # Safety
+ * All pointers lead to what they say; `handle` and `error` can be written.
+ */
+SbdpCode sbdp_client_upload(const struct SbdpClient *client,
+                            const struct SbdpAssembly *assembly,
+                            struct SbdpHandle *handle,
+                            struct SbdpError *error);
+
+/**
+ * Whether the daemon knows an assembly.
+ *
+ * # Safety
+ * All pointers lead to what they say; `known` and `error` can be written.
+ */
+SbdpCode sbdp_client_knows(const struct SbdpClient *client,
+                           const struct SbdpHandle *handle,
+                           bool *known,
+                           struct SbdpError *error);
+
+/**
+ * Hands over what differs from an assembly that the daemon knows. `revised` gets the handle of what becomes of it.
+ *
+ * # Safety
+ * All pointers lead to what they say; `revised` and `error` can be written.
+ */
+SbdpCode sbdp_client_revise(const struct SbdpClient *client,
+                            const struct SbdpHandle *base,
+                            const struct SbdpChange *change,
+                            struct SbdpHandle *revised,
+                            struct SbdpError *error);
+
+/**
+ * All metrics of the daemon: a JSON object, to be freed by `sbdp_text_free`.
+ *
+ * # Safety
+ * `client` is one of this library's; `metrics` and `error` can be written.
+ */
+SbdpCode sbdp_client_metrics(const struct SbdpClient *client, char **metrics, struct SbdpError *error);
+
+/**
+ * Frees a text of this library.
+ *
+ * # Safety
+ * `text` is null, or leads to null or to a text of `sbdp_client_metrics`.
+ */
+void sbdp_text_free(char **text);
+
+/**
+ * The daemon's process id; 0 for a null client.
+ *
+ * # Safety
+ * `client` is null or one of this library's.
+ */
+uint32_t sbdp_client_daemon_pid(const struct SbdpClient *client);
+
+/**
+ * How often this client has followed a daemon that was restarted at the same place; 0 for a null client.
+ *
+ * # Safety
+ * `client` is null or one of this library's.
+ */
+uint32_t sbdp_client_restarts(const struct SbdpClient *client);
+
+/**
+ * Copies an assembly, to be planned by `sbdp_client_plan_meshes` without thinking of uploads.
+ *
+ * # Safety
+ * `assembly` and what it points to is as it says; `meshes` and `error` can be written.
+ */
+SbdpCode sbdp_meshes_copy(const struct SbdpAssembly *assembly, struct SbdpMeshes **meshes, struct SbdpError *error);
+
+/**
+ * The handle of kept meshes.
+ *
+ * # Safety
+ * `meshes` is one of this library's; `handle` and `error` can be written.
+ */
+SbdpCode sbdp_meshes_handle(const struct SbdpMeshes *meshes, struct SbdpHandle *handle, struct SbdpError *error);
+
+/**
+ * Frees meshes; plans and sessions about them go on.
+ *
+ * # Safety
+ * `meshes` is null, or leads to null or to meshes of this library.
+ */
+void sbdp_meshes_free(struct SbdpMeshes **meshes);
+
+/**
+ * How many steps a plan has; 0 for a null plan.
+ *
+ * # Safety
+ * `plan` is null or one of this library's.
+ */
+size_t sbdp_plan_step_count(const struct SbdpPlan *plan);
+
+/**
+ * A step, valid until the plan is freed; null if there is none of this number.
+ *
+ * # Safety
+ * `plan` is null or one of this library's.
+ */
+const struct SbdpStep *sbdp_plan_step(const struct SbdpPlan *plan, size_t number);
+
+/**
+ * Everything about a plan but its steps, valid until it is freed; null for a null plan.
+ *
+ * # Safety
+ * `plan` is null or one of this library's.
+ */
+const struct SbdpSummary *sbdp_plan_summary(const struct SbdpPlan *plan);
+
+/**
+ * Events of the search, if they were wanted: whole lines, one JSON object each, valid until the plan is freed; null for a
+ * null plan.
+ *
+ * # Safety
+ * `plan` is null or one of this library's.
+ */
+const char *sbdp_plan_trace(const struct SbdpPlan *plan);
+
+/**
+ * Frees a plan.
+ *
+ * # Safety
+ * `plan` is null, or leads to null or to a plan of this library.
+ */
+void sbdp_plan_free(struct SbdpPlan **plan);
+
+/**
+ * Begins a session about an assembly that was uploaded. Nothing is asked yet. `options` may be null.
+ *
+ * # Safety
+ * All pointers lead to what they say; `session` and `error` can be written.
+ */
+SbdpCode sbdp_client_session(const struct SbdpClient *client,
+                             const struct SbdpHandle *handle,
+                             const struct SbdpPlanOptions *options,
+                             struct SbdpSession **session,
+                             struct SbdpError *error);
+
+/**
+ * Begins a session about meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
+ *
+ * # Safety
+ * All pointers lead to what they say; `session` and `error` can be written.
+ */
+SbdpCode sbdp_client_session_meshes(const struct SbdpClient *client,
+                                    const struct SbdpMeshes *meshes,
+                                    const struct SbdpPlanOptions *options,
+                                    struct SbdpSession **session,
+                                    struct SbdpError *error);
+
+/**
+ * The number of a part, of a session about meshes.
+ *
+ * # Safety
+ * All pointers lead to what they say; `part` and `error` can be written.
+ */
+SbdpCode sbdp_session_part(const struct SbdpSession *session,
+                           const char *name,
+                           uint32_t *part,
+                           struct SbdpError *error);
+
+/**
+ * These parts are out.
+ *
+ * # Safety
+ * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ */
+SbdpCode sbdp_session_executed(struct SbdpSession *session,
+                               const uint32_t *parts,
+                               size_t part_count,
+                               struct SbdpError *error);
+
+/**
+ * A step of the last plan was done: its parts are out, or stand where it left them.
+ *
+ * # Safety
+ * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ */
+SbdpCode sbdp_session_performed(struct SbdpSession *session, const struct SbdpStep *step, struct SbdpError *error);
+
+/**
+ * This part does not move: until it is freed, plans do without moving it, and it is no target any more.
+ *
+ * # Safety
+ * `session` is one of this library's that no other call uses; `error` can be written.
+ */
+SbdpCode sbdp_session_stuck(struct SbdpSession *session, uint32_t part, struct SbdpError *error);
+
+/**
+ * This part moves again.
+ *
+ * # Safety
+ * `session` is one of this library's that no other call uses; `error` can be written.
+ */
+SbdpCode sbdp_session_freed(struct SbdpSession *session, uint32_t part, struct SbdpError *error);
+
+/**
+ * This part stands elsewhere.
+ *
+ * # Safety
+ * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ */
+SbdpCode sbdp_session_moved(struct SbdpSession *session, const struct SbdpMovedPart *moved, struct SbdpError *error);
+
+/**
+ * From the next plan on: time until the daemon must answer with what it has; null for none.
+ *
+ * # Safety
+ * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ */
+SbdpCode sbdp_session_set_timeout(struct SbdpSession *session, const uint64_t *timeout_ns, struct SbdpError *error);
+
+/**
+ * Asks how the rest comes apart from how it stands now.
+ *
+ * # Safety
+ * `session` is one of this library's that no other call uses; `stream` and `error` can be written.
+ */
+SbdpCode sbdp_session_replan(struct SbdpSession *session, struct SbdpStream **stream, struct SbdpError *error);
+
+/**
+ * Frees a session; its streams go on.
+ *
+ * # Safety
+ * `session` is null, or leads to null or to a session of this library that no other call uses.
+ */
+void sbdp_session_free(struct SbdpSession **session);
+
+/**
+ * Keeps a step beyond the next call on its stream, or beyond its plan; to be freed by `sbdp_step_free`. Nothing is copied.
+ *
+ * # Safety
+ * `step` is one of this library's that is still valid; `kept` and `error` can be written.
+ */
+SbdpCode sbdp_step_keep(const struct SbdpStep *step,
+                        struct SbdpStep **kept,
+                        struct SbdpError *error);
+
+/**
+ * Frees a step that was kept.
+ *
+ * # Safety
+ * `step` is null, or leads to null or to a step of `sbdp_step_keep`.
+ */
+void sbdp_step_free(struct SbdpStep **step);
+
+/**
+ * Asks for a plan of an assembly that was uploaded. `options` may be null.
+ *
+ * # Safety
+ * All pointers lead to what they say; `stream` and `error` can be written.
+ */
+SbdpCode sbdp_client_plan(const struct SbdpClient *client,
+                          const struct SbdpHandle *handle,
+                          const struct SbdpPlanOptions *options,
+                          struct SbdpStream **stream,
+                          struct SbdpError *error);
+
+/**
+ * Asks for a plan of meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
+ *
+ * # Safety
+ * All pointers lead to what they say; `stream` and `error` can be written.
+ */
+SbdpCode sbdp_client_plan_meshes(const struct SbdpClient *client,
+                                 const struct SbdpMeshes *meshes,
+                                 const struct SbdpPlanOptions *options,
+                                 struct SbdpStream **stream,
+                                 struct SbdpError *error);
+
+/**
+ * From now on steps are read in shared memory, without a copy. Steps of two messages may then be kept; a call that needs a
+ * third fails with `SBDP_CODE_VIEWS_HELD`, and nothing is lost by it.
+ *
+ * # Safety
+ * `stream` is one of this library's; `error` can be written.
+ */
+SbdpCode sbdp_stream_read_in_place(struct SbdpStream *stream,
+                                   struct SbdpError *error);
+
+/**
+ * Waits for the next event, as long as the daemon lives; `SBDP_EVENT_KIND_END` after the end. After an error the stream
+ * is over, except after `SBDP_CODE_VIEWS_HELD`.
+ *
+ * # Safety
+ * `stream` is one of this library's that no other call uses; `event` and `error` can be written.
+ */
+SbdpCode sbdp_stream_next(struct SbdpStream *stream, const struct SbdpEvent **event, struct SbdpError *error);
+
+/**
+ * The next event if it comes within a time, which may be 0; else `SBDP_EVENT_KIND_PENDING`.
+ *
+ * # Safety
+ * As `sbdp_stream_next`.
+ */
+SbdpCode sbdp_stream_poll(struct SbdpStream *stream,
+                          uint64_t within_ns,
+                          const struct SbdpEvent **event,
+                          struct SbdpError *error);
+
+/**
+ * Asks the daemon to stop soon. The stream goes on until its end, whose summary then says so, unless the plan was ready
+ * before.
+ *
+ * # Safety
+ * `stream` is one of this library's that no other call uses; `error` can be written.
+ */
+SbdpCode sbdp_stream_cancel(struct SbdpStream *stream, struct SbdpError *error);
+
+/**
+ * Waits for the end and keeps all that comes until then. The stream is freed, also after an error.
+ *
+ * # Safety
+ * `stream` leads to a stream of this library that no other call uses; `plan` and `error` can be written.
+ */
+SbdpCode sbdp_stream_to_end(struct SbdpStream **stream, struct SbdpPlan **plan, struct SbdpError *error);
+
+/**
+ * Frees a stream, and cancels its request if it has not ended.
+ *
+ * # Safety
+ * `stream` is null, or leads to null or to a stream of this library that no other call uses.
+ */
+void sbdp_stream_free(struct SbdpStream **stream);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+#endif  /* SBDP_H */
