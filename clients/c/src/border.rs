@@ -151,7 +151,9 @@ pub(crate) unsafe fn free<T>(handle: *mut *mut T) {
     // SAFETY: so the caller promises.
     let taken = unsafe {
         match handle.as_mut() {
-            Some(handle) if !handle.is_null() => Box::from_raw(std::mem::replace(handle, std::ptr::null_mut())),
+            Some(handle) if !handle.is_null() => {
+                Box::from_raw(std::mem::replace(handle, std::ptr::null_mut()))
+            }
             _ => return,
         }
     };

@@ -287,9 +287,8 @@ fn planner(number: u32) -> Result<Planner, Failure> {
 }
 
 fn penalty(given: &[SbdpPenalty]) -> Result<Vec<(PenaltyParameter, f64)>, Failure> {
-    let parameter = |p: &SbdpPenalty| {
-        Ok((choose("penalty[].parameter", p.parameter, &PenaltyParameter::ALL)?, p.value))
-    };
+    let parameter =
+        |p: &SbdpPenalty| Ok((choose("penalty[].parameter", p.parameter, &PenaltyParameter::ALL)?, p.value));
     given.iter().map(parameter).collect()
 }
 
@@ -297,6 +296,9 @@ fn penalty(given: &[SbdpPenalty]) -> Result<Vec<(PenaltyParameter, f64)>, Failur
 fn choose<T: Clone>(field: &str, number: u32, values: &[T]) -> Result<T, Failure> {
     let value = values.get(number as usize).cloned();
     value.ok_or_else(|| {
-        Failure::argument(format!("`options->{field}` is {number}: this library knows 0 to {}", values.len() - 1))
+        Failure::argument(format!(
+            "`options->{field}` is {number}: this library knows 0 to {}",
+            values.len() - 1
+        ))
     })
 }

@@ -107,7 +107,8 @@ impl SbdpStream {
         next: impl FnOnce(&mut PlanStream) -> Result<Poll<Option<Event>>, sbdp_client::ClientError>,
     ) -> Result<*const SbdpEvent, Failure> {
         self.step = None;
-        let stream = self.stream.as_mut().ok_or_else(|| Failure::argument("`stream` failed before: free it"))?;
+        let stream =
+            self.stream.as_mut().ok_or_else(|| Failure::argument("`stream` failed before: free it"))?;
         let came = next(stream)?;
         let event = &mut self.event;
         (event.step, event.trace, event.summary) = (std::ptr::null(), std::ptr::null(), std::ptr::null());
@@ -210,7 +211,10 @@ pub unsafe extern "C" fn sbdp_client_plan_meshes(
 /// # Safety
 /// `stream` is one of this library's; `error` can be written.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn sbdp_stream_read_in_place(stream: *mut SbdpStream, error: *mut SbdpError) -> SbdpCode {
+pub unsafe extern "C" fn sbdp_stream_read_in_place(
+    stream: *mut SbdpStream,
+    error: *mut SbdpError,
+) -> SbdpCode {
     // SAFETY: so the caller promises.
     unsafe {
         enter(error, || {

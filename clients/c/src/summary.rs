@@ -232,9 +232,22 @@ impl HeldSummary {
             parts: parts.into_iter().map(|place| texts.at(place)).collect(),
             kept_together: summary.kept_together.iter().map(|parts| group(parts)).collect(),
             free_together: summary.free_together.iter().map(free_group).collect(),
-            poses: summary.poses.iter().map(|&(part, motion)| SbdpMovedPart { part, reserved: 0, motion }).collect(),
-            blocked: summary.blocked.iter().zip(actions).map(|(b, action)| blocked(b, texts.at(action))).collect(),
-            overlaps: summary.overlaps.iter().map(|o| SbdpOverlap { parts: o.parts, depth: o.depth }).collect(),
+            poses: summary
+                .poses
+                .iter()
+                .map(|&(part, motion)| SbdpMovedPart { part, reserved: 0, motion })
+                .collect(),
+            blocked: summary
+                .blocked
+                .iter()
+                .zip(actions)
+                .map(|(b, action)| blocked(b, texts.at(action)))
+                .collect(),
+            overlaps: summary
+                .overlaps
+                .iter()
+                .map(|o| SbdpOverlap { parts: o.parts, depth: o.depth })
+                .collect(),
             warnings: (summary.warnings.iter().zip(messages))
                 .map(|(w, message)| SbdpWarning {
                     part: w.part.unwrap_or(u32::MAX),
@@ -294,11 +307,7 @@ fn group(parts: &[u32]) -> SbdpGroup {
 }
 
 fn free_group(group: &sbdp_client::FreeGroup) -> SbdpFreeGroup {
-    SbdpFreeGroup {
-        parts: group.parts.as_ptr(),
-        part_count: group.parts.len(),
-        direction: group.direction,
-    }
+    SbdpFreeGroup { parts: group.parts.as_ptr(), part_count: group.parts.len(), direction: group.direction }
 }
 
 fn blocked(blocked: &sbdp_client::Blocked, action: *const c_char) -> SbdpBlocked {

@@ -7,7 +7,8 @@ fn the_header_is_that_of_the_sources() {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(here.join("cbindgen.toml")).unwrap();
     let bindings = cbindgen::Builder::new().with_src(here.join("src/lib.rs"));
-    let modules = ["border", "client", "code", "geometry", "options", "plan", "session", "step", "stream", "summary"];
+    let modules =
+        ["border", "client", "code", "geometry", "options", "plan", "session", "step", "stream", "summary"];
     let bindings = modules.iter().fold(bindings, |b, m| b.with_src(here.join(format!("src/{m}.rs"))));
     let mut made = Vec::new();
     bindings.with_config(config).generate().unwrap().write(&mut made);

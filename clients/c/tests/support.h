@@ -34,13 +34,14 @@ static inline void cuboid(double *vertices, double low, double size, double z) {
 }
 
 static inline pid_t start_daemon(const char *program, const char *place) {
-    char run[512], root[512], prefix[64];
+    char run[512], root[512], prefix[64], log[512];
     snprintf(run, sizeof run, "%s/run", place);
     snprintf(root, sizeof root, "%s/root", place);
     snprintf(prefix, sizeof prefix, "sbdp-c-%d-", (int)getpid());
+    snprintf(log, sizeof log, "%s/log", place);
     pid_t pid = fork();
     if (pid == 0) {
-        CHECK(freopen("/dev/null", "w", stderr) != NULL);
+        CHECK(freopen(log, "a", stderr) != NULL);
         execl(program, program, "--runtime-dir", run, "--root", root, "--prefix", prefix, (char *)NULL);
         _exit(127);
     }
@@ -56,7 +57,10 @@ static inline pid_t start_daemon(const char *program, const char *place) {
             sbdp_client_free(&client);
             return pid;
         }
-        CHECK(waitpid(pid, NULL, WNOHANG) == 0);
+        if (waitpid(pid, NULL, WNOHANG) != 0) {
+            fprintf(stderr, "%s has ended: see %s\n", program, log);
+            abort();
+        }
         struct timespec pause = {0, 20000000};
         nanosleep(&pause, NULL);
     }
