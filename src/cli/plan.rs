@@ -13,6 +13,7 @@ use super::part_names::{part_named, resolve};
 use super::staging::staging;
 use super::subject::{Subject, content_of, further, only_mesh};
 use super::{cache, interrupt, print, report, written};
+use crate::bench::end_with_benchmark;
 use crate::cache::CacheSettings;
 use crate::files::{LoadOptions, load};
 use crate::geometry::{Revision, SourceAssembly, SourceGroup, content_hash, pose_from_waypoint};
@@ -22,6 +23,7 @@ use crate::search::{PlanRequest, Planner, Termination};
 use crate::simulation::PenaltyParameters;
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
+    end_with_benchmark();
     let planned = planned(arguments)?;
     write_files(arguments, &planned)?;
     if arguments.json.as_deref() != Some(Path::new(STDOUT)) {
