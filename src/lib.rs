@@ -9,6 +9,7 @@ pub mod cli;
 pub mod config;
 pub mod contact;
 pub mod daemon;
+pub mod exchange;
 pub mod files;
 #[cfg(test)]
 mod fixtures;
@@ -25,5 +26,4 @@ pub mod simulation;
 pub mod telemetry;
 pub mod termination;
 mod tolerances;
-mod upload;
 pub mod view;

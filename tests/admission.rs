@@ -4,7 +4,7 @@ mod common;
 
 use std::time::Duration;
 
-use common::{Boxes, Daemon, HANG, options, plan};
+use common::{Boxes, Daemon, HANG, next_event, options, plan};
 use sbdp_client::{
     Client, ClientError, ConnectOptions, ErrorCode, Event, PlanOptions, PlanStatus, PlanStream,
 };
@@ -17,9 +17,9 @@ fn unremembered() -> PlanOptions {
 }
 
 /// The first error of a stream, whatever progress comes before it.
-fn refusal(stream: &mut PlanStream<'_>) -> ClientError {
+fn refusal(stream: &mut PlanStream) -> ClientError {
     loop {
-        match stream.next_event_within(HANG) {
+        match next_event(stream) {
             Ok(Some(Event::Progress(_))) => {}
             Ok(event) => panic!("not refused but {event:?}"),
             Err(error) => return error,
@@ -46,15 +46,9 @@ fn a_busy_daemon_says_when_to_come_again_and_a_patient_client_gets_its_plan() {
     assert!(error.retry_after().is_some_and(|hint| !hint.is_zero()));
     let patient = ConnectOptions { busy_wait: HANG, ..options(&daemon.runtime_dir()) };
     let patient = Client::connect_with(patient).unwrap();
-    let mut stream = patient.plan(two, &unremembered()).unwrap();
+    let stream = patient.plan(two, &unremembered()).unwrap();
     drop((long, queued));
-    let summary = loop {
-        match stream.next_event_within(HANG).unwrap() {
-            Some(Event::Done(summary)) => break summary,
-            Some(_) => {}
-            None => panic!("the stream ended without an answer"),
-        }
-    };
+    let summary = stream.plan_to_end().unwrap().summary;
     assert_eq!(summary.status, PlanStatus::Complete);
 }
 

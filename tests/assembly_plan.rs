@@ -8,7 +8,7 @@ use std::process::{Command, Output, Stdio};
 
 use common::{Boxes, Daemon};
 use sbdp::plan::export::PlanDocument;
-use sbdp_client::{Client, Event, Handle, PlanOptions, PlanStatus, Staging, Summary, Waypoint};
+use sbdp_client::{Client, Handle, PlanOptions, PlanStatus, Staging, Summary, Waypoint};
 
 const IN_PLACE: Waypoint = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
@@ -108,17 +108,9 @@ fn a_place_that_is_taken_is_told() {
 }
 
 fn asked(client: &Client, handle: Handle, options: &PlanOptions) -> (Vec<(u32, Vec<Waypoint>)>, Summary) {
-    let mut stream = client.plan(handle, options).unwrap();
-    let mut steps = Vec::new();
-    while let Some(event) = stream.next_event().unwrap() {
-        match event {
-            Event::Step(step) => steps.push((step.parts[0], step.path.to_vec())),
-            Event::Done(summary) => return (steps, summary),
-            Event::Restarted => steps.clear(),
-            Event::Progress(_) | Event::Trace(_) => {}
-        }
-    }
-    panic!("no summary");
+    let plan = client.plan(handle, options).unwrap().plan_to_end().unwrap();
+    let steps = plan.steps.iter().map(|step| (step.view().parts[0], step.view().path.to_vec()));
+    (steps.collect(), plan.summary)
 }
 
 #[test]

@@ -3,6 +3,7 @@
 mod common;
 
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
@@ -404,23 +405,35 @@ fn chain(folder: &Path) {
     }
 }
 
-/// A plan that takes longer than the tests that cut it short, at work.
-fn start_long(daemon: Option<&Daemon>, assembly: &Path) -> Child {
+/// A plan that takes longer than the tests that cut it short, at work: `place` is an option.
+fn start_long(daemon: Option<&Daemon>, place: &[&str], assembly: &Path) -> Child {
     chain(assembly);
+    let trace = tempfile::NamedTempFile::new().unwrap();
+    fs::remove_file(trace.path()).unwrap();
     let mut command = sbdp();
-    let place = match daemon {
-        Some(daemon) => {
-            command.env("SBDP_RUNTIME_DIR", daemon.runtime_dir());
-            "--daemon"
-        }
-        None => "--embedded",
-    };
-    command.arg("plan").arg(assembly).args([place, "--json", "-"]);
+    if let Some(daemon) = daemon {
+        command.env("SBDP_RUNTIME_DIR", daemon.runtime_dir());
+    }
+    command.arg("plan").arg(assembly).args(place).args(["--json", "-", "--trace"]).arg(trace.path());
     let planning = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    while !catches_interrupts(&planning) || daemon.is_some_and(|d| plans_running(d) == 0) {
+    // The trace is begun when all files are read.
+    while !trace.path().exists() || daemon.is_some_and(|d| plans_running(d) == 0) {
         std::thread::sleep(Duration::from_millis(10));
     }
     planning
+}
+
+fn interrupt(process: &Child) {
+    kill_process(Pid::from_child(process), Signal::INT).unwrap();
+}
+
+/// It ended with exit code 5 and the plan so far.
+#[track_caller]
+fn cancelled(output: &Output) -> PlanDocument {
+    assert_eq!(output.status.code(), Some(5), "{}", stderr(output));
+    let document = PlanDocument::from_json(&stdout(output)).unwrap();
+    assert_eq!(document.status, "cancelled");
+    document
 }
 
 /// Whether the process has set its handlers, by the kernel's mask of caught signals.
@@ -440,24 +453,88 @@ fn an_interrupt_ends_with_what_is_there() {
     let daemon = Daemon::start();
     for daemon in [None, Some(&daemon)] {
         let folder = tempfile::tempdir().unwrap();
-        let planning = start_long(daemon, folder.path());
-        kill_process(Pid::from_child(&planning), Signal::INT).unwrap();
-        let output = planning.wait_with_output().unwrap();
-        assert_eq!(output.status.code(), Some(5), "{}", stderr(&output));
-        assert_eq!(PlanDocument::from_json(&stdout(&output)).unwrap().status, "cancelled");
+        let place = if daemon.is_some() { "--daemon" } else { "--embedded" };
+        let planning = start_long(daemon, &[place], folder.path());
+        interrupt(&planning);
+        cancelled(&planning.wait_with_output().unwrap());
     }
 }
 
 #[test]
-fn a_daemon_that_dies_is_told() {
+fn an_interrupt_while_files_are_read_ends_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("endless.obj");
+    rustix::fs::mkfifoat(rustix::fs::CWD, &pipe, rustix::fs::Mode::RUSR | rustix::fs::Mode::WUSR).unwrap();
+    let mut command = sbdp();
+    let reading = command.arg("plan").arg(&pipe).stdout(Stdio::piped()).spawn().unwrap();
+    while !catches_interrupts(&reading) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    interrupt(&reading);
+    let output = reading.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(5), 0));
+}
+
+#[test]
+fn an_interrupt_is_heard_while_the_daemon_hangs() {
     let daemon = Daemon::start();
     let folder = tempfile::tempdir().unwrap();
-    let planning = start_long(Some(&daemon), folder.path());
+    let planning = start_long(Some(&daemon), &[], folder.path());
+    daemon.signal(Signal::STOP);
+    interrupt(&planning);
+    let plan = cancelled(&planning.wait_with_output().unwrap());
+    assert_eq!((plan.steps.len(), plan.remaining.len()), (0, 60));
+}
+
+#[test]
+fn a_daemon_that_dies_is_told_where_no_other_place_will_do() {
+    let daemon = Daemon::start();
+    let folder = tempfile::tempdir().unwrap();
+    let planning = start_long(Some(&daemon), &["--daemon"], folder.path());
     // Killed and not waited for: what remains of it until then must not pass for a daemon.
     daemon.signal(Signal::KILL);
     let output = planning.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     assert!(stderr(&output).contains("restart `sbdpd`"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_plan_whose_daemon_dies_is_made_here_and_that_is_told_at_once() {
+    let daemon = Daemon::start();
+    let folder = tempfile::tempdir().unwrap();
+    let mut planning = start_long(Some(&daemon), &[], folder.path());
+    daemon.signal(Signal::KILL);
+    let mut line = String::new();
+    BufReader::new(planning.stderr.take().unwrap()).read_line(&mut line).unwrap();
+    assert!(line.contains("went away") && line.contains("planning in this process"), "{line}");
+    interrupt(&planning);
+    cancelled(&planning.wait_with_output().unwrap());
+}
+
+#[test]
+fn a_plan_whose_daemon_dies_is_the_same() {
+    let mut daemon = Daemon::start();
+    let traces = tempfile::tempdir().unwrap();
+    let [through, here] = ["through", "here"].map(|name| traces.path().join(name));
+    // The daemon is stopped while it is asked, so that it dies before it has answered.
+    daemon.signal(Signal::STOP);
+    let mut command = sbdp();
+    command.env("SBDP_RUNTIME_DIR", daemon.runtime_dir()).arg("plan").arg(assembly("pin-bolt-cover"));
+    command.args(["--json", "-", "--trace"]).arg(&through).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let planning = command.spawn().unwrap();
+    while !through.exists() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    daemon.signal(Signal::KILL);
+    daemon.wait();
+    let output = planning.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(stderr(&output).contains("planning in this process"), "{}", stderr(&output));
+    let there = PlanDocument::from_json(&stdout(&output)).unwrap();
+    let alone = plan("pin-bolt-cover", &["--json", "-", "--trace", here.to_str().unwrap()]);
+    let alone = PlanDocument::from_json(&stdout(&alone)).unwrap();
+    assert_eq!(there.steps, alone.steps);
+    assert_eq!(fs::read(through).unwrap().len(), fs::read(here).unwrap().len());
 }
 
 #[test]

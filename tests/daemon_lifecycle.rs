@@ -5,7 +5,7 @@ mod common;
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command};
 
-use common::{Boxes, Daemon, HANG, act_as_client, plan, wait};
+use common::{Boxes, Daemon, act_as_client, next_event, plan, wait};
 use rustix::process::Signal;
 use sbdp_client::{Client, ClientError, ConnectOptions, ErrorCode, Event, PlanOptions, PlanStatus};
 
@@ -78,7 +78,7 @@ fn sigterm_while_planning_is_answered_and_the_daemon_leaves_with_success() {
     let mut stream = client.plan(handle, &PlanOptions::default()).unwrap();
     let mut signalled = false;
     let summary = loop {
-        match stream.next_event_within(HANG).unwrap() {
+        match next_event(&mut stream).unwrap() {
             Some(Event::Done(summary)) => break summary,
             Some(_) if !signalled => {
                 daemon.signal(Signal::TERM);
@@ -181,12 +181,12 @@ fn a_daemon_that_dies_while_planning_is_a_clear_error() {
     let client = daemon.connect();
     let handle = client.upload(&Boxes::lattice(5).assembly()).unwrap();
     let mut stream = client.plan(handle, &PlanOptions::default()).unwrap();
-    let first = stream.next_event_within(HANG).unwrap();
+    let first = next_event(&mut stream).unwrap();
     assert!(first.is_some());
     daemon.signal(Signal::KILL);
     daemon.wait();
     loop {
-        match stream.next_event_within(HANG) {
+        match next_event(&mut stream) {
             Ok(Some(Event::Done(_))) => return, // planned faster than killed
             Ok(Some(_)) => {}
             Ok(None) => panic!("the stream ended without an answer"),
@@ -229,7 +229,7 @@ fn a_cancelled_stream_ends_with_what_there_is() {
     let mut stream = client.plan(handle, &PlanOptions::default()).unwrap();
     stream.cancel();
     loop {
-        match stream.next_event_within(HANG) {
+        match next_event(&mut stream) {
             Ok(Some(Event::Done(summary))) => {
                 assert!(matches!(summary.status, PlanStatus::Cancelled | PlanStatus::Complete));
                 break;

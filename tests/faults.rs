@@ -5,9 +5,10 @@ mod common;
 
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use common::{Boxes, Daemon, HANG, options, plan, wait};
+use common::{Boxes, Daemon, HANG, next_event, options, plan, wait};
 use rustix::process::{Signal, kill_process};
 use sbdp_client::{Client, ClientError, ConnectOptions, Event, PlanOptions, PlanStatus, Summary};
 use sbdp_ipc::endpoint::{DAEMON_FILE, Endpoint};
@@ -27,14 +28,13 @@ fn patient(daemon: &Daemon) -> Client {
 type Steps = Vec<(Vec<u32>, Vec<[f64; 7]>)>;
 
 /// Plans an assembly whatever happens meanwhile: the steps, the summary, and how often the plan began anew.
-fn plan_through(client: &Client, boxes: &Boxes) -> (Steps, Summary, u32) {
-    let assembly = boxes.assembly();
+fn plan_through(client: &Client, boxes: &Arc<Boxes>) -> (Steps, Summary, u32) {
     let options = PlanOptions { no_cache: true, ..PlanOptions::default() };
-    let mut stream = client.plan_assembly(&assembly, &options).unwrap();
+    let mut stream = client.plan(Arc::clone(boxes), &options).unwrap();
     let (mut steps, mut restarts) = (Vec::new(), 0);
     loop {
-        match stream.next_event_within(HANG).unwrap() {
-            Some(Event::Step(step)) => steps.push((step.parts.to_vec(), step.path.to_vec())),
+        match next_event(&mut stream).unwrap() {
+            Some(Event::Step(step)) => steps.push((step.view().parts.to_vec(), step.view().path.to_vec())),
             Some(Event::Progress(_) | Event::Trace(_)) => {}
             Some(Event::Restarted) => {
                 steps.clear();
@@ -49,7 +49,7 @@ fn plan_through(client: &Client, boxes: &Boxes) -> (Steps, Summary, u32) {
 #[test]
 fn clients_of_a_daemon_that_is_killed_and_restarted_get_the_same_plans_and_are_told() {
     let mut daemon = Daemon::start();
-    let boxes = Boxes::lattice(5);
+    let boxes = Arc::new(Boxes::lattice(5));
     let (undisturbed, _, restarts) = plan_through(&patient(&daemon), &boxes);
     assert_eq!(restarts, 0);
     let clients: Vec<Client> = (0..4).map(|_| patient(&daemon)).collect();

@@ -3,14 +3,14 @@
 
 mod common;
 
-use common::{Daemon, HANG, assembly};
+use common::{Daemon, assembly};
 use sbdp::geometry::SourceAssembly;
 use sbdp::plan::{Plan, PlanStatus, PlanStep, StepEnd};
 use sbdp::search::PlanRequest;
 use sbdp::service::Service;
 use sbdp::termination::Termination;
 use sbdp_client as client;
-use sbdp_client::{Client, Event, Handle, Part, PlanOptions, Summary, Vertices};
+use sbdp_client::{Client, Handle, Part, PlanOptions, Summary, Vertices};
 
 fn planned(service: &Service, name: &str, request: &PlanRequest) -> Plan {
     let id = service.admit(&assembly(name)).unwrap().id;
@@ -63,19 +63,12 @@ fn a_slider_is_moved_aside_for_a_target() {
 type Received = (Vec<u32>, Option<u32>, client::StepEnd, Vec<[f64; 7]>, Vec<u32>, u32);
 
 fn received(client: &Client, handle: Handle, options: &PlanOptions) -> (Vec<Received>, Summary) {
-    let mut stream = client.plan(handle, options).unwrap();
-    let mut steps = Vec::new();
-    loop {
-        match stream.next_event_within(HANG).unwrap() {
-            Some(Event::Step(s)) => {
-                steps.push((s.parts.to_vec(), s.of, s.ends, s.path.to_vec(), s.requires.to_vec(), s.wave));
-            }
-            Some(Event::Done(summary)) => return (steps, summary),
-            Some(Event::Restarted) => steps.clear(),
-            Some(_) => {}
-            None => panic!("a stream ends with `Done`"),
-        }
-    }
+    let plan = client.plan(handle, options).unwrap().plan_to_end().unwrap();
+    let received = |step: &client::Step| {
+        let s = step.view();
+        (s.parts.to_vec(), s.of, s.ends, s.path.to_vec(), s.requires.to_vec(), s.wave)
+    };
+    (plan.steps.iter().map(received).collect(), plan.summary)
 }
 
 fn uploaded(client: &Client, source: &SourceAssembly) -> Handle {

@@ -4,7 +4,7 @@ mod common;
 
 use std::time::Duration;
 
-use common::{Boxes, Daemon, HANG, plan};
+use common::{Boxes, Daemon, HANG, next_event, plan};
 use sbdp::blocking_graph::StaticAnalysis;
 use sbdp::geometry::{SourceAssembly, SourceMesh, SourcePart};
 use sbdp::plan::PlanStep;
@@ -165,8 +165,9 @@ fn the_daemon_answers_to_the_bit_what_the_service_answers_in_process() {
     let mut stream = client.plan(handle, &PlanOptions { fixed: vec![0], ..PlanOptions::default() }).unwrap();
     let mut steps = here.steps.iter();
     loop {
-        match stream.next_event_within(HANG).unwrap().unwrap() {
+        match next_event(&mut stream).unwrap().unwrap() {
             Event::Step(there) => {
+                let there = there.view();
                 let here = steps.next().unwrap();
                 assert_eq!((there.parts, there.path), (&numbers(&here.parts)[..], here.path.as_slice()));
                 assert_eq!((there.of, there.ends), (None, StepEnd::Out));
@@ -201,7 +202,7 @@ fn trace(client: &Client, handle: Handle, options: &PlanOptions) -> (String, Sum
     let mut stream = client.plan(handle, options).unwrap();
     let mut lines = String::new();
     loop {
-        match stream.next_event_within(HANG).unwrap().unwrap() {
+        match next_event(&mut stream).unwrap().unwrap() {
             Event::Trace(more) => lines += &more,
             Event::Progress(_) | Event::Step(_) => {}
             Event::Restarted => panic!("nothing was restarted"),
@@ -283,7 +284,7 @@ fn the_status_counts_states_whose_graphs_were_answered_from_memory() {
 fn refusal(client: &Client, handle: Handle, options: &PlanOptions) -> (ErrorCode, String) {
     let mut stream = client.plan(handle, options).unwrap();
     loop {
-        match stream.next_event_within(HANG) {
+        match next_event(&mut stream) {
             Ok(Some(Event::Progress(_))) => {}
             Ok(event) => panic!("not refused but {event:?}"),
             Err(error) => return (error.code().unwrap(), error.to_string()),

@@ -80,7 +80,7 @@ fn what_cannot_be_changed_is_refused_with_the_reason() {
     let options = PlanOptions { moved: vec![(1, [f64::NAN; 7])], ..PlanOptions::default() };
     let mut stream = client.plan(handle, &options).unwrap();
     let error = loop {
-        match stream.next_event_within(common::HANG) {
+        match common::next_event(&mut stream) {
             Ok(Some(_)) => {}
             Ok(None) => panic!("answered"),
             Err(error) => break error,

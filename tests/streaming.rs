@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use common::{Boxes, HANG, connect};
+use common::{Boxes, HANG, connect, next_event};
 use sbdp::config::Config;
 use sbdp::daemon::Planning;
 use sbdp::geometry::{Revision, SourceAssembly};
@@ -145,8 +145,9 @@ fn read(client: &Client, options: &PlanOptions, pause: Duration) -> usize {
     std::thread::sleep(pause);
     let mut steps = 0_usize;
     loop {
-        match stream.next_event_within(HANG).unwrap() {
+        match next_event(&mut stream).unwrap() {
             Some(Event::Step(step)) => {
+                let step = step.view();
                 assert_eq!(
                     (step.number as usize, step.of),
                     (steps, steps.checked_sub(1).map(|of| of as u32))
@@ -202,6 +203,42 @@ fn a_summary_longer_than_a_chunk_arrives_whole() {
 }
 
 #[test]
+fn steps_in_place_hold_their_chunk_and_two_chunks_are_the_most() {
+    let daemon = InProcess::start("[requests]\noutbox_mb = 512\n");
+    let client = connect(&daemon.runtime_dir());
+    let handle = client.upload(&Boxes::two().assembly()).unwrap();
+    let mut stream = client.plan(handle, &options(600, 1000)).unwrap().in_place();
+    let (mut held, mut seen, mut refusals) = (Vec::new(), 0, 0);
+    loop {
+        match next_event(&mut stream) {
+            Ok(Some(Event::Step(step))) => {
+                assert!(step.is_in_place());
+                assert_eq!(step.view().path.len(), 1000);
+                assert_eq!(step.view().path[999], waypoint(seen, 999));
+                seen += 1;
+                held.push(step);
+            }
+            Err(client::ClientError::ViewsHeld) => {
+                // Four of these paths are in a chunk; what was there at first came alone.
+                assert!(held.len() >= 2 && held.len() <= 8, "{}", held.len());
+                let first = held[0].view().number as usize;
+                assert!(held.iter().enumerate().all(|(i, s)| s.view().path[7] == waypoint(first + i, 7)));
+                held.clear();
+                refusals += 1;
+            }
+            Ok(Some(Event::Done(summary))) => {
+                assert_eq!(summary.steps, 600);
+                break;
+            }
+            Ok(event) => assert!(event.is_some()),
+            Err(error) => panic!("{error}"),
+        }
+    }
+    assert_eq!(seen, 600);
+    assert!(refusals >= 600 / 8, "{refusals}");
+}
+
+#[test]
 fn a_client_that_does_not_read_loses_its_stream_and_the_next_one_is_served() {
     let daemon = InProcess::start("[requests]\noutbox_mb = 1\n");
     let client = connect(&daemon.runtime_dir());
@@ -212,7 +249,7 @@ fn a_client_that_does_not_read_loses_its_stream_and_the_next_one_is_served() {
         std::thread::sleep(Duration::from_millis(2));
     }
     let error = loop {
-        match stream.next_event_within(HANG) {
+        match next_event(&mut stream) {
             Ok(Some(Event::Done(_)) | None) => panic!("the whole plan cannot have fitted"),
             Ok(Some(_)) => {}
             Err(error) => break error,
@@ -229,7 +266,7 @@ fn a_planner_that_panics_fails_its_request_only() {
     let client = connect(&daemon.runtime_dir());
     let handle = client.upload(&Boxes::two().assembly()).unwrap();
     let mut stream = client.plan(handle, &options(666, 1)).unwrap();
-    let error = stream.next_event_within(HANG).unwrap_err();
+    let error = next_event(&mut stream).unwrap_err();
     assert_eq!(error.code(), Some(ErrorCode::Failed), "{error}");
     drop(stream);
     assert_eq!(read(&client, &options(2, 2), Duration::ZERO), 2);

@@ -493,7 +493,7 @@ pub fn encode_steps<'s>(first_step: u32, steps: impl IntoIterator<Item = &'s Ste
 }
 
 /// Steps read in place; borrows the received bytes.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct StepsView<'a> {
     first_step: u32,
     records: &'a [StepRecord],
@@ -503,7 +503,7 @@ pub struct StepsView<'a> {
 }
 
 /// One step read in place.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StepView<'a> {
     /// Its place in the plan.
     pub number: u32,
@@ -535,16 +535,8 @@ impl<'a> StepsView<'a> {
     /// # Errors
     /// The message is malformed.
     pub fn new(bytes: &'a [u8]) -> Result<Self, Malformed> {
-        let mut reader = Reader::new(bytes)?;
-        let h: StepsHeader = reader.value("steps header")?;
-        let view = Self {
-            first_step: h.first_step,
-            records: reader.array("step records", u64::from(h.steps))?,
-            waypoints: reader.array("waypoints", u64::from(h.waypoints))?,
-            requirements: reader.array("requirements", u64::from(h.requirements))?,
-            parts: reader.array("step parts", u64::from(h.parts))?,
-        };
-        for (number, record) in (u64::from(h.first_step)..).zip(view.records) {
+        let view = Self::sections(bytes)?;
+        for (number, record) in (u64::from(view.first_step)..).zip(view.records) {
             check_range("step waypoints", record.first_waypoint, record.waypoints, view.waypoints.len())?;
             let (first, count) = (record.first_requirement, record.requirements);
             check_range("step requirements", first, count, view.requirements.len())?;
@@ -561,6 +553,24 @@ impl<'a> StepsView<'a> {
             }
         }
         Ok(view)
+    }
+
+    /// The same over bytes that were checked before. Should the sender have changed them since, steps may be missing.
+    #[must_use]
+    pub fn checked(bytes: &'a [u8]) -> Self {
+        Self::sections(bytes).unwrap_or_default()
+    }
+
+    fn sections(bytes: &'a [u8]) -> Result<Self, Malformed> {
+        let mut reader = Reader::new(bytes)?;
+        let h: StepsHeader = reader.value("steps header")?;
+        Ok(Self {
+            first_step: h.first_step,
+            records: reader.array("step records", u64::from(h.steps))?,
+            waypoints: reader.array("waypoints", u64::from(h.waypoints))?,
+            requirements: reader.array("requirements", u64::from(h.requirements))?,
+            parts: reader.array("step parts", u64::from(h.parts))?,
+        })
     }
 
     /// How many steps.

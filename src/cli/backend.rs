@@ -5,11 +5,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::error::CliError;
+use super::listener::Listener;
 use crate::cache::Cache;
-use crate::geometry::{Revision, SourceAssembly};
-use crate::plan::Plan;
+use crate::geometry::{GeometryError, Revision, SourceAssembly};
+use crate::plan::{Base, Plan, PlanKind, PlanStats, PlanStatus};
 use crate::search::{PlanRequest, PlanSink, Termination};
-use crate::service::Service;
+use crate::service::{Service, ServiceError};
+use crate::termination::Interrupt;
 
 /// A question, ready to be asked.
 pub(super) struct CommandQuestion<'a> {
@@ -32,7 +34,7 @@ pub(super) struct CommandQuestion<'a> {
 /// Something that plans.
 pub(super) trait Backend {
     /// Plans; blocks until done.
-    fn plan(&self, question: &CommandQuestion<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError>;
+    fn plan(&self, question: &CommandQuestion<'_>, listener: &mut Listener) -> Result<Plan, CliError>;
 }
 
 /// The service in this process.
@@ -47,14 +49,58 @@ impl Embedded {
     }
 }
 
-impl Backend for Embedded {
-    fn plan(&self, question: &CommandQuestion<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError> {
+impl Embedded {
+    fn planned(&self, question: &CommandQuestion<'_>, sink: &mut dyn PlanSink) -> Result<Plan, ServiceError> {
         let started = Instant::now();
-        let admission = self.service.admit(question.assembly)?;
+        let termination = &question.termination;
+        let admission = self.service.admit_until(question.assembly, termination)?;
         let admitted = started.elapsed();
-        let revised = self.service.revise(admission.id, &question.revision)?;
-        let mut plan = self.service.plan(revised.id, &question.request, &question.termination, sink)?;
+        let revised = self.service.revise_until(admission.id, &question.revision, termination)?;
+        let mut plan = self.service.plan(revised.id, &question.request, termination, sink)?;
         plan.stats.load_time_s = Some((question.read + admitted).as_secs_f64());
         Ok(plan)
+    }
+}
+
+impl Backend for Embedded {
+    fn plan(&self, question: &CommandQuestion<'_>, listener: &mut Listener) -> Result<Plan, CliError> {
+        match self.planned(question, listener) {
+            Err(ServiceError::Geometry(GeometryError::Interrupted(Interrupt::Cancelled))) => {
+                Ok(unplanned(question, PlanStatus::Cancelled, Interrupt::Cancelled.to_string()))
+            }
+            Err(ServiceError::Geometry(GeometryError::Interrupted(interrupt))) => {
+                Ok(unplanned(question, PlanStatus::Timeout, interrupt.to_string()))
+            }
+            planned => Ok(planned?),
+        }
+    }
+}
+
+/// The answer to a question that was let go before planning began: everything stands where it stood.
+pub(super) fn unplanned(question: &CommandQuestion<'_>, status: PlanStatus, reason: String) -> Plan {
+    let request = &question.request;
+    let parts: Vec<String> = question.revised.parts.iter().map(|p| p.name.clone()).collect();
+    let remaining = (0..parts.len()).filter(|p| !request.removed.contains(p)).collect();
+    Plan {
+        kind: if request.assembly.is_some() { PlanKind::Assembly } else { PlanKind::Disassembly },
+        status,
+        reason: Some(reason),
+        planner: request.planner.name().to_owned(),
+        engine: request.engine.name().to_owned(),
+        units: question.assembly.units.clone(),
+        parts,
+        removed: request.removed.clone(),
+        poses: Vec::new(),
+        targets: request.targets.clone(),
+        fixed: request.fixed.clone(),
+        base: Base::default(),
+        steps: Vec::new(),
+        remaining,
+        kept_together: Vec::new(),
+        free_together: Vec::new(),
+        blocked: Vec::new(),
+        overlaps: Vec::new(),
+        warnings: Vec::new(),
+        stats: PlanStats::default(),
     }
 }

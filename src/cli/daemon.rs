@@ -1,26 +1,29 @@
 //! The daemon as a backend: the client crate's types on one side, the planning modules' on the
 //! other.
 
-use std::sync::atomic::Ordering;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use sbdp_client as client;
-use sbdp_client::{Client, ClientError, ErrorCode, Event, PlanOptions, PlanStream, Summary};
+use sbdp_client::{Client, ClientError, ConnectOptions, ErrorCode, Event, PlanOptions, PlanStream};
 
-use super::backend::{Backend, CommandQuestion};
+use super::backend::{Backend, CommandQuestion, unplanned};
 use super::error::CliError;
+use super::listener::Listener;
 use crate::blocking_graph::StaticAnalysis;
+use crate::exchange::{plan, plan_step, wire_assembly, wire_mesh, wire_part};
 use crate::geometry::{Revision, SourceAssembly, heal, waypoint_from_pose};
-use crate::plan::{
-    Base, Blocked, FreeGroup, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd,
-    Warning,
-};
-use crate::search::{ActionSet, Engine, PlanSink, Planner, Progress, Stage, Staging};
+use crate::plan::{Plan, PlanStatus};
+use crate::search::{ActionSet, Engine, PlanSink as _, Planner, Progress, Stage, Staging};
 use crate::simulation::PenaltyParameters;
-use crate::upload::{wire_assembly, wire_mesh, wire_part};
 
 /// How long Ctrl-C may go unnoticed while the daemon has nothing to say.
-const CANCEL_POLL: Duration = Duration::from_millis(100);
+const CANCEL_POLL: Duration = Duration::from_millis(50);
+/// How long the daemon may take for the plan so far after Ctrl-C. It stops within tens of milliseconds, unless it hangs;
+/// half of this would give up daemons on machines that are busy, twice as much keeps the user waiting.
+const CANCEL_PATIENCE: Duration = Duration::from_secs(2);
 
 /// A connection to the daemon.
 pub(super) struct Daemon {
@@ -32,6 +35,16 @@ impl Daemon {
         Ok(Self { client: Client::connect()? })
     }
 
+    /// A connection for plans. `reconnect` is how long to wait for another daemon when this one is gone.
+    pub(super) fn connect_for_plans(
+        cancel: &Arc<AtomicBool>,
+        reconnect: Duration,
+    ) -> Result<Self, ClientError> {
+        let interrupt = Some(Arc::clone(cancel).into());
+        let options = ConnectOptions { reconnect, interrupt, ..ConnectOptions::default() };
+        Ok(Self { client: Client::connect_with(options)? })
+    }
+
     pub(super) fn status(&self) -> Result<client::Status, ClientError> {
         self.client.status()
     }
@@ -40,31 +53,57 @@ impl Daemon {
         self.client.metrics()
     }
 
-    fn ask(&self, question: &CommandQuestion<'_>, sink: &mut dyn PlanSink) -> Result<Plan, ClientError> {
+    /// Asks; what the client says if there is no plan.
+    pub(super) fn answer(
+        &self,
+        question: &CommandQuestion<'_>,
+        listener: &mut Listener,
+    ) -> Result<Plan, ClientError> {
+        let answer = self.ask(question, listener);
+        if matches!(&answer, Err(e) if e.code() == Some(ErrorCode::UnknownHandle)) {
+            // Evicted between the two requests.
+            return self.ask(question, listener);
+        }
+        answer
+    }
+
+    fn ask(&self, question: &CommandQuestion<'_>, listener: &mut Listener) -> Result<Plan, ClientError> {
         let mut handle = self.client.upload(&wire_assembly(question.assembly))?;
         if !question.revision.is_empty() {
             handle = self.client.revise(handle, &change(&question.revision))?;
         }
-        let mut stream = self.client.plan(handle, &options(question, sink.traces()))?;
-        receive(&mut stream, question, sink)
+        let mut stream = self.client.plan(handle, &options(question, listener.traces()))?;
+        receive(&mut stream, question, listener)
     }
 }
 
 impl Backend for Daemon {
-    fn plan(&self, question: &CommandQuestion<'_>, sink: &mut dyn PlanSink) -> Result<Plan, CliError> {
-        let mut answer = self.ask(question, sink);
-        if matches!(&answer, Err(e) if e.code() == Some(ErrorCode::UnknownHandle)) {
-            // Evicted between the two requests.
-            answer = self.ask(question, sink);
-        }
-        answer.or_else(|error| match error.code() {
-            Some(ErrorCode::Expired) => Ok(unplanned(question, PlanStatus::Timeout, &error)),
-            Some(ErrorCode::Cancelled) => Ok(unplanned(question, PlanStatus::Cancelled, &error)),
-            Some(ErrorCode::Geometry) => Err(refusal(question.revised, &error)),
-            Some(ErrorCode::NoSuchPart | ErrorCode::Unsupported) => Err(CliError::Refused(error.to_string())),
-            _ => Err(CliError::Failed(error.to_string())),
-        })
+    fn plan(&self, question: &CommandQuestion<'_>, listener: &mut Listener) -> Result<Plan, CliError> {
+        concluded(question, self.answer(question, listener))
     }
+}
+
+/// What the command makes of the daemon's answer.
+pub(super) fn concluded(
+    question: &CommandQuestion<'_>,
+    answer: Result<Plan, ClientError>,
+) -> Result<Plan, CliError> {
+    answer.or_else(|error| match (&error, error.code()) {
+        (ClientError::Interrupted, _) | (_, Some(ErrorCode::Cancelled)) => {
+            Ok(unplanned(question, PlanStatus::Cancelled, error.to_string()))
+        }
+        (_, Some(ErrorCode::Expired)) => Ok(unplanned(question, PlanStatus::Timeout, error.to_string())),
+        (_, Some(ErrorCode::Geometry)) => Err(refusal(question.revised, &error)),
+        (_, Some(ErrorCode::NoSuchPart | ErrorCode::Unsupported)) => {
+            Err(CliError::Refused(error.to_string()))
+        }
+        _ => Err(CliError::Failed(error.to_string())),
+    })
+}
+
+/// Whether an answer failed because the daemon is gone, or about to be.
+pub(super) fn went_away(error: &ClientError) -> bool {
+    error.is_no_daemon() || error.code() == Some(ErrorCode::ShuttingDown)
 }
 
 /// The daemon does not know the files that an upload came from: the same check here does.
@@ -74,38 +113,40 @@ fn refusal(assembly: &SourceAssembly, error: &ClientError) -> CliError {
 }
 
 fn receive(
-    stream: &mut PlanStream<'_>,
+    stream: &mut PlanStream,
     question: &CommandQuestion<'_>,
-    sink: &mut dyn PlanSink,
+    listener: &mut Listener,
 ) -> Result<Plan, ClientError> {
     let cancel = question.termination.cancel_flag();
     let mut steps = Vec::new();
+    let mut cancelled = None;
     loop {
         if cancel.load(Ordering::Relaxed) {
             stream.cancel();
-        }
-        match stream.next_event_within(CANCEL_POLL) {
-            Ok(Some(Event::Progress(p))) => sink.progress(progress(p)),
-            Ok(Some(Event::Step(step))) => {
-                steps.push(plan_step(&step));
-                steps.last().into_iter().for_each(|s| sink.step(s));
+            if cancelled.get_or_insert_with(Instant::now).elapsed() > CANCEL_PATIENCE {
+                return Err(ClientError::Interrupted);
             }
-            Ok(Some(Event::Trace(lines))) => {
+        }
+        let Poll::Ready(event) = stream.poll_event(CANCEL_POLL)? else { continue };
+        match event {
+            Some(Event::Progress(p)) => listener.progress(progress(p)),
+            Some(Event::Step(step)) => {
+                steps.push(plan_step(&step));
+                steps.last().into_iter().for_each(|s| listener.step(s));
+            }
+            Some(Event::Trace(lines)) => {
                 for line in lines.lines() {
                     let event = serde_json::from_str(line);
-                    sink.traced(event.map_err(|e| ClientError::Protocol(format!("trace: {e}")))?);
+                    listener.traced(event.map_err(|e| ClientError::Protocol(format!("trace: {e}")))?);
                 }
             }
-            Ok(Some(Event::Restarted)) => {
+            Some(Event::Restarted) => {
                 eprintln!("the daemon was restarted: the plan begins anew");
                 steps.clear();
+                listener.begin_anew();
             }
-            Ok(Some(Event::Done(summary))) => {
-                return Ok(plan(summary, steps));
-            }
-            Ok(None) => return Err(ClientError::Protocol("the plan ended without its summary".into())),
-            Err(ClientError::Timeout { .. }) => {}
-            Err(error) => return Err(error),
+            Some(Event::Done(summary)) => return Ok(plan(summary, steps)),
+            None => return Err(ClientError::Protocol("the plan ended without its summary".into())),
         }
     }
 }
@@ -195,132 +236,4 @@ fn progress(p: client::Progress) -> Progress {
         client::Stage::Transfer => Stage::Transfer,
     };
     Progress { stage, done: p.done, total: p.total, simulations: p.simulations }
-}
-
-fn plan_step(step: &client::Step<'_>) -> PlanStep {
-    PlanStep {
-        parts: indices(step.parts),
-        of: step.of.map(|number| number as usize),
-        ends: match step.ends {
-            client::StepEnd::Out => StepEnd::Out,
-            client::StepEnd::Aside => StepEnd::Aside,
-            client::StepEnd::In => StepEnd::In,
-        },
-        motion: if step.rotates { MotionKind::Rotation } else { MotionKind::Translation },
-        path: step.path.to_vec(),
-        verified_depth: step.verified_depth,
-        requires: indices(step.requires),
-        wave: step.wave as usize,
-        direction: step.direction,
-    }
-}
-
-fn plan(s: Summary, steps: Vec<PlanStep>) -> Plan {
-    Plan {
-        kind: if s.assembly { PlanKind::Assembly } else { PlanKind::Disassembly },
-        status: status(s.status),
-        reason: s.reason,
-        planner: s.planner,
-        engine: s.engine,
-        units: s.units,
-        parts: s.parts,
-        removed: indices(&s.removed),
-        poses: s.poses.into_iter().map(|(part, pose)| (part as usize, pose)).collect(),
-        targets: s.targets.as_deref().map(indices),
-        fixed: indices(&s.fixed),
-        base: Base { parts: indices(&s.base.parts), reason: s.base.reason },
-        steps,
-        remaining: indices(&s.remaining),
-        kept_together: s.kept_together.iter().map(|group| indices(group)).collect(),
-        free_together: s
-            .free_together
-            .iter()
-            .map(|g| FreeGroup { parts: indices(&g.parts), direction: g.direction })
-            .collect(),
-        blocked: s
-            .blocked
-            .into_iter()
-            .map(|b| Blocked { part: b.part as usize, by: indices(&b.by), action: b.action })
-            .collect(),
-        overlaps: s
-            .overlaps
-            .into_iter()
-            .map(|o| Overlap { parts: o.parts.map(|p| p as usize), depth: o.depth })
-            .collect(),
-        warnings: s
-            .warnings
-            .into_iter()
-            .map(|w| Warning { part: w.part.map(|p| p as usize), message: w.message })
-            .collect(),
-        stats: stats(&s.stats),
-    }
-}
-
-fn status(status: client::PlanStatus) -> PlanStatus {
-    match status {
-        client::PlanStatus::Complete => PlanStatus::Complete,
-        client::PlanStatus::Partial => PlanStatus::Partial,
-        client::PlanStatus::Infeasible => PlanStatus::Infeasible,
-        client::PlanStatus::Timeout => PlanStatus::Timeout,
-        client::PlanStatus::Cancelled => PlanStatus::Cancelled,
-        client::PlanStatus::Exhausted => PlanStatus::Exhausted,
-    }
-}
-
-fn stats(s: &client::Stats) -> PlanStats {
-    PlanStats {
-        simulations: s.simulations,
-        simulations_run: s.simulations_run,
-        sweeps: s.sweeps,
-        states: s.states,
-        // The wire has no room for these.
-        load_time_s: None,
-        overlap_time_s: None,
-        transfer_time_s: None,
-        verdict_hits: None,
-        sdf_time_s: s.sdf_time_s,
-        static_analysis_time_s: s.static_analysis_time_s,
-        path_time_s: s.path_time_s,
-        verify_time_s: s.verify_time_s,
-        total_time_s: s.total_time_s,
-        sdf_hits: s.sdf_hits,
-        blocking_hits: s.blocking_hits,
-        graph_hits: s.graph_hits,
-        motion_hits: s.motion_hits,
-        plan_hit: s.plan_hit != 0,
-    }
-}
-
-fn indices(parts: &[u32]) -> Vec<usize> {
-    parts.iter().map(|&p| p as usize).collect()
-}
-
-/// The answer to a question that the daemon let go before planning began: everything stands
-/// where it stood.
-fn unplanned(question: &CommandQuestion<'_>, status: PlanStatus, error: &ClientError) -> Plan {
-    let request = &question.request;
-    let parts: Vec<String> = question.revised.parts.iter().map(|p| p.name.clone()).collect();
-    let remaining = (0..parts.len()).filter(|p| !request.removed.contains(p)).collect();
-    Plan {
-        kind: if request.assembly.is_some() { PlanKind::Assembly } else { PlanKind::Disassembly },
-        status,
-        reason: Some(error.to_string()),
-        planner: request.planner.name().to_owned(),
-        engine: request.engine.name().to_owned(),
-        units: question.assembly.units.clone(),
-        parts,
-        removed: request.removed.clone(),
-        poses: Vec::new(),
-        targets: request.targets.clone(),
-        fixed: request.fixed.clone(),
-        base: Base::default(),
-        steps: Vec::new(),
-        remaining,
-        kept_together: Vec::new(),
-        free_together: Vec::new(),
-        blocked: Vec::new(),
-        overlaps: Vec::new(),
-        warnings: Vec::new(),
-        stats: PlanStats::default(),
-    }
 }

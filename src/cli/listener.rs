@@ -34,6 +34,17 @@ impl Listener {
         Ok(Self { display: ProgressDisplay::new(), trace })
     }
 
+    /// The plan comes again from its beginning: the trace so far is void.
+    pub(super) fn begin_anew(&mut self) {
+        if let Some(TraceFile { path, file, failed }) = &mut self.trace {
+            match File::create(&*path) {
+                // What the old one has not written yet is for nobody.
+                Ok(anew) => drop(std::mem::replace(file, BufWriter::new(anew)).into_parts()),
+                Err(error) => *failed = failed.take().or(Some(error)),
+            }
+        }
+    }
+
     /// Ends the display and completes the trace.
     pub(super) fn finish(self) -> Result<(), CliError> {
         let Some(TraceFile { path, mut file, failed }) = self.trace else { return Ok(()) };

@@ -1,24 +1,28 @@
 //! `sbdp plan`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
-use std::time::Instant;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use sbdp_client::ConnectOptions;
 
 use super::args::{GroupsArgument, PlanArguments};
 use super::backend::{Backend, CommandQuestion, Embedded};
-use super::daemon::Daemon;
+use super::daemon::{Daemon, concluded, went_away};
 use super::error::{CliError, exit_code};
 use super::listener::Listener;
 use super::part_names::{part_named, resolve};
 use super::staging::staging;
-use super::subject::{Subject, content_of, further, only_mesh};
+use super::subject::{Subject, further, only_mesh};
 use super::{cache, interrupt, print, report, written};
 use crate::bench::end_with_benchmark;
 use crate::cache::CacheSettings;
+use crate::exchange::{absolute, add_notes, content_of, document, source};
 use crate::files::{LoadOptions, load};
-use crate::geometry::{Revision, SourceAssembly, SourceGroup, content_hash, pose_from_waypoint};
-use crate::plan::export::{GroupDocument, PlanDocument, SourceDocument};
-use crate::plan::{Plan, Warning};
+use crate::geometry::{Revision, SourceAssembly, content_hash, pose_from_waypoint};
+use crate::plan::Plan;
+use crate::plan::export::SourceDocument;
 use crate::search::{PlanRequest, Planner, Termination};
 use crate::simulation::PenaltyParameters;
 
@@ -49,7 +53,7 @@ pub(super) struct Planned {
 pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let deadline = arguments.timeout.and_then(|t| Instant::now().checked_add(t));
     let termination = Termination::new(deadline);
-    interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
+    let reading = interrupt::end_on_interrupt()?;
     let started = Instant::now();
     let options = load_options(arguments);
     let mut assembly = load(&arguments.input.assembly, &options)?;
@@ -61,7 +65,9 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let revision = revision(arguments, &assembly, &further(&options))?;
     let revised = assembly.revised(&revision);
     let request = request(arguments, &revised)?;
-    let backend = choose_backend(arguments)?;
+    interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
+    reading.store(false, Ordering::Relaxed);
+    let backend = choose_backend(arguments, &termination)?;
     let question = CommandQuestion {
         assembly: &assembly,
         revision,
@@ -75,30 +81,23 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let plan = backend.plan(&question, &mut listener);
     listener.finish()?;
     let mut plan = plan?;
-    let notes = assembly.notes.iter().map(|note| Warning { part: None, message: note.clone() });
-    plan.warnings.splice(0..0, notes);
+    add_notes(&mut plan, &assembly);
     let revision = question.revision;
-    let source = source(arguments, content_of(&content, &revision));
-    let group = |g: &SourceGroup| GroupDocument { name: g.name.clone(), parts: g.parts.clone() };
-    let groups = assembly.groups.iter().map(group).collect();
-    let document = PlanDocument { source: Some(source), groups, ..PlanDocument::new(&plan) };
+    let source = source_of(arguments, content_of(&content, &revision));
+    let document = document(&plan, &assembly, source);
     Ok(Planned { plan, revised, subject: Subject::new(assembly, revision, document) })
 }
 
 /// Where the meshes are, for who reads the plan later and elsewhere.
-fn source(arguments: &PlanArguments, content: String) -> SourceDocument {
-    let absolute =
-        |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone()).display().to_string();
+fn source_of(arguments: &PlanArguments, content: String) -> SourceDocument {
+    let input = &arguments.input;
+    let read = source(&input.assembly, content, input.split, &input.ignore, input.deflection);
     let replaced = arguments.replaced.iter().map(|(part, file)| (part.clone(), absolute(file)));
     SourceDocument {
-        assembly: absolute(&arguments.input.assembly),
-        content,
         rotate: arguments.rotate.map(|q| [q.w, q.i, q.j, q.k]),
         replaced: replaced.collect(),
-        added: arguments.added.iter().map(absolute).collect(),
-        split: arguments.input.split.map(|split| split.to_string()),
-        ignore: arguments.input.ignore.iter().map(|pattern| pattern.as_str().to_owned()).collect(),
-        deflection: arguments.input.deflection,
+        added: arguments.added.iter().map(|path| absolute(path)).collect(),
+        ..read
     }
 }
 
@@ -189,24 +188,48 @@ fn penalty(given: &[String]) -> Result<PenaltyParameters, CliError> {
 }
 
 /// The daemon if one runs, else this process; or what the user insists on.
-fn choose_backend(arguments: &PlanArguments) -> Result<Box<dyn Backend>, CliError> {
-    let embedded = || {
-        let cache = (!arguments.no_cache).then(|| cache::embedded(arguments.cache_dir.as_deref()));
-        Box::new(Embedded::new(cache))
-    };
+fn choose_backend<'a>(
+    arguments: &'a PlanArguments,
+    termination: &Termination,
+) -> Result<Box<dyn Backend + 'a>, CliError> {
     if arguments.embedded || arguments.cache_dir.is_some() {
-        return Ok(embedded());
+        return Ok(Box::new(embedded(arguments)));
     }
-    match Daemon::connect() {
-        Ok(daemon) => Ok(Box::new(daemon)),
+    // Who insists on a daemon waits for the next one; planning here is sooner.
+    let reconnect = if arguments.daemon { ConnectOptions::default().reconnect } else { Duration::ZERO };
+    match Daemon::connect_for_plans(&termination.cancel_flag(), reconnect) {
+        Ok(daemon) if arguments.daemon => Ok(Box::new(daemon)),
+        Ok(daemon) => Ok(Box::new(DaemonFirst { daemon, arguments })),
         Err(error) if arguments.daemon => Err(CliError::Failed(error.to_string())),
         Err(error) => {
             // That none runs is normal; that one runs and cannot be used is worth a word.
             if !error.is_no_daemon() {
                 eprintln!("warning: {error}; planning in this process");
             }
-            Ok(embedded())
+            Ok(Box::new(embedded(arguments)))
         }
+    }
+}
+
+fn embedded(arguments: &PlanArguments) -> Embedded {
+    Embedded::new((!arguments.no_cache).then(|| cache::embedded(arguments.cache_dir.as_deref())))
+}
+
+/// The daemon as long as it is there, then this process.
+struct DaemonFirst<'a> {
+    daemon: Daemon,
+    arguments: &'a PlanArguments,
+}
+
+impl Backend for DaemonFirst<'_> {
+    fn plan(&self, question: &CommandQuestion<'_>, listener: &mut Listener) -> Result<Plan, CliError> {
+        let answer = self.daemon.answer(question, listener);
+        if matches!(&answer, Err(error) if went_away(error)) {
+            eprintln!("warning: the daemon went away before it had answered; planning in this process");
+            listener.begin_anew();
+            return embedded(self.arguments).plan(question, listener);
+        }
+        concluded(question, answer)
     }
 }
 

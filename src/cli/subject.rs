@@ -8,6 +8,7 @@ use super::error::CliError;
 use super::part_names::part_named;
 use crate::blocking_graph::DirectionalGraph;
 use crate::cache::CacheSettings;
+use crate::exchange::content_of;
 use crate::files::{LoadOptions, StepSettings, load};
 use crate::geometry::{
     Assembly, Pose, Revision, SourceAssembly, SourceMesh, content_hash, pose_from_waypoint,
@@ -133,14 +134,6 @@ impl Subject {
         page::page(&scene, &names, &graphs)
             .map_err(|e| CliError::Failed(format!("cannot write the scene as JSON: {e}")))
     }
-}
-
-/// A hash of an assembly as it was read (whose own hash is given), with the meshes that differ.
-pub(super) fn content_of(base: &[u8; 32], revision: &Revision) -> String {
-    let Revision { replaced, added, .. } = revision.clone();
-    let meshes = Revision { replaced, added, ..Revision::default() };
-    let hash = if meshes.is_empty() { *base } else { meshes.content_hash(base) };
-    blake3::Hash::from_bytes(hash).to_hex().to_string()
 }
 
 /// The plan in a file.

@@ -4,11 +4,15 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use sbdp::files::load_assembly;
 use sbdp::geometry::SourceAssembly;
-use sbdp_client::{Assembly, Client, ConnectOptions, Event, Handle, Part, PlanOptions, Summary, Vertices};
+use sbdp_client::{
+    Assembly, Client, ClientError, ConnectOptions, Event, Handle, Meshes, Part, PlanOptions, PlanStream,
+    Summary, Vertices,
+};
 use sbdp_ipc::endpoint::{Endpoint, default_prefix};
 use sbdp_ipc::layout::shared_memory_files;
 
@@ -216,6 +220,12 @@ impl Boxes {
     }
 }
 
+impl Meshes for Boxes {
+    fn assembly(&self) -> Assembly<'_> {
+        Boxes::assembly(self)
+    }
+}
+
 /// A link of a chain along x as an OBJ file: a torus, flat or upright by turns. It is cut open, by less
 /// than it is thick: then nothing but a long search shows that the chain does not come apart.
 pub fn ring(link: u32) -> String {
@@ -240,13 +250,22 @@ pub fn ring(link: u32) -> String {
     text + &format!("f {}\nf {}\n", first.join(" "), last.join(" "))
 }
 
+/// The next event of a stream, with a guard against hanging.
+pub fn next_event(stream: &mut PlanStream) -> Result<Option<Event>, ClientError> {
+    match stream.poll_event(HANG)? {
+        Poll::Ready(event) => Ok(event),
+        Poll::Pending => panic!("nothing comes"),
+    }
+}
+
 /// Plans to the end; the steps' parts and the summary.
 pub fn plan(client: &Client, handle: Handle, options: &PlanOptions) -> (Vec<u32>, Summary) {
     let mut stream = client.plan(handle, options).unwrap();
     let (mut steps, mut parts) = (0, Vec::new());
     loop {
-        match stream.next_event_within(HANG).unwrap() {
+        match next_event(&mut stream).unwrap() {
             Some(Event::Step(step)) => {
+                let step = step.view();
                 assert!(!step.path.is_empty());
                 assert_eq!(step.number as usize, steps);
                 steps += 1;

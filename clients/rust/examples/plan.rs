@@ -13,7 +13,7 @@ fn main() -> Result<(), ClientError> {
     while let Some(event) = stream.next_event()? {
         match event {
             Event::Progress(progress) => eprintln!("{progress:?}"),
-            Event::Step(step) => println!("parts {:?} leave along {:?}", step.parts, step.path),
+            Event::Step(step) => println!("{:?} leave along {:?}", step.view().parts, step.view().path),
             Event::Trace(lines) => print!("{lines}"),
             Event::Restarted => println!("the daemon was restarted: from the beginning"),
             Event::Done(summary) => println!("{}: {} steps", summary.status.name(), summary.steps),

@@ -1,8 +1,10 @@
 //! A client of the daemon.
 
-use std::cell::{Cell, RefCell};
+use std::collections::HashSet;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
 
 use sbdp_ipc::bytes;
 use sbdp_ipc::endpoint::default_runtime_dir;
@@ -11,17 +13,34 @@ use sbdp_ipc::status::Status;
 
 use crate::connection::{Connection, Through};
 use crate::error::ClientError;
-use crate::options::ConnectOptions;
+use crate::options::{ConnectOptions, Handle};
+use crate::process_bound::{ProcessBound, pid};
 
-/// A client of the daemon of one place. It may move between threads but is used by one at a time.
-#[derive(Debug)]
+/// Longest pause without asking whether the caller wants to be interrupted.
+const PAUSE: Duration = Duration::from_millis(50);
+
+/// How many uploads are noted, at 32 bytes each. Whoever plans more assemblies than this in turn asks for each of them,
+/// once more, whether the daemon has it: some 20 µs.
+const UPLOADS_NOTED: usize = 4096;
+
+/// A client of the daemon of one place. Threads may share it, and its copies are the same client: one plan at a time.
+#[derive(Debug, Clone)]
 pub struct Client {
-    pub(crate) options: ConnectOptions,
+    shared: Arc<Shared>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    options: ConnectOptions,
     runtime_dir: PathBuf,
-    connection: RefCell<Arc<Connection>>,
-    pub(crate) planning: Cell<bool>,
-    restarts: Cell<u32>,
-    next_request: Cell<u64>,
+    connection: Mutex<Arc<ProcessBound<Connection>>>,
+    planning: AtomicBool,
+    restarts: AtomicU32,
+    next_request: AtomicU64,
+    /// What the daemon is known to have got, unless it has forgotten it.
+    uploaded: Mutex<HashSet<Handle>>,
+    /// The process that connected.
+    pid: u32,
 }
 
 impl Client {
@@ -41,12 +60,16 @@ impl Client {
         let runtime_dir = options.runtime_dir.clone().unwrap_or_else(default_runtime_dir);
         let connection = Connection::open(&runtime_dir, options.poll)?;
         Ok(Self {
-            options,
-            runtime_dir,
-            connection: RefCell::new(Arc::new(connection)),
-            planning: Cell::new(false),
-            restarts: Cell::new(0),
-            next_request: Cell::new(1),
+            shared: Arc::new(Shared {
+                options,
+                runtime_dir,
+                connection: Mutex::new(Arc::new(ProcessBound::new(connection))),
+                planning: AtomicBool::new(false),
+                restarts: AtomicU32::new(0),
+                next_request: AtomicU64::new(1),
+                uploaded: Mutex::default(),
+                pid: pid(),
+            }),
         })
     }
 
@@ -57,7 +80,7 @@ impl Client {
     pub fn status(&self) -> Result<Status, ClientError> {
         let header = Self::header(RequestKind::Status, self.new_request());
         let length = bytes::ALIGNMENT;
-        let answer = self.ask("status", Through::Plan, header, length, |_| {}, self.options.timeout)?;
+        let answer = self.ask("status", Through::Plan, header, length, |_| {}, self.options().timeout)?;
         Ok(Status::decode(answer.as_slice())?)
     }
 
@@ -68,7 +91,7 @@ impl Client {
     pub fn metrics(&self) -> Result<String, ClientError> {
         let header = Self::header(RequestKind::Metrics, self.new_request());
         let length = bytes::ALIGNMENT;
-        let answer = self.ask("metrics", Through::Plan, header, length, |_| {}, self.options.timeout)?;
+        let answer = self.ask("metrics", Through::Plan, header, length, |_| {}, self.options().timeout)?;
         let wrong = |_| ClientError::Protocol("its metrics are no text".to_owned());
         String::from_utf8(answer.as_slice().to_vec()).map_err(wrong)
     }
@@ -76,45 +99,108 @@ impl Client {
     /// The daemon's process id.
     #[must_use]
     pub fn pid(&self) -> u32 {
-        self.connection.borrow().pid()
+        self.known_connection().pid()
     }
 
     /// How often this client has followed a daemon that was restarted at the same place.
     #[must_use]
     pub fn restarts(&self) -> u32 {
-        self.restarts.get()
+        self.shared.restarts.load(Ordering::Relaxed)
+    }
+
+    pub(crate) fn options(&self) -> &ConnectOptions {
+        &self.shared.options
     }
 
     pub(crate) fn new_request(&self) -> u64 {
-        self.next_request.replace(self.next_request.get() + 1)
+        self.shared.next_request.fetch_add(1, Ordering::Relaxed)
+    }
+
+    /// Takes the client's one plan; false if it is taken.
+    pub(crate) fn begin_plan(&self) -> bool {
+        !self.shared.planning.swap(true, Ordering::Acquire)
+    }
+
+    pub(crate) fn end_plan(&self) {
+        self.shared.planning.store(false, Ordering::Release);
+    }
+
+    /// Whether the daemon got this assembly from here, or said that it knows it. It may have forgotten it since.
+    pub(crate) fn has_uploaded(&self, handle: Handle) -> bool {
+        self.uploaded().contains(&handle)
+    }
+
+    pub(crate) fn note_uploaded(&self, handle: Handle) {
+        let mut uploaded = self.uploaded();
+        if uploaded.len() >= UPLOADS_NOTED {
+            uploaded.clear();
+        }
+        uploaded.insert(handle);
+    }
+
+    fn uploaded(&self) -> MutexGuard<'_, HashSet<Handle>> {
+        self.shared.uploaded.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Fails in a forked child of the process that connected.
+    pub(crate) fn check_process(&self) -> Result<(), ClientError> {
+        if self.shared.pid == pid() { Ok(()) } else { Err(ClientError::Forked { pid: self.shared.pid }) }
+    }
+
+    /// Fails if the caller wants to be interrupted.
+    pub(crate) fn check_interrupt(&self) -> Result<(), ClientError> {
+        match &self.options().interrupt {
+            Some(interrupt) if interrupt.is_wanted() => Err(ClientError::Interrupted),
+            _ => Ok(()),
+        }
+    }
+
+    /// Sleeps until a moment, unless the caller wants to be interrupted.
+    pub(crate) fn pause(&self, until: Instant) -> Result<(), ClientError> {
+        loop {
+            self.check_interrupt()?;
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(());
+            }
+            std::thread::sleep(left.min(PAUSE));
+        }
     }
 
     /// The connection as it is, to a daemon that may be gone.
-    pub(crate) fn known_connection(&self) -> Arc<Connection> {
-        Arc::clone(&self.connection.borrow())
+    pub(crate) fn known_connection(&self) -> Arc<ProcessBound<Connection>> {
+        // Nothing in between can leave it half changed.
+        Arc::clone(&self.shared.connection.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// The connection to the daemon that runs: a new one if another daemon has taken the place of the one
     /// before.
-    pub(crate) fn connection(&self) -> Result<Arc<Connection>, ClientError> {
-        let known = self.known_connection();
-        if known.is_alive() {
-            return Ok(known);
+    pub(crate) fn connection(&self) -> Result<Arc<ProcessBound<Connection>>, ClientError> {
+        self.check_process()?;
+        let mut known = self.shared.connection.lock().unwrap_or_else(PoisonError::into_inner);
+        if !known.is_alive() {
+            let found = Connection::open(&self.shared.runtime_dir, self.options().poll)?;
+            *known = Arc::new(ProcessBound::new(found));
+            self.uploaded().clear();
+            self.shared.restarts.fetch_add(1, Ordering::Relaxed);
         }
-        let found = Arc::new(Connection::open(&self.runtime_dir, self.options.poll)?);
-        self.restarts.set(self.restarts.get() + 1);
-        *self.connection.borrow_mut() = Arc::clone(&found);
-        Ok(found)
+        Ok(Arc::clone(&known))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Client;
+    use crate::{Client, Event, Plan, PlanStream, Session, Step};
 
     #[test]
-    fn a_client_may_move_between_threads() {
-        fn moves<T: Send>() {}
-        moves::<Client>();
+    fn threads_share_clients_and_hand_streams_on() {
+        fn shared<T: Send + Sync + 'static>() {}
+        fn moves<T: Send + 'static>() {}
+        shared::<Client>();
+        shared::<Step>();
+        shared::<Plan>();
+        moves::<Event>();
+        moves::<PlanStream>();
+        moves::<Session>();
     }
 }

@@ -3,7 +3,7 @@
 use std::ops::Deref;
 use std::os::fd::OwnedFd;
 use std::path::Path;
-use std::sync::Mutex;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use iceoryx2::node::Node;
@@ -25,9 +25,11 @@ use crate::error::ClientError;
 
 /// Longest sleep between two looks at the port: a lost wake-up costs at most this.
 pub(crate) const SLICE: Duration = Duration::from_millis(200);
+/// The same where the caller may want to be interrupted: Ctrl-C is to be heard within 100 ms.
+pub(crate) const INTERRUPTIBLE: Duration = Duration::from_millis(50);
 /// Bytes of the longest request through the port of short questions: a part with another mesh is mostly smaller, and
 /// to make a port takes as long as to take in such a mesh. Of memory that was never written to, there is none.
-const ASKED: usize = 256 * 1024;
+pub(crate) const ASKED: usize = 256 * 1024;
 /// Pause before something is tried again that could not be done.
 pub(crate) const RETRY: Duration = Duration::from_millis(2);
 
@@ -64,11 +66,23 @@ pub(crate) struct Connection {
     polling: Mutex<Polling>,
     pub(crate) plan: ClientPort,
     ask: ClientPort,
+    /// Held while a request is written to a port that stays: one may be loaned at a time.
+    writing: Mutex<()>,
     geometry: ExchangeService,
     pub(crate) progress: Subscriber<Transport, ProgressSample, ()>,
     listener: Listener<Transport>,
+    sleepers: Mutex<Sleepers>,
+    woken: Condvar,
     notifier: Notifier<Transport>,
     _node: Node<Transport>,
+}
+
+/// The threads that wait for the daemon. One of them sleeps at the listener and, when it is woken, wakes all others: what
+/// the daemon has sent may be for any of them.
+#[derive(Debug, Default)]
+struct Sleepers {
+    is_watched: bool,
+    wakes: u64,
 }
 
 /// Which port a request goes through.
@@ -135,6 +149,7 @@ impl Connection {
         Ok(Self {
             plan: client_port(&plan, layout::PLAN_REQUEST)?,
             ask: client_port(&geometry, ASKED)?,
+            writing: Mutex::new(()),
             geometry,
             progress: progress.subscriber_builder().create().map_err(|e| match e {
                 SubscriberCreateError::ExceedsMaxSupportedSubscribers => ClientError::TooManyClients,
@@ -144,6 +159,8 @@ impl Connection {
                 ListenerCreateError::ExceedsMaxSupportedListeners => ClientError::TooManyClients,
                 e => SetupError::at("creating the listener")(e).into(),
             })?,
+            sleepers: Mutex::new(Sleepers::default()),
+            woken: Condvar::new(),
             notifier: wake_server
                 .notifier_builder()
                 .create()
@@ -196,13 +213,43 @@ impl Connection {
         self.polling.try_lock().is_ok_and(|mut polling| polling.look(|| pending.has_response()))
     }
 
-    /// Sleeps until the daemon wakes this client, at most until `until`.
-    pub(crate) fn sleep(&self, until: Instant) {
-        let left = until.saturating_duration_since(Instant::now());
-        if self.listener.timed_wait(|_| {}, left.min(SLICE)).is_err() {
+    /// One request is written at a time through the ports that stay.
+    pub(crate) fn begin_writing(&self) -> MutexGuard<'_, ()> {
+        self.writing.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// How often this client was woken. Whoever is about to sleep asks before looking for data.
+    pub(crate) fn wakes(&self) -> u64 {
+        self.sleepers().wakes
+    }
+
+    /// Sleeps until the daemon wakes this client, at most until `until` and for one slice; not at all if it was woken
+    /// after `seen`.
+    pub(crate) fn sleep(&self, until: Instant, seen: u64, slice: Duration) {
+        let left = until.saturating_duration_since(Instant::now()).min(slice);
+        let mut sleepers = self.sleepers();
+        if sleepers.wakes != seen {
+            return;
+        }
+        if sleepers.is_watched {
+            let waited = self.woken.wait_timeout(sleepers, left);
+            drop(waited.unwrap_or_else(PoisonError::into_inner));
+            return;
+        }
+        sleepers.is_watched = true;
+        drop(sleepers);
+        if self.listener.timed_wait(|_| {}, left).is_err() {
             // Interrupted by a signal, or broken: either way the caller looks again.
             std::thread::sleep(RETRY);
         }
+        let mut sleepers = self.sleepers();
+        sleepers.is_watched = false;
+        sleepers.wakes += 1;
+        self.woken.notify_all();
+    }
+
+    fn sleepers(&self) -> MutexGuard<'_, Sleepers> {
+        self.sleepers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -43,6 +43,27 @@ pub enum ClientError {
     /// A plan is being received on this client already.
     #[error("this client receives a plan already: finish or drop that stream, or connect another client")]
     StreamOpen,
+    /// Two chunks of the plan are still held, and the next one needs the room.
+    #[error("two chunks of this plan are still held: drop their steps before asking for the next one")]
+    ViewsHeld,
+    /// The caller wanted no longer to wait.
+    #[error("interrupted while waiting for the daemon")]
+    Interrupted,
+    /// The client belongs to the process that this one was forked from.
+    #[error("this client belongs to process {pid}, which this one was forked from: connect another one here")]
+    Forked {
+        /// The process that connected.
+        pid: u32,
+    },
+    /// There is no part of this name.
+    #[error("the assembly has no part `{name}`")]
+    NoSuchPart {
+        /// The name.
+        name: String,
+    },
+    /// The session is given options that it cannot keep.
+    #[error("a session replans how an assembly comes apart: leave out `assembly` in its options")]
+    NoAssemblySession,
     /// The daemon answered with an error.
     #[error("{}{}", .0.message, hint(.0.code))]
     Refused(WireError),

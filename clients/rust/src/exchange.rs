@@ -10,9 +10,10 @@ use sbdp_ipc::headers::{RequestHeader, RequestKind, ResponseKind, id_words};
 use sbdp_ipc::services::{Answer, ClientPort, Pending, SetupError};
 
 use crate::client::Client;
-use crate::connection::{Connection, RETRY, Through};
+use crate::connection::{ASKED, Connection, INTERRUPTIBLE, RETRY, SLICE, Through};
 use crate::error::ClientError;
 use crate::patience::Patience;
+use crate::process_bound::ProcessBound;
 
 impl Client {
     /// A header that lacks only the listener: that one belongs to the connection.
@@ -31,39 +32,44 @@ impl Client {
         timeout: Duration,
     ) -> Result<AlignedBytes, ClientError> {
         let mut patience = Patience::default();
+        let attempt = || {
+            let connection = self.connection()?;
+            let port = connection.port(through)?;
+            let pending = self.send(&connection, what, &port, header, length, &fill)?;
+            Ok(self.answer(&connection, what, &pending, timeout))
+        };
         loop {
-            let asked = self.connection().and_then(|connection| {
-                let port = connection.port(through)?;
-                let pending = connection.send(what, &port, header, length, &fill, self.options.timeout)?;
-                connection.answer(what, &pending, timeout)
-            });
-            match asked {
-                Ok(answer) => return Ok(answer),
-                Err(error) => patience.after(self, error)?,
+            let error = match attempt() {
+                Ok(Ok(answer)) => return Ok(answer),
+                Ok(Err(error)) => {
+                    patience.asked();
+                    error
+                }
+                Err(error) => error,
             };
+            self.pause(patience.after(self.options(), error)?)?;
         }
     }
-}
 
-impl Connection {
-    /// Sends a request; tries until the daemon took it or the timeout has passed. Whoever asks has just seen
-    /// the daemon alive.
+    /// Sends a request; tries until the daemon took it or the timeout of short questions has passed. The caller has just
+    /// seen the daemon alive.
     pub(crate) fn send(
         &self,
+        connection: &Connection,
         what: &'static str,
         port: &ClientPort,
         header: RequestHeader,
         length: usize,
         fill: impl Fn(&mut [u8]),
-        timeout: Duration,
-    ) -> Result<Pending, ClientError> {
-        let start = Instant::now();
+    ) -> Result<ProcessBound<Pending>, ClientError> {
+        let (start, timeout) = (Instant::now(), self.options().timeout);
         loop {
-            if let Some(pending) = self.try_send(port, header, length, &fill)? {
-                self.wake_daemon();
+            if let Some(pending) = connection.try_send(port, header, length, &fill)? {
+                connection.wake_daemon();
                 return Ok(pending);
             }
-            self.check_alive()?;
+            connection.check_alive()?;
+            self.check_interrupt()?;
             if start.elapsed() > timeout {
                 return Err(ClientError::Timeout { what, after: timeout });
             }
@@ -71,8 +77,42 @@ impl Connection {
         }
     }
 
+    /// Waits for the one response to a request.
+    fn answer(
+        &self,
+        connection: &Connection,
+        what: &'static str,
+        pending: &Pending,
+        timeout: Duration,
+    ) -> Result<AlignedBytes, ClientError> {
+        let deadline = Instant::now() + timeout;
+        let mut slept = false;
+        loop {
+            let seen = connection.wakes();
+            if let Some(answer) = connection.try_receive(pending, slept)? {
+                return open(&answer);
+            }
+            if !slept && connection.comes_at_once(pending) {
+                continue;
+            }
+            self.check_interrupt()?;
+            if Instant::now() >= deadline {
+                return Err(ClientError::Timeout { what, after: timeout });
+            }
+            connection.sleep(deadline, seen, self.slice());
+            slept = true;
+        }
+    }
+
+    /// Longest sleep between two looks.
+    pub(crate) fn slice(&self) -> Duration {
+        if self.options().interrupt.is_some() { INTERRUPTIBLE } else { SLICE }
+    }
+}
+
+impl Connection {
     /// One attempt to send a control request.
-    pub(crate) fn try_send_control(&self, header: RequestHeader) -> Option<Pending> {
+    pub(crate) fn try_send_control(&self, header: RequestHeader) -> Option<ProcessBound<Pending>> {
         let length = sbdp_ipc::bytes::ALIGNMENT;
         let pending = self.try_send(&self.plan, header, length, &|_: &mut [u8]| {}).ok().flatten()?;
         self.wake_daemon();
@@ -86,12 +126,14 @@ impl Connection {
         header: RequestHeader,
         length: usize,
         fill: &impl Fn(&mut [u8]),
-    ) -> Result<Option<Pending>, ClientError> {
+    ) -> Result<Option<ProcessBound<Pending>>, ClientError> {
+        // A long one has a port of its own.
+        let _writing = (length <= ASKED).then(|| self.begin_writing());
         let mut request = port.loan_slice(length).map_err(SetupError::at("loaning shared memory"))?;
         *request.user_header_mut() = RequestHeader { listener: id_words(self.listener_id()), ..header };
         fill(request.payload_mut());
         match request.send() {
-            Ok(pending) if pending.number_of_server_connections() > 0 => Ok(Some(pending)),
+            Ok(pending) if pending.number_of_server_connections() > 0 => Ok(Some(ProcessBound::new(pending))),
             Ok(_) | Err(RequestSendError::SendError(SendError::UnableToDeliver)) => Ok(None),
             Err(RequestSendError::ExceedsMaxActiveRequests) => Ok(None),
             Err(e) => Err(SetupError::at("sending")(e).into()),
@@ -110,30 +152,6 @@ impl Connection {
             Ok(None) if connected => Ok(None),
             Ok(None) => Err(self.died()),
             Err(e) => Err(SetupError::at("receiving")(e).into()),
-        }
-    }
-
-    /// Waits for the one response to a request.
-    fn answer(
-        &self,
-        what: &'static str,
-        pending: &Pending,
-        timeout: Duration,
-    ) -> Result<AlignedBytes, ClientError> {
-        let deadline = Instant::now() + timeout;
-        let mut slept = false;
-        loop {
-            if let Some(answer) = self.try_receive(pending, slept)? {
-                return open(&answer);
-            }
-            if !slept && self.comes_at_once(pending) {
-                continue;
-            }
-            if Instant::now() >= deadline {
-                return Err(ClientError::Timeout { what, after: timeout });
-            }
-            self.sleep(deadline);
-            slept = true;
         }
     }
 }

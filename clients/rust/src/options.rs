@@ -8,6 +8,8 @@ use sbdp_ipc::clock;
 use sbdp_ipc::plan::{self, MovedPart, PENALTY_PARAMETERS, PenaltyRecord, PlanRequest, Waypoint};
 use sbdp_ipc::polling;
 
+use crate::interrupt::Interrupt;
+
 /// The name of an assembly: the hash of its content.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Handle(pub [u8; 32]);
@@ -19,7 +21,7 @@ impl fmt::Display for Handle {
 }
 
 /// How to find and treat the daemon.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct ConnectOptions {
     /// The daemon's runtime folder; by default `$SBDP_RUNTIME_DIR`, else
     /// `$XDG_RUNTIME_DIR/sbdp`, else `/tmp/sbdp-UID`.
@@ -40,6 +42,9 @@ pub struct ConnectOptions {
     /// from memory comes sooner than a process wakes. Where that is in vain, or others need the processors,
     /// it is left out by itself ([`sbdp_ipc::polling`]). Zero for never.
     pub poll: Duration,
+    /// Ends what waits for the daemon; without it, only timeouts do. [`PlanStream::poll_event`](crate::PlanStream::poll_event)
+    /// and `next_event` do not ask it while the daemon plans: a plan is cancelled, or its stream dropped.
+    pub interrupt: Option<Interrupt>,
 }
 
 impl Default for ConnectOptions {
@@ -51,6 +56,7 @@ impl Default for ConnectOptions {
             reconnect: Duration::from_secs(10),
             busy_wait: Duration::ZERO,
             poll: polling::USUAL,
+            interrupt: None,
         }
     }
 }

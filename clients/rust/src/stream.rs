@@ -1,26 +1,27 @@
 //! A plan as it comes in.
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
+use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
-use sbdp_ipc::geometry::Assembly;
 use sbdp_ipc::headers::{CONTROL_CANCEL, RequestKind, ResponseHeader, ResponseKind, id_of_words};
-use sbdp_ipc::layout::{CREDIT_STEP, PLAN_REQUEST};
-use sbdp_ipc::plan::{StepView, StepsView};
+use sbdp_ipc::layout::{BORROWED_RESPONSES, CREDIT_STEP, PLAN_REQUEST};
 use sbdp_ipc::progress::{STAGE_SDF, STAGE_TRANSFER};
 use sbdp_ipc::services::{Answer, Pending};
 
 use crate::client::Client;
-use crate::connection::{Connection, SLICE};
+use crate::connection::Connection;
 use crate::error::ClientError;
-use crate::options::{Handle, PlanOptions};
-use crate::patience::{Again, Patience};
+use crate::message::Assembler;
+use crate::options::PlanOptions;
+use crate::patience::Patience;
+use crate::process_bound::ProcessBound;
+use crate::step::{Message, Step, Steps};
+use crate::subject::{Meshes, Subject};
 use crate::summary::Summary;
 
-/// No message may announce more than this (it would be put together in memory).
-const LONGEST_MESSAGE: u64 = 1 << 30;
 /// So often one assembly is uploaded again for one plan: a daemon that forgets it again at once has no
 /// room for it.
 const UPLOADS_AGAIN: u32 = 3;
@@ -52,12 +53,11 @@ pub struct Progress {
 /// What a stream yields.
 #[allow(clippy::large_enum_variant, reason = "there is one summary in a stream")]
 #[derive(Debug)]
-pub enum Event<'s> {
+pub enum Event {
     /// Something moved on.
     Progress(Progress),
-    /// A verified step, in order; its slices lie in shared memory and live as long as the
-    /// borrow of the stream, that is until the next event is asked for.
-    Step(StepView<'s>),
+    /// A verified step, in order.
+    Step(Step),
     /// Events of the search, if the trace is wanted: whole lines, one JSON object each.
     Trace(String),
     /// The daemon went away, and another one has taken its place and was asked again: the steps and the trace so far
@@ -67,112 +67,84 @@ pub enum Event<'s> {
     Done(Summary),
 }
 
-/// A plan as it comes in. Dropping it cancels the request.
+/// A plan as it comes in. Dropping it cancels the request. It may move between threads, and outlive the client.
 #[derive(Debug)]
-pub struct PlanStream<'c> {
-    client: &'c Client,
-    connection: Arc<Connection>,
+pub struct PlanStream {
+    client: Client,
+    connection: Arc<ProcessBound<Connection>>,
     /// It is the client's one plan.
     is_open: bool,
-    pending: Option<Pending>,
+    pending: Option<ProcessBound<Pending>>,
     /// The last control request: it must live until the daemon saw it or a newer one.
-    control: Option<Pending>,
+    control: Option<ProcessBound<Pending>>,
     request: u64,
     received: u64,
     granted: u64,
     cancel_wanted: bool,
     cancel_sent: bool,
-    message: Message,
-    next_step: usize,
-    parts: Option<Parts>,
-    question: Question<'c>,
+    steps: Option<Steps>,
+    /// Steps are read in shared memory.
+    in_place: bool,
+    /// The messages in shared memory that may still be held.
+    views: Vec<Weak<Message>>,
+    long_message: Assembler,
+    question: Question,
     patience: Patience,
+    again: Option<Again>,
 }
 
 /// What was asked, to ask it again.
 #[derive(Debug)]
-struct Question<'c> {
+struct Question {
     bytes: Vec<u8>,
-    /// To be uploaded again if the daemon does not know it any more.
-    assembly: Option<&'c Assembly<'c>>,
-    /// How often that happened without a plan.
+    subject: Subject,
+    /// How often it was uploaded again without a plan.
     uploads: u32,
 }
 
-/// The message that is being read.
-#[derive(Debug)]
-enum Message {
-    None,
-    /// In place.
-    Shared(Answer),
-    /// Put together from several chunks.
-    Owned(AlignedBytes),
-}
-
-/// A message that comes in several chunks.
-#[derive(Debug)]
-struct Parts {
-    kind: u32,
-    bytes: AlignedBytes,
-    filled: u64,
-}
-
-/// What `advance` found; the borrow of the step is made by the caller.
-#[allow(clippy::large_enum_variant, reason = "there is one summary in a stream")]
-enum Found {
-    Restarted,
-    Progress(Progress),
-    Step(usize),
-    Trace(String),
-    Done(Summary),
-}
-
-impl Message {
-    fn bytes(&self) -> &[u8] {
-        match self {
-            Self::None => &[],
-            Self::Shared(answer) => answer.payload(),
-            Self::Owned(bytes) => bytes.as_slice(),
-        }
-    }
+/// The question is to be asked once more.
+#[derive(Debug, Clone, Copy)]
+struct Again {
+    at: Instant,
+    /// The daemon that was asked is gone.
+    restarted: bool,
 }
 
 impl Client {
-    /// Asks for a plan.
+    /// Asks for a plan. What it is about is a handle, or meshes (in an `Arc`), which are uploaded whenever the daemon does
+    /// not know them, as after a restart.
     ///
     /// # Errors
-    /// The daemon is gone, or this client receives a plan already. What the daemon refuses
+    /// The daemon is gone, this client receives a plan already, or the geometry is refused. What else the daemon refuses
     /// (`busy`, an unknown handle) comes as the stream's first result.
-    pub fn plan(&self, handle: Handle, options: &PlanOptions) -> Result<PlanStream<'_>, ClientError> {
-        self.stream(Question { bytes: options.to_wire(handle).encode(), assembly: None, uploads: 0 })
-    }
-
-    /// Uploads an assembly and asks for a plan; uploads it again whenever the daemon does not know it any
-    /// more, as after a restart.
-    ///
-    /// # Errors
-    /// The geometry is refused, the daemon is gone, or this client receives a plan already.
-    pub fn plan_assembly<'c>(
-        &'c self,
-        assembly: &'c Assembly<'c>,
+    pub fn plan(
+        &self,
+        subject: impl Into<Subject>,
         options: &PlanOptions,
-    ) -> Result<PlanStream<'c>, ClientError> {
-        let handle = self.upload(assembly)?;
+    ) -> Result<PlanStream, ClientError> {
+        self.check_process()?;
+        let subject = subject.into();
+        let handle = match &subject {
+            Subject::Handle(handle) => *handle,
+            Subject::Meshes(meshes) => {
+                let handle = meshes.handle();
+                if !self.has_uploaded(handle) {
+                    self.upload(&meshes.assembly())?;
+                }
+                handle
+            }
+        };
         let bytes = options.to_wire(handle).encode();
-        self.stream(Question { bytes, assembly: Some(assembly), uploads: 0 })
-    }
-
-    fn stream<'c>(&'c self, question: Question<'c>) -> Result<PlanStream<'c>, ClientError> {
-        if question.bytes.len() > PLAN_REQUEST {
-            return Err(ClientError::RequestTooLong { bytes: question.bytes.len() });
+        if bytes.len() > PLAN_REQUEST {
+            return Err(ClientError::RequestTooLong { bytes: bytes.len() });
         }
         let connection = self.known_connection();
-        if self.planning.replace(true) {
+        if !self.begin_plan() {
             return Err(ClientError::StreamOpen);
         }
         // From here on the stream lets the client go, however this ends.
         let mut stream = PlanStream {
-            client: self,
+            client: self.clone(),
             connection,
             is_open: true,
             pending: None,
@@ -182,88 +154,108 @@ impl Client {
             granted: 0,
             cancel_wanted: false,
             cancel_sent: false,
-            message: Message::None,
-            next_step: 0,
-            parts: None,
-            question,
+            steps: None,
+            in_place: false,
+            views: Vec::new(),
+            long_message: Assembler::default(),
+            question: Question { bytes, subject, uploads: 0 },
             patience: Patience::default(),
+            again: None,
         };
-        if let Err(error) = stream.send() {
-            stream.ask_again(error)?;
+        let mut sent = stream.send();
+        while let Err(error) = sent {
+            let again = stream.recover(error)?;
+            self.pause(again.at)?;
+            sent = stream.send();
         }
+        stream.again = None;
         Ok(stream)
     }
 }
 
-impl PlanStream<'_> {
+impl PlanStream {
     /// Asks, as if nothing had been asked before.
     fn send(&mut self) -> Result<(), ClientError> {
-        self.message = Message::None;
-        self.parts = None;
+        self.steps = None;
+        self.long_message = Assembler::default();
         self.control = None;
         self.pending = None;
-        (self.received, self.granted, self.next_step) = (0, 0, 0);
+        (self.received, self.granted) = (0, 0);
         self.cancel_sent = false;
         self.request = self.client.new_request();
         self.connection = self.client.connection()?;
         let header = Client::header(RequestKind::Plan, self.request);
         let (connection, bytes) = (&self.connection, &self.question.bytes);
         let fill = |out: &mut [u8]| out.copy_from_slice(bytes);
-        let timeout = self.client.options.timeout;
-        self.pending = Some(connection.send("plan", &connection.plan, header, bytes.len(), fill, timeout)?);
+        let sent = self.client.send(connection, "plan", &connection.plan, header, bytes.len(), fill)?;
+        self.pending = Some(sent);
+        self.patience.asked();
         Ok(())
     }
 
-    /// Asks once more after an error that a client gets over by itself.
-    fn recover(&mut self, error: ClientError) -> Result<Option<Found>, ClientError> {
+    /// Prepares to ask once more after an error that a client gets over by itself.
+    fn recover(&mut self, error: ClientError) -> Result<Again, ClientError> {
         // Of a plan that is not wanted any more only the end is: where a daemon is, it has said it.
         if self.cancel_wanted && !error.is_no_daemon() {
             return Err(error);
         }
         let forgotten = error.code() == Some(ErrorCode::UnknownHandle);
-        if let Some(assembly) = self.question.assembly.filter(|_| forgotten)
+        let restarted = error.is_no_daemon() || self.again.is_some_and(|again| again.restarted);
+        if let Some(meshes) = self.question.meshes().filter(|_| forgotten)
             && self.question.uploads < UPLOADS_AGAIN
         {
             self.question.uploads += 1;
-            self.client.upload(assembly)?;
-            self.send()?;
-            return Ok(None);
+            self.client.upload(&meshes.assembly())?;
+            return Ok(*self.again.insert(Again { at: Instant::now(), restarted }));
         }
-        Ok(self.ask_again(error)?.then_some(Found::Restarted))
+        let at = self.patience.after(self.client.options(), error)?;
+        Ok(*self.again.insert(Again { at, restarted }))
     }
+}
 
-    /// Asks until it could be asked; whether that was another daemon.
-    fn ask_again(&mut self, mut error: ClientError) -> Result<bool, ClientError> {
-        let (until, mut restarted) = (Instant::now() + self.client.options.reconnect, false);
-        loop {
-            restarted |= self.patience.after(self.client, error)? == Again::Restarted;
-            // That daemon may die, too, before it is asked.
-            match self.send() {
-                Ok(()) => return Ok(restarted),
-                Err(e) if restarted && Instant::now() >= until => return Err(e),
-                Err(e) => error = e,
-            }
+impl Question {
+    fn meshes(&self) -> Option<Arc<dyn Meshes>> {
+        match &self.subject {
+            Subject::Handle(_) => None,
+            Subject::Meshes(meshes) => Some(Arc::clone(meshes)),
         }
     }
 }
 
-impl PlanStream<'_> {
+impl PlanStream {
+    /// Steps are read in shared memory, without a copy. Of their messages two may be held: to ask for an event that needs
+    /// a third is [`ClientError::ViewsHeld`], and nothing is lost by it.
+    #[must_use]
+    pub fn in_place(mut self) -> Self {
+        self.in_place = true;
+        self
+    }
+
+    /// Steps are copied, as they are unless they are read [in place](Self::in_place).
+    pub(crate) fn copied(mut self) -> Self {
+        self.in_place = false;
+        self
+    }
+
     /// Waits for the next event; `None` after [`Event::Done`]. Waits as long as the daemon
     /// lives: give [`PlanOptions::timeout`] to bound the planning itself.
     ///
     /// # Errors
-    /// The daemon refused, failed or died. The stream is over then.
-    pub fn next_event(&mut self) -> Result<Option<Event<'_>>, ClientError> {
-        self.next_event_until(None, Duration::ZERO)
+    /// The daemon refused, failed or died. The stream is over then, except after [`ClientError::ViewsHeld`].
+    pub fn next_event(&mut self) -> Result<Option<Event>, ClientError> {
+        loop {
+            if let Poll::Ready(event) = self.event_until(None)? {
+                return Ok(event);
+            }
+        }
     }
 
-    /// Like [`Self::next_event`], but gives up after a while with [`ClientError::Timeout`]; the
-    /// stream can be used further then.
+    /// The next event if it comes within a time, which may be zero; else `Pending`, and the stream goes on.
     ///
     /// # Errors
-    /// As above, and when nothing came in time.
-    pub fn next_event_within(&mut self, timeout: Duration) -> Result<Option<Event<'_>>, ClientError> {
-        self.next_event_until(Some(Instant::now() + timeout), timeout)
+    /// As [`Self::next_event`].
+    pub fn poll_event(&mut self, within: Duration) -> Result<Poll<Option<Event>>, ClientError> {
+        self.event_until(Some(Instant::now() + within))
     }
 
     /// Asks the daemon to stop soon. The stream goes on until `Done`, which then says
@@ -273,53 +265,46 @@ impl PlanStream<'_> {
         self.send_control();
     }
 
-    fn next_event_until(
-        &mut self,
-        deadline: Option<Instant>,
-        timeout: Duration,
-    ) -> Result<Option<Event<'_>>, ClientError> {
-        let found = loop {
-            let error = match self.advance(deadline, timeout) {
-                Ok(found) => break found,
-                Err(timeout @ ClientError::Timeout { .. }) => return Err(timeout),
+    fn event_until(&mut self, deadline: Option<Instant>) -> Result<Poll<Option<Event>>, ClientError> {
+        self.client.check_process()?;
+        loop {
+            let error = match self.advance(deadline) {
+                Ok(found) => return Ok(found),
+                Err(held @ ClientError::ViewsHeld) => return Err(held),
                 Err(error) => error,
             };
-            match self.recover(error) {
-                Ok(None) => {}
-                Ok(found) => break found,
-                Err(error) => {
-                    self.close();
-                    return Err(error);
-                }
+            if let Err(error) = self.recover(error) {
+                self.close();
+                return Err(error);
             }
-        };
-        Ok(match found {
-            None => None,
-            Some(Found::Restarted) => Some(Event::Restarted),
-            Some(Found::Progress(progress)) => Some(Event::Progress(progress)),
-            Some(Found::Done(summary)) => Some(Event::Done(summary)),
-            Some(Found::Trace(lines)) => Some(Event::Trace(lines)),
-            Some(Found::Step(index)) => {
-                let step = StepsView::new(self.message.bytes())?.get(index);
-                step.map(Event::Step)
-            }
-        })
+        }
     }
 
-    fn advance(
-        &mut self,
-        deadline: Option<Instant>,
-        timeout: Duration,
-    ) -> Result<Option<Found>, ClientError> {
+    fn advance(&mut self, deadline: Option<Instant>) -> Result<Poll<Option<Event>>, ClientError> {
+        if let Some(again) = self.again {
+            self.client.pause(deadline.map_or(again.at, |d| d.min(again.at)))?;
+            if Instant::now() < again.at {
+                return Ok(Poll::Pending);
+            }
+            self.send()?;
+            self.again = None;
+            if again.restarted {
+                return Ok(Poll::Ready(Some(Event::Restarted)));
+            }
+        }
         let mut slept = false;
         loop {
-            if let Some(index) = self.step_at_hand()? {
-                return Ok(Some(Found::Step(index)));
+            if let Some(step) = self.step_at_hand() {
+                return Ok(Poll::Ready(Some(Event::Step(step))));
             }
-            let Some(pending) = self.pending.as_ref() else { return Ok(None) };
+            if self.pending.is_some() {
+                self.check_views()?;
+            }
+            let Some(pending) = self.pending.as_ref() else { return Ok(Poll::Ready(None)) };
+            let seen = self.connection.wakes();
             if let Some(answer) = self.connection.try_receive(pending, slept)? {
                 if let Some(found) = self.take(answer)? {
-                    return Ok(Some(found));
+                    return Ok(Poll::Ready(Some(found)));
                 }
                 continue;
             }
@@ -328,33 +313,37 @@ impl PlanStream<'_> {
             }
             self.send_control();
             if let Some(progress) = self.progress() {
-                return Ok(Some(Found::Progress(progress)));
+                return Ok(Poll::Ready(Some(Event::Progress(progress))));
             }
             let now = Instant::now();
             if deadline.is_some_and(|d| now >= d) {
-                return Err(ClientError::Timeout { what: "plan", after: timeout });
+                // Whoever only ever polls finds out here that nothing will come.
+                self.connection.check_alive()?;
+                return Ok(Poll::Pending);
             }
-            self.connection.sleep(deadline.unwrap_or(now + SLICE));
+            let slice = self.client.slice();
+            self.connection.sleep(deadline.unwrap_or(now + slice), seen, slice);
             slept = true;
         }
     }
 
     /// The next step of the message that is being read.
-    fn step_at_hand(&mut self) -> Result<Option<usize>, ClientError> {
-        if matches!(self.message, Message::None) {
-            return Ok(None);
+    fn step_at_hand(&mut self) -> Option<Step> {
+        let step = self.steps.as_mut()?.take_next();
+        if step.is_none() {
+            self.steps = None;
         }
-        let count = StepsView::new(self.message.bytes())?.len();
-        if self.next_step < count {
-            self.next_step += 1;
-            return Ok(Some(self.next_step - 1));
-        }
-        self.message = Message::None;
-        Ok(None)
+        step
+    }
+
+    /// Whether another message may be borrowed.
+    fn check_views(&mut self) -> Result<(), ClientError> {
+        self.views.retain(|message| message.strong_count() > 0);
+        if self.views.len() < BORROWED_RESPONSES { Ok(()) } else { Err(ClientError::ViewsHeld) }
     }
 
     /// Takes a chunk in.
-    fn take(&mut self, answer: Answer) -> Result<Option<Found>, ClientError> {
+    fn take(&mut self, answer: Answer) -> Result<Option<Event>, ClientError> {
         let header = *answer.user_header();
         if header.sequence != self.received {
             return Err(ClientError::Protocol(format!(
@@ -365,58 +354,41 @@ impl PlanStream<'_> {
         self.received += 1;
         self.send_control();
         if header.offset == 0 && header.total == answer.payload().len() as u64 {
-            return self.open(&header, Message::Shared(answer));
+            return self.open(&header, Message::shared(answer));
         }
-        match self.put_together(&header, &answer)? {
+        match self.long_message.add(&header, answer.payload())? {
             Some(bytes) => self.open(&header, Message::Owned(bytes)),
             None => Ok(None),
         }
     }
 
-    fn put_together(
-        &mut self,
-        header: &ResponseHeader,
-        answer: &Answer,
-    ) -> Result<Option<AlignedBytes>, ClientError> {
-        if header.offset == 0 && header.total <= LONGEST_MESSAGE {
-            let bytes = AlignedBytes::zeroed(header.total as usize);
-            self.parts = Some(Parts { kind: header.kind, bytes, filled: 0 });
-        }
-        let wrong = || ClientError::Protocol("the chunks of a message do not fit together".to_owned());
-        let mut parts = self.parts.take().ok_or_else(wrong)?;
-        let (start, end) = (parts.filled, parts.filled + answer.payload().len() as u64);
-        if header.offset != start || header.kind != parts.kind {
-            return Err(wrong());
-        }
-        let target = parts.bytes.as_mut_slice().get_mut(start as usize..end as usize).ok_or_else(wrong)?;
-        target.copy_from_slice(answer.payload());
-        parts.filled = end;
-        if end == header.total {
-            return Ok(Some(parts.bytes));
-        }
-        self.parts = Some(parts);
-        Ok(None)
-    }
-
     /// Opens a whole message.
-    fn open(&mut self, header: &ResponseHeader, message: Message) -> Result<Option<Found>, ClientError> {
+    fn open(&mut self, header: &ResponseHeader, message: Message) -> Result<Option<Event>, ClientError> {
         match ResponseKind::from_wire(header.kind) {
+            Some(ResponseKind::Steps) if self.in_place => {
+                let steps = Steps::new(message)?;
+                if matches!(**steps.message(), Message::Shared(_)) {
+                    self.views.push(Arc::downgrade(steps.message()));
+                }
+                self.steps = Some(steps);
+                Ok(None)
+            }
             Some(ResponseKind::Steps) => {
-                self.message = message;
-                self.next_step = 0;
+                self.steps = Some(Steps::new(message.owned())?);
                 Ok(None)
             }
             Some(ResponseKind::Trace) => {
                 let lines = String::from_utf8(message.bytes().to_vec());
                 let lines = lines.map_err(|_| ClientError::Protocol("a trace is not UTF-8".to_owned()))?;
-                Ok(Some(Found::Trace(lines)))
+                Ok(Some(Event::Trace(lines)))
             }
             Some(ResponseKind::Summary) => {
                 // A copy: it outlives the stream, and nothing decoded may change behind our back.
                 let copy = AlignedBytes::copy_of(message.bytes());
                 let summary = Summary::decode(copy.as_slice())?;
+                drop(message);
                 self.close();
-                Ok(Some(Found::Done(summary)))
+                Ok(Some(Event::Done(summary)))
             }
             Some(ResponseKind::Error) => {
                 let copy = AlignedBytes::copy_of(message.bytes());
@@ -466,13 +438,18 @@ impl PlanStream<'_> {
 
     /// Lets go of the request.
     fn close(&mut self) {
-        self.message = Message::None;
+        self.steps = None;
+        self.again = None;
         self.control = None;
         if self.is_open {
             self.is_open = false;
-            self.client.planning.set(false);
+            self.client.end_plan();
         }
         let Some(pending) = self.pending.take() else { return };
+        if self.client.check_process().is_err() {
+            // The request goes on: it is that of the parent process.
+            return;
+        }
         let daemon_holds_it = pending.is_connected();
         drop(pending);
         // The daemon asks whether we are still there when it is woken, not before. Of a request that it has
@@ -483,7 +460,7 @@ impl PlanStream<'_> {
     }
 }
 
-impl Drop for PlanStream<'_> {
+impl Drop for PlanStream {
     fn drop(&mut self) {
         self.close();
     }

@@ -34,6 +34,7 @@ impl Client {
     pub fn upload(&self, assembly: &Assembly<'_>) -> Result<Handle, ClientError> {
         let handle = content_hash(assembly);
         if self.knows(handle)? {
+            self.note_uploaded(handle);
             return Ok(handle);
         }
         let answered = self.send_meshes(assembly)?;
@@ -42,6 +43,7 @@ impl Client {
                 "it names the assembly {answered} where the content gives {handle}"
             )));
         }
+        self.note_uploaded(handle);
         Ok(handle)
     }
 
@@ -52,7 +54,7 @@ impl Client {
     pub fn knows(&self, handle: Handle) -> Result<bool, ClientError> {
         let header = Self::header(RequestKind::Have, 0);
         let fill = |out: &mut [u8]| out.copy_from_slice(&handle.0);
-        let answer = self.ask("have", Through::Ask, header, handle.0.len(), fill, self.options.timeout)?;
+        let answer = self.ask("have", Through::Ask, header, handle.0.len(), fill, self.options().timeout)?;
         let response: HandleResponse = Reader::new(answer.as_slice())?.value("handle")?;
         Ok(response.known != 0)
     }
@@ -90,13 +92,13 @@ impl Client {
         check_shared_memory(length as u64)?;
         let mut header = Self::header(kind, 0);
         // Nobody reads what comes later.
-        header.consumed = clock::deadline_in(self.options.upload_timeout);
+        header.consumed = clock::deadline_in(self.options().upload_timeout);
         let fill = |out: &mut [u8]| {
             let fits = encode(out);
             debug_assert!(fits, "the port was made as long as the message");
         };
         let answer =
-            self.ask(what, Through::Upload(length), header, length, fill, self.options.upload_timeout)?;
+            self.ask(what, Through::Upload(length), header, length, fill, self.options().upload_timeout)?;
         let response: HandleResponse = Reader::new(answer.as_slice())?.value("handle")?;
         Ok(Handle(response.handle))
     }

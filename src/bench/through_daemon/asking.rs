@@ -25,7 +25,8 @@ pub(super) struct AnsweredStep {
 }
 
 impl AnsweredStep {
-    fn of(step: &Step<'_>) -> Self {
+    fn of(step: &Step) -> Self {
+        let step = step.view();
         Self { parts: step.parts.to_vec(), of: step.of, ends: step.ends, path: step.path.to_vec() }
     }
 
@@ -62,7 +63,7 @@ fn follow(
     client: &Client,
     handle: Handle,
     options: &PlanOptions,
-    mut each: impl FnMut(Event<'_>),
+    mut each: impl FnMut(Event),
 ) -> Result<Summary, BenchError> {
     let mut stream = client.plan(handle, options).map_err(BenchError::failed)?;
     while let Some(event) = stream.next_event().map_err(BenchError::failed)? {

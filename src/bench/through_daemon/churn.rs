@@ -11,8 +11,8 @@ use super::BenchError;
 use super::asking::summary;
 use super::load::footprint;
 use super::server::{Place, Server};
+use crate::exchange::wire_assembly;
 use crate::geometry::{SourceAssembly, SourcePart};
-use crate::upload::wire_assembly;
 
 /// What to do.
 #[derive(Debug, Clone, Copy)]

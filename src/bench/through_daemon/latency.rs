@@ -14,8 +14,8 @@ use super::BenchError;
 use super::asking::summary;
 use super::raw_peer::RawClient;
 use super::server::{Place, Server};
+use crate::exchange::wire_assembly;
 use crate::geometry::SourceAssembly;
-use crate::upload::wire_assembly;
 
 /// What to measure.
 #[derive(Debug, Clone)]

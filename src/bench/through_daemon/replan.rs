@@ -10,9 +10,9 @@ use serde::Serialize;
 use super::BenchError;
 use super::asking::{Answered, AnsweredStep, leave_alone, plan};
 use super::server::{Place, Server};
+use crate::exchange::{wire_assembly, wire_part};
 use crate::files::load_assembly;
 use crate::geometry::{SourceAssembly, SourceMesh};
-use crate::upload::{wire_assembly, wire_part};
 
 /// One question, cold or after the change.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -12,8 +12,8 @@ use super::asking::{figures, plan, summary};
 use super::latency::{Percentiles, percentiles};
 use super::replan::fastener;
 use super::server::{Place, Server};
+use crate::exchange::wire_assembly;
 use crate::geometry::{Bounds, SourceAssembly};
-use crate::upload::wire_assembly;
 
 /// So long a restarted daemon is left alone, where it may make ready what was asked last.
 const QUIET: Duration = Duration::from_secs(2);

@@ -3,6 +3,7 @@
 
 use std::io::{BufRead, Write};
 use std::path::PathBuf;
+use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use sbdp_client::{
@@ -12,8 +13,8 @@ use sbdp_client::{
 use super::super::BenchError;
 use super::figures::{ClientFigures, Ending};
 use super::mix::{Kind, Mix, Question};
+use crate::exchange::wire_assembly;
 use crate::geometry::{SourceAssembly, SourceMesh};
-use crate::upload::wire_assembly;
 
 /// What such a process is to be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -194,13 +195,20 @@ impl Asking<'_> {
         }
         let mut hasher = blake3::Hasher::new();
         let started = Instant::now();
-        while let Some(event) = stream.next_event_within(PATIENCE.saturating_sub(started.elapsed()))? {
+        loop {
+            let Poll::Ready(event) = stream.poll_event(PATIENCE.saturating_sub(started.elapsed()))? else {
+                return Ok(Ending::Lost(format!("no answer within {PATIENCE:?}")));
+            };
+            let Some(event) = event else {
+                return Ok(Ending::Lost("a stream ended without its summary".to_owned()));
+            };
             match event {
                 Event::Progress(_) | Event::Trace(_) => {}
                 Event::Restarted => {
                     hasher.reset();
                 }
                 Event::Step(step) => {
+                    let step = step.view();
                     for number in step.parts.iter().chain(&step.of) {
                         hasher.update(&number.to_le_bytes());
                     }
@@ -218,7 +226,6 @@ impl Asking<'_> {
                 }
             }
         }
-        Ok(Ending::Lost("a stream ended without its summary".to_owned()))
     }
 
     /// The first parts, in another size.

@@ -1,0 +1,250 @@
+"""Types of the compiled part. Lengths and poses are in the input's units and frame."""
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import TracebackType
+from typing import Any, Literal, TypedDict, Unpack
+
+import numpy
+from numpy.typing import NDArray
+
+VERSION: str
+
+Pose = Sequence[float] | NDArray[numpy.floating[Any]]
+"""[x, y, z], or [x, y, z, qw, qx, qy, qz]: the rigid motion x' = q x + t."""
+
+class Options(TypedDict, total=False):
+    """What is planned; as the options of `sbdp plan`. Times are in seconds, lengths in the input's units."""
+
+    planner: Literal["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star", "rrt", "bk-rrt"]
+    engine: Literal["sliding", "penalty"]
+    actions: Literal["paper", "extended"]
+    dbg: Literal["sliding", "paper"]
+    penalty: Mapping[str, float]
+    sweeps: bool | None
+    timeout: float | None
+    """The daemon answers with what it has by then."""
+    planning_timeout: float | None
+    path_timeout: float | None
+    seed: int
+    clearance: float | None
+    max_simulations: int | None
+    threads: int
+    fixed: str | Iterable[str]
+    """Parts that may not move, besides those that the assembly declares."""
+    removed: str | Iterable[str]
+    """Parts that are gone already."""
+    targets: str | Iterable[str] | None
+    """Parts that must come out; None for all."""
+    base: str | Iterable[str]
+    """Parts that stay as long as others leave."""
+    moved: Mapping[str, Pose]
+    """Parts that stand elsewhere: the rigid motion of their mesh from where the assembly has it."""
+    assembly: bool
+    """How it is put together, not apart."""
+    staging: Literal["auto", "none"] | Mapping[str, Pose]
+    """Where parts of an assembly plan wait: where the files say, else beside the assembly; nowhere; or at these poses."""
+    up: Literal["+x", "-x", "+y", "-y", "+z", "-z"] | Sequence[float] | None
+    """Ways up come before ways sideways, and those before ways down."""
+    groups: Literal["needed", "prefer"]
+    """Whether parts that belong together where the assembly comes from leave together as long as anything else leaves."""
+    no_cache: bool
+    batch: bool
+
+class Assembly:
+    """An assembly, its meshes and the names of its parts. Made by `sbdp.load` and `sbdp.assembly`."""
+
+    def __init__(
+        self,
+        parts: Sequence[tuple[str, NDArray[numpy.float64] | NDArray[numpy.float32], NDArray[numpy.uint32]]],
+        units: str | None = None,
+        name: str = "",
+        fixed: Sequence[str] = (),
+    ) -> None: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def units(self) -> str | None:
+        """The unit of length, if known."""
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The names of the parts, in natural order ("2" before "10")."""
+    @property
+    def fixed(self) -> tuple[str, ...]:
+        """Parts that the assembly's own description declares fixed."""
+    @property
+    def groups(self) -> list[tuple[str, list[str]]]:
+        """Parts that belong together where the files say so."""
+    @property
+    def notes(self) -> list[str]:
+        """What was left out, chosen or in doubt when the files were read."""
+    @property
+    def handle(self) -> bytes:
+        """The hash of the content, 32 bytes: the assembly's name for the daemon."""
+    def mesh(self, part: str) -> tuple[NDArray[numpy.float64], NDArray[numpy.uint32]]:
+        """Copies of a part's vertices, of shape (n, 3), and triangles, (m, 3)."""
+    def __len__(self) -> int: ...
+
+def load(
+    path: str | os.PathLike[str],
+    *,
+    split: Literal["objects", "bodies", "none"] | None = None,
+    ignore: Sequence[str] = (),
+    deflection: float | None = None,
+    converter: str | os.PathLike[str] | None = None,
+) -> Assembly:
+    """Reads an assembly as the command line does: a folder of meshes, or a file (OBJ, STL, glTF; STEP by a converter).
+
+    `split` says what is a part in a file that holds several, `ignore` has patterns of names to leave out, `deflection` is
+    how far triangles of STEP files may be from the surfaces, in mm, and `converter` the program that makes them.
+    Raises `GeometryError`, which names file and reason.
+    """
+
+class Step:
+    """Parts that move as one rigid body. A step that is read in place (`views=True`) ends when the next one is asked for:
+    then its properties raise BufferError."""
+
+    @property
+    def number(self) -> int:
+        """Its place in the plan, from 0."""
+    @property
+    def parts(self) -> tuple[str, ...]: ...
+    @property
+    def of(self) -> int | None:
+        """The step that takes the group out (of an assembly plan: puts it in) to which the parts belong, if one does."""
+    @property
+    def ends(self) -> Literal["out", "aside", "in"]: ...
+    @property
+    def motion(self) -> Literal["translation", "rotation"]: ...
+    @property
+    def path(self) -> NDArray[numpy.float64]:
+        """Waypoints, of shape (n, 7): rigid motions [x, y, z, qw, qx, qy, qz] of the parts as they stand when the step
+        begins (of an assembly plan: when it ends). With `views=True` a view that cannot be written to; it owns what it
+        shows, and to ask for the next step while it lives raises BufferError."""
+    @property
+    def verified_depth(self) -> float:
+        """No point gets deeper than this along the path, beyond the depth as assembled."""
+    @property
+    def requires(self) -> tuple[int, ...]:
+        """Numbers of the steps that must be done before."""
+    @property
+    def wave(self) -> int:
+        """The earliest round, from 0, in which it can be done."""
+    @property
+    def direction(self) -> tuple[float, float, float] | None:
+        """The unit vector of the path's last leg."""
+
+class Plan:
+    """A plan that has come to its end."""
+
+    @property
+    def status(
+        self,
+    ) -> Literal["complete", "partial", "infeasible", "timeout", "cancelled", "exhausted"]: ...
+    @property
+    def reason(self) -> str | None:
+        """Why it is not complete."""
+    @property
+    def parts(self) -> tuple[str, ...]: ...
+    @property
+    def remaining(self) -> tuple[str, ...]:
+        """Parts that stand in the assembly in the end."""
+    @property
+    def steps(self) -> tuple[Step, ...]: ...
+    def steps_of(self, part: str) -> list[Step]:
+        """The steps that move a part."""
+    def to_json(self) -> str:
+        """The plan in the contract `sbdp-plan/2`: the bytes of `sbdp plan --json`, the line's end included."""
+    def to_dict(self) -> dict[str, Any]:
+        """The same, parsed."""
+    def __len__(self) -> int:
+        """How many steps."""
+
+class Progress(TypedDict):
+    """Where planning is."""
+
+    stage: Literal["sdf", "search", "transfer"]
+    done: int
+    total: int
+    simulations: int
+
+class PlanStream(Iterator[Step]):
+    """Steps as they are found. To close it, or to leave its `with` block, cancels the request. After a daemon was restarted
+    steps come again from the first (`restarts` counts that)."""
+
+    def __next__(self) -> Step: ...
+    def poll(self, timeout: float = 0.0) -> Step | None:
+        """The next step if it comes within so many seconds; None if there is nothing yet, or nothing more (`done`)."""
+    def result(self, timeout: float | None = None) -> Plan:
+        """Waits for the end, and returns the whole plan, with the steps that were read before. Raises TimeoutError if it has
+        not come within so many seconds; the stream goes on then. BufferError with `views=True`: nothing is kept there."""
+    def cancel(self) -> None:
+        """Asks the daemon to stop soon: the plan so far still comes, with status `cancelled`."""
+    def close(self) -> None:
+        """Ends the request."""
+    @property
+    def done(self) -> bool: ...
+    @property
+    def status(self) -> str | None:
+        """How planning ended; None before."""
+    @property
+    def summary(self) -> dict[str, Any] | None:
+        """The plan's document without its steps, once it has ended."""
+    @property
+    def progress(self) -> Progress | None:
+        """The latest that the daemon said."""
+    @property
+    def restarts(self) -> int: ...
+    def __enter__(self) -> PlanStream: ...
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+class Session:
+    """An assembly that is being taken apart: what has happened to it, and plans for the rest."""
+
+    def executed(self, parts: str | Iterable[str]) -> None:
+        """These parts are out."""
+    def performed(self, step: Step) -> None:
+        """A step of the last plan was done: its parts are out, or stand where it left them."""
+    def stuck(self, part: str) -> None:
+        """This part does not move: until it is freed, plans do without moving it."""
+    def freed(self, part: str) -> None:
+        """This part moves again."""
+    def moved(self, part: str, pose: Pose) -> None:
+        """This part stands elsewhere: the rigid motion of its mesh from where the assembly has it."""
+    def replan(self, timeout: float | None = None, *, views: bool = False) -> PlanStream:
+        """Plans how the rest comes apart from how it stands now, within so many seconds; a timeout stays for the next."""
+
+class Client:
+    """A connection to the daemon. Threads may share it; it receives one plan at a time. Not in a forked child."""
+
+    def __init__(
+        self,
+        runtime_dir: str | os.PathLike[str] | None = None,
+        *,
+        timeout: float = 10.0,
+        upload_timeout: float = 300.0,
+        reconnect: float = 10.0,
+        busy_wait: float = 0.0,
+    ) -> None: ...
+    def plan(self, assembly: Assembly, /, *, views: bool = False, **options: Unpack[Options]) -> PlanStream:
+        """Asks for a plan; the meshes are uploaded if the daemon does not know them."""
+    def session(self, assembly: Assembly, /, **options: Unpack[Options]) -> Session:
+        """Begins a session about how an assembly comes apart."""
+    def upload(self, assembly: Assembly) -> bytes:
+        """Hands an assembly over ahead of the first plan; returns its handle."""
+    def knows(self, assembly: Assembly) -> bool: ...
+    def metrics(self) -> dict[str, Any]:
+        """All figures of the daemon."""
+    @property
+    def pid(self) -> int:
+        """The daemon's process."""
+    @property
+    def restarts(self) -> int:
+        """How often it was followed to another daemon."""
+    def close(self) -> None: ...
+    def __enter__(self) -> Client: ...
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...

@@ -1,0 +1,108 @@
+"""Errors, a class for each reason. Their messages say what to do."""
+
+
+class Error(Exception):
+    """Whatever the daemon or the connection to it refuses. `code` is the daemon's stable number, if it answered."""
+
+    code: int | None = None
+
+
+class MalformedError(Error):
+    """The request cannot be read: use matching versions."""
+
+    code = 1
+
+
+class UnknownHandleError(Error):
+    """The daemon does not know the assembly (any more)."""
+
+    code = 2
+
+
+class BusyError(Error):
+    """The daemon's queue is full: come again after `retry_after` seconds."""
+
+    code = 3
+    retry_after: float = 0.0
+
+
+class ExpiredError(Error):
+    """The deadline passed before planning began."""
+
+    code = 4
+
+
+class GeometryError(Error):
+    """A file or a mesh is refused; the message names the part and the reason."""
+
+    code = 5
+
+
+class NoSuchPartError(Error):
+    """The assembly has no part of this name."""
+
+    code = 6
+
+
+class UnsupportedError(Error):
+    """What is asked for is not offered."""
+
+    code = 7
+
+
+class FailedError(Error):
+    """The daemon failed; its log says more."""
+
+    code = 8
+
+
+class SlowReaderError(Error):
+    """The stream was not read for too long, and was ended."""
+
+    code = 9
+
+
+class ShuttingDownError(Error):
+    """The daemon is about to leave."""
+
+    code = 10
+
+
+class TooLargeError(Error):
+    """The message exceeds a limit of the daemon, or what memory is left."""
+
+    code = 11
+
+
+class CancelledError(Error):
+    """The request was cancelled before planning began."""
+
+    code = 12
+
+
+class NoDaemonError(Error):
+    """No daemon runs, or it went away before it had answered."""
+
+
+class TimeoutError(Error, TimeoutError):
+    """The daemon gave no answer in time: it is overloaded or stopped."""
+
+
+class StreamOpenError(Error):
+    """This client receives a plan already: finish or close that stream, or connect another client."""
+
+
+class ForkedError(Error):
+    """The client belongs to the process that this one was forked from: connect again here."""
+
+
+class TooManyClientsError(Error):
+    """The daemon serves as many clients as it can."""
+
+
+class SharedMemoryError(Error):
+    """/dev/shm is too small for the meshes."""
+
+
+class ConnectionError(Error, ConnectionError):
+    """The daemon cannot be reached or understood: it is of another version, or its folder is not safe."""

@@ -1,0 +1,48 @@
+//! Messages that are longer than a chunk.
+
+use sbdp_ipc::bytes::AlignedBytes;
+use sbdp_ipc::headers::ResponseHeader;
+
+use crate::error::ClientError;
+
+/// No message may announce more than this (it would be put together in memory).
+const LONGEST_MESSAGE: u64 = 1 << 30;
+
+/// A message that comes in several chunks.
+#[derive(Debug, Default)]
+pub(crate) struct Assembler(Option<Begun>);
+
+#[derive(Debug)]
+struct Begun {
+    kind: u32,
+    bytes: AlignedBytes,
+    filled: u64,
+}
+
+impl Assembler {
+    /// Adds a chunk; the message if that was the last one.
+    pub(crate) fn add(
+        &mut self,
+        header: &ResponseHeader,
+        payload: &[u8],
+    ) -> Result<Option<AlignedBytes>, ClientError> {
+        if header.offset == 0 && header.total <= LONGEST_MESSAGE {
+            let bytes = AlignedBytes::zeroed(header.total as usize);
+            self.0 = Some(Begun { kind: header.kind, bytes, filled: 0 });
+        }
+        let wrong = || ClientError::Protocol("the chunks of a message do not fit together".to_owned());
+        let mut begun = self.0.take().ok_or_else(wrong)?;
+        let (start, end) = (begun.filled, begun.filled + payload.len() as u64);
+        if header.offset != start || header.kind != begun.kind {
+            return Err(wrong());
+        }
+        let target = begun.bytes.as_mut_slice().get_mut(start as usize..end as usize).ok_or_else(wrong)?;
+        target.copy_from_slice(payload);
+        begun.filled = end;
+        if end == header.total {
+            return Ok(Some(begun.bytes));
+        }
+        self.0 = Some(begun);
+        Ok(None)
+    }
+}

@@ -1,0 +1,56 @@
+//! The document of a plan, with all that is known of the files that it is about.
+
+use std::path::Path;
+
+use crate::files::{IgnorePattern, Split};
+use crate::geometry::{Revision, SourceAssembly, SourceGroup};
+use crate::plan::export::{GroupDocument, PlanDocument, SourceDocument};
+use crate::plan::{Plan, Warning};
+
+/// Puts what was found while the files were read before the plan's own warnings.
+pub fn add_notes(plan: &mut Plan, assembly: &SourceAssembly) {
+    let notes = assembly.notes.iter().map(|note| Warning { part: None, message: note.clone() });
+    plan.warnings.splice(0..0, notes);
+}
+
+/// The document of a plan (with [notes](add_notes)) of an assembly from files.
+#[must_use]
+pub fn document(plan: &Plan, assembly: &SourceAssembly, source: SourceDocument) -> PlanDocument {
+    let group = |g: &SourceGroup| GroupDocument { name: g.name.clone(), parts: g.parts.clone() };
+    let groups = assembly.groups.iter().map(group).collect();
+    PlanDocument { source: Some(source), groups, ..PlanDocument::new(plan) }
+}
+
+/// Where the meshes are, and how they were read; `deflection` only if it was given.
+#[must_use]
+pub fn source(
+    path: &Path,
+    content: String,
+    split: Option<Split>,
+    ignore: &[IgnorePattern],
+    deflection: Option<f64>,
+) -> SourceDocument {
+    SourceDocument {
+        assembly: absolute(path),
+        content,
+        split: split.map(|split| split.to_string()),
+        ignore: ignore.iter().map(|pattern| pattern.as_str().to_owned()).collect(),
+        deflection,
+        ..SourceDocument::default()
+    }
+}
+
+/// A path that means the same in every folder.
+#[must_use]
+pub fn absolute(path: &Path) -> String {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned()).display().to_string()
+}
+
+/// A hash of an assembly as it was read (whose own hash is given), with the meshes that differ.
+#[must_use]
+pub fn content_of(base: &[u8; 32], revision: &Revision) -> String {
+    let Revision { replaced, added, .. } = revision.clone();
+    let meshes = Revision { replaced, added, ..Revision::default() };
+    let hash = if meshes.is_empty() { *base } else { meshes.content_hash(base) };
+    blake3::Hash::from_bytes(hash).to_hex().to_string()
+}

@@ -1,0 +1,10 @@
+//! Between the planning modules and clients of the daemon: assemblies as they are uploaded, plans as they come, and the
+//! documents of plans. The command line, the benchmarks and the clients in other languages have it in common.
+
+mod document;
+mod plan;
+mod upload;
+
+pub use document::{absolute, add_notes, content_of, document, source};
+pub use plan::{plan, plan_step};
+pub use upload::{wire_assembly, wire_mesh, wire_part};
