@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use rustix::process::{Pid, Signal, kill_process};
-use sbdp::bench::{self, BenchError, BenchObserver, Record, Request, Shard, Summary};
+use sbdp::bench::{self, BenchError, BenchObserver, Record, Request, Shard, Summary, Unit};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests")
@@ -255,6 +255,27 @@ fn shards_of_rotated_runs_are_put_together() {
         logs.filter_map(turned).map(|(name, rest)| name + rest.split(' ').next().unwrap_or("")).collect()
     };
     assert_eq!(lines(&folders), lines(&[whole.out]));
+}
+
+#[test]
+fn units_have_the_records_of_the_whole_but_for_the_times() {
+    let folder = tempfile::tempdir().unwrap();
+    let planners = ["sbdp-star", "pdp-star"].map(str::to_owned).to_vec();
+    let whole = Request { planners, rotations: 1, ..request(folder.path(), &["a", "crash", "refuse"]) };
+    run(&whole).unwrap();
+    let timeless = |mut record: Record| {
+        (record.wall_time_s, record.peak_memory_kib) = (0.0, 0);
+        format!("{record:?}")
+    };
+    let expected: Vec<String> = bench::read(&whole.out).unwrap().into_iter().map(timeless).collect();
+    let alone = |unit: Unit| {
+        let line = serde_json::to_string(&unit).unwrap();
+        let unit = Unit::from_json(&line).unwrap();
+        timeless(bench::run_unit(unit, &whole.program, &AtomicBool::new(false)).unwrap().unwrap())
+    };
+    let units = bench::units(&whole).unwrap();
+    assert_eq!(units.len(), 3 * 2 * 3, "pdp-star is two");
+    assert_eq!(units.into_iter().map(alone).collect::<Vec<_>>(), expected);
 }
 
 #[test]

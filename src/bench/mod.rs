@@ -24,6 +24,7 @@ mod tables;
 #[cfg(test)]
 mod tests;
 mod through_daemon;
+mod unit;
 
 use std::collections::HashSet;
 use std::io;
@@ -42,9 +43,11 @@ pub use through_daemon::{
     LoadClient, LoadRequest, Percentiles, Phase, ProcessFootprint, ReplanRecord, Restart, Role, Soak,
     SoakRequest, churn, latency, load, load_client, replan, restart, serve_raw, soak,
 };
+pub use unit::{Unit, run_unit};
 
 use estimate::Estimate;
-use runner::{Job, Runner};
+use runner::Runner;
+pub(crate) use runner::end_with_benchmark;
 use statistics::EngineResults;
 
 /// The planners, in the order of the tables. PDP* never runs by itself: it is what PDP_t solved and, of the
@@ -169,19 +172,43 @@ pub fn run(
     cancel: &AtomicBool,
     observer: &mut dyn BenchObserver,
 ) -> Result<Summary, BenchError> {
-    let planners = planners_to_run(&request.planners)?;
-    let engines = known("engine", &ENGINES, &request.engines)?;
-    let mut problems = find(&request.corpora)?;
-    problems.retain(|p| request.parts_up_to.is_none_or(|most| p.parts <= most));
-    let problems = request.shard.select(problems);
+    let units = units(request)?;
     let settings = settings(request)?;
     std::fs::create_dir_all(&request.out).map_err(|e| BenchError::file(&request.out, &e))?;
     let (store, mut records) = Store::open(&request.out)?;
     check_resumable(&settings, &records, &request.out)?;
-    let jobs = jobs(&problems, request.rotations, &planners, &engines);
-    let missing = run_missing(request, &settings, &jobs, store, &mut records, cancel, observer)?;
+    let missing = run_missing(request, &settings, &units, store, &mut records, cancel, observer)?;
     write_evaluation(&request.out, &records)?;
     Ok(Summary { records: records.len(), missing, repeated: 0 })
+}
+
+/// All runs of a benchmark: problem by problem, so that an interrupted one has problems that all planners ran on.
+///
+/// # Errors
+/// As [`run`].
+pub fn units(request: &Request) -> Result<Vec<Unit>, BenchError> {
+    let planners = planners_to_run(&request.planners)?;
+    let engines = known("engine", &ENGINES, &request.engines)?;
+    let mut problems = find(&request.corpora)?;
+    problems.retain(|p| request.parts_up_to.is_none_or(|most| p.parts <= most));
+    let settings = settings(request)?;
+    let mut units = Vec::new();
+    for CorpusProblem { name, folder, parts } in request.shard.select(problems) {
+        for rotation in 0..=request.rotations {
+            for engine in &engines {
+                units.extend(planners.iter().map(|planner| Unit {
+                    assembly: name.clone(),
+                    folder: folder.clone(),
+                    parts,
+                    rotation,
+                    planner: (*planner).to_owned(),
+                    engine: (*engine).to_owned(),
+                    settings: settings.clone(),
+                }));
+            }
+        }
+    }
+    Ok(units)
 }
 
 /// Puts the results of several folders together, writes the merged records, tables and figures.
@@ -270,11 +297,20 @@ fn planners_to_run(names: &[String]) -> Result<Vec<&'static str>, BenchError> {
     Ok(PLANNERS.into_iter().filter(|p| *p != PDP_STAR && asked.contains(p)).collect())
 }
 
+/// The hash of an executable.
+fn build_of(program: &Path) -> Result<String, BenchError> {
+    let bytes = std::fs::read(program).map_err(|e| BenchError::file(program, &e))?;
+    Ok(blake3::hash(&bytes).to_hex()[..12].to_owned())
+}
+
+fn processors() -> usize {
+    std::thread::available_parallelism().map_or(0, usize::from)
+}
+
 fn settings(request: &Request) -> Result<Settings, BenchError> {
-    let program = std::fs::read(&request.program).map_err(|e| BenchError::file(&request.program, &e))?;
     Ok(Settings {
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        build: blake3::hash(&program).to_hex()[..12].to_owned(),
+        build: build_of(&request.program)?,
         timeout_s: request.timeout.as_secs_f64(),
         path_timeout_s: request.path_timeout.as_secs_f64(),
         actions: request.actions.to_owned(),
@@ -283,7 +319,7 @@ fn settings(request: &Request) -> Result<Settings, BenchError> {
         seed: request.seed,
         threads: request.threads,
         jobs: request.jobs,
-        processors: std::thread::available_parallelism().map_or(0, usize::from),
+        processors: processors(),
     })
 }
 
@@ -301,47 +337,29 @@ fn different(here: &Settings, there: &Settings, folder: &Path) -> BenchError {
     ))
 }
 
-/// Problem by problem, so that an interrupted benchmark has problems that all planners ran on.
-fn jobs<'a>(
-    problems: &'a [CorpusProblem],
-    rotations: u32,
-    planners: &[&'static str],
-    engines: &[&'static str],
-) -> Vec<Job<'a>> {
-    let mut jobs = Vec::new();
-    for problem in problems {
-        for rotation in 0..=rotations {
-            for engine in engines {
-                jobs.extend(planners.iter().map(|planner| Job { problem, rotation, planner, engine }));
-            }
-        }
-    }
-    jobs
-}
-
 /// Runs what has no record; how many runs are missing in the end.
 fn run_missing(
     request: &Request,
     settings: &Settings,
-    jobs: &[Job<'_>],
+    units: &[Unit],
     store: Store,
     records: &mut Vec<Record>,
     cancel: &AtomicBool,
     observer: &mut dyn BenchObserver,
 ) -> Result<usize, BenchError> {
     let present: HashSet<_> = records.iter().map(Record::key).collect();
-    let to_do: Vec<Job<'_>> = jobs.iter().copied().filter(|j| !present.contains(&j.key())).collect();
+    let to_do: Vec<&Unit> = units.iter().filter(|unit| !present.contains(&unit.key())).collect();
     let mut estimate = Estimate::default();
     for record in records.iter() {
         estimate.took(record.group(), &record.planner, &record.engine, record.wall_time_s);
     }
-    to_do.iter().for_each(|j| estimate.expect(j.category(), j.planner, j.engine));
-    observer.begun(jobs.len(), jobs.len() - to_do.len());
+    to_do.iter().for_each(|unit| estimate.expect(unit.category(), &unit.planner, &unit.engine));
+    observer.begun(units.len(), units.len() - to_do.len());
     let mut ledger =
-        Ledger { store, records, observer, estimate, done: jobs.len() - to_do.len(), jobs: request.jobs };
+        Ledger { store, records, observer, estimate, done: units.len() - to_do.len(), jobs: request.jobs };
     let scratch = Scratch::new(&request.out)?;
     run_side_by_side(request, settings, &scratch.own, &to_do, cancel, &mut ledger)?;
-    Ok(jobs.len() - ledger.done)
+    Ok(units.len() - ledger.done)
 }
 
 /// The folder that processes write to. Each benchmark has one of its own: a process that outlived
@@ -359,6 +377,10 @@ impl Scratch {
         scratch.clear();
         std::fs::create_dir_all(&scratch.own).map_err(|e| BenchError::file(&scratch.own, &e))?;
         Ok(scratch)
+    }
+
+    fn own(&self) -> &Path {
+        &self.own
     }
 
     /// What is left there is of no use to anybody, but no reason to fail either.
@@ -384,11 +406,11 @@ struct Ledger<'a> {
 }
 
 impl Ledger<'_> {
-    fn enter(&mut self, job: Job<'_>, record: Record) -> Result<(), BenchError> {
+    fn enter(&mut self, unit: &Unit, record: Record) -> Result<(), BenchError> {
         self.store.append(&record)?;
         self.done += 1;
-        self.estimate.done(job.category(), job.planner, job.engine);
-        self.estimate.took(job.category(), job.planner, job.engine, record.wall_time_s);
+        self.estimate.done(unit.category(), &unit.planner, &unit.engine);
+        self.estimate.took(unit.category(), &unit.planner, &unit.engine, record.wall_time_s);
         let left = self.estimate.left().map(|t| t / self.jobs.max(1) as u32);
         self.observer.ran(&record, self.done, left);
         self.records.push(record);
@@ -396,12 +418,12 @@ impl Ledger<'_> {
     }
 }
 
-/// Several runners take jobs in order; the first error stops them all.
+/// Several runners take units in order; the first error stops them all.
 fn run_side_by_side(
     request: &Request,
     settings: &Settings,
     scratch: &Path,
-    to_do: &[Job<'_>],
+    to_do: &[&Unit],
     cancel: &AtomicBool,
     ledger: &mut Ledger<'_>,
 ) -> Result<(), BenchError> {
@@ -420,17 +442,17 @@ fn run_side_by_side(
                 number,
             };
             scope.spawn(move || {
-                while let Some(&job) = to_do.get(next.fetch_add(1, Ordering::Relaxed)) {
+                while let Some(&unit) = to_do.get(next.fetch_add(1, Ordering::Relaxed)) {
                     // Nobody listens any more after an error.
-                    if runner.is_ended() || sender.send((job, runner.run(job))).is_err() {
+                    if runner.is_ended() || sender.send((unit, runner.run(unit))).is_err() {
                         break;
                     }
                 }
             });
         }
         drop(sender);
-        let mut enter = |(job, result): (Job<'_>, Result<Option<Record>, BenchError>)| match result? {
-            Some(record) => ledger.enter(job, record),
+        let mut enter = |(unit, result): (&Unit, Result<Option<Record>, BenchError>)| match result? {
+            Some(record) => ledger.enter(unit, record),
             None => Ok(()),
         };
         let result = ended.into_iter().try_for_each(&mut enter);

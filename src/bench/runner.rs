@@ -7,10 +7,13 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use rustix::process::{Signal, getppid, set_parent_process_death_signal};
+
 use super::BenchError;
-use super::corpus::{Category, CorpusProblem};
-use super::record::{Record, RunKey, Settings};
+use super::corpus::Category;
+use super::record::{Record, Settings};
 use super::rotation::random_rotation;
+use super::unit::Unit;
 use crate::plan::StepEnd;
 use crate::plan::export::{PlanDocument, StepDocument};
 
@@ -23,17 +26,23 @@ const REFUSALS: [i32; 2] = [1, 2];
 /// How much of what a process said is looked at.
 const LAST_WORDS: usize = 4096;
 
-/// What to run.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Job<'a> {
-    pub(super) problem: &'a CorpusProblem,
-    /// As [`Record::rotation`].
-    pub(super) rotation: u32,
-    pub(super) planner: &'static str,
-    pub(super) engine: &'static str,
+/// Environment variable of a process that a benchmark runs: the number of the process that reads its plan.
+const READER: &str = "SBDP_BENCH_READER";
+
+/// If a benchmark runs this process, it ends with that: a killed benchmark ends nothing itself, and what went on would take
+/// processor time from the next one.
+pub(crate) fn end_with_benchmark() {
+    let Ok(reader) = std::env::var(READER) else { return };
+    // Without the signal, a benchmark's process only runs for longer than it must.
+    let _ = set_parent_process_death_signal(Some(Signal::KILL));
+    let parent = getppid().map(|parent| parent.as_raw_nonzero().to_string());
+    if parent.is_none_or(|parent| parent != reader) {
+        // It ended before the signal was asked for.
+        std::process::exit(CANCELLED);
+    }
 }
 
-/// Runs jobs one after the other; several may work side by side, each with its own files.
+/// Runs units one after the other; several may work side by side, each with its own files.
 pub(super) struct Runner<'a> {
     pub(super) program: &'a Path,
     pub(super) settings: &'a Settings,
@@ -53,29 +62,18 @@ enum End {
     Cancelled,
 }
 
-impl<'a> Job<'a> {
-    pub(super) fn category(&self) -> Category {
-        Category::of(self.problem.parts)
-    }
-
-    /// As [`Record::key`] of its record.
-    pub(super) fn key(&self) -> RunKey<'a> {
-        (&self.problem.name, self.rotation, self.planner, self.engine)
-    }
-}
-
 impl Runner<'_> {
     pub(super) fn is_ended(&self) -> bool {
         self.ended_by.iter().any(|flag| flag.load(Ordering::Relaxed))
     }
 
-    /// Runs a job to its record, or `None` if it was cancelled.
-    pub(super) fn run(&self, job: Job<'_>) -> Result<Option<Record>, BenchError> {
+    /// Runs a unit to its record, or `None` if it was cancelled.
+    pub(super) fn run(&self, unit: &Unit) -> Result<Option<Record>, BenchError> {
         let (plan, said) = (self.file("json"), self.file("stderr"));
         // A plan of the run before must not pass for this one's.
         remove(&plan)?;
         let started = Instant::now();
-        let mut process = self.start(job, &plan, &said)?;
+        let mut process = self.start(unit, &plan, &said)?;
         let mut peak = 0;
         let end = self.wait(&mut process, started, &mut peak);
         let end = end.map_err(|e| BenchError::file(self.program, &e))?;
@@ -83,9 +81,9 @@ impl Runner<'_> {
         let record = match end {
             End::Cancelled => None,
             End::Overstayed => {
-                Some(self.record(job, wall, "killed", format!("did not end within {} s", wall.as_secs())))
+                Some(self.record(unit, wall, "killed", format!("did not end within {} s", wall.as_secs())))
             }
-            End::Exited(status) => self.ended(job, wall, status, &plan, &said),
+            End::Exited(status) => self.ended(unit, wall, status, &plan, &said),
         };
         remove(&plan)?;
         remove(&said)?;
@@ -96,17 +94,17 @@ impl Runner<'_> {
         self.scratch.join(format!("{}.{extension}", self.number))
     }
 
-    fn start(&self, job: Job<'_>, plan: &Path, said: &Path) -> Result<Process, BenchError> {
+    fn start(&self, unit: &Unit, plan: &Path, said: &Path) -> Result<Process, BenchError> {
         let stderr = File::create(said).map_err(|e| BenchError::file(said, &e))?;
         let mut command = Command::new(self.program);
-        command.arg("plan").arg(&job.problem.folder).args(["--embedded", "--no-cache"]);
-        command.args(["--planner", job.planner, "--engine", job.engine]);
+        command.arg("plan").arg(&unit.folder).args(["--embedded", "--no-cache"]);
+        command.args(["--planner", &unit.planner, "--engine", &unit.engine]);
         command.args(["--planning-timeout", &self.timeout.as_secs_f64().to_string()]);
         command.args(["--path-timeout", &self.settings.path_timeout_s.to_string()]);
         command.args(["--actions", &self.settings.actions, "--dbg", &self.settings.dbg]);
         command.arg(if self.settings.sweeps { "--sweeps" } else { "--no-sweeps" });
-        if job.rotation > 0 {
-            let q = random_rotation(self.settings.seed, &job.problem.name, job.rotation);
+        if unit.rotation > 0 {
+            let q = random_rotation(self.settings.seed, &unit.assembly, unit.rotation);
             // As one word: it may begin with a minus.
             command.arg(format!("--rotate={},{},{},{}", q.w, q.i, q.j, q.k));
         }
@@ -114,6 +112,7 @@ impl Runner<'_> {
             command.args(["--threads", &self.settings.threads.to_string()]);
         }
         command.arg("--json").arg(plan);
+        command.env(READER, std::process::id().to_string());
         // Into a file, for a full pipe would stop the process.
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
         command.spawn().map(Process).map_err(|e| BenchError::file(self.program, &e))
@@ -140,17 +139,17 @@ impl Runner<'_> {
 
     fn ended(
         &self,
-        job: Job<'_>,
+        unit: &Unit,
         wall: Duration,
         status: ExitStatus,
         plan: &Path,
         said: &Path,
     ) -> Option<Record> {
-        let problem = |name: &str, what: String| Some(self.record(job, wall, name, what));
+        let problem = |name: &str, what: String| Some(self.record(unit, wall, name, what));
         match status.code() {
             Some(CANCELLED) => None,
             Some(code) if PLAN_CODES.contains(&code) => match read_plan(plan) {
-                Ok(document) => Some(self.planned(job, wall, &document)),
+                Ok(document) => Some(self.planned(unit, wall, &document)),
                 Err(reason) => problem("crashed", format!("{status}, but {reason}")),
             },
             Some(code) if REFUSALS.contains(&code) => problem("failed", last_words(said)),
@@ -158,7 +157,7 @@ impl Runner<'_> {
         }
     }
 
-    fn planned(&self, job: Job<'_>, wall: Duration, plan: &PlanDocument) -> Record {
+    fn planned(&self, unit: &Unit, wall: Duration, plan: &PlanDocument) -> Record {
         let s = &plan.stats;
         Record {
             parts: plan.parts.len(),
@@ -174,18 +173,18 @@ impl Runner<'_> {
             verify_time_s: s.verify_time_s,
             steps: plan.steps.len(),
             verified: verified(plan),
-            ..self.record(job, wall, &plan.status, String::new())
+            ..self.record(unit, wall, &plan.status, String::new())
         }
     }
 
-    fn record(&self, job: Job<'_>, wall: Duration, status: &str, reason: String) -> Record {
+    fn record(&self, unit: &Unit, wall: Duration, status: &str, reason: String) -> Record {
         Record {
-            assembly: job.problem.name.clone(),
-            rotation: job.rotation,
-            parts: job.problem.parts,
-            category: Category::of(job.problem.parts).name().to_owned(),
-            planner: job.planner.to_owned(),
-            engine: job.engine.to_owned(),
+            assembly: unit.assembly.clone(),
+            rotation: unit.rotation,
+            parts: unit.parts,
+            category: unit.category().name().to_owned(),
+            planner: unit.planner.clone(),
+            engine: unit.engine.clone(),
             status: status.to_owned(),
             reason: Some(reason),
             simulations: 0,

@@ -214,6 +214,10 @@ pub(super) struct BenchArguments {
 pub(super) enum BenchCommand {
     /// Plan families of assemblies with ever more parts, and see how time and memory grow
     Scale(BenchScale),
+    /// Print the runs of a benchmark, one line of JSON each, for `run-unit`
+    Units(BenchUnits),
+    /// Run one line of `units` and print its record, a line of results.jsonl
+    RunUnit(BenchUnit),
     /// Put results together, as those of shards, and evaluate them without running anything
     Report(BenchReport),
     /// Ask a daemon for the same plan again and again, beside a peer that only copies its bytes
@@ -277,7 +281,7 @@ pub(super) struct BenchRun {
     no_sweeps: bool,
     /// Where results, tables and figures go; a benchmark that was interrupted goes on there
     #[arg(long, value_name = "DIR", required = true)]
-    pub(super) out: PathBuf,
+    pub(super) out: Option<PathBuf>,
     /// Run only the K-th of N parts of the corpus, as 2/8; `bench report` puts them together
     #[arg(long, value_name = "K/N")]
     pub(super) shard: Option<Shard>,
@@ -302,6 +306,22 @@ impl BenchRun {
     pub(super) fn sweeps(&self) -> Sweeps {
         Sweeps { sweeps: self.sweeps, no_sweeps: self.no_sweeps }
     }
+}
+
+/// Arguments of `sbdp bench units`: those of a benchmark, without where results go.
+#[derive(Debug, Args)]
+#[command(mut_arg("out", |out| out.required(false).hide(true)), mut_arg("jobs", |jobs| jobs.hide(true)))]
+pub(super) struct BenchUnits {
+    #[command(flatten)]
+    pub(super) run: BenchRun,
+}
+
+/// Arguments of `sbdp bench run-unit`.
+#[derive(Debug, Args)]
+pub(super) struct BenchUnit {
+    /// The line [default: stdin's first]
+    #[arg(value_name = "UNIT")]
+    pub(super) unit: Option<String>,
 }
 
 /// Arguments of `sbdp bench scale`.

@@ -11,11 +11,12 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
 
-use super::args::{BenchArguments, BenchCommand, BenchReport, BenchRun, BenchScale};
+use super::args::{BenchArguments, BenchCommand, BenchReport, BenchRun, BenchScale, BenchUnit};
 use super::error::CliError;
 use super::{interrupt, print};
-use crate::bench::{self, BenchError, BenchObserver, Record, Request, ScaleRequest, Shard, Summary};
+use crate::bench::{self, BenchError, BenchObserver, Record, Request, ScaleRequest, Shard, Summary, Unit};
 use crate::blocking_graph::StaticAnalysis;
 use crate::search;
 
@@ -26,6 +27,8 @@ const INTERRUPTED: u8 = 5;
 
 pub(super) fn run(arguments: &BenchArguments) -> Result<ExitCode, CliError> {
     match (&arguments.command, &arguments.run) {
+        (Some(BenchCommand::Units(units)), _) => print_units(&units.run),
+        (Some(BenchCommand::RunUnit(unit)), _) => run_unit(unit),
         (Some(BenchCommand::Report(report)), _) => report_on(report),
         (Some(BenchCommand::Scale(scale)), _) => measure_growth(scale),
         (Some(BenchCommand::Latency(latency)), _) => through_daemon::latency(latency),
@@ -44,7 +47,37 @@ pub(super) fn run(arguments: &BenchArguments) -> Result<ExitCode, CliError> {
 
 fn measure(arguments: &BenchRun) -> Result<ExitCode, CliError> {
     let request = request(arguments);
-    watched(|cancel, display| bench::run(&request, cancel, display), &files(&arguments.out))
+    watched(|cancel, display| bench::run(&request, cancel, display), &files(&request.out))
+}
+
+fn print_units(arguments: &BenchRun) -> Result<ExitCode, CliError> {
+    for unit in bench::units(&request(arguments))? {
+        print(&json_line(&unit)?)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_unit(arguments: &BenchUnit) -> Result<ExitCode, CliError> {
+    let mut line = String::new();
+    let line = match &arguments.unit {
+        Some(unit) => unit,
+        None => {
+            let read = std::io::stdin().read_line(&mut line);
+            read.map_err(|e| CliError::Refused(format!("stdin: {e}")))?;
+            &line
+        }
+    };
+    let cancel = Arc::new(AtomicBool::new(false));
+    interrupt::cancel_on_interrupt(&cancel)?;
+    let record = bench::run_unit(Unit::from_json(line)?, Path::new(THIS_PROGRAM), &cancel)?;
+    let Some(record) = record else { return Ok(ExitCode::from(INTERRUPTED)) };
+    print(&json_line(&record)?)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn json_line(value: &impl Serialize) -> Result<String, CliError> {
+    let json = serde_json::to_string(value).map_err(|e| CliError::Failed(e.to_string()))?;
+    Ok(json + "\n")
 }
 
 fn measure_growth(arguments: &BenchScale) -> Result<ExitCode, CliError> {
@@ -98,7 +131,8 @@ fn request(arguments: &BenchRun) -> Request {
         rotations: arguments.rotations,
         seed: arguments.seed,
         shard: arguments.shard.unwrap_or(Shard::WHOLE),
-        out: arguments.out.clone(),
+        // Only `units` goes without.
+        out: arguments.out.clone().unwrap_or_default(),
         program: PathBuf::from(THIS_PROGRAM),
     }
 }

@@ -5,6 +5,8 @@ use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+use sbdp_client::ConnectOptions;
+
 use super::args::{GroupsArgument, PlanArguments};
 use super::backend::{Backend, CommandQuestion, Embedded};
 use super::daemon::{Daemon, concluded, went_away};
@@ -14,8 +16,7 @@ use super::part_names::{part_named, resolve};
 use super::staging::staging;
 use super::subject::{Subject, further, only_mesh};
 use super::{cache, interrupt, print, report, written};
-use sbdp_client::ConnectOptions;
-
+use crate::bench::end_with_benchmark;
 use crate::cache::CacheSettings;
 use crate::exchange::{absolute, add_notes, content_of, document, source};
 use crate::files::{LoadOptions, load};
@@ -26,6 +27,7 @@ use crate::search::{PlanRequest, Planner, Termination};
 use crate::simulation::PenaltyParameters;
 
 pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
+    end_with_benchmark();
     let planned = planned(arguments)?;
     write_files(arguments, &planned)?;
     if arguments.json.as_deref() != Some(Path::new(STDOUT)) {
