@@ -37,13 +37,14 @@ pub use cancel::{CancelRecord, CancelRequest, cancel};
 pub use corpus::{Category, CorpusProblem, Shard, find};
 pub use families::Family;
 pub use record::{Record, RunKey, Settings, Store, read};
+pub use runner::run_unit;
 pub use scale::{Growth, PARTS, ScaleRequest, scale};
 pub use through_daemon::{
     Churn, ChurnRequest, ChurnSample, Cost, DaemonFigures, Kind, KindFigures, Latency, LatencyRequest, Load,
     LoadClient, LoadRequest, Percentiles, Phase, ProcessFootprint, ReplanRecord, Restart, Role, Soak,
     SoakRequest, churn, latency, load, load_client, replan, restart, serve_raw, soak,
 };
-pub use unit::{Unit, run_unit};
+pub use unit::Unit;
 
 use estimate::Estimate;
 use runner::Runner;

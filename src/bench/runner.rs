@@ -9,11 +9,11 @@ use std::time::{Duration, Instant};
 
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 
-use super::BenchError;
 use super::corpus::Category;
 use super::record::{Record, Settings};
 use super::rotation::random_rotation;
 use super::unit::Unit;
+use super::{BenchError, Scratch, build_of, grace, processors};
 use crate::plan::StepEnd;
 use crate::plan::export::{PlanDocument, StepDocument};
 
@@ -60,6 +60,43 @@ enum End {
     Exited(ExitStatus),
     Overstayed,
     Cancelled,
+}
+
+/// Runs a unit with `program` to its record; `None` once `cancel` is set.
+///
+/// # Errors
+/// Its assembly is not on this machine, it was made by another build, or a file or process failed. There is no record
+/// then: another machine may do better.
+pub fn run_unit(unit: Unit, program: &Path, cancel: &AtomicBool) -> Result<Option<Record>, BenchError> {
+    let build = build_of(program)?;
+    let (its, version) = (&unit.settings.build, &unit.settings.version);
+    if *its != build {
+        return Err(BenchError::Refused(format!(
+            "the unit was made by sbdp {version}, build {its}, and this is build {build}: use one binary on all machines"
+        )));
+    }
+    if !unit.folder.is_dir() {
+        return Err(BenchError::Refused(format!(
+            "{}: there is no such folder on this machine",
+            unit.folder.display()
+        )));
+    }
+    let settings = Settings { jobs: 1, processors: processors(), ..unit.settings.clone() };
+    let unit = Unit { settings, ..unit };
+    let folder = tempfile::Builder::new().prefix("sbdp-unit-").tempdir().map_err(BenchError::failed)?;
+    let scratch = Scratch::new(folder.path())?;
+    // Checked where it was read; a unit that was made otherwise runs for as long as it can.
+    let timeout = Duration::try_from_secs_f64(unit.settings.timeout_s).unwrap_or(Duration::MAX);
+    let runner = Runner {
+        program,
+        settings: &unit.settings,
+        timeout,
+        grace: grace(timeout),
+        ended_by: [cancel, cancel],
+        scratch: scratch.own().to_owned(),
+        number: 0,
+    };
+    runner.run(&unit)
 }
 
 impl Runner<'_> {
@@ -258,6 +295,7 @@ fn last_words(file: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::unit::tests::unit;
     use super::*;
 
     fn words(text: &str) -> String {
@@ -283,5 +321,15 @@ mod tests {
         assert_eq!(words(panic), "index 3 out of bounds");
         assert_eq!(words(&format!("{}\nlast", "x".repeat(100_000))), "last");
         assert_eq!(words(" \n"), "said nothing");
+    }
+
+    #[test]
+    fn a_unit_of_another_build_or_without_its_folder_has_no_record() {
+        let program = Path::new("/proc/self/exe");
+        let run = |unit| run_unit(unit, program, &AtomicBool::new(false)).unwrap_err().to_string();
+        assert!(run(unit()).contains("use one binary on all machines"));
+        let mut here = unit();
+        here.settings.build = build_of(program).unwrap();
+        assert!(run(here).contains("/corpus/hinge"));
     }
 }

@@ -1,16 +1,14 @@
 //! A run as a unit of its own, so that anything can hand the runs of a benchmark out to machines: `sbdp bench units`
 //! prints one line of JSON per run, `sbdp bench run-unit` takes one and prints its record.
 
-use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicBool;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
 use super::corpus::Category;
-use super::record::{Record, RunKey, Settings};
-use super::runner::Runner;
-use super::{BenchError, ENGINES, PLANNERS, Scratch, build_of, grace, known, processors};
+use super::record::{RunKey, Settings};
+use super::{BenchError, ENGINES, PLANNERS, known};
 
 /// One assembly, as given or rotated, one planner, one engine, and how they are run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,7 +31,7 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// As [`Record::key`] of its record.
+    /// As [`Record::key`](super::Record::key) of its record.
     #[must_use]
     pub fn key(&self) -> RunKey<'_> {
         (&self.assembly, self.rotation, &self.planner, &self.engine)
@@ -63,48 +61,11 @@ impl Unit {
     }
 }
 
-/// Runs a unit with `program` to its record; `None` once `cancel` is set.
-///
-/// # Errors
-/// Its assembly is not on this machine, it was made by another build, or a file or process failed. There is no record
-/// then: another machine may do better.
-pub fn run_unit(unit: Unit, program: &Path, cancel: &AtomicBool) -> Result<Option<Record>, BenchError> {
-    let build = build_of(program)?;
-    let (its, version) = (&unit.settings.build, &unit.settings.version);
-    if *its != build {
-        return Err(BenchError::Refused(format!(
-            "the unit was made by sbdp {version}, build {its}, and this is build {build}: use one binary on all machines"
-        )));
-    }
-    if !unit.folder.is_dir() {
-        return Err(BenchError::Refused(format!(
-            "{}: there is no such folder on this machine",
-            unit.folder.display()
-        )));
-    }
-    let settings = Settings { jobs: 1, processors: processors(), ..unit.settings.clone() };
-    let unit = Unit { settings, ..unit };
-    let folder = tempfile::Builder::new().prefix("sbdp-unit-").tempdir().map_err(BenchError::failed)?;
-    let scratch = Scratch::new(folder.path())?;
-    // Checked where it was read; a unit that was made otherwise runs for as long as it can.
-    let timeout = Duration::try_from_secs_f64(unit.settings.timeout_s).unwrap_or(Duration::MAX);
-    let runner = Runner {
-        program,
-        settings: &unit.settings,
-        timeout,
-        grace: grace(timeout),
-        ended_by: [cancel, cancel],
-        scratch: scratch.own().to_owned(),
-        number: 0,
-    };
-    runner.run(&unit)
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn unit() -> Unit {
+    pub(in super::super) fn unit() -> Unit {
         let settings = Settings {
             version: "0".into(),
             build: "b".into(),
@@ -150,15 +111,5 @@ mod tests {
             let error = Unit::from_json(&changed).unwrap_err().to_string();
             assert!(error.contains(words), "{error}");
         }
-    }
-
-    #[test]
-    fn a_unit_of_another_build_or_without_its_folder_has_no_record() {
-        let program = Path::new("/proc/self/exe");
-        let run = |unit| run_unit(unit, program, &AtomicBool::new(false)).unwrap_err().to_string();
-        assert!(run(unit()).contains("use one binary on all machines"));
-        let mut here = unit();
-        here.settings.build = build_of(program).unwrap();
-        assert!(run(here).contains("/corpus/hinge"));
     }
 }
