@@ -136,7 +136,7 @@ pub struct Request {
     pub program: PathBuf,
 }
 
-/// Is told how a benchmark gets on.
+/// Receives the progress of a benchmark.
 pub trait BenchObserver {
     /// The number of all runs, and of those that had been done before.
     fn begun(&mut self, total: usize, done: usize);

@@ -19,7 +19,7 @@ use crate::plan::export::{PlanDocument, StepDocument};
 
 /// `sbdp plan` exits with these when it has written a plan.
 const PLAN_CODES: [i32; 3] = [0, 3, 4];
-/// It was told to stop.
+/// It was asked to stop.
 const CANCELLED: i32 = 5;
 /// It said why there is no plan: wrong usage or refused input, and anything else in good order.
 const REFUSALS: [i32; 2] = [1, 2];

@@ -82,7 +82,7 @@ impl Subject {
         if !source.content.is_empty() && content_of(&content, &revision) != source.content {
             let other = format!("the meshes in {} are not those that were planned", path.display());
             match meshes {
-                // Whoever names them may mean them: finer ones of the same parts.
+                // A user who names them may mean them: finer ones of the same parts.
                 Some(_) => eprintln!("warning: {other}"),
                 None => {
                     let advice = "plan again, or name the assembly with --meshes";

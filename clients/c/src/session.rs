@@ -77,7 +77,7 @@ pub unsafe extern "C" fn sbdp_client_session_meshes(
     }
 }
 
-/// What happened, told to a session.
+/// What happened to an assembly, for its session.
 ///
 /// # Safety
 /// `session` is null or one of this library's that no other call uses; `error` can be written.

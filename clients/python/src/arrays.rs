@@ -42,7 +42,7 @@ impl<T: Element + bytemuck::Pod> Rows<T> {
 
 impl<T> Rows<T> {
     fn slice(&self) -> &[[T; 3]] {
-        // SAFETY: See `Send`: so many rows are there as long as `self` is.
+        // SAFETY: See `Send`: the rows are there as long as `self` is.
         unsafe { std::slice::from_raw_parts(self.first, self.count) }
     }
 }

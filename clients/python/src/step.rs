@@ -76,7 +76,7 @@ impl Step {
     fn path<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let step = self.step()?;
         match &self.views {
-            // Not kept here: whoever asks on must be able to let it go.
+            // Not kept here: the caller must be able to let it go.
             Some(views) => path_view(py, &step, views),
             None => {
                 let path = self.path.get_or_try_init(py, || path_copy(py, &step).map(Bound::unbind))?;

@@ -19,7 +19,7 @@ use crate::process_bound::{ProcessBound, pid};
 /// Longest pause without asking whether the caller wants to be interrupted.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// How many uploads are noted, at 32 bytes each. Whoever plans more assemblies than this in turn asks for each of them,
+/// How many uploads are noted, at 32 bytes each. A client that plans more assemblies than this in turn asks for each of them,
 /// once more, whether the daemon has it: some 20 µs.
 const UPLOADS_NOTED: usize = 4096;
 

@@ -13,7 +13,7 @@ const LOOK: Duration = Duration::from_millis(20);
 #[derive(Debug, Default)]
 pub(crate) struct Patience {
     busy_since: Option<Instant>,
-    /// Since when there is no daemon, and what told so.
+    /// Since when there is no daemon, and which error said so.
     lost: Option<(Instant, ClientError)>,
 }
 

@@ -317,7 +317,7 @@ impl PlanStream {
             }
             let now = Instant::now();
             if deadline.is_some_and(|d| now >= d) {
-                // Whoever only ever polls finds out here that nothing will come.
+                // A caller that only polls finds out here that nothing will come.
                 self.connection.check_alive()?;
                 return Ok(Poll::Pending);
             }

@@ -52,7 +52,7 @@ class Workers(Protocol):
         """Waits for one of those that run; it, and its record (or what it raises)."""
 
     def free(self, running: int) -> bool:
-        """Whether one more can run beside so many."""
+        """Whether one more can run beside those that run, given their number."""
 
 
 class LocalWorkers:

@@ -51,7 +51,7 @@ class Daemon:
         if config is not None:
             command += ["--config", os.fspath(config)]
         nowhere = subprocess.DEVNULL
-        # Ctrl-C is for the caller; the daemon is stopped when it is not wanted any more. Whoever reads what the caller
+        # Ctrl-C is for the caller; the daemon is stopped when it is not wanted any more. A program that reads what the caller
         # writes must not wait for the daemon's end.
         self._process = subprocess.Popen(
             [*command, *arguments],
