@@ -25,12 +25,16 @@ const TRIANGLES: [[u32; 3]; 12] = [
     [1, 3, 7],
     [1, 7, 5],
 ];
-const HANDLE: &str = "0000000000000000000000000000000000000000000000000000000000000000";
-const LISTENER: [u64; 2] = [0x0000_1234_0000_0007, 0x0000_0001_0000_2a10];
+const HANDLE: &str = "4932375aa0a0a9cc5799ba13013c0a79521a3d60cf2b1d9a6799ee88918fce39";
+/// The index of `extended` in the names of action sets.
+const EXTENDED: u32 = 1;
+const LISTENER: [u64; 2] = [0x07ad_bd9c_0000_215a, 0x3_0000_67b7];
 
-/// Corners of a unit cube above (0, 0, `bottom`).
+/// Corners of the unit cube whose lowest corner is (0, 0, `bottom`).
 fn corners(bottom: f64) -> [[f64; 3]; 8] {
-    std::array::from_fn(|i| [f64::from(i as u32 & 1), f64::from(i as u32 >> 1 & 1), bottom + f64::from(i as u32 >> 2)])
+    std::array::from_fn(|i| {
+        [f64::from(i as u32 & 1), f64::from(i as u32 >> 1 & 1), bottom + f64::from(i as u32 >> 2)]
+    })
 }
 
 fn handle() -> [u8; 32] {
@@ -50,7 +54,12 @@ fn upload() -> Vec<u8> {
 }
 
 fn steps() -> Vec<u8> {
-    let step = Step { parts: vec![1], ..Step::default() };
+    let step = Step {
+        parts: vec![1],
+        path: vec![[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 1.01, 0.0, 1.0, 0.0, 0.0, 0.0]],
+        direction: Some([0.0, 1.0, 0.0]),
+        ..Step::default()
+    };
     encode_steps(0, [&step])
 }
 
@@ -61,7 +70,18 @@ fn summary() -> Vec<u8> {
         engine: "sliding",
         units: Some("mm"),
         parts: vec!["low", "high"],
-        stats: Stats::default(),
+        base: (vec![0], Some("it is the largest, no other lies lower, it touches 1 other")),
+        remaining: vec![0],
+        stats: Stats {
+            sweeps: 1,
+            states: 2,
+            sdf_time_s: 1.6e-7,
+            static_analysis_time_s: 9.3829e-5,
+            path_time_s: 3.1296e-5,
+            verify_time_s: 3.2909e-5,
+            total_time_s: 0.000863229,
+            ..Stats::default()
+        },
         ..SummaryParts::default()
     };
     summary.encode()
@@ -95,19 +115,30 @@ pub(crate) fn dumps(layouts: &Layouts<'_>) -> Vec<(String, String)> {
     };
     let known = HandleResponse { handle: handle(), known: 1, reserved: 0 };
     let known = bytes_of(&known);
-    let plan = PlanRequest { handle: handle(), ..PlanRequest::default() }.encode();
+    let plan = PlanRequest { handle: handle(), actions: EXTENDED, ..PlanRequest::default() }.encode();
+    let times = |sent| [8_538_138_841_442, 8_538_139_136_327, sent];
     let (upload, steps, summary) = (upload(), steps(), summary());
     let text = [
         asked("A request on `geometry`", request(RequestKind::Upload, 0), "Upload", &upload),
         answered(
             "Its response",
-            response(ResponseKind::Handle, 0, 0, known, [0, 0, 7_551_202_334_871]),
+            response(ResponseKind::Handle, 0, 0, known, [0, 0, 8_538_138_053_771]),
             "Handle",
             known,
         ),
         asked("A request on `plan`", request(RequestKind::Plan, 1), "Plan", &plan),
-        answered("Its first response", response(ResponseKind::Steps, 1, 0, &steps, [0; 3]), "Steps", &steps),
-        answered("Its last response", response(ResponseKind::Summary, 1, 1, &summary, [0; 3]), "Summary", &summary),
+        answered(
+            "Its first response",
+            response(ResponseKind::Steps, 1, 0, &steps, times(8_538_140_151_723)),
+            "Steps",
+            &steps,
+        ),
+        answered(
+            "Its last response",
+            response(ResponseKind::Summary, 1, 1, &summary, times(8_538_140_156_571)),
+            "Summary",
+            &summary,
+        ),
     ];
     vec![("exchange".to_owned(), text.concat())]
 }

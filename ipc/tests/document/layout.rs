@@ -62,7 +62,9 @@ impl<'s> Layouts<'s> {
         let layouts = Self { source, compiled };
         for (name, found) in &source.structs {
             let Some((size, _)) = layouts.compiled.get(name.as_str()) else {
-                panic!("`{name}` is new: add it to the list in ipc/tests/document/layout.rs, and its table to PROTOCOL.md")
+                panic!(
+                    "`{name}` is new: add it to the list in ipc/tests/document/layout.rs, and its table to PROTOCOL.md"
+                )
             };
             let sum: usize = found.fields.iter().map(|field| layouts.size(&field.kind)).sum();
             assert_eq!(sum, *size, "size of `{name}`");
@@ -93,7 +95,8 @@ impl<'s> Layouts<'s> {
                 let mut at = offset;
                 let mut places = Vec::new();
                 for field in &self.of(of).fields {
-                    let name = if name.is_empty() { field.name.clone() } else { format!("{name}.{}", field.name) };
+                    let name =
+                        if name.is_empty() { field.name.clone() } else { format!("{name}.{}", field.name) };
                     places.extend(self.places(&name, &field.kind, at));
                     at += self.size(&field.kind);
                 }
@@ -125,7 +128,12 @@ impl<'s> Layouts<'s> {
         let mut offset = 0;
         for field in &found.fields {
             let size = self.size(&field.kind);
-            text += &format!("| {offset} | {size} | {} | `{}` | {} |\n", shown(&field.kind), field.name, field.comment);
+            text += &format!(
+                "| {offset} | {size} | {} | `{}` | {} |\n",
+                shown(&field.kind),
+                field.name,
+                field.comment
+            );
             offset += size;
         }
         text

@@ -37,7 +37,8 @@ fn filled(document: &str, made: &[(String, String)]) -> String {
     for piece in pieces {
         let (name, rest) = piece.split_once(" -->\n").expect("a marker ends with ` -->`");
         let (_, after) = rest.split_once(END).unwrap_or_else(|| panic!("`{name}` has no `{}`", END.trim()));
-        let (_, table) = made.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("nothing makes `{name}`"));
+        let (_, table) =
+            made.iter().find(|(n, _)| n == name).unwrap_or_else(|| panic!("nothing makes `{name}`"));
         let place = missing.iter().position(|n| *n == name);
         missing.remove(place.unwrap_or_else(|| panic!("`{name}` is there twice")));
         text += &format!("{BEGIN}{name} -->\n{table}{END}{after}");

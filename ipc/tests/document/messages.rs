@@ -202,7 +202,13 @@ impl Message {
                         };
                         let (vertices, triangles) = (number("vertices"), number("triangles"));
                         take(&mut found, format!("vertices of part {part}"), kind(vertex), vertices, false);
-                        take(&mut found, format!("triangles of part {part}"), kind("u32 × 3"), triangles, false);
+                        take(
+                            &mut found,
+                            format!("triangles of part {part}"),
+                            kind("u32 × 3"),
+                            triangles,
+                            false,
+                        );
                     }
                 }
             }
@@ -266,7 +272,9 @@ fn lines_of_value(name: &str, of: &Kind, offset: usize, bytes: &[u8]) -> String 
         Kind::Array(element, count) if bytes.len() > LONGEST => {
             let size = bytes.len() / count;
             let lines = bytes.chunks(size).enumerate();
-            lines.map(|(i, b)| lines_of_value(&format!("{name}[{i}]"), element, offset + i * size, b)).collect()
+            lines
+                .map(|(i, b)| lines_of_value(&format!("{name}[{i}]"), element, offset + i * size, b))
+                .collect()
         }
         of => line(offset, bytes, &format!("{name} = {}", value(of, bytes))),
     }

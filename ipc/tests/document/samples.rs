@@ -3,7 +3,9 @@
 use sbdp_ipc::bytes::Text;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, HandleResponse, Part, PartRecord, VERTICES_F32, VERTICES_F64, Vertices};
-use sbdp_ipc::plan::{MovedPart, NO_STEP, PenaltyRecord, PlanRequest, Staging, Step, StepRecord, encode_steps};
+use sbdp_ipc::plan::{
+    MovedPart, NO_STEP, PenaltyRecord, PlanRequest, Staging, Step, StepRecord, encode_steps,
+};
 use sbdp_ipc::revision::{ADDED, Revision};
 use sbdp_ipc::status::{PreloadRecord, Status, StatusHeader};
 use sbdp_ipc::summary::{BlockedRecord, GroupRecord, OverlapRecord, Stats, SummaryParts, WarningRecord};
@@ -25,7 +27,8 @@ fn check(name: &str, bytes: &[u8], expected: &[(&str, Vec<u8>)]) {
     let found = messages::of(name).walk(&layouts, bytes);
     let names: Vec<&str> = found.iter().map(|f| f.name.as_str()).collect();
     for (section, bytes) in expected {
-        let section = found.iter().find(|f| f.name == *section).unwrap_or_else(|| panic!("{section}: {names:?}"));
+        let section =
+            found.iter().find(|f| f.name == *section).unwrap_or_else(|| panic!("{section}: {names:?}"));
         assert_eq!(section.bytes, *bytes, "{name}: {}", section.name);
     }
     // The header's numbers are what the sections were found by.
@@ -87,8 +90,12 @@ fn meshes_have_their_sections_in_order() {
         ("vertices of part 1", raw(&narrow)),
         ("triangles of part 1", raw::<u32>(&[3, 4, 5, 6, 7, 8])),
     ];
-    let revision =
-        Revision { base: [7; 32], replaced: vec![(4, parts[0])], added: vec![parts[1]], moved: vec![moved(3)] };
+    let revision = Revision {
+        base: [7; 32],
+        replaced: vec![(4, parts[0])],
+        added: vec![parts[1]],
+        moved: vec![moved(3)],
+    };
     let mut bytes = vec![0; revision.encoded_len()];
     assert!(revision.encode_into(&mut bytes));
     let records = |places: [u32; 2]| {
@@ -109,22 +116,16 @@ fn meshes_have_their_sections_in_order() {
         [one, two]
     };
     let revised = records([4, ADDED]);
-    let others: [(&str, Vec<u8>); 3] = [
-        ("parts", raw(&revised)),
-        ("moved", raw(&[moved(3)])),
-        ("texts", raw(b"onetwo")),
-    ];
+    let others: [(&str, Vec<u8>); 3] =
+        [("parts", raw(&revised)), ("moved", raw(&[moved(3)])), ("texts", raw(b"onetwo"))];
     check("Revise", &bytes, &[&others[..], &meshes].concat());
 
     let assembly = Assembly { name: "demo", units: Some("mm"), parts, fixed: vec!["fix"] };
     let mut bytes = vec![0; assembly.encoded_len()];
     assert!(assembly.encode_into(&mut bytes));
     let (uploaded, fixed) = (records([0, 0]), text(6, 3));
-    let others: [(&str, Vec<u8>); 3] = [
-        ("parts", raw(&uploaded)),
-        ("fixed names", raw(&[fixed])),
-        ("texts", raw(b"onetwofixdemomm")),
-    ];
+    let others: [(&str, Vec<u8>); 3] =
+        [("parts", raw(&uploaded)), ("fixed names", raw(&[fixed])), ("texts", raw(b"onetwofixdemomm"))];
     check("Upload", &bytes, &[&others[..], &meshes].concat());
 }
 
@@ -214,7 +215,6 @@ fn short_answers_have_their_sections_in_order() {
         preloaded: vec![("frame".to_owned(), [3; 32])],
     };
     let preloaded = PreloadRecord { handle: [3; 32], name: text(5, 5) };
-    let expected: &[(&str, Vec<u8>)] =
-        &[("preloaded", raw(&[preloaded])), ("texts", raw(b"0.1.0frame"))];
+    let expected: &[(&str, Vec<u8>)] = &[("preloaded", raw(&[preloaded])), ("texts", raw(b"0.1.0frame"))];
     check("Status", &status.encode(), expected);
 }

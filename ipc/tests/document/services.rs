@@ -50,7 +50,8 @@ pub(crate) fn table() -> String {
 fn exchange(name: &str, builder: ExchangeBuilder) -> String {
     let service = builder.create().unwrap();
     let settings = service.static_config();
-    let (request, response) = (settings.request_message_type_details(), settings.response_message_type_details());
+    let (request, response) =
+        (settings.request_message_type_details(), settings.response_message_type_details());
     setting_table(
         &format!("`{name}`, request-response"),
         &[
@@ -64,7 +65,10 @@ fn exchange(name: &str, builder: ExchangeBuilder) -> String {
             ("active requests of a client port", settings.max_active_requests_per_client().to_string()),
             ("loaned requests", settings.max_loaned_requests().to_string()),
             ("responses buffered for a request", settings.max_response_buffer_size().to_string()),
-            ("responses borrowed of a request", settings.max_borrowed_responses_per_pending_response().to_string()),
+            (
+                "responses borrowed of a request",
+                settings.max_borrowed_responses_per_pending_response().to_string(),
+            ),
             ("overflow of requests", yes(settings.has_safe_overflow_for_requests())),
             ("overflow of responses", yes(settings.has_safe_overflow_for_responses())),
             ("fire and forget", yes(settings.does_support_fire_and_forget_requests())),

@@ -93,7 +93,9 @@ impl Source {
             }
             Item::Enum(item) if has_repr(&item.attrs, "u32") => {
                 let variants = item.variants.into_iter().map(|variant| {
-                    let Some((_, number)) = variant.discriminant else { panic!("{} has no number", variant.ident) };
+                    let Some((_, number)) = variant.discriminant else {
+                        panic!("{} has no number", variant.ident)
+                    };
                     Variant {
                         name: variant.ident.to_string(),
                         number: integer(&number),
