@@ -103,6 +103,20 @@ static void refusals(const SbdpClient *client, const SbdpHandle *handle) {
     CHECK(sbdp_client_plan(client, handle, NULL, &stream, &error) == SBDP_CODE_OK);
     CHECK(sbdp_client_plan(client, handle, NULL, &second, &error) == SBDP_CODE_STREAM_OPEN && second == NULL);
     sbdp_stream_free(&stream);
+    /* Parts that are wrong in themselves. */
+    const float narrow[3] = {0, 0, 0};
+    SbdpPart part_of = {.name = "both", .vertices_f64 = (const double[3]){0, 0, 0}, .vertices_f32 = narrow, .vertex_count = 1};
+    SbdpAssembly strange = {.struct_size = sizeof strange, .parts = &part_of, .part_count = 1};
+    CHECK(sbdp_client_upload(client, &strange, &wrong, &error) == SBDP_CODE_ARGUMENT);
+    CHECK(strstr(error.message, "`both`") != NULL);
+    part_of.vertices_f64 = NULL, part_of.vertex_count = SIZE_MAX;
+    CHECK(sbdp_client_upload(client, &strange, &wrong, &error) == SBDP_CODE_ARGUMENT);
+    part_of.vertices_f32 = (const float *)(const void *)((const char *)narrow + 1), part_of.vertex_count = 0;
+    part_of.name = "\xff";
+    CHECK(sbdp_client_upload(client, &strange, &wrong, &error) == SBDP_CODE_ARGUMENT);
+    CHECK(strstr(error.message, "UTF-8") != NULL);
+    part_of.name = NULL;
+    CHECK(sbdp_client_upload(client, &strange, &wrong, &error) == SBDP_CODE_ARGUMENT);
     /* Geometry. */
     const double flat[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
     const uint32_t triangle[3] = {0, 1, 9};
@@ -144,7 +158,7 @@ static void steps(const SbdpClient *client, const SbdpHandle *handle, bool in_pl
 }
 
 /* A cube in a closed box: a search for a way out that only a limit ends. */
-static void limits(const SbdpClient *client) {
+static SbdpHandle limits(const SbdpClient *client) {
     double outer[48], inner[24];
     uint32_t shell[72];
     cuboid(outer, 0, 10, 0), cuboid(outer + 24, 1, 8, 0), cuboid(inner, 4, 2, 0);
@@ -185,6 +199,7 @@ static void limits(const SbdpClient *client) {
     } while (event->kind != SBDP_EVENT_KIND_DONE);
     CHECK(pending && event->summary->status == SBDP_PLAN_STATUS_CANCELLED);
     sbdp_stream_free(&stream);
+    return handle;
 }
 
 static int asked;
@@ -222,7 +237,7 @@ int main(int count, char **arguments) {
     refusals(client, &handle);
     steps(client, &handle, false);
     steps(client, &handle, true);
-    limits(client);
+    const SbdpHandle boxed = limits(client);
 
     /* Memory is flat, once all that is kept for the next time is there. */
     double *times = malloc((size_t)rounds * sizeof *times);
@@ -248,16 +263,17 @@ int main(int count, char **arguments) {
     CHECK(after - before < 1024);
     free(times);
 
-    /* The daemon is killed under the client: the Rust client says the same. */
+    /* The daemon is killed while it plans, and is missed then: the Rust client says the same. */
     SbdpStream *stream = NULL;
     SbdpPlan *plan = NULL;
+    const SbdpEvent *event = NULL;
+    SbdpPlanOptions endless = {.struct_size = sizeof endless, .planner = SBDP_PLANNER_RRT, .no_cache = 1};
+    CHECK(sbdp_client_plan(client, &boxed, &endless, &stream, &error) == SBDP_CODE_OK);
+    CHECK(sbdp_stream_poll(stream, 50000000, &event, &error) == SBDP_CODE_OK);
     end_daemon(daemon, SIGKILL);
-    SbdpCode code = sbdp_client_plan(client, &handle, NULL, &stream, &error);
-    if (code == SBDP_CODE_OK) {
-        code = sbdp_stream_to_end(&stream, &plan, &error);
-    }
-    CHECK(code == SBDP_CODE_NO_DAEMON || code == SBDP_CODE_DAEMON_DIED);
-    CHECK(stream == NULL && plan == NULL);
+    CHECK(sbdp_stream_to_end(&stream, &plan, &error) == SBDP_CODE_DAEMON_DIED && stream == NULL && plan == NULL);
+    CHECK(strstr(error.message, "went away before it had answered") != NULL);
+    CHECK(sbdp_client_plan(client, &handle, NULL, &stream, &error) == SBDP_CODE_NO_DAEMON && stream == NULL);
     daemon = start_daemon(arguments[1], arguments[2]);
     handle = upload(client, low, high);
     CHECK(sbdp_client_restarts(client) == 1);
