@@ -5,11 +5,22 @@ use iceoryx2::service::static_config::message_type_details::{TypeDetail, TypeVar
 use sbdp_ipc::layout::{self, WAKE_CLIENT_SERVICE, WAKE_SERVER_SERVICE};
 use sbdp_ipc::services::{self, ExchangeBuilder};
 
+/// The prefix of what is made in shared memory. iceoryx2 leaves a segment behind.
+struct Place(String);
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        for file in layout::shared_memory_files(&self.0).unwrap_or_default() {
+            let _ = std::fs::remove_file(file);
+        }
+    }
+}
+
 /// One row per setting of every service.
 pub(crate) fn table() -> String {
     let folder = tempfile::tempdir().unwrap();
-    let prefix = format!("sbdp_doc{}_", std::process::id());
-    let node = services::node(&layout::iceoryx2_config(&prefix, folder.path()).unwrap()).unwrap();
+    let place = Place(format!("sbdp_doc{}_", std::process::id()));
+    let node = services::node(&layout::iceoryx2_config(&place.0, folder.path()).unwrap()).unwrap();
     let mut text = exchange(layout::PLAN_SERVICE, services::plan(&node).unwrap());
     text += &exchange(layout::GEOMETRY_SERVICE, services::geometry(&node).unwrap());
 
