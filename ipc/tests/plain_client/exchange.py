@@ -117,6 +117,8 @@ def beyond(client):
 
     client.requests += 1
     pending = client.send(client.plan_port, "Plan", traced, request=client.requests)
+    # What is let go before the daemon saw it never reaches it.
+    client.receive(pending)
     pending.delete()
     client.notifier.notify()
     while True:
@@ -124,7 +126,8 @@ def beyond(client):
         if numbers["running"] + numbers["queued"] == 0:
             break
         time.sleep(0.01)
-    assert (numbers["protocol"], numbers["uploads"]) == (document.constants["PROTOCOL"], 2), numbers
+    counted = (numbers["protocol"], numbers["uploads"], numbers["requests"], numbers["refused"])
+    assert counted == (document.constants["PROTOCOL"], 2, client.requests, 3), numbers
     print(f"tower: {dict(kinds)}; sbdpd {version}: {numbers['requests']} requests, {numbers['refused']} refused")
 
 
