@@ -162,9 +162,9 @@ impl AlignedBytes {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Text {
-    /// First byte in the text section.
+    /// Its first byte, counted from the beginning of the text section.
     pub offset: u32,
-    /// Bytes.
+    /// How many bytes it has.
     pub length: u32,
 }
 

@@ -20,17 +20,17 @@ pub const MAX_PARTS: u32 = 65_536;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct UploadHeader {
-    /// Parts.
+    /// How many parts there are.
     pub parts: u32,
-    /// Names of parts declared fixed.
+    /// How many names of parts that may not move there are.
     pub fixed: u32,
-    /// [`UPLOAD_HAS_UNITS`].
+    /// [`UPLOAD_HAS_UNITS`], or 0.
     pub flags: u32,
     /// Bytes of text.
     pub text_bytes: u32,
-    /// A name for people.
+    /// A name for people; no part of the content.
     pub name: Text,
-    /// The unit of length.
+    /// The unit of length, as `mm`; ignored without [`UPLOAD_HAS_UNITS`].
     pub units: Text,
 }
 
@@ -45,9 +45,9 @@ pub struct PartRecord {
     /// In revisions the place of the part that it replaces, or [`ADDED`](crate::revision::ADDED); in
     /// uploads 0.
     pub place: u32,
-    /// Vertices.
+    /// How many vertices it has.
     pub vertices: u64,
-    /// Triangles.
+    /// How many triangles it has.
     pub triangles: u64,
 }
 
@@ -245,9 +245,9 @@ fn read_vertices<'a>(reader: &mut Reader<'a>, record: &PartRecord) -> Result<Ver
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct HandleResponse {
-    /// The handle.
+    /// Handle of the assembly.
     pub handle: [u8; 32],
-    /// 1 if the daemon knows the assembly.
+    /// 1 if the daemon knows the assembly, else 0.
     pub known: u32,
     /// Reserved, 0.
     pub reserved: u32,

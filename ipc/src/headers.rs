@@ -12,7 +12,7 @@ use iceoryx2::prelude::ZeroCopySend;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum RequestKind {
-    /// `plan`: a [`crate::plan::PlanRequest`].
+    /// `plan`: a plan request.
     Plan = 1,
     /// `plan`: no payload; grants credit to the plan request named in the header, and may end it.
     Control = 2,
@@ -24,7 +24,7 @@ pub enum RequestKind {
     Upload = 5,
     /// `geometry`: what differs from a known assembly.
     Revise = 6,
-    /// `plan`: no payload; the metrics of the daemon, to which more may be added
+    /// `plan`: no payload; the metrics of the daemon, to which more may be added.
     Metrics = 7,
 }
 
@@ -46,7 +46,7 @@ pub enum ResponseKind {
     Steps = 1,
     /// Everything else about the plan; ends the request.
     Summary = 2,
-    /// A [`crate::error::WireError`]; ends the request.
+    /// Why there is no answer; ends the request.
     Error = 3,
     /// The daemon's status.
     Status = 4,
@@ -78,7 +78,7 @@ pub const CONTROL_CANCEL: u32 = 1;
 pub struct RequestHeader {
     /// A [`RequestKind`].
     pub kind: u32,
-    /// Flags of the kind.
+    /// Flags of the kind: [`CONTROL_CANCEL`] for `Control`; else 0.
     pub flags: u32,
     /// Number of the plan request, unique within its client port; for `Control` the one meant.
     pub request: u64,
@@ -98,19 +98,19 @@ pub struct ResponseHeader {
     pub kind: u32,
     /// Beside the error `busy`: milliseconds after which asking again makes sense. Else 0.
     pub retry_ms: u32,
-    /// Number of the plan request.
+    /// Number of the plan request that is answered.
     pub request: u64,
     /// Number of this chunk in its request, from 0 without gaps.
     pub sequence: u64,
-    /// Where this chunk's bytes stand in their message.
+    /// At which byte of the message this chunk begins.
     pub offset: u64,
     /// Bytes of the whole message; one longer than a chunk comes in consecutive chunks.
     pub total: u64,
-    /// When the daemon admitted the request (CLOCK_MONOTONIC).
+    /// When the daemon admitted the request (CLOCK_MONOTONIC nanoseconds).
     pub admitted_ns: u64,
-    /// When a worker took it up; 0 before.
+    /// When a worker took it up (CLOCK_MONOTONIC nanoseconds); 0 before.
     pub started_ns: u64,
-    /// When this chunk was sent.
+    /// When this chunk was sent (CLOCK_MONOTONIC nanoseconds).
     pub sent_ns: u64,
 }
 

@@ -1,5 +1,6 @@
 //! The wire contract of the sbdp daemon: names and limits of its iceoryx2 services, the layout
-//! of every message, and where a client finds the daemon. `PROTOCOL.md` says the same in prose.
+//! of every message, and where a client finds the daemon. `PROTOCOL.md` has all of it in tables,
+//! made of these definitions and their comments.
 //!
 //! Everything received is a stranger's input: views check all bounds once when they are made,
 //! and no byte string makes one panic.

@@ -16,23 +16,24 @@ pub const PLAN_HAS_TARGETS: u32 = 2;
 
 /// Parts that leave straight are taken out by a sweep, without simulation.
 pub const PLAN_SWEEPS: u32 = 4;
-/// They are simulated, too. Neither flag leaves it to the daemon; both are malformed.
+/// Parts that leave straight are simulated, too. Neither this nor [`PLAN_SWEEPS`] leaves it to the daemon; both are
+/// malformed.
 pub const PLAN_NO_SWEEPS: u32 = 8;
 
-/// Others go first: nobody waits for this plan.
+/// Nobody waits for this plan: requests without this flag go first.
 pub const PLAN_BATCH: u32 = 16;
 
 /// An assembly plan is wanted: the disassembly reversed, with each part's way from where it waits.
 pub const PLAN_ASSEMBLY: u32 = 32;
-/// Its parts wait nowhere: each begins where its insertion does. Without [`PLAN_ASSEMBLY`] malformed, and
-/// with places given.
+/// The parts of the assembly plan wait nowhere: each begins where its insertion does. Malformed without
+/// [`PLAN_ASSEMBLY`], and with places where parts wait (`staged`).
 pub const PLAN_NO_STAGING: u32 = 64;
 
-/// The events of the search are wanted, too: it runs whatever is remembered.
+/// The events of the search are wanted, too: it runs even where the plan is remembered.
 pub const PLAN_TRACE: u32 = 128;
-/// The clearance is given.
+/// The header's `clearance` is given.
 pub const PLAN_HAS_CLEARANCE: u32 = 256;
-/// The direction up is given.
+/// The header's `up` is given.
 pub const PLAN_HAS_UP: u32 = 512;
 
 /// Names of the planners; the wire carries the index.
@@ -69,7 +70,7 @@ pub const PENALTY_PARAMETERS: [&str; 16] = [
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct PlanRequestHeader {
-    /// Which assembly.
+    /// Handle of the assembly.
     pub handle: [u8; 32],
     /// Index into [`PLANNERS`].
     pub planner: u32,
@@ -82,25 +83,25 @@ pub struct PlanRequestHeader {
     pub flags: u32,
     /// Threads for this request; 0 leaves it to the daemon.
     pub threads: u32,
-    /// Parts that may not move.
+    /// How many parts may not move.
     pub fixed: u32,
-    /// Parts that are gone already.
+    /// How many parts are gone already.
     pub removed: u32,
-    /// Parts that must come out.
+    /// How many parts must come out.
     pub targets: u32,
-    /// Parts that stay as long as others leave.
+    /// How many parts stay as long as others leave.
     pub base: u32,
-    /// Parts that stand elsewhere than in the assembly.
+    /// How many parts stand elsewhere than in the assembly.
     pub moved: u32,
-    /// Parts of an assembly plan that wait at given places; the others are laid out.
+    /// How many parts of an assembly plan wait at given places; the others are laid out.
     pub staged: u32,
     /// Index into [`STATIC_ANALYSES`].
     pub static_analysis: u32,
-    /// Parameters of the engine `penalty` that differ from the paper's.
+    /// How many parameters of the engine `penalty` differ from the paper's.
     pub penalty: u32,
-    /// Groups that rather leave as wholes.
+    /// How many groups rather leave as wholes.
     pub groups: u32,
-    /// CLOCK_MONOTONIC nanoseconds; 0 for none.
+    /// When the answer is of no use any more, in nanoseconds of CLOCK_MONOTONIC; 0 for never.
     pub deadline_ns: u64,
     /// Simulations after which to give up; `u64::MAX` for no limit.
     pub max_simulations: u64,
@@ -133,12 +134,12 @@ pub struct PenaltyRecord {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 pub struct MovedPart {
-    /// The part.
+    /// Number of the part.
     pub part: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// The rigid motion of its mesh: of a part that stands elsewhere from where the assembly has it, of one
-    /// that waits from where it was given.
+    /// The rigid motion of its mesh (x, y, z, qw, qx, qy, qz; input units and frame): of a part that stands elsewhere
+    /// from where the assembly has it, of one that waits from where it was given.
     pub motion: Waypoint,
 }
 
@@ -149,29 +150,29 @@ pub const NO_STEP: u32 = u32::MAX;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct StepRecord {
-    /// First of the parts that move, in the message's parts.
+    /// Index of the first of the parts that move, in the message's parts.
     pub first_part: u32,
-    /// Parts that move in this step, at least one.
+    /// How many parts move in this step, at least one.
     pub parts: u32,
-    /// The step that takes the group out, or puts it in, to which these parts belong; or [`NO_STEP`].
+    /// Number of the step that takes the group out, or puts it in, to which these parts belong; or [`NO_STEP`].
     pub of: u32,
-    /// Where the step leaves its parts: 0 out, 1 aside, 2 in.
+    /// Where the step leaves its parts: a [`StepEnd`].
     pub ends: u32,
-    /// 0 translation, 1 rotation.
+    /// 0 if the path only translates the parts, 1 if it turns them.
     pub motion: u32,
-    /// First waypoint in the message's waypoints.
+    /// Index of the first waypoint in the message's waypoints.
     pub first_waypoint: u32,
-    /// Waypoints of this step.
+    /// How many waypoints this step has.
     pub waypoints: u32,
-    /// First step number in the message's requirements.
+    /// Index of the first number of a step in the message's requirements.
     pub first_requirement: u32,
-    /// Requirements of this step.
+    /// How many requirements this step has.
     pub requirements: u32,
-    /// The earliest round in which the step can be done.
+    /// The earliest round, from 0, in which the step can be done, if every step is done as soon as it can be.
     pub wave: u32,
-    /// Deepest penetration found by verification beyond the assembled depth.
+    /// Deepest penetration found by verification beyond the assembled depth, in the input's units.
     pub verified_depth: f64,
-    /// The unit vector of the path's last leg, or zero.
+    /// The unit vector of the path's last leg, in the input's frame; zero where that only turns, or there is none.
     pub direction: [f64; 3],
 }
 
@@ -179,15 +180,15 @@ pub struct StepRecord {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub struct StepsHeader {
-    /// Steps.
+    /// How many steps the message has.
     pub steps: u32,
-    /// Place of the first of them in the plan.
+    /// Number of the first of them: its place in the plan, from 0.
     pub first_step: u32,
-    /// Waypoints in all.
+    /// How many waypoints the message has.
     pub waypoints: u32,
-    /// Requirements in all.
+    /// How many requirements the message has.
     pub requirements: u32,
-    /// Parts in all; one that moves in several steps counts for each.
+    /// How many numbers of parts the message has; a part that moves in several steps counts for each.
     pub parts: u32,
     /// Reserved, 0.
     pub reserved: u32,

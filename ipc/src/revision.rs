@@ -18,9 +18,9 @@ pub const ADDED: u32 = u32::MAX;
 pub struct RevisionHeader {
     /// Handle of the assembly that is revised.
     pub base: [u8; 32],
-    /// Parts with a mesh: those that replace one, and those that are added.
+    /// How many parts have a mesh: those that replace one, and those that are added.
     pub parts: u32,
-    /// Parts that stand elsewhere.
+    /// How many parts stand elsewhere.
     pub moved: u32,
     /// Bytes of text.
     pub text_bytes: u32,

@@ -8,13 +8,13 @@ use crate::bytes::{Malformed, Reader, Text, TextWriter, Texts, Writer};
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct StatusHeader {
-    /// Process id.
+    /// The daemon's process id.
     pub pid: u32,
-    /// Protocol version.
+    /// Version of this protocol.
     pub protocol: u32,
-    /// Nanoseconds since start.
+    /// Nanoseconds since the daemon started.
     pub uptime_ns: u64,
-    /// Worker threads.
+    /// How many worker threads there are.
     pub workers: u32,
     /// Requests that a worker runs now.
     pub running: u32,
@@ -24,23 +24,23 @@ pub struct StatusHeader {
     pub queue_limit: u32,
     /// Plan requests received since start.
     pub requests: u64,
-    /// Answered with a plan.
+    /// Plan requests answered with a plan.
     pub done: u64,
-    /// Answered at once with what was answered before (they count as done, too).
+    /// Plan requests answered at once with what was answered before (they count as done, too).
     pub remembered: u64,
-    /// Cancelled by the client.
+    /// Plan requests cancelled by the client.
     pub cancelled: u64,
-    /// Expired before planning began.
+    /// Plan requests that expired before planning began.
     pub expired: u64,
-    /// Refused.
+    /// Plan requests refused.
     pub refused: u64,
-    /// Failed.
+    /// Plan requests that failed.
     pub failed: u64,
     /// States, over all plans, whose blocking graphs were answered from memory.
     pub graphs_remembered: u64,
     /// Assemblies whose geometry was received (known ones are not sent again).
     pub uploads: u64,
-    /// Preloaded assemblies.
+    /// How many preloaded assemblies are listed.
     pub preloaded: u32,
     /// Bytes of text.
     pub text_bytes: u32,

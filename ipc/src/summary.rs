@@ -8,11 +8,11 @@ use crate::plan::{MovedPart, check_range, slice_of};
 /// Names of the plan statuses; the wire carries the index.
 pub const STATUSES: [&str; 6] = ["complete", "partial", "infeasible", "timeout", "cancelled", "exhausted"];
 
-/// The plan carries a reason.
+/// The summary has a reason.
 pub const SUMMARY_HAS_REASON: u32 = 1;
 /// The assembly's unit of length is known.
 pub const SUMMARY_HAS_UNITS: u32 = 2;
-/// The list of targets is given.
+/// The list of targets is given; without it all parts had to come out.
 pub const SUMMARY_HAS_TARGETS: u32 = 4;
 /// It is an assembly plan.
 pub const SUMMARY_ASSEMBLY: u32 = 8;
@@ -34,15 +34,15 @@ pub struct Stats {
     pub sweeps: u64,
     /// States kept.
     pub states: u64,
-    /// Building or loading distance fields.
+    /// Building or loading distance fields, in seconds.
     pub sdf_time_s: f64,
-    /// Building blocking graphs.
+    /// Building blocking graphs, in seconds.
     pub static_analysis_time_s: f64,
-    /// Simulation.
+    /// Sweeps and the simulations that were used, in seconds; with several threads, the sum over these.
     pub path_time_s: f64,
-    /// Shortening and verification.
+    /// Shortening and verification of paths, in seconds.
     pub verify_time_s: f64,
-    /// From admission to the last step.
+    /// From admission to the last step, in seconds.
     pub total_time_s: f64,
     /// Distance fields that were there already.
     pub sdf_hits: u64,
@@ -62,49 +62,50 @@ pub struct Stats {
 pub struct SummaryHeader {
     /// Index into [`STATUSES`].
     pub status: u32,
-    /// `SUMMARY_HAS_…` flags.
+    /// [`SUMMARY_HAS_REASON`], [`SUMMARY_HAS_UNITS`], [`SUMMARY_HAS_TARGETS`], [`SUMMARY_ASSEMBLY`],
+    /// [`SUMMARY_HAS_BASE_REASON`].
     pub flags: u32,
-    /// Steps that were sent.
+    /// How many steps were sent.
     pub steps: u32,
-    /// Part names ([`Text`]).
+    /// How many part names follow ([`Text`]).
     pub parts: u32,
-    /// Overlaps ([`OverlapRecord`]).
+    /// How many overlaps follow ([`OverlapRecord`]).
     pub overlaps: u32,
-    /// Blocked parts ([`BlockedRecord`]).
+    /// How many blocked parts follow ([`BlockedRecord`]).
     pub blocked: u32,
-    /// Warnings ([`WarningRecord`]).
+    /// How many warnings follow ([`WarningRecord`]).
     pub warnings: u32,
-    /// Parts removed before (u32).
+    /// How many parts were gone before (u32).
     pub removed: u32,
-    /// Targets (u32).
+    /// How many targets follow (u32).
     pub targets: u32,
-    /// Fixed parts (u32).
+    /// How many fixed parts follow (u32).
     pub fixed: u32,
-    /// Parts that remain (u32).
+    /// How many parts remain (u32).
     pub remaining: u32,
-    /// Blockers that [`BlockedRecord`]s point to (u32).
+    /// How many blockers follow, to which [`BlockedRecord`]s point (u32).
     pub blockers: u32,
     /// Bytes of text.
     pub text_bytes: u32,
-    /// Parts that began elsewhere ([`MovedPart`]).
+    /// How many parts began elsewhere than where their mesh was given ([`MovedPart`]).
     pub poses: u32,
-    /// Parts that the rest is taken off (u32).
+    /// How many parts the rest is taken off (u32).
     pub base: u32,
-    /// Groups that left together and were not taken apart ([`GroupRecord`]).
+    /// How many groups left together and were not taken apart ([`GroupRecord`]).
     pub kept_together: u32,
-    /// Groups that can begin to move ([`GroupRecord`]).
+    /// How many groups can begin to move ([`GroupRecord`]).
     pub free_together: u32,
-    /// Parts that [`GroupRecord`]s point to (u32).
+    /// How many numbers of parts follow, to which [`GroupRecord`]s point (u32).
     pub group_parts: u32,
-    /// Why the plan is not complete.
+    /// Why the plan is not complete; empty without [`SUMMARY_HAS_REASON`].
     pub reason: Text,
     /// The planner's name.
     pub planner: Text,
     /// The engine's name.
     pub engine: Text,
-    /// The unit of length.
+    /// The unit of length; empty without [`SUMMARY_HAS_UNITS`].
     pub units: Text,
-    /// Why the base was chosen; empty where the request gave it.
+    /// Why the base was chosen; empty without [`SUMMARY_HAS_BASE_REASON`], as where the request gave it.
     pub base_reason: Text,
     /// Counters and times.
     pub stats: Stats,
@@ -116,7 +117,7 @@ pub struct SummaryHeader {
 pub struct OverlapRecord {
     /// The two parts, smaller first.
     pub parts: [u32; 2],
-    /// How deep.
+    /// How deep, in the input's units.
     pub depth: f64,
 }
 
@@ -126,9 +127,9 @@ pub struct OverlapRecord {
 pub struct BlockedRecord {
     /// The part.
     pub part: u32,
-    /// First of its blockers.
+    /// Index of the first of its blockers.
     pub first_blocker: u32,
-    /// How many.
+    /// How many blockers it has.
     pub blockers: u32,
     /// The blocked action, as `+x`.
     pub action: Text,
@@ -138,11 +139,11 @@ pub struct BlockedRecord {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct GroupRecord {
-    /// First of its parts.
+    /// Index of the first of its parts.
     pub first_part: u32,
-    /// How many.
+    /// How many parts it has.
     pub parts: u32,
-    /// Of a group that can begin to move, the unit vector along which it begins; else zero.
+    /// Of a group that can begin to move, the unit vector along which it begins, in the input's frame; else zero.
     pub direction: [f64; 3],
 }
 
@@ -152,7 +153,7 @@ pub struct GroupRecord {
 pub struct WarningRecord {
     /// The part, or [`NO_PART`].
     pub part: u32,
-    /// What.
+    /// What was found.
     pub message: Text,
 }
 
