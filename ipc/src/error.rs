@@ -20,7 +20,7 @@ pub enum ErrorCode {
     Geometry = 5,
     /// The request names a part that is not there.
     NoSuchPart = 6,
-    /// This daemon does not offer what was asked for.
+    /// The request wants something that this daemon does not offer.
     Unsupported = 7,
     /// The daemon failed; its log says more.
     Failed = 8,

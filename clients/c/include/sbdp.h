@@ -54,7 +54,7 @@ enum SbdpCode
      */
     SBDP_CODE_NO_SUCH_PART = 6,
     /**
-     * This daemon does not offer what was asked for.
+     * The request wants something that this daemon does not offer.
      */
     SBDP_CODE_UNSUPPORTED = 7,
     /**

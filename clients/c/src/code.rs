@@ -20,7 +20,7 @@ pub enum SbdpCode {
     Geometry = 5,
     /// There is no such part.
     NoSuchPart = 6,
-    /// This daemon does not offer what was asked for.
+    /// The request wants something that this daemon does not offer.
     Unsupported = 7,
     /// The daemon failed; its log says more.
     Failed = 8,

@@ -5,7 +5,8 @@ use std::mem::MaybeUninit;
 
 use crate::border::Failure;
 
-/// No caller's options are longer than this; a length that was not set often is.
+/// Bytes of the longest options that are taken. Today's longest have 232, and an uninitialised `struct_size` is mostly far
+/// larger than this. Half of it would do as well; at double, more such sizes would be read behind the caller's struct.
 const LONGEST_OPTIONS: usize = 4096;
 
 /// A struct that begins with `struct_size: u32` and may grow at its end.

@@ -1,4 +1,4 @@
-//! What is asked for, from keyword arguments.
+//! The options of a plan request, from keyword arguments.
 
 use std::time::Duration;
 
@@ -102,7 +102,8 @@ fn penalty(value: &Bound<'_, PyAny>) -> PyResult<Vec<(PenaltyParameter, f64)>> {
     entries.map(|(name, number)| Ok((one_of("penalty", &name, &words)?, number.extract()?))).collect()
 }
 
-/// What is asked about an assembly: what its files say, and the keywords, which are those of the command line.
+/// The options of a request: those that the assembly's files give, and the keywords, which are named as on the command
+/// line.
 pub(crate) fn options(
     py: Python<'_>,
     data: &Data,
@@ -169,7 +170,7 @@ pub(crate) fn options(
         Planner::SbdpStar => ActionSet::Extended,
         _ => ActionSet::Paper,
     });
-    // The description of an assembly belongs to what is asked.
+    // The description of an assembly gives options of the request.
     for name in data.fixed() {
         options.fixed.push(data.part(py, name)?);
     }

@@ -218,7 +218,8 @@ impl Connection {
         self.writing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// How often this client was woken. Whoever is about to sleep asks before looking for data.
+    /// How often this client was woken. A thread reads this number before it looks for data, and then sleeps only if the
+    /// number is still the same.
     pub(crate) fn wakes(&self) -> u64 {
         self.sleepers().wakes
     }

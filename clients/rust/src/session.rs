@@ -102,7 +102,7 @@ impl Session {
         self.moved.insert(part, pose);
     }
 
-    /// What is asked next; a timeout, for one, may be changed between two plans.
+    /// The options of the next request: a timeout, for example, may change between two plans.
     pub fn options_mut(&mut self) -> &mut PlanOptions {
         &mut self.options
     }

@@ -45,7 +45,7 @@ class NoSuchPartError(Error):
 
 
 class UnsupportedError(Error):
-    """What is asked for is not offered."""
+    """The request wants something that this daemon does not offer."""
 
     code = 7
 
