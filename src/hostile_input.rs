@@ -35,6 +35,12 @@ pub enum Reader {
     Stl,
     /// glTF and GLB scenes.
     Gltf,
+    /// PLY files.
+    Ply,
+    /// OFF files.
+    Off,
+    /// The main model of 3MF files.
+    ThreeMf,
     /// OBJ files, healed.
     Healing,
     /// `assembly.json`, `assembly.toml` and `translation.json`.
@@ -55,13 +61,16 @@ pub enum Reader {
 
 impl Reader {
     /// All of them.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 17] = [
         Self::Messages,
         Self::Meshes,
         Self::Admission,
         Self::Obj,
         Self::Stl,
         Self::Gltf,
+        Self::Ply,
+        Self::Off,
+        Self::ThreeMf,
         Self::Healing,
         Self::Manifest,
         Self::Config,
@@ -82,6 +91,11 @@ impl Reader {
             Self::Obj => file("a.obj", bytes),
             Self::Stl => file("a.stl", bytes),
             Self::Gltf => file("a.gltf", bytes),
+            Self::Ply => file("a.ply", bytes),
+            Self::Off => file("a.off", bytes),
+            Self::ThreeMf => {
+                files::threemf_archive(bytes).map_or_else(|e| e, |archive| file("a.3mf", &archive))
+            }
             Self::Healing => match files::parse_file("a.obj", bytes, Some(Split::None)) {
                 Ok(assembly) => admitted(&assembly),
                 Err(reason) => reason,

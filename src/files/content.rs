@@ -1,5 +1,7 @@
 //! What readers find in a file, before it is decided what is a part.
 
+use nalgebra::{Matrix4, Point3};
+
 use crate::geometry::SourceMesh;
 
 /// All of a file.
@@ -68,4 +70,25 @@ pub(super) struct Pieces {
     pub(super) names: Vec<String>,
     /// By triangle, its piece's place in `names`.
     pub(super) of: Vec<u32>,
+}
+
+/// A scene of more nodes or instances is no assembly.
+pub(super) const MAX_NODES: usize = 20_000;
+/// One that is nested deeper is none, either: trees are walked by recursion.
+pub(super) const MAX_DEPTH: usize = 200;
+
+/// A mesh as an affine pose places it; whether that mirrors it. Mirroring turns triangles inside out, so they are turned
+/// back.
+pub(super) fn placed(mesh: &SourceMesh, pose: &Matrix4<f64>) -> (SourceMesh, bool) {
+    let is_mirrored = pose.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
+    let moved = |p: &[f64; 3]| {
+        let q = pose * Point3::from(*p).to_homogeneous();
+        [q.x, q.y, q.z]
+    };
+    let vertices = mesh.vertices.iter().map(moved).collect();
+    let mut triangles = mesh.triangles.clone();
+    if is_mirrored {
+        triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
+    (SourceMesh { vertices, triangles }, is_mirrored)
 }

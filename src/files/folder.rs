@@ -197,7 +197,8 @@ impl Listing {
 
     /// Why there is no part.
     fn nothing(&self) -> String {
-        let mut reason = "the folder holds no .obj, .stl, .gltf, .glb or .step file".to_owned();
+        let mut reason =
+            "the folder holds no .obj, .stl, .gltf, .glb, .3mf, .ply, .off or .step file".to_owned();
         if !self.ignored.is_empty() {
             reason.push_str(" that is not ignored");
         }

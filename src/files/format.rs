@@ -11,6 +11,12 @@ pub(super) enum Format {
     Stl,
     /// glTF or GLB.
     Gltf,
+    /// PLY, binary or text.
+    Ply,
+    /// OFF, as text.
+    Off,
+    /// 3MF.
+    ThreeMf,
     /// STEP (ISO 10303-21).
     Step,
 }
@@ -22,6 +28,9 @@ impl Format {
             "obj" => Some(Self::Obj),
             "stl" => Some(Self::Stl),
             "gltf" | "glb" => Some(Self::Gltf),
+            "ply" => Some(Self::Ply),
+            "off" => Some(Self::Off),
+            "3mf" => Some(Self::ThreeMf),
             "step" | "stp" | "p21" => Some(Self::Step),
             _ => None,
         }
@@ -32,6 +41,9 @@ impl Format {
             Self::Obj => "an OBJ file",
             Self::Stl => "an STL file",
             Self::Gltf => "a glTF file",
+            Self::Ply => "a PLY file",
+            Self::Off => "an OFF file",
+            Self::ThreeMf => "a 3MF file",
             Self::Step => "a STEP file",
         }
     }
@@ -52,9 +64,10 @@ pub(super) fn advice(path: &Path) -> Option<&'static str> {
         | "x_t" | "x_b" | "sat" | "sab" | "smt" | "smb" | "jt" | "3dm" | "skp" | "dwg" | "dxf" => {
             "this is a file of a CAD program: export the assembly from there as GLB, or each part as STL"
         }
-        "3mf" | "amf" => "open it in the slicer or in Blender and export each part as STL, or all as GLB",
-        "ply" | "off" | "dae" | "fbx" | "blend" | "3ds" | "x3d" | "wrl" | "usd" | "usda" | "usdc"
-        | "usdz" => "open it in Blender or MeshLab and export GLB, or each part as STL",
+        "amf" => "open it in a slicer and export it as 3MF, or each part as STL",
+        "dae" | "fbx" | "blend" | "3ds" | "x3d" | "wrl" | "usd" | "usda" | "usdc" | "usdz" => {
+            "open it in Blender or MeshLab and export GLB, or each part as STL"
+        }
         "urdf" | "xacro" | "sdf" | "mjcf" => {
             "a robot's description names mesh files: give the folder of these, placed as assembled, or a GLB"
         }
@@ -97,18 +110,24 @@ pub(super) fn mismatch(format: Format, bytes: &[u8]) -> Option<String> {
         return Some("this is text as UTF-16; save it as UTF-8 (or plain ASCII)".into());
     }
     let magic = [
-        (&b"PK\x03\x04"[..], "a ZIP archive", "unpack it"),
+        (&b"PK\x03\x04"[..], "a ZIP archive", "unpack it, or rename it to .3mf if it is one"),
         (b"\x1f\x8b", "compressed by gzip", "unpack it"),
         (b"glTF", "a GLB file", "rename it to .glb"),
         (b"ISO-10303-21", "a STEP file", "rename it to .step"),
-        (b"ply\n", "a PLY file", "export it as STL or GLB"),
-        (b"ply\r\n", "a PLY file", "export it as STL or GLB"),
+        (b"ply\n", "a PLY file", "rename it to .ply"),
+        (b"ply\r\n", "a PLY file", "rename it to .ply"),
         (b"Kaydara FBX", "an FBX file", "export it as GLB"),
         (b"%PDF", "a PDF file", "export the part as a mesh"),
     ];
     let found = magic.iter().find(|(magic, ..)| bytes.starts_with(magic))?;
     let (_, what, advice) = found;
-    let own = [(Format::Gltf, &b"glTF"[..]), (Format::Step, b"ISO-10303-21")];
+    let own = [
+        (Format::Gltf, &b"glTF"[..]),
+        (Format::Step, b"ISO-10303-21"),
+        (Format::ThreeMf, b"PK\x03\x04"),
+        (Format::Ply, b"ply\n"),
+        (Format::Ply, b"ply\r\n"),
+    ];
     if own.contains(&(format, found.0)) || super::stl::is_binary_by_length(bytes) {
         return None;
     }

@@ -15,12 +15,17 @@ mod gltf;
 mod names;
 mod natural_order;
 mod obj;
+mod off;
 mod options;
+mod ply;
+mod polygon;
 mod poses;
 mod split;
 mod step;
 mod stl;
 mod text;
+mod threemf;
+mod units;
 
 #[cfg(test)]
 mod tests;
@@ -132,8 +137,8 @@ fn ignore(
 /// beside it are looked for, and `step` how STEP files are converted, if they are.
 fn parse(name: &Path, bytes: &[u8], folder: &Path, step: Option<&StepSettings>) -> Result<Content, String> {
     let Some(format) = Format::of(name) else {
-        let advice =
-            format::advice(name).unwrap_or("give a folder, or an .obj, .stl, .gltf, .glb or .step file");
+        let advice = format::advice(name)
+            .unwrap_or("give a folder, or an .obj, .stl, .gltf, .glb, .3mf, .ply, .off or .step file");
         return Err(format!("not a mesh that can be read; {advice}"));
     };
     if let Some(reason) = format::mismatch(format, bytes) {
@@ -143,6 +148,9 @@ fn parse(name: &Path, bytes: &[u8], folder: &Path, step: Option<&StepSettings>) 
         Format::Obj => obj::parse_obj(bytes),
         Format::Stl => stl::parse_stl(bytes),
         Format::Gltf => gltf::parse_gltf(bytes, folder),
+        Format::Ply => ply::parse_ply(bytes),
+        Format::Off => off::parse_off(bytes),
+        Format::ThreeMf => threemf::parse_threemf(bytes),
         Format::Step => parse_step(bytes, step),
     }
 }
@@ -180,6 +188,11 @@ pub(crate) fn parse_file(name: &str, bytes: &[u8], split: Option<Split>) -> Resu
     let path = Path::new(name);
     let content = parse(path, bytes, Path::new("/nowhere"), None)?;
     whole(content, path, split).map_err(|e| e.to_string())
+}
+
+/// A 3MF file with this as its main model.
+pub(crate) fn threemf_archive(model: &[u8]) -> Result<Vec<u8>, String> {
+    threemf::archive_of(model).map_err(|e| e.to_string())
 }
 
 /// Reads what a converter of STEP files writes to stdout.

@@ -5,10 +5,8 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-use earcut::Earcut;
-use nalgebra::{Point3, Vector3};
-
 use super::content::{Body, Content, PieceKind, Pieces};
+use super::polygon::Triangulator;
 use super::text::{decimal_comma, decoded, excerpt};
 use crate::geometry::SourceMesh;
 
@@ -185,10 +183,10 @@ impl Obj<'_> {
         };
         let kind = usize::from(count(0) < 2 && count(1) > 1);
         let mut of = Vec::with_capacity(self.faces.len());
-        let mut earcut = Earcut::new();
+        let mut triangulator = Triangulator::default();
         let mut first = 0;
         for (end, keys) in self.faces {
-            triangulate(&mesh.vertices, &self.corners[first..end], &mut earcut, &mut mesh.triangles);
+            triangulator.add(&mesh.vertices, &self.corners[first..end], &mut mesh.triangles);
             of.resize(mesh.triangles.len(), keys[kind]);
             first = end;
         }
@@ -264,54 +262,6 @@ fn logical_lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
 
 fn looks_like_stl(text: &str) -> bool {
     text.trim_start().starts_with("solid") || text.contains("facet normal")
-}
-
-/// Splits a polygon: convex ones into a fan, concave ones by ear clipping in the plane that
-/// fits best.
-fn triangulate(
-    vertices: &[[f64; 3]],
-    polygon: &[u32],
-    earcut: &mut Earcut<f64>,
-    triangles: &mut Vec<[u32; 3]>,
-) {
-    let points: Vec<Point3<f64>> = polygon.iter().map(|&v| Point3::from(vertices[v as usize])).collect();
-    let normal = polygon_normal(&points);
-    if polygon.len() <= 3 || is_convex(&points, &normal) {
-        triangles.extend((2..polygon.len()).map(|i| [polygon[0], polygon[i - 1], polygon[i]]));
-        return;
-    }
-    let (u, v) = plane_axes(&normal);
-    let flat: Vec<[f64; 2]> = points.iter().map(|p| [p.coords.dot(&u), p.coords.dot(&v)]).collect();
-    let mut ears: Vec<u32> = Vec::new();
-    earcut.earcut_slice(&flat, &[], &mut ears);
-    for ear in ears.chunks_exact(3) {
-        let [a, b, c] = [ear[0], ear[1], ear[2]].map(|i| i as usize);
-        let keeps_turn = (points[b] - points[a]).cross(&(points[c] - points[a])).dot(&normal) >= 0.0;
-        let (b, c) = if keeps_turn { (b, c) } else { (c, b) };
-        triangles.push([polygon[a], polygon[b], polygon[c]]);
-    }
-}
-
-/// Newell's normal: right also for concave and slightly warped polygons.
-fn polygon_normal(points: &[Point3<f64>]) -> Vector3<f64> {
-    let Some(first) = points.first() else { return Vector3::zeros() };
-    points.windows(2).map(|w| (w[0] - first).cross(&(w[1] - first))).sum()
-}
-
-fn is_convex(points: &[Point3<f64>], normal: &Vector3<f64>) -> bool {
-    let n = points.len();
-    (0..n).all(|i| {
-        let (a, b, c) = (points[i], points[(i + 1) % n], points[(i + 2) % n]);
-        // A straight corner would make a fan from it degenerate: ear clipping handles it.
-        (b - a).cross(&(c - b)).dot(normal) > 0.0
-    })
-}
-
-fn plane_axes(normal: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    let unit = normal.try_normalize(0.0).unwrap_or_else(Vector3::z);
-    let away = if unit.x.abs() < 0.6 { Vector3::x() } else { Vector3::y() };
-    let u = away.cross(&unit).normalize();
-    (u, unit.cross(&u))
 }
 
 #[cfg(test)]

@@ -84,8 +84,8 @@ fn refusals_name_file_and_reason() {
         (vec![a, ("config.json", r#"{"b": {"final_state": [1,2,3]}}"#)], vec!["config.json", "no part `b`"]),
         (vec![a, ("config.json", "{}"), ("translation.json", "{}")], vec!["keep one"]),
         (
-            vec![("a.3mf", "x"), ("b.iges", "x")],
-            vec!["no .obj", "a.3mf: open it in the slicer", "b.iges: IGES"],
+            vec![("a.amf", "x"), ("b.iges", "x")],
+            vec!["no .obj", "a.amf: open it in a slicer", "b.iges: IGES"],
         ),
         (vec![a, ("a.stl", "garbage")], vec!["a.obj and a.stl"]),
         (vec![a, ("b.glb", "")], vec!["scene beside"]),
@@ -380,10 +380,10 @@ fn step_files_are_read_through_a_converter() {
         assert!(notes.contains(note), "{note}: {notes}");
     }
     // Alone it is refused, with what to do with all that is there.
-    let alone = folder(&[("y.step", "ISO-10303-21; broken"), ("a.3mf", "x")]);
+    let alone = folder(&[("y.step", "ISO-10303-21; broken"), ("a.amf", "x")]);
     let error = load(alone.path(), &options).unwrap_err().to_string();
     assert!(
-        ["y.step", "it is broken", "a.3mf: open it"].iter().all(|words| error.contains(words)),
+        ["y.step", "it is broken", "a.amf: open it"].iter().all(|words| error.contains(words)),
         "{error}"
     );
     // The line and the scene must agree.

@@ -20,6 +20,8 @@ fn readers(path: &Path) -> &'static [Reader] {
         "obj" => &[Reader::Obj, Reader::Healing],
         "stl" => &[Reader::Stl],
         "gltf" | "glb" => &[Reader::Gltf],
+        "ply" => &[Reader::Ply],
+        "off" => &[Reader::Off],
         "json" => &[Reader::Manifest, Reader::Endpoint],
         "toml" => &[Reader::Config, Reader::Manifest],
         _ => &[],
@@ -80,6 +82,16 @@ fn built_in(reader: Reader) -> Vec<Vec<u8>> {
         ],
         Reader::Stl => vec![b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nsolid b\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 0 1\nendloop\nendfacet\nendsolid\n".to_vec(), b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n".to_vec(), binary_stl()],
         Reader::Gltf => vec![br#"{"asset":{"version":"2.0","extras":{"units":"mm"}},"scenes":[{"nodes":[0]}],"extensionsRequired":["EXT_mesh_gpu_instancing","KHR_mesh_quantization"],"nodes":[{"name":"a","mesh":0,"scale":[1,1,-1],"extensions":{"EXT_mesh_gpu_instancing":{"attributes":{"TRANSLATION":2}}}}],"meshes":[{"weights":[1],"primitives":[{"attributes":{"POSITION":0},"indices":1},{"attributes":{"POSITION":0},"mode":1}]}],"accessors":[{"bufferView":0,"componentType":5123,"normalized":true,"count":3,"type":"VEC3","min":[0,0,0],"max":[1,1,0]},{"bufferView":1,"componentType":5121,"count":3,"type":"SCALAR"},{"bufferView":2,"componentType":5126,"count":2,"type":"VEC3"}],"bufferViews":[{"buffer":0,"byteLength":24,"byteStride":8},{"buffer":0,"byteOffset":24,"byteLength":4},{"buffer":0,"byteOffset":28,"byteLength":24}],"buffers":[{"byteLength":52,"uri":"data:;base64,AAAAAAAAAAD//wAAAAAAAAAA//8AAAAAAAECAAAAAAAAAAAAAAAAAAAAoEAAAAAAAAAAAA=="}]}"#.to_vec()],
+        Reader::Ply => vec![
+            b"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nelement face 2\nproperty list uchar int vertex_indices\nelement edge 1\nproperty int a\nend_header\n0 0 0 9\n1 0 0 9\n1 1 0 9\n0 1 0.5 9\n4 0 1 2 3\n3 0 3 1\n7\n".to_vec(),
+            b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty uchar x\nproperty short y\nproperty float z\nelement tristrips 1\nproperty list uchar char vertex_indices\nend_header\n\0\0\0\0\0\0\0\x01\0\0\0\0\0\0\0\x01\0\0\0\0\0\x05\0\x01\x02\xff\0".to_vec(),
+            b"ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty double x\nproperty int y\nproperty uint z\nelement face 1\nproperty list ushort uint vertex_index\nend_header\n\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0".to_vec(),
+        ],
+        Reader::Off => vec![
+            b"OFF # c\n4 2 0\n0 0 0\n1 0 0\n\n1 1 0\n0 1 0.5\n4 0 1 2 3 255 0 0\n3 0 3 1\n".to_vec(),
+            b"STCNOFF3 1 0\n0 0 0 1 1 1\n1 0 0\n0 1 0\n3 0 1 2\n2 0 1\n".to_vec(),
+        ],
+        Reader::ThreeMf => vec![br##"<?xml version="1.0"?><model unit="inch" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02" xmlns:p="http://schemas.microsoft.com/3dmanufacturing/production/2015/06" requiredextensions="p"><metadata name="Title">a</metadata><resources><p:x a="&amp;"/><object id="1" name="a" type="model"><mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/><vertex x="0" y="1" z="0"/></vertices><triangles><triangle v1="0" v2="2" v3="1"/></triangles></mesh></object><object id="2" partnumber="b"><components><component objectid="1"/><component objectid="1" transform="0 1 0 -1 0 0 0 0 1 10 0 0"/></components></object><object id="3" type="support"/></resources><build><item objectid="2" transform="1 0 0 0 1 0 0 0 1 0 0 5"/><item objectid="3" p:path="/a.model"/></build></model>"##.to_vec()],
         Reader::StepReport => vec![
             br#"{"sbdp-step":1,"unit":"mm","deflection":0.01,"products":3,"parts":2,"warnings":["a: no geometry"]}"#.to_vec(),
         ],

@@ -3,6 +3,8 @@
 use gltf::json::Root;
 use serde_json::Value;
 
+use super::super::units::known_unit;
+
 /// Extensions that are read.
 const READ: [&str; 2] = ["KHR_mesh_quantization", INSTANCING];
 /// Several poses for one node's mesh.
@@ -64,16 +66,4 @@ pub(super) fn unit(extras: &gltf::json::Extras) -> Result<Option<String>, String
     let named =
         ["unit", "units", "length_unit", "lengthUnit"].into_iter().find_map(|key| value.get(key)?.as_str());
     named.map(|word| known_unit(word).map(str::to_owned).ok_or_else(|| word.to_owned())).transpose()
-}
-
-fn known_unit(word: &str) -> Option<&'static str> {
-    Some(match word.trim().to_ascii_lowercase().as_str() {
-        "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => "mm",
-        "cm" | "centimeter" | "centimeters" | "centimetre" | "centimetres" => "cm",
-        "m" | "meter" | "meters" | "metre" | "metres" => "m",
-        "um" | "µm" | "micron" | "microns" | "micrometer" | "micrometers" => "µm",
-        "in" | "inch" | "inches" | "\"" => "in",
-        "ft" | "foot" | "feet" => "ft",
-        _ => return None,
-    })
 }

@@ -3,19 +3,14 @@
 use std::collections::HashSet;
 
 use gltf::mesh::Mode;
-use nalgebra::{Matrix4, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix4, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use super::super::content::{Body, Content, PieceKind, Pieces};
+use super::super::content::{Body, Content, MAX_DEPTH, MAX_NODES, PieceKind, Pieces, placed};
 use super::super::split::listed;
 use super::super::text::printable;
 use super::buffers::Buffers;
 use super::extensions::{INSTANCING, unit};
 use crate::geometry::SourceMesh;
-
-/// A scene of more nodes is no assembly.
-const MAX_NODES: usize = 20_000;
-/// One that is nested deeper is none, either: the tree is walked by recursion.
-const MAX_DEPTH: usize = 200;
 
 /// Reads the default scene, or the first.
 pub(super) fn read(document: &gltf::Document, buffers: &Buffers) -> Result<Content, String> {
@@ -136,20 +131,12 @@ impl SceneReader<'_> {
             path.push(format!("node{}", node.index()));
         }
         for instance in self.instances(node)? {
-            let scene_from_mesh = pose * instance;
-            let is_mirrored = scene_from_mesh.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
+            let (mesh, is_mirrored) = placed(&local, &(pose * instance));
             if is_mirrored {
                 self.content
                     .notes
                     .push(format!("`{}` is mirrored: its pose has a negative scale", shown(node)));
             }
-            let vertices = local.vertices.iter().map(|p| transformed(&scene_from_mesh, p)).collect();
-            let mut triangles = local.triangles.clone();
-            // Mirroring turns triangles inside out.
-            if is_mirrored {
-                triangles.iter_mut().for_each(|t| t.swap(1, 2));
-            }
-            let mesh = SourceMesh { vertices, triangles };
             self.content.bodies.push(Body { path: path.clone(), mesh, pieces: pieces.clone() });
         }
         Ok(())
@@ -239,11 +226,6 @@ fn composed(shift: [f64; 3], [i, j, k, w]: [f64; 4], scale: [f64; 3]) -> Matrix4
     Translation3::from(Vector3::from(shift)).to_homogeneous()
         * rotation.to_homogeneous()
         * Matrix4::new_nonuniform_scaling(&Vector3::from(scale))
-}
-
-fn transformed(scene_from_node: &Matrix4<f64>, p: &[f64; 3]) -> [f64; 3] {
-    let q = scene_from_node * Point3::from(*p).to_homogeneous();
-    [q.x, q.y, q.z]
 }
 
 fn bounds_volume(mode: Mode) -> bool {
