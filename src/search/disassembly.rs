@@ -421,9 +421,17 @@ impl<'a, 'o> Disassembly<'a, 'o> {
 
     /// The parts that alone carry another one, as they stand.
     pub(super) fn carriers(&self) -> BTreeSet<usize> {
-        let (problem, standing) = (&self.problem, self.everything.standing());
-        let is_base = |part: usize| problem.base.parts.contains(&part);
-        self.supports.carriers(standing, |part| is_base(part) || !problem.is_movable(part))
+        self.supports.carriers(self.everything.standing(), |part| self.stays(part))
+    }
+
+    /// The parts that nothing carries any more when some have left, and that were carried before.
+    pub(super) fn left_in_air(&self, leaving: &[usize]) -> Vec<usize> {
+        self.supports.left_in_air(self.everything.standing(), leaving, |part| self.stays(part))
+    }
+
+    /// Whether a part is one that others stand on in the end.
+    fn stays(&self, part: usize) -> bool {
+        self.problem.base.parts.contains(&part) || !self.problem.is_movable(part)
     }
 
     /// Which parts leave after others where both can: first the base, then parts that carry others.

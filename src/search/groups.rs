@@ -94,6 +94,53 @@ impl<'a> Groups<'_, 'a, '_> {
         Ok(None)
     }
 
+    /// A group that leaves along a line with something that a part alone carries, so that nothing else is left in the air.
+    pub(super) fn leave_carried(
+        &mut self,
+        carrier: usize,
+    ) -> Result<Option<(Contraction<'a>, VerifiedPath)>, Stop> {
+        let standing = self.disassembly.everything.standing().to_vec();
+        let carried = self.disassembly.left_in_air(&[carrier]);
+        let mut candidates: BTreeSet<Candidate> = BTreeSet::new();
+        for direction in 0..self.translations.len() {
+            let mut graph: BlockingGraph =
+                vec![Some(Vec::new()); self.disassembly.problem.scene.bodies.len()];
+            let mut swept = BTreeSet::new();
+            for &part in &carried {
+                let group = self.swept_closure(direction, part, &mut graph, &mut swept)?;
+                candidates.extend(group.and_then(|group| self.candidate(group, direction)));
+            }
+        }
+        for (_, group, direction) in candidates {
+            if self.disassembly.left_in_air(&group).is_empty()
+                && let Some(found) = self.leaves_along(&standing, &group, direction)?
+            {
+                return Ok(Some(found));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The closure of a part in the graph of sweeps along a direction, of which only what it needs is swept.
+    fn swept_closure(
+        &mut self,
+        direction: usize,
+        part: usize,
+        graph: &mut BlockingGraph,
+        swept: &mut BTreeSet<usize>,
+    ) -> Result<Option<Vec<usize>>, Stop> {
+        loop {
+            let Some(group) = self.closure(graph, [part]) else { return Ok(None) };
+            let unknown: Vec<usize> = group.iter().copied().filter(|&part| swept.insert(part)).collect();
+            if unknown.is_empty() {
+                return Ok(Some(group));
+            }
+            for (part, obstacles) in self.sweeps_of(direction, &unknown)? {
+                graph[part] = obstacles;
+            }
+        }
+    }
+
     /// A group and its way along a translation, if it leaves so.
     fn leaves_along(
         &mut self,
@@ -299,10 +346,23 @@ impl<'a> Groups<'_, 'a, '_> {
     /// Per part, the parts that it enters on its way out along a direction.
     fn sweeps(&mut self, direction: usize) -> Result<BlockingGraph, Stop> {
         let standing = self.disassembly.everything.standing().to_vec();
-        let around = standing.iter().map(|&part| self.disassembly.surroundings(part)).collect::<Vec<_>>();
+        let mut graph: BlockingGraph = vec![None; self.disassembly.problem.scene.bodies.len()];
+        for (part, obstacles) in self.sweeps_of(direction, &standing)? {
+            graph[part] = obstacles;
+        }
+        Ok(graph)
+    }
+
+    /// The same for some parts.
+    fn sweeps_of(
+        &mut self,
+        direction: usize,
+        parts: &[usize],
+    ) -> Result<Vec<(usize, Option<Vec<usize>>)>, Stop> {
+        let around = parts.iter().map(|&part| self.disassembly.surroundings(part)).collect::<Vec<_>>();
         let problem = &self.disassembly.problem;
         let along = self.translations[direction].force();
-        let swept = standing.par_iter().zip(around).map(|(&part, around)| {
+        let swept = parts.par_iter().zip(around).map(|(&part, around)| {
             if !problem.may_join(part) {
                 return Ok((part, None));
             }
@@ -315,10 +375,7 @@ impl<'a> Groups<'_, 'a, '_> {
             };
             Ok((part, remembered_obstacles(&problem.cache, &question, &problem.termination)?))
         });
-        let swept: Vec<(usize, Option<Vec<usize>>)> = swept.collect::<Result<_, Interrupt>>()?;
-        let mut graph: BlockingGraph = vec![None; problem.scene.bodies.len()];
-        swept.into_iter().for_each(|(part, obstacles)| graph[part] = obstacles);
-        Ok(graph)
+        Ok(swept.collect::<Result<_, Interrupt>>()?)
     }
 
     /// Per part, what stops it at once along a direction.

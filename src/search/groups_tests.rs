@@ -68,6 +68,23 @@ fn what_holds_together_leaves_the_base_together_and_is_then_taken_apart() {
 }
 
 #[test]
+fn a_group_leaves_before_what_carries_it() {
+    // A channel along y (part 0), in it a slab (1) that could be drawn out, and on that a pinned block (2, 3).
+    let channel =
+        cells([&[-3.0, -1.5, 1.5, 3.0], &[-3.0, 3.0], &[-2.0, -1.0, 1.5]], |c| c[0] != 1 || c[2] == 0);
+    let slab = cuboid([-1.4, -1.4, -1.0], [1.4, 1.4, -0.5]);
+    let across: &[f64] = &[-1.4, -0.4, 0.4, 1.4];
+    let block = cells([&[-1.4, 1.4], across, &[-0.5, 0.1, 0.9, 1.4]], |c| c[1] != 1 || c[2] != 1);
+    let pin = cuboid([-1.4, -0.35, 0.1], [1.4, 0.35, 0.8]);
+    let (outcome, _) = planned(vec![channel, slab, block, pin], |problem| problem);
+    assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
+    let left = left(&outcome);
+    assert_eq!((left[0], left[1]), ((&[2, 3][..], None), (&[1][..], None)));
+    assert_eq!((left.len(), left[2].0.len(), left[2].1), (3, 1, Some(0)));
+    assert_eq!(outcome.base.parts, [0]);
+}
+
+#[test]
 fn groups_are_taken_apart_in_groups() {
     let (outcome, _) = planned(pinned_block_in_sleeve(), |problem| problem);
     assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);

@@ -359,6 +359,13 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             for ((&i, run), result) in window.iter().zip(&runs).zip(results) {
                 let at = sweeps[i];
                 let blocked = match result {
+                    // Before others are left in the air.
+                    Some(Sweep::Clear { .. })
+                        if carriers.contains(&run.part)
+                            && self.leave_together(|groups| groups.leave_carried(run.part))? =>
+                    {
+                        return Ok(true);
+                    }
                     Some(Sweep::Clear { path, .. }) => {
                         if self.states.nodes[at.node].alive && self.prove_sweep(at, run, &path)? {
                             // Later results answer a question that has changed.

@@ -1,10 +1,16 @@
 //! What carries what, in the assembled state.
 //!
-//! A part is carried by those that stop it at once on its way down: the edges of its directional blocking graph in that
-//! direction. One that alone carries another leaves after it where both can, so that nothing is left in the air. Of
-//! several that carry a part together, any may leave.
+//! A part is carried by those that stop it at once on its way down (the edges of its directional blocking graph in that
+//! direction), and in the end by what stays. A part carries another alone if all chains of edges from the other to what
+//! stays lead through it: it dominates the other. It leaves after the other where both can, so that nothing is left in the
+//! air.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
+
+use petgraph::Direction;
+use petgraph::algo::dominators::simple_fast;
+use petgraph::graphmap::DiGraphMap;
+use petgraph::visit::Dfs;
 
 use crate::blocking_graph::StateGraphs;
 
@@ -22,16 +28,75 @@ impl Supports {
         Self { carried_by: carried_by.collect() }
     }
 
-    /// Of the parts that stand (ascending), those that alone carry another one, which is not among those that stay.
+    /// Of the parts that stand (ascending), those that alone carry another one, which is not among those that stay. Where
+    /// no chain leads to what stays, as where a bearing has play, a part is carried alone by the only one under it.
     pub(super) fn carriers(&self, standing: &[usize], stays: impl Fn(usize) -> bool) -> BTreeSet<usize> {
-        let carried =
-            standing.iter().filter(|&&part| !stays(part)).filter_map(|&part| self.carried_by.get(part));
-        let only = carried.filter_map(|by| {
-            let mut by = by.iter().copied().filter(|part| standing.binary_search(part).is_ok());
-            by.next().filter(|_| by.next().is_none())
-        });
-        only.collect()
+        if self.carried_by.is_empty() {
+            return BTreeSet::new();
+        }
+        let (carries, ground) = self.carries(standing, &stays);
+        let dominators = simple_fast(&carries, ground);
+        let carrier = |&part: &usize| match dominators.immediate_dominator(part) {
+            Some(dominator) => (dominator != ground).then_some(dominator),
+            None => {
+                let mut under = carries.neighbors_directed(part, Direction::Incoming);
+                under.next().filter(|_| under.next().is_none())
+            }
+        };
+        standing
+            .iter()
+            .filter(|&&part| !stays(part) && carries.contains_node(part))
+            .filter_map(carrier)
+            .collect()
     }
+
+    /// Of the parts that stand (ascending), those that are carried, and are not any more when some have left.
+    pub(super) fn left_in_air(
+        &self,
+        standing: &[usize],
+        leaving: &[usize],
+        stays: impl Fn(usize) -> bool,
+    ) -> Vec<usize> {
+        if self.carried_by.is_empty() {
+            return Vec::new();
+        }
+        let (mut carries, ground) = self.carries(standing, &stays);
+        let carried_before = carried(&carries, ground);
+        let under = |carries: &DiGraphMap<usize, ()>, part| {
+            carries.neighbors_directed(part, Direction::Incoming).next().is_some()
+        };
+        let others = standing.iter().copied().filter(|part| !leaving.contains(part) && !stays(*part));
+        let others: Vec<(usize, bool)> = others.map(|part| (part, under(&carries, part))).collect();
+        leaving.iter().for_each(|&part| _ = carries.remove_node(part));
+        let carried_after = carried(&carries, ground);
+        let is_left = |&(part, was_on_something): &(usize, bool)| match carried_before.contains(&part) {
+            true => !carried_after.contains(&part),
+            false => was_on_something && !under(&carries, part),
+        };
+        others.into_iter().filter(is_left).map(|(part, _)| part).collect()
+    }
+
+    /// What carries what among the parts that stand, and the node of the ground, which carries what stays. Edges lead up.
+    fn carries(&self, standing: &[usize], stays: &impl Fn(usize) -> bool) -> (DiGraphMap<usize, ()>, usize) {
+        let ground = self.carried_by.len();
+        let mut carries = DiGraphMap::new();
+        carries.add_node(ground);
+        for &part in standing {
+            if stays(part) {
+                carries.add_edge(ground, part, ());
+            } else {
+                let by = self.carried_by[part].iter().filter(|by| standing.binary_search(by).is_ok());
+                by.for_each(|&by| _ = carries.add_edge(by, part, ()));
+            }
+        }
+        (carries, ground)
+    }
+}
+
+/// What the ground carries.
+fn carried(carries: &DiGraphMap<usize, ()>, ground: usize) -> HashSet<usize> {
+    let mut search = Dfs::new(carries, ground);
+    std::iter::from_fn(|| search.next(carries)).collect()
 }
 
 #[cfg(test)]
@@ -50,6 +115,19 @@ mod tests {
         assert_eq!(carriers(&[0, 1, 3], 0), [0, 1]);
         assert_eq!(carriers(&[0, 1, 2, 3], 1), [1], "a base is carried by nothing");
         assert_eq!(carriers(&[0, 2, 3], 0), [2]);
+        // 4 on 2 and 3: whichever leaves, the other carries it; but both stand on 1.
+        let carried_by = vec![vec![], vec![0], vec![1], vec![1], vec![2, 3]];
+        let supports = Supports { carried_by: carried_by.into_iter().map(BTreeSet::from_iter).collect() };
+        let carriers = |standing: &[usize]| supports.carriers(standing, |part| part == 0);
+        assert_eq!(carriers(&[0, 1, 2, 3, 4]).into_iter().collect::<Vec<_>>(), [0, 1]);
+        assert_eq!(carriers(&[0, 1, 3, 4]).into_iter().collect::<Vec<_>>(), [0, 1, 3]);
+        let left = |leaving: &[usize]| supports.left_in_air(&[0, 1, 2, 3, 4], leaving, |part| part == 0);
+        assert_eq!(left(&[1]), [2, 3, 4]);
+        assert_eq!(left(&[1, 2, 3]), [4]);
+        assert!(left(&[2]).is_empty() && left(&[1, 2, 3, 4]).is_empty());
+        // Nothing connects 3 with what stays.
+        let left = |leaving: &[usize]| supports.left_in_air(&[0, 2, 3, 4], leaving, |part| part == 0);
+        assert_eq!((left(&[2]), left(&[2, 3])), (vec![], vec![4]));
         assert!(Supports::default().carriers(&[0, 1], |_| false).is_empty());
     }
 }

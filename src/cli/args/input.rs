@@ -11,7 +11,7 @@ use crate::geometry::{GeometryError, SourceAssembly};
 /// An assembly, and how its files are read.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Input {
-    /// A folder of OBJ, STL, GLB or STEP files in assembled pose, or one such file with the whole assembly in it
+    /// A folder of OBJ, STL, PLY, OFF, GLB, 3MF or STEP files in assembled pose, or one such file with the whole assembly in it
     pub(in crate::cli) assembly: PathBuf,
     /// What is a part in a file that holds several: each object, group, solid or primitive; each separate body; or all of
     /// it (of a scene each node) [default: what a file of the whole assembly names, if these are bodies]
