@@ -49,6 +49,15 @@ class Disassembly:
         self.display = Display(self.document, parts)
         self.job = self._live.plan(live, **options)
 
+    @property
+    def was_sent(self) -> bool:
+        """Whether the daemon has the parts, so that a plan is a matter of what changed."""
+        return self._live.was_sent
+
+    def forget(self) -> None:
+        """Sends all parts with the next plan."""
+        self._live.forget()
+
     def finish(self) -> "sbdp.Plan":
         """Takes the plan of the job, waiting for it. Raises what went wrong."""
         job, self.job = self.job, None

@@ -206,7 +206,7 @@ class Tessellation:
             return _arrays(points, facets)
         shape = _own_shape(part)
         known = self._known.get(part.key)
-        if known and known[0].isSame(shape) and known[1] == self.deflection:
+        if known and known[0].isPartner(shape) and known[0].Placement == shape.Placement and known[1] == self.deflection:
             return known[2]
         # Without the triangles that the view made, which follow other settings.
         mesh = _arrays(*shape.copy(True, False).tessellate(self.deflection))

@@ -139,6 +139,11 @@ class LiveAssembly:
         removed = tuple(part for part in self._sent if part not in parts)
         return Change(False, len(parts), tuple(moved), replaced, added, removed), moved
 
+    @property
+    def was_sent(self) -> bool:
+        """Whether meshes were sent that the next plan goes by."""
+        return self._assembly is not None
+
     def forget(self) -> None:
         """Sends all meshes with the next plan, through a new connection."""
         if self._client is not None:
