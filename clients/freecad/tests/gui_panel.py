@@ -14,6 +14,7 @@ from support import add, bolted, captive, connect, distance, placement
 from test_cancel import chain
 
 from freecad.sbdp_workbench import panel as panels
+from freecad.sbdp_workbench.colours import COLOURS
 
 
 class InWindow(unittest.TestCase):
@@ -24,6 +25,8 @@ class InWindow(unittest.TestCase):
         FreeCAD.setActiveDocument(self.document.Name)
         self.addCleanup(FreeCAD.closeDocument, self.document.Name)
         FreeCADGui.Selection.clearSelection()
+        FreeCADGui.activateWorkbench("DisassemblyWorkbench")
+        FreeCADGui.getMainWindow().showMaximized()
         self.panel = panels.show(self.document, connect)
         self.addCleanup(self.panel.reject)
 
@@ -46,7 +49,9 @@ class InWindow(unittest.TestCase):
         for _ in range(20):
             QtWidgets.QApplication.processEvents()
             time.sleep(0.02)
-        FreeCADGui.getMainWindow().grab().save(os.path.join(folder, f"freecad-{name}.png"))
+        # The window's own picture of itself is without the view of the document.
+        screen = QtWidgets.QApplication.primaryScreen()
+        screen.grabWindow(0).save(os.path.join(folder, f"freecad-{name}.png"))
 
     def placements(self):
         return {thing.Label: Placement(thing.Placement) for thing in self.document.Objects}
@@ -83,7 +88,6 @@ class Motion(InWindow):
         self.assertFalse(self.panel.replan.isEnabled())
         self.plan()
         bolt = self.document.getObjectsByLabel("bolt 3")[0]
-        bolt.Placement.Base.z += 2
         bolt.Placement = Placement(Vector(0, 0, 2), Rotation()) * bolt.Placement
         self.panel.replan.click()
         self.wait()
@@ -141,12 +145,17 @@ class Blocked(InWindow):
         before = self.colours()
         self.plan()
         self.assertIn("Infeasible", self.panel.status.text())
+        roles = self.panel.disassembly.blocking()
+        self.assertIn(set(roles), ({"ball", "box"}, {"ball2", "copy"}))
         self.panel.blocking.setChecked(True)
-        red = panels.Marks.__module__ and (0.85, 0.15, 0.10)
-        self.assertEqual([round(c, 2) for c in self.view("ball").ShapeColor[:3]], [round(c, 2) for c in red])
-        self.assertEqual([round(c, 2) for c in self.view("ball").DiffuseColor[0][:3]], [round(c, 2) for c in red])
-        self.assertTrue(self.view("copy").OverrideMaterial)
-        self.assertNotEqual(self.colours()["body"], before["body"])
+        for label, role in roles.items():
+            expected, view = COLOURS[role], self.view(label)
+            linked = hasattr(view, "OverrideMaterial")
+            shown = [view.ShapeMaterial.DiffuseColor] if linked else [view.ShapeColor, *view.DiffuseColor]
+            self.assertTrue(view.OverrideMaterial if linked else True)
+            for colour in shown:
+                self.assertLess(max(abs(a - b) for a, b in zip(colour, expected)), 0.01, label)
+        self.assertEqual(self.view("body").Transparency, 70)
         self.picture("blocked")
         self.panel.blocking.setChecked(False)
         self.assertEqual(self.colours(), before)

@@ -30,6 +30,7 @@ class Panel:
     def __init__(self, document: "FreeCAD.Document", connect=None) -> None:
         self.disassembly = Disassembly(document, connect)
         self.marks = Marks()
+        self._closed = False
         self.form = QtWidgets.QWidget()
         self.form.setWindowTitle("Disassembly")
         self._build()
@@ -73,12 +74,14 @@ class Panel:
 
         layout = QtWidgets.QVBoxLayout(self.form)
         for widgets in (
-            (self.whole, self.selected),
+            (self.whole,),
+            (self.selected,),
             (QtWidgets.QLabel("Deflection"), self.deflection),
             (self.plan, self.replan, self.cancel),
             (self.steps,),
             (self.slider, self.play),
-            (self.exploded, self.blocking),
+            (self.exploded,),
+            (self.blocking,),
             (self.reset,),
             (self.status,),
         ):
@@ -91,6 +94,8 @@ class Panel:
     def _button(self, text, clicked, tip):
         button = QtWidgets.QPushButton(text)
         button.setToolTip(tip)
+        # The task panel is narrow at first: three buttons go beside each other.
+        button.setMinimumWidth(40)
         button.clicked.connect(clicked)
         return button
 
@@ -268,11 +273,13 @@ class Panel:
 
     def reject(self) -> bool:
         """Closes: a running plan is cancelled, and the document is as it was."""
-        self._timer.stop()
-        self._stop_playing()
-        self.marks.clear()
-        self.disassembly.close()
-        FreeCADGui.Control.closeDialog()
+        if not self._closed:
+            self._closed = True
+            self._timer.stop()
+            self._playing.stop()
+            self.marks.clear()
+            self.disassembly.close()
+            FreeCADGui.Control.closeDialog()
         return True
 
     accept = reject
