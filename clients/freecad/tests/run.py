@@ -26,7 +26,7 @@ try:
     code = main()
 except BaseException:  # noqa: BLE001 - nothing may be swallowed
     traceback.print_exc(file=sys.stdout)
-    print("0 passed, 1 failed", flush=True)
+    print("0 passed, 1 failed, 0 skipped", flush=True)
     code = 1
 sys.stdout.flush()
 # Without the program's own end, which would ask for what to do with the documents.
