@@ -99,7 +99,8 @@ class SBDP_OT_plan(bpy.types.Operator):
             self.report({"WARNING"}, note)
         said = f"{plan.status}: {len(plan)} steps; {disassembly.change}"
         level = "INFO" if plan.status == "complete" else "WARNING"
-        self.report({level}, f"{said}. {plan.reason}" if plan.reason else said)
+        # The reason of a plan that was cancelled is just that.
+        self.report({level}, f"{said}. {plan.reason}" if plan.reason not in (None, plan.status) else said)
         return {"FINISHED"}
 
 

@@ -40,11 +40,11 @@ class SBDP_PT_panel(bpy.types.Panel):
         layout.operator("sbdp.clear", icon="X")
         if disassembly.plan is None:
             return
-        box = layout.box()
+        box = layout.box().column(align=True)
         box.label(text=f"{disassembly.plan.status}, {len(disassembly.plan)} steps")
         for step in disassembly.plan.steps[:_SHOWN]:
             first, last = disassembly.frames(context.scene, step.number, settings.frames_per_step)
-            box.label(text=f"{step.number + 1}. {', '.join(step.parts)}: {first} to {last}")
+            box.label(text=f"{step.number + 1}. {', '.join(step.parts)} (frames {first}–{last})")
         if len(disassembly.plan) > _SHOWN:
             box.label(text=f"and {len(disassembly.plan) - _SHOWN} more")
 

@@ -113,6 +113,24 @@ class Motion(InWindow):
         self.assertFalse(FreeCADGui.Control.activeDialog())
 
 
+class Closed(unittest.TestCase):
+    def test_a_document_that_is_closed_first(self):
+        document = bolted()
+        panel = panels.show(document, connect)
+        self.addCleanup(panel.reject)
+        panel.plan.click()
+        while panel.disassembly.job is not None:
+            QtWidgets.QApplication.processEvents(QtCore.QEventLoop.AllEvents, 50)
+        panel.slider.setValue(250)
+        FreeCAD.closeDocument(document.Name)
+        panel.slider.setValue(300)
+        self.assertIn("was closed", panel.status.text())
+        panel.replan.click()
+        self.assertIn("was closed", panel.status.text())
+        panel.reject()
+        self.assertFalse(FreeCADGui.Control.activeDialog())
+
+
 class Blocked(InWindow):
     make = staticmethod(captive)
 

@@ -13,9 +13,12 @@ def main() -> int:
     sys.path.insert(0, str(folder))
     pattern = os.environ.get("SBDP_TESTS", "test_*.py")
     tests = unittest.defaultTestLoader.discover(str(folder), pattern=pattern)
+    # What a button raises gets no further than Qt.
+    raised = []
+    sys.excepthook = lambda *error: (raised.append(error), traceback.print_exception(*error, file=sys.stdout))
     result = unittest.TextTestRunner(stream=sys.stdout, verbosity=2).run(tests)
-    failed = len(result.failures) + len(result.errors) + len(result.unexpectedSuccesses)
-    passed = result.testsRun - failed - len(result.skipped) - len(result.expectedFailures)
+    failed = len(result.failures) + len(result.errors) + len(result.unexpectedSuccesses) + len(raised)
+    passed = max(0, result.testsRun - failed - len(result.skipped) - len(result.expectedFailures))
     print(f"{passed} passed, {failed} failed, {len(result.skipped)} skipped", flush=True)
     if support := sys.modules.get("support"):
         support.stop()

@@ -7,7 +7,7 @@ import FreeCAD
 import sbdp
 from sbdp.motion import blockers
 
-from .display import Display
+from .display import Display, is_open
 from .document import DEFLECTION, Tessellation, find_parts
 
 # FreeCAD's own unit of length.
@@ -38,6 +38,7 @@ class Disassembly:
         Raises ValueError where there is nothing to plan."""
         if self.job is not None:
             raise RuntimeError("a plan is being made: wait for it, or cancel it")
+        self._need_document()
         self.close_display()
         parts = find_parts(self.document, None if selection is None else list(selection))
         self.notes = list(parts.left_out)
@@ -73,11 +74,14 @@ class Disassembly:
         return plan
 
     def show(self, moment: float) -> None:
-        """Shows a moment of the plan, from 0 to the number of its steps."""
+        """Shows a moment of the plan, from 0 to the number of its steps. Raises ValueError where a part cannot be moved, or
+        the document was closed."""
+        self._need_document()
         self.display.show(self.motion.at(moment))
 
     def explode(self) -> None:
-        """Shows the parts along their ways out."""
+        """Shows the parts along their ways out. Raises as `show`."""
+        self._need_document()
         transforms = {}
         for name, shift in self.motion.exploded().items():
             transforms[name] = sbdp.motion.matrix([*shift, 1, 0, 0, 0])
@@ -97,6 +101,10 @@ class Disassembly:
         if self.display is not None:
             self.display.close()
         self.plan, self.motion, self.display = None, None, None
+
+    def _need_document(self) -> None:
+        if not is_open(self.document):
+            raise ValueError("the document was closed: close this panel, too")
 
     def close(self) -> None:
         """Ends all of it: a running plan is cancelled."""

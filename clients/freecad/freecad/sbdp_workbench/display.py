@@ -40,7 +40,9 @@ class Display:
                 self._put(name, targets.get(name))
 
     def reset(self) -> None:
-        """Puts all parts to where they belong."""
+        """Puts all parts to where they belong, if the document is open."""
+        if not is_open(self.document):
+            return
         self._keep_edits()
         for name in self.parts:
             if self._is_there(name):
@@ -53,8 +55,7 @@ class Display:
             return
         self._closed = True
         FreeCAD.removeDocumentObserver(self)
-        if self._document_is_open():
-            self.reset()
+        self.reset()
 
     @property
     def is_home(self) -> bool:
@@ -117,12 +118,6 @@ class Display:
             return False
         return there and (part.element is None or part.element < part.object.ElementCount)
 
-    def _document_is_open(self) -> bool:
-        try:
-            return self.document.Name in FreeCAD.listDocuments()
-        except ReferenceError:
-            return False
-
     # What FreeCAD calls.
 
     def slotStartSaveDocument(self, document: "FreeCAD.Document", _file: str) -> None:
@@ -142,6 +137,14 @@ class Display:
         if document == self.document:
             self._closed = True
             FreeCAD.removeDocumentObserver(self)
+
+
+def is_open(document: "FreeCAD.Document") -> bool:
+    """Whether a document was not closed."""
+    try:
+        return document.Name in FreeCAD.listDocuments()
+    except ReferenceError:
+        return False
 
 
 def _same(one: "FreeCAD.Placement", other: "FreeCAD.Placement") -> bool:

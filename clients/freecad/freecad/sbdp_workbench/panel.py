@@ -114,7 +114,7 @@ class Panel:
         try:
             self.disassembly.begin(self._selection(), self.deflection.value())
         except (ValueError, RuntimeError) as error:
-            self._say(str(error), error=True)
+            self._say(_words(error), error=True)
             return
         finally:
             self._list_steps()
@@ -155,10 +155,11 @@ class Panel:
         except sbdp.CancelledError:
             self._say("Cancelled.")
         except Exception as error:  # noqa: BLE001 - all that can go wrong is for the person to read
-            self._say(f"{type(error).__name__}: {error}", error=True)
+            self._say(_words(error), error=True)
         else:
             lines = [_STATUS.get(plan.status, plan.status)]
-            lines += [plan.reason] if plan.reason else []
+            # The reason of a plan that was cancelled is just that.
+            lines += [plan.reason] if plan.reason not in (None, plan.status) else []
             lines += [f"{len(plan)} steps; {self.disassembly.change}.", *self.disassembly.notes]
             self._say("\n".join(lines), error=plan.status in ("infeasible", "exhausted"))
         self._list_steps()
@@ -184,7 +185,8 @@ class Panel:
         try:
             show()
         except ValueError as error:
-            self._say(str(error), error=True)
+            self._stop_playing()
+            self._say(_words(error), error=True)
         FreeCADGui.updateGui()
 
     def _scrub(self, value: int) -> None:
@@ -283,6 +285,10 @@ class Panel:
         return True
 
     accept = reject
+
+
+def _words(error: Exception) -> str:
+    return str(error) if isinstance(error, (ValueError, RuntimeError)) else f"{type(error).__name__}: {error}"
 
 
 def show(document: "FreeCAD.Document", connect=None) -> Panel:
