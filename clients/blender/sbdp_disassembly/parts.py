@@ -65,7 +65,8 @@ def find_parts(context: "bpy.types.Context", only_selected: bool) -> Parts:
             result.left_out.append(f"{thing.name} is left out: it is flat")
         else:
             result.parts[thing.name_full] = LivePart(vertices, triangles, scale @ numpy.array(thing.matrix_world))
-    refused = [reason for name in result.parts for reason in _refusals(bpy.data.objects[name], result.parts)]
+    moving = [thing for thing in found if thing.name_full in result.parts]
+    refused = [reason for thing in moving for reason in _refusals(thing, result.parts)]
     if refused:
         raise ValueError("\n".join(refused))
     return result

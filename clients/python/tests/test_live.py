@@ -1,5 +1,7 @@
 """Assemblies that are edited between plans: what is sent, and that the plans are those of the edited assembly."""
 
+import os
+import signal
 import time
 
 import numpy
@@ -120,6 +122,32 @@ def test_a_daemon_that_was_started_anew_gets_all_again(place):
         live.forget()
         for daemon in daemons:
             daemon.stop()
+
+
+def test_a_daemon_is_started_where_none_runs(place, monkeypatch):
+    monkeypatch.setenv("SBDP_RUNTIME_DIR", str(place / "run"))
+    monkeypatch.setenv("SBDP_CACHE_DIR", str(place / "cache"))
+    live = sbdp.LiveAssembly()
+    with pytest.raises(sbdp.NoDaemonError):
+        sbdp.connect()
+    try:
+        assert live.plan(stack()).result().status == "complete"
+    finally:
+        live.forget()
+        with sbdp.connect() as client:
+            os.kill(client.pid, signal.SIGTERM)
+
+
+def test_the_program_is_found_where_pip_puts_it(place, monkeypatch):
+    monkeypatch.delenv("SBDPD", raising=False)
+    # `pip install --target`: the package and the programs are in one folder.
+    (place / "sbdp").mkdir()
+    (place / "bin").mkdir()
+    program = place / "bin" / "sbdpd"
+    program.write_text("")
+    program.chmod(0o755)
+    monkeypatch.setattr(sbdp.daemon, "__file__", str(place / "sbdp" / "daemon.py"))
+    assert sbdp.daemon.program() == str(program)
 
 
 def test_a_part_that_is_refused_is_named_and_nothing_of_it_is_kept(live):
