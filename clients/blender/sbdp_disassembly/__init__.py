@@ -18,7 +18,9 @@ def _module():
     try:
         import sbdp  # noqa: F401
     except ImportError as error:
-        raise ImportError(f"the Python module `sbdp` is missing: install it as clients/blender/README.md says ({error})") from error
+        raise ImportError(
+            f"the Python module `sbdp` is missing: install it as clients/blender/README.md says ({error})"
+        ) from error
 
 
 def register():

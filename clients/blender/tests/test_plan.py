@@ -2,10 +2,10 @@
 
 import json
 
+import bmesh
 import bpy
 import numpy
-from support import Scene, add, box_mesh, connect, empty_scene, mesh_of, rigid
-import bmesh
+from support import Scene, add, box_mesh, empty_scene, mesh_of, rigid
 
 from sbdp_disassembly.placing import HOME
 
@@ -174,7 +174,11 @@ class Captive(Scene):
         modifier = bpy.data.objects["box"].modifiers.new("void", "BOOLEAN")
         modifier.object, modifier.solver = inner, "EXACT"
         inner.hide_set(True)
-        add("ball", mesh_of("ball", lambda built: bmesh.ops.create_icosphere(built, subdivisions=2, radius=0.6)), (1.5, 1.5, 1.5))
+        add(
+            "ball",
+            mesh_of("ball", lambda built: bmesh.ops.create_icosphere(built, subdivisions=2, radius=0.6)),
+            (1.5, 1.5, 1.5),
+        )
         add("lid", box_mesh("lid", (0, 0, 3), (3, 3, 3.2)))
 
     def test_what_blocks_is_selected(self):

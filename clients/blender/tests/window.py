@@ -21,10 +21,10 @@ def in_view():
 
 
 def disassembly_of(make):
+    import support
+
     from sbdp_disassembly import operators
     from sbdp_disassembly.disassembly import Disassembly
-
-    import support
 
     operators.forget_all()
     make()

@@ -29,6 +29,7 @@ class InWindow(unittest.TestCase):
         FreeCADGui.getMainWindow().showMaximized()
         self.panel = panels.show(self.document, connect)
         self.addCleanup(self.panel.reject)
+        self.panel.deflection.setValue(0.05)
 
     def wait(self):
         while self.panel.disassembly.job is not None:
@@ -153,10 +154,12 @@ class Blocked(InWindow):
 
     def colours(self):
         names = ("ShapeColor", "DiffuseColor", "Transparency", "OverrideMaterial")
+
         def values(view):
             yield from ((name, str(getattr(view, name))) for name in names if hasattr(view, name))
             if hasattr(view, "ShapeMaterial"):
                 yield "ShapeMaterial", str(view.ShapeMaterial.DiffuseColor)
+
         return {thing.Name: dict(values(thing.ViewObject)) for thing in self.document.Objects}
 
     def test_what_blocks_is_marked_and_gets_its_colours_back(self):
@@ -186,7 +189,7 @@ class Long(InWindow):
     make = staticmethod(lambda: chain(6))
 
     def test_cancel_while_the_window_lives(self):
-        self.panel.deflection.setValue(0.1)
+        self.panel.deflection.setValue(0.3)
         self.panel.plan.click()
         self.assertTrue(self.panel.cancel.isEnabled())
         self.assertFalse(self.panel.plan.isEnabled())

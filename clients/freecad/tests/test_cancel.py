@@ -32,7 +32,7 @@ class Cancelling(unittest.TestCase):
         self.addCleanup(self.disassembly.close)
 
     def test_a_cancelled_plan_ends(self):
-        self.disassembly.begin(deflection=0.1)
+        self.disassembly.begin(deflection=0.3)
         job = self.disassembly.job
         while job.progress is None and job.is_alive():
             time.sleep(0.01)
@@ -44,11 +44,11 @@ class Cancelling(unittest.TestCase):
         self.assertEqual(plan.status, "cancelled")
         self.assertIsNone(self.disassembly.job)
         # And the next question is answered.
-        self.disassembly.begin([("link_0",)], deflection=0.1)
+        self.disassembly.begin([("link_0",)], deflection=0.3)
         self.assertEqual(self.disassembly.finish().status, "complete")
 
     def test_one_that_is_cancelled_before_it_begins(self):
-        self.disassembly.begin(deflection=0.1)
+        self.disassembly.begin(deflection=0.3)
         self.disassembly.job.cancel()
         try:
             self.assertEqual(self.disassembly.finish().status, "cancelled")
@@ -56,7 +56,7 @@ class Cancelling(unittest.TestCase):
             pass
 
     def test_closing_cancels(self):
-        self.disassembly.begin(deflection=0.1)
+        self.disassembly.begin(deflection=0.3)
         job = self.disassembly.job
         self.disassembly.close()
         self.assertFalse(job.is_alive())

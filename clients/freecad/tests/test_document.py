@@ -217,7 +217,7 @@ class Units(unittest.TestCase):
         self.addCleanup(FreeCAD.closeDocument, document.Name)
         disassembly = Disassembly(document, connect)
         self.addCleanup(disassembly.close)
-        disassembly.begin()
+        disassembly.begin(deflection=0.05)
         plan = disassembly.finish().to_dict()
         self.assertEqual(plan["units"], "mm")
         self.assertEqual([w for w in plan["warnings"] if "unit" in w["message"]], [])

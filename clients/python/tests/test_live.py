@@ -6,9 +6,8 @@ import time
 
 import numpy
 import pytest
-from conftest import box, chain, start
-
 import sbdp
+from conftest import box, chain, start
 
 
 def live_box(size=(1.0, 1.0, 1.0), where=(0.0, 0.0, 0.0)):
@@ -69,6 +68,37 @@ def test_only_what_changed_is_sent(live, client):
     job = live.plan(parts)
     assert job.result().status == "complete"
     assert (job.change.moved, job.change.replaced, job.change.added, job.change.removed) == (("top",), (), (), ())
+
+
+class Spy:
+    """A client, and what goes through it."""
+
+    def __init__(self, client):
+        self.client, self.sent = client, []
+
+    def revise(self, base, parts):
+        self.sent.append([name for name, *_ in parts])
+        return self.client.revise(base, parts)
+
+    def __getattr__(self, name):
+        return getattr(self.client, name)
+
+
+def test_moved_parts_need_no_upload_and_new_shapes_one_of_their_own(runtime_dir, client):
+    spies = []
+    live = sbdp.LiveAssembly(connect=lambda: spies.append(Spy(sbdp.connect(runtime_dir))) or spies[-1])
+    parts = {name: part._replace(vertices=part.vertices * 1.1) for name, part in stack().items()}
+    live.plan(parts).result()
+    uploads = client.metrics()["uploads"]
+    parts["top"] = parts["top"]._replace(placement=live_box(where=(1, 1, 3)).placement)
+    live.plan(parts).result()
+    assert client.metrics()["uploads"] == uploads
+    parts["middle"] = parts["middle"]._replace(vertices=parts["middle"].vertices * 0.9)
+    live.plan(parts).result()
+    assert client.metrics()["uploads"] == uploads + 1
+    (spy,) = spies
+    assert spy.sent == [["middle"]]
+    live.forget()
 
 
 def test_scaled_and_mirrored_parts(live):

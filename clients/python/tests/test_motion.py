@@ -4,9 +4,8 @@ from types import SimpleNamespace
 
 import numpy
 import pytest
-from conftest import ASSEMBLIES, box
-
 import sbdp
+from conftest import ASSEMBLIES, box
 from sbdp.explosion import Leaving, exploded
 from sbdp.motion import is_rigid, matrix, pose
 

@@ -33,7 +33,9 @@ class Disassembly:
         #: Objects that are no parts, with the reason, and what the planner says about the parts.
         self.notes: list[str] = []
 
-    def begin(self, selection: "Sequence[tuple[str, ...]] | None" = None, deflection: float = DEFLECTION, **options: Any) -> None:
+    def begin(
+        self, selection: "Sequence[tuple[str, ...]] | None" = None, deflection: float = DEFLECTION, **options: Any
+    ) -> None:
         """Begins to plan the selected parts as they stand, or all. Parts that are shown elsewhere are brought home first.
         Raises ValueError where there is nothing to plan."""
         if self.job is not None:
