@@ -2,6 +2,9 @@
 of the window."""
 
 import os
+import re
+import shutil
+import tempfile
 import time
 import unittest
 
@@ -132,6 +135,10 @@ class Closed(unittest.TestCase):
         self.assertFalse(FreeCADGui.Control.activeDialog())
 
 
+def rounded(colours):
+    return re.sub(r"\d+\.\d+(e-\d+)?", lambda number: f"{float(number[0]):.1f}", str(colours))
+
+
 class Blocked(InWindow):
     make = staticmethod(captive)
 
@@ -152,7 +159,7 @@ class Blocked(InWindow):
     def view(self, name):
         return self.document.getObject(name).ViewObject
 
-    def colours(self):
+    def colours(self, document=None):
         names = ("ShapeColor", "DiffuseColor", "Transparency", "OverrideMaterial")
 
         def values(view):
@@ -160,7 +167,7 @@ class Blocked(InWindow):
             if hasattr(view, "ShapeMaterial"):
                 yield "ShapeMaterial", str(view.ShapeMaterial.DiffuseColor)
 
-        return {thing.Name: dict(values(thing.ViewObject)) for thing in self.document.Objects}
+        return {thing.Name: dict(values(thing.ViewObject)) for thing in (document or self.document).Objects}
 
     def test_what_blocks_is_marked_and_gets_its_colours_back(self):
         before = self.colours()
@@ -178,6 +185,18 @@ class Blocked(InWindow):
                 self.assertLess(max(abs(a - b) for a, b in zip(colour, expected)), 0.01, label)
         self.assertEqual(self.view("body").Transparency, 70)
         self.picture("blocked")
+        marked = self.colours()
+        with tempfile.TemporaryDirectory() as folder:
+            self.document.saveAs(f"{folder}/saved.FCStd")
+            self.assertEqual(self.colours(), marked)
+            # A file that is open already would not be read.
+            shutil.copy(f"{folder}/saved.FCStd", f"{folder}/copy.FCStd")
+            saved = FreeCAD.openDocument(f"{folder}/copy.FCStd")
+            try:
+                # Files have 8 bits of each colour.
+                self.assertEqual(rounded(self.colours(saved)), rounded(before))
+            finally:
+                FreeCAD.closeDocument(saved.Name)
         self.panel.blocking.setChecked(False)
         self.assertEqual(self.colours(), before)
         self.panel.blocking.setChecked(True)

@@ -1,5 +1,7 @@
 """Colours of parts that block, and back. Needs FreeCAD's window: without one, objects have no colours."""
 
+import FreeCAD
+
 # Red for what cannot leave, orange for what stops it; as in the page of `sbdp view`.
 COLOURS = {"captive": (0.85, 0.15, 0.10), "blocks": (1.00, 0.60, 0.10)}
 # Per cent, of all other parts, so that what is marked can be seen inside them. At half they hide it; at double they are hardly
@@ -8,14 +10,19 @@ _TRANSPARENCY = 70
 
 
 class Marks:
-    """Parts that are coloured for a while."""
+    """Parts of a document that are coloured for a while; not while it is saved."""
 
-    def __init__(self) -> None:
+    def __init__(self, document: "FreeCAD.Document") -> None:
+        self.document = document
         self._before: list[tuple] = []
+        # What is marked, and is again when the document was saved.
+        self._marked: tuple[dict, dict[str, str]] | None = None
+        FreeCAD.addDocumentObserver(self)
 
     def mark(self, parts: dict, roles: dict[str, str]) -> None:
         """Colours parts (`PartObject` by name) by what they are in `blocking()`, and makes the others transparent."""
         self.clear()
+        self._marked = parts, roles
         marked = {parts[name].object.Name for name in roles}
         for name, part in parts.items():
             if name in roles:
@@ -25,6 +32,25 @@ class Marks:
 
     def clear(self) -> None:
         """Gives all parts their colours back."""
+        self._marked = None
+        self._restore()
+
+    def close(self) -> None:
+        """The same, for good."""
+        FreeCAD.removeDocumentObserver(self)
+        self.clear()
+
+    def slotStartSaveDocument(self, document: "FreeCAD.Document", _file: str) -> None:
+        """Called by FreeCAD."""
+        if document == self.document:
+            self._restore()
+
+    def slotFinishSaveDocument(self, document: "FreeCAD.Document", _file: str) -> None:
+        """Called by FreeCAD."""
+        if document == self.document and self._marked is not None:
+            self.mark(*self._marked)
+
+    def _restore(self) -> None:
         for view, name, value in reversed(self._before):
             try:
                 setattr(view, name, value)

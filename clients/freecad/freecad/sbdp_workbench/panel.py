@@ -29,7 +29,7 @@ class Panel:
 
     def __init__(self, document: "FreeCAD.Document", connect=None) -> None:
         self.disassembly = Disassembly(document, connect)
-        self.marks = Marks()
+        self.marks = Marks(document)
         self._closed = False
         self.form = QtWidgets.QWidget()
         self.form.setWindowTitle("Disassembly")
@@ -279,7 +279,7 @@ class Panel:
             self._closed = True
             self._timer.stop()
             self._playing.stop()
-            self.marks.clear()
+            self.marks.close()
             self.disassembly.close()
             FreeCADGui.Control.closeDialog()
         return True
