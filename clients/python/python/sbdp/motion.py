@@ -18,8 +18,8 @@ from ._native import Step
 
 Matrix = NDArray[numpy.float64]
 
-#: Half turns between two quaternions closer than this (the sine of the angle) are interpolated along a line: the slerp would
-#: divide by it. At this angle both differ by 1e-17.
+#: Two quaternions whose angle has a smaller sine are interpolated along a line: the slerp would divide by that sine. At half
+#: no effect; at double none either, as both ways differ by 1e-17 there.
 _NO_TURN = 1e-8
 
 
@@ -84,25 +84,28 @@ class Leg:
     standing: dict[str, Matrix]
     #: The middle of the common box of the parts as they stand then.
     centre: NDArray
+    #: Half the diagonal of that box: how far corners are from the middle.
+    lever: float
     #: The waypoints, with quaternions of length 1.
     path: NDArray
+    #: Of each waypoint, where it has the middle.
+    middles: NDArray = field(init=False)
     #: Of each waypoint, which share of the step is over when the parts get there: from 0 to 1, by how far the middle goes
-    #: and the corner of the box turns.
+    #: and a corner turns about it.
     shares: NDArray = field(init=False)
 
     def __post_init__(self) -> None:
-        self._middles = numpy.array([(matrix(p) @ [*self.centre, 1.0])[:3] for p in self.path])
-        self.shares = self._spread(0.0)
-
-    def _spread(self, lever: float) -> NDArray:
-        """The shares, for a box whose corners are `lever` from its middle."""
-        ways = numpy.linalg.norm(numpy.diff(self._middles, axis=0), axis=1)
+        self.middles = numpy.array([(matrix(waypoint) @ [*self.centre, 1.0])[:3] for waypoint in self.path])
+        ways = numpy.linalg.norm(numpy.diff(self.middles, axis=0), axis=1)
         alike = numpy.abs((self.path[1:, 3:] * self.path[:-1, 3:]).sum(axis=1)).clip(0, 1)
-        efforts = ways + 2 * numpy.arccos(alike) * lever
+        efforts = ways + 2 * numpy.arccos(alike) * self.lever
         total = efforts.sum()
-        if len(self.path) == 1 or total == 0:
-            return numpy.linspace(0, 1, len(self.path)) if len(self.path) > 1 else numpy.ones(1)
-        return numpy.concatenate([[0.0], numpy.cumsum(efforts) / total]).clip(0, 1)
+        if len(self.path) == 1:
+            self.shares = numpy.ones(1)
+        elif total == 0:
+            self.shares = numpy.linspace(0, 1, len(self.path))
+        else:
+            self.shares = numpy.concatenate([[0.0], numpy.cumsum(efforts) / total]).clip(0, 1)
 
     def turns(self, waypoint: int) -> bool:
         """Whether the parts turn on the way from the waypoint before to this one."""
@@ -119,7 +122,7 @@ class Leg:
         along = (share - self.shares[before]) / (self.shares[after] - self.shares[before])
         turn = _slerp(self.path[before, 3:], self.path[after, 3:], along)
         made = matrix([0, 0, 0, *turn])
-        middle = (1 - along) * self._middles[before] + along * self._middles[after]
+        middle = (1 - along) * self.middles[before] + along * self.middles[after]
         made[:3, 3] = middle - made[:3, :3] @ self.centre
         return made
 
@@ -168,8 +171,8 @@ class Motion:
         path = numpy.array(step.path, dtype=float)
         path[:, 3:] /= numpy.linalg.norm(path[:, 3:], axis=1, keepdims=True)
         body_frame = numpy.eye(4) if step.of is None else self._frame(step.of)
-        leg = Leg(tuple(step.parts), body_frame, standing, (low + high) / 2, path)
-        leg.shares = leg._spread(float(numpy.linalg.norm(high - low)) / 2)
+        lever = float(numpy.linalg.norm(high - low)) / 2
+        leg = Leg(tuple(step.parts), body_frame, standing, (low + high) / 2, lever, path)
         self.steps.append(step)
         self.legs.append(leg)
         last = matrix(path[-1])
@@ -202,7 +205,7 @@ class Motion:
 
         boxes = {part: (points.min(axis=0), points.max(axis=0)) for part, points in self._vertices.items()}
         leaving = [
-            Leaving(number, step.of, leg.parts, leg._middles)
+            Leaving(number, step.of, leg.parts, leg.middles)
             for number, (step, leg) in enumerate(zip(self.steps, self.legs))
             if step.ends == "out"
         ]
