@@ -78,7 +78,11 @@ class Motion(InWindow):
         for label, there in self.placements().items():
             self.assertLess(distance(there, expected[label]), 1e-6)
         panel.steps.setCurrentRow(1)
-        self.assertEqual(panel.slider.value(), 2 * panels.PER_STEP)
+        self.assertEqual((panel.slider.value(), panel.steps.currentRow()), (2 * panels.PER_STEP, 1))
+        panel.slider.setValue(2 * panels.PER_STEP + 1)
+        self.assertEqual(panel.steps.currentRow(), 2)
+        panel.steps.itemClicked.emit(panel.steps.item(1))
+        self.assertEqual((panel.slider.value(), panel.steps.currentRow()), (2 * panels.PER_STEP, 1))
         self.picture("motion")
         panel.exploded.setChecked(True)
         self.picture("exploded")

@@ -15,7 +15,7 @@ PER_STEP = 100
 # Milliseconds between two looks at a running plan. At half nothing is seen earlier; at double progress comes in jerks.
 _LOOK = 100
 _STATUS = {
-    "complete": "Complete: every part comes out.",
+    "complete": "Complete: the parts come apart.",
     "partial": "Partial: the limit was reached first.",
     "infeasible": "Infeasible.",
     "exhausted": "Exhausted: nothing more was found to try.",
@@ -63,6 +63,8 @@ class Panel:
         self.steps = QtWidgets.QListWidget()
         self.steps.setMinimumHeight(150)
         self.steps.currentRowChanged.connect(self._go_to)
+        # Also where the row is the current one already.
+        self.steps.itemClicked.connect(lambda item: self._go_to(self.steps.row(item)))
         self.exploded = QtWidgets.QCheckBox("Exploded view")
         self.exploded.toggled.connect(self._explode)
         self.blocking = QtWidgets.QCheckBox("Mark what blocks")
@@ -195,7 +197,8 @@ class Panel:
         self._uncheck(self.exploded)
         self._show(lambda: self.disassembly.show(value / PER_STEP))
         self.steps.blockSignals(True)
-        self.steps.setCurrentRow(min(value // PER_STEP, self.steps.count() - 1) if value else -1)
+        # The step that is under way, or has just ended.
+        self.steps.setCurrentRow((value - 1) // PER_STEP)
         self.steps.blockSignals(False)
 
     def _go_to(self, row: int) -> None:
