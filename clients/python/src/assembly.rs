@@ -1,5 +1,6 @@
 //! Assemblies: from files, or from arrays.
 
+use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -14,7 +15,7 @@ use sbdp::exchange;
 use sbdp::files::{self, IgnorePattern, LoadOptions, StepSettings};
 use sbdp::geometry::{SourceAssembly, content_hash};
 use sbdp::plan::export::SourceDocument;
-use sbdp_client::{Assembly as WireAssembly, Handle, Meshes, Subject, Vertices};
+use sbdp_client::{Assembly as WireAssembly, Change, Handle, Meshes, Subject, Vertices};
 
 use crate::arrays::{ArrayMesh, rows_copy};
 use crate::error::{no_such_part, refused};
@@ -41,6 +42,8 @@ pub(crate) enum Origin {
     Files(Box<(SourceAssembly, SourceDocument)>),
     /// Arrays of the caller.
     Arrays(ArrayAssembly),
+    /// Another assembly with other meshes for some parts, and further parts.
+    Revised(Revision),
 }
 
 pub(crate) struct ArrayAssembly {
@@ -48,6 +51,14 @@ pub(crate) struct ArrayAssembly {
     units: Option<String>,
     fixed: Vec<String>,
     meshes: Vec<ArrayMesh>,
+}
+
+/// What differs from another assembly, by the places of parts there.
+pub(crate) struct Revision {
+    base: Arc<Data>,
+    replaced: BTreeMap<u32, ArrayMesh>,
+    /// They have the last names.
+    added: Vec<ArrayMesh>,
 }
 
 impl Meshes for Data {
@@ -60,6 +71,17 @@ impl Meshes for Data {
                 parts: arrays.meshes.iter().zip(&self.names).map(|(mesh, name)| mesh.part(name)).collect(),
                 fixed: arrays.fixed.iter().map(String::as_str).collect(),
             },
+            Origin::Revised(revision) => {
+                let mut assembly = revision.base.assembly();
+                let added = self.names.iter().skip(assembly.parts.len());
+                for (place, part) in assembly.parts.iter_mut().enumerate() {
+                    if let Some(mesh) = revision.replaced.get(&(place as u32)) {
+                        *part = mesh.part(part.name);
+                    }
+                }
+                assembly.parts.extend(revision.added.iter().zip(added).map(|(mesh, name)| mesh.part(name)));
+                assembly
+            }
         }
     }
 
@@ -73,15 +95,48 @@ impl Data {
         Self { names, origin, handle: OnceLock::new() }
     }
 
+    /// Revisions go by the daemon's handle, which nobody can tell from meshes.
     pub(crate) fn subject(this: &Arc<Self>) -> Subject {
-        Arc::clone(this).into()
+        match &this.origin {
+            Origin::Revised(_) => this.handle().into(),
+            Origin::Files(_) | Origin::Arrays(_) => Arc::clone(this).into(),
+        }
+    }
+
+    /// This assembly with other meshes for parts that it has, and with those that it has not. `hand_over` sends what
+    /// differs to the daemon and returns its handle.
+    pub(crate) fn revised(
+        this: &Arc<Self>,
+        parts: Vec<(String, ArrayMesh)>,
+        hand_over: impl FnOnce(Handle, &Change<'_>) -> PyResult<Handle>,
+    ) -> PyResult<Self> {
+        let places: HashMap<&str, u32> = (0..).zip(&this.names).map(|(n, name)| (name.as_str(), n)).collect();
+        let (mut names, mut replaced, mut added) = (this.names.clone(), BTreeMap::new(), Vec::new());
+        for (name, mesh) in parts {
+            match places.get(name.as_str()) {
+                Some(place) => drop(replaced.insert(*place, mesh)),
+                None => {
+                    names.push(name);
+                    added.push(mesh);
+                }
+            }
+        }
+        let change = Change {
+            replaced: replaced.iter().map(|(n, mesh)| (*n, mesh.part(this.name(*n)))).collect(),
+            added: added.iter().zip(&names[this.names.len()..]).map(|(mesh, name)| mesh.part(name)).collect(),
+            moved: Vec::new(),
+        };
+        let handle = hand_over(this.handle(), &change)?;
+        drop(change);
+        let origin = Origin::Revised(Revision { base: Arc::clone(this), replaced, added });
+        Ok(Self { names, origin, handle: handle.into() })
     }
 
     /// The assembly as it was read, if it is from files.
     pub(crate) fn files(&self) -> Option<(&SourceAssembly, &SourceDocument)> {
         match &self.origin {
             Origin::Files(files) => Some((&files.0, &files.1)),
-            Origin::Arrays(_) => None,
+            Origin::Arrays(_) | Origin::Revised(_) => None,
         }
     }
 
@@ -89,6 +144,7 @@ impl Data {
         match &self.origin {
             Origin::Files(files) => &files.0.fixed,
             Origin::Arrays(arrays) => &arrays.fixed,
+            Origin::Revised(revision) => revision.base.fixed(),
         }
     }
 
@@ -133,18 +189,12 @@ impl Assembly {
 
     #[getter]
     fn name(&self) -> &str {
-        match &self.data.origin {
-            Origin::Files(files) => &files.0.name,
-            Origin::Arrays(arrays) => &arrays.name,
-        }
+        self.data.assembly().name
     }
 
     #[getter]
     fn units(&self) -> Option<&str> {
-        match &self.data.origin {
-            Origin::Files(files) => files.0.units.as_deref(),
-            Origin::Arrays(arrays) => arrays.units.as_deref(),
-        }
+        self.data.assembly().units
     }
 
     #[getter]

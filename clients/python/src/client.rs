@@ -7,8 +7,9 @@ use std::time::Duration;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sbdp_client::{Client as SharedClient, ClientError, ConnectOptions};
+use sbdp_client::{Change, Client as SharedClient, ClientError, ConnectOptions, Handle};
 
+use crate::arrays::ArrayMesh;
 use crate::assembly::{Assembly, Data};
 use crate::options::options;
 use crate::session::Session;
@@ -75,6 +76,24 @@ impl Client {
         let data = Arc::clone(&assembly.data);
         let upload = |client: &SharedClient| client.upload(&sbdp_client::Meshes::assembly(&*data));
         Ok(self.ask(py, upload)?.0.to_vec())
+    }
+
+    /// Hands over what differs from an assembly; `sbdp.revise` makes the parts.
+    fn revise(
+        &self,
+        py: Python<'_>,
+        base: &Assembly,
+        parts: Vec<(String, Bound<'_, PyAny>, Bound<'_, PyAny>)>,
+    ) -> PyResult<Assembly> {
+        let mesh = |(name, vertices, triangles): (String, Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+            let mesh = ArrayMesh::new(&name, &vertices, &triangles)?;
+            Ok((name, mesh))
+        };
+        let parts = parts.into_iter().map(mesh).collect::<PyResult<_>>()?;
+        let hand_over =
+            |base: Handle, change: &Change<'_>| self.ask(py, |client| client.revise(base, change));
+        let data = Arc::new(Data::revised(&base.data, parts, hand_over)?);
+        Ok(Assembly { data })
     }
 
     /// Whether the daemon knows an assembly.

@@ -19,13 +19,20 @@ from .daemon import Daemon, leave_running
 from .errors import *  # noqa: F403
 from .errors import NoDaemonError
 from .frames import path_frame, steps_frame
+from .live import Change, LiveAssembly, LivePart, PlanJob
 from .meshes import assembly, to_trimesh
+from .motion import Motion
 
 __all__ = [
     "Assembly",
+    "Change",
     "Client",
     "Daemon",
+    "LiveAssembly",
+    "LivePart",
+    "Motion",
     "Plan",
+    "PlanJob",
     "PlanStream",
     "Session",
     "Step",

@@ -234,6 +234,14 @@ class Client:
         """Begins a session about how an assembly comes apart."""
     def upload(self, assembly: Assembly) -> bytes:
         """Hands an assembly over ahead of the first plan; returns its handle."""
+    def revise(
+        self,
+        base: Assembly,
+        parts: Sequence[tuple[str, NDArray[numpy.float64] | NDArray[numpy.float32], NDArray[numpy.uint32]]],
+    ) -> Assembly:
+        """An assembly with these meshes for parts of `base`, and with those of other names as further parts, after all
+        others. Only these meshes are sent, and the daemon keeps what it knows about the other parts. The daemon must know
+        `base`; once it has forgotten the new assembly, plans of it raise `UnknownHandleError`."""
     def knows(self, assembly: Assembly) -> bool: ...
     def metrics(self) -> dict[str, Any]:
         """All figures of the daemon."""

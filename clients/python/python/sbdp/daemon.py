@@ -23,8 +23,11 @@ def program() -> str:
     named = os.environ.get("SBDPD")
     if named:
         return named
-    beside = Path(sysconfig.get_path("scripts")) / "sbdpd"
-    found = str(beside) if os.access(beside, os.X_OK) else shutil.which("sbdpd")
+    # `pip install --target FOLDER` puts programs into FOLDER/bin, and `--user` into ~/.local/bin.
+    folders = [Path(__file__).parents[1] / "bin"]
+    folders += [Path(sysconfig.get_path("scripts", scheme)) for scheme in (sysconfig.get_default_scheme(), "posix_user")]
+    beside = (str(folder / "sbdpd") for folder in folders if os.access(folder / "sbdpd", os.X_OK))
+    found = next(beside, None) or shutil.which("sbdpd")
     if not found:
         raise NoDaemonError("there is no program `sbdpd`: install it, put it on $PATH, or name it in $SBDPD")
     return found

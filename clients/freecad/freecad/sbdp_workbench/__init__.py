@@ -1,0 +1,1 @@
+"""A workbench that plans how the parts of a document come apart."""
