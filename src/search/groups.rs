@@ -112,7 +112,10 @@ impl<'a> Groups<'_, 'a, '_> {
             }
         }
         for (_, group, direction) in candidates {
-            if self.disassembly.left_in_air(&group).is_empty()
+            // What would rather stay is no group that leaves here.
+            let stays = self.disassembly.problem.base_among(&group, &standing, &self.order.up).is_some();
+            if !stays
+                && self.disassembly.left_in_air(&group).is_empty()
                 && let Some(found) = self.leaves_along(&standing, &group, direction)?
             {
                 return Ok(Some(found));
