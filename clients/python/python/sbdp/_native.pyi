@@ -93,7 +93,7 @@ def load(
     deflection: float | None = None,
     converter: str | os.PathLike[str] | None = None,
 ) -> Assembly:
-    """Reads an assembly as the command line does: a folder of meshes, or a file (OBJ, STL, glTF; STEP by a converter).
+    """Reads an assembly as the command line does: a folder of meshes, or a file (OBJ, STL, PLY, OFF, glTF, 3MF; STEP by a converter).
 
     `split` says what is a part in a file that holds several, `ignore` has patterns of names to leave out, `deflection` is
     how far triangles of STEP files may be from the surfaces, in mm, and `converter` the program that makes them.
