@@ -76,7 +76,8 @@ fn a_group_leaves_before_what_carries_it() {
     let across: &[f64] = &[-1.4, -0.4, 0.4, 1.4];
     let block = cells([&[-1.4, 1.4], across, &[-0.5, 0.1, 0.9, 1.4]], |c| c[1] != 1 || c[2] != 1);
     let pin = cuboid([-1.4, -0.35, 0.1], [1.4, 0.35, 0.8]);
-    let (outcome, _) = planned(vec![channel, slab, block, pin], |problem| problem);
+    let up = Some(nalgebra::Vector3::z());
+    let (outcome, _) = planned(vec![channel, slab, block, pin], |problem| Problem { up, ..problem });
     assert_eq!(outcome.status, PlanStatus::Complete, "{:?}", outcome.reason);
     let left = left(&outcome);
     assert_eq!((left[0], left[1]), ((&[2, 3][..], None), (&[1][..], None)));
