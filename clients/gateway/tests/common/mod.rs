@@ -21,8 +21,11 @@ use sbdp_gateway::proto::upload_request::Piece;
 use sbdp_gateway::proto::{self, PlanEvent, PlanRequest, StatusReply, StatusRequest, UploadRequest};
 use sbdp_ipc::endpoint::{Endpoint, default_prefix};
 use sbdp_ipc::layout::shared_memory_files;
-use tonic::Streaming;
 use tonic::transport::{Channel, Endpoint as Address};
+use tonic::{Status, Streaming};
+use tonic_health::pb::HealthCheckRequest;
+use tonic_health::pb::health_check_response::ServingStatus;
+use tonic_health::pb::health_client::HealthClient;
 
 pub type Caller = PlannerServiceClient<Channel>;
 
@@ -171,9 +174,44 @@ impl Gateway {
         Self { process: Process(child), address, _folder: folder }
     }
 
+    async fn channel(&self) -> Channel {
+        Address::from_shared(self.address.clone()).unwrap().connect().await.unwrap()
+    }
+
     pub async fn connect(&self) -> Caller {
-        let channel = Address::from_shared(self.address.clone()).unwrap().connect().await.unwrap();
-        PlannerServiceClient::new(channel)
+        PlannerServiceClient::new(self.channel().await)
+    }
+
+    pub async fn health(&self) -> Health {
+        Health(HealthClient::new(self.channel().await))
+    }
+
+    /// What a call to a service that is not there gives.
+    pub async fn call_unknown_service(&self) -> Status {
+        let mut grpc = tonic::client::Grpc::new(self.channel().await);
+        grpc.ready().await.unwrap();
+        let codec = tonic_prost::ProstCodec::<StatusRequest, StatusReply>::default();
+        let path = "/sbdp.v9.PlannerService/Status".parse().unwrap();
+        grpc.unary(tonic::Request::new(StatusRequest {}), path, codec).await.unwrap_err()
+    }
+}
+
+/// The health service of a gateway.
+pub struct Health(HealthClient<Channel>);
+
+impl Health {
+    /// Waits until a service serves, or does not.
+    pub async fn serves(&self, service: &str, wanted: bool) -> bool {
+        let (mut client, start) = (self.0.clone(), Instant::now());
+        loop {
+            let request = HealthCheckRequest { service: service.to_owned() };
+            let status = client.check(request).await.map(|answer| answer.into_inner().status());
+            let serves = matches!(status, Ok(ServingStatus::Serving));
+            if status.is_ok() && serves == wanted || start.elapsed() > HANG {
+                return serves;
+            }
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
     }
 }
 
