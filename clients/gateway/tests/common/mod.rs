@@ -288,13 +288,13 @@ pub fn code(status: &tonic::Status) -> i32 {
     code.to_str().unwrap().parse().unwrap()
 }
 
-/// `n` × `n` × `n` boxes, each touching its neighbours: from 6 on, the search takes seconds.
-pub struct Lattice {
+/// Parts that are made here.
+pub struct Parts {
     names: Vec<String>,
-    vertices: Vec<Vec<[f64; 3]>>,
+    meshes: Vec<(Vec<[f64; 3]>, Vec<[u32; 3]>)>,
 }
 
-const TRIANGLES: [[u32; 3]; 12] = [
+const BOX: [[u32; 3]; 12] = [
     [0, 2, 3],
     [0, 3, 1],
     [4, 5, 7],
@@ -309,23 +309,28 @@ const TRIANGLES: [[u32; 3]; 12] = [
     [1, 7, 5],
 ];
 
-impl Lattice {
-    pub fn new(n: u32) -> Self {
+impl Parts {
+    fn new(meshes: Vec<(Vec<[f64; 3]>, Vec<[u32; 3]>)>) -> Self {
+        Self { names: (0..meshes.len()).map(|number| number.to_string()).collect(), meshes }
+    }
+
+    /// `n` × `n` × `n` boxes, each touching its neighbours.
+    pub fn lattice(n: u32) -> Self {
         let cells = (0..n * n * n).map(|cell| [cell / (n * n), cell / n % n, cell % n]);
-        let corner = |cell: [u32; 3], i: u32| {
-            [f64::from(cell[0] + (i & 1)), f64::from(cell[1] + (i >> 1 & 1)), f64::from(cell[2] + (i >> 2))]
-        };
-        let vertices: Vec<Vec<[f64; 3]>> =
-            cells.map(|cell| (0..8).map(|i| corner(cell, i)).collect()).collect();
-        Self { names: (0..vertices.len()).map(|i| i.to_string()).collect(), vertices }
+        Self::new(cells.map(|cell| cube(cell.map(f64::from))).collect())
     }
 
     pub fn assembly(&self) -> Assembly<'_> {
-        let parts = self.names.iter().zip(&self.vertices).map(|(name, vertices)| Part {
+        let parts = self.names.iter().zip(&self.meshes).map(|(name, (vertices, triangles))| Part {
             name,
             vertices: Vertices::F64(vertices),
-            triangles: &TRIANGLES,
+            triangles,
         });
         Assembly { units: Some("mm"), parts: parts.collect(), ..Assembly::default() }
     }
+}
+
+fn cube([x, y, z]: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
+    let end = |i: u32, bit: u32| f64::from(i >> bit & 1);
+    ((0..8).map(|i| [x + end(i, 0), y + end(i, 1), z + end(i, 2)]).collect(), BOX.to_vec())
 }
