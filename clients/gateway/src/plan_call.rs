@@ -72,24 +72,22 @@ struct Caller<'c> {
 impl PlanCall {
     /// Follows the plan to its end.
     pub(crate) fn run(mut self, sender: Sender) {
-        let ended = match self.follow(&sender) {
-            Ok(()) => Ok(()),
-            Err(Stop::Error(status)) => Err(status),
-            Err(Stop::Abandoned) => {
-                tracing::debug!(handle = %self.handle, "a plan is not wanted any more");
-                Ok(())
+        let ended = self.follow(&sender);
+        // A caller that has the end may ask again at once: place and key are free then.
+        drop(self);
+        let end = match ended {
+            Ok(end) => Ok(answer::event(plan_event::Event::End(end))),
+            Err(Stop::Abandoned) => return tracing::debug!("a plan is not wanted any more"),
+            Err(Stop::Error(status)) => {
+                tracing::info!(code = ?status.code(), message = status.message(), "a plan ended with an error");
+                Err(status)
             }
         };
-        if let Err(status) = &ended {
-            tracing::info!(code = ?status.code(), message = status.message(), "a plan ended with an error");
-        }
-        // A caller that has the end may ask again at once: the place is free then.
-        drop(self);
         // Nobody may be there to read it.
-        let _ = sender.end.send(ended);
+        let _ = sender.end.send(end);
     }
 
-    fn follow(&mut self, sender: &Sender) -> Result<(), Stop> {
+    fn follow(&mut self, sender: &Sender) -> Result<proto::Summary, Stop> {
         let lease = self.pool.lease(Arc::clone(&self.abandoned))?;
         self.options.timeout = self.deadlines.time_for_daemon(Instant::now(), self.margin);
         let mut stream = lease.plan(self.handle, &self.options)?;
@@ -122,7 +120,7 @@ impl PlanCall {
                             caller.send(&mut stream, plan_event::Event::Document(piece.to_owned()))?;
                         }
                     }
-                    return caller.send(&mut stream, plan_event::Event::End(summary(done)));
+                    return Ok(summary(done));
                 }
                 Poll::Ready(None) => {
                     return Err(Stop::Error(status::internal("the plan ended without its summary")));

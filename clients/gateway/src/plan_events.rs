@@ -19,15 +19,15 @@ const WAITING: usize = 16;
 #[derive(Debug)]
 pub(crate) struct Sender {
     pub(crate) events: mpsc::Sender<PlanEvent>,
-    /// How it ended. This never waits for the caller.
-    pub(crate) end: oneshot::Sender<Result<(), Status>>,
+    /// The last event, or why there is none. This never waits for the caller.
+    pub(crate) end: oneshot::Sender<Result<PlanEvent, Status>>,
 }
 
 /// What the caller reads. When it is dropped, as when the call is cancelled, the thread learns that.
 #[derive(Debug)]
 pub(crate) struct PlanEvents {
     events: mpsc::Receiver<PlanEvent>,
-    end: Option<oneshot::Receiver<Result<(), Status>>>,
+    end: Option<oneshot::Receiver<Result<PlanEvent, Status>>>,
     _waiter: Waiter,
 }
 
@@ -47,11 +47,8 @@ impl Stream for PlanEvents {
         let Some(end) = &mut self.end else { return Poll::Ready(None) };
         let ended = ready!(Pin::new(end).poll(context));
         self.end = None;
-        Poll::Ready(match ended {
-            Ok(Ok(())) => None,
-            Ok(Err(status)) => Some(Err(status)),
-            Err(_) => Some(Err(internal("the gateway failed while it followed this plan"))),
-        })
+        let failed = |_| Err(internal("the gateway failed while it followed this plan"));
+        Poll::Ready(Some(ended.unwrap_or_else(failed)))
     }
 }
 
@@ -69,8 +66,9 @@ mod tests {
         block_on(async {
             let (sender, mut events) = channel(Waiter::default());
             sender.events.try_send(PlanEvent::default()).unwrap();
-            sender.end.send(Ok(())).unwrap();
+            sender.end.send(Ok(PlanEvent::default())).unwrap();
             drop(sender.events);
+            assert!(events.next().await.unwrap().is_ok());
             assert!(events.next().await.unwrap().is_ok());
             assert!(events.next().await.is_none());
             assert!(events.next().await.is_none());

@@ -64,11 +64,10 @@ pub enum ServeError {
 }
 
 /// A gateway that listens.
-#[derive(Debug)]
 pub struct Server {
     config: Config,
     listener: TcpListener,
-    tls: Option<ServerTlsConfig>,
+    transport: tonic::transport::Server,
 }
 
 /// What went wrong, with all that led to it.
@@ -90,12 +89,18 @@ impl Server {
     /// See [`ServeError`].
     pub fn bind(config: Config, allow_plaintext: bool) -> Result<Self, ServeError> {
         config.check(allow_plaintext)?;
-        let tls = config.tls.as_ref().map(tls).transpose()?;
+        let mut transport = tonic::transport::Server::builder()
+            .http2_keepalive_interval(Some(KEEPALIVE))
+            .http2_keepalive_timeout(Some(KEEPALIVE))
+            .max_concurrent_streams(STREAMS);
+        if let Some(files) = &config.tls {
+            transport = transport.tls_config(tls(files)?).map_err(|error| ServeError::Tls(chain(&error)))?;
+        }
         let address = config.listen;
         let listening = |source| ServeError::Listen { address, source };
         let listener = TcpListener::bind(address).map_err(listening)?;
         listener.set_nonblocking(true).map_err(listening)?;
-        Ok(Self { config, listener, tls })
+        Ok(Self { config, listener, transport })
     }
 
     /// The address as clients write it; the port is the real one where 0 was configured.
@@ -105,15 +110,15 @@ impl Server {
     pub fn address(&self) -> Result<String, ServeError> {
         let address = self.listener.local_addr();
         let address = address.map_err(|source| ServeError::Listen { address: self.config.listen, source })?;
-        Ok(format!("{}://{address}", if self.tls.is_some() { "https" } else { "http" }))
+        Ok(format!("{}://{address}", if self.config.tls.is_some() { "https" } else { "http" }))
     }
 
     /// Serves until `end` comes. Then plans under way are cancelled, and their callers get what there is.
     ///
     /// # Errors
-    /// The certificates cannot be used, or connections cannot be accepted.
+    /// Connections cannot be accepted.
     pub async fn serve(self, end: impl Future<Output = ()>) -> Result<(), ServeError> {
-        let transport = |error| ServeError::Transport(chain(&error));
+        let failed = |error| ServeError::Transport(chain(&error));
         let (ending, shutdown) = watch::channel(false);
         let message = self.config.limits.message_mb << 20;
         let planner = PlannerServiceServer::new(Gateway::new(&self.config, shutdown.clone()))
@@ -122,13 +127,6 @@ impl Server {
         let runtime_dir = self.config.runtime_dir.clone().unwrap_or_else(default_runtime_dir);
         let watching = tokio::spawn(report_health(reporter, runtime_dir, shutdown.clone()));
 
-        let mut builder = tonic::transport::Server::builder()
-            .http2_keepalive_interval(Some(KEEPALIVE))
-            .http2_keepalive_timeout(Some(KEEPALIVE))
-            .max_concurrent_streams(STREAMS);
-        if let Some(tls) = self.tls {
-            builder = builder.tls_config(tls).map_err(|error| ServeError::Tls(chain(&error)))?;
-        }
         let listen = self.config.listen;
         let listener = tokio::net::TcpListener::from_std(self.listener)
             .map_err(|source| ServeError::Listen { address: listen, source })?;
@@ -138,16 +136,17 @@ impl Server {
         let ended = async move {
             let _ = of_server.wait_for(|ends| *ends).await;
         };
-        let serving = builder.serve_with_incoming_shutdown(Routes { planner, health }, incoming, ended);
+        let serving =
+            self.transport.serve_with_incoming_shutdown(Routes { planner, health }, incoming, ended);
         tokio::pin!(serving);
         tokio::select! {
-            served = &mut serving => return served.map_err(transport),
+            served = &mut serving => return served.map_err(failed),
             () = end => {}
         }
         tracing::info!("ending: plans under way are cancelled");
         let _ = ending.send(true);
         match timeout(GRACE, serving).await {
-            Ok(served) => served.map_err(transport)?,
+            Ok(served) => served.map_err(failed)?,
             Err(_) => tracing::warn!("some calls did not end within {GRACE:?}"),
         }
         watching.abort();

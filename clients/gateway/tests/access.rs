@@ -147,5 +147,6 @@ fn configurations_that_cannot_be_used_are_refused_with_the_reason() {
     std::fs::write(&path, "[tls]\ncertificate = \"wrong.pem\"\nkey = \"wrong.pem\"\n").unwrap();
     let refused = sbdp_gateway(&["--listen", "127.0.0.1:0", "--config", path.to_str().unwrap()]);
     let said = String::from_utf8(refused.stderr).unwrap();
-    assert!(!refused.status.success() && said.contains("[tls]"), "{said}");
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    assert!(said.contains("[tls]") && refused.stdout.is_empty(), "{said}");
 }
