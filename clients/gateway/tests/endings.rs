@@ -2,15 +2,15 @@
 
 mod common;
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use common::{
-    Caller, Daemon, Gateway, Parts, assembly, code, end_of, next_event, request, status, to_end, upload,
-    upload_source, wait_until,
+    Caller, Daemon, Gateway, HANG, Parts, assembly, code, end_of, next_event, request, status, to_end,
+    upload, upload_source, wait_until,
 };
 use rustix::process::Signal;
 use sbdp_gateway::proto::plan_event::Event;
-use sbdp_gateway::proto::{self, CancelRequest, PlanEvent, PlanRequest, PlanStatus};
+use sbdp_gateway::proto::{self, CancelRequest, PlanEvent, PlanRequest, PlanStatus, StatusReply};
 use tonic::{Code, Request, Streaming};
 
 #[test]
@@ -36,15 +36,18 @@ async fn next_step(events: &mut Streaming<PlanEvent>) -> u32 {
     }
 }
 
-/// Waits until the daemon works on nothing; another caller asks, as the daemon does not say it by itself.
-async fn idle(caller: &mut Caller) {
-    loop {
-        let now = status(caller).await;
-        if (now.running, now.queued, now.plans) == (0, 0, 0) {
-            return;
-        }
+/// Waits for a state of daemon and gateway; another caller asks, as they do not say it by themselves.
+async fn wait_for(caller: &mut Caller, is_so: impl Fn(&StatusReply) -> bool) {
+    let start = Instant::now();
+    while !is_so(&status(caller).await) {
+        assert!(start.elapsed() < HANG, "{:?}", status(caller).await);
         tokio::time::sleep(Duration::from_millis(5)).await;
     }
+}
+
+/// Waits until nothing is under way.
+async fn idle(caller: &mut Caller) {
+    wait_for(caller, |now| (now.running, now.queued, now.plans) == (0, 0, 0)).await;
 }
 
 #[tokio::test]
@@ -119,13 +122,14 @@ async fn a_call_that_is_dropped_ends_in_the_daemon() {
 async fn a_caller_that_does_not_read_keeps_nobody_waiting() {
     let daemon = Daemon::start();
     let gateway = Gateway::start(&daemon);
-    let (mut slow, mut other) = (gateway.connect().await, gateway.connect().await);
+    let (mut slow, mut other) = (gateway.connect_narrowly().await, gateway.connect().await);
     let boxes = Parts::lattice(5);
     let handle = upload(&mut slow, &boxes.assembly()).await;
     let wanted = PlanRequest { trace: true, ..request(&handle) };
     let unread = slow.plan(wanted.clone()).await.unwrap().into_inner();
     let alone = to_end(other.plan(wanted.clone()).await.unwrap().into_inner()).await.unwrap();
     assert_eq!(end_of(&alone).status(), PlanStatus::Complete);
+    wait_for(&mut other, |now| (now.running, now.plans) == (0, 1)).await;
     // Nothing was lost meanwhile but progress.
     let late = to_end(unread).await.unwrap();
     let count = |events: &[Event], is: fn(&Event) -> bool| events.iter().filter(|event| is(event)).count();

@@ -182,6 +182,12 @@ impl Gateway {
         PlannerServiceClient::new(self.channel().await)
     }
 
+    /// A caller for whom hardly anything waits on its own side: what it does not read waits in the gateway.
+    pub async fn connect_narrowly(&self) -> Caller {
+        let address = Address::from_shared(self.address.clone()).unwrap();
+        PlannerServiceClient::new(address.initial_stream_window_size(1024).connect().await.unwrap())
+    }
+
     pub async fn health(&self) -> Health {
         Health(HealthClient::new(self.channel().await))
     }
