@@ -70,7 +70,7 @@ fn run(server: Server) -> Result<(), String> {
         let (Ok(mut terminate), Ok(mut interrupt)) = signals else {
             return Err("cannot listen for signals".to_owned());
         };
-        // Whoever started this with port 0 reads the port here.
+        // A program that starts this with port 0 reads the port here.
         println!("sbdp-gateway: serving on {}", server.address().map_err(|error| error.to_string())?);
         let end = async {
             tokio::select! {

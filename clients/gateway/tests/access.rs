@@ -5,7 +5,7 @@ mod common;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use common::{Caller, Daemon, Gateway, Parts, request, to_end, upload};
+use common::{Caller, Daemon, Gateway, Lattice, request, to_end, upload};
 use rcgen::{BasicConstraints, CertificateParams, CertifiedIssuer, IsCa, KeyPair};
 use sbdp_gateway::proto::VersionRequest;
 use sbdp_gateway::proto::planner_service_client::PlannerServiceClient;
@@ -67,7 +67,7 @@ fn trusting(authority: &Authority) -> ClientTlsConfig {
 }
 
 async fn plan(caller: &mut Caller) {
-    let handle = upload(caller, &Parts::lattice(2).assembly()).await;
+    let handle = upload(caller, &Lattice::new(2).assembly()).await;
     to_end(caller.plan(request(&handle)).await.unwrap().into_inner()).await.unwrap();
 }
 

@@ -5,7 +5,7 @@ mod common;
 use std::time::{Duration, Instant};
 
 use common::{
-    Caller, Daemon, Gateway, HANG, Parts, assembly, code, end_of, next_event, request, status, to_end,
+    Caller, Daemon, Gateway, HANG, Lattice, assembly, code, end_of, next_event, request, status, to_end,
     upload, upload_source, wait_until,
 };
 use rustix::process::Signal;
@@ -123,7 +123,7 @@ async fn a_caller_that_does_not_read_keeps_nobody_waiting() {
     let daemon = Daemon::start();
     let gateway = Gateway::start(&daemon);
     let (mut slow, mut other) = (gateway.connect_narrowly().await, gateway.connect().await);
-    let boxes = Parts::lattice(5);
+    let boxes = Lattice::new(5);
     let handle = upload(&mut slow, &boxes.assembly()).await;
     let wanted = PlanRequest { trace: true, ..request(&handle) };
     let unread = slow.plan(wanted.clone()).await.unwrap().into_inner();
@@ -151,7 +151,7 @@ async fn more_plans_than_allowed_are_refused_for_now() {
     assert!(refused.message().contains("limits.plans"), "{refused}");
     drop(events);
     idle(&mut caller).await;
-    let small = upload(&mut caller, &Parts::lattice(2).assembly()).await;
+    let small = upload(&mut caller, &Lattice::new(2).assembly()).await;
     to_end(caller.plan(request(&small)).await.unwrap().into_inner()).await.unwrap();
 }
 
@@ -196,7 +196,7 @@ async fn without_a_daemon_callers_learn_what_to_do() {
     assert!(refused.message().contains("start one with `sbdpd`"), "{refused}");
     daemon.start_again();
     assert!(health.serves("sbdp.v1.PlannerService", true).await);
-    upload(&mut caller, &Parts::lattice(2).assembly()).await;
+    upload(&mut caller, &Lattice::new(2).assembly()).await;
 }
 
 #[tokio::test]

@@ -4,7 +4,7 @@ mod common;
 
 use std::sync::Arc;
 
-use common::{Daemon, Gateway, Parts, assembly, end_of, request, status, to_end, upload, upload_source};
+use common::{Daemon, Gateway, Lattice, assembly, end_of, request, status, to_end, upload, upload_source};
 use sbdp::exchange;
 use sbdp::plan::export::PlanDocument;
 use sbdp_client::{Plan, PlanOptions, Staging};
@@ -91,7 +91,7 @@ async fn known_content_is_not_sent_again() {
     let daemon = Daemon::start();
     let gateway = Gateway::start(&daemon);
     let mut caller = gateway.connect().await;
-    let boxes = Parts::lattice(2);
+    let boxes = Lattice::new(2);
     let handle = sbdp_client::content_hash(&boxes.assembly()).0.to_vec();
     let have = |handle: &[u8]| HaveRequest { handle: handle.to_vec().into() };
     assert!(!caller.have(have(&handle)).await.unwrap().into_inner().known);
@@ -110,7 +110,7 @@ async fn progress_and_steps_come_before_the_end_and_options_arrive() {
     let daemon = Daemon::start();
     let gateway = Gateway::start(&daemon);
     let mut caller = gateway.connect().await;
-    let boxes = Parts::lattice(4);
+    let boxes = Lattice::new(4);
     let handle = upload(&mut caller, &boxes.assembly()).await;
     let wanted = PlanRequest {
         no_cache: true,

@@ -5,7 +5,7 @@ mod common;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 
-use common::{Daemon, Gateway, Parts, code, pieces, request, status, to_end, upload};
+use common::{Daemon, Gateway, Lattice, code, pieces, request, status, to_end, upload};
 use sbdp_gateway::proto::upload_request::Piece;
 use sbdp_gateway::proto::{self, HaveRequest, PlanRequest, UploadRequest};
 use tonic::{Code, Status};
@@ -23,7 +23,7 @@ fn assert_names(refused: &Status, name: &str, what: &str) {
 
 /// Two boxes, with the second one changed.
 fn changed(change: impl Fn(&mut proto::Mesh)) -> Vec<UploadRequest> {
-    let boxes = Parts::lattice(2);
+    let boxes = Lattice::new(2);
     let mut messages = pieces(&boxes.assembly(), 1000);
     for message in &mut messages {
         if let Some(Piece::Mesh(mesh)) = &mut message.piece
@@ -84,7 +84,7 @@ async fn uploads_that_make_no_sense_name_the_part() {
     let nothing: Vec<UploadRequest> = Vec::new();
     let refused = caller.upload(tokio_stream::iter(nothing)).await.unwrap_err();
     assert_names(&refused, "assembly", "no message");
-    upload(&mut caller, &Parts::lattice(2).assembly()).await;
+    upload(&mut caller, &Lattice::new(2).assembly()).await;
 }
 
 #[tokio::test]
@@ -110,7 +110,7 @@ async fn uploads_that_are_too_long_are_refused() {
     let refused = caller.upload(tokio_stream::iter(long_upload)).await.unwrap_err();
     assert_names(&refused, "limits.uploads_mb_per_client", "a long upload");
     assert_eq!(code(&refused), 11);
-    upload(&mut caller, &Parts::lattice(2).assembly()).await;
+    upload(&mut caller, &Lattice::new(2).assembly()).await;
 }
 
 #[tokio::test]
@@ -118,7 +118,7 @@ async fn requests_that_make_no_sense_name_the_field_or_part() {
     let daemon = Daemon::start();
     let gateway = Gateway::start(&daemon);
     let mut caller = gateway.connect().await;
-    let handle = upload(&mut caller, &Parts::lattice(2).assembly()).await;
+    let handle = upload(&mut caller, &Lattice::new(2).assembly()).await;
     let known = || request(&handle);
     let moved = |x: f64, qw: f64| {
         let motion = proto::Motion { x, qw, ..proto::Motion::default() };

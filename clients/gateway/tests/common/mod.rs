@@ -221,7 +221,7 @@ impl Health {
     }
 }
 
-/// The messages that upload an assembly, with meshes in pieces of so many rows.
+/// The messages that upload an assembly, with meshes in pieces of `rows` rows.
 pub fn pieces(assembly: &Assembly<'_>, rows: usize) -> Vec<UploadRequest> {
     let first = proto::Assembly {
         name: assembly.name.to_owned(),
@@ -294,10 +294,10 @@ pub fn code(status: &tonic::Status) -> i32 {
     code.to_str().unwrap().parse().unwrap()
 }
 
-/// Parts that are made here.
-pub struct Parts {
+/// Boxes that are made here.
+pub struct Lattice {
     names: Vec<String>,
-    meshes: Vec<(Vec<[f64; 3]>, Vec<[u32; 3]>)>,
+    vertices: Vec<Vec<[f64; 3]>>,
 }
 
 const BOX: [[u32; 3]; 12] = [
@@ -315,28 +315,24 @@ const BOX: [[u32; 3]; 12] = [
     [1, 7, 5],
 ];
 
-impl Parts {
-    fn new(meshes: Vec<(Vec<[f64; 3]>, Vec<[u32; 3]>)>) -> Self {
-        Self { names: (0..meshes.len()).map(|number| number.to_string()).collect(), meshes }
-    }
-
+impl Lattice {
     /// `n` × `n` × `n` boxes, each touching its neighbours.
-    pub fn lattice(n: u32) -> Self {
+    pub fn new(n: u32) -> Self {
         let cells = (0..n * n * n).map(|cell| [cell / (n * n), cell / n % n, cell % n]);
-        Self::new(cells.map(|cell| cube(cell.map(f64::from))).collect())
+        let corner = |[x, y, z]: [u32; 3], i: u32| {
+            [f64::from(x + (i & 1)), f64::from(y + (i >> 1 & 1)), f64::from(z + (i >> 2))]
+        };
+        let vertices: Vec<Vec<[f64; 3]>> =
+            cells.map(|cell| (0..8).map(|i| corner(cell, i)).collect()).collect();
+        Self { names: (0..vertices.len()).map(|number| number.to_string()).collect(), vertices }
     }
 
     pub fn assembly(&self) -> Assembly<'_> {
-        let parts = self.names.iter().zip(&self.meshes).map(|(name, (vertices, triangles))| Part {
+        let parts = self.names.iter().zip(&self.vertices).map(|(name, vertices)| Part {
             name,
             vertices: Vertices::F64(vertices),
-            triangles,
+            triangles: &BOX,
         });
         Assembly { units: Some("mm"), parts: parts.collect(), ..Assembly::default() }
     }
-}
-
-fn cube([x, y, z]: [f64; 3]) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
-    let end = |i: u32, bit: u32| f64::from(i >> bit & 1);
-    ((0..8).map(|i| [x + end(i, 0), y + end(i, 1), z + end(i, 2)]).collect(), BOX.to_vec())
 }
