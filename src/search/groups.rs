@@ -138,9 +138,7 @@ impl<'a> Groups<'_, 'a, '_> {
             if unknown.is_empty() {
                 return Ok(Some(group));
             }
-            for (part, obstacles) in self.sweeps_of(direction, &unknown)? {
-                graph[part] = obstacles;
-            }
+            self.sweep(direction, &unknown, graph)?;
         }
     }
 
@@ -348,26 +346,20 @@ impl<'a> Groups<'_, 'a, '_> {
 
     /// Per part, the parts that it enters on its way out along a direction.
     fn sweeps(&mut self, direction: usize) -> Result<BlockingGraph, Stop> {
-        let standing = self.disassembly.everything.standing().to_vec();
         let mut graph: BlockingGraph = vec![None; self.disassembly.problem.scene.bodies.len()];
-        for (part, obstacles) in self.sweeps_of(direction, &standing)? {
-            graph[part] = obstacles;
-        }
+        let standing = self.disassembly.everything.standing().to_vec();
+        self.sweep(direction, &standing, &mut graph)?;
         Ok(graph)
     }
 
     /// The same for some parts.
-    fn sweeps_of(
-        &mut self,
-        direction: usize,
-        parts: &[usize],
-    ) -> Result<Vec<(usize, Option<Vec<usize>>)>, Stop> {
+    fn sweep(&mut self, direction: usize, parts: &[usize], graph: &mut BlockingGraph) -> Result<(), Stop> {
         let around = parts.iter().map(|&part| self.disassembly.surroundings(part)).collect::<Vec<_>>();
         let problem = &self.disassembly.problem;
         let along = self.translations[direction].force();
         let swept = parts.par_iter().zip(around).map(|(&part, around)| {
             if !problem.may_join(part) {
-                return Ok((part, None));
+                return Ok(None);
             }
             let question = SweepQuestion {
                 scene: &problem.scene,
@@ -376,9 +368,11 @@ impl<'a> Groups<'_, 'a, '_> {
                 start: &problem.scene.bodies[part].planning_from_shape,
                 direction: &along,
             };
-            Ok((part, remembered_obstacles(&problem.cache, &question, &problem.termination)?))
+            remembered_obstacles(&problem.cache, &question, &problem.termination)
         });
-        Ok(swept.collect::<Result<_, Interrupt>>()?)
+        let swept: Vec<Option<Vec<usize>>> = swept.collect::<Result<_, Interrupt>>()?;
+        parts.iter().zip(swept).for_each(|(&part, obstacles)| graph[part] = obstacles);
+        Ok(())
     }
 
     /// Per part, what stops it at once along a direction.
