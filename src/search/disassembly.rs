@@ -1,7 +1,8 @@
 //! The state of a disassembly: which parts stand and which are out. All planners use it to simulate a motion,
 //! to prove a path, and to take parts out that nothing holds.
 
-use std::collections::{BTreeSet, HashMap};
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
@@ -421,6 +422,10 @@ impl<'a, 'o> Disassembly<'a, 'o> {
 
     /// The parts that alone carry another one, as they stand.
     pub(super) fn carriers(&self) -> BTreeSet<usize> {
+        self.carriers_by_depth().into_keys().collect()
+    }
+
+    fn carriers_by_depth(&self) -> BTreeMap<usize, usize> {
         self.supports.carriers(self.everything.standing(), |part| self.stays(part))
     }
 
@@ -434,11 +439,12 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.problem.base.parts.contains(&part) || !self.problem.is_movable(part)
     }
 
-    /// Which parts leave after others where both can: first the base, then parts that carry others.
-    pub(super) fn leaving_late(&self) -> impl Fn(usize) -> (bool, bool) + use<> {
-        let carriers = self.carriers();
+    /// Which parts leave after others where both can: first the base, then parts that carry others, those that carry most
+    /// of each other last.
+    pub(super) fn leaving_late(&self) -> impl Fn(usize) -> (bool, Option<Reverse<usize>>) + use<> {
+        let carriers = self.carriers_by_depth();
         let base = self.problem.base.parts.clone();
-        move |part| (base.contains(&part), carriers.contains(&part))
+        move |part| (base.contains(&part), carriers.get(&part).copied().map(Reverse))
     }
 
     /// A part that may move and whose hull is apart from all others': it needs no motion. Without sweeps it is

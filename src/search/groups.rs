@@ -9,7 +9,7 @@
 //! Small groups come first. Fixed parts are in none, nor is the base as long as the other half of the split may move
 //! instead: only the relative motion of the two counts. So no half is tried after the other.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use rayon::prelude::*;
 
@@ -94,24 +94,44 @@ impl<'a> Groups<'_, 'a, '_> {
         Ok(None)
     }
 
-    /// A group that leaves along a line with something that a part alone carries, so that nothing else is left in the air.
+    /// A group that leaves along a line before a part that alone carries something in it, so that nothing else is left in the
+    /// air.
     pub(super) fn leave_carried(
         &mut self,
         carrier: usize,
     ) -> Result<Option<(Contraction<'a>, VerifiedPath)>, Stop> {
         let standing = self.disassembly.everything.standing().to_vec();
         let carried = self.disassembly.left_in_air(&[carrier]);
+        let roots: HashMap<usize, usize> = self.roots().map(|(node, root)| (root.part, node)).collect();
+        let free: BlockingGraph = vec![Some(Vec::new()); self.disassembly.problem.scene.bodies.len()];
         let mut candidates: BTreeSet<Candidate> = BTreeSet::new();
         for direction in 0..self.translations.len() {
-            let mut graph: BlockingGraph =
-                vec![Some(Vec::new()); self.disassembly.problem.scene.bodies.len()];
-            let mut swept = BTreeSet::new();
+            let (mut stopped, mut swept) = (free.clone(), free.clone());
+            let mut known = [BTreeSet::new(), BTreeSet::new()];
             for &part in &carried {
-                let group = self.swept_closure(direction, part, &mut graph, &mut swept)?;
+                // What stops parts at once is known: mostly something that stays.
+                let begins =
+                    self.grown_closure(part, &mut stopped, &mut known[0], |groups, parts, graph| {
+                        for part in parts {
+                            let root = roots.get(part).map(|&node| &groups.states.nodes[node]);
+                            graph[*part] = root.and_then(|root| stopped_at(root, direction));
+                        }
+                        Ok(())
+                    })?;
+                if begins.is_none() {
+                    continue;
+                }
+                let group = self.grown_closure(part, &mut swept, &mut known[1], |groups, parts, graph| {
+                    groups.sweep(direction, parts, graph)
+                })?;
                 candidates.extend(group.and_then(|group| self.candidate(group, direction)));
             }
         }
         for (_, group, direction) in candidates {
+            // A carrier that leaves with what it carries may as well leave first: single parts are preferred.
+            if group.contains(&carrier) {
+                continue;
+            }
             // What would rather stay is no group that leaves here.
             let stays = self.disassembly.problem.base_among(&group, &standing, &self.order.up).is_some();
             if !stays
@@ -124,21 +144,21 @@ impl<'a> Groups<'_, 'a, '_> {
         Ok(None)
     }
 
-    /// The closure of a part in the graph of sweeps along a direction, of which only what it needs is swept.
-    fn swept_closure(
+    /// The closure of a part in a graph that `look` completes for the parts that it needs and that are not `known`.
+    fn grown_closure(
         &mut self,
-        direction: usize,
         part: usize,
         graph: &mut BlockingGraph,
-        swept: &mut BTreeSet<usize>,
+        known: &mut BTreeSet<usize>,
+        mut look: impl FnMut(&mut Self, &[usize], &mut BlockingGraph) -> Result<(), Stop>,
     ) -> Result<Option<Vec<usize>>, Stop> {
         loop {
             let Some(group) = self.closure(graph, [part]) else { return Ok(None) };
-            let unknown: Vec<usize> = group.iter().copied().filter(|&part| swept.insert(part)).collect();
+            let unknown: Vec<usize> = group.iter().copied().filter(|&part| known.insert(part)).collect();
             if unknown.is_empty() {
                 return Ok(Some(group));
             }
-            self.sweep(direction, &unknown, graph)?;
+            look(self, &unknown, graph)?;
         }
     }
 
@@ -377,21 +397,24 @@ impl<'a> Groups<'_, 'a, '_> {
 
     /// Per part, what stops it at once along a direction.
     fn stopped_in(&self, direction: usize) -> BlockingGraph {
-        self.graph(|node| node.translation.as_ref().map(|b| b.single_blockers(direction).clone()))
+        self.graph(|node| stopped_at(node, direction))
     }
 
     /// The same, and what stopped it in simulations.
     fn met_in(&self, direction: usize) -> BlockingGraph {
-        self.graph(|node| node.translation.as_ref().map(|b| b.blockers(direction)))
+        self.graph(|node| Some(node.translation.as_ref()?.blockers(direction).into_iter().collect()))
     }
 
     /// A graph of the assembled state.
-    fn graph(&self, blockers: impl Fn(&StateNode) -> Option<BTreeSet<usize>>) -> BlockingGraph {
+    fn graph(&self, blockers: impl Fn(&StateNode) -> Option<Vec<usize>>) -> BlockingGraph {
         let mut graph = vec![None; self.disassembly.problem.scene.bodies.len()];
-        for node in self.states.nodes.iter().filter(|node| node.alive && node.is_root()) {
-            graph[node.part] = blockers(node).map(|by| by.into_iter().collect());
-        }
+        self.roots().for_each(|(_, root)| graph[root.part] = blockers(root));
         graph
+    }
+
+    /// The assembled states of the parts that stand, with their places among all states.
+    fn roots(&self) -> impl Iterator<Item = (usize, &StateNode)> {
+        self.states.nodes.iter().enumerate().filter(|(_, node)| node.alive && node.is_root())
     }
 
     /// The closures of all parts that are groups, each once.
@@ -446,4 +469,9 @@ impl<'a> Groups<'_, 'a, '_> {
         }
         Some(group.into_iter().collect())
     }
+}
+
+/// What stops a state's part at once along a direction.
+fn stopped_at(node: &StateNode, direction: usize) -> Option<Vec<usize>> {
+    Some(node.translation.as_ref()?.single_blockers(direction).iter().copied().collect())
 }

@@ -5,7 +5,7 @@
 //! stays lead through it: it dominates the other. It leaves after the other where both can, so that nothing is left in the
 //! air.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use petgraph::Direction;
 use petgraph::algo::dominators::simple_fast;
@@ -28,11 +28,16 @@ impl Supports {
         Self { carried_by: carried_by.collect() }
     }
 
-    /// Of the parts that stand (ascending), those that alone carry another one, which is not among those that stay. Where
-    /// no chain leads to what stays, as where a bearing has play, a part is carried alone by the only one under it.
-    pub(super) fn carriers(&self, standing: &[usize], stays: impl Fn(usize) -> bool) -> BTreeSet<usize> {
+    /// Of the parts that stand (ascending), those that alone carry another one, which is not among those that stay; and of
+    /// each how many carry it alone. Where no chain leads to what stays, as where a bearing has play, a part is carried
+    /// alone by the only one under it.
+    pub(super) fn carriers(
+        &self,
+        standing: &[usize],
+        stays: impl Fn(usize) -> bool,
+    ) -> BTreeMap<usize, usize> {
         if self.carried_by.is_empty() {
-            return BTreeSet::new();
+            return BTreeMap::new();
         }
         let (carries, ground) = self.carries(standing, &stays);
         let dominators = simple_fast(&carries, ground);
@@ -43,11 +48,9 @@ impl Supports {
                 under.next().filter(|_| under.next().is_none())
             }
         };
-        standing
-            .iter()
-            .filter(|&&part| !stays(part) && carries.contains_node(part))
-            .filter_map(carrier)
-            .collect()
+        let carried = standing.iter().filter(|&&part| !stays(part) && carries.contains_node(part));
+        let depth = |part| dominators.strict_dominators(part).map_or(usize::MAX, Iterator::count);
+        carried.filter_map(carrier).map(|part| (part, depth(part))).collect()
     }
 
     /// Of the parts that stand (ascending), those that are carried, and are not any more when some have left.
@@ -109,7 +112,7 @@ mod tests {
         let carried_by = vec![vec![], vec![0], vec![1], vec![1, 2]];
         let supports = Supports { carried_by: carried_by.into_iter().map(BTreeSet::from_iter).collect() };
         let carriers = |standing: &[usize], base: usize| {
-            supports.carriers(standing, |part| part == base).into_iter().collect::<Vec<_>>()
+            supports.carriers(standing, |part| part == base).into_keys().collect::<Vec<_>>()
         };
         assert_eq!(carriers(&[0, 1, 2, 3], 0), [0, 1]);
         assert_eq!(carriers(&[0, 1, 3], 0), [0, 1]);
@@ -119,8 +122,9 @@ mod tests {
         let carried_by = vec![vec![], vec![0], vec![1], vec![1], vec![2, 3]];
         let supports = Supports { carried_by: carried_by.into_iter().map(BTreeSet::from_iter).collect() };
         let carriers = |standing: &[usize]| supports.carriers(standing, |part| part == 0);
-        assert_eq!(carriers(&[0, 1, 2, 3, 4]).into_iter().collect::<Vec<_>>(), [0, 1]);
-        assert_eq!(carriers(&[0, 1, 3, 4]).into_iter().collect::<Vec<_>>(), [0, 1, 3]);
+        // By each only the ground is below 0.
+        assert_eq!(carriers(&[0, 1, 2, 3, 4]).into_iter().collect::<Vec<_>>(), [(0, 1), (1, 2)]);
+        assert_eq!(carriers(&[0, 1, 3, 4]).into_iter().collect::<Vec<_>>(), [(0, 1), (1, 2), (3, 3)]);
         let left = |leaving: &[usize]| supports.left_in_air(&[0, 1, 2, 3, 4], leaving, |part| part == 0);
         assert_eq!(left(&[1]), [2, 3, 4]);
         assert_eq!(left(&[1, 2, 3]), [4]);
