@@ -439,8 +439,8 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.problem.base.parts.contains(&part) || !self.problem.is_movable(part)
     }
 
-    /// Which parts leave after others where both can: first the base, then parts that carry others, those that carry most
-    /// of each other last.
+    /// By part, when it leaves where several can: the smallest value first. Parts that carry nothing come before those that
+    /// carry others; of the latter, a part comes before those that carry it. The base comes last.
     pub(super) fn leaving_late(&self) -> impl Fn(usize) -> (bool, Option<Reverse<usize>>) + use<> {
         let carriers = self.carriers_by_depth();
         let base = self.problem.base.parts.clone();

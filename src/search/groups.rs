@@ -9,7 +9,7 @@
 //! Small groups come first. Fixed parts are in none, nor is the base as long as the other half of the split may move
 //! instead: only the relative motion of the two counts. So no half is tried after the other.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeSet, HashSet};
 
 use rayon::prelude::*;
 
@@ -45,10 +45,10 @@ pub(super) struct GroupMemory {
 }
 
 /// Which parts each part takes along in one direction; `None` where it does not leave in that direction at all.
-type BlockingGraph = Vec<Option<Vec<usize>>>;
+pub(super) type BlockingGraph = Vec<Option<Vec<usize>>>;
 
 /// A group, smaller ones first, and the number of the translation that it begins with.
-type Candidate = (usize, Vec<usize>, usize);
+pub(super) type Candidate = (usize, Vec<usize>, usize);
 
 /// A preferred group, and members that hold it in some direction.
 #[derive(Debug, PartialEq)]
@@ -94,76 +94,8 @@ impl<'a> Groups<'_, 'a, '_> {
         Ok(None)
     }
 
-    /// A group that leaves along a line before a part that alone carries something in it, so that nothing else is left in the
-    /// air.
-    pub(super) fn leave_carried(
-        &mut self,
-        carrier: usize,
-    ) -> Result<Option<(Contraction<'a>, VerifiedPath)>, Stop> {
-        let standing = self.disassembly.everything.standing().to_vec();
-        let carried = self.disassembly.left_in_air(&[carrier]);
-        let roots: HashMap<usize, usize> = self.roots().map(|(node, root)| (root.part, node)).collect();
-        let free: BlockingGraph = vec![Some(Vec::new()); self.disassembly.problem.scene.bodies.len()];
-        let mut candidates: BTreeSet<Candidate> = BTreeSet::new();
-        for direction in 0..self.translations.len() {
-            let (mut stopped, mut swept) = (free.clone(), free.clone());
-            let mut known = [BTreeSet::new(), BTreeSet::new()];
-            for &part in &carried {
-                // What stops parts at once is known: mostly something that stays.
-                let begins =
-                    self.grown_closure(part, &mut stopped, &mut known[0], |groups, parts, graph| {
-                        for part in parts {
-                            let root = roots.get(part).map(|&node| &groups.states.nodes[node]);
-                            graph[*part] = root.and_then(|root| stopped_at(root, direction));
-                        }
-                        Ok(())
-                    })?;
-                if begins.is_none() {
-                    continue;
-                }
-                let group = self.grown_closure(part, &mut swept, &mut known[1], |groups, parts, graph| {
-                    groups.sweep(direction, parts, graph)
-                })?;
-                candidates.extend(group.and_then(|group| self.candidate(group, direction)));
-            }
-        }
-        for (_, group, direction) in candidates {
-            // A carrier that leaves with what it carries may as well leave first: single parts are preferred.
-            if group.contains(&carrier) {
-                continue;
-            }
-            // What would rather stay is no group that leaves here.
-            let stays = self.disassembly.problem.base_among(&group, &standing, &self.order.up).is_some();
-            if !stays
-                && self.disassembly.left_in_air(&group).is_empty()
-                && let Some(found) = self.leaves_along(&standing, &group, direction)?
-            {
-                return Ok(Some(found));
-            }
-        }
-        Ok(None)
-    }
-
-    /// The closure of a part in a graph that `look` completes for the parts that it needs and that are not `known`.
-    fn grown_closure(
-        &mut self,
-        part: usize,
-        graph: &mut BlockingGraph,
-        known: &mut BTreeSet<usize>,
-        mut look: impl FnMut(&mut Self, &[usize], &mut BlockingGraph) -> Result<(), Stop>,
-    ) -> Result<Option<Vec<usize>>, Stop> {
-        loop {
-            let Some(group) = self.closure(graph, [part]) else { return Ok(None) };
-            let unknown: Vec<usize> = group.iter().copied().filter(|&part| known.insert(part)).collect();
-            if unknown.is_empty() {
-                return Ok(Some(group));
-            }
-            look(self, &unknown, graph)?;
-        }
-    }
-
     /// A group and its way along a translation, if it leaves so.
-    fn leaves_along(
+    pub(super) fn leaves_along(
         &mut self,
         standing: &[usize],
         group: &[usize],
@@ -373,7 +305,12 @@ impl<'a> Groups<'_, 'a, '_> {
     }
 
     /// The same for some parts.
-    fn sweep(&mut self, direction: usize, parts: &[usize], graph: &mut BlockingGraph) -> Result<(), Stop> {
+    pub(super) fn sweep(
+        &mut self,
+        direction: usize,
+        parts: &[usize],
+        graph: &mut BlockingGraph,
+    ) -> Result<(), Stop> {
         let around = parts.iter().map(|&part| self.disassembly.surroundings(part)).collect::<Vec<_>>();
         let problem = &self.disassembly.problem;
         let along = self.translations[direction].force();
@@ -413,7 +350,7 @@ impl<'a> Groups<'_, 'a, '_> {
     }
 
     /// The assembled states of the parts that stand, with their places among all states.
-    fn roots(&self) -> impl Iterator<Item = (usize, &StateNode)> {
+    pub(super) fn roots(&self) -> impl Iterator<Item = (usize, &StateNode)> {
         self.states.nodes.iter().enumerate().filter(|(_, node)| node.alive && node.is_root())
     }
 
@@ -426,7 +363,7 @@ impl<'a> Groups<'_, 'a, '_> {
 
     /// A closed set that moves along a direction as a candidate, or else what remains, which moves against it: the smaller
     /// of the two, and the one without the base. None if one of them is a part that may move: it was tried alone.
-    fn candidate(&self, group: Vec<usize>, direction: usize) -> Option<Candidate> {
+    pub(super) fn candidate(&self, group: Vec<usize>, direction: usize) -> Option<Candidate> {
         let Disassembly { problem, everything, .. } = &*self.disassembly;
         let is_rest = |part: &usize| group.binary_search(part).is_err();
         let rest: Vec<usize> = everything.standing().iter().copied().filter(is_rest).collect();
@@ -446,7 +383,11 @@ impl<'a> Groups<'_, 'a, '_> {
     }
 
     /// All that some parts take along, themselves included, in order; `None` if that is everything, or may not move.
-    fn closure(&self, graph: &BlockingGraph, parts: impl IntoIterator<Item = usize>) -> Option<Vec<usize>> {
+    pub(super) fn closure(
+        &self,
+        graph: &BlockingGraph,
+        parts: impl IntoIterator<Item = usize>,
+    ) -> Option<Vec<usize>> {
         let standing = self.disassembly.everything.standing();
         let mut group = BTreeSet::new();
         let mut open: Vec<usize> = parts.into_iter().collect();
@@ -472,6 +413,6 @@ impl<'a> Groups<'_, 'a, '_> {
 }
 
 /// What stops a state's part at once along a direction.
-fn stopped_at(node: &StateNode, direction: usize) -> Option<Vec<usize>> {
+pub(super) fn stopped_at(node: &StateNode, direction: usize) -> Option<Vec<usize>> {
     Some(node.translation.as_ref()?.single_blockers(direction).iter().copied().collect())
 }

@@ -14,6 +14,7 @@ mod aside;
 mod ball;
 mod base;
 mod blocked_actions;
+mod carried_groups;
 mod cell_decomposition;
 mod cell_memory;
 mod contraction;

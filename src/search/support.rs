@@ -28,8 +28,8 @@ impl Supports {
         Self { carried_by: carried_by.collect() }
     }
 
-    /// Of the parts that stand (ascending), those that alone carry another one, which is not among those that stay; and of
-    /// each how many carry it alone. Where no chain leads to what stays, as where a bearing has play, a part is carried
+    /// Of the parts that stand (ascending), those that alone carry another one, which is not among those that stay; and for
+    /// each the number of parts, and of the ground, that carry it alone: the depth in the tree of dominators. Where no chain leads to what stays, as where a bearing has play, a part is carried
     /// alone by the only one under it.
     pub(super) fn carriers(
         &self,
