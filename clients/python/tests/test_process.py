@@ -104,6 +104,8 @@ def test_threads_share_a_client(client):
 
 def interrupted(runtime_dir, program):
     """Seconds from Ctrl-C to the end of a program that waits; it says `ready` before."""
+    # A shell has processes in the background ignore it, and Python leaves that so.
+    program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n" + program
     command = [sys.executable, "-c", program, str(runtime_dir), str(Path(__file__).parent)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     # One that does not hear would wait for ever.
