@@ -59,10 +59,7 @@ impl Surface {
             let centre = p - normal * radius;
             let near = self.closest(&centre, radius * (1.0 - BALL_TOUCHES));
             let Some(near) = near else {
-                // The ball meets nothing, so all of it is on one side. In a sphere, all triangles are as near to the centre
-                // as each other; half-way to the point few are.
-                let half_way = p - normal * (radius / 2.0);
-                return (self.signed_distance(&half_way) < 0.0).then_some(centre);
+                return (self.signed_distance(&centre) < 0.0).then_some(centre);
             };
             let chord = near.point - p;
             let inward = -chord.dot(normal);
