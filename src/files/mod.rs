@@ -1,5 +1,5 @@
-//! Assemblies from files as people have them: folders of OBJ, STL and GLB files, one file of a whole assembly, the
-//! layouts of public data sets.
+//! Assemblies from files as people have them: folders of one mesh file for each part, one file of a whole assembly,
+//! the layouts of public data sets.
 //!
 //! A reader turns bytes into a `content::Content`: surfaces with the names that the file gives to them and their
 //! pieces. `split.rs` decides which of these is a part. What is not read, or decided without being asked, is a note of

@@ -1,4 +1,5 @@
-//! Groups: parts that leave together, as one rigid body, where none leaves alone.
+//! Groups: parts that leave together, as one rigid body, where none leaves alone, or before a part that carries them
+//! (`carried_groups.rs`).
 //!
 //! In each direction, the parts that a part takes along are its closure under the edges of a directional blocking graph
 //! (R. Wilson and J.-C. Latombe 1994). Two graphs give candidates. In the graph of sweeps, an edge leads from a part to

@@ -9,6 +9,7 @@ use tonic::Status;
 use crate::pool::lock;
 use crate::status::{busy, too_large};
 
+/// Bytes: limits are configured in MB.
 const MB: usize = 1 << 20;
 
 /// The memory of all uploads.

@@ -10,7 +10,7 @@ use tonic::Status;
 use crate::pool::lock;
 use crate::status::argument;
 
-/// Bytes of the longest key: a UUID has 36.
+/// Bytes of the longest key. A UUID has 36, and a name with one in it fits; longer ones only cost memory.
 const LONGEST: usize = 256;
 
 /// The keys of the plans under way.

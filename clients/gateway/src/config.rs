@@ -8,7 +8,8 @@ use serde::Deserialize;
 
 /// The port of gRPC's own examples, which people look for first.
 const PORT: u16 = 50051;
-/// The daemon takes 40 connections: the others are for uploads, short questions, and clients on the daemon's machine.
+/// The most plans under way that may be configured. The daemon takes 40 connections: the others are for uploads, short
+/// questions, and clients on the daemon's machine. At double, they are refused by the daemon; at half nothing breaks.
 const MOST_PLANS: usize = 32;
 
 /// Why a configuration is refused.

@@ -9,7 +9,7 @@ use crate::status::argument;
 
 /// The header by which gRPC passes a deadline on, as the time that is left.
 const HEADER: &str = "grpc-timeout";
-/// The most digits that gRPC allows.
+/// The most digits of its number, by the protocol of gRPC over HTTP/2.
 const DIGITS: usize = 8;
 
 /// The time that a call has, if it has a deadline.

@@ -28,7 +28,8 @@ const KEEPALIVE: Duration = Duration::from_secs(20);
 /// Time in which calls under way come to their end when the gateway ends: a cancelled plan takes the daemon 10 ms, and
 /// slow connections take longer to carry it.
 const GRACE: Duration = Duration::from_secs(10);
-/// Calls under way on one connection, plans and others; further ones wait in the client.
+/// Calls under way on one connection, plans and others: four times the plans that may be configured. Further ones wait in
+/// the client.
 const STREAMS: u32 = 128;
 
 /// Why the gateway cannot serve.

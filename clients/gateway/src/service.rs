@@ -25,7 +25,7 @@ use crate::upload::Intake;
 use crate::{answer, request, status, upload};
 
 /// Questions and uploads that wait for the daemon at the same time. Each has a connection of the daemon's 40; others wait
-/// for their turn.
+/// for their turn. At double, they may take connections that 32 plans need (40 in all); at half, uploads wait longer.
 const ASKING: usize = 4;
 
 /// The service.
