@@ -1,5 +1,5 @@
 //! Plans as JSON: the contract `sbdp-plan/2`, written by `sbdp plan ASSEMBLY --json FILE` and
-//! documented in the README. Parts go by their names there. Fields may be added; those that
+//! documented in `src/plan/JSON.md`. Parts go by their names there. Fields may be added; those that
 //! are here keep their meaning.
 
 use std::collections::BTreeMap;

@@ -3,7 +3,7 @@
 //!
 //! Source: the paper, Algorithm 1; for SBDP* with the evaluation functions (f_c, f_a), the constraints and the
 //! decisions of its sections on blocking graphs. With the paper's action set it differs from the paper as the table in
-//! `src/README.md` says. Beyond that set, a collision is about a set of parts, translational passes repeat while they
+//! `src/search/README.md` says. Beyond that set, a collision is about a set of parts, translational passes repeat while they
 //! find new states, since turning costs more, and both kinds of planning share their states, since a bayonet needs
 //! both.
 //!
