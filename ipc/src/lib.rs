@@ -1,9 +1,46 @@
-//! The wire contract of the sbdp daemon: names and limits of its iceoryx2 services, the layout
-//! of every message, and where a client finds the daemon. `PROTOCOL.md` has all of it in tables,
-//! made of these definitions and their comments.
+//! The wire contract of the sbdp daemon: names and limits of its iceoryx2 services, the layout of every message, and where
+//! a client finds the daemon. Programs that only want plans use the crate `sbdp-client`.
 //!
-//! Everything received is a stranger's input: views check all bounds once when they are made,
+//! `PROTOCOL.md` lists the whole contract in tables, which are generated from these definitions and their comments.
+//!
+//! # Find the daemon
+//! ```no_run
+//! use sbdp_ipc::endpoint::{Endpoint, default_runtime_dir};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let daemon = Endpoint::find(&default_runtime_dir())?;
+//! let node = sbdp_ipc::services::node(&sbdp_ipc::layout::iceoryx2_config(&daemon.prefix, &daemon.root)?)?;
+//! let plans = sbdp_ipc::services::plan(&node)?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Write a request
+//! ```
+//! use sbdp_ipc::bytes::AlignedBytes;
+//! use sbdp_ipc::geometry::{Assembly, Part, Vertices};
+//!
+//! let vertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+//! let triangles = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+//! let part = Part { name: "wedge", vertices: Vertices::F64(&vertices), triangles: &triangles };
+//! let assembly = Assembly { units: Some("mm"), parts: vec![part], ..Assembly::default() };
+//! let mut message = AlignedBytes::zeroed(assembly.encoded_len());
+//! assert!(assembly.encode_into(message.as_mut_slice()));
+//! ```
+//!
+//! # Read a message
+//! Every received message may come from a faulty or hostile process. A view checks all bounds once, when it is created,
 //! and no byte string makes one panic.
+//!
+//! ```
+//! use sbdp_ipc::plan::StepsView;
+//!
+//! # let message = sbdp_ipc::bytes::AlignedBytes::zeroed(8);
+//! match StepsView::new(message.as_slice()) {
+//!     Ok(steps) => steps.iter().for_each(|step| println!("{:?}: {:?}", step.parts, step.path)),
+//!     Err(malformed) => eprintln!("{malformed}"),
+//! }
+//! ```
 
 pub mod bytes;
 pub mod clock;

@@ -1,19 +1,18 @@
-//! Client of the sbdp daemon: hands meshes over and reads plans in shared memory.
+//! Client of the sbdp daemon: sends meshes and receives disassembly plans through shared memory. `README.md` describes
+//! everything that a client can do.
 //!
+//! # Plan
 //! ```no_run
 //! use sbdp_client::{Assembly, Client, Event, PlanOptions};
 //! # fn main() -> Result<(), sbdp_client::ClientError> {
 //! # let assembly = Assembly::default();
-//! let client = Client::connect()?;
-//! let handle = client.upload(&assembly)?;
+//! let client = Client::connect()?;                  // `sbdpd` is running
+//! let handle = client.upload(&assembly)?;           // known content is not sent again
 //! let mut stream = client.plan(handle, &PlanOptions::default())?;
-//! while let Some(event) = stream.next_event()? {
+//! while let Some(event) = stream.next_event()? {    // steps as they are found
 //!     match event {
 //!         Event::Progress(progress) => eprintln!("{progress:?}"),
-//!         Event::Step(step) => {
-//!             let step = step.view();
-//!             println!("parts {:?} along {} waypoints", step.parts, step.path.len());
-//!         }
+//!         Event::Step(step) => println!("parts {:?} along {:?}", step.view().parts, step.view().path),
 //!         Event::Trace(lines) => print!("{lines}"),
 //!         Event::Restarted => println!("another daemon: the steps come again"),
 //!         Event::Done(summary) => println!("{}", summary.status.name()),
@@ -23,7 +22,43 @@
 //! # }
 //! ```
 //!
-//! Everything blocks, with timeouts; every [`ClientError`] says what to do.
+//! [`PlanStream::plan_to_end`] waits for the whole [`Plan`].
+//!
+//! # Plan again after a change
+//! [`PlanOptions`] names parts that are removed, locked, wanted or moved. [`Client::revise`] changes meshes:
+//!
+//! ```no_run
+//! use sbdp_client::{Change, Client, Handle, Part, PlanOptions, Vertices};
+//! # fn main() -> Result<(), sbdp_client::ClientError> {
+//! # let (client, handle) = (Client::connect()?, Handle([0; 32]));
+//! # let (vertices, triangles) = (vec![[0.0; 3]], vec![[0; 3]]);
+//! let longer = Part { name: "bolt", vertices: Vertices::F64(&vertices), triangles: &triangles };
+//! let changed = client.revise(handle, &Change { replaced: vec![(3, longer)], ..Change::default() })?;
+//! let plan = client.plan(changed, &PlanOptions::default())?.plan_to_end()?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Carry out a plan
+//! A [`Session`] records what was done and what failed, and plans the rest from there:
+//!
+//! ```no_run
+//! use std::time::Duration;
+//!
+//! use sbdp_client::{Client, Handle, PlanOptions};
+//! # fn main() -> Result<(), sbdp_client::ClientError> {
+//! # let (client, handle) = (Client::connect()?, Handle([0; 32]));
+//! let options = PlanOptions { timeout: Some(Duration::from_millis(50)), ..PlanOptions::default() };
+//! let mut session = client.session(handle, options)?;
+//! let plan = session.replan()?.plan_to_end()?;
+//! session.performed(&plan.steps[0]);
+//! session.stuck(plan.steps[1].view().parts[0]);     // the rest is planned without it
+//! let rest = session.replan()?.plan_to_end()?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! All calls block, with timeouts. The message of every [`ClientError`] says what to do.
 
 mod client;
 mod connection;
