@@ -213,7 +213,7 @@ impl<'a> Texts<'a> {
         std::str::from_utf8(range).map_err(|_| Malformed::NotText { field })
     }
 
-    /// A text that was checked before; empty should the sender have changed it since.
+    /// A text that was checked before; empty if the sender has changed it since.
     #[must_use]
     pub fn get_checked(&self, text: Text) -> &'a str {
         self.get(text, "text").unwrap_or("")

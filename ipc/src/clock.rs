@@ -17,7 +17,7 @@ pub fn deadline_in(timeout: Duration) -> u64 {
     monotonic_ns().saturating_add(u64::try_from(timeout.as_nanos()).unwrap_or(u64::MAX))
 }
 
-/// The instant of a deadline; one so far ahead that no `Instant` holds it is none.
+/// The instant of a deadline; `None` if it is too far ahead for an `Instant`.
 #[must_use]
 pub fn instant_of(deadline_ns: u64) -> Option<Instant> {
     let now = monotonic_ns();

@@ -14,7 +14,7 @@ pub const DAEMON_FILE: &str = "daemon.json";
 /// Environment variable that names the runtime folder.
 pub const RUNTIME_DIR_VARIABLE: &str = "SBDP_RUNTIME_DIR";
 
-/// What `daemon.json` says.
+/// The content of `daemon.json`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Endpoint {
     /// The daemon's process id.
@@ -54,7 +54,7 @@ pub enum EndpointError {
         /// Its iceoryx2.
         iceoryx2: String,
     },
-    /// The folder belongs to somebody else, or is open to others.
+    /// The folder belongs to another user, or other users can access it.
     #[error("runtime folder {path} is not safe: {reason}")]
     Unsafe {
         /// The folder.
@@ -67,10 +67,10 @@ pub enum EndpointError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: io::Error,
     },
-    /// `daemon.json` makes no sense.
+    /// `daemon.json` cannot be understood.
     #[error("{path} cannot be understood: {reason}; remove it and restart `sbdpd`")]
     Damaged {
         /// The file.
@@ -117,7 +117,7 @@ impl Endpoint {
     /// Reads `daemon.json` as it is.
     ///
     /// # Errors
-    /// It is not there or makes no sense.
+    /// It does not exist or cannot be understood.
     pub fn read(file: &Path) -> Result<Self, EndpointError> {
         let text = fs::read(file).map_err(|source| match source.kind() {
             io::ErrorKind::NotFound => EndpointError::NoDaemon(file.to_owned()),
@@ -127,7 +127,7 @@ impl Endpoint {
             .map_err(|e| EndpointError::Damaged { path: file.to_owned(), reason: e.to_string() })
     }
 
-    /// Publishes `daemon.json` at once and whole.
+    /// Publishes `daemon.json` atomically.
     ///
     /// # Errors
     /// It cannot be written.
@@ -141,15 +141,15 @@ impl Endpoint {
         write().map_err(|source| EndpointError::Io { path: path.clone(), source })
     }
 
-    /// Whether its process lives ([`is_process_alive`]).
+    /// Whether its process is alive ([`is_process_alive`]).
     #[must_use]
     pub fn is_alive(&self) -> bool {
         is_process_alive(self.pid)
     }
 }
 
-/// Whether a process lives. One that ended but was not waited for by its parent yet (a
-/// zombie) can still be signalled, but answers nobody: it counts as dead.
+/// Whether a process is alive. One that ended but was not waited for by its parent yet (a
+/// zombie) can be signalled but never answers: it counts as dead.
 #[must_use]
 pub fn is_process_alive(pid: u32) -> bool {
     let Some(id) = i32::try_from(pid).ok().and_then(rustix::process::Pid::from_raw) else {
@@ -186,7 +186,7 @@ pub fn default_prefix(runtime_dir: &Path) -> String {
 /// Creates the runtime folder with mode 0700, or checks the one that is there.
 ///
 /// # Errors
-/// It cannot be created, belongs to somebody else, or is open to others.
+/// It cannot be created, belongs to another user, or other users can access it.
 pub fn create_runtime_dir(path: &Path) -> Result<(), EndpointError> {
     match DirBuilder::new().mode(0o700).recursive(false).create(path) {
         Ok(()) => {}

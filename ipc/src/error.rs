@@ -1,4 +1,4 @@
-//! Why a request was not answered with what it asked for.
+//! Why a request failed.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -20,7 +20,7 @@ pub enum ErrorCode {
     Geometry = 5,
     /// The request names a part that is not there.
     NoSuchPart = 6,
-    /// The request wants something that this daemon does not offer.
+    /// The request needs something that this daemon does not offer.
     Unsupported = 7,
     /// The daemon failed; its log says more.
     Failed = 8,
@@ -28,7 +28,7 @@ pub enum ErrorCode {
     SlowReader = 9,
     /// The daemon is shutting down.
     ShuttingDown = 10,
-    /// The message exceeds a limit of the daemon, or what memory is left.
+    /// The message exceeds a limit of the daemon, or the memory that is left.
     TooLarge = 11,
     /// The client cancelled, or left, before planning began.
     Cancelled = 12,
@@ -68,14 +68,14 @@ pub struct ErrorHeader {
 
 const _: () = assert!(size_of::<ErrorHeader>() == 8);
 
-/// An error as it travels.
+/// An error on the wire.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WireError {
-    /// What kind.
+    /// Its kind.
     pub code: ErrorCode,
     /// What happened and what to do.
     pub message: String,
-    /// Of `Busy`: milliseconds after which asking again makes sense; else 0. It travels in the response's
+    /// For `Busy`: milliseconds to wait before the next try; otherwise 0. It is sent in the response's
     /// header, not in the message.
     pub retry_ms: u32,
 }
@@ -86,7 +86,7 @@ impl WireError {
         Self { code, message: message.into(), retry_ms: 0 }
     }
 
-    /// `Busy`, and when to come again.
+    /// `Busy`, with the time to wait before the next try.
     pub fn busy(message: impl Into<String>, retry_ms: u32) -> Self {
         Self { retry_ms, ..Self::new(ErrorCode::Busy, message) }
     }

@@ -1,4 +1,4 @@
-//! Uploads: an assembly's meshes as they travel.
+//! Uploads: an assembly's meshes on the wire.
 //!
 //! Sections: [`UploadHeader`], [`PartRecord`] per part, names of fixed parts ([`Text`]), texts,
 //! then per part its vertices and its triangles.
@@ -28,7 +28,7 @@ pub struct UploadHeader {
     pub flags: u32,
     /// Bytes of text.
     pub text_bytes: u32,
-    /// A name for people; no part of the content.
+    /// A name for display; not part of the content.
     pub name: Text,
     /// The unit of length, as `mm`; ignored without [`UPLOAD_HAS_UNITS`].
     pub units: Text,
@@ -118,7 +118,7 @@ impl<'a> Part<'a> {
         }
     }
 
-    /// Its mesh as it travels, in two pieces.
+    /// Its mesh on the wire, in two pieces.
     pub(crate) fn pieces(&self) -> [&'a [u8]; 2] {
         [self.vertices.bytes(), bytemuck::cast_slice(self.triangles)]
     }
@@ -160,7 +160,7 @@ pub(crate) fn write_pieces<'p>(
 /// An assembly to upload, or as received.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Assembly<'a> {
-    /// A name for people; not part of the content.
+    /// A name for display; not part of the content.
     pub name: &'a str,
     /// The unit of length, if known (`mm`).
     pub units: Option<&'a str>,

@@ -1,4 +1,4 @@
-//! The user headers that ride beside every request and response payload.
+//! The user headers of every request and response.
 //!
 //! Request ids and timings are here and not in the payload, so that a stored answer's bytes
 //! never change.
@@ -8,7 +8,7 @@ use std::mem::offset_of;
 use bytemuck::{Pod, Zeroable};
 use iceoryx2::prelude::ZeroCopySend;
 
-/// What a request on `plan` or `geometry` asks.
+/// The kind of a request on `plan` or `geometry`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum RequestKind {
@@ -16,15 +16,15 @@ pub enum RequestKind {
     Plan = 1,
     /// `plan`: no payload; grants credit to the plan request named in the header, and may end it.
     Control = 2,
-    /// `plan`: no payload; how is the daemon?
+    /// `plan`: no payload; asks for the daemon's status.
     Status = 3,
-    /// `geometry`: 32 bytes; is this handle known?
+    /// `geometry`: 32 bytes; asks whether this handle is known.
     Have = 4,
     /// `geometry`: an upload.
     Upload = 5,
-    /// `geometry`: what differs from a known assembly.
+    /// `geometry`: changes of a known assembly.
     Revise = 6,
-    /// `plan`: no payload; the metrics of the daemon, to which more may be added.
+    /// `plan`: no payload; asks for the daemon's metrics, to which later versions may add.
     Metrics = 7,
 }
 
@@ -71,7 +71,7 @@ impl ResponseKind {
 /// Control flag: end the plan request soon; it is still answered, with status `cancelled`.
 pub const CONTROL_CANCEL: u32 = 1;
 
-/// Beside every request.
+/// The header of every request.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("sbdp/v8/RequestHeader")]
@@ -80,23 +80,23 @@ pub struct RequestHeader {
     pub kind: u32,
     /// Flags of the kind: [`CONTROL_CANCEL`] for `Control`; else 0.
     pub flags: u32,
-    /// Number of the plan request, unique within its client port; for `Control` the one meant.
+    /// Number of the plan request, unique within its client port; for `Control` that of the request to control.
     pub request: u64,
-    /// For `Control`: chunks of that request received so far, in all. For `Upload` and `Revise`: when the
-    /// answer is of no use any more (CLOCK_MONOTONIC nanoseconds), 0 for never.
+    /// For `Control`: chunks of that request received so far, in all. For `Upload` and `Revise`: the deadline of the
+    /// answer (CLOCK_MONOTONIC nanoseconds), 0 for none.
     pub consumed: u64,
     /// Id of the listener on `wake/client` that the daemon notifies, low half first; 0 for none.
     pub listener: [u64; 2],
 }
 
-/// Beside every response.
+/// The header of every response.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("sbdp/v8/ResponseHeader")]
 pub struct ResponseHeader {
     /// A [`ResponseKind`].
     pub kind: u32,
-    /// Beside the error `busy`: milliseconds after which asking again makes sense. Else 0.
+    /// With the error `busy`: milliseconds to wait before the next try. Otherwise 0.
     pub retry_ms: u32,
     /// Number of the plan request that is answered.
     pub request: u64,
@@ -104,18 +104,18 @@ pub struct ResponseHeader {
     pub sequence: u64,
     /// At which byte of the message this chunk begins.
     pub offset: u64,
-    /// Bytes of the whole message; one longer than a chunk comes in consecutive chunks.
+    /// Bytes of the whole message. A message longer than a chunk is sent in consecutive chunks.
     pub total: u64,
     /// When the daemon admitted the request (CLOCK_MONOTONIC nanoseconds).
     pub admitted_ns: u64,
-    /// When a worker took it up (CLOCK_MONOTONIC nanoseconds); 0 before.
+    /// When a worker began to plan (CLOCK_MONOTONIC nanoseconds); 0 before.
     pub started_ns: u64,
     /// When this chunk was sent (CLOCK_MONOTONIC nanoseconds).
     pub sent_ns: u64,
 }
 
 impl RequestHeader {
-    /// When an upload or revision is of no use to its client any more.
+    /// The deadline of an upload or revision.
     #[must_use]
     pub fn upload_deadline_ns(&self) -> Option<u64> {
         (self.consumed != 0).then_some(self.consumed)

@@ -1,7 +1,7 @@
 //! Names and limits of the services, and the explicit iceoryx2 configuration.
 //!
 //! Both sides take their configuration from here and from [`crate::endpoint`], never from the
-//! iceoryx2 search path: that one begins in the working directory.
+//! iceoryx2 search path, which begins in the working directory.
 
 use std::path::{Path, PathBuf};
 
@@ -18,11 +18,11 @@ pub const WAKE_SERVER_SERVICE: &str = "sbdp/v8/wake/server";
 /// Event: wakes one client.
 pub const WAKE_CLIENT_SERVICE: &str = "sbdp/v8/wake/client";
 
-/// Clients at once.
+/// The most clients at a time.
 pub const MAX_CLIENTS: usize = 40;
-/// Client ports on `geometry`: one to ask, one while an upload lasts.
+/// Client ports on `geometry`: one for questions, one during an upload.
 pub const MAX_GEOMETRY_CLIENTS: usize = 80;
-/// Processes at once that have a service open.
+/// The most processes that have a service open at a time.
 pub const MAX_NODES: usize = 64;
 /// Listeners and notifiers on the event services.
 pub const MAX_EVENT_PORTS: usize = 64;

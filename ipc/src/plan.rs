@@ -9,27 +9,27 @@ use crate::bytes::{Malformed, Reader, Writer};
 /// `[x, y, z, qw, qx, qy, qz]` in the input's units and frame.
 pub type Waypoint = [f64; 7];
 
-/// Neither read nor write anything remembered.
+/// Neither read nor write the cache.
 pub const PLAN_NO_CACHE: u32 = 1;
-/// The list of targets is given (it may be empty); without it all parts are meant.
+/// The list of targets is given (it may be empty); without it, all parts must come out.
 pub const PLAN_HAS_TARGETS: u32 = 2;
 
-/// Parts that leave straight are taken out by a sweep, without simulation.
+/// Remove parts that leave straight by a sweep, without simulation.
 pub const PLAN_SWEEPS: u32 = 4;
-/// Parts that leave straight are simulated, too. Neither this nor [`PLAN_SWEEPS`] leaves it to the daemon; both are
+/// Simulate parts that leave straight, too. Without this and [`PLAN_SWEEPS`] the daemon decides; both together are
 /// malformed.
 pub const PLAN_NO_SWEEPS: u32 = 8;
 
-/// Nobody waits for this plan: requests without this flag go first.
+/// No one waits for this plan: requests without this flag come first.
 pub const PLAN_BATCH: u32 = 16;
 
-/// An assembly plan is wanted: the disassembly reversed, with each part's way from where it waits.
+/// Make an assembly plan: the disassembly reversed, with each part's path from where it waits.
 pub const PLAN_ASSEMBLY: u32 = 32;
-/// The parts of the assembly plan wait nowhere: each begins where its insertion does. Malformed without
+/// The parts of the assembly plan wait nowhere: each begins where its insertion begins. Malformed without
 /// [`PLAN_ASSEMBLY`], and with places where parts wait (`staged`).
 pub const PLAN_NO_STAGING: u32 = 64;
 
-/// The events of the search are wanted, too: it runs even where the plan is remembered.
+/// Send the events of the search, too. The search then runs even if the plan is remembered.
 pub const PLAN_TRACE: u32 = 128;
 /// The header's `clearance` is given.
 pub const PLAN_HAS_CLEARANCE: u32 = 256;
@@ -64,9 +64,9 @@ pub const PENALTY_PARAMETERS: [&str; 16] = [
     "newton-tolerance",
 ];
 
-/// Header of a plan request; four lists of u32 part numbers follow: fixed, removed, targets, base; then the sizes of the
-/// groups (u32) and their parts (u32), group after group; then [`MovedPart`]s: those that stand elsewhere, and those that
-/// wait at given places; then [`PenaltyRecord`]s.
+/// Header of a plan request; four lists of u32 part numbers follow: fixed, removed, targets, base; then the sizes of
+/// the groups (u32) and their parts (u32), group after group; then [`MovedPart`]s: those that stand elsewhere, and
+/// those that wait at given places; then [`PenaltyRecord`]s.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct PlanRequestHeader {
@@ -85,7 +85,7 @@ pub struct PlanRequestHeader {
     pub threads: u32,
     /// How many parts may not move.
     pub fixed: u32,
-    /// How many parts are gone already.
+    /// How many parts are already removed.
     pub removed: u32,
     /// How many parts must come out.
     pub targets: u32,
@@ -99,20 +99,20 @@ pub struct PlanRequestHeader {
     pub static_analysis: u32,
     /// How many parameters of the engine `penalty` differ from the paper's.
     pub penalty: u32,
-    /// How many groups rather leave as wholes.
+    /// How many groups should leave as wholes.
     pub groups: u32,
-    /// When the answer is of no use any more, in nanoseconds of CLOCK_MONOTONIC; 0 for never.
+    /// The deadline of the answer, in nanoseconds of CLOCK_MONOTONIC; 0 for none.
     pub deadline_ns: u64,
     /// Simulations after which to give up; `u64::MAX` for no limit.
     pub max_simulations: u64,
     /// Nanoseconds after which one motion, or a baseline's search for one part, is given up; `u64::MAX` for no limit.
     pub path_timeout_ns: u64,
-    /// Nanoseconds of planning, verification not counted, after which to answer with what is there; `u64::MAX` for no
+    /// Nanoseconds of planning, verification not counted, after which to answer with the plan so far; `u64::MAX` for no
     /// limit.
     pub planning_timeout_ns: u64,
-    /// What the random poses of `rrt` and `bk-rrt` depend on.
+    /// Seed of the random poses of `rrt` and `bk-rrt`.
     pub seed: u64,
-    /// The gap between hulls where a way out ends, in the input's units; ignored without [`PLAN_HAS_CLEARANCE`].
+    /// The gap between hulls where a path out ends, in the input's units; ignored without [`PLAN_HAS_CLEARANCE`].
     pub clearance: f64,
     /// The direction up, in the input's frame, of any length but 0; ignored without [`PLAN_HAS_UP`].
     pub up: [f64; 3],
@@ -154,7 +154,7 @@ pub struct StepRecord {
     pub first_part: u32,
     /// How many parts move in this step, at least one.
     pub parts: u32,
-    /// Number of the step that takes the group out, or puts it in, to which these parts belong; or [`NO_STEP`].
+    /// Number of the step that removes, or inserts, the group to which these parts belong; or [`NO_STEP`].
     pub of: u32,
     /// Where the step leaves its parts: a [`StepEnd`].
     pub ends: u32,
@@ -168,7 +168,7 @@ pub struct StepRecord {
     pub first_requirement: u32,
     /// How many requirements this step has.
     pub requirements: u32,
-    /// The earliest round, from 0, in which the step can be done, if every step is done as soon as it can be.
+    /// The earliest round, from 0, in which the step can be done, if every step is done as soon as possible.
     pub wave: u32,
     /// Deepest penetration found by verification beyond the assembled depth, in the input's units.
     pub verified_depth: f64,
@@ -217,14 +217,14 @@ const _: () = {
 pub enum Staging {
     /// Each where its insertion begins; it is not there before its turn.
     None,
-    /// Laid out beside the assembly, but for these.
+    /// Laid out beside the assembly, except for these.
     Beside(Vec<MovedPart>),
 }
 
 /// A plan request, owned.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlanRequest {
-    /// Which assembly.
+    /// The assembly's handle.
     pub handle: [u8; 32],
     /// Index into [`PLANNERS`].
     pub planner: u32,
@@ -236,22 +236,22 @@ pub struct PlanRequest {
     pub static_analysis: u32,
     /// Parameters of the engine `penalty` that differ from the paper's.
     pub penalty: Vec<PenaltyRecord>,
-    /// Whether parts that leave straight are taken out without simulation; `None` leaves it to the
+    /// Whether parts that leave straight are removed without simulation; `None` leaves it to the
     /// daemon.
     pub sweeps: Option<bool>,
-    /// The events of the search are wanted, too.
+    /// Send the events of the search, too.
     pub trace: bool,
-    /// Neither read nor write anything remembered.
+    /// Neither read nor write the cache.
     pub no_cache: bool,
-    /// Others go first: nobody waits for this plan.
+    /// Other requests come first: no one waits for this plan.
     pub batch: bool,
-    /// Threads; 0 leaves it to the daemon.
+    /// The number of threads; 0 leaves it to the daemon.
     pub threads: u32,
-    /// CLOCK_MONOTONIC nanoseconds.
+    /// The deadline, in nanoseconds of CLOCK_MONOTONIC.
     pub deadline_ns: Option<u64>,
-    /// What the random poses of `rrt` and `bk-rrt` depend on.
+    /// Seed of the random poses of `rrt` and `bk-rrt`.
     pub seed: u64,
-    /// The gap between a part's hull and that of all that stands where its way out ends, in the input's units; `None` leaves
+    /// The gap between a part's hull and that of the rest where its path out ends, in the input's units; `None` leaves
     /// it to the daemon.
     pub clearance: Option<f64>,
     /// The direction up, in the input's frame, of any length but 0; `None` leaves it to the daemon.
@@ -260,21 +260,21 @@ pub struct PlanRequest {
     pub max_simulations: Option<u64>,
     /// Nanoseconds after which one motion, or a baseline's search for one part, is given up.
     pub path_timeout_ns: Option<u64>,
-    /// Nanoseconds of planning, verification not counted, after which to answer with what is there.
+    /// Nanoseconds of planning, verification not counted, after which to answer with the plan so far.
     pub planning_timeout_ns: Option<u64>,
     /// Parts that may not move.
     pub fixed: Vec<u32>,
-    /// Parts that are gone already.
+    /// Parts that are already removed.
     pub removed: Vec<u32>,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<u32>>,
     /// Parts that stay as long as others leave; if there are none, the daemon chooses one.
     pub base: Vec<u32>,
-    /// Groups that rather leave as wholes, to be taken apart then.
+    /// Groups that should leave as wholes, to be taken apart afterwards.
     pub groups: Vec<Vec<u32>>,
     /// Parts that stand elsewhere than in the assembly.
     pub moved: Vec<MovedPart>,
-    /// An assembly plan is wanted, with parts that begin there.
+    /// Make an assembly plan, with parts that begin there.
     pub assembly: Option<Staging>,
 }
 
@@ -406,7 +406,7 @@ impl PlanRequest {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(u32)]
 pub enum StepEnd {
-    /// Apart from all that they stood with.
+    /// Clear of everything that they stood with.
     #[default]
     Out = 0,
     /// Elsewhere among the others, where they stay until a later step moves them again.
@@ -428,7 +428,7 @@ impl StepEnd {
 pub struct Step {
     /// The parts that move, as one rigid body; at least one.
     pub parts: Vec<u32>,
-    /// The number of the step that takes the group out (of an assembly plan: puts it in) to which these parts belong;
+    /// The number of the step that removes (in an assembly plan: inserts) the group to which these parts belong;
     /// `None` for parts that leave the assembly, or enter it.
     pub of: Option<u32>,
     /// Where the step leaves them.
@@ -439,9 +439,9 @@ pub struct Step {
     pub path: Vec<Waypoint>,
     /// Deepest penetration beyond the assembled depth.
     pub verified_depth: f64,
-    /// Numbers of the steps that must be done before this very path is free, ascending.
+    /// Numbers of the steps that must be done before this exact path is free, ascending.
     pub requires: Vec<u32>,
-    /// The earliest round, from 0, in which it can be done, if every step is done as soon as it can be.
+    /// The earliest round, from 0, in which it can be done, if every step is done as soon as possible.
     pub wave: u32,
     /// The unit vector of the path's last leg, in the input's frame; `None` where that only turns, or there is none.
     pub direction: Option<[f64; 3]>,
@@ -510,7 +510,7 @@ pub struct StepView<'a> {
     pub number: u32,
     /// The parts that move, as one rigid body, in shared memory; all others that stand with them stay where they are.
     pub parts: &'a [u32],
-    /// The number of the step that takes the group out (of an assembly plan: puts it in) to which these parts belong;
+    /// The number of the step that removes (in an assembly plan: inserts) the group to which these parts belong;
     /// `None` for parts that leave the assembly, or enter it. A group is taken apart as it stood in the assembly.
     pub of: Option<u32>,
     /// Where the step leaves them.
@@ -522,9 +522,9 @@ pub struct StepView<'a> {
     pub path: &'a [Waypoint],
     /// Deepest penetration beyond the assembled depth.
     pub verified_depth: f64,
-    /// Numbers of the steps that must be done before this very path is free, ascending.
+    /// Numbers of the steps that must be done before this exact path is free, ascending.
     pub requires: &'a [u32],
-    /// The earliest round, from 0, in which it can be done, if every step is done as soon as it can be.
+    /// The earliest round, from 0, in which it can be done, if every step is done as soon as possible.
     pub wave: u32,
     /// The unit vector of the path's last leg, in the input's frame; `None` where that only turns, or there is none.
     pub direction: Option<[f64; 3]>,
@@ -556,7 +556,7 @@ impl<'a> StepsView<'a> {
         Ok(view)
     }
 
-    /// The same over bytes that were checked before. Should the sender have changed them since, steps may be missing.
+    /// The same over bytes that were checked before. If the sender has changed them since, steps may be missing.
     #[must_use]
     pub fn checked(bytes: &'a [u8]) -> Self {
         Self::sections(bytes).unwrap_or_default()
@@ -586,7 +586,7 @@ impl<'a> StepsView<'a> {
         self.records.is_empty()
     }
 
-    /// A step. Its slices are empty should the sender have changed the bytes since the check.
+    /// A step. Its slices are empty if the sender has changed the bytes since the check.
     #[must_use]
     pub fn get(&self, index: usize) -> Option<StepView<'a>> {
         let r = *self.records.get(index)?;

@@ -1,44 +1,43 @@
-//! Looking for what is waited for, for a moment, before going to sleep.
+//! Polling for a short time before going to sleep.
 //!
-//! To wake a process takes the system 10 to 60 µs, depending on how deep the processor had gone to sleep;
-//! what an answer from memory takes is less. So whoever expects something at once first looks by itself, and
-//! lets others run between two looks. Where that does not pay it stops by itself: where nothing comes in
-//! time it looks more and more rarely, and where others need the processors it rests, for a thread that
-//! gives way to a busy one may get the processor back after milliseconds only.
+//! Waking a process takes the system 10 to 60 µs, depending on how deeply the processor slept. An answer from memory
+//! takes less. So a thread that expects something soon polls first, and yields to other threads between two polls. It
+//! stops where that does not pay: after fruitless polls it polls more and more rarely, and where others need the
+//! processors it pauses, because a thread that yields to a busy one may get the processor back only after milliseconds.
 
 use std::time::{Duration, Instant};
 
-/// For how long is looked, unless told otherwise: about what it takes to be woken.
+/// The usual polling time: about as long as it takes to be woken.
 pub const USUAL: Duration = Duration::from_micros(50);
 
-/// After one wait that was in vain the next 1 is not begun by looking, then 3, 7 and so on up to this.
+/// Exponential back-off: after n fruitless polls in a row, the next 2ⁿ − 1 waits do not poll, up to this number.
 const LONGEST_OMISSION: u32 = 255;
-/// Who gets the processor back no sooner than this gave way to somebody with work to do.
+/// A yield that took longer than this gave the processor to a thread with work to do.
 const CONTESTED: Duration = Duration::from_micros(500);
-/// The rest after that; twice as long each time it turns out to have been too short.
+/// The pause after that; doubled each time it turns out to be too short.
 const SHORTEST_REST: Duration = Duration::from_millis(25);
 const LONGEST_REST: Duration = Duration::from_secs(1);
 
-/// Whether and how long to look before sleeping.
+/// Whether and how long to poll before sleeping.
 #[derive(Debug)]
 pub struct Polling {
     limit: Duration,
-    /// Waits that are not begun by looking, after the last in vain.
+    /// Waits without polling after the last fruitless poll.
     omission: u32,
-    /// Those of them that are still to come.
+    /// How many of these are still to come.
     omitted: u32,
     rest: Duration,
     rest_until: Option<Instant>,
 }
 
 impl Polling {
-    /// Looks for so long before each sleep; zero for never.
+    /// Polls for up to this long before each sleep; zero for never.
     #[must_use]
     pub fn new(limit: Duration) -> Self {
         Self { limit, omission: 0, omitted: 0, rest: SHORTEST_REST, rest_until: None }
     }
 
-    /// Looks until `is_there`, for a moment or not at all; whether it is there.
+    /// Polls until `is_there` returns true, for a short time or not at all. Returns whether it did.
     pub fn look(&mut self, is_there: impl FnMut() -> bool) -> bool {
         self.look_by(Instant::now, std::thread::yield_now, is_there)
     }
@@ -82,7 +81,7 @@ impl Polling {
         }
     }
 
-    /// Rests; longer than the last time if that has just been.
+    /// Pauses; twice as long as before if the last pause has only just ended.
     fn rest_from(&mut self, start: Instant, time: Instant) {
         let again = self.rest_until.is_some_and(|end| start < end + self.rest);
         self.rest = if again { (self.rest * 2).min(LONGEST_REST) } else { SHORTEST_REST };
@@ -94,7 +93,7 @@ impl Polling {
 mod tests {
     use super::*;
 
-    /// A clock by which a look, with what others do meanwhile, takes so long.
+    /// A clock in which each poll, with what other threads do meanwhile, takes a given time.
     struct World {
         time: Instant,
         looks: u32,
@@ -105,7 +104,7 @@ mod tests {
             Self { time: Instant::now(), looks: 0 }
         }
 
-        /// What looking says if it is there at the look with this number, from 1, and how often it looked.
+        /// The result if the condition holds at the poll with this number, from 1, and the number of polls.
         fn look(&mut self, polling: &mut Polling, look_us: u64, there_at: u32) -> (bool, u32) {
             let (time, looks) = (std::cell::Cell::new(self.time), std::cell::Cell::new(0));
             let found = polling.look_by(

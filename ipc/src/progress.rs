@@ -1,4 +1,4 @@
-//! Progress: lossy, for display only, nothing a client must have.
+//! Progress: lossy, and for display only.
 
 use std::mem::offset_of;
 
@@ -9,10 +9,10 @@ use iceoryx2::prelude::ZeroCopySend;
 pub const STAGE_SDF: u32 = 1;
 /// Searching and verifying.
 pub const STAGE_SEARCH: u32 = 2;
-/// Finding the ways to where insertions begin.
+/// Finding the paths to where insertions begin.
 pub const STAGE_TRANSFER: u32 = 3;
 
-/// One sample on `progress`, seen by every client; each picks its own.
+/// One sample on `progress`, received by every client; each picks its own.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
 #[type_name("sbdp/v8/Progress")]

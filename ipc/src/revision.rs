@@ -1,4 +1,4 @@
-//! Revisions: what differs from an assembly that the daemon knows.
+//! Revisions: changes of an assembly that the daemon knows.
 //!
 //! Sections: [`RevisionHeader`], [`PartRecord`] per part with a mesh, [`MovedPart`]s, texts, then per
 //! part with a mesh its vertices and its triangles.
@@ -30,13 +30,13 @@ pub struct RevisionHeader {
 
 const _: () = assert!(size_of::<RevisionHeader>() == 48 && align_of::<RevisionHeader>() <= 8);
 
-/// What differs from a known assembly, to send or as received.
+/// Changes of a known assembly, to send or as received.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Revision<'a> {
     /// Handle of the assembly that is revised.
     pub base: [u8; 32],
-    /// Parts with another mesh: their places, and the mesh. The name stays: that given here is left
-    /// out of account.
+    /// Parts with another mesh: their places, and the mesh. Names stay: the one given here is
+    /// ignored.
     pub replaced: Vec<(u32, Part<'a>)>,
     /// Further parts; they get the places after all others.
     pub added: Vec<Part<'a>>,

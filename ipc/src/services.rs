@@ -14,15 +14,15 @@ use crate::headers::{RequestHeader, ResponseHeader};
 use crate::layout;
 use crate::progress::ProgressSample;
 
-/// A port that asks.
+/// A port that sends requests.
 pub type ClientPort = Client<Transport, [u8], RequestHeader, [u8], ResponseHeader>;
-/// A port that answers.
+/// A port that sends responses.
 pub type ServerPort = Server<Transport, [u8], RequestHeader, [u8], ResponseHeader>;
-/// A request on the asking side.
+/// A request, on the client's side.
 pub type Pending = PendingResponse<Transport, [u8], RequestHeader, [u8], ResponseHeader>;
-/// A request on the answering side.
+/// A request, on the daemon's side.
 pub type Active = ActiveRequest<Transport, [u8], RequestHeader, [u8], ResponseHeader>;
-/// A received answer.
+/// A received response.
 pub type Answer = Response<Transport, [u8], ResponseHeader>;
 /// Opens or creates a request-response service.
 pub type ExchangeBuilder = request_response::Builder<[u8], RequestHeader, [u8], ResponseHeader, Transport>;
@@ -45,7 +45,7 @@ pub type WakeBuilder = event::Builder<Transport>;
 pub struct SetupError {
     /// What was tried.
     pub what: &'static str,
-    /// What iceoryx2 said.
+    /// iceoryx2's error.
     pub reason: String,
 }
 

@@ -1,4 +1,4 @@
-//! How the daemon is.
+//! The daemon's status.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -26,7 +26,7 @@ pub struct StatusHeader {
     pub requests: u64,
     /// Plan requests answered with a plan.
     pub done: u64,
-    /// Plan requests answered at once with what was answered before (they count as done, too).
+    /// Plan requests answered from memory (they also count as done).
     pub remembered: u64,
     /// Plan requests cancelled by the client.
     pub cancelled: u64,

@@ -14,9 +14,9 @@ pub const SUMMARY_HAS_REASON: u32 = 1;
 pub const SUMMARY_HAS_UNITS: u32 = 2;
 /// The list of targets is given; without it all parts had to come out.
 pub const SUMMARY_HAS_TARGETS: u32 = 4;
-/// It is an assembly plan.
+/// The plan is an assembly plan.
 pub const SUMMARY_ASSEMBLY: u32 = 8;
-/// The base was chosen, and why is given.
+/// The daemon chose the base, and the reason is given.
 pub const SUMMARY_HAS_BASE_REASON: u32 = 16;
 
 /// A warning about the assembly as a whole, not about a part.
@@ -26,9 +26,9 @@ pub const NO_PART: u32 = u32::MAX;
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 pub struct Stats {
-    /// Transition functions that the search used, cached ones included.
+    /// Uses of the transition function by the search, cached ones included.
     pub simulations: u64,
-    /// Transition functions really computed.
+    /// Uses of the transition function that were computed.
     pub simulations_run: u64,
     /// Straight sweeps that proved a removal without simulation.
     pub sweeps: u64,
@@ -44,15 +44,15 @@ pub struct Stats {
     pub verify_time_s: f64,
     /// From admission to the last step, in seconds.
     pub total_time_s: f64,
-    /// Distance fields that were there already.
+    /// Distance fields found in the cache.
     pub sdf_hits: u64,
-    /// Blocking relations that were there already.
+    /// Blocking relations found in the cache.
     pub blocking_hits: u64,
-    /// States whose blocking graphs were there already.
+    /// States whose blocking graphs were found in the cache.
     pub graph_hits: u64,
-    /// Motions that were there already.
+    /// Motions found in the cache.
     pub motion_hits: u64,
-    /// 1 when the whole plan was there already.
+    /// 1 if the whole plan was found in the cache.
     pub plan_hit: u64,
 }
 
@@ -75,7 +75,7 @@ pub struct SummaryHeader {
     pub blocked: u32,
     /// How many warnings follow ([`WarningRecord`]).
     pub warnings: u32,
-    /// How many parts were gone before (u32).
+    /// How many parts were removed before (u32).
     pub removed: u32,
     /// How many targets follow (u32).
     pub targets: u32,
@@ -87,9 +87,9 @@ pub struct SummaryHeader {
     pub blockers: u32,
     /// Bytes of text.
     pub text_bytes: u32,
-    /// How many parts began elsewhere than where their mesh was given ([`MovedPart`]).
+    /// How many parts did not begin where their mesh was given ([`MovedPart`]).
     pub poses: u32,
-    /// How many parts the rest is taken off (u32).
+    /// How many parts the base has (u32).
     pub base: u32,
     /// How many groups left together and were not taken apart ([`GroupRecord`]).
     pub kept_together: u32,
@@ -105,7 +105,7 @@ pub struct SummaryHeader {
     pub engine: Text,
     /// The unit of length; empty without [`SUMMARY_HAS_UNITS`].
     pub units: Text,
-    /// Why the base was chosen; empty without [`SUMMARY_HAS_BASE_REASON`], as where the request gave it.
+    /// Why the base was chosen; empty without [`SUMMARY_HAS_BASE_REASON`], as where the request named it.
     pub base_reason: Text,
     /// Counters and times.
     pub stats: Stats,
@@ -171,7 +171,7 @@ const _: () = {
 pub struct Blocked<'a> {
     /// The part.
     pub part: u32,
-    /// The parts that it met.
+    /// The parts that block it.
     pub by: &'a [u32],
     /// The action, as `+x`.
     pub action: &'a str,
@@ -189,7 +189,7 @@ pub struct FreeGroup<'a> {
 /// A summary to be sent. Part numbers are indices into `parts`.
 #[derive(Debug, Clone, Default)]
 pub struct SummaryParts<'a> {
-    /// It is an assembly plan.
+    /// The plan is an assembly plan.
     pub assembly: bool,
     /// Index into [`STATUSES`].
     pub status: u32,
@@ -217,7 +217,7 @@ pub struct SummaryParts<'a> {
     pub targets: Option<Vec<u32>>,
     /// Fixed parts.
     pub fixed: Vec<u32>,
-    /// The parts that the rest is taken off, and why they were chosen; without a reason where the request gave them.
+    /// The base, and why it was chosen; without a reason where the request named it.
     pub base: (Vec<u32>, Option<&'a str>),
     /// Parts that remain.
     pub remaining: Vec<u32>,
@@ -225,7 +225,7 @@ pub struct SummaryParts<'a> {
     pub kept_together: Vec<Vec<u32>>,
     /// Where nothing leaves any more: groups that can begin to move, and along which unit vectors.
     pub free_together: Vec<(Vec<u32>, [f64; 3])>,
-    /// Parts that began elsewhere than where their mesh was given, and where: the rigid motion of the mesh.
+    /// Parts that did not begin where their mesh was given, and where they began: the rigid motion of the mesh.
     pub poses: Vec<MovedPart>,
     /// Counters and times.
     pub stats: Stats,
@@ -433,13 +433,13 @@ impl<'a> SummaryView<'a> {
         self.optional(SUMMARY_HAS_UNITS, self.header.units)
     }
 
-    /// The parts that the rest is taken off.
+    /// The base: the parts that the rest is taken off.
     #[must_use]
     pub fn base(&self) -> &'a [u32] {
         self.base
     }
 
-    /// Why the base was chosen; none where the request gave it.
+    /// Why the base was chosen; `None` where the request named it.
     #[must_use]
     pub fn base_reason(&self) -> Option<&'a str> {
         self.optional(SUMMARY_HAS_BASE_REASON, self.header.base_reason)
@@ -480,13 +480,13 @@ impl<'a> SummaryView<'a> {
         self.fixed
     }
 
-    /// Parts that stand where they stood.
+    /// Parts that remain in the assembly.
     #[must_use]
     pub fn remaining(&self) -> &'a [u32] {
         self.remaining
     }
 
-    /// Parts that began elsewhere than where their mesh was given, and where: the rigid motion of the mesh.
+    /// Parts that did not begin where their mesh was given, and where they began: the rigid motion of the mesh.
     #[must_use]
     pub fn poses(&self) -> &'a [MovedPart] {
         self.poses
@@ -496,7 +496,7 @@ impl<'a> SummaryView<'a> {
         slice_of(self.group_parts, group.first_part, group.parts)
     }
 
-    /// Groups that left together and were not taken apart: nobody asked for it, or no way was found.
+    /// Groups that left together and were not taken apart: this was not required, or no way was found.
     pub fn kept_together(&self) -> impl Iterator<Item = &'a [u32]> + '_ {
         self.kept_together.iter().map(|group| self.group(group))
     }

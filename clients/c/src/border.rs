@@ -1,4 +1,4 @@
-//! Where calls from C come in: what fails becomes a code and a message, and no panic leaves.
+//! The boundary to C: failures become a code and a message, and no panic crosses it.
 
 use std::ffi::c_char;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,14 +11,14 @@ use crate::code::SbdpCode;
 /// would cut those with several paths in them.
 const MESSAGE: usize = 2040;
 
-/// What went wrong. The caller owns it; its size never changes.
+/// An error. The caller owns it; its size never changes.
 #[repr(C)]
 pub struct SbdpError {
     /// A `SbdpCode`.
     pub code: u32,
-    /// Of `SBDP_CODE_BUSY`: milliseconds after which asking again makes sense; else 0.
+    /// For `SBDP_CODE_BUSY`: milliseconds to wait before the next try; otherwise 0.
     pub retry_ms: u32,
-    /// What happened and what to do: UTF-8, ended by a zero byte, empty if all went well. One that is too long is cut, and
+    /// What happened and what to do: UTF-8, ended by a zero byte, empty on success. A longer message is cut, and
     /// ends in `...`.
     pub message: [c_char; 2040],
 }

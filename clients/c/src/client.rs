@@ -11,16 +11,17 @@ use crate::geometry::{SbdpAssembly, SbdpHandle, SbdpPart, read_assembly, read_pa
 use crate::input::{Versioned, array, optional, required, text, versioned};
 use crate::options::{SbdpMovedPart, moved_parts};
 
-/// A client of the daemon of one place. Threads may share it. It receives one plan at a time: connect several for more.
+/// A client of one daemon. Threads may share it. It receives one plan at a time: connect several clients for more.
 pub struct SbdpClient {
     pub(crate) client: Client,
 }
 
-/// How to find and treat the daemon. All zero but for `struct_size` is the default; so is a null pointer to it.
+/// How to find the daemon, and how long to wait for it. All zero except `struct_size` is the default, as is a null
+/// pointer.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct SbdpConnectOptions {
-    /// `sizeof` this struct. What it leaves out has its default.
+    /// `sizeof` this struct. Fields beyond it have their defaults.
     pub struct_size: u32,
     /// Zero.
     pub reserved: u32,
@@ -30,17 +31,17 @@ pub struct SbdpConnectOptions {
     pub timeout_ns: *const u64,
     /// How long the daemon may take to check and heal an upload; null for 300 s.
     pub upload_timeout_ns: *const u64,
-    /// How long to wait for a new daemon when the one that was asked went away; null for 10 s, 0 to report it at once.
+    /// How long to wait for a new daemon when the one in use goes away; null for 10 s, 0 to report it at once.
     pub reconnect_ns: *const u64,
-    /// How long to come again by itself while the daemon is busy; null for not at all.
+    /// For how long to repeat a request automatically while the daemon is busy; null for not at all.
     pub busy_wait_ns: *const u64,
-    /// How long to look for an answer before going to sleep; null for the usual, 0 for not at all.
+    /// How long to poll for an answer before going to sleep; null for the default, 0 for not at all.
     pub poll_ns: *const u64,
-    /// Asked at least every 50 ms by calls that wait for the daemon, on their thread; not by `sbdp_stream_poll` and
-    /// `sbdp_stream_next` while the daemon plans. Not 0 ends the call with `SBDP_CODE_INTERRUPTED`. It must not throw, and
-    /// must live as long as the client and its streams and sessions. May be null.
+    /// Called at least every 50 ms by calls that wait for the daemon, on their thread; not by `sbdp_stream_poll` and
+    /// `sbdp_stream_next` while the daemon plans. Not 0 ends the call with `SBDP_CODE_INTERRUPTED`. It must not throw,
+    /// and must live as long as the client and its streams and sessions. May be null.
     pub interrupt: Option<unsafe extern "C" fn(data: *mut c_void) -> i32>,
-    /// What `interrupt` is given.
+    /// The argument of `interrupt`.
     pub interrupt_data: *mut c_void,
 }
 
@@ -66,7 +67,7 @@ impl Callback {
 }
 
 /// # Safety
-/// The pointer is null, or leads to options, and what these point to is as they say.
+/// The pointer is null, or points to options whose pointers and counts are valid.
 unsafe fn read_connect_options(options: *const SbdpConnectOptions) -> Result<ConnectOptions, Failure> {
     // SAFETY: so the caller promises.
     unsafe {
@@ -98,7 +99,7 @@ unsafe fn read_connect_options(options: *const SbdpConnectOptions) -> Result<Con
 /// Connects to a daemon. `options` may be null.
 ///
 /// # Safety
-/// `options` and what it points to is as it says; `client` and `error` can be written.
+/// `options` is null or valid with everything that it points to; `client` and `error` are null or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_client_connect(
     options: *const SbdpConnectOptions,
@@ -115,20 +116,20 @@ pub unsafe extern "C" fn sbdp_client_connect(
     }
 }
 
-/// Frees a client. Its streams and sessions go on.
+/// Frees a client. Its streams and sessions remain valid.
 ///
 /// # Safety
-/// `client` is null, or leads to null or to a client of this library that no other call uses.
+/// `client` is null, or points to null or to a client of this library that no other call uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_client_free(client: *mut *mut SbdpClient) {
     // SAFETY: so the caller promises.
     unsafe { free(client) }
 }
 
-/// Hands an assembly over; one that the daemon knows is not copied again.
+/// Uploads an assembly. One that the daemon knows is not copied again.
 ///
 /// # Safety
-/// All pointers lead to what they say; `handle` and `error` can be written.
+/// All pointers are valid; `handle` and `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_client_upload(
     client: *const SbdpClient,
@@ -150,7 +151,7 @@ pub unsafe extern "C" fn sbdp_client_upload(
 /// Whether the daemon knows an assembly.
 ///
 /// # Safety
-/// All pointers lead to what they say; `known` and `error` can be written.
+/// All pointers are valid; `known` and `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_client_knows(
     client: *const SbdpClient,
@@ -170,21 +171,21 @@ pub unsafe extern "C" fn sbdp_client_knows(
     }
 }
 
-/// What differs from an assembly that the daemon knows.
+/// Changes of an assembly that the daemon knows.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct SbdpChange {
-    /// `sizeof` this struct. What it leaves out is as if it were zero.
+    /// `sizeof` this struct. Fields beyond it count as zero.
     pub struct_size: u32,
     /// Zero.
     pub reserved: u32,
     /// Numbers of the parts with another mesh.
     pub replaced: *const u32,
-    /// Their meshes, given where they stand assembled; the names stay, whatever these say.
+    /// Their meshes, given at the assembled pose. Names stay: the ones given here are ignored.
     pub replaced_by: *const SbdpPart,
     /// How many of both.
     pub replaced_count: usize,
-    /// Further parts; they get the places after all others.
+    /// Further parts; they get the numbers after all others.
     pub added: *const SbdpPart,
     /// How many.
     pub added_count: usize,
@@ -198,7 +199,7 @@ pub struct SbdpChange {
 unsafe impl Versioned for SbdpChange {}
 
 /// # Safety
-/// The pointer is null, or leads to a change, and what it points to is as it says.
+/// The pointer is null, or points to a change whose pointers and counts are valid.
 unsafe fn read_change<'a>(change: *const SbdpChange) -> Result<Change<'a>, Failure> {
     // SAFETY: so the caller promises.
     unsafe {
@@ -218,10 +219,10 @@ unsafe fn read_change<'a>(change: *const SbdpChange) -> Result<Change<'a>, Failu
     }
 }
 
-/// Hands over what differs from an assembly that the daemon knows. `revised` gets the handle of what becomes of it.
+/// Uploads the changes of an assembly that the daemon knows. `revised` receives the handle of the changed assembly.
 ///
 /// # Safety
-/// All pointers lead to what they say; `revised` and `error` can be written.
+/// All pointers are valid; `revised` and `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_client_revise(
     client: *const SbdpClient,
@@ -267,7 +268,7 @@ pub unsafe extern "C" fn sbdp_client_metrics(
 /// Frees a text of this library.
 ///
 /// # Safety
-/// `text` is null, or leads to null or to a text of `sbdp_client_metrics`.
+/// `text` is null, or points to null or to a text of `sbdp_client_metrics`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_text_free(text: *mut *mut c_char) {
     // SAFETY: so the caller promises.
@@ -288,7 +289,7 @@ pub unsafe extern "C" fn sbdp_client_daemon_pid(client: *const SbdpClient) -> u3
     answer(0, || unsafe { client.as_ref() }.map_or(0, |client| client.client.pid()))
 }
 
-/// How often this client has followed a daemon that was restarted at the same place; 0 for a null client.
+/// How often this client has followed a daemon that was restarted; 0 for a null client.
 ///
 /// # Safety
 /// `client` is null or one of this library's.

@@ -2,11 +2,11 @@
 
 use sbdp_client::ClientError;
 
-/// Why something was not done. A number keeps its meaning for ever. Below 100 are the daemon's codes.
+/// The result of a call. A number keeps its meaning for ever. Codes below 100 are the daemon's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum SbdpCode {
-    /// It was done.
+    /// Success.
     Ok = 0,
     /// The daemon cannot read the request.
     Malformed = 1,
@@ -20,47 +20,47 @@ pub enum SbdpCode {
     Geometry = 5,
     /// There is no such part.
     NoSuchPart = 6,
-    /// The request wants something that this daemon does not offer.
+    /// The request needs something that this daemon does not offer.
     Unsupported = 7,
     /// The daemon failed; its log says more.
     Failed = 8,
-    /// The plan was not read, and the daemon ended it.
+    /// The client did not read the plan, and the daemon ended it.
     SlowReader = 9,
     /// The daemon is shutting down.
     ShuttingDown = 10,
-    /// The message exceeds a limit of the daemon, or what memory is left.
+    /// The message exceeds a limit of the daemon, or the memory that is left.
     TooLarge = 11,
-    /// It was cancelled before planning began.
+    /// The request was cancelled before planning began.
     Cancelled = 12,
-    /// No daemon runs at this place.
+    /// No daemon is running at this place.
     NoDaemon = 100,
-    /// The daemon went away before it had answered.
+    /// The daemon went away before it answered.
     DaemonDied = 101,
     /// The daemon speaks another version, or its folder or files cannot be used.
     Unusable = 102,
-    /// The daemon serves as many clients as it can.
+    /// The daemon has as many clients as it can serve.
     TooManyClients = 103,
     /// Shared memory could not be set up.
     Setup = 104,
-    /// No answer in time to what needs no planning.
+    /// No answer in time to a request that needs no planning.
     Timeout = 105,
-    /// This client receives a plan already.
+    /// This client is already receiving a plan.
     StreamOpen = 106,
-    /// Steps of two messages are kept in place: free them, then go on.
+    /// Steps of two messages are kept in place: free them, then continue.
     ViewsHeld = 107,
-    /// The interrupt function ended the wait.
+    /// The interrupt function ended the call.
     Interrupted = 108,
     /// The client belongs to the process that this one was forked from.
     Forked = 109,
     /// An argument cannot be used; the message names it.
     Argument = 110,
-    /// `/dev/shm` is too small.
+    /// `/dev/shm` has too little space.
     SharedMemory = 111,
     /// The request names too many parts for one message.
     RequestTooLong = 112,
     /// The daemon's answer is wrong or cannot be read.
     Protocol = 113,
-    /// A fault of this library: free the handles of this call, and please report it.
+    /// A fault of this library: free the handles of this call, and report it.
     Internal = 114,
 }
 

@@ -1,4 +1,4 @@
-//! Assemblies as C has them.
+//! Assemblies in C.
 
 use std::ffi::c_char;
 use std::sync::Arc;
@@ -29,7 +29,7 @@ impl From<Handle> for SbdpHandle {
     }
 }
 
-/// A part: a closed mesh at its assembled pose. The arrays are read during the call alone, and written once, into shared
+/// A part: a closed mesh at its assembled pose. The arrays are read only during the call, and written once, into shared
 /// memory.
 #[derive(Clone, Copy)]
 #[repr(C)]
@@ -48,15 +48,15 @@ pub struct SbdpPart {
     pub triangle_count: usize,
 }
 
-/// An assembly. The parts' places are their numbers everywhere; list them in natural order of their names.
+/// An assembly. Part numbers are indices into its list of parts; list them in natural order of their names.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct SbdpAssembly {
-    /// `sizeof` this struct. What it leaves out is as if it were zero.
+    /// `sizeof` this struct. Fields beyond it count as zero.
     pub struct_size: u32,
     /// Zero.
     pub reserved: u32,
-    /// A name for people, or null. It is not part of the content.
+    /// A name for display, or null. It is not part of the content.
     pub name: *const c_char,
     /// The unit of length, as `mm`, or null.
     pub units: *const c_char,
@@ -74,7 +74,7 @@ pub struct SbdpAssembly {
 unsafe impl Versioned for SbdpAssembly {}
 
 /// # Safety
-/// What the part points to is as it says, and stays so.
+/// Everything that the part points to is valid and does not change.
 pub(crate) unsafe fn read_part<'a>(part: &SbdpPart, index: usize) -> Result<Part<'a>, Failure> {
     let field = |name| format!("parts[{index}].{name}");
     // SAFETY: so the caller promises.
@@ -98,7 +98,7 @@ pub(crate) unsafe fn read_part<'a>(part: &SbdpPart, index: usize) -> Result<Part
 }
 
 /// # Safety
-/// What the assembly points to is as it says, and stays so.
+/// Everything that the assembly points to is valid and does not change.
 pub(crate) unsafe fn read_assembly<'a>(assembly: *const SbdpAssembly) -> Result<Assembly<'a>, Failure> {
     // SAFETY: so the caller promises.
     unsafe {
@@ -115,7 +115,7 @@ pub(crate) unsafe fn read_assembly<'a>(assembly: *const SbdpAssembly) -> Result<
     }
 }
 
-/// Meshes that are kept, to be uploaded whenever the daemon does not know them, as after a restart.
+/// Meshes that the library keeps, and uploads whenever the daemon does not know them, for example after a restart.
 pub struct SbdpMeshes {
     pub(crate) kept: Arc<KeptMeshes>,
 }
@@ -182,10 +182,10 @@ impl Meshes for KeptMeshes {
     }
 }
 
-/// Copies an assembly, to be planned by `sbdp_client_plan_meshes` without thinking of uploads.
+/// Copies an assembly, for `sbdp_client_plan_meshes`, which uploads it when necessary.
 ///
 /// # Safety
-/// `assembly` and what it points to is as it says; `meshes` and `error` can be written.
+/// `assembly` is valid with everything that it points to; `meshes` and `error` are null or writable.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_meshes_copy(
     assembly: *const SbdpAssembly,
@@ -203,7 +203,7 @@ pub unsafe extern "C" fn sbdp_meshes_copy(
     }
 }
 
-/// The handle of kept meshes.
+/// The handle of meshes.
 ///
 /// # Safety
 /// `meshes` is one of this library's; `handle` and `error` can be written.
@@ -231,10 +231,10 @@ pub(crate) unsafe fn write_handle(pointer: *mut SbdpHandle, handle: Handle) -> R
     Ok(())
 }
 
-/// Frees meshes; plans and sessions about them go on.
+/// Frees meshes. Plans and sessions about them remain valid.
 ///
 /// # Safety
-/// `meshes` is null, or leads to null or to meshes of this library.
+/// `meshes` is null, or points to null or to meshes of this library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_meshes_free(meshes: *mut *mut SbdpMeshes) {
     // SAFETY: so the caller promises.

@@ -1,12 +1,13 @@
-//! Reading what C hands in.
+//! Reading arguments from C.
 
 use std::ffi::{CStr, c_char};
 use std::mem::MaybeUninit;
 
 use crate::border::Failure;
 
-/// Bytes of the longest options that are taken. Today's longest have 232, and an uninitialised `struct_size` is mostly far
-/// larger than this. Half of it would do as well; at double, more such sizes would be read behind the caller's struct.
+/// Bytes of the longest options that are taken. Today's longest have 232, and an uninitialised `struct_size` is mostly
+/// far larger than this. Half of it would do as well; at double, more such sizes would be read behind the caller's
+/// struct.
 const LONGEST_OPTIONS: usize = 4096;
 
 /// A struct that begins with `struct_size: u32` and may grow at its end.
@@ -15,7 +16,8 @@ const LONGEST_OPTIONS: usize = 4096;
 /// All bytes zero are a value, and so is every other pattern.
 pub(crate) unsafe trait Versioned: Copy {}
 
-/// A caller's struct, as far as it goes: what an older caller does not know is zero. What a newer one knows more of must be.
+/// A caller's struct, as far as it goes: what an older caller does not know is zero. What a newer one knows more of
+/// must be.
 ///
 /// # Safety
 /// The pointer is null, or leads to as many bytes as the struct says.

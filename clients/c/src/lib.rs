@@ -1,5 +1,5 @@
-//! The client of the sbdp daemon for C and C++. The header `sbdp.h` is generated from this crate; `sbdp.hpp` is built on
-//! it. The work is done by `sbdp-client`; this crate gives its values the shapes of C.
+//! The client of the sbdp daemon for C and C++. The header `sbdp.h` is generated from this crate; `sbdp.hpp` is built
+//! on it. The work is done by `sbdp-client`; this crate gives its values the shapes of C.
 //!
 //! # Plan
 //! ```c

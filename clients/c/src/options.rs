@@ -1,4 +1,4 @@
-//! What a caller chooses for a plan.
+//! Options of a plan.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use sbdp_client::{
 use crate::border::Failure;
 use crate::input::{Versioned, array, optional, versioned};
 
-/// Which search runs.
+/// The search.
 #[repr(u32)]
 pub enum SbdpPlanner {
     /// `SBDP_PLANNER_SBDP_STAR`.
@@ -24,13 +24,13 @@ pub enum SbdpPlanner {
     PdpR = 4,
     /// `SBDP_PLANNER_PDP_T`, then `SBDP_PLANNER_PDP_R` if that failed.
     PdpStar = 5,
-    /// A rapidly-exploring random tree per part, of straight ways.
+    /// A rapidly-exploring random tree per part, of straight paths.
     Rrt = 6,
     /// A rapidly-exploring random tree per part, of simulated motions.
     BkRrt = 7,
 }
 
-/// Which transition function moves the parts.
+/// The simulation that moves the parts.
 #[repr(u32)]
 pub enum SbdpEngine {
     /// `SBDP_ENGINE_SLIDING`.
@@ -41,7 +41,7 @@ pub enum SbdpEngine {
     Penalty = 2,
 }
 
-/// Which actions the search may use.
+/// The actions that the search may use.
 #[repr(u32)]
 pub enum SbdpActions {
     /// `SBDP_ACTIONS_EXTENDED`.
@@ -57,16 +57,16 @@ pub enum SbdpActions {
 pub enum SbdpStaticAnalysis {
     /// `SBDP_STATIC_ANALYSIS_SLIDING`.
     Default = 0,
-    /// An edge where contact with the other part alone lets a part hardly move.
+    /// An arc where contact with the other part alone hardly lets a part move.
     Sliding = 1,
     /// The paper's rule, taken literally.
     Paper = 2,
 }
 
-/// Yes, no, or as the daemon chooses.
+/// Yes, no, or the daemon's choice.
 #[repr(u32)]
 pub enum SbdpChoice {
-    /// As the daemon chooses.
+    /// The daemon chooses.
     Default = 0,
     /// No.
     No = 1,
@@ -74,14 +74,14 @@ pub enum SbdpChoice {
     Yes = 2,
 }
 
-/// Whether a plan takes apart or puts together, and from where.
+/// Disassembly or assembly plan, and where its parts begin.
 #[repr(u32)]
 pub enum SbdpStaging {
-    /// The plan takes apart.
+    /// A disassembly plan.
     Disassembly = 0,
-    /// The plan puts together; a part is not there before its turn, and begins where its insertion begins.
+    /// An assembly plan. A part is absent before its turn, and begins where its insertion begins.
     None = 1,
-    /// The plan puts together; parts begin laid out beside the assembly, but for those in `staged`.
+    /// An assembly plan. Parts begin laid out beside the assembly, except for those in `staged`.
     Beside = 2,
 }
 
@@ -111,7 +111,7 @@ pub struct SbdpGroup {
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct SbdpPenalty {
-    /// Its place among `time-step`, `planning-time-step`, `stiffness`, `damping`, `penetration-threshold`, `force`,
+    /// Its index among `time-step`, `planning-time-step`, `stiffness`, `damping`, `penetration-threshold`, `force`,
     /// `torque-factor`, `similar-translation`, `similar-rotation`, `longest-edge`, `yielding`, `share-of-extent`,
     /// `steps-per-waypoint`, `most-blocks`, `newton-iterations`, `newton-tolerance`; the first is 0.
     pub parameter: u32,
@@ -121,12 +121,12 @@ pub struct SbdpPenalty {
     pub value: f64,
 }
 
-/// What to plan. All zero but for `struct_size` is the default; so is a null pointer to it. Where zero would mean something
+/// What to plan. All zero except `struct_size` is the default, as is a null pointer. Where zero would have a meaning
 /// of its own, the field is a pointer, and null is the default.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct SbdpPlanOptions {
-    /// `sizeof` this struct. What it leaves out has its default.
+    /// `sizeof` this struct. Fields beyond it have their defaults.
     pub struct_size: u32,
     /// A `SbdpPlanner`.
     pub planner: u32,
@@ -136,31 +136,31 @@ pub struct SbdpPlanOptions {
     pub actions: u32,
     /// A `SbdpStaticAnalysis`.
     pub static_analysis: u32,
-    /// A `SbdpChoice`: whether parts that leave straight are taken out without simulation.
+    /// A `SbdpChoice`: whether parts that leave straight are removed without simulation.
     pub sweeps: u32,
     /// A `SbdpStaging`.
     pub staging: u32,
-    /// Threads for this request; 0 leaves it to the daemon.
+    /// The number of threads; 0 leaves it to the daemon.
     pub threads: u32,
-    /// Not 0: neither read nor write anything remembered.
+    /// Not 0: neither read nor write the cache.
     pub no_cache: u32,
-    /// Not 0: others go first.
+    /// Not 0: other requests come first.
     pub batch: u32,
-    /// Not 0: the events of the search are wanted, too; it runs whatever is remembered.
+    /// Not 0: send the events of the search, too. The search then runs even if the plan is remembered.
     pub trace: u32,
     /// Zero.
     pub reserved: u32,
-    /// What the random poses of the planners with trees depend on.
+    /// Seed of the random poses of the planners with trees.
     pub seed: u64,
-    /// Time from now until the daemon must answer with what it has; null for none.
+    /// Time from now after which the daemon answers with the plan so far; null for none.
     pub timeout_ns: *const u64,
-    /// Time of planning, waiting not counted, after which the daemon answers with what it has; null for none.
+    /// Time of planning, not counting waiting, after which the daemon answers with the plan so far; null for none.
     pub planning_timeout_ns: *const u64,
     /// Time after which one motion is given up; null for none. The plan is not remembered.
     pub path_timeout_ns: *const u64,
     /// Simulations after which to give up; null for no limit.
     pub max_simulations: *const u64,
-    /// The gap that a way out ends with, in the input's units; null for a hundredth of the part's longest side.
+    /// The gap with which a path out ends, in the input's units; null for a hundredth of the part's longest side.
     pub clearance: *const f64,
     /// The direction up, three numbers, of any length but 0; null for the one in which most parts can go at first.
     pub up: *const f64,
@@ -168,7 +168,7 @@ pub struct SbdpPlanOptions {
     pub fixed: *const u32,
     /// How many.
     pub fixed_count: usize,
-    /// Parts that are gone already.
+    /// Parts that are already removed.
     pub removed: *const u32,
     /// How many.
     pub removed_count: usize,
@@ -176,11 +176,11 @@ pub struct SbdpPlanOptions {
     pub targets: *const u32,
     /// How many.
     pub target_count: usize,
-    /// Parts that stay as long as others leave; none to have the daemon choose.
+    /// Parts that stay as long as others leave. If there are none, the daemon chooses.
     pub base: *const u32,
     /// How many.
     pub base_count: usize,
-    /// Groups that rather leave as wholes, and are taken apart then.
+    /// Groups that should leave as wholes, to be taken apart afterwards.
     pub groups: *const SbdpGroup,
     /// How many.
     pub group_count: usize,
@@ -188,7 +188,7 @@ pub struct SbdpPlanOptions {
     pub moved: *const SbdpMovedPart,
     /// How many.
     pub moved_count: usize,
-    /// With `SBDP_STAGING_BESIDE`: parts that wait at places of your choice.
+    /// With `SBDP_STAGING_BESIDE`: parts that wait at given poses.
     pub staged: *const SbdpMovedPart,
     /// How many.
     pub staged_count: usize,
@@ -202,7 +202,7 @@ pub struct SbdpPlanOptions {
 unsafe impl Versioned for SbdpPlanOptions {}
 
 /// # Safety
-/// The pointer is null, or leads to options, and what these point to is as they say.
+/// The pointer is null, or points to options whose pointers and counts are valid.
 pub(crate) unsafe fn read_plan_options(options: *const SbdpPlanOptions) -> Result<PlanOptions, Failure> {
     // SAFETY: so the caller promises.
     unsafe {

@@ -8,7 +8,7 @@ use crate::border::{answer, free};
 use crate::step::{HeldStep, SbdpStep};
 use crate::summary::{HeldSummary, SbdpSummary};
 
-/// A plan that has come to its end. Threads may read it at the same time.
+/// A finished plan. Several threads may read it at the same time.
 pub struct SbdpPlan {
     steps: Vec<HeldStep>,
     summary: HeldSummary,
@@ -49,7 +49,7 @@ pub unsafe extern "C" fn sbdp_plan_step(plan: *const SbdpPlan, number: usize) ->
     })
 }
 
-/// Everything about a plan but its steps, valid until it is freed; null for a null plan.
+/// Everything about a plan except its steps, valid until it is freed; null for a null plan.
 ///
 /// # Safety
 /// `plan` is null or one of this library's.
@@ -59,8 +59,8 @@ pub unsafe extern "C" fn sbdp_plan_summary(plan: *const SbdpPlan) -> *const Sbdp
     answer(std::ptr::null(), || unsafe { plan.as_ref() }.map_or(std::ptr::null(), |p| p.summary.to_c()))
 }
 
-/// Events of the search, if they were wanted: whole lines, one JSON object each, valid until the plan is freed; null for a
-/// null plan.
+/// Events of the search, if they were requested: whole lines with one JSON object each, valid until the plan is freed;
+/// null for a null plan.
 ///
 /// # Safety
 /// `plan` is null or one of this library's.
@@ -73,7 +73,7 @@ pub unsafe extern "C" fn sbdp_plan_trace(plan: *const SbdpPlan) -> *const c_char
 /// Frees a plan.
 ///
 /// # Safety
-/// `plan` is null, or leads to null or to a plan of this library.
+/// `plan` is null, or points to null or to a plan of this library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_plan_free(plan: *mut *mut SbdpPlan) {
     // SAFETY: so the caller promises.

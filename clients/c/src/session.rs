@@ -31,10 +31,10 @@ unsafe fn begin(
     Ok(SbdpSession { session: client.client.session(subject, options)? })
 }
 
-/// Begins a session about an assembly that was uploaded. Nothing is asked yet. `options` may be null.
+/// Begins a session about an uploaded assembly. Sends nothing yet. `options` may be null.
 ///
 /// # Safety
-/// All pointers lead to what they say; `session` and `error` can be written.
+/// All pointers are valid; `session` and `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_client_session(
     client: *const SbdpClient,
@@ -57,7 +57,7 @@ pub unsafe extern "C" fn sbdp_client_session(
 /// Begins a session about meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
 ///
 /// # Safety
-/// All pointers lead to what they say; `session` and `error` can be written.
+/// All pointers are valid; `session` and `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_client_session_meshes(
     client: *const SbdpClient,
@@ -93,7 +93,7 @@ unsafe fn tell(
 /// The number of a part, of a session about meshes.
 ///
 /// # Safety
-/// All pointers lead to what they say; `part` and `error` can be written.
+/// All pointers are valid; `part` and `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_session_part(
     session: *const SbdpSession,
@@ -112,10 +112,10 @@ pub unsafe extern "C" fn sbdp_session_part(
     }
 }
 
-/// These parts are out.
+/// Records that these parts are out.
 ///
 /// # Safety
-/// All pointers lead to what they say, and no other call uses the session; `error` can be written.
+/// All pointers are valid, and no other call uses the session; `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_session_executed(
     session: *mut SbdpSession,
@@ -132,10 +132,10 @@ pub unsafe extern "C" fn sbdp_session_executed(
     }
 }
 
-/// A step of the last plan was done: its parts are out, or stand where it left them.
+/// Records that a step of the last plan was done: its parts are out, or stand where the step left them.
 ///
 /// # Safety
-/// All pointers lead to what they say, and no other call uses the session; `error` can be written.
+/// All pointers are valid, and no other call uses the session; `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_session_performed(
     session: *mut SbdpSession,
@@ -151,7 +151,7 @@ pub unsafe extern "C" fn sbdp_session_performed(
     }
 }
 
-/// This part does not move: until it is freed, plans do without moving it, and it is no target any more.
+/// Records that this part does not move: until it is freed, plans leave it in place. It is no longer a target.
 ///
 /// # Safety
 /// `session` is one of this library's that no other call uses; `error` can be written.
@@ -170,7 +170,7 @@ pub unsafe extern "C" fn sbdp_session_stuck(
     }
 }
 
-/// This part moves again.
+/// Records that this part moves again.
 ///
 /// # Safety
 /// `session` is one of this library's that no other call uses; `error` can be written.
@@ -189,10 +189,10 @@ pub unsafe extern "C" fn sbdp_session_freed(
     }
 }
 
-/// This part stands elsewhere.
+/// Records that this part stands elsewhere.
 ///
 /// # Safety
-/// All pointers lead to what they say, and no other call uses the session; `error` can be written.
+/// All pointers are valid, and no other call uses the session; `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_session_moved(
     session: *mut SbdpSession,
@@ -209,10 +209,10 @@ pub unsafe extern "C" fn sbdp_session_moved(
     }
 }
 
-/// From the next plan on: time until the daemon must answer with what it has; null for none.
+/// From the next plan on: time after which the daemon answers with the plan so far; null for none.
 ///
 /// # Safety
-/// All pointers lead to what they say, and no other call uses the session; `error` can be written.
+/// All pointers are valid, and no other call uses the session; `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_session_set_timeout(
     session: *mut SbdpSession,
@@ -228,7 +228,7 @@ pub unsafe extern "C" fn sbdp_session_set_timeout(
     }
 }
 
-/// Asks how the rest comes apart from how it stands now.
+/// Plans how the rest comes apart from how it stands now.
 ///
 /// # Safety
 /// `session` is one of this library's that no other call uses; `stream` and `error` can be written.
@@ -248,10 +248,10 @@ pub unsafe extern "C" fn sbdp_session_replan(
     }
 }
 
-/// Frees a session; its streams go on.
+/// Frees a session. Its streams remain valid.
 ///
 /// # Safety
-/// `session` is null, or leads to null or to a session of this library that no other call uses.
+/// `session` is null, or points to null or to a session of this library that no other call uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_session_free(session: *mut *mut SbdpSession) {
     // SAFETY: so the caller promises.

@@ -1,4 +1,4 @@
-//! Steps as C reads them.
+//! Steps in C.
 
 use sbdp_client::Step;
 
@@ -8,47 +8,47 @@ use crate::code::SbdpCode;
 /// Where a step leaves its parts.
 #[repr(u32)]
 pub enum SbdpStepEnd {
-    /// Apart from all that they stood with.
+    /// Clear of everything that they stood with.
     Out = 0,
     /// Elsewhere among the others, where they stay until a later step moves them again.
     Aside = 1,
-    /// In their places: in plans that put together.
+    /// In their places: in assembly plans.
     In = 2,
 }
 
-/// A verified step. The library owns it and all that it points to; it may get further fields at its end, so copy fields,
-/// not the struct.
+/// A verified step. The library owns it and everything that it points to. Later versions may add fields at its end, so
+/// copy fields, not the struct.
 #[repr(C)]
 pub struct SbdpStep {
     /// Its number; the first is 0.
     pub number: u32,
-    /// The number of the step that takes the group out (of a plan that puts together: puts it in) to which these parts
+    /// The number of the step that removes (in an assembly plan: inserts) the group to which these parts
     /// belong; `UINT32_MAX` for none. A group is taken apart as it stood in the assembly.
     pub of: u32,
     /// A `SbdpStepEnd`.
     pub ends: u32,
-    /// The earliest round, from 0, in which it can be done, if every step is done as soon as it can be.
+    /// The earliest round, from 0, in which it can be done, if every step is done as soon as possible.
     pub wave: u32,
-    /// The way turns.
+    /// Whether the path turns the parts.
     pub rotates: bool,
-    /// The last leg of the way has a `direction`: it does not only turn.
+    /// Whether the last leg of the path has a `direction`: it does not only turn.
     pub has_direction: bool,
     /// The parts that move, as one body.
     pub parts: *const u32,
     /// How many.
     pub part_count: usize,
-    /// Their motions from where they stand when the step begins (of a plan that puts together: when it ends), so that the
+    /// Their motions from where they stand when the step begins (in an assembly plan: when it ends), so that the
     /// first (the last) is the identity. A motion is the shift x, y, z, then the unit quaternion w, x, y, z.
     pub path: *const [f64; 7],
     /// How many.
     pub waypoint_count: usize,
-    /// Numbers of the steps that must be done before this very path is free, ascending.
+    /// Numbers of the steps that must be done before this exact path is free, ascending.
     pub required: *const u32,
     /// How many.
     pub required_count: usize,
-    /// The deepest overlap along the way beyond that of the assembled pose, in the input's units.
+    /// The deepest overlap along the path beyond that of the assembled pose, in the input's units.
     pub verified_depth: f64,
-    /// The unit vector of the way's last leg, in the input's frame.
+    /// The unit vector of the path's last leg, in the input's frame.
     pub direction: [f64; 3],
 }
 
@@ -86,7 +86,8 @@ impl HeldStep {
     }
 }
 
-/// Keeps a step beyond the next call on its stream, or beyond its plan; to be freed by `sbdp_step_free`. Nothing is copied.
+/// Keeps a step beyond the next call on its stream, or beyond its plan; to be freed by `sbdp_step_free`. Nothing is
+/// copied.
 ///
 /// # Safety
 /// `step` is one of this library's that is still valid; `kept` and `error` can be written.
@@ -111,7 +112,7 @@ pub unsafe extern "C" fn sbdp_step_keep(
 /// Frees a step that was kept.
 ///
 /// # Safety
-/// `step` is null, or leads to null or to a step of `sbdp_step_keep`.
+/// `step` is null, or points to null or to a step of `sbdp_step_keep`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_step_free(step: *mut *mut SbdpStep) {
     // SAFETY: so the caller promises; it was made as a `HeldStep`.

@@ -1,4 +1,4 @@
-//! Plans as they come in.
+//! Plans as they arrive.
 
 use std::ffi::{CString, c_char};
 use std::task::Poll;
@@ -16,20 +16,20 @@ use crate::plan::SbdpPlan;
 use crate::step::{HeldStep, SbdpStep};
 use crate::summary::{HeldSummary, SbdpSummary};
 
-/// What comes.
+/// The kind of an event.
 #[repr(u32)]
 pub enum SbdpEventKind {
-    /// Nothing more will come.
+    /// The plan has ended, and nothing follows.
     End = 0,
-    /// Nothing came in time; the stream goes on.
+    /// Nothing arrived in time; the stream continues.
     Pending = 1,
-    /// Something moved on: see `progress`.
+    /// Planning made progress: see `progress`.
     Progress = 2,
     /// A step, in order: see `step`.
     Step = 3,
     /// Events of the search: see `trace`.
     Trace = 4,
-    /// Another daemon was asked again: the steps and the trace so far are void, and come again from the first.
+    /// The request was sent to another daemon: the steps and the trace so far are void, and come again from the first.
     Restarted = 5,
     /// The end of the plan: see `summary`.
     Done = 6,
@@ -42,11 +42,11 @@ pub enum SbdpStage {
     Sdf = 0,
     /// Searching and verifying.
     Search = 1,
-    /// Finding the ways to where insertions begin.
+    /// Finding the paths to where insertions begin.
     Transfer = 2,
 }
 
-/// What the daemon is doing; some of these are lost on purpose.
+/// What the daemon is doing. Some samples are dropped on purpose.
 #[derive(Clone, Copy, Default)]
 #[repr(C)]
 pub struct SbdpProgress {
@@ -62,7 +62,8 @@ pub struct SbdpProgress {
     pub simulations: u64,
 }
 
-/// What came. It and all that it points to is valid until the next call on the stream. It may get further fields at its end.
+/// An event. It and everything that it points to is valid until the next call on the stream. Later versions may add
+/// fields at its end.
 #[repr(C)]
 pub struct SbdpEvent {
     /// A `SbdpEventKind`.
@@ -71,15 +72,15 @@ pub struct SbdpEvent {
     pub reserved: u32,
     /// The step, or null.
     pub step: *const SbdpStep,
-    /// Whole lines, one JSON object each, or null.
+    /// Whole lines with one JSON object each, or null.
     pub trace: *const c_char,
     /// The summary, or null. It is valid until the stream is freed.
     pub summary: *const SbdpSummary,
-    /// The progress, all zero if it is another event.
+    /// The progress; all zero for other events.
     pub progress: SbdpProgress,
 }
 
-/// A plan as it comes in, for one thread at a time. To free it cancels the request. It may outlive its client.
+/// A plan as it arrives, for one thread at a time. Freeing it cancels the request. It may outlive its client.
 pub struct SbdpStream {
     /// None after a panic.
     stream: Option<PlanStream>,
@@ -159,10 +160,10 @@ fn plan(
     Ok(SbdpStream::new(client.client.plan(subject, options)?))
 }
 
-/// Asks for a plan of an assembly that was uploaded. `options` may be null.
+/// Requests a plan of an uploaded assembly. `options` may be null.
 ///
 /// # Safety
-/// All pointers lead to what they say; `stream` and `error` can be written.
+/// All pointers are valid; `stream` and `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_client_plan(
     client: *const SbdpClient,
@@ -182,10 +183,10 @@ pub unsafe extern "C" fn sbdp_client_plan(
     }
 }
 
-/// Asks for a plan of meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
+/// Requests a plan of meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
 ///
 /// # Safety
-/// All pointers lead to what they say; `stream` and `error` can be written.
+/// All pointers are valid; `stream` and `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_client_plan_meshes(
     client: *const SbdpClient,
@@ -205,8 +206,8 @@ pub unsafe extern "C" fn sbdp_client_plan_meshes(
     }
 }
 
-/// From now on steps are read in shared memory, without a copy. Steps of two messages may then be kept; a call that needs a
-/// third fails with `SBDP_CODE_VIEWS_HELD`, and nothing is lost by it.
+/// Reads steps in shared memory from now on, without a copy. Steps of two messages may then be kept; a call that needs
+/// a third fails with `SBDP_CODE_VIEWS_HELD`, and nothing is lost.
 ///
 /// # Safety
 /// `stream` is one of this library's; `error` can be written.
@@ -225,8 +226,8 @@ pub unsafe extern "C" fn sbdp_stream_read_in_place(
     }
 }
 
-/// Waits for the next event, as long as the daemon lives; `SBDP_EVENT_KIND_END` after the end. After an error the stream
-/// is over, except after `SBDP_CODE_VIEWS_HELD`.
+/// Waits for the next event, as long as the daemon lives; `SBDP_EVENT_KIND_END` after the end. After an error the
+/// stream is over, except after `SBDP_CODE_VIEWS_HELD`.
 ///
 /// # Safety
 /// `stream` is one of this library's that no other call uses; `event` and `error` can be written.
@@ -248,7 +249,7 @@ pub unsafe extern "C" fn sbdp_stream_next(
     }
 }
 
-/// The next event if it comes within a time, which may be 0; else `SBDP_EVENT_KIND_PENDING`.
+/// The next event if it arrives within a time, which may be 0; otherwise `SBDP_EVENT_KIND_PENDING`.
 ///
 /// # Safety
 /// As `sbdp_stream_next`.
@@ -271,8 +272,8 @@ pub unsafe extern "C" fn sbdp_stream_poll(
     }
 }
 
-/// Asks the daemon to stop soon. The stream goes on until its end, whose summary then says so, unless the plan was ready
-/// before.
+/// Asks the daemon to stop soon. The stream continues until its end, whose status is then `cancelled`, unless the plan
+/// was ready before.
 ///
 /// # Safety
 /// `stream` is one of this library's that no other call uses; `error` can be written.
@@ -289,10 +290,10 @@ pub unsafe extern "C" fn sbdp_stream_cancel(stream: *mut SbdpStream, error: *mut
     }
 }
 
-/// Waits for the end and keeps all that comes until then. The stream is freed, also after an error.
+/// Waits for the end of the plan and keeps everything. Frees the stream, also after an error.
 ///
 /// # Safety
-/// `stream` leads to a stream of this library that no other call uses; `plan` and `error` can be written.
+/// `stream` points to a stream of this library that no other call uses; `plan` and `error` can be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_stream_to_end(
     stream: *mut *mut SbdpStream,
@@ -316,7 +317,7 @@ pub unsafe extern "C" fn sbdp_stream_to_end(
 /// Frees a stream, and cancels its request if it has not ended.
 ///
 /// # Safety
-/// `stream` is null, or leads to null or to a stream of this library that no other call uses.
+/// `stream` is null, or points to null or to a stream of this library that no other call uses.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sbdp_stream_free(stream: *mut *mut SbdpStream) {
     // SAFETY: so the caller promises.

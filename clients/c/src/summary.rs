@@ -1,4 +1,4 @@
-//! What ends a plan, as C reads it.
+//! The summary that ends a plan, in C.
 
 use std::ffi::c_char;
 
@@ -9,9 +9,9 @@ use crate::options::{SbdpGroup, SbdpMovedPart};
 /// How planning ended.
 #[repr(u32)]
 pub enum SbdpPlanStatus {
-    /// Every part that was asked for is out.
+    /// Every requested part is out.
     Complete = 0,
-    /// A budget ran out; the steps are the best so far.
+    /// A budget was spent; the steps are the best so far.
     Partial = 1,
     /// It is proved that some parts cannot come off.
     Infeasible = 2,
@@ -41,7 +41,7 @@ pub struct SbdpBlocked {
     pub part: u32,
     /// Zero.
     pub reserved: u32,
-    /// The parts that it met.
+    /// The parts that block it.
     pub by: *const u32,
     /// How many.
     pub by_count: usize,
@@ -58,14 +58,14 @@ pub struct SbdpOverlap {
     pub depth: f64,
 }
 
-/// Something to know about the input.
+/// A finding about the input.
 #[repr(C)]
 pub struct SbdpWarning {
-    /// The part it is about; `UINT32_MAX` for none.
+    /// The part that it is about; `UINT32_MAX` for none.
     pub part: u32,
     /// Zero.
     pub reserved: u32,
-    /// What was found and what was done about it.
+    /// What was found, and what was done about it.
     pub message: *const c_char,
 }
 
@@ -73,9 +73,9 @@ pub struct SbdpWarning {
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct SbdpStats {
-    /// Transition functions that the search used, remembered ones included.
+    /// Uses of the transition function by the search, remembered ones included.
     pub simulations: u64,
-    /// Transition functions really computed.
+    /// Uses of the transition function that were computed.
     pub simulations_run: u64,
     /// Straight sweeps that proved a removal without simulation.
     pub sweeps: u64,
@@ -91,29 +91,29 @@ pub struct SbdpStats {
     pub verify_time_s: f64,
     /// From admission to the last step.
     pub total_time_s: f64,
-    /// Distance fields that were there already.
+    /// Distance fields found in the cache.
     pub sdf_hits: u64,
-    /// Blocking relations that were there already.
+    /// Blocking relations found in the cache.
     pub blocking_hits: u64,
-    /// States whose blocking graphs were there already.
+    /// States whose blocking graphs were found in the cache.
     pub graph_hits: u64,
-    /// Motions that were there already.
+    /// Motions found in the cache.
     pub motion_hits: u64,
-    /// 1 when the whole plan was there already.
+    /// 1 if the whole plan was found in the cache.
     pub plan_hit: u64,
 }
 
-/// Everything about a plan except its steps. The library owns it and all that it points to; it may get further fields at
-/// its end. Texts are UTF-8.
+/// Everything about a plan except its steps. The library owns it and everything that it points to. Later versions may
+/// add fields at its end. Texts are UTF-8.
 #[repr(C)]
 pub struct SbdpSummary {
     /// A `SbdpPlanStatus`.
     pub status: u32,
     /// How many steps there were.
     pub steps: u32,
-    /// The plan puts together.
+    /// Whether it is an assembly plan.
     pub assembly: bool,
-    /// The request named targets.
+    /// Whether the request named targets.
     pub has_targets: bool,
     /// Why it is not complete, or null.
     pub reason: *const c_char,
@@ -139,13 +139,13 @@ pub struct SbdpSummary {
     pub fixed: *const u32,
     /// How many.
     pub fixed_count: usize,
-    /// The parts that the rest is taken off.
+    /// The base: the parts that the rest is taken off.
     pub base: *const u32,
     /// How many.
     pub base_count: usize,
-    /// Why the base was chosen; null where the request gave it.
+    /// Why the base was chosen; null where the request named it.
     pub base_reason: *const c_char,
-    /// Parts that stand in the assembly in the end (of a plan that puts together: from the start).
+    /// Parts that are in the assembly at the end (in an assembly plan: from the start).
     pub remaining: *const u32,
     /// How many.
     pub remaining_count: usize,
@@ -157,7 +157,7 @@ pub struct SbdpSummary {
     pub free_together: *const SbdpFreeGroup,
     /// How many.
     pub free_together_count: usize,
-    /// Parts that began elsewhere than where their mesh was given.
+    /// Parts that did not begin where their mesh was given.
     pub poses: *const SbdpMovedPart,
     /// How many.
     pub pose_count: usize,

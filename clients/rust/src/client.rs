@@ -16,14 +16,14 @@ use crate::error::ClientError;
 use crate::options::{ConnectOptions, Handle};
 use crate::process_bound::{ProcessBound, pid};
 
-/// Longest pause without asking whether the caller wants to be interrupted.
+/// Longest pause between two checks for an interruption by the caller.
 const PAUSE: Duration = Duration::from_millis(50);
 
-/// How many uploads are noted, at 32 bytes each. A client that plans more assemblies than this in turn asks for each of them,
-/// once more, whether the daemon has it: some 20 µs.
+/// How many uploads are noted, at 32 bytes each. A client that plans more assemblies than this in turn asks once more
+/// for each of them whether the daemon has it: about 20 µs.
 const UPLOADS_NOTED: usize = 4096;
 
-/// A client of the daemon of one place. Threads may share it, and its copies are the same client: one plan at a time.
+/// A client of one daemon. Threads may share it; clones are the same client. It receives one plan at a time.
 #[derive(Debug, Clone)]
 pub struct Client {
     shared: Arc<Shared>,
@@ -37,7 +37,7 @@ struct Shared {
     planning: AtomicBool,
     restarts: AtomicU32,
     next_request: AtomicU64,
-    /// What the daemon is known to have got, unless it has forgotten it.
+    /// Assemblies that the daemon has received, and may have dropped since.
     uploaded: Mutex<HashSet<Handle>>,
     /// The process that connected.
     pid: u32,
@@ -47,15 +47,15 @@ impl Client {
     /// Connects to the daemon of the default runtime folder.
     ///
     /// # Errors
-    /// No daemon runs, it speaks another version, or it serves too many clients.
+    /// No daemon is running, it speaks another version, or it has too many clients.
     pub fn connect() -> Result<Self, ClientError> {
         Self::connect_with(ConnectOptions::default())
     }
 
-    /// Connects as told.
+    /// Connects with options.
     ///
     /// # Errors
-    /// No daemon runs, it speaks another version, or it serves too many clients.
+    /// No daemon is running, it speaks another version, or it has too many clients.
     pub fn connect_with(options: ConnectOptions) -> Result<Self, ClientError> {
         let runtime_dir = options.runtime_dir.clone().unwrap_or_else(default_runtime_dir);
         let connection = Connection::open(&runtime_dir, options.poll)?;
@@ -73,10 +73,10 @@ impl Client {
         })
     }
 
-    /// How the daemon is.
+    /// The daemon's status.
     ///
     /// # Errors
-    /// The daemon is gone or gives no answer.
+    /// The daemon is gone or does not answer.
     pub fn status(&self) -> Result<Status, ClientError> {
         let header = Self::header(RequestKind::Status, self.new_request());
         let length = bytes::ALIGNMENT;
@@ -87,7 +87,7 @@ impl Client {
     /// All metrics of the daemon: a JSON object, to which fields may be added.
     ///
     /// # Errors
-    /// The daemon is gone, gives no answer, or is older than this request.
+    /// The daemon is gone, does not answer, or does not know this request.
     pub fn metrics(&self) -> Result<String, ClientError> {
         let header = Self::header(RequestKind::Metrics, self.new_request());
         let length = bytes::ALIGNMENT;
@@ -102,7 +102,7 @@ impl Client {
         self.known_connection().pid()
     }
 
-    /// How often this client has followed a daemon that was restarted at the same place.
+    /// How often this client has followed a daemon that was restarted.
     #[must_use]
     pub fn restarts(&self) -> u32 {
         self.shared.restarts.load(Ordering::Relaxed)
@@ -116,7 +116,7 @@ impl Client {
         self.shared.next_request.fetch_add(1, Ordering::Relaxed)
     }
 
-    /// Takes the client's one plan; false if it is taken.
+    /// Reserves the client's one plan; false if it is already in use.
     pub(crate) fn begin_plan(&self) -> bool {
         !self.shared.planning.swap(true, Ordering::Acquire)
     }
@@ -125,7 +125,7 @@ impl Client {
         self.shared.planning.store(false, Ordering::Release);
     }
 
-    /// Whether the daemon got this assembly from here, or said that it knows it. It may have forgotten it since.
+    /// Whether the daemon received this assembly from here, or said that it knows it. It may have dropped it since.
     pub(crate) fn has_uploaded(&self, handle: Handle) -> bool {
         self.uploaded().contains(&handle)
     }
@@ -147,7 +147,7 @@ impl Client {
         if self.shared.pid == pid() { Ok(()) } else { Err(ClientError::Forked { pid: self.shared.pid }) }
     }
 
-    /// Fails if the caller wants to be interrupted.
+    /// Fails if the caller wants to interrupt the call.
     pub(crate) fn check_interrupt(&self) -> Result<(), ClientError> {
         match &self.options().interrupt {
             Some(interrupt) if interrupt.is_wanted() => Err(ClientError::Interrupted),
@@ -155,7 +155,7 @@ impl Client {
         }
     }
 
-    /// Sleeps until a moment, unless the caller wants to be interrupted.
+    /// Sleeps until a point in time, unless the caller interrupts.
     pub(crate) fn pause(&self, until: Instant) -> Result<(), ClientError> {
         loop {
             self.check_interrupt()?;
@@ -167,13 +167,13 @@ impl Client {
         }
     }
 
-    /// The connection as it is, to a daemon that may be gone.
+    /// The current connection, to a daemon that may be gone.
     pub(crate) fn known_connection(&self) -> Arc<ProcessBound<Connection>> {
         // Nothing in between can leave it half changed.
         Arc::clone(&self.shared.connection.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// The connection to the daemon that runs: a new one if another daemon has taken the place of the one
+    /// A connection to the running daemon: a new one if another daemon has replaced the one
     /// before.
     pub(crate) fn connection(&self) -> Result<Arc<ProcessBound<Connection>>, ClientError> {
         self.check_process()?;

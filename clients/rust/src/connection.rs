@@ -23,21 +23,21 @@ use sbdp_ipc::services::{self, ClientPort, ExchangeService, Pending, SetupError}
 
 use crate::error::ClientError;
 
-/// Longest sleep between two looks at the port: a lost wake-up costs at most this.
+/// Longest sleep between two polls of the port: a lost wake-up costs at most this.
 pub(crate) const SLICE: Duration = Duration::from_millis(200);
-/// The same where the caller may want to be interrupted: Ctrl-C is to be heard within 100 ms.
+/// The same where the caller may interrupt: Ctrl-C must take effect within 100 ms.
 pub(crate) const INTERRUPTIBLE: Duration = Duration::from_millis(50);
 /// Bytes of the longest request through the port of short questions: a part with another mesh is mostly smaller, and
 /// to make a port takes as long as to take in such a mesh. Of memory that was never written to, there is none.
 pub(crate) const ASKED: usize = 256 * 1024;
-/// Pause before something is tried again that could not be done.
+/// Pause before a failed attempt is repeated.
 pub(crate) const RETRY: Duration = Duration::from_millis(2);
 
-/// A daemon process whose end is seen at the cost of one call to the system.
+/// A daemon process whose end can be detected with one system call.
 #[derive(Debug)]
 struct Watched {
     endpoint: Endpoint,
-    /// Readable once the process has ended; none where the system has no such thing.
+    /// Readable once the process has ended; `None` where the system does not support it.
     process: Option<OwnedFd>,
 }
 
@@ -77,8 +77,8 @@ pub(crate) struct Connection {
     _node: Node<Transport>,
 }
 
-/// The threads that wait for the daemon. One of them sleeps at the listener and, when it is woken, wakes all others: what
-/// the daemon has sent may be for any of them.
+/// The threads that wait for the daemon. One of them sleeps on the listener and, when woken, wakes all others, because
+/// what the daemon sent may be for any of them.
 #[derive(Debug, Default)]
 struct Sleepers {
     is_watched: bool,
@@ -119,7 +119,7 @@ impl Connection {
     /// Opens the ports to the daemon that is published in a folder.
     ///
     /// # Errors
-    /// There is none, it ends meanwhile, it speaks another version, or it serves too many clients.
+    /// There is no daemon, it ended meanwhile, it speaks another version, or it has too many clients.
     pub(crate) fn open(runtime_dir: &Path, poll: Duration) -> Result<Self, ClientError> {
         let endpoint = Endpoint::find(runtime_dir)?;
         let pid = endpoint.pid;
@@ -218,8 +218,8 @@ impl Connection {
         self.writing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// How often this client was woken. A thread reads this number before it looks for data, and then sleeps only if the
-    /// number is still the same.
+    /// How often this client was woken. A thread reads this number before it looks for data, and then sleeps only if
+    /// the number is still the same.
     pub(crate) fn wakes(&self) -> u64 {
         self.sleepers().wakes
     }

@@ -1,4 +1,4 @@
-//! What can go wrong, and what to do then.
+//! Errors, with what to do about them.
 
 use std::fmt;
 use std::time::Duration;
@@ -9,16 +9,16 @@ use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::layout::{LayoutError, MAX_CLIENTS};
 use sbdp_ipc::services::SetupError;
 
-/// Why the client could not do what was asked.
+/// Why a call failed.
 #[derive(thiserror::Error)]
 pub enum ClientError {
-    /// There is no usable daemon: none runs, or another version, or its folder is not safe.
+    /// There is no usable daemon: none is running, it has another version, or its folder is not safe.
     #[error(transparent)]
     Endpoint(#[from] EndpointError),
     /// `daemon.json` names a prefix or root that cannot be used.
     #[error(transparent)]
     Layout(#[from] LayoutError),
-    /// The daemon serves as many clients as it can.
+    /// The daemon has as many clients as it can serve.
     #[error("the daemon serves {MAX_CLIENTS} clients already: try again when one has left")]
     TooManyClients,
     /// Shared memory could not be set up.
@@ -27,9 +27,9 @@ pub enum ClientError {
     /// No answer in time.
     #[error("the daemon gave no answer to `{what}` within {after:?}: it is overloaded or stopped")]
     Timeout {
-        /// What was asked.
+        /// The request.
         what: &'static str,
-        /// How long was waited.
+        /// How long the client waited.
         after: Duration,
     },
     /// The daemon's process ended before it answered.
@@ -40,13 +40,13 @@ pub enum ClientError {
         /// Its process id.
         pid: u32,
     },
-    /// A plan is being received on this client already.
+    /// This client is already receiving a plan.
     #[error("this client receives a plan already: finish or drop that stream, or connect another client")]
     StreamOpen,
-    /// Two chunks of the plan are still held, and the next one needs the room.
+    /// Two chunks of the plan are still held, and the next one needs the space.
     #[error("two chunks of this plan are still held: drop their steps before asking for the next one")]
     ViewsHeld,
-    /// The caller wanted no longer to wait.
+    /// The caller interrupted the call.
     #[error("interrupted while waiting for the daemon")]
     Interrupted,
     /// The client belongs to the process that this one was forked from.
@@ -61,13 +61,13 @@ pub enum ClientError {
         /// The name.
         name: String,
     },
-    /// The session is given options that it cannot keep.
+    /// A session does not support these options.
     #[error("a session replans how an assembly comes apart: leave out `assembly` in its options")]
     NoAssemblySession,
     /// The daemon answered with an error.
     #[error("{}{}", .0.message, hint(.0.code))]
     Refused(WireError),
-    /// `/dev/shm` is too small for what is to be handed over.
+    /// `/dev/shm` has too little space for the upload.
     #[error(
         "{needed} bytes are to be handed over, but /dev/shm has only {free} free: enlarge it \
          (`mount -o remount,size=…`, `docker run --shm-size`)"
@@ -87,7 +87,7 @@ pub enum ClientError {
     /// The daemon's answer cannot be read.
     #[error("the daemon's answer cannot be read ({0}): use matching versions")]
     Malformed(#[from] Malformed),
-    /// The daemon's answer does not fit the question, or a chunk is missing.
+    /// The daemon's answer does not fit the request, or a chunk is missing.
     #[error("the daemon's answer is wrong: {0}; please report this")]
     Protocol(String),
 }
@@ -109,7 +109,7 @@ impl ClientError {
         }
     }
 
-    /// If the daemon is busy, when to come again.
+    /// If the daemon is busy, the time to wait before the next try.
     #[must_use]
     pub fn retry_after(&self) -> Option<Duration> {
         match self {
@@ -120,7 +120,7 @@ impl ClientError {
         }
     }
 
-    /// Whether there is no daemon to talk to (any more).
+    /// Whether no daemon is running, or it is gone.
     #[must_use]
     pub fn is_no_daemon(&self) -> bool {
         matches!(

@@ -1,4 +1,4 @@
-//! Sending requests and waiting for answers without burning a core.
+//! Sending requests and waiting for answers, without busy waiting.
 
 use std::time::{Duration, Instant};
 
@@ -51,8 +51,8 @@ impl Client {
         }
     }
 
-    /// Sends a request; tries until the daemon took it or the timeout of short questions has passed. The caller has just
-    /// seen the daemon alive.
+    /// Sends a request; tries until the daemon took it or the timeout of short questions has passed. The caller has
+    /// just seen the daemon alive.
     pub(crate) fn send(
         &self,
         connection: &Connection,

@@ -5,8 +5,8 @@ use sbdp_ipc::headers::ResponseHeader;
 
 use crate::error::ClientError;
 
-/// Bytes of the longest message that is put together from chunks, a guard against a damaged length. A plan of 4,000 parts
-/// takes some megabytes; at half nothing changes, at double a damaged length costs twice the memory.
+/// Bytes of the longest message that is put together from chunks, a guard against a damaged length. A plan of 4,000
+/// parts takes some megabytes; at half nothing changes, at double a damaged length costs twice the memory.
 const LONGEST_MESSAGE: u64 = 1 << 30;
 
 /// A message that comes in several chunks.
@@ -21,7 +21,7 @@ struct Begun {
 }
 
 impl Assembler {
-    /// Adds a chunk; the message if that was the last one.
+    /// Adds a chunk. Returns the message if this was the last chunk.
     pub(crate) fn add(
         &mut self,
         header: &ResponseHeader,

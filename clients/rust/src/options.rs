@@ -1,4 +1,4 @@
-//! What a caller chooses.
+//! Options.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -20,7 +20,7 @@ impl fmt::Display for Handle {
     }
 }
 
-/// How to find and treat the daemon.
+/// How to find the daemon, and how long to wait for it.
 #[derive(Debug, Clone)]
 pub struct ConnectOptions {
     /// The daemon's runtime folder; by default `$SBDP_RUNTIME_DIR`, else
@@ -30,20 +30,21 @@ pub struct ConnectOptions {
     pub timeout: Duration,
     /// How long the daemon may take to check and heal an upload.
     pub upload_timeout: Duration,
-    /// How long to wait for a new daemon when the one that was asked went away. What was asked is then
-    /// asked again by itself: see [`Event::Restarted`](crate::Event::Restarted) and
+    /// How long to wait for a new daemon when the one in use goes away. The request is then
+    /// sent again automatically: see [`Event::Restarted`](crate::Event::Restarted) and
     /// [`Client::restarts`](crate::Client::restarts). Zero reports the loss at once.
     pub reconnect: Duration,
-    /// How long to come again by itself, when the daemon says that it does, while it answers `busy`.
+    /// For how long to repeat a request automatically while the daemon answers `busy`.
     /// Zero (the default) reports `busy` at once; [`ClientError::retry_after`](crate::ClientError::retry_after)
-    /// then tells when to come again.
+    /// then has the time to wait.
     pub busy_wait: Duration,
-    /// How long to look for an answer before going to sleep until the daemon wakes this process: an answer
-    /// from memory comes sooner than a process wakes. Where that is in vain, or others need the processors,
-    /// it is left out by itself ([`sbdp_ipc::polling`]). Zero for never.
+    /// How long to poll for an answer before sleeping until the daemon wakes this process: an answer
+    /// from memory arrives sooner than a process wakes. Where polling is fruitless, or others need the processors,
+    /// it stops automatically ([`sbdp_ipc::polling`]). Zero for never.
     pub poll: Duration,
-    /// Ends what waits for the daemon; without it, only timeouts do. [`PlanStream::poll_event`](crate::PlanStream::poll_event)
-    /// and `next_event` do not ask it while the daemon plans: a plan is cancelled, or its stream dropped.
+    /// Interrupts calls that wait for the daemon; without it, only timeouts end them.
+    /// [`PlanStream::poll_event`](crate::PlanStream::poll_event) and `next_event` do not check it while the daemon
+    /// plans: cancel the plan, or drop its stream, instead.
     pub interrupt: Option<Interrupt>,
 }
 
@@ -61,7 +62,7 @@ impl Default for ConnectOptions {
     }
 }
 
-/// Which search runs.
+/// The search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Planner {
     /// State-based planning guided by directional blocking graphs.
@@ -75,13 +76,13 @@ pub enum Planner {
     PdpR,
     /// `PdpT`, then `PdpR` if that failed.
     PdpStar,
-    /// A rapidly-exploring random tree per part, of straight ways.
+    /// A rapidly-exploring random tree per part, of straight paths.
     Rrt,
     /// A rapidly-exploring random tree per part, of simulated motions.
     BkRrt,
 }
 
-/// Which transition function moves the parts.
+/// The simulation that moves the parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Engine {
     /// Contact-constrained sliding without inertia.
@@ -91,7 +92,7 @@ pub enum Engine {
     Penalty,
 }
 
-/// Which actions the search may use.
+/// The actions that the search may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ActionSet {
     /// The paper's.
@@ -104,7 +105,7 @@ pub enum ActionSet {
 /// How blocking graphs begin, before anything is simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum StaticAnalysis {
-    /// An edge where contact with the other part alone lets a part hardly move.
+    /// An arc where contact with the other part alone hardly lets a part move.
     #[default]
     Sliding,
     /// The paper's rule, taken literally.
@@ -180,70 +181,71 @@ impl PenaltyParameter {
 /// Where the parts of an assembly plan begin.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Staging {
-    /// Each where its insertion begins; it is not there before its turn.
+    /// Each where its insertion begins; it is absent before its turn.
     None,
-    /// Laid out beside the assembly, but for those whose place is given: the rigid motion of their mesh from
+    /// Laid out beside the assembly, except for those with a given pose: the rigid motion of their mesh from
     /// where it was given, as in paths.
     Beside(Vec<(u32, Waypoint)>),
 }
 
-/// What to plan. Part numbers are places in the uploaded assembly's list of parts.
+/// What to plan. Part numbers are indices into the uploaded assembly's list of parts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlanOptions {
-    /// Which search.
+    /// The search.
     pub planner: Planner,
-    /// Which transition function.
+    /// The simulation.
     pub engine: Engine,
-    /// Which actions.
+    /// The actions.
     pub actions: ActionSet,
     /// How blocking graphs begin.
     pub static_analysis: StaticAnalysis,
     /// Parameters of the engine `penalty` that differ from the paper's.
     pub penalty: Vec<(PenaltyParameter, f64)>,
-    /// Whether parts that leave straight, and those that are apart already, are taken out without simulation; `None`
-    /// leaves it to the daemon: with extended actions they are.
+    /// Whether parts that leave straight, or are clear already, are removed without simulation; `None`
+    /// leaves it to the daemon: yes with extended actions.
     pub sweeps: Option<bool>,
-    /// Time from now until the daemon must answer with what it has.
+    /// Time from now after which the daemon answers with the plan so far.
     pub timeout: Option<Duration>,
-    /// Time of planning, waiting and verification not counted, after which the daemon answers with what it has.
+    /// Time of planning, not counting waiting and verification, after which the daemon answers with the plan so far.
     pub planning_timeout: Option<Duration>,
     /// Time after which one motion, or a baseline's search for one part, is given up. The plan then depends on the
     /// clock and is not remembered.
     pub path_timeout: Option<Duration>,
-    /// What the random poses of [`Planner::Rrt`] and [`Planner::BkRrt`] depend on.
+    /// Seed of the random poses of [`Planner::Rrt`] and [`Planner::BkRrt`].
     pub seed: u64,
-    /// The gap between a part's hull and that of all that stands where its way out ends, in the input's units, at least 0;
+    /// The gap between a part's hull and that of the rest where its path out ends, in the input's units, at least 0;
     /// `None` for a hundredth of the longest side of the part's box.
     pub clearance: Option<f64>,
-    /// The direction up, in the input's frame, of any length but 0: ways up come before ways sideways, and those before
-    /// ways down. `None` for the direction in which most parts can go at first.
+    /// The direction up, in the input's frame, of any length but 0: upward paths come before sideways ones, and these
+    /// before downward ones. `None` for the direction in which most parts can go at first.
     pub up: Option<[f64; 3]>,
     /// Simulations (steps of a tree, in RRT) after which to give up.
     pub max_simulations: Option<u64>,
-    /// Threads for this request; 0 leaves it to the daemon.
+    /// The number of threads; 0 leaves it to the daemon.
     pub threads: u32,
     /// Parts that may not move.
     pub fixed: Vec<u32>,
-    /// Parts that are gone already.
+    /// Parts that are already removed.
     pub removed: Vec<u32>,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<u32>>,
     /// Parts that stay as long as others leave: what the rest is taken off. If there are none, the daemon chooses one.
     pub base: Vec<u32>,
-    /// Groups that rather leave as wholes, and are taken apart then. A part may be in several, if one lies in the other.
+    /// Groups that should leave as wholes, to be taken apart afterwards. A part may be in several groups if these are
+    /// nested.
     pub groups: Vec<Vec<u32>>,
     /// Parts that stand elsewhere than in the assembly, with the rigid motion of their mesh from there
     /// (input units and frame).
     pub moved: Vec<(u32, Waypoint)>,
-    /// An assembly plan is wanted (the disassembly reversed, with each part's way from where it waits), with
+    /// Make an assembly plan (the disassembly reversed, with each part's path from where it waits), with
     /// parts that begin there.
     pub assembly: Option<Staging>,
-    /// Neither read nor write anything remembered.
+    /// Neither read nor write the cache.
     pub no_cache: bool,
-    /// Others go first: nobody waits for this plan.
+    /// Other requests come first: no one waits for this plan.
     pub batch: bool,
-    /// The events of the search are wanted, too ([`Event::Trace`](crate::Event::Trace)): it runs whatever is
-    /// remembered.
+    /// Send the events of the search, too ([`Event::Trace`](crate::Event::Trace)). The search then runs even if the
+    /// plan is remembered.
     pub trace: bool,
 }
 
@@ -286,7 +288,7 @@ fn penalty_record(&(parameter, value): &(PenaltyParameter, f64)) -> PenaltyRecor
     PenaltyRecord { parameter: parameter as u32, reserved: 0, value }
 }
 
-/// What is too long for the wire (five hundred years) is shortened.
+/// A time too long for the wire (five hundred years) is shortened.
 fn nanoseconds(time: Duration) -> u64 {
     u64::try_from(time.as_nanos()).unwrap_or(u64::MAX).min(u64::MAX - 1)
 }

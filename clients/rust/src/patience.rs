@@ -1,24 +1,24 @@
-//! What a client does by itself before it reports an error: it follows a daemon that was restarted, and
-//! comes again to one that is busy.
+//! What a client does automatically before it reports an error: it follows a daemon that was restarted, and
+//! repeats requests to one that is busy.
 
 use std::time::{Duration, Instant};
 
 use crate::error::ClientError;
 use crate::options::ConnectOptions;
 
-/// Pause between two looks for a new daemon.
+/// Pause between two searches for a new daemon.
 const LOOK: Duration = Duration::from_millis(20);
 
 /// How long one request has been tried already.
 #[derive(Debug, Default)]
 pub(crate) struct Patience {
     busy_since: Option<Instant>,
-    /// Since when there is no daemon, and which error said so.
+    /// When the daemon was found to be gone, and by which error.
     lost: Option<(Instant, ClientError)>,
 }
 
 impl Patience {
-    /// When the request makes sense once more; the error if it never will.
+    /// When to send the request again; the error if that is useless.
     pub(crate) fn after(
         &mut self,
         options: &ConnectOptions,
@@ -47,7 +47,7 @@ impl Patience {
         }
     }
 
-    /// A daemon took the request.
+    /// A daemon accepted the request.
     pub(crate) fn asked(&mut self) {
         self.lost = None;
     }

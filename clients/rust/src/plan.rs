@@ -5,14 +5,14 @@ use crate::step::Step;
 use crate::stream::{Event, PlanStream};
 use crate::summary::Summary;
 
-/// A plan that has come to its end: all that a stream yields, with names.
+/// A finished plan: everything that a stream yields, with part names.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// The steps in order.
     pub steps: Vec<Step>,
     /// Everything else.
     pub summary: Summary,
-    /// Events of the search, if the trace was wanted: lines, one JSON object each.
+    /// Events of the search, if the trace was requested: lines with one JSON object each.
     pub trace: String,
 }
 
@@ -42,7 +42,7 @@ pub(crate) fn part_named<'n>(
 }
 
 impl PlanStream {
-    /// Waits for the end and keeps all that comes until then, in memory of this process.
+    /// Waits for the end of the plan and keeps everything in memory of this process.
     ///
     /// # Errors
     /// The daemon refused, failed or died.

@@ -12,8 +12,9 @@ use crate::step::Step;
 use crate::stream::PlanStream;
 use crate::subject::Subject;
 
-/// An assembly that is being taken apart: what has happened to it, and plans for the rest. What is said here becomes what
-/// differs in the next question ([`PlanOptions`]), so that the daemon works out again only what depends on it.
+/// An assembly that is being taken apart: what has happened to it, and plans for the rest. What is recorded here
+/// becomes the changes of the next request ([`PlanOptions`]), so that the daemon computes again only what depends on
+/// them.
 #[derive(Debug)]
 pub struct Session {
     client: Client,
@@ -23,10 +24,10 @@ pub struct Session {
 }
 
 impl Client {
-    /// Begins a session about an assembly as `options` have it. Nothing is asked yet.
+    /// Begins a session about an assembly in the state that `options` describe. Sends nothing yet.
     ///
     /// # Errors
-    /// An assembly plan is wanted.
+    /// `options` ask for an assembly plan.
     pub fn session(&self, subject: impl Into<Subject>, options: PlanOptions) -> Result<Session, ClientError> {
         if options.assembly.is_some() {
             return Err(ClientError::NoAssemblySession);
@@ -48,7 +49,7 @@ impl Session {
         }
     }
 
-    /// These parts are out.
+    /// Records that these parts are out.
     pub fn executed(&mut self, parts: &[u32]) {
         for &part in parts {
             if !self.options.removed.contains(&part) {
@@ -64,8 +65,8 @@ impl Session {
         }
     }
 
-    /// A step of the last plan was done: its parts are out, or stand where it left them. Of a group that is out, nothing
-    /// changes when it is taken apart.
+    /// Records that a step of the last plan was done: its parts are out, or stand where the step left them. A step
+    /// within a group that is out changes nothing.
     pub fn performed(&mut self, step: &Step) {
         let step = step.view();
         match (step.of, step.ends) {
@@ -81,7 +82,7 @@ impl Session {
         }
     }
 
-    /// This part does not move: until it is [`freed`](Self::freed), plans do without moving it.
+    /// Records that this part does not move: until it is [`freed`](Self::freed), plans leave it in place.
     pub fn stuck(&mut self, part: u32) {
         if !self.options.fixed.contains(&part) {
             self.options.fixed.push(part);
@@ -92,12 +93,13 @@ impl Session {
         }
     }
 
-    /// This part moves again. If only targets are asked for and it was one, it is none any more.
+    /// Records that this part moves again. If it was a target before it got stuck, it is no longer one.
     pub fn freed(&mut self, part: u32) {
         self.options.fixed.retain(|p| *p != part);
     }
 
-    /// This part stands elsewhere: the rigid motion of its mesh from where the assembly has it (input units and frame).
+    /// Records that this part stands elsewhere: the rigid motion of its mesh from where the assembly has it (input
+    /// units and frame).
     pub fn moved(&mut self, part: u32, pose: Waypoint) {
         self.moved.insert(part, pose);
     }

@@ -18,7 +18,7 @@ pub(crate) enum Message {
     Owned(AlignedBytes),
 }
 
-/// An answer that threads may read at the same time.
+/// An answer that several threads may read at the same time.
 pub(crate) struct SharedAnswer(ProcessBound<Answer>);
 
 impl fmt::Debug for SharedAnswer {
@@ -38,7 +38,7 @@ impl Message {
         Self::Shared(SharedAnswer(ProcessBound::new(answer)))
     }
 
-    /// The same in memory of this process, so that the daemon gets its chunk back.
+    /// A copy in memory of this process, so that the daemon gets its chunk back.
     pub(crate) fn owned(self) -> Self {
         match self {
             Self::Shared(answer) => Self::Owned(AlignedBytes::copy_of(answer.0.payload())),
@@ -82,8 +82,8 @@ impl Steps {
     }
 }
 
-/// A verified step. It owns the memory that it is read in, together with the other steps of the same message: a copy, or,
-/// of a stream whose steps are read in place, shared memory, which the daemon gets back when the last of them is dropped.
+/// A verified step. It owns the memory in which it is read, together with the other steps of the same message: a copy,
+/// or, if the stream reads in place, shared memory, which the daemon gets back when the last of these steps is dropped.
 /// A clone is the same step, not a copy.
 #[derive(Clone)]
 pub struct Step {

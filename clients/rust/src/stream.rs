@@ -1,4 +1,4 @@
-//! A plan as it comes in.
+//! A plan as it arrives.
 
 use std::sync::{Arc, Weak};
 use std::task::Poll;
@@ -22,7 +22,7 @@ use crate::step::{Message, Step, Steps};
 use crate::subject::{Meshes, Subject};
 use crate::summary::Summary;
 
-/// So often one assembly is uploaded again for one plan: a daemon that forgets it again at once has no
+/// How often one assembly is uploaded again for one plan: a daemon that drops it again at once has no
 /// room for it.
 const UPLOADS_AGAIN: u32 = 3;
 
@@ -37,7 +37,7 @@ pub enum Stage {
     Transfer,
 }
 
-/// What the daemon is doing; some of these are lost on purpose.
+/// What the daemon is doing. Some samples are dropped on purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Progress {
     /// The stage that runs.
@@ -54,25 +54,25 @@ pub struct Progress {
 #[allow(clippy::large_enum_variant, reason = "there is one summary in a stream")]
 #[derive(Debug)]
 pub enum Event {
-    /// Something moved on.
+    /// Planning made progress.
     Progress(Progress),
     /// A verified step, in order.
     Step(Step),
-    /// Events of the search, if the trace is wanted: whole lines, one JSON object each.
+    /// Events of the search, if the trace was requested: whole lines with one JSON object each.
     Trace(String),
-    /// The daemon went away, and another one has taken its place and was asked again: the steps and the trace so far
-    /// are void, and all of them come again from the first.
+    /// The daemon went away, and the request was sent to the one that replaced it: the steps and the trace so far
+    /// are void, and come again from the first.
     Restarted,
     /// The end: everything else about the plan.
     Done(Summary),
 }
 
-/// A plan as it comes in. Dropping it cancels the request. It may move between threads, and outlive the client.
+/// A plan as it arrives. Dropping it cancels the request. It may move between threads, and outlive the client.
 #[derive(Debug)]
 pub struct PlanStream {
     client: Client,
     connection: Arc<ProcessBound<Connection>>,
-    /// It is the client's one plan.
+    /// Whether it is the client's one plan.
     is_open: bool,
     pending: Option<ProcessBound<Pending>>,
     /// The last control request: it must live until the daemon saw it or a newer one.
@@ -93,7 +93,7 @@ pub struct PlanStream {
     again: Option<Again>,
 }
 
-/// What was asked, to ask it again.
+/// The request, to send it again.
 #[derive(Debug)]
 struct Question {
     bytes: Vec<u8>,
@@ -102,21 +102,21 @@ struct Question {
     uploads: u32,
 }
 
-/// The question is to be asked once more.
+/// The request must be sent again.
 #[derive(Debug, Clone, Copy)]
 struct Again {
     at: Instant,
-    /// The daemon that was asked is gone.
+    /// The daemon that received the request is gone.
     restarted: bool,
 }
 
 impl Client {
-    /// Asks for a plan. What it is about is a handle, or meshes (in an `Arc`), which are uploaded whenever the daemon does
+    /// Requests a plan for a handle, or for meshes (in an `Arc`), which are uploaded whenever the daemon does
     /// not know them, as after a restart.
     ///
     /// # Errors
-    /// The daemon is gone, this client receives a plan already, or the geometry is refused. What else the daemon refuses
-    /// (`busy`, an unknown handle) comes as the stream's first result.
+    /// The daemon is gone, this client is already receiving a plan, or the geometry is refused. Other refusals
+    /// (`busy`, an unknown handle) are the stream's first result.
     pub fn plan(
         &self,
         subject: impl Into<Subject>,
@@ -174,7 +174,7 @@ impl Client {
 }
 
 impl PlanStream {
-    /// Asks, as if nothing had been asked before.
+    /// Sends the request as if it were the first time.
     fn send(&mut self) -> Result<(), ClientError> {
         self.steps = None;
         self.long_message = Assembler::default();
@@ -193,7 +193,7 @@ impl PlanStream {
         Ok(())
     }
 
-    /// Prepares to ask once more after an error that a client gets over by itself.
+    /// Prepares to send the request again after an error that the client handles itself.
     fn recover(&mut self, error: ClientError) -> Result<Again, ClientError> {
         // Of a plan that is not wanted any more only the end is: where a daemon is, it has said it.
         if self.cancel_wanted && !error.is_no_daemon() {
@@ -223,8 +223,8 @@ impl Question {
 }
 
 impl PlanStream {
-    /// Steps are read in shared memory, without a copy. Of their messages two may be held: to ask for an event that needs
-    /// a third is [`ClientError::ViewsHeld`], and nothing is lost by it.
+    /// Reads steps in shared memory, without a copy. Two of their messages may be held: asking for an event that needs
+    /// a third returns [`ClientError::ViewsHeld`], and nothing is lost.
     #[must_use]
     pub fn in_place(mut self) -> Self {
         self.in_place = true;
@@ -250,7 +250,7 @@ impl PlanStream {
         }
     }
 
-    /// The next event if it comes within a time, which may be zero; else `Pending`, and the stream goes on.
+    /// The next event if it arrives within a time, which may be zero; otherwise `Pending`, and the stream continues.
     ///
     /// # Errors
     /// As [`Self::next_event`].
@@ -258,7 +258,7 @@ impl PlanStream {
         self.event_until(Some(Instant::now() + within))
     }
 
-    /// Asks the daemon to stop soon. The stream goes on until `Done`, which then says
+    /// Asks the daemon to stop soon. The stream continues until `Done`, whose status is then
     /// `cancelled` unless the plan was ready before. To leave without an answer, drop the stream.
     pub fn cancel(&mut self) {
         self.cancel_wanted = true;
@@ -399,7 +399,7 @@ impl PlanStream {
         }
     }
 
-    /// Grants credit when enough was read, and passes a wish to cancel on. What the daemon has
+    /// Grants credit when enough was read, and passes on a cancellation. What the daemon has
     /// no room for now is tried again at the next occasion; both numbers are cumulative.
     fn send_control(&mut self) {
         let due = self.received - self.granted >= CREDIT_STEP;
@@ -436,7 +436,7 @@ impl PlanStream {
         None
     }
 
-    /// Lets go of the request.
+    /// Releases the request.
     fn close(&mut self) {
         self.steps = None;
         self.again = None;

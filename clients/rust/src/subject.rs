@@ -1,4 +1,4 @@
-//! What a plan is about.
+//! The subject of a plan.
 
 use std::fmt;
 use std::sync::Arc;
@@ -8,18 +8,18 @@ use sbdp_ipc::geometry::Assembly;
 use crate::content_hash::content_hash;
 use crate::options::Handle;
 
-/// Meshes that are kept, to be uploaded whenever the daemon does not know them.
+/// Meshes that the caller keeps, to be uploaded whenever the daemon does not know them.
 pub trait Meshes: Send + Sync {
-    /// The assembly that they are; the same whenever it is asked.
+    /// The assembly; the same at every call.
     fn assembly(&self) -> Assembly<'_>;
 
-    /// The handle of that assembly. It is asked for every plan: remember it where meshes are large.
+    /// The handle of that assembly. It is called for every plan: cache it if the meshes are large.
     fn handle(&self) -> Handle {
         content_hash(&self.assembly())
     }
 }
 
-/// What a plan is about: an assembly that the daemon knows, or meshes that it gets when it does not know them (any more).
+/// The subject of a plan: an assembly that the daemon knows, or meshes that it receives when it does not know them.
 #[derive(Clone)]
 pub enum Subject {
     /// An assembly that was uploaded.

@@ -1,4 +1,4 @@
-//! What ends a plan.
+//! The summary that ends a plan.
 
 use sbdp_ipc::bytes::Malformed;
 use sbdp_ipc::plan::Waypoint;
@@ -7,9 +7,9 @@ use sbdp_ipc::summary::{STATUSES, Stats, SummaryView};
 /// How planning ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlanStatus {
-    /// Every part that was asked for is out.
+    /// Every requested part is out.
     Complete,
-    /// A budget ran out; the steps are the best so far.
+    /// A budget was spent; the steps are the best so far.
     Partial,
     /// It is proved that some parts cannot come off.
     Infeasible,
@@ -32,12 +32,12 @@ impl PlanStatus {
     }
 }
 
-/// The parts that stay, and that the rest is taken off.
+/// The base: the parts that stay, and that the rest is taken off.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Base {
     /// The parts.
     pub parts: Vec<u32>,
-    /// Why they were chosen, in a few words; none where the request gave them.
+    /// Why they were chosen, in a few words; `None` where the request named them.
     pub reason: Option<String>,
 }
 
@@ -46,7 +46,7 @@ pub struct Base {
 pub struct Blocked {
     /// The part.
     pub part: u32,
-    /// The parts that it met.
+    /// The parts that block it.
     pub by: Vec<u32>,
     /// The action, as `+x`.
     pub action: String,
@@ -70,19 +70,19 @@ pub struct Overlap {
     pub depth: f64,
 }
 
-/// Something to know about the input.
+/// A finding about the input.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
-    /// The part it is about, if one.
+    /// The part that it is about, if any.
     pub part: Option<u32>,
-    /// What was found and what was done about it.
+    /// What was found, and what was done about it.
     pub message: String,
 }
 
-/// Everything about a plan except its steps. Part numbers are places in `parts`.
+/// Everything about a plan except its steps. Part numbers are indices into `parts`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Summary {
-    /// It is an assembly plan.
+    /// Whether it is an assembly plan.
     pub assembly: bool,
     /// How planning ended.
     pub status: PlanStatus,
@@ -104,16 +104,17 @@ pub struct Summary {
     pub targets: Option<Vec<u32>>,
     /// Parts that may not move.
     pub fixed: Vec<u32>,
-    /// The parts that the rest is taken off, or built up on; none where parts are fixed and no others were given, or where
-    /// all others had to leave too.
+    /// The parts that the rest is taken off, or built up on. Empty where parts are fixed and no base was named, or
+    /// where all others had to leave too.
     pub base: Base,
-    /// Parts that stand in the assembly in the end (of an assembly plan: from the start).
+    /// Parts that are in the assembly at the end (in an assembly plan: from the start).
     pub remaining: Vec<u32>,
-    /// Groups that left together and were not taken apart: nobody asked for it, or no way was found.
+    /// Groups that left together and were not taken apart: this was not required, or no way was found.
     pub kept_together: Vec<Vec<u32>>,
     /// Where nothing leaves any more: groups that can begin to move.
     pub free_together: Vec<FreeGroup>,
-    /// Parts that began elsewhere than where their mesh was given, and where: the rigid motion of the mesh. Parts of an assembly plan that wait are among them.
+    /// Parts that did not begin where their mesh was given, and where they began: the rigid motion of the mesh. Parts
+    /// of an assembly plan that wait are among them.
     pub poses: Vec<(u32, Waypoint)>,
     /// What blocks the parts that should have come off.
     pub blocked: Vec<Blocked>,

@@ -1,4 +1,4 @@
-//! Handing an assembly over.
+//! Uploading assemblies.
 
 use sbdp_ipc::bytes::Reader;
 use sbdp_ipc::clock;
@@ -13,12 +13,12 @@ use crate::content_hash;
 use crate::error::ClientError;
 use crate::options::{Handle, moved_part};
 
-/// What differs from an assembly that the daemon knows. Parts are named by their places in it.
+/// Changes of an assembly that the daemon knows. Parts are named by their indices in it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Change<'a> {
-    /// Parts with another mesh, given where it stands assembled; the part's name stays.
+    /// Parts with another mesh, given at the assembled pose; the part's name stays.
     pub replaced: Vec<(u32, Part<'a>)>,
-    /// Further parts; they get the places after all others.
+    /// Further parts; they get the indices after all others.
     pub added: Vec<Part<'a>>,
     /// Parts that stand elsewhere: the rigid motion of the (new) mesh from where it was (input units and
     /// frame).
@@ -26,7 +26,7 @@ pub struct Change<'a> {
 }
 
 impl Client {
-    /// Hands an assembly over and returns its handle. The daemon is asked first whether it
+    /// Uploads an assembly and returns its handle. The daemon is asked first whether it
     /// knows the content, so that uploading again copies nothing.
     ///
     /// # Errors
@@ -50,7 +50,7 @@ impl Client {
     /// Whether the daemon knows an assembly.
     ///
     /// # Errors
-    /// The daemon is gone or gives no answer.
+    /// The daemon is gone or does not answer.
     pub fn knows(&self, handle: Handle) -> Result<bool, ClientError> {
         let header = Self::header(RequestKind::Have, 0);
         let fill = |out: &mut [u8]| out.copy_from_slice(&handle.0);
@@ -59,11 +59,11 @@ impl Client {
         Ok(response.known != 0)
     }
 
-    /// Hands over what differs from an assembly that the daemon knows, and returns the handle of what
-    /// becomes of it. The daemon keeps all that it knows of what did not change.
+    /// Uploads the changes of an assembly that the daemon knows, and returns the handle of the
+    /// changed assembly. The daemon keeps everything that it knows about the unchanged parts.
     ///
     /// # Errors
-    /// The base is not known (any more), the geometry is refused, or the daemon is gone.
+    /// The daemon does not know the base (any more), the geometry is refused, or the daemon is gone.
     pub fn revise(&self, base: Handle, change: &Change<'_>) -> Result<Handle, ClientError> {
         let revision = Revision {
             base: base.0,

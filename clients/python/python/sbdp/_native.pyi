@@ -14,7 +14,7 @@ Pose = Sequence[float] | NDArray[numpy.floating[Any]]
 """[x, y, z], or [x, y, z, qw, qx, qy, qz]: the rigid motion x' = q x + t."""
 
 class Options(TypedDict, total=False):
-    """What is planned; as the options of `sbdp plan`. Times are in seconds, lengths in the input's units."""
+    """Options of a plan, named as those of `sbdp plan`. Times are in seconds, lengths in the input's units."""
 
     planner: Literal["sbdp-star", "sbdp", "pdp-t", "pdp-r", "pdp-star", "rrt", "bk-rrt"]
     engine: Literal["sliding", "penalty"]
@@ -23,7 +23,7 @@ class Options(TypedDict, total=False):
     penalty: Mapping[str, float]
     sweeps: bool | None
     timeout: float | None
-    """The daemon answers with what it has by then."""
+    """Time after which the daemon answers with the plan so far."""
     planning_timeout: float | None
     path_timeout: float | None
     seed: int
@@ -33,7 +33,7 @@ class Options(TypedDict, total=False):
     fixed: str | Iterable[str]
     """Parts that may not move, besides those that the assembly declares."""
     removed: str | Iterable[str]
-    """Parts that are gone already."""
+    """Parts that are already removed."""
     targets: str | Iterable[str] | None
     """Parts that must come out; None for all."""
     base: str | Iterable[str]
@@ -41,13 +41,14 @@ class Options(TypedDict, total=False):
     moved: Mapping[str, Pose]
     """Parts that stand elsewhere: the rigid motion of their mesh from where the assembly has it."""
     assembly: bool
-    """How it is put together, not apart."""
+    """Plan how it is put together."""
     staging: Literal["auto", "none"] | Mapping[str, Pose]
-    """Where parts of an assembly plan wait: where the files say, else beside the assembly; nowhere; or at these poses."""
+    """Where parts of an assembly plan wait: where the files say, otherwise beside the assembly ("auto"); nowhere; or at
+    these poses."""
     up: Literal["+x", "-x", "+y", "-y", "+z", "-z"] | Sequence[float] | None
-    """Ways up come before ways sideways, and those before ways down."""
+    """The direction up: upward paths come before sideways ones, and these before downward ones."""
     groups: Literal["needed", "prefer"]
-    """Whether parts that belong together where the assembly comes from leave together as long as anything else leaves."""
+    """"prefer": groups that the files name leave as wholes, as long as anything else leaves."""
     no_cache: bool
     batch: bool
 
@@ -74,13 +75,13 @@ class Assembly:
         """Parts that the assembly's own description declares fixed."""
     @property
     def groups(self) -> list[tuple[str, list[str]]]:
-        """Parts that belong together where the files say so."""
+        """Groups that the files name: name and parts."""
     @property
     def notes(self) -> list[str]:
-        """What was left out, chosen or in doubt when the files were read."""
+        """Warnings: what was left out, decided or doubtful when the files were read."""
     @property
     def handle(self) -> bytes:
-        """The hash of the content, 32 bytes: the assembly's name for the daemon."""
+        """The hash of the content, 32 bytes, by which the daemon knows the assembly."""
     def mesh(self, part: str) -> tuple[NDArray[numpy.float64], NDArray[numpy.uint32]]:
         """Copies of a part's vertices, of shape (n, 3), and triangles, (m, 3)."""
     def __len__(self) -> int: ...
@@ -95,23 +96,24 @@ def load(
 ) -> Assembly:
     """Reads an assembly as the command line does: a folder of meshes, or a file (OBJ, STL, PLY, OFF, glTF, 3MF; STEP by a converter).
 
-    `split` says what is a part in a file that holds several, `ignore` has patterns of names to leave out, `deflection` is
-    how far triangles of STEP files may be from the surfaces, in mm, and `converter` the program that makes them.
+    `split` says what counts as a part in a file that holds several. `ignore` has patterns of names to leave out.
+    `deflection` is how far triangles of STEP files may be from the surfaces, in mm. `converter` is the program that makes
+    them.
     Raises `GeometryError`, which names file and reason.
     """
 
 class Step:
-    """Parts that move as one rigid body. A step that is read in place (`views=True`) ends when the next one is asked for:
+    """Parts that move as one rigid body. A step that is read in place (`views=True`) ends when the next one is requested:
     then its properties raise BufferError."""
 
     @property
     def number(self) -> int:
-        """Its place in the plan, from 0."""
+        """Its index in the plan, from 0."""
     @property
     def parts(self) -> tuple[str, ...]: ...
     @property
     def of(self) -> int | None:
-        """The step that takes the group out (of an assembly plan: puts it in) to which the parts belong, if one does."""
+        """The step that removes (in an assembly plan: inserts) the group to which the parts belong, if any."""
     @property
     def ends(self) -> Literal["out", "aside", "in"]: ...
     @property
@@ -119,11 +121,11 @@ class Step:
     @property
     def path(self) -> NDArray[numpy.float64]:
         """Waypoints, of shape (n, 7): rigid motions [x, y, z, qw, qx, qy, qz] of the parts as they stand when the step
-        begins (of an assembly plan: when it ends). With `views=True` a view that cannot be written to; it owns what it
-        shows, and to ask for the next step while it lives raises BufferError."""
+        begins (in an assembly plan: when it ends). With `views=True` a read-only view; it owns its memory,
+        and requesting the next step while the view exists raises BufferError."""
     @property
     def verified_depth(self) -> float:
-        """No point gets deeper than this along the path, beyond the depth as assembled."""
+        """No point gets deeper than this along the path, beyond the assembled depth."""
     @property
     def requires(self) -> tuple[int, ...]:
         """Numbers of the steps that must be done before."""
@@ -135,7 +137,7 @@ class Step:
         """The unit vector of the path's last leg."""
 
 class Plan:
-    """A plan that has come to its end."""
+    """A finished plan."""
 
     @property
     def status(
@@ -148,7 +150,7 @@ class Plan:
     def parts(self) -> tuple[str, ...]: ...
     @property
     def remaining(self) -> tuple[str, ...]:
-        """Parts that stand in the assembly in the end."""
+        """Parts that are in the assembly at the end."""
     @property
     def steps(self) -> tuple[Step, ...]: ...
     def steps_of(self, part: str) -> list[Step]:
@@ -161,7 +163,7 @@ class Plan:
         """How many steps."""
 
 class Progress(TypedDict):
-    """Where planning is."""
+    """The progress of planning."""
 
     stage: Literal["sdf", "search", "transfer"]
     done: int
@@ -169,17 +171,18 @@ class Progress(TypedDict):
     simulations: int
 
 class PlanStream(Iterator[Step]):
-    """Steps as they are found. To close it, or to leave its `with` block, cancels the request. After a daemon was restarted
+    """Steps as they are found. Closing it, or leaving its `with` block, cancels the request. After a daemon was restarted,
     steps come again from the first (`restarts` counts that)."""
 
     def __next__(self) -> Step: ...
     def poll(self, timeout: float = 0.0) -> Step | None:
-        """The next step if it comes within so many seconds; None if there is nothing yet, or nothing more (`done`)."""
+        """The next step if it arrives within `timeout` seconds; None if there is nothing yet, or nothing more (`done`)."""
     def result(self, timeout: float | None = None) -> Plan:
-        """Waits for the end, and returns the whole plan, with the steps that were read before. Raises TimeoutError if it has
-        not come within so many seconds; the stream goes on then. BufferError with `views=True`: nothing is kept there."""
+        """Waits for the end, and returns the whole plan, with the steps that were read before. Raises TimeoutError if the
+        end has not come within `timeout` seconds; the stream then continues. Raises BufferError with `views=True`, which
+        keeps no steps."""
     def cancel(self) -> None:
-        """Asks the daemon to stop soon: the plan so far still comes, with status `cancelled`."""
+        """Asks the daemon to stop soon. The plan so far still arrives, with status `cancelled`."""
     def close(self) -> None:
         """Ends the request."""
     @property
@@ -192,7 +195,7 @@ class PlanStream(Iterator[Step]):
         """The plan's document without its steps, once it has ended."""
     @property
     def progress(self) -> Progress | None:
-        """The latest that the daemon said."""
+        """The latest progress that the daemon reported."""
     @property
     def restarts(self) -> int: ...
     def __enter__(self) -> PlanStream: ...
@@ -204,20 +207,22 @@ class Session:
     """An assembly that is being taken apart: what has happened to it, and plans for the rest."""
 
     def executed(self, parts: str | Iterable[str]) -> None:
-        """These parts are out."""
+        """Records that these parts are out."""
     def performed(self, step: Step) -> None:
-        """A step of the last plan was done: its parts are out, or stand where it left them."""
+        """Records that a step of the last plan was done: its parts are out, or stand where the step left them."""
     def stuck(self, part: str) -> None:
-        """This part does not move: until it is freed, plans do without moving it."""
+        """Records that this part does not move: until it is freed, plans leave it in place."""
     def freed(self, part: str) -> None:
-        """This part moves again."""
+        """Records that this part moves again."""
     def moved(self, part: str, pose: Pose) -> None:
-        """This part stands elsewhere: the rigid motion of its mesh from where the assembly has it."""
+        """Records that this part stands elsewhere: the rigid motion of its mesh from where the assembly has it."""
     def replan(self, timeout: float | None = None, *, views: bool = False) -> PlanStream:
-        """Plans how the rest comes apart from how it stands now, within so many seconds; a timeout stays for the next."""
+        """Plans how the rest comes apart from how it stands now, within `timeout` seconds. A timeout also holds for later
+        plans."""
 
 class Client:
-    """A connection to the daemon. Threads may share it; it receives one plan at a time. Not in a forked child."""
+    """A connection to the daemon. Threads may share it; it receives one plan at a time. A forked child must connect for
+    itself."""
 
     def __init__(
         self,
@@ -229,28 +234,28 @@ class Client:
         busy_wait: float = 0.0,
     ) -> None: ...
     def plan(self, assembly: Assembly, /, *, views: bool = False, **options: Unpack[Options]) -> PlanStream:
-        """Asks for a plan; the meshes are uploaded if the daemon does not know them."""
+        """Requests a plan. The meshes are uploaded if the daemon does not know them."""
     def session(self, assembly: Assembly, /, **options: Unpack[Options]) -> Session:
         """Begins a session about how an assembly comes apart."""
     def upload(self, assembly: Assembly) -> bytes:
-        """Hands an assembly over ahead of the first plan; returns its handle."""
+        """Uploads an assembly ahead of the first plan. Returns its handle."""
     def revise(
         self,
         base: Assembly,
         parts: Sequence[tuple[str, NDArray[numpy.float64] | NDArray[numpy.float32], NDArray[numpy.uint32]]],
     ) -> Assembly:
-        """An assembly with these meshes for parts of `base`, and with those of other names as further parts, after all
+        """Returns an assembly with these meshes for parts of `base`. Meshes with other names become further parts, after all
         others. Only these meshes are sent, and the daemon keeps what it knows about the other parts. The daemon must know
-        `base`; once it has forgotten the new assembly, plans of it raise `UnknownHandleError`."""
+        `base`; once it has dropped the new assembly, plans of it raise `UnknownHandleError`."""
     def knows(self, assembly: Assembly) -> bool: ...
     def metrics(self) -> dict[str, Any]:
-        """All figures of the daemon."""
+        """All metrics of the daemon."""
     @property
     def pid(self) -> int:
-        """The daemon's process."""
+        """The daemon's process id."""
     @property
     def restarts(self) -> int:
-        """How often it was followed to another daemon."""
+        """How often the client has followed a daemon that was restarted."""
     def close(self) -> None: ...
     def __enter__(self) -> Client: ...
     def __exit__(
