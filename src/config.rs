@@ -16,7 +16,7 @@ pub enum ConfigError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// It is not valid: syntax, an unknown key, or a value of the wrong type.
@@ -53,25 +53,25 @@ pub enum ConfigError {
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Config {
-    /// Where the daemon is found.
+    /// Where clients find the daemon.
     pub endpoint: EndpointConfig,
-    /// Who works.
+    /// The workers.
     pub workers: WorkersConfig,
-    /// What requests may do.
+    /// Limits of requests.
     pub requests: RequestsConfig,
     /// Housekeeping and shutting down.
     pub times: TimesConfig,
-    /// What is remembered.
+    /// The cache.
     pub cache: CacheConfig,
     /// Assemblies to load at start.
     pub preload: PreloadConfig,
-    /// What is logged.
+    /// Logging.
     pub log: LogConfig,
-    /// Where figures are told.
+    /// Where metrics are published.
     pub metrics: MetricsConfig,
 }
 
-/// Where the daemon is found.
+/// Where clients find the daemon.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct EndpointConfig {
@@ -83,7 +83,7 @@ pub struct EndpointConfig {
     pub root: Option<PathBuf>,
 }
 
-/// Who works.
+/// The workers.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct WorkersConfig {
@@ -93,7 +93,7 @@ pub struct WorkersConfig {
     pub threads_per_request: usize,
 }
 
-/// What requests may do.
+/// Limits of requests.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RequestsConfig {
@@ -107,7 +107,7 @@ pub struct RequestsConfig {
     pub work_s_per_client: f64,
     /// Megabytes that one upload may have.
     pub max_upload_mb: u64,
-    /// Megabytes of uploads that may wait to be taken in.
+    /// Megabytes of uploads that may wait for admission.
     pub uploads_mb: u64,
     /// Those of one client.
     pub uploads_mb_per_client: u64,
@@ -121,19 +121,19 @@ pub struct RequestsConfig {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TimesConfig {
-    /// Seconds between two looks for dead clients.
+    /// Seconds between two checks for dead clients.
     pub tick_s: f64,
     /// Seconds that running requests get at SIGTERM before they are cancelled.
     pub grace_s: f64,
     /// Seconds that cancelled requests then get to be answered.
     pub drain_s: f64,
-    /// Seconds after which a daemon ends that serves nobody any more.
+    /// Seconds after which a daemon that stands still ends itself.
     pub hang_s: f64,
-    /// Microseconds for which the daemon looks for the next request before it sleeps; 0 for not at all.
+    /// Microseconds for which the daemon polls for the next request before it sleeps; 0 for none.
     pub poll_us: u64,
 }
 
-/// What is remembered.
+/// The cache.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CacheConfig {
@@ -147,11 +147,11 @@ pub struct CacheConfig {
     pub memory_mb: u64,
     /// Whether likely requests are prepared while the workers are idle.
     pub prefetch: bool,
-    /// Seconds of idle time for planning the likely questions after each plan.
+    /// Seconds of idle time for planning likely requests after each plan.
     pub speculation_s: u64,
 }
 
-/// What of the memory is for what, in bytes.
+/// How the memory is divided, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MemoryBudget {
     /// All that is remembered. Assemblies, with their distance fields and what else is derived from them, have
@@ -171,17 +171,17 @@ pub struct PreloadConfig {
     pub assemblies: Vec<PathBuf>,
 }
 
-/// What is logged.
+/// Logging.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LogConfig {
-    /// How a line looks.
+    /// The format of a line.
     pub format: LogFormat,
     /// Which lines; the environment variable `SBDP_LOG` takes precedence.
     pub filter: String,
 }
 
-/// Where figures are told.
+/// Where metrics are published.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct MetricsConfig {
@@ -189,11 +189,11 @@ pub struct MetricsConfig {
     pub socket: Option<PathBuf>,
 }
 
-/// How a log line looks.
+/// The format of a log line.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LogFormat {
-    /// For people.
+    /// Text for people.
     #[default]
     Text,
     /// One JSON object per line.
@@ -235,7 +235,7 @@ impl Default for TimesConfig {
 }
 
 impl TimesConfig {
-    /// For how long the daemon looks for the next request before it sleeps.
+    /// How long the daemon polls for the next request before it sleeps.
     #[must_use]
     pub fn poll(&self) -> Duration {
         Duration::from_micros(self.poll_us)
@@ -258,13 +258,13 @@ impl CacheConfig {
         MemoryBudget { all: all / 2, records: all / 16 * 2, answers: all / 16 }
     }
 
-    /// The idle time for planning the likely questions after a plan.
+    /// The idle time for planning likely requests after a plan.
     #[must_use]
     pub fn speculation(&self) -> Duration {
         Duration::from_secs(if self.prefetch { self.speculation_s } else { 0 })
     }
 
-    /// What the cache is to keep to.
+    /// The limits of the cache.
     #[must_use]
     pub fn settings(&self) -> CacheSettings {
         let folder = self.dir.clone().or_else(CacheSettings::default_folder).filter(|_| self.disk);

@@ -1,4 +1,4 @@
-//! Everything that reads a stranger's bytes, behind one door: for `tests/fuzz`, which looks for bytes that
+//! One entry to everything that reads foreign bytes, for `tests/fuzz`, which searches for bytes that
 //! make it panic, hang or grow. Nothing else depends on it.
 
 use std::path::Path;
@@ -27,7 +27,7 @@ pub enum Reader {
     Messages,
     /// Uploads and revisions, not further than into source meshes.
     Meshes,
-    /// Uploads, taken in as the daemon does.
+    /// Uploads, admitted as by the daemon.
     Admission,
     /// OBJ files.
     Obj,
@@ -53,7 +53,7 @@ pub enum Reader {
     Fields,
     /// `daemon.json`.
     Endpoint,
-    /// Plans as JSON, told and drawn.
+    /// Plans as JSON, as instructions and as pictures.
     Plan,
     /// What a converter of STEP files writes to stdout.
     StepReport,
@@ -81,7 +81,7 @@ impl Reader {
         Self::StepReport,
     ];
 
-    /// Reads bytes. What came of it, in words: different words for different ways through the reader.
+    /// Reads bytes. Returns the outcome in words, which differ for different paths through the reader.
     #[must_use]
     pub fn read(self, bytes: &[u8]) -> String {
         match self {
@@ -171,7 +171,7 @@ fn meshes(bytes: &[u8]) -> String {
     format!("{upload}; {revision}")
 }
 
-/// Healing may take its time over many triangles, whoever sends them: here are few.
+/// Healing many triangles takes time for any sender; here are few.
 const FEW: usize = 300;
 
 fn admission(bytes: &[u8]) -> String {
@@ -195,7 +195,7 @@ fn config(text: &str) -> String {
 /// Plans of more parts are read, but not drawn.
 const FEW_PARTS: usize = 8;
 
-/// A plan is told, and drawn with a tetrahedron for every part.
+/// A plan as instructions, and drawn with a tetrahedron for every part.
 fn plan(text: &str) -> String {
     let plan = match read_plan(text) {
         Ok(plan) => plan,

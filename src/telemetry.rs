@@ -21,7 +21,7 @@ pub enum TelemetryError {
         /// What is wrong.
         reason: String,
     },
-    /// Somebody set a subscriber before.
+    /// Logging was already started.
     #[error("logging was started twice")]
     Twice,
 }

@@ -1,4 +1,4 @@
-//! The one condition that everything long-running polls: cancelled, or past its deadline.
+//! The one condition that all long-running work polls: cancelled, or past its deadline.
 
 mod silence;
 
@@ -13,7 +13,7 @@ pub use silence::{Silence, Watch};
 /// Why work stopped early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Interrupt {
-    /// Somebody asked for it.
+    /// The work was cancelled.
     #[error("cancelled")]
     Cancelled,
     /// The deadline passed.
@@ -21,7 +21,7 @@ pub enum Interrupt {
     DeadlinePassed,
 }
 
-/// The one condition that everything long-running polls.
+/// The one condition that all long-running work polls.
 #[derive(Debug, Clone, Default)]
 pub struct Termination {
     cancelled: Arc<AtomicBool>,
@@ -53,25 +53,25 @@ impl Termination {
         Self { cancelled: Arc::default(), deadline, ..Self::default() }
     }
 
-    /// A flag that ends the work when it is set; shared with whoever may cancel.
+    /// A flag that ends the work when it is set, shared with those that may cancel.
     #[must_use]
     pub fn cancel_flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.cancelled)
     }
 
-    /// The same for work that is in vain as soon as `winner` holds less than `rank`.
+    /// The same for work that is useless as soon as `winner` holds less than `rank`.
     #[must_use]
     pub fn unless_won(&self, winner: &Arc<AtomicUsize>, rank: usize) -> Self {
         Self { race: Some((Arc::clone(winner), rank)), ..self.clone() }
     }
 
-    /// The same, and who looks at it is watched.
+    /// The same, with a watch on how often it is checked.
     #[must_use]
     pub fn watched(&self, watch: &Arc<Watch>) -> Self {
         Self { watch: Some(Arc::clone(watch)), ..self.clone() }
     }
 
-    /// The same with at most so much time from now on.
+    /// The same with at most this much time from now.
     #[must_use]
     pub fn within(&self, limit: Duration) -> Self {
         let limit = Instant::now().checked_add(limit);
@@ -93,7 +93,7 @@ impl Termination {
         Self { planning_time: None, ..self.clone() }
     }
 
-    /// Leaves work that took so long out of that limit, if there is one.
+    /// Excludes work that took this long from that limit, if there is one.
     pub fn leave_out(&self, took: Duration) {
         if let Some(planning_time) = &self.planning_time {
             let nanoseconds = u64::try_from(took.as_nanos()).unwrap_or(u64::MAX);
@@ -159,7 +159,7 @@ pub fn try_all<T, E>(
     Ok(true)
 }
 
-/// Checks a condition now and then, for work of many short steps: reading the clock at each step would take as long as
+/// Checks a condition at intervals, for work of many short steps: reading the clock at each step would take as long as
 /// the step. Once the condition was seen to be true, it stays so.
 #[derive(Debug)]
 pub struct Poll<'t> {
@@ -170,13 +170,13 @@ pub struct Poll<'t> {
 }
 
 impl<'t> Poll<'t> {
-    /// Looks at the condition, if there is one, at the first step and at every so many.
+    /// Checks the condition, if there is one, at the first step and then at every `every`-th.
     #[must_use]
     pub fn every(every: u32, termination: Option<&'t Termination>) -> Self {
         Self { termination, every, steps: Cell::new(0), interrupt: Cell::new(None) }
     }
 
-    /// The same, but the first look is after so many steps.
+    /// The same, but the first check is after `steps` steps.
     #[cfg(test)]
     pub(crate) fn first_after(steps: u32, termination: &'t Termination) -> Self {
         Self { steps: Cell::new(1), ..Self::every(steps + 1, Some(termination)) }

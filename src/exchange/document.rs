@@ -1,4 +1,4 @@
-//! The document of a plan, with all that is known of the files that it is about.
+//! The document of a plan, with what is known about its files.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use crate::geometry::{Revision, SourceAssembly, SourceGroup};
 use crate::plan::export::{GroupDocument, PlanDocument, SourceDocument};
 use crate::plan::{Plan, Warning};
 
-/// Puts what was found while the files were read before the plan's own warnings.
+/// Puts the findings from reading the files before the plan's own warnings.
 pub fn add_notes(plan: &mut Plan, assembly: &SourceAssembly) {
     let notes = assembly.notes.iter().map(|note| Warning { part: None, message: note.clone() });
     plan.warnings.splice(0..0, notes);

@@ -1,4 +1,4 @@
-//! Between the planning modules and clients of the daemon: assemblies as they are uploaded, plans as they come, and the
+//! Between the planning modules and clients of the daemon: uploaded assemblies, received plans, and the
 //! documents of plans. The command line, the benchmarks and the clients in other languages have it in common.
 
 mod document;

@@ -1,4 +1,4 @@
-//! A plan that came from the daemon.
+//! A plan received from the daemon.
 
 use sbdp_client as client;
 
@@ -7,7 +7,7 @@ use crate::plan::{
     Warning,
 };
 
-/// A step as the planning modules have it.
+/// Converts a step for the planning modules.
 #[must_use]
 pub fn plan_step(step: &client::Step) -> PlanStep {
     let step = step.view();
@@ -28,7 +28,7 @@ pub fn plan_step(step: &client::Step) -> PlanStep {
     }
 }
 
-/// A plan as the planning modules have it.
+/// Converts a plan for the planning modules.
 #[must_use]
 pub fn plan(s: client::Summary, steps: Vec<PlanStep>) -> Plan {
     Plan {

@@ -1,8 +1,8 @@
-//! Assemblies from files as people have them: folders of one mesh file for each part, one file of a whole assembly,
+//! Assemblies from files: folders with one mesh file per part, one file with a whole assembly,
 //! the layouts of public data sets.
 //!
 //! A reader turns bytes into a `content::Content`: surfaces with the names that the file gives to them and their
-//! pieces. `split.rs` decides which of these is a part. What is not read, or decided without being asked, is a note of
+//! pieces. `split.rs` decides which of these is a part. What is not read, or decided without a request, is a note of
 //! the assembly ([`SourceAssembly::notes`]): nothing is left out without one.
 
 mod content;
@@ -42,7 +42,7 @@ pub use self::options::{IgnorePattern, LoadOptions, Split};
 pub use self::step::StepSettings;
 pub(crate) use self::step::forget as forget_converted;
 
-/// Reads an assembly as its files say themselves; see [`load`].
+/// Reads an assembly with default options; see [`load`].
 ///
 /// # Errors
 /// As [`load`].
@@ -50,9 +50,9 @@ pub fn load_assembly(path: &Path) -> Result<SourceAssembly, GeometryError> {
     load(path, &LoadOptions::default())
 }
 
-/// Reads an assembly: a folder of mesh files in assembled pose (with an optional `assembly.json` or `assembly.toml`, and
-/// `translation.json` or `config.json`), or one file. Meshes are as given; [`heal`](crate::geometry::heal) makes them
-/// usable.
+/// Reads an assembly: a folder of mesh files in assembled pose (with an optional `assembly.json` or `assembly.toml`,
+/// and `translation.json` or `config.json`), or one file. Meshes are as given; [`heal`](crate::geometry::heal) makes
+/// them usable.
 ///
 /// # Errors
 /// A file cannot be read, is damaged or not what its name says, or the description does not

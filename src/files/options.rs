@@ -4,10 +4,10 @@ use glob::{MatchOptions, Pattern};
 
 use super::step::StepSettings;
 
-/// What is a part in a file that holds several.
+/// What counts as a part in a file that holds several.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Split {
-    /// Each object or group of an OBJ file, solid of an STL file, primitive of a glTF mesh that the file tells apart.
+    /// Each object or group of an OBJ file, solid of an STL file, or primitive of a glTF mesh.
     Objects,
     /// Each separate body.
     Bodies,
@@ -38,14 +38,14 @@ impl std::fmt::Display for Split {
     }
 }
 
-/// How files are read; by default as they say themselves.
+/// How files are read.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct LoadOptions {
-    /// What is a part in a file that holds several [default: what a file of a whole assembly tells apart by name].
+    /// What counts as a part in a file that holds several [default: what a file with a whole assembly names].
     pub split: Option<Split>,
     /// Patterns of file and part names that are left out.
     pub ignore: Vec<IgnorePattern>,
-    /// How STEP files are converted; if it is not said, they are not: that runs a program.
+    /// How STEP files are converted. `None`: they are not, because that runs a program.
     pub step: Option<StepSettings>,
 }
 
@@ -62,13 +62,13 @@ impl std::str::FromStr for IgnorePattern {
 }
 
 impl IgnorePattern {
-    /// Whether a name is meant. Capital and small letters are different.
+    /// Whether a name matches. Upper and lower case differ.
     #[must_use]
     pub fn matches(&self, name: &str) -> bool {
         self.0.matches_with(name, MatchOptions::new())
     }
 
-    /// The pattern as it was given.
+    /// The pattern as given.
     #[must_use]
     pub fn as_str(&self) -> &str {
         self.0.as_str()

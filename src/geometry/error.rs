@@ -10,7 +10,7 @@ pub enum GeometryError {
     Unreadable {
         /// The path.
         path: String,
-        /// What the reader said.
+        /// The reader's error.
         reason: String,
     },
     /// A part's mesh cannot be used.

@@ -1,4 +1,4 @@
-//! What differs from an assembly that is known: parts that stand elsewhere, have another mesh, or are
+//! Changes of a known assembly: parts that stand elsewhere, have another mesh, or are
 //! new. The rest keeps its shapes with all that was derived from them, and its frame.
 
 use std::sync::Arc;
@@ -20,26 +20,26 @@ const TAG: &[u8] = b"sbdp-revision/1";
 /// The longest side of a revised assembly, in the planning frame: beyond, its scale would be wrong.
 const LONGEST_SIDE: std::ops::RangeInclusive<f64> = 1.25..=40.0;
 
-/// What differs. Parts are named by their places in the assembly.
+/// The changes. Parts are named by their indices in the assembly.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Revision {
-    /// Parts with another mesh, given where it stands assembled (input units and frame).
+    /// Parts with another mesh, given at the assembled pose (input units and frame).
     pub replaced: Vec<(usize, SourceMesh)>,
     /// Parts that stand elsewhere: the rigid motion of the (new) mesh from where it was (input units
     /// and frame).
     pub moved: Vec<(usize, Pose)>,
-    /// Further parts; they get the places after all others.
+    /// Further parts; they get the indices after all others.
     pub added: Vec<SourcePart>,
 }
 
 impl Revision {
-    /// Whether nothing differs.
+    /// Whether nothing changes.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.replaced.is_empty() && self.moved.is_empty() && self.added.is_empty()
     }
 
-    /// The handle of what becomes of the assembly with the handle `base`.
+    /// The handle of the changed assembly, from the handle `base`.
     #[must_use]
     pub fn content_hash(&self, base: &[u8; 32]) -> [u8; 32] {
         let mut hasher = blake3::Hasher::new();
@@ -74,8 +74,8 @@ impl Revision {
 }
 
 impl SourceAssembly {
-    /// The assembly as it would have been given with what differs. Parts that do not exist are left out
-    /// of account.
+    /// The changed assembly as it would have been given. Parts that do not exist are
+    /// ignored.
     #[must_use]
     pub fn revised(&self, revision: &Revision) -> Self {
         let mut revised = self.clone();
@@ -95,7 +95,7 @@ impl SourceAssembly {
 }
 
 impl Assembly {
-    /// The assembly with what differs. Its scale stays, so that all that is known about what did not
+    /// The changed assembly. Its scale stays, so that everything known about what did not
     /// change holds.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! An assembly as it came in, before anything was healed or scaled.
+//! An assembly as given, before healing and scaling.
 
 use nalgebra::{Point3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
@@ -25,19 +25,19 @@ pub struct SourcePart {
     pub mesh: SourceMesh,
 }
 
-/// Parts that belong together where the assembly comes from: a node of a scene, a product of a CAD program.
+/// A group that the input names: a node of a scene, a product of a CAD program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SourceGroup {
-    /// Its name; of nested groups the names from the outside in, with slashes between.
+    /// Its name; for nested groups, the names from the outside in, separated by slashes.
     pub name: String,
-    /// The names of all parts in it, of nested groups, too. At least two.
+    /// The names of all parts in it, including those of nested groups. At least two.
     pub parts: Vec<String>,
 }
 
 /// An assembly as given. Parts stand in natural order of their names ("2" before "10").
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SourceAssembly {
-    /// A name for people.
+    /// A name for display.
     pub name: String,
     /// The unit of length, if known ("mm").
     pub units: Option<String>,
@@ -45,12 +45,12 @@ pub struct SourceAssembly {
     pub parts: Vec<SourcePart>,
     /// Names of parts that the assembly's own description declares fixed.
     pub fixed: Vec<String>,
-    /// Names of parts that stay as long as others leave, if the description says so. They belong to questions about the
+    /// Names of parts that stay as long as others leave, if the description says so. They belong to requests about the
     /// assembly, not to its content.
     #[serde(skip)]
     pub base: Vec<String>,
-    /// How far triangles may be from the surfaces that they stand for, where these were made from others (STEP): overlaps
-    /// up to that depth may be of the triangles alone. In the assembly's units. Not content, either.
+    /// How far triangles may be from the surfaces that they stand for, where these were made from others (STEP):
+    /// overlaps up to that depth may be of the triangles alone. In the assembly's units. Not content, either.
     #[serde(skip)]
     pub resolution: Option<f64>,
     /// Which parts belong together, outer groups before inner ones. Not content, either.
@@ -60,13 +60,14 @@ pub struct SourceAssembly {
     /// assembled. Not content, either.
     #[serde(skip)]
     pub waiting: Vec<(String, Pose)>,
-    /// What was left out, chosen or in doubt when the files were read, in sentences that name the file. Not content, either.
+    /// Warnings about what was left out, decided or doubtful when the files were read, in sentences that name the file.
+    /// Not content, either.
     #[serde(skip)]
     pub notes: Vec<String>,
 }
 
 impl SourceAssembly {
-    /// Turns all parts together about the origin of the input's frame.
+    /// Rotates all parts together about the origin of the input's frame.
     pub fn rotate(&mut self, rotation: &UnitQuaternion<f64>) {
         let turn = Pose::from_parts(Default::default(), *rotation);
         self.waiting.iter_mut().for_each(|(_, pose)| *pose = turn * *pose * turn.inverse());

@@ -1,5 +1,5 @@
 //! Plans as JSON: the contract `sbdp-plan/2`, written by `sbdp plan ASSEMBLY --json FILE` and
-//! documented in `src/plan/JSON.md`. Parts go by their names there. Fields may be added; those that
+//! described in `src/plan/JSON.md`. Parts go by their names. Later versions may add fields; those that
 //! are here keep their meaning.
 
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ use crate::geometry::Waypoint;
 /// The name and version of the contract.
 pub const SCHEMA: &str = "sbdp-plan/2";
 
-/// A plan in the words of the contract.
+/// A plan as the contract describes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanDocument {
     /// Always [`SCHEMA`].
@@ -23,7 +23,7 @@ pub struct PlanDocument {
     /// `disassembly` or `assembly`.
     #[serde(default = "disassembly")]
     pub kind: String,
-    /// Where the meshes are, if that is known.
+    /// Where the meshes are, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<SourceDocument>,
     /// `complete`, `partial`, `infeasible`, `timeout`, `cancelled` or `exhausted`.
@@ -38,10 +38,10 @@ pub struct PlanDocument {
     pub units: Option<String>,
     /// All parts, in natural order.
     pub parts: Vec<String>,
-    /// Which parts belong together where the assembly comes from, outer groups before inner ones.
+    /// Groups that the input names, outer ones before inner ones.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub groups: Vec<GroupDocument>,
-    /// What had happened before.
+    /// The state at the start.
     pub initial: InitialDocument,
     /// Parts that must come out, or all.
     pub targets: Option<Vec<String>>,
@@ -53,9 +53,9 @@ pub struct PlanDocument {
     pub base_reason: Option<String>,
     /// The removals, or insertions, in order.
     pub steps: Vec<StepDocument>,
-    /// Parts that stand in the assembly in the end (of an assembly plan: from the start).
+    /// Parts that are in the assembly at the end (in an assembly plan: from the start).
     pub remaining: Vec<String>,
-    /// Groups that left together and were not taken apart: nobody asked for it, or no way was found.
+    /// Groups that left together and were not taken apart: this was not required, or no way was found.
     pub kept_together: Vec<Vec<String>>,
     /// Where nothing leaves any more: groups that can begin to move.
     pub free_together: Vec<FreeGroupDocument>,
@@ -69,20 +69,20 @@ pub struct PlanDocument {
     pub stats: StatsDocument,
 }
 
-/// What plans do that do not say it.
+/// The kind of a document without one.
 fn disassembly() -> String {
     PlanKind::Disassembly.name().to_owned()
 }
 
-/// The files that the meshes came from, and what was done to them before planning, but for `initial.poses`.
+/// The files of the meshes, and what was done to them before planning, except `initial.poses`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct SourceDocument {
     /// The file or folder of the assembly.
     pub assembly: String,
-    /// A hash of all meshes as they were read: others are not those that were planned.
+    /// A hash of all meshes as they were read, to recognise them.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub content: String,
-    /// The quaternion `[w, x, y, z]` by which all was turned about the origin (`--rotate`).
+    /// The quaternion `[w, x, y, z]` by which everything was rotated about the origin (`--rotate`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rotate: Option<[f64; 4]>,
     /// Parts with the mesh of another file (`--replaced`).
@@ -91,7 +91,7 @@ pub struct SourceDocument {
     /// Files and folders of further parts (`--added`).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub added: Vec<String>,
-    /// What was taken as a part in files that hold several (`--split`).
+    /// What counted as a part in files that hold several (`--split`).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub split: Option<String>,
     /// Patterns of the names of parts and files that were left out (`--ignore`).
@@ -102,21 +102,21 @@ pub struct SourceDocument {
     pub deflection: Option<f64>,
 }
 
-/// Parts that belong together where the assembly comes from.
+/// A group that the input names.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GroupDocument {
-    /// The group's name; of nested groups with the names of the outer ones before it, and slashes between.
+    /// The group's name; for nested groups, after the names of the outer ones, separated by slashes.
     pub name: String,
-    /// All parts in it, of nested groups, too.
+    /// All parts in it, including those of nested groups.
     pub parts: Vec<String>,
 }
 
 /// The state that planning began with, where it differs from the assembly as given.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct InitialDocument {
-    /// Parts that were gone.
+    /// Parts that were removed before.
     pub removed: Vec<String>,
-    /// Parts that stood elsewhere, and where: in an assembly plan also those that waited for their turn.
+    /// Parts that stood elsewhere, and where. In an assembly plan also those that waited for their turn.
     pub poses: BTreeMap<String, Waypoint>,
 }
 
@@ -125,24 +125,24 @@ pub struct InitialDocument {
 pub struct StepDocument {
     /// The parts that move.
     pub parts: Vec<String>,
-    /// The number of the step that takes the group out (of an assembly plan: puts it in) to which these parts belong;
+    /// The number of the step that removes (in an assembly plan: inserts) the group to which these parts belong;
     /// null for parts that leave the assembly. A group is taken apart as it stood in the assembly.
     pub of: Option<usize>,
-    /// `out`: apart from all that they stood with; `aside`: elsewhere among the others; `in`: in their places (assembly
-    /// plans).
+    /// `out`: clear of everything that they stood with; `aside`: elsewhere among the others; `in`: in their places
+    /// (assembly plans).
     pub ends: String,
     /// `translation`, or `rotation` if any waypoint is turned against the first.
     pub motion: String,
-    /// Rigid transforms x′ = q·x + t, `[x, y, z, qw, qx, qy, qz]`, of the parts as they stand when the step begins (of an
-    /// assembly plan: when it ends), so that the first (the last) is the identity; between two, the centre of the box of
-    /// all these parts, axis-aligned as they stand then, moves on a line, and the rotation slerps.
+    /// Rigid transforms x′ = q·x + t, `[x, y, z, qw, qx, qy, qz]`, of the parts as they stand when the step begins (of
+    /// an assembly plan: when it ends), so that the first (the last) is the identity; between two, the centre of the
+    /// box of all these parts, axis-aligned as they stand then, moves on a line, and the rotation slerps.
     pub path: Vec<Waypoint>,
     /// Deepest penetration along the path beyond the pair's assembled depth.
     pub verified_depth: f64,
-    /// Numbers of the steps, from 0, that must be done before this very path is free, ascending: necessary, and
+    /// Numbers of the steps, from 0, that must be done before this exact path is free, ascending: necessary, and
     /// sufficient with what these require in turn.
     pub requires: Vec<usize>,
-    /// The earliest round, from 0, in which it can be done, if every step is done as soon as it can be.
+    /// The earliest round, from 0, in which it can be done, if every step is done as soon as possible.
     pub wave: usize,
     /// The unit vector along which the middle of the part's box moves on the last leg of the path; null where it does
     /// not.
@@ -163,7 +163,7 @@ pub struct FreeGroupDocument {
 pub struct BlockedDocument {
     /// The part.
     pub part: String,
-    /// The parts that it met.
+    /// The parts that block it.
     pub by: Vec<String>,
     /// The action that they blocked, as `+x`.
     pub action: String,
@@ -181,18 +181,18 @@ pub struct OverlapDocument {
 /// A finding.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WarningDocument {
-    /// The part it is about, if one.
+    /// The part that it is about, if any.
     pub part: Option<String>,
-    /// What was found and what was done about it.
+    /// What was found, and what was done about it.
     pub message: String,
 }
 
 /// Counters, and times in seconds.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct StatsDocument {
-    /// Transition functions used, remembered ones included.
+    /// Uses of the transition function, remembered ones included.
     pub simulations: u64,
-    /// Transition functions computed.
+    /// Uses of the transition function that were computed.
     pub simulations_run: u64,
     /// Straight sweeps that proved a removal.
     pub sweeps: u64,
@@ -212,16 +212,16 @@ pub struct StatsDocument {
     pub path_time_s: f64,
     /// Shortening and verification.
     pub verify_time_s: f64,
-    /// Ways to where insertions begin; null where there are none, or the daemon planned.
+    /// Paths to where insertions begin; null where there are none, or the daemon planned.
     #[serde(default)]
     pub transfer_time_s: Option<f64>,
-    /// All of it.
+    /// The total.
     pub total_time_s: f64,
     /// What was remembered.
     pub cache: CacheDocument,
 }
 
-/// What was there already.
+/// What was found in the cache.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CacheDocument {
     /// Distance fields.
@@ -241,7 +241,7 @@ pub struct CacheDocument {
 }
 
 impl PlanKind {
-    /// The kind in the words of the contract.
+    /// The kind as the contract names it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -252,7 +252,7 @@ impl PlanKind {
 }
 
 impl PlanStatus {
-    /// The status in the words of the contract.
+    /// The status as the contract names it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -267,7 +267,7 @@ impl PlanStatus {
 }
 
 impl MotionKind {
-    /// The kind of motion in the words of the contract.
+    /// The kind of motion as the contract names it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -278,7 +278,7 @@ impl MotionKind {
 }
 
 impl StepEnd {
-    /// The end in the words of the contract.
+    /// The end as the contract names it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! Plans: what is returned, and the check that it is true.
+//! Plans, and the verification of their paths.
 
 mod common_depth;
 pub mod export;

@@ -1,4 +1,4 @@
-//! What a planning request returns. All lengths and poses in the input's units and frame.
+//! The result of a planning request. All lengths and poses are in the input's units and frame.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,11 +17,11 @@ pub enum PlanKind {
 /// How planning ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PlanStatus {
-    /// Every part that was asked for is out (of an assembly plan: in place), or was from the start.
+    /// Every requested part is out (in an assembly plan: in place), or was from the start.
     Complete,
-    /// A budget ran out (the reason names it); the steps are the best so far.
+    /// A budget was spent (the reason names it); the steps are the best so far.
     Partial,
-    /// It is proved that parts which were asked for cannot come off.
+    /// It is proved that requested parts cannot come off.
     Infeasible,
     /// The deadline passed.
     Timeout,
@@ -43,7 +43,7 @@ pub enum MotionKind {
 /// Where a step leaves its parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepEnd {
-    /// Apart from all that they stood with.
+    /// Clear of everything that they stood with.
     Out,
     /// Elsewhere among the others, where they stay until a later step moves them again.
     Aside,
@@ -56,10 +56,10 @@ pub enum StepEnd {
 pub struct PlanStep {
     /// Indices of the parts that move, ascending; all others that stand with them stay where they are.
     pub parts: Vec<usize>,
-    /// The number of the step that takes the group out (of an assembly plan: puts it in) to which these parts belong;
+    /// The number of the step that removes (in an assembly plan: inserts) the group to which these parts belong;
     /// `None` for parts that leave the assembly. A group is taken apart as it stood in the assembly.
     pub of: Option<usize>,
-    /// Where they are in the end.
+    /// Where the step leaves the parts.
     pub ends: StepEnd,
     /// Whether the path turns them.
     pub motion: MotionKind,
@@ -69,10 +69,10 @@ pub struct PlanStep {
     pub path: Vec<Waypoint>,
     /// Deepest penetration found by verification beyond the pair's assembled depth.
     pub verified_depth: f64,
-    /// Numbers of the steps that must be done before this very path is free, ascending: necessary, and sufficient with
+    /// Numbers of the steps that must be done before this exact path is free, ascending: necessary, and sufficient with
     /// what these require in turn. All are smaller than the step's own number.
     pub requires: Vec<usize>,
-    /// The earliest round, from 0, in which it can be done, if every step is done as soon as it can be.
+    /// The earliest round, from 0, in which it can be done, if every step is done as soon as possible.
     pub wave: usize,
     /// The unit vector along which the middle of the parts' box moves on the last leg of the path; `None` where it does
     /// not.
@@ -88,12 +88,12 @@ pub struct FreeGroup {
     pub direction: [f64; 3],
 }
 
-/// The parts that stay, and that the rest is taken off.
+/// The base: the parts that stay, and that the rest is taken off.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Base {
     /// The parts.
     pub parts: Vec<usize>,
-    /// Why they were chosen, in a few words; none where the request gave them.
+    /// Why they were chosen, in a few words; `None` where the request named them.
     pub reason: Option<String>,
 }
 
@@ -112,7 +112,7 @@ impl Base {
 pub struct Blocked {
     /// The part that remains.
     pub part: usize,
-    /// The parts that it met.
+    /// The parts that block it.
     pub by: Vec<usize>,
     /// The action that they blocked, as `+x` or `-rz` or `+z+rz`.
     pub action: String,
@@ -127,21 +127,21 @@ pub struct Overlap {
     pub depth: f64,
 }
 
-/// Something the user should know about the input.
+/// A finding about the input.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
-    /// The part it is about, if one.
+    /// The part that it is about, if any.
     pub part: Option<usize>,
-    /// What was found and what was done about it.
+    /// What was found, and what was done about it.
     pub message: String,
 }
 
 /// Counters and times. Times in seconds.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PlanStats {
-    /// Transition functions that the search used, cached ones included.
+    /// Uses of the transition function by the search, cached ones included.
     pub simulations: u64,
-    /// Transition functions really computed.
+    /// Uses of the transition function that were computed.
     pub simulations_run: u64,
     /// Straight sweeps that proved a removal without simulation.
     pub sweeps: u64,
@@ -160,22 +160,22 @@ pub struct PlanStats {
     pub path_time_s: f64,
     /// Shortening and verification.
     pub verify_time_s: f64,
-    /// In an assembly plan, finding and verifying the ways to where insertions begin; `None` where there
+    /// In an assembly plan, finding and verifying the paths to where insertions begin; `None` where there
     /// are none or it is unknown, as from the daemon.
     pub transfer_time_s: Option<f64>,
     /// From admission to the last step.
     pub total_time_s: f64,
-    /// Distance fields that were there already.
+    /// Distance fields found in the cache.
     pub sdf_hits: u64,
-    /// Overlaps and blocking relations of pairs, and planes that parts touch, that were there already.
+    /// Overlaps and blocking relations of pairs, and planes that parts touch, found in the cache.
     pub blocking_hits: u64,
-    /// States whose blocking graphs were there already: those of all pairs that they are about.
+    /// States whose blocking graphs were found in the cache, for all of their pairs.
     pub graph_hits: u64,
-    /// Motions that were there already.
+    /// Motions found in the cache.
     pub motion_hits: u64,
-    /// Verified paths that were there already; `None` where it is unknown, as from the daemon.
+    /// Verified paths found in the cache; `None` where it is unknown, as from the daemon.
     pub verdict_hits: Option<u64>,
-    /// The whole plan was there already.
+    /// Whether the whole plan was found in the cache.
     pub plan_hit: bool,
 }
 
@@ -198,20 +198,20 @@ pub struct Plan {
     pub parts: Vec<String>,
     /// Parts that had been removed before.
     pub removed: Vec<usize>,
-    /// Parts that stood elsewhere at the start than where their mesh was given, and where.
+    /// Parts that did not begin where their mesh was given, and where they began.
     pub poses: Vec<(usize, Waypoint)>,
     /// Parts that must come out, or all.
     pub targets: Option<Vec<usize>>,
     /// Parts that may not move.
     pub fixed: Vec<usize>,
-    /// The parts that the rest is taken off, or built up on; none where parts are fixed and no others were given, or where
-    /// all others had to leave too.
+    /// The parts that the rest is taken off, or built up on. Empty where parts are fixed and no base was named, or
+    /// where all others had to leave too.
     pub base: Base,
     /// The removals, or insertions, in order.
     pub steps: Vec<PlanStep>,
-    /// Parts that stand in the assembly in the end (of an assembly plan: from the start).
+    /// Parts that are in the assembly at the end (in an assembly plan: from the start).
     pub remaining: Vec<usize>,
-    /// Groups that left together and were not taken apart: nobody asked for it, or no way was found.
+    /// Groups that left together and were not taken apart: this was not required, or no way was found.
     pub kept_together: Vec<Vec<usize>>,
     /// Where nothing leaves any more: groups that can begin to move.
     pub free_together: Vec<FreeGroup>,

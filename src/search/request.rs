@@ -6,7 +6,7 @@ use crate::blocking_graph::StaticAnalysis;
 use crate::geometry::Waypoint;
 use crate::simulation::PenaltyParameters;
 
-/// Which search runs.
+/// The search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Planner {
     /// State-based planning guided by directional blocking graphs (the paper's SBDP*).
@@ -20,7 +20,7 @@ pub enum Planner {
     PdpR,
     /// PDP_t, then PDP_r from the start if that failed (PDP*).
     PdpStar,
-    /// A rapidly-exploring random tree per part, of straight ways (RRT).
+    /// A rapidly-exploring random tree per part, of straight paths (RRT).
     Rrt,
     /// A rapidly-exploring random tree per part, of motions of the transition function (BK-RRT).
     BkRrt,
@@ -55,7 +55,7 @@ impl Planner {
     }
 }
 
-/// Which transition function moves the parts.
+/// The simulation that moves the parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Engine {
     /// Contact-constrained sliding without inertia.
@@ -79,7 +79,7 @@ impl Engine {
     }
 }
 
-/// Which actions the search may use.
+/// The actions that the search may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ActionSet {
     /// The paper's: six translations; six translations and six rotations.
@@ -112,37 +112,37 @@ impl ActionSet {
 /// Where the parts of an assembly plan begin.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Staging {
-    /// Each where its insertion begins; it is not there before its turn.
+    /// Each where its insertion begins; it is absent before its turn.
     None,
-    /// Laid out beside the assembly, but for those whose place is given: the rigid motion of their mesh from
+    /// Laid out beside the assembly, except for those with a given pose: the rigid motion of their mesh from
     /// where it was given, in the input's units and frame.
     Beside(Vec<(usize, Waypoint)>),
 }
 
-/// A planning question about one assembly. Part numbers are indices into its parts.
+/// A planning request about one assembly. Part numbers are indices into its parts.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct PlanRequest {
-    /// Which search.
+    /// The search.
     pub planner: Planner,
-    /// Which transition function.
+    /// The simulation.
     pub engine: Engine,
     /// Parameters of the engine `penalty`.
     pub penalty: PenaltyParameters,
-    /// Which actions.
+    /// The actions.
     pub actions: ActionSet,
     /// The rule that fills blocking graphs before anything is simulated.
     pub static_analysis: StaticAnalysis,
-    /// Whether parts that leave straight, and those that are apart already, are taken out by a geometric test,
+    /// Whether parts that leave straight, or are clear already, are removed by a geometric test,
     /// without simulation, by the planners `sbdp-star` and `sbdp`; `None` for the default of the actions: the paper
     /// simulates all.
     pub sweeps: Option<bool>,
-    /// The gap between a part's hull and that of all that stands where its way out ends, in the input's units, at least 0;
+    /// The gap between a part's hull and that of the rest where its path out ends, in the input's units, at least 0;
     /// `None` for a hundredth of the longest side of the part's box.
     pub clearance: Option<f64>,
-    /// The direction up, in the input's frame, of any length but 0: ways up come before ways sideways, and those before
-    /// ways down. `None` for the direction in which most parts can go at first.
+    /// The direction up, in the input's frame, of any length but 0: upward paths come before sideways ones, and these
+    /// before downward ones. `None` for the direction in which most parts can go at first.
     pub up: Option<[f64; 3]>,
-    /// What the random poses of the planners `rrt` and `bk-rrt` depend on.
+    /// Seed of the random poses of the planners `rrt` and `bk-rrt`.
     pub seed: u64,
     /// Simulations (steps of a tree, in RRT) after which the search gives up with `partial`.
     pub max_simulations: Option<u64>,
@@ -156,15 +156,15 @@ pub struct PlanRequest {
     pub threads: usize,
     /// Parts that may not move.
     pub fixed: Vec<usize>,
-    /// Parts that are gone already.
+    /// Parts that are already removed.
     pub removed: Vec<usize>,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<usize>>,
-    /// Parts that stay as long as others leave: what the rest is taken off. With the extended actions, SBDP and SBDP* choose
-    /// one if there are none; for the other planners they are as fixed ones.
+    /// Parts that stay as long as others leave: what the rest is taken off. With the extended actions, SBDP and SBDP*
+    /// choose one if there are none; the other planners treat them as fixed.
     pub base: Vec<usize>,
-    /// Groups that rather leave as wholes, and are taken apart then. A part may be in several, if one lies in the other.
-    /// Heeded by SBDP* with the extended actions.
+    /// Groups that should leave as wholes, to be taken apart afterwards. A part may be in several groups if these are
+    /// nested. Only SBDP* with the extended actions supports them.
     pub groups: Vec<Vec<usize>>,
     /// Set for an assembly plan (the disassembly reversed): where its parts begin.
     pub assembly: Option<Staging>,
@@ -173,7 +173,7 @@ pub struct PlanRequest {
 }
 
 impl PlanRequest {
-    /// Whether its search heeds preferred groups.
+    /// Whether its search supports preferred groups.
     #[must_use]
     pub fn prefers_groups(&self) -> bool {
         self.planner == Planner::SbdpStar && self.actions == ActionSet::Extended
@@ -207,7 +207,7 @@ pub enum Stage {
     Sdf,
     /// Searching and verifying.
     Search,
-    /// Finding the ways to where insertions begin.
+    /// Finding the paths to where insertions begin.
     Transfer,
 }
 
@@ -217,15 +217,15 @@ pub trait PlanSink: Send {
     fn progress(&mut self, progress: Progress);
     /// A verified step, in order.
     fn step(&mut self, step: &crate::plan::PlanStep);
-    /// Whether it wants every event of the search.
+    /// Whether the receiver wants every event of the search.
     fn traces(&self) -> bool {
         false
     }
-    /// An event of the search, if it wants them.
+    /// An event of the search, if the receiver wants them.
     fn traced(&mut self, _event: super::TraceEvent) {}
 }
 
-/// Receives nothing: for callers that take the plan alone.
+/// Ignores everything: for callers that need only the plan.
 impl PlanSink for () {
     fn progress(&mut self, _: Progress) {}
     fn step(&mut self, _: &crate::plan::PlanStep) {}

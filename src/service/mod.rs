@@ -4,8 +4,8 @@
 //!
 //! Data flow of a request: assembly (`geometry`; those in memory: `store`) → fields (`sdf`) and overlaps
 //! (`prepared`) → `search` (`entry`), for an assembly plan → `assembling` (`assembly_plan`) → plan in the
-//! input's units (`answer`). What was answered before, in
-//! whole or in part, the `cache` knows.
+//! input's units (`answer`). The `cache` keeps earlier
+//! answers, whole or in part.
 
 mod answer;
 mod assembly_plan;
@@ -54,9 +54,9 @@ pub struct AssemblyId(pub [u8; 32]);
 pub struct Admission {
     /// Its handle.
     pub id: AssemblyId,
-    /// It was known before: nothing was done.
+    /// Whether it was known before, so that nothing was done.
     pub known: bool,
-    /// What healing found, and parts that are given twice.
+    /// What healing found, and duplicate parts.
     pub warnings: Vec<Warning>,
 }
 
@@ -78,11 +78,11 @@ pub enum ServiceError {
     /// The request names a part that is not there.
     #[error("the request names part {index} in `{field}`, but the assembly has {count} parts")]
     NoSuchPart {
-        /// Which list.
+        /// The list in the request.
         field: &'static str,
         /// The index given.
         index: usize,
-        /// How many there are.
+        /// How many parts the assembly has.
         count: usize,
     },
     /// A target is among the parts that stay.
@@ -90,26 +90,26 @@ pub enum ServiceError {
     TargetStays {
         /// The part.
         name: String,
-        /// Which list.
+        /// The list in the request.
         field: &'static str,
     },
     /// A length is negative or not finite.
     #[error("`{field}` is {value}: give a length of at least 0")]
     NoLength {
-        /// Which one.
+        /// The field of the request.
         field: &'static str,
-        /// What was given.
+        /// The given value.
         value: f64,
     },
     /// A direction has no length, or is not finite.
     #[error("`{field}` is {value:?}: give a finite vector that is not zero")]
     NoDirection {
-        /// Which one.
+        /// The field of the request.
         field: &'static str,
-        /// What was given.
+        /// The given value.
         value: [f64; 3],
     },
-    /// Preferred groups were given to a planner that knows none.
+    /// Preferred groups were given to a planner that does not support them.
     #[error(
         "`groups` are for the planner sbdp-star with the extended actions, not for {planner} with the {actions} ones"
     )]
@@ -127,7 +127,7 @@ pub enum ServiceError {
     Geometry(#[from] GeometryError),
 }
 
-/// The service. Shared by all threads.
+/// The planning service, shared by all threads.
 #[derive(Debug)]
 pub struct Service {
     store: AssemblyStore,
@@ -306,7 +306,7 @@ impl Service {
         Ok(found.map_or_else(|_| Vec::new(), |(p, _)| answer::overlaps(&entry.assembly, &p.overlaps)))
     }
 
-    /// Plans. Blocks until done; `termination` ends it early with a plan that says so.
+    /// Plans. Blocks until done. `termination` ends it early; the plan's status then says so.
     ///
     /// # Errors
     /// Nothing could be planned: unknown id, part numbers out of range.
@@ -320,7 +320,7 @@ impl Service {
         self.planned(id, request, termination, sink, Some(&self.pools))
     }
 
-    /// Plans a likely question on the caller's threads. The plan is cached.
+    /// Plans a likely request on the caller's threads. The plan is cached.
     ///
     /// # Errors
     /// As [`Service::plan`].

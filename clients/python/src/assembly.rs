@@ -23,7 +23,7 @@ use crate::error::{no_such_part, refused};
 /// How long Ctrl-C may go unnoticed.
 pub(crate) const SLICE: Duration = Duration::from_millis(50);
 
-/// An assembly, its meshes and the names of its parts. It does not change.
+/// An assembly, its meshes and the names of its parts. It is immutable.
 #[pyclass(frozen, module = "sbdp")]
 #[derive(Clone)]
 pub(crate) struct Assembly {
@@ -53,7 +53,7 @@ pub(crate) struct ArrayAssembly {
     meshes: Vec<ArrayMesh>,
 }
 
-/// What differs from another assembly, by the places of parts there.
+/// Changes of another assembly, by the indices of parts there.
 pub(crate) struct Revision {
     base: Arc<Data>,
     replaced: BTreeMap<u32, ArrayMesh>,
@@ -95,7 +95,7 @@ impl Data {
         Self { names, origin, handle: OnceLock::new() }
     }
 
-    /// Revisions go by the daemon's handle, which nobody can tell from meshes.
+    /// Revisions go by the daemon's handle, which cannot be computed from meshes.
     pub(crate) fn subject(this: &Arc<Self>) -> Subject {
         match &this.origin {
             Origin::Revised(_) => this.handle().into(),
@@ -103,8 +103,8 @@ impl Data {
         }
     }
 
-    /// This assembly with other meshes for parts that it has, and with those that it has not. `hand_over` sends what
-    /// differs to the daemon and returns its handle.
+    /// This assembly with other meshes for parts that it has, and with those that it has not. `hand_over` sends the
+    /// changes to the daemon and returns the new handle.
     pub(crate) fn revised(
         this: &Arc<Self>,
         parts: Vec<(String, ArrayMesh)>,

@@ -34,7 +34,7 @@ impl Client {
         client.ok_or_else(|| PyValueError::new_err("this client was closed"))
     }
 
-    /// Asks without holding the interpreter.
+    /// Runs a call without holding the interpreter lock.
     fn ask<T: Send>(
         &self,
         py: Python<'_>,
@@ -71,14 +71,14 @@ impl Client {
         Ok(Self { client: Mutex::new(Some(client)), signals })
     }
 
-    /// Hands an assembly over; plans do this by themselves.
+    /// Uploads an assembly; plans do this automatically.
     fn upload(&self, py: Python<'_>, assembly: &Assembly) -> PyResult<Vec<u8>> {
         let data = Arc::clone(&assembly.data);
         let upload = |client: &SharedClient| client.upload(&sbdp_client::Meshes::assembly(&*data));
         Ok(self.ask(py, upload)?.0.to_vec())
     }
 
-    /// Hands over what differs from an assembly; `sbdp.revise` makes the parts.
+    /// Uploads the changes of an assembly; `sbdp.revise` makes the parts.
     fn revise(
         &self,
         py: Python<'_>,
@@ -102,7 +102,7 @@ impl Client {
         self.ask(py, |client| client.knows(sbdp_client::Meshes::handle(&*data)))
     }
 
-    /// Asks for a plan.
+    /// Requests a plan.
     #[pyo3(signature = (assembly, /, *, views=false, **keywords))]
     fn plan(
         &self,
@@ -132,7 +132,7 @@ impl Client {
         Ok(Session::new(session, data, self.signals.clone()))
     }
 
-    /// All figures of the daemon.
+    /// All metrics of the daemon.
     fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let text = self.ask(py, SharedClient::metrics)?;
         py.import("json")?.call_method1("loads", (text,))
@@ -148,7 +148,7 @@ impl Client {
         Ok(self.client()?.restarts())
     }
 
-    /// Lets the connection go, once no stream uses it any more.
+    /// Closes the connection, once no stream uses it.
     fn close(&self) {
         drop(self.client.lock().unwrap_or_else(PoisonError::into_inner).take());
     }

@@ -17,7 +17,7 @@ fn of_class(py: Python<'_>, class: &str, message: &str, retry_after: Option<f64>
     made().unwrap_or_else(|broken| broken)
 }
 
-/// What the client says, as an exception.
+/// A client error as an exception.
 pub(crate) fn raised(py: Python<'_>, error: &ClientError) -> PyErr {
     let message = error.to_string();
     let class = match error {
@@ -51,7 +51,7 @@ pub(crate) fn raised(py: Python<'_>, error: &ClientError) -> PyErr {
     of_class(py, class, &message, error.retry_after().map(|time| time.as_secs_f64()))
 }
 
-/// What is wrong with files or meshes, as an exception.
+/// An error in files or meshes, as an exception.
 pub(crate) fn refused(py: Python<'_>, error: &GeometryError) -> PyErr {
     of_class(py, "GeometryError", &error.to_string(), None)
 }

@@ -13,7 +13,7 @@ use sbdp_client::{Plan as ClientPlan, Step as ClientStep, Summary};
 use crate::assembly::Data;
 use crate::step::Step;
 
-/// A plan that has come to its end.
+/// A finished plan.
 #[pyclass(frozen, module = "sbdp")]
 pub(crate) struct Plan {
     plan: ClientPlan,

@@ -27,31 +27,31 @@ impl Session {
 
 #[pymethods]
 impl Session {
-    /// These parts are out.
+    /// Records that these parts are out.
     fn executed(&mut self, parts_: &Bound<'_, PyAny>) -> PyResult<()> {
         self.session.executed(&parts(&self.data, parts_)?);
         Ok(())
     }
 
-    /// A step of the last plan was done.
+    /// Records that a step of the last plan was done.
     fn performed(&mut self, step: &Step) -> PyResult<()> {
         self.session.performed(&step.step()?);
         Ok(())
     }
 
-    /// This part does not move.
+    /// Records that this part does not move.
     fn stuck(&mut self, py: Python<'_>, part: &str) -> PyResult<()> {
         self.session.stuck(self.data.part(py, part)?);
         Ok(())
     }
 
-    /// This part moves again.
+    /// Records that this part moves again.
     fn freed(&mut self, py: Python<'_>, part: &str) -> PyResult<()> {
         self.session.freed(self.data.part(py, part)?);
         Ok(())
     }
 
-    /// This part stands elsewhere.
+    /// Records that this part stands elsewhere.
     fn moved(&mut self, py: Python<'_>, part: &str, pose_: &Bound<'_, PyAny>) -> PyResult<()> {
         self.session.moved(self.data.part(py, part)?, pose(pose_)?);
         Ok(())

@@ -12,7 +12,7 @@ use crate::error::raised;
 pub(crate) struct Signals(Arc<Mutex<Option<PyErr>>>);
 
 impl Signals {
-    /// Asks Python now and then whether a signal came, as Ctrl-C.
+    /// Asks Python regularly whether a signal, such as Ctrl-C, has arrived.
     pub(crate) fn interrupt(&self) -> Interrupt {
         let raised = Arc::clone(&self.0);
         Interrupt::new(move || {
@@ -22,7 +22,7 @@ impl Signals {
         })
     }
 
-    /// What the client says, as an exception; that of the handler if it was one that ended the call.
+    /// A client error as an exception, or the exception of the signal handler that ended the call.
     pub(crate) fn raised(&self, py: Python<'_>, error: &ClientError) -> PyErr {
         let by_handler = match error {
             ClientError::Interrupted => self.0.lock().unwrap_or_else(PoisonError::into_inner).take(),

@@ -13,7 +13,7 @@ use sbdp_client::{Step as ClientStep, StepEnd};
 use crate::arrays::{path_copy, path_view};
 use crate::assembly::Data;
 
-/// A step that may be taken back: one that is read in place ends when the next one is asked for.
+/// A step that may be taken back: one that is read in place ends when the next one is requested.
 pub(crate) type Lent = Arc<Mutex<Option<ClientStep>>>;
 
 /// Parts that move as one rigid body.

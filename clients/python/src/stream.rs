@@ -28,7 +28,7 @@ pub(crate) struct PlanStream {
     signals: Signals,
     /// Counts the arrays that are views; none if steps are copied.
     views: Option<Arc<AtomicUsize>>,
-    /// The step that was yielded last, if it is read in place.
+    /// The last step that was yielded, if it is read in place.
     lent: Option<Lent>,
     /// The copied steps so far.
     steps: Vec<ClientStep>,
@@ -38,7 +38,7 @@ pub(crate) struct PlanStream {
     restarts: u32,
 }
 
-/// What came next.
+/// The next event.
 enum Next {
     Step(ClientStep),
     Nothing,
@@ -61,7 +61,7 @@ impl PlanStream {
         }
     }
 
-    /// Ends what was read in place: nobody may hold any of it.
+    /// Ends what was read in place: no view of it may exist.
     fn take_back(&mut self) -> PyResult<()> {
         if let Some(views) = &self.views
             && views.load(Ordering::Relaxed) > 0
@@ -147,7 +147,7 @@ impl PlanStream {
         }
     }
 
-    /// The next step if it comes within a time, else None.
+    /// The next step if it arrives within a time, otherwise None.
     #[pyo3(signature = (timeout=0.0))]
     fn poll<'py>(&mut self, py: Python<'py>, timeout: f64) -> PyResult<Option<Bound<'py, Step>>> {
         let within = Duration::try_from_secs_f64(timeout);
@@ -158,7 +158,7 @@ impl PlanStream {
         }
     }
 
-    /// Waits for the end, and returns all of it.
+    /// Waits for the end, and returns the whole plan.
     #[pyo3(signature = (timeout=None))]
     fn result(slf: &Bound<'_, Self>, timeout: Option<Bound<'_, PyAny>>) -> PyResult<Py<Plan>> {
         let py = slf.py();
@@ -188,7 +188,7 @@ impl PlanStream {
         Ok(plan)
     }
 
-    /// What is known when the plan has come to its end, without the steps; None before.
+    /// The plan's document without its steps, once it has ended; None before.
     #[getter]
     fn summary<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let Some(summary) = &self.summary else { return Ok(None) };
@@ -228,7 +228,7 @@ impl PlanStream {
         Ok(Some(dict))
     }
 
-    /// Asks the daemon to stop: the plan so far still comes.
+    /// Asks the daemon to stop. The plan so far still arrives.
     fn cancel(&mut self) {
         if let Some(stream) = &mut self.stream {
             stream.get_mut().unwrap_or_else(PoisonError::into_inner).cancel();

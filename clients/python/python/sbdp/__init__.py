@@ -58,11 +58,11 @@ def connect(
 ) -> Client:
     """Connects to the daemon of this user, or of a runtime folder.
 
-    With `start=True` one is started where none runs, and left running. All times are in seconds: `timeout` for answers that
-    need no planning, `upload_timeout` for meshes to be checked, `reconnect` for another daemon to take the place of one that
-    went away, `busy_wait` for one that answers busy.
+    With `start=True` a daemon is started if none is running, and left running. All times are in seconds: `timeout` for
+    answers that need no planning, `upload_timeout` for checking meshes, `reconnect` for another daemon to replace one that
+    went away, `busy_wait` for a daemon that answers busy.
 
-    Raises `NoDaemonError` where none runs, `ConnectionError` for another version, `TooManyClientsError`.
+    Raises `NoDaemonError` if none is running, `ConnectionError` for another version, and `TooManyClientsError`.
     """
     options = {
         "timeout": timeout,

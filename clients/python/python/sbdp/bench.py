@@ -30,7 +30,7 @@ LEFT = 5
 
 
 class NoRecord(Exception):
-    """A run that gave no record; the message says why."""
+    """A run without a record; the message says why."""
 
 
 def run_unit(program: str, line: str) -> str:
@@ -46,10 +46,10 @@ class Workers(Protocol):
     """Something that runs units side by side."""
 
     def start(self, line: str) -> Any:
-        """Starts a unit; what stands for it until it is over."""
+        """Starts a unit. Returns a token for it."""
 
     def ended(self, running: list[Any]) -> tuple[Any, Callable[[], str]]:
-        """Waits for one of those that run; it, and its record (or what it raises)."""
+        """Waits for one of the running units. Returns its token, and its record (or what it raises)."""
 
     def free(self, running: int) -> bool:
         """Whether one more can run beside those that run, given their number."""

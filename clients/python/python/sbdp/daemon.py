@@ -36,8 +36,8 @@ def program() -> str:
 class Daemon:
     """A daemon that this process starts, and stops at the end of a `with` block.
 
-    `runtime_dir` is where clients find it (default: that of the user), `config` a file of settings, and `arguments` go to
-    the program as they are. Its log goes to stderr, unless `quiet`. Raises `NoDaemonError` if it does not become ready.
+    `runtime_dir` is where clients find it (default: that of the user), `config` a configuration file, and `arguments` are
+    passed to the program unchanged. Its log goes to stderr, unless `quiet`. Raises `NoDaemonError` if it does not become ready.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class Daemon:
         return self._process.pid
 
     def stop(self) -> None:
-        """Stops it, if it still runs, and waits for its end: it answers what it has first."""
+        """Stops it, if it is still running, and waits for its end. It answers its requests first."""
         if self._process.poll() is None:
             self._process.terminate()
         self._process.wait()
@@ -106,6 +106,6 @@ class Daemon:
 
 
 def leave_running(daemon: Daemon) -> None:
-    """Lets a daemon stay when this process ends."""
+    """Keeps a daemon running when this process ends."""
     # `Popen` would warn of a child that still runs.
     daemon._process.returncode = 0

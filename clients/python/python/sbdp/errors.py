@@ -2,7 +2,7 @@
 
 
 class Error(Exception):
-    """Whatever the daemon or the connection to it refuses. `code` is the daemon's stable number, if it answered."""
+    """The daemon, or the connection to it, refused a request. `code` is the daemon's stable number, if it answered."""
 
     code: int | None = None
 
@@ -14,13 +14,13 @@ class MalformedError(Error):
 
 
 class UnknownHandleError(Error):
-    """The daemon does not know the assembly (any more)."""
+    """The daemon does not know the assembly: upload it (again)."""
 
     code = 2
 
 
 class BusyError(Error):
-    """The daemon's queue is full: come again after `retry_after` seconds."""
+    """The daemon's queue is full: try again after `retry_after` seconds."""
 
     code = 3
     retry_after: float = 0.0
@@ -45,7 +45,7 @@ class NoSuchPartError(Error):
 
 
 class UnsupportedError(Error):
-    """The request wants something that this daemon does not offer."""
+    """The request needs something that this daemon does not offer."""
 
     code = 7
 
@@ -63,13 +63,13 @@ class SlowReaderError(Error):
 
 
 class ShuttingDownError(Error):
-    """The daemon is about to leave."""
+    """The daemon is shutting down."""
 
     code = 10
 
 
 class TooLargeError(Error):
-    """The message exceeds a limit of the daemon, or what memory is left."""
+    """The message exceeds a limit of the daemon, or the memory that is left."""
 
     code = 11
 
@@ -81,7 +81,7 @@ class CancelledError(Error):
 
 
 class NoDaemonError(Error):
-    """No daemon runs, or it went away before it had answered."""
+    """No daemon is running, or it went away before it answered."""
 
 
 class TimeoutError(Error, TimeoutError):
@@ -89,7 +89,7 @@ class TimeoutError(Error, TimeoutError):
 
 
 class StreamOpenError(Error):
-    """This client receives a plan already: finish or close that stream, or connect another client."""
+    """This client is already receiving a plan: finish or close that stream, or connect another client."""
 
 
 class ForkedError(Error):
@@ -97,11 +97,11 @@ class ForkedError(Error):
 
 
 class TooManyClientsError(Error):
-    """The daemon serves as many clients as it can."""
+    """The daemon has as many clients as it can serve."""
 
 
 class SharedMemoryError(Error):
-    """/dev/shm is too small for the meshes."""
+    """/dev/shm has too little space for the meshes."""
 
 
 class ConnectionError(Error, ConnectionError):

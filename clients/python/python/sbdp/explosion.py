@@ -1,4 +1,4 @@
-"""Where parts stand in an exploded view: along their own ways out, just so far that their boxes are apart. The rule is that
+"""Where parts stand in an exploded view: along their own ways out, just far enough to separate their boxes. The rule is that
 of the page of `sbdp view` (`src/view/explode.rs`)."""
 
 from collections.abc import Mapping, Sequence

@@ -1,9 +1,9 @@
-"""Planning a document that is open in a program for design: only what changed is sent again, and planning runs in a thread
+"""Planning a document that is open in a CAD program: only what changed is sent again, and planning runs in a thread
 of its own. The FreeCAD workbench and the Blender add-on are built on this.
 
     live = sbdp.LiveAssembly(units="mm")
     job = live.plan({"bolt": sbdp.LivePart(vertices, triangles, placement), …})
-    job.join()                                     # or look at `job.is_alive()`, `job.steps` and `job.progress` now and then
+    job.join()                                     # or check `job.is_alive()`, `job.steps` and `job.progress`
     print(job.change, job.plan.status)             # or `job.error`
 """
 
@@ -32,7 +32,7 @@ _RIGID = 1e-6
 
 
 class LivePart(NamedTuple):
-    """A part: its mesh in its own frame, and its place."""
+    """A part: its mesh in its own frame, and its placement."""
 
     #: Shape (n, 3), in the part's own frame.
     vertices: NDArray
@@ -56,19 +56,19 @@ class LivePart(NamedTuple):
 
 @dataclass(frozen=True)
 class Change:
-    """What was sent for a plan, beside the question. Names of parts."""
+    """What was sent for a plan, beside the request. Lists of part names."""
 
-    #: All meshes were sent, for the first time or because the daemon had forgotten them.
+    #: All meshes were sent, for the first time or because the daemon had dropped them.
     whole: bool = False
     #: How many parts there are.
     count: int = 0
-    #: Only where they stand was sent, for they stand elsewhere than their meshes were sent.
+    #: Only their position was sent, because they were moved.
     moved: tuple[str, ...] = ()
     #: New meshes of known parts.
     replaced: tuple[str, ...] = ()
     #: Meshes of new parts.
     added: tuple[str, ...] = ()
-    #: Parts that are gone.
+    #: Parts that were removed.
     removed: tuple[str, ...] = ()
 
     def __str__(self) -> str:
@@ -85,9 +85,9 @@ def _listed(parts: tuple[str, ...]) -> str:
 
 
 class LiveAssembly:
-    """An assembly that is edited between plans. One plan at a time; not for use from several threads at once.
+    """An assembly that is edited between plans. It makes one plan at a time, and is for one thread at a time.
 
-    `units` is the unit of length, if known. `connect` makes a client, and again one where the daemon went away; default: the
+    `units` is the unit of length, if known. `connect` makes a client, and a new one if the daemon went away; default: the
     daemon of this user, started if none runs.
     """
 
@@ -107,7 +107,7 @@ class LiveAssembly:
         return job
 
     def ask(self, parts: Mapping[str, LivePart], **options: Any) -> tuple[Change, PlanStream]:
-        """Sends what changed, and asks for a plan. Raises as `sbdp.assembly`, `sbdp.connect` and `Client.plan`."""
+        """Sends what changed, and requests a plan. Raises as `sbdp.assembly`, `sbdp.connect` and `Client.plan`."""
         if not parts:
             raise ValueError("there is no part to plan: choose objects with a volume")
         if self._client is None:
@@ -141,7 +141,7 @@ class LiveAssembly:
 
     @property
     def was_sent(self) -> bool:
-        """Whether meshes were sent that the next plan goes by."""
+        """Whether meshes were sent that the next plan can use."""
         return self._assembly is not None
 
     def forget(self) -> None:
@@ -178,13 +178,13 @@ class PlanJob(threading.Thread):
         super().__init__(name="sbdp plan", daemon=True)
         self._live, self._options = live, dict(options)
         self._cancelled = threading.Event()
-        #: What it is about.
+        #: The parts.
         self.parts = dict(parts)
         #: What was sent; None before.
         self.change: Change | None = None
-        #: The steps that were found so far.
+        #: The steps found so far.
         self.steps: list[Step] = []
-        #: The latest that the daemon said.
+        #: The latest progress that the daemon reported.
         self.progress: Progress | None = None
         #: The whole plan; None before the end, and where there is an error.
         self.plan: Plan | None = None
@@ -192,11 +192,11 @@ class PlanJob(threading.Thread):
         self.error: Exception | None = None
 
     def cancel(self) -> None:
-        """Asks for an end soon: the plan has status `cancelled` then, or `error` is a `CancelledError`."""
+        """Asks the daemon to stop soon. The plan then has status `cancelled`, or `error` is a `CancelledError`."""
         self._cancelled.set()
 
     def result(self) -> Plan:
-        """Waits for the end. Raises what went wrong."""
+        """Waits for the end. Raises the error of the plan, if any."""
         self.join()
         if self.error is not None:
             raise self.error

@@ -1,4 +1,4 @@
-"""Meshes as callers have them, as arrays that are uploaded without a copy."""
+"""Meshes of callers, as arrays that are uploaded without a copy."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -40,7 +40,7 @@ def _part(name, mesh):
 def assembly(
     parts: Mapping[str, Any] | Any, *, units: str | None = None, name: str = "", fixed: Iterable[str] = ()
 ) -> _native.Assembly:
-    """An assembly of meshes, given where they stand assembled.
+    """An assembly of meshes, given at their assembled poses.
 
     `parts` are meshes by name: each `(vertices, triangles)`, of shapes (n, 3) and (m, 3), or an object with `vertices` and
     `faces`, as `trimesh.Trimesh`; or a `trimesh.Scene`. `units` is the unit of length, if known, as "mm". `fixed` are names

@@ -57,7 +57,7 @@ def pose(transform: ArrayLike) -> NDArray[numpy.float64]:
 
 
 def is_rigid(transform: ArrayLike, tolerance: float = 1e-9) -> bool:
-    """Whether a transform turns and shifts only: no scale, no shear, no mirror."""
+    """Whether a transform only rotates and shifts, without scale, shear or mirror."""
     turn = numpy.asarray(transform, dtype=float)[:3, :3]
     return bool(numpy.abs(turn @ turn.T - numpy.eye(3)).max() <= tolerance and numpy.linalg.det(turn) > 0)
 
@@ -199,8 +199,8 @@ class Motion:
         return now
 
     def exploded(self) -> dict[str, NDArray]:
-        """How far each part is shifted from where it is when the plan begins, in an exploded view: along its own way out,
-        just so far that boxes are apart; parts that do not leave stay."""
+        """How far each part is shifted in an exploded view, from where it is when the plan begins: along its own way out,
+        just far enough to separate the boxes. Parts that do not leave stay."""
         from .explosion import Leaving, exploded
 
         boxes = {part: (points.min(axis=0), points.max(axis=0)) for part, points in self._vertices.items()}
@@ -213,8 +213,8 @@ class Motion:
 
 
 def blockers(plan_document: Mapping) -> dict[str, str]:
-    """What keeps a plan from being complete, from `plan.to_dict()`: by part, `captive` if it should have come out and did
-    not, or `blocks` if it stops such a part and is none itself."""
+    """What keeps a plan from being complete, from `plan.to_dict()`. By part: `captive` if it should have come out and did
+    not, or `blocks` if it blocks such a part and is not captive itself."""
     captive = {entry["part"] for entry in plan_document["blocked"]}
     stopping: Sequence[str] = [part for entry in plan_document["blocked"] for part in entry["by"]]
     return {**dict.fromkeys(stopping, "blocks"), **dict.fromkeys(captive, "captive")}
