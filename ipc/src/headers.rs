@@ -108,7 +108,7 @@ pub struct ResponseHeader {
     pub total: u64,
     /// When the daemon admitted the request (CLOCK_MONOTONIC nanoseconds).
     pub admitted_ns: u64,
-    /// When a worker began to plan (CLOCK_MONOTONIC nanoseconds); 0 before.
+    /// When a worker started on the request (CLOCK_MONOTONIC nanoseconds); 0 before.
     pub started_ns: u64,
     /// When this chunk was sent (CLOCK_MONOTONIC nanoseconds).
     pub sent_ns: u64,

@@ -18,7 +18,7 @@
 #include <stdlib.h>
 
 /**
- * Why something was not done. A number keeps its meaning for ever. Below 100 are the daemon's codes.
+ * The result of a call. A number keeps its meaning for ever. Codes below 100 are the daemon's.
  */
 enum SbdpCode
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -26,7 +26,7 @@ enum SbdpCode
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * It was done.
+     * Success.
      */
     SBDP_CODE_OK = 0,
     /**
@@ -54,7 +54,7 @@ enum SbdpCode
      */
     SBDP_CODE_NO_SUCH_PART = 6,
     /**
-     * The request wants something that this daemon does not offer.
+     * The request needs something that this daemon does not offer.
      */
     SBDP_CODE_UNSUPPORTED = 7,
     /**
@@ -62,7 +62,7 @@ enum SbdpCode
      */
     SBDP_CODE_FAILED = 8,
     /**
-     * The plan was not read, and the daemon ended it.
+     * The client did not read the plan, and the daemon ended it.
      */
     SBDP_CODE_SLOW_READER = 9,
     /**
@@ -70,19 +70,19 @@ enum SbdpCode
      */
     SBDP_CODE_SHUTTING_DOWN = 10,
     /**
-     * The message exceeds a limit of the daemon, or what memory is left.
+     * The message exceeds a limit of the daemon, or the memory that is left.
      */
     SBDP_CODE_TOO_LARGE = 11,
     /**
-     * It was cancelled before planning began.
+     * The request was cancelled before planning began.
      */
     SBDP_CODE_CANCELLED = 12,
     /**
-     * No daemon runs at this place.
+     * No daemon is running at this place.
      */
     SBDP_CODE_NO_DAEMON = 100,
     /**
-     * The daemon went away before it had answered.
+     * The daemon went away before it answered.
      */
     SBDP_CODE_DAEMON_DIED = 101,
     /**
@@ -90,7 +90,7 @@ enum SbdpCode
      */
     SBDP_CODE_UNUSABLE = 102,
     /**
-     * The daemon serves as many clients as it can.
+     * The daemon has as many clients as it can serve.
      */
     SBDP_CODE_TOO_MANY_CLIENTS = 103,
     /**
@@ -98,19 +98,19 @@ enum SbdpCode
      */
     SBDP_CODE_SETUP = 104,
     /**
-     * No answer in time to what needs no planning.
+     * No answer in time to a request that needs no planning.
      */
     SBDP_CODE_TIMEOUT = 105,
     /**
-     * This client receives a plan already.
+     * This client is already receiving a plan.
      */
     SBDP_CODE_STREAM_OPEN = 106,
     /**
-     * Steps of two messages are kept in place: free them, then go on.
+     * Steps of two messages are kept in place: free them, then continue.
      */
     SBDP_CODE_VIEWS_HELD = 107,
     /**
-     * The interrupt function ended the wait.
+     * The interrupt function ended the call.
      */
     SBDP_CODE_INTERRUPTED = 108,
     /**
@@ -122,7 +122,7 @@ enum SbdpCode
      */
     SBDP_CODE_ARGUMENT = 110,
     /**
-     * `/dev/shm` is too small.
+     * `/dev/shm` has too little space.
      */
     SBDP_CODE_SHARED_MEMORY = 111,
     /**
@@ -134,7 +134,7 @@ enum SbdpCode
      */
     SBDP_CODE_PROTOCOL = 113,
     /**
-     * A fault of this library: free the handles of this call, and please report it.
+     * A fault of this library: free the handles of this call, and report it.
      */
     SBDP_CODE_INTERNAL = 114,
 };
@@ -147,7 +147,7 @@ typedef uint32_t SbdpCode;
 #endif // __cplusplus
 
 /**
- * Which search runs.
+ * The search.
  */
 enum SbdpPlanner
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -179,7 +179,7 @@ enum SbdpPlanner
      */
     SBDP_PLANNER_PDP_STAR = 5,
     /**
-     * A rapidly-exploring random tree per part, of straight ways.
+     * A rapidly-exploring random tree per part, of straight paths.
      */
     SBDP_PLANNER_RRT = 6,
     /**
@@ -196,7 +196,7 @@ typedef uint32_t SbdpPlanner;
 #endif // __cplusplus
 
 /**
- * Which transition function moves the parts.
+ * The simulation that moves the parts.
  */
 enum SbdpEngine
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -225,7 +225,7 @@ typedef uint32_t SbdpEngine;
 #endif // __cplusplus
 
 /**
- * Which actions the search may use.
+ * The actions that the search may use.
  */
 enum SbdpActions
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -266,7 +266,7 @@ enum SbdpStaticAnalysis
      */
     SBDP_STATIC_ANALYSIS_DEFAULT = 0,
     /**
-     * An edge where contact with the other part alone lets a part hardly move.
+     * An arc where contact with the other part alone hardly lets a part move.
      */
     SBDP_STATIC_ANALYSIS_SLIDING = 1,
     /**
@@ -283,7 +283,7 @@ typedef uint32_t SbdpStaticAnalysis;
 #endif // __cplusplus
 
 /**
- * Yes, no, or as the daemon chooses.
+ * Yes, no, or the daemon's choice.
  */
 enum SbdpChoice
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -291,7 +291,7 @@ enum SbdpChoice
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * As the daemon chooses.
+     * The daemon chooses.
      */
     SBDP_CHOICE_DEFAULT = 0,
     /**
@@ -312,7 +312,7 @@ typedef uint32_t SbdpChoice;
 #endif // __cplusplus
 
 /**
- * Whether a plan takes apart or puts together, and from where.
+ * Disassembly or assembly plan, and where its parts begin.
  */
 enum SbdpStaging
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -320,15 +320,15 @@ enum SbdpStaging
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * The plan takes apart.
+     * A disassembly plan.
      */
     SBDP_STAGING_DISASSEMBLY = 0,
     /**
-     * The plan puts together; a part is not there before its turn, and begins where its insertion begins.
+     * An assembly plan. A part is absent before its turn, and begins where its insertion begins.
      */
     SBDP_STAGING_NONE = 1,
     /**
-     * The plan puts together; parts begin laid out beside the assembly, but for those in `staged`.
+     * An assembly plan. Parts begin laid out beside the assembly, except for those in `staged`.
      */
     SBDP_STAGING_BESIDE = 2,
 };
@@ -341,7 +341,7 @@ typedef uint32_t SbdpStaging;
 #endif // __cplusplus
 
 /**
- * What comes.
+ * The kind of an event.
  */
 enum SbdpEventKind
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -349,15 +349,15 @@ enum SbdpEventKind
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * Nothing more will come.
+     * The plan has ended, and nothing follows.
      */
     SBDP_EVENT_KIND_END = 0,
     /**
-     * Nothing came in time; the stream goes on.
+     * Nothing arrived in time; the stream continues.
      */
     SBDP_EVENT_KIND_PENDING = 1,
     /**
-     * Something moved on: see `progress`.
+     * Planning made progress: see `progress`.
      */
     SBDP_EVENT_KIND_PROGRESS = 2,
     /**
@@ -369,7 +369,7 @@ enum SbdpEventKind
      */
     SBDP_EVENT_KIND_TRACE = 4,
     /**
-     * Another daemon was asked again: the steps and the trace so far are void, and come again from the first.
+     * The request was sent to another daemon: the steps and the trace so far are void, and come again from the first.
      */
     SBDP_EVENT_KIND_RESTARTED = 5,
     /**
@@ -402,7 +402,7 @@ enum SbdpStage
      */
     SBDP_STAGE_SEARCH = 1,
     /**
-     * Finding the ways to where insertions begin.
+     * Finding the paths to where insertions begin.
      */
     SBDP_STAGE_TRANSFER = 2,
 };
@@ -423,7 +423,7 @@ enum SbdpStepEnd
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * Apart from all that they stood with.
+     * Clear of everything that they stood with.
      */
     SBDP_STEP_END_OUT = 0,
     /**
@@ -431,7 +431,7 @@ enum SbdpStepEnd
      */
     SBDP_STEP_END_ASIDE = 1,
     /**
-     * In their places: in plans that put together.
+     * In their places: in assembly plans.
      */
     SBDP_STEP_END_IN = 2,
 };
@@ -452,11 +452,11 @@ enum SbdpPlanStatus
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
     /**
-     * Every part that was asked for is out.
+     * Every requested part is out.
      */
     SBDP_PLAN_STATUS_COMPLETE = 0,
     /**
-     * A budget ran out; the steps are the best so far.
+     * A budget was spent; the steps are the best so far.
      */
     SBDP_PLAN_STATUS_PARTIAL = 1,
     /**
@@ -485,17 +485,17 @@ typedef uint32_t SbdpPlanStatus;
 #endif // __cplusplus
 
 /**
- * A client of the daemon of one place. Threads may share it. It receives one plan at a time: connect several for more.
+ * A client of one daemon. Threads may share it. It receives one plan at a time: connect several clients for more.
  */
 typedef struct SbdpClient SbdpClient;
 
 /**
- * Meshes that are kept, to be uploaded whenever the daemon does not know them, as after a restart.
+ * Meshes that the library keeps, and uploads whenever the daemon does not know them, for example after a restart.
  */
 typedef struct SbdpMeshes SbdpMeshes;
 
 /**
- * A plan that has come to its end. Threads may read it at the same time.
+ * A finished plan. Several threads may read it at the same time.
  */
 typedef struct SbdpPlan SbdpPlan;
 
@@ -505,16 +505,17 @@ typedef struct SbdpPlan SbdpPlan;
 typedef struct SbdpSession SbdpSession;
 
 /**
- * A plan as it comes in, for one thread at a time. To free it cancels the request. It may outlive its client.
+ * A plan as it arrives, for one thread at a time. Freeing it cancels the request. It may outlive its client.
  */
 typedef struct SbdpStream SbdpStream;
 
 /**
- * How to find and treat the daemon. All zero but for `struct_size` is the default; so is a null pointer to it.
+ * How to find the daemon, and how long to wait for it. All zero except `struct_size` is the default, as is a null
+ * pointer.
  */
 typedef struct SbdpConnectOptions {
     /**
-     * `sizeof` this struct. What it leaves out has its default.
+     * `sizeof` this struct. Fields beyond it have their defaults.
      */
     uint32_t struct_size;
     /**
@@ -534,31 +535,31 @@ typedef struct SbdpConnectOptions {
      */
     const uint64_t *upload_timeout_ns;
     /**
-     * How long to wait for a new daemon when the one that was asked went away; null for 10 s, 0 to report it at once.
+     * How long to wait for a new daemon when the one in use goes away; null for 10 s, 0 to report it at once.
      */
     const uint64_t *reconnect_ns;
     /**
-     * How long to come again by itself while the daemon is busy; null for not at all.
+     * For how long to repeat a request automatically while the daemon is busy; null for not at all.
      */
     const uint64_t *busy_wait_ns;
     /**
-     * How long to look for an answer before going to sleep; null for the usual, 0 for not at all.
+     * How long to poll for an answer before going to sleep; null for the default, 0 for not at all.
      */
     const uint64_t *poll_ns;
     /**
-     * Asked at least every 50 ms by calls that wait for the daemon, on their thread; not by `sbdp_stream_poll` and
-     * `sbdp_stream_next` while the daemon plans. Not 0 ends the call with `SBDP_CODE_INTERRUPTED`. It must not throw, and
-     * must live as long as the client and its streams and sessions. May be null.
+     * Called at least every 50 ms by calls that wait for the daemon, on their thread; not by `sbdp_stream_poll` and
+     * `sbdp_stream_next` while the daemon plans. Not 0 ends the call with `SBDP_CODE_INTERRUPTED`. It must not throw,
+     * and must live as long as the client and its streams and sessions. May be null.
      */
     int32_t (*interrupt)(void *data);
     /**
-     * What `interrupt` is given.
+     * The argument of `interrupt`.
      */
     void *interrupt_data;
 } SbdpConnectOptions;
 
 /**
- * What went wrong. The caller owns it; its size never changes.
+ * An error. The caller owns it; its size never changes.
  */
 typedef struct SbdpError {
     /**
@@ -566,18 +567,18 @@ typedef struct SbdpError {
      */
     uint32_t code;
     /**
-     * Of `SBDP_CODE_BUSY`: milliseconds after which asking again makes sense; else 0.
+     * For `SBDP_CODE_BUSY`: milliseconds to wait before the next try; otherwise 0.
      */
     uint32_t retry_ms;
     /**
-     * What happened and what to do: UTF-8, ended by a zero byte, empty if all went well. One that is too long is cut, and
+     * What happened and what to do: UTF-8, ended by a zero byte, empty on success. A longer message is cut, and
      * ends in `...`.
      */
     char message[2040];
 } SbdpError;
 
 /**
- * A part: a closed mesh at its assembled pose. The arrays are read during the call alone, and written once, into shared
+ * A part: a closed mesh at its assembled pose. The arrays are read only during the call, and written once, into shared
  * memory.
  */
 typedef struct SbdpPart {
@@ -608,11 +609,11 @@ typedef struct SbdpPart {
 } SbdpPart;
 
 /**
- * An assembly. The parts' places are their numbers everywhere; list them in natural order of their names.
+ * An assembly. Part numbers are indices into its list of parts; list them in natural order of their names.
  */
 typedef struct SbdpAssembly {
     /**
-     * `sizeof` this struct. What it leaves out is as if it were zero.
+     * `sizeof` this struct. Fields beyond it count as zero.
      */
     uint32_t struct_size;
     /**
@@ -620,7 +621,7 @@ typedef struct SbdpAssembly {
      */
     uint32_t reserved;
     /**
-     * A name for people, or null. It is not part of the content.
+     * A name for display, or null. It is not part of the content.
      */
     const char *name;
     /**
@@ -674,11 +675,11 @@ typedef struct SbdpMovedPart {
 } SbdpMovedPart;
 
 /**
- * What differs from an assembly that the daemon knows.
+ * Changes of an assembly that the daemon knows.
  */
 typedef struct SbdpChange {
     /**
-     * `sizeof` this struct. What it leaves out is as if it were zero.
+     * `sizeof` this struct. Fields beyond it count as zero.
      */
     uint32_t struct_size;
     /**
@@ -690,7 +691,7 @@ typedef struct SbdpChange {
      */
     const uint32_t *replaced;
     /**
-     * Their meshes, given where they stand assembled; the names stay, whatever these say.
+     * Their meshes, given at the assembled pose. Names stay: the ones given here are ignored.
      */
     const struct SbdpPart *replaced_by;
     /**
@@ -698,7 +699,7 @@ typedef struct SbdpChange {
      */
     size_t replaced_count;
     /**
-     * Further parts; they get the places after all others.
+     * Further parts; they get the numbers after all others.
      */
     const struct SbdpPart *added;
     /**
@@ -716,8 +717,8 @@ typedef struct SbdpChange {
 } SbdpChange;
 
 /**
- * A verified step. The library owns it and all that it points to; it may get further fields at its end, so copy fields,
- * not the struct.
+ * A verified step. The library owns it and everything that it points to. Later versions may add fields at its end, so
+ * copy fields, not the struct.
  */
 typedef struct SbdpStep {
     /**
@@ -725,7 +726,7 @@ typedef struct SbdpStep {
      */
     uint32_t number;
     /**
-     * The number of the step that takes the group out (of a plan that puts together: puts it in) to which these parts
+     * The number of the step that removes (in an assembly plan: inserts) the group to which these parts
      * belong; `UINT32_MAX` for none. A group is taken apart as it stood in the assembly.
      */
     uint32_t of;
@@ -734,15 +735,15 @@ typedef struct SbdpStep {
      */
     uint32_t ends;
     /**
-     * The earliest round, from 0, in which it can be done, if every step is done as soon as it can be.
+     * The earliest round, from 0, in which it can be done, if every step is done as soon as possible.
      */
     uint32_t wave;
     /**
-     * The way turns.
+     * Whether the path turns the parts.
      */
     bool rotates;
     /**
-     * The last leg of the way has a `direction`: it does not only turn.
+     * Whether the last leg of the path has a `direction`: it does not only turn.
      */
     bool has_direction;
     /**
@@ -754,7 +755,7 @@ typedef struct SbdpStep {
      */
     size_t part_count;
     /**
-     * Their motions from where they stand when the step begins (of a plan that puts together: when it ends), so that the
+     * Their motions from where they stand when the step begins (in an assembly plan: when it ends), so that the
      * first (the last) is the identity. A motion is the shift x, y, z, then the unit quaternion w, x, y, z.
      */
     const double (*path)[7];
@@ -763,7 +764,7 @@ typedef struct SbdpStep {
      */
     size_t waypoint_count;
     /**
-     * Numbers of the steps that must be done before this very path is free, ascending.
+     * Numbers of the steps that must be done before this exact path is free, ascending.
      */
     const uint32_t *required;
     /**
@@ -771,11 +772,11 @@ typedef struct SbdpStep {
      */
     size_t required_count;
     /**
-     * The deepest overlap along the way beyond that of the assembled pose, in the input's units.
+     * The deepest overlap along the path beyond that of the assembled pose, in the input's units.
      */
     double verified_depth;
     /**
-     * The unit vector of the way's last leg, in the input's frame.
+     * The unit vector of the path's last leg, in the input's frame.
      */
     double direction[3];
 } SbdpStep;
@@ -825,7 +826,7 @@ typedef struct SbdpBlocked {
      */
     uint32_t reserved;
     /**
-     * The parts that it met.
+     * The parts that block it.
      */
     const uint32_t *by;
     /**
@@ -853,11 +854,11 @@ typedef struct SbdpOverlap {
 } SbdpOverlap;
 
 /**
- * Something to know about the input.
+ * A finding about the input.
  */
 typedef struct SbdpWarning {
     /**
-     * The part it is about; `UINT32_MAX` for none.
+     * The part that it is about; `UINT32_MAX` for none.
      */
     uint32_t part;
     /**
@@ -865,7 +866,7 @@ typedef struct SbdpWarning {
      */
     uint32_t reserved;
     /**
-     * What was found and what was done about it.
+     * What was found, and what was done about it.
      */
     const char *message;
 } SbdpWarning;
@@ -875,11 +876,11 @@ typedef struct SbdpWarning {
  */
 typedef struct SbdpStats {
     /**
-     * Transition functions that the search used, remembered ones included.
+     * Uses of the transition function by the search, remembered ones included.
      */
     uint64_t simulations;
     /**
-     * Transition functions really computed.
+     * Uses of the transition function that were computed.
      */
     uint64_t simulations_run;
     /**
@@ -911,30 +912,30 @@ typedef struct SbdpStats {
      */
     double total_time_s;
     /**
-     * Distance fields that were there already.
+     * Distance fields found in the cache.
      */
     uint64_t sdf_hits;
     /**
-     * Blocking relations that were there already.
+     * Blocking relations found in the cache.
      */
     uint64_t blocking_hits;
     /**
-     * States whose blocking graphs were there already.
+     * States whose blocking graphs were found in the cache.
      */
     uint64_t graph_hits;
     /**
-     * Motions that were there already.
+     * Motions found in the cache.
      */
     uint64_t motion_hits;
     /**
-     * 1 when the whole plan was there already.
+     * 1 if the whole plan was found in the cache.
      */
     uint64_t plan_hit;
 } SbdpStats;
 
 /**
- * Everything about a plan except its steps. The library owns it and all that it points to; it may get further fields at
- * its end. Texts are UTF-8.
+ * Everything about a plan except its steps. The library owns it and everything that it points to. Later versions may
+ * add fields at its end. Texts are UTF-8.
  */
 typedef struct SbdpSummary {
     /**
@@ -946,11 +947,11 @@ typedef struct SbdpSummary {
      */
     uint32_t steps;
     /**
-     * The plan puts together.
+     * Whether it is an assembly plan.
      */
     bool assembly;
     /**
-     * The request named targets.
+     * Whether the request named targets.
      */
     bool has_targets;
     /**
@@ -1002,7 +1003,7 @@ typedef struct SbdpSummary {
      */
     size_t fixed_count;
     /**
-     * The parts that the rest is taken off.
+     * The base: the parts that the rest is taken off.
      */
     const uint32_t *base;
     /**
@@ -1010,11 +1011,11 @@ typedef struct SbdpSummary {
      */
     size_t base_count;
     /**
-     * Why the base was chosen; null where the request gave it.
+     * Why the base was chosen; null where the request named it.
      */
     const char *base_reason;
     /**
-     * Parts that stand in the assembly in the end (of a plan that puts together: from the start).
+     * Parts that are in the assembly at the end (in an assembly plan: from the start).
      */
     const uint32_t *remaining;
     /**
@@ -1038,7 +1039,7 @@ typedef struct SbdpSummary {
      */
     size_t free_together_count;
     /**
-     * Parts that began elsewhere than where their mesh was given.
+     * Parts that did not begin where their mesh was given.
      */
     const struct SbdpMovedPart *poses;
     /**
@@ -1080,7 +1081,7 @@ typedef struct SbdpSummary {
  */
 typedef struct SbdpPenalty {
     /**
-     * Its place among `time-step`, `planning-time-step`, `stiffness`, `damping`, `penetration-threshold`, `force`,
+     * Its index among `time-step`, `planning-time-step`, `stiffness`, `damping`, `penetration-threshold`, `force`,
      * `torque-factor`, `similar-translation`, `similar-rotation`, `longest-edge`, `yielding`, `share-of-extent`,
      * `steps-per-waypoint`, `most-blocks`, `newton-iterations`, `newton-tolerance`; the first is 0.
      */
@@ -1096,12 +1097,12 @@ typedef struct SbdpPenalty {
 } SbdpPenalty;
 
 /**
- * What to plan. All zero but for `struct_size` is the default; so is a null pointer to it. Where zero would mean something
+ * What to plan. All zero except `struct_size` is the default, as is a null pointer. Where zero would have a meaning
  * of its own, the field is a pointer, and null is the default.
  */
 typedef struct SbdpPlanOptions {
     /**
-     * `sizeof` this struct. What it leaves out has its default.
+     * `sizeof` this struct. Fields beyond it have their defaults.
      */
     uint32_t struct_size;
     /**
@@ -1121,7 +1122,7 @@ typedef struct SbdpPlanOptions {
      */
     uint32_t static_analysis;
     /**
-     * A `SbdpChoice`: whether parts that leave straight are taken out without simulation.
+     * A `SbdpChoice`: whether parts that leave straight are removed without simulation.
      */
     uint32_t sweeps;
     /**
@@ -1129,19 +1130,19 @@ typedef struct SbdpPlanOptions {
      */
     uint32_t staging;
     /**
-     * Threads for this request; 0 leaves it to the daemon.
+     * The number of threads; 0 leaves it to the daemon.
      */
     uint32_t threads;
     /**
-     * Not 0: neither read nor write anything remembered.
+     * Not 0: neither read nor write the cache.
      */
     uint32_t no_cache;
     /**
-     * Not 0: others go first.
+     * Not 0: other requests come first.
      */
     uint32_t batch;
     /**
-     * Not 0: the events of the search are wanted, too; it runs whatever is remembered.
+     * Not 0: send the events of the search, too. The search then runs even if the plan is remembered.
      */
     uint32_t trace;
     /**
@@ -1149,15 +1150,15 @@ typedef struct SbdpPlanOptions {
      */
     uint32_t reserved;
     /**
-     * What the random poses of the planners with trees depend on.
+     * Seed of the random poses of the planners with trees.
      */
     uint64_t seed;
     /**
-     * Time from now until the daemon must answer with what it has; null for none.
+     * Time from now after which the daemon answers with the plan so far; null for none.
      */
     const uint64_t *timeout_ns;
     /**
-     * Time of planning, waiting not counted, after which the daemon answers with what it has; null for none.
+     * Time of planning, not counting waiting, after which the daemon answers with the plan so far; null for none.
      */
     const uint64_t *planning_timeout_ns;
     /**
@@ -1169,7 +1170,7 @@ typedef struct SbdpPlanOptions {
      */
     const uint64_t *max_simulations;
     /**
-     * The gap that a way out ends with, in the input's units; null for a hundredth of the part's longest side.
+     * The gap with which a path out ends, in the input's units; null for a hundredth of the part's longest side.
      */
     const double *clearance;
     /**
@@ -1185,7 +1186,7 @@ typedef struct SbdpPlanOptions {
      */
     size_t fixed_count;
     /**
-     * Parts that are gone already.
+     * Parts that are already removed.
      */
     const uint32_t *removed;
     /**
@@ -1201,7 +1202,7 @@ typedef struct SbdpPlanOptions {
      */
     size_t target_count;
     /**
-     * Parts that stay as long as others leave; none to have the daemon choose.
+     * Parts that stay as long as others leave. If there are none, the daemon chooses.
      */
     const uint32_t *base;
     /**
@@ -1209,7 +1210,7 @@ typedef struct SbdpPlanOptions {
      */
     size_t base_count;
     /**
-     * Groups that rather leave as wholes, and are taken apart then.
+     * Groups that should leave as wholes, to be taken apart afterwards.
      */
     const struct SbdpGroup *groups;
     /**
@@ -1225,7 +1226,7 @@ typedef struct SbdpPlanOptions {
      */
     size_t moved_count;
     /**
-     * With `SBDP_STAGING_BESIDE`: parts that wait at places of your choice.
+     * With `SBDP_STAGING_BESIDE`: parts that wait at given poses.
      */
     const struct SbdpMovedPart *staged;
     /**
@@ -1243,7 +1244,7 @@ typedef struct SbdpPlanOptions {
 } SbdpPlanOptions;
 
 /**
- * What the daemon is doing; some of these are lost on purpose.
+ * What the daemon is doing. Some samples are dropped on purpose.
  */
 typedef struct SbdpProgress {
     /**
@@ -1269,7 +1270,8 @@ typedef struct SbdpProgress {
 } SbdpProgress;
 
 /**
- * What came. It and all that it points to is valid until the next call on the stream. It may get further fields at its end.
+ * An event. It and everything that it points to is valid until the next call on the stream. Later versions may add
+ * fields at its end.
  */
 typedef struct SbdpEvent {
     /**
@@ -1285,7 +1287,7 @@ typedef struct SbdpEvent {
      */
     const struct SbdpStep *step;
     /**
-     * Whole lines, one JSON object each, or null.
+     * Whole lines with one JSON object each, or null.
      */
     const char *trace;
     /**
@@ -1293,7 +1295,7 @@ typedef struct SbdpEvent {
      */
     const struct SbdpSummary *summary;
     /**
-     * The progress, all zero if it is another event.
+     * The progress; all zero for other events.
      */
     struct SbdpProgress progress;
 } SbdpEvent;
@@ -1306,25 +1308,25 @@ extern "C" {
  * Connects to a daemon. `options` may be null.
  *
  * # Safety
- * `options` and what it points to is as it says; `client` and `error` can be written.
+ * `options` is null or valid with everything that it points to; `client` and `error` are null or writable.
  */
 SbdpCode sbdp_client_connect(const struct SbdpConnectOptions *options,
                              struct SbdpClient **client,
                              struct SbdpError *error);
 
 /**
- * Frees a client. Its streams and sessions go on.
+ * Frees a client. Its streams and sessions remain valid.
  *
  * # Safety
- * `client` is null, or leads to null or to a client of this library that no other call uses.
+ * `client` is null, or points to null or to a client of this library that no other call uses.
  */
 void sbdp_client_free(struct SbdpClient **client);
 
 /**
- * Hands an assembly over; one that the daemon knows is not copied again.
+ * Uploads an assembly. One that the daemon knows is not copied again.
  *
  * # Safety
- * All pointers lead to what they say; `handle` and `error` can be written.
+ * All pointers are valid; `handle` and `error` can be written.
  */
 SbdpCode sbdp_client_upload(const struct SbdpClient *client,
                             const struct SbdpAssembly *assembly,
@@ -1335,7 +1337,7 @@ SbdpCode sbdp_client_upload(const struct SbdpClient *client,
  * Whether the daemon knows an assembly.
  *
  * # Safety
- * All pointers lead to what they say; `known` and `error` can be written.
+ * All pointers are valid; `known` and `error` can be written.
  */
 SbdpCode sbdp_client_knows(const struct SbdpClient *client,
                            const struct SbdpHandle *handle,
@@ -1343,10 +1345,10 @@ SbdpCode sbdp_client_knows(const struct SbdpClient *client,
                            struct SbdpError *error);
 
 /**
- * Hands over what differs from an assembly that the daemon knows. `revised` gets the handle of what becomes of it.
+ * Uploads the changes of an assembly that the daemon knows. `revised` receives the handle of the changed assembly.
  *
  * # Safety
- * All pointers lead to what they say; `revised` and `error` can be written.
+ * All pointers are valid; `revised` and `error` can be written.
  */
 SbdpCode sbdp_client_revise(const struct SbdpClient *client,
                             const struct SbdpHandle *base,
@@ -1366,7 +1368,7 @@ SbdpCode sbdp_client_metrics(const struct SbdpClient *client, char **metrics, st
  * Frees a text of this library.
  *
  * # Safety
- * `text` is null, or leads to null or to a text of `sbdp_client_metrics`.
+ * `text` is null, or points to null or to a text of `sbdp_client_metrics`.
  */
 void sbdp_text_free(char **text);
 
@@ -1379,7 +1381,7 @@ void sbdp_text_free(char **text);
 uint32_t sbdp_client_daemon_pid(const struct SbdpClient *client);
 
 /**
- * How often this client has followed a daemon that was restarted at the same place; 0 for a null client.
+ * How often this client has followed a daemon that was restarted; 0 for a null client.
  *
  * # Safety
  * `client` is null or one of this library's.
@@ -1387,15 +1389,15 @@ uint32_t sbdp_client_daemon_pid(const struct SbdpClient *client);
 uint32_t sbdp_client_restarts(const struct SbdpClient *client);
 
 /**
- * Copies an assembly, to be planned by `sbdp_client_plan_meshes` without thinking of uploads.
+ * Copies an assembly, for `sbdp_client_plan_meshes`, which uploads it when necessary.
  *
  * # Safety
- * `assembly` and what it points to is as it says; `meshes` and `error` can be written.
+ * `assembly` is valid with everything that it points to; `meshes` and `error` are null or writable.
  */
 SbdpCode sbdp_meshes_copy(const struct SbdpAssembly *assembly, struct SbdpMeshes **meshes, struct SbdpError *error);
 
 /**
- * The handle of kept meshes.
+ * The handle of meshes.
  *
  * # Safety
  * `meshes` is one of this library's; `handle` and `error` can be written.
@@ -1403,10 +1405,10 @@ SbdpCode sbdp_meshes_copy(const struct SbdpAssembly *assembly, struct SbdpMeshes
 SbdpCode sbdp_meshes_handle(const struct SbdpMeshes *meshes, struct SbdpHandle *handle, struct SbdpError *error);
 
 /**
- * Frees meshes; plans and sessions about them go on.
+ * Frees meshes. Plans and sessions about them remain valid.
  *
  * # Safety
- * `meshes` is null, or leads to null or to meshes of this library.
+ * `meshes` is null, or points to null or to meshes of this library.
  */
 void sbdp_meshes_free(struct SbdpMeshes **meshes);
 
@@ -1427,7 +1429,7 @@ size_t sbdp_plan_step_count(const struct SbdpPlan *plan);
 const struct SbdpStep *sbdp_plan_step(const struct SbdpPlan *plan, size_t number);
 
 /**
- * Everything about a plan but its steps, valid until it is freed; null for a null plan.
+ * Everything about a plan except its steps, valid until it is freed; null for a null plan.
  *
  * # Safety
  * `plan` is null or one of this library's.
@@ -1435,8 +1437,8 @@ const struct SbdpStep *sbdp_plan_step(const struct SbdpPlan *plan, size_t number
 const struct SbdpSummary *sbdp_plan_summary(const struct SbdpPlan *plan);
 
 /**
- * Events of the search, if they were wanted: whole lines, one JSON object each, valid until the plan is freed; null for a
- * null plan.
+ * Events of the search, if they were requested: whole lines with one JSON object each, valid until the plan is freed;
+ * null for a null plan.
  *
  * # Safety
  * `plan` is null or one of this library's.
@@ -1447,15 +1449,15 @@ const char *sbdp_plan_trace(const struct SbdpPlan *plan);
  * Frees a plan.
  *
  * # Safety
- * `plan` is null, or leads to null or to a plan of this library.
+ * `plan` is null, or points to null or to a plan of this library.
  */
 void sbdp_plan_free(struct SbdpPlan **plan);
 
 /**
- * Begins a session about an assembly that was uploaded. Nothing is asked yet. `options` may be null.
+ * Begins a session about an uploaded assembly. Sends nothing yet. `options` may be null.
  *
  * # Safety
- * All pointers lead to what they say; `session` and `error` can be written.
+ * All pointers are valid; `session` and `error` can be written.
  */
 SbdpCode sbdp_client_session(const struct SbdpClient *client,
                              const struct SbdpHandle *handle,
@@ -1467,7 +1469,7 @@ SbdpCode sbdp_client_session(const struct SbdpClient *client,
  * Begins a session about meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
  *
  * # Safety
- * All pointers lead to what they say; `session` and `error` can be written.
+ * All pointers are valid; `session` and `error` can be written.
  */
 SbdpCode sbdp_client_session_meshes(const struct SbdpClient *client,
                                     const struct SbdpMeshes *meshes,
@@ -1479,7 +1481,7 @@ SbdpCode sbdp_client_session_meshes(const struct SbdpClient *client,
  * The number of a part, of a session about meshes.
  *
  * # Safety
- * All pointers lead to what they say; `part` and `error` can be written.
+ * All pointers are valid; `part` and `error` can be written.
  */
 SbdpCode sbdp_session_part(const struct SbdpSession *session,
                            const char *name,
@@ -1487,10 +1489,10 @@ SbdpCode sbdp_session_part(const struct SbdpSession *session,
                            struct SbdpError *error);
 
 /**
- * These parts are out.
+ * Records that these parts are out.
  *
  * # Safety
- * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ * All pointers are valid, and no other call uses the session; `error` can be written.
  */
 SbdpCode sbdp_session_executed(struct SbdpSession *session,
                                const uint32_t *parts,
@@ -1498,15 +1500,15 @@ SbdpCode sbdp_session_executed(struct SbdpSession *session,
                                struct SbdpError *error);
 
 /**
- * A step of the last plan was done: its parts are out, or stand where it left them.
+ * Records that a step of the last plan was done: its parts are out, or stand where the step left them.
  *
  * # Safety
- * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ * All pointers are valid, and no other call uses the session; `error` can be written.
  */
 SbdpCode sbdp_session_performed(struct SbdpSession *session, const struct SbdpStep *step, struct SbdpError *error);
 
 /**
- * This part does not move: until it is freed, plans do without moving it, and it is no target any more.
+ * Records that this part does not move: until it is freed, plans leave it in place. It is no longer a target.
  *
  * # Safety
  * `session` is one of this library's that no other call uses; `error` can be written.
@@ -1514,7 +1516,7 @@ SbdpCode sbdp_session_performed(struct SbdpSession *session, const struct SbdpSt
 SbdpCode sbdp_session_stuck(struct SbdpSession *session, uint32_t part, struct SbdpError *error);
 
 /**
- * This part moves again.
+ * Records that this part moves again.
  *
  * # Safety
  * `session` is one of this library's that no other call uses; `error` can be written.
@@ -1522,23 +1524,23 @@ SbdpCode sbdp_session_stuck(struct SbdpSession *session, uint32_t part, struct S
 SbdpCode sbdp_session_freed(struct SbdpSession *session, uint32_t part, struct SbdpError *error);
 
 /**
- * This part stands elsewhere.
+ * Records that this part stands elsewhere.
  *
  * # Safety
- * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ * All pointers are valid, and no other call uses the session; `error` can be written.
  */
 SbdpCode sbdp_session_moved(struct SbdpSession *session, const struct SbdpMovedPart *moved, struct SbdpError *error);
 
 /**
- * From the next plan on: time until the daemon must answer with what it has; null for none.
+ * From the next plan on: time after which the daemon answers with the plan so far; null for none.
  *
  * # Safety
- * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ * All pointers are valid, and no other call uses the session; `error` can be written.
  */
 SbdpCode sbdp_session_set_timeout(struct SbdpSession *session, const uint64_t *timeout_ns, struct SbdpError *error);
 
 /**
- * Asks how the rest comes apart from how it stands now.
+ * Plans how the rest comes apart from how it stands now.
  *
  * # Safety
  * `session` is one of this library's that no other call uses; `stream` and `error` can be written.
@@ -1546,36 +1548,35 @@ SbdpCode sbdp_session_set_timeout(struct SbdpSession *session, const uint64_t *t
 SbdpCode sbdp_session_replan(struct SbdpSession *session, struct SbdpStream **stream, struct SbdpError *error);
 
 /**
- * Frees a session; its streams go on.
+ * Frees a session. Its streams remain valid.
  *
  * # Safety
- * `session` is null, or leads to null or to a session of this library that no other call uses.
+ * `session` is null, or points to null or to a session of this library that no other call uses.
  */
 void sbdp_session_free(struct SbdpSession **session);
 
 /**
- * Keeps a step beyond the next call on its stream, or beyond its plan; to be freed by `sbdp_step_free`. Nothing is copied.
+ * Keeps a step beyond the next call on its stream, or beyond its plan; to be freed by `sbdp_step_free`. Nothing is
+ * copied.
  *
  * # Safety
  * `step` is one of this library's that is still valid; `kept` and `error` can be written.
  */
-SbdpCode sbdp_step_keep(const struct SbdpStep *step,
-                        struct SbdpStep **kept,
-                        struct SbdpError *error);
+SbdpCode sbdp_step_keep(const struct SbdpStep *step, struct SbdpStep **kept, struct SbdpError *error);
 
 /**
  * Frees a step that was kept.
  *
  * # Safety
- * `step` is null, or leads to null or to a step of `sbdp_step_keep`.
+ * `step` is null, or points to null or to a step of `sbdp_step_keep`.
  */
 void sbdp_step_free(struct SbdpStep **step);
 
 /**
- * Asks for a plan of an assembly that was uploaded. `options` may be null.
+ * Requests a plan of an uploaded assembly. `options` may be null.
  *
  * # Safety
- * All pointers lead to what they say; `stream` and `error` can be written.
+ * All pointers are valid; `stream` and `error` can be written.
  */
 SbdpCode sbdp_client_plan(const struct SbdpClient *client,
                           const struct SbdpHandle *handle,
@@ -1584,10 +1585,10 @@ SbdpCode sbdp_client_plan(const struct SbdpClient *client,
                           struct SbdpError *error);
 
 /**
- * Asks for a plan of meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
+ * Requests a plan of meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
  *
  * # Safety
- * All pointers lead to what they say; `stream` and `error` can be written.
+ * All pointers are valid; `stream` and `error` can be written.
  */
 SbdpCode sbdp_client_plan_meshes(const struct SbdpClient *client,
                                  const struct SbdpMeshes *meshes,
@@ -1596,18 +1597,17 @@ SbdpCode sbdp_client_plan_meshes(const struct SbdpClient *client,
                                  struct SbdpError *error);
 
 /**
- * From now on steps are read in shared memory, without a copy. Steps of two messages may then be kept; a call that needs a
- * third fails with `SBDP_CODE_VIEWS_HELD`, and nothing is lost by it.
+ * Reads steps in shared memory from now on, without a copy. Steps of two messages may then be kept; a call that needs
+ * a third fails with `SBDP_CODE_VIEWS_HELD`, and nothing is lost.
  *
  * # Safety
  * `stream` is one of this library's; `error` can be written.
  */
-SbdpCode sbdp_stream_read_in_place(struct SbdpStream *stream,
-                                   struct SbdpError *error);
+SbdpCode sbdp_stream_read_in_place(struct SbdpStream *stream, struct SbdpError *error);
 
 /**
- * Waits for the next event, as long as the daemon lives; `SBDP_EVENT_KIND_END` after the end. After an error the stream
- * is over, except after `SBDP_CODE_VIEWS_HELD`.
+ * Waits for the next event, as long as the daemon lives; `SBDP_EVENT_KIND_END` after the end. After an error the
+ * stream is over, except after `SBDP_CODE_VIEWS_HELD`.
  *
  * # Safety
  * `stream` is one of this library's that no other call uses; `event` and `error` can be written.
@@ -1615,7 +1615,7 @@ SbdpCode sbdp_stream_read_in_place(struct SbdpStream *stream,
 SbdpCode sbdp_stream_next(struct SbdpStream *stream, const struct SbdpEvent **event, struct SbdpError *error);
 
 /**
- * The next event if it comes within a time, which may be 0; else `SBDP_EVENT_KIND_PENDING`.
+ * The next event if it arrives within a time, which may be 0; otherwise `SBDP_EVENT_KIND_PENDING`.
  *
  * # Safety
  * As `sbdp_stream_next`.
@@ -1626,8 +1626,8 @@ SbdpCode sbdp_stream_poll(struct SbdpStream *stream,
                           struct SbdpError *error);
 
 /**
- * Asks the daemon to stop soon. The stream goes on until its end, whose summary then says so, unless the plan was ready
- * before.
+ * Asks the daemon to stop soon. The stream continues until its end, whose status is then `cancelled`, unless the plan
+ * was ready before.
  *
  * # Safety
  * `stream` is one of this library's that no other call uses; `error` can be written.
@@ -1635,10 +1635,10 @@ SbdpCode sbdp_stream_poll(struct SbdpStream *stream,
 SbdpCode sbdp_stream_cancel(struct SbdpStream *stream, struct SbdpError *error);
 
 /**
- * Waits for the end and keeps all that comes until then. The stream is freed, also after an error.
+ * Waits for the end of the plan and keeps everything. Frees the stream, also after an error.
  *
  * # Safety
- * `stream` leads to a stream of this library that no other call uses; `plan` and `error` can be written.
+ * `stream` points to a stream of this library that no other call uses; `plan` and `error` can be written.
  */
 SbdpCode sbdp_stream_to_end(struct SbdpStream **stream, struct SbdpPlan **plan, struct SbdpError *error);
 
@@ -1646,7 +1646,7 @@ SbdpCode sbdp_stream_to_end(struct SbdpStream **stream, struct SbdpPlan **plan, 
  * Frees a stream, and cancels its request if it has not ended.
  *
  * # Safety
- * `stream` is null, or leads to null or to a stream of this library that no other call uses.
+ * `stream` is null, or points to null or to a stream of this library that no other call uses.
  */
 void sbdp_stream_free(struct SbdpStream **stream);
 
@@ -1654,25 +1654,25 @@ void sbdp_stream_free(struct SbdpStream **stream);
  * Connects to a daemon. `options` may be null.
  *
  * # Safety
- * `options` and what it points to is as it says; `client` and `error` can be written.
+ * `options` is null or valid with everything that it points to; `client` and `error` are null or writable.
  */
 SbdpCode sbdp_client_connect(const struct SbdpConnectOptions *options,
                              struct SbdpClient **client,
                              struct SbdpError *error);
 
 /**
- * Frees a client. Its streams and sessions go on.
+ * Frees a client. Its streams and sessions remain valid.
  *
  * # Safety
- * `client` is null, or leads to null or to a client of this library that no other call uses.
+ * `client` is null, or points to null or to a client of this library that no other call uses.
  */
 void sbdp_client_free(struct SbdpClient **client);
 
 /**
- * Hands an assembly over; one that the daemon knows is not copied again.
+ * Uploads an assembly. One that the daemon knows is not copied again.
  *
  * # Safety
- * All pointers lead to what they say; `handle` and `error` can be written.
+ * All pointers are valid; `handle` and `error` can be written.
  */
 SbdpCode sbdp_client_upload(const struct SbdpClient *client,
                             const struct SbdpAssembly *assembly,
@@ -1683,7 +1683,7 @@ SbdpCode sbdp_client_upload(const struct SbdpClient *client,
  * Whether the daemon knows an assembly.
  *
  * # Safety
- * All pointers lead to what they say; `known` and `error` can be written.
+ * All pointers are valid; `known` and `error` can be written.
  */
 SbdpCode sbdp_client_knows(const struct SbdpClient *client,
                            const struct SbdpHandle *handle,
@@ -1691,10 +1691,10 @@ SbdpCode sbdp_client_knows(const struct SbdpClient *client,
                            struct SbdpError *error);
 
 /**
- * Hands over what differs from an assembly that the daemon knows. `revised` gets the handle of what becomes of it.
+ * Uploads the changes of an assembly that the daemon knows. `revised` receives the handle of the changed assembly.
  *
  * # Safety
- * All pointers lead to what they say; `revised` and `error` can be written.
+ * All pointers are valid; `revised` and `error` can be written.
  */
 SbdpCode sbdp_client_revise(const struct SbdpClient *client,
                             const struct SbdpHandle *base,
@@ -1714,7 +1714,7 @@ SbdpCode sbdp_client_metrics(const struct SbdpClient *client, char **metrics, st
  * Frees a text of this library.
  *
  * # Safety
- * `text` is null, or leads to null or to a text of `sbdp_client_metrics`.
+ * `text` is null, or points to null or to a text of `sbdp_client_metrics`.
  */
 void sbdp_text_free(char **text);
 
@@ -1727,7 +1727,7 @@ void sbdp_text_free(char **text);
 uint32_t sbdp_client_daemon_pid(const struct SbdpClient *client);
 
 /**
- * How often this client has followed a daemon that was restarted at the same place; 0 for a null client.
+ * How often this client has followed a daemon that was restarted; 0 for a null client.
  *
  * # Safety
  * `client` is null or one of this library's.
@@ -1735,15 +1735,15 @@ uint32_t sbdp_client_daemon_pid(const struct SbdpClient *client);
 uint32_t sbdp_client_restarts(const struct SbdpClient *client);
 
 /**
- * Copies an assembly, to be planned by `sbdp_client_plan_meshes` without thinking of uploads.
+ * Copies an assembly, for `sbdp_client_plan_meshes`, which uploads it when necessary.
  *
  * # Safety
- * `assembly` and what it points to is as it says; `meshes` and `error` can be written.
+ * `assembly` is valid with everything that it points to; `meshes` and `error` are null or writable.
  */
 SbdpCode sbdp_meshes_copy(const struct SbdpAssembly *assembly, struct SbdpMeshes **meshes, struct SbdpError *error);
 
 /**
- * The handle of kept meshes.
+ * The handle of meshes.
  *
  * # Safety
  * `meshes` is one of this library's; `handle` and `error` can be written.
@@ -1751,10 +1751,10 @@ SbdpCode sbdp_meshes_copy(const struct SbdpAssembly *assembly, struct SbdpMeshes
 SbdpCode sbdp_meshes_handle(const struct SbdpMeshes *meshes, struct SbdpHandle *handle, struct SbdpError *error);
 
 /**
- * Frees meshes; plans and sessions about them go on.
+ * Frees meshes. Plans and sessions about them remain valid.
  *
  * # Safety
- * `meshes` is null, or leads to null or to meshes of this library.
+ * `meshes` is null, or points to null or to meshes of this library.
  */
 void sbdp_meshes_free(struct SbdpMeshes **meshes);
 
@@ -1775,7 +1775,7 @@ size_t sbdp_plan_step_count(const struct SbdpPlan *plan);
 const struct SbdpStep *sbdp_plan_step(const struct SbdpPlan *plan, size_t number);
 
 /**
- * Everything about a plan but its steps, valid until it is freed; null for a null plan.
+ * Everything about a plan except its steps, valid until it is freed; null for a null plan.
  *
  * # Safety
  * `plan` is null or one of this library's.
@@ -1783,8 +1783,8 @@ const struct SbdpStep *sbdp_plan_step(const struct SbdpPlan *plan, size_t number
 const struct SbdpSummary *sbdp_plan_summary(const struct SbdpPlan *plan);
 
 /**
- * Events of the search, if they were wanted: whole lines, one JSON object each, valid until the plan is freed; null for a
- * null plan.
+ * Events of the search, if they were requested: whole lines with one JSON object each, valid until the plan is freed;
+ * null for a null plan.
  *
  * # Safety
  * `plan` is null or one of this library's.
@@ -1795,15 +1795,15 @@ const char *sbdp_plan_trace(const struct SbdpPlan *plan);
  * Frees a plan.
  *
  * # Safety
- * `plan` is null, or leads to null or to a plan of this library.
+ * `plan` is null, or points to null or to a plan of this library.
  */
 void sbdp_plan_free(struct SbdpPlan **plan);
 
 /**
- * Begins a session about an assembly that was uploaded. Nothing is asked yet. `options` may be null.
+ * Begins a session about an uploaded assembly. Sends nothing yet. `options` may be null.
  *
  * # Safety
- * All pointers lead to what they say; `session` and `error` can be written.
+ * All pointers are valid; `session` and `error` can be written.
  */
 SbdpCode sbdp_client_session(const struct SbdpClient *client,
                              const struct SbdpHandle *handle,
@@ -1815,7 +1815,7 @@ SbdpCode sbdp_client_session(const struct SbdpClient *client,
  * Begins a session about meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
  *
  * # Safety
- * All pointers lead to what they say; `session` and `error` can be written.
+ * All pointers are valid; `session` and `error` can be written.
  */
 SbdpCode sbdp_client_session_meshes(const struct SbdpClient *client,
                                     const struct SbdpMeshes *meshes,
@@ -1827,7 +1827,7 @@ SbdpCode sbdp_client_session_meshes(const struct SbdpClient *client,
  * The number of a part, of a session about meshes.
  *
  * # Safety
- * All pointers lead to what they say; `part` and `error` can be written.
+ * All pointers are valid; `part` and `error` can be written.
  */
 SbdpCode sbdp_session_part(const struct SbdpSession *session,
                            const char *name,
@@ -1835,10 +1835,10 @@ SbdpCode sbdp_session_part(const struct SbdpSession *session,
                            struct SbdpError *error);
 
 /**
- * These parts are out.
+ * Records that these parts are out.
  *
  * # Safety
- * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ * All pointers are valid, and no other call uses the session; `error` can be written.
  */
 SbdpCode sbdp_session_executed(struct SbdpSession *session,
                                const uint32_t *parts,
@@ -1846,15 +1846,15 @@ SbdpCode sbdp_session_executed(struct SbdpSession *session,
                                struct SbdpError *error);
 
 /**
- * A step of the last plan was done: its parts are out, or stand where it left them.
+ * Records that a step of the last plan was done: its parts are out, or stand where the step left them.
  *
  * # Safety
- * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ * All pointers are valid, and no other call uses the session; `error` can be written.
  */
 SbdpCode sbdp_session_performed(struct SbdpSession *session, const struct SbdpStep *step, struct SbdpError *error);
 
 /**
- * This part does not move: until it is freed, plans do without moving it, and it is no target any more.
+ * Records that this part does not move: until it is freed, plans leave it in place. It is no longer a target.
  *
  * # Safety
  * `session` is one of this library's that no other call uses; `error` can be written.
@@ -1862,7 +1862,7 @@ SbdpCode sbdp_session_performed(struct SbdpSession *session, const struct SbdpSt
 SbdpCode sbdp_session_stuck(struct SbdpSession *session, uint32_t part, struct SbdpError *error);
 
 /**
- * This part moves again.
+ * Records that this part moves again.
  *
  * # Safety
  * `session` is one of this library's that no other call uses; `error` can be written.
@@ -1870,23 +1870,23 @@ SbdpCode sbdp_session_stuck(struct SbdpSession *session, uint32_t part, struct S
 SbdpCode sbdp_session_freed(struct SbdpSession *session, uint32_t part, struct SbdpError *error);
 
 /**
- * This part stands elsewhere.
+ * Records that this part stands elsewhere.
  *
  * # Safety
- * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ * All pointers are valid, and no other call uses the session; `error` can be written.
  */
 SbdpCode sbdp_session_moved(struct SbdpSession *session, const struct SbdpMovedPart *moved, struct SbdpError *error);
 
 /**
- * From the next plan on: time until the daemon must answer with what it has; null for none.
+ * From the next plan on: time after which the daemon answers with the plan so far; null for none.
  *
  * # Safety
- * All pointers lead to what they say, and no other call uses the session; `error` can be written.
+ * All pointers are valid, and no other call uses the session; `error` can be written.
  */
 SbdpCode sbdp_session_set_timeout(struct SbdpSession *session, const uint64_t *timeout_ns, struct SbdpError *error);
 
 /**
- * Asks how the rest comes apart from how it stands now.
+ * Plans how the rest comes apart from how it stands now.
  *
  * # Safety
  * `session` is one of this library's that no other call uses; `stream` and `error` can be written.
@@ -1894,36 +1894,35 @@ SbdpCode sbdp_session_set_timeout(struct SbdpSession *session, const uint64_t *t
 SbdpCode sbdp_session_replan(struct SbdpSession *session, struct SbdpStream **stream, struct SbdpError *error);
 
 /**
- * Frees a session; its streams go on.
+ * Frees a session. Its streams remain valid.
  *
  * # Safety
- * `session` is null, or leads to null or to a session of this library that no other call uses.
+ * `session` is null, or points to null or to a session of this library that no other call uses.
  */
 void sbdp_session_free(struct SbdpSession **session);
 
 /**
- * Keeps a step beyond the next call on its stream, or beyond its plan; to be freed by `sbdp_step_free`. Nothing is copied.
+ * Keeps a step beyond the next call on its stream, or beyond its plan; to be freed by `sbdp_step_free`. Nothing is
+ * copied.
  *
  * # Safety
  * `step` is one of this library's that is still valid; `kept` and `error` can be written.
  */
-SbdpCode sbdp_step_keep(const struct SbdpStep *step,
-                        struct SbdpStep **kept,
-                        struct SbdpError *error);
+SbdpCode sbdp_step_keep(const struct SbdpStep *step, struct SbdpStep **kept, struct SbdpError *error);
 
 /**
  * Frees a step that was kept.
  *
  * # Safety
- * `step` is null, or leads to null or to a step of `sbdp_step_keep`.
+ * `step` is null, or points to null or to a step of `sbdp_step_keep`.
  */
 void sbdp_step_free(struct SbdpStep **step);
 
 /**
- * Asks for a plan of an assembly that was uploaded. `options` may be null.
+ * Requests a plan of an uploaded assembly. `options` may be null.
  *
  * # Safety
- * All pointers lead to what they say; `stream` and `error` can be written.
+ * All pointers are valid; `stream` and `error` can be written.
  */
 SbdpCode sbdp_client_plan(const struct SbdpClient *client,
                           const struct SbdpHandle *handle,
@@ -1932,10 +1931,10 @@ SbdpCode sbdp_client_plan(const struct SbdpClient *client,
                           struct SbdpError *error);
 
 /**
- * Asks for a plan of meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
+ * Requests a plan of meshes, which are uploaded whenever the daemon does not know them. `options` may be null.
  *
  * # Safety
- * All pointers lead to what they say; `stream` and `error` can be written.
+ * All pointers are valid; `stream` and `error` can be written.
  */
 SbdpCode sbdp_client_plan_meshes(const struct SbdpClient *client,
                                  const struct SbdpMeshes *meshes,
@@ -1944,18 +1943,17 @@ SbdpCode sbdp_client_plan_meshes(const struct SbdpClient *client,
                                  struct SbdpError *error);
 
 /**
- * From now on steps are read in shared memory, without a copy. Steps of two messages may then be kept; a call that needs a
- * third fails with `SBDP_CODE_VIEWS_HELD`, and nothing is lost by it.
+ * Reads steps in shared memory from now on, without a copy. Steps of two messages may then be kept; a call that needs
+ * a third fails with `SBDP_CODE_VIEWS_HELD`, and nothing is lost.
  *
  * # Safety
  * `stream` is one of this library's; `error` can be written.
  */
-SbdpCode sbdp_stream_read_in_place(struct SbdpStream *stream,
-                                   struct SbdpError *error);
+SbdpCode sbdp_stream_read_in_place(struct SbdpStream *stream, struct SbdpError *error);
 
 /**
- * Waits for the next event, as long as the daemon lives; `SBDP_EVENT_KIND_END` after the end. After an error the stream
- * is over, except after `SBDP_CODE_VIEWS_HELD`.
+ * Waits for the next event, as long as the daemon lives; `SBDP_EVENT_KIND_END` after the end. After an error the
+ * stream is over, except after `SBDP_CODE_VIEWS_HELD`.
  *
  * # Safety
  * `stream` is one of this library's that no other call uses; `event` and `error` can be written.
@@ -1963,7 +1961,7 @@ SbdpCode sbdp_stream_read_in_place(struct SbdpStream *stream,
 SbdpCode sbdp_stream_next(struct SbdpStream *stream, const struct SbdpEvent **event, struct SbdpError *error);
 
 /**
- * The next event if it comes within a time, which may be 0; else `SBDP_EVENT_KIND_PENDING`.
+ * The next event if it arrives within a time, which may be 0; otherwise `SBDP_EVENT_KIND_PENDING`.
  *
  * # Safety
  * As `sbdp_stream_next`.
@@ -1974,8 +1972,8 @@ SbdpCode sbdp_stream_poll(struct SbdpStream *stream,
                           struct SbdpError *error);
 
 /**
- * Asks the daemon to stop soon. The stream goes on until its end, whose summary then says so, unless the plan was ready
- * before.
+ * Asks the daemon to stop soon. The stream continues until its end, whose status is then `cancelled`, unless the plan
+ * was ready before.
  *
  * # Safety
  * `stream` is one of this library's that no other call uses; `error` can be written.
@@ -1983,10 +1981,10 @@ SbdpCode sbdp_stream_poll(struct SbdpStream *stream,
 SbdpCode sbdp_stream_cancel(struct SbdpStream *stream, struct SbdpError *error);
 
 /**
- * Waits for the end and keeps all that comes until then. The stream is freed, also after an error.
+ * Waits for the end of the plan and keeps everything. Frees the stream, also after an error.
  *
  * # Safety
- * `stream` leads to a stream of this library that no other call uses; `plan` and `error` can be written.
+ * `stream` points to a stream of this library that no other call uses; `plan` and `error` can be written.
  */
 SbdpCode sbdp_stream_to_end(struct SbdpStream **stream, struct SbdpPlan **plan, struct SbdpError *error);
 
@@ -1994,7 +1992,7 @@ SbdpCode sbdp_stream_to_end(struct SbdpStream **stream, struct SbdpPlan **plan, 
  * Frees a stream, and cancels its request if it has not ended.
  *
  * # Safety
- * `stream` is null, or leads to null or to a stream of this library that no other call uses.
+ * `stream` is null, or points to null or to a stream of this library that no other call uses.
  */
 void sbdp_stream_free(struct SbdpStream **stream);
 
