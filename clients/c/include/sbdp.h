@@ -1,10 +1,10 @@
 /* The client of the sbdp daemon for C. README.md says how to build, link and use it.
  *
  * Lengths are in the input's units, in the input's frame. A motion is seven doubles: the shift x, y, z, then the unit
- * quaternion w, x, y, z. Part numbers are places in the uploaded assembly. Times are nanoseconds.
+ * quaternion w, x, y, z. Part numbers are indices into the uploaded list of parts. Times are nanoseconds.
  *
- * Functions that can fail return SBDP_CODE_OK or why not, and write the same with a message to `error`, which may be null.
- * What they give out is null then. Free functions set the pointer to null; to free null is no error.
+ * Functions that can fail return SBDP_CODE_OK or an error code, and write the code with a message to `error`, which may be
+ * null. On failure their results are null. Free functions set the pointer to null; freeing null is allowed.
  *
  * Made by cbindgen from clients/c/src: do not edit. */
 

@@ -1,7 +1,7 @@
 // The client of the sbdp daemon for C++17, over sbdp.h. README.md says how to build, link and use it.
 //
-// What fails throws sbdp::Error: an error cannot be overlooked, and constructors and loops stay plain. Code without
-// exceptions uses sbdp.h, which returns codes. All classes own what they hold and can be moved, not copied.
+// Failures throw sbdp::Error, so that no error is overlooked, and constructors and loops stay simple. Code without
+// exceptions uses sbdp.h, which returns codes. All classes own what they hold. They can be moved, not copied.
 #ifndef SBDP_HPP
 #define SBDP_HPP
 
@@ -27,14 +27,14 @@ using Handle = ::SbdpHandle;
 using Motion = std::array<double, 7>;
 using Nanoseconds = std::chrono::nanoseconds;
 
-// Why something was not done, and what to do.
+// Why a call failed, and what to do.
 class Error : public std::runtime_error {
 public:
     explicit Error(const SbdpError &error)
         : std::runtime_error(error.message), code_(static_cast<Code>(error.code)), retry_(error.retry_ms) {}
 
     Code code() const noexcept { return code_; }
-    // Of SBDP_CODE_BUSY: when asking again makes sense.
+    // For SBDP_CODE_BUSY: the time to wait before the next try.
     std::chrono::milliseconds retry_after() const noexcept { return retry_; }
     bool is_no_daemon() const noexcept { return code_ == SBDP_CODE_NO_DAEMON || code_ == SBDP_CODE_DAEMON_DIED; }
 
@@ -74,7 +74,7 @@ template <class T, void (*Free)(T **)> struct Deleter {
 };
 template <class T, void (*Free)(T **)> using Owned = std::unique_ptr<T, Deleter<T, Free>>;
 
-// The caller's function that ends a wait. It lives as long as anything that may ask it.
+// The caller's function that interrupts calls. It lives as long as anything that may call it.
 using Interrupt = std::shared_ptr<std::function<bool()>>;
 
 extern "C" inline std::int32_t sbdp_hpp_is_interrupted(void *function) {
@@ -87,7 +87,7 @@ extern "C" inline std::int32_t sbdp_hpp_is_interrupted(void *function) {
 
 inline std::uint64_t count(Nanoseconds time) { return time.count() < 0 ? 0 : static_cast<std::uint64_t>(time.count()); }
 
-// A pointer to a time of the caller's, for the length of a call.
+// A pointer to the caller's time, valid during a call.
 class Time {
 public:
     explicit Time(const std::optional<Nanoseconds> &time) : given_(time), count_(time ? count(*time) : 0) {}
@@ -100,15 +100,15 @@ private:
 
 } // namespace detail
 
-// How to find and treat the daemon.
+// How to find the daemon, and how long to wait for it.
 struct ConnectOptions {
     std::string runtime_dir; // Empty for the default.
     std::optional<Nanoseconds> timeout, upload_timeout, reconnect, busy_wait, poll;
-    // Asked at least every 50 ms by what waits for the daemon; true ends the wait, and so does an exception.
+    // Called at least every 50 ms by calls that wait for the daemon. True ends the call, and so does an exception.
     std::function<bool()> interrupt;
 };
 
-// A part: a closed mesh at its assembled pose. It borrows its arrays, and its name, until the call that takes it has ended.
+// A part: a closed mesh at its assembled pose. It borrows its arrays, and its name, until the call that takes it returns.
 class Part {
 public:
     Part(const char *name, const double *vertices, std::size_t vertex_count, const std::uint32_t *triangles,
@@ -137,7 +137,7 @@ private:
     SbdpPart part_;
 };
 
-// An assembly, whose parts' places are their numbers everywhere.
+// An assembly. Part numbers are indices into its list of parts.
 struct Assembly {
     std::vector<Part> parts;
     std::string name, units;
@@ -168,7 +168,7 @@ template <class F> auto with_assembly(const Assembly &assembly, F use) {
 
 } // namespace detail
 
-// What to plan. What is left out has its default.
+// What to plan. Fields that are not set have their defaults.
 struct PlanOptions {
     std::uint32_t planner = SBDP_PLANNER_DEFAULT, engine = SBDP_ENGINE_DEFAULT, actions = SBDP_ACTIONS_DEFAULT;
     std::uint32_t static_analysis = SBDP_STATIC_ANALYSIS_DEFAULT, staging = SBDP_STAGING_DISASSEMBLY, threads = 0;
@@ -231,7 +231,7 @@ template <class F> auto with_options(const PlanOptions &o, F use) {
 
 } // namespace detail
 
-// A verified step, read where it lies: valid as long as what it came from says.
+// A verified step, read in place. Its source says how long it is valid.
 class StepView {
 public:
     explicit StepView(const SbdpStep *step) noexcept : step_(step) {}
@@ -255,7 +255,7 @@ private:
     const SbdpStep *step_;
 };
 
-// A step that owns what it is read in: nothing is copied.
+// A step that owns the memory in which it is read. Nothing is copied.
 class Step {
 public:
     explicit Step(StepView step) {
@@ -269,7 +269,7 @@ private:
     detail::Owned<SbdpStep, sbdp_step_free> step_;
 };
 
-// Everything about a plan but its steps, valid as long as what it came from.
+// Everything about a plan except its steps, valid as long as its source.
 class Summary {
 public:
     explicit Summary(const SbdpSummary *summary) noexcept : summary_(summary) {}
@@ -284,7 +284,7 @@ private:
     const SbdpSummary *summary_;
 };
 
-// A plan that has come to its end. Threads may read it at the same time.
+// A finished plan. Several threads may read it at the same time.
 class Plan {
 public:
     explicit Plan(SbdpPlan *plan) : plan_(plan) {}
@@ -304,7 +304,7 @@ private:
     detail::Owned<SbdpPlan, sbdp_plan_free> plan_;
 };
 
-// A plan as it comes in, for one thread at a time. Its end of life cancels the request. It may outlive its client.
+// A plan as it arrives, for one thread at a time. Destroying it cancels the request. It may outlive its client.
 class Stream {
 public:
     Stream(SbdpStream *stream, detail::Interrupt interrupt) : interrupt_(std::move(interrupt)), stream_(stream) {}
@@ -315,17 +315,17 @@ public:
         detail::call(sbdp_stream_next, stream_.get(), &event);
         return *event;
     }
-    // The next event if it comes within a time, which may be zero; else one of kind SBDP_EVENT_KIND_PENDING.
+    // The next event if it arrives within a time, which may be zero; otherwise one of kind SBDP_EVENT_KIND_PENDING.
     const SbdpEvent &poll(Nanoseconds within) {
         const SbdpEvent *event = nullptr;
         detail::call(sbdp_stream_poll, stream_.get(), detail::count(within), &event);
         return *event;
     }
-    // From now on steps are read in shared memory, without a copy; of two messages at a time.
+    // Reads steps in shared memory from now on, without a copy, of two messages at a time.
     void read_in_place() { detail::call(sbdp_stream_read_in_place, stream_.get()); }
-    // Asks the daemon to stop soon; the stream goes on until its end.
+    // Asks the daemon to stop soon. The stream continues until its end.
     void cancel() { detail::call(sbdp_stream_cancel, stream_.get()); }
-    // Waits for the end, and keeps all that comes until then. The stream is used up.
+    // Waits for the end of the plan and keeps everything. The stream is used up.
     Plan to_end() {
         SbdpStream *stream = stream_.release();
         SbdpPlan *plan = nullptr;
@@ -334,12 +334,12 @@ public:
     }
 
 private:
-    // Before the stream, which may ask it until its end.
+    // Declared before the stream, which may call it until its end.
     detail::Interrupt interrupt_;
     detail::Owned<SbdpStream, sbdp_stream_free> stream_;
 };
 
-// Meshes that are kept, to be uploaded whenever the daemon does not know them, as after a restart.
+// Meshes that the library keeps, and uploads whenever the daemon does not know them, for example after a restart.
 class Meshes {
 public:
     explicit Meshes(const Assembly &assembly) {
@@ -371,7 +371,7 @@ public:
     void executed(const std::vector<std::uint32_t> &parts) {
         detail::call(sbdp_session_executed, session_.get(), parts.data(), parts.size());
     }
-    // A step of the last plan was done.
+    // Records that a step of the last plan was done.
     void performed(StepView step) { detail::call(sbdp_session_performed, session_.get(), step.c()); }
     void stuck(std::uint32_t part) { detail::call(sbdp_session_stuck, session_.get(), part); }
     void freed(std::uint32_t part) { detail::call(sbdp_session_freed, session_.get(), part); }
@@ -384,7 +384,7 @@ public:
         const SbdpMovedPart *given = &moved;
         detail::call(sbdp_session_moved, session_.get(), given);
     }
-    // Of the plans from now on; none for no limit.
+    // The timeout of later plans; none for no limit.
     void set_timeout(std::optional<Nanoseconds> timeout) {
         const detail::Time time(timeout);
         detail::call(sbdp_session_set_timeout, session_.get(), time.get());
@@ -400,7 +400,7 @@ private:
     detail::Owned<SbdpSession, sbdp_session_free> session_;
 };
 
-// A client of the daemon of one place. Threads may share it. It receives one plan at a time: connect several for more.
+// A client of one daemon. Threads may share it. It receives one plan at a time: connect several clients for more.
 class Client {
 public:
     explicit Client(const ConnectOptions &options = {}) {
@@ -425,7 +425,7 @@ public:
         client_.reset(client);
     }
 
-    // Hands an assembly over; one that the daemon knows is not copied again.
+    // Uploads an assembly. One that the daemon knows is not copied again.
     Handle upload(const Assembly &assembly) const {
         Handle handle{};
         detail::with_assembly(assembly, [&](auto *c) { detail::call(sbdp_client_upload, client_.get(), c, &handle); });
