@@ -26,7 +26,7 @@ fn asked(name: &str, moved: Vec<(usize, Pose)>, request: &PlanRequest) -> (Assem
     let base = service.admit(&load_assembly(&folder(name)).unwrap()).unwrap().id;
     let id = service.revise(base, &Revision { moved, ..Revision::default() }).unwrap().id;
     let plan = service.plan(id, request, &Termination::default(), &mut ()).unwrap();
-    (service.assembly(id).unwrap(), PlanDocument::new(&plan))
+    (service.assembly(id).unwrap(), PlanDocument::from(&plan))
 }
 
 /// The plan backwards, as an assembly plan.

@@ -44,6 +44,7 @@
 
 pub mod bytes;
 pub mod clock;
+pub mod document;
 pub mod endpoint;
 pub mod error;
 pub mod geometry;

@@ -18,11 +18,11 @@ use super::subject::{Subject, further, only_mesh};
 use super::{cache, interrupt, print, report, written};
 use crate::bench::end_with_benchmark;
 use crate::cache::CacheSettings;
-use crate::exchange::{absolute, add_notes, content_of, document, source};
+use crate::exchange::{absolute, content_of, source, with_files};
 use crate::files::{LoadOptions, load};
 use crate::geometry::{Revision, SourceAssembly, content_hash, pose_from_waypoint};
 use crate::plan::Plan;
-use crate::plan::export::SourceDocument;
+use crate::plan::export::{PlanDocument, SourceDocument};
 use crate::search::{PlanRequest, Planner, Termination};
 use crate::simulation::PenaltyParameters;
 
@@ -31,7 +31,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     let planned = planned(arguments)?;
     write_files(arguments, &planned)?;
     if arguments.json.as_deref() != Some(Path::new(STDOUT)) {
-        print(&report::plan(&planned.revised, &planned.plan, arguments.verbose))?;
+        print(&report::plan(&planned.revised, &planned.plan, &planned.subject.plan, arguments.verbose))?;
     }
     Ok(exit_code(planned.plan.status))
 }
@@ -80,11 +80,10 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let mut listener = Listener::new(arguments.trace.as_deref())?;
     let plan = backend.plan(&question, &mut listener);
     listener.finish()?;
-    let mut plan = plan?;
-    add_notes(&mut plan, &assembly);
+    let plan = plan?;
     let revision = question.revision;
     let source = source_of(arguments, content_of(&content, &revision));
-    let document = document(&plan, &assembly, source);
+    let document = with_files(PlanDocument::from(&plan), &assembly, source);
     Ok(Planned { plan, revised, subject: Subject::new(assembly, revision, document) })
 }
 

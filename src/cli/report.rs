@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::table::{TextTable, length};
 use crate::geometry::{Bounds, Pose, SourceAssembly, SourceMesh, pose_from_waypoint};
-use crate::plan::export::PlanDocument;
+use crate::plan::export::{PlanDocument, WarningDocument};
 use crate::plan::{
     Base, FreeGroup, MotionKind, Overlap, Placements, Plan, PlanKind, PlanStats, PlanStep, StepEnd, StepFrame,
 };
@@ -16,12 +16,11 @@ const MOST_NAMES: usize = 4;
 
 /// The table of steps, and what there is to know about the rest: all overlaps and blocked actions if it is `verbose`,
 /// else the worst and the few that matter, with a count of what is left out.
-pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan, verbose: bool) -> String {
-    let document = PlanDocument::new(plan);
+pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan, document: &PlanDocument, verbose: bool) -> String {
     let mut text = headline(assembly, plan);
     if !plan.steps.is_empty() {
         text.push('\n');
-        text.push_str(&steps(assembly, plan, &document));
+        text.push_str(&steps(assembly, plan, document));
     }
     let sections = [
         ("base", base(plan)),
@@ -30,11 +29,11 @@ pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan, verbose: bool) -> Str
             "left together and not taken apart",
             plan.kept_together.iter().map(|g| words(plan, g, ", ")).collect(),
         ),
-        ("not complete", verdict(&document).into_iter().collect()),
+        ("not complete", verdict(document).into_iter().collect()),
         ("can begin to move together", free_together(plan)),
-        ("blocked", blocked(&document, verbose)),
+        ("blocked", blocked(document, verbose)),
         ("overlaps at the assembled pose", overlaps(plan, verbose)),
-        ("warnings", warnings(plan)),
+        ("warnings", warnings(document)),
     ];
     for (title, lines) in sections {
         if !lines.is_empty() {
@@ -181,12 +180,12 @@ fn overlaps(plan: &Plan, verbose: bool) -> Vec<String> {
     }
 }
 
-fn warnings(plan: &Plan) -> Vec<String> {
-    let line = |w: &crate::plan::Warning| match w.part {
-        Some(part) => format!("{}: {}", part_word(plan.part_name(part)), w.message),
+fn warnings(document: &PlanDocument) -> Vec<String> {
+    let line = |w: &WarningDocument| match &w.part {
+        Some(part) => format!("{}: {}", part_word(part), w.message),
         None => w.message.clone(),
     };
-    plan.warnings.iter().map(line).collect()
+    document.warnings.iter().map(line).collect()
 }
 
 fn stats(plan: &Plan) -> String {
@@ -302,7 +301,7 @@ mod tests {
             stats: PlanStats { motion_hits: 3, verdict_hits: Some(2), ..PlanStats::default() },
         };
         let told = |verbose: bool, lines: &[&str]| {
-            let text = super::plan(&assembly, &plan, verbose);
+            let text = super::plan(&assembly, &plan, &PlanDocument::from(&plan), verbose);
             lines.iter().for_each(|line| assert!(text.contains(line), "{line}\n{text}"));
         };
         let always = [
@@ -365,7 +364,7 @@ mod tests {
         ];
         let plan =
             Plan { parts: names, kept_together: vec![vec![0, 1]], ..plan_of(PlanStatus::Complete, steps) };
-        let text = super::plan(&assembly, &plan, false);
+        let text = super::plan(&assembly, &plan, &PlanDocument::from(&plan), false);
         // The middle of both boxes is at (2, 1): half a turn about the origin brings it to (−2, −1).
         for line in [
             "step  part                   group of  motion              length",

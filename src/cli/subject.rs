@@ -226,7 +226,7 @@ mod tests {
         };
         let poses = starts.map(|pose| waypoint_from_pose(&pose)).into_iter().enumerate().collect();
         let (group, own) = ways();
-        PlanDocument::new(&Plan {
+        PlanDocument::from(&Plan {
             kind: PlanKind::Assembly,
             parts: ["a", "b"].map(String::from).into(),
             poses,

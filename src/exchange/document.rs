@@ -4,21 +4,22 @@ use std::path::Path;
 
 use crate::files::{IgnorePattern, Split};
 use crate::geometry::{Revision, SourceAssembly, SourceGroup};
-use crate::plan::export::{GroupDocument, PlanDocument, SourceDocument};
-use crate::plan::{Plan, Warning};
+use crate::plan::export::{GroupDocument, PlanDocument, SourceDocument, WarningDocument};
 
-/// Puts the findings from reading the files before the plan's own warnings.
-pub fn add_notes(plan: &mut Plan, assembly: &SourceAssembly) {
-    let notes = assembly.notes.iter().map(|note| Warning { part: None, message: note.clone() });
-    plan.warnings.splice(0..0, notes);
-}
-
-/// The document of a plan (with [notes](add_notes)) of an assembly from files.
+/// The document of a plan of an assembly from files: with its groups, and what was found while the files were read, before
+/// the plan's own warnings.
 #[must_use]
-pub fn document(plan: &Plan, assembly: &SourceAssembly, source: SourceDocument) -> PlanDocument {
+pub fn with_files(
+    mut document: PlanDocument,
+    assembly: &SourceAssembly,
+    source: SourceDocument,
+) -> PlanDocument {
     let group = |g: &SourceGroup| GroupDocument { name: g.name.clone(), parts: g.parts.clone() };
-    let groups = assembly.groups.iter().map(group).collect();
-    PlanDocument { source: Some(source), groups, ..PlanDocument::new(plan) }
+    document.groups = assembly.groups.iter().map(group).collect();
+    let notes = assembly.notes.iter().map(|note| WarningDocument { part: None, message: note.clone() });
+    document.warnings.splice(0..0, notes);
+    document.source = Some(source);
+    document
 }
 
 /// Where the meshes are, and how they were read; `deflection` only if it was given.

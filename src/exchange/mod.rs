@@ -5,6 +5,6 @@ mod document;
 mod plan;
 mod upload;
 
-pub use document::{absolute, add_notes, content_of, document, source};
+pub use document::{absolute, content_of, source, with_files};
 pub use plan::{plan, plan_step};
 pub use upload::{wire_assembly, wire_mesh, wire_part};

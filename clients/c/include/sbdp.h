@@ -1446,6 +1446,17 @@ const struct SbdpSummary *sbdp_plan_summary(const struct SbdpPlan *plan);
 const char *sbdp_plan_trace(const struct SbdpPlan *plan);
 
 /**
+ * The plan as the command line writes it: JSON (`sbdp-plan/2`) in a line with its end, without what only the files of an
+ * assembly have (`source`, `groups`, findings while reading). `json` is valid until the plan is freed.
+ *
+ * # Safety
+ * `plan` is one of this library's; `json` and `error` can be written.
+ */
+SbdpCode sbdp_plan_json(const struct SbdpPlan *plan,
+                        const char **json,
+                        struct SbdpError *error);
+
+/**
  * Frees a plan.
  *
  * # Safety
@@ -1790,6 +1801,17 @@ const struct SbdpSummary *sbdp_plan_summary(const struct SbdpPlan *plan);
  * `plan` is null or one of this library's.
  */
 const char *sbdp_plan_trace(const struct SbdpPlan *plan);
+
+/**
+ * The plan as the command line writes it: JSON (`sbdp-plan/2`) in a line with its end, without what only the files of an
+ * assembly have (`source`, `groups`, findings while reading). `json` is valid until the plan is freed.
+ *
+ * # Safety
+ * `plan` is one of this library's; `json` and `error` can be written.
+ */
+SbdpCode sbdp_plan_json(const struct SbdpPlan *plan,
+                        const char **json,
+                        struct SbdpError *error);
 
 /**
  * Frees a plan.

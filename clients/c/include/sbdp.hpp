@@ -299,6 +299,12 @@ public:
     }
     Summary summary() const { return Summary(sbdp_plan_summary(plan_.get())); }
     std::string_view trace() const { return sbdp_plan_trace(plan_.get()); }
+    // JSON as the command line writes it, without what only the files of an assembly have; as long as the plan.
+    std::string_view to_json() const {
+        const char *json = nullptr;
+        detail::call(sbdp_plan_json, plan_.get(), &json);
+        return json;
+    }
 
 private:
     detail::Owned<SbdpPlan, sbdp_plan_free> plan_;

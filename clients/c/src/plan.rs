@@ -1,10 +1,12 @@
 //! Whole plans.
 
-use std::ffi::{CString, c_char};
+use std::ffi::{CStr, CString, c_char};
+use std::sync::OnceLock;
 
-use sbdp_client::Plan;
+use sbdp_client::{Plan, Step};
 
-use crate::border::{answer, free};
+use crate::border::{Failure, SbdpError, answer, behind, enter, free, not_null};
+use crate::code::SbdpCode;
 use crate::step::{HeldStep, SbdpStep};
 use crate::summary::{HeldSummary, SbdpSummary};
 
@@ -13,6 +15,8 @@ pub struct SbdpPlan {
     steps: Vec<HeldStep>,
     summary: HeldSummary,
     trace: CString,
+    /// Made when it is asked for.
+    json: OnceLock<CString>,
 }
 
 impl SbdpPlan {
@@ -22,7 +26,17 @@ impl SbdpPlan {
             summary: HeldSummary::new(plan.summary),
             // JSON has no zero bytes.
             trace: CString::new(plan.trace).unwrap_or_default(),
+            json: OnceLock::new(),
         }
+    }
+
+    fn json(&self) -> Result<&CStr, Failure> {
+        if let Some(json) = self.json.get() {
+            return Ok(json);
+        }
+        let steps: Vec<Step> = self.steps.iter().map(|held| held.step.clone()).collect();
+        let json = self.summary.summary().to_json(&steps)?;
+        Ok(self.json.get_or_init(|| CString::new(json).unwrap_or_default()))
     }
 }
 
@@ -68,6 +82,27 @@ pub unsafe extern "C" fn sbdp_plan_summary(plan: *const SbdpPlan) -> *const Sbdp
 pub unsafe extern "C" fn sbdp_plan_trace(plan: *const SbdpPlan) -> *const c_char {
     // SAFETY: so the caller promises.
     answer(std::ptr::null(), || unsafe { plan.as_ref() }.map_or(std::ptr::null(), |p| p.trace.as_ptr()))
+}
+
+/// The plan as the command line writes it: JSON (`sbdp-plan/2`) in a line with its end, without what only the files of an
+/// assembly have (`source`, `groups`, findings while reading). `json` is valid until the plan is freed.
+///
+/// # Safety
+/// `plan` is one of this library's; `json` and `error` can be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sbdp_plan_json(
+    plan: *const SbdpPlan,
+    json: *mut *const c_char,
+    error: *mut SbdpError,
+) -> SbdpCode {
+    // SAFETY: so the caller promises.
+    unsafe {
+        enter(error, || {
+            not_null(json, "json")?;
+            json.write(behind(plan, "plan")?.json()?.as_ptr());
+            Ok(())
+        })
+    }
 }
 
 /// Frees a plan.

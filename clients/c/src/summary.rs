@@ -204,7 +204,7 @@ impl Texts {
 /// What the fields of a `SbdpSummary` point to.
 pub(crate) struct HeldSummary {
     fields: SbdpSummary,
-    _held: (Summary, Texts, Lists),
+    held: (Summary, Texts, Lists),
 }
 
 struct Lists {
@@ -294,7 +294,11 @@ impl HeldSummary {
             stats: stats(&summary.stats),
         };
         // What is pointed to lies in vectors, and stays where it is when these move.
-        Self { fields, _held: (summary, texts, lists) }
+        Self { fields, held: (summary, texts, lists) }
+    }
+
+    pub(crate) fn summary(&self) -> &Summary {
+        &self.held.0
     }
 
     pub(crate) fn to_c(&self) -> *const SbdpSummary {

@@ -42,6 +42,8 @@ static void nulls(void) {
     CHECK(sbdp_client_daemon_pid(NULL) == 0 && sbdp_client_restarts(NULL) == 0);
     CHECK(sbdp_plan_step_count(NULL) == 0 && sbdp_plan_step(NULL, 0) == NULL);
     CHECK(sbdp_plan_summary(NULL) == NULL && sbdp_plan_trace(NULL) == NULL);
+    const char *json = NULL;
+    CHECK(sbdp_plan_json(NULL, &json, &error) == SBDP_CODE_ARGUMENT && json == NULL);
     sbdp_client_free(NULL), sbdp_meshes_free(NULL), sbdp_stream_free(NULL), sbdp_plan_free(NULL);
     sbdp_session_free(NULL), sbdp_step_free(NULL), sbdp_text_free(NULL);
     SbdpClient *none = NULL;
@@ -183,6 +185,9 @@ static SbdpHandle limits(const SbdpClient *client) {
     CHECK(sbdp_client_plan(client, &handle, &options, &stream, &error) == SBDP_CODE_OK);
     CHECK(sbdp_stream_to_end(&stream, &plan, &error) == SBDP_CODE_OK);
     CHECK(sbdp_plan_summary(plan)->status == SBDP_PLAN_STATUS_TIMEOUT);
+    const char *json = NULL, *again = NULL;
+    CHECK(sbdp_plan_json(plan, &json, &error) == SBDP_CODE_OK && sbdp_plan_json(plan, &again, &error) == SBDP_CODE_OK);
+    CHECK(json == again && strstr(json, "\"status\":\"timeout\"") != NULL && json[strlen(json) - 1] == '\n');
     sbdp_plan_free(&plan);
 
     options.timeout_ns = NULL;

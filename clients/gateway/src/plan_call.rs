@@ -5,9 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::Poll;
 use std::time::{Duration, Instant};
 
-use sbdp::exchange;
-use sbdp::plan::export::PlanDocument;
-use sbdp_client::{ClientError, Event, Handle, PlanOptions, PlanStream, Step, Summary};
+use sbdp_client::{ClientError, Event, Handle, PlanOptions, PlanStream, Step};
 use tokio::runtime;
 use tokio::sync::mpsc::error::TrySendError;
 use tokio::sync::{OwnedSemaphorePermit, watch};
@@ -117,7 +115,7 @@ impl PlanCall {
                 }
                 Poll::Ready(Some(Event::Done(done))) => {
                     if self.wants_document {
-                        for piece in pieces(&document(&done, &steps)?) {
+                        for piece in pieces(&done.to_json(&steps)?) {
                             caller.send(&mut stream, plan_event::Event::Document(piece.to_owned()))?;
                         }
                     }
@@ -175,14 +173,6 @@ impl Caller<'_> {
             }
         }
     }
-}
-
-/// The document of a plan, as the command line writes it, but for what only the files of the assembly have.
-fn document(summary: &Summary, steps: &[Step]) -> Result<String, Stop> {
-    let plan = exchange::plan(summary.clone(), steps.iter().map(exchange::plan_step).collect());
-    let json = PlanDocument::new(&plan).to_json();
-    json.map(|text| text + "\n")
-        .map_err(|error| Stop::Error(status::internal(&format!("the plan has no document: {error}"))))
 }
 
 /// A text in pieces, cut between characters.

@@ -28,9 +28,10 @@ fn acts_as_the_daemon() {
     common::act_as_the_daemon();
 }
 
+/// As the command line makes it of what the daemon sent.
 fn document(plan: &Plan) -> String {
     let steps = plan.steps.iter().map(exchange::plan_step).collect();
-    PlanDocument::new(&exchange::plan(plan.summary.clone(), steps)).to_json().unwrap() + "\n"
+    PlanDocument::from(&exchange::plan(plan.summary.clone(), steps)).to_json().unwrap() + "\n"
 }
 
 fn joined(events: &[Event]) -> String {

@@ -24,13 +24,10 @@ pub(crate) struct Plan {
 
 /// The document of a plan, as the command line writes it.
 pub(crate) fn document(summary: &Summary, steps: &[ClientStep], data: &Data) -> PlanDocument {
-    let mut plan = exchange::plan(summary.clone(), steps.iter().map(exchange::plan_step).collect());
+    let document = summary.document(steps);
     match data.files() {
-        Some((assembly, source)) => {
-            exchange::add_notes(&mut plan, assembly);
-            exchange::document(&plan, assembly, source.clone())
-        }
-        None => PlanDocument::new(&plan),
+        Some((assembly, source)) => exchange::with_files(document, assembly, source.clone()),
+        None => document,
     }
 }
 

@@ -63,6 +63,7 @@
 mod client;
 mod connection;
 mod content_hash;
+mod document;
 mod error;
 mod exchange;
 mod interrupt;
@@ -87,6 +88,7 @@ pub use options::{
     StaticAnalysis,
 };
 pub use plan::Plan;
+pub use sbdp_ipc::document::PlanDocument;
 pub use sbdp_ipc::error::ErrorCode;
 pub use sbdp_ipc::geometry::{Assembly, Part, Vertices};
 pub use sbdp_ipc::plan::{StepEnd, StepView, Waypoint};

@@ -30,6 +30,15 @@ impl Plan {
         let part = part_named(self.summary.parts.iter().map(String::as_str), name)?;
         Ok(self.steps.iter().filter(move |step| step.view().parts.contains(&part)))
     }
+
+    /// The plan as the command line writes it: JSON (`sbdp-plan/2`) in a line with its end, but for what only the files of
+    /// the assembly have (`source`, `groups`, findings while reading).
+    ///
+    /// # Errors
+    /// The plan cannot be written as JSON.
+    pub fn to_json(&self) -> Result<String, ClientError> {
+        self.summary.to_json(&self.steps)
+    }
 }
 
 /// The number of a part.
