@@ -201,7 +201,7 @@ fn plan(text: &str) -> String {
         Ok(plan) => plan,
         Err(error) => return error.to_string(),
     };
-    let words = view::steps::markdown(&plan, None);
+    let words = view::steps::markdown(&view::Instructions::of(&plan, None));
     if plan.parts.len() > FEW_PARTS || words.is_empty() {
         return "many parts".to_owned();
     }

@@ -1,17 +1,23 @@
-//! `sbdp steps`: a plan as instructions in words.
+//! `sbdp steps`: a plan as instructions, in words and in pictures.
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use super::args::StepsArguments;
 use super::error::CliError;
-use super::print;
 use super::subject::{Subject, plan_in};
+use super::{print, written};
+use crate::geometry::Assembly;
 use crate::plan::export::PlanDocument;
-use crate::view::equal_parts;
+use crate::view::sheet::sheet;
 use crate::view::steps::markdown;
+use crate::view::{Illustration, Instructions, PlanScene, equal_parts, illustrations};
 
 pub(super) fn run(arguments: &StepsArguments) -> Result<ExitCode, CliError> {
     let plan = plan_in(&arguments.plan)?;
+    if arguments.pictures.is_some() || arguments.html.is_some() {
+        return drawn(plan, arguments);
+    }
     let classes = match classes(&plan, arguments) {
         Ok(classes) => Some(classes),
         // What was asked for must be; what was tried may fail.
@@ -21,14 +27,49 @@ pub(super) fn run(arguments: &StepsArguments) -> Result<ExitCode, CliError> {
             None
         }
     };
-    print(&markdown(&plan, classes.as_deref()))?;
+    print(&markdown(&Instructions::of(&plan, classes.as_deref())))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes pictures, for which there must be meshes.
+fn drawn(plan: PlanDocument, arguments: &StepsArguments) -> Result<ExitCode, CliError> {
+    let subject = Subject::of(plan, arguments.meshes.as_deref())?;
+    let assembly = subject.assembly()?;
+    let instructions = Instructions::of(&subject.plan, Some(&classes_of(&subject.plan, &assembly)?));
+    let scene = PlanScene::new(&assembly, subject.up(), &subject.plan)?;
+    let pictures = illustrations(&scene, &instructions)?;
+    if let Some(folder) = &arguments.pictures {
+        write_pictures(folder, &pictures)?;
+    }
+    if let Some(file) = &arguments.html {
+        let equal = equal_parts(&assembly);
+        let is_shown = |part: &usize| scene.parts.iter().any(|p| p.name == assembly.parts[*part].name);
+        let classes: Vec<usize> =
+            (0..assembly.parts.len()).filter(is_shown).map(|part| equal[part]).collect();
+        let html = sheet(&scene, &classes, &instructions, &pictures);
+        written(file, html.as_bytes())?;
+        let size = html.len().div_ceil(1000);
+        print(&format!("{}: instructions {}, {size} kB\n", file.display(), instructions.list.len()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write_pictures(folder: &Path, pictures: &[Illustration]) -> Result<(), CliError> {
+    std::fs::create_dir_all(folder).map_err(|e| CliError::Failed(format!("{}: {e}", folder.display())))?;
+    for picture in pictures {
+        written(&folder.join(format!("{}.png", picture.name)), &picture.png)?;
+    }
+    let size: usize = pictures.iter().map(|p| p.png.len()).sum();
+    print(&format!("{}: pictures {}, {} kB\n", folder.display(), pictures.len(), size.div_ceil(1000)))
 }
 
 /// Of each part of a plan, its class: parts of one class are equal.
 fn classes(plan: &PlanDocument, arguments: &StepsArguments) -> Result<Vec<usize>, CliError> {
-    let assembly = Subject::of(plan.clone(), arguments.meshes.as_deref())?.assembly()?;
-    let classes = equal_parts(&assembly);
+    classes_of(plan, &Subject::of(plan.clone(), arguments.meshes.as_deref())?.assembly()?)
+}
+
+fn classes_of(plan: &PlanDocument, assembly: &Assembly) -> Result<Vec<usize>, CliError> {
+    let classes = equal_parts(assembly);
     let class = |name: &String| {
         let part = assembly.parts.iter().position(|p| p.name == *name);
         part.map(|p| classes[p])

@@ -106,7 +106,8 @@ impl Subject {
         Ok(service.assembly(id)?)
     }
 
-    fn up(&self) -> Up {
+    /// Which way is up, by the custom of its files.
+    pub(super) fn up(&self) -> Up {
         let is_scene = |origin: &str| {
             let extension = Path::new(origin).extension().and_then(|e| e.to_str()).unwrap_or_default();
             ["gltf", "glb"].iter().any(|e| extension.eq_ignore_ascii_case(e))

@@ -84,6 +84,25 @@ pub struct ScenePart {
     pub exploded: Vector3<f64>,
 }
 
+impl ScenePart {
+    /// Where it is at a time.
+    #[must_use]
+    pub fn placement(&self, time: f64) -> Placement {
+        let next = self.keys.partition_point(|key| key.time <= time);
+        match (next.checked_sub(1).map(|i| self.keys[i]), self.keys.get(next)) {
+            (None, _) => self.start,
+            (Some(last), None) => last.placement,
+            (Some(a), Some(b)) => {
+                let u = (time - a.time) / (b.time - a.time);
+                let centre = a.placement.centre + (b.placement.centre - a.placement.centre) * u;
+                // Half turns have no short way: either is right.
+                let turned = a.placement.rotation.try_slerp(&b.placement.rotation, u, 1e-9);
+                Placement { centre, rotation: turned.unwrap_or(b.placement.rotation) }
+            }
+        }
+    }
+}
+
 /// Where a part is at a moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Keyframe {
@@ -104,6 +123,11 @@ pub struct SceneStep {
     pub begins: f64,
     /// When it is over, in seconds.
     pub ends: f64,
+    /// Whether its parts only go aside: they leave no body, and get into none.
+    pub is_aside: bool,
+    /// The parts of the body that they leave, as long as they are in it; of an assembly plan, of that which they get into.
+    /// Those that move are among them, those that left before are not.
+    pub body: Vec<usize>,
     /// Other parts that must have moved before.
     pub after: Vec<usize>,
     /// The step in words.
@@ -208,6 +232,13 @@ impl PlanScene {
     #[must_use]
     pub fn bounds(&self) -> Bounds {
         self.parts.iter().fold(Bounds::EMPTY, |b, p| b.union(&p.bounds))
+    }
+
+    /// The box of a part at a place.
+    pub(super) fn bounds_at(&self, part: usize, at: &Placement) -> Bounds {
+        let vertices = self.drawn[self.parts[part].drawn].positions.iter();
+        let place = |p: &[f32; 3]| at.centre + at.rotation * Vector3::from(p.map(f64::from));
+        vertices.fold(Bounds::EMPTY, |bounds, p| bounds.with_point(&place(p)))
     }
 
     /// The colour of a part.
@@ -367,6 +398,8 @@ impl<'a> SceneBuilder<'a> {
                 of: step.of,
                 begins: clock,
                 ends: course.ends,
+                is_aside: frame.ends == StepEnd::Aside,
+                body: Vec::new(),
                 after: after.collect(),
                 words: words.step(number),
             });
@@ -375,6 +408,8 @@ impl<'a> SceneBuilder<'a> {
         if kind == PlanKind::Assembly {
             leaving.reverse();
         }
+        let bodies: Vec<Vec<usize>> = (0..steps.len()).map(|step| body(step, kind, &steps, parts)).collect();
+        steps.iter_mut().zip(bodies).for_each(|(step, body)| step.body = body);
         for (place, part) in parts.iter_mut().enumerate() {
             part.handled = handled(place, &part.steps, &steps, &leaving);
         }
@@ -457,6 +492,32 @@ fn pieces(angle: f64, lever: f64, size: f64) -> usize {
     (angle / widest).ceil().clamp(1.0, MOST) as usize
 }
 
+/// The parts of the body that a step is about, ascending.
+fn body(number: usize, kind: PlanKind, steps: &[SceneStep], parts: &[ScenePart]) -> Vec<usize> {
+    let step = &steps[number];
+    let moves = |other: &SceneStep, part: usize| {
+        other.of == step.of && !other.is_aside && other.parts.contains(&part)
+    };
+    // Those that left before, or get in later.
+    let others = match kind {
+        PlanKind::Disassembly => &steps[..number],
+        PlanKind::Assembly => &steps[number + 1..],
+    };
+    let belongs = |part: &usize| match step.of {
+        Some(group) => steps[group].parts.contains(part),
+        // What an assembly plan cannot put in waits elsewhere.
+        None => {
+            kind == PlanKind::Disassembly
+                || parts[*part].stays
+                || steps.iter().any(|other| moves(other, *part))
+        }
+    };
+    let is_there = |part: &usize| {
+        step.parts.contains(part) || (belongs(part) && !others.iter().any(|other| moves(other, *part)))
+    };
+    (0..parts.len()).filter(is_there).collect()
+}
+
 /// From when to when something is done to a part that some steps move, or to the group that it belongs to in the end
 /// (of an assembly plan: at first).
 fn handled(place: usize, own: &[usize], steps: &[SceneStep], leaving: &[Leaving]) -> Option<[f64; 2]> {
@@ -522,19 +583,8 @@ mod tests {
         PlanScene::new(&assembly(), Up::Z, plan).unwrap()
     }
 
-    /// Where a part is at a time, as whatever plays the scene has it.
     fn at(scene: &PlanScene, part: usize, time: f64) -> Placement {
-        let ScenePart { keys, start, .. } = &scene.parts[part];
-        let next = keys.partition_point(|key| key.time <= time);
-        match (next.checked_sub(1).map(|i| keys[i]), keys.get(next)) {
-            (None, _) => *start,
-            (Some(last), None) => last.placement,
-            (Some(a), Some(b)) => {
-                let u = (time - a.time) / (b.time - a.time);
-                let centre = a.placement.centre + (b.placement.centre - a.placement.centre) * u;
-                Placement { centre, rotation: a.placement.rotation.slerp(&b.placement.rotation, u) }
-            }
-        }
+        scene.parts[part].placement(time)
     }
 
     fn assert_at(scene: &PlanScene, part: usize, time: f64, centre: [f64; 3], tolerance: f64) {
@@ -577,6 +627,20 @@ mod tests {
             let expected = quarter * scene.parts[part].assembled.rotation;
             assert!(at(&scene, part, ends).rotation.angle_to(&expected) < 1e-9);
         }
+    }
+
+    #[test]
+    fn parts_are_in_a_body_until_they_leave_it() {
+        let bodies =
+            |plan: &PlanDocument| scene(plan).steps.iter().map(|s| s.body.clone()).collect::<Vec<_>>();
+        assert_eq!(bodies(&group()), [vec![0, 1, 2], vec![1, 2], vec![1, 2]]);
+        assert_eq!(bodies(&reversed(group())), [vec![1, 2], vec![1, 2], vec![0, 1, 2]]);
+        let mut one_by_one = group();
+        one_by_one.steps.truncate(1);
+        one_by_one.steps[0].parts = vec!["2".into()];
+        one_by_one.steps.push(StepDocument { parts: vec!["1".into()], ..one_by_one.steps[0].clone() });
+        assert_eq!(bodies(&one_by_one), [vec![0, 1, 2], vec![0, 1]]);
+        assert_eq!(bodies(&reversed(one_by_one)), [vec![0, 1], vec![0, 1, 2]]);
     }
 
     #[test]

@@ -50,6 +50,13 @@ pub(in crate::cli) struct StepsArguments {
     /// there, else parts are equal whose names differ in a number only]
     #[arg(long, value_name = "ASSEMBLY")]
     pub(in crate::cli) meshes: Option<PathBuf>,
+    /// Draw a PNG picture per instruction into this folder, which is made if it is not there: `step-3.png`, or
+    /// `steps-1-4.png` for equal parts; and an exploded view, `overview.png`. Not together with words on stdout
+    #[arg(long, value_name = "DIR")]
+    pub(in crate::cli) pictures: Option<PathBuf>,
+    /// Write the instructions with their pictures as one HTML file, for the screen and for paper
+    #[arg(long, value_name = "FILE")]
+    pub(in crate::cli) html: Option<PathBuf>,
 }
 
 fn direction(text: &str) -> Result<Action, String> {
