@@ -7,7 +7,6 @@ use super::args::StepsArguments;
 use super::error::CliError;
 use super::subject::{Subject, plan_in};
 use super::{print, written};
-use crate::geometry::Assembly;
 use crate::plan::export::PlanDocument;
 use crate::view::sheet::sheet;
 use crate::view::steps::markdown;
@@ -18,16 +17,16 @@ pub(super) fn run(arguments: &StepsArguments) -> Result<ExitCode, CliError> {
     if arguments.pictures.is_some() || arguments.html.is_some() {
         return drawn(plan, arguments);
     }
-    let classes = match classes(&plan, arguments) {
-        Ok(classes) => Some(classes),
+    let instructions = match instructions(&plan, arguments) {
+        Ok(instructions) => instructions,
         // What was asked for must be; what was tried may fail.
         Err(error) if arguments.meshes.is_some() => return Err(error),
         Err(error) => {
             eprintln!("note: {error}; parts are taken for equal whose names differ in a number only");
-            None
+            Instructions::of(&plan, None)
         }
     };
-    print(&markdown(&Instructions::of(&plan, classes.as_deref())))?;
+    print(&markdown(&instructions))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -35,7 +34,7 @@ pub(super) fn run(arguments: &StepsArguments) -> Result<ExitCode, CliError> {
 fn drawn(plan: PlanDocument, arguments: &StepsArguments) -> Result<ExitCode, CliError> {
     let subject = Subject::of(plan, arguments.meshes.as_deref())?;
     let assembly = subject.assembly()?;
-    let instructions = Instructions::of(&subject.plan, Some(&classes_of(&subject.plan, &assembly)?));
+    let instructions = subject.instructions(&assembly)?;
     let scene = PlanScene::new(&assembly, subject.up(), &subject.plan)?;
     let pictures = illustrations(&scene, &instructions)?;
     if let Some(folder) = &arguments.pictures {
@@ -63,17 +62,7 @@ fn write_pictures(folder: &Path, pictures: &[Illustration]) -> Result<(), CliErr
     print(&format!("{}: pictures {}, {} kB\n", folder.display(), pictures.len(), size.div_ceil(1000)))
 }
 
-/// Of each part of a plan, its class: parts of one class are equal.
-fn classes(plan: &PlanDocument, arguments: &StepsArguments) -> Result<Vec<usize>, CliError> {
-    classes_of(plan, &Subject::of(plan.clone(), arguments.meshes.as_deref())?.assembly()?)
-}
-
-fn classes_of(plan: &PlanDocument, assembly: &Assembly) -> Result<Vec<usize>, CliError> {
-    let classes = equal_parts(assembly);
-    let class = |name: &String| {
-        let part = assembly.parts.iter().position(|p| p.name == *name);
-        part.map(|p| classes[p])
-            .ok_or_else(|| CliError::Refused(format!("the assembly has no part `{name}`")))
-    };
-    plan.parts.iter().map(class).collect()
+fn instructions(plan: &PlanDocument, arguments: &StepsArguments) -> Result<Instructions, CliError> {
+    let subject = Subject::of(plan.clone(), arguments.meshes.as_deref())?;
+    subject.instructions(&subject.assembly()?)
 }

@@ -17,7 +17,7 @@ use crate::plan::export::{PlanDocument, SourceDocument};
 use crate::plan::{MOTION_ROUNDING, Placements, PlanKind};
 use crate::search::Termination;
 use crate::service::{AssemblyId, Service};
-use crate::view::{PlanScene, Up, ViewError, glb, kind_of, page, read_plan};
+use crate::view::{Instructions, PlanScene, Up, ViewError, equal_parts, glb, kind_of, page, read_plan};
 
 /// A plan, and the meshes that it moves.
 pub(super) struct Subject {
@@ -116,6 +116,18 @@ impl Subject {
         if scene { Up::Y } else { Up::Z }
     }
 
+    /// The plan as instructions, in which equal parts are known by their shapes.
+    pub(super) fn instructions(&self, assembly: &Assembly) -> Result<Instructions, CliError> {
+        let classes = equal_parts(assembly);
+        let class = |name: &String| {
+            let part = assembly.parts.iter().position(|p| p.name == *name);
+            part.map(|p| classes[p])
+                .ok_or_else(|| CliError::Refused(format!("the assembly has no part `{name}`")))
+        };
+        let classes: Vec<usize> = self.plan.parts.iter().map(class).collect::<Result<_, _>>()?;
+        Ok(Instructions::of(&self.plan, Some(&classes)))
+    }
+
     /// The plan as a GLB scene.
     pub(super) fn glb(&self) -> Result<Vec<u8>, CliError> {
         Ok(glb::glb(&PlanScene::new(&self.assembly()?, self.up(), &self.plan)?)?)
@@ -132,7 +144,7 @@ impl Subject {
             service.blocking_graphs(id, None, &removed, termination)?;
         let graphs = graphs.ok_or_else(|| CliError::Failed("interrupted".to_owned()))?;
         let scene = PlanScene::new(&assembly, self.up(), &self.plan)?;
-        page::page(&scene, &names, &graphs)
+        page::page(&scene, &self.instructions(&assembly)?, &names, &graphs)
             .map_err(|e| CliError::Failed(format!("cannot write the scene as JSON: {e}")))
     }
 }

@@ -37,6 +37,8 @@ pub(super) struct Arrow {
     pub(super) points: Vec<Point3<f64>>,
     /// Whether it goes around an axis.
     pub(super) is_turn: bool,
+    /// Whose parts go there.
+    pub(super) step: usize,
 }
 
 /// The arrows of a step, and the time at which its parts are drawn: when they begin to move out, or shortly before they are
@@ -76,9 +78,11 @@ pub(super) fn arrows_of(scene: &PlanScene, step: usize, size: f64) -> (f64, Vec<
                 from = way[0];
                 let tail = way[there] - direction * front;
                 let tail = if (tail - from).dot(&direction) > SHORTEST * size { tail } else { way[there] };
-                arrows.push(Arrow { points: vec![tail, from], is_turn: false });
+                arrows.push(Arrow { points: vec![tail, from], is_turn: false, step });
             } else {
-                arrows.push(Arrow { points: vec![from, from + direction * reach], is_turn: false });
+                let tail = way[0] + direction * surface(scene, step, &way[0], &direction);
+                let tip = from + direction * reach;
+                arrows.push(Arrow { points: vec![tail, tip], is_turn: false, step });
             }
         }
         _ if length > size * 1e-6 => {
@@ -95,12 +99,37 @@ pub(super) fn arrows_of(scene: &PlanScene, step: usize, size: f64) -> (f64, Vec<
             if is_assembly {
                 points.reverse();
             }
-            arrows.push(Arrow { points, is_turn: false });
+            arrows.push(Arrow { points, is_turn: false, step });
         }
         _ => {}
     }
     arrows.extend(turn(scene, step, direction, &bounds(drawn)));
     (drawn, arrows)
+}
+
+/// How far from a point in a direction the surface of a step's parts lies outermost; 0 if it is not there.
+fn surface(scene: &PlanScene, step: usize, from: &Point3<f64>, along: &Vector3<f64>) -> f64 {
+    let mut far = 0.0;
+    for &part in &scene.steps[step].parts {
+        let at = scene.parts[part].placement(scene.steps[step].begins);
+        let mesh = &scene.drawn[scene.parts[part].drawn];
+        // In the node frame.
+        let (origin, along) = (at.rotation.inverse() * (from - at.centre), at.rotation.inverse() * along);
+        for corners in &mesh.triangles {
+            let [a, b, c] = corners.map(|v| Vector3::from(mesh.positions[v as usize].map(f64::from)));
+            let (ab, ac) = (b - a, c - a);
+            let normal = along.cross(&ac);
+            let volume = ab.dot(&normal);
+            let to = origin - a;
+            let u = to.dot(&normal) / volume;
+            let across = to.cross(&ab);
+            let v = along.dot(&across) / volume;
+            if volume != 0.0 && u >= 0.0 && v >= 0.0 && u + v <= 1.0 {
+                far = f64::max(far, ac.dot(&across) / volume);
+            }
+        }
+    }
+    far
 }
 
 fn is_straight(way: &[Point3<f64>], chord: &Vector3<f64>) -> bool {
@@ -138,7 +167,7 @@ fn turn(scene: &PlanScene, step: usize, out: Option<Vector3<f64>>, bounds: &Boun
         let angle = TAU * AROUND * i as f64 / PIECES as f64;
         centre + UnitQuaternion::from_scaled_axis(axis * angle) * begin
     };
-    Some(Arrow { points: (0..=PIECES).map(point).collect(), is_turn: true })
+    Some(Arrow { points: (0..=PIECES).map(point).collect(), is_turn: true, step })
 }
 
 impl Arrow {

@@ -32,7 +32,7 @@ const AROUND: f64 = 0.3;
 /// corner become glass; at double, the head of a screw that sticks out hides its way.
 const HIDES: f64 = 0.1;
 /// Opacity of faces and lines of what is see-through, …
-const GLASS: [f32; 2] = [0.1, 0.4];
+const GLASS: [f32; 2] = [0.16, 0.55];
 /// … and of the places where parts are put in.
 const PLACE: [f32; 2] = [0.16, 0.6];
 
@@ -41,11 +41,11 @@ const BACKGROUND: Rgb = [255, 255, 255];
 pub(super) const MOVING: Rgb = [0xE8, 0x5D, 0x04];
 const MOVING_EDGE: Rgb = [0x5A, 0x1E, 0x00];
 const EDGE: Rgb = [0x56, 0x60, 0x70];
-/// Parts that should have come out, or gone in, and did not.
-const STUCK: Rgb = [0x9B, 0x3F, 0xA5];
+/// Parts that should have come out, or gone in, and did not; in turns, so that two that hold each other are told apart.
+pub(super) const STUCK: [Rgb; 3] = [[0x8E, 0x3B, 0x9C], [0xC9, 0x8A, 0xD6], [0x5F, 0x4B, 0xB6]];
 const STUCK_EDGE: Rgb = [0x3E, 0x0A, 0x46];
 /// Groups that can begin to move together.
-const FREE: [Rgb; 3] = [[0x2A, 0x9D, 0x6E], [0x1F, 0x86, 0xC4], [0xC9, 0x9A, 0x06]];
+pub(super) const FREE: [Rgb; 3] = [[0x2A, 0x9D, 0x6E], [0x1F, 0x86, 0xC4], [0xC9, 0x9A, 0x06]];
 const ARROW: Rgb = [0x0B, 0x3D, 0x91];
 const GUIDE: Rgb = [0x8A, 0x97, 0xAD];
 const FRAME: Rgb = [0x8A, 0x94, 0xA3];
@@ -68,11 +68,9 @@ pub struct Illustration {
 /// # Errors
 /// A picture cannot be written as PNG.
 pub fn illustrations(scene: &PlanScene, instructions: &Instructions) -> Result<Vec<Illustration>, ViewError> {
-    let figures: Vec<Figure> = instructions.list.iter().map(|i| Figure::of_instruction(scene, i)).collect();
-    let merits: Vec<Vec<f64>> = figures.par_iter().map(|figure| figure.merits(scene)).collect();
-    let all = views(scene.up);
+    let (figures, backs) = figures(scene, instructions);
     let digits = scene.steps.len().to_string().len();
-    let of_instruction = |(k, view): (usize, usize)| {
+    let of_instruction = |(k, back): (usize, &Vector3<f64>)| {
         let instruction = &instructions.list[k];
         let numbers: Vec<String> =
             instruction.steps.iter().map(|step| format!("{:0digits$}", step + 1)).collect();
@@ -81,10 +79,10 @@ pub fn illustrations(scene: &PlanScene, instructions: &Instructions) -> Result<V
             numbers => format!("step-{}", numbers.concat()),
         };
         let text = format!("{}. {}", instruction.numbers(), instruction.words);
-        illustration(name, Some(k), text, &figures[k].drawn(scene, &all[view]))
+        illustration(name, Some(k), text, &figures[k].drawn(scene, back))
     };
-    let views: Vec<(usize, usize)> = chosen(&merits).into_iter().enumerate().collect();
-    let pictures: Vec<Result<Illustration, ViewError>> = views.into_par_iter().map(of_instruction).collect();
+    let pictures: Vec<Result<Illustration, ViewError>> =
+        backs.par_iter().enumerate().map(of_instruction).collect();
     let name = if scene.name.is_empty() { "the assembly" } else { &scene.name };
     let overview = illustration(
         "overview".to_owned(),
@@ -99,6 +97,37 @@ pub fn illustrations(scene: &PlanScene, instructions: &Instructions) -> Result<V
         illustration("stuck".to_owned(), None, "What is stuck, as it stands and exploded".to_owned(), &image)
     });
     std::iter::once(overview).chain(pictures).chain(stuck).collect()
+}
+
+/// How an instruction is shown where it plays.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Shot {
+    /// Unit direction to the viewer.
+    pub(super) back: Vector3<f64>,
+    /// Parts that hide much of the moving ones.
+    pub(super) hiding: Vec<usize>,
+    /// The ways of its parts.
+    pub(super) arrows: Vec<Arrow>,
+}
+
+/// How each instruction is shown, as in its picture.
+pub(super) fn shots(scene: &PlanScene, instructions: &Instructions) -> Vec<Shot> {
+    let (figures, backs) = figures(scene, instructions);
+    let shot = |(figure, back): (Figure, Vector3<f64>)| {
+        let camera =
+            Camera::fitting(&back, &upwards(scene.up), &figure.extent(scene, |_| true), SIZE, MARGIN);
+        let hiding = figure.hiding(scene, &camera).into_iter().map(|at| figure.shown[at].part).collect();
+        Shot { back, hiding, arrows: figure.arrows }
+    };
+    figures.into_par_iter().zip(backs).map(shot).collect()
+}
+
+/// What is shown of each instruction, and from which side.
+fn figures(scene: &PlanScene, instructions: &Instructions) -> (Vec<Figure>, Vec<Vector3<f64>>) {
+    let figures: Vec<Figure> = instructions.list.iter().map(|i| Figure::of_instruction(scene, i)).collect();
+    let merits: Vec<Vec<f64>> = figures.par_iter().map(|figure| figure.merits(scene)).collect();
+    let all = views(scene.up);
+    (figures, chosen(&merits).into_iter().map(|view| all[view]).collect())
 }
 
 fn illustration(
@@ -126,8 +155,8 @@ enum Role {
     Standing,
     /// It is shown in its own colour.
     Coloured,
-    /// It should have moved, and did not.
-    Stuck,
+    /// It should have moved, and did not; its turn among the colours.
+    Stuck(usize),
     /// It is in one of the groups that can begin to move together.
     Free(usize),
 }
@@ -321,10 +350,12 @@ impl Figure {
 /// The role of a part that is left in the end.
 fn left_role(scene: &PlanScene, part: usize) -> Role {
     let group = scene.free_together.iter().position(|group| group.parts.contains(&part));
-    let is_stuck = scene.blocked.iter().any(|blocked| blocked.part == scene.parts[part].name);
+    let is_stuck = |part: usize| scene.blocked.iter().any(|blocked| blocked.part == scene.parts[part].name);
     match group {
         Some(group) => Role::Free(group % FREE.len()),
-        None if is_stuck => Role::Stuck,
+        None if is_stuck(part) => {
+            Role::Stuck((0..part).filter(|&other| is_stuck(other)).count() % STUCK.len())
+        }
         None => Role::Standing,
     }
 }
@@ -364,7 +395,7 @@ fn paint(scene: &PlanScene, shown: &Shown) -> Paint {
         Role::Moving => Paint { colour: MOVING, edge: MOVING_EDGE, outline: 2 },
         Role::Standing => Paint { colour: pale(0.78), edge: EDGE, outline: 1 },
         Role::Coloured => Paint { colour: pale(0.25), edge: EDGE, outline: 1 },
-        Role::Stuck => Paint { colour: STUCK, edge: STUCK_EDGE, outline: 2 },
+        Role::Stuck(turn) => Paint { colour: STUCK[turn], edge: STUCK_EDGE, outline: 2 },
         Role::Free(group) => Paint { colour: FREE[group], edge: STUCK_EDGE, outline: 2 },
     }
 }

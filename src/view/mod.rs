@@ -20,6 +20,7 @@ pub mod layout;
 mod moves;
 pub mod page;
 pub mod picture;
+mod quotient;
 mod raster;
 mod scene;
 mod shading;

@@ -13,7 +13,7 @@ pub(super) const SAMPLES: usize = 3;
 /// dotted; at double, edges shine through thin sheets.
 const EDGE_BIAS: f32 = 3.0;
 /// Share of light that a face gets which is turned away from the lamp.
-const AMBIENT: f64 = 0.55;
+const AMBIENT: f64 = 0.6;
 /// No part.
 const NOTHING: u32 = u32::MAX;
 
@@ -102,7 +102,7 @@ impl Layer {
 
     /// Draws the surface of a part.
     pub(super) fn surface(&mut self, camera: &Camera, mesh: &DrawnPart, at: &Placement, part: u32) {
-        let lamp = (camera.back * 0.75 + camera.up * 0.5 - camera.right * 0.35).normalize();
+        let lamp = (camera.back * 0.85 + camera.up * 0.4 - camera.right * 0.3).normalize();
         let rotation = at.rotation.to_rotation_matrix();
         let shade = |n: &[f32; 3]| {
             let normal = rotation * Vector3::from(n.map(f64::from));

@@ -6,14 +6,15 @@ use serde::Serialize;
 
 use super::colour::colours;
 use super::document::kind_of;
-use super::explode::{Leaving, exploded_parts};
+use super::equal_parts::equal_parts;
+use super::explode::{Leaving, exploded_parts, spread};
 use super::shading::{Shaded, shaded};
 use super::verdict::verdict;
 use super::words::{Words, free_together, kept_together, required};
 use super::{PALETTE, Rgb, ViewError};
 use crate::geometry::{Assembly, Bounds, Pose, interpolate, pose_from_waypoint};
 use crate::plan::export::{BlockedDocument, PlanDocument};
-use crate::plan::{Placements, PlanKind, StepEnd, StepFrame};
+use crate::plan::{Placements, PlanKind, PlanStatus, StepEnd, StepFrame};
 
 /// Boxes closer than this share of the longest side count as touching.
 const TOUCHING: f64 = 1e-6;
@@ -23,12 +24,12 @@ const SAME_MIDDLE: f64 = 1e-9;
 /// along an arc, which key frames cut short.
 const ARC_ERROR: f64 = 1e-3;
 /// Seconds that a part takes to move by the assembly's longest side, and to turn once.
-const PER_LENGTH: f64 = 1.6;
-const PER_TURN: f64 = 0.6;
-/// Seconds of a step, at least and at most; and between two steps.
-const SHORTEST: f64 = 0.6;
+const PER_LENGTH: f64 = 2.2;
+const PER_TURN: f64 = 0.9;
+/// Seconds of a step, at least and at most; and between two steps, in which the page lets what is out fade.
+const SHORTEST: f64 = 1.0;
 const LONGEST: f64 = 8.0;
-const PAUSE: f64 = 0.15;
+const PAUSE: f64 = 0.4;
 
 /// Where a node frame stands in the input's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -195,7 +196,8 @@ impl PlanScene {
         let mut parts: Vec<ScenePart> = stage.present.clone().iter().map(|&part| stage.part(part)).collect();
         let (steps, leaving) = stage.steps(&placements, &mut parts);
         let boxes: Vec<Bounds> = parts.iter().map(|p| p.bounds).collect();
-        for (part, shift) in parts.iter_mut().zip(exploded_parts(&boxes, &leaving)) {
+        let units = units_left(plan, &parts);
+        for (part, shift) in parts.iter_mut().zip(exploded_parts(&boxes, spread(&boxes, &units), &leaving)) {
             part.exploded = shift;
         }
         let group = |names: &[String], words: String| {
@@ -215,10 +217,10 @@ impl PlanScene {
             free_together: free,
             blocked: plan.blocked.clone(),
             steps,
-            drawn: stage.drawn,
+            drawn: std::mem::take(&mut stage.drawn),
             parts,
         };
-        scene.colour();
+        scene.colour(&stage.classes());
         Ok(scene)
     }
 
@@ -247,7 +249,8 @@ impl PlanScene {
         PALETTE[self.parts[part].colour]
     }
 
-    fn colour(&mut self) {
+    /// `classes`: one per part, the same for equal parts.
+    fn colour(&mut self, classes: &[usize]) {
         let near = self.bounds().extents().max() * TOUCHING;
         let meets = |a: &ScenePart, b: &ScenePart| a.bounds.grown(near).meets(&b.bounds);
         let neighbours: Vec<Vec<usize>> = (0..self.parts.len())
@@ -255,11 +258,29 @@ impl PlanScene {
                 (0..self.parts.len()).filter(|&q| q != p && meets(&self.parts[p], &self.parts[q])).collect()
             })
             .collect();
-        let shapes: Vec<usize> = self.parts.iter().map(|p| p.drawn).collect();
-        for (part, colour) in self.parts.iter_mut().zip(colours(&shapes, &neighbours)) {
+        let sizes: Vec<f64> = self.parts.iter().map(|p| p.bounds.extents().norm()).collect();
+        for (part, colour) in self.parts.iter_mut().zip(colours(classes, &sizes, &neighbours)) {
             part.colour = colour;
         }
     }
+}
+
+/// What is drawn apart although no step takes it apart: of a plan that is not complete, the parts that are left, and the
+/// groups among them that can begin to move together.
+fn units_left(plan: &PlanDocument, parts: &[ScenePart]) -> Vec<Vec<usize>> {
+    if plan.status == PlanStatus::Complete.name() {
+        return Vec::new();
+    }
+    let group = |part: usize| plan.free_together.iter().position(|g| g.parts.contains(&parts[part].name));
+    let mut units: Vec<(Option<usize>, Vec<usize>)> = Vec::new();
+    for part in (0..parts.len()).filter(|&part| parts[part].crosses.is_none()) {
+        let own = group(part);
+        match units.iter_mut().find(|(other, _)| own.is_some() && *other == own) {
+            Some((_, unit)) => unit.push(part),
+            None => units.push((own, vec![part])),
+        }
+    }
+    units.into_iter().map(|(_, unit)| unit).collect()
 }
 
 fn check_parts(assembly: &Assembly, plan: &PlanDocument) -> Result<(), ViewError> {
@@ -289,6 +310,12 @@ impl<'a> SceneBuilder<'a> {
         let is_there = |i: &usize| !plan.initial.removed.contains(&assembly.parts[*i].name);
         let present = (0..assembly.parts.len()).filter(is_there).collect();
         Self { assembly, plan, present, drawn: Vec::new(), origins: Vec::new() }
+    }
+
+    /// Of each part that is there, its class: equal parts are of one.
+    fn classes(&self) -> Vec<usize> {
+        let all = equal_parts(self.assembly);
+        self.present.iter().map(|&part| all[part]).collect()
     }
 
     /// Index in the scene of a named part, if it is there.

@@ -22,6 +22,8 @@ const LENGTH: f64 = 0.7;
 const TOWARDS: f64 = 0.25;
 const USUAL: f64 = 0.2;
 const ABOVE: f64 = 0.3;
+/// Faces of boxes along the axes are seen evenly from every second view; the others are for what hides there.
+const EVEN: f64 = 0.12;
 /// A view is changed only if another one is better by this.
 const BETTER: f64 = 0.35;
 
@@ -62,7 +64,8 @@ pub(super) fn merits(posed: &[Posed<'_>], ways: &[Vec<Point3<f64>>], up: Up) -> 
     let corners: Vec<Point3<f64>> = posed.iter().flat_map(|p| corners(p.mesh, &p.at)).collect();
     let all = views(up);
     let usual = all[0];
-    let merit = |back: &Vector3<f64>| {
+    let is_all = posed.iter().all(|p| p.is_subject);
+    let merit = |(k, back): (usize, &Vector3<f64>)| {
         let camera = Camera::fitting(back, &upwards(up), &corners, PROBE, 0.02);
         let [mut alone, mut rest] = [Layer::new(&camera), Layer::new(&camera)];
         for Posed { mesh, at, is_subject } in posed {
@@ -70,12 +73,36 @@ pub(super) fn merits(posed: &[Posed<'_>], ways: &[Vec<Point3<f64>>], up: Up) -> 
             layer.surface(&camera, mesh, at, 0);
         }
         let whole = alone.count(|_| true);
-        let seen = 1.0 - alone.covered_by(&rest) as f64 / whole.max(1) as f64;
+        let seen = match is_all {
+            true => seen(posed, &camera),
+            false => 1.0 - alone.covered_by(&rest) as f64 / whole.max(1) as f64,
+        };
+        let even = if k % 2 == 0 { EVEN } else { 0.0 };
         let (length, towards) = along(ways, back);
         let above = if back.dot(&upwards(up)) > 0.0 { ABOVE } else { 0.0 };
-        SEEN * seen + LENGTH * length + TOWARDS * towards + USUAL * (1.0 + back.dot(&usual)) / 2.0 + above
+        SEEN * seen
+            + LENGTH * length
+            + TOWARDS * towards
+            + USUAL * (1.0 + back.dot(&usual)) / 2.0
+            + above
+            + even
     };
-    all.iter().map(merit).collect()
+    all.iter().enumerate().map(merit).collect()
+}
+
+/// The mean share of the parts that is seen of each.
+fn seen(posed: &[Posed<'_>], camera: &Camera) -> f64 {
+    let mut all = Layer::new(camera);
+    let mut whole = Vec::new();
+    for (k, Posed { mesh, at, .. }) in posed.iter().enumerate() {
+        all.surface(camera, mesh, at, k as u32);
+        let mut own = Layer::new(camera);
+        own.surface(camera, mesh, at, 0);
+        whole.push(own.count(|_| true));
+    }
+    let share =
+        |(k, whole): (usize, &usize)| all.count(|part| part == k as u32) as f64 / (*whole).max(1) as f64;
+    whole.iter().enumerate().map(share).sum::<f64>() / posed.len().max(1) as f64
 }
 
 /// The view of each of some pictures in a row, by the merits of the views for each: the best, but the one of the picture

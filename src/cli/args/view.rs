@@ -36,7 +36,8 @@ pub(in crate::cli) struct GraphArguments {
     /// A part that is gone already (repeatable)
     #[arg(long, value_name = "PART")]
     pub(in crate::cli) removed: Vec<String>,
-    /// Where the picture goes: .svg, or .dot for Graphviz
+    /// Where the picture goes: .svg, with equal parts as one box, or .dot for Graphviz, with all parts. Of several
+    /// directions, each gets an .svg of its own: `graph.svg` becomes `graph+x.svg`, `graph-x.svg` …
     #[arg(short, long, value_name = "FILE")]
     pub(in crate::cli) output: PathBuf,
 }
