@@ -399,3 +399,106 @@ fn paint(scene: &PlanScene, shown: &Shown) -> Paint {
         Role::Free(group) => Paint { colour: FREE[group], edge: STUCK_EDGE, outline: 2 },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Up;
+    use super::super::document::tests::{plan, reversed, step};
+    use super::*;
+    use crate::fixtures::{cuboid, source};
+    use crate::geometry::Assembly;
+    use crate::plan::export::{BlockedDocument, PlanDocument};
+
+    /// A plate with two boxes of different sizes on it, which are lifted one after the other.
+    fn lifted() -> PlanDocument {
+        let up = [[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 9.0, 1.0, 0.0, 0.0, 0.0]];
+        let steps = vec![step("1", &up), step("2", &up)];
+        PlanDocument { parts: ["0", "1", "2"].map(String::from).into(), steps, ..plan() }
+    }
+
+    fn scene(plan: &PlanDocument) -> PlanScene {
+        let meshes = [
+            cuboid([-4.0, -4.0, -1.0], [4.0, 4.0, 0.0]),
+            cuboid([-3.0, -3.0, 0.0], [-1.0, -1.0, 2.0]),
+            cuboid([1.0, 1.0, 0.0], [3.0, 3.0, 3.0]),
+        ];
+        PlanScene::new(&Assembly::new(&source(meshes)).unwrap(), Up::Z, plan).unwrap()
+    }
+
+    fn drawn(scene: &PlanScene, plan: &PlanDocument) -> Vec<Illustration> {
+        illustrations(scene, &Instructions::of(plan, Some(&[0, 1, 2]))).unwrap()
+    }
+
+    /// How many pixels of a picture have the hue of the moving parts.
+    fn moving_pixels(picture: &Illustration) -> usize {
+        let mut reader = png::Decoder::new(std::io::Cursor::new(&picture.png)).read_info().unwrap();
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut bytes).unwrap();
+        let is_moving = |p: &&[u8]| {
+            let [r, g, b] = [p[0], p[1], p[2]].map(i32::from);
+            r > 120 && g * 10 < r * 6 && b * 10 < r * 3
+        };
+        bytes.chunks_exact(3).filter(is_moving).count()
+    }
+
+    #[test]
+    fn each_instruction_has_a_picture_in_which_its_part_is_seen() {
+        for plan in [lifted(), reversed(lifted())] {
+            let pictures = drawn(&scene(&plan), &plan);
+            let names: Vec<&str> = pictures.iter().map(|p| p.name.as_str()).collect();
+            assert_eq!(names, ["overview", "step-1", "step-2"]);
+            for picture in &pictures[1..] {
+                assert!(moving_pixels(picture) > 2000, "{}: {}", picture.name, moving_pixels(picture));
+            }
+            assert_eq!(pictures[1].instruction, Some(0));
+        }
+    }
+
+    #[test]
+    fn the_same_plan_gives_the_same_bytes() {
+        assert_eq!(drawn(&scene(&lifted()), &lifted()), drawn(&scene(&lifted()), &lifted()));
+    }
+
+    #[test]
+    fn nothing_is_drawn_of_parts_that_left_before() {
+        let (plan, before) = (lifted(), scene(&lifted()));
+        let mut other = before.clone();
+        let gone = other.parts[1].drawn;
+        assert!(other.parts.iter().filter(|p| p.drawn == gone).count() == 1);
+        other.drawn[gone].positions.iter_mut().for_each(|p| *p = p.map(|x| x * 1.5));
+        let [before, after] = [drawn(&before, &plan), drawn(&other, &plan)];
+        assert_ne!(before[1].png, after[1].png, "it is seen while it is there");
+        assert_eq!(before[2].png, after[2].png, "and not when it is gone");
+    }
+
+    #[test]
+    fn a_part_that_hides_the_moving_one_is_see_through() {
+        let plan = lifted();
+        let mut scene = scene(&plan);
+        assert!(shots(&scene, &Instructions::of(&plan, None)).iter().all(|shot| shot.hiding.is_empty()));
+        // The plate becomes a block around all.
+        let block = scene.parts[0].drawn;
+        scene.drawn[block].positions.iter_mut().for_each(|p| p[2] *= 20.0);
+        let shots = shots(&scene, &Instructions::of(&plan, None));
+        assert!(shots.iter().all(|shot| shot.hiding == [0]), "{shots:?}");
+        assert!(drawn(&scene, &plan)[1..].iter().all(|picture| moving_pixels(picture) > 500));
+    }
+
+    #[test]
+    fn what_is_stuck_has_a_picture() {
+        let blocked = BlockedDocument { part: "2".into(), by: vec!["0".into()], action: "any".into() };
+        let stuck = PlanDocument {
+            status: "infeasible".into(),
+            steps: lifted().steps[..1].to_vec(),
+            blocked: vec![blocked],
+            ..lifted()
+        };
+        let scene = scene(&stuck);
+        let pictures = drawn(&scene, &stuck);
+        assert_eq!(pictures.last().map(|p| p.name.as_str()), Some("stuck"));
+        let left = left(&scene);
+        assert_eq!(left, [0, 2]);
+        let roles: Vec<Role> = Figure::at_the_end(&scene, &left).shown.iter().map(|s| s.role).collect();
+        assert_eq!(roles, [Role::Standing, Role::Stuck(0)]);
+    }
+}

@@ -8,6 +8,7 @@ use std::fmt::Write;
 
 use super::layout::{Layout, layout};
 use super::quotient::{Quotient, quotient};
+use super::words::part_word;
 use crate::blocking_graph::DirectionalGraph;
 
 /// SVG lengths: a column, a row, a part's box, and the border of a direction's picture with its title.
@@ -115,7 +116,7 @@ impl Picture<'_> {
             let own = if quotient.holds_itself[k] { " ↺" } else { "" };
             let label = match names[..] {
                 [only] => shortened(only),
-                _ => format!("{} × {}{own}", names.len(), shortened(names[0])),
+                _ => format!("{} × {}{own}", names.len(), shortened(&part_word(names[0]))),
             };
             body.push_str(&node(place(k), &label, &names.join(", "), !quotient.is_blocked[k]));
         }

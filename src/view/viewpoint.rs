@@ -18,6 +18,8 @@ const HEIGHTS: [f64; 3] = [27.0, 52.0, -27.0];
 /// of `SEEN`, screws are seen from the side where their heads are hidden; at double of `USUAL`, bottom covers are shown
 /// from above.
 const SEEN: f64 = 1.0;
+/// The weight of what is seen where a picture is about all of its parts: hardly one may be hidden.
+const SEEN_OF_ALL: f64 = 2.5;
 const LENGTH: f64 = 0.7;
 const TOWARDS: f64 = 0.25;
 const USUAL: f64 = 0.2;
@@ -74,7 +76,7 @@ pub(super) fn merits(posed: &[Posed<'_>], ways: &[Vec<Point3<f64>>], up: Up) -> 
         }
         let whole = alone.count(|_| true);
         let seen = match is_all {
-            true => seen(posed, &camera),
+            true => seen(posed, &camera) * SEEN_OF_ALL / SEEN,
             false => 1.0 - alone.covered_by(&rest) as f64 / whole.max(1) as f64,
         };
         let even = if k % 2 == 0 { EVEN } else { 0.0 };

@@ -71,7 +71,7 @@ export class Stage {
     this.lit();
     this.radius = Math.max(...scene.parts.map((p) => reach(p)), 1e-9);
     this.arrows = arrows(scene, this.radius, "#0b3d91");
-    this.world.add(...this.arrows.values());
+    for (const arrow of this.arrows.values()) this.world.add(arrow);
     this.free = new Map(scene.free_together.flatMap(({ parts }, k) => parts.map((p) => [p, k])));
     /** Whether the camera goes by itself to the side where something happens. */
     this.follows = true;
@@ -105,6 +105,13 @@ export class Stage {
   get step() {
     const step = stepAt(this.scene, this.time);
     return step < this.scene.steps.length ? step : null;
+  }
+
+  /** The steps whose parts are in the strong colour: the one under way, or in a picture of an instruction all of it. */
+  get active() {
+    const { instruction, step } = this;
+    if (step === null || this.selection.explode > 0) return [];
+    return this.isWhole && instruction ? instruction.steps : [step];
   }
 
   /** Begins to go to the side from which the instruction is seen best. A viewer who turned the view is left alone until the
@@ -276,8 +283,8 @@ export class Stage {
   snapshot(time, [width, height]) {
     const { camera, controls, renderer, selection } = this;
     const before = { position: camera.position.clone(), target: controls.target.clone(), aspect: camera.aspect, explode: selection.explode };
-    const shown = { time: this.time, ground: this.ground, edge: this.edge, swing: this.swing };
-    Object.assign(this, { time, ground: new Color("#ffffff"), edge: new Color("#1b2330"), swing: null });
+    const shown = { time: this.time, ground: this.ground, edge: this.edge, swing: this.swing, isWhole: false };
+    Object.assign(this, { time, ground: new Color("#ffffff"), edge: new Color("#1b2330"), swing: null, isWhole: true });
     this.world.background = this.ground;
     selection.explode = 0;
     renderer.setPixelRatio(1);
@@ -328,8 +335,8 @@ export class Stage {
       }
       this.dress(body, i);
     });
-    const { step } = this;
-    for (const [of, arrow] of this.arrows) arrow.visible = explode === 0 && of === step;
+    const { active } = this;
+    for (const [of, arrow] of this.arrows) arrow.visible = active.includes(of);
     this.guides.visible = explode > 0;
     if (explode > 0) this.stretch(explode);
   }
@@ -353,7 +360,7 @@ export class Stage {
     else if (selection.others.size + selection.group.size > 0 && !pointed) opacity *= BESIDE;
     else if (!pointing(selection) && instruction?.hiding.includes(part)) opacity *= THROUGH;
     look.fade(opacity);
-    const moving = selection.explode === 0 && step !== null && scene.steps[step].parts.includes(part);
+    const moving = this.active.some((step) => scene.steps[step].parts.includes(part));
     look.outline(moving || picked);
     const own = scene.palette[scene.parts[part].colour];
     const isStuck = this.stuck.includes(part) && (selection.others.size === 0 || picked);
@@ -365,7 +372,6 @@ export class Stage {
     } else if (isEnd && isStuck) {
       const { stuck } = scene.colours;
       look.paint(stuck[this.stuck.indexOf(part) % stuck.length], pointed ? GLOW : "#000000", STUCK_EDGE);
-      look.outline(true);
     } else {
       // All colours are shown exploded, in the end, and of what is pointed out.
       const pale = selection.explode > 0 || isEnd || pointed ? 0 : PALE;
