@@ -201,7 +201,7 @@ fn plan(text: &str) -> String {
         Ok(plan) => plan,
         Err(error) => return error.to_string(),
     };
-    let words = view::steps::markdown(&plan, None);
+    let words = view::steps::markdown(&view::Instructions::of(&plan, None));
     if plan.parts.len() > FEW_PARTS || words.is_empty() {
         return "many parts".to_owned();
     }
@@ -210,7 +210,8 @@ fn plan(text: &str) -> String {
     let assembly = Assembly::new(&SourceAssembly { parts, ..SourceAssembly::default() });
     said(assembly.map_err(|e| e.to_string()).and_then(|assembly| {
         let scene = PlanScene::new(&assembly, Up::Z, &plan).map_err(|e| e.to_string())?;
-        view::page::page(&scene, &plan.parts, &[]).map_err(|e| e.to_string())?;
+        view::page::page(&scene, &view::Instructions::of(&plan, None), &plan.parts, &[])
+            .map_err(|e| e.to_string())?;
         view::glb::glb(&scene).map_err(|e| e.to_string())
     }))
 }

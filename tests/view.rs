@@ -328,6 +328,70 @@ fn a_plan_becomes_a_scene_a_page_and_words() {
     assert_eq!(fs::read_to_string(&again).unwrap(), page);
 }
 
+/// The names of a folder's files, sorted.
+fn names_in(folder: &str) -> Vec<String> {
+    let entries = fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> =
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn instructions_have_pictures_in_files_and_in_one_sheet() {
+    let here = tempfile::tempdir().unwrap();
+    let at = |name: &str| here.path().join(name).display().to_string();
+    let json = at("plan.json");
+    for (assembly, together) in
+        [("bolted-bracket-20", false), ("pin-bolt-cover", true), ("pinned-block", false)]
+    {
+        let source = folder(assembly).display().to_string();
+        let options: &[&str] = if together { &["--assembly"] } else { &[] };
+        succeeded(&run(&[&["plan", &source, "--no-cache", "--json", &json], options].concat()));
+        let words = succeeded(&run(&["steps", &json]));
+        let numbered = |text: &str| text.lines().filter(|l| l.starts_with("**")).count();
+        let (pictures, html) = (at(assembly), at("sheet.html"));
+        let told = succeeded(&run(&["steps", &json, "--pictures", &pictures, "--html", &html]));
+        let names = names_in(&pictures);
+        assert_eq!(names.len(), numbered(&words) + 1, "{names:?}");
+        assert!(told.contains(&format!("pictures {}", names.len())), "{told}");
+        let sheet = fs::read_to_string(&html).unwrap();
+        // The overview, and of every instruction its own.
+        assert_eq!(sheet.matches("<img ").count(), names.len());
+        assert_eq!(sheet.matches("<section class=\"step\">").count(), numbered(&words));
+        for section in sheet.split("<section class=\"step\">").skip(1) {
+            assert!(section.split("</section>").next().unwrap().contains("src=\"data:image/png;base64,"));
+        }
+        for loading in ["src=\"http", "href=", "<script", "url("] {
+            assert!(!sheet.contains(loading), "{loading}: the sheet must need nothing else");
+        }
+        let again = at("again");
+        succeeded(&run(&["steps", &json, "--pictures", &again]));
+        assert_eq!(names_in(&again), names);
+        for name in &names {
+            let [one, two] = [&pictures, &again].map(|f| fs::read(Path::new(f).join(name)).unwrap());
+            assert!(one == two, "{name} has other bytes");
+        }
+        fs::remove_dir_all(&again).unwrap();
+    }
+}
+
+#[test]
+fn pictures_need_meshes_and_stuck_parts_have_one() {
+    let here = tempfile::tempdir().unwrap();
+    let at = |name: &str| here.path().join(name).display().to_string();
+    let (json, html) = (at("plan.json"), at("sheet.html"));
+    let rings = folder("linked-rings").display().to_string();
+    assert_eq!(run(&["plan", &rings, "--no-cache", "--json", &json]).status.code(), Some(3));
+    succeeded(&run(&["steps", &json, "--html", &html, "--pictures", &at("pictures")]));
+    assert_eq!(names_in(&at("pictures")), ["overview.png", "stuck.png"]);
+    let sheet = fs::read_to_string(&html).unwrap();
+    assert!(sheet.contains("What is stuck") && sheet.contains("Not complete (infeasible)"), "{sheet}");
+    let plan = PlanDocument::from_json(&fs::read_to_string(&json).unwrap()).unwrap();
+    fs::write(&json, PlanDocument { source: None, ..plan }.to_json().unwrap()).unwrap();
+    refused(&run(&["steps", &json, "--html", &html]), &["--meshes"]);
+}
+
 #[test]
 fn what_was_changed_for_planning_is_shown_so() {
     let here = tempfile::tempdir().unwrap();
@@ -415,8 +479,15 @@ fn blocking_graphs_are_drawn() {
         succeeded(&run(&[&["graph", assembly.as_str(), "-o", &file], options].concat()));
         fs::read_to_string(&file).unwrap()
     };
-    let svg = drawn(&[], "g.svg");
-    assert_eq!((svg.matches("class=\"title\"").count(), svg.matches("<rect").count()), (6, 6 * parts.len()));
+    let svg = drawn(&["--direction", "+z"], "g.svg");
+    assert_eq!((svg.matches("class=\"title\"").count(), svg.matches("<rect").count()), (1, parts.len()));
+    // Of several directions, each has a file.
+    succeeded(&run(&["graph", &assembly, "-o", &at("all.svg")]));
+    for direction in ["+x", "-x", "+y", "-y", "+z", "-z"] {
+        let svg = fs::read_to_string(at(&format!("all{direction}.svg"))).unwrap();
+        assert!(svg.contains(&format!(">{direction}: ")), "{svg}");
+    }
+    assert!(!Path::new(&at("all.svg")).exists());
     let both = |dot: &str, from: usize, to: usize| dot.contains(&format!("d0p{from} -> d0p{to};"));
     let (up, down) = (drawn(&["--direction", "+z"], "g.dot"), drawn(&["--direction", "0,0,-1"], "d.dot"));
     assert_eq!(up.matches(" -> ").count(), down.matches(" -> ").count());

@@ -1,38 +1,68 @@
-//! `sbdp steps`: a plan as instructions in words.
+//! `sbdp steps`: a plan as instructions, in words and in pictures.
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use super::args::StepsArguments;
 use super::error::CliError;
-use super::print;
 use super::subject::{Subject, plan_in};
+use super::{print, written};
 use crate::plan::export::PlanDocument;
-use crate::view::equal_parts;
+use crate::view::sheet::sheet;
 use crate::view::steps::markdown;
+use crate::view::{Illustration, Instructions, PlanScene, equal_parts, illustrations};
 
 pub(super) fn run(arguments: &StepsArguments) -> Result<ExitCode, CliError> {
     let plan = plan_in(&arguments.plan)?;
-    let classes = match classes(&plan, arguments) {
-        Ok(classes) => Some(classes),
+    if arguments.pictures.is_some() || arguments.html.is_some() {
+        return drawn(plan, arguments);
+    }
+    let instructions = match instructions(&plan, arguments) {
+        Ok(instructions) => instructions,
         // What was asked for must be; what was tried may fail.
         Err(error) if arguments.meshes.is_some() => return Err(error),
         Err(error) => {
             eprintln!("note: {error}; parts are taken for equal whose names differ in a number only");
-            None
+            Instructions::of(&plan, None)
         }
     };
-    print(&markdown(&plan, classes.as_deref()))?;
+    print(&markdown(&instructions))?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// Of each part of a plan, its class: parts of one class are equal.
-fn classes(plan: &PlanDocument, arguments: &StepsArguments) -> Result<Vec<usize>, CliError> {
-    let assembly = Subject::of(plan.clone(), arguments.meshes.as_deref())?.assembly()?;
-    let classes = equal_parts(&assembly);
-    let class = |name: &String| {
-        let part = assembly.parts.iter().position(|p| p.name == *name);
-        part.map(|p| classes[p])
-            .ok_or_else(|| CliError::Refused(format!("the assembly has no part `{name}`")))
-    };
-    plan.parts.iter().map(class).collect()
+/// Writes pictures, for which there must be meshes.
+fn drawn(plan: PlanDocument, arguments: &StepsArguments) -> Result<ExitCode, CliError> {
+    let subject = Subject::of(plan, arguments.meshes.as_deref())?;
+    let assembly = subject.assembly()?;
+    let instructions = subject.instructions(&assembly)?;
+    let scene = PlanScene::new(&assembly, subject.up(), &subject.plan)?;
+    let pictures = illustrations(&scene, &instructions)?;
+    if let Some(folder) = &arguments.pictures {
+        write_pictures(folder, &pictures)?;
+    }
+    if let Some(file) = &arguments.html {
+        let equal = equal_parts(&assembly);
+        let is_shown = |part: &usize| scene.parts.iter().any(|p| p.name == assembly.parts[*part].name);
+        let classes: Vec<usize> =
+            (0..assembly.parts.len()).filter(is_shown).map(|part| equal[part]).collect();
+        let html = sheet(&scene, &classes, &instructions, &pictures);
+        written(file, html.as_bytes())?;
+        let size = html.len().div_ceil(1000);
+        print(&format!("{}: instructions {}, {size} kB\n", file.display(), instructions.list.len()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write_pictures(folder: &Path, pictures: &[Illustration]) -> Result<(), CliError> {
+    std::fs::create_dir_all(folder).map_err(|e| CliError::Failed(format!("{}: {e}", folder.display())))?;
+    for picture in pictures {
+        written(&folder.join(format!("{}.png", picture.name)), &picture.png)?;
+    }
+    let size: usize = pictures.iter().map(|p| p.png.len()).sum();
+    print(&format!("{}: pictures {}, {} kB\n", folder.display(), pictures.len(), size.div_ceil(1000)))
+}
+
+fn instructions(plan: &PlanDocument, arguments: &StepsArguments) -> Result<Instructions, CliError> {
+    let subject = Subject::of(plan.clone(), arguments.meshes.as_deref())?;
+    subject.instructions(&subject.assembly()?)
 }

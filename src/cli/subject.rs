@@ -17,7 +17,7 @@ use crate::plan::export::{PlanDocument, SourceDocument};
 use crate::plan::{MOTION_ROUNDING, Placements, PlanKind};
 use crate::search::Termination;
 use crate::service::{AssemblyId, Service};
-use crate::view::{PlanScene, Up, ViewError, glb, kind_of, page, read_plan};
+use crate::view::{Instructions, PlanScene, Up, ViewError, equal_parts, glb, kind_of, page, read_plan};
 
 /// A plan, and the meshes that it moves.
 pub(super) struct Subject {
@@ -106,13 +106,26 @@ impl Subject {
         Ok(service.assembly(id)?)
     }
 
-    fn up(&self) -> Up {
+    /// Which way is up, by the custom of its files.
+    pub(super) fn up(&self) -> Up {
         let is_scene = |origin: &str| {
             let extension = Path::new(origin).extension().and_then(|e| e.to_str()).unwrap_or_default();
             ["gltf", "glb"].iter().any(|e| extension.eq_ignore_ascii_case(e))
         };
         let scene = self.base.parts.iter().all(|p| is_scene(&p.origin));
         if scene { Up::Y } else { Up::Z }
+    }
+
+    /// The plan as instructions, in which equal parts are known by their shapes.
+    pub(super) fn instructions(&self, assembly: &Assembly) -> Result<Instructions, CliError> {
+        let classes = equal_parts(assembly);
+        let class = |name: &String| {
+            let part = assembly.parts.iter().position(|p| p.name == *name);
+            part.map(|p| classes[p])
+                .ok_or_else(|| CliError::Refused(format!("the assembly has no part `{name}`")))
+        };
+        let classes: Vec<usize> = self.plan.parts.iter().map(class).collect::<Result<_, _>>()?;
+        Ok(Instructions::of(&self.plan, Some(&classes)))
     }
 
     /// The plan as a GLB scene.
@@ -131,7 +144,7 @@ impl Subject {
             service.blocking_graphs(id, None, &removed, termination)?;
         let graphs = graphs.ok_or_else(|| CliError::Failed("interrupted".to_owned()))?;
         let scene = PlanScene::new(&assembly, self.up(), &self.plan)?;
-        page::page(&scene, &names, &graphs)
+        page::page(&scene, &self.instructions(&assembly)?, &names, &graphs)
             .map_err(|e| CliError::Failed(format!("cannot write the scene as JSON: {e}")))
     }
 }

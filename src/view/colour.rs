@@ -1,5 +1,7 @@
 //! Colours that tell neighbours apart, also to the colour-blind.
 
+use std::collections::{HashMap, HashSet};
+
 /// Red, green and blue as on screens (sRGB).
 pub type Rgb = [u8; 3];
 
@@ -15,24 +17,34 @@ pub const PALETTE: [Rgb; 8] = [
     [0xD5, 0x5E, 0x00],
 ];
 
-/// A place in the palette for every part, greedily in the parts' order: none of its neighbours' if there is
-/// one, and of these the one of parts with the same shape, else the one that the fewest parts have.
+/// A place in the palette for every part. Equal parts (of one class) have the same; of two classes whose parts touch, one
+/// that no other of them has if there is one, the largest parts first; else one that the fewest classes have.
 #[must_use]
-pub(super) fn colours(shapes: &[usize], neighbours: &[Vec<usize>]) -> Vec<usize> {
-    let mut colours: Vec<usize> = Vec::with_capacity(shapes.len());
-    let mut used = [0usize; PALETTE.len()];
-    for (part, shape) in shapes.iter().enumerate() {
-        let mut near = [0usize; PALETTE.len()];
-        for &n in neighbours[part].iter().filter(|&&n| n < part) {
-            near[colours[n]] += 1;
-        }
-        let of_equals = |c: usize| (0..part).any(|p| shapes[p] == *shape && colours[p] == c);
+pub(super) fn colours(classes: &[usize], sizes: &[f64], neighbours: &[Vec<usize>]) -> Vec<usize> {
+    let size = |class: usize| {
+        (0..classes.len()).filter(|&p| classes[p] == class).map(|p| sizes[p]).fold(0.0, f64::max)
+    };
+    let mut order: Vec<usize> = classes.to_vec();
+    order.sort_unstable();
+    order.dedup();
+    // Stable: of classes of one size the first.
+    order.sort_by(|&a, &b| size(b).total_cmp(&size(a)));
+    let mut colours: HashMap<usize, usize> = HashMap::new();
+    for &class in &order {
+        let own = (0..classes.len()).filter(|&p| classes[p] == class);
+        let around: HashSet<usize> =
+            own.flat_map(|p| &neighbours[p]).map(|&n| classes[n]).filter(|&other| other != class).collect();
+        let count = |colour: usize, is_near: bool| {
+            let is_counted =
+                |(other, own): &(&usize, &usize)| **own == colour && (!is_near || around.contains(*other));
+            colours.iter().filter(is_counted).count()
+        };
+        let best =
+            (0..PALETTE.len()).min_by_key(|&colour| (count(colour, true), count(colour, false), colour));
         // There is always a least one: the palette is not empty.
-        let best = (0..PALETTE.len()).min_by_key(|&c| (near[c], !of_equals(c), used[c], c)).unwrap_or(0);
-        used[best] += 1;
-        colours.push(best);
+        colours.insert(class, best.unwrap_or(0));
     }
-    colours
+    classes.iter().map(|class| colours[class]).collect()
 }
 
 #[cfg(test)]
@@ -40,18 +52,23 @@ mod tests {
     use super::colours;
 
     #[test]
-    fn neighbours_differ_and_equals_agree_where_they_can() {
-        // A plate, four bolts in it, of which the last two touch each other.
-        let neighbours = [vec![1, 2, 3, 4], vec![0], vec![0], vec![0, 4], vec![0, 3]];
-        let c = colours(&[0, 1, 1, 1, 1], &neighbours);
-        assert!(neighbours.iter().enumerate().all(|(p, near)| near.iter().all(|&n| c[n] != c[p])));
-        assert!(c[1] == c[2] && c[2] == c[3] && c[4] != c[3]);
+    fn equal_parts_agree_and_neighbours_differ() {
+        // A plate, four bolts in it, of which the last two touch each other, and a pin in the plate.
+        let neighbours = [vec![1, 2, 3, 4, 5], vec![0], vec![0], vec![0, 4], vec![0, 3], vec![0]];
+        let c = colours(&[0, 1, 1, 1, 1, 2], &[9.0, 1.0, 1.0, 1.0, 1.0, 2.0], &neighbours);
+        assert!(c[1..5].iter().all(|&colour| colour == c[1]), "{c:?}");
+        assert!(c[0] != c[1] && c[5] != c[0] && c[5] != c[1], "{c:?}");
     }
 
     #[test]
-    fn more_neighbours_than_colours_share_them_evenly() {
-        let all: Vec<Vec<usize>> = (0..20).map(|p| (0..20).filter(|&q| q != p).collect()).collect();
-        let c = colours(&(0..20).collect::<Vec<_>>(), &all);
+    fn large_neighbours_differ_even_where_colours_run_out() {
+        let count = 20;
+        let all: Vec<Vec<usize>> = (0..count).map(|p| (0..count).filter(|&q| q != p).collect()).collect();
+        let sizes: Vec<f64> = (0..count).map(|p| p as f64).collect();
+        let c = colours(&(0..count).collect::<Vec<_>>(), &sizes, &all);
+        let large: std::collections::HashSet<usize> =
+            c[count - super::PALETTE.len()..].iter().copied().collect();
+        assert_eq!(large.len(), super::PALETTE.len(), "{c:?}");
         assert!((0..super::PALETTE.len()).all(|k| (2..=3).contains(&c.iter().filter(|&&x| x == k).count())));
     }
 }

@@ -34,8 +34,12 @@ struct Placed {
 /// How each part is shifted, by their boxes when assembled and who leaves whom, first to last. Parts go out along their
 /// own ways, those that leave last the least far; parts of a group along their ways out of the group, and along that of
 /// the group.
-pub(super) fn exploded_parts(boxes: &[Bounds], leaving: &[Leaving]) -> Vec<Vector3<f64>> {
-    let mut shifts = vec![Vector3::zeros(); boxes.len()];
+/// What is left begins at `shifts`.
+pub(super) fn exploded_parts(
+    boxes: &[Bounds],
+    mut shifts: Vec<Vector3<f64>>,
+    leaving: &[Leaving],
+) -> Vec<Vector3<f64>> {
     // Of each body, the parts that have their places; at first those that never leave it.
     let mut placed: HashMap<Option<usize>, Vec<usize>> = HashMap::from([(None, (0..boxes.len()).collect())]);
     placed.extend(leaving.iter().map(|l| (Some(l.number), l.parts.clone())));
@@ -54,6 +58,31 @@ pub(super) fn exploded_parts(boxes: &[Bounds], leaving: &[Leaving]) -> Vec<Vecto
         let shift = exploded(&shown, &around, &way_out(&assembled, &around, &centres));
         l.parts.iter().for_each(|part| shifts[*part] += shift);
         placed.entry(l.of).or_default().extend(&l.parts);
+    }
+    shifts
+}
+
+/// How far at most units are drawn away from their common centre, as a multiple of how far they are from it.
+const WIDEST: f64 = 2.0;
+/// In how many steps to there it is tried whether their boxes are apart.
+const TRIES: u32 = 20;
+
+/// How parts are shifted that nothing takes apart: away from the centre of all, as far as it takes for the boxes of the
+/// units, of which each stays together, to be apart. Units with one centre stay together.
+pub(super) fn spread(boxes: &[Bounds], units: &[Vec<usize>]) -> Vec<Vector3<f64>> {
+    let box_of = |unit: &Vec<usize>| unit.iter().fold(Bounds::EMPTY, |all, &part| all.union(&boxes[part]));
+    let own: Vec<Bounds> = units.iter().map(box_of).collect();
+    let middle = own.iter().fold(Bounds::EMPTY, |all, bounds| all.union(bounds)).centre();
+    let shift = |bounds: &Bounds, amount: f64| (bounds.centre() - middle) * amount;
+    let are_apart = |amount: &f64| {
+        let there: Vec<Bounds> = own.iter().map(|b| shifted(b, &shift(b, *amount))).collect();
+        (0..there.len()).all(|i| !there[..i].iter().any(|other| other.meets(&there[i])))
+    };
+    let mut amounts = (1..=TRIES).map(|k| WIDEST * f64::from(k) / f64::from(TRIES));
+    let amount = amounts.find(are_apart).unwrap_or(WIDEST);
+    let mut shifts = vec![Vector3::zeros(); boxes.len()];
+    for (unit, bounds) in units.iter().zip(&own) {
+        unit.iter().for_each(|&part| shifts[part] = shift(bounds, amount));
     }
     shifts
 }
@@ -140,6 +169,21 @@ mod tests {
         let shift = exploded(&cube([0.0; 3], 1.0), &around, &Vector3::z());
         assert!((shift.z - 2.35).abs() < 1e-12 && shift.xy().norm() == 0.0, "{shift}");
         assert_eq!(exploded(&cube([0.0; 3], 1.0), &around, &Vector3::zeros()), Vector3::zeros());
+    }
+
+    #[test]
+    fn what_is_left_is_drawn_apart_by_its_centres_and_groups_stay_together() {
+        let boxes = [
+            cube([0.0; 3], 2.0),
+            cube([1.5, 0.0, 0.0], 2.0),
+            cube([1.5, 0.0, 2.0], 2.0),
+            cube([9.0; 3], 1.0),
+        ];
+        let shifts = spread(&boxes, &[vec![0], vec![1, 2]]);
+        assert_eq!((shifts[1], shifts[3]), (shifts[2], Vector3::zeros()));
+        assert!(shifts[0].x < 0.0 && shifts[1].x > 0.0, "{shifts:?}");
+        assert!(!shifted(&boxes[0], &shifts[0]).meets(&shifted(&boxes[1], &shifts[1])));
+        assert_eq!(spread(&boxes, &[vec![0]])[0], Vector3::zeros());
     }
 
     #[test]

@@ -8,24 +8,33 @@
 //! middle of the part's box: that point moves on a line between waypoints of a plan, and the rotation slerps,
 //! which is what glTF does between key frames.
 
+mod arrow;
 mod colour;
 mod document;
 mod equal_parts;
 mod explode;
 pub mod glb;
+mod illustration;
+pub mod instructions;
 pub mod layout;
 mod moves;
 pub mod page;
 pub mod picture;
+mod quotient;
+mod raster;
 mod scene;
 mod shading;
+pub mod sheet;
 pub mod steps;
 mod verdict;
+mod viewpoint;
 mod words;
 
 pub use colour::{PALETTE, Rgb};
 pub use document::{kind_of, read_plan};
 pub(crate) use equal_parts::equal_parts;
+pub use illustration::{Illustration, illustrations};
+pub use instructions::{Instruction, Instructions};
 pub use scene::{DrawnPart, Keyframe, Placement, PlanScene, SceneGroup, ScenePart, SceneStep, Up};
 pub(crate) use verdict::{blockers, verdict};
 pub(crate) use words::{direction, part_word, part_words};

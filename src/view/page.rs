@@ -11,8 +11,12 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
 
+use super::illustration::{FREE, MOVING, STUCK, shots};
 use super::layout::layout;
-use super::{DrawnPart, Keyframe, PALETTE, Placement, PlanScene, SceneGroup, ScenePart, SceneStep, Up};
+use super::{
+    DrawnPart, Instructions, Keyframe, PALETTE, Placement, PlanScene, Rgb, SceneGroup, ScenePart, SceneStep,
+    Up,
+};
 use crate::blocking_graph::DirectionalGraph;
 use crate::plan::export::BlockedDocument;
 use nalgebra::Point3;
@@ -25,8 +29,13 @@ const SCRIPT: &str = include_str!("page/dist/page.js");
 ///
 /// # Errors
 /// None that is known: all keys are text.
-pub fn page(scene: &PlanScene, names: &[String], graphs: &[DirectionalGraph]) -> serde_json::Result<String> {
-    let data = serde_json::to_string(&data(scene, names, graphs))?;
+pub fn page(
+    scene: &PlanScene,
+    instructions: &Instructions,
+    names: &[String],
+    graphs: &[DirectionalGraph],
+) -> serde_json::Result<String> {
+    let data = serde_json::to_string(&data(scene, instructions, names, graphs))?;
     let title = if scene.name.is_empty() { "assembly" } else { &scene.name };
     // In this order: what a name holds is never taken for a placeholder.
     Ok(HTML
@@ -51,6 +60,8 @@ struct Data<'a> {
     verdict: Option<&'a str>,
     duration: f64,
     palette: Vec<String>,
+    colours: Colours,
+    instructions: Vec<PageInstruction<'a>>,
     meshes: Vec<PageMesh>,
     parts: Vec<PagePart<'a>>,
     steps: Vec<PageStep<'a>>,
@@ -59,6 +70,33 @@ struct Data<'a> {
     blocked: Vec<Stuck<'a>>,
     graphs: Vec<Graph>,
     bytes: String,
+}
+
+/// Colours with a meaning, as in the pictures.
+#[derive(Debug, Serialize)]
+struct Colours {
+    moving: String,
+    stuck: Vec<String>,
+    free: Vec<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct PageInstruction<'a> {
+    heading: Option<&'a str>,
+    numbers: String,
+    words: &'a str,
+    steps: &'a [usize],
+    /// Unit direction to the viewer.
+    view: [f64; 3],
+    hiding: Vec<usize>,
+    arrows: Vec<PageArrow>,
+}
+
+#[derive(Debug, Serialize)]
+struct PageArrow {
+    step: usize,
+    /// About the middle of the assembly.
+    points: Vec<[f32; 3]>,
 }
 
 #[derive(Debug, Serialize)]
@@ -99,6 +137,7 @@ struct PagePart<'a> {
 struct PageStep<'a> {
     parts: &'a [usize],
     of: Option<usize>,
+    body: &'a [usize],
     words: &'a str,
     after: &'a [usize],
     begins: f64,
@@ -122,7 +161,12 @@ struct Graph {
     edges: Vec<[usize; 2]>,
 }
 
-fn data<'a>(scene: &'a PlanScene, names: &[String], graphs: &[DirectionalGraph]) -> Data<'a> {
+fn data<'a>(
+    scene: &'a PlanScene,
+    instructions: &'a Instructions,
+    names: &[String],
+    graphs: &[DirectionalGraph],
+) -> Data<'a> {
     let middle = scene.bounds().centre();
     let mut bytes = Vec::new();
     let meshes = scene.drawn.iter().map(|m| mesh(m, &mut bytes)).collect();
@@ -138,7 +182,13 @@ fn data<'a>(scene: &'a PlanScene, names: &[String], graphs: &[DirectionalGraph])
         status: &scene.status,
         verdict: scene.verdict.as_deref(),
         duration: scene.duration(),
-        palette: PALETTE.iter().map(|[r, g, b]| format!("#{r:02x}{g:02x}{b:02x}")).collect(),
+        palette: PALETTE.iter().map(css).collect(),
+        colours: Colours {
+            moving: css(&MOVING),
+            stuck: STUCK.iter().map(css).collect(),
+            free: FREE.iter().map(css).collect(),
+        },
+        instructions: page_instructions(scene, instructions, &middle),
         meshes,
         parts,
         steps: scene.steps.iter().map(step).collect(),
@@ -148,6 +198,36 @@ fn data<'a>(scene: &'a PlanScene, names: &[String], graphs: &[DirectionalGraph])
         graphs: graphs.iter().map(|g| graph(scene, names, g)).collect(),
         bytes: STANDARD.encode(&bytes),
     }
+}
+
+fn css([r, g, b]: &Rgb) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+fn page_instructions<'a>(
+    scene: &PlanScene,
+    instructions: &'a Instructions,
+    middle: &Point3<f64>,
+) -> Vec<PageInstruction<'a>> {
+    let point = |p: &Point3<f64>| [0, 1, 2].map(|a| (p[a] - middle[a]) as f32);
+    let instructions = instructions.list.iter().zip(shots(scene, instructions));
+    let told = instructions.map(|(instruction, shot)| {
+        let arrows = shot.arrows.iter();
+        let arrow = |a: &super::arrow::Arrow| PageArrow {
+            step: a.step,
+            points: a.points.iter().map(point).collect(),
+        };
+        PageInstruction {
+            heading: instruction.heading.as_deref(),
+            numbers: instruction.numbers(),
+            words: &instruction.words,
+            steps: &instruction.steps,
+            view: shot.back.into(),
+            hiding: shot.hiding.clone(),
+            arrows: arrows.map(arrow).collect(),
+        }
+    });
+    told.collect()
 }
 
 /// Appends numbers where any may begin; where that is.
@@ -223,6 +303,7 @@ fn step(step: &SceneStep) -> PageStep<'_> {
     PageStep {
         parts: &step.parts,
         of: step.of,
+        body: &step.body,
         words: &step.words,
         after: &step.after,
         begins: step.begins,
@@ -266,7 +347,7 @@ mod tests {
     fn written(scene: &PlanScene) -> String {
         let names = ["0", "1"].map(String::from);
         let graph = DirectionalGraph { direction: Action::translations()[4], edges: vec![[0, 1]] };
-        page(scene, &names, &[graph]).unwrap()
+        page(scene, &Instructions::of(&plan(), None), &names, &[graph]).unwrap()
     }
 
     /// The scene as the page's script reads it.

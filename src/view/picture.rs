@@ -1,19 +1,24 @@
 //! Blocking graphs as pictures: DOT, for Graphviz and the like, and SVG.
 //!
 //! An arrow points from a part to one that keeps it from going in the direction, so what no arrow leaves from
-//! is free to go.
+//! is free to go. DOT has all parts and arrows. SVG is for people: equal parts that are blocked alike are one box, and
+//! arrows that follow from others are left out (`quotient.rs`).
 
 use std::fmt::Write;
 
 use super::layout::{Layout, layout};
+use super::quotient::{Quotient, quotient};
+use super::words::part_word;
 use crate::blocking_graph::DirectionalGraph;
 
 /// SVG lengths: a column, a row, a part's box, and the border of a direction's picture with its title.
-const COLUMN: f64 = 112.0;
+const COLUMN: f64 = 140.0;
 const ROW: f64 = 74.0;
-const NODE: [f64; 2] = [96.0, 28.0];
+const NODE: [f64; 2] = [124.0, 28.0];
 const BORDER: f64 = 24.0;
 const TITLE: f64 = 34.0;
+/// SVG length: a line of the legend.
+const LINE: f64 = 18.0;
 /// Longer names are cut; the whole name is in the tooltip.
 const MOST_LETTERS: usize = 13;
 
@@ -26,6 +31,8 @@ pub struct Picture<'a> {
     pub parts: &'a [String],
     /// Parts that are there, ascending.
     pub present: &'a [usize],
+    /// Of each part, its class: parts of one class are equal.
+    pub classes: &'a [usize],
     /// One graph per direction.
     pub graphs: &'a [DirectionalGraph],
 }
@@ -49,30 +56,36 @@ impl Picture<'_> {
         text
     }
 
-    /// As an SVG image, directions below each other.
+    /// One of the graphs as an SVG image.
     #[must_use]
-    pub fn svg(&self) -> String {
-        let panels: Vec<(Layout, &DirectionalGraph)> =
-            self.graphs.iter().map(|g| (self.arranged(g), g)).collect();
-        let width =
-            panels.iter().map(|(l, _)| l.columns).max().unwrap_or(0).max(4) as f64 * COLUMN + 2.0 * BORDER;
-        let (mut body, mut top) = (String::new(), 0.0);
-        for (layout, graph) in &panels {
-            let _ = writeln!(body, "<g transform=\"translate({:.1} {top:.1})\">", width / 2.0);
-            let _ = writeln!(
-                body,
-                "<text class=\"title\" x=\"{:.1}\" y=\"24\">{}</text>",
-                BORDER - width / 2.0,
-                escaped(&self.title(graph))
-            );
-            self.panel(layout, graph, &mut body);
-            body.push_str("</g>\n");
-            top += layout.rows as f64 * ROW + TITLE + BORDER;
+    pub fn svg(&self, graph: &DirectionalGraph) -> String {
+        let at = |part: usize| self.present.binary_search(&part).ok();
+        let edges: Vec<_> = graph.edges.iter().filter_map(|[p, b]| Some([at(*p)?, at(*b)?])).collect();
+        let classes: Vec<usize> = self.present.iter().map(|&part| self.classes[part]).collect();
+        let quotient = quotient(&classes, &edges);
+        let layout = layout(quotient.groups.len(), &quotient.edges);
+        let width = layout.columns.max(4) as f64 * COLUMN + 2.0 * BORDER;
+        let lines = legend(&quotient);
+        let bottom = layout.rows as f64 * ROW + TITLE + BORDER;
+        let height = bottom + lines.len() as f64 * LINE + BORDER / 2.0;
+        let mut body = format!("<g transform=\"translate({:.1} 0)\">\n", width / 2.0);
+        let _ = writeln!(
+            body,
+            "<text class=\"title\" x=\"{:.1}\" y=\"24\">{}</text>",
+            BORDER - width / 2.0,
+            escaped(&self.title(graph))
+        );
+        self.panel(&layout, &quotient, &mut body);
+        for (k, line) in lines.iter().enumerate() {
+            let (x, y) = (BORDER - width / 2.0, bottom + (k as f64 + 0.5) * LINE);
+            let _ = writeln!(body, "<text class=\"legend\" x=\"{x:.1}\" y=\"{y:.1}\">{line}</text>");
         }
+        body.push_str("</g>\n");
         format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{top:.0}\" \
-             viewBox=\"0 0 {width:.0} {top:.0}\">\n<title>Blocking graphs of {}</title>\n{STYLE}{body}</svg>\n",
-            escaped(self.name)
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
+             viewBox=\"0 0 {width:.0} {height:.0}\">\n<title>Blocking graph of {}, {}</title>\n{STYLE}{body}</svg>\n",
+            escaped(self.name),
+            graph.direction
         )
     }
 
@@ -86,49 +99,71 @@ impl Picture<'_> {
         )
     }
 
-    /// Vertices by their place in `present`.
-    fn arranged(&self, graph: &DirectionalGraph) -> Layout {
-        let at = |part: usize| self.present.binary_search(&part).ok();
-        let edges: Vec<_> = graph.edges.iter().filter_map(|[p, b]| Some([at(*p)?, at(*b)?])).collect();
-        layout(self.present.len(), &edges)
-    }
-
-    fn panel(&self, layout: &Layout, graph: &DirectionalGraph, body: &mut String) {
-        let place = |part: usize| {
-            let [x, y] = self.present.binary_search(&part).map_or([0.0; 2], |at| layout.places[at]);
+    fn panel(&self, layout: &Layout, quotient: &Quotient, body: &mut String) {
+        let place = |group: usize| {
+            let [x, y] = layout.places[group];
             [x * COLUMN, y * ROW + TITLE + NODE[1]]
         };
-        for &[part, by] in &graph.edges {
-            let mutual = graph.edges.contains(&[by, part]);
+        for &[group, by] in &quotient.edges {
+            let mutual = quotient.edges.contains(&[by, group]);
             // One line with two heads is enough.
-            if !mutual || part < by {
-                body.push_str(&arrow(place(part), place(by), mutual));
+            if !mutual || group < by {
+                body.push_str(&arrow(place(group), place(by), mutual));
             }
         }
-        for &part in self.present {
-            let is_free = !graph.edges.iter().any(|[p, _]| *p == part);
-            body.push_str(&node(place(part), &self.parts[part], is_free));
+        for (k, group) in quotient.groups.iter().enumerate() {
+            let names: Vec<&str> = group.iter().map(|&at| self.parts[self.present[at]].as_str()).collect();
+            let own = if quotient.holds_itself[k] { " ↺" } else { "" };
+            let label = match names[..] {
+                [only] => shortened(only),
+                _ => format!("{} × {}{own}", names.len(), shortened(&part_word(names[0]))),
+            };
+            body.push_str(&node(place(k), &label, &names.join(", "), !quotient.is_blocked[k]));
         }
     }
 }
 
+/// What the picture means.
+fn legend(quotient: &Quotient) -> Vec<String> {
+    let mut lines =
+        vec!["An arrow points from a part to one that blocks it. Green boxes: not blocked.".to_owned()];
+    if quotient.groups.iter().any(|group| group.len() > 1) {
+        lines.push(
+            "n × name: equal parts that are blocked alike, each by at least one of the box its arrow"
+                .to_owned(),
+        );
+        lines.push(
+            "points to (↺: also by one another). Rest the pointer on a box to read all names.".to_owned(),
+        );
+    }
+    if quotient.left_out > 0 {
+        let arrows = if quotient.left_out == 1 {
+            "1 arrow".to_owned()
+        } else {
+            format!("{} arrows", quotient.left_out)
+        };
+        lines.push(format!("Left out: {arrows} to boxes that other arrows lead to by way of further boxes."));
+    }
+    lines
+}
+
 const STYLE: &str = "<defs><marker id=\"head\" viewBox=\"0 0 10 10\" refX=\"9\" refY=\"5\" markerWidth=\"9\" \
 markerHeight=\"9\" markerUnits=\"userSpaceOnUse\" orient=\"auto-start-reverse\"><path d=\"M0 0L10 5L0 10z\" fill=\"#556\"/></marker></defs>\n\
-<style>svg{background:#fff;font:12px sans-serif}.title{font-size:16px;font-weight:600}\
+<style>svg{background:#fff;font:12px sans-serif}.title{font-size:16px;font-weight:600}.legend{fill:#4a5668}\
 path.edge{fill:none;stroke:#556;stroke-width:1.2}rect{fill:#eef1f6;stroke:#556}\
 .free rect{fill:#d3f0e4;stroke:#00694c;stroke-width:2}g.node text{text-anchor:middle}</style>\n";
 
-fn node([x, y]: [f64; 2], name: &str, is_free: bool) -> String {
+fn node([x, y]: [f64; 2], label: &str, names: &str, is_free: bool) -> String {
     let [w, h] = NODE;
     let class = if is_free { "node free" } else { "node" };
     format!(
         "<g class=\"{class}\"><title>{}</title><rect x=\"{:.1}\" y=\"{:.1}\" width=\"{w}\" height=\"{h}\" rx=\"6\"/>\
          <text x=\"{x:.1}\" y=\"{:.1}\">{}</text></g>\n",
-        escaped(name),
+        escaped(names),
         x - w / 2.0,
         y - h / 2.0,
         y + 4.0,
-        escaped(&shortened(name)),
+        escaped(label),
     )
 }
 
@@ -198,7 +233,13 @@ mod tests {
             DirectionalGraph { direction: directions[4], edges: vec![[0, 1], [0, 2]] },
             DirectionalGraph { direction: directions[0], edges: vec![[0, 1], [1, 0]] },
         ];
-        see(&Picture { name: "pair", parts: &parts, present: &[0, 1, 2], graphs: &graphs })
+        see(&Picture {
+            name: "pair",
+            parts: &parts,
+            present: &[0, 1, 2],
+            classes: &[0, 1, 2],
+            graphs: &graphs,
+        })
     }
 
     #[test]
@@ -217,11 +258,36 @@ mod tests {
 
     #[test]
     fn svg_draws_parts_and_arrows_once() {
-        let svg = with_picture(|p| p.svg());
-        assert_eq!((svg.matches("<rect").count(), svg.matches("class=\"edge\"").count()), (6, 3));
-        assert_eq!(svg.matches("marker-start").count(), 1, "what blocks each other has one line");
-        assert_eq!(svg.matches("node free").count(), 2 + 1);
-        assert!(svg.contains("bolt &quot;M8&quot; &lt;1&gt;") && svg.contains(">a-name-that-…<"), "{svg}");
-        assert_eq!((svg.matches("<g").count(), svg.matches("NaN").count()), (svg.matches("</g>").count(), 0));
+        let [up, right] = with_picture(|p| [p.svg(&p.graphs[0]), p.svg(&p.graphs[1])]);
+        let count = |svg: &str, what: &str| svg.matches(what).count();
+        assert_eq!(
+            [&up, &right].map(|svg| (count(svg, "<rect"), count(svg, "class=\"edge\""))),
+            [(3, 2), (3, 1)]
+        );
+        assert_eq!(count(&right, "marker-start"), 1, "what blocks each other has one line");
+        assert_eq!([&up, &right].map(|svg| count(svg, "node free")), [2, 1]);
+        assert!(up.contains("bolt &quot;M8&quot; &lt;1&gt;") && up.contains(">a-name-that-…<"), "{up}");
+        assert_eq!((count(&up, "<g"), count(&up, "NaN")), (count(&up, "</g>"), 0));
+    }
+
+    #[test]
+    fn equal_parts_are_one_box_and_the_legend_says_so() {
+        let parts = ["plate", "bolt-1", "bolt-2", "washer-1", "washer-2"].map(String::from);
+        let edges = vec![[0, 1], [0, 2], [0, 3], [0, 4], [3, 1], [4, 2]];
+        let graphs = [DirectionalGraph { direction: Action::translations()[4], edges }];
+        let picture = Picture {
+            name: "plate",
+            parts: &parts,
+            present: &[0, 1, 2, 3, 4],
+            classes: &[0, 1, 1, 3, 3],
+            graphs: &graphs,
+        };
+        let svg = picture.svg(&graphs[0]);
+        assert_eq!((svg.matches("<rect").count(), svg.matches("class=\"edge\"").count()), (3, 2));
+        for words in
+            [">2 × bolt-1<", "<title>washer-1, washer-2</title>", "Left out: 1 arrow ", "blocked alike"]
+        {
+            assert!(svg.contains(words), "{words}: {svg}");
+        }
     }
 }

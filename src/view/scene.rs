@@ -6,14 +6,15 @@ use serde::Serialize;
 
 use super::colour::colours;
 use super::document::kind_of;
-use super::explode::{Leaving, exploded_parts};
+use super::equal_parts::equal_parts;
+use super::explode::{Leaving, exploded_parts, spread};
 use super::shading::{Shaded, shaded};
 use super::verdict::verdict;
 use super::words::{Words, free_together, kept_together, required};
 use super::{PALETTE, Rgb, ViewError};
 use crate::geometry::{Assembly, Bounds, Pose, interpolate, pose_from_waypoint};
 use crate::plan::export::{BlockedDocument, PlanDocument};
-use crate::plan::{Placements, PlanKind, StepEnd, StepFrame};
+use crate::plan::{Placements, PlanKind, PlanStatus, StepEnd, StepFrame};
 
 /// Boxes closer than this share of the longest side count as touching.
 const TOUCHING: f64 = 1e-6;
@@ -23,12 +24,12 @@ const SAME_MIDDLE: f64 = 1e-9;
 /// along an arc, which key frames cut short.
 const ARC_ERROR: f64 = 1e-3;
 /// Seconds that a part takes to move by the assembly's longest side, and to turn once.
-const PER_LENGTH: f64 = 1.6;
-const PER_TURN: f64 = 0.6;
-/// Seconds of a step, at least and at most; and between two steps.
-const SHORTEST: f64 = 0.6;
+const PER_LENGTH: f64 = 2.2;
+const PER_TURN: f64 = 0.9;
+/// Seconds of a step, at least and at most; and between two steps, in which the page lets what is out fade.
+const SHORTEST: f64 = 1.0;
 const LONGEST: f64 = 8.0;
-const PAUSE: f64 = 0.15;
+const PAUSE: f64 = 0.4;
 
 /// Where a node frame stands in the input's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,6 +85,25 @@ pub struct ScenePart {
     pub exploded: Vector3<f64>,
 }
 
+impl ScenePart {
+    /// Where it is at a time.
+    #[must_use]
+    pub fn placement(&self, time: f64) -> Placement {
+        let next = self.keys.partition_point(|key| key.time <= time);
+        match (next.checked_sub(1).map(|i| self.keys[i]), self.keys.get(next)) {
+            (None, _) => self.start,
+            (Some(last), None) => last.placement,
+            (Some(a), Some(b)) => {
+                let u = (time - a.time) / (b.time - a.time);
+                let centre = a.placement.centre + (b.placement.centre - a.placement.centre) * u;
+                // Half turns have no short way: either is right.
+                let turned = a.placement.rotation.try_slerp(&b.placement.rotation, u, 1e-9);
+                Placement { centre, rotation: turned.unwrap_or(b.placement.rotation) }
+            }
+        }
+    }
+}
+
 /// Where a part is at a moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Keyframe {
@@ -104,6 +124,11 @@ pub struct SceneStep {
     pub begins: f64,
     /// When it is over, in seconds.
     pub ends: f64,
+    /// Whether its parts only go aside: they leave no body, and get into none.
+    pub is_aside: bool,
+    /// The parts of the body that they leave, as long as they are in it; of an assembly plan, of that which they get into.
+    /// Those that move are among them, those that left before are not.
+    pub body: Vec<usize>,
     /// Other parts that must have moved before.
     pub after: Vec<usize>,
     /// The step in words.
@@ -171,7 +196,8 @@ impl PlanScene {
         let mut parts: Vec<ScenePart> = stage.present.clone().iter().map(|&part| stage.part(part)).collect();
         let (steps, leaving) = stage.steps(&placements, &mut parts);
         let boxes: Vec<Bounds> = parts.iter().map(|p| p.bounds).collect();
-        for (part, shift) in parts.iter_mut().zip(exploded_parts(&boxes, &leaving)) {
+        let units = units_left(plan, &parts);
+        for (part, shift) in parts.iter_mut().zip(exploded_parts(&boxes, spread(&boxes, &units), &leaving)) {
             part.exploded = shift;
         }
         let group = |names: &[String], words: String| {
@@ -191,10 +217,10 @@ impl PlanScene {
             free_together: free,
             blocked: plan.blocked.clone(),
             steps,
-            drawn: stage.drawn,
+            drawn: std::mem::take(&mut stage.drawn),
             parts,
         };
-        scene.colour();
+        scene.colour(&stage.classes());
         Ok(scene)
     }
 
@@ -210,13 +236,21 @@ impl PlanScene {
         self.parts.iter().fold(Bounds::EMPTY, |b, p| b.union(&p.bounds))
     }
 
+    /// The box of a part at a place.
+    pub(super) fn bounds_at(&self, part: usize, at: &Placement) -> Bounds {
+        let vertices = self.drawn[self.parts[part].drawn].positions.iter();
+        let place = |p: &[f32; 3]| at.centre + at.rotation * Vector3::from(p.map(f64::from));
+        vertices.fold(Bounds::EMPTY, |bounds, p| bounds.with_point(&place(p)))
+    }
+
     /// The colour of a part.
     #[must_use]
     pub fn rgb(&self, part: usize) -> Rgb {
         PALETTE[self.parts[part].colour]
     }
 
-    fn colour(&mut self) {
+    /// `classes`: one per part, the same for equal parts.
+    fn colour(&mut self, classes: &[usize]) {
         let near = self.bounds().extents().max() * TOUCHING;
         let meets = |a: &ScenePart, b: &ScenePart| a.bounds.grown(near).meets(&b.bounds);
         let neighbours: Vec<Vec<usize>> = (0..self.parts.len())
@@ -224,11 +258,29 @@ impl PlanScene {
                 (0..self.parts.len()).filter(|&q| q != p && meets(&self.parts[p], &self.parts[q])).collect()
             })
             .collect();
-        let shapes: Vec<usize> = self.parts.iter().map(|p| p.drawn).collect();
-        for (part, colour) in self.parts.iter_mut().zip(colours(&shapes, &neighbours)) {
+        let sizes: Vec<f64> = self.parts.iter().map(|p| p.bounds.extents().norm()).collect();
+        for (part, colour) in self.parts.iter_mut().zip(colours(classes, &sizes, &neighbours)) {
             part.colour = colour;
         }
     }
+}
+
+/// What is drawn apart although no step takes it apart: of a plan that is not complete, the parts that are left, and the
+/// groups among them that can begin to move together.
+fn units_left(plan: &PlanDocument, parts: &[ScenePart]) -> Vec<Vec<usize>> {
+    if plan.status == PlanStatus::Complete.name() {
+        return Vec::new();
+    }
+    let group = |part: usize| plan.free_together.iter().position(|g| g.parts.contains(&parts[part].name));
+    let mut units: Vec<(Option<usize>, Vec<usize>)> = Vec::new();
+    for part in (0..parts.len()).filter(|&part| parts[part].crosses.is_none()) {
+        let own = group(part);
+        match units.iter_mut().find(|(other, _)| own.is_some() && *other == own) {
+            Some((_, unit)) => unit.push(part),
+            None => units.push((own, vec![part])),
+        }
+    }
+    units.into_iter().map(|(_, unit)| unit).collect()
 }
 
 fn check_parts(assembly: &Assembly, plan: &PlanDocument) -> Result<(), ViewError> {
@@ -258,6 +310,12 @@ impl<'a> SceneBuilder<'a> {
         let is_there = |i: &usize| !plan.initial.removed.contains(&assembly.parts[*i].name);
         let present = (0..assembly.parts.len()).filter(is_there).collect();
         Self { assembly, plan, present, drawn: Vec::new(), origins: Vec::new() }
+    }
+
+    /// Of each part that is there, its class: equal parts are of one.
+    fn classes(&self) -> Vec<usize> {
+        let all = equal_parts(self.assembly);
+        self.present.iter().map(|&part| all[part]).collect()
     }
 
     /// Index in the scene of a named part, if it is there.
@@ -367,6 +425,8 @@ impl<'a> SceneBuilder<'a> {
                 of: step.of,
                 begins: clock,
                 ends: course.ends,
+                is_aside: frame.ends == StepEnd::Aside,
+                body: Vec::new(),
                 after: after.collect(),
                 words: words.step(number),
             });
@@ -375,6 +435,8 @@ impl<'a> SceneBuilder<'a> {
         if kind == PlanKind::Assembly {
             leaving.reverse();
         }
+        let bodies: Vec<Vec<usize>> = (0..steps.len()).map(|step| body(step, kind, &steps, parts)).collect();
+        steps.iter_mut().zip(bodies).for_each(|(step, body)| step.body = body);
         for (place, part) in parts.iter_mut().enumerate() {
             part.handled = handled(place, &part.steps, &steps, &leaving);
         }
@@ -457,6 +519,32 @@ fn pieces(angle: f64, lever: f64, size: f64) -> usize {
     (angle / widest).ceil().clamp(1.0, MOST) as usize
 }
 
+/// The parts of the body that a step is about, ascending.
+fn body(number: usize, kind: PlanKind, steps: &[SceneStep], parts: &[ScenePart]) -> Vec<usize> {
+    let step = &steps[number];
+    let moves = |other: &SceneStep, part: usize| {
+        other.of == step.of && !other.is_aside && other.parts.contains(&part)
+    };
+    // Those that left before, or get in later.
+    let others = match kind {
+        PlanKind::Disassembly => &steps[..number],
+        PlanKind::Assembly => &steps[number + 1..],
+    };
+    let belongs = |part: &usize| match step.of {
+        Some(group) => steps[group].parts.contains(part),
+        // What an assembly plan cannot put in waits elsewhere.
+        None => {
+            kind == PlanKind::Disassembly
+                || parts[*part].stays
+                || steps.iter().any(|other| moves(other, *part))
+        }
+    };
+    let is_there = |part: &usize| {
+        step.parts.contains(part) || (belongs(part) && !others.iter().any(|other| moves(other, *part)))
+    };
+    (0..parts.len()).filter(is_there).collect()
+}
+
 /// From when to when something is done to a part that some steps move, or to the group that it belongs to in the end
 /// (of an assembly plan: at first).
 fn handled(place: usize, own: &[usize], steps: &[SceneStep], leaving: &[Leaving]) -> Option<[f64; 2]> {
@@ -522,19 +610,8 @@ mod tests {
         PlanScene::new(&assembly(), Up::Z, plan).unwrap()
     }
 
-    /// Where a part is at a time, as whatever plays the scene has it.
     fn at(scene: &PlanScene, part: usize, time: f64) -> Placement {
-        let ScenePart { keys, start, .. } = &scene.parts[part];
-        let next = keys.partition_point(|key| key.time <= time);
-        match (next.checked_sub(1).map(|i| keys[i]), keys.get(next)) {
-            (None, _) => *start,
-            (Some(last), None) => last.placement,
-            (Some(a), Some(b)) => {
-                let u = (time - a.time) / (b.time - a.time);
-                let centre = a.placement.centre + (b.placement.centre - a.placement.centre) * u;
-                Placement { centre, rotation: a.placement.rotation.slerp(&b.placement.rotation, u) }
-            }
-        }
+        scene.parts[part].placement(time)
     }
 
     fn assert_at(scene: &PlanScene, part: usize, time: f64, centre: [f64; 3], tolerance: f64) {
@@ -577,6 +654,20 @@ mod tests {
             let expected = quarter * scene.parts[part].assembled.rotation;
             assert!(at(&scene, part, ends).rotation.angle_to(&expected) < 1e-9);
         }
+    }
+
+    #[test]
+    fn parts_are_in_a_body_until_they_leave_it() {
+        let bodies =
+            |plan: &PlanDocument| scene(plan).steps.iter().map(|s| s.body.clone()).collect::<Vec<_>>();
+        assert_eq!(bodies(&group()), [vec![0, 1, 2], vec![1, 2], vec![1, 2]]);
+        assert_eq!(bodies(&reversed(group())), [vec![1, 2], vec![1, 2], vec![0, 1, 2]]);
+        let mut one_by_one = group();
+        one_by_one.steps.truncate(1);
+        one_by_one.steps[0].parts = vec!["2".into()];
+        one_by_one.steps.push(StepDocument { parts: vec!["1".into()], ..one_by_one.steps[0].clone() });
+        assert_eq!(bodies(&one_by_one), [vec![0, 1, 2], vec![0, 1]]);
+        assert_eq!(bodies(&reversed(one_by_one)), [vec![0, 1], vec![0, 1, 2]]);
     }
 
     #[test]

@@ -2,189 +2,51 @@
 
 use std::fmt::Write;
 
-use super::document::kind_of;
-use super::verdict::{blockers, verdict};
-use super::words::{Moved, Words, capital, free_together, kept_together, part_words, required, told_names};
-use crate::plan::PlanKind;
-use crate::plan::export::{GroupDocument, PlanDocument, StepDocument};
+use super::instructions::Instructions;
 
-/// The instructions. Steps in a row that do the same with equal parts are told as one. Parts are equal if they
-/// are of one `class` (one per part of the plan); without classes, if their names
-/// differ in a number only.
+/// The instructions as Markdown.
 #[must_use]
-pub fn markdown(plan: &PlanDocument, classes: Option<&[usize]>) -> String {
-    let account = StepAccount { plan, classes, words: Words::of(plan) };
-    let mut text = account.headline();
-    let runs = account.runs();
-    let headings = account.headings(&runs);
-    for (run, heading) in runs.iter().zip(headings) {
-        text.push_str(&heading);
-        text.push_str(&account.run(run));
+pub fn markdown(instructions: &Instructions) -> String {
+    let Instructions { title, verdict, gone, list, rest, stuck, left_out } = instructions;
+    let mut text = format!("# {title}\n\n");
+    if let Some((mark, why)) = verdict.as_deref().and_then(|verdict| verdict.split_once(". ")) {
+        let _ = writeln!(text, "**{mark}.** {why}\n");
     }
-    text.push_str(&account.rest());
+    if let Some(gone) = gone {
+        let _ = writeln!(text, "{gone}\n");
+    }
+    for instruction in list {
+        if let Some(heading) = &instruction.heading {
+            let _ = writeln!(text, "## {heading}\n");
+        }
+        let _ = writeln!(text, "**{}.** {}.\n", instruction.numbers(), instruction.words);
+    }
+    for sentence in rest {
+        let _ = writeln!(text, "{sentence}\n");
+    }
+    if !stuck.is_empty() {
+        text.push_str("## What is stuck\n\n");
+    }
+    for line in stuck {
+        let _ = writeln!(text, "- {line}");
+    }
+    if let Some(left_out) = left_out {
+        let _ = writeln!(text, "\n{left_out}");
+    }
     text
-}
-
-/// The name without the number at its end: what `bolt-1` and `bolt-12` have in common.
-fn stem(name: &str) -> &str {
-    name.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches(['-', '_', ' ', '.', '#'])
-}
-
-struct StepAccount<'a> {
-    plan: &'a PlanDocument,
-    classes: Option<&'a [usize]>,
-    words: Words<'a>,
-}
-
-impl StepAccount<'_> {
-    fn headline(&self) -> String {
-        let steps = self.plan.steps.len();
-        let count = if steps == 1 { "1 step".to_owned() } else { format!("{steps} steps") };
-        let what = match kind_of(self.plan) {
-            PlanKind::Disassembly => "Taking apart",
-            PlanKind::Assembly => "Putting together",
-        };
-        let mut text = format!("# {what}: {count}\n\n");
-        if let Some(verdict) = verdict(self.plan) {
-            let _ = writeln!(text, "**Not complete ({}).** {verdict}\n", self.plan.status);
-        }
-        let gone = &self.plan.initial.removed;
-        if !gone.is_empty() {
-            let _ = writeln!(text, "Gone before: {}.\n", part_words(gone, ", "));
-        }
-        text
-    }
-
-    fn is_equal(&self, a: &str, b: &str) -> bool {
-        let class = |name: &str| {
-            let at = self.plan.parts.iter().position(|p| p == name)?;
-            self.classes?.get(at)
-        };
-        match (class(a), class(b)) {
-            (Some(a), Some(b)) => a == b,
-            _ => !stem(a).is_empty() && stem(a) == stem(b),
-        }
-    }
-
-    /// Runs of steps that become one instruction: each moves a single part, all out of the same body.
-    fn runs(&self) -> Vec<Vec<usize>> {
-        let mut runs: Vec<Vec<usize>> = Vec::new();
-        for (i, step) in self.plan.steps.iter().enumerate() {
-            let joins = |run: &&mut Vec<usize>| {
-                let first = &self.plan.steps[run[0]];
-                let ([a], [b]) = (&first.parts[..], &step.parts[..]) else { return false };
-                self.is_equal(a, b)
-                    && self.group(first) == self.group(step)
-                    && run.iter().all(|&other| self.words.is_alike(other, i))
-                    && !run.iter().any(|g| step.requires.contains(g))
-            };
-            match runs.last_mut().filter(joins) {
-                Some(run) => run.push(i),
-                None => runs.push(vec![i]),
-            }
-        }
-        runs
-    }
-
-    /// The innermost group that has all parts of a step.
-    fn group(&self, step: &StepDocument) -> Option<&str> {
-        let holds = |group: &&GroupDocument| step.parts.iter().all(|part| group.parts.contains(part));
-        let innermost = self.plan.groups.iter().filter(holds).min_by_key(|group| group.parts.len());
-        innermost.map(|group| group.name.as_str())
-    }
-
-    /// A heading before each run that is of another group than the one before; none at all if groups alternate, for
-    /// headings of single instructions only tear them apart.
-    fn headings(&self, runs: &[Vec<usize>]) -> Vec<String> {
-        let groups: Vec<Option<&str>> = runs.iter().map(|run| self.group(&self.plan.steps[run[0]])).collect();
-        let is_new = |i: usize| if i == 0 { groups[i].is_some() } else { groups[i] != groups[i - 1] };
-        let changes = (0..runs.len()).filter(|&i| is_new(i)).count();
-        let heading = |i: usize| match groups[i] {
-            _ if 2 * changes > runs.len() || !is_new(i) => String::new(),
-            Some(name) => format!("## {name}\n\n"),
-            None => "## Other parts\n\n".to_owned(),
-        };
-        (0..runs.len()).map(heading).collect()
-    }
-
-    fn run(&self, run: &[usize]) -> String {
-        let first = run[0];
-        let after = self.after(run);
-        if let [only] = run {
-            return format!("**{}.** {}{after}.\n\n", first + 1, self.words.step(*only));
-        }
-        let names: Vec<&str> =
-            run.iter().flat_map(|&i| &self.plan.steps[i].parts).map(String::as_str).collect();
-        let what = format!("{} × {}", names.len(), common_name(&names));
-        let (told, list) = (self.words.done(run, &Moved::one(&what)), part_words(&names, ", "));
-        // One by one: of several "it" would be wrong.
-        let told = told
-            .replace("nothing holds it", "nothing holds them")
-            .replace("in its place: it touches", "in place: they touch");
-        format!("**{}–{}.** {told}, one by one: {list}{after}.\n\n", first + 1, first + run.len())
-    }
-
-    /// The parts that the steps of a run require to have moved before.
-    fn after(&self, run: &[usize]) -> String {
-        let mut names: Vec<&str> = Vec::new();
-        for name in run.iter().flat_map(|&i| required(self.plan, i)) {
-            if !names.contains(&name) {
-                names.push(name);
-            }
-        }
-        if names.is_empty() {
-            return String::new();
-        }
-        let parts = run.iter().map(|&i| self.plan.steps[i].parts.len()).sum();
-        let verb = match (kind_of(self.plan), parts) {
-            (PlanKind::Disassembly, _) => "after",
-            (PlanKind::Assembly, 1) => "goes in after",
-            (PlanKind::Assembly, _) => "go in after",
-        };
-        format!(", {verb} {}", told_names(&names, ", "))
-    }
-
-    /// What stays, and what keeps it.
-    fn rest(&self) -> String {
-        let plan = self.plan;
-        let mut text = String::new();
-        let stays = match kind_of(plan) {
-            PlanKind::Disassembly => "Stays",
-            PlanKind::Assembly => "Stands from the start",
-        };
-        if !plan.remaining.is_empty() {
-            let _ = writeln!(text, "{stays}: {}.\n", part_words(&plan.remaining, ", "));
-        }
-        for group in &plan.kept_together {
-            let _ = writeln!(text, "{}.\n", kept_together(group));
-        }
-        for group in &plan.free_together {
-            let _ = writeln!(text, "{}.\n", free_together(group));
-        }
-        let (blockers, left_out) = blockers(plan, false);
-        if !blockers.is_empty() {
-            text.push_str("## What is stuck\n\n");
-        }
-        for line in blockers {
-            let _ = writeln!(text, "- {line}");
-        }
-        if let Some(left_out) = left_out {
-            let _ = writeln!(text, "\n{}: the plan's JSON has them.", capital(&left_out));
-        }
-        text
-    }
-}
-
-fn common_name<'a>(names: &[&'a str]) -> &'a str {
-    let first = stem(names.first().unwrap_or(&""));
-    if !first.is_empty() && names.iter().all(|n| stem(n) == first) { first } else { "equal parts" }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::document::tests::{plan, step};
     use super::*;
-    use crate::plan::export::{BlockedDocument, FreeGroupDocument};
+    use crate::plan::export::{
+        BlockedDocument, FreeGroupDocument, GroupDocument, PlanDocument, StepDocument,
+    };
+
+    fn markdown(plan: &PlanDocument, classes: Option<&[usize]>) -> String {
+        super::markdown(&Instructions::of(plan, classes))
+    }
 
     fn lifted(part: &str, by: f64, requires: &[usize]) -> StepDocument {
         let mut step = step(part, &[[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, by, 1.0, 0.0, 0.0, 0.0]]);

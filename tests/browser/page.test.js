@@ -63,13 +63,18 @@ test("steps go on and back, by buttons, keys and the list", () =>
     assert.equal(await time(page), ends[1]);
     await page.locator("#previous").click();
     assert.equal(await time(page), ends[0]);
+    const instructions = await page.evaluate(() => window.sbdp.scene.instructions);
+    assert.equal(await page.locator("#steps button").count(), instructions.length, "a row per instruction");
+    assert.ok(instructions.length < ends.length, "equal steps share a row");
     await page.locator("#steps button").nth(1).click();
-    await page.waitForFunction((end) => window.sbdp.player.time === end && !window.sbdp.player.playing, ends[1]);
+    await page.evaluate(() => window.sbdp.player.setSpeed(20));
+    const last = ends[instructions[1].steps.at(-1)];
+    await page.waitForFunction((end) => window.sbdp.player.time === end && !window.sbdp.player.playing, last);
     await page.keyboard.press("Home");
     assert.equal(await time(page), 0);
     assert.match(await page.locator("#now").textContent(), /^Step 1 of/);
-    const after = await page.evaluate(() => window.sbdp.scene.steps.some((s) => s.after.length > 0));
-    assert.equal((await page.locator("#steps .after").count()) > 0, after);
+    const rows = await page.locator("#steps button").allTextContents();
+    assert.deepEqual(rows, instructions.map((i) => i.numbers + i.words));
   }));
 
 test("it explodes and comes together again", () =>
@@ -148,6 +153,156 @@ test("the view goes around by drag and by keys, and comes back", () =>
     await page.keyboard.press("+");
     assert.ok(distance(await camera()) < distance(places[3]));
   }));
+
+/** Of each part its colour, its opacity as drawn, and whether it is seen. */
+const looks = (page) =>
+  page.evaluate(() => {
+    const { stage } = window.sbdp;
+    stage.invalidate();
+    stage.draw();
+    return stage.bodies.map((b) => ({
+      colour: `#${b.material.color.getHexString()}`,
+      opacity: b.group.visible ? b.opacity : 0,
+    }));
+  });
+
+test("of each step the moving parts are in one colour with an arrow, and what left before is gone", () =>
+  visited(complete, async (page) => {
+    const { steps, colours } = await page.evaluate(() => window.sbdp.scene);
+    const gone = new Set();
+    for (const [i, step] of steps.entries()) {
+      await page.evaluate((time) => window.sbdp.player.seek(time), (step.begins + step.ends) / 2);
+      const all = await looks(page);
+      all.forEach(({ colour, opacity }, part) => {
+        assert.equal(colour === colours.moving, step.parts.includes(part), `part ${part} at step ${i}`);
+        assert.equal(opacity === 0, gone.has(part), `part ${part} at step ${i}`);
+      });
+      const arrows = await page.evaluate(() => [...window.sbdp.stage.arrows].filter(([, a]) => a.visible).map(([s]) => s));
+      assert.deepEqual(arrows, [i]);
+      step.parts.forEach((part) => gone.add(part));
+    }
+  }));
+
+test("what hides the moving parts is see-through by itself", () =>
+  visited(complete, async (page) => {
+    const instructions = await page.evaluate(() => window.sbdp.scene.instructions);
+    const hidden = instructions.find((i) => i.hiding.length > 0);
+    assert.ok(hidden, "nothing hides anything here");
+    await page.evaluate((step) => window.sbdp.player.seek(window.sbdp.scene.steps[step].begins), hidden.steps[0]);
+    const all = await looks(page);
+    assert.ok(hidden.hiding.every((part) => all[part].opacity < 0.5));
+    await page.evaluate((part) => window.sbdp.selection.pick(part), hidden.hiding[0]);
+    assert.ok((await looks(page)).every(({ opacity }) => opacity === 0 || opacity === 1), "who points decides");
+  }));
+
+test("the camera goes to the side of the instruction, unless it is told not to", () =>
+  visited(complete, async (page) => {
+    const instructions = await page.evaluate(() => window.sbdp.scene.instructions);
+    const angle = (view) =>
+      page.evaluate((view) => {
+        const { camera, controls } = window.sbdp.stage;
+        const back = camera.position.clone().sub(controls.target).normalize();
+        return Math.acos(Math.min(1, back.x * view[0] + back.y * view[1] + back.z * view[2]));
+      }, view);
+    const other = instructions.find((i) => i.view.join() !== instructions[0].view.join());
+    assert.ok(other, "all instructions are seen from one side");
+    const go = ({ steps }) => page.evaluate((step) => window.sbdp.player.seek(window.sbdp.scene.steps[step].begins), steps[0]);
+    await go(other);
+    await page.waitForFunction(() => !window.sbdp.stage.swing);
+    assert.ok((await angle(other.view)) < 0.02);
+    await page.getByRole("button", { name: "Follow" }).click();
+    await go(instructions[0]);
+    await page.waitForTimeout(200);
+    assert.ok((await angle(other.view)) < 0.02, "it stays");
+  }));
+
+test("names are at the moving parts, at the pointer, and everywhere if wanted", () =>
+  visited(complete, async (page) => {
+    const { parts, steps } = await page.evaluate(() => window.sbdp.scene);
+    const shown = () => page.locator("#labels .label:not(.hover):not([hidden])").allTextContents();
+    assert.deepEqual(await shown(), steps[0].parts.map((p) => parts[p].name));
+    await page.getByRole("button", { name: "Names" }).click();
+    await page.waitForFunction((n) => document.querySelectorAll("#labels .label:not(.hover):not([hidden])").length === n, parts.length);
+    const box = await page.locator("canvas").boundingBox();
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    const under = await page.evaluate(([x, y]) => window.sbdp.stage.pick(x, y), [box.x + box.width / 2, box.y + box.height / 2]);
+    assert.equal(await page.locator(".label.hover").textContent(), parts[under].name);
+  }));
+
+test("it is dark where the system is, and the button changes that", () =>
+  visited(
+    complete,
+    async (page) => {
+      const ground = async () => [...(await pixels(page)).subarray(0, 3)];
+      const dark = await ground();
+      assert.ok(dark.every((c) => c < 60), `${dark}`);
+      await page.getByRole("button", { name: "Dark" }).click();
+      const light = await ground();
+      assert.ok(light.every((c) => c > 200), `${light}`);
+    },
+    { colorScheme: "dark" },
+  ));
+
+test("a sheet with a picture per instruction is printed", () =>
+  visited(complete, async (page) => {
+    const before = await page.evaluate(() => window.sbdp.stage.camera.position.toArray());
+    await page.evaluate(() => window.dispatchEvent(new Event("beforeprint")));
+    const sources = await page.locator("#sheet img").evaluateAll((all) => all.map((e) => e.src));
+    const count = await page.evaluate(() => window.sbdp.scene.instructions.length);
+    assert.equal(new Set(sources).size, count);
+    await page.emulateMedia({ media: "print" });
+    assert.ok(await page.locator("#sheet").isVisible());
+    assert.ok(!(await page.locator("main").isVisible()));
+    await page.evaluate(() => window.dispatchEvent(new Event("afterprint")));
+    assert.equal(await page.locator("#sheet img").count(), 0);
+    const after = await page.evaluate(() => window.sbdp.stage.camera.position.toArray());
+    assert.ok(before.every((x, i) => Math.abs(x - after[i]) < 1e-6 * Math.hypot(...before)), `${before} ${after}`);
+  }));
+
+test("what is stuck has colours of its own and is drawn apart by its centres", () =>
+  visited(infeasible, async (page) => {
+    const { colours, blocked } = await page.evaluate(() => window.sbdp.scene);
+    const stuck = [...new Set(blocked.map((b) => b.part))];
+    const all = await looks(page);
+    assert.ok(stuck.every((part) => colours.stuck.includes(all[part].colour)), JSON.stringify(all));
+    assert.ok(new Set(stuck.map((part) => all[part].colour)).size > 1, "two that hold each other are told apart");
+    const distance = () =>
+      page.evaluate(([a, b]) => window.sbdp.stage.bodies[a].group.position.distanceTo(window.sbdp.stage.bodies[b].group.position), stuck);
+    const together = await distance();
+    await page.getByLabel("Explode").fill("1");
+    await looks(page);
+    assert.ok((await distance()) > together * 1.2);
+  }));
+
+test("groups that can begin to move have one colour each", () =>
+  visited(join(folder, "kept.html"), async (page) => {
+    const { colours, free_together, duration } = await page.evaluate(() => window.sbdp.scene);
+    await page.evaluate((time) => window.sbdp.player.seek(time), duration);
+    await page.evaluate(() => window.sbdp.player.seek(window.sbdp.scene.duration));
+    const all = await looks(page);
+    free_together.forEach(({ parts }, k) => {
+      assert.ok(parts.every((part) => all[part].colour === colours.free[k % colours.free.length]), JSON.stringify(all));
+    });
+  }));
+
+for (const [what, viewport] of [["upright", { width: 390, height: 844 }], ["on its side", { width: 844, height: 390 }]]) {
+  test(`it fits a phone ${what}`, () =>
+    visited(
+      complete,
+      async (page) => {
+        const overflow = await page.evaluate(() => [
+          document.documentElement.scrollWidth - window.innerWidth,
+          document.documentElement.scrollHeight - window.innerHeight,
+        ]);
+        assert.ok(overflow.every((x) => x <= 0), `${overflow} pixels too large`);
+        const box = await page.locator("canvas").boundingBox();
+        assert.ok(box.height > viewport.height / 3 && box.width > viewport.width * 0.5, JSON.stringify(box));
+        const list = await page.locator("#steps").boundingBox();
+        assert.ok(list.y + 60 < viewport.height, "the steps are not seen");
+      },
+      { viewport, hasTouch: true },
+    ));
+}
 
 test("what is stuck stands out, with what blocks it", () =>
   visited(infeasible, async (page) => {

@@ -36,7 +36,8 @@ pub(in crate::cli) struct GraphArguments {
     /// A part that is gone already (repeatable)
     #[arg(long, value_name = "PART")]
     pub(in crate::cli) removed: Vec<String>,
-    /// Where the picture goes: .svg, or .dot for Graphviz
+    /// Where the picture goes: .svg, with equal parts as one box, or .dot for Graphviz, with all parts. Of several
+    /// directions, each gets an .svg of its own: `graph.svg` becomes `graph+x.svg`, `graph-x.svg` …
     #[arg(short, long, value_name = "FILE")]
     pub(in crate::cli) output: PathBuf,
 }
@@ -50,6 +51,13 @@ pub(in crate::cli) struct StepsArguments {
     /// there, else parts are equal whose names differ in a number only]
     #[arg(long, value_name = "ASSEMBLY")]
     pub(in crate::cli) meshes: Option<PathBuf>,
+    /// Draw a PNG picture per instruction into this folder, which is made if it is not there: `step-3.png`, or
+    /// `steps-1-4.png` for equal parts; and an exploded view, `overview.png`. Not together with words on stdout
+    #[arg(long, value_name = "DIR")]
+    pub(in crate::cli) pictures: Option<PathBuf>,
+    /// Write the instructions with their pictures as one HTML file, for the screen and for paper
+    #[arg(long, value_name = "FILE")]
+    pub(in crate::cli) html: Option<PathBuf>,
 }
 
 fn direction(text: &str) -> Result<Action, String> {

@@ -25,6 +25,10 @@ export function controls(player, selection, stage) {
   on("hide", () => selection.toggleHidden());
   on("through", () => selection.toggleThrough());
   on("show-all", () => selection.showAll());
+  on("follow", () => {
+    stage.follows = !stage.follows;
+    byId("follow").setAttribute("aria-pressed", String(stage.follows));
+  });
   on("keys", () => byId("help").showModal());
   scrub.addEventListener("input", () => player.seek(Number(scrub.value)));
   speed.addEventListener("change", () => player.setSpeed(Number(speed.value)));

@@ -33,10 +33,20 @@
  * @typedef {object} Step
  * @property {number[]} parts
  * @property {number | null} of the step that takes out, or puts in, the group to which they belong
+ * @property {number[]} body the parts of the body that they leave, or get into, as long as they are in it
  * @property {string} words
  * @property {number[]} after other parts that must have moved before
  * @property {number} begins
  * @property {number} ends
+ *
+ * @typedef {object} Instruction steps in a row that do the same with equal parts
+ * @property {string | null} heading
+ * @property {string} numbers of its steps
+ * @property {string} words
+ * @property {number[]} steps
+ * @property {number[]} view unit direction to the viewer
+ * @property {number[]} hiding parts that hide much of the moving ones
+ * @property {{step: number, points: number[][]}[]} arrows along the ways
  *
  * @typedef {object} Group
  * @property {number[]} parts
@@ -58,6 +68,8 @@
  * @property {string | null} verdict why it is not complete
  * @property {number} duration seconds
  * @property {string[]} palette
+ * @property {{moving: string, stuck: string[], free: string[]}} colours with a meaning
+ * @property {Instruction[]} instructions
  * @property {Mesh[]} meshes
  * @property {Part[]} parts
  * @property {Step[]} steps

@@ -5,12 +5,15 @@ import { byId } from "./dom.js";
 import { groupLists } from "./groups.js";
 import { graphPanel } from "./graph-panel.js";
 import { keyboard } from "./keyboard.js";
+import { labels } from "./labels.js";
 import { partsList, stuckList } from "./parts-list.js";
 import { Player } from "./player.js";
+import { printing } from "./print.js";
 import { Selection } from "./selection.js";
 import { Stage } from "./stage.js";
 import { stepsList } from "./steps-list.js";
 import { tabs } from "./tabs.js";
+import { theme } from "./theme.js";
 
 /** A longer pause between two pictures is none that the viewer saw. */
 const LONGEST_TICK = 0.25;
@@ -22,9 +25,13 @@ function start() {
   const player = new Player(scene);
   const still = matchMedia("(prefers-reduced-motion: reduce)");
   player.stepwise = still.matches;
-  still.addEventListener("change", () => (player.stepwise = still.matches));
   const selection = new Selection(scene.parts.length);
   const stage = new Stage(byId("canvas"), scene, selection);
+  stage.still = still.matches;
+  still.addEventListener("change", () => (player.stepwise = stage.still = still.matches));
+  theme(stage);
+  labels(stage);
+  printing(stage);
   tabs();
   controls(player, selection, stage);
   stepsList(player, selection);
@@ -41,6 +48,7 @@ function start() {
     }
     stage.at(player.time);
   });
+  stage.at(player.time);
   run(player, stage);
   // For tests, and for pages that embed this one.
   Object.assign(window, { sbdp: { scene, player, selection, stage } });
@@ -50,7 +58,9 @@ function start() {
 function run(player, stage) {
   let before = performance.now();
   const frame = (now) => {
-    player.tick(Math.min((now - before) / 1000, LONGEST_TICK));
+    const seconds = Math.min((now - before) / 1000, LONGEST_TICK);
+    player.tick(seconds);
+    stage.swung(seconds);
     before = now;
     if (!stage.draw()) stage.refine();
     else if (!document.documentElement.dataset.drawn) {

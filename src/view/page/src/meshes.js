@@ -15,6 +15,9 @@ import {
   MeshLambertMaterial,
 } from "three";
 
+/** Opacity of edges. */
+const EDGE = 0.6;
+
 /**
  * The surface and the sharp edges of a mesh; both share the vertices.
  * @param {Mesh} mesh
@@ -42,7 +45,7 @@ export class Body {
     // Edges are drawn a little nearer than faces, else they drown in them.
     const offset = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1 };
     this.material = new MeshLambertMaterial({ color: colour, side: DoubleSide, ...offset });
-    this.line = new LineBasicMaterial({ color: "#1b2330", transparent: true, opacity: 0.55 });
+    this.line = new LineBasicMaterial({ color: "#1b2330", transparent: true, opacity: EDGE });
     this.surface = new Surface(shape.surface, this.material);
     this.edges = new LineSegments(shape.edges, this.line);
     this.surface.userData.part = index;
@@ -70,7 +73,7 @@ export class Body {
     // Another kind of material is compiled anew: only when it changes.
     if (this.material.transparent === solid) this.material.needsUpdate = true;
     Object.assign(this.material, { transparent: !solid, depthWrite: solid, opacity });
-    this.line.opacity = 0.55 * Math.max(opacity, 0.3 * Math.min(1, opacity * 4));
+    this.line.opacity = EDGE * Math.max(opacity, 0.5 * Math.min(1, opacity * 4));
     this.opacity = opacity;
   }
 

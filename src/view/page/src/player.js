@@ -78,9 +78,16 @@ export class Player extends EventTarget {
   /** Plays one step and stops.
    * @param {number} step */
   playStep(step) {
-    if (step < 0 || step >= this.scene.steps.length) return;
-    this.time = timeOf(this.scene, step);
-    this.until = this.scene.steps[step].ends;
+    this.playSteps(step, step);
+  }
+
+  /** Plays steps in a row and stops.
+   * @param {number} first
+   * @param {number} last */
+  playSteps(first, last) {
+    if (first < 0 || last >= this.scene.steps.length) return;
+    this.time = timeOf(this.scene, first);
+    this.until = this.scene.steps[last].ends;
     this.playing = true;
     this.changed();
   }

@@ -4,6 +4,7 @@
  * @import { Selection } from "./selection.js"
  */
 import {
+  AxesHelper,
   Box3,
   BufferAttribute,
   BufferGeometry,
@@ -21,10 +22,17 @@ import {
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { Body, geometries } from "./meshes.js";
-import { isMoving, isWaiting, placementAt, visibility } from "./timeline.js";
+import { arrows } from "./arrows.js";
+import { instructionOf } from "./steps-list.js";
+import { isWaiting, placementAt, stepAt, visibility } from "./timeline.js";
 
-/** Parts that should have moved and could not: dark among the light colours of the palette, with bright edges. */
-const STUCK = { colour: "#2b1d24", glow: "#3a0010", edge: "#ff2d55" };
+/** Edges of parts that should have moved and could not. */
+const STUCK_EDGE = "#3e0a46";
+/** Of the parts that neither move nor are pointed out: how much of their colour is replaced by that of the ground. */
+const PALE = 0.7;
+/** Seconds in which the camera goes to another side; and milliseconds for which it stays where the viewer put it. */
+const SWING = 0.7;
+const GLOW = "#2c3a55";
 const THROUGH = 0.22;
 const BESIDE = 0.12;
 /** What blocks a part often stands all around it. */
@@ -52,8 +60,7 @@ export class Stage {
     this.ratio = soft ? { moving: 1, still: 2 } : { moving: ratio, still: ratio };
     this.renderer.setPixelRatio(this.ratio.moving);
     this.world = new World();
-    this.world.background = new Color("#eef1f5");
-    this.stuck = new Set(scene.blocked.map((b) => b.part));
+    this.stuck = [...new Set(scene.blocked.map((b) => b.part))].filter((p) => p !== null);
     const shapes = scene.meshes.map(geometries);
     this.bodies = scene.parts.map(
       (p, i) => new Body(p, scene.meshes[p.mesh], shapes[p.mesh], scene.palette[p.colour], i),
@@ -63,10 +70,82 @@ export class Stage {
     this.world.add(this.guides);
     this.lit();
     this.radius = Math.max(...scene.parts.map((p) => reach(p)), 1e-9);
+    this.arrows = arrows(scene, this.radius, "#0b3d91");
+    for (const arrow of this.arrows.values()) this.world.add(arrow);
+    this.free = new Map(scene.free_together.flatMap(({ parts }, k) => parts.map((p) => [p, k])));
+    /** Whether the camera goes by itself to the side where something happens. */
+    this.follows = true;
+    this.theme();
     this.look();
+    this.world.add(axes(scene, this.radius));
+    this.controls.addEventListener("start", () => (this.swing = null));
     selection.addEventListener("change", () => this.invalidate());
     this.controls.addEventListener("change", () => (this.stale = true));
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
+  }
+
+  /** Takes the colours of the page. */
+  theme() {
+    const style = getComputedStyle(document.documentElement);
+    const colour = (name, otherwise) => new Color(style.getPropertyValue(name).trim() || otherwise);
+    this.ground = colour("--ground", "#eef1f5");
+    this.edge = colour("--edge", "#1b2330");
+    this.world.background = this.ground;
+    for (const { material } of [...this.arrows.values()].flatMap((group) => group.children)) material.color = colour("--arrow", "#0b3d91");
+    this.invalidate();
+  }
+
+  /** The instruction under way, where one is. */
+  get instruction() {
+    const { scene, selection, step } = this;
+    return selection.explode > 0 || step === null ? null : (scene.instructions[instructionOf(scene, step)] ?? null);
+  }
+
+  /** The step under way or next, unless all are over. */
+  get step() {
+    const step = stepAt(this.scene, this.time);
+    return step < this.scene.steps.length ? step : null;
+  }
+
+  /** The steps whose parts are in the strong colour: the one under way, or in a picture of an instruction all of it. */
+  get active() {
+    const { instruction, step } = this;
+    if (step === null || this.selection.explode > 0) return [];
+    return this.isWhole && instruction ? instruction.steps : [step];
+  }
+
+  /** Begins to go to the side from which the instruction is seen best. A viewer who turned the view is left alone until the
+   * next instruction.
+   * @param {boolean} [at_once] */
+  turnTo(instruction, at_once = false) {
+    const back = new Vector3().fromArray(instruction.view);
+    const now = this.camera.position.clone().sub(this.controls.target);
+    if (now.angleTo(back) < 1e-3) return;
+    this.swing = { from: now.clone().normalize(), to: back, length: now.length(), u: 0 };
+    if (at_once) this.swung(SWING);
+  }
+
+  /** Goes on with that.
+   * @param {number} seconds */
+  swung(seconds) {
+    const { swing, controls } = this;
+    if (!swing) return;
+    swing.u = Math.min(1, swing.u + seconds / SWING);
+    const eased = swing.u * swing.u * (3 - 2 * swing.u);
+    // Around the direction up, so that the horizon stays level.
+    const up = this.camera.up;
+    const [a, b] = [swing.from, swing.to].map((d) => spherical(d, up));
+    let around = b.around - a.around;
+    if (Math.abs(around) > Math.PI) around -= Math.sign(around) * 2 * Math.PI;
+    const at = { around: a.around + around * eased, height: a.height + (b.height - a.height) * eased };
+    this.camera.position.copy(controls.target).addScaledVector(cartesian(at, up), swing.length);
+    const done = swing.u >= 1;
+    if (done) this.swing = null;
+    this.pose();
+    const { target, length } = this.frame();
+    this.aim(target, length);
+    if (!done) this.swing.length = length;
+    this.invalidate();
   }
 
   lit() {
@@ -99,6 +178,7 @@ export class Stage {
    * @param {number} amount 0 to 1 */
   explode(amount) {
     const { controls, camera } = this;
+    this.swing = null;
     this.before ??= { target: controls.target.clone(), length: camera.position.distanceTo(controls.target) };
     this.pose();
     const { target, length } = amount > 0 ? this.frame() : this.before;
@@ -172,6 +252,9 @@ export class Stage {
   /** @param {number} time */
   at(time) {
     this.time = time;
+    const { instruction } = this;
+    if (instruction && instruction !== this.shown && this.follows) this.turnTo(instruction, this.still || this.shown === undefined);
+    this.shown = instruction;
     this.invalidate();
   }
 
@@ -188,7 +271,43 @@ export class Stage {
     this.renderer.render(this.world, this.camera);
     this.stale = this.moved = false;
     this.drawn = performance.now();
+    this.afterDraw?.();
     return true;
+  }
+
+  /**
+   * A picture of the instruction at a time, on white paper, as a data URI. What is shown does not change.
+   * @param {number} time
+   * @param {number[]} size pixels
+   */
+  snapshot(time, [width, height]) {
+    const { camera, controls, renderer, selection } = this;
+    const before = { position: camera.position.clone(), target: controls.target.clone(), aspect: camera.aspect, explode: selection.explode };
+    const shown = { time: this.time, ground: this.ground, edge: this.edge, swing: this.swing, isWhole: false };
+    Object.assign(this, { time, ground: new Color("#ffffff"), edge: new Color("#1b2330"), swing: null, isWhole: true });
+    this.world.background = this.ground;
+    selection.explode = 0;
+    renderer.setPixelRatio(1);
+    renderer.setSize(width, height, false);
+    camera.aspect = width / height;
+    const { instruction } = this;
+    if (instruction) this.turnTo(instruction, true);
+    this.pose();
+    const { target, length } = this.frame();
+    this.aim(target, length);
+    renderer.render(this.world, camera);
+    const picture = this.canvas.toDataURL("image/png");
+    Object.assign(this, shown);
+    this.world.background = this.ground;
+    selection.explode = before.explode;
+    camera.aspect = before.aspect;
+    controls.target.copy(before.target);
+    camera.position.copy(before.position);
+    renderer.setPixelRatio(this.ratio.moving);
+    this.resize();
+    this.aim(before.target, before.position.distanceTo(before.target));
+    this.invalidate();
+    return picture;
   }
 
   /** Draws once more with smooth edges, where nothing changed for a while. */
@@ -216,32 +335,48 @@ export class Stage {
       }
       this.dress(body, i);
     });
+    const { active } = this;
+    for (const [of, arrow] of this.arrows) arrow.visible = active.includes(of);
     this.guides.visible = explode > 0;
     if (explode > 0) this.stretch(explode);
   }
 
   /** How a part looks, by what was chosen.
-   * @param {Body} body
+   * @param {Body} look
    * @param {number} part */
-  dress(body, part) {
+  dress(look, part) {
     const { selection, scene } = this;
     const picked = selection.part === part || selection.group.has(part);
     const pointed = picked || selection.others.has(part);
     let opacity = selection.explode > 0 ? 1 : visibility(scene, part, this.time);
     const waits = selection.explode === 0 && scene.kind === "assembly" && isWaiting(scene, part, this.time);
+    const { step, instruction } = this;
+    const body = step === null || selection.explode > 0 || pointing(selection) ? null : scene.steps[step].body;
+    // Other bodies: what is out already, what waits.
+    if (body && scene.steps[step].of !== null && !body.includes(part)) opacity *= BESIDE;
     if (selection.hidden.has(part) || (waits && !selection.waiting)) opacity = 0;
     else if (selection.through.has(part)) opacity *= THROUGH;
     else if (selection.others.has(part)) opacity *= BLOCKER;
     else if (selection.others.size + selection.group.size > 0 && !pointed) opacity *= BESIDE;
-    body.fade(opacity);
-    const moving = selection.explode === 0 && isMoving(scene, part, this.time);
-    body.outline(moving || picked);
-    // Where it is told what blocks one, the others that are stuck are but blockers.
-    if (this.stuck.has(part) && (selection.others.size === 0 || picked)) {
-      body.paint(STUCK.colour, pointed ? "#7a0022" : STUCK.glow, STUCK.edge);
+    else if (!pointing(selection) && instruction?.hiding.includes(part)) opacity *= THROUGH;
+    look.fade(opacity);
+    const moving = this.active.some((step) => scene.steps[step].parts.includes(part));
+    look.outline(moving || picked);
+    const own = scene.palette[scene.parts[part].colour];
+    const isStuck = this.stuck.includes(part) && (selection.others.size === 0 || picked);
+    const isEnd = step === null || scene.duration === 0;
+    if (moving) look.paint(scene.colours.moving, "#000000", "#5a1e00");
+    else if (isEnd && this.free.has(part)) {
+      const { free } = scene.colours;
+      look.paint(free[this.free.get(part) % free.length], picked ? GLOW : "#000000", STUCK_EDGE);
+    } else if (isEnd && isStuck) {
+      const { stuck } = scene.colours;
+      look.paint(stuck[this.stuck.indexOf(part) % stuck.length], pointed ? GLOW : "#000000", STUCK_EDGE);
     } else {
-      const glow = picked || moving ? "#2c3a55" : selection.others.has(part) ? "#332a10" : "#000000";
-      body.paint(scene.palette[scene.parts[part].colour], glow, pointed || moving ? "#000000" : "#1b2330");
+      // All colours are shown exploded, in the end, and of what is pointed out.
+      const pale = selection.explode > 0 || isEnd || pointed ? 0 : PALE;
+      const glow = picked ? GLOW : selection.others.has(part) ? "#332a10" : "#000000";
+      look.paint(new Color(own).lerp(this.ground, pale), glow, pointed ? "#000000" : this.edge);
     }
   }
 
@@ -270,6 +405,30 @@ export class Stage {
     const solid = this.bodies.filter((b) => b.group.visible && b.opacity > BESIDE).map((b) => b.surface);
     return ray.intersectObjects(solid, false)[0]?.object.userData.part ?? null;
   }
+}
+
+/** Whether the viewer has something pointed out. */
+function pointing({ part, others, group }) {
+  return part !== null || others.size + group.size > 0;
+}
+
+/** A direction as angles around the direction up and above the horizon. */
+function spherical(d, up) {
+  const [x, y, z] = up.z ? [d.x, d.y, d.z] : [d.x, -d.z, d.y];
+  return { around: Math.atan2(y, x), height: Math.asin(Math.min(1, Math.max(-1, z))) };
+}
+
+function cartesian({ around, height }, up) {
+  const [x, y, z] = [Math.cos(around) * Math.cos(height), Math.sin(around) * Math.cos(height), Math.sin(height)];
+  return up.z ? new Vector3(x, y, z) : new Vector3(x, z, -y);
+}
+
+/** The axes of the input's frame, from a corner of the assembly's box: red x, green y, blue z. */
+function axes(scene, radius) {
+  const low = [0, 1, 2].map((a) => Math.min(...scene.parts.map((p) => p.assembled[a] - p.size[a] / 2)));
+  const helper = new AxesHelper(radius * 0.3);
+  helper.position.fromArray(low.map((x) => x - radius * 0.08));
+  return helper;
 }
 
 /** Whether pictures are drawn without a graphics card. */

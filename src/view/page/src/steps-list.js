@@ -1,11 +1,11 @@
 /**
- * The list of steps, those within a group further in, with the parts that must have moved before each; a click goes there.
+ * The list of instructions: steps in a row that do the same with equal parts are one row, those within a group further in. A
+ * click plays them.
  * @import { Player } from "./player.js"
  * @import { Selection } from "./selection.js"
  */
 import { byId, element } from "./dom.js";
 import { depth } from "./groups.js";
-import { partWords } from "./names.js";
 
 /**
  * @param {Player} player
@@ -13,28 +13,39 @@ import { partWords } from "./names.js";
  */
 export function stepsList(player, selection) {
   const { scene } = player;
-  const items = scene.steps.map((step, i) => {
-    const goes = step.parts.length > 1 ? "go" : "goes";
-    const verb = scene.kind === "assembly" ? `${goes} in after` : "after";
-    const names = partWords(step.after.map((p) => scene.parts[p].name));
-    const after = names ? element("span", { class: "after" }, `${verb} ${names}`) : "";
+  const rows = scene.instructions.map(({ numbers, words, steps }) => {
     const go = () => {
-      // Those of a group stand out as they move.
-      selection.pick(step.parts.length === 1 ? step.parts[0] : null);
-      player.playStep(i);
+      selection.pick(null);
+      player.playSteps(steps[0], steps.at(-1));
     };
-    return element("button", { type: "button", onclick: go }, element("span", {}, step.words), after);
+    return element(
+      "button",
+      { type: "button", onclick: go },
+      element("span", { class: "number" }, numbers),
+      element("span", {}, words),
+    );
   });
-  byId("steps").append(...items.map((button, i) => element("li", { style: `--depth:${depth(scene, i)}` }, button)));
+  const items = scene.instructions.flatMap(({ heading, steps }, i) => [
+    ...(heading ? [element("li", { class: "heading" }, heading)] : []),
+    element("li", { style: `--depth:${depth(scene, steps[0])}` }, rows[i]),
+  ]);
+  byId("steps").append(...items);
   let current = -1;
   const mark = () => {
-    const step = player.step;
-    if (step === current) return;
-    items[current]?.removeAttribute("aria-current");
-    items[step]?.setAttribute("aria-current", "step");
-    items[step]?.scrollIntoView({ block: "nearest" });
-    current = step;
+    const row = instructionOf(scene, player.step);
+    if (row === current) return;
+    rows[current]?.removeAttribute("aria-current");
+    rows[row]?.setAttribute("aria-current", "step");
+    rows[row]?.scrollIntoView({ block: "nearest" });
+    current = row;
   };
   player.addEventListener("change", mark);
   mark();
+}
+
+/** The place of the instruction that has a step; -1 for none.
+ * @param {import("./data.js").Scene} scene
+ * @param {number} step */
+export function instructionOf(scene, step) {
+  return scene.instructions.findIndex(({ steps }) => steps.includes(step));
 }

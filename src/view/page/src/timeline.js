@@ -4,7 +4,7 @@
  */
 
 /** Seconds that a part to which nothing more is done takes to fade. */
-const FADE = 0.5;
+const FADE = 0.25;
 
 /**
  * The first step that is not over at a time; as many as there are steps, once all are.

@@ -79,7 +79,7 @@ test("what is out fades, and what is put in stays", () => {
     [true, true, false, false],
   );
   assert.deepEqual(
-    [0.5, 1.25, 2].map((t) => visibility(s, 1, t)),
+    [0.5, 1.125, 2].map((t) => visibility(s, 1, t)),
     [1, 0.5, 0],
   );
   const together = scene("assembly");
@@ -116,7 +116,7 @@ test("a group stands out of the assembly and is seen until it is taken apart", (
       [true, false],
     );
     close(
-      [1.05, 3.2, 3.45, 3.7].map((t) => visibility(s, part, t)),
+      [1.05, 3.2, 3.325, 3.7].map((t) => visibility(s, part, t)),
       [1, 1, 0.5, 0],
     );
   }
