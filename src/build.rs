@@ -7,6 +7,7 @@
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::{env, fs, io};
 
 /// Every stage, and the stages that its code imports. A stage comes after all that it depends on.
@@ -45,6 +46,7 @@ const STAGES: [(&str, &str); 20] = [
 
 fn main() -> io::Result<()> {
     let root = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
+    println!("cargo:rustc-env=SBDP_BUILD={}", build(&root));
     println!("cargo:rerun-if-changed=Cargo.lock");
     let lock = fs::read(root.join("Cargo.lock"))?;
     let mut hashes: HashMap<&str, u64> = HashMap::new();
@@ -65,6 +67,26 @@ fn main() -> io::Result<()> {
         hashes.insert(stage, hash);
     }
     Ok(())
+}
+
+/// The version, and of a release build from a repository its commit and the commit's date. Other builds are made too
+/// often for that: each commit would build everything anew.
+fn build(root: &Path) -> String {
+    let version = env::var("CARGO_PKG_VERSION").unwrap_or_default();
+    let is_release = env::var("PROFILE").is_ok_and(|profile| profile == "release");
+    let git = |arguments: &[&str]| {
+        let output = Command::new("git").arg("-C").arg(root).args(arguments).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    let commit = is_release.then(|| git(&["log", "-1", "--format=%h %cs", "--", "."])).flatten();
+    // What moves with each commit, wherever the repository lies.
+    if let Some(log) = git(&["rev-parse", "--git-path", "logs/HEAD"]).filter(|_| is_release) {
+        println!("cargo:rerun-if-changed={}", root.join(log).display());
+    }
+    match commit.filter(|commit| !commit.is_empty()) {
+        Some(commit) => format!("{version} ({commit})"),
+        None => version,
+    }
 }
 
 /// Adds a source file's name and content, or the files of a folder in the order of their names.

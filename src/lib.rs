@@ -35,7 +35,7 @@
 //! # let service = Service::default();
 //! # let id = service.admit(&load_assembly(Path::new("tests/assemblies/pin-bolt-cover"))?)?.id;
 //! # let plan = service.plan(id, &PlanRequest::default(), &Termination::default(), &mut ())?;
-//! let json = PlanDocument::new(&plan).to_json()?;
+//! let json = PlanDocument::from(&plan).to_json()?;
 //! let document = PlanDocument::from_json(&json)?;
 //! assert_eq!(document.status, "complete");
 //! # Ok(())
@@ -45,6 +45,9 @@
 //! # Find a stage
 //! Each module is a stage or a program; `src/README.md` describes them in the order of the data flow, with the rules
 //! that they keep.
+
+/// The version, and of a release build from a repository its commit and the commit's date.
+pub const BUILD: &str = env!("SBDP_BUILD");
 
 pub mod assembling;
 pub mod bench;

@@ -567,3 +567,52 @@ fn what_the_daemon_refuses_is_told_with_its_file() {
     command.env("SBDP_RUNTIME_DIR", daemon.runtime_dir()).arg("plan").arg(folder.path()).arg("--daemon");
     refused(&command.output().unwrap(), &["lid.obj", "part `lid`", "one plane"]);
 }
+
+#[test]
+fn json_is_indented_on_request_and_quiet_shows_nothing() {
+    let pretty = plan("l-slot", &["--json", "-", "--pretty"]);
+    assert!(stdout(&pretty).starts_with("{\n  \"schema\""));
+    assert_eq!(PlanDocument::from_json(&stdout(&pretty)).unwrap().status, "complete");
+    refused(&plan("l-slot", &["--pretty"]), &["--json"]);
+    let quiet = plan("l-slot", &["--quiet"]);
+    assert_eq!(
+        (quiet.status.code(), stdout(&quiet), stderr(&quiet)),
+        (Some(0), String::new(), String::new())
+    );
+}
+
+#[test]
+fn a_page_lies_beside_what_it_shows() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("l-slot.v2");
+    fs::create_dir(&folder).unwrap();
+    for file in fs::read_dir(assembly("l-slot")).unwrap().map(Result::unwrap) {
+        fs::copy(file.path(), folder.join(file.file_name())).unwrap();
+    }
+    let json = place.path().join("plan.json");
+    let view = ["view", folder.to_str().unwrap(), "--embedded", "--json", json.to_str().unwrap()];
+    let shown = run(&view);
+    assert_eq!(shown.status.code(), Some(0), "{}", stderr(&shown));
+    let page = place.path().join("l-slot.v2.html");
+    assert!(stdout(&shown).contains(page.canonicalize().unwrap().to_str().unwrap()));
+    assert_eq!(run(&["view", json.to_str().unwrap()]).status.code(), Some(0));
+    assert!(fs::read_to_string(place.path().join("plan.html")).unwrap().contains("<html"));
+    // Without a browser the page is there all the same, and the error says so.
+    let opened = sbdp().args(view).arg("--open").env("PATH", "/nonexistent").output().unwrap();
+    assert_eq!(opened.status.code(), Some(1));
+    assert!(stderr(&opened).contains("xdg-open") && stderr(&opened).contains("l-slot.v2.html"));
+}
+
+#[test]
+fn shells_and_man_know_all_commands() {
+    for shell in ["bash", "zsh", "fish"] {
+        let text = stdout(&run(&["completions", shell]));
+        assert!(text.contains("planning-timeout") && text.contains("completions"), "{shell}");
+    }
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path().join("man1");
+    assert_eq!(run(&["man", folder.to_str().unwrap()]).status.code(), Some(0));
+    for page in ["sbdp.1", "sbdp-plan.1", "sbdp-bench-replan.1", "sbdp-cache-evict.1"] {
+        assert!(fs::read_to_string(folder.join(page)).unwrap().starts_with(".ie"), "{page}");
+    }
+}

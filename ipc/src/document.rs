@@ -245,6 +245,14 @@ impl PlanDocument {
         serde_json::to_string(self)
     }
 
+    /// The same, indented.
+    ///
+    /// # Errors
+    /// As [`Self::to_json`].
+    pub fn to_pretty_json(&self) -> serde_json::Result<String> {
+        serde_json::to_string_pretty(self)
+    }
+
     /// Reads a document.
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use sbdp::cache::Cache;
 use sbdp::config::Config;
 use sbdp::service::{RECORD_KINDS, Service};
@@ -15,7 +15,7 @@ use sbdp::{daemon, telemetry};
 
 /// Plans how assemblies come apart, for clients on this machine.
 #[derive(Debug, Parser)]
-#[command(name = "sbdpd", version)]
+#[command(name = "sbdpd", version = sbdp::BUILD)]
 struct DaemonArguments {
     /// Configuration file; `config/default.toml` explains every key.
     #[arg(long, value_name = "FILE")]
@@ -32,6 +32,9 @@ struct DaemonArguments {
     /// Check the configuration and leave.
     #[arg(long)]
     check_config: bool,
+    /// Print the manual page and leave.
+    #[arg(long, hide = true)]
+    man: bool,
 }
 
 /// Refused usage or configuration.
@@ -39,6 +42,10 @@ const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
     let arguments = DaemonArguments::parse();
+    if arguments.man {
+        let page = clap_mangen::Man::new(DaemonArguments::command());
+        return page.render(&mut std::io::stdout()).map_or(ExitCode::FAILURE, |()| ExitCode::SUCCESS);
+    }
     let config = match configuration(&arguments) {
         Ok(config) => config,
         Err(message) => {

@@ -29,38 +29,49 @@ pub(super) use view::{GraphArguments, StepsArguments, ViewArguments};
 
 /// Plans how assemblies come apart.
 #[derive(Debug, Parser)]
-#[command(name = "sbdp", version, about, after_help = EXIT_CODES)]
+#[command(name = "sbdp", version = crate::BUILD, about, after_help = EXAMPLES, after_long_help = EXAMPLES)]
 pub(super) struct Arguments {
     #[command(subcommand)]
     pub(super) command: Command,
 }
 
-const EXIT_CODES: &str = "Exit codes: 0 complete, 2 wrong usage or refused input, 3 infeasible, exhausted or partial, \
-4 timeout, 5 cancelled, 1 anything else.";
+const EXAMPLES: &str = "\
+Examples:
+  sbdp plan gearbox/                      the order and the paths, as a table
+  sbdp plan gearbox/ --assembly --json -  how it is put together, as JSON
+  sbdp view gearbox/ --open               the plan as a page in the browser
+  sbdp check gearbox/                     what is wrong with the files
+
+Exit codes: 0 complete, 2 wrong usage or refused input, 3 infeasible, exhausted or partial, 4 timeout, 5 cancelled, \
+1 anything else.";
 
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Plan in which order and along which paths the parts of an assembly come off
+    /// Plan the order and the paths in which the parts of an assembly come off
     Plan(Box<PlanArguments>),
-    /// Say what is found in an assembly's files: healing, sizes, overlaps
+    /// Check the files of an assembly: healing, sizes, overlaps
     Check(CheckArguments),
-    /// Tell in words what a search did, from its trace
+    /// Explain in words what a search did, from its trace
     Explain(ExplainArguments),
     /// Show a plan as a page: one HTML file that plays it and needs no network
     View(Box<ViewArguments>),
-    /// Draw who blocks whom in which direction
+    /// Draw which part blocks which, for each direction
     Graph(GraphArguments),
-    /// Tell a plan as instructions in words (Markdown)
+    /// Write a plan as instructions
     Steps(StepsArguments),
-    /// Say how the running daemon is
+    /// Show the state of the running daemon
     Status(super::status::StatusArguments),
-    /// Look at a configuration of the daemon
+    /// Check a configuration of the daemon
     Config(super::config::ConfigArguments),
-    /// Look after what is remembered on disk (stop the daemon first: it holds the store alone)
+    /// Manage the cache on disk (stop the daemon first: it locks the cache)
     Cache(super::cache::CacheArguments),
-    /// Run planners over folders of assemblies and evaluate what comes out
+    /// Run planners over folders of assemblies and compare the results
     Bench(Box<BenchArguments>),
+    /// Print the completions of a shell, to be put where it looks for them
+    Completions(CompletionsArguments),
+    /// Write the manual pages of all commands
+    Man(ManArguments),
 }
 
 /// Arguments of `sbdp plan`.
@@ -75,6 +86,9 @@ pub(super) struct PlanArguments {
     /// Write the plan there as JSON (contract sbdp-plan/2); `-` writes it to stdout in place of the table
     #[arg(long, value_name = "FILE")]
     pub(super) json: Option<PathBuf>,
+    /// Indent the JSON
+    #[arg(long, requires = "json")]
+    pub(super) pretty: bool,
     /// Also write the plan there as a glTF scene in motion (GLB)
     #[arg(long, value_name = "FILE")]
     pub(super) glb: Option<PathBuf>,
@@ -95,18 +109,18 @@ pub(super) struct PlanArguments {
     pub(super) dbg: Option<Dbg>,
     #[command(flatten)]
     pub(super) sweeps: Sweeps,
-    /// Answer after this time with what is there
+    /// Stop after this time, with the plan so far
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) timeout: Option<Duration>,
-    /// Answer after this time of planning with what is there. Verification does not count: the paper's planners do
-    /// not verify
+    /// Stop after this time of planning, with the plan so far. Verification does not count: the paper's planners do not
+    /// verify
     #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
     pub(super) planning_timeout: Option<Duration>,
     /// Give up one motion, or a baseline's search for one part, after this time [default: no limit; the paper
     /// has 360]
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     pub(super) path_timeout: Option<Duration>,
-    /// What the random poses of rrt and bk-rrt depend on
+    /// Seed of the random poses of rrt and bk-rrt
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(super) seed: u64,
     /// Give up after this number of simulations (of rrt: steps of a tree)
@@ -132,7 +146,7 @@ pub(super) struct PlanArguments {
     /// A part that stays as long as others leave: what the rest is taken off (repeatable) [default: chosen]
     #[arg(long, value_name = "PART")]
     pub(super) base: Vec<String>,
-    /// A part that is gone already (repeatable)
+    /// A part that has been removed already (repeatable)
     #[arg(long, value_name = "PART")]
     pub(super) removed: Vec<String>,
     /// A part that must come out (repeatable) [default: all]
@@ -160,7 +174,7 @@ pub(super) struct PlanArguments {
     /// Write there what the search did, one JSON object per line (see `sbdp explain`)
     #[arg(long, value_name = "FILE")]
     pub(super) trace: Option<PathBuf>,
-    /// Neither read nor write anything remembered
+    /// Do not use the cache
     #[arg(long)]
     pub(super) no_cache: bool,
     /// The folder of what is remembered on disk [default: $SBDP_CACHE_DIR, else
@@ -176,6 +190,25 @@ pub(super) struct PlanArguments {
     /// In the table, list all overlaps and all blocked actions
     #[arg(short, long)]
     pub(super) verbose: bool,
+    /// Show no progress and no table: only files, errors and the exit code
+    #[arg(short, long, conflicts_with = "verbose")]
+    pub(super) quiet: bool,
+}
+
+/// Arguments of `sbdp completions`.
+#[derive(Debug, Args)]
+pub(super) struct CompletionsArguments {
+    /// Which shell
+    #[arg(value_enum)]
+    pub(super) shell: clap_complete::Shell,
+}
+
+/// Arguments of `sbdp man`.
+#[derive(Debug, Args)]
+pub(super) struct ManArguments {
+    /// The folder for the pages: sbdp.1, sbdp-plan.1, …
+    #[arg(value_name = "DIR")]
+    pub(super) folder: PathBuf,
 }
 
 /// Arguments of `sbdp check`.

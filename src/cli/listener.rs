@@ -23,7 +23,8 @@ struct TraceFile {
 }
 
 impl Listener {
-    pub(super) fn new(trace: Option<&Path>) -> Result<Self, CliError> {
+    /// Writes the trace there, and shows progress unless it is `quiet`.
+    pub(super) fn new(trace: Option<&Path>, quiet: bool) -> Result<Self, CliError> {
         let trace = match trace {
             None => None,
             Some(path) => {
@@ -31,7 +32,7 @@ impl Listener {
                 Some(TraceFile { path: path.to_owned(), file: BufWriter::new(file), failed: None })
             }
         };
-        Ok(Self { display: ProgressDisplay::new(), trace })
+        Ok(Self { display: ProgressDisplay::new(quiet), trace })
     }
 
     /// The plan comes again from its beginning: the trace so far is void.

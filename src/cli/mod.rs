@@ -15,6 +15,7 @@ mod explain;
 mod graph;
 mod interrupt;
 mod listener;
+mod manual;
 mod part_names;
 mod plan;
 mod progress;
@@ -49,6 +50,8 @@ pub fn run() -> ExitCode {
         Command::Config(arguments) => config::run(&arguments),
         Command::Cache(arguments) => cache::run(&arguments),
         Command::Bench(arguments) => bench::run(&arguments),
+        Command::Completions(arguments) => manual::completions(&arguments),
+        Command::Man(arguments) => manual::pages(&arguments),
     };
     result.unwrap_or_else(|error| {
         eprintln!("error: {error}");

@@ -30,7 +30,7 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     end_with_benchmark();
     let planned = planned(arguments)?;
     write_files(arguments, &planned)?;
-    if arguments.json.as_deref() != Some(Path::new(STDOUT)) {
+    if !arguments.quiet && arguments.json.as_deref() != Some(Path::new(STDOUT)) {
         print(&report::plan(&planned.revised, &planned.plan, &planned.subject.plan, arguments.verbose))?;
     }
     Ok(exit_code(planned.plan.status))
@@ -77,7 +77,7 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
         deadline,
         termination,
     };
-    let mut listener = Listener::new(arguments.trace.as_deref())?;
+    let mut listener = Listener::new(arguments.trace.as_deref(), arguments.quiet)?;
     let plan = backend.plan(&question, &mut listener);
     listener.finish()?;
     let plan = plan?;
@@ -238,7 +238,8 @@ pub(super) fn write_files(arguments: &PlanArguments, planned: &Planned) -> Resul
         written(file, &planned.subject.glb()?)?;
     }
     let Some(file) = &arguments.json else { return Ok(()) };
-    let json = planned.subject.plan.to_json();
+    let document = &planned.subject.plan;
+    let json = if arguments.pretty { document.to_pretty_json() } else { document.to_json() };
     let text = json.map_err(|e| CliError::Failed(format!("cannot write the plan as JSON: {e}")))? + "\n";
     if file == Path::new(STDOUT) { print(&text) } else { written(file, text.as_bytes()) }
 }

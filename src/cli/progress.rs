@@ -14,9 +14,9 @@ pub(super) struct ProgressDisplay {
 }
 
 impl ProgressDisplay {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(quiet: bool) -> Self {
         let bar = ProgressBar::new(0);
-        let target = if std::io::stderr().is_terminal() {
+        let target = if !quiet && std::io::stderr().is_terminal() {
             ProgressDrawTarget::stderr()
         } else {
             ProgressDrawTarget::hidden()

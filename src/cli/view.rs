@@ -1,6 +1,7 @@
 //! `sbdp view`: a plan as a page.
 
-use std::process::ExitCode;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Stdio};
 
 use clap::CommandFactory;
 use clap::parser::ValueSource;
@@ -30,15 +31,43 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<ExitCode, CliError> {
         (planned.subject, code, Termination::default())
     };
     let html = subject.page(&termination)?;
-    written(&arguments.output, html.as_bytes())?;
-    print(&format!(
-        "{}: {}, steps {}, {} kB\n",
-        arguments.output.display(),
-        subject.plan.status,
-        subject.plan.steps.len(),
-        html.len().div_ceil(1000)
-    ))?;
+    let output = arguments.output.clone().map_or_else(|| beside(file), Ok)?;
+    written(&output, html.as_bytes())?;
+    if !arguments.plan.quiet {
+        print(&format!(
+            "{}: {}, steps {}, {} kB\n",
+            output.display(),
+            subject.plan.status,
+            subject.plan.steps.len(),
+            html.len().div_ceil(1000)
+        ))?;
+    }
+    if arguments.open {
+        open(&output)?;
+    }
     Ok(code)
+}
+
+/// The page of an assembly or plan, beside it: `gearbox.html` of `gearbox/`, `gearbox.json` or `gearbox.step`.
+fn beside(file: &Path) -> Result<PathBuf, CliError> {
+    // `.` and `..` have names only in full.
+    let whole = file.canonicalize().map_err(|e| CliError::Refused(format!("{}: {e}", file.display())))?;
+    let name = if whole.is_dir() { whole.file_name() } else { whole.file_stem() };
+    let name = name.ok_or_else(|| CliError::Refused(format!("{}: give -o FILE", file.display())))?;
+    let mut page = name.to_owned();
+    page.push(".html");
+    Ok(whole.with_file_name(page))
+}
+
+/// Opens a page in the user's browser.
+fn open(page: &Path) -> Result<(), CliError> {
+    let failed = |why: String| CliError::Failed(format!("--open: {why}; open {} yourself", page.display()));
+    let status = Command::new("xdg-open").arg(page).stdin(Stdio::null()).status();
+    match status {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(failed(format!("`xdg-open` ended with {status}"))),
+        Err(error) => Err(failed(format!("`xdg-open` cannot be run: {error}"))),
+    }
 }
 
 /// What is planned already is not planned otherwise: options that would be without effect are refused.
@@ -49,7 +78,7 @@ fn refuse_options_of_planning() -> Result<(), CliError> {
     else {
         return Ok(());
     };
-    let own = ["assembly", "output", "meshes", "help", "version"];
+    let own = ["assembly", "output", "open", "quiet", "meshes", "help", "version"];
     let planning = view.get_arguments().filter(|a| !own.contains(&a.get_id().as_str()));
     let is_given = |a: &&clap::Arg| given.value_source(a.get_id().as_str()) == Some(ValueSource::CommandLine);
     match planning.filter(is_given).find_map(|a| a.get_long()) {

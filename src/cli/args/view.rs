@@ -16,9 +16,12 @@ use crate::simulation::{Action, Axis};
 pub(in crate::cli) struct ViewArguments {
     #[command(flatten)]
     pub(in crate::cli) plan: PlanArguments,
-    /// Where the page goes
+    /// Where the page goes [default: beside the assembly or plan, by its name, with `.html`]
     #[arg(short, long, value_name = "FILE")]
-    pub(in crate::cli) output: PathBuf,
+    pub(in crate::cli) output: Option<PathBuf>,
+    /// Open the page in the browser (by `xdg-open`)
+    #[arg(long)]
+    pub(in crate::cli) open: bool,
     /// Of a PLAN.json: the assembly that it is about [default: the one that it names]
     #[arg(long, value_name = "ASSEMBLY")]
     pub(in crate::cli) meshes: Option<PathBuf>,
