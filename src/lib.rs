@@ -24,10 +24,10 @@
 //! ```
 //!
 //! # Write and read plans
-//! [`plan::export`] is the JSON contract `sbdp-plan/2`; `src/plan/JSON.md` describes its fields.
+//! [`document`] is the JSON contract `sbdp-plan/2`; `src/document/JSON.md` describes its fields.
 //!
 //! ```
-//! use sbdp::plan::export::PlanDocument;
+//! use sbdp::document::PlanDocument;
 //!
 //! # use std::path::Path;
 //! # use sbdp::{files::load_assembly, search::PlanRequest, service::Service, termination::Termination};
@@ -58,6 +58,7 @@ pub mod cli;
 pub mod config;
 pub mod contact;
 pub mod daemon;
+pub mod document;
 pub mod exchange;
 pub mod files;
 #[cfg(test)]

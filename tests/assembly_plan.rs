@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use common::{Boxes, Daemon};
-use sbdp::plan::export::PlanDocument;
+use sbdp::document::PlanDocument;
 use sbdp_client::{Client, Handle, PlanOptions, PlanStatus, Staging, Summary, Waypoint};
 
 const IN_PLACE: Waypoint = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];

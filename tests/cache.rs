@@ -9,7 +9,7 @@ use std::process::{Command, Output, Stdio};
 use common::{Boxes, Daemon};
 use rustix::process::Signal;
 use sbdp::cache::{Cache, CacheSettings};
-use sbdp::plan::export::{PlanDocument, StatsDocument};
+use sbdp::document::{PlanDocument, StatsDocument};
 use sbdp::service::RECORD_KINDS;
 use sbdp_client::{Change, Handle, PlanOptions, PlanStatus};
 

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use common::Daemon;
 use rustix::process::{Pid, Signal, kill_process};
-use sbdp::plan::export::{PlanDocument, StatsDocument};
+use sbdp::document::{PlanDocument, StatsDocument};
 
 fn assembly(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/assemblies").join(name)

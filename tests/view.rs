@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
+use sbdp::document::PlanDocument;
 use sbdp::files::load_assembly;
 use sbdp::geometry::{Assembly, Pose, Revision, heal, interpolate, pose_from_waypoint, waypoint_from_pose};
-use sbdp::plan::export::PlanDocument;
 use sbdp::search::{PlanRequest, Staging, Termination};
 use sbdp::service::Service;
 use sbdp::view::{PlanScene, Up, glb};

@@ -1,5 +1,5 @@
 //! Plans as JSON: the contract `sbdp-plan/2`, written by `sbdp plan ASSEMBLY --json FILE` and
-//! described in `src/plan/JSON.md`. Parts go by their names. Later versions may add fields; those that
+//! described in `src/document/JSON.md`. Parts go by their names. Later versions may add fields; those that
 //! are here keep their meaning.
 
 use std::collections::BTreeMap;

@@ -14,8 +14,8 @@ use super::record::{Record, Settings};
 use super::rotation::random_rotation;
 use super::unit::Unit;
 use super::{BenchError, Scratch, build_of, grace, processors};
+use crate::document::{PlanDocument, StepDocument};
 use crate::plan::StepEnd;
-use crate::plan::export::{PlanDocument, StepDocument};
 
 /// `sbdp plan` exits with these when it has written a plan.
 const PLAN_CODES: [i32; 3] = [0, 3, 4];

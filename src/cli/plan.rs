@@ -18,11 +18,11 @@ use super::subject::{Subject, further, only_mesh};
 use super::{cache, interrupt, print, report, written};
 use crate::bench::end_with_benchmark;
 use crate::cache::CacheSettings;
-use crate::exchange::{absolute, content_of, source, with_files};
+use crate::document::{PlanDocument, SourceDocument};
+use crate::document::{absolute, content_of, source, with_files};
 use crate::files::{LoadOptions, load};
 use crate::geometry::{Revision, SourceAssembly, content_hash, pose_from_waypoint};
 use crate::plan::Plan;
-use crate::plan::export::{PlanDocument, SourceDocument};
 use crate::search::{PlanRequest, Planner, Termination};
 use crate::simulation::PenaltyParameters;
 

@@ -3,11 +3,10 @@
 use nalgebra::Point3;
 
 use super::table::{TextTable, length};
+use crate::document::{Placements, StepFrame};
+use crate::document::{PlanDocument, WarningDocument};
 use crate::geometry::{Bounds, Pose, SourceAssembly, SourceMesh, pose_from_waypoint};
-use crate::plan::export::{PlanDocument, WarningDocument};
-use crate::plan::{
-    Base, FreeGroup, MotionKind, Overlap, Placements, Plan, PlanKind, PlanStats, PlanStep, StepEnd, StepFrame,
-};
+use crate::plan::{Base, FreeGroup, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStep, StepEnd};
 use crate::view::{blockers, direction, part_word, part_words, verdict};
 
 /// Count of parts that a row of the table names; more are counted. With names of ten letters, the row still fits 120

@@ -7,7 +7,7 @@ use super::args::StepsArguments;
 use super::error::CliError;
 use super::subject::{Subject, plan_in};
 use super::{print, written};
-use crate::plan::export::PlanDocument;
+use crate::document::PlanDocument;
 use crate::view::sheet::sheet;
 use crate::view::steps::markdown;
 use crate::view::{Illustration, Instructions, PlanScene, equal_parts, illustrations};

@@ -8,13 +8,14 @@ use super::error::CliError;
 use super::part_names::part_named;
 use crate::blocking_graph::DirectionalGraph;
 use crate::cache::CacheSettings;
-use crate::exchange::content_of;
+use crate::document::content_of;
+use crate::document::{MOTION_ROUNDING, Placements};
+use crate::document::{PlanDocument, SourceDocument};
 use crate::files::{LoadOptions, StepSettings, load};
 use crate::geometry::{
     Assembly, Pose, Revision, SourceAssembly, SourceMesh, content_hash, pose_from_waypoint,
 };
-use crate::plan::export::{PlanDocument, SourceDocument};
-use crate::plan::{MOTION_ROUNDING, Placements, PlanKind};
+use crate::plan::PlanKind;
 use crate::search::Termination;
 use crate::service::{AssemblyId, Service};
 use crate::view::{Instructions, PlanScene, Up, ViewError, equal_parts, glb, kind_of, page, read_plan};

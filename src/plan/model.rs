@@ -224,3 +224,64 @@ pub struct Plan {
     /// Counters and times.
     pub stats: PlanStats,
 }
+
+impl PlanKind {
+    /// The kind as the contract names it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Disassembly => "disassembly",
+            Self::Assembly => "assembly",
+        }
+    }
+}
+
+impl PlanStatus {
+    /// The status as the contract names it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Complete => "complete",
+            Self::Partial => "partial",
+            Self::Infeasible => "infeasible",
+            Self::Exhausted => "exhausted",
+            Self::Timeout => "timeout",
+            Self::Cancelled => "cancelled",
+        }
+    }
+}
+
+impl MotionKind {
+    /// The kind of motion as the contract names it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Translation => "translation",
+            Self::Rotation => "rotation",
+        }
+    }
+}
+
+impl StepEnd {
+    /// The end as the contract names it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Out => "out",
+            Self::Aside => "aside",
+            Self::In => "in",
+        }
+    }
+}
+
+impl Plan {
+    /// The name of a part.
+    #[must_use]
+    pub fn part_name(&self, part: usize) -> &str {
+        self.parts.get(part).map_or("?", String::as_str)
+    }
+
+    pub(crate) fn names(&self, parts: &[usize]) -> Vec<String> {
+        parts.iter().map(|&p| self.part_name(p).to_owned()).collect()
+    }
+}

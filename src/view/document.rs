@@ -5,9 +5,10 @@ use std::collections::HashSet;
 use nalgebra::Vector3;
 
 use super::ViewError;
+use crate::document::{MOTION_ROUNDING, Placements};
+use crate::document::{PlanDocument, SCHEMA, StepDocument};
 use crate::geometry::Waypoint;
-use crate::plan::export::{PlanDocument, SCHEMA, StepDocument};
-use crate::plan::{MOTION_ROUNDING, Placements, PlanKind};
+use crate::plan::PlanKind;
 
 /// Quaternions of waypoints are this close to unit length.
 const UNIT: f64 = 1e-3;
@@ -137,7 +138,7 @@ fn check_waypoint(waypoint: &Waypoint) -> Result<(), String> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::plan::export::FreeGroupDocument;
+    use crate::document::FreeGroupDocument;
 
     /// A plan of two parts, of which the second is lifted.
     pub(in crate::view) fn plan() -> PlanDocument {

@@ -405,9 +405,9 @@ mod tests {
     use super::super::Up;
     use super::super::document::tests::{plan, reversed, step};
     use super::*;
+    use crate::document::{BlockedDocument, PlanDocument};
     use crate::fixtures::{cuboid, source};
     use crate::geometry::Assembly;
-    use crate::plan::export::{BlockedDocument, PlanDocument};
 
     /// A plate with two boxes of different sizes on it, which are lifted one after the other.
     fn lifted() -> PlanDocument {

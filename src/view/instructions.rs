@@ -4,8 +4,8 @@
 use super::document::kind_of;
 use super::verdict::{blockers, verdict};
 use super::words::{Moved, Words, capital, free_together, kept_together, part_words, required, told_names};
+use crate::document::{GroupDocument, PlanDocument, StepDocument};
 use crate::plan::PlanKind;
-use crate::plan::export::{GroupDocument, PlanDocument, StepDocument};
 
 /// A plan in words.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -43,7 +43,7 @@ pub(crate) use words::{direction, part_word, part_words};
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ViewError {
     /// The text is no plan.
-    #[error("not a plan (JSON `{schema}`, as `sbdp plan --json` writes it): {reason}", schema = crate::plan::export::SCHEMA)]
+    #[error("not a plan (JSON `{schema}`, as `sbdp plan --json` writes it): {reason}", schema = crate::document::SCHEMA)]
     NoPlan {
         /// What is wrong with it.
         reason: String,

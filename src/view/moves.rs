@@ -7,8 +7,8 @@ use std::f64::consts::PI;
 
 use nalgebra::Vector3;
 
+use crate::document::StepDocument;
 use crate::geometry::{Pose, pose_from_waypoint};
-use crate::plan::export::StepDocument;
 
 /// Turns below this (radians) are none.
 const NO_TURN: f64 = 0.01;

@@ -18,7 +18,7 @@ use super::{
     Up,
 };
 use crate::blocking_graph::DirectionalGraph;
-use crate::plan::export::BlockedDocument;
+use crate::document::BlockedDocument;
 use nalgebra::Point3;
 
 const HTML: &str = include_str!("page/index.html");

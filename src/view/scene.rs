@@ -12,9 +12,10 @@ use super::shading::{Shaded, shaded};
 use super::verdict::verdict;
 use super::words::{Words, free_together, kept_together, required};
 use super::{PALETTE, Rgb, ViewError};
+use crate::document::{BlockedDocument, PlanDocument};
+use crate::document::{Placements, StepFrame};
 use crate::geometry::{Assembly, Bounds, Pose, interpolate, pose_from_waypoint};
-use crate::plan::export::{BlockedDocument, PlanDocument};
-use crate::plan::{Placements, PlanKind, PlanStatus, StepEnd, StepFrame};
+use crate::plan::{PlanKind, PlanStatus, StepEnd};
 
 /// Boxes closer than this share of the longest side count as touching.
 const TOUCHING: f64 = 1e-6;
@@ -570,9 +571,9 @@ fn drawn(mesh: Shaded) -> DrawnPart {
 mod tests {
     use super::super::document::tests::{plan, reversed, step};
     use super::*;
+    use crate::document::{FreeGroupDocument, StepDocument};
     use crate::fixtures::{cuboid, source};
     use crate::geometry::{Waypoint, waypoint_from_pose};
-    use crate::plan::export::{FreeGroupDocument, StepDocument};
 
     const STILL: Waypoint = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 

@@ -40,9 +40,7 @@ pub fn markdown(instructions: &Instructions) -> String {
 mod tests {
     use super::super::document::tests::{plan, step};
     use super::*;
-    use crate::plan::export::{
-        BlockedDocument, FreeGroupDocument, GroupDocument, PlanDocument, StepDocument,
-    };
+    use crate::document::{BlockedDocument, FreeGroupDocument, GroupDocument, PlanDocument, StepDocument};
 
     fn markdown(plan: &PlanDocument, classes: Option<&[usize]>) -> String {
         super::markdown(&Instructions::of(plan, classes))

@@ -2,7 +2,7 @@
 
 use super::document::kind_of;
 use super::words::{capital, part_word, part_words};
-use crate::plan::export::{BlockedDocument, PlanDocument};
+use crate::document::{BlockedDocument, PlanDocument};
 use crate::plan::{PlanKind, PlanStatus, StepEnd};
 
 /// Count of blocked parts that a short list names: those that the fewest parts block. At half, the list of a frame with four

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 use super::document::kind_of;
 use super::moves::{Move, MoveKind, NEARLY, QUARTERLY, brought_near, moves, telling};
-use crate::plan::export::{FreeGroupDocument, PlanDocument, StepDocument};
+use crate::document::{FreeGroupDocument, PlanDocument, StepDocument};
 use crate::plan::{PlanKind, StepEnd};
 
 /// A sentence names no more moves than this.

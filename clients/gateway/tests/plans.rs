@@ -5,8 +5,8 @@ mod common;
 use std::sync::Arc;
 
 use common::{Daemon, Gateway, Lattice, assembly, end_of, request, status, to_end, upload, upload_source};
+use sbdp::document::PlanDocument;
 use sbdp::exchange;
-use sbdp::plan::export::PlanDocument;
 use sbdp_client::{Plan, PlanOptions, Staging};
 use sbdp_gateway::proto::plan_event::Event;
 use sbdp_gateway::proto::{self, HaveRequest, PlanRequest, VersionRequest};

@@ -11,10 +11,10 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use sbdp::cache::CacheSettings;
+use sbdp::document::SourceDocument;
 use sbdp::exchange;
 use sbdp::files::{self, IgnorePattern, LoadOptions, StepSettings};
 use sbdp::geometry::{SourceAssembly, content_hash};
-use sbdp::plan::export::SourceDocument;
 use sbdp_client::{Assembly as WireAssembly, Change, Handle, Meshes, Subject, Vertices};
 
 use crate::arrays::{ArrayMesh, rows_copy};
@@ -289,8 +289,8 @@ pub(crate) fn load(
             }
         }
     };
-    let content = exchange::content_of(&content_hash(&assembly), &sbdp::geometry::Revision::default());
-    let source = exchange::source(&path, content, split, &ignore, deflection);
+    let content = sbdp::document::content_of(&content_hash(&assembly), &sbdp::geometry::Revision::default());
+    let source = sbdp::document::source(&path, content, split, &ignore, deflection);
     let names = assembly.parts.iter().map(|part| part.name.clone()).collect();
     Ok(Assembly { data: Arc::new(Data::new(names, Origin::Files(Box::new((assembly, source))))) })
 }

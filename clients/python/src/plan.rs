@@ -6,8 +6,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyTuple;
-use sbdp::exchange;
-use sbdp::plan::export::PlanDocument;
+use sbdp::document::PlanDocument;
 use sbdp_client::{Plan as ClientPlan, Step as ClientStep, Summary};
 
 use crate::assembly::Data;
@@ -26,7 +25,7 @@ pub(crate) struct Plan {
 pub(crate) fn document(summary: &Summary, steps: &[ClientStep], data: &Data) -> PlanDocument {
     let document = summary.document(steps);
     match data.files() {
-        Some((assembly, source)) => exchange::with_files(document, assembly, source.clone()),
+        Some((assembly, source)) => sbdp::document::with_files(document, assembly, source.clone()),
         None => document,
     }
 }

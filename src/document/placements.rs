@@ -7,9 +7,9 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::export::{PlanDocument, StepDocument};
-use super::{PlanKind, StepEnd};
+use super::{PlanDocument, StepDocument};
 use crate::geometry::{Pose, pose_from_waypoint};
+use crate::plan::{PlanKind, StepEnd};
 
 /// Radians, and share of the length of the way. A rigid motion that differs from another by less is the same one: products of a
 /// few motions with coordinates in double precision are off by some 1e-15, in text of twelve digits by 1e-12. At half and

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use super::{GroupDocument, PlanDocument, SourceDocument, WarningDocument};
 use crate::files::{IgnorePattern, Split};
 use crate::geometry::{Revision, SourceAssembly, SourceGroup};
-use crate::plan::export::{GroupDocument, PlanDocument, SourceDocument, WarningDocument};
 
 /// The document of a plan of an assembly from files: with its groups, and what was found while the files were read, before
 /// the plan's own warnings.

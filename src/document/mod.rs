@@ -1,78 +1,21 @@
-//! Plans as JSON: a plan of this crate in the words of the contract.
+//! Plans as documents: a plan in the words of the contract `sbdp-plan/2` (JSON.md), with what is known of the files that it
+//! is about, and where the parts stand while it is carried out.
+
+mod files;
+mod placements;
 
 use std::collections::BTreeMap;
 
+pub use files::{absolute, content_of, source, with_files};
+pub(crate) use placements::MOTION_ROUNDING;
+pub use placements::{Placements, StepFrame};
 pub use sbdp_ipc::document::{
     BlockedDocument, CacheDocument, FreeGroupDocument, GroupDocument, InitialDocument, OverlapDocument,
     PlanDocument, SCHEMA, SourceDocument, StatsDocument, StepDocument, WarningDocument,
 };
 
-use super::{
-    Blocked, FreeGroup, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd,
-    Warning,
-};
 use crate::geometry::Waypoint;
-
-impl PlanKind {
-    /// The kind as the contract names it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Disassembly => "disassembly",
-            Self::Assembly => "assembly",
-        }
-    }
-}
-
-impl PlanStatus {
-    /// The status as the contract names it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Complete => "complete",
-            Self::Partial => "partial",
-            Self::Infeasible => "infeasible",
-            Self::Exhausted => "exhausted",
-            Self::Timeout => "timeout",
-            Self::Cancelled => "cancelled",
-        }
-    }
-}
-
-impl MotionKind {
-    /// The kind of motion as the contract names it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Translation => "translation",
-            Self::Rotation => "rotation",
-        }
-    }
-}
-
-impl StepEnd {
-    /// The end as the contract names it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Out => "out",
-            Self::Aside => "aside",
-            Self::In => "in",
-        }
-    }
-}
-
-impl Plan {
-    /// The name of a part.
-    #[must_use]
-    pub fn part_name(&self, part: usize) -> &str {
-        self.parts.get(part).map_or("?", String::as_str)
-    }
-
-    fn names(&self, parts: &[usize]) -> Vec<String> {
-        parts.iter().map(|&p| self.part_name(p).to_owned()).collect()
-    }
-}
+use crate::plan::{Blocked, FreeGroup, Overlap, Plan, PlanStats, PlanStep, Warning};
 
 impl From<&Plan> for PlanDocument {
     fn from(plan: &Plan) -> Self {
@@ -173,7 +116,7 @@ fn stats(stats: &PlanStats) -> StatsDocument {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::Base;
+    use crate::plan::{Base, MotionKind, PlanKind, PlanStatus, StepEnd};
 
     fn plan() -> Plan {
         Plan {
