@@ -119,8 +119,8 @@ fn lists() -> Vec<(&'static str, Vec<&'static str>)> {
 /// A constant of the contract is in no table.
 pub(crate) fn tables(source: &Source) -> Vec<(String, String)> {
     let mut tables = Vec::new();
-    // What the Rust client looks for by itself, on its own side.
-    let mut told = BTreeSet::from(["USUAL"]);
+    // What is not on the wire: how long the Rust client polls, and the JSON of plans (src/document/JSON.md).
+    let mut told = BTreeSet::from(["USUAL", "SCHEMA"]);
     for (name, values) in groups() {
         let mut text = "| constant | value | meaning |\n|---|---:|---|\n".to_owned();
         for (name, value) in values {
