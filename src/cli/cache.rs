@@ -26,31 +26,30 @@ pub(super) struct CacheArguments {
 /// What to do with the store.
 #[derive(Debug, Subcommand)]
 pub(super) enum CacheCommand {
-    /// List all records and distance fields: kind, key, bytes, and the transaction in which it was used last
+    /// List all records and distance fields: kind, key, bytes, and the transaction of the last use
     Ls,
     /// Count records and bytes by kind
     Stats {
-        /// Write all statistics there as JSON; `-` for stdout
+        /// Write all statistics to a file as JSON; `-` for stdout
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
-    /// Check all files and every record, and take out what is damaged; exits with 1 if anything was
+    /// Check all files and records, and remove damaged ones; the exit code is 1 if there were any
     Verify,
-    /// Take out the records and distance fields used least recently, and converted STEP files likewise
+    /// Remove the records, distance fields and converted STEP files that were used least recently
     Evict {
-        /// Until so many megabytes are left, and as many of converted STEP files
+        /// Megabytes to keep of each: of the records and fields, and of the converted STEP files
         #[arg(long, value_name = "MB")]
         to_mb: u64,
     },
-    /// Take out everything
+    /// Remove everything
     Clear,
 }
 
 /// Megabytes as the command line and the configuration have them.
 const MEGABYTE: u64 = 1 << 20;
 
-/// The cache for planning in this process. Where the store on disk cannot be had, that is told, and
-/// memory has to do.
+/// The cache for planning in this process: in memory, with a message, where the store on disk cannot be opened.
 pub(super) fn embedded(folder: Option<&Path>) -> Arc<Cache> {
     let settings = settings(folder);
     let cache = Cache::open(&settings, &RECORD_KINDS).unwrap_or_else(|error| {

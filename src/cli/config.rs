@@ -19,7 +19,7 @@ pub(super) struct ConfigArguments {
 
 #[derive(Debug, Subcommand)]
 enum ConfigCommand {
-    /// Say whether the daemon would take a file, and which line is wrong
+    /// Check whether a file is a valid configuration; names the line that is wrong
     Check {
         /// A configuration of `sbdpd`
         file: PathBuf,

@@ -10,7 +10,7 @@ use crate::service::ServiceError;
 /// Why a command ended without its result.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum CliError {
-    /// The user asked for something that makes no sense, or gave geometry that is refused.
+    /// The arguments contradict each other, or the geometry is refused.
     #[error("{0}")]
     Refused(String),
     /// Anything else.

@@ -1,4 +1,4 @@
-//! What listens to a request: the display on the terminal, and the trace if one is asked for.
+//! The listener of a request: the display on the terminal, and the trace, if the user wants one.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -39,7 +39,7 @@ impl Listener {
     pub(super) fn begin_anew(&mut self) {
         if let Some(TraceFile { path, file, failed }) = &mut self.trace {
             match File::create(&*path) {
-                // What the old one has not written yet is for nobody.
+                // What the old one has not written yet is void, too.
                 Ok(anew) => drop(std::mem::replace(file, BufWriter::new(anew)).into_parts()),
                 Err(error) => *failed = failed.take().or(Some(error)),
             }

@@ -13,8 +13,8 @@ use crate::view::{blockers, direction, part_word, part_words, verdict};
 /// columns. At half, pairs alone are named; at double, rows wrap.
 const MOST_NAMES: usize = 4;
 
-/// The table of steps, and what there is to know about the rest: all overlaps and blocked actions if it is `verbose`,
-/// else the worst and the few that matter, with a count of what is left out.
+/// The table of steps and all other sections. If it is `verbose`, with all overlaps and blocked actions, else with the
+/// worst and few, and the number of the others.
 pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan, document: &PlanDocument, verbose: bool) -> String {
     let mut text = headline(assembly, plan);
     if !plan.steps.is_empty() {

@@ -37,7 +37,7 @@ fn describe(status: &Status) -> String {
          workers   {}, {} busy; {} of {} requests wait\n\
          requests  {}: {} answered ({} of them from memory), {} cancelled, {} expired, {} refused, {} failed\n\
          graphs    {} states' blocking graphs answered from memory\n\
-         uploads   {}; what is remembered: `sbdp status --json`\n",
+         uploads   {}; all figures: `sbdp status --json`\n",
         status.version,
         n.protocol,
         n.pid,

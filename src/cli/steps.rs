@@ -19,7 +19,7 @@ pub(super) fn run(arguments: &StepsArguments) -> Result<ExitCode, CliError> {
     }
     let instructions = match instructions(&plan, arguments) {
         Ok(instructions) => instructions,
-        // What was asked for must be; what was tried may fail.
+        // Meshes that the user names must be there; those that the plan names may be missing.
         Err(error) if arguments.meshes.is_some() => return Err(error),
         Err(error) => {
             eprintln!("note: {error}; parts are taken for equal whose names differ in a number only");

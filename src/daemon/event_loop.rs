@@ -125,7 +125,7 @@ pub fn run_reloading<P: Planning>(
         next_sweep,
     };
     event_loop.run();
-    tracing::info!("sbdpd has answered everybody and leaves");
+    tracing::info!("all requests are answered; sbdpd ends");
     Ok(())
 }
 

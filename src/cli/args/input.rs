@@ -13,18 +13,18 @@ use crate::geometry::{GeometryError, SourceAssembly};
 pub(in crate::cli) struct Input {
     /// A folder of OBJ, STL, PLY, OFF, GLB, 3MF or STEP files in assembled pose, or one such file with the whole assembly in it
     pub(in crate::cli) assembly: PathBuf,
-    /// What is a part in a file that holds several: each object, group, solid or primitive; each separate body; or all of
-    /// it (of a scene each node) [default: what a file of the whole assembly names, if these are bodies]
+    /// What counts as a part in a file that holds several: each object, group, solid or primitive; each separate body; or
+    /// the whole file (of a scene each node) [default: what a file of the whole assembly names, if these are bodies]
     #[arg(long, value_name = "objects|bodies|none")]
     pub(in crate::cli) split: Option<Split>,
-    /// Leave out the parts whose names, or whose files' names, fit a pattern, as '*bolt*' (repeatable)
+    /// Leave out parts whose names, or whose files' names, match a pattern, as '*bolt*' (repeatable)
     #[arg(long, value_name = "GLOB")]
     pub(in crate::cli) ignore: Vec<IgnorePattern>,
-    /// The program that makes GLB of STEP files (see clients/step) [default: $SBDP_STEP, else `sbdp-step` beside this
+    /// The program that converts STEP files to GLB (see clients/step) [default: $SBDP_STEP, else `sbdp-step` beside this
     /// program or on PATH]
     #[arg(long, value_name = "PROGRAM")]
     pub(in crate::cli) converter: Option<PathBuf>,
-    /// How far the triangles made of a STEP file may be from its surfaces, in mm [default: 0.01]
+    /// Largest distance of the triangles of a STEP file from its surfaces, in mm [default: 0.01]
     #[arg(long, value_name = "MM", value_parser = deflection)]
     pub(in crate::cli) deflection: Option<f64>,
 }

@@ -10,27 +10,27 @@ use crate::bench;
 /// A benchmark of many clients at once.
 #[derive(Debug, Args)]
 pub(in super::super) struct BenchLoad {
-    /// What is planned [default: a bolted frame of 20 parts]
+    /// The assembly to plan [default: a bolted frame of 20 parts]
     pub(in super::super) assembly: Option<PathBuf>,
-    /// How many clients ask at the same time, each a process of its own (the daemon takes 40)
+    /// Simultaneous clients, each a process of its own (the daemon serves 40)
     #[arg(long, value_name = "N", default_value = "16")]
     pub(in super::super) clients: NonZeroUsize,
-    /// How many requests they make in all
+    /// Number of requests in all
     #[arg(long, value_name = "N", default_value = "20000")]
     pub(in super::super) requests: NonZeroUsize,
-    /// How many different questions of each kind there are
+    /// Different requests of each kind
     #[arg(long, value_name = "N", default_value = "64")]
     pub(in super::super) variety: u64,
-    /// Which questions are asked
+    /// Seed of the requests
     #[arg(long, value_name = "N", default_value = "1")]
     pub(in super::super) seed: u64,
-    /// Do it all once more beside three further clients: one stopped, one that floods, one that never reads
+    /// Repeat it beside three more clients: one stopped, one that floods, one that never reads
     #[arg(long)]
     pub(in super::super) disturb: bool,
-    /// The folder of the running daemon to ask [default: starts one of its own, `sbdpd` beside `sbdp`]
+    /// Runtime folder of a running daemon [default: starts one, `sbdpd` beside `sbdp`]
     #[arg(long, value_name = "DIR")]
     pub(in super::super) runtime_dir: Option<PathBuf>,
-    /// Write the figures there as JSON
+    /// Write the figures to a file as JSON
     #[arg(long, value_name = "FILE")]
     pub(in super::super) json: Option<PathBuf>,
 }
@@ -38,24 +38,24 @@ pub(in super::super) struct BenchLoad {
 /// A test of endurance.
 #[derive(Debug, Args)]
 pub(in super::super) struct BenchSoak {
-    /// What is planned [default: a bolted frame of 20 parts]
+    /// The assembly to plan [default: a bolted frame of 20 parts]
     pub(in super::super) assembly: Option<PathBuf>,
-    /// How many clients ask at the same time
+    /// Simultaneous clients
     #[arg(long, value_name = "N", default_value = "4")]
     pub(in super::super) clients: NonZeroUsize,
-    /// How many clients are killed, and replaced
+    /// Number of clients to kill and replace
     #[arg(long, value_name = "N", default_value = "200")]
     pub(in super::super) client_kills: u32,
-    /// How many daemons are killed, and restarted
+    /// Number of daemons to kill and restart
     #[arg(long, value_name = "N", default_value = "50")]
     pub(in super::super) daemon_kills: u32,
-    /// How many requests each client makes, if it lives so long
+    /// Requests of each client that is not killed before
     #[arg(long, value_name = "N", default_value = "300")]
     pub(in super::super) requests: NonZeroUsize,
-    /// Which moments and victims
+    /// Seed of the moments and of which process is killed
     #[arg(long, value_name = "N", default_value = "1")]
     pub(in super::super) seed: u64,
-    /// Write the figures there as JSON
+    /// Write the figures to a file as JSON
     #[arg(long, value_name = "FILE")]
     pub(in super::super) json: Option<PathBuf>,
 }
@@ -66,13 +66,13 @@ pub(in super::super) struct BenchCancel {
     /// Folders or files of assemblies
     #[arg(value_name = "ASSEMBLY", required = true)]
     pub(in super::super) assemblies: Vec<PathBuf>,
-    /// At how many moments of each plan it is ended
+    /// Number of moments at which each plan is cancelled
     #[arg(long, value_name = "N", default_value = "200")]
     pub(in super::super) samples: u32,
-    /// Threads that plan [default: all processors]
+    /// Worker threads [default: all processors]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     pub(in super::super) threads: usize,
-    /// Write the figures there as JSON
+    /// Write the figures to a file as JSON
     #[arg(long, value_name = "FILE")]
     pub(in super::super) json: Option<PathBuf>,
 }

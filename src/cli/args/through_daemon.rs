@@ -8,15 +8,15 @@ use clap::Args;
 /// A benchmark of answers from memory.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct BenchLatency {
-    /// What is planned [default: a bolted frame of 20 parts]
+    /// The assembly to plan [default: a bolted frame of 20 parts]
     pub(in crate::cli) assembly: Option<PathBuf>,
-    /// How many clients ask at the same time
+    /// Simultaneous clients
     #[arg(long, value_name = "N", default_value = "1")]
     pub(in crate::cli) clients: NonZeroUsize,
-    /// How often each asks
+    /// Requests of each client
     #[arg(long, value_name = "N", default_value = "5000")]
     pub(in crate::cli) rounds: NonZeroUsize,
-    /// Write the figures there as JSON
+    /// Write the figures to a file as JSON
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) json: Option<PathBuf>,
 }
@@ -24,10 +24,10 @@ pub(in crate::cli) struct BenchLatency {
 /// A benchmark of changed questions.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct BenchReplan {
-    /// Folders or files of assemblies; of each, a bolt is removed, moved, replaced and locked
+    /// Folders or files of assemblies; a bolt of each is removed, moved, replaced and locked
     #[arg(value_name = "ASSEMBLY", required = true)]
     pub(in crate::cli) assemblies: Vec<PathBuf>,
-    /// Write the figures there as JSON
+    /// Write the figures to a file as JSON
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) json: Option<PathBuf>,
 }
@@ -35,12 +35,12 @@ pub(in crate::cli) struct BenchReplan {
 /// A benchmark of restarts.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct BenchRestart {
-    /// What is planned [default: a bolted frame of 20 parts]
+    /// The assembly to plan [default: a bolted frame of 20 parts]
     pub(in crate::cli) assembly: Option<PathBuf>,
     /// Restarts of each kind
     #[arg(long, value_name = "N", default_value = "20")]
     pub(in crate::cli) rounds: NonZeroUsize,
-    /// Write the figures there as JSON
+    /// Write the figures to a file as JSON
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) json: Option<PathBuf>,
 }
@@ -48,16 +48,16 @@ pub(in crate::cli) struct BenchRestart {
 /// A benchmark of budgets.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct BenchChurn {
-    /// How many assemblies
+    /// Number of assemblies
     #[arg(long, value_name = "N", default_value = "1000")]
     pub(in crate::cli) assemblies: NonZeroUsize,
-    /// The daemon's budget of memory
+    /// Memory budget of the daemon
     #[arg(long, value_name = "MB", default_value = "256")]
     pub(in crate::cli) memory_mb: u64,
-    /// Its budget on disk
+    /// Disk budget of the daemon
     #[arg(long, value_name = "MB", default_value = "1024")]
     pub(in crate::cli) disk_mb: u64,
-    /// Write the figures there as JSON
+    /// Write the figures to a file as JSON
     #[arg(long, value_name = "FILE")]
     pub(in crate::cli) json: Option<PathBuf>,
 }

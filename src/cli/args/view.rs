@@ -16,13 +16,13 @@ use crate::simulation::{Action, Axis};
 pub(in crate::cli) struct ViewArguments {
     #[command(flatten)]
     pub(in crate::cli) plan: PlanArguments,
-    /// Where the page goes [default: beside the assembly or plan, by its name, with `.html`]
+    /// File for the page [default: beside the assembly or plan, by its name, with `.html`]
     #[arg(short, long, value_name = "FILE")]
     pub(in crate::cli) output: Option<PathBuf>,
     /// Open the page in the browser (by `xdg-open`)
     #[arg(long)]
     pub(in crate::cli) open: bool,
-    /// Of a PLAN.json: the assembly that it is about [default: the one that it names]
+    /// For a PLAN.json: its assembly [default: the one that it names]
     #[arg(long, value_name = "ASSEMBLY")]
     pub(in crate::cli) meshes: Option<PathBuf>,
 }
@@ -36,7 +36,7 @@ pub(in crate::cli) struct GraphArguments {
     /// this assembly uses]
     #[arg(long, value_name = "DIRECTION", value_parser = direction, allow_hyphen_values = true)]
     pub(in crate::cli) direction: Vec<Action>,
-    /// A part that is gone already (repeatable)
+    /// A part that has been removed already (repeatable)
     #[arg(long, value_name = "PART")]
     pub(in crate::cli) removed: Vec<String>,
     /// Where the picture goes: .svg, with equal parts as one box, or .dot for Graphviz, with all parts. Of several
@@ -50,8 +50,8 @@ pub(in crate::cli) struct GraphArguments {
 pub(in crate::cli) struct StepsArguments {
     /// A plan that `sbdp plan --json` wrote
     pub(in crate::cli) plan: PathBuf,
-    /// The assembly that it is about, which tells equal parts [default: the one that it names, if it is
-    /// there, else parts are equal whose names differ in a number only]
+    /// Its assembly, from which equal parts are found [default: the one that the plan names; where that is missing, parts
+    /// are equal if their names differ only in a number]
     #[arg(long, value_name = "ASSEMBLY")]
     pub(in crate::cli) meshes: Option<PathBuf>,
     /// Draw a PNG picture per instruction into this folder, which is made if it is not there: `step-3.png`, or
