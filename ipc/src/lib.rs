@@ -1,5 +1,5 @@
 //! The wire contract of the sbdp daemon: names and limits of its iceoryx2 services, the layout of every message, and
-//! where a client finds the daemon. Programs that only want plans use the crate `sbdp-client`.
+//! where a client finds the daemon; and plans as JSON ([`document`]). Programs that only want plans use the crate `sbdp-client`.
 //!
 //! `PROTOCOL.md` lists the whole contract in tables, which are generated from these definitions and their comments.
 //!

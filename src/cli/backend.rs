@@ -1,5 +1,4 @@
-//! Where plans are made: in this process or in the daemon. Both speak the planning modules'
-//! own types.
+//! Where plans are made: in this process or in the daemon. Both answer with the document of a plan.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -7,6 +6,7 @@ use std::time::{Duration, Instant};
 use super::error::CliError;
 use super::listener::Listener;
 use crate::cache::Cache;
+use crate::document::PlanDocument;
 use crate::geometry::{GeometryError, Revision, SourceAssembly};
 use crate::plan::{Base, Plan, PlanKind, PlanStats, PlanStatus};
 use crate::search::{PlanRequest, PlanSink, Termination};
@@ -34,7 +34,8 @@ pub(super) struct CommandQuestion<'a> {
 /// Something that plans.
 pub(super) trait Backend {
     /// Plans; blocks until done.
-    fn plan(&self, question: &CommandQuestion<'_>, listener: &mut Listener) -> Result<Plan, CliError>;
+    fn plan(&self, question: &CommandQuestion<'_>, listener: &mut Listener)
+    -> Result<PlanDocument, CliError>;
 }
 
 /// The service in this process.
@@ -63,7 +64,11 @@ impl Embedded {
 }
 
 impl Backend for Embedded {
-    fn plan(&self, question: &CommandQuestion<'_>, listener: &mut Listener) -> Result<Plan, CliError> {
+    fn plan(
+        &self,
+        question: &CommandQuestion<'_>,
+        listener: &mut Listener,
+    ) -> Result<PlanDocument, CliError> {
         match self.planned(question, listener) {
             Err(ServiceError::Geometry(GeometryError::Interrupted(Interrupt::Cancelled))) => {
                 Ok(unplanned(question, PlanStatus::Cancelled, Interrupt::Cancelled.to_string()))
@@ -71,17 +76,17 @@ impl Backend for Embedded {
             Err(ServiceError::Geometry(GeometryError::Interrupted(interrupt))) => {
                 Ok(unplanned(question, PlanStatus::Timeout, interrupt.to_string()))
             }
-            planned => Ok(planned?),
+            planned => Ok(PlanDocument::from(&planned?)),
         }
     }
 }
 
 /// The answer to a question that was let go before planning began: everything stands where it stood.
-pub(super) fn unplanned(question: &CommandQuestion<'_>, status: PlanStatus, reason: String) -> Plan {
+pub(super) fn unplanned(question: &CommandQuestion<'_>, status: PlanStatus, reason: String) -> PlanDocument {
     let request = &question.request;
     let parts: Vec<String> = question.revised.parts.iter().map(|p| p.name.clone()).collect();
     let remaining = (0..parts.len()).filter(|p| !request.removed.contains(p)).collect();
-    Plan {
+    PlanDocument::from(&Plan {
         kind: if request.assembly.is_some() { PlanKind::Assembly } else { PlanKind::Disassembly },
         status,
         reason: Some(reason),
@@ -102,5 +107,5 @@ pub(super) fn unplanned(question: &CommandQuestion<'_>, status: PlanStatus, reas
         overlaps: Vec::new(),
         warnings: Vec::new(),
         stats: PlanStats::default(),
-    }
+    })
 }

@@ -1,5 +1,4 @@
-//! The daemon as a backend: the client crate's types on one side, the planning modules' on the
-//! other.
+//! The daemon as a backend: requests of the command line as the client crate has them.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,9 +12,10 @@ use super::backend::{Backend, CommandQuestion, unplanned};
 use super::error::CliError;
 use super::listener::Listener;
 use crate::blocking_graph::StaticAnalysis;
-use crate::exchange::{plan, plan_step, wire_assembly, wire_mesh, wire_part};
+use crate::document::PlanDocument;
+use crate::exchange::{wire_assembly, wire_mesh, wire_part};
 use crate::geometry::{Revision, SourceAssembly, heal, waypoint_from_pose};
-use crate::plan::{Plan, PlanStatus};
+use crate::plan::PlanStatus;
 use crate::search::{ActionSet, Engine, PlanSink as _, Planner, Progress, Stage, Staging};
 use crate::simulation::PenaltyParameters;
 
@@ -58,7 +58,7 @@ impl Daemon {
         &self,
         question: &CommandQuestion<'_>,
         listener: &mut Listener,
-    ) -> Result<Plan, ClientError> {
+    ) -> Result<PlanDocument, ClientError> {
         let answer = self.ask(question, listener);
         if matches!(&answer, Err(e) if e.code() == Some(ErrorCode::UnknownHandle)) {
             // Evicted between the two requests.
@@ -67,7 +67,11 @@ impl Daemon {
         answer
     }
 
-    fn ask(&self, question: &CommandQuestion<'_>, listener: &mut Listener) -> Result<Plan, ClientError> {
+    fn ask(
+        &self,
+        question: &CommandQuestion<'_>,
+        listener: &mut Listener,
+    ) -> Result<PlanDocument, ClientError> {
         let mut handle = self.client.upload(&wire_assembly(question.assembly))?;
         if !question.revision.is_empty() {
             handle = self.client.revise(handle, &change(&question.revision))?;
@@ -78,7 +82,11 @@ impl Daemon {
 }
 
 impl Backend for Daemon {
-    fn plan(&self, question: &CommandQuestion<'_>, listener: &mut Listener) -> Result<Plan, CliError> {
+    fn plan(
+        &self,
+        question: &CommandQuestion<'_>,
+        listener: &mut Listener,
+    ) -> Result<PlanDocument, CliError> {
         concluded(question, self.answer(question, listener))
     }
 }
@@ -86,8 +94,8 @@ impl Backend for Daemon {
 /// What the command makes of the daemon's answer.
 pub(super) fn concluded(
     question: &CommandQuestion<'_>,
-    answer: Result<Plan, ClientError>,
-) -> Result<Plan, CliError> {
+    answer: Result<PlanDocument, ClientError>,
+) -> Result<PlanDocument, CliError> {
     answer.or_else(|error| match (&error, error.code()) {
         (ClientError::Interrupted, _) | (_, Some(ErrorCode::Cancelled)) => {
             Ok(unplanned(question, PlanStatus::Cancelled, error.to_string()))
@@ -116,7 +124,7 @@ fn receive(
     stream: &mut PlanStream,
     question: &CommandQuestion<'_>,
     listener: &mut Listener,
-) -> Result<Plan, ClientError> {
+) -> Result<PlanDocument, ClientError> {
     let cancel = question.termination.cancel_flag();
     let mut steps = Vec::new();
     let mut cancelled = None;
@@ -131,8 +139,8 @@ fn receive(
         match event {
             Some(Event::Progress(p)) => listener.progress(progress(p)),
             Some(Event::Step(step)) => {
-                steps.push(plan_step(&step));
-                steps.last().into_iter().for_each(|s| listener.step(s));
+                listener.step_found();
+                steps.push(step);
             }
             Some(Event::Trace(lines)) => {
                 for line in lines.lines() {
@@ -145,7 +153,7 @@ fn receive(
                 steps.clear();
                 listener.begin_anew();
             }
-            Some(Event::Done(summary)) => return Ok(plan(summary, steps)),
+            Some(Event::Done(summary)) => return Ok(summary.document(&steps)),
             None => return Err(ClientError::Protocol("the plan ended without its summary".into())),
         }
     }

@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use crate::bench::BenchError;
+use crate::document::PlanDocument;
 use crate::geometry::GeometryError;
 use crate::plan::PlanStatus;
 use crate::service::ServiceError;
@@ -58,22 +59,26 @@ impl From<BenchError> for CliError {
 }
 
 /// The exit code of a plan.
-pub(super) fn exit_code(status: PlanStatus) -> ExitCode {
-    ExitCode::from(match status {
-        PlanStatus::Complete => 0,
-        PlanStatus::Partial | PlanStatus::Infeasible | PlanStatus::Exhausted => 3,
-        PlanStatus::Timeout => 4,
-        PlanStatus::Cancelled => 5,
+pub(super) fn exit_code(plan: &PlanDocument) -> ExitCode {
+    ExitCode::from(match PlanStatus::named(&plan.status) {
+        Some(PlanStatus::Complete) => 0,
+        Some(PlanStatus::Partial | PlanStatus::Infeasible | PlanStatus::Exhausted) => 3,
+        Some(PlanStatus::Timeout) => 4,
+        Some(PlanStatus::Cancelled) => 5,
+        // A daemon of this version has no other.
+        None => 1,
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::plan_of;
 
     #[test]
     fn what_ends_without_a_plan_and_what_is_proved_to_have_none_exit_alike() {
-        let code = |status| format!("{:?}", exit_code(status));
+        let plan = |status| PlanDocument::from(&plan_of(status, Vec::new()));
+        let code = |status| format!("{:?}", exit_code(&plan(status)));
         let three = format!("{:?}", ExitCode::from(3));
         assert_eq!((code(PlanStatus::Exhausted), code(PlanStatus::Infeasible)), (three.clone(), three));
     }

@@ -46,6 +46,11 @@ impl Listener {
         }
     }
 
+    /// A step was found: the search has begun.
+    pub(super) fn step_found(&mut self) {
+        self.display.step_found();
+    }
+
     /// Ends the display and completes the trace.
     pub(super) fn finish(self) -> Result<(), CliError> {
         let Some(TraceFile { path, mut file, failed }) = self.trace else { return Ok(()) };
@@ -61,8 +66,8 @@ impl PlanSink for Listener {
         self.display.progress(progress);
     }
 
-    fn step(&mut self, step: &PlanStep) {
-        self.display.step(step);
+    fn step(&mut self, _: &PlanStep) {
+        self.step_found();
     }
 
     fn traces(&self) -> bool {

@@ -22,7 +22,6 @@ use crate::document::{PlanDocument, SourceDocument};
 use crate::document::{absolute, content_of, source, with_files};
 use crate::files::{LoadOptions, load};
 use crate::geometry::{Revision, SourceAssembly, content_hash, pose_from_waypoint};
-use crate::plan::Plan;
 use crate::search::{PlanRequest, Planner, Termination};
 use crate::simulation::PenaltyParameters;
 
@@ -31,9 +30,9 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     let planned = planned(arguments)?;
     write_files(arguments, &planned)?;
     if !arguments.quiet && arguments.json.as_deref() != Some(Path::new(STDOUT)) {
-        print(&report::plan(&planned.revised, &planned.plan, &planned.subject.plan, arguments.verbose))?;
+        print(&report::plan(&planned.revised, &planned.subject.plan, arguments.verbose))?;
     }
-    Ok(exit_code(planned.plan.status))
+    Ok(exit_code(&planned.subject.plan))
 }
 
 /// The name of the file that is stdout.
@@ -41,8 +40,6 @@ const STDOUT: &str = "-";
 
 /// A plan with all that is needed to show it.
 pub(super) struct Planned {
-    /// The plan.
-    pub(super) plan: Plan,
     /// The assembly that it is about, with what differs.
     revised: SourceAssembly,
     /// The plan in the words of its contract, with the assembly before what differs.
@@ -83,8 +80,8 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
     let plan = plan?;
     let revision = question.revision;
     let source = source_of(arguments, content_of(&content, &revision));
-    let document = with_files(PlanDocument::from(&plan), &assembly, source);
-    Ok(Planned { plan, revised, subject: Subject::new(assembly, revision, document) })
+    let document = with_files(plan, &assembly, source);
+    Ok(Planned { revised, subject: Subject::new(assembly, revision, document) })
 }
 
 /// Where the meshes are, for who reads the plan later and elsewhere.
@@ -221,7 +218,11 @@ struct DaemonFirst<'a> {
 }
 
 impl Backend for DaemonFirst<'_> {
-    fn plan(&self, question: &CommandQuestion<'_>, listener: &mut Listener) -> Result<Plan, CliError> {
+    fn plan(
+        &self,
+        question: &CommandQuestion<'_>,
+        listener: &mut Listener,
+    ) -> Result<PlanDocument, CliError> {
         let answer = self.daemon.answer(question, listener);
         if matches!(&answer, Err(error) if went_away(error)) {
             eprintln!("warning: the daemon went away before it had answered; planning in this process");

@@ -4,8 +4,7 @@ use std::io::IsTerminal;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::plan::PlanStep;
-use crate::search::{PlanSink, Progress, Stage};
+use crate::search::{Progress, Stage};
 
 /// Shows the stages of a request on stderr.
 pub(super) struct ProgressDisplay {
@@ -42,15 +41,15 @@ impl ProgressDisplay {
     }
 }
 
-impl PlanSink for ProgressDisplay {
-    fn progress(&mut self, progress: Progress) {
+impl ProgressDisplay {
+    pub(super) fn progress(&mut self, progress: Progress) {
         self.enter(progress.stage);
         self.bar.set_length(u64::from(progress.total));
         self.bar.set_position(u64::from(progress.done));
         self.bar.set_message(format!("{} simulations", progress.simulations));
     }
 
-    fn step(&mut self, _step: &PlanStep) {
+    pub(super) fn step_found(&mut self) {
         if self.stage != Some(Stage::Transfer) {
             self.enter(Stage::Search);
         }

@@ -1,13 +1,17 @@
 //! A plan as a text for people.
 
+use std::collections::HashMap;
+
 use nalgebra::Point3;
 
 use super::table::{TextTable, length};
-use crate::document::{Placements, StepFrame};
-use crate::document::{PlanDocument, WarningDocument};
+use crate::document::{
+    CacheDocument, FreeGroupDocument, OverlapDocument, Placements, PlanDocument, StepDocument, StepFrame,
+    WarningDocument,
+};
 use crate::geometry::{Bounds, Pose, SourceAssembly, SourceMesh, pose_from_waypoint};
-use crate::plan::{Base, FreeGroup, MotionKind, Overlap, Plan, PlanKind, PlanStats, PlanStep, StepEnd};
-use crate::view::{blockers, direction, part_word, part_words, verdict};
+use crate::plan::{MotionKind, PlanKind, StepEnd};
+use crate::view::{blockers, direction, kind_of, part_word, part_words, verdict};
 
 /// Count of parts that a row of the table names; more are counted. With names of ten letters, the row still fits 120
 /// columns. At half, pairs alone are named; at double, rows wrap.
@@ -15,24 +19,21 @@ const MOST_NAMES: usize = 4;
 
 /// The table of steps and all other sections. If it is `verbose`, with all overlaps and blocked actions, else with the
 /// worst and few, and the number of the others.
-pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan, document: &PlanDocument, verbose: bool) -> String {
+pub(super) fn plan(assembly: &SourceAssembly, plan: &PlanDocument, verbose: bool) -> String {
     let mut text = headline(assembly, plan);
     if !plan.steps.is_empty() {
         text.push('\n');
-        text.push_str(&steps(assembly, plan, document));
+        text.push_str(&steps(assembly, plan));
     }
     let sections = [
         ("base", base(plan)),
         ("remaining", remaining(plan)),
-        (
-            "left together and not taken apart",
-            plan.kept_together.iter().map(|g| words(plan, g, ", ")).collect(),
-        ),
-        ("not complete", verdict(document).into_iter().collect()),
+        ("left together and not taken apart", plan.kept_together.iter().map(|g| words(g, ", ")).collect()),
+        ("not complete", verdict(plan).into_iter().collect()),
         ("can begin to move together", free_together(plan)),
-        ("blocked", blocked(document, verbose)),
+        ("blocked", blocked(plan, verbose)),
         ("overlaps at the assembled pose", overlaps(plan, verbose)),
-        ("warnings", warnings(document)),
+        ("warnings", warnings(plan)),
     ];
     for (title, lines) in sections {
         if !lines.is_empty() {
@@ -45,36 +46,36 @@ pub(super) fn plan(assembly: &SourceAssembly, plan: &Plan, document: &PlanDocume
     text
 }
 
-fn headline(assembly: &SourceAssembly, plan: &Plan) -> String {
+fn headline(assembly: &SourceAssembly, plan: &PlanDocument) -> String {
     let name = if assembly.name.is_empty() { "assembly" } else { &assembly.name };
-    let done = match plan.kind {
+    let done = match kind_of(plan) {
         PlanKind::Disassembly => "come off",
         PlanKind::Assembly => "are put in",
     };
-    let crosses = plan.steps.iter().filter(|step| step.of.is_none() && step.ends != StepEnd::Aside);
+    let crosses = plan.steps.iter().filter(|step| step.of.is_none() && step.ends != StepEnd::Aside.name());
     format!(
         "{name}: {}; {} of {} parts {done}, planner {}, engine {}\n",
-        plan.status.name(),
+        plan.status,
         crosses.map(|step| step.parts.len()).sum::<usize>(),
-        plan.parts.len().saturating_sub(plan.removed.len()),
+        plan.parts.len().saturating_sub(plan.initial.removed.len()),
         plan.planner,
         plan.engine
     )
 }
 
-fn steps(assembly: &SourceAssembly, plan: &Plan, document: &PlanDocument) -> String {
+fn steps(assembly: &SourceAssembly, plan: &PlanDocument) -> String {
     let has_groups = plan.steps.iter().any(|step| step.of.is_some());
     let group = has_groups.then_some("group of");
     let header =
         ["step", "part"].into_iter().chain(group).chain(["motion", "length", "direction", "after step"]);
     let mut table = TextTable::new(&header.collect::<Vec<_>>());
-    let middles = middles(assembly, plan, document);
+    let middles = middles(assembly, plan);
     for ((number, step), middle) in (1..).zip(&plan.steps).zip(middles) {
         let of = has_groups.then(|| step.of.map_or_else(String::new, |of| format!("step {}", of + 1)));
-        let aside = if step.ends == StepEnd::Aside { ", aside" } else { "" };
-        let cells = [format!("{number}"), moved(plan, step)].into_iter().chain(of).chain([
-            format!("{}{aside}", step.motion.name()),
-            travelled(step, plan.kind, &middle, plan.units.as_deref()),
+        let aside = if step.ends == StepEnd::Aside.name() { ", aside" } else { "" };
+        let cells = [format!("{number}"), moved(step)].into_iter().chain(of).chain([
+            format!("{}{aside}", step.motion),
+            travelled(step, kind_of(plan), &middle, plan.units.as_deref()),
             step.direction.map_or_else(String::new, |d| direction(&d.into())),
             step.requires.iter().map(|number| format!("{}", number + 1)).collect::<Vec<_>>().join(", "),
         ]);
@@ -84,19 +85,20 @@ fn steps(assembly: &SourceAssembly, plan: &Plan, document: &PlanDocument) -> Str
 }
 
 /// The parts of a step.
-fn moved(plan: &Plan, step: &PlanStep) -> String {
+fn moved(step: &StepDocument) -> String {
     let shown = step.parts.len().min(MOST_NAMES);
     match step.parts.len() - shown {
-        0 => names(plan, &step.parts),
-        more => format!("{} and {more} more", names(plan, &step.parts[..shown])),
+        0 => step.parts.join(", "),
+        more => format!("{} and {more} more", step.parts[..shown].join(", ")),
     }
 }
 
 /// How far the middle of the box of what moves goes, and how far it turns on the way.
-fn travelled(step: &PlanStep, kind: PlanKind, middle: &Point3<f64>, units: Option<&str>) -> String {
+fn travelled(step: &StepDocument, kind: PlanKind, middle: &Point3<f64>, units: Option<&str>) -> String {
     let poses: Vec<_> = step.path.iter().map(pose_from_waypoint).collect();
     let distance: f64 = poses.windows(2).map(|w| (w[1] * middle - w[0] * middle).norm()).sum();
-    if distance == 0.0 && step.motion == MotionKind::Translation {
+    let turns = step.motion == MotionKind::Rotation.name();
+    if distance == 0.0 && !turns {
         return match kind {
             PlanKind::Disassembly => "free already".to_owned(),
             PlanKind::Assembly => "in place".to_owned(),
@@ -104,27 +106,27 @@ fn travelled(step: &PlanStep, kind: PlanKind, middle: &Point3<f64>, units: Optio
     }
     let turned: f64 = poses.windows(2).map(|w| w[0].rotation.angle_to(&w[1].rotation)).sum();
     let straight = length(distance, units);
-    match step.motion {
-        MotionKind::Translation => straight,
-        MotionKind::Rotation => format!("{straight}, turning {:.0}°", turned.to_degrees()),
-    }
+    if turns { format!("{straight}, turning {:.0}°", turned.to_degrees()) } else { straight }
 }
 
 /// By step, the middle of the box of the parts that it moves, where its path is the identity. Steps that contradict each
 /// other have the middle of the parts as given.
-fn middles(assembly: &SourceAssembly, plan: &Plan, document: &PlanDocument) -> Vec<Point3<f64>> {
-    let placements = Placements::new(plan.kind, document).ok();
+fn middles(assembly: &SourceAssembly, plan: &PlanDocument) -> Vec<Point3<f64>> {
+    let kind = kind_of(plan);
+    let placements = Placements::new(kind, plan).ok();
+    let numbers: HashMap<&str, usize> = plan.parts.iter().map(String::as_str).zip(0..).collect();
     let assembled = |part: usize| {
-        let start = plan.poses.iter().find(|(p, _)| *p == part);
-        let start = start.map_or_else(Pose::identity, |(_, pose)| pose_from_waypoint(pose));
-        match (plan.kind, &placements) {
+        let start = plan.initial.poses.get(&plan.parts[part]);
+        let start = start.map_or_else(Pose::identity, pose_from_waypoint);
+        match (kind, &placements) {
             (PlanKind::Assembly, Some(placements)) => placements.apart[part].inverse() * start,
             _ => start,
         }
     };
-    let middle = |number: usize, step: &PlanStep| {
+    let middle = |number: usize, step: &StepDocument| {
         let frame: Option<&StepFrame> = placements.as_ref().map(|p| &p.steps[number]);
-        let bounds = step.parts.iter().enumerate().map(|(k, &part)| {
+        let parts = step.parts.iter().filter_map(|name| numbers.get(name.as_str()));
+        let bounds = parts.enumerate().map(|(k, &part)| {
             let standing = frame.map_or_else(Pose::identity, |frame| frame.standing[k]);
             let mesh = assembly.parts.get(part).map(|p| &p.mesh);
             mesh.map_or(Bounds::EMPTY, |mesh| box_of(mesh, &(standing * assembled(part))))
@@ -141,33 +143,32 @@ fn box_of(mesh: &SourceMesh, pose: &Pose) -> Bounds {
     used.fold(Bounds::EMPTY, |bounds, p| bounds.with_point(&(pose * Point3::from(*p))))
 }
 
-fn base(plan: &Plan) -> Vec<String> {
-    let Base { parts, reason } = &plan.base;
-    let reason = reason.as_deref().unwrap_or("as given");
-    if parts.is_empty() { Vec::new() } else { vec![format!("{}: {reason}", words(plan, parts, ", "))] }
+fn base(plan: &PlanDocument) -> Vec<String> {
+    let reason = plan.base_reason.as_deref().unwrap_or("as given");
+    if plan.base.is_empty() { Vec::new() } else { vec![format!("{}: {reason}", words(&plan.base, ", "))] }
 }
 
-fn remaining(plan: &Plan) -> Vec<String> {
-    if plan.remaining.is_empty() { Vec::new() } else { vec![words(plan, &plan.remaining, ", ")] }
+fn remaining(plan: &PlanDocument) -> Vec<String> {
+    if plan.remaining.is_empty() { Vec::new() } else { vec![words(&plan.remaining, ", ")] }
 }
 
-fn free_together(plan: &Plan) -> Vec<String> {
+fn free_together(plan: &PlanDocument) -> Vec<String> {
     let line =
-        |g: &FreeGroup| format!("{} along {}", words(plan, &g.parts, ", "), direction(&g.direction.into()));
+        |g: &FreeGroupDocument| format!("{} along {}", words(&g.parts, ", "), direction(&g.direction.into()));
     plan.free_together.iter().map(line).collect()
 }
 
 /// What keeps each part, and how much of it is left out.
-fn blocked(document: &PlanDocument, verbose: bool) -> Vec<String> {
-    let (mut lines, left_out) = blockers(document, verbose);
+fn blocked(plan: &PlanDocument, verbose: bool) -> Vec<String> {
+    let (mut lines, left_out) = blockers(plan, verbose);
     lines.extend(left_out.map(|left_out| format!("{left_out} (-v lists them)")));
     lines
 }
 
 /// How many pairs overlap, and the deepest; or each pair.
-fn overlaps(plan: &Plan, verbose: bool) -> Vec<String> {
-    let line = |o: &Overlap| {
-        let pair = words(plan, &o.parts, " and ");
+fn overlaps(plan: &PlanDocument, verbose: bool) -> Vec<String> {
+    let line = |o: &OverlapDocument| {
+        let pair = words(&o.parts, " and ");
         format!("{pair}: {} deep", length(o.depth, plan.units.as_deref()))
     };
     let deepest = plan.overlaps.iter().max_by(|a, b| a.depth.total_cmp(&b.depth));
@@ -179,18 +180,18 @@ fn overlaps(plan: &Plan, verbose: bool) -> Vec<String> {
     }
 }
 
-fn warnings(document: &PlanDocument) -> Vec<String> {
+fn warnings(plan: &PlanDocument) -> Vec<String> {
     let line = |w: &WarningDocument| match &w.part {
         Some(part) => format!("{}: {}", part_word(part), w.message),
         None => w.message.clone(),
     };
-    document.warnings.iter().map(line).collect()
+    plan.warnings.iter().map(line).collect()
 }
 
-fn stats(plan: &Plan) -> String {
+fn stats(plan: &PlanDocument) -> String {
     let s = &plan.stats;
     let depth = plan.steps.iter().map(|step| step.verified_depth).fold(0.0, f64::max);
-    let hit = if s.plan_hit { ", plan remembered".to_owned() } else { reused(s) };
+    let hit = if s.cache.plan_hit { ", plan remembered".to_owned() } else { reused(&s.cache) };
     let told =
         |name: &str, time: Option<f64>| time.map_or_else(String::new, |t| format!("{name} {t:.3} s, "));
     format!(
@@ -213,7 +214,7 @@ fn stats(plan: &Plan) -> String {
 }
 
 /// How much was there already.
-fn reused(s: &PlanStats) -> String {
+fn reused(s: &CacheDocument) -> String {
     let counts = [
         (s.blocking_hits, "relations"),
         (s.graph_hits, "graphs of states"),
@@ -225,15 +226,9 @@ fn reused(s: &PlanStats) -> String {
     if told.is_empty() { String::new() } else { format!(", remembered: {}", told.join(", ")) }
 }
 
-/// Names in a cell of the table.
-fn names(plan: &Plan, parts: &[usize]) -> String {
-    let names: Vec<&str> = parts.iter().map(|&p| plan.part_name(p)).collect();
-    names.join(", ")
-}
-
 /// Names beside the table.
-fn words(plan: &Plan, parts: &[usize], last: &str) -> String {
-    let names: Vec<&str> = parts.iter().map(|&p| plan.part_name(p)).collect();
+fn words(parts: &[String], last: &str) -> String {
+    let names: Vec<&str> = parts.iter().map(String::as_str).collect();
     part_words(&names, last)
 }
 
@@ -242,7 +237,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{plan_of, step_of};
     use crate::geometry::SourcePart;
-    use crate::plan::{Blocked, Overlap, PlanStatus, Warning};
+    use crate::plan::{Base, Blocked, FreeGroup, Overlap, Plan, PlanStats, PlanStatus, PlanStep, Warning};
 
     #[test]
     fn everything_is_told() {
@@ -300,7 +295,7 @@ mod tests {
             stats: PlanStats { motion_hits: 3, verdict_hits: Some(2), ..PlanStats::default() },
         };
         let told = |verbose: bool, lines: &[&str]| {
-            let text = super::plan(&assembly, &plan, &PlanDocument::from(&plan), verbose);
+            let text = super::plan(&assembly, &PlanDocument::from(&plan), verbose);
             lines.iter().for_each(|line| assert!(text.contains(line), "{line}\n{text}"));
         };
         let always = [
@@ -363,7 +358,7 @@ mod tests {
         ];
         let plan =
             Plan { parts: names, kept_together: vec![vec![0, 1]], ..plan_of(PlanStatus::Complete, steps) };
-        let text = super::plan(&assembly, &plan, &PlanDocument::from(&plan), false);
+        let text = super::plan(&assembly, &PlanDocument::from(&plan), false);
         // The middle of both boxes is at (2, 1): half a turn about the origin brings it to (−2, −1).
         for line in [
             "step  part                   group of  motion              length",

@@ -26,7 +26,7 @@ pub(super) fn run(arguments: &ViewArguments) -> Result<ExitCode, CliError> {
         }
         let planned = plan::planned(&arguments.plan)?;
         plan::write_files(&arguments.plan, &planned)?;
-        let code = super::error::exit_code(planned.plan.status);
+        let code = super::error::exit_code(&planned.subject.plan);
         // The page is due also where planning was ended early.
         (planned.subject, code, Termination::default())
     };

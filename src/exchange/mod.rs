@@ -1,8 +1,6 @@
-//! Between the planning modules and clients of the daemon: uploaded assemblies, received plans, and the
-//! documents of plans. The command line, the benchmarks and the clients in other languages have it in common.
+//! Between files and clients of the daemon: assemblies to be uploaded. The command line, the benchmarks and the Python module
+//! share it.
 
-mod plan;
 mod upload;
 
-pub use plan::{plan, plan_step};
 pub use upload::{wire_assembly, wire_mesh, wire_part};

@@ -237,6 +237,20 @@ impl PlanKind {
 }
 
 impl PlanStatus {
+    /// The status that the contract names so.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        let all = [
+            Self::Complete,
+            Self::Partial,
+            Self::Infeasible,
+            Self::Exhausted,
+            Self::Timeout,
+            Self::Cancelled,
+        ];
+        all.into_iter().find(|status| status.name() == name)
+    }
+
     /// The status as the contract names it.
     #[must_use]
     pub fn name(self) -> &'static str {

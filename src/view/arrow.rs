@@ -9,25 +9,33 @@ use super::{PlanScene, Rgb};
 use crate::geometry::Bounds;
 use crate::plan::PlanKind;
 
-/// Into how many pieces of equal time the way of a step is cut to be drawn. At half, arcs have corners.
+/// Pieces of equal time of which the line of an arrow consists: of a whole turn, 7.5 degrees each. Chosen: at half, arcs have
+/// visible corners; at double, no difference is visible.
 const PIECES: usize = 48;
-/// Share of a way's length. A way whose points are no further from its chord is straight.
+/// Share of a path's length. A path whose points are no further from its chord has a straight arrow. Chosen: at half, play
+/// at the begin of a path bends its arrow; at double, small detours are not shown.
 const STRAIGHT: f64 = 0.03;
-/// Lengths of straight arrows: twice the moving parts, but within these shares of the body's diagonal. Ways lead far out;
-/// longer arrows make the picture small, shorter ones are hidden by their own heads.
+/// Share of the body's diagonal: the shortest straight arrow (an arrow is twice as long as the moving parts). Chosen: at
+/// half, a head is as long as its arrow in a picture of the whole; at double, arrows of screws reach over other parts.
 const SHORTEST: f64 = 0.18;
+/// The same for the longest one. At half, it ends inside long parts; at double, it makes the picture half as large.
 const LONGEST: f64 = 0.45;
-/// Share of the body's diagonal: the longest arrow along a way with bends.
+/// Share of the body's diagonal: the longest arrow along a path with bends, which must reach its last bend. At half, paths
+/// out of mazes are cut off; at double, the picture becomes half as large.
 const LONGEST_BENT: f64 = 1.3;
-/// Radians. From this turn on an arrow goes around the axis.
+/// Radians: a turn from which on an arrow goes around the axis. At half, lids that are tilted out get one; at double, keys
+/// that turn by a quarter get none.
 const TURN: f64 = TAU / 4.0;
-/// Share of a whole turn that such an arrow goes around.
+/// Share of a whole turn that such an arrow covers: at half, it does not look like a turn; a whole one hides its own tail.
 const AROUND: f64 = 0.75;
 
-/// Pixels: half the width of a shaft, length and half the width of a head, and the white border around both.
+/// Pixels: half the width of a shaft. At half, it is as thin as an edge; at double, it hides screws.
 const SHAFT: f64 = 3.2;
+/// Pixels: length and half the width of a head, about six and three times the half width of the shaft, as in drawings.
 const HEAD: [f64; 2] = [21.0, 10.5];
+/// Pixels: width of the white border around an arrow. At half, it is lost on dark parts; at double, it covers thin parts.
 const BORDER: f64 = 1.8;
+/// The colour of the border.
 const PAPER: Rgb = [255, 255, 255];
 
 /// An arrow in space.

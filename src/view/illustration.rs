@@ -41,7 +41,7 @@ const BACKGROUND: Rgb = [255, 255, 255];
 pub(super) const MOVING: Rgb = [0xE8, 0x5D, 0x04];
 const MOVING_EDGE: Rgb = [0x5A, 0x1E, 0x00];
 const EDGE: Rgb = [0x56, 0x60, 0x70];
-/// Parts that should have come out, or gone in, and did not; in turns, so that two that hold each other are told apart.
+/// The colours of stuck parts. They alternate, so that two parts that hold each other differ.
 pub(super) const STUCK: [Rgb; 3] = [[0x8E, 0x3B, 0x9C], [0xC9, 0x8A, 0xD6], [0x5F, 0x4B, 0xB6]];
 const STUCK_EDGE: Rgb = [0x3E, 0x0A, 0x46];
 /// Groups that can begin to move together.

@@ -12,7 +12,8 @@ pub(super) const SAMPLES: usize = 3;
 /// Samples. An edge is drawn if it is at most this far behind the surface at its place. At half, edges of slanted faces are
 /// dotted; at double, edges shine through thin sheets.
 const EDGE_BIAS: f32 = 3.0;
-/// Share of light that a face gets which is turned away from the lamp.
+/// Share of the light that a face gets if it is turned away from the lamp. At half, undersides are nearly black; at 1, faces
+/// do not differ.
 const AMBIENT: f64 = 0.6;
 /// No part.
 const NOTHING: u32 = u32::MAX;

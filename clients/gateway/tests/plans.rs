@@ -5,8 +5,6 @@ mod common;
 use std::sync::Arc;
 
 use common::{Daemon, Gateway, Lattice, assembly, end_of, request, status, to_end, upload, upload_source};
-use sbdp::document::PlanDocument;
-use sbdp::exchange;
 use sbdp_client::{Plan, PlanOptions, Staging};
 use sbdp_gateway::proto::plan_event::Event;
 use sbdp_gateway::proto::{self, HaveRequest, PlanRequest, VersionRequest};
@@ -28,10 +26,8 @@ fn acts_as_the_daemon() {
     common::act_as_the_daemon();
 }
 
-/// As the command line makes it of what the daemon sent.
 fn document(plan: &Plan) -> String {
-    let steps = plan.steps.iter().map(exchange::plan_step).collect();
-    PlanDocument::from(&exchange::plan(plan.summary.clone(), steps)).to_json().unwrap() + "\n"
+    plan.to_json().unwrap()
 }
 
 fn joined(events: &[Event]) -> String {
