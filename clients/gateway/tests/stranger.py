@@ -24,7 +24,11 @@ def meshes(folder):
 
 def messages(folder, description):
     yield sbdp.UploadRequest(
-        assembly=sbdp.Assembly(name=Path(folder).name, units=description.get("units"), fixed=description.get("fixed", []))
+        assembly=sbdp.Assembly(
+            name=description.get("name", Path(folder).name),
+            units=description.get("units"),
+            fixed=description.get("fixed", []),
+        )
     )
     for name, vertices, triangles in meshes(folder):
         rows = lambda code, triples: b"".join(struct.pack(f"<3{code}", *triple) for triple in triples)
@@ -99,4 +103,5 @@ def main(kind, address, certificate, folder, plan):
     print(f"{kind}: {len(steps)} steps of {Path(folder).name}, as the command line has them")
 
 
-main(*sys.argv[1:])
+if __name__ == "__main__":
+    main(*sys.argv[1:])
