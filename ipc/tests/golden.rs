@@ -94,12 +94,12 @@ fn numbers_of_kinds_and_codes_and_names_of_services() {
     assert_eq!((ErrorCode::Busy as u32, ErrorCode::Cancelled as u32), (3, 12));
     assert_eq!(
         (PROTOCOL, layout::PLAN_SERVICE, layout::GEOMETRY_SERVICE),
-        (8, "sbdp/v8/plan", "sbdp/v8/geometry")
+        (9, "sbdp/v9/plan", "sbdp/v9/geometry")
     );
-    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v8/progress");
+    assert_eq!(layout::PROGRESS_SERVICE, "sbdp/v9/progress");
     assert_eq!(
         (layout::WAKE_SERVER_SERVICE, layout::WAKE_CLIENT_SERVICE),
-        ("sbdp/v8/wake/server", "sbdp/v8/wake/client")
+        ("sbdp/v9/wake/server", "sbdp/v9/wake/client")
     );
 }
 
@@ -128,6 +128,7 @@ fn a_plan_request() {
         removed: vec![4],
         targets: Some(vec![5, 6]),
         base: vec![8],
+        keep: vec![9, 10],
         groups: vec![vec![1, 2], vec![9, 10, 11]],
         moved: vec![MovedPart { part: 7, reserved: 0, motion: POSE }],
         assembly: None,
@@ -137,9 +138,9 @@ fn a_plan_request() {
         &request.encode(),
         "\
          abababababababab*4 0100000001000000 0100000097030000 0400000003000000 0100000002000000 \
-         0100000001000000 0000000001000000 0100000002000000 0403020100000000 0900000000000000 0a00000000000000 \
+         0100000001000000 0000000001000000 0100000002000000 0200000000000000 0403020100000000 0900000000000000 0a00000000000000 \
          0b00000000000000 0c00000000000000 000000000000f03f 0000000000000000 000000000000f0bf 000000000000e03f \
-         0100000002000000 0300000000000000 0400000000000000 0500000006000000 0800000000000000 \
+         0100000002000000 0300000000000000 0400000000000000 0500000006000000 0800000000000000 090000000a000000 \
          0200000003000000 0100000002000000 090000000a000000 0b00000000000000 0700000000000000 000000000000f03f 0000000000000040 000000000000e0bf 000000000000f03f \
          0000000000000000*3 0200000000000000 000000000000e03f",
     );
@@ -147,7 +148,7 @@ fn a_plan_request() {
     check(
         "plain plan request",
         &PlanRequest::default().encode(),
-        "0000000000000000*12 ffffffffffffffff*3 0000000000000000*5",
+        "0000000000000000*13 ffffffffffffffff*3 0000000000000000*5",
     );
 }
 
@@ -159,7 +160,7 @@ fn a_request_for_an_assembly_plan() {
         "assembly plan request",
         &request.encode(),
         "\
-         0000000000000000*5 0000000020000000 0000000000000000*3 0100000000000000 0000000000000000*2 \
+         0000000000000000*5 0000000020000000 0000000000000000*3 0100000000000000 0000000000000000*3 \
          ffffffffffffffff*3 0000000000000000*5 0700000000000000 000000000000f03f 0000000000000040 \
          000000000000e0bf 000000000000f03f 0000000000000000*3",
     );
@@ -167,7 +168,7 @@ fn a_request_for_an_assembly_plan() {
     check(
         "assembly plan request without staging",
         &request.encode(),
-        "0000000000000000*5 0000000060000000 0000000000000000*6 ffffffffffffffff*3 0000000000000000*5",
+        "0000000000000000*5 0000000060000000 0000000000000000*7 ffffffffffffffff*3 0000000000000000*5",
     );
 }
 
@@ -216,6 +217,7 @@ fn a_summary() {
         removed: vec![0],
         targets: Some(vec![1]),
         fixed: vec![],
+        keep: vec![1],
         base: (vec![0], Some("big")),
         remaining: vec![1],
         kept_together: vec![vec![0, 1]],

@@ -195,6 +195,7 @@ fn a_summary_that_names_a_part_out_of_range_is_refused() {
     assert!(!is_refused(SummaryParts { kept_together: vec![vec![0]], ..SummaryParts::default() }));
     assert!(is_refused(SummaryParts { remaining: vec![1], ..SummaryParts::default() }));
     assert!(is_refused(SummaryParts { base: (vec![1], None), ..SummaryParts::default() }));
+    assert!(is_refused(SummaryParts { keep: vec![1], ..SummaryParts::default() }));
     assert!(is_refused(SummaryParts { kept_together: vec![vec![0], vec![1]], ..SummaryParts::default() }));
     assert!(is_refused(SummaryParts { free_together: vec![(vec![1], [0.0; 3])], ..SummaryParts::default() }));
 }
@@ -208,6 +209,7 @@ fn requests_errors_and_status_come_back() {
         max_simulations: Some(0),
         fixed: vec![1, 2, 3],
         base: vec![4],
+        keep: vec![8],
         groups: vec![vec![], vec![5, 6], vec![7]],
         up: Some([0.0, 0.0, 2.0]),
         targets: Some(vec![]),
@@ -256,6 +258,7 @@ fn messages() -> Vec<Vec<u8>> {
     let request = PlanRequest {
         fixed: vec![1, 2],
         base: vec![4],
+        keep: vec![8],
         groups: vec![vec![5, 6], vec![7]],
         penalty: vec![PenaltyRecord { parameter: 0, reserved: 0, value: 1.0 }],
         targets: Some(vec![3]),

@@ -31,6 +31,7 @@ mod groups_tests;
 mod initial_analysis;
 mod inseparable;
 mod invalidation;
+mod kept;
 mod known_states;
 mod linked;
 mod necked;
@@ -44,6 +45,7 @@ mod preferred;
 mod problem;
 mod rays;
 mod rearrangement;
+mod release;
 mod report;
 mod request;
 mod requirements;
@@ -72,6 +74,7 @@ pub use directions::axes_of;
 pub use initial_analysis::initial_graphs;
 pub use outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal, SeparationProof};
 pub use preferred::PreferredGroups;
+pub use release::Release;
 pub use problem::{Checked, Effort, Observer, Problem, VerifiedPath};
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging};
 pub use state::least_travel;
@@ -91,8 +94,21 @@ pub fn search(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observe
     outcome
 }
 
-/// A search, with parts moved aside where nothing leaves, and the groups that left taken apart.
+/// A search, with parts taken off that are to be kept where others cannot leave otherwise, and the groups that left taken
+/// apart.
 fn run(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
+    let outcome = run_with_moves(planner, &problem, observer);
+    let mut outcome = kept::with_kept_released(planner, &problem, outcome, observer);
+    for group in 0..outcome.removals.len() {
+        if outcome.removals[group].is_group() {
+            subassembly::take_apart(planner, &problem, &mut outcome, group, observer);
+        }
+    }
+    outcome
+}
+
+/// A search, with parts moved aside where nothing leaves.
+fn run_with_moves(planner: Planner, problem: &Problem<'_>, observer: &mut dyn Observer) -> Outcome {
     let mut outcome = run_once(planner, problem.clone(), observer);
     // What is moved aside is so because nothing leaves: no group was left whole then.
     let alone = Problem { preferred: PreferredGroups::default(), ..problem.clone() };
@@ -108,11 +124,6 @@ fn run(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> O
         let counters = outcome.counters;
         outcome = run_once(planner, next, observer);
         outcome.counters.add(&counters);
-    }
-    for group in 0..outcome.removals.len() {
-        if outcome.removals[group].is_group() {
-            subassembly::take_apart(planner, &problem, &mut outcome, group, observer);
-        }
     }
     outcome
 }

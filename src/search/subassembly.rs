@@ -6,6 +6,7 @@ use crate::plan::{Base, PlanStatus};
 use super::deferred_removals::DeferredRemovals;
 use super::outcome::{Outcome, Removal};
 use super::problem::{Observer, Problem};
+use super::release::Release;
 use super::request::Planner;
 use super::requirements::places_after;
 use super::run;
@@ -34,7 +35,7 @@ pub(super) fn take_apart(
     let spent = problem.spent + outcome.counters.simulations;
     let scene = problem.scene.with_placed(&places_after(&problem.scene, &outcome.removals[..group]));
     let base = Base::default();
-    let inner = Problem { scene, present, targets, base, releases_base: false, spent, ..problem.clone() };
+    let inner = Problem { scene, present, targets, base, released: Release::Nothing, spent, ..problem.clone() };
     let done = outcome.removals.len();
     let mut deferred = DeferredRemovals::after(observer, done, outcome.counters.simulations);
     let Outcome { status, reason, removals, unfinished, blocked, free_together, counters, .. } =

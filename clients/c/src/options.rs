@@ -180,6 +180,10 @@ pub struct SbdpPlanOptions {
     pub base: *const u32,
     /// How many.
     pub base_count: usize,
+    /// Parts that stay unless others that are asked for cannot leave otherwise. They are not asked for.
+    pub keep: *const u32,
+    /// How many.
+    pub keep_count: usize,
     /// Groups that should leave as wholes, to be taken apart afterwards.
     pub groups: *const SbdpGroup,
     /// How many.
@@ -243,6 +247,7 @@ pub(crate) unsafe fn read_plan_options(options: *const SbdpPlanOptions) -> Resul
                 false => Some(list(given.targets, given.target_count, "options->targets")?),
             },
             base: list(given.base, given.base_count, "options->base")?,
+            keep: list(given.keep, given.keep_count, "options->keep")?,
             groups: array(given.groups, given.group_count, "options->groups")?
                 .iter()
                 .map(|group| list(group.parts, group.part_count, "options->groups[].parts"))
