@@ -67,6 +67,7 @@ fn summary() -> Vec<u8> {
         removed: vec![0],
         targets: Some(vec![]),
         fixed: vec![1],
+        keep: vec![2],
         base: (vec![1], Some("it is the largest")),
         remaining: vec![1, 2],
         kept_together: vec![vec![0, 2], vec![1, 2]],
@@ -174,6 +175,7 @@ fn a_summary_carries_everything_of_a_plan_but_its_steps() {
     assert_eq!((view.planner(), view.engine(), view.units()), ("sbdp-star", "sliding", Some("mm")));
     assert_eq!(view.part_names().collect::<Vec<_>>(), ["0", "1", "größer"]);
     assert_eq!((view.removed(), view.targets(), view.fixed()), (&[0][..], Some(&[][..]), &[1][..]));
+    assert_eq!(view.keep(), [2]);
     assert_eq!((view.base(), view.base_reason()), (&[1][..], Some("it is the largest")));
     assert_eq!((view.remaining(), view.overlaps()[0].depth), (&[1, 2][..], 0.25));
     let blocked: Vec<_> = view.blocked().collect();

@@ -134,6 +134,11 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         self.problem.is_goal(self.everything.standing())
     }
 
+    /// Lets the next of the parts leave that stay so far, up to some; false if there are none.
+    pub(super) fn release(&mut self, most: Release) -> bool {
+        self.problem.release(self.everything.standing(), most)
+    }
+
     /// Where a part stands assembled.
     pub(super) fn assembled(&self, part: usize) -> Pose {
         self.problem.scene.bodies[part].planning_from_shape

@@ -1,8 +1,10 @@
 //! Parts that are to be kept are taken off where others cannot leave otherwise: as late and as few as possible.
 //!
 //! A first search takes none of them off. Where it is not complete, a second one goes on with what remains and may take
-//! them off; its removals of such parts that no other removal requires are left out again. If it still takes off several,
-//! searches in which one of these is fixed as well look for fewer.
+//! them off; its removals of such parts that no other removal requires are left out again. If several still leave, searches
+//! in which only some may leave look for fewer.
+
+use std::collections::BTreeSet;
 
 use crate::budgets::KEPT_SEARCHES;
 use crate::plan::PlanStatus;
@@ -11,6 +13,7 @@ use super::contraction::Unobserved;
 use super::deferred_removals::DeferredRemovals;
 use super::outcome::{Counters, Outcome, Removal};
 use super::problem::{Observer, Problem};
+use super::release::Release;
 use super::request::Planner;
 use super::requirements::without_unrequired;
 use super::run_with_moves;
@@ -30,8 +33,16 @@ pub(super) fn with_kept_released(
     }
     let here = Problem { releases_kept: true, ..problem.after(&outcome) };
     let first = outcome.removals.len();
-    let mut search = KeptSearch { planner, here: &here, spent: problem.spent, first, counters: outcome.counters, searches: 0 };
-    let found = search.searched(&[], &mut DeferredRemovals::after(observer, 0, outcome.counters.simulations));
+    let mut search = KeptSearch {
+        planner,
+        here: &here,
+        spent: problem.spent,
+        first,
+        counters: outcome.counters,
+        searches: 0,
+    };
+    let found = search
+        .searched(&problem.keep, &mut DeferredRemovals::after(observer, 0, outcome.counters.simulations));
     let mut best = search.with_fewest(found);
     if search.cost(&best).0 == here.wanted(&outcome.remaining).len() {
         // None of them was in the way of anything.
@@ -55,12 +66,18 @@ struct KeptSearch<'p, 'a> {
 }
 
 impl KeptSearch<'_, '_> {
-    /// The outcome of a search in which some parts that are to be kept do not move.
-    fn searched(&mut self, held: &[usize], observer: &mut dyn Observer) -> Outcome {
+    /// The outcome of a search in which, of the parts that are to be kept, only some may leave. Nothing else does at first.
+    fn searched(&mut self, may_leave: &[usize], observer: &mut dyn Observer) -> Outcome {
         self.searches += 1;
-        let fixed = [&self.here.fixed[..], held].concat();
-        let spent = self.spent + self.counters.simulations;
-        let found = run_with_moves(self.planner, &Problem { fixed, spent, ..self.here.clone() }, observer);
+        let held = self.here.keep.iter().filter(|part| !may_leave.contains(part));
+        let problem = Problem {
+            fixed: self.here.fixed.iter().chain(held).copied().collect(),
+            keep: may_leave.to_vec(),
+            released: Release::Kept,
+            spent: self.spent + self.counters.simulations,
+            ..self.here.clone()
+        };
+        let found = run_with_moves(self.planner, &problem, observer);
         self.counters.add(&found.counters);
         self.pruned(found)
     }
@@ -81,20 +98,36 @@ impl KeptSearch<'_, '_> {
 
     /// An outcome, or one in which as much leaves, and fewer parts do that are to be kept.
     fn with_fewest(&mut self, mut best: Outcome) -> Outcome {
-        let mut tried: Vec<usize> = Vec::new();
-        loop {
-            let off = self.here.kept_off(&best.remaining);
-            let next = off.iter().copied().find(|part| !tried.contains(part));
-            let is_over = self.searches == KEPT_SEARCHES || self.here.termination.check().is_err();
-            // Without any of them, less leaves.
-            let Some(part) = next.filter(|_| off.len() > 1 && !is_over) else { return best };
-            tried.push(part);
-            let found = self.searched(&[part], &mut Unobserved);
-            if self.cost(&found) < self.cost(&best) {
+        let mut tried: BTreeSet<Vec<usize>> = BTreeSet::new();
+        while self.searches < KEPT_SEARCHES && self.here.termination.check().is_ok() {
+            let fewer = self.fewer(&self.here.kept_off(&best.remaining));
+            let Some(next) = fewer.into_iter().find(|set| !tried.contains(set)) else { break };
+            let found = self.searched(&next, &mut Unobserved);
+            tried.insert(next);
+            if found.status == best.status && self.cost(&found) < self.cost(&best) {
                 best = found;
-                tried.clear();
             }
         }
+        best
+    }
+
+    /// Sets of parts that are to be kept of which fewer than those that left may have to leave: all but one of these, one,
+    /// or two. None where one left: without any, less leaves.
+    fn fewer(&self, off: &[usize]) -> Vec<Vec<usize>> {
+        if off.len() < 2 {
+            return Vec::new();
+        }
+        let all: Vec<usize> =
+            self.here.present.iter().copied().filter(|part| self.here.keep.contains(part)).collect();
+        let without = |part: &usize| all.iter().copied().filter(|other| other != part).collect();
+        let mut sets: Vec<Vec<usize>> = off.iter().map(without).collect();
+        sets.extend(all.iter().map(|&part| vec![part]));
+        if off.len() > 2 {
+            let pairs =
+                all.iter().enumerate().flat_map(|(i, &a)| all[i + 1..].iter().map(move |&b| vec![a, b]));
+            sets.extend(pairs);
+        }
+        sets
     }
 
     /// How many of the parts that are asked for do not leave, and how many do that are to be kept.

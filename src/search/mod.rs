@@ -32,6 +32,8 @@ mod initial_analysis;
 mod inseparable;
 mod invalidation;
 mod kept;
+#[cfg(test)]
+mod kept_tests;
 mod known_states;
 mod linked;
 mod necked;
@@ -74,8 +76,8 @@ pub use directions::axes_of;
 pub use initial_analysis::initial_graphs;
 pub use outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal, SeparationProof};
 pub use preferred::PreferredGroups;
-pub use release::Release;
 pub use problem::{Checked, Effort, Observer, Problem, VerifiedPath};
+pub use release::Release;
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging};
 pub use state::least_travel;
 pub use trace::{BlockedBy, PlanningPhase, TraceEvent};

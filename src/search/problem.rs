@@ -176,6 +176,36 @@ impl Problem<'_> {
         self.release_of(part) > self.released
     }
 
+    /// From when on a part may leave.
+    pub(super) fn release_of(&self, part: usize) -> Release {
+        match (self.base.parts.contains(&part), &self.base.reason) {
+            (true, None) => Release::GivenBase,
+            _ if self.keep.contains(&part) => Release::Kept,
+            (true, Some(_)) => Release::ChosenBase,
+            (false, _) => Release::Nothing,
+        }
+    }
+
+    /// What this search may release at most.
+    pub(super) fn last_release(&self) -> Release {
+        if self.keep.is_empty() || self.releases_kept { Release::GivenBase } else { Release::ChosenBase }
+    }
+
+    /// Lets the next of the parts that stand and stay so far leave, up to some; false if there are none.
+    pub(super) fn release(&mut self, standing: &[usize], most: Release) -> bool {
+        let most = most.min(self.last_release());
+        let all = standing.iter().map(|&part| self.release_of(part));
+        let Some(next) = all.filter(|&r| self.released < r && r <= most).min() else { return false };
+        self.released = next;
+        true
+    }
+
+    /// Lets the base leave, unless parts stand that leave before it and are to be kept.
+    pub(super) fn release_base(&mut self, standing: &[usize]) -> bool {
+        let are_kept = standing.iter().any(|part| self.keep.contains(part));
+        self.release(standing, if are_kept { Release::ChosenBase } else { Release::GivenBase })
+    }
+
     /// Of the parts that remain, those that should come out.
     #[must_use]
     pub fn wanted(&self, remaining: &[usize]) -> Vec<usize> {

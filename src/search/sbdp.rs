@@ -196,7 +196,8 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 continue;
             }
             // Others may leave once the base has: nothing is turned before.
-            if self.disassembly.release_base() {
+            let Disassembly { problem, everything, .. } = &mut self.disassembly;
+            if problem.release_base(everything.standing()) {
                 self.take_free_parts()?;
                 continue;
             }

@@ -35,7 +35,8 @@ pub(super) fn take_apart(
     let spent = problem.spent + outcome.counters.simulations;
     let scene = problem.scene.with_placed(&places_after(&problem.scene, &outcome.removals[..group]));
     let base = Base::default();
-    let inner = Problem { scene, present, targets, base, released: Release::Nothing, spent, ..problem.clone() };
+    let inner =
+        Problem { scene, present, targets, base, released: Release::Nothing, spent, ..problem.clone() };
     let done = outcome.removals.len();
     let mut deferred = DeferredRemovals::after(observer, done, outcome.counters.simulations);
     let Outcome { status, reason, removals, unfinished, blocked, free_together, counters, .. } =

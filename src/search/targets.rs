@@ -93,7 +93,9 @@ impl Shortest<'_, '_> {
             return false;
         }
         let Outcome { removals, remaining, .. } = without_needless(found, targets);
-        let cost = |removals: &[Removal], remaining: &[usize]| (self.problem.kept_off(remaining).len(), removals.len());
+        let cost = |removals: &[Removal], remaining: &[usize]| {
+            (self.problem.kept_off(remaining).len(), removals.len())
+        };
         let is_less = cost(&removals, &remaining) < cost(&best.removals, &best.remaining);
         if is_less {
             (best.removals, best.remaining) = (removals, remaining);
