@@ -180,10 +180,6 @@ pub struct SbdpPlanOptions {
     pub base: *const u32,
     /// How many.
     pub base_count: usize,
-    /// Parts that stay unless others that are asked for cannot leave otherwise. They are not asked for.
-    pub keep: *const u32,
-    /// How many.
-    pub keep_count: usize,
     /// Groups that should leave as wholes, to be taken apart afterwards.
     pub groups: *const SbdpGroup,
     /// How many.
@@ -200,6 +196,10 @@ pub struct SbdpPlanOptions {
     pub penalty: *const SbdpPenalty,
     /// How many.
     pub penalty_count: usize,
+    /// Parts that stay unless others that are asked for cannot leave otherwise. They are not asked for.
+    pub keep: *const u32,
+    /// How many.
+    pub keep_count: usize,
 }
 
 // SAFETY: it begins with its size, and has but numbers and pointers.
