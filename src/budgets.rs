@@ -409,6 +409,10 @@ pub(crate) const TARGET_SETS: usize = 2000;
 /// graph of all; at half, plans of more than six removals are left longer than they need to be; at double, such questions take
 /// longer.
 pub(crate) const TARGET_SEARCHES: usize = 12;
+/// Count of searches for fewer parts that leave though they are to be kept, each for all that remains. They are made where
+/// several such parts leave. Enough for all sets of four such parts; at half, more of them may leave than has to; at double,
+/// such questions take longer.
+pub(crate) const KEPT_SEARCHES: usize = 16;
 /// Count of groups of one state that are searched for a way out by pushes. Six pieces have at most 31; at half, puzzles of five
 /// pieces are given up; at double, what never comes apart takes up to twice as long.
 pub(crate) const GROUPS_SEARCHED: usize = 64;

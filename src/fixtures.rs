@@ -304,6 +304,7 @@ pub(crate) fn plan_of(status: PlanStatus, steps: Vec<PlanStep>) -> Plan {
         poses: vec![],
         targets: None,
         fixed: vec![],
+        keep: vec![],
         base: Base::default(),
         steps,
         remaining: vec![],

@@ -323,6 +323,49 @@ fn a_given_base_stays_and_what_contradicts_itself_is_refused() {
 }
 
 #[test]
+fn what_is_to_be_kept_stays_unless_others_cannot_leave_otherwise() {
+    let document = |output: &Output| {
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
+        PlanDocument::from_json(&stdout(output)).unwrap()
+    };
+    let kept = document(&plan("pin-bolt-cover", &["--keep", "cover", "--keep", "bolt", "--json", "-"]));
+    assert_eq!((&kept.status[..], kept.steps.len()), ("complete", 1));
+    assert_eq!(
+        (&kept.keep[..], &kept.remaining[..]),
+        (&["bolt", "cover"].map(String::from)[..], &["base", "bolt", "cover"].map(String::from)[..])
+    );
+    assert!(kept.warnings.is_empty(), "{:?}", kept.warnings);
+    let left = document(&plan("pin-bolt-cover", &["--keep", "pin", "--target", "bolt", "--json", "-"]));
+    assert_eq!(left.remaining, ["base", "cover"]);
+    let warning = &left.warnings[0];
+    assert_eq!(warning.part.as_deref(), Some("pin"));
+    assert!(warning.message.contains("to be kept"), "{}", warning.message);
+
+    // The description of a folder says the same, and the option takes precedence.
+    let folder = tempfile::tempdir().unwrap();
+    for file in fs::read_dir(assembly("pin-bolt-cover")).unwrap().map(Result::unwrap) {
+        fs::copy(file.path(), folder.path().join(file.file_name())).unwrap();
+    }
+    let path = folder.path().to_str().unwrap();
+    let run_with = |keep: &str, options: &[&str]| {
+        fs::write(folder.path().join("assembly.json"), format!(r#"{{"fixed": ["base"], "keep": {keep}}}"#))
+            .unwrap();
+        run(&[&["plan", path, "--embedded", "--json", "-"], options].concat())
+    };
+    assert_eq!(document(&run_with(r#"["cover.obj"]"#, &[])).remaining, ["base", "cover"]);
+    let option = document(&run_with(r#"["bolt", "cover"]"#, &["--keep", "cover"]));
+    assert_eq!((&option.keep[..], option.remaining.len()), (&["cover".to_owned()][..], 2));
+    refused(&run_with(r#"["lid"]"#, &[]), &["assembly.json", "there is no part `lid`"]);
+    refused(&run_with(r#"["base"]"#, &[]), &["part `base` is in `fixed` and in `keep`"]);
+    refused(&plan("pin-bolt-cover", &["--keep", "lid"]), &["--keep", "`lid`"]);
+    refused(&plan("pin-bolt-cover", &["--keep", "pin", "--fixed", "pin"]), &["`pin`", "`fixed`", "`keep`"]);
+    refused(
+        &plan("pin-bolt-cover", &["--keep", "pin", "--target", "pin"]),
+        &["part `pin` is a target and in `keep`"],
+    );
+}
+
+#[test]
 fn groups_of_the_input_leave_as_wholes_if_they_are_preferred() {
     refused(&plan("pin-bolt-cover", &["--groups", "prefer"]), &["names no groups", "assembly.json"]);
     let folder = tempfile::tempdir().unwrap();

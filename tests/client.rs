@@ -194,6 +194,46 @@ fn a_session_asks_for_the_plan_of_what_is_left() {
 }
 
 #[test]
+fn what_is_to_be_kept_stays_in_plans_of_the_daemon() {
+    let daemon = Daemon::start();
+    let client = daemon.connect();
+    let handle = client.upload(&Boxes::lattice(2).assembly()).unwrap();
+    let asked = |options: &PlanOptions| client.plan(handle, options).and_then(|stream| stream.plan_to_end());
+    // Remembered plans are those of the same list alone.
+    for keep in [vec![], vec![7], vec![0, 7], vec![], vec![7]] {
+        let plan = asked(&PlanOptions { keep: keep.clone(), ..PlanOptions::default() }).unwrap();
+        assert_eq!((plan.summary.status, &plan.summary.keep), (PlanStatus::Complete, &keep));
+        assert!(
+            keep.iter().all(|part| plan.summary.remaining.contains(part)),
+            "{:?}",
+            plan.summary.remaining
+        );
+        let stay = keep.iter().chain(&plan.summary.base.parts).collect::<std::collections::BTreeSet<_>>();
+        assert_eq!(plan.steps.len(), 8 - stay.len());
+    }
+    let refused = |options: PlanOptions, words: &str| {
+        let error = asked(&options).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    };
+    let keep = vec![3];
+    refused(
+        PlanOptions { keep: keep.clone(), fixed: vec![3], ..PlanOptions::default() },
+        "in `fixed` and in `keep`",
+    );
+    refused(
+        PlanOptions { keep, targets: Some(vec![3]), ..PlanOptions::default() },
+        "is a target and in `keep`",
+    );
+    refused(PlanOptions { keep: vec![8], ..PlanOptions::default() }, "part 8 in `keep`");
+    // A session forgets what is out.
+    let mut session =
+        client.session(handle, PlanOptions { keep: vec![0, 7], ..PlanOptions::default() }).unwrap();
+    session.executed(&[7]);
+    let rest = session.replan().unwrap().plan_to_end().unwrap();
+    assert_eq!((rest.summary.status, rest.summary.keep), (PlanStatus::Complete, vec![0]));
+}
+
+#[test]
 fn whoever_waits_for_a_daemon_that_hangs_can_give_up() {
     let daemon = Daemon::start();
     let wanted = Arc::new(AtomicBool::new(false));

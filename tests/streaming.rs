@@ -88,6 +88,7 @@ impl Planning for Scripted {
             poses: vec![],
             targets: None,
             fixed: vec![],
+            keep: vec![],
             base: Base::default(),
             steps,
             remaining: vec![],

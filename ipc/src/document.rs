@@ -43,6 +43,9 @@ pub struct PlanDocument {
     pub targets: Option<Vec<String>>,
     /// Parts that may not move.
     pub fixed: Vec<String>,
+    /// Parts that were to stay unless others could not leave otherwise.
+    #[serde(default)]
+    pub keep: Vec<String>,
     /// The part that the rest is taken off, or built up on; empty where parts are fixed, or where it had to leave.
     pub base: Vec<String>,
     /// Why it was chosen.

@@ -64,8 +64,8 @@ pub const PENALTY_PARAMETERS: [&str; 16] = [
     "newton-tolerance",
 ];
 
-/// Header of a plan request; four lists of u32 part numbers follow: fixed, removed, targets, base; then the sizes of
-/// the groups (u32) and their parts (u32), group after group; then [`MovedPart`]s: those that stand elsewhere, and
+/// Header of a plan request; five lists of u32 part numbers follow: fixed, removed, targets, base, keep; then the sizes
+/// of the groups (u32) and their parts (u32), group after group; then [`MovedPart`]s: those that stand elsewhere, and
 /// those that wait at given places; then [`PenaltyRecord`]s.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -101,6 +101,10 @@ pub struct PlanRequestHeader {
     pub penalty: u32,
     /// How many groups should leave as wholes.
     pub groups: u32,
+    /// How many parts stay unless others cannot leave otherwise.
+    pub keep: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
     /// The deadline of the answer, in nanoseconds of CLOCK_MONOTONIC; 0 for none.
     pub deadline_ns: u64,
     /// Simulations after which to give up; `u64::MAX` for no limit.
@@ -195,12 +199,12 @@ pub struct StepsHeader {
 }
 
 const _: () = {
-    assert!(size_of::<PlanRequestHeader>() == 160 && align_of::<PlanRequestHeader>() == 8);
+    assert!(size_of::<PlanRequestHeader>() == 168 && align_of::<PlanRequestHeader>() == 8);
     assert!(offset_of!(PlanRequestHeader, planner) == 32);
     assert!(offset_of!(PlanRequestHeader, moved) == 68);
     assert!(offset_of!(PlanRequestHeader, static_analysis) == 76);
-    assert!(offset_of!(PlanRequestHeader, deadline_ns) == 88);
-    assert!(offset_of!(PlanRequestHeader, up) == 136);
+    assert!(offset_of!(PlanRequestHeader, deadline_ns) == 96);
+    assert!(offset_of!(PlanRequestHeader, up) == 144);
     assert!(size_of::<PenaltyRecord>() == 16 && offset_of!(PenaltyRecord, value) == 8);
     assert!(size_of::<MovedPart>() == 64 && offset_of!(MovedPart, motion) == 8);
     assert!(size_of::<StepRecord>() == 72 && align_of::<StepRecord>() == 8);
@@ -270,6 +274,8 @@ pub struct PlanRequest {
     pub targets: Option<Vec<u32>>,
     /// Parts that stay as long as others leave; if there are none, the daemon chooses one.
     pub base: Vec<u32>,
+    /// Parts that stay unless others that are asked for cannot leave otherwise; they are not asked for.
+    pub keep: Vec<u32>,
     /// Groups that should leave as wholes, to be taken apart afterwards.
     pub groups: Vec<Vec<u32>>,
     /// Parts that stand elsewhere than in the assembly.
@@ -313,6 +319,8 @@ impl PlanRequest {
             static_analysis: self.static_analysis,
             penalty: self.penalty.len() as u32,
             groups: self.groups.len() as u32,
+            keep: self.keep.len() as u32,
+            reserved: 0,
             deadline_ns: self.deadline_ns.unwrap_or(0),
             max_simulations: self.max_simulations.unwrap_or(u64::MAX),
             path_timeout_ns: self.path_timeout_ns.unwrap_or(u64::MAX),
@@ -322,7 +330,7 @@ impl PlanRequest {
             up: self.up.unwrap_or_default(),
         });
         let sizes: Vec<u32> = self.groups.iter().map(|group| group.len() as u32).collect();
-        writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.base);
+        writer.array(&self.fixed).array(&self.removed).array(targets).array(&self.base).array(&self.keep);
         writer.array(&sizes).array(&self.groups.concat());
         writer.array(&self.moved).array(staged).array(&self.penalty);
         writer.finish()
@@ -339,6 +347,7 @@ impl PlanRequest {
         let removed = reader.array::<u32>("removed", u64::from(h.removed))?.to_vec();
         let targets = reader.array::<u32>("targets", u64::from(h.targets))?.to_vec();
         let base = reader.array::<u32>("base", u64::from(h.base))?.to_vec();
+        let keep = reader.array::<u32>("keep", u64::from(h.keep))?.to_vec();
         let sizes = reader.array::<u32>("groups", u64::from(h.groups))?;
         let in_groups = sizes.iter().map(|&size| u64::from(size)).sum();
         let mut in_groups = reader.array::<u32>("parts of groups", in_groups)?;
@@ -391,6 +400,7 @@ impl PlanRequest {
             removed,
             targets: set(PLAN_HAS_TARGETS).then_some(targets),
             base,
+            keep,
             groups,
             moved,
             assembly: set(PLAN_ASSEMBLY).then_some(if set(PLAN_NO_STAGING) {

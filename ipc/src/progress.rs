@@ -15,7 +15,7 @@ pub const STAGE_TRANSFER: u32 = 3;
 /// One sample on `progress`, received by every client; each picks its own.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Pod, Zeroable, ZeroCopySend)]
-#[type_name("sbdp/v8/Progress")]
+#[type_name("sbdp/v9/Progress")]
 pub struct ProgressSample {
     /// Id of the client port that asked, low half first.
     pub client: [u64; 2],

@@ -97,6 +97,10 @@ pub struct SummaryHeader {
     pub free_together: u32,
     /// How many numbers of parts follow, to which [`GroupRecord`]s point (u32).
     pub group_parts: u32,
+    /// How many parts were to be kept (u32).
+    pub keep: u32,
+    /// Reserved, 0.
+    pub reserved: u32,
     /// Why the plan is not complete; empty without [`SUMMARY_HAS_REASON`].
     pub reason: Text,
     /// The planner's name.
@@ -158,9 +162,9 @@ pub struct WarningRecord {
 }
 
 const _: () = {
-    assert!(size_of::<Stats>() == 112 && size_of::<SummaryHeader>() == 224);
-    assert!(std::mem::offset_of!(SummaryHeader, reason) == 72);
-    assert!(std::mem::offset_of!(SummaryHeader, stats) == 112);
+    assert!(size_of::<Stats>() == 112 && size_of::<SummaryHeader>() == 232);
+    assert!(std::mem::offset_of!(SummaryHeader, reason) == 80);
+    assert!(std::mem::offset_of!(SummaryHeader, stats) == 120);
     assert!(size_of::<GroupRecord>() == 32 && std::mem::offset_of!(GroupRecord, direction) == 8);
     assert!(size_of::<OverlapRecord>() == 16 && size_of::<BlockedRecord>() == 20);
     assert!(size_of::<WarningRecord>() == 12);
@@ -217,6 +221,8 @@ pub struct SummaryParts<'a> {
     pub targets: Option<Vec<u32>>,
     /// Fixed parts.
     pub fixed: Vec<u32>,
+    /// Parts that were to be kept.
+    pub keep: Vec<u32>,
     /// The base, and why it was chosen; without a reason where the request named it.
     pub base: (Vec<u32>, Option<&'a str>),
     /// Parts that remain.
@@ -274,6 +280,8 @@ impl SummaryParts<'_> {
             kept_together: kept.len() as u32,
             free_together: free.len() as u32,
             group_parts: group_parts.len() as u32,
+            keep: self.keep.len() as u32,
+            reserved: 0,
             reason: texts.add(self.reason.unwrap_or("")),
             planner: texts.add(self.planner),
             engine: texts.add(self.engine),
@@ -284,8 +292,8 @@ impl SummaryParts<'_> {
         };
         let mut writer = Writer::default();
         writer.value(header).array(&names).array(&self.overlaps).array(&blocked).array(&warnings);
-        writer.array(&self.removed).array(targets).array(&self.fixed).array(&self.base.0);
-        writer.array(&self.remaining);
+        writer.array(&self.removed).array(targets).array(&self.fixed).array(&self.keep);
+        writer.array(&self.base.0).array(&self.remaining);
         writer.array(&blockers).array(&self.poses).array(&kept).array(&free).array(&group_parts);
         writer.array(texts.bytes());
         writer.finish()
@@ -312,6 +320,7 @@ pub struct SummaryView<'a> {
     removed: &'a [u32],
     targets: &'a [u32],
     fixed: &'a [u32],
+    keep: &'a [u32],
     base: &'a [u32],
     remaining: &'a [u32],
     blockers: &'a [u32],
@@ -339,6 +348,7 @@ impl<'a> SummaryView<'a> {
             removed: reader.array("removed", u64::from(header.removed))?,
             targets: reader.array("targets", u64::from(header.targets))?,
             fixed: reader.array("fixed", u64::from(header.fixed))?,
+            keep: reader.array("keep", u64::from(header.keep))?,
             base: reader.array("base", u64::from(header.base))?,
             remaining: reader.array("remaining", u64::from(header.remaining))?,
             blockers: reader.array("blockers", u64::from(header.blockers))?,
@@ -375,8 +385,8 @@ impl<'a> SummaryView<'a> {
 
     fn check_part_numbers(&self) -> Result<(), Malformed> {
         let count = self.names.len();
-        let Self { removed, targets, fixed, base, remaining, blockers, group_parts, .. } = *self;
-        let lists = [removed, targets, fixed, base, remaining, blockers, group_parts];
+        let Self { removed, targets, fixed, keep, base, remaining, blockers, group_parts, .. } = *self;
+        let lists = [removed, targets, fixed, keep, base, remaining, blockers, group_parts];
         let pairs = self.overlaps.iter().flat_map(|o| o.parts);
         let singles = self.blocked.iter().map(|b| b.part).chain(self.poses.iter().map(|p| p.part));
         let warned = self.warnings.iter().map(|w| w.part).filter(|p| *p != NO_PART);
@@ -431,6 +441,12 @@ impl<'a> SummaryView<'a> {
     #[must_use]
     pub fn units(&self) -> Option<&'a str> {
         self.optional(SUMMARY_HAS_UNITS, self.header.units)
+    }
+
+    /// Parts that were to be kept.
+    #[must_use]
+    pub fn keep(&self) -> &'a [u32] {
+        self.keep
     }
 
     /// The base: the parts that the rest is taken off.

@@ -67,6 +67,7 @@ fn summary() -> Vec<u8> {
         removed: vec![0],
         targets: Some(vec![]),
         fixed: vec![1],
+        keep: vec![2],
         base: (vec![1], Some("it is the largest")),
         remaining: vec![1, 2],
         kept_together: vec![vec![0, 2], vec![1, 2]],
@@ -174,6 +175,7 @@ fn a_summary_carries_everything_of_a_plan_but_its_steps() {
     assert_eq!((view.planner(), view.engine(), view.units()), ("sbdp-star", "sliding", Some("mm")));
     assert_eq!(view.part_names().collect::<Vec<_>>(), ["0", "1", "größer"]);
     assert_eq!((view.removed(), view.targets(), view.fixed()), (&[0][..], Some(&[][..]), &[1][..]));
+    assert_eq!(view.keep(), [2]);
     assert_eq!((view.base(), view.base_reason()), (&[1][..], Some("it is the largest")));
     assert_eq!((view.remaining(), view.overlaps()[0].depth), (&[1, 2][..], 0.25));
     let blocked: Vec<_> = view.blocked().collect();
@@ -195,6 +197,7 @@ fn a_summary_that_names_a_part_out_of_range_is_refused() {
     assert!(!is_refused(SummaryParts { kept_together: vec![vec![0]], ..SummaryParts::default() }));
     assert!(is_refused(SummaryParts { remaining: vec![1], ..SummaryParts::default() }));
     assert!(is_refused(SummaryParts { base: (vec![1], None), ..SummaryParts::default() }));
+    assert!(is_refused(SummaryParts { keep: vec![1], ..SummaryParts::default() }));
     assert!(is_refused(SummaryParts { kept_together: vec![vec![0], vec![1]], ..SummaryParts::default() }));
     assert!(is_refused(SummaryParts { free_together: vec![(vec![1], [0.0; 3])], ..SummaryParts::default() }));
 }
@@ -208,6 +211,7 @@ fn requests_errors_and_status_come_back() {
         max_simulations: Some(0),
         fixed: vec![1, 2, 3],
         base: vec![4],
+        keep: vec![8],
         groups: vec![vec![], vec![5, 6], vec![7]],
         up: Some([0.0, 0.0, 2.0]),
         targets: Some(vec![]),
@@ -256,6 +260,7 @@ fn messages() -> Vec<Vec<u8>> {
     let request = PlanRequest {
         fixed: vec![1, 2],
         base: vec![4],
+        keep: vec![8],
         groups: vec![vec![5, 6], vec![7]],
         penalty: vec![PenaltyRecord { parameter: 0, reserved: 0, value: 1.0 }],
         targets: Some(vec![3]),

@@ -152,6 +152,9 @@ pub(super) struct PlanArguments {
     /// A part that stays as long as others leave (repeatable) [default: a large, low part]
     #[arg(long, value_name = "PART", help_heading = WHAT)]
     pub(super) base: Vec<String>,
+    /// A part that stays unless others that are asked for cannot leave otherwise (repeatable)
+    #[arg(long, value_name = "PART", help_heading = WHAT)]
+    pub(super) keep: Vec<String>,
     /// A part that has been removed already (repeatable)
     #[arg(long, value_name = "PART", help_heading = WHAT)]
     pub(super) removed: Vec<String>,

@@ -98,6 +98,7 @@ pub(super) fn unplanned(question: &CommandQuestion<'_>, status: PlanStatus, reas
         poses: Vec::new(),
         targets: request.targets.clone(),
         fixed: request.fixed.clone(),
+        keep: request.keep.clone(),
         base: Base::default(),
         steps: Vec::new(),
         remaining,

@@ -210,6 +210,7 @@ fn options(question: &CommandQuestion<'_>, trace: bool) -> PlanOptions {
         removed: numbers(&request.removed),
         targets: request.targets.as_deref().map(numbers),
         base: numbers(&request.base),
+        keep: numbers(&request.keep),
         groups: request.groups.iter().map(|group| numbers(group)).collect(),
         sweeps: request.sweeps,
         no_cache: request.no_cache,

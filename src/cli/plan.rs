@@ -101,6 +101,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
     let fixed = [&assembly.fixed[..], &arguments.fixed[..]].concat();
     let targets = resolve(assembly, "--target", &arguments.target)?;
     let base = if arguments.base.is_empty() { &assembly.base } else { &arguments.base };
+    let keep = if arguments.keep.is_empty() { &assembly.keep } else { &arguments.keep };
     let planner = Planner::from(arguments.planner);
     Ok(PlanRequest {
         planner,
@@ -119,6 +120,7 @@ fn request(arguments: &PlanArguments, assembly: &SourceAssembly) -> Result<PlanR
         fixed: resolve(assembly, "--fixed", &fixed)?,
         removed: resolve(assembly, "--removed", &arguments.removed)?,
         base: resolve(assembly, "--base", base)?,
+        keep: resolve(assembly, "--keep", keep)?,
         groups: preferred_groups(arguments, assembly)?,
         targets: (!arguments.target.is_empty()).then_some(targets),
         assembly: arguments.together.then(|| staging(assembly, &arguments.staging)).transpose()?,

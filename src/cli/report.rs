@@ -276,6 +276,7 @@ mod tests {
             poses: vec![],
             targets: None,
             fixed: vec![],
+            keep: vec![],
             base: Base { parts: vec![1], reason: Some("it is the largest".into()) },
             steps: vec![
                 step(0, MotionKind::Rotation, vec![start, half_turn]),

@@ -44,6 +44,7 @@ pub(crate) fn plan_request(
         removed: indices(&request.removed),
         targets: request.targets.as_deref().map(indices),
         base: indices(&request.base),
+        keep: indices(&request.keep),
         groups: request.groups.iter().map(|group| indices(group)).collect(),
         assembly: request.assembly.as_ref().map(staging),
         no_cache: request.no_cache,
@@ -168,6 +169,7 @@ pub(crate) fn summary(plan: &Plan, spent: &PlanStats) -> Vec<u8> {
         removed: numbers(&plan.removed),
         targets: plan.targets.as_deref().map(numbers),
         fixed: numbers(&plan.fixed),
+        keep: numbers(&plan.keep),
         base: (numbers(&plan.base.parts), plan.base.reason.as_deref()),
         remaining: numbers(&plan.remaining),
         kept_together: plan.kept_together.iter().map(|group| numbers(group)).collect(),
@@ -256,6 +258,7 @@ pub(crate) fn service_error(error: &ServiceError) -> WireError {
         ServiceError::UnknownAssembly => ErrorCode::UnknownHandle,
         ServiceError::NoSuchPart { .. } => ErrorCode::NoSuchPart,
         ServiceError::TargetStays { .. }
+        | ServiceError::FixedAndKept { .. }
         | ServiceError::NoLength { .. }
         | ServiceError::NoDirection { .. }
         | ServiceError::NoGroups { .. } => ErrorCode::Unsupported,

@@ -46,6 +46,8 @@ impl Contingency {
             Self::Stuck(place) => request.fixed.extend(&order[place]),
             Self::Gone(place) => request.removed.extend(&order[place]),
         }
+        // What does not move is kept anyway.
+        request.keep.retain(|part| !request.fixed.contains(part));
         request
     }
 }

@@ -33,6 +33,7 @@ impl From<&Plan> for PlanDocument {
             initial: InitialDocument { removed: plan.names(&plan.removed), poses: poses(plan) },
             targets: plan.targets.as_ref().map(|t| plan.names(t)),
             fixed: plan.names(&plan.fixed),
+            keep: plan.names(&plan.keep),
             base: plan.names(&plan.base.parts),
             base_reason: plan.base.reason.clone(),
             steps: plan.steps.iter().map(|s| step(plan, s)).collect(),
@@ -131,6 +132,7 @@ mod tests {
             poses: vec![(1, [0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0])],
             targets: Some(vec![1]),
             fixed: vec![0],
+            keep: vec![2],
             base: Base { parts: vec![1], reason: Some("it is the largest".into()) },
             steps: vec![PlanStep {
                 parts: vec![2],
@@ -166,7 +168,7 @@ mod tests {
         let expected = concat!(
             r#"{"schema":"sbdp-plan/2","kind":"disassembly","status":"infeasible","reason":"nothing moves","#,
             r#""planner":"sbdp-star","engine":"sliding","units":"mm","parts":["0","1","2","10"],"#,
-            r#""initial":{"removed":["10"],"poses":{"1":[0.0,0.5,0.0,1.0,0.0,0.0,0.0]}},"targets":["1"],"fixed":["0"],"#,
+            r#""initial":{"removed":["10"],"poses":{"1":[0.0,0.5,0.0,1.0,0.0,0.0,0.0]}},"targets":["1"],"fixed":["0"],"keep":["2"],"#,
             r#""base":["1"],"base_reason":"it is the largest","#,
             r#""steps":[{"parts":["2"],"of":null,"ends":"out","motion":"rotation","#,
             r#""path":[[0.0,0.0,0.0,1.0,0.0,0.0,0.0],[0.0,0.5,0.0,0.0,1.0,0.0,0.0]],"verified_depth":0.001,"requires":[],"wave":0,"direction":[0.0,1.0,0.0]}],"#,

@@ -24,6 +24,9 @@ pub(super) struct Description {
     /// Parts that stay as long as others leave, by name.
     #[serde(default)]
     base: Vec<String>,
+    /// Parts that stay unless others cannot leave otherwise, by name.
+    #[serde(default)]
+    keep: Vec<String>,
     /// Parts that belong together, by the group's name.
     #[serde(default)]
     groups: BTreeMap<String, Vec<String>>,
@@ -142,15 +145,15 @@ impl Described {
             let found = assembly.parts.iter().find(|p| p.name == *name || Some(p.name.as_str()) == stem);
             found.map(|p| p.name.clone()).ok_or_else(|| self.refused(format!("there is no part `{name}`")))
         };
-        let fixed = description.fixed.iter().map(resolve).collect::<Result<Vec<_>, _>>()?;
-        let base = description.base.iter().map(resolve).collect::<Result<Vec<_>, _>>()?;
+        let all = |names: &Vec<String>| names.iter().map(resolve).collect::<Result<Vec<_>, _>>();
+        let [fixed, base, keep] =
+            [all(&description.fixed)?, all(&description.base)?, all(&description.keep)?];
         description.densities.keys().try_for_each(|n| resolve(n).map(drop))?;
         let group = |(name, parts): (&String, &Vec<String>)| {
-            let parts = parts.iter().map(resolve).collect::<Result<Vec<_>, _>>()?;
-            Ok(SourceGroup { name: printable(name), parts })
+            Ok(SourceGroup { name: printable(name), parts: all(parts)? })
         };
         let groups = description.groups.iter().map(group).collect::<Result<Vec<_>, GeometryError>>()?;
-        (assembly.fixed, assembly.base) = (fixed, base);
+        (assembly.fixed, assembly.base, assembly.keep) = (fixed, base, keep);
         assembly.groups.extend(groups);
         if let Some(name) = &description.name {
             assembly.name.clone_from(name);

@@ -204,6 +204,8 @@ pub struct Plan {
     pub targets: Option<Vec<usize>>,
     /// Parts that may not move.
     pub fixed: Vec<usize>,
+    /// Parts that were to stay unless others could not leave otherwise.
+    pub keep: Vec<usize>,
     /// The parts that the rest is taken off, or built up on. Empty where parts are fixed and no base was named, or
     /// where all others had to leave too.
     pub base: Base,

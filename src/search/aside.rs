@@ -17,6 +17,7 @@ use super::directions::axes_of;
 use super::outcome::Outcome;
 use super::problem::{Observer, Problem, VerifiedPath};
 use super::rearrangement::{PlaceSearch, Rearrangement};
+use super::release::Release;
 use super::request::{ActionSet, Planner};
 use super::requirements::{Leaving, places_after};
 use super::trace::TraceEvent;
@@ -38,11 +39,7 @@ pub(super) fn moved_aside<'a>(
     if !is_over || !is_extended || outcome.remaining.len() < 3 {
         return Ok(None);
     }
-    let scene = problem.scene.with_placed(&places_after(&problem.scene, &outcome.removals));
-    let base = outcome.base.clone();
-    let spent = problem.spent + outcome.counters.simulations;
-    let (present, earlier) = (outcome.remaining.clone(), outcome.removals.clone());
-    let here = Problem { scene, present, base, releases_base: true, spent, earlier, ..problem.clone() };
+    let here = Problem { released: problem.last_release(), ..problem.after(outcome) };
     let mut search =
         PlaceSearch::new(&here, &here.present, axes_of(&here.scene, &here.present, &here.termination)?);
     let mut next = None;
@@ -71,7 +68,7 @@ pub(super) fn moved_aside<'a>(
             observer.traced(TraceEvent::of(removal, &next.earlier[..i]));
         }
     }
-    Ok(Some(Problem { releases_base: false, ..next }))
+    Ok(Some(Problem { released: Release::Nothing, ..next }))
 }
 
 /// Some moves one after the other, if all of them are verified.

@@ -49,6 +49,7 @@ impl<'a> Contraction<'a> {
             present,
             fixed: rest,
             base: Base::default(),
+            keep: Vec::new(),
             preferred: PreferredGroups::default(),
             targets,
             is_group: true,

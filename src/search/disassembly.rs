@@ -24,6 +24,7 @@ use super::blocked_actions::{few_of_each_part, of_inseparable};
 use super::inseparable::InseparablePairs;
 use super::outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal};
 use super::problem::{Checked, Observer, Problem, VerifiedPath};
+use super::release::Release;
 use super::requirements::Leaving;
 use super::support::Supports;
 use super::trace::TraceEvent;
@@ -131,6 +132,11 @@ impl<'a, 'o> Disassembly<'a, 'o> {
 
     pub(super) fn is_done(&self) -> bool {
         self.problem.is_goal(self.everything.standing())
+    }
+
+    /// Lets the next of the parts leave that stay so far, up to some; false if there are none.
+    pub(super) fn release(&mut self, most: Release) -> bool {
+        self.problem.release(self.everything.standing(), most)
     }
 
     /// Where a part stands assembled.
@@ -413,6 +419,8 @@ impl<'a, 'o> Disassembly<'a, 'o> {
             self.hull_changes += usize::from(self.everything.remove(&self.problem.scene, part));
         }
         self.around.clear();
+        // What else left may have freed others.
+        self.problem.released = Release::Nothing;
         self.observer.removal(&removal);
         if self.observer.traces() {
             self.observer.traced(TraceEvent::of(&removal, &self.removals));
@@ -440,11 +448,12 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     }
 
     /// By part, when it leaves where several can: the smallest value first. Parts that carry nothing come before those that
-    /// carry others; of the latter, a part comes before those that carry it. The base comes last.
-    pub(super) fn leaving_late(&self) -> impl Fn(usize) -> (bool, Option<Reverse<usize>>) + use<> {
+    /// carry others; of the latter, a part comes before those that carry it. What stays as long as others leave comes last.
+    pub(super) fn leaving_late(&self) -> impl Fn(usize) -> (Release, Option<Reverse<usize>>) + use<> {
         let carriers = self.carriers_by_depth();
-        let base = self.problem.base.parts.clone();
-        move |part| (base.contains(&part), carriers.get(&part).copied().map(Reverse))
+        let releases: Vec<Release> =
+            (0..self.problem.scene.bodies.len()).map(|part| self.problem.release_of(part)).collect();
+        move |part| (releases[part], carriers.get(&part).copied().map(Reverse))
     }
 
     /// A part that may move and whose hull is apart from all others': it needs no motion. Without sweeps it is

@@ -362,14 +362,14 @@ impl<'a> Groups<'_, 'a, '_> {
         standing.iter().filter_map(closure).filter_map(|group| self.candidate(group, direction)).collect()
     }
 
-    /// A closed set that moves along a direction as a candidate, or else what remains, which moves against it: the smaller
-    /// of the two, and the one without the base. None if one of them is a part that may move: it was tried alone.
+    /// A closed set that moves along a direction as a candidate, or else what remains, which moves against it: the one
+    /// that may leave earlier, and of equal ones the smaller. None if one of them is a part that may move: it was tried alone.
     pub(super) fn candidate(&self, group: Vec<usize>, direction: usize) -> Option<Candidate> {
         let Disassembly { problem, everything, .. } = &*self.disassembly;
         let is_rest = |part: &usize| group.binary_search(part).is_err();
         let rest: Vec<usize> = everything.standing().iter().copied().filter(is_rest).collect();
-        let has_base = |parts: &[usize]| problem.base.parts.iter().any(|part| parts.contains(part));
-        let rank = |parts: &[usize]| (has_base(parts), parts.len(), parts[0]);
+        let release = |parts: &[usize]| parts.iter().map(|&part| problem.release_of(part)).max();
+        let rank = |parts: &[usize]| (release(parts), parts.len(), parts[0]);
         let may_move = |parts: &[usize]| problem.may_all_join(parts);
         let is_tried = |parts: &[usize]| parts.len() == 1 && may_move(parts);
         if rest.is_empty() || is_tried(&group) || is_tried(&rest) {

@@ -31,6 +31,9 @@ mod groups_tests;
 mod initial_analysis;
 mod inseparable;
 mod invalidation;
+mod kept;
+#[cfg(test)]
+mod kept_tests;
 mod known_states;
 mod linked;
 mod necked;
@@ -44,6 +47,7 @@ mod preferred;
 mod problem;
 mod rays;
 mod rearrangement;
+mod release;
 mod report;
 mod request;
 mod requirements;
@@ -73,6 +77,7 @@ pub use initial_analysis::initial_graphs;
 pub use outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal, SeparationProof};
 pub use preferred::PreferredGroups;
 pub use problem::{Checked, Effort, Observer, Problem, VerifiedPath};
+pub use release::Release;
 pub use request::{ActionSet, Engine, PlanRequest, PlanSink, Planner, Progress, Stage, Staging};
 pub use state::least_travel;
 pub use trace::{BlockedBy, PlanningPhase, TraceEvent};
@@ -91,8 +96,21 @@ pub fn search(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observe
     outcome
 }
 
-/// A search, with parts moved aside where nothing leaves, and the groups that left taken apart.
+/// A search, with parts taken off that are to be kept where others cannot leave otherwise, and the groups that left taken
+/// apart.
 fn run(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
+    let outcome = run_with_moves(planner, &problem, observer);
+    let mut outcome = kept::with_kept_released(planner, &problem, outcome, observer);
+    for group in 0..outcome.removals.len() {
+        if outcome.removals[group].is_group() {
+            subassembly::take_apart(planner, &problem, &mut outcome, group, observer);
+        }
+    }
+    outcome
+}
+
+/// A search, with parts moved aside where nothing leaves.
+fn run_with_moves(planner: Planner, problem: &Problem<'_>, observer: &mut dyn Observer) -> Outcome {
     let mut outcome = run_once(planner, problem.clone(), observer);
     // What is moved aside is so because nothing leaves: no group was left whole then.
     let alone = Problem { preferred: PreferredGroups::default(), ..problem.clone() };
@@ -108,11 +126,6 @@ fn run(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> O
         let counters = outcome.counters;
         outcome = run_once(planner, next, observer);
         outcome.counters.add(&counters);
-    }
-    for group in 0..outcome.removals.len() {
-        if outcome.removals[group].is_group() {
-            subassembly::take_apart(planner, &problem, &mut outcome, group, observer);
-        }
     }
     outcome
 }

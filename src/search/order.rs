@@ -89,14 +89,15 @@ impl Order {
     }
 
     /// The states to expand, the initial one included. Of two last parts it does not matter which one moves
-    /// against the other: beyond the first push, only the smaller one does, or the one that is no base. A part that is
+    /// against the other: beyond the first push, only the smaller one does, or the one that may leave
+    /// earlier. A part that is
     /// proved to stay is not moved, and a ball not turned.
     pub(super) fn expandable(&self, of: &PhaseStates<'_>, disassembly: &Disassembly<'_, '_>) -> Vec<usize> {
         let PhaseStates { strategy, phase, states, .. } = *of;
         let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());
         let still = match standing[..] {
             [a, b] if !strategy.separate_lists && problem.may_move(a) && problem.may_move(b) => {
-                let size = |part: usize| (problem.base.parts.contains(&part), of.reach(part));
+                let size = |part: usize| (problem.release_of(part), of.reach(part));
                 Some(if size(a) < size(b) { b } else { a })
             }
             _ => None,

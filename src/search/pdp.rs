@@ -18,6 +18,7 @@ use super::inseparable::InseparablePairs;
 use super::known_states::{KnownStates, Resolution};
 use super::outcome::Outcome;
 use super::problem::{Observer, Problem, VerifiedPath};
+use super::release::Release;
 use super::stopped_actions::StoppedActions;
 use super::trace::{PlanningPhase, TraceEvent};
 
@@ -125,6 +126,7 @@ impl Pdp<'_, '_> {
             match (removed, cut) {
                 (true, _) => {}
                 (false, true) => limit += 1,
+                (false, false) if self.disassembly.release(Release::Kept) => limit = 1,
                 (false, false) => return Ok(()),
             }
         }

@@ -20,6 +20,7 @@ use crate::termination::{Interrupt, Termination};
 use super::directions::Directions;
 use super::outcome::Removal;
 use super::preferred::PreferredGroups;
+use super::release::Release;
 use super::request::ActionSet;
 use super::trace::TraceEvent;
 
@@ -74,8 +75,12 @@ pub struct Problem<'a> {
     pub fixed: Vec<usize>,
     /// Parts that stay as long as others leave.
     pub base: Base,
-    /// Whether the base may leave now, too.
-    pub releases_base: bool,
+    /// Parts that are not asked for, and stay unless others cannot leave otherwise.
+    pub keep: Vec<usize>,
+    /// Whether this search may take parts off that are to be kept.
+    pub releases_kept: bool,
+    /// What may leave now beside the parts that are asked for.
+    pub released: Release,
     /// Groups that leave as wholes as long as others leave.
     pub preferred: PreferredGroups,
     /// Parts that must come out; `None` for all.
@@ -142,10 +147,15 @@ impl Problem<'_> {
     /// Whether a part is present and not fixed.
     #[must_use]
     pub fn is_movable(&self, part: usize) -> bool {
-        self.present.binary_search(&part).is_ok() && !self.fixed.contains(&part)
+        self.is_present(part) && !self.fixed.contains(&part)
     }
 
-    /// Whether it may leave now by itself: a base, and what is in a preferred group, stay as long as others leave.
+    fn is_present(&self, part: usize) -> bool {
+        self.present.binary_search(&part).is_ok()
+    }
+
+    /// Whether it may leave now by itself: a base, what is to be kept, and what is in a preferred group, stay as long as
+    /// others leave.
     #[must_use]
     pub fn may_move(&self, part: usize) -> bool {
         self.may_join(part) && !self.preferred.keeps(part)
@@ -161,20 +171,56 @@ impl Problem<'_> {
         group.iter().all(|&part| self.may_join(part))
     }
 
-    /// Whether a part is a base that may not leave yet.
+    /// Whether a part stays as long as others leave, and may not leave yet.
     fn keeps(&self, part: usize) -> bool {
-        self.base.parts.contains(&part) && !self.releases_base
+        self.release_of(part) > self.released
+    }
+
+    /// From when on a part may leave.
+    pub(super) fn release_of(&self, part: usize) -> Release {
+        match (self.base.parts.contains(&part), &self.base.reason) {
+            (true, None) => Release::GivenBase,
+            _ if self.keep.contains(&part) => Release::Kept,
+            (true, Some(_)) => Release::ChosenBase,
+            (false, _) => Release::Nothing,
+        }
+    }
+
+    /// What this search may release at most.
+    pub(super) fn last_release(&self) -> Release {
+        if self.keep.is_empty() || self.releases_kept { Release::GivenBase } else { Release::ChosenBase }
+    }
+
+    /// Lets the next of the parts that stand and stay so far leave, up to some; false if there are none.
+    pub(super) fn release(&mut self, standing: &[usize], most: Release) -> bool {
+        let most = most.min(self.last_release());
+        let all = standing.iter().map(|&part| self.release_of(part));
+        let Some(next) = all.filter(|&r| self.released < r && r <= most).min() else { return false };
+        self.released = next;
+        true
+    }
+
+    /// Lets the base leave, unless parts stand that leave before it and are to be kept.
+    pub(super) fn release_base(&mut self, standing: &[usize]) -> bool {
+        let are_kept = standing.iter().any(|part| self.keep.contains(part));
+        self.release(standing, if are_kept { Release::ChosenBase } else { Release::GivenBase })
     }
 
     /// Of the parts that remain, those that should come out.
     #[must_use]
     pub fn wanted(&self, remaining: &[usize]) -> Vec<usize> {
-        let asked = |p: &usize| self.targets.as_ref().is_none_or(|t| t.contains(p));
+        let asked = |p: &usize| self.targets.as_ref().is_none_or(|t| t.contains(p)) && !self.keep.contains(p);
         remaining
             .iter()
             .copied()
             .filter(|&p| !self.fixed.contains(&p) && !self.keeps(p) && asked(&p))
             .collect()
+    }
+
+    /// The parts that are to be kept and are not among those that remain.
+    pub(super) fn kept_off(&self, remaining: &[usize]) -> Vec<usize> {
+        let is_off = |part: &usize| self.is_present(*part) && remaining.binary_search(part).is_err();
+        self.keep.iter().copied().filter(is_off).collect()
     }
 
     /// Whether nothing more has to come out: a last part alone is apart from all others.

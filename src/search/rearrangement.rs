@@ -83,7 +83,7 @@ impl<'p, 'a> PlaceSearch<'p, 'a> {
     /// The search among some parts (ascending) that stand where the scene has them.
     pub(super) fn new(problem: &'p Problem<'a>, standing: &[usize], axes: Vec<Axis>) -> Self {
         let size = |&i: &usize| problem.scene.bodies[standing[i]].shape.mass.volume;
-        let rank = |i: &usize| (!problem.may_move(standing[*i]), problem.base.parts.contains(&standing[*i]));
+        let rank = |i: &usize| (!problem.may_move(standing[*i]), problem.release_of(standing[*i]));
         let still =
             (0..standing.len()).max_by(|a, b| rank(a).cmp(&rank(b)).then(size(a).total_cmp(&size(b))));
         let mut search = Self {

@@ -163,6 +163,8 @@ pub struct PlanRequest {
     /// Parts that stay as long as others leave: what the rest is taken off. With the extended actions, SBDP and SBDP*
     /// choose one if there are none; the other planners treat them as fixed.
     pub base: Vec<usize>,
+    /// Parts that stay unless others that are asked for cannot leave otherwise. They are not asked for.
+    pub keep: Vec<usize>,
     /// Groups that should leave as wholes, to be taken apart afterwards. A part may be in several groups if these are
     /// nested. Only SBDP* with the extended actions supports them.
     pub groups: Vec<Vec<usize>>,

@@ -18,6 +18,7 @@ use crate::tolerances::{ALONG_HULL, HULL_CLEARANCE, HULL_MARGIN};
 
 use super::outcome::{Outcome, Removal};
 use super::problem::Problem;
+use super::release::Release;
 
 /// A body that leaves what stands.
 #[derive(Clone, Copy)]
@@ -201,6 +202,21 @@ pub(super) fn places_after(scene: &Scene, removals: &[Removal]) -> Vec<(usize, P
     places.into_iter().collect()
 }
 
+impl<'a> Problem<'a> {
+    /// The question about what remains after a search that was not complete.
+    pub(super) fn after(&self, outcome: &Outcome) -> Self {
+        Problem {
+            scene: self.scene.with_placed(&places_after(&self.scene, &outcome.removals)),
+            present: outcome.remaining.clone(),
+            base: outcome.base.clone(),
+            released: Release::Nothing,
+            spent: self.spent + outcome.counters.simulations,
+            earlier: outcome.removals.clone(),
+            ..self.clone()
+        }
+    }
+}
+
 /// The unit vector of the last leg of a path, if that does not turn.
 fn last_leg(path: &[Pose]) -> Option<Vector3<f64>> {
     let [.., from, to] = path else { return None };
@@ -210,8 +226,13 @@ fn last_leg(path: &[Pose]) -> Option<Vector3<f64>> {
 
 /// A complete outcome without the removals that no target requires: what is left stands as verified as before.
 pub(super) fn without_needless(outcome: Outcome, targets: &[usize]) -> Outcome {
+    let needed = outcome.removals.iter().map(|removal| frees(removal, &outcome.removals, targets)).collect();
+    without_unrequired(outcome, needed)
+}
+
+/// An outcome without the removals that are not needed, and that none of the needed ones requires in turn.
+pub(super) fn without_unrequired(outcome: Outcome, mut needed: Vec<bool>) -> Outcome {
     let Outcome { mut removals, mut remaining, .. } = outcome;
-    let mut needed: Vec<bool> = removals.iter().map(|removal| frees(removal, &removals, targets)).collect();
     for i in (0..removals.len()).rev() {
         if needed[i] {
             removals[i].requires.iter().for_each(|&j| needed[j] = true);

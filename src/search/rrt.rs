@@ -26,6 +26,7 @@ use super::disassembly::{Disassembly, Proof, Stop, Transition, joined};
 use super::inseparable::InseparablePairs;
 use super::outcome::Outcome;
 use super::problem::{Observer, Problem, VerifiedPath};
+use super::release::Release;
 use super::stopped_actions::StoppedActions;
 use super::trace::{PlanningPhase, TraceEvent};
 
@@ -132,6 +133,7 @@ impl RrtSearch<'_, '_> {
             match removed {
                 true => {}
                 false if samples < RRT_SAMPLES => samples *= 2,
+                false if self.disassembly.release(Release::Kept) => {}
                 false => return Ok(()),
             }
         }

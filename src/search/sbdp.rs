@@ -38,6 +38,7 @@ use super::novelty::Novelty;
 use super::order::Order;
 use super::outcome::Outcome;
 use super::problem::{Effort, Observer, Problem, VerifiedPath};
+use super::release::Release;
 use super::report::SearchReport;
 use super::request::ActionSet;
 use super::speculation::Speculation;
@@ -195,8 +196,8 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 continue;
             }
             // Others may leave once the base has: nothing is turned before.
-            let Problem { base, releases_base, .. } = &mut self.disassembly.problem;
-            if !base.parts.is_empty() && !std::mem::replace(releases_base, true) {
+            let Disassembly { problem, everything, .. } = &mut self.disassembly;
+            if problem.release_base(everything.standing()) {
                 self.take_free_parts()?;
                 continue;
             }
@@ -223,6 +224,9 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             }
             // The paper trusts its graphs.
             if !self.strategy.is_extended() {
+                if self.release_rest()? {
+                    continue;
+                }
                 return Ok(());
             }
             self.strategy.distrust_static = true;
@@ -232,13 +236,19 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 || last?.any()
                 || self.leave_by_cells(CellStage::Last)?
                 || self.leave_together(|groups| groups.leave(Effort::All))?;
-            if !left {
-                return Ok(());
-            }
-            if self.disassembly.is_done() {
+            if self.disassembly.is_done() || !(left || self.release_rest()?) {
                 return Ok(());
             }
         }
+    }
+
+    /// Lets the next of the parts leave that stay so far, where nothing leaves without them; false if there are none.
+    fn release_rest(&mut self) -> Result<bool, Stop> {
+        let released = self.disassembly.release(Release::GivenBase);
+        if released {
+            self.take_free_parts()?;
+        }
+        Ok(released)
     }
 
     /// One run of Algorithm 1's `disassembly` over the open list.

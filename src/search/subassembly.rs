@@ -12,6 +12,7 @@ use super::deferred_removals::DeferredRemovals;
 use super::disassembly::interrupted;
 use super::outcome::{Outcome, Reason, Removal};
 use super::problem::{Observer, Problem};
+use super::release::Release;
 use super::request::Planner;
 use super::requirements::places_after;
 use super::run;
@@ -40,7 +41,8 @@ pub(super) fn take_apart(
     let spent = problem.spent + outcome.counters.simulations;
     let scene = problem.scene.with_placed(&places_after(&problem.scene, &outcome.removals[..group]));
     let base = Base::default();
-    let inner = Problem { scene, present, targets, base, releases_base: false, spent, ..problem.clone() };
+    let inner =
+        Problem { scene, present, targets, base, released: Release::Nothing, spent, ..problem.clone() };
     let done = outcome.removals.len();
     let mut deferred = DeferredRemovals::after(observer, done, outcome.counters.simulations);
     let found = taken_apart(planner, inner, &mut deferred);

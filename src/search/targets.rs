@@ -1,4 +1,5 @@
-//! The fewest removals that take targets out.
+//! The fewest removals that take targets out. Of parts that are to be kept, as few as possible are among them; this counts
+//! first.
 //!
 //! A search that ends when the targets are out is pruned to what they require. Then fewer removals are looked for, in
 //! searches in which only some parts may move: first those of the smallest set from which the targets leave straight, each
@@ -16,7 +17,7 @@ use crate::simulation::{Action, SweepQuestion, remembered_obstacles};
 use crate::termination::Interrupt;
 
 use super::contraction::Unobserved;
-use super::outcome::Outcome;
+use super::outcome::{Outcome, Removal};
 use super::problem::{Effort, Problem};
 use super::request::{ActionSet, Planner};
 use super::requirements::without_needless;
@@ -57,7 +58,9 @@ impl Shortest<'_, '_> {
         loop {
             let moved: BTreeSet<usize> = self.best.removals.iter().flat_map(|r| r.parts.clone()).collect();
             let is_other = |part: &&usize| !self.targets.contains(part) && !needed.contains(*part);
-            let Some(&left_out) = moved.iter().find(is_other) else { return Ok(()) };
+            let mut others = moved.iter().filter(is_other).collect::<Vec<_>>();
+            others.sort_by_key(|part| !self.problem.keep.contains(part));
+            let Some(&&left_out) = others.first() else { return Ok(()) };
             self.problem.termination.check()?;
             let parts = moved.iter().copied().filter(|&part| part != left_out).collect();
             if !self.search_among(&parts) {
@@ -66,7 +69,8 @@ impl Shortest<'_, '_> {
         }
     }
 
-    /// Searches with only some parts that may move; true if fewer removals are found.
+    /// Searches with only some parts that may move; true if that takes fewer parts off that are to be kept, or as many of
+    /// them in fewer removals.
     fn search_among(&mut self, parts: &BTreeSet<usize>) -> bool {
         let Self { planner, problem, targets, best, searches } = self;
         if *searches == TARGET_SEARCHES {
@@ -77,6 +81,7 @@ impl Shortest<'_, '_> {
         let problem = Problem {
             fixed: problem.present.iter().copied().filter(stays).collect(),
             base: Base::default(),
+            keep: Vec::new(),
             effort: Effort::Pushes,
             spent: problem.spent + best.counters.simulations,
             ..problem.clone()
@@ -88,19 +93,22 @@ impl Shortest<'_, '_> {
             return false;
         }
         let Outcome { removals, remaining, .. } = without_needless(found, targets);
-        let is_shorter = removals.len() < best.removals.len();
-        if is_shorter {
+        let cost = |removals: &[Removal], remaining: &[usize]| {
+            (self.problem.kept_off(remaining).len(), removals.len())
+        };
+        let is_less = cost(&removals, &remaining) < cost(&best.removals, &best.remaining);
+        if is_less {
             (best.removals, best.remaining) = (removals, remaining);
         }
-        is_shorter
+        is_less
     }
 }
 
 /// Straight ways out of the assembled state.
 struct StraightWays<'p, 'a> {
     problem: &'p Problem<'a>,
-    /// A smaller set is looked for.
-    removals: usize,
+    /// How many parts the plan takes off that are to be kept, and its removals: a set of fewer is looked for.
+    most: (usize, usize),
     /// Parts of the base.
     base: &'p [usize],
     translations: Vec<Action>,
@@ -111,6 +119,8 @@ struct StraightWays<'p, 'a> {
 /// Parts that have to leave: smaller sets first.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct NeededParts {
+    /// How many of them are to be kept.
+    kept: usize,
     count: usize,
     parts: BTreeSet<usize>,
     /// Those for which no way was chosen yet.
@@ -122,16 +132,19 @@ struct NeededParts {
 impl<'p, 'a> StraightWays<'p, 'a> {
     fn new(problem: &'p Problem<'a>, plan: &'p Outcome) -> Result<Self, Interrupt> {
         let (translations, _) = problem.action_lists(&problem.directions()?);
-        let (removals, base) = (plan.removals.len(), &plan.base.parts[..]);
-        Ok(Self { problem, removals, base, translations, obstacles: HashMap::new() })
+        let most = (problem.kept_off(&plan.remaining).len(), plan.removals.len());
+        let base = &plan.base.parts[..];
+        Ok(Self { problem, most, base, translations, obstacles: HashMap::new() })
     }
 
     /// The smallest set of parts, the targets among them, that leave straight one after the other, if it is smaller than the
     /// plan.
     fn smallest_set(mut self, targets: &[usize]) -> Result<Option<BTreeSet<usize>>, Interrupt> {
         let parts: BTreeSet<usize> = targets.iter().copied().collect();
-        let first = NeededParts { count: parts.len(), open: parts.clone(), parts, after: BTreeSet::new() };
-        let (mut queue, mut seen, most) = (BTreeSet::from([first]), 0, self.removals);
+        let (kept, count, open) = (0, parts.len(), parts.clone());
+        let first = NeededParts { kept, count, parts, open, after: BTreeSet::new() };
+        let (mut queue, mut seen, most) = (BTreeSet::from([first]), 0, self.most);
+        let keep = &self.problem.keep;
         while let Some(needed) = queue.pop_first() {
             let Some(&part) = needed.open.first() else { return Ok(Some(needed.parts)) };
             seen += 1;
@@ -145,7 +158,8 @@ impl<'p, 'a> StraightWays<'p, 'a> {
                 next.parts.extend(obstacles);
                 next.after.extend(obstacles.iter().map(|&other| (part, other)));
                 next.count = next.parts.len();
-                if next.count < most && has_order(&next) {
+                next.kept = next.parts.iter().filter(|part| keep.contains(part)).count();
+                if (next.kept, next.count) < most && has_order(&next) {
                     queue.insert(next);
                 }
             }

@@ -154,6 +154,8 @@ pub(super) struct PlanFrame<'a> {
     pub(super) removed: Vec<usize>,
     /// Parts that were given as the base and are there.
     pub(super) base: Vec<usize>,
+    /// Parts that are to be kept and are there.
+    pub(super) keep: Vec<usize>,
     pub(super) overlaps: Vec<Overlap>,
     /// What else the reader of the plan should know.
     pub(super) notes: Vec<String>,
@@ -214,12 +216,12 @@ impl PlanFrame<'_> {
         };
         let kept_together = outcome.kept_together();
         let is_gone = |part: &usize| outcome.remaining.binary_search(part).is_err();
-        let left = self.base.iter().copied().filter(is_gone);
-        let left = left.map(|part| Warning {
-            part: Some(part),
-            message: "it was given as a base, and left: nothing else did any more".to_owned(),
-        });
-        let left: Vec<Warning> = left.collect();
+        let left = |parts: &[usize], message: &str| {
+            let left = parts.iter().copied().filter(is_gone);
+            left.map(|part| Warning { part: Some(part), message: message.to_owned() }).collect::<Vec<_>>()
+        };
+        let base_left = left(&self.base, "it was given as a base, and left: nothing else did any more");
+        let kept_left = left(&self.keep, "it was to be kept, and left: others could not leave otherwise");
         let steps = outcome.removals.iter().map(|r| removal(self.assembly, r)).collect();
         let blocked = outcome.blocked.into_iter().map(|BlockedAction { part, action, by }| Blocked {
             part,
@@ -238,7 +240,7 @@ impl PlanFrame<'_> {
             free_together: outcome.free_together,
             blocked: blocked.collect(),
             stats,
-            warnings: empty.warnings.into_iter().chain(left).collect(),
+            warnings: empty.warnings.into_iter().chain(base_left).chain(kept_left).collect(),
             ..empty
         }
     }
@@ -265,6 +267,7 @@ impl PlanFrame<'_> {
             removed: self.removed,
             targets: self.request.targets.clone(),
             fixed: self.fixed,
+            keep: self.keep,
             base: Base::default(),
             steps: Vec::new(),
             kept_together: Vec::new(),

@@ -13,8 +13,8 @@ use crate::geometry::{Assembly, Shape};
 use crate::plan::{Base, OVERLAP, Plan, PlanStatus, VERDICT, Verifier};
 use crate::scene::{HullTree, JoinedHulls};
 use crate::search::{
-    Effort, Engine, Observer, PlanRequest, PlanSink, PreferredGroups, Problem, TraceEvent, initial_graphs,
-    search,
+    Effort, Engine, Observer, PlanRequest, PlanSink, PreferredGroups, Problem, Release, TraceEvent,
+    initial_graphs, search,
 };
 use crate::simulation::{
     MOTION, PenaltyEngine, PenaltyParameters, SlidingEngine, TOUCHING, TransitionFunction,
@@ -96,20 +96,23 @@ impl Entry {
         let termination = limited.as_ref().unwrap_or(termination);
         let mut fixed = request.fixed.clone();
         fixed.extend(&self.assembly.fixed);
-        let (mut removed, mut base) = (request.removed.clone(), request.base.clone());
-        for list in [&mut fixed, &mut removed, &mut base] {
+        let PlanRequest { mut removed, mut base, mut keep, .. } = request.clone();
+        for list in [&mut fixed, &mut removed, &mut base, &mut keep] {
             list.sort_unstable();
             list.dedup();
         }
-        for list in [&mut fixed, &mut base] {
+        for list in [&mut fixed, &mut base, &mut keep] {
             list.retain(|p| removed.binary_search(p).is_err());
         }
         check_values(request)?;
-        for (field, list) in [("fixed", &fixed), ("base", &base)] {
+        for (field, list) in [("fixed", &fixed), ("base", &base), ("keep", &keep)] {
             if let Some(&part) = request.targets.iter().flatten().find(|&p| list.binary_search(p).is_ok()) {
                 let name = self.assembly.parts[part].name.clone();
                 return Err(ServiceError::TargetStays { name, field });
             }
+        }
+        if let Some(&part) = keep.iter().find(|part| fixed.binary_search(part).is_ok()) {
+            return Err(ServiceError::FixedAndKept { name: self.assembly.parts[part].name.clone() });
         }
         let frame = PlanFrame {
             assembly: &self.assembly,
@@ -117,12 +120,15 @@ impl Entry {
             fixed,
             removed,
             base,
+            keep,
             overlaps: Vec::new(),
             notes: Vec::new(),
         };
-        let (fixed, removed, base) = (frame.fixed.clone(), frame.removed.clone(), frame.base.clone());
+        let PlanFrame { fixed, removed, base, keep, .. } = &frame;
+        let [fixed, removed, base, keep] = [fixed, removed, base, keep].map(Vec::clone);
         let assembly = &self.assembly;
-        let question = PlanQuestion { assembly, request, fixed: &fixed, removed: &removed, base: &base };
+        let question =
+            PlanQuestion { assembly, request, fixed: &fixed, removed: &removed, base: &base, keep: &keep };
         // A trace shows what the search does, so the search must run.
         let known = if sink.traces() { None } else { remembered_plan(cache, &question) };
         let known = match known {
@@ -273,7 +279,7 @@ impl Entry {
         termination: &Termination,
         cache: &RequestCache,
     ) -> Problem<'a> {
-        let PlanQuestion { request, fixed, removed, base, .. } = *asked.question;
+        let PlanQuestion { request, fixed, removed, base, keep, .. } = *asked.question;
         let is_there = |part: &usize| removed.binary_search(part).is_err();
         Problem {
             scene: prepared.scene.clone(),
@@ -282,7 +288,9 @@ impl Entry {
             present: (0..self.assembly.parts.len()).filter(is_there).collect(),
             fixed: fixed.to_vec(),
             base: Base { parts: base.to_vec(), reason: None },
-            releases_base: false,
+            keep: keep.to_vec(),
+            releases_kept: false,
+            released: Release::Nothing,
             preferred: PreferredGroups::new(&request.groups),
             up: request.up.map(|up| Vector3::from(up).normalize()),
             targets: request.targets.clone(),
@@ -313,7 +321,7 @@ impl Entry {
         let Ok((prepared, _)) = self.prepared(termination, cache) else { return };
         let request = PlanRequest::default();
         let (assembly, request) = (&self.assembly, &request);
-        let question = PlanQuestion { assembly, request, fixed: &[], removed: &[], base: &[] };
+        let question = PlanQuestion { assembly, request, fixed: &[], removed: &[], base: &[], keep: &[] };
         let engine = engine_of(request.engine, request.penalty);
         let asked = SearchQuestion { question: &question, engine: &*engine, verifier: &prepared.verifier };
         // If it is interrupted, the blockages that were found are cached all the same.

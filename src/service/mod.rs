@@ -93,6 +93,12 @@ pub enum ServiceError {
         /// The list in the request.
         field: &'static str,
     },
+    /// A part is to be kept, and may not move.
+    #[error("part `{name}` is in `fixed` and in `keep`: name it in one of them")]
+    FixedAndKept {
+        /// The part.
+        name: String,
+    },
     /// A length is negative or not finite.
     #[error("`{field}` is {value}: give a length of at least 0")]
     NoLength {
@@ -465,8 +471,8 @@ impl Drop for Service {
 /// Parts that a request or a revision names, by field.
 type Named = [(&'static str, Vec<usize>)];
 
-fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 6] {
-    let PlanRequest { fixed, removed, targets, base, groups, assembly, .. } = request;
+fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 7] {
+    let PlanRequest { fixed, removed, targets, base, keep, groups, assembly, .. } = request;
     let staged = match assembly {
         Some(Staging::Beside(given)) => given.iter().map(|(part, _)| *part).collect(),
         _ => Vec::new(),
@@ -477,6 +483,7 @@ fn named_parts(request: &PlanRequest) -> [(&'static str, Vec<usize>); 6] {
         ("removed", removed.clone()),
         ("targets", targets),
         ("base", base.clone()),
+        ("keep", keep.clone()),
         ("groups", groups.concat()),
         ("staged", staged),
     ]

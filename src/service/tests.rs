@@ -74,6 +74,7 @@ enum Edit {
     Swapped(usize, usize),
     Fixed(usize),
     Base(usize),
+    Keep(usize),
     /// Two parts rather leave together.
     Group(usize, usize),
     Target(usize),
@@ -94,6 +95,7 @@ fn edit() -> impl Strategy<Value = Edit> {
         1 => (part(), part()).prop_map(|(p, q)| Edit::Swapped(p, q)),
         1 => part().prop_map(Edit::Fixed),
         1 => part().prop_map(Edit::Base),
+        2 => part().prop_map(Edit::Keep),
         2 => (part(), part()).prop_map(|(p, q)| Edit::Group(p, q)),
         1 => part().prop_map(Edit::Target),
     ]
@@ -126,6 +128,7 @@ impl Question {
             Edit::Swapped(p, q) => meshes.swap(p % count, q % count),
             Edit::Fixed(p) => request.fixed = vec![p % count],
             Edit::Base(p) => request.base = vec![p % count],
+            Edit::Keep(p) => request.keep.push(p % count),
             Edit::Group(p, q) if request.prefers_groups() => {
                 request.groups.push(vec![p % count, q % count]);
             }
@@ -134,12 +137,13 @@ impl Question {
             Edit::Target(p) => request.targets = Some(vec![p % count]),
         }
         let count = meshes.len();
-        let PlanRequest { removed, fixed, base, targets, groups, .. } = request;
-        for list in [&mut *removed, fixed, base].into_iter().chain(&mut *targets).chain(groups) {
+        let PlanRequest { removed, fixed, base, keep, targets, groups, .. } = request;
+        for list in [&mut *removed, fixed, base, keep].into_iter().chain(&mut *targets).chain(groups) {
             list.retain(|&p| p < count);
         }
-        // What stays is no target.
-        let stay = [&fixed[..], base].concat();
+        // What may not move is not kept, and what stays is no target.
+        keep.retain(|part| !fixed.contains(part));
+        let stay = [&fixed[..], base, keep].concat();
         targets.iter_mut().for_each(|targets| targets.retain(|p| !stay.contains(p)));
         next
     }
@@ -334,6 +338,8 @@ fn names_and_threads_do_not_count_but_what_is_asked_does() {
         PlanRequest { removed: vec![5], ..simulated() },
         PlanRequest { fixed: vec![5], ..simulated() },
         PlanRequest { targets: Some(vec![5]), ..simulated() },
+        PlanRequest { keep: vec![5], ..simulated() },
+        PlanRequest { base: vec![5], ..simulated() },
         PlanRequest { max_simulations: Some(3), ..simulated() },
         PlanRequest { sweeps: Some(true), ..simulated() },
         PlanRequest { planner: Planner::Sbdp, max_simulations: Some(3), ..simulated() },

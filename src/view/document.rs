@@ -65,6 +65,7 @@ fn named(plan: &PlanDocument) -> impl Iterator<Item = (&'static str, &str)> {
     let lists = [
         ("initial.removed", &plan.initial.removed),
         ("fixed", &plan.fixed),
+        ("keep", &plan.keep),
         ("base", &plan.base),
         ("remaining", &plan.remaining),
     ];

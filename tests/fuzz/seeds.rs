@@ -61,7 +61,7 @@ fn built_in(reader: Reader) -> Vec<Vec<u8>> {
         Reader::Meshes | Reader::Admission => meshes(),
         Reader::Config => vec![include_bytes!("../../config/default.toml").to_vec()],
         Reader::Manifest => vec![
-            br#"{"name": "a", "units": "mm", "fixed": ["0"], "base": ["0"], "densities": {"0": 1.5}, "parts": ["0.obj"]}"#.to_vec(),
+            br#"{"name": "a", "units": "mm", "fixed": ["0"], "base": ["0"], "keep": ["0"], "densities": {"0": 1.5}, "parts": ["0.obj"]}"#.to_vec(),
             b"name = \"a\"\nfixed = [\"0\"]\n[densities]\n0 = 1.5\n[[parts]]\nfile = \"0.obj\"\n".to_vec(),
             br#"{"0": [1.0, 2.0, 3.0]}"#.to_vec(),
             b"[[1.0, 2.0, 3.0]]".to_vec(),
@@ -153,6 +153,7 @@ fn messages() -> Vec<Vec<u8>> {
     let request = PlanRequest {
         fixed: vec![1, 2],
         base: vec![3],
+        keep: vec![0],
         groups: vec![vec![0, 1], vec![2]],
         up: Some([0.0, 1.0, 0.0]),
         penalty: vec![PenaltyRecord { parameter: 1, reserved: 0, value: 0.5 }],

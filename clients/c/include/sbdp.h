@@ -1003,6 +1003,14 @@ typedef struct SbdpSummary {
      */
     size_t fixed_count;
     /**
+     * Parts that were to stay unless others could not leave otherwise.
+     */
+    const uint32_t *keep;
+    /**
+     * How many.
+     */
+    size_t keep_count;
+    /**
      * The base: the parts that the rest is taken off.
      */
     const uint32_t *base;
@@ -1241,6 +1249,14 @@ typedef struct SbdpPlanOptions {
      * How many.
      */
     size_t penalty_count;
+    /**
+     * Parts that stay unless others that are asked for cannot leave otherwise. They are not asked for.
+     */
+    const uint32_t *keep;
+    /**
+     * How many.
+     */
+    size_t keep_count;
 } SbdpPlanOptions;
 
 /**

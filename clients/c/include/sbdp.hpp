@@ -179,7 +179,7 @@ struct PlanOptions {
     std::optional<std::uint64_t> max_simulations;
     std::optional<double> clearance;
     std::optional<std::array<double, 3>> up;
-    std::vector<std::uint32_t> fixed, removed, base;
+    std::vector<std::uint32_t> fixed, removed, base, keep;
     std::optional<std::vector<std::uint32_t>> targets;
     std::vector<std::vector<std::uint32_t>> groups;
     std::vector<SbdpMovedPart> moved, staged;
@@ -222,6 +222,7 @@ template <class F> auto with_options(const PlanOptions &o, F use) {
         c.target_count = o.targets->size();
     }
     c.base = o.base.data(), c.base_count = o.base.size();
+    c.keep = o.keep.data(), c.keep_count = o.keep.size();
     c.groups = groups.data(), c.group_count = groups.size();
     c.moved = o.moved.data(), c.moved_count = o.moved.size();
     c.staged = o.staged.data(), c.staged_count = o.staged.size();

@@ -196,6 +196,10 @@ pub struct SbdpPlanOptions {
     pub penalty: *const SbdpPenalty,
     /// How many.
     pub penalty_count: usize,
+    /// Parts that stay unless others that are asked for cannot leave otherwise. They are not asked for.
+    pub keep: *const u32,
+    /// How many.
+    pub keep_count: usize,
 }
 
 // SAFETY: it begins with its size, and has but numbers and pointers.
@@ -243,6 +247,7 @@ pub(crate) unsafe fn read_plan_options(options: *const SbdpPlanOptions) -> Resul
                 false => Some(list(given.targets, given.target_count, "options->targets")?),
             },
             base: list(given.base, given.base_count, "options->base")?,
+            keep: list(given.keep, given.keep_count, "options->keep")?,
             groups: array(given.groups, given.group_count, "options->groups")?
                 .iter()
                 .map(|group| list(group.parts, group.part_count, "options->groups[].parts"))

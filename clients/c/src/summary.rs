@@ -139,6 +139,10 @@ pub struct SbdpSummary {
     pub fixed: *const u32,
     /// How many.
     pub fixed_count: usize,
+    /// Parts that were to stay unless others could not leave otherwise.
+    pub keep: *const u32,
+    /// How many.
+    pub keep_count: usize,
     /// The base: the parts that the rest is taken off.
     pub base: *const u32,
     /// How many.
@@ -274,6 +278,8 @@ impl HeldSummary {
             target_count: targets.len(),
             fixed: summary.fixed.as_ptr(),
             fixed_count: summary.fixed.len(),
+            keep: summary.keep.as_ptr(),
+            keep_count: summary.keep.len(),
             base: summary.base.parts.as_ptr(),
             base_count: summary.base.parts.len(),
             base_reason: at(base_reason),

@@ -62,6 +62,11 @@ int main(int count, char **arguments) {
     CHECK((*upwards[0].direction())[2] > 0.9);
     chosen.targets->clear();
     CHECK(client.plan(handle, chosen).to_end().size() == 0);
+    sbdp::PlanOptions keeping;
+    keeping.keep = {0, 1};
+    const sbdp::Plan kept_both = client.plan(handle, keeping).to_end();
+    CHECK(kept_both.size() == 0 && kept_both.summary().status() == SBDP_PLAN_STATUS_COMPLETE);
+    CHECK(kept_both.summary()->keep_count == 2);
 
     // Steps that are kept outlive their stream; events by polling.
     std::vector<sbdp::Step> kept;

@@ -52,6 +52,7 @@ pub(crate) fn options(request: &proto::PlanRequest) -> Result<PlanOptions, Statu
         removed: request.removed.clone(),
         targets: request.targets.as_ref().map(|targets| targets.parts.clone()),
         base: request.base.clone(),
+        keep: request.keep.clone(),
         groups: request.groups.iter().map(|group| group.parts.clone()).collect(),
         moved: moved("moved", &request.moved)?,
         assembly: staging(request)?,

@@ -18,6 +18,7 @@ pub(crate) fn summary(summary: Summary) -> proto::Summary {
         removed: summary.removed,
         targets: summary.targets.map(part_list),
         fixed: summary.fixed,
+        keep: summary.keep,
         base: summary.base.parts,
         base_reason: summary.base.reason,
         remaining: summary.remaining,

@@ -47,7 +47,9 @@ async fn documents_are_those_of_the_rust_client_byte_for_byte() {
         let assembly = Arc::new(assembly(name));
         let handle = upload_source(&mut caller, &assembly).await;
         for staging in [None, Some(Staging::Beside(Vec::new()))] {
-            let options = PlanOptions { assembly: staging.clone(), ..PlanOptions::default() };
+            let keep = if name == "pin-bolt-cover" { vec![1, 2] } else { Vec::new() };
+            let options =
+                PlanOptions { assembly: staging.clone(), keep: keep.clone(), ..PlanOptions::default() };
             let local = |options: &PlanOptions| {
                 client.plan(Arc::clone(&assembly), options).unwrap().plan_to_end().unwrap()
             };
@@ -56,7 +58,12 @@ async fn documents_are_those_of_the_rust_client_byte_for_byte() {
             let local = local(&options);
             let staging =
                 if staging.is_some() { proto::Staging::Beside } else { proto::Staging::Disassembly };
-            let wanted = PlanRequest { document: true, staging: staging.into(), ..request(&handle) };
+            let wanted = PlanRequest {
+                document: true,
+                staging: staging.into(),
+                keep: keep.clone(),
+                ..request(&handle)
+            };
             let events = to_end(caller.plan(wanted).await.unwrap().into_inner()).await.unwrap();
             assert_eq!(joined(&events), document(&local), "{name}");
 
@@ -79,6 +86,7 @@ async fn documents_are_those_of_the_rust_client_byte_for_byte() {
             assert_eq!((&end.parts, &end.remaining), (&local.summary.parts, &local.summary.remaining));
             assert_eq!((end.assembly, end.base.clone()), (local.summary.assembly, local.summary.base.parts));
             assert_eq!(end.warnings.len(), local.summary.warnings.len());
+            assert_eq!((&end.keep, &local.summary.keep), (&keep, &keep));
         }
     }
 }

@@ -152,6 +152,7 @@ pub(crate) fn options(
             "targets" if value.is_none() => {}
             "targets" => options.targets = Some(parts(data, &value)?),
             "base" => options.base = parts(data, &value)?,
+            "keep" => options.keep = parts(data, &value)?,
             "moved" => options.moved = poses(data, &value)?,
             "assembly" => together = value.extract()?,
             "staging" => staging = Some(value),
@@ -176,12 +177,14 @@ pub(crate) fn options(
     }
     options.fixed.sort_unstable();
     options.fixed.dedup();
-    if let Some((files, _)) = data.files()
-        && options.base.is_empty()
-    {
-        options.base = files.base.iter().map(|name| data.part(py, name)).collect::<PyResult<_>>()?;
-        options.base.sort_unstable();
-        options.base.dedup();
+    if let Some((files, _)) = data.files() {
+        for (list, described) in [(&mut options.base, &files.base), (&mut options.keep, &files.keep)] {
+            if list.is_empty() {
+                *list = described.iter().map(|name| data.part(py, name)).collect::<PyResult<_>>()?;
+                list.sort_unstable();
+                list.dedup();
+            }
+        }
     }
     if staging.is_some() && !together {
         return Err(PyValueError::new_err("staging: only assembly plans have it; give assembly=True"));

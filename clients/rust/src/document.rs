@@ -31,6 +31,7 @@ impl Summary {
             initial: InitialDocument { removed: self.names(&self.removed), poses: poses.collect() },
             targets: self.targets.as_ref().map(|targets| self.names(targets)),
             fixed: self.names(&self.fixed),
+            keep: self.names(&self.keep),
             base: self.names(&self.base.parts),
             base_reason: self.base.reason.clone(),
             steps: steps.iter().map(|step| self.step(&step.view())).collect(),

@@ -231,6 +231,9 @@ pub struct PlanOptions {
     pub targets: Option<Vec<u32>>,
     /// Parts that stay as long as others leave: what the rest is taken off. If there are none, the daemon chooses one.
     pub base: Vec<u32>,
+    /// Parts that stay unless others that are asked for cannot leave otherwise. They are not asked for: the plan is
+    /// complete with them in the assembly.
+    pub keep: Vec<u32>,
     /// Groups that should leave as wholes, to be taken apart afterwards. A part may be in several groups if these are
     /// nested.
     pub groups: Vec<Vec<u32>>,
@@ -274,6 +277,7 @@ impl PlanOptions {
             removed: self.removed.clone(),
             targets: self.targets.clone(),
             base: self.base.clone(),
+            keep: self.keep.clone(),
             groups: self.groups.clone(),
             moved: self.moved.iter().map(moved_part).collect(),
             assembly: self.assembly.as_ref().map(|staging| match staging {

@@ -60,6 +60,7 @@ impl Session {
         let is_out = |part: &u32| parts.contains(part);
         self.options.fixed.retain(|p| !is_out(p));
         self.options.base.retain(|p| !is_out(p));
+        self.options.keep.retain(|p| !is_out(p));
         if let Some(targets) = &mut self.options.targets {
             targets.retain(|p| !is_out(p));
         }

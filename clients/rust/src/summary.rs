@@ -104,6 +104,8 @@ pub struct Summary {
     pub targets: Option<Vec<u32>>,
     /// Parts that may not move.
     pub fixed: Vec<u32>,
+    /// Parts that were to stay unless others could not leave otherwise.
+    pub keep: Vec<u32>,
     /// The parts that the rest is taken off, or built up on. Empty where parts are fixed and no base was named, or
     /// where all others had to leave too.
     pub base: Base,
@@ -143,6 +145,7 @@ impl Summary {
             removed: view.removed().to_vec(),
             targets: view.targets().map(<[u32]>::to_vec),
             fixed: view.fixed().to_vec(),
+            keep: view.keep().to_vec(),
             base: Base { parts: view.base().to_vec(), reason: view.base_reason().map(owned) },
             remaining: view.remaining().to_vec(),
             kept_together: view.kept_together().map(<[u32]>::to_vec).collect(),

@@ -135,8 +135,6 @@ impl<'a, 'o> Sbdp<'a, 'o> {
     /// chosen.
     pub(super) fn renew_base(&mut self) {
         let Disassembly { problem, everything, .. } = &mut self.disassembly;
-        // What else left may have freed others.
-        problem.releases_base = false;
         let base = problem.base.among(everything.standing());
         if base != problem.base {
             let is_chosen = base.parts.is_empty() && self.strategy.is_extended();

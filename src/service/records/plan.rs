@@ -25,6 +25,8 @@ pub(crate) struct PlanQuestion<'a> {
     pub removed: &'a [usize],
     /// Parts that were given as the base.
     pub base: &'a [usize],
+    /// Parts that are to be kept.
+    pub keep: &'a [usize],
 }
 
 /// A remembered answer, in the planning frame.
@@ -86,7 +88,7 @@ impl PlanAnswer {
 
 impl PlanQuestion<'_> {
     fn key(&self) -> RecordKey {
-        let Self { assembly, request, fixed, removed, base } = *self;
+        let Self { assembly, request, fixed, removed, base, keep } = *self;
         let mut digest = Digest::new();
         digest.integer(assembly.parts.len() as u64);
         for part in &assembly.parts {
@@ -105,7 +107,7 @@ impl PlanQuestion<'_> {
             targets.dedup();
         }
         digest.integer(u64::from(targets.is_some()));
-        for list in [fixed, removed, base, &targets.unwrap_or_default()] {
+        for list in [fixed, removed, base, keep, &targets.unwrap_or_default()] {
             digest.integer(list.len() as u64);
             list.iter().for_each(|&part| {
                 digest.integer(part as u64);

@@ -37,6 +37,7 @@ class Options(TypedDict, total=False):
     targets: str | Iterable[str] | None
     """Parts that must come out; None for all."""
     base: str | Iterable[str]
+    keep: str | Iterable[str]
     """Parts that stay as long as others leave."""
     moved: Mapping[str, Pose]
     """Parts that stand elsewhere: the rigid motion of their mesh from where the assembly has it."""
