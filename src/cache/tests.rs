@@ -115,7 +115,7 @@ fn what_was_remembered_is_there_after_a_restart() {
     assert_eq!(
         s.kinds
             .iter()
-            .map(|k| (k.hits, k.disk_entries.unwrap()))
+            .map(|k| (k.hits, k.disk_entries))
             .fold((0, 0), |(a, b), (c, d)| (a + c, b + d)),
         (100, 100)
     );
@@ -339,7 +339,7 @@ fn a_store_survives_being_killed() {
                 "kill {kill}: file {n} is gone or damaged"
             );
         }
-        assert_eq!(cache.counters().kinds[KINDS.len() - 1].hits, files as u64, "kill {kill}");
+        assert_eq!(cache.statistics().kinds[KINDS.len() - 1].hits, files as u64, "kill {kill}");
     }
     assert!(most > 0 && most_files > 0, "none lived long enough to write");
 }

@@ -63,7 +63,7 @@ pub(super) enum Command {
     Status(super::status::StatusArguments),
     /// Check a configuration of the daemon
     Config(super::config::ConfigArguments),
-    /// Manage the cache on disk (stop the daemon first: it locks the cache)
+    /// Manage the cache on disk (all but `stats` need the daemon stopped, which locks the cache)
     Cache(super::cache::CacheArguments),
     /// Run planners over folders of assemblies and compare the results
     Bench(Box<BenchArguments>),
