@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use rustix::process::{Pid, Signal, kill_process};
-use sbdp::bench::{self, BenchError, BenchObserver, Record, Request, Shard, Summary, Unit};
+use sbdp::bench::{self, BenchError, BenchObserver, Record, Request, Shard, Summary, Unit, Workload};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests")
@@ -52,7 +52,7 @@ fn request(folder: &Path, assemblies: &[&str]) -> Request {
 struct Unwatched;
 
 impl BenchObserver for Unwatched {
-    fn begun(&mut self, _: usize, _: usize) {}
+    fn begun(&mut self, _: &Workload) {}
     fn ran(&mut self, _: &Record, _: usize, _: Option<Duration>) {}
 }
 
@@ -138,7 +138,7 @@ struct CancelWhileOneHangs<'a> {
 }
 
 impl BenchObserver for CancelWhileOneHangs<'_> {
-    fn begun(&mut self, _: usize, _: usize) {}
+    fn begun(&mut self, _: &Workload) {}
     fn ran(&mut self, _: &Record, _: usize, _: Option<Duration>) {
         while !log(self.out).iter().any(|l| l.starts_with("hang")) {
             std::thread::sleep(Duration::from_millis(5));

@@ -113,10 +113,7 @@ fn what_was_remembered_is_there_after_a_restart() {
     assert!((0..100).all(|n| has(&cache, n, 20)) && !has(&cache, 100, 20));
     let s = cache.statistics();
     assert_eq!(
-        s.kinds
-            .iter()
-            .map(|k| (k.hits, k.disk_entries))
-            .fold((0, 0), |(a, b), (c, d)| (a + c, b + d)),
+        s.kinds.iter().map(|k| (k.hits, k.disk_entries)).fold((0, 0), |(a, b), (c, d)| (a + c, b + d)),
         (100, 100)
     );
     assert_eq!(s.kinds.iter().map(|k| k.misses).sum::<u64>(), 1);

@@ -28,7 +28,7 @@ pub(super) use view::{GraphArguments, StepsArguments, ViewArguments};
 
 /// Plans how assemblies come apart.
 #[derive(Debug, Parser)]
-#[command(name = "sbdp", version = crate::BUILD, about, after_help = EXAMPLES, after_long_help = EXAMPLES)]
+#[command(name = "sbdp", version = crate::BUILD, after_help = EXAMPLES, after_long_help = EXAMPLES)]
 pub(super) struct Arguments {
     #[command(subcommand)]
     pub(super) command: Command,
@@ -341,10 +341,10 @@ impl From<Dbg> for StaticAnalysis {
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct Sweeps {
     /// Remove parts that leave straight without simulation, with sbdp-star and sbdp [default with extended actions]
-    #[arg(long, overrides_with = "no_sweeps")]
+    #[arg(long, overrides_with = "no_sweeps", help_heading = SEARCH)]
     sweeps: bool,
     /// Simulate parts that leave straight, too [default with the paper's actions]
-    #[arg(long, overrides_with = "sweeps")]
+    #[arg(long, overrides_with = "sweeps", help_heading = SEARCH)]
     no_sweeps: bool,
 }
 

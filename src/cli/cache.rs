@@ -94,7 +94,10 @@ pub(super) fn run(arguments: &CacheArguments) -> Result<ExitCode, CliError> {
     match &arguments.command {
         CacheCommand::Ls => print(&listed(&cache))?,
         CacheCommand::Stats { json } => {
-            stats(&CountedCache { from: "files", pid: None, statistics: cache.statistics() }, json.as_deref())?;
+            stats(
+                &CountedCache { from: "files", pid: None, statistics: cache.statistics() },
+                json.as_deref(),
+            )?;
         }
         CacheCommand::Verify => return verify(&cache),
         CacheCommand::Evict { to_mb } => evict(&cache, folder, to_mb.saturating_mul(MEGABYTE))?,
@@ -128,11 +131,11 @@ struct CountedCache {
 /// The statistics of a folder whose file another process has locked: no one else can read it meanwhile, so the daemon
 /// is asked, if it is the one.
 fn of_daemon(folder: &Path, file: &Path) -> Result<CountedCache, CliError> {
-    let failed = |why: String| {
-        CliError::Failed(format!("{}: in use by another process, and {why}", file.display()))
-    };
+    let failed =
+        |why: String| CliError::Failed(format!("{}: in use by another process, and {why}", file.display()));
     let daemon = Daemon::connect().map_err(|e| failed(e.to_string()))?;
-    let DaemonFigures { pid, remembered, .. } = DaemonFigures::of(&daemon).map_err(|e| failed(e.to_string()))?;
+    let DaemonFigures { pid, remembered, .. } =
+        DaemonFigures::of(&daemon).map_err(|e| failed(e.to_string()))?;
     let statistics = remembered.map(|remembered| remembered.records).filter(|records| records.on_disk);
     let its_folder = statistics.as_ref().and_then(|s| s.folder.as_ref()?.canonicalize().ok());
     match (statistics, its_folder) {

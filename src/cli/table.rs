@@ -55,9 +55,14 @@ pub(super) fn duration(seconds: f64) -> String {
         s if s < 0.9995 => format!("{:.0} ms", s * 1e3),
         s if s < 119.5 => format!("{s:.1} s"),
         _ if whole < 7200 => format!("{} min", whole / 60),
-        _ if whole < 172_800 => format!("{} h {} min", whole / 3600, whole / 60 % 60),
-        _ => format!("{} days {} h", whole / 86_400, whole / 3600 % 24),
+        _ if whole < 172_800 => with_rest(format!("{} h", whole / 3600), whole / 60 % 60, "min"),
+        _ => with_rest(format!("{} days", whole / 86_400), whole / 3600 % 24, "h"),
     }
+}
+
+/// A time with what is left in the next smaller unit.
+fn with_rest(time: String, rest: u64, unit: &str) -> String {
+    if rest == 0 { time } else { format!("{time} {rest} {unit}") }
 }
 
 /// A length in few digits, with its unit if known.
@@ -105,6 +110,7 @@ mod tests {
             (0.1234, "123 ms"),
             (1.26, "1.3 s"),
             (125.0, "2 min"),
+            (7200.0, "2 h"),
             (7384.0, "2 h 3 min"),
             (180_000.0, "2 days 2 h"),
         ];
