@@ -119,7 +119,7 @@ impl Disk {
         *self.database.write().unwrap_or_else(PoisonError::into_inner) = Some(database);
         let list = self.list(None).unwrap_or_default();
         self.index().extend(list.iter().map(|l| l.key).filter(|key| key.kind().is_indexed()));
-        *self.stored() = StoredTally::of(&list);
+        *self.stored() = Listed::tally(&list);
     }
 
     /// The file; another one, if it is damaged.
@@ -437,7 +437,7 @@ impl Disk {
                 *slot = self.database_at().ok();
                 // It has no records, but the files that are there.
                 let list = slot.as_ref().map(|database| contained(|| listed(database, &self.kinds, None)));
-                *self.stored() = StoredTally::of(&list.and_then(Result::ok).unwrap_or_default());
+                *self.stored() = Listed::tally(&list.and_then(Result::ok).unwrap_or_default());
             }
             DiskFailure::Io(reason) => {
                 self.tally.write_failures.one_more();

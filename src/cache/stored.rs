@@ -4,7 +4,6 @@
 use std::collections::HashMap;
 
 use super::kind::RecordKind;
-use super::tables::Listed;
 
 /// Records by the number of their kind; or by how much a transaction changes that.
 #[derive(Debug, Default)]
@@ -18,10 +17,10 @@ struct Stored {
 }
 
 impl StoredTally {
-    /// The count of a list.
-    pub(super) fn of(list: &[Listed]) -> Self {
+    /// The count of records, each with the number of its kind and its bytes.
+    pub(super) fn of(records: impl Iterator<Item = (u8, u64)>) -> Self {
         let mut tally = Self::default();
-        list.iter().for_each(|listed| tally.add(listed.key.kind().number, listed.bytes));
+        records.for_each(|(number, bytes)| tally.add(number, bytes));
         tally
     }
 

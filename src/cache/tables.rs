@@ -45,6 +45,11 @@ pub struct Listed {
 }
 
 impl Listed {
+    /// How many there are of each kind in a list, and their bytes.
+    pub(super) fn tally(list: &[Self]) -> StoredTally {
+        StoredTally::of(list.iter().map(|listed| (listed.key.kind().number, listed.bytes)))
+    }
+
     /// Bytes that it takes on disk, about.
     pub(super) fn cost(&self) -> u64 {
         self.bytes + OVERHEAD
