@@ -54,10 +54,10 @@ impl ProgressDisplay {
         if self.bar.is_hidden() {
             return;
         }
-        self.enter(progress.stage);
         self.bar.set_length(u64::from(progress.total));
         self.bar.set_position(u64::from(progress.done));
         self.bar.set_message(message(&progress, &self.names));
+        self.enter(progress.stage);
     }
 
     pub(super) fn step_found(&mut self) {
@@ -74,8 +74,11 @@ fn message(progress: &Progress, names: &[String]) -> String {
         Stage::Sdf => format!("{done} of {total} distance fields"),
         Stage::Transfer => format!("{done} of {total} put in"),
         Stage::Search => {
-            let counted =
-                if *simulations > 0 { format!(", {simulations} simulations") } else { String::new() };
+            let counted = match simulations {
+                0 => String::new(),
+                1 => ", 1 simulation".to_owned(),
+                more => format!(", {more} simulations"),
+            };
             let named = |tried: &Tried| Some((names.get(tried.part)?, tried.turns));
             match tried.as_ref().and_then(named) {
                 None => format!("{done} of {total} removed{counted}"),
@@ -108,6 +111,7 @@ mod tests {
         assert_eq!(of(Stage::Search, 0, tried(0, true)), "12 of 84 removed; turning bolt 4");
         let counted = "12 of 84 removed, 3 simulations; moving part 7";
         assert_eq!(of(Stage::Search, 3, tried(1, false)), counted);
+        assert_eq!(of(Stage::Search, 1, None), "12 of 84 removed, 1 simulation");
         assert_eq!(of(Stage::Search, 0, tried(2, false)), "12 of 84 removed", "there is no such part");
         assert_eq!(of(Stage::Sdf, 0, None), "12 of 84 distance fields");
         assert_eq!(of(Stage::Transfer, 3, None), "12 of 84 put in");
