@@ -343,7 +343,10 @@ fn the_command_line_measures_real_assemblies() {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(0), "{said}");
     assert!(
-        said.lines().count() == 2 && said.contains("1/2, about ") && said.contains("complete after"),
+        said.lines().count() == 3
+            && said.starts_with("2 runs, timeout 2 h; worst case: ")
+            && said.contains("1/2, about ")
+            && said.contains("complete after"),
         "{said}"
     );
     let records = bench::read(&out).unwrap();

@@ -162,11 +162,14 @@ fn files(out: &Path) -> String {
 fn outlook(workload: &Workload) -> String {
     let Workload { total, done, timeout, jobs } = workload;
     let left = total - done;
+    if left == 0 {
+        return format!("{done} of {total} runs were done before");
+    }
     let [each, all] = [*timeout, workload.worst_case()].map(|time| duration(time.as_secs_f64()));
-    let before = if *done > 0 { format!(" ({done} of {total} were done before)") } else { String::new() };
+    let before = if *done > 0 { format!("; {done} of {total} runs were done before") } else { String::new() };
     format!(
-        "{left} runs{before}, timeout {each}; worst case: {left} × {each} / {jobs} at a time = {all} of planning, \
-         and as long again for verification"
+        "{left} runs, timeout {each}; worst case: {left} × {each} / {jobs} at a time = {all} of planning, \
+         and as long again for verification{before}"
     )
 }
 
