@@ -58,8 +58,16 @@ export function compact(graph, parts, widest) {
   }
   const rows = [...byRow.keys()].sort((a, b) => a - b).flatMap((row) => {
     const side = byRow.get(row).sort((a, b) => graph.places[a][0] - graph.places[b][0]);
-    return Array.from({ length: Math.ceil(side.length / widest) }, (_, k) => side.slice(k * widest, (k + 1) * widest));
+    const pieces = Math.ceil(side.length / widest);
+    const piece = (k) => side.slice(Math.ceil((k * side.length) / pieces), Math.ceil(((k + 1) * side.length) / pieces));
+    // Boxes stand below the gaps of the piece above: an arrow that passes behind a box would seem to come from it.
+    const isHalf = (k) => piece(k).length % 2 === 0;
+    return Array.from({ length: pieces }, (_, k) => {
+      const shift = isHalf(k) === (isHalf(0) !== (k % 2 === 1)) ? 0 : 0.5;
+      return piece(k).map((part, i) => [part, i - (piece(k).length - 1) / 2 + shift]);
+    });
   });
-  const places = new Map(rows.flatMap((side, row) => side.map((part, k) => [part, [k - (side.length - 1) / 2, row]])));
-  return { places, rows: rows.length, columns: Math.max(0, ...rows.map((side) => side.length)) };
+  const places = new Map(rows.flatMap((side, row) => side.map(([part, column]) => [part, [column, row]])));
+  const reach = Math.max(0, ...rows.flat().map(([, column]) => Math.abs(column)));
+  return { places, rows: rows.length, columns: 2 * reach + 1 };
 }

@@ -52,4 +52,12 @@ test("few parts stand close together, in rows as before", () => {
   assert.deepEqual([1, 2, 3].map((p) => places.get(p)[1]), [1, 1, 2]);
   assert.equal(places.get(0)[1], 3);
   assert.equal(new Set([...places.values()].map(String)).size, 5);
+  for (const count of [4, 5, 6, 7, 8, 9]) {
+    const bolts = Array.from({ length: count }, (_, i) => i + 1);
+    const { places } = compact(graph(count), bolts, 3);
+    const of = (row) => [...places.values()].filter(([, r]) => r === row).map(([column]) => column);
+    for (let row = 1; of(row).length > 0; row += 1) {
+      assert.ok(of(row).every((column) => !of(row - 1).includes(column)), `${count} bolts: ${[...places.values()].join(" ")}`);
+    }
+  }
 });
