@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use rustix::process::{Pid, Signal, kill_process};
-use sbdp::bench::{self, BenchError, BenchObserver, Record, Request, Shard, Summary, Unit};
+use sbdp::bench::{self, BenchError, BenchObserver, Record, Request, Shard, Summary, Unit, Workload};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests")
@@ -52,7 +52,7 @@ fn request(folder: &Path, assemblies: &[&str]) -> Request {
 struct Unwatched;
 
 impl BenchObserver for Unwatched {
-    fn begun(&mut self, _: usize, _: usize) {}
+    fn begun(&mut self, _: &Workload) {}
     fn ran(&mut self, _: &Record, _: usize, _: Option<Duration>) {}
 }
 
@@ -112,6 +112,8 @@ fn a_record_holds_the_papers_measures() {
     let times = [record.path_time_s, record.total_time_s, record.sdf_time_s, record.static_analysis_time_s];
     // The total is without the second of verification.
     assert_eq!((times, record.verify_time_s), ([2.0, 3.0, 0.5, 0.25], 1.0));
+    assert!(!record.settings.processor.is_empty() && record.settings.processors > 0);
+    assert!(record.date.starts_with("20") && record.date.ends_with('Z'), "{}", record.date);
     let line = &log(&request.out)[0];
     assert!(
         line.contains(" --embedded --no-cache --planner sbdp-star --engine sliding --planning-timeout 7200 --path-timeout 360 --actions paper --dbg sliding --no-sweeps --json "),
@@ -138,7 +140,7 @@ struct CancelWhileOneHangs<'a> {
 }
 
 impl BenchObserver for CancelWhileOneHangs<'_> {
-    fn begun(&mut self, _: usize, _: usize) {}
+    fn begun(&mut self, _: &Workload) {}
     fn ran(&mut self, _: &Record, _: usize, _: Option<Duration>) {
         while !log(self.out).iter().any(|l| l.starts_with("hang")) {
             std::thread::sleep(Duration::from_millis(5));
@@ -265,6 +267,8 @@ fn units_have_the_records_of_the_whole_but_for_the_times() {
     run(&whole).unwrap();
     let timeless = |mut record: Record| {
         (record.wall_time_s, record.peak_memory_kib) = (0.0, 0);
+        assert!(!record.date.is_empty());
+        record.date.clear();
         format!("{record:?}")
     };
     let expected: Vec<String> = bench::read(&whole.out).unwrap().into_iter().map(timeless).collect();
@@ -339,7 +343,10 @@ fn the_command_line_measures_real_assemblies() {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(0), "{said}");
     assert!(
-        said.lines().count() == 2 && said.contains("1/2, about ") && said.contains("complete after"),
+        said.lines().count() == 3
+            && said.starts_with("2 runs, timeout 2 h; worst case: ")
+            && said.contains("1/2, about ")
+            && said.contains("complete after"),
         "{said}"
     );
     let records = bench::read(&out).unwrap();
@@ -376,5 +383,7 @@ fn an_interrupted_command_exits_5_and_records_nothing_of_what_ran() {
     let output = bench.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(5), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(String::from_utf8_lossy(&output.stdout).contains("1 runs are left"));
+    let outlook = "1 runs, timeout 2 h; worst case: 1 × 2 h / 1 at a time = 2 h of planning";
+    assert!(String::from_utf8_lossy(&output.stderr).contains(outlook), "{output:?}");
     assert_eq!(fs::read(out.join("results.jsonl")).unwrap(), b"");
 }

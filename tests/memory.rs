@@ -94,7 +94,7 @@ fn what_records_are_said_to_take_is_what_they_take() {
         plan(&service, &grown(&base, 1.0 + f64::from(i) / 100.0));
     }
     drop(service);
-    let said = cache.counters();
+    let said = cache.statistics();
     let entries: u64 = said.kinds.iter().map(|kind| kind.entries).sum();
     let (real, said) = (taken() - before, said.memory_bytes);
     let ratio = said as f64 / real as f64;

@@ -45,6 +45,96 @@ fn figures_tell_what_was_asked_and_how_long_it_took() {
     }
 }
 
+#[test]
+fn the_state_is_told_in_plain_lines() {
+    let daemon = Daemon::start();
+    let client = daemon.connect();
+    let handle = client.upload(&Boxes::two().assembly()).unwrap();
+    plan(&client, handle, &PlanOptions::default());
+    let output = sbdp(&daemon, &["status"]);
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    let first = format!("sbdpd {}, protocol 8, pid {}, up ", sbdp::BUILD, daemon.pid());
+    assert!(text.starts_with(&first), "{text}");
+    let line = |subject: &str| {
+        let found = text.lines().find(|line| line.starts_with(subject));
+        found.unwrap_or_else(|| panic!("no {subject} in\n{text}"))
+    };
+    assert!(line("workers ").contains("2, 0 busy; 0 requests wait, at most 64"), "{text}");
+    assert!(line("clients ").contains("2, with 2 connections"), "{text}");
+    assert!(line("requests ").ends_with("1: 1 answered (0 from memory)"), "{text}");
+    for kind in ["plan time ", "upload time "] {
+        assert!(line(kind).contains("median ") && line(kind).ends_with("(of 1)"), "{text}");
+    }
+    assert!(
+        line("memory ").contains(" MB in all, ") && line("memory ").contains(" in 1 assemblies"),
+        "{text}"
+    );
+    assert!(line("cache ").contains(&format!("{}: ", daemon.cache_dir().display())), "{text}");
+    // Aligned, and few.
+    let column = |line: &str| {
+        let gap = line.find("  ").unwrap();
+        gap + line[gap..].find(|c| c != ' ').unwrap()
+    };
+    let columns: std::collections::HashSet<_> = text.lines().skip(1).map(column).collect();
+    assert!(columns.len() == 1 && text.lines().count() < 12, "{text}");
+}
+
+#[test]
+fn the_cache_is_counted_while_the_daemon_holds_it() {
+    let mut daemon = Daemon::start();
+    let client = daemon.connect();
+    let handle = client.upload(&Boxes::two().assembly()).unwrap();
+    plan(&client, handle, &PlanOptions::default());
+    let folder = daemon.cache_dir();
+    let stats = |daemon: &Daemon| {
+        let arguments = ["cache", "stats", "--json", "-", "--cache-dir", folder.to_str().unwrap()];
+        let output = sbdp(daemon, &arguments);
+        assert!(output.status.success(), "{output:?}");
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).unwrap()
+    };
+    let records = |stats: &serde_json::Value| -> Vec<u64> {
+        let kinds = stats["kinds"].as_array().unwrap().iter();
+        kinds.flat_map(|k| [k["disk_entries"].as_u64().unwrap(), k["disk_bytes"].as_u64().unwrap()]).collect()
+    };
+    // What was planned is written a moment later.
+    let start = Instant::now();
+    let mut held = stats(&daemon);
+    while records(&held).iter().sum::<u64>() == 0 {
+        assert!(start.elapsed() < HANG, "{held}");
+        std::thread::sleep(Duration::from_millis(10));
+        held = stats(&daemon);
+    }
+    assert_eq!(
+        (held["from"].as_str(), held["pid"].as_u64()),
+        (Some("daemon"), Some(u64::from(daemon.pid())))
+    );
+    assert_eq!(held["folder"].as_str(), folder.to_str());
+    let plain = sbdp(&daemon, &["cache", "stats", "--cache-dir", folder.to_str().unwrap()]);
+    let told = format!("as counted by the daemon that holds it (pid {})", daemon.pid());
+    assert!(String::from_utf8_lossy(&plain.stdout).contains(&told), "{plain:?}");
+    // The daemon is not asked about another folder that is in use.
+    let other = tempfile::tempdir().unwrap();
+    let settings = sbdp::cache::CacheSettings {
+        folder: Some(other.path().to_owned()),
+        ..sbdp::cache::CacheSettings::default()
+    };
+    let taken = sbdp::cache::Cache::open(&settings, &sbdp::service::RECORD_KINDS).unwrap();
+    let refused = sbdp(&daemon, &["cache", "stats", "--cache-dir", other.path().to_str().unwrap()]);
+    assert_eq!(refused.status.code(), Some(1));
+    let why = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(why.contains("in use by another process") && why.contains(folder.to_str().unwrap()), "{why}");
+    drop(taken);
+    // Both ways of counting agree.
+    daemon.signal(Signal::TERM);
+    daemon.wait();
+    let before = records(&held);
+    let files = stats(&daemon);
+    assert_eq!((files["from"].as_str(), files["pid"].as_u64()), (Some("files"), None));
+    let after = records(&files);
+    assert!(before.iter().zip(&after).all(|(held, read)| held <= read), "{before:?} {after:?}");
+}
+
 fn metrics(daemon: &Daemon) -> String {
     let mut stream = UnixStream::connect(daemon.runtime_dir().join("metrics.sock")).unwrap();
     stream.write_all(b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n").unwrap();

@@ -11,7 +11,7 @@ use sbdp::config::Config;
 use sbdp::daemon::Planning;
 use sbdp::geometry::{Revision, SourceAssembly};
 use sbdp::plan::{Base, FreeGroup, MotionKind, Plan, PlanStats, PlanStatus, PlanStep, StepEnd};
-use sbdp::search::{PlanRequest, PlanSink, Progress, Stage, Termination};
+use sbdp::search::{PlanRequest, PlanSink, Progress, Stage, Termination, Tried};
 use sbdp::service::{Admission, AssemblyId, ServiceError};
 use sbdp_client as client;
 use sbdp_client::{Client, ErrorCode, Event, PlanOptions};
@@ -60,7 +60,9 @@ impl Planning for Scripted {
                 status = PlanStatus::Cancelled;
                 break;
             }
-            let progress = Progress { stage: Stage::Search, done: part as u32, total: 0, simulations: 0 };
+            let tried = Some(Tried { part: part + 7, turns: part % 2 == 1 });
+            let progress =
+                Progress { stage: Stage::Search, done: part as u32, total: 0, simulations: 0, tried };
             sink.progress(progress);
             let step = PlanStep {
                 parts: moved(part),
@@ -165,7 +167,11 @@ fn read(client: &Client, options: &PlanOptions, pause: Duration) -> usize {
                 assert_eq!((step.wave, step.direction), (steps as u32, Some([0.0, 0.6, -0.8])));
                 steps += 1;
             }
-            Some(Event::Progress(_) | Event::Trace(_)) => {}
+            Some(Event::Progress(progress)) => {
+                let tried = client::Tried { part: progress.done + 7, turns: progress.done % 2 == 1 };
+                assert_eq!(progress.tried, Some(tried));
+            }
+            Some(Event::Trace(_)) => {}
             Some(Event::Restarted) => panic!("nothing was restarted"),
             Some(Event::Done(summary)) => {
                 assert_eq!((summary.steps as usize, summary.parts.len()), (steps, steps + 2));

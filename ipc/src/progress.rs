@@ -11,6 +11,8 @@ pub const STAGE_SDF: u32 = 1;
 pub const STAGE_SEARCH: u32 = 2;
 /// Finding the paths to where insertions begin.
 pub const STAGE_TRANSFER: u32 = 3;
+/// In `tried`: the part is turned, and not only pushed.
+pub const TRIED_TURNS: u32 = 1 << 31;
 
 /// One sample on `progress`, received by every client; each picks its own.
 #[repr(C)]
@@ -29,8 +31,8 @@ pub struct ProgressSample {
     pub done: u32,
     /// Units of the stage in all.
     pub total: u32,
-    /// Reserved, 0.
-    pub reserved: u32,
+    /// What the search tries: 1 + the index of the part, with [`TRIED_TURNS`] if it is turned; 0 if that is not known.
+    pub tried: u32,
 }
 
 const _: () = {
@@ -38,4 +40,5 @@ const _: () = {
     assert!(offset_of!(ProgressSample, request) == 16);
     assert!(offset_of!(ProgressSample, simulations) == 24);
     assert!(offset_of!(ProgressSample, stage) == 32);
+    assert!(offset_of!(ProgressSample, tried) == 44);
 };

@@ -10,7 +10,7 @@ use sbdp_ipc::layout;
 use sbdp_ipc::plan::{
     MovedPart, PenaltyRecord, PlanRequest, Staging, Step, StepEnd, StepsView, encode_steps,
 };
-use sbdp_ipc::progress::{ProgressSample, STAGE_SEARCH};
+use sbdp_ipc::progress::{ProgressSample, STAGE_SEARCH, TRIED_TURNS};
 use sbdp_ipc::revision::Revision;
 use sbdp_ipc::status::{Status, StatusHeader};
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts, SummaryView};
@@ -327,13 +327,13 @@ fn status_and_progress() {
         stage: STAGE_SEARCH,
         done: 5,
         total: 6,
-        reserved: 0,
+        tried: 8 | TRIED_TURNS,
     };
     check(
         "progress",
         bytemuck::bytes_of(&sample),
         "\
          0100000000000000 0200000000000000 0300000000000000 0400000000000000 0200000005000000 \
-         0600000000000000",
+         0600000008000080",
     );
 }

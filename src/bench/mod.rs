@@ -13,6 +13,7 @@ mod corpus;
 mod estimate;
 pub(crate) mod families;
 mod figure;
+mod machine;
 mod markdown;
 mod record;
 mod rotated;
@@ -136,10 +137,32 @@ pub struct Request {
     pub program: PathBuf,
 }
 
+/// What a benchmark has to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Workload {
+    /// All runs.
+    pub total: usize,
+    /// Of these, runs that had been done before.
+    pub done: usize,
+    /// The longest planning time of a run.
+    pub timeout: Duration,
+    /// Runs at a time.
+    pub jobs: usize,
+}
+
+impl Workload {
+    /// How long planning takes if every run needs all its time; verification may take as long again.
+    #[must_use]
+    pub fn worst_case(&self) -> Duration {
+        let turns = self.total.saturating_sub(self.done).div_ceil(self.jobs.max(1));
+        self.timeout.saturating_mul(u32::try_from(turns).unwrap_or(u32::MAX))
+    }
+}
+
 /// Receives the progress of a benchmark.
 pub trait BenchObserver {
-    /// The number of all runs, and of those that had been done before.
-    fn begun(&mut self, total: usize, done: usize);
+    /// What is to be done.
+    fn begun(&mut self, workload: &Workload);
     /// A run ended and is recorded; `left` is an estimate for all that is still to do.
     fn ran(&mut self, record: &Record, done: usize, left: Option<Duration>);
 }
@@ -304,10 +327,6 @@ fn build_of(program: &Path) -> Result<String, BenchError> {
     Ok(blake3::hash(&bytes).to_hex()[..12].to_owned())
 }
 
-fn processors() -> usize {
-    std::thread::available_parallelism().map_or(0, usize::from)
-}
-
 fn settings(request: &Request) -> Result<Settings, BenchError> {
     Ok(Settings {
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -320,7 +339,8 @@ fn settings(request: &Request) -> Result<Settings, BenchError> {
         seed: request.seed,
         threads: request.threads,
         jobs: request.jobs,
-        processors: processors(),
+        processor: machine::processor(),
+        processors: machine::processors(),
     })
 }
 
@@ -355,9 +375,9 @@ fn run_missing(
         estimate.took(record.group(), &record.planner, &record.engine, record.wall_time_s);
     }
     to_do.iter().for_each(|unit| estimate.expect(unit.category(), &unit.planner, &unit.engine));
-    observer.begun(units.len(), units.len() - to_do.len());
-    let mut ledger =
-        Ledger { store, records, observer, estimate, done: units.len() - to_do.len(), jobs: request.jobs };
+    let (done, jobs) = (units.len() - to_do.len(), request.jobs);
+    observer.begun(&Workload { total: units.len(), done, timeout: request.timeout, jobs });
+    let mut ledger = Ledger { store, records, observer, estimate, done, jobs };
     let scratch = Scratch::new(&request.out)?;
     run_side_by_side(request, settings, &scratch.own, &to_do, cancel, &mut ledger)?;
     Ok(units.len() - ledger.done)

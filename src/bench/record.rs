@@ -35,7 +35,10 @@ pub struct Settings {
     pub threads: u32,
     /// How many runs went on at a time.
     pub jobs: usize,
-    /// How many processors the machine has.
+    /// The name of the machine's processor; empty in records of older builds.
+    #[serde(default)]
+    pub processor: String,
+    /// How many processors (cores, with hardware threads) the run could use.
     pub processors: usize,
 }
 
@@ -94,6 +97,9 @@ pub struct Record {
     pub parts: usize,
     /// `pair`, `small`, `medium` or `large`.
     pub category: String,
+    /// When the run began, UTC (RFC 3339); empty in records of older builds.
+    #[serde(default)]
+    pub date: String,
     /// The planner.
     pub planner: String,
     /// The engine.

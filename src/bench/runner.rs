@@ -10,10 +10,11 @@ use std::time::{Duration, Instant};
 use rustix::process::{Signal, getppid, set_parent_process_death_signal};
 
 use super::corpus::Category;
+use super::machine::{now, processor, processors};
 use super::record::{Record, Settings};
 use super::rotation::random_rotation;
 use super::unit::Unit;
-use super::{BenchError, Scratch, build_of, grace, processors};
+use super::{BenchError, Scratch, build_of, grace};
 use crate::document::{PlanDocument, StepDocument};
 use crate::plan::StepEnd;
 
@@ -81,7 +82,8 @@ pub fn run_unit(unit: Unit, program: &Path, cancel: &AtomicBool) -> Result<Optio
             unit.folder.display()
         )));
     }
-    let settings = Settings { jobs: 1, processors: processors(), ..unit.settings.clone() };
+    let settings =
+        Settings { jobs: 1, processor: processor(), processors: processors(), ..unit.settings.clone() };
     let unit = Unit { settings, ..unit };
     let folder = tempfile::Builder::new().prefix("sbdp-unit-").tempdir().map_err(BenchError::failed)?;
     let scratch = Scratch::new(folder.path())?;
@@ -109,7 +111,7 @@ impl Runner<'_> {
         let (plan, said) = (self.file("json"), self.file("stderr"));
         // A plan of the run before must not pass for this one's.
         remove(&plan)?;
-        let started = Instant::now();
+        let (started, date) = (Instant::now(), now());
         let mut process = self.start(unit, &plan, &said)?;
         let mut peak = 0;
         let end = self.wait(&mut process, started, &mut peak);
@@ -124,7 +126,7 @@ impl Runner<'_> {
         };
         remove(&plan)?;
         remove(&said)?;
-        Ok(record.map(|record| Record { peak_memory_kib: peak, ..record }))
+        Ok(record.map(|record| Record { peak_memory_kib: peak, date, ..record }))
     }
 
     fn file(&self, extension: &str) -> PathBuf {
@@ -220,6 +222,7 @@ impl Runner<'_> {
             rotation: unit.rotation,
             parts: unit.parts,
             category: unit.category().name().to_owned(),
+            date: String::new(),
             planner: unit.planner.clone(),
             engine: unit.engine.clone(),
             status: status.to_owned(),

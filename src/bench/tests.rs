@@ -16,6 +16,7 @@ pub(super) fn record(problem: (&str, usize), planner: &str, end: End) -> Record 
         assembly: problem.0.to_owned(),
         rotation: 0,
         parts: problem.1,
+        date: "2026-01-02T03:04:05Z".to_owned(),
         category: Category::of(problem.1).name().to_owned(),
         planner: planner.to_owned(),
         engine: "sliding".to_owned(),
@@ -44,6 +45,7 @@ pub(super) fn record(problem: (&str, usize), planner: &str, end: End) -> Record 
             seed: 0,
             threads: 0,
             jobs: 1,
+            processor: "Fast 9000".to_owned(),
             processors: 2,
         },
     }

@@ -77,6 +77,7 @@ pub(super) mod tests {
             seed: 7,
             threads: 1,
             jobs: 1,
+            processor: "Fast 9000".into(),
             processors: 2,
         };
         Unit {

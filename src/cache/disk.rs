@@ -19,6 +19,7 @@ use super::database_file;
 use super::files::{FileSource, RecordFiles};
 use super::key::RecordKey;
 use super::kind::RecordKind;
+use super::stored::StoredTally;
 use super::tables::{DiskFailure, Listed, StoreTables, agree, grew, listed, make_tables, read, write};
 use super::tally::CacheTally;
 
@@ -70,6 +71,7 @@ pub(super) struct Disk {
     touched: Mutex<HashSet<RecordKey>>,
     /// All keys in the file of the kinds with an index.
     index: Mutex<HashSet<RecordKey>>,
+    stored: Mutex<StoredTally>,
     tally: Arc<CacheTally>,
 }
 
@@ -97,6 +99,7 @@ impl Disk {
             pause: PAUSE,
             touched: Mutex::default(),
             index: Mutex::default(),
+            stored: Mutex::default(),
             tally,
         };
         let database = match disk.database_or_new() {
@@ -114,10 +117,9 @@ impl Disk {
     /// Uses a file from now on.
     fn begin(&self, database: Database) {
         *self.database.write().unwrap_or_else(PoisonError::into_inner) = Some(database);
-        for kind in self.kinds.iter().filter(|kind| kind.is_indexed()) {
-            let listed = self.list(Some(kind)).unwrap_or_default();
-            self.index().extend(listed.iter().map(|l| l.key));
-        }
+        let list = self.list(None).unwrap_or_default();
+        self.index().extend(list.iter().map(|l| l.key).filter(|key| key.kind().is_indexed()));
+        *self.stored() = Listed::tally(&list);
     }
 
     /// The file; another one, if it is damaged.
@@ -197,6 +199,15 @@ impl Disk {
         self.index.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The records of a kind, and their bytes, without a look at the disk.
+    pub(super) fn count_of(&self, kind: &RecordKind) -> (u64, u64) {
+        self.stored().count(kind)
+    }
+
+    fn stored(&self) -> MutexGuard<'_, StoredTally> {
+        self.stored.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Notes that a record was used; the next transaction writes that down.
     pub(super) fn touch(&self, key: RecordKey) {
         let mut touched = self.touched.lock().unwrap_or_else(PoisonError::into_inner);
@@ -217,7 +228,7 @@ impl Disk {
         let before = self.file_bytes();
         let written = self.with(|database| {
             let transaction = write(database)?;
-            let (evicted, bytes) = {
+            let (evicted, bytes, changes) = {
                 let mut tables = StoreTables::of(&transaction, &self.kinds)?;
                 for (key, bytes) in records {
                     tables.insert(key, bytes)?;
@@ -231,13 +242,13 @@ impl Disk {
                 let limit = tables.limit(self.budget, before)?;
                 let mut evicted = tables.evict_above(limit, (limit as f64 * AFTER_EVICTION) as u64)?;
                 evicted.extend(tables.evict_files_above(self.for_files)?);
-                tables.finish()?;
-                (evicted, tables.bytes)
+                (evicted, tables.bytes, tables.finish()?)
             };
             transaction.commit()?;
-            Ok((evicted, bytes))
+            Ok((evicted, bytes, changes))
         });
-        let Some((evicted, bytes)) = written else { return };
+        let Some((evicted, bytes, changes)) = written else { return };
+        self.stored().merge(&changes);
         self.files.remove(&evicted);
         let new = records.iter().map(|(key, _)| *key).filter(|key| key.kind().is_indexed());
         self.index().extend(new);
@@ -287,11 +298,12 @@ impl Disk {
                     tables.remove(&key.to_bytes())?;
                 }
             }
-            tables.finish()?;
-            drop(tables);
-            Ok(transaction.commit()?)
+            let changes = tables.finish()?;
+            transaction.commit()?;
+            Ok(changes)
         });
         self.files.remove(keys);
+        done.iter().for_each(|changes| self.stored().merge(changes));
         let mut index = self.index();
         keys.iter().for_each(|key| {
             index.remove(key);
@@ -318,15 +330,15 @@ impl Disk {
 
     /// Evicts records until no more than `budget` bytes are left; how many were evicted.
     fn evict(&self, budget: u64) -> Option<usize> {
-        let evicted = self.with(|database| {
+        let (evicted, changes) = self.with(|database| {
             let transaction = write(database)?;
             let mut tables = StoreTables::of(&transaction, &self.kinds)?;
             let evicted = tables.evict_above(budget, budget)?;
-            tables.finish()?;
-            drop(tables);
+            let changes = tables.finish()?;
             transaction.commit()?;
-            Ok(evicted)
+            Ok((evicted, changes))
         })?;
+        self.stored().merge(&changes);
         self.count(&evicted);
         Some(evicted.len())
     }
@@ -343,6 +355,11 @@ impl Disk {
     /// The records of one kind, or of all, in the order of their keys.
     pub(super) fn list(&self, kind: Option<&RecordKind>) -> Option<Vec<Listed>> {
         self.with(|database| listed(database, &self.kinds, kind))
+    }
+
+    /// The folder of the files.
+    pub(super) fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// Bytes of the file.
@@ -404,6 +421,7 @@ impl Disk {
         }
         self.generation.store(generation + 1, Ordering::Relaxed);
         self.index().clear();
+        *self.stored() = StoredTally::default();
         let database = slot.take();
         // redb writes when it is dropped.
         let closed = contained(|| {
@@ -417,6 +435,9 @@ impl Disk {
             DiskFailure::Damaged(reason) => {
                 self.rename(&reason);
                 *slot = self.database_at().ok();
+                // It has no records, but the files that are there.
+                let list = slot.as_ref().map(|database| contained(|| listed(database, &self.kinds, None)));
+                *self.stored() = Listed::tally(&list.and_then(Result::ok).unwrap_or_default());
             }
             DiskFailure::Io(reason) => {
                 self.tally.write_failures.one_more();

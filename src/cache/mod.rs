@@ -3,8 +3,8 @@
 //! A stage declares a kind for each type of record that it remembers ([`RecordKind`], `kind`), and makes a [`RecordKey`]
 //! of all that the record depends on (`key`). The payload of a record (`record`) goes to the tier in memory (`memory`,
 //! with a budget in bytes) and in an envelope (`envelope`, drawn in `FORMAT.md`) to the tier on disk (`disk`: a redb
-//! file that one process holds, opened by `database_file`, with its `tables`; large records are files beside it,
-//! `files`, which are mapped, `mapping`). One thread writes to disk (`writer`). Both tiers evict what was used least
+//! file that one process holds, opened by `database_file`, with its `tables`, counted in `stored`; large records are
+//! files beside it, `files`, which are mapped, `mapping`). One thread writes to disk (`writer`). Both tiers evict what was used least
 //! recently. A process that starts can read ahead what was used last (`recent`). A request uses a cache through its
 //! [`RequestCache`] (`request`), which counts what it reused.
 //!
@@ -31,6 +31,7 @@ mod record;
 mod request;
 mod settings;
 mod statistics;
+mod stored;
 mod tables;
 mod tally;
 #[cfg(test)]

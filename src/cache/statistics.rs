@@ -1,14 +1,19 @@
 //! What the store holds and counts, and maintenance from outside (`sbdp cache`).
 
-use serde::Serialize;
+use std::borrow::Cow;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
 
 use super::{Cache, Listed, RecordKind, envelope};
 
 /// What the store holds and counts.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CacheStatistics {
     /// Whether there is a store on disk that works.
     pub on_disk: bool,
+    /// The folder of the store on disk.
+    pub folder: Option<PathBuf>,
     /// Bytes of the file of records.
     pub file_bytes: u64,
     /// Bytes of the records that are files: distance fields, hence the name.
@@ -27,11 +32,19 @@ pub struct CacheStatistics {
     pub kinds: Vec<KindStatistics>,
 }
 
+impl CacheStatistics {
+    /// Records on disk, of all kinds.
+    #[must_use]
+    pub fn disk_records(&self) -> u64 {
+        self.kinds.iter().map(|kind| kind.disk_entries).sum()
+    }
+}
+
 /// What the store holds and counts of one kind, since the start.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KindStatistics {
     /// The name of the kind.
-    pub kind: &'static str,
+    pub kind: Cow<'static, str>,
     /// Records found.
     pub hits: u64,
     /// Records asked for and not found.
@@ -42,12 +55,10 @@ pub struct KindStatistics {
     pub bytes: u64,
     /// Records that were evicted from memory.
     pub evictions: u64,
-    /// Records on disk, if they were counted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub disk_entries: Option<u64>,
-    /// Bytes of the records on disk, if they were counted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub disk_bytes: Option<u64>,
+    /// Records on disk.
+    pub disk_entries: u64,
+    /// Bytes of the records on disk.
+    pub disk_bytes: u64,
     /// Records that were evicted from disk.
     pub disk_evictions: u64,
     /// Records found damaged, or of another version.
@@ -66,40 +77,29 @@ pub struct Verified {
 }
 
 impl Cache {
-    /// Counts what there is; looks at every record's entry on disk.
+    /// What there is, and what was counted since the start. Does not wait for the disk.
     #[must_use]
     pub fn statistics(&self) -> CacheStatistics {
-        let list = self.list();
-        let mut counters = self.counters();
-        for (statistics, kind) in counters.kinds.iter_mut().zip(self.kinds.iter()) {
-            let bytes = list.iter().filter(|l| l.key.kind() == *kind).map(|l| l.bytes);
-            statistics.disk_entries = Some(bytes.clone().count() as u64);
-            statistics.disk_bytes = Some(bytes.sum());
-        }
-        counters
-    }
-
-    /// The same without what is on disk, which takes no time.
-    #[must_use]
-    pub fn counters(&self) -> CacheStatistics {
         let memory = self.memory();
         let kind = |kind: &&'static RecordKind| {
             let (tally, usage) = (&self.tally.kinds[*kind], memory.usage(kind));
+            let (disk_entries, disk_bytes) = self.disk.as_ref().map_or((0, 0), |disk| disk.count_of(kind));
             KindStatistics {
-                kind: kind.name,
+                kind: kind.name.into(),
                 hits: tally.hits.count(),
                 misses: tally.misses.count(),
                 entries: usage.entries,
                 bytes: usage.bytes,
                 evictions: tally.evictions.count(),
-                disk_entries: None,
-                disk_bytes: None,
+                disk_entries,
+                disk_bytes,
                 disk_evictions: tally.disk_evictions.count(),
                 damaged: tally.damaged.count() + self.damaged_files(kind),
             }
         };
         CacheStatistics {
             on_disk: self.is_on_disk(),
+            folder: self.disk.as_ref().map(|disk| disk.folder().to_owned()),
             file_bytes: self.disk.as_ref().map_or(0, |d| d.file_bytes()),
             field_file_bytes: self.disk.as_ref().map_or(0, |d| d.files.bytes()),
             mapped_bytes: self.disk.as_ref().map_or(0, |d| d.files.mapped().bytes()),

@@ -8,6 +8,7 @@ use redb::{Database, ReadableDatabase, ReadableTable, ReadableTableMetadata, Sto
 
 use super::key::RecordKey;
 use super::kind::RecordKind;
+use super::stored::StoredTally;
 
 /// Envelopes by key.
 const RECORDS: TableDefinition<'_, &[u8], &[u8]> = TableDefinition::new("records");
@@ -44,6 +45,11 @@ pub struct Listed {
 }
 
 impl Listed {
+    /// How many there are of each kind in a list, and their bytes.
+    pub(super) fn tally(list: &[Self]) -> StoredTally {
+        StoredTally::of(list.iter().map(|listed| (listed.key.kind().number, listed.bytes)))
+    }
+
     /// Bytes that it takes on disk, about.
     pub(super) fn cost(&self) -> u64 {
         self.bytes + OVERHEAD
@@ -92,6 +98,8 @@ pub(super) struct StoreTables<'t> {
     meta: redb::Table<'t, &'static str, u64>,
     clock: u64,
     pub(super) bytes: u64,
+    /// What the transaction changes.
+    changes: StoredTally,
 }
 
 impl<'t> StoreTables<'t> {
@@ -106,7 +114,7 @@ impl<'t> StoreTables<'t> {
         let number =
             |name: &str| -> Result<u64, StorageError> { Ok(meta.get(name)?.map_or(0, |n| n.value())) };
         let (clock, bytes) = (number(CLOCK)? + 1, number(BYTES)?);
-        Ok(Self { kinds, records, used, files, meta, clock, bytes })
+        Ok(Self { kinds, records, used, files, meta, clock, bytes, changes: StoredTally::default() })
     }
 
     pub(super) fn insert(&mut self, key: &RecordKey, bytes: &[u8]) -> Result<(), DiskFailure> {
@@ -115,13 +123,16 @@ impl<'t> StoreTables<'t> {
         self.records.insert(&key[..], bytes)?;
         self.used.insert(&key[..], (self.clock, bytes.len() as u64))?;
         self.bytes += bytes.len() as u64 + OVERHEAD;
+        self.changes.add(key[0], bytes.len() as u64);
         Ok(())
     }
 
     pub(super) fn remove(&mut self, key: &[u8]) -> Result<(), DiskFailure> {
         self.records.remove(key)?;
         if let Some(old) = self.used.remove(key)? {
-            self.bytes = self.bytes.saturating_sub(old.value().1 + OVERHEAD);
+            let bytes = old.value().1;
+            self.bytes = self.bytes.saturating_sub(bytes + OVERHEAD);
+            self.changes.take(key[0], bytes);
         }
         Ok(())
     }
@@ -138,13 +149,17 @@ impl<'t> StoreTables<'t> {
 
     /// Notes a file that was written.
     pub(super) fn insert_file(&mut self, key: &RecordKey, bytes: u64) -> Result<(), DiskFailure> {
+        self.remove_file(key)?;
         self.files.insert(&key.to_bytes()[..], (self.clock, bytes))?;
+        self.changes.add(key.kind().number, bytes);
         Ok(())
     }
 
     /// Takes a file out; it is still in its folder.
     pub(super) fn remove_file(&mut self, key: &RecordKey) -> Result<(), DiskFailure> {
-        self.files.remove(&key.to_bytes()[..])?;
+        if let Some(old) = self.files.remove(&key.to_bytes()[..])? {
+            self.changes.take(key.kind().number, old.value().1);
+        }
         Ok(())
     }
 
@@ -209,10 +224,11 @@ impl<'t> StoreTables<'t> {
         Ok(evicted)
     }
 
-    pub(super) fn finish(&mut self) -> Result<(), DiskFailure> {
+    /// Closes the tables; what changed, if the transaction is committed.
+    pub(super) fn finish(mut self) -> Result<StoredTally, DiskFailure> {
         self.meta.insert(CLOCK, self.clock)?;
         self.meta.insert(BYTES, self.bytes)?;
-        Ok(())
+        Ok(self.changes)
     }
 }
 

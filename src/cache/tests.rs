@@ -113,10 +113,7 @@ fn what_was_remembered_is_there_after_a_restart() {
     assert!((0..100).all(|n| has(&cache, n, 20)) && !has(&cache, 100, 20));
     let s = cache.statistics();
     assert_eq!(
-        s.kinds
-            .iter()
-            .map(|k| (k.hits, k.disk_entries.unwrap()))
-            .fold((0, 0), |(a, b), (c, d)| (a + c, b + d)),
+        s.kinds.iter().map(|k| (k.hits, k.disk_entries)).fold((0, 0), |(a, b), (c, d)| (a + c, b + d)),
         (100, 100)
     );
     assert_eq!(s.kinds.iter().map(|k| k.misses).sum::<u64>(), 1);
@@ -261,6 +258,7 @@ fn memory_and_disk_keep_their_budgets() {
     };
     assert!(KINDS.iter().zip(&s.kinds).all(left), "{s:?}");
     assert_eq!(s.overflows, 0);
+    assert_counted(&cache);
     // The last one is there.
     assert!(has(&cache, 19_999, 100 + (19_999 * 37) % 8000));
     assert!(cache.verify().clean);
@@ -281,6 +279,37 @@ fn what_is_used_stays_on_disk_while_others_come_and_go() {
     cache.flush();
     cache.memory().clear();
     assert!(has(&cache, 0, 2000) && !has(&cache, 1, 2000));
+}
+
+/// What is counted without a look at the disk is what is there.
+fn assert_counted(cache: &Cache) {
+    cache.flush();
+    let list = cache.list();
+    for (kind, statistics) in KINDS.iter().zip(cache.statistics().kinds) {
+        let bytes: Vec<u64> = list.iter().filter(|l| l.key.kind() == *kind).map(|l| l.bytes).collect();
+        let counted = (statistics.disk_entries, statistics.disk_bytes);
+        assert_eq!(counted, (bytes.len() as u64, bytes.iter().sum()), "{kind:?}");
+    }
+}
+
+#[test]
+fn records_on_disk_are_counted_as_they_come_and_go() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = open(folder.path());
+    assert_counted(&cache);
+    (0..300).for_each(|n| cache.put(key(n), &record(n, 2000)));
+    assert_counted(&cache);
+    // Others with the same keys.
+    (0..100).for_each(|n| cache.put(key(n), &record(n, 500)));
+    assert_counted(&cache);
+    assert!(cache.evict(200_000) > 0);
+    assert_counted(&cache);
+    cache.remove(&[key(299), key(1_000_000)]);
+    assert_counted(&cache);
+    drop(cache);
+    let cache = open(folder.path());
+    assert!(cache.statistics().disk_records() > 0);
+    assert_counted(&cache);
 }
 
 #[test]
@@ -339,7 +368,7 @@ fn a_store_survives_being_killed() {
                 "kill {kill}: file {n} is gone or damaged"
             );
         }
-        assert_eq!(cache.counters().kinds[KINDS.len() - 1].hits, files as u64, "kill {kill}");
+        assert_eq!(cache.statistics().kinds[KINDS.len() - 1].hits, files as u64, "kill {kill}");
     }
     assert!(most > 0 && most_files > 0, "none lived long enough to write");
 }

@@ -28,7 +28,7 @@ pub(super) use view::{GraphArguments, StepsArguments, ViewArguments};
 
 /// Plans how assemblies come apart.
 #[derive(Debug, Parser)]
-#[command(name = "sbdp", version = crate::BUILD, about, after_help = EXAMPLES, after_long_help = EXAMPLES)]
+#[command(name = "sbdp", version = crate::BUILD, after_help = EXAMPLES, after_long_help = EXAMPLES)]
 pub(super) struct Arguments {
     #[command(subcommand)]
     pub(super) command: Command,
@@ -63,7 +63,7 @@ pub(super) enum Command {
     Status(super::status::StatusArguments),
     /// Check a configuration of the daemon
     Config(super::config::ConfigArguments),
-    /// Manage the cache on disk (stop the daemon first: it locks the cache)
+    /// Manage the cache on disk (all but `stats` need the daemon stopped, which locks the cache)
     Cache(super::cache::CacheArguments),
     /// Run planners over folders of assemblies and compare the results
     Bench(Box<BenchArguments>),
@@ -344,10 +344,10 @@ impl From<Dbg> for StaticAnalysis {
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct Sweeps {
     /// Remove parts that leave straight without simulation, with sbdp-star and sbdp [default with extended actions]
-    #[arg(long, overrides_with = "no_sweeps")]
+    #[arg(long, overrides_with = "no_sweeps", help_heading = SEARCH)]
     sweeps: bool,
     /// Simulate parts that leave straight, too [default with the paper's actions]
-    #[arg(long, overrides_with = "sweeps")]
+    #[arg(long, overrides_with = "sweeps", help_heading = SEARCH)]
     no_sweeps: bool,
 }
 

@@ -15,8 +15,11 @@ use serde::Serialize;
 
 use super::args::{BenchArguments, BenchCommand, BenchReport, BenchRun, BenchScale, BenchUnit};
 use super::error::CliError;
+use super::table::duration;
 use super::{interrupt, print};
-use crate::bench::{self, BenchError, BenchObserver, Record, Request, ScaleRequest, Shard, Summary, Unit};
+use crate::bench::{
+    self, BenchError, BenchObserver, Record, Request, ScaleRequest, Shard, Summary, Unit, Workload,
+};
 use crate::blocking_graph::StaticAnalysis;
 use crate::search;
 
@@ -155,6 +158,21 @@ fn files(out: &Path) -> String {
     format!("{0}/results.jsonl, evaluated in {0}/tables.md", out.display())
 }
 
+/// What is to be done, and how long it may take at worst.
+fn outlook(workload: &Workload) -> String {
+    let Workload { total, done, timeout, jobs } = workload;
+    let left = total - done;
+    if left == 0 {
+        return format!("{done} of {total} runs were done before");
+    }
+    let [each, all] = [*timeout, workload.worst_case()].map(|time| duration(time.as_secs_f64()));
+    let before = if *done > 0 { format!("; {done} of {total} runs were done before") } else { String::new() };
+    format!(
+        "{left} runs, timeout {each}; worst case: {left} × {each} / {jobs} at a time = {all} of planning, \
+         and as long again for verification{before}"
+    )
+}
+
 /// A bar on a terminal, else a line per run.
 struct BenchDisplay {
     bar: Option<ProgressBar>,
@@ -179,13 +197,15 @@ impl BenchDisplay {
 }
 
 impl BenchObserver for BenchDisplay {
-    fn begun(&mut self, total: usize, done: usize) {
-        self.total = total;
+    fn begun(&mut self, workload: &Workload) {
+        self.total = workload.total;
+        let text = outlook(workload);
         if let Some(bar) = &self.bar {
-            bar.set_length(total as u64);
-            bar.set_position(done as u64);
-        } else if done > 0 {
-            eprintln!("{done} of {total} runs were done before");
+            bar.suspend(|| eprintln!("{text}"));
+            bar.set_length(workload.total as u64);
+            bar.set_position(workload.done as u64);
+        } else {
+            eprintln!("{text}");
         }
     }
 

@@ -16,7 +16,7 @@ use crate::document::PlanDocument;
 use crate::exchange::{wire_assembly, wire_mesh, wire_part};
 use crate::geometry::{Revision, SourceAssembly, heal, waypoint_from_pose};
 use crate::plan::PlanStatus;
-use crate::search::{ActionSet, Engine, PlanSink as _, Planner, Progress, Stage, Staging};
+use crate::search::{ActionSet, Engine, PlanSink as _, Planner, Progress, Stage, Staging, Tried};
 use crate::simulation::PenaltyParameters;
 
 /// How long Ctrl-C may go unnoticed while the daemon has nothing to say.
@@ -244,5 +244,6 @@ fn progress(p: client::Progress) -> Progress {
         client::Stage::Search => Stage::Search,
         client::Stage::Transfer => Stage::Transfer,
     };
-    Progress { stage, done: p.done, total: p.total, simulations: p.simulations }
+    let tried = p.tried.map(|tried| Tried { part: tried.part as usize, turns: tried.turns });
+    Progress { stage, done: p.done, total: p.total, simulations: p.simulations, tried }
 }

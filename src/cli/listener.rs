@@ -23,8 +23,12 @@ struct TraceFile {
 }
 
 impl Listener {
-    /// Writes the trace there, and shows progress unless it is `quiet`.
-    pub(super) fn new(trace: Option<&Path>, quiet: bool) -> Result<Self, CliError> {
+    /// Writes the trace there, and shows progress with the names of the parts unless it is `quiet`.
+    pub(super) fn new(
+        trace: Option<&Path>,
+        quiet: bool,
+        names: impl Iterator<Item = String>,
+    ) -> Result<Self, CliError> {
         let trace = match trace {
             None => None,
             Some(path) => {
@@ -32,7 +36,7 @@ impl Listener {
                 Some(TraceFile { path: path.to_owned(), file: BufWriter::new(file), failed: None })
             }
         };
-        Ok(Self { display: ProgressDisplay::new(quiet), trace })
+        Ok(Self { display: ProgressDisplay::new(quiet, names), trace })
     }
 
     /// The plan comes again from its beginning: the trace so far is void.

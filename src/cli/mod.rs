@@ -12,6 +12,7 @@ mod config;
 mod daemon;
 mod error;
 mod explain;
+mod figures;
 mod graph;
 mod interrupt;
 mod listener;

@@ -74,7 +74,8 @@ pub(super) fn planned(arguments: &PlanArguments) -> Result<Planned, CliError> {
         deadline,
         termination,
     };
-    let mut listener = Listener::new(arguments.trace.as_deref(), arguments.quiet)?;
+    let names = revised.parts.iter().map(|part| part.name.clone());
+    let mut listener = Listener::new(arguments.trace.as_deref(), arguments.quiet, names)?;
     let plan = backend.plan(&question, &mut listener);
     listener.finish()?;
     let plan = plan?;

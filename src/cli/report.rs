@@ -17,6 +17,9 @@ use crate::view::{blockers, direction, kind_of, part_word, part_words, verdict};
 /// columns. At half, pairs alone are named; at double, rows wrap.
 const MOST_NAMES: usize = 4;
 
+/// Seconds of the shortest stage that is shown: with three digits, shorter ones are 0.
+const SHORTEST: f64 = 0.5e-3;
+
 /// The table of steps and all other sections. If it is `verbose`, with all overlaps and blocked actions, else with the
 /// worst and few, and the number of the others.
 pub(super) fn plan(assembly: &SourceAssembly, plan: &PlanDocument, verbose: bool) -> String {
@@ -192,24 +195,26 @@ fn stats(plan: &PlanDocument) -> String {
     let s = &plan.stats;
     let depth = plan.steps.iter().map(|step| step.verified_depth).fold(0.0, f64::max);
     let hit = if s.cache.plan_hit { ", plan remembered".to_owned() } else { reused(&s.cache) };
-    let told =
-        |name: &str, time: Option<f64>| time.map_or_else(String::new, |t| format!("{name} {t:.3} s, "));
+    let stages = [
+        ("loading", s.load_time_s.unwrap_or(0.0)),
+        ("fields", s.sdf_time_s),
+        ("overlaps", s.overlap_time_s.unwrap_or(0.0)),
+        ("static analysis", s.static_analysis_time_s),
+        ("paths", s.path_time_s),
+        ("verification", s.verify_time_s),
+        ("transfers", s.transfer_time_s.unwrap_or(0.0)),
+    ];
+    let lasting = stages.iter().filter(|(_, time)| *time >= SHORTEST);
+    let times: Vec<String> = lasting.map(|(name, time)| format!("{name} {time:.3} s")).collect();
+    let times = if times.is_empty() { String::new() } else { format!(": {}", times.join(", ")) };
     format!(
-        "{} simulations ({} run), {} sweeps, {} states{hit}; {}fields {:.3} s, {}static analysis {:.3} s, \
-         paths {:.3} s, verification {:.3} s, {}total {:.3} s; verified to {}\n",
+        "{} simulations ({} run), {} sweeps, {} states{hit}; verified to {}\ntotal {:.3} s{times}\n",
         s.simulations,
         s.simulations_run,
         s.sweeps,
         s.states,
-        told("loading", s.load_time_s),
-        s.sdf_time_s,
-        told("overlaps", s.overlap_time_s),
-        s.static_analysis_time_s,
-        s.path_time_s,
-        s.verify_time_s,
-        told("transfers", s.transfer_time_s),
-        s.total_time_s,
-        length(depth, plan.units.as_deref())
+        length(depth, plan.units.as_deref()),
+        s.total_time_s
     )
 }
 
@@ -293,7 +298,13 @@ mod tests {
                 .map(|(b, depth)| Overlap { parts: [0, b], depth })
                 .into(),
             warnings: vec![Warning { part: Some(2), message: "open".into() }],
-            stats: PlanStats { motion_hits: 3, verdict_hits: Some(2), ..PlanStats::default() },
+            stats: PlanStats {
+                motion_hits: 3,
+                verdict_hits: Some(2),
+                total_time_s: 1.5,
+                verify_time_s: 0.25,
+                ..PlanStats::default()
+            },
         };
         let told = |verbose: bool, lines: &[&str]| {
             let text = super::plan(&assembly, &PlanDocument::from(&plan), verbose);
@@ -306,8 +317,7 @@ mod tests {
             "  b: it is the largest",
             "not complete:\n  Parts a and b remain. Nothing is proved.\n\ncan begin to move together:\n  a, b along +Y\n\nblocked",
             "  c: open",
-            "0 states, remembered: 3 motions, 2 verified paths; fields",
-            "verified to 0.0100 mm",
+            "0 states, remembered: 3 motions, 2 verified paths; verified to 0.0100 mm\ntotal 1.500 s: verification 0.250 s\n",
         ];
         for verbose in [false, true] {
             told(verbose, &always);

@@ -31,6 +31,40 @@ impl TextTable {
     }
 }
 
+/// Bytes in few digits, in powers of 1024, as the configuration counts them.
+pub(super) fn bytes(count: u64) -> String {
+    const UNITS: [&str; 4] = ["kB", "MB", "GB", "TB"];
+    if count < 1024 {
+        return format!("{count} B");
+    }
+    let (mut value, mut unit) = (count as f64 / 1024.0, UNITS[0]);
+    for larger in &UNITS[1..] {
+        if value >= 1000.0 {
+            (value, unit) = (value / 1024.0, larger);
+        }
+    }
+    if value < 10.0 { format!("{value:.1} {unit}") } else { format!("{value:.0} {unit}") }
+}
+
+/// Seconds in few digits, in the unit that suits them.
+pub(super) fn duration(seconds: f64) -> String {
+    let whole = seconds as u64;
+    match seconds {
+        s if s < 0.9995e-3 => format!("{:.0} µs", s * 1e6),
+        s if s < 9.95e-3 => format!("{:.1} ms", s * 1e3),
+        s if s < 0.9995 => format!("{:.0} ms", s * 1e3),
+        s if s < 119.5 => format!("{s:.1} s"),
+        _ if whole < 7200 => format!("{} min", whole / 60),
+        _ if whole < 172_800 => with_rest(format!("{} h", whole / 3600), whole / 60 % 60, "min"),
+        _ => with_rest(format!("{} days", whole / 86_400), whole / 3600 % 24, "h"),
+    }
+}
+
+/// A time with what is left in the next smaller unit.
+fn with_rest(time: String, rest: u64, unit: &str) -> String {
+    if rest == 0 { time } else { format!("{time} {rest} {unit}") }
+}
+
 /// A length in few digits, with its unit if known.
 pub(super) fn length(value: f64, units: Option<&str>) -> String {
     let magnitude = value.abs();
@@ -54,6 +88,35 @@ mod tests {
         table.row(["ä".into(), "1".into()]);
         table.row(["housing".into(), String::new()]);
         assert_eq!(table.render(), "part     length\nä        1\nhousing\n");
+    }
+
+    #[test]
+    fn bytes_and_times_have_the_unit_that_suits_them() {
+        let sizes = [
+            (0, "0 B"),
+            (1023, "1023 B"),
+            (1536, "1.5 kB"),
+            (10 << 10, "10 kB"),
+            (1_048_575, "1.0 MB"),
+            (5 << 40, "5.0 TB"),
+        ];
+        for (count, text) in sizes {
+            assert_eq!(bytes(count), text);
+        }
+        let times = [
+            (0.0, "0 µs"),
+            (8.9e-5, "89 µs"),
+            (2.31e-3, "2.3 ms"),
+            (0.1234, "123 ms"),
+            (1.26, "1.3 s"),
+            (125.0, "2 min"),
+            (7200.0, "2 h"),
+            (7384.0, "2 h 3 min"),
+            (180_000.0, "2 days 2 h"),
+        ];
+        for (seconds, text) in times {
+            assert_eq!(duration(seconds), text);
+        }
     }
 
     #[test]

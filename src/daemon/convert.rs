@@ -6,7 +6,7 @@ use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::geometry::{Assembly, Part};
 use sbdp_ipc::plan as wire;
-use sbdp_ipc::progress::{ProgressSample, STAGE_SDF, STAGE_SEARCH, STAGE_TRANSFER};
+use sbdp_ipc::progress::{ProgressSample, STAGE_SDF, STAGE_SEARCH, STAGE_TRANSFER, TRIED_TURNS};
 use sbdp_ipc::revision as wire_revision;
 use sbdp_ipc::summary::{NO_PART, OverlapRecord, Stats, SummaryParts};
 
@@ -15,7 +15,7 @@ use crate::geometry::{
     GeometryError, Pose, Revision, SourceAssembly, SourceMesh, SourcePart, pose_from_waypoint,
 };
 use crate::plan::{MotionKind, Plan, PlanKind, PlanStats, PlanStatus, PlanStep, StepEnd};
-use crate::search::{ActionSet, Engine, PlanRequest, Planner, Progress, Stage, Staging};
+use crate::search::{ActionSet, Engine, PlanRequest, Planner, Progress, Stage, Staging, Tried};
 use crate::service::{AssemblyId, ServiceError};
 use crate::simulation::PenaltyParameters;
 use crate::termination::Interrupt;
@@ -227,8 +227,14 @@ pub(crate) fn progress(client: [u64; 2], request: u64, progress: Progress) -> Pr
         },
         done: progress.done,
         total: progress.total,
-        reserved: 0,
+        tried: progress.tried.map_or(0, tried),
     }
+}
+
+/// A part that does not fit is not named: what is tried is for display only.
+fn tried(tried: Tried) -> u32 {
+    let part = u32::try_from(tried.part).ok().filter(|part| *part < TRIED_TURNS - 1);
+    part.map_or(0, |part| (part + 1) | if tried.turns { TRIED_TURNS } else { 0 })
 }
 
 /// An upload as the geometry stage takes it. The bytes are a private copy.

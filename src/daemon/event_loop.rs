@@ -23,14 +23,16 @@ use super::planning::Planning;
 use super::ports::{ActiveLink, Ports};
 use super::prefetch::{self, CloseOnDrop};
 use super::request_queue::Owner;
-use super::resources::{SharedMemory, raise_file_limit};
+use super::resources::{SharedMemory, raise_file_limit, resident_memory};
 use super::shared_queue::Queues;
 use super::supervisor::Supervisor;
 use super::thread_events::{Recently, ThreadEvent, reporter, watch_signals};
 use super::uploads::ticket;
 use super::watchdog::{Watchdog, give_up};
 use super::workers::start;
+use crate::cache::CacheStatistics;
 use crate::config::{Config, seconds};
+use crate::service::MemoryStatistics;
 
 /// Requests taken from one port before workers' reports are read again. It is the number of requests that may be
 /// active: iceoryx2 asks the clients' ports in the same order each time, and with fewer the last ones would starve.
@@ -92,16 +94,12 @@ pub fn run_reloading<P: Planning>(
     let metrics = metrics
         .transpose()
         .map_err(|source| DaemonError::System { what: "opening the metrics socket", source })?;
+    let remembered = service.remembered();
     let dispatcher = Dispatcher::new(service, queues, config);
     lease.publish()?;
     let supervisor = Supervisor::of_this_process();
     supervisor.ready();
-    tracing::info!(
-        pid = std::process::id(),
-        runtime_dir = %place.runtime_dir.display(),
-        prefix = lease.instance.prefix,
-        "sbdpd is ready"
-    );
+    log_start(config, &place, &lease, remembered.as_ref());
     let limits = ReceiveLimits::of(config);
     let tick = seconds(config.times.tick_s);
     let polling = Polling::new(config.times.poll());
@@ -127,6 +125,25 @@ pub fn run_reloading<P: Planning>(
     event_loop.run();
     tracing::info!("all requests are answered; sbdpd ends");
     Ok(())
+}
+
+/// Logs what was started, and what is remembered from earlier.
+fn log_start(config: &Config, place: &DaemonPlace, lease: &Lease, remembered: Option<&MemoryStatistics>) {
+    let store = remembered.map(|remembered| &remembered.records).filter(|records| records.on_disk);
+    let folder = store.and_then(|records| records.folder.as_ref());
+    let mebibytes = |bytes: u64| format!("{:.1}", bytes as f64 / f64::from(1 << 20));
+    tracing::info!(
+        version = crate::BUILD,
+        pid = std::process::id(),
+        workers = config.workers.count,
+        threads_per_request = config.workers.threads_per_request,
+        cache = folder.map_or_else(|| "in memory".to_owned(), |folder| folder.display().to_string()),
+        cache_mb = store.map(|records| mebibytes(records.file_bytes + records.field_file_bytes)),
+        cache_records = store.map(CacheStatistics::disk_records),
+        runtime_dir = %place.runtime_dir.display(),
+        prefix = lease.instance.prefix,
+        "sbdpd is ready"
+    );
 }
 
 /// Watches the port thread, and ends this daemon if it stands still.
@@ -224,7 +241,8 @@ impl<P: Planning> EventLoop<'_, P> {
     fn look_around(&mut self) {
         let (connections, clients) = self.ports.clients();
         let shared_memory_free = self.shared_memory.look();
-        self.dispatcher.host = HostStatus { connections, clients, shared_memory_free };
+        let resident = resident_memory();
+        self.dispatcher.host = HostStatus { connections, clients, resident, shared_memory_free };
     }
 
     /// Polls for the next request for a moment.

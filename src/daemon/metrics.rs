@@ -101,13 +101,15 @@ struct LatencySummary {
     p99_s: f64,
 }
 
-/// The connections, and the shared memory that is left.
+/// The connections, the memory of this process, and the shared memory that is left.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct HostStatus {
     /// Connections of clients.
     pub(crate) connections: usize,
     /// Processes that these belong to.
     pub(crate) clients: usize,
+    /// Bytes of memory that the process has; `None` where the system does not say.
+    pub(crate) resident: Option<u64>,
     /// Bytes free in /dev/shm; `None` where it has no limit.
     pub(crate) shared_memory_free: Option<u64>,
 }
@@ -128,6 +130,7 @@ pub(crate) struct Metrics {
     /// Processes that are connected, and their connections.
     clients: usize,
     connections: usize,
+    resident_bytes: Option<u64>,
     shared_memory_free_bytes: Option<u64>,
     requests: u64,
     done: u64,
@@ -176,7 +179,7 @@ impl Metrics {
             (kind.name(), figures)
         };
         Self {
-            version: env!("CARGO_PKG_VERSION"),
+            version: crate::BUILD,
             pid: n.pid,
             protocol: n.protocol,
             uptime_s: n.uptime_ns as f64 * 1e-9,
@@ -187,6 +190,7 @@ impl Metrics {
             open_requests,
             clients: host.clients,
             connections: host.connections,
+            resident_bytes: host.resident,
             shared_memory_free_bytes: host.shared_memory_free,
             requests: n.requests,
             done: n.done,
@@ -224,8 +228,12 @@ impl Metrics {
             ("ahead_assemblies", self.cache.ahead.assemblies as f64),
             ("ahead_questions", self.cache.ahead.questions as f64),
         ];
-        let free = self.shared_memory_free_bytes.map(|free| ("shared_memory_free_bytes", free as f64));
-        for (name, value) in gauges.into_iter().chain(free) {
+        let told = [
+            ("resident_bytes", self.resident_bytes),
+            ("shared_memory_free_bytes", self.shared_memory_free_bytes),
+        ];
+        let told = told.into_iter().filter_map(|(name, bytes)| Some((name, bytes? as f64)));
+        for (name, value) in gauges.into_iter().chain(told) {
             let _ = writeln!(text, "# TYPE sbdp_{name} gauge\nsbdp_{name} {value}");
         }
         let _ = writeln!(text, "# TYPE sbdp_plan_requests_total counter");
@@ -281,6 +289,10 @@ fn cache_metrics(text: &mut String, MemoryStatistics { assemblies, records }: &M
     for (name, value) in gauges {
         let _ = writeln!(text, "# TYPE sbdp_{name} gauge\nsbdp_{name} {value}");
     }
+    let _ = writeln!(text, "# TYPE sbdp_cache_disk_records gauge");
+    for kind in &records.kinds {
+        let _ = writeln!(text, "sbdp_cache_disk_records{{kind=\"{}\"}} {}", kind.kind, kind.disk_entries);
+    }
     let _ = writeln!(text, "# TYPE sbdp_assemblies_evicted_total counter");
     let _ = writeln!(text, "sbdp_assemblies_evicted_total {}", assemblies.evictions);
     let mut counter = |name: &str, value: &dyn Fn(&KindStatistics) -> u64| {
@@ -330,7 +342,12 @@ mod tests {
         let figures = Metrics::of(
             &numbers,
             2,
-            HostStatus { connections: 3, clients: 2, shared_memory_free: Some(1 << 20) },
+            HostStatus {
+                connections: 3,
+                clients: 2,
+                resident: Some(3 << 20),
+                shared_memory_free: Some(1 << 20),
+            },
             &latencies,
             &[("frame".to_owned(), [0; 32])],
             CacheMetrics {
@@ -355,7 +372,9 @@ mod tests {
             "sbdp_ahead_questions 3",
             "sbdp_questions_speculated_total 8",
             "sbdp_cache_mapped_bytes 0",
+            "sbdp_resident_bytes 3145728",
             "sbdp_shared_memory_free_bytes 1048576",
+            "sbdp_cache_disk_records{kind=\"motion\"} 0",
         ] {
             assert!(text.lines().any(|l| l == line), "{line} in\n{text}");
         }

@@ -23,9 +23,19 @@ pub(super) fn free_memory() -> Option<u64> {
     [machine, groups].into_iter().flatten().min()
 }
 
+/// Bytes of memory that this process has now. `None` where the system does not say.
+pub(super) fn resident_memory() -> Option<u64> {
+    line_of(&fs::read_to_string("/proc/self/status").ok()?, "VmRSS:")
+}
+
 /// By the text of `/proc/meminfo`.
 fn of_machine(text: &str) -> Option<u64> {
-    let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+    line_of(text, "MemAvailable:")
+}
+
+/// The bytes in the line of a text that begins with a name.
+fn line_of(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
     let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kilobytes << 10)
 }
@@ -120,7 +130,8 @@ mod tests {
     }
 
     #[test]
-    fn this_process_can_take_some() {
+    fn this_process_has_memory_and_can_take_some() {
+        assert!(resident_memory().is_some_and(|bytes| bytes > 1 << 20), "{:?}", resident_memory());
         assert!(free_memory().is_none_or(|bytes| bytes > 1 << 20), "{:?}", free_memory());
     }
 

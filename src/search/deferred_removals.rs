@@ -2,6 +2,7 @@
 
 use super::outcome::Removal;
 use super::problem::Observer;
+use super::request::Tried;
 use super::trace::TraceEvent;
 
 /// Passes on all events but removals.
@@ -26,6 +27,10 @@ impl Observer for DeferredRemovals<'_> {
     fn progress(&mut self, removed: usize, simulations: u64) {
         let (earlier, spent) = self.before;
         self.observer.progress(earlier + removed, spent + simulations);
+    }
+
+    fn tried(&mut self, tried: Tried) {
+        self.observer.tried(tried);
     }
 
     fn removal(&mut self, _removal: &Removal) {}

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::budgets::{REFINEMENTS, REMEMBERED_STANDING_PARTS};
@@ -25,6 +26,7 @@ use super::inseparable::InseparablePairs;
 use super::outcome::{BlockedAction, Counters, Inseparable, Outcome, Reason, Removal};
 use super::problem::{Checked, Observer, Problem, VerifiedPath};
 use super::release::Release;
+use super::request::Tried;
 use super::requirements::Leaving;
 use super::support::Supports;
 use super::trace::TraceEvent;
@@ -213,6 +215,13 @@ impl<'a, 'o> Disassembly<'a, 'o> {
         Ok(())
     }
 
+    /// Tells the observer what is tried now: of motions side by side, the first.
+    fn announce(&mut self, runs: &[Transition]) {
+        let Some(Transition { part, action, .. }) = runs.first() else { return };
+        self.observer.tried(Tried { part: *part, turns: action.torque() != Vector3::zeros() });
+        self.observer.progress(self.removals.len(), self.counters.simulations);
+    }
+
     /// Counts a motion that the search uses: whether it was remembered, and its time. What was simulated ahead and is
     /// thrown away has no time.
     pub(super) fn used(&mut self, motion: &Motion) {
@@ -223,6 +232,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     /// The motions of some runs, in order, up to the first that leads out. It changes the scene of the later ones,
     /// so they are stopped.
     pub(super) fn simulate(&mut self, runs: &[Transition]) -> Result<Vec<Motion>, Stop> {
+        self.announce(runs);
         let around = self.all_surroundings(runs)?;
         let problem = &self.problem;
         let winner = Arc::new(AtomicUsize::new(usize::MAX));
@@ -266,6 +276,7 @@ impl<'a, 'o> Disassembly<'a, 'o> {
     /// The results of straight sweeps along the forces of some runs, in order, up to the first that is clear.
     pub(super) fn sweep(&mut self, runs: &[Transition]) -> Result<Vec<Option<Sweep>>, Stop> {
         self.problem.termination.check()?;
+        self.announce(runs);
         let started = Instant::now();
         let around = self.all_surroundings(runs)?;
         let Problem { scene, termination, cache, .. } = &self.problem;

@@ -21,13 +21,15 @@ use super::directions::Directions;
 use super::outcome::Removal;
 use super::preferred::PreferredGroups;
 use super::release::Release;
-use super::request::ActionSet;
+use super::request::{ActionSet, Tried};
 use super::trace::TraceEvent;
 
 /// Receives the events of a search.
 pub trait Observer {
     /// The number of parts that are out and of simulations so far.
     fn progress(&mut self, removed: usize, simulations: u64);
+    /// What is tried from now on; the next progress tells it.
+    fn tried(&mut self, _tried: Tried) {}
     /// A part is out; in order.
     fn removal(&mut self, removal: &Removal);
     /// Whether it wants every event.

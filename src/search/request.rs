@@ -200,6 +200,17 @@ pub struct Progress {
     pub total: u32,
     /// Simulations so far.
     pub simulations: u64,
+    /// What the search tries.
+    pub tried: Option<Tried>,
+}
+
+/// A motion that a search tries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tried {
+    /// The part; of several side by side, the first.
+    pub part: usize,
+    /// Whether the part is turned, and not only pushed.
+    pub turns: bool,
 }
 
 /// The stages of a request, named like the folders that do them.

@@ -44,7 +44,7 @@ impl AssemblyPlanner<'_> {
             sink.step(&step);
             steps.push(step);
             let (done, simulations) = (steps.len() as u32, plan.stats.simulations);
-            sink.progress(Progress { stage: Stage::Transfer, done, total, simulations });
+            sink.progress(Progress { stage: Stage::Transfer, done, total, simulations, tried: None });
         });
         plan.poses = self.starts(&plan, &assembling);
         plan.steps = steps;

@@ -239,7 +239,7 @@ impl Entry {
         let asked = SearchQuestion { question, engine: &*engine, verifier: &verifier };
         let problem = self.problem(prepared, &asked, termination, cache);
         let total = problem.present.len() as u32;
-        let mut relay = Relay { assembly: &self.assembly, sink, total };
+        let mut relay = Relay { assembly: &self.assembly, sink, total, tried: None };
         if relay.traces() {
             relay.traced(TraceEvent::Start {
                 parts: self.assembly.parts.iter().map(|p| p.name.clone()).collect(),

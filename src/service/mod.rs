@@ -22,7 +22,7 @@ mod tests;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Weak};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::blocking_graph::{Analysis, Audit, DirectionalGraph, StaticAnalysis, audit};
 use crate::cache::{Cache, CacheStatistics, RequestCache};
@@ -61,7 +61,7 @@ pub struct Admission {
 }
 
 /// The memory that a service uses.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MemoryStatistics {
     /// Assemblies, in memory.
     pub assemblies: StoreStatistics,
@@ -194,7 +194,7 @@ impl Service {
     /// The memory that it uses. Does not block.
     #[must_use]
     pub fn remembered(&self) -> MemoryStatistics {
-        MemoryStatistics { assemblies: self.store.statistics(), records: self.cache.counters() }
+        MemoryStatistics { assemblies: self.store.statistics(), records: self.cache.statistics() }
     }
 
     /// The cache.

@@ -74,7 +74,7 @@ impl Prepared {
         let total = self.fields.len() as u32;
         let done = AtomicU32::new(0);
         let report = |sink: &mut dyn PlanSink, done| {
-            sink.progress(Progress { stage: Stage::Sdf, done, total, simulations: 0 });
+            sink.progress(Progress { stage: Stage::Sdf, done, total, simulations: 0, tried: None });
         };
         report(sink, 0);
         let sink = std::sync::Mutex::new(sink);

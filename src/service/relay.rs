@@ -2,20 +2,26 @@
 
 use super::answer;
 use crate::geometry::Assembly;
-use crate::search::{Observer, PlanSink, Progress, Removal, Stage, TraceEvent};
+use crate::search::{Observer, PlanSink, Progress, Removal, Stage, TraceEvent, Tried};
 
 /// Passes the events of a search on to a sink.
 pub(super) struct Relay<'a> {
     pub(super) assembly: &'a Assembly,
     pub(super) sink: &'a mut dyn PlanSink,
     pub(super) total: u32,
+    pub(super) tried: Option<Tried>,
 }
 
 impl Observer for Relay<'_> {
     fn progress(&mut self, removed: usize, simulations: u64) {
         // A part that leaves in a group, or is moved aside, is in several removals.
         let (done, total) = (self.total.min(removed as u32), self.total);
-        self.sink.progress(Progress { stage: Stage::Search, done, total, simulations });
+        let tried = self.tried;
+        self.sink.progress(Progress { stage: Stage::Search, done, total, simulations, tried });
+    }
+
+    fn tried(&mut self, tried: Tried) {
+        self.tried = Some(tried);
     }
 
     fn removal(&mut self, removal: &Removal) {

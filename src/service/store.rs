@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::AssemblyId;
 use super::entry::Entry;
@@ -16,7 +16,7 @@ use crate::scene::JoinedHulls;
 use crate::sdf::FieldStore;
 
 /// How many assemblies and shapes are in memory.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StoreStatistics {
     /// Assemblies.
     pub assemblies: u64,

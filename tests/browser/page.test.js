@@ -114,6 +114,7 @@ test("parts are hidden, isolated and seen through", () =>
 test("the blocking graph follows the state on show", () =>
   visited(complete, async (page) => {
     await page.getByRole("tab", { name: "Blocking" }).click();
+    await page.getByLabel("All parts").check();
     const parts = await page.evaluate(() => window.sbdp.scene.parts.length);
     assert.equal(await page.locator("#graph .node").count(), parts);
     await page.evaluate(() => window.sbdp.player.next());
@@ -128,6 +129,41 @@ test("the blocking graph follows the state on show", () =>
       edges.some((n) => n > 0),
       `${edges}`,
     );
+  }));
+
+/** The names in the blocking graph, as boxes show them. */
+const boxes = (page) => page.locator("#graph .node title").allTextContents();
+
+test("the blocking graph shows the parts that matter for what is looked at", () =>
+  visited(complete, async (page) => {
+    await page.getByRole("tab", { name: "Blocking" }).click();
+    const { parts, steps, graphs } = await page.evaluate(() => window.sbdp.scene);
+    const expected = (graph, about) => {
+      const near = graph.edges.filter((edge) => edge.some((p) => about.includes(p))).flat();
+      return new Set([...about, ...near].map((p) => parts[p].name));
+    };
+    let fewest = parts.length;
+    for (const graph of graphs) {
+      await page.evaluate(() => window.sbdp.selection.pick(null));
+      await page.getByLabel("Direction").selectOption({ label: graph.direction });
+      const shown = await boxes(page);
+      assert.deepEqual(new Set(shown), expected(graph, steps[0].parts), graph.direction);
+      fewest = Math.min(fewest, shown.length);
+      await page.evaluate((part) => window.sbdp.selection.pick(part), parts.length - 1);
+      assert.deepEqual(new Set(await boxes(page)), expected(graph, [parts.length - 1]), graph.direction);
+    }
+    assert.ok(fewest < parts.length, "everything is always shown");
+    assert.match(await page.locator("#shown").textContent(), new RegExp(parts.at(-1).name));
+  }));
+
+test("the blocking graph of an incomplete plan shows what is stuck", () =>
+  visited(infeasible, async (page) => {
+    await page.getByRole("tab", { name: "Blocking" }).click();
+    const { parts, blocked } = await page.evaluate(() => window.sbdp.scene);
+    const stuck = new Set(blocked.map((b) => parts[b.part].name));
+    const shown = await boxes(page);
+    assert.ok(stuck.size > 0 && [...stuck].every((name) => shown.includes(name)), `${shown}`);
+    assert.match(await page.locator("#shown").textContent(), /stuck/);
   }));
 
 test("the view goes around by drag and by keys, and comes back", () =>
@@ -219,14 +255,34 @@ test("the camera goes to the side of the instruction, unless it is told not to",
 test("names are at the moving parts, at the pointer, and everywhere if wanted", () =>
   visited(complete, async (page) => {
     const { parts, steps } = await page.evaluate(() => window.sbdp.scene);
-    const shown = () => page.locator("#labels .label:not(.hover):not([hidden])").allTextContents();
+    const shown = () => page.locator("#labels .label:not(.hover):not(.left-out):not([hidden])").allTextContents();
     assert.deepEqual(await shown(), steps[0].parts.map((p) => parts[p].name));
     await page.getByRole("button", { name: "Names" }).click();
-    await page.waitForFunction((n) => document.querySelectorAll("#labels .label:not(.hover):not([hidden])").length === n, parts.length);
+    await page.waitForFunction((n) => document.querySelectorAll("#labels .label:not(.hover):not(.left-out):not([hidden])").length === n, parts.length);
     const box = await page.locator("canvas").boundingBox();
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
     const under = await page.evaluate(([x, y]) => window.sbdp.stage.pick(x, y), [box.x + box.width / 2, box.y + box.height / 2]);
     assert.equal(await page.locator(".label.hover").textContent(), parts[under].name);
+  }));
+
+test("names do not overlap, from no side, and those that do not fit are counted", () =>
+  visited(complete, async (page) => {
+    await page.getByRole("button", { name: "Names" }).click();
+    const count = await page.evaluate(() => window.sbdp.scene.parts.length);
+    for (let side = 0; side < 6; side += 1) {
+      await page.keyboard.press("Shift+ArrowRight");
+      // Further away, names come closer together.
+      await page.keyboard.press("-");
+      await pixels(page);
+      const seen = await page.locator("#labels .label:not(.hover):not(.left-out):not([hidden])").evaluateAll((all) =>
+        all.map((e) => e.getBoundingClientRect()).map(({ left, right, top, bottom }) => ({ left, right, top, bottom })),
+      );
+      const overlap = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+      seen.forEach((a, i) => seen.slice(i + 1).forEach((b) => assert.ok(!overlap(a, b), `${JSON.stringify([a, b])} at side ${side}`)));
+      assert.equal(await page.locator(".leaders line").count(), seen.length, "a line leads from each to its part");
+      const left = Number.parseInt((await page.locator(".label.left-out:not([hidden])").allTextContents())[0] ?? "0", 10);
+      assert.equal(seen.length + left, count);
+    }
   }));
 
 test("it is dark where the system is, and the button changes that", () =>

@@ -63,6 +63,11 @@ impl Daemon {
         runtime_dir(self.folder.path())
     }
 
+    /// The folder of its cache.
+    pub fn cache_dir(&self) -> PathBuf {
+        self.folder.path().join("cache")
+    }
+
     /// A second daemon at the same place; it is expected to leave at once.
     pub fn rival(&self) -> std::process::Output {
         sbdpd(self.folder.path()).output().unwrap()

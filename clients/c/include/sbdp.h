@@ -1276,9 +1276,10 @@ typedef struct SbdpProgress {
      */
     uint32_t total;
     /**
-     * Zero.
+     * What the search tries: 1 + the index of the part, plus 2³¹ if the part is turned and not only pushed; 0 if that
+     * is not known.
      */
-    uint32_t reserved;
+    uint32_t tried;
     /**
      * Simulations so far.
      */

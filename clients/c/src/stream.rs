@@ -56,8 +56,9 @@ pub struct SbdpProgress {
     pub done: u32,
     /// Units of the stage in all.
     pub total: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// What the search tries: 1 + the index of the part, plus 2³¹ if the part is turned and not only pushed; 0 if that
+    /// is not known.
+    pub tried: u32,
     /// Simulations so far.
     pub simulations: u64,
 }
@@ -127,7 +128,7 @@ impl SbdpStream {
                     } as u32,
                     done: progress.done,
                     total: progress.total,
-                    reserved: 0,
+                    tried: progress.tried.map_or(0, |tried| (tried.part + 1) | u32::from(tried.turns) << 31),
                     simulations: progress.simulations,
                 };
                 SbdpEventKind::Progress

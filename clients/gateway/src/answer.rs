@@ -20,6 +20,8 @@ pub(crate) fn progress(progress: &Progress) -> proto::Progress {
         done: progress.done,
         total: progress.total,
         simulations: progress.simulations,
+        tried_part: progress.tried.map(|tried| tried.part),
+        tried_turns: progress.tried.is_some_and(|tried| tried.turns),
     }
 }
 

@@ -225,6 +225,8 @@ impl PlanStream {
         dict.set_item("done", progress.done)?;
         dict.set_item("total", progress.total)?;
         dict.set_item("simulations", progress.simulations)?;
+        dict.set_item("part", progress.tried.map(|tried| tried.part))?;
+        dict.set_item("turns", progress.tried.is_some_and(|tried| tried.turns))?;
         Ok(Some(dict))
     }
 

@@ -96,7 +96,7 @@ pub use sbdp_ipc::status::Status;
 pub use sbdp_ipc::summary::Stats;
 pub use session::Session;
 pub use step::Step;
-pub use stream::{Event, PlanStream, Progress, Stage};
+pub use stream::{Event, PlanStream, Progress, Stage, Tried};
 pub use subject::{Meshes, Subject};
 pub use summary::{Base, Blocked, FreeGroup, Overlap, PlanStatus, Summary, Warning};
 pub use upload::Change;

@@ -8,7 +8,7 @@ use sbdp_ipc::bytes::AlignedBytes;
 use sbdp_ipc::error::{ErrorCode, WireError};
 use sbdp_ipc::headers::{CONTROL_CANCEL, RequestKind, ResponseHeader, ResponseKind, id_of_words};
 use sbdp_ipc::layout::{BORROWED_RESPONSES, CREDIT_STEP, PLAN_REQUEST};
-use sbdp_ipc::progress::{STAGE_SDF, STAGE_TRANSFER};
+use sbdp_ipc::progress::{STAGE_SDF, STAGE_TRANSFER, TRIED_TURNS};
 use sbdp_ipc::services::{Answer, Pending};
 
 use crate::client::Client;
@@ -48,6 +48,25 @@ pub struct Progress {
     pub total: u32,
     /// Simulations so far.
     pub simulations: u64,
+    /// What the search tries, if that is known.
+    pub tried: Option<Tried>,
+}
+
+/// A motion that the search tries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tried {
+    /// Index of the part; of several side by side, the first.
+    pub part: u32,
+    /// Whether the part is turned, and not only pushed.
+    pub turns: bool,
+}
+
+impl Tried {
+    /// From [`ProgressSample::tried`](sbdp_ipc::progress::ProgressSample::tried).
+    fn from_wire(tried: u32) -> Option<Self> {
+        let part = (tried & !TRIED_TURNS).checked_sub(1)?;
+        Some(Self { part, turns: tried & TRIED_TURNS != 0 })
+    }
 }
 
 /// What a stream yields.
@@ -430,6 +449,7 @@ impl PlanStream {
                     done: sample.done,
                     total: sample.total,
                     simulations: sample.simulations,
+                    tried: Tried::from_wire(sample.tried),
                 });
             }
         }

@@ -99,6 +99,7 @@ fn groups() -> Vec<Group> {
             ],
         ),
         ("stages", values![progress::STAGE_SDF, progress::STAGE_SEARCH, progress::STAGE_TRANSFER]),
+        ("what is tried", values![progress::TRIED_TURNS]),
     ]
 }
 

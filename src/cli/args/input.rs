@@ -8,6 +8,9 @@ use crate::cache::CacheSettings;
 use crate::files::{IgnorePattern, LoadOptions, Split, StepSettings, load};
 use crate::geometry::{GeometryError, SourceAssembly};
 
+/// The heading of its options, as in `src/cli/README.md`.
+const INPUT: &str = "Input";
+
 /// An assembly, and how its files are read.
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Input {
@@ -15,17 +18,17 @@ pub(in crate::cli) struct Input {
     pub(in crate::cli) assembly: PathBuf,
     /// What counts as a part in a file that holds several: each object, group, solid or primitive; each separate body; or
     /// the whole file (of a scene each node) [default: what a file of the whole assembly names, if these are bodies]
-    #[arg(long, value_name = "objects|bodies|none")]
+    #[arg(long, value_name = "objects|bodies|none", help_heading = INPUT)]
     pub(in crate::cli) split: Option<Split>,
     /// Leave out parts whose names, or whose files' names, match a pattern, as '*bolt*' (repeatable)
-    #[arg(long, value_name = "GLOB")]
+    #[arg(long, value_name = "GLOB", help_heading = INPUT)]
     pub(in crate::cli) ignore: Vec<IgnorePattern>,
     /// The program that converts STEP files to GLB (see clients/step) [default: $SBDP_STEP, else `sbdp-step` beside this
     /// program or on PATH]
-    #[arg(long, value_name = "PROGRAM")]
+    #[arg(long, value_name = "PROGRAM", help_heading = INPUT)]
     pub(in crate::cli) converter: Option<PathBuf>,
     /// Largest distance of the triangles of a STEP file from its surfaces, in mm [default: 0.01]
-    #[arg(long, value_name = "MM", value_parser = deflection)]
+    #[arg(long, value_name = "MM", value_parser = deflection, help_heading = INPUT)]
     pub(in crate::cli) deflection: Option<f64>,
 }
 

@@ -170,6 +170,10 @@ class Progress(TypedDict):
     done: int
     total: int
     simulations: int
+    part: int | None
+    """Index of the part that the search tries to move; of several side by side, the first."""
+    turns: bool
+    """Whether that part is turned, and not only pushed."""
 
 class PlanStream(Iterator[Step]):
     """Steps as they are found. Closing it, or leaving its `with` block, cancels the request. After a daemon was restarted,

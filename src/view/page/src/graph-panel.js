@@ -1,16 +1,20 @@
 /**
- * The blocking graph of the state on show, for one direction. Rust computed and arranged those of the assembled
+ * The blocking graph of the state on show, for one direction: the parts that matter for what is looked at, or all. Rust computed and arranged those of the assembled
  * state; that of any later state is what remains of them without the parts that are gone.
  * @import { Player } from "./player.js"
  * @import { Selection } from "./selection.js"
  */
 import { byId, element, svg } from "./dom.js";
-import { stands } from "./timeline.js";
+import { compact, focus } from "./graph-focus.js";
+import { stands, stepAt } from "./timeline.js";
 
 const COLUMN = 96;
 const ROW = 62;
 const BOX = [84, 24];
 const MOST_LETTERS = 12;
+/** Pixels beside all boxes, and boxes side by side where the panel is narrower. */
+const MARGIN = 16;
+const NARROWEST = 3;
 
 /**
  * @param {Player} player
@@ -20,48 +24,71 @@ export function graphPanel(player, selection) {
   const { scene } = player;
   const chosen = byId("direction");
   chosen.append(...scene.graphs.map((g, i) => element("option", { value: i }, g.direction)));
+  const everything = byId("all-parts");
+  const frame = byId("graph");
   let drawing = null;
+  let drawn = "";
   const draw = () => {
     const graph = scene.graphs[Number(chosen.value)];
     if (!graph) return;
-    drawing = new Drawing(scene, graph, selection);
-    const frame = byId("graph");
-    frame.replaceChildren(drawing.root);
-    frame.scrollLeft = (frame.scrollWidth - frame.clientWidth) / 2;
+    const all = [...scene.parts.keys()];
+    const { parts, words } = everything.checked ? { parts: all, words: "Shown: all parts." } : focus(scene, graph, player.time, selection);
+    const widest = Math.max(NARROWEST, Math.floor((frame.clientWidth - MARGIN) / COLUMN));
+    // The same parts keep their drawing, so that the keyboard's focus stays in it.
+    const wanted = [chosen.value, everything.checked, widest, ...parts].join();
+    if (wanted !== drawn) {
+      drawn = wanted;
+      drawing = new Drawing(scene, graph, selection, everything.checked ? whole(graph) : compact(graph, parts, widest));
+      frame.replaceChildren(drawing.root);
+      frame.scrollLeft = (frame.scrollWidth - frame.clientWidth) / 2;
+    }
+    byId("shown").textContent = words;
     byId("free").textContent = drawing.update(player.time);
   };
   chosen.addEventListener("change", draw);
+  everything.addEventListener("change", draw);
   const wide = byId("enlarge");
   wide.addEventListener("click", () => {
     const is = document.querySelector("main").classList.toggle("wide");
     wide.setAttribute("aria-pressed", String(is));
     draw();
   });
-  // Only what is shown can be scrolled to its middle.
-  byId("tab-graph").addEventListener("click", draw);
+  // Only what is shown has a width, and can be scrolled to its middle.
+  byId("tab-graph").addEventListener("click", () => {
+    drawn = "";
+    draw();
+  });
   let shown = "";
   const update = () => {
-    const state = scene.parts.map((_, i) => (stands(scene, i, player.time) ? 1 : 0)).join("") + selection.part;
-    if (state === shown || !drawing) return;
-    shown = state;
-    byId("free").textContent = drawing.update(player.time);
+    const { part, others, group } = selection;
+    const state = scene.parts.map((_, i) => (stands(scene, i, player.time) ? 1 : 0)).join("");
+    const now = [state, stepAt(scene, player.time), part, ...others, "", ...group].join();
+    if (now === shown) return;
+    shown = now;
+    draw();
   };
   player.addEventListener("change", update);
   selection.addEventListener("change", update);
   draw();
 }
 
-/** One direction's graph, drawn once and then marked. */
+/** All parts of a graph, where Rust placed them. */
+function whole({ places, rows, columns }) {
+  return { places: new Map(places.entries()), rows, columns };
+}
+
+/** One direction's graph of some parts, drawn once and then marked. */
 class Drawing {
-  constructor(scene, graph, selection) {
-    Object.assign(this, { scene, graph, selection });
-    this.nodes = scene.parts.map((part, i) => this.node(part, i));
-    const mutual = (p, b) => graph.edges.some(([q, c]) => q === b && c === p);
+  constructor(scene, graph, selection, layout) {
+    Object.assign(this, { scene, graph, selection, layout });
+    this.nodes = new Map([...layout.places.keys()].map((part) => [part, this.node(scene.parts[part], part)]));
+    const shown = graph.edges.filter((edge) => edge.every((part) => layout.places.has(part)));
+    const mutual = (p, b) => shown.some(([q, c]) => q === b && c === p);
     // What blocks each other has one line with two heads.
-    this.edges = graph.edges.filter(([p, b]) => !mutual(p, b) || p < b);
+    this.edges = shown.filter(([p, b]) => !mutual(p, b) || p < b);
     this.lines = this.edges.map(([p, b]) => this.arrow(p, b, mutual(p, b)));
-    const width = Math.max(graph.columns, 1) * COLUMN + 16;
-    const height = graph.rows * ROW + 30;
+    const width = Math.max(layout.columns, 1) * COLUMN + MARGIN;
+    const height = layout.rows * ROW + 30;
     const head = svg(
       "marker",
       {
@@ -82,12 +109,12 @@ class Drawing {
       { width, height, viewBox: `${-width / 2} -30 ${width} ${height}`, role: "group", "aria-label": label },
       svg("defs", {}, head),
       ...this.lines,
-      ...this.nodes,
+      ...this.nodes.values(),
     );
   }
 
   place(part) {
-    const [column, row] = this.graph.places[part];
+    const [column, row] = this.layout.places.get(part);
     return [column * COLUMN, row * ROW + BOX[1] / 2];
   }
 
