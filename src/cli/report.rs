@@ -196,7 +196,6 @@ fn stats(plan: &PlanDocument) -> String {
     let depth = plan.steps.iter().map(|step| step.verified_depth).fold(0.0, f64::max);
     let hit = if s.cache.plan_hit { ", plan remembered".to_owned() } else { reused(&s.cache) };
     let stages = [
-        ("loading", s.load_time_s.unwrap_or(0.0)),
         ("fields", s.sdf_time_s),
         ("overlaps", s.overlap_time_s.unwrap_or(0.0)),
         ("static analysis", s.static_analysis_time_s),
@@ -207,8 +206,11 @@ fn stats(plan: &PlanDocument) -> String {
     let lasting = stages.iter().filter(|(_, time)| *time >= SHORTEST);
     let times: Vec<String> = lasting.map(|(name, time)| format!("{name} {time:.3} s")).collect();
     let times = if times.is_empty() { String::new() } else { format!(": {}", times.join(", ")) };
+    // Loading comes before what the total counts.
+    let loaded = s.load_time_s.filter(|time| *time >= SHORTEST);
+    let loaded = loaded.map_or_else(String::new, |time| format!("; loaded in {time:.3} s"));
     format!(
-        "{} simulations ({} run), {} sweeps, {} states{hit}; verified to {}\ntotal {:.3} s{times}\n",
+        "{} simulations ({} run), {} sweeps, {} states{hit}; verified to {}\ntotal {:.3} s{times}{loaded}\n",
         s.simulations,
         s.simulations_run,
         s.sweeps,
