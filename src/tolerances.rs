@@ -394,7 +394,7 @@ pub(crate) const PATH_TOLERANCE: f64 = 2e-5;
 /// Radians. Two waypoints turn by less, so that the interpolation between them is unambiguous.
 /// Measured: at half and at double another plan of 3 entries.
 pub(crate) const WAYPOINT_TURN: f64 = 2.0;
-/// Share of the longest side. Largest travel of a vertex between two poses that samples are checked at.
+/// Share of the longest side of the smaller part of a pair. Largest travel of a vertex between two poses that samples are checked at.
 /// Measured: no effect at half and double.
 pub(crate) const PATH_DENSITY: f64 = 0.004;
 /// Share of the longest side of the smaller part of a pair. A path is refused at this depth, whatever stands beside the
@@ -415,7 +415,7 @@ pub(crate) const IGNORED_SHARE_IN_OVERLAP: f64 = 1.0 / 4.0;
 /// Share of the limit. The smallest radius of a piece of surface.
 /// Measured: no effect at half and double.
 pub(crate) const FINEST_SHARE: f64 = 1.0 / 4.0;
-/// Share of the longest side. Penetrations are reported no closer to each other.
+/// Share of the longest side of the smaller part of a pair. Penetrations are reported no closer to each other.
 /// Measured: at half another plan of `bayonet`, `caxif-s1-c5-214`; at double another plan of `bayonet`,
 /// `caxif-as1-tu-203`.
 pub(crate) const COARSE_SHARE: f64 = 4e-3;

@@ -25,8 +25,6 @@ pub struct PairPath<'a> {
     pub centre: Point3<f64>,
     /// The allowed penetration, in the planning frame.
     pub allowed: f64,
-    /// The longest side of the assembly, from which verification derives its precision.
-    pub longest_side: f64,
 }
 
 impl<'a> PairPath<'a> {
@@ -77,7 +75,6 @@ impl<'a> PairPath<'a> {
             // On a path that does not turn, any point moves on a line.
             centre: if turns { centre } else { shapes[0].bounds().centre() }.map(rounded),
             allowed: allowed.of(part, other),
-            longest_side: scene.longest_side,
             path,
         }
     }
@@ -93,7 +90,6 @@ impl<'a> PairPath<'a> {
             path: vec![other.inverse() * one],
             centre: shapes[0].bounds().centre(),
             allowed: 0.0,
-            longest_side: scene.longest_side,
         }
     }
 
@@ -102,6 +98,13 @@ impl<'a> PairPath<'a> {
     pub fn reach(&self) -> f64 {
         let hull = self.shapes[0].hull.iter();
         hull.map(|p| (p - self.centre).norm_squared()).fold(0.0, f64::max).sqrt()
+    }
+
+    /// The longest side of the smaller part, in its frame: verification derives its precision from it, so that what else
+    /// is in the assembly changes nothing.
+    #[must_use]
+    pub fn size(&self) -> f64 {
+        self.shapes.map(|shape| shape.bounds().extents().max()).into_iter().fold(f64::INFINITY, f64::min)
     }
 
     /// The surfaces of the moving and of the standing part.

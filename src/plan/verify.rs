@@ -128,6 +128,14 @@ impl Verifier {
         Self { samples: self.samples.twice(), ..*self }
     }
 
+    /// The same check for the bodies of a scene whose longest side is `factor` times that of this one's.
+    #[must_use]
+    pub(crate) fn at_scale(&self, scene: &Scene, factor: f64) -> Self {
+        let shapes: Vec<Arc<Shape>> = scene.bodies.iter().map(|body| Arc::clone(&body.shape)).collect();
+        let shape_of = (0..shapes.len()).collect();
+        Self { samples: PathSamples::new(&shapes, shape_of), limit: self.limit * factor, ..*self }
+    }
+
     /// The largest depth at which a path is refused, in the planning frame.
     #[must_use]
     pub fn limit(&self) -> f64 {
@@ -163,7 +171,7 @@ impl Verifier {
             deep: f64::INFINITY,
             margin: OVERLAP_MARGIN * limit,
             finest: OVERLAP_FINEST * limit,
-            coarse: COARSE_SHARE * scene.longest_side,
+            coarse: COARSE_SHARE * pair_path.size(),
         };
         let course = Course::new(&pair_path.path, pair_path.centre, 0.0);
         let way = PathQuestion { pair_path: &pair_path, course: &course, precision, termination };
@@ -173,7 +181,7 @@ impl Verifier {
         tracing::debug!(parts = ?pair.parts, depth, ?effort, "overlap measured");
         if !one.open.is_empty() || !other.open.is_empty() {
             let penetrations =
-                self.samples.penetrations_along(&pair_path, &pair_path.path, self.limit, termination)?;
+                self.samples.penetrations_along(&pair_path, &pair_path.path, limit, termination)?;
             return Ok(deepest(depth, &penetrations));
         }
         Ok(depth)
@@ -287,7 +295,7 @@ impl Verifier {
             deep: limit,
             margin: limit,
             finest: limit * FINEST_SHARE,
-            coarse: COARSE_SHARE * pair_path.longest_side,
+            coarse: COARSE_SHARE * pair_path.size(),
         };
         PathQuestion { pair_path, course, precision, termination }
     }
@@ -325,8 +333,8 @@ fn joined<'i>(course: &Course, intervals: impl Iterator<Item = &'i Interval>) ->
 
 /// The points that help in refining a motion: the deepest of those near each other.
 fn deepest_penetrations(pair_path: &PairPath<'_>, [moving, standing]: &[PathDepth; 2]) -> Vec<Penetration> {
-    let PairPath { parts: [_, other], longest_side, .. } = *pair_path;
-    let cell = COARSE_SHARE * longest_side;
+    let [_, other] = pair_path.parts;
+    let cell = COARSE_SHARE * pair_path.size();
     let mut taken: BTreeMap<(bool, [i64; 3]), Penetration> = BTreeMap::new();
     for (on_moving, side) in [(true, moving), (false, standing)] {
         for &(point, over) in &side.deep {

@@ -15,6 +15,7 @@ mod hull_separation;
 mod hull_tree;
 mod joined_hulls;
 mod memo;
+mod own_scale;
 mod part_metric;
 mod records;
 
@@ -33,6 +34,7 @@ pub use hull_separation::{StandingParts, exit_direction};
 pub use hull_tree::HullTree;
 pub use joined_hulls::{HullStore, JoinedHulls};
 pub use memo::Memo;
+pub(crate) use own_scale::OwnScale;
 pub(crate) use part_metric::PartMetric;
 pub(crate) use records::{HULL, add_pair, add_samples, add_standing};
 
@@ -264,7 +266,10 @@ impl Scene {
 /// The longest side of an assembly, rounded down by less than a sixteenth.
 #[must_use]
 pub fn resolution(assembly: &Assembly) -> f64 {
-    let longest = assembly.longest_side();
+    rounded_down(assembly.longest_side())
+}
+
+fn rounded_down(longest: f64) -> f64 {
     let step = longest.log2().floor().exp2() / 16.0;
     (longest / step).floor() * step
 }

@@ -1,10 +1,16 @@
 //! Groups that left are taken apart: each by a search of its own, in which only its parts stand, where they stood in the
-//! assembly.
+//! assembly. A small group that does not come apart is searched again at its own scale, as if it were alone.
+
+use std::collections::HashMap;
+use std::sync::Arc;
 
 use crate::plan::{Base, PlanStatus};
+use crate::scene::OwnScale;
+use crate::termination::Interrupt;
 
 use super::deferred_removals::DeferredRemovals;
-use super::outcome::{Outcome, Removal};
+use super::disassembly::interrupted;
+use super::outcome::{Outcome, Reason, Removal};
 use super::problem::{Observer, Problem};
 use super::release::Release;
 use super::request::Planner;
@@ -39,8 +45,8 @@ pub(super) fn take_apart(
         Problem { scene, present, targets, base, released: Release::Nothing, spent, ..problem.clone() };
     let done = outcome.removals.len();
     let mut deferred = DeferredRemovals::after(observer, done, outcome.counters.simulations);
-    let Outcome { status, reason, removals, unfinished, blocked, free_together, counters, .. } =
-        run(planner, inner, &mut deferred);
+    let found = taken_apart(planner, inner, &mut deferred);
+    let Outcome { status, reason, removals, unfinished, blocked, free_together, counters, .. } = found;
     for removal in removals {
         let of = Some(removal.of.map_or(group, |of| done + of));
         let mut requires: Vec<usize> = removal.requires.iter().map(|i| done + i).collect();
@@ -57,4 +63,55 @@ pub(super) fn take_apart(
         (outcome.status, outcome.reason, outcome.unfinished) = (status, reason, unfinished);
         (outcome.blocked, outcome.free_together) = (blocked, free_together);
     }
+}
+
+/// The search for a group, and where it ends with parts left, the one at the group's own scale. Of the two, the one
+/// with more removals counts, and how the second one ended.
+fn taken_apart(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
+    let found = run(planner, problem.clone(), observer);
+    if found.reason != Some(Reason::Exhausted) {
+        return found;
+    }
+    let spent = problem.spent + found.counters.simulations;
+    match at_own_scale(planner, &Problem { spent, ..problem }, observer) {
+        Ok(None) => found,
+        Ok(Some(mut again)) => {
+            again.counters.add(&found.counters);
+            if again.removals.len() < found.removals.len() {
+                again =
+                    Outcome { status: again.status, reason: again.reason, counters: again.counters, ..found };
+            }
+            again
+        }
+        Err(interrupt) => {
+            let (status, reason) = interrupted(interrupt);
+            Outcome { status, reason, ..found }
+        }
+    }
+}
+
+/// The search for a group, at its own scale; `None` if that is the assembly's.
+fn at_own_scale(
+    planner: Planner,
+    problem: &Problem<'_>,
+    observer: &mut dyn Observer,
+) -> Result<Option<Outcome>, Interrupt> {
+    let Some(own) = OwnScale::of(&problem.scene, &problem.present, &problem.termination)? else {
+        return Ok(None);
+    };
+    let verifier = problem.verifier.at_scale(&own.scene, own.scene.longest_side / problem.scene.longest_side);
+    let scaled = Problem {
+        scene: own.scene.clone(),
+        verifier: &verifier,
+        clearance: problem.clearance.map(|gap| gap * own.factor),
+        verdicts: Arc::default(),
+        extra_points: HashMap::new(),
+        ..problem.clone()
+    };
+    let mut outcome = run(planner, scaled, observer);
+    for removal in &mut outcome.removals {
+        removal.path.iter_mut().for_each(|pose| *pose = own.restored(pose));
+        removal.depth /= own.factor;
+    }
+    Ok(Some(outcome))
 }

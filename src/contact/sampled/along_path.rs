@@ -1,6 +1,6 @@
 //! Verification at samples, where bounds fail.
 //!
-//! No vertex of the moving part travels further than [`PATH_DENSITY`] of the longest side between two poses. At each
+//! No vertex of the moving part travels further than [`PATH_DENSITY`] of the smaller part's longest side between two poses. At each
 //! pose, samples of both surfaces are measured exactly against the other's triangles through a bounding-volume
 //! hierarchy: all vertices, and points of convex edges and faces, closer together than the engine's samples. On a
 //! path that passes, edges are measured again at points four times as close. Known miss: features that penetrate only
@@ -295,7 +295,7 @@ fn dealt(surface: &Surface, closeness: Closeness) -> [SampleTree; SAMPLE_SHARES]
 /// Denser than the engine's samples, and not a multiple of their spacing. Every vertex is a sample: the crest of a
 /// small rounded thread has its vertices at blunt edges, closer together than any spacing.
 fn spacing(bounds: &Bounds, closeness: Closeness) -> Spacing {
-    let face = (bounds.extents().max() / 16.0).clamp(0.06, 0.28);
+    let face = (bounds.extents().max() / 16.0).min(0.28);
     match closeness {
         Closeness::Sparse => Spacing { vertex: None, edge: face / 4.0, blunt_edge: face, face },
         // Crests of overlapping threads are deepest between vertices.
@@ -305,8 +305,8 @@ fn spacing(bounds: &Bounds, closeness: Closeness) -> Spacing {
 
 /// The poses of a stretch of the path, and as many between them as the density demands.
 fn dense(pair_path: &PairPath<'_>, path: &[Pose]) -> Vec<Pose> {
-    let PairPath { shapes: [shape, _], centre, longest_side, .. } = pair_path;
-    let step = PATH_DENSITY * longest_side;
+    let PairPath { shapes: [shape, _], centre, .. } = pair_path;
+    let step = PATH_DENSITY * pair_path.size();
     let mut out = Vec::new();
     for (a, b) in path.iter().zip(path.iter().skip(1)) {
         let turn = (a.rotation.inverse() * b.rotation).scaled_axis();
@@ -389,7 +389,7 @@ mod tests {
         for w in poses.windows(2) {
             for v in scene.bodies[1].shape.surface.vertices() {
                 let travel = (w[1] * v - w[0] * v).norm();
-                assert!(travel <= PATH_DENSITY * scene.longest_side + 1e-9, "{travel}");
+                assert!(travel <= PATH_DENSITY * pair_path.size() + 1e-9, "{travel}");
             }
         }
     }

@@ -69,12 +69,12 @@ impl KnownVerdicts {
 
 impl VerdictQuestion<'_> {
     fn key(&self) -> RecordKey {
-        let PairPath { shapes, path, centre, allowed, longest_side, .. } = self.pair_path;
+        let PairPath { shapes, path, centre, allowed, .. } = self.pair_path;
         let mut digest = Digest::new();
         shapes.iter().for_each(|shape| {
             digest.hash(shape.content());
         });
-        digest.numbers([self.limit, *allowed, *longest_side]).numbers(centre.iter().copied());
+        digest.numbers([self.limit, *allowed]).numbers(centre.iter().copied());
         digest.integer(path.len() as u64);
         path.iter().for_each(|pose| add_pose(&mut digest, pose));
         digest.key(&VERDICT)

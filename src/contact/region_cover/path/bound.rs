@@ -131,7 +131,9 @@ impl PathSearch<'_> {
         let beyond = depth - allowed;
         let small = swept.radius <= precision.coarse && beyond <= precision.deep / 2.0;
         let exact = real >= depth - precision.ignored.max(precision.margin_of(depth));
-        let told = exact || (small && precision.deep.is_finite());
+        // Real or not, a depth on the other side of the limit would decide the verdict by its error.
+        let decides = beyond > precision.deep && real - allowed <= precision.deep;
+        let told = !decides && (exact || (small && precision.deep.is_finite()));
         if !told {
             return false;
         }
