@@ -327,7 +327,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::fixtures::{ball, block_on_plate, moved, rod, scene, surface};
+    use crate::fixtures::{ball, block_on_plate, cuboid, moved, rod, scene, surface};
     use crate::scene::CongruentPair;
 
     fn bits(p: &Point3<f64>) -> [u64; 3] {
@@ -372,6 +372,23 @@ mod tests {
         assert_eq!(penetrations(-0.01), (0, 0));
         let (sparse, all) = penetrations(0.02);
         assert!(sparse == 0 && all > 0, "{sparse} of {all}");
+    }
+
+    #[test]
+    fn a_small_part_beside_a_long_one_does_not_pass_a_wall_between_two_poses() {
+        let half = 0.006;
+        let wall = cuboid([-0.001, -half, -half], [0.001, half, half]);
+        let block = cuboid([-half - 0.02, -half, -half], [half - 0.02, half, half]);
+        let rail = cuboid([-4.5, 1.0, 0.0], [4.5, 1.1, 0.1]);
+        let (scene, _) = scene([wall, block, rail]);
+        let from = scene.bodies[1].planning_from_shape;
+        let path = [from, Pose::translation(0.04, 0.0, 0.0) * from];
+        let pair_path = PairPath::new(&scene, &scene.allowed, [1, 0], &path);
+        let shapes: Vec<Arc<Shape>> = scene.bodies.iter().map(|b| Arc::clone(&b.shape)).collect();
+        let samples = PathSamples::new(&shapes, vec![0, 1, 2]);
+        let termination = Termination::default();
+        let found = samples.penetrations_along(&pair_path, &pair_path.path, 1e-5, &termination).unwrap();
+        assert!(found.iter().any(|p| p.over > 1e-4), "{found:?}");
     }
 
     #[test]
