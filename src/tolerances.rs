@@ -416,9 +416,10 @@ pub(crate) const IGNORED_SHARE_IN_OVERLAP: f64 = 1.0 / 4.0;
 /// Share of the limit. The smallest radius of a piece of surface.
 /// Measured: no effect at half and double.
 pub(crate) const FINEST_SHARE: f64 = 1.0 / 4.0;
-/// Share of the longest side of the smaller part of a pair. Penetrations are reported no closer to each other. At 0.004
-/// refuted paths take longer to look through, and refine no better; at double, points of one edge are taken for one.
-pub(crate) const COARSE_SHARE: f64 = 0.01;
+/// Share of the longest side of the larger part of a pair. Penetrations are reported no closer to each other.
+/// Measured: at half another plan of `bayonet`, `caxif-s1-c5-214`; at double another plan of `bayonet`,
+/// `caxif-as1-tu-203`. At 0.01 of the smaller part, points of a shallow spot fill the report before the deepest is found.
+pub(crate) const COARSE_SHARE: f64 = 4e-3;
 /// Share of the limit. Depth that is not looked into when the overlap of assembled parts is measured. No more is allowed
 /// than is measured at some point, and no less than nine tenths of what there is ([`DEPTH_SHARE`]).
 /// Measured: no effect at half and double.

@@ -54,7 +54,7 @@ fn the_state_is_told_in_plain_lines() {
     let output = sbdp(&daemon, &["status"]);
     assert!(output.status.success(), "{output:?}");
     let text = String::from_utf8(output.stdout).unwrap();
-    let first = format!("sbdpd {}, protocol 8, pid {}, up ", sbdp::BUILD, daemon.pid());
+    let first = format!("sbdpd {}, protocol {}, pid {}, up ", sbdp::BUILD, sbdp_ipc::PROTOCOL, daemon.pid());
     assert!(text.starts_with(&first), "{text}");
     let line = |subject: &str| {
         let found = text.lines().find(|line| line.starts_with(subject));

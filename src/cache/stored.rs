@@ -47,8 +47,9 @@ impl StoredTally {
 
     fn change(&mut self, number: u8, change: Stored) {
         let stored = self.0.entry(number).or_default();
-        stored.records += change.records;
-        stored.bytes += change.bytes;
+        // A damaged file may name any length.
+        stored.records = stored.records.saturating_add(change.records);
+        stored.bytes = stored.bytes.saturating_add(change.bytes);
     }
 }
 

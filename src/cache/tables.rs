@@ -52,7 +52,7 @@ impl Listed {
 
     /// Bytes that it takes on disk, about.
     pub(super) fn cost(&self) -> u64 {
-        self.bytes + OVERHEAD
+        self.bytes.saturating_add(OVERHEAD)
     }
 }
 
@@ -131,7 +131,7 @@ impl<'t> StoreTables<'t> {
         self.records.remove(key)?;
         if let Some(old) = self.used.remove(key)? {
             let bytes = old.value().1;
-            self.bytes = self.bytes.saturating_sub(bytes + OVERHEAD);
+            self.bytes = self.bytes.saturating_sub(bytes.saturating_add(OVERHEAD));
             self.changes.take(key[0], bytes);
         }
         Ok(())
@@ -197,7 +197,8 @@ impl<'t> StoreTables<'t> {
         let mut by_stamp: BTreeMap<u64, u64> = BTreeMap::new();
         for entry in self.used.iter()? {
             let (stamp, bytes) = entry?.1.value();
-            *by_stamp.entry(stamp).or_default() += bytes + OVERHEAD;
+            let sum = by_stamp.entry(stamp).or_default();
+            *sum = sum.saturating_add(bytes).saturating_add(OVERHEAD);
         }
         let mut surplus = self.bytes.saturating_sub(goal);
         let last = by_stamp.into_iter().find_map(|(stamp, bytes)| {

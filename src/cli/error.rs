@@ -40,6 +40,7 @@ impl From<ServiceError> for CliError {
             ServiceError::Geometry(_)
             | ServiceError::NoSuchPart { .. }
             | ServiceError::TargetStays { .. }
+            | ServiceError::FixedAndKept { .. }
             | ServiceError::NoLength { .. }
             | ServiceError::NoDirection { .. }
             | ServiceError::NoGroups { .. } => Self::Refused(error.to_string()),

@@ -100,11 +100,12 @@ impl<'a> PairPath<'a> {
         hull.map(|p| (p - self.centre).norm_squared()).fold(0.0, f64::max).sqrt()
     }
 
-    /// The longest side of the smaller part, in its frame: verification derives its precision from it, so that what else
-    /// is in the assembly changes nothing.
+    /// The longest sides of the smaller and of the larger part, in their frames: verification derives its precision from
+    /// them, so that what else is in the assembly changes nothing.
     #[must_use]
-    pub fn size(&self) -> f64 {
-        self.shapes.map(|shape| shape.bounds().extents().max()).into_iter().fold(f64::INFINITY, f64::min)
+    pub fn sizes(&self) -> [f64; 2] {
+        let [a, b] = self.shapes.map(|shape| shape.bounds().extents().max());
+        [a.min(b), a.max(b)]
     }
 
     /// The surfaces of the moving and of the standing part.

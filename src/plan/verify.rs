@@ -171,7 +171,7 @@ impl Verifier {
             deep: f64::INFINITY,
             margin: OVERLAP_MARGIN * limit,
             finest: OVERLAP_FINEST * limit,
-            coarse: COARSE_SHARE * pair_path.size(),
+            coarse: COARSE_SHARE * pair_path.sizes()[1],
         };
         let course = Course::new(&pair_path.path, pair_path.centre, 0.0);
         let way = PathQuestion { pair_path: &pair_path, course: &course, precision, termination };
@@ -295,7 +295,7 @@ impl Verifier {
             deep: limit,
             margin: limit,
             finest: limit * FINEST_SHARE,
-            coarse: COARSE_SHARE * pair_path.size(),
+            coarse: COARSE_SHARE * pair_path.sizes()[1],
         };
         PathQuestion { pair_path, course, precision, termination }
     }
@@ -334,7 +334,7 @@ fn joined<'i>(course: &Course, intervals: impl Iterator<Item = &'i Interval>) ->
 /// The points that help in refining a motion: the deepest of those near each other.
 fn deepest_penetrations(pair_path: &PairPath<'_>, [moving, standing]: &[PathDepth; 2]) -> Vec<Penetration> {
     let [_, other] = pair_path.parts;
-    let cell = COARSE_SHARE * pair_path.size();
+    let cell = COARSE_SHARE * pair_path.sizes()[1];
     let mut taken: BTreeMap<(bool, [i64; 3]), Penetration> = BTreeMap::new();
     for (on_moving, side) in [(true, moving), (false, standing)] {
         for &(point, over) in &side.deep {

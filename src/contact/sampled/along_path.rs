@@ -306,7 +306,7 @@ fn spacing(bounds: &Bounds, closeness: Closeness) -> Spacing {
 /// The poses of a stretch of the path, and as many between them as the density demands.
 fn dense(pair_path: &PairPath<'_>, path: &[Pose]) -> Vec<Pose> {
     let PairPath { shapes: [shape, _], centre, .. } = pair_path;
-    let step = PATH_DENSITY * pair_path.size();
+    let step = PATH_DENSITY * pair_path.sizes()[0];
     let mut out = Vec::new();
     for (a, b) in path.iter().zip(path.iter().skip(1)) {
         let turn = (a.rotation.inverse() * b.rotation).scaled_axis();
@@ -406,7 +406,7 @@ mod tests {
         for w in poses.windows(2) {
             for v in scene.bodies[1].shape.surface.vertices() {
                 let travel = (w[1] * v - w[0] * v).norm();
-                assert!(travel <= PATH_DENSITY * pair_path.size() + 1e-9, "{travel}");
+                assert!(travel <= PATH_DENSITY * pair_path.sizes()[0] + 1e-9, "{travel}");
             }
         }
     }
