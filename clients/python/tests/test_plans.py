@@ -64,7 +64,7 @@ def test_options_mean_what_they_mean_on_the_command_line(client, runtime_dir):
         ({"removed": other}, ["--removed", other]),
         ({"fixed": [part]}, ["--fixed", part]),
         ({"base": part, "actions": "paper"}, ["--base", part, "--actions", "paper"]),
-        ({"keep": [part, other]}, ["--keep", part, "--keep", other]),
+        ({"keep": assembly.parts[1:3]}, ["--keep", other, "--keep", assembly.parts[2]]),
         ({"planner": "sbdp", "max_simulations": 50}, ["--planner", "sbdp", "--max-simulations", "50"]),
     ):
         client.plan(assembly, **options).result()
