@@ -73,6 +73,14 @@ impl Shape {
         Self::over(Surface::deferred(mesh), hull, OnceLock::from(content))
     }
 
+    /// The shape with all lengths multiplied by a power of two, which loses no bit. All is derived when it is asked for.
+    #[must_use]
+    pub(crate) fn scaled(&self, factor: f64) -> Self {
+        let scaled = |points: &[Point3<f64>]| points.iter().map(|p| p * factor).collect();
+        let mesh = Mesh { vertices: scaled(&self.mesh().vertices), ..self.mesh().clone() };
+        Self::over(Surface::deferred(mesh), scaled(&self.hull), OnceLock::new())
+    }
+
     fn over(surface: Surface, hull: Vec<Point3<f64>>, content: OnceLock<[u8; 32]>) -> Self {
         let mass = surface.mass_properties();
         let reach =
@@ -216,10 +224,11 @@ impl Shape {
     }
 }
 
-/// Closer on small parts, so that a pin has as many samples around as a plate has along.
+/// Closer on small parts, so that a pin has as many samples around as a plate has along. Only parts that are scaled for
+/// the search of a much smaller one are larger than 100: their number of samples is bounded.
 fn spacing(bounds: &Bounds) -> Spacing {
     let size = bounds.extents().max();
-    let edge = (size / 40.0).clamp(0.02, 0.1);
+    let edge = (size / 40.0).clamp(0.02, (size / 1000.0).max(0.1));
     Spacing { vertex: Some(edge), edge, blunt_edge: edge * 3.0, face: edge * 4.0 }
 }
 
@@ -287,6 +296,6 @@ mod tests {
         let edge =
             |size: f64| spacing(&Bounds { min: Point3::origin(), max: Point3::new(size, 0.1, 0.1) }).edge;
         assert!(edge(0.1) < edge(2.0) && edge(2.0) < edge(10.0));
-        assert_eq!((edge(1e-6), edge(1e3)), (0.02, 0.1));
+        assert_eq!((edge(1e-6), edge(100.0), edge(1e4)), (0.02, 0.1, 10.0));
     }
 }

@@ -136,6 +136,11 @@ impl Verifier {
         Self { samples: PathSamples::new(&shapes, shape_of), limit: self.limit * factor, ..*self }
     }
 
+    /// Whether small and thin parts have lower limits.
+    pub(crate) fn is_by_pair(&self) -> bool {
+        self.is_by_pair
+    }
+
     /// The largest depth at which a path is refused, in the planning frame.
     #[must_use]
     pub fn limit(&self) -> f64 {

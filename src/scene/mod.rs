@@ -35,6 +35,7 @@ pub use hull_tree::HullTree;
 pub use joined_hulls::{HullStore, JoinedHulls};
 pub use memo::Memo;
 pub(crate) use own_scale::OwnScale;
+pub use own_scale::ScaledShapes;
 pub(crate) use part_metric::PartMetric;
 pub(crate) use records::{HULL, add_pair, add_samples, add_standing};
 
@@ -269,7 +270,8 @@ pub fn resolution(assembly: &Assembly) -> f64 {
     rounded_down(assembly.longest_side())
 }
 
-fn rounded_down(longest: f64) -> f64 {
+/// The longest side of a scene, rounded down by less than a sixteenth.
+pub(crate) fn rounded_down(longest: f64) -> f64 {
     let step = longest.log2().floor().exp2() / 16.0;
     (longest / step).floor() * step
 }

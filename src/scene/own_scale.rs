@@ -1,76 +1,54 @@
-//! Some parts of a scene at their own scale.
+//! A scene at the scale of some of its parts.
 //!
-//! The planning frame has the whole assembly in (5, 10], and all steps of motions are lengths in it. Of a group that is
-//! much smaller, steps are as large as its details. So the group is scaled as if it were alone: by a power of two, which
+//! The planning frame has the whole assembly in (5, 10], and all steps and tolerances of motions are lengths in it. Of
+//! what is much smaller, steps are as large as its details. So the scene is scaled up for it: by a power of two, which
 //! loses no bit.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::Vector3;
 
-use crate::geometry::{Bounds, Mesh, Pose, SampleTree, Shape};
+use crate::geometry::{Bounds, Pose, SampleTree, Shape};
 use crate::sdf::Field;
-use crate::termination::{Interrupt, Termination};
 
-use super::{AllowedPenetrations, Scene, rounded_down};
+use super::{AllowedPenetrations, Body, Scene};
 
-/// Some parts of a scene, scaled so that their longest side is in (5, 10].
+/// A scene whose standing parts were scaled.
 #[derive(Debug)]
 pub(crate) struct OwnScale {
-    /// The scene. Parts that were not named have the size that they had: nothing may be asked about them.
+    /// The scene. Parts that do not stand have the size that they had: nothing may be asked about them.
     pub(crate) scene: Scene,
-    /// The power of two that was multiplied by; at least 2.
+    /// The power of two that was multiplied by.
     pub(crate) factor: f64,
 }
 
 impl OwnScale {
-    /// Scales parts; `None` if they are as large as an assembly already.
-    ///
-    /// # Errors
-    /// The termination condition became true.
+    /// Scales the standing parts of a scene by a power of two. `longest_side` is that of the assembly as which it counts.
     pub(crate) fn of(
         scene: &Scene,
-        parts: &[usize],
-        termination: &Termination,
-    ) -> Result<Option<Self>, Interrupt> {
-        let bounds = parts.iter().fold(Bounds::EMPTY, |all, &part| all.union(&scene.bodies[part].bounds));
-        let longest = bounds.extents().max();
-        // Where the longest side is a power of two times 10, it becomes 10.
-        let factor = (10.0 / longest).log2().floor().exp2();
-        if !factor.is_finite() || factor < 2.0 {
-            return Ok(None);
-        }
-        let mut scaled: HashMap<*const Shape, Arc<Shape>> = HashMap::new();
+        standing: &[usize],
+        factor: f64,
+        longest_side: f64,
+        shapes: &ScaledShapes,
+    ) -> Self {
         let mut bodies = scene.bodies.to_vec();
-        for &part in parts {
+        for &part in standing {
             let body = &mut bodies[part];
-            let shape = match scaled.get(&Arc::as_ptr(&body.shape)) {
-                Some(shape) => Arc::clone(shape),
-                None => {
-                    let shape = Arc::new(Shape::of(scaled_mesh(body.shape.mesh(), factor), termination)?);
-                    scaled.insert(Arc::as_ptr(&body.shape), Arc::clone(&shape));
-                    shape
-                }
-            };
-            body.field = Arc::new(Field::of(&shape.surface));
-            body.shape = shape;
+            (body.shape, body.field) = shapes.of(body, factor);
             body.planning_from_shape = scaled_pose(&body.planning_from_shape, factor);
             body.bounds = Bounds { min: body.bounds.min * factor, max: body.bounds.max * factor };
             body.extra_samples = SampleTree::default();
         }
-        let mut scene_at_scale = Scene::of(bodies, rounded_down(longest * factor));
+        let mut scaled = Scene::of(bodies, longest_side);
         let mut allowed = AllowedPenetrations::none();
-        for (i, &a) in parts.iter().enumerate() {
-            for &b in &parts[..i] {
-                let depth = scene.allowed.of(a, b);
-                if depth > 0.0 {
-                    allowed.allow(a, b, depth * factor);
-                }
+        for (&(a, b), depth) in scene.allowed.depth.iter() {
+            if standing.contains(&a) && standing.contains(&b) {
+                allowed.allow(a, b, depth * factor);
             }
         }
-        scene_at_scale.allowed = allowed;
-        Ok(Some(Self { scene: scene_at_scale, factor }))
+        scaled.allowed = allowed;
+        Self { scene: scaled, factor }
     }
 
     /// A pose of this scene in the scene that it was made from.
@@ -79,19 +57,35 @@ impl OwnScale {
     }
 }
 
-fn scaled_mesh(mesh: &Mesh, factor: f64) -> Mesh {
-    Mesh { vertices: mesh.vertices.iter().map(|v| v * factor).collect(), ..mesh.clone() }
-}
-
 fn scaled_pose(pose: &Pose, factor: f64) -> Pose {
     let shift: Vector3<f64> = pose.translation.vector * factor;
     Pose::from_parts(shift.into(), pose.rotation)
+}
+
+/// The scaled shapes of one request, by content and factor, so that each is made once.
+#[derive(Debug, Default)]
+pub struct ScaledShapes(Mutex<HashMap<([u8; 32], u64), ScaledShape>>);
+
+type ScaledShape = (Arc<Shape>, Arc<Field>);
+
+impl ScaledShapes {
+    fn of(&self, body: &Body, factor: f64) -> ScaledShape {
+        let key = (*body.shape.content(), factor.to_bits());
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let scaled = known.entry(key).or_insert_with(|| {
+            let shape = body.shape.scaled(factor);
+            let field = Field::of(&shape.surface);
+            (Arc::new(shape), Arc::new(field))
+        });
+        scaled.clone()
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::fixtures::{cuboid, scene};
+    use crate::termination::Termination;
 
     #[test]
     fn parts_at_their_own_scale_are_the_same_to_the_bit() {
@@ -99,20 +93,24 @@ mod tests {
         let (scene, _) = scene([cuboid([-5.0; 3], [4.0; 3]), small(4.1), small(4.5)]);
         let mut scene = scene;
         scene.allowed.allow(1, 2, 0.01);
-        let found = OwnScale::of(&scene, &[1, 2], &Termination::default()).unwrap().unwrap();
-        let longest =
-            [1, 2].map(|part| scene.bodies[part].bounds).into_iter().fold(Bounds::EMPTY, |a, b| a.union(&b));
-        let side = longest.extents().max() * found.factor;
-        assert!(side > 5.0 && side <= 10.0, "{side}");
-        assert_eq!(found.factor.log2().fract(), 0.0);
-        assert_eq!(found.scene.allowed.of(1, 2), 0.01 * found.factor);
+        scene.allowed.allow(0, 1, 0.02);
+        let shapes = ScaledShapes::default();
+        let found = OwnScale::of(&scene, &[1, 2], 8.0, 7.5, &shapes);
+        assert_eq!((found.scene.longest_side, found.factor), (7.5, 8.0));
+        assert_eq!((found.scene.allowed.of(1, 2), found.scene.allowed.of(0, 1)), (0.08, 0.0));
         for part in [1, 2] {
             let [old, new] = [&scene.bodies[part], &found.scene.bodies[part]];
             assert_eq!(found.restored(&new.planning_from_shape), old.planning_from_shape);
             let restored: Vec<_> = new.shape.surface.vertices().iter().map(|v| v / found.factor).collect();
             assert_eq!(restored, old.shape.surface.vertices());
+            let anew = Shape::of(new.shape.mesh().clone(), &Termination::default()).unwrap();
+            assert_eq!((&anew.hull, anew.content()), (&new.shape.hull, new.shape.content()));
         }
-        let all = OwnScale::of(&scene, &[0, 1, 2], &Termination::default()).unwrap();
-        assert!(all.is_none(), "the whole has its scale");
+        assert_eq!(found.scene.bodies[0].bounds, scene.bodies[0].bounds);
+        let again = OwnScale::of(&scene, &[1], 8.0, 7.5, &shapes);
+        assert!(
+            Arc::ptr_eq(&again.scene.bodies[1].shape, &found.scene.bodies[2].shape),
+            "equal parts share one"
+        );
     }
 }

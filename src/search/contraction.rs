@@ -10,6 +10,7 @@ use crate::termination::Interrupt;
 
 use super::disassembly::joined;
 use super::outcome::{Outcome, Removal};
+use super::own_scale::{scale_of, searched_at};
 use super::preferred::PreferredGroups;
 use super::problem::{Effort, Observer, Problem, VerifiedPath};
 use super::requirements::Leaving;
@@ -108,9 +109,16 @@ impl<'a> Contraction<'a> {
         Leaving { problem: &self.problem, body: self.body, around: &self.around, aside: false }
     }
 
-    /// The outcome of a search for a way out of the body, with some effort.
+    /// The outcome of a search for a way out of the body, with some effort, at the body's own scale.
     pub(super) fn searched(&self, search: Search, effort: Effort, spent: u64) -> Outcome {
-        search(Problem { effort, spent, ..self.problem.clone() }, &mut Unobserved)
+        let problem = Problem { effort, spent, ..self.problem.clone() };
+        match scale_of(&problem, self.body) {
+            None => search(problem, &mut Unobserved),
+            Some(factor) => {
+                let scale = (factor, problem.scene.longest_side);
+                searched_at(&problem, scale, |scaled| search(scaled, &mut Unobserved))
+            }
+        }
     }
 }
 

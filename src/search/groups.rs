@@ -244,9 +244,7 @@ impl<'a> Groups<'_, 'a, '_> {
                 continue;
             }
             let contraction = Contraction::new(&self.disassembly.problem, &standing, &group)?;
-            let mut outcome = self.searched(&contraction, effort)?;
-            let way = outcome.removals.pop().map(|r| VerifiedPath { path: r.path, depth: r.depth });
-            self.trace_tried(&group, way.is_some());
+            let (outcome, way) = self.searched(&contraction, effort)?;
             if let Some(way) = way {
                 return Ok(Some((contraction, way)));
             }
@@ -263,16 +261,27 @@ impl<'a> Groups<'_, 'a, '_> {
         Ok(None)
     }
 
+    /// The way that a search with some effort finds for a part alone.
+    pub(super) fn leave_alone(&mut self, part: usize, effort: Effort) -> Result<Option<VerifiedPath>, Stop> {
+        let standing = self.disassembly.everything.standing().to_vec();
+        let contraction = Contraction::new(&self.disassembly.problem, &standing, &[part])?;
+        Ok(self.searched(&contraction, effort)?.1)
+    }
+
     fn trace_tried(&mut self, group: &[usize], leaves: bool) {
         tracing::debug!(?group, leaves, "group tried");
         self.disassembly.trace(|| TraceEvent::GroupTried { parts: group.to_vec(), leaves });
     }
 
-    /// A search for a way out of a group. It counts as a part of this one.
-    fn searched(&mut self, contraction: &Contraction<'_>, effort: Effort) -> Result<Outcome, Stop> {
+    /// A search for a way out of a group, and the way. It counts as a part of this one.
+    fn searched(
+        &mut self,
+        contraction: &Contraction<'_>,
+        effort: Effort,
+    ) -> Result<(Outcome, Option<VerifiedPath>), Stop> {
         let Disassembly { problem, counters, .. } = &mut *self.disassembly;
         let spent = problem.spent + counters.simulations;
-        let outcome = contraction.searched(self.search, effort, spent);
+        let mut outcome = contraction.searched(self.search, effort, spent);
         counters.add(&outcome.counters);
         problem.termination.check()?;
         match (outcome.status, problem.max_simulations) {
@@ -280,7 +289,9 @@ impl<'a> Groups<'_, 'a, '_> {
             (PlanStatus::Timeout, _) => self.disassembly.path_time_ran_out = true,
             _ => {}
         }
-        Ok(outcome)
+        let way = outcome.removals.pop().map(|r| VerifiedPath { path: r.path, depth: r.depth });
+        self.trace_tried(contraction.members(), way.is_some());
+        Ok((outcome, way))
     }
 
     /// The groups that can begin to move, the smallest of each direction.

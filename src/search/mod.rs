@@ -40,6 +40,7 @@ mod necked;
 mod novelty;
 mod order;
 mod outcome;
+mod own_scale;
 #[cfg(test)]
 mod paper_tests;
 mod pdp;

@@ -8,7 +8,6 @@ use rayon::prelude::*;
 use crate::blocking_graph::Blockage;
 use crate::budgets::SHORT_STEPS_PER_POLL;
 use crate::contact::obstruction;
-use crate::scene::Scene;
 use crate::termination::{Interrupt, Poll};
 use crate::tolerances::TOUCHED;
 
@@ -16,6 +15,8 @@ use super::action_table::ActionTable;
 use super::ball::is_ball;
 use super::disassembly::{Disassembly, SceneVersion, Stop};
 use super::inseparable::{FindPairs, InseparablePairs};
+use super::own_scale::scale_of;
+use super::problem::Problem;
 use super::state::{StateAction, StateNode, least_travel};
 use super::states::{PhaseStates, States};
 use super::strategy::Strategy;
@@ -38,6 +39,8 @@ struct Obstruction {
 pub(super) struct Order {
     /// Per part: whether it is a ball, which no action has to turn.
     balls: Vec<bool>,
+    /// Per part: whether it is searched at its own scale, and here only swept.
+    small: Vec<bool>,
     /// Parts that need not be tried while others stand.
     inseparable: InseparablePairs,
     /// By state and push.
@@ -47,11 +50,14 @@ pub(super) struct Order {
 }
 
 impl Order {
-    pub(super) fn new(scene: &Scene, strategy: Strategy, up: Vector3<f64>) -> Self {
+    pub(super) fn new(problem: &Problem<'_>, strategy: Strategy, up: Vector3<f64>) -> Self {
+        let Problem { scene, .. } = problem;
         let bodies = scene.bodies.iter().enumerate();
+        let is_small = |part| strategy.is_extended() && scale_of(problem, part).is_some();
         let is_ball = |(part, shape)| strategy.is_extended() && is_ball(shape, least_travel(scene, part));
         Self {
             balls: bodies.map(|(part, b)| is_ball((part, &*b.shape))).collect(),
+            small: (0..scene.bodies.len()).map(is_small).collect(),
             inseparable: InseparablePairs::default(),
             obstructions: HashMap::new(),
             up,
@@ -73,6 +79,11 @@ impl Order {
         Ok(strategy.is_extended() && !problem.is_group && find(&mut self.inseparable, problem, standing)?)
     }
 
+    /// Whether a part is searched at its own scale, and here only swept.
+    pub(super) fn is_small(&self, part: usize) -> bool {
+        self.small[part]
+    }
+
     /// The pairs that were found.
     pub(super) fn inseparable(&self) -> &InseparablePairs {
         &self.inseparable
@@ -91,7 +102,7 @@ impl Order {
     /// The states to expand, the initial one included. Of two last parts it does not matter which one moves
     /// against the other: beyond the first push, only the smaller one does, or the one that may leave
     /// earlier. A part that is
-    /// proved to stay is not moved, and a ball not turned.
+    /// proved to stay is not moved, and a ball not turned, nor here a part that is searched at its own scale.
     pub(super) fn expandable(&self, of: &PhaseStates<'_>, disassembly: &Disassembly<'_, '_>) -> Vec<usize> {
         let PhaseStates { strategy, phase, states, .. } = *of;
         let (problem, standing) = (&disassembly.problem, disassembly.everything.standing());
@@ -104,8 +115,8 @@ impl Order {
         };
         let is_rotation = phase == PlanningPhase::Rotation;
         let skipped = |n: &StateNode| Some(n.part) == still && (is_rotation || !n.is_root());
-        let in_vain =
-            |n: &StateNode| (is_rotation && self.balls[n.part]) || self.holder(n.part, standing).is_some();
+        let not_turned = |part: usize| is_rotation && (self.balls[part] || self.small[part]);
+        let in_vain = |n: &StateNode| not_turned(n.part) || self.holder(n.part, standing).is_some();
         let waits = |n: &StateNode| strategy.waits(phase, n);
         let may = |n: &StateNode| n.alive && problem.may_move(n.part);
         let wanted = |n: &StateNode| may(n) && of.lists(n) && !waits(n) && !skipped(n) && !in_vain(n);

@@ -13,7 +13,7 @@ use crate::contact::sampled::along_path::Penetration;
 use crate::contact::{PairPath, is_seen_to_enter};
 use crate::geometry::{Pose, SampleTree};
 use crate::plan::{Base, KnownVerdicts, Verdict, VerdictQuestion, Verifier, thinned};
-use crate::scene::Scene;
+use crate::scene::{ScaledShapes, Scene};
 use crate::simulation::{Action, TransitionFunction};
 use crate::termination::{Interrupt, Termination};
 
@@ -117,6 +117,8 @@ pub struct Problem<'a> {
     pub cache: RequestCache,
     /// The verdicts of this request.
     pub verdicts: Arc<KnownVerdicts>,
+    /// The shapes that this request scaled.
+    pub scaled: Arc<ScaledShapes>,
     /// Points added so far, per part.
     pub extra_points: HashMap<usize, Vec<Point3<f64>>>,
 }

@@ -74,6 +74,8 @@ struct Sbdp<'a, 'o> {
     sweep_memory: SweepMemory,
     cell_memory: CellMemory,
     unscrewing_memory: UnscrewingMemory,
+    /// Small parts that were searched at their own scale in vain, with the number of removals before.
+    small_searched: HashSet<(Effort, usize, usize)>,
     group_memory: GroupMemory,
     speculation: Speculation,
     /// Parts that were the base until another one was.
@@ -121,12 +123,13 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             strategy,
             states: States::new(&disassembly.problem.scene, strategy),
             actions: ActionTable::new(directions, translations, rotations),
-            order: Order::new(&disassembly.problem.scene, strategy, up),
+            order: Order::new(&disassembly.problem, strategy, up),
             novelty: Novelty::default(),
             invalidation: Invalidation::default(),
             sweep_memory: SweepMemory::default(),
             cell_memory: CellMemory::default(),
             unscrewing_memory: UnscrewingMemory::default(),
+            small_searched: HashSet::new(),
             group_memory: GroupMemory::default(),
             speculation: Speculation::default(),
             former_bases: Vec::new(),
@@ -168,7 +171,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                     break;
                 }
             }
-            if self.leave_along_threads()? {
+            if self.leave_along_threads()? || self.leave_at_own_scale(Effort::Pushes)? {
                 if self.disassembly.is_done() {
                     return Ok(());
                 }
@@ -235,6 +238,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             let left = self.disassembly.is_done()
                 || last?.any()
                 || self.leave_by_cells(CellStage::Last)?
+                || self.leave_at_own_scale(Effort::All)?
                 || self.leave_together(|groups| groups.leave(Effort::All))?;
             if self.disassembly.is_done() || !(left || self.release_rest()?) {
                 return Ok(());
@@ -437,7 +441,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         let mut expanded = HashSet::new();
         while next < jobs.len() {
             let size = self.window_size(jobs[next]);
-            let (window, end) = window(&jobs, next, size, |at| self.may_try(at));
+            let (window, end) = window(&jobs, next, size, |at| self.may_simulate(at));
             next = end;
             let mut motions = self.simulated(&jobs, &window)?.into_iter();
             while let Some((i, motion)) = motions.next() {
@@ -490,6 +494,11 @@ impl<'a, 'o> Sbdp<'a, 'o> {
     fn may_try(&self, at: StateAction) -> bool {
         let part = self.states.nodes[at.node].part;
         self.disassembly.problem.may_move(part) && self.states.is_open(self.strategy, at)
+    }
+
+    /// The same of a simulation at the scale of the assembly.
+    fn may_simulate(&self, at: StateAction) -> bool {
+        self.may_try(at) && !self.order.is_small(self.states.nodes[at.node].part)
     }
 
     fn transition(&self, at: StateAction) -> Transition {

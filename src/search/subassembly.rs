@@ -1,16 +1,11 @@
 //! Groups that left are taken apart: each by a search of its own, in which only its parts stand, where they stood in the
 //! assembly. A small group that does not come apart is searched again at its own scale, as if it were alone.
 
-use std::collections::HashMap;
-use std::sync::Arc;
-
 use crate::plan::{Base, PlanStatus};
-use crate::scene::OwnScale;
-use crate::termination::Interrupt;
 
 use super::deferred_removals::DeferredRemovals;
-use super::disassembly::interrupted;
 use super::outcome::{Outcome, Reason, Removal};
+use super::own_scale::{scale_of_all, searched_at};
 use super::problem::{Observer, Problem};
 use super::release::Release;
 use super::request::Planner;
@@ -69,49 +64,15 @@ pub(super) fn take_apart(
 /// with more removals counts, and how the second one ended.
 fn taken_apart(planner: Planner, problem: Problem<'_>, observer: &mut dyn Observer) -> Outcome {
     let found = run(planner, problem.clone(), observer);
-    if found.reason != Some(Reason::Exhausted) {
+    let (Some(Reason::Exhausted), Some(scale)) = (&found.reason, scale_of_all(&problem)) else {
         return found;
-    }
+    };
     let spent = problem.spent + found.counters.simulations;
-    match at_own_scale(planner, &Problem { spent, ..problem }, observer) {
-        Ok(None) => found,
-        Ok(Some(mut again)) => {
-            again.counters.add(&found.counters);
-            if again.removals.len() < found.removals.len() {
-                again =
-                    Outcome { status: again.status, reason: again.reason, counters: again.counters, ..found };
-            }
-            again
-        }
-        Err(interrupt) => {
-            let (status, reason) = interrupted(interrupt);
-            Outcome { status, reason, ..found }
-        }
+    let problem = Problem { spent, ..problem };
+    let mut again = searched_at(&problem, scale, |scaled| run(planner, scaled, observer));
+    again.counters.add(&found.counters);
+    if again.removals.len() >= found.removals.len() {
+        return again;
     }
-}
-
-/// The search for a group, at its own scale; `None` if that is the assembly's.
-fn at_own_scale(
-    planner: Planner,
-    problem: &Problem<'_>,
-    observer: &mut dyn Observer,
-) -> Result<Option<Outcome>, Interrupt> {
-    let Some(own) = OwnScale::of(&problem.scene, &problem.present, &problem.termination)? else {
-        return Ok(None);
-    };
-    let verifier = problem.verifier.at_scale(&own.scene, own.scene.longest_side / problem.scene.longest_side);
-    let scaled = Problem {
-        scene: own.scene.clone(),
-        verifier: &verifier,
-        clearance: problem.clearance.map(|gap| gap * own.factor),
-        verdicts: Arc::default(),
-        extra_points: HashMap::new(),
-        ..problem.clone()
-    };
-    let mut outcome = run(planner, scaled, observer);
-    for removal in &mut outcome.removals {
-        removal.path.iter_mut().for_each(|pose| *pose = own.restored(pose));
-        removal.depth /= own.factor;
-    }
-    Ok(Some(outcome))
+    Outcome { status: again.status, reason: again.reason, counters: again.counters, ..found }
 }

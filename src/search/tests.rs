@@ -57,6 +57,7 @@ pub(super) fn problem(scene: Scene, verifier: &Verifier) -> Problem<'_> {
         termination: Termination::default(),
         cache: RequestCache::default(),
         verdicts: Arc::default(),
+        scaled: Arc::default(),
         extra_points: HashMap::new(),
     }
 }

@@ -308,6 +308,7 @@ impl Entry {
             termination: termination.clone(),
             cache: cache.clone(),
             verdicts: Arc::default(),
+            scaled: Arc::default(),
             extra_points: HashMap::new(),
         }
     }

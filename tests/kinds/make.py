@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Writes random members of kinds of mechanisms whose answer is known by construction.
 
-usage: make.py OUT [--kinds keyhole,thread,...] [--cases 20] [--seed 1]     (needs numpy and manifold3d)
+usage: make.py OUT [--kinds keyhole,thread,...] [--cases 20] [--seed 1] [--beam N]     (needs numpy and manifold3d)
 
 OUT/index.json lists them; OUT/kinds/ID/ holds one OBJ file per part and assembly.json, whose notes give the numbers
 that were drawn. Lengths are millimetres, z is up. `planned` members come apart; `infeasible` ones never do.
 The play of a fit is drawn between 0.02 and 0.3, evenly on a logarithmic scale.
+With --beam, a fixed beam stands beside each, N times as long as the mechanism: the answer is the same.
 """
 import argparse
 import json
@@ -260,12 +261,22 @@ def write(folder, parts, about):
         json.dump(about, out, indent=1)
 
 
+def beam(parts, times):
+    """A beam beside some parts, `times` as long as they are."""
+    low, high = (np.array([part.bounding_box() for part in parts]).reshape(-1, 2, 3)[:, i] for i in (0, 1))
+    low, high = low.min(axis=0), high.max(axis=0)
+    length = float((high - low).max())
+    begin = high[1] + 0.5 * length
+    return box([low[0], begin, low[2]], [low[0] + times * length, begin + length, low[2] + length])
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out")
     parser.add_argument("--kinds", default=",".join(kind.__name__ for kind in KINDS))
     parser.add_argument("--cases", type=int, default=20)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--beam", type=float, help="how many times as long as the mechanism the beam beside it is")
     options = parser.parse_args()
     known = {kind.__name__: kind for kind in KINDS}
     wanted = options.kinds.split(",")
@@ -282,9 +293,13 @@ def main():
             pieces = [len(part.decompose()) for part in parts]
             if pieces != [1] * len(parts):
                 raise SystemExit(f"{name} {case}: a part falls into {max(pieces)} pieces: {drawn}")
+            if options.beam:
+                parts.append(beam(parts, options.beam))
             expect = "planned" if comes_apart else "infeasible"
             row = dict(set="kinds", id=f"{name}_{case:02}", parts=len(parts), expect=expect, kind=name)
             about = dict(name=row["id"], units="mm", expect=expect, notes=kind.__doc__, drawn=drawn)
+            if options.beam:
+                about["fixed"] = [str(len(parts) - 1)]
             write(os.path.join(options.out, "kinds", row["id"]), parts, about)
             index.append(row)
     with open(os.path.join(options.out, "index.json"), "w") as out:

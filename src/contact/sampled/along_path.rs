@@ -124,12 +124,29 @@ impl PathSamples {
     ) -> Result<Vec<Penetration>, Interrupt> {
         let every = if turns_far(&pair_path.path) { FIRST_POSES_EVERY } else { 1 };
         let poses: Vec<Pose> = dense(pair_path, &pair_path.path).into_iter().step_by(every).collect();
-        self.penetrations_at(pair_path, &poses, limit, Closeness::Sparse, termination)
+        let sparse =
+            |shares| self.penetrations_of(shares, pair_path, &poses, limit, Closeness::Sparse, termination);
+        // A share of the samples refutes most paths that all of them refute. The others help in refining the motion.
+        let few = sparse(PoseShares::one)?;
+        if few.iter().any(|e| e.over > limit) { sparse(PoseShares::of) } else { Ok(few) }
     }
 
     /// The same at some poses, with samples of one density.
     fn penetrations_at(
         &self,
+        pair_path: &PairPath<'_>,
+        poses: &[Pose],
+        limit: f64,
+        closeness: Closeness,
+        termination: &Termination,
+    ) -> Result<Vec<Penetration>, Interrupt> {
+        self.penetrations_of(PoseShares::of, pair_path, poses, limit, closeness, termination)
+    }
+
+    /// The same with the shares of the samples that `shares` gives each pose, by its number and that of all.
+    fn penetrations_of(
+        &self,
+        shares: fn(usize, usize) -> PoseShares,
         pair_path: &PairPath<'_>,
         poses: &[Pose],
         limit: f64,
@@ -147,7 +164,7 @@ impl PathSamples {
         let has_inside = [standing.has_inside_for(moving), moving.has_inside_for(standing)];
         let measured = (0..sides.len()).filter(|&side| has_inside[side]);
         for (side, share) in measured.flat_map(|side| (0..SAMPLE_SHARES).map(move |share| (side, share))) {
-            let takes = |i: &usize| PoseShares::of(*i, poses.len()).takes(share);
+            let takes = |i: &usize| shares(*i, poses.len()).takes(share);
             let moments: Vec<usize> = (0..poses.len()).filter(takes).collect();
             let stretches = moments.chunks(POSES_AT_ONCE).map(<[usize]>::to_vec);
             asked.extend(stretches.map(|moments| SampledStretch { side, share, moments }));
@@ -277,6 +294,11 @@ impl PoseShares {
             _ if poses <= 2 * LONG_PATH => Self { index, of: 2 },
             _ => Self { index, of: SAMPLE_SHARES },
         }
+    }
+
+    /// One share at every pose.
+    fn one(index: usize, _: usize) -> Self {
+        Self { index, of: SAMPLE_SHARES }
     }
 
     fn takes(self, share: usize) -> bool {

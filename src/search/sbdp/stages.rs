@@ -17,7 +17,7 @@ use super::super::critical_turns::TurningPart;
 use super::super::disassembly::{Disassembly, Stop, Transition, joined};
 use super::super::groups::{Groups, HeldGroup};
 use super::super::inseparable::InseparablePairs;
-use super::super::problem::{Problem, VerifiedPath};
+use super::super::problem::{Effort, Problem, VerifiedPath};
 use super::super::state::StateNode;
 use super::super::trace::{PlanningPhase, TraceEvent};
 use super::super::unscrewing::{Unscrewed, unscrewed};
@@ -40,9 +40,8 @@ impl<'a, 'o> Sbdp<'a, 'o> {
         if !self.strategy.is_extended() || !self.disassembly.problem.sweeps {
             return Ok(false);
         }
-        let open = self.expandable(PlanningPhase::Translation);
+        let mut parts = self.open_parts(false);
         let of = self.of(PlanningPhase::Translation);
-        let mut parts = self.order.parts(&of, &open, &self.disassembly);
         parts.sort_by(|&a, &b| of.reach(a).total_cmp(&of.reach(b)));
         for part in parts {
             if self.unscrewing_memory.holds(part, self.disassembly.everything.standing()) {
@@ -64,6 +63,35 @@ impl<'a, 'o> Sbdp<'a, 'o> {
                 }
                 Err(met) => self.unscrewing_memory.keep(part, met),
             }
+        }
+        Ok(false)
+    }
+
+    /// The parts of the states that translations may lead on from, in the order of expansion: those that are searched at
+    /// their own scale, or the others.
+    fn open_parts(&self, small: bool) -> Vec<usize> {
+        let open = self.expandable(PlanningPhase::Translation);
+        let mut parts = self.order.parts(&self.of(PlanningPhase::Translation), &open, &self.disassembly);
+        parts.retain(|&part| self.order.is_small(part) == small);
+        parts
+    }
+
+    /// Takes a small part out that a search at its own scale finds a way for; true if there is one.
+    pub(super) fn leave_at_own_scale(&mut self, effort: Effort) -> Result<bool, Stop> {
+        if self.disassembly.problem.is_group {
+            return Ok(false);
+        }
+        for part in self.open_parts(true) {
+            let tried = (effort, part, self.disassembly.removals.len());
+            if self.small_searched.contains(&tried) {
+                continue;
+            }
+            if let Some(VerifiedPath { path, depth }) = self.groups().leave_alone(part, effort)? {
+                self.remove(part, path, depth)?;
+                self.take_free_parts()?;
+                return Ok(true);
+            }
+            self.small_searched.insert(tried);
         }
         Ok(false)
     }
@@ -173,7 +201,7 @@ impl<'a, 'o> Sbdp<'a, 'o> {
             return Ok(false);
         }
         let open = self.expandable(PlanningPhase::Translation);
-        for part in self.order.parts(&self.of(PlanningPhase::Translation), &open, &self.disassembly) {
+        for part in self.open_parts(false) {
             let is_start = |&node: &usize| {
                 let node = &self.states.nodes[node];
                 node.part == part && (stage == CellStage::Last || !self.is_turned(node))
