@@ -16,9 +16,11 @@ use serde::{Deserialize, Serialize};
 use crate::budgets::EFFORT_BEFORE_SAMPLES;
 use crate::contact::PairPath;
 use crate::contact::course::{Course, Interval, turns_far};
-use crate::contact::helix_profile::{path_on_thread, screw_depth, screw_depth_soon};
+use crate::contact::helix_profile::{
+    open_after_profiles, path_on_thread, screw_depth, screw_depth_soon, surfaces_cross,
+};
 use crate::contact::region_cover::path::{DepthPrecision, PathDepth, PathQuestion};
-use crate::contact::sampled::along_path::{PathSamples, Penetration};
+use crate::contact::sampled::along_path::{PathSamples, Penetration, Thoroughness};
 use crate::geometry::{Pose, Shape};
 use crate::scene::{AllowedPenetrations, CongruentPair, Scene};
 use crate::termination::{Interrupt, Termination};
@@ -253,15 +255,16 @@ impl Verifier {
         let (samples, limit) = (&self.samples, &self.limit_past(pair_path.shapes));
         let course = &Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
         let question = self.question(pair_path, course, termination);
-        let mut found = depth_soon(&question)?;
-        if found.iter().any(|side| !side.open.is_empty()) {
-            // Most paths that are refused are refused here.
-            let seen = samples.early_penetrations_along(pair_path, *limit, termination)?;
-            if seen.iter().any(|e| e.over > *limit) {
-                return Ok(Verdict::past(0.0, seen, *limit));
-            }
-            found = depth_after(&question, found, *limit)?;
-        }
+        let early = |thoroughness, stretch: &[Pose]| {
+            let seen =
+                samples.early_penetrations_along(pair_path, stretch, *limit, thoroughness, termination)?;
+            let is_refused = seen.iter().any(|e| e.over > *limit);
+            Ok(is_refused.then(|| Verdict::past(0.0, seen, *limit)))
+        };
+        let found = match bounded(&question, early)? {
+            Ok(found) => found,
+            Err(refused) => return Ok(refused),
+        };
         let bound = found.iter().map(|f| f.bound).fold(0.0, f64::max);
         let [part, other] = pair_path.parts;
         let effort = found.each_ref().map(|f| f.effort);
@@ -282,8 +285,7 @@ impl Verifier {
         let course = Course::new(&pair_path.path, pair_path.centre, pair_path.reach());
         let termination = Termination::default();
         let question = self.question(pair_path, &course, &termination);
-        let soon = depth_soon(&question).unwrap();
-        depth_after(&question, soon, self.limit_past(pair_path.shapes)).unwrap()
+        bounded(&question, |_, _| Ok(None::<()>)).unwrap().unwrap()
     }
 
     /// The question of how deep each of two parts gets into the other along a path.
@@ -306,22 +308,38 @@ impl Verifier {
     }
 }
 
-/// How deep each of two parts gets into the other, as far as little effort bounds it.
-fn depth_soon(question: &PathQuestion<'_>) -> Result<[PathDepth; 2], Interrupt> {
-    if turns_far(&question.pair_path.path) {
-        screw_depth_soon(question)
-    } else {
-        question.depth_within(EFFORT_BEFORE_SAMPLES)
-    }
-}
-
-/// The same as far as it can be bounded, after [`depth_soon`] left some stretches open.
-fn depth_after(
+/// How deep each of two parts gets into the other, as far as that can be bounded. Where little effort leaves stretches
+/// open, `early` looks at samples: most paths that are refused are refused there, and what refuses them is the answer.
+fn bounded<R>(
     question: &PathQuestion<'_>,
-    soon: [PathDepth; 2],
-    limit: f64,
-) -> Result<[PathDepth; 2], Interrupt> {
-    if turns_far(&question.pair_path.path) { screw_depth(question, soon, limit) } else { question.depth() }
+    early: impl Fn(Thoroughness, &[Pose]) -> Result<Option<R>, Interrupt>,
+) -> Result<Result<[PathDepth; 2], R>, Interrupt> {
+    let is_open = |found: &[PathDepth; 2]| found.iter().any(|side| !side.open.is_empty());
+    let path = &question.pair_path.path;
+    if !turns_far(path) {
+        let soon = question.depth_within(EFFORT_BEFORE_SAMPLES)?;
+        if !is_open(&soon) {
+            return Ok(Ok(soon));
+        }
+        let refused = early(Thoroughness::All, path)?;
+        return refused.map_or_else(|| question.depth().map(Ok), |refused| Ok(Err(refused)));
+    }
+    let mut soon = screw_depth_soon(question)?;
+    // Where surfaces cross, samples alone decide.
+    if !is_open(&soon) || surfaces_cross(question) {
+        return Ok(Ok(soon));
+    }
+    // Profiles take less time than all samples.
+    if let Some(refused) = early(Thoroughness::Few, path)? {
+        return Ok(Err(refused));
+    }
+    let open = open_after_profiles(question, &mut soon, question.precision.deep)?;
+    for stretch in joined(question.course, open.iter()) {
+        if let Some(refused) = early(Thoroughness::All, &question.course.path_between(stretch))? {
+            return Ok(Err(refused));
+        }
+    }
+    screw_depth(question, soon, open).map(Ok)
 }
 
 /// Stretches of the path; those that touch each other become one.

@@ -123,24 +123,37 @@ pub(crate) fn screw_depth_soon(way: &PathQuestion<'_>) -> Result<[PathDepth; 2],
     bounded(way, vec![Interval::WHOLE], EFFORT_BEFORE_PROFILES)
 }
 
-/// The same as far as profiles and more effort bound it, after [`screw_depth_soon`] left some stretches open.
+/// Whether surfaces cross along a screw, as they do if one part lies in the other: neither profiles nor more effort bound
+/// then what [`screw_depth_soon`] left open.
+pub(crate) fn surfaces_cross(way: &PathQuestion<'_>) -> bool {
+    way.pair_path.allowed > 0.0 || has_holes(way)
+}
+
+/// Of the stretches that [`screw_depth_soon`] left open (and that are taken out of what it found), those that profiles
+/// along the helix do not settle.
+///
+/// # Errors
+/// The termination condition became true.
+pub(crate) fn open_after_profiles(
+    way: &PathQuestion<'_>,
+    soon: &mut [PathDepth; 2],
+    limit: f64,
+) -> Result<Vec<Interval>, Interrupt> {
+    // They do not overlap at the start: where neither surface meets the other, they stay apart.
+    unsettled(way.course, way.pair_path.surfaces(), taken_open(soon), limit, way.termination)
+}
+
+/// What [`screw_depth_soon`] found, and the depth on the stretches that were open after profiles, as far as more effort
+/// bounds it.
 ///
 /// # Errors
 /// The termination condition became true.
 pub(crate) fn screw_depth(
     way: &PathQuestion<'_>,
-    mut soon: [PathDepth; 2],
-    limit: f64,
+    [mut one, mut other]: [PathDepth; 2],
+    open: Vec<Interval>,
 ) -> Result<[PathDepth; 2], Interrupt> {
-    // If one part lies in the other, surfaces cross, and more effort would bound no more.
-    if way.pair_path.allowed > 0.0 || has_holes(way) {
-        return Ok(soon);
-    }
-    let open = taken_open(&mut soon);
-    // They do not overlap at the start: where neither surface meets the other, they stay apart.
-    let open = unsettled(way.course, way.pair_path.surfaces(), open, limit, way.termination)?;
     let [more, others] = bounded(way, open, PATH_EFFORT_IN_DOUBT)?;
-    let [mut one, mut other] = soon;
     one.add(more);
     other.add(others);
     Ok([one, other])

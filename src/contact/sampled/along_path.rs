@@ -58,6 +58,15 @@ enum Closeness {
     Dense,
 }
 
+/// How thoroughly a path is looked at early.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Thoroughness {
+    /// A share of the samples at few poses, and only if these refute the path, all.
+    Few,
+    /// All that may refute it early.
+    All,
+}
+
 impl Closeness {
     const ALL: [Self; 2] = [Self::Sparse, Self::Dense];
 }
@@ -115,20 +124,29 @@ impl PathSamples {
         Ok(penetrations)
     }
 
-    /// The same along all of a path, at the coarse samples alone, and at few poses if it turns far.
+    /// The same at the coarse samples alone, and at few poses if the whole path turns far.
     pub(crate) fn early_penetrations_along(
         &self,
         pair_path: &PairPath<'_>,
+        stretch: &[Pose],
         limit: f64,
+        thoroughness: Thoroughness,
         termination: &Termination,
     ) -> Result<Vec<Penetration>, Interrupt> {
         let every = if turns_far(&pair_path.path) { FIRST_POSES_EVERY } else { 1 };
-        let poses: Vec<Pose> = dense(pair_path, &pair_path.path).into_iter().step_by(every).collect();
-        let sparse =
-            |shares| self.penetrations_of(shares, pair_path, &poses, limit, Closeness::Sparse, termination);
-        // A share of the samples refutes most paths that all of them refute. The others help in refining the motion.
-        let few = sparse(PoseShares::one)?;
-        if few.iter().any(|e| e.over > limit) { sparse(PoseShares::of) } else { Ok(few) }
+        let poses: Vec<Pose> = dense(pair_path, stretch).into_iter().step_by(every).collect();
+        let sparse = |poses: &[Pose], shares| {
+            self.penetrations_of(shares, pair_path, poses, limit, Closeness::Sparse, termination)
+        };
+        if let Thoroughness::Few = thoroughness {
+            let few: Vec<Pose> = poses.iter().step_by(FIRST_POSES_EVERY).copied().collect();
+            let found = sparse(&few, PoseShares::one)?;
+            // If they refute the path, the others help in refining the motion.
+            if found.iter().all(|e| e.over <= limit) {
+                return Ok(found);
+            }
+        }
+        sparse(&poses, PoseShares::of)
     }
 
     /// The same at some poses, with samples of one density.
