@@ -24,7 +24,7 @@ pub(crate) struct OwnScale {
 }
 
 impl OwnScale {
-    /// Scales the standing parts of a scene by a power of two. `longest_side` is that of the assembly as which it counts.
+    /// Scales the standing parts (ascending) of a scene by a power of two. `longest_side` is that of the assembly as which it counts.
     pub(crate) fn of(
         scene: &Scene,
         standing: &[usize],
@@ -43,7 +43,7 @@ impl OwnScale {
         let mut scaled = Scene::of(bodies, longest_side);
         let mut allowed = AllowedPenetrations::none();
         for (&(a, b), depth) in scene.allowed.depth.iter() {
-            if standing.contains(&a) && standing.contains(&b) {
+            if [a, b].iter().all(|part| standing.binary_search(part).is_ok()) {
                 allowed.allow(a, b, depth * factor);
             }
         }
