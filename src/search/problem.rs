@@ -87,7 +87,8 @@ pub struct Problem<'a> {
     pub preferred: PreferredGroups,
     /// Parts that must come out; `None` for all.
     pub targets: Option<Vec<usize>>,
-    /// Whether the only part that may move is the body of a group: nothing is proved about it, and it is in no group.
+    /// Whether the only part that may move is the body of a group, or one at its own scale: nothing is proved about it, and it
+    /// is in no group.
     pub is_group: bool,
     /// How far the search goes.
     pub effort: Effort,
