@@ -73,6 +73,7 @@ pub mod sdf;
 pub mod search;
 pub mod service;
 pub mod simulation;
+pub mod statics;
 pub mod telemetry;
 pub mod termination;
 mod tolerances;

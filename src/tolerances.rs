@@ -486,6 +486,44 @@ pub(crate) const DISC_SHARE: f64 = 0.98;
 /// them; at double, moves in a grid count as short, too.
 pub(crate) const SHORT_MOVE: f64 = 0.9;
 
+// Statics.
+
+/// Share of the longest side of the smaller part of a pair. Surfaces no further apart count as touching: parts in CAD are
+/// drawn with gaps, and settle. Chosen: a washer of 16 mm may be drawn 0.16 mm off. At half, parts with a usual play fall
+/// that do not; at double, a part counts as held by what it passes at a visible distance.
+pub(crate) const CONTACT_GAP: f64 = 0.01;
+/// Length. Parts that overlap by more as assembled are one body: press fits, and threads drawn as cylinders. Twice what a
+/// motion may enter, so that no contact counts as a fit. At half, rounded coordinates join parts; at double, fits with an
+/// overlap of 0.0001 of the assembly come loose.
+pub(crate) const JOINED_OVERLAP: f64 = 2.0 * DEPTH_TOLERANCE;
+/// Sine of the angle from which on two edges cross in a point (3 degrees). Flatter ones lie along each other, and their
+/// corners are contacts. At half, points far from where both are nearest count; at double, rods that cross at 4 degrees
+/// have no contact but at their ends.
+pub(crate) const CROSSED_EDGES: f64 = 0.05;
+/// Share. A direction leads out of an edge between its faces even if it is this little outside of both: facets of round
+/// parts lean by some degrees, and one may be no edge's. At half and double, cylinders with fewer or more sides.
+pub(crate) const CONTACT_CONE: f64 = 0.05;
+/// Share of a body's weight by which forces may miss it and still hold it, and of its speed by which a motion may enter a
+/// contact: far above the solver's precision (1e-8), far below what friction and densities are known to. At half and
+/// double no effect is known.
+pub(crate) const HELD_SHARE: f64 = 1e-3;
+/// Share of the strongest force by which a force may leave its friction cone. As above.
+pub(crate) const BALANCED: f64 = 1e-6;
+/// Share of the heaviest body's weight below which none counts as lighter, so that the program is well conditioned: such
+/// a body moves the centre of mass of both by as little.
+pub(crate) const LEAST_WEIGHT: f64 = 1e-4;
+/// How far a contact gives way under the weight of the heaviest body, in a unit of its own: only ratios of forces depend
+/// on it, where several contacts share a load.
+pub(crate) const CONTACT_COMPLIANCE: f64 = 1.0;
+/// Share of the fastest fall. What moves down more slowly gives way to what falls, and does not fall itself. At half and
+/// double, more or fewer parts are named.
+pub(crate) const FALL_SHARE: f64 = 0.1;
+/// Share of the given friction, and share of the weight, to which the least friction and the margin are found.
+pub(crate) const FRICTION_PRECISION: f64 = 1.0 / 512.0;
+/// Multiple of the least friction at which slips are seen to settle. Closer to it they take hundreds of repetitions; at
+/// double the distance, a friction that clamping alone makes suffice may pass for the least.
+pub(crate) const FRICTION_ROOM: f64 = 1.02;
+
 // Tessellation of STEP files.
 
 /// mm. How far the triangles of a STEP file may be from its surfaces, if the user does not say: the smallest play that is

@@ -24,7 +24,7 @@ pub(super) use input::Input;
 pub(super) use load::{BenchCancel, BenchLoad, BenchLoadClient, BenchSoak};
 pub(super) use poses::placed;
 pub(super) use through_daemon::{BenchChurn, BenchLatency, BenchRawPeer, BenchReplan, BenchRestart};
-pub(super) use view::{GraphArguments, StepsArguments, ViewArguments};
+pub(super) use view::{GraphArguments, StaticsArguments, StepsArguments, ViewArguments};
 
 /// Plans how assemblies come apart.
 #[derive(Debug, Parser)]
@@ -59,6 +59,8 @@ pub(super) enum Command {
     Graph(GraphArguments),
     /// Write a plan as instructions
     Steps(StepsArguments),
+    /// Say after each step of a plan what stands by itself, what needs friction, and what has to be held
+    Statics(StaticsArguments),
     /// Show the state of the running daemon
     Status(super::status::StatusArguments),
     /// Check a configuration of the daemon

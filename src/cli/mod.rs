@@ -1,7 +1,7 @@
 //! The command line `sbdp`.
 //!
 //! `plan` asks the daemon if one runs, else a service in this process; `check` always works
-//! here; `view`, `graph` and `steps` show; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
+//! here; `view`, `graph`, `steps` and `statics` show; `cache` looks after the store on disk; `bench` runs `plan` in processes of its own. Results go to stdout; progress, warnings about the way there and errors to stderr.
 
 mod args;
 mod backend;
@@ -22,6 +22,7 @@ mod plan;
 mod progress;
 mod report;
 mod staging;
+mod statics;
 mod status;
 mod steps;
 mod subject;
@@ -37,6 +38,9 @@ use clap::Parser;
 use args::{Arguments, Command};
 use error::CliError;
 
+/// The name of the file that is stdout.
+const STDOUT: &str = "-";
+
 /// Runs the command that the process was given.
 #[must_use]
 pub fn run() -> ExitCode {
@@ -47,6 +51,7 @@ pub fn run() -> ExitCode {
         Command::View(arguments) => view::run(&arguments),
         Command::Graph(arguments) => graph::run(&arguments),
         Command::Steps(arguments) => steps::run(&arguments),
+        Command::Statics(arguments) => statics::run(&arguments),
         Command::Status(arguments) => status::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Cache(arguments) => cache::run(&arguments),

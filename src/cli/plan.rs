@@ -15,7 +15,7 @@ use super::listener::Listener;
 use super::part_names::{part_named, resolve};
 use super::staging::staging;
 use super::subject::{Subject, further, only_mesh};
-use super::{cache, interrupt, print, report, written};
+use super::{STDOUT, cache, interrupt, print, report, written};
 use crate::bench::end_with_benchmark;
 use crate::cache::CacheSettings;
 use crate::document::{PlanDocument, SourceDocument};
@@ -34,9 +34,6 @@ pub(super) fn run(arguments: &PlanArguments) -> Result<ExitCode, CliError> {
     }
     Ok(exit_code(&planned.subject.plan))
 }
-
-/// The name of the file that is stdout.
-const STDOUT: &str = "-";
 
 /// A plan with all that is needed to show it.
 pub(super) struct Planned {

@@ -94,7 +94,7 @@ impl Subject {
         Ok(Self::new(base, revision, plan))
     }
 
-    fn admitted(&self) -> Result<(Service, AssemblyId), CliError> {
+    pub(super) fn admitted(&self) -> Result<(Service, AssemblyId), CliError> {
         let service = Service::default();
         let base = service.admit(&self.base)?;
         let id = service.revise(base.id, &self.revision)?.id;

@@ -77,6 +77,11 @@ impl ConvexEdges {
         self.edges.len()
     }
 
+    /// All of them.
+    pub fn all(&self) -> impl Iterator<Item = &ConvexEdge> {
+        self.edges.iter()
+    }
+
     /// Where they end.
     #[must_use]
     pub fn ends(&self) -> &OrientedSamples {

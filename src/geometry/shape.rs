@@ -225,7 +225,8 @@ impl Shape {
 }
 
 /// Closer on small parts, so that a pin has as many samples around as a plate has along. Only parts that are scaled for
-/// the search of a much smaller one are larger than 100: their number of samples is bounded.
+/// the search of a much smaller one are larger than 100: their samples are a thousandth of the longest side apart. At half
+/// that number small parts stand between two samples; at double, such a part takes four times the memory.
 fn spacing(bounds: &Bounds) -> Spacing {
     let size = bounds.extents().max();
     let edge = (size / 40.0).clamp(0.02, (size / 1000.0).max(0.1));

@@ -15,10 +15,12 @@ mod prepared;
 mod records;
 mod relay;
 mod shared_shape;
+mod statics;
 mod store;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Weak};
 
@@ -35,6 +37,7 @@ use crate::scene::{HullStore, JoinedHulls};
 use crate::sdf::{FieldStore, keep_field, keep_rest_of_field};
 use crate::search::{Engine, PlanRequest, PlanSink, Staging, axes_of, least_travel};
 use crate::simulation::{Action, Axis, PenaltyParameters};
+use crate::statics::{Stability, StaticsOptions};
 use crate::termination::Termination;
 
 use entry::{Entry, engine_of};
@@ -42,6 +45,7 @@ use pools::Pools;
 pub use records::RECORD_KINDS;
 pub(crate) use records::{AnsweredQuestion, recent_answers, remember_answer, remembered_answer};
 use relay::Discard;
+pub use statics::StandingState;
 use store::AssemblyStore;
 pub use store::StoreStatistics;
 
@@ -387,6 +391,32 @@ impl Service {
         let least = |part| least_travel(scene, part);
         let engine = engine_of(engine, PenaltyParameters::default());
         Ok(audit(rule, scene, &present, &*engine, &least, termination).ok())
+    }
+
+    /// How the parts of an assembly stand under gravity in each of some states. `screwed`: parts that are screwed off,
+    /// which are one body with those that they share a thread with.
+    ///
+    /// # Errors
+    /// The assembly is unknown, a part does not exist, or the termination condition became true (`Ok(None)`).
+    pub fn statics(
+        &self,
+        id: AssemblyId,
+        options: &StaticsOptions,
+        states: &[StandingState],
+        screwed: &BTreeSet<usize>,
+        termination: &Termination,
+    ) -> Result<Option<Vec<Stability>>, ServiceError> {
+        let entry = self.entry(id, termination)?;
+        let count = entry.assembly.parts.len();
+        check_parts(&[("screwed", screwed.iter().copied().collect())], count)?;
+        for state in states {
+            check_parts(&[("parts", state.parts.iter().map(|(part, _)| *part).collect())], count)?;
+            check_parts(&[("stays", state.stays.clone())], count)?;
+        }
+        let cache = RequestCache::of(Arc::clone(&self.cache));
+        let Ok((prepared, _)) = entry.prepared(termination, &cache) else { return Ok(None) };
+        let (assembly, scene) = (&entry.assembly, &prepared.scene);
+        Ok(statics::stabilities(assembly, scene, options, states, screwed, termination).ok())
     }
 
     /// The blocking graphs of the assembled state along some axes, both ways each, without the `removed` parts

@@ -1,0 +1,361 @@
+//! How bodies are held: by contact alone, by friction, or by hands.
+
+use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
+
+use nalgebra::{Unit, Vector3};
+
+use super::equilibrium::{Balance, ContactKey, Falling, HeldContact, System, Velocity};
+use super::{Connected, Statics};
+use crate::budgets::{HOLDING_SETS, SIDEWAYS_DIRECTIONS};
+use crate::termination::{Interrupt, Termination};
+use crate::tolerances::{FALL_SHARE, FRICTION_PRECISION, FRICTION_ROOM, HELD_SHARE};
+
+/// How the parts of a state are held.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Stability {
+    /// The least coefficient of friction with which all that does not fall stands: 0 where contacts alone hold it.
+    pub needs_friction: f64,
+    /// The share of the weight that may act sideways, in the worst of eight directions, until something falls: 0 is a
+    /// pencil on its tip, 1 withstands 45 degrees. `None` where something falls as it is, nothing is free, or it is not wanted.
+    pub margin: Option<f64>,
+    /// What falls, by bodies that are connected with each other.
+    pub unstable: Vec<Unstable>,
+    /// Parts of which it is not known whether they are held: the solver gave no answer that passes its check.
+    pub unknown: Vec<usize>,
+}
+
+/// Connected parts of which some fall.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unstable {
+    /// What falls.
+    pub falls: Vec<Fall>,
+    /// Sets of parts, each of which is enough to hold, the smallest ones that were found.
+    pub hold: Vec<Vec<usize>>,
+    /// Forces exist that would hold all of them, but only if something pressed the contacts together that does not: a
+    /// block between two walls.
+    pub needs_clamping: bool,
+}
+
+/// A part that falls.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fall {
+    /// The part.
+    pub part: usize,
+    /// The unit vector along which its centre of mass would begin to move if nothing rubbed.
+    pub direction: [f64; 3],
+}
+
+impl Stability {
+    /// That of several answers together.
+    pub(super) fn of(answers: &[Arc<Self>]) -> Self {
+        let mut all = Self::default();
+        for answer in answers {
+            all.needs_friction = all.needs_friction.max(answer.needs_friction);
+            all.margin = match (all.margin, answer.margin) {
+                (Some(one), Some(other)) => Some(one.min(other)),
+                (one, other) => one.or(other),
+            };
+            all.unstable.extend(answer.unstable.iter().cloned());
+            all.unknown.extend(&answer.unknown);
+        }
+        if !all.stands() {
+            all.margin = None;
+        }
+        all.unknown.sort_unstable();
+        all
+    }
+
+    /// Whether all is known to stand.
+    #[must_use]
+    pub fn stands(&self) -> bool {
+        self.unstable.is_empty() && self.unknown.is_empty()
+    }
+
+    /// The number of parts that have to be held at once.
+    #[must_use]
+    pub fn hands(&self) -> usize {
+        self.unstable.iter().map(|unstable| unstable.hold.first().map_or(0, Vec::len)).sum()
+    }
+}
+
+/// How bodies stand without regard to the least friction.
+enum Standing {
+    /// By contact alone, whatever the friction.
+    Smooth(Vec<Vector3<f64>>),
+    /// By friction, with these forces.
+    Rubbing(Vec<Vector3<f64>>),
+    Falls {
+        motion: Vec<Velocity>,
+        /// The motion without friction.
+        smooth: Vec<Velocity>,
+        needs_clamping: bool,
+    },
+    Unknown,
+}
+
+impl Standing {
+    /// That of a few bodies, asked all at once.
+    fn of(system: &System, friction: f64) -> Self {
+        let smooth = match system.balance(0.0, &Vector3::zeros()) {
+            Balance::Held(forces) => return Self::Smooth(forces),
+            Balance::Falls(falling) => falling.velocities,
+            Balance::Unknown => return Self::Unknown,
+        };
+        // With friction, a motion of the program leaves each surface on which it slips: its direction is not the true one.
+        match system.balance(friction, &Vector3::zeros()) {
+            Balance::Held(forces) if system.is_held_elastically(friction) => Self::Rubbing(forces),
+            Balance::Held(_) => Self::Falls { motion: smooth.clone(), smooth, needs_clamping: true },
+            Balance::Falls(Falling { velocities: motion, .. }) => {
+                Self::Falls { motion, smooth, needs_clamping: false }
+            }
+            Balance::Unknown => Self::Unknown,
+        }
+    }
+}
+
+/// How connected bodies are held.
+///
+/// Without friction most are held. What is not is loose, and is judged by itself with all else fixed: what falls then
+/// falls; what stands leans on the others, which have to bear it.
+pub(super) fn answer(
+    statics: &mut Statics<'_>,
+    connected: &Connected,
+    termination: &Termination,
+) -> Result<Stability, Interrupt> {
+    let system = statics.system(connected);
+    let friction = statics.friction;
+    let margin = |system: &System| match statics.margins {
+        true => margin(system, friction, termination).map(Some),
+        false => Ok(None),
+    };
+    let smooth = match held_smoothly(&system, &mut statics.forces) {
+        Balance::Held(_) => return Ok(Stability { margin: margin(&system)?, ..Stability::default() }),
+        Balance::Falls(smooth) => smooth,
+        Balance::Unknown => {
+            return Ok(Stability { unknown: connected.bodies.concat(), ..Stability::default() });
+        }
+    };
+    let mut found = Stability::default();
+    let mut held: HashMap<ContactKey, Vector3<f64>> = keyed(&system, smooth.forces.clone()).collect();
+    let mut fixed = BTreeSet::new();
+    for loose in statics.loose(connected, &is_loose(&smooth, &statics.down)) {
+        termination.check()?;
+        let judged = match statics.known_loose.get(&loose) {
+            Some(judged) => Arc::clone(judged),
+            None => Arc::new(judged(statics, &loose, termination)?),
+        };
+        statics.known_loose.insert(loose.clone(), Arc::clone(&judged));
+        match &*judged {
+            Loose::Stands { friction, forces } => {
+                found.needs_friction = found.needs_friction.max(*friction);
+                held.extend(forces.iter().copied());
+                continue;
+            }
+            Loose::Falls(unstable) => found.unstable.push(unstable.clone()),
+            Loose::Unknown => found.unknown.extend(loose.bodies.concat()),
+        }
+        fixed.extend(loose.bodies);
+    }
+    // What falls is taken as held: then all else has to bear what leans on it.
+    let rest = connected.without(&fixed);
+    let others = statics.system(&rest);
+    let given = others.contacts.iter().map(|c| held.get(&c.key).copied().unwrap_or_default()).collect();
+    if others.mended(given, found.needs_friction * FRICTION_ROOM).is_none() {
+        match Standing::of(&others, friction) {
+            Standing::Smooth(_) => {}
+            Standing::Rubbing(_) => found.needs_friction = least_friction(&others, friction, termination)?,
+            Standing::Falls { motion, smooth, needs_clamping } => {
+                found.unstable.push(unstable(
+                    statics,
+                    &rest,
+                    [&motion, &smooth],
+                    needs_clamping,
+                    termination,
+                )?);
+            }
+            Standing::Unknown => found.unknown.extend(rest.bodies.concat()),
+        }
+    }
+    if found.stands() {
+        found.margin = margin(&system)?;
+    }
+    Ok(found)
+}
+
+/// Bodies of which all beside them stays.
+#[derive(Debug)]
+pub(super) enum Loose {
+    /// They stand with this friction at least, by these forces.
+    Stands {
+        friction: f64,
+        forces: Vec<(ContactKey, Vector3<f64>)>,
+    },
+    Falls(Unstable),
+    Unknown,
+}
+
+fn judged(statics: &Statics<'_>, loose: &Connected, termination: &Termination) -> Result<Loose, Interrupt> {
+    let system = statics.system(loose);
+    Ok(match Standing::of(&system, statics.friction) {
+        Standing::Smooth(held) => Loose::Stands { friction: 0.0, forces: keyed(&system, held).collect() },
+        Standing::Rubbing(held) => {
+            let friction = least_friction(&system, statics.friction, termination)?;
+            // What leans on others rubs no more than it has to.
+            let held = match system.balance(friction * FRICTION_ROOM, &Vector3::zeros()) {
+                Balance::Held(held) => held,
+                Balance::Falls(_) | Balance::Unknown => held,
+            };
+            Loose::Stands { friction, forces: keyed(&system, held).collect() }
+        }
+        Standing::Falls { motion, smooth, needs_clamping } => {
+            Loose::Falls(unstable(statics, loose, [&motion, &smooth], needs_clamping, termination)?)
+        }
+        Standing::Unknown => Loose::Unknown,
+    })
+}
+
+/// Forces by the keys of the contacts.
+fn keyed(system: &System, forces: Vec<Vector3<f64>>) -> impl Iterator<Item = (ContactKey, Vector3<f64>)> {
+    system.contacts.iter().map(|contact| contact.key).zip(forces)
+}
+
+/// Whether bodies are held without friction, given forces that may hold most of them, which are replaced by those that do.
+fn held_smoothly(system: &System, forces: &mut HashMap<ContactKey, Vector3<f64>>) -> Balance {
+    let known = |contact: &HeldContact| forces.get(&contact.key).copied();
+    let given = || system.contacts.iter().map(|contact| known(contact).unwrap_or_default()).collect();
+    let is_begun = system.contacts.iter().any(|contact| known(contact).is_some());
+    let mended = if is_begun { system.mended(given(), 0.0) } else { None };
+    let found = mended.map_or_else(|| system.balance(0.0, &Vector3::zeros()), Balance::Held);
+    if let Balance::Held(held) = &found {
+        forces.extend(system.contacts.iter().map(|contact| contact.key).zip(held.iter().copied()));
+    }
+    found
+}
+
+/// By body: whether not all of its weight is held without friction, or it moves down with what is not.
+fn is_loose(smooth: &Falling, down: &Vector3<f64>) -> Vec<bool> {
+    let fall = |velocity: &Velocity| velocity.linear.dot(down);
+    let fastest = smooth.velocities.iter().map(fall).fold(0.0, f64::max);
+    let of = smooth.velocities.iter().zip(&smooth.shares);
+    of.map(|(velocity, share)| *share <= 1.0 - HELD_SHARE || fall(velocity) > FALL_SHARE * fastest).collect()
+}
+
+/// What of connected bodies falls, and what to hold.
+fn unstable(
+    statics: &Statics<'_>,
+    connected: &Connected,
+    [motion, smooth]: [&[Velocity]; 2],
+    needs_clamping: bool,
+    termination: &Termination,
+) -> Result<Unstable, Interrupt> {
+    let fall = |body: usize| motion[body].linear.dot(&statics.down);
+    let fastest = (0..motion.len()).map(fall).fold(0.0, f64::max);
+    let falling: Vec<usize> = (0..motion.len()).filter(|&body| fall(body) > FALL_SHARE * fastest).collect();
+    let mut falls = Vec::new();
+    for &body in &falling {
+        let direction = Unit::try_new(smooth[body].linear, f64::MIN_POSITIVE)
+            .unwrap_or_else(|| Unit::new_normalize(motion[body].linear));
+        let direction = direction.into_inner().into();
+        falls.extend(connected.bodies[body].iter().map(|&part| Fall { part, direction }));
+    }
+    falls.sort_by_key(|fall| fall.part);
+    let hold = holding(statics, connected, &falling, termination)?;
+    Ok(Unstable { falls, hold, needs_clamping })
+}
+
+/// The least coefficient of friction with which bodies stand that stand with a greater one.
+fn least_friction(system: &System, enough: f64, termination: &Termination) -> Result<f64, Interrupt> {
+    let least = |low: f64, holds: &dyn Fn(f64) -> bool| -> Result<f64, Interrupt> {
+        let (mut low, mut high) = (low, enough);
+        while high - low > FRICTION_PRECISION * enough {
+            termination.check()?;
+            let middle = (low + high) / 2.0;
+            if holds(middle) { high = middle } else { low = middle }
+        }
+        Ok(high)
+    };
+    let found =
+        least(0.0, &|friction| matches!(system.balance(friction, &Vector3::zeros()), Balance::Held(_)))?;
+    let room = found * FRICTION_ROOM;
+    // Close to the least friction slips take long to settle.
+    if room >= enough || system.is_held_elastically(room) {
+        return Ok(found);
+    }
+    least(room, &|friction| system.is_held_elastically(friction))
+}
+
+/// The share of the weight that may act sideways.
+fn margin(system: &System, friction: f64, termination: &Termination) -> Result<f64, Interrupt> {
+    let across = system.down.cross(&Vector3::ith(system.down.iamin(), 1.0)).normalize();
+    let other = system.down.cross(&across);
+    let mut least = 1.0;
+    for i in 0..SIDEWAYS_DIRECTIONS {
+        let (sine, cosine) = (std::f64::consts::TAU * i as f64 / SIDEWAYS_DIRECTIONS as f64).sin_cos();
+        let direction = across * cosine + other * sine;
+        let holds = |share: f64| matches!(system.balance(friction, &(direction * share)), Balance::Held(_));
+        termination.check()?;
+        if holds(least) {
+            continue;
+        }
+        let mut low = 0.0;
+        while least - low > FRICTION_PRECISION {
+            termination.check()?;
+            let middle = (low + least) / 2.0;
+            if holds(middle) { low = middle } else { least = middle }
+        }
+        least = low;
+    }
+    Ok(least)
+}
+
+/// The smallest sets of falling bodies that have to be held, each by one of its parts, the heaviest.
+fn holding(
+    statics: &Statics<'_>,
+    connected: &Connected,
+    falling: &[usize],
+    termination: &Termination,
+) -> Result<Vec<Vec<usize>>, Interrupt> {
+    let volume = |part: &usize| statics.scene.bodies[*part].shape.mass.volume;
+    let heaviest = |body: &usize| {
+        let parts = &connected.bodies[*body];
+        parts.iter().copied().max_by(|a, b| volume(a).total_cmp(&volume(b)).then(b.cmp(a)))
+    };
+    let named = |held: &[usize]| held.iter().filter_map(heaviest).collect::<Vec<_>>();
+    let is_enough = |held: &[usize]| {
+        let held = held.iter().map(|&body| connected.bodies[body].clone()).collect();
+        let rest = connected.without(&held);
+        if rest.bodies.is_empty() {
+            return true;
+        }
+        let rest = statics.system(&rest);
+        matches!(Standing::of(&rest, statics.friction), Standing::Smooth(_) | Standing::Rubbing(_))
+    };
+    let pairs =
+        (0..falling.len()).flat_map(|i| (i + 1..falling.len()).map(move |j| vec![falling[i], falling[j]]));
+    for sets in [falling.iter().map(|&body| vec![body]).collect::<Vec<_>>(), pairs.collect()] {
+        if sets.len() > HOLDING_SETS {
+            continue;
+        }
+        let mut found = Vec::new();
+        for held in sets {
+            termination.check()?;
+            if is_enough(&held) {
+                found.push(named(&held));
+            }
+        }
+        if !found.is_empty() {
+            return Ok(found);
+        }
+    }
+    // One after the other is let go, where the rest is enough.
+    let mut held = falling.to_vec();
+    for &body in falling {
+        termination.check()?;
+        let rest: Vec<usize> = held.iter().copied().filter(|&other| other != body).collect();
+        if is_enough(&rest) {
+            held = rest;
+        }
+    }
+    Ok(vec![named(&held)])
+}

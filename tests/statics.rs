@@ -1,0 +1,101 @@
+//! `sbdp statics`, from outside.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// An upright cuboid as OBJ.
+fn cuboid(lo: [f64; 3], hi: [f64; 3]) -> String {
+    let mut text = String::new();
+    for i in 0..8 {
+        let at = |axis: usize| if i >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
+        text.push_str(&format!("v {} {} {}\n", at(0), at(1), at(2)));
+    }
+    for [a, b, c, d] in [[1, 3, 4, 2], [5, 6, 8, 7], [1, 2, 6, 5], [3, 7, 8, 4], [1, 5, 7, 3], [2, 4, 8, 6]] {
+        text.push_str(&format!("f {a} {b} {c}\nf {a} {c} {d}\n"));
+    }
+    text
+}
+
+fn sbdp(folder: &Path, arguments: &[&str]) -> Output {
+    let command = &mut Command::new(env!("CARGO_BIN_EXE_sbdp"));
+    command.current_dir(folder).env("SBDP_CACHE_DIR", folder.join("cache")).args(arguments).output().unwrap()
+}
+
+/// The states of the plan of some boxes.
+fn states(folder: &Path, parts: &[(&str, String)], plan: &[&str], statics: &[&str]) -> Vec<Value> {
+    let assembly = folder.join("assembly");
+    fs::create_dir_all(&assembly).unwrap();
+    for (name, mesh) in parts {
+        fs::write(assembly.join(format!("{name}.obj")), mesh).unwrap();
+    }
+    let planned =
+        sbdp(folder, &[&["plan", "assembly", "--embedded", "-q", "--json", "plan.json"], plan].concat());
+    assert!(planned.status.success(), "{planned:?}");
+    let found = sbdp(folder, &[&["statics", "plan.json", "--json", "-"], statics].concat());
+    assert!(found.status.success(), "{found:?}");
+    let document: Value = serde_json::from_slice(&found.stdout).unwrap();
+    assert_eq!(document["schema"], "sbdp-statics/1");
+    document["states"].as_array().unwrap().clone()
+}
+
+/// A table, a beam that reaches over its edge, and a block that keeps the beam from tipping.
+fn counterweight() -> [(&'static str, String); 3] {
+    [
+        ("table", cuboid([0.0, 0.0, 0.0], [100.0, 60.0, 20.0])),
+        ("beam", cuboid([50.0, 20.0, 20.0], [190.0, 40.0, 30.0])),
+        ("weight", cuboid([50.0, 15.0, 30.0], [75.0, 45.0, 70.0])),
+    ]
+}
+
+#[test]
+fn a_beam_falls_once_its_counterweight_is_gone() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = ["--base", "table", "--target", "weight"];
+    let states = states(folder.path(), &counterweight(), &plan, &["--stays", "table", "--margin"]);
+    let [before, after] = &states[..] else { panic!("{states:?}") };
+    assert_eq!(before["standing"].as_array().unwrap().len(), 3);
+    assert_eq!((&before["unstable"], &before["needs_friction"]), (&Value::Array(vec![]), &Value::from(0.0)));
+    assert!(before["margin"].as_f64().unwrap() > 0.1, "{before}");
+    let [unstable] = &after["unstable"].as_array().unwrap()[..] else { panic!("{after}") };
+    assert_eq!(unstable["falls"][0]["part"], "beam");
+    assert_eq!(unstable["hold"], serde_json::json!([["beam"]]));
+    assert_eq!((&unstable["needs_clamping"], &after["margin"]), (&Value::Bool(false), &Value::Null));
+}
+
+#[test]
+fn an_assembly_plan_has_the_states_of_the_disassembly_backwards() {
+    let folder = tempfile::tempdir().unwrap();
+    let parts = [
+        ("plate", cuboid([0.0, 0.0, 0.0], [100.0, 60.0, 10.0])),
+        ("block", cuboid([40.0, 20.0, 10.0], [60.0, 40.0, 30.0])),
+    ];
+    let apart = states(folder.path(), &parts, &["--base", "plate"], &[]);
+    let together = states(folder.path(), &parts, &["--base", "plate", "--assembly"], &[]);
+    assert_eq!(apart.len(), 2);
+    for (one, other) in apart.iter().zip(together.iter().rev()) {
+        for field in ["standing", "needs_friction", "margin", "unstable"] {
+            assert_eq!(one[field], other[field], "{field}");
+        }
+    }
+}
+
+#[test]
+fn questions_that_have_no_answer_are_refused_with_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    states(folder.path(), &counterweight(), &["--base", "table"], &[]);
+    for (arguments, words) in [
+        (&["statics", "plan.json", "--stays", "nobody"][..], "no part `nobody`"),
+        (&["statics", "plan.json", "--friction", "-1"], "from 0 up"),
+        (&["statics", "plan.json", "--friction", "nan"], "from 0 up"),
+        (&["statics", "plan.json", "--up", "0,0,0"], "one is not 0"),
+        (&["statics", "nowhere.json"], "nowhere.json"),
+    ] {
+        let output = sbdp(folder.path(), arguments);
+        let error = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
+        assert!(error.contains(words), "{arguments:?}: {error}");
+    }
+}
