@@ -19,6 +19,14 @@ pub struct StandingState {
     pub stays: Vec<usize>,
 }
 
+/// States with the same parts aside.
+struct SamePlaces {
+    /// These parts, and how they have moved.
+    aside: Vec<(usize, Pose)>,
+    /// The numbers of the states.
+    states: Vec<usize>,
+}
+
 /// How each of some states is held. Parts that are screwed are one body with those that they share a thread with.
 pub(super) fn stabilities(
     assembly: &Assembly,
@@ -29,17 +37,17 @@ pub(super) fn stabilities(
     termination: &Termination,
 ) -> Result<Vec<Stability>, Interrupt> {
     let mut answers = vec![Stability::default(); states.len()];
-    // States with the same parts aside share what is found about their contacts.
-    let mut places: Vec<(Vec<(usize, Pose)>, Vec<usize>)> = Vec::new();
+    // They share what is found about their contacts.
+    let mut places: Vec<SamePlaces> = Vec::new();
     for (i, state) in states.iter().enumerate() {
         let aside: Vec<(usize, Pose)> =
             state.parts.iter().filter(|(_, motion)| *motion != Pose::identity()).copied().collect();
-        match places.iter_mut().find(|(known, _)| *known == aside) {
-            Some((_, members)) => members.push(i),
-            None => places.push((aside, vec![i])),
+        match places.iter_mut().find(|places| places.aside == aside) {
+            Some(places) => places.states.push(i),
+            None => places.push(SamePlaces { aside, states: vec![i] }),
         }
     }
-    for (aside, members) in places {
+    for SamePlaces { aside, states: members } in places {
         let aside: Vec<(usize, Pose)> = aside
             .iter()
             .map(|(part, motion)| {
