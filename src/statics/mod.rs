@@ -33,8 +33,8 @@ pub struct StaticsOptions {
     pub up: Unit<Vector3<f64>>,
     /// The coefficient of friction (Coulomb) of all contacts. 0.2 is that of dry machined steel on steel, at the lower end.
     pub friction: f64,
-    /// The gap up to which two surfaces count as touching, in the input's units. `None`: [`CONTACT_GAP`] of the smaller
-    /// part.
+    /// The gap up to which two surfaces count as touching, in the input's units. `None`: a hundredth of
+    /// the longest side of the smaller part.
     pub gap: Option<f64>,
     /// Whether margins are wanted, which take most of the time.
     pub margin: bool,
