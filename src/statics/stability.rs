@@ -42,7 +42,8 @@ pub struct Unstable {
 pub struct Fall {
     /// The part.
     pub part: usize,
-    /// The unit vector along which its centre of mass would begin to move if nothing rubbed.
+    /// The unit vector along which its centre of mass moves in a motion that goes down and that no contact stops, if nothing
+    /// rubs. There may be others; the one that begins depends on inertia.
     pub direction: [f64; 3],
 }
 

@@ -92,8 +92,12 @@ fn a_block_on_a_slope_needs_the_tangent_of_its_angle() {
     let found = case.with(0.25);
     let [Unstable { falls, hold, needs_clamping: false }] = &found.unstable[..] else { panic!("{found:?}") };
     assert_eq!((falls[0].part, &hold[..]), (1, &[vec![1]][..]));
-    let along = Vector3::new(slope.cos(), 0.0, -slope.sin());
-    assert!(Vector3::from(falls[0].direction).dot(&along) > 1.0 - 1e-6, "{falls:?}");
+    // Down, and not into the slope.
+    let direction = Vector3::from(falls[0].direction);
+    assert!(
+        direction.z < 0.0 && direction.dot(&Vector3::new(slope.sin(), 0.0, slope.cos())) > -1e-6,
+        "{falls:?}"
+    );
 }
 
 #[test]
