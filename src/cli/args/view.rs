@@ -73,11 +73,11 @@ pub(in crate::cli) struct StaticsArguments {
     #[arg(long, value_name = "ASSEMBLY")]
     pub(in crate::cli) meshes: Option<PathBuf>,
     /// Coefficient of friction of all contacts: 0.2 is dry machined steel at the lower end, 0.05 oiled steel, 0.5 rubber
-    #[arg(long, value_name = "MU", default_value_t = 0.2, value_parser = not_negative)]
+    #[arg(long, value_name = "MU", default_value_t = 0.2, value_parser = not_negative, allow_negative_numbers = true)]
     pub(in crate::cli) friction: f64,
     /// Gap up to which two surfaces count as touching, in the input's units [default: a hundredth of the longest side of
     /// the smaller part]
-    #[arg(long, value_name = "LENGTH", value_parser = not_negative)]
+    #[arg(long, value_name = "LENGTH", value_parser = not_negative, allow_negative_numbers = true)]
     pub(in crate::cli) gap: Option<f64>,
     /// The direction against gravity, as +z or as a vector [default: +z; +y for glTF scenes]
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
