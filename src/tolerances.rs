@@ -512,9 +512,6 @@ pub(crate) const BALANCED: f64 = 1e-6;
 /// Share of the heaviest body's weight below which none counts as lighter, so that the program is well conditioned: such
 /// a body moves the centre of mass of both by as little.
 pub(crate) const LEAST_WEIGHT: f64 = 1e-4;
-/// How far a contact gives way under the weight of the heaviest body, in a unit of its own: only ratios of forces depend
-/// on it, where several contacts share a load.
-pub(crate) const CONTACT_COMPLIANCE: f64 = 1.0;
 /// Share of the fastest fall. What moves down more slowly gives way to what falls, and does not fall itself. At half and
 /// double, more or fewer parts are named.
 pub(crate) const FALL_SHARE: f64 = 0.1;

@@ -7,15 +7,13 @@
 //!
 //! Forces are in units of the weight that they act on, torques in units of weight times the body's reach.
 
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{
-    DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SolverStatus,
-    SupportedConeT, ZeroConeT,
-};
-use nalgebra::{Point3, Vector3};
+use clarabel::solver::{NonnegativeConeT, SecondOrderConeT, ZeroConeT};
+use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::contacts::ContactPoint;
-use crate::tolerances::{BALANCED, CONTACT_COMPLIANCE, HELD_SHARE, LEAST_WEIGHT};
+use super::program::Program;
+use crate::termination::{Interrupt, Termination};
+use crate::tolerances::{BALANCED, HELD_SHARE, LEAST_WEIGHT};
 
 /// A body that contacts have to hold.
 #[derive(Debug, Clone)]
@@ -24,6 +22,8 @@ pub(super) struct HeldBody {
     pub(super) centre: Point3<f64>,
     /// Its mass; only ratios matter. None counts as lighter than [`LEAST_WEIGHT`] of the heaviest.
     pub(super) mass: f64,
+    /// The inertia tensor about its centre, for that mass.
+    pub(super) inertia: Matrix3<f64>,
     /// The greatest distance of any of its points from the centre.
     pub(super) reach: f64,
     /// A force and a torque about the centre that it has to bear besides its weight, in the weight of a mass of 1.
@@ -50,6 +50,8 @@ pub(super) struct System {
     pub(super) contacts: Vec<HeldContact>,
     /// The unit vector along which things fall.
     pub(super) down: Vector3<f64>,
+    /// Ends every program early.
+    pub(super) termination: Termination,
 }
 
 /// A velocity of a body.
@@ -105,20 +107,24 @@ impl System {
     /// weight, as a share of it.
     ///
     /// Such forces may press bodies together that nothing presses: see [`Self::is_held_elastically`].
-    pub(super) fn balance(&self, friction: f64, sideways: &Vector3<f64>) -> Balance {
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn balance(&self, friction: f64, sideways: &Vector3<f64>) -> Result<Balance, Interrupt> {
         let load = self.down + sideways;
         let question = Question { friction, load, slip: None };
-        let Some(found) = self.solved(&question) else { return Balance::Unknown };
+        let Some(found) = self.solved(&question)? else { return Ok(Balance::Unknown) };
         let unit = self.unit();
         let forces: Vec<_> = found.forces.iter().map(|force| force * unit).collect();
         if found.shares.iter().all(|share| *share > 1.0 - HELD_SHARE) {
-            return if self.balances(&forces, &question) { Balance::Held(forces) } else { Balance::Unknown };
+            let is_right = self.balances(&forces, &question);
+            return Ok(if is_right { Balance::Held(forces) } else { Balance::Unknown });
         }
-        if self.is_free_motion(&found.velocities, &question) {
+        Ok(if self.is_free_motion(&found.velocities, &question) {
             Balance::Falls(Falling { velocities: found.velocities, shares: found.shares, forces })
         } else {
             Balance::Unknown
-        }
+        })
     }
 
     /// Whether contacts that give way a little hold all bodies with a coefficient of friction, if gravity alone presses
@@ -127,37 +133,91 @@ impl System {
     /// Coulomb's law with slip is a conic program if each contact first moves apart by as much as friction times the slip
     /// (G. De Saxcé and Z.-Q. Feng 1998); the slip that makes both agree is found by repetition (F. Cadoux 2009). Without
     /// end, the bodies slip away.
-    pub(super) fn is_held_elastically(&self, friction: f64) -> bool {
-        /// Repetitions. Most slips settle within ten; slow ones are close to slipping away.
+    ///
+    /// Slips are in units of what a contact gives way under the weight of the heaviest body.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn is_held_elastically(&self, friction: f64) -> Result<bool, Interrupt> {
+        /// Count of repetitions. Most slips settle within ten. At half, a friction within some 4 % of the least counts as
+        /// too little; at double, what slips away slowly takes twice as long.
         const ROUNDS: usize = 60;
-        /// Of the greatest slip.
+        /// Share of the greatest slip, or of the unit: a change that is smaller is none. At half one repetition more; at
+        /// double one less.
         const SETTLED: f64 = 1e-3;
-        /// Share of a change by which the next one is smaller at least if slips are to settle within [`ROUNDS`], …
+        /// Share of the last change below which a change shrinks fast enough to settle within [`ROUNDS`]
+        /// (0.95⁶⁰ = 0.05), …
         const SHRINKING: f64 = 0.95;
-        /// … and how often in a row it may not be.
+        /// … and count of changes in a row that may be larger. At 1, slips that first grow are given up; at double, what
+        /// nothing presses takes half as long again.
         const PATIENCE: usize = 3;
         let mut slip = vec![0.0; self.contacts.len()];
         let (mut last, mut steady) = (f64::INFINITY, 0);
         for _ in 0..ROUNDS {
             let question = Question { friction, load: self.down, slip: Some(&slip) };
-            let Some(found) = self.solved(&question) else { return false };
+            let Some(found) = self.solved(&question)? else { return Ok(false) };
             let unit = self.unit();
             if !self.balances(&found.forces.iter().map(|force| force * unit).collect::<Vec<_>>(), &question) {
-                return false;
+                return Ok(false);
             }
             let change = found.slip.iter().zip(&slip).map(|(new, old)| (new - old).abs()).fold(0.0, f64::max);
             let most = found.slip.iter().copied().fold(0.0, f64::max);
-            // A slip far below what contacts give way is none.
-            if change <= SETTLED * most.max(CONTACT_COMPLIANCE) {
-                return true;
+            if change <= SETTLED * most.max(1.0) {
+                return Ok(true);
             }
             steady = if change > SHRINKING * last { steady + 1 } else { 0 };
             if steady == PATIENCE {
-                return false;
+                return Ok(false);
             }
             (slip, last) = (found.slip, change);
         }
-        false
+        Ok(false)
+    }
+
+    /// The accelerations of the centres of mass with which bodies begin to move if nothing rubs, in units of gravity: of all
+    /// that no contact stops, those nearest to free fall (Gauss' principle of least constraint). `None` where the solver
+    /// finds no answer that passes the check.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn beginning(&self) -> Result<Option<Vec<Vector3<f64>>>, Interrupt> {
+        let unit = self.unit();
+        let (mut curvature, mut linear) = (Vec::new(), Vec::new());
+        // In the axes of its inertia, each body's turns are apart from each other.
+        let turned: Vec<_> = self.bodies.iter().map(|body| body.inertia.symmetric_eigen()).collect();
+        for (body, turns) in self.bodies.iter().zip(&turned) {
+            let (mass, squared) = (body.mass / unit, body.reach * body.reach);
+            // None turns more easily than a ball of a hundredth of its reach.
+            let inertia = turns.eigenvalues.map(|value| (value / (unit * squared)).max(1e-4 * mass));
+            curvature.extend([mass, mass, mass, inertia.x, inertia.y, inertia.z]);
+            let weight = self.down * -mass;
+            linear.extend([weight.x, weight.y, weight.z, 0.0, 0.0, 0.0]);
+        }
+        let mut program = Program::new(curvature, linear);
+        for (row, contact) in self.contacts.iter().enumerate() {
+            for (body, sign, lever) in self.ends(contact) {
+                let turn = turned[body].eigenvectors.transpose() * lever.cross(&contact.at.normal);
+                for i in 0..3 {
+                    program.push(row, 6 * body + i, -sign * contact.at.normal[i]);
+                    program.push(row, 6 * body + 3 + i, -sign * turn[i] / self.bodies[body].reach);
+                }
+            }
+            program.right.push(0.0);
+        }
+        if !self.contacts.is_empty() {
+            program.cones.push(NonnegativeConeT(self.contacts.len()));
+        }
+        let Some(found) = program.solve(&self.termination)? else { return Ok(None) };
+        let part = |from: usize| Vector3::from_fn(|i, _| found.point[from + i]);
+        let accelerations: Vec<Velocity> = (0..self.bodies.len())
+            .map(|body| Velocity {
+                linear: part(6 * body),
+                angular: turned[body].eigenvectors * part(6 * body + 3) / self.bodies[body].reach,
+            })
+            .collect();
+        let question = Question { friction: 0.0, load: self.down, slip: None };
+        let is_right = self.is_free_motion(&accelerations, &question);
+        Ok(is_right.then(|| accelerations.iter().map(|acceleration| acceleration.linear).collect()))
     }
 
     /// The bodies that a force at a contact acts on: each with the sign of the force, and the lever from its centre.
@@ -193,15 +253,23 @@ impl System {
 
     /// Forces that hold all bodies with a coefficient of friction, given some (in the weight of a mass of 1, by contact) that
     /// held them when a little was different: as few as possible are changed. `None` if none are found so.
-    pub(super) fn mended(&self, forces: Vec<Vector3<f64>>, friction: f64) -> Option<Vec<Vector3<f64>>> {
-        /// Bodies around those that are out of balance; of more, all might be asked at once.
+    ///
+    /// # Errors
+    /// The termination condition became true.
+    pub(super) fn mended(
+        &self,
+        forces: Vec<Vector3<f64>>,
+        friction: f64,
+    ) -> Result<Option<Vec<Vector3<f64>>>, Interrupt> {
+        /// Count of contacts from a body that is out of balance to those that are asked with it. At half, most parts with
+        /// two washers are asked all at once; with more, all might be asked at once.
         const HOPS: [usize; 3] = [1, 2, 4];
         let question = Question { friction, load: self.down, slip: None };
         let mut held = forces;
         let disturbed: Vec<bool> =
             self.rests(&held, &question).iter().map(|rest| *rest > HELD_SHARE / 2.0).collect();
         if !disturbed.contains(&true) {
-            return self.balances(&held, &question).then_some(held);
+            return Ok(self.balances(&held, &question).then_some(held));
         }
         let (mut near, mut hops) = (disturbed, 0);
         for wanted in HOPS {
@@ -210,16 +278,16 @@ impl System {
                 hops += 1;
             }
             if 2 * near.iter().filter(|near| **near).count() > near.len() {
-                return None;
+                return Ok(None);
             }
             let (part, contacts) = self.around(&near, &held);
-            let Balance::Held(found) = part.balance(friction, &Vector3::zeros()) else { continue };
+            let Balance::Held(found) = part.balance(friction, &Vector3::zeros())? else { continue };
             for (contact, force) in contacts.into_iter().zip(found) {
                 held[contact] = force;
             }
-            return self.balances(&held, &question).then_some(held);
+            return Ok(self.balances(&held, &question).then_some(held));
         }
-        None
+        Ok(None)
     }
 
     /// Bodies, and those that touch them.
@@ -237,7 +305,7 @@ impl System {
 
     /// Some of the bodies, with their contacts among each other and with what stays, which are numbered. They bear the
     /// forces at all other contacts.
-    fn around(&self, near: &[bool], held: &[Vector3<f64>]) -> (Self, Vec<usize>) {
+    pub(super) fn around(&self, near: &[bool], held: &[Vector3<f64>]) -> (Self, Vec<usize>) {
         let mut numbers = vec![None; near.len()];
         let mut bodies = Vec::new();
         for body in (0..near.len()).filter(|&body| near[body]) {
@@ -260,104 +328,80 @@ impl System {
                 }
             }
         }
-        (Self { bodies, contacts, down: self.down }, places)
+        (Self { bodies, contacts, down: self.down, termination: self.termination.clone() }, places)
     }
 
-    fn solved(&self, question: &Question<'_>) -> Option<Solution> {
+    fn solved(&self, question: &Question<'_>) -> Result<Option<Solution>, Interrupt> {
         let (bodies, contacts) = (self.bodies.len(), self.contacts.len());
         let rubs = question.friction > 0.0;
         let width = if rubs { 3 } else { 1 };
         let shares = if question.slip.is_none() { bodies } else { 0 };
-        let (forces, columns) = (width * contacts, width * contacts + shares);
+        let forces = width * contacts;
         let axes: Vec<[Vector3<f64>; 3]> = self.contacts.iter().map(|c| axes(&c.at.normal)).collect();
         let weights = self.weights();
-        let mut matrix = Triplets::default();
-        let mut right = vec![0.0; 6 * bodies];
+        // Of forces that do the same, the smallest; where contacts give way, by as much as the force.
+        let curvature = if question.slip.is_some() { 1.0 } else { BALANCED };
+        let curvature = [vec![curvature; forces], vec![0.0; shares]].concat();
+        let mut linear = [vec![0.0; forces], vec![-1.0; shares]].concat();
+        for (c, slip) in question.slip.into_iter().flatten().enumerate() {
+            linear[width * c] = question.friction * slip;
+        }
+        let mut program = Program::new(curvature, linear);
         for (c, contact) in self.contacts.iter().enumerate() {
             for (body, sign, lever) in self.ends(contact) {
                 let factor = sign * weights[body];
                 for (k, axis) in axes[c][..width].iter().enumerate() {
                     let torque = lever.cross(axis) / self.bodies[body].reach;
                     for i in 0..3 {
-                        matrix.push(6 * body + i, width * c + k, factor * axis[i]);
-                        matrix.push(6 * body + 3 + i, width * c + k, factor * torque[i]);
+                        program.push(6 * body + i, width * c + k, factor * axis[i]);
+                        program.push(6 * body + 3 + i, width * c + k, factor * torque[i]);
                     }
                 }
             }
         }
         let fixed = if question.slip.is_some() { 1.0 } else { 0.0 };
-        for (body, load) in self.loads(&question.load, fixed).iter().enumerate() {
-            for i in 0..3 {
-                right[6 * body + i] = -load[0][i];
-                right[6 * body + 3 + i] = -load[1][i];
-                if shares > 0 {
-                    matrix.push(6 * body + i, forces + body, question.load[i]);
-                }
+        for [force, torque] in self.loads(&question.load, fixed) {
+            program.right.extend((-force).iter().chain(&-torque));
+        }
+        program.cones.push(ZeroConeT(6 * bodies));
+        for body in 0..shares {
+            (0..3).for_each(|i| program.push(6 * body + i, forces + body, question.load[i]));
+            for (sign, limit) in [(1.0, 1.0), (-1.0, 0.0)] {
+                program.push(program.right.len(), forces + body, sign);
+                program.right.push(limit);
             }
         }
-        let mut cones: Vec<SupportedConeT<f64>> = vec![ZeroConeT(6 * bodies)];
         if shares > 0 {
-            for body in 0..bodies {
-                matrix.push(right.len(), forces + body, 1.0);
-                right.push(1.0);
-                matrix.push(right.len(), forces + body, -1.0);
-                right.push(0.0);
-            }
-            cones.push(NonnegativeConeT(2 * bodies));
+            program.cones.push(NonnegativeConeT(2 * shares));
         }
-        let first_of_cones = right.len();
+        let first_of_cones = program.right.len();
         for c in 0..contacts {
             for k in 0..width {
                 let factor = if rubs && k == 0 { question.friction } else { 1.0 };
-                matrix.push(right.len(), width * c + k, -factor);
-                right.push(0.0);
+                program.push(program.right.len(), width * c + k, -factor);
+                program.right.push(0.0);
             }
-            if rubs {
-                cones.push(SecondOrderConeT(3));
-            }
+            program.cones.push(if rubs { SecondOrderConeT(3) } else { NonnegativeConeT(1) });
         }
-        if !rubs && contacts > 0 {
-            cones.push(NonnegativeConeT(contacts));
-        }
-        let compliance = CONTACT_COMPLIANCE;
-        let curvature = |column: usize| match (column < forces, question.slip.is_some()) {
-            (true, true) => compliance,
-            // Of forces that do the same, the smallest.
-            (true, false) => compliance * BALANCED,
-            (false, _) => 0.0,
-        };
-        let mut quadratic = Triplets::default();
-        (0..columns).for_each(|column| quadratic.push(column, column, curvature(column)));
-        let mut linear = vec![0.0; columns];
-        linear[forces..].fill(-1.0);
-        if let Some(slip) = question.slip {
-            slip.iter().enumerate().for_each(|(c, slip)| linear[width * c] = question.friction * slip);
-        }
-        let settings = DefaultSettings { verbose: false, max_threads: 1, ..DefaultSettings::default() };
-        let (p, a) = (quadratic.matrix(columns, columns), matrix.matrix(right.len(), columns));
-        let mut solver = DefaultSolver::new(&p, &linear, &a, &right, &cones, settings).ok()?;
-        solver.solve();
-        let solution = &solver.solution;
-        if !matches!(solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved) {
-            return None;
-        }
+        let Some(found) = program.solve(&self.termination)? else { return Ok(None) };
         let force = |c: usize| {
-            axes[c][..width].iter().enumerate().map(|(k, axis)| axis * solution.x[width * c + k]).sum()
+            axes[c][..width].iter().enumerate().map(|(k, axis)| axis * found.point[width * c + k]).sum()
         };
         let velocity = |body: usize| {
-            let part = |from: usize| Vector3::from_fn(|i, _| weights[body] * solution.z[6 * body + from + i]);
+            let part =
+                |from: usize| Vector3::from_fn(|i, _| weights[body] * found.multipliers[6 * body + from + i]);
             Velocity { linear: part(0), angular: part(3) / self.bodies[body].reach }
         };
         let slips = |c: usize| {
-            let multiplier = |k: usize| solution.z[first_of_cones + width * c + k];
+            let multiplier = |k: usize| found.multipliers[first_of_cones + width * c + k];
             if rubs { multiplier(1).hypot(multiplier(2)) } else { 0.0 }
         };
-        Some(Solution {
+        Ok(Some(Solution {
             forces: (0..contacts).map(force).collect(),
-            shares: solution.x[forces..].to_vec(),
+            shares: found.point[forces..].to_vec(),
             velocities: (0..bodies).map(velocity).collect(),
             slip: (0..contacts).map(slips).collect(),
-        })
+        }))
     }
 
     /// By body: how much of its load forces leave, as a share of its weight.
@@ -408,26 +452,4 @@ impl System {
 fn axes(normal: &Vector3<f64>) -> [Vector3<f64>; 3] {
     let across = normal.cross(&Vector3::ith(normal.iamin(), 1.0)).normalize();
     [*normal, across, normal.cross(&across)]
-}
-
-/// A sparse matrix by its entries.
-#[derive(Default)]
-struct Triplets {
-    rows: Vec<usize>,
-    columns: Vec<usize>,
-    values: Vec<f64>,
-}
-
-impl Triplets {
-    fn push(&mut self, row: usize, column: usize, value: f64) {
-        if value != 0.0 {
-            self.rows.push(row);
-            self.columns.push(column);
-            self.values.push(value);
-        }
-    }
-
-    fn matrix(self, rows: usize, columns: usize) -> CscMatrix<f64> {
-        CscMatrix::new_from_triplets(rows, columns, self.rows, self.columns, self.values)
-    }
 }

@@ -7,17 +7,18 @@
 
 mod contacts;
 mod equilibrium;
+mod program;
 mod stability;
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
-use nalgebra::{Point3, Unit, Vector3};
+use nalgebra::{Matrix3, Point3, Unit, Vector3};
 use petgraph::unionfind::UnionFind;
 use rayon::prelude::*;
 
 use crate::geometry::Assembly;
-use crate::scene::Scene;
+use crate::scene::{Body, Scene};
 use crate::termination::{Interrupt, Termination};
 use crate::tolerances::{CONTACT_GAP, JOINED_OVERLAP};
 
@@ -225,7 +226,7 @@ impl<'a> Statics<'a> {
     }
 
     /// Connected bodies with the contacts among them and with what stays.
-    fn system(&self, connected: &Connected) -> System {
+    fn system(&self, connected: &Connected, termination: &Termination) -> System {
         let place: HashMap<usize, usize> = connected
             .bodies
             .iter()
@@ -245,20 +246,34 @@ impl<'a> Statics<'a> {
                 }));
             }
         }
-        System { bodies, contacts, down: self.down }
+        System { bodies, contacts, down: self.down, termination: termination.clone() }
     }
 
     /// Parts as one rigid body.
     fn body(&self, parts: &[usize]) -> HeldBody {
-        let placed = || parts.iter().map(|&part| &self.scene.bodies[part]);
-        let mass = placed().map(|body| body.shape.mass.volume).sum::<f64>();
-        let moment: Vector3<f64> = placed()
-            .map(|body| (body.planning_from_shape * body.shape.mass.centre).coords * body.shape.mass.volume)
-            .sum();
+        /// Volume (planning frame) of a flat sheet, of which the box has none either: it must weigh something.
+        const SHEET: f64 = 1e-9;
+        let placed = |&part: &usize| {
+            let body = &self.scene.bodies[part];
+            let mass = &body.shape.mass;
+            (body, mass.volume.max(SHEET), body.planning_from_shape * mass.centre)
+        };
+        let mass = parts.iter().map(placed).map(|(_, mass, _)| mass).sum::<f64>();
+        let moment: Vector3<f64> =
+            parts.iter().map(placed).map(|(_, mass, centre)| centre.coords * mass).sum();
         let centre = Point3::from(moment / mass);
-        let vertices = placed().flat_map(|body| body.shape.hull.iter().map(|p| body.planning_from_shape * p));
-        let reach = vertices.map(|p| (p - centre).norm()).fold(0.0, f64::max);
-        HeldBody { centre, mass, reach, bears: [Vector3::zeros(); 2] }
+        let inertia = |(body, mass, at): (&Body, f64, Point3<f64>)| {
+            let (turn, away) = (body.planning_from_shape.rotation.to_rotation_matrix(), at - centre);
+            let own = turn * body.shape.mass.unit_inertia() * turn.inverse();
+            let shifted = Matrix3::from_diagonal_element(away.norm_squared()) - away * away.transpose();
+            (own + shifted) * mass
+        };
+        let inertia = parts.iter().map(placed).map(inertia).sum();
+        let corners = |(body, ..): (&'a Body, f64, Point3<f64>)| {
+            body.shape.hull.iter().map(|p| (body.planning_from_shape * p - centre).norm())
+        };
+        let reach = parts.iter().map(placed).flat_map(corners).fold(0.0, f64::max);
+        HeldBody { centre, mass, inertia, reach, bears: [Vector3::zeros(); 2] }
     }
 }
 

@@ -3,13 +3,13 @@
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
-use nalgebra::{Unit, Vector3};
+use nalgebra::Vector3;
 
 use super::equilibrium::{Balance, ContactKey, Falling, HeldContact, System, Velocity};
 use super::{Connected, Statics};
 use crate::budgets::{HOLDING_SETS, SIDEWAYS_DIRECTIONS};
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{FALL_SHARE, FRICTION_PRECISION, FRICTION_ROOM, HELD_SHARE};
+use crate::tolerances::{BALANCED, FALL_SHARE, FRICTION_PRECISION, FRICTION_ROOM, HELD_SHARE};
 
 /// How the parts of a state are held.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -42,8 +42,7 @@ pub struct Unstable {
 pub struct Fall {
     /// The part.
     pub part: usize,
-    /// The unit vector along which its centre of mass moves in a motion that goes down and that no contact stops, if nothing
-    /// rubs. There may be others; the one that begins depends on inertia.
+    /// The unit vector along which its centre of mass would begin to move if nothing rubbed.
     pub direction: [f64; 3],
 }
 
@@ -86,10 +85,9 @@ enum Standing {
     Smooth(Vec<Vector3<f64>>),
     /// By friction, with these forces.
     Rubbing(Vec<Vector3<f64>>),
+    /// With a motion that begins.
     Falls {
         motion: Vec<Velocity>,
-        /// The motion without friction.
-        smooth: Vec<Velocity>,
         needs_clamping: bool,
     },
     Unknown,
@@ -97,21 +95,20 @@ enum Standing {
 
 impl Standing {
     /// That of a few bodies, asked all at once.
-    fn of(system: &System, friction: f64) -> Self {
-        let smooth = match system.balance(0.0, &Vector3::zeros()) {
-            Balance::Held(forces) => return Self::Smooth(forces),
+    fn of(system: &System, friction: f64) -> Result<Self, Interrupt> {
+        let smooth = match system.balance(0.0, &Vector3::zeros())? {
+            Balance::Held(forces) => return Ok(Self::Smooth(forces)),
             Balance::Falls(falling) => falling.velocities,
-            Balance::Unknown => return Self::Unknown,
+            Balance::Unknown => return Ok(Self::Unknown),
         };
-        // With friction, a motion of the program leaves each surface on which it slips: its direction is not the true one.
-        match system.balance(friction, &Vector3::zeros()) {
-            Balance::Held(forces) if system.is_held_elastically(friction) => Self::Rubbing(forces),
-            Balance::Held(_) => Self::Falls { motion: smooth.clone(), smooth, needs_clamping: true },
+        Ok(match system.balance(friction, &Vector3::zeros())? {
+            Balance::Held(forces) if system.is_held_elastically(friction)? => Self::Rubbing(forces),
+            Balance::Held(_) => Self::Falls { motion: smooth, needs_clamping: true },
             Balance::Falls(Falling { velocities: motion, .. }) => {
-                Self::Falls { motion, smooth, needs_clamping: false }
+                Self::Falls { motion, needs_clamping: false }
             }
             Balance::Unknown => Self::Unknown,
-        }
+        })
     }
 }
 
@@ -124,13 +121,13 @@ pub(super) fn answer(
     connected: &Connected,
     termination: &Termination,
 ) -> Result<Stability, Interrupt> {
-    let system = statics.system(connected);
+    let system = statics.system(connected, termination);
     let friction = statics.friction;
     let margin = |system: &System| match statics.margins {
-        true => margin(system, friction, termination).map(Some),
+        true => margin(system, friction).map(Some),
         false => Ok(None),
     };
-    let smooth = match held_smoothly(&system, &mut statics.forces) {
+    let smooth = match held_smoothly(&system, &mut statics.forces)? {
         Balance::Held(_) => return Ok(Stability { margin: margin(&system)?, ..Stability::default() }),
         Balance::Falls(smooth) => smooth,
         Balance::Unknown => {
@@ -139,9 +136,8 @@ pub(super) fn answer(
     };
     let mut found = Stability::default();
     let mut held: HashMap<ContactKey, Vector3<f64>> = keyed(&system, smooth.forces.clone()).collect();
-    let mut fixed = BTreeSet::new();
+    let (mut fixed, mut leaning) = (BTreeSet::new(), BTreeSet::new());
     for loose in statics.loose(connected, &is_loose(&smooth, &statics.down)) {
-        termination.check()?;
         let judged = match statics.known_loose.get(&loose) {
             Some(judged) => Arc::clone(judged),
             None => Arc::new(judged(statics, &loose, termination)?),
@@ -151,6 +147,7 @@ pub(super) fn answer(
             Loose::Stands { friction, forces } => {
                 found.needs_friction = found.needs_friction.max(*friction);
                 held.extend(forces.iter().copied());
+                leaning.extend(loose.bodies);
                 continue;
             }
             Loose::Falls(unstable) => found.unstable.push(unstable.clone()),
@@ -158,22 +155,19 @@ pub(super) fn answer(
         }
         fixed.extend(loose.bodies);
     }
-    // What falls is taken as held: then all else has to bear what leans on it.
+    // What falls is taken as held: then all else has to bear what leans on it, without friction or all together with it.
     let rest = connected.without(&fixed);
-    let others = statics.system(&rest);
-    let given = others.contacts.iter().map(|c| held.get(&c.key).copied().unwrap_or_default()).collect();
-    if others.mended(given, found.needs_friction * FRICTION_ROOM).is_none() {
-        match Standing::of(&others, friction) {
+    let others = statics.system(&rest, termination);
+    let given: Vec<_> =
+        others.contacts.iter().map(|c| held.get(&c.key).copied().unwrap_or_default()).collect();
+    let bears: Vec<bool> = rest.bodies.iter().map(|body| !leaning.contains(body)).collect();
+    let (bearing, places) = others.around(&bears, &given);
+    if bearing.mended(places.into_iter().map(|place| given[place]).collect(), 0.0)?.is_none() {
+        match Standing::of(&others, friction)? {
             Standing::Smooth(_) => {}
-            Standing::Rubbing(_) => found.needs_friction = least_friction(&others, friction, termination)?,
-            Standing::Falls { motion, smooth, needs_clamping } => {
-                found.unstable.push(unstable(
-                    statics,
-                    &rest,
-                    [&motion, &smooth],
-                    needs_clamping,
-                    termination,
-                )?);
+            Standing::Rubbing(_) => found.needs_friction = least_friction(&others, friction)?,
+            Standing::Falls { motion, needs_clamping } => {
+                found.unstable.push(unstable(statics, &rest, &motion, needs_clamping, termination)?);
             }
             Standing::Unknown => found.unknown.extend(rest.bodies.concat()),
         }
@@ -197,20 +191,20 @@ pub(super) enum Loose {
 }
 
 fn judged(statics: &Statics<'_>, loose: &Connected, termination: &Termination) -> Result<Loose, Interrupt> {
-    let system = statics.system(loose);
-    Ok(match Standing::of(&system, statics.friction) {
+    let system = statics.system(loose, termination);
+    Ok(match Standing::of(&system, statics.friction)? {
         Standing::Smooth(held) => Loose::Stands { friction: 0.0, forces: keyed(&system, held).collect() },
         Standing::Rubbing(held) => {
-            let friction = least_friction(&system, statics.friction, termination)?;
+            let friction = least_friction(&system, statics.friction)?;
             // What leans on others rubs no more than it has to.
-            let held = match system.balance(friction * FRICTION_ROOM, &Vector3::zeros()) {
+            let held = match system.balance(friction * FRICTION_ROOM, &Vector3::zeros())? {
                 Balance::Held(held) => held,
                 Balance::Falls(_) | Balance::Unknown => held,
             };
             Loose::Stands { friction, forces: keyed(&system, held).collect() }
         }
-        Standing::Falls { motion, smooth, needs_clamping } => {
-            Loose::Falls(unstable(statics, loose, [&motion, &smooth], needs_clamping, termination)?)
+        Standing::Falls { motion, needs_clamping } => {
+            Loose::Falls(unstable(statics, loose, &motion, needs_clamping, termination)?)
         }
         Standing::Unknown => Loose::Unknown,
     })
@@ -222,16 +216,22 @@ fn keyed(system: &System, forces: Vec<Vector3<f64>>) -> impl Iterator<Item = (Co
 }
 
 /// Whether bodies are held without friction, given forces that may hold most of them, which are replaced by those that do.
-fn held_smoothly(system: &System, forces: &mut HashMap<ContactKey, Vector3<f64>>) -> Balance {
+fn held_smoothly(
+    system: &System,
+    forces: &mut HashMap<ContactKey, Vector3<f64>>,
+) -> Result<Balance, Interrupt> {
     let known = |contact: &HeldContact| forces.get(&contact.key).copied();
-    let given = || system.contacts.iter().map(|contact| known(contact).unwrap_or_default()).collect();
+    let given = system.contacts.iter().map(|contact| known(contact).unwrap_or_default()).collect();
     let is_begun = system.contacts.iter().any(|contact| known(contact).is_some());
-    let mended = if is_begun { system.mended(given(), 0.0) } else { None };
-    let found = mended.map_or_else(|| system.balance(0.0, &Vector3::zeros()), Balance::Held);
+    let mended = if is_begun { system.mended(given, 0.0)? } else { None };
+    let found = match mended {
+        Some(held) => Balance::Held(held),
+        None => system.balance(0.0, &Vector3::zeros())?,
+    };
     if let Balance::Held(held) = &found {
         forces.extend(system.contacts.iter().map(|contact| contact.key).zip(held.iter().copied()));
     }
-    found
+    Ok(found)
 }
 
 /// By body: whether not all of its weight is held without friction, or it moves down with what is not.
@@ -246,18 +246,19 @@ fn is_loose(smooth: &Falling, down: &Vector3<f64>) -> Vec<bool> {
 fn unstable(
     statics: &Statics<'_>,
     connected: &Connected,
-    [motion, smooth]: [&[Velocity]; 2],
+    motion: &[Velocity],
     needs_clamping: bool,
     termination: &Termination,
 ) -> Result<Unstable, Interrupt> {
     let fall = |body: usize| motion[body].linear.dot(&statics.down);
     let fastest = (0..motion.len()).map(fall).fold(0.0, f64::max);
     let falling: Vec<usize> = (0..motion.len()).filter(|&body| fall(body) > FALL_SHARE * fastest).collect();
+    let begins = statics.system(connected, termination).beginning()?;
     let mut falls = Vec::new();
     for &body in &falling {
-        let direction = Unit::try_new(smooth[body].linear, f64::MIN_POSITIVE)
-            .unwrap_or_else(|| Unit::new_normalize(motion[body].linear));
-        let direction = direction.into_inner().into();
+        // Motions that are free are many; where what falls does not begin to, as one part of it wedges another, any will do.
+        let begins = begins.as_ref().map(|begins| begins[body]).filter(|a| a.dot(&statics.down) > BALANCED);
+        let direction = begins.unwrap_or(motion[body].linear).normalize().into();
         falls.extend(connected.bodies[body].iter().map(|&part| Fall { part, direction }));
     }
     falls.sort_by_key(|fall| fall.part);
@@ -266,44 +267,44 @@ fn unstable(
 }
 
 /// The least coefficient of friction with which bodies stand that stand with a greater one.
-fn least_friction(system: &System, enough: f64, termination: &Termination) -> Result<f64, Interrupt> {
-    let least = |low: f64, holds: &dyn Fn(f64) -> bool| -> Result<f64, Interrupt> {
+fn least_friction(system: &System, enough: f64) -> Result<f64, Interrupt> {
+    let least = |low: f64, holds: &dyn Fn(f64) -> Result<bool, Interrupt>| {
         let (mut low, mut high) = (low, enough);
         while high - low > FRICTION_PRECISION * enough {
-            termination.check()?;
             let middle = (low + high) / 2.0;
-            if holds(middle) { high = middle } else { low = middle }
+            if holds(middle)? { high = middle } else { low = middle }
         }
         Ok(high)
     };
-    let found =
-        least(0.0, &|friction| matches!(system.balance(friction, &Vector3::zeros()), Balance::Held(_)))?;
+    let found = least(0.0, &|friction| is_held(system, friction, &Vector3::zeros()))?;
     let room = found * FRICTION_ROOM;
     // Close to the least friction slips take long to settle.
-    if room >= enough || system.is_held_elastically(room) {
+    if room >= enough || system.is_held_elastically(room)? {
         return Ok(found);
     }
     least(room, &|friction| system.is_held_elastically(friction))
 }
 
+fn is_held(system: &System, friction: f64, sideways: &Vector3<f64>) -> Result<bool, Interrupt> {
+    Ok(matches!(system.balance(friction, sideways)?, Balance::Held(_)))
+}
+
 /// The share of the weight that may act sideways.
-fn margin(system: &System, friction: f64, termination: &Termination) -> Result<f64, Interrupt> {
+fn margin(system: &System, friction: f64) -> Result<f64, Interrupt> {
     let across = system.down.cross(&Vector3::ith(system.down.iamin(), 1.0)).normalize();
     let other = system.down.cross(&across);
     let mut least = 1.0;
     for i in 0..SIDEWAYS_DIRECTIONS {
         let (sine, cosine) = (std::f64::consts::TAU * i as f64 / SIDEWAYS_DIRECTIONS as f64).sin_cos();
         let direction = across * cosine + other * sine;
-        let holds = |share: f64| matches!(system.balance(friction, &(direction * share)), Balance::Held(_));
-        termination.check()?;
-        if holds(least) {
+        let holds = |share: f64| is_held(system, friction, &(direction * share));
+        if holds(least)? {
             continue;
         }
         let mut low = 0.0;
         while least - low > FRICTION_PRECISION {
-            termination.check()?;
             let middle = (low + least) / 2.0;
-            if holds(middle) { low = middle } else { least = middle }
+            if holds(middle)? { low = middle } else { least = middle }
         }
         least = low;
     }
@@ -327,10 +328,11 @@ fn holding(
         let held = held.iter().map(|&body| connected.bodies[body].clone()).collect();
         let rest = connected.without(&held);
         if rest.bodies.is_empty() {
-            return true;
+            return Ok(true);
         }
-        let rest = statics.system(&rest);
-        matches!(Standing::of(&rest, statics.friction), Standing::Smooth(_) | Standing::Rubbing(_))
+        let rest = statics.system(&rest, termination);
+        let standing = Standing::of(&rest, statics.friction)?;
+        Ok::<_, Interrupt>(matches!(standing, Standing::Smooth(_) | Standing::Rubbing(_)))
     };
     let pairs =
         (0..falling.len()).flat_map(|i| (i + 1..falling.len()).map(move |j| vec![falling[i], falling[j]]));
@@ -340,8 +342,7 @@ fn holding(
         }
         let mut found = Vec::new();
         for held in sets {
-            termination.check()?;
-            if is_enough(&held) {
+            if is_enough(&held)? {
                 found.push(named(&held));
             }
         }
@@ -352,9 +353,8 @@ fn holding(
     // One after the other is let go, where the rest is enough.
     let mut held = falling.to_vec();
     for &body in falling {
-        termination.check()?;
         let rest: Vec<usize> = held.iter().copied().filter(|&other| other != body).collect();
-        if is_enough(&rest) {
+        if is_enough(&rest)? {
             held = rest;
         }
     }

@@ -92,12 +92,8 @@ fn a_block_on_a_slope_needs_the_tangent_of_its_angle() {
     let found = case.with(0.25);
     let [Unstable { falls, hold, needs_clamping: false }] = &found.unstable[..] else { panic!("{found:?}") };
     assert_eq!((falls[0].part, &hold[..]), (1, &[vec![1]][..]));
-    // Down, and not into the slope.
-    let direction = Vector3::from(falls[0].direction);
-    assert!(
-        direction.z < 0.0 && direction.dot(&Vector3::new(slope.sin(), 0.0, slope.cos())) > -1e-6,
-        "{falls:?}"
-    );
+    let along = Vector3::new(slope.cos(), 0.0, -slope.sin());
+    assert!(Vector3::from(falls[0].direction).dot(&along) > 1.0 - 1e-6, "{falls:?}");
 }
 
 #[test]
@@ -137,6 +133,63 @@ fn a_bar_in_a_groove_stands_and_a_block_between_walls_has_nothing_to_stand_on() 
     let found = case([walls, cuboid([-1.0, -1.0, 0.0], [1.0, 1.0, 1.0])]).with(0.6);
     let [Unstable { falls, hold, needs_clamping: true }] = &found.unstable[..] else { panic!("{found:?}") };
     assert!(falls[0].direction[2] < -0.99 && hold == &[vec![1]], "{found:?}");
+}
+
+/// A prism along y over a quadrilateral in the plane of x and z, counter-clockwise as seen from −y.
+fn prism(corners: [[f64; 2]; 4], half_width: f64) -> SourceMesh {
+    let mut mesh = cuboid([0.0; 3], [1.0; 3]);
+    for vertex in &mut mesh.vertices {
+        let corner = match (vertex[0] > 0.5, vertex[2] > 0.5) {
+            (false, false) => 0,
+            (true, false) => 1,
+            (true, true) => 2,
+            (false, true) => 3,
+        };
+        let [x, z] = corners[corner];
+        *vertex = [x, (2.0 * vertex[1] - 1.0) * half_width, z];
+    }
+    mesh
+}
+
+#[test]
+fn a_wedge_drives_blocks_apart_unless_both_its_faces_and_the_ground_rub_enough() {
+    // Faces at 45 degrees: each is pressed by N and rubs by μN upwards, so 2 N (1 + μ) / √2 is the wedge's weight, and the
+    // ground rubs at each block by N (1 − μ) / √2.
+    let block = [[0.5, 0.0], [4.0, 0.0], [4.0, 2.0], [2.5, 2.0]];
+    let other = [[-4.0, 0.0], [-0.5, 0.0], [-2.5, 2.0], [-4.0, 2.0]];
+    let wedge = [[-1.0, 0.5], [1.0, 0.5], [2.0, 1.5], [-2.0, 1.5]];
+    let (of_block, of_wedge) = (5.0, 3.0);
+    let floor = cuboid([-5.0, -2.0, -1.0], [5.0, 2.0, 0.0]);
+    let case = case([floor, prism(block, 1.0), prism(other, 1.0), prism(wedge, 1.0)]);
+    let needed = |friction: f64| {
+        of_wedge / 2.0 * (1.0 - friction) - friction * (1.0 + friction) * (of_block + of_wedge / 2.0)
+    };
+    let found = case.with(0.25);
+    assert!(found.stands(), "{found:?}");
+    assert!(
+        needed(found.needs_friction * 0.99) > 0.0 && needed(found.needs_friction * 1.01) < 0.0,
+        "{found:?}"
+    );
+    assert!(!case.with(0.15).stands());
+}
+
+#[test]
+fn an_arch_stands_if_it_is_thick_enough_for_a_line_of_thrust() {
+    // J. Heyman, "The safety of masonry arches", 1969: a semicircular arch needs a thickness of 0.106 of its middle radius.
+    // Of few stones it needs a little less.
+    for (thickness, stands) in [(0.14, true), (0.07, false)] {
+        let stone = |i: u32| {
+            let at = |radius: f64, i: u32| {
+                let (sine, cosine) = (f64::from(i) * std::f64::consts::PI / 12.0).sin_cos();
+                [radius * cosine, radius * sine]
+            };
+            let [inner, outer] = [-1.0, 1.0].map(|side| 4.0 * (1.0 + side * thickness / 2.0));
+            prism([at(inner, i), at(outer, i), at(outer, i + 1), at(inner, i + 1)], 0.5)
+        };
+        let found = case(std::iter::once(ground()).chain((0..12).map(stone))).with(0.7);
+        assert_eq!(found.stands(), stands, "{found:?}");
+        assert!(found.unknown.is_empty(), "{found:?}");
+    }
 }
 
 #[test]
