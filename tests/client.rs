@@ -235,7 +235,7 @@ fn what_is_to_be_kept_stays_in_plans_of_the_daemon() {
 
 #[test]
 fn whoever_waits_for_a_daemon_that_hangs_can_give_up() {
-    let daemon = Daemon::start();
+    let mut daemon = Daemon::start();
     let wanted = Arc::new(AtomicBool::new(false));
     let options = ConnectOptions {
         interrupt: Some(Arc::clone(&wanted).into()),
@@ -263,6 +263,8 @@ fn whoever_waits_for_a_daemon_that_hangs_can_give_up() {
     given_up(&|| client.status().map(drop));
     // Also while there is none, and another one is waited for.
     daemon.signal(Signal::KILL);
+    // Until its last thread has ended, it takes requests, and a plan that was requested is no error.
+    daemon.wait();
     given_up(&|| client.knows(handle).map(drop));
     given_up(&|| client.plan(handle, &PlanOptions::default()).map(drop));
 }
