@@ -12,7 +12,7 @@ use std::{env, fs, io};
 
 /// Every stage, and the stages that its code imports. A stage comes after all that it depends on.
 /// `.ci/structure` compares this table with the imports.
-const STAGES: [(&str, &str); 21] = [
+const STAGES: [(&str, &str); 22] = [
     ("lru", ""),
     ("termination", ""),
     ("tolerances", ""),
@@ -26,6 +26,7 @@ const STAGES: [(&str, &str); 21] = [
     ("scene", "budgets cache geometry lru sdf termination tolerances"),
     ("rrt", "geometry scene termination"),
     ("contact", "budgets geometry scene sdf termination tolerances"),
+    ("fasteners", "geometry tolerances"),
     ("statics", "budgets geometry scene termination tolerances"),
     ("simulation", "budgets cache contact geometry scene sdf termination tolerances"),
     ("blocking_graph", "cache geometry scene simulation termination"),
@@ -37,7 +38,7 @@ const STAGES: [(&str, &str); 21] = [
     ("assembling", "contact geometry plan rrt scene search termination"),
     (
         "service",
-        "assembling blocking_graph cache contact geometry lru plan scene sdf search simulation statics termination tolerances",
+        "assembling blocking_graph cache contact fasteners geometry lru plan scene sdf search simulation statics termination tolerances",
     ),
     (
         "daemon",

@@ -60,6 +60,7 @@ pub mod contact;
 pub mod daemon;
 pub mod document;
 pub mod exchange;
+pub mod fasteners;
 pub mod files;
 #[cfg(test)]
 mod fixtures;

@@ -521,6 +521,45 @@ pub(crate) const FRICTION_PRECISION: f64 = 1.0 / 512.0;
 /// double the distance, a friction that clamping alone makes suffice may pass for the least.
 pub(crate) const FRICTION_ROOM: f64 = 1.02;
 
+// Fasteners.
+
+/// Share of a part's surface that a flat of a hexagon has at least: of a screw M8 that is 200 long, one flat of the socket
+/// has 0.002. At half, longer screws are known; at double, screws of 15 diameters and more are none. Time goes with the
+/// square of the number of such flats.
+pub(crate) const FLAT_SHARE: f64 = 0.001;
+/// Cosine of the difference of two directions from a right angle, or of one from 60 degrees: 0.1 degrees, far above what
+/// coordinates with five digits are rounded by. At half and double no effect is known.
+pub(crate) const FLAT_SPREAD: f64 = 0.002;
+/// Share of the size by which the six flats of a hexagon differ at most, in area and distance from the middle: chamfers
+/// with few facets cut flats unevenly. At half, hexagons with chamfers of 16 facets are none; at double, no effect is known.
+pub(crate) const HEXAGON_SPREAD: f64 = 0.05;
+/// Share of its radius by which corners of a cylinder differ at most in their distance from the line. At half, the holes
+/// and rods of scans are none; at double, the steps of a turned part that is 2 % thicker count as one cylinder.
+pub(crate) const ROUND_SPREAD: f64 = 0.01;
+/// Cosine of the angle between a facet of a cylinder and its corners' radii: at least 8 facets around. At half the angle,
+/// 16, and coarse holes are none; at double, a square bar is round.
+pub(crate) const ROUND_COSINE: f64 = 0.92;
+/// Share of a whole cylinder that facets must have: keyways and cross holes cut into it. At half, fillets count as holes;
+/// at double, a hole with any cut is none.
+pub(crate) const ROUND_SHARE: f64 = 0.5;
+/// The diameter of the thread over the distance of the flats, of nuts and of screws with a hexagon head: 0.5 (M1.6) to 0.68
+/// (M64) by ISO 4032 and ISO 4014, and 0.8 of that where the core is drawn, with room beyond. Wider, a hexagonal spacer
+/// with a wide hole is a nut.
+pub(crate) const THREAD_OF_HEXAGON: [f64; 2] = [0.4, 0.8];
+/// The same of screws with a hexagon socket: 1.07 (M1.6) to 1.33 (M8) by ISO 4762, up to 2.3 of set screws by ISO 4026.
+/// Wider, a bush with a hexagonal hole is a screw.
+pub(crate) const THREAD_OF_SOCKET: [f64; 2] = [1.05, 2.5];
+/// The radius of a rod over that of the nut's hole. Threads are drawn at their outer diameter or at the core, 0.8 to 0.85
+/// of it, of a hole with play besides. Wider, nuts are screwed on rods that pass through them.
+pub(crate) const ROD_OF_NUT: [f64; 2] = [0.85, 1.25];
+/// The radius of a hole over that of a screw's shank. Holes that screws pass through have at least 1.03 (ISO 273, fine);
+/// tapped ones are drawn from the core's 0.8 to the thread's own diameter. At 1.03 and more, screws are fast in holes that
+/// they only pass through.
+pub(crate) const TAPPED_HOLE: [f64; 2] = [0.75, 1.015];
+/// Share of the thread's radius along which it is at least engaged: one pitch of a coarse thread is 0.3 of the radius. At
+/// half, a screw counts as fast that a quarter of a turn frees; at double, the thinnest nuts hold nothing.
+pub(crate) const LEAST_ENGAGEMENT: f64 = 0.3;
+
 // Tessellation of STEP files.
 
 /// mm. How far the triangles of a STEP file may be from its surfaces, if the user does not say: the smallest play that is

@@ -16,7 +16,7 @@ use crate::document::{Placements, PlanDocument, StepDocument};
 use crate::geometry::{Pose, pose_from_waypoint};
 use crate::plan::{PlanKind, StepEnd};
 use crate::search::Termination;
-use crate::service::StandingState;
+use crate::service::{JointKind, StandingState, StaticsQuery};
 use crate::statics::{Stability, StaticsOptions};
 use crate::view::{Up, kind_of};
 
@@ -30,7 +30,15 @@ struct StaticsDocument<'a> {
     up: [f64; 3],
     friction: f64,
     stays: &'a [String],
+    joined: Vec<JointDocument<'a>>,
     states: Vec<StateDocument<'a>>,
+}
+
+/// Two parts that are one body while both stand.
+#[derive(Debug, Serialize)]
+struct JointDocument<'a> {
+    parts: [&'a str; 2],
+    by: &'static str,
 }
 
 /// The state after a number of steps, 0 at first.
@@ -70,23 +78,35 @@ pub(super) fn run(arguments: &StaticsArguments) -> Result<ExitCode, CliError> {
     let stays = stays(plan, &arguments.stays)?;
     let termination = Termination::default();
     interrupt::cancel_on_interrupt(&termination.cancel_flag())?;
-    let states = states(plan, &stays)?;
+    let query = StaticsQuery {
+        options,
+        states: states(plan, &stays)?,
+        screwed: screwed(plan),
+        join: pairs(plan, "--join", &arguments.join)?,
+        apart: pairs(plan, "--apart", &arguments.apart)?,
+    };
     let (service, id) = subject.admitted()?;
     let assembly = service.assembly(id)?;
     if assembly.parts.iter().map(|part| &part.name).ne(&plan.parts) {
         return Err(CliError::Refused("the assembly has other parts than the plan".to_owned()));
     }
-    let found = service.statics(id, &options, &states, &screwed(plan), &termination)?;
-    let found = found.ok_or_else(|| CliError::Failed("interrupted".to_owned()))?;
+    let answer = service.statics(id, &query, &termination)?;
+    let answer = answer.ok_or_else(|| CliError::Failed("interrupted".to_owned()))?;
     let name = |part: usize| plan.parts.get(part).map_or("?", String::as_str);
     let document = StaticsDocument {
         schema: SCHEMA,
         up: up.into_inner().into(),
-        friction: options.friction,
+        friction: query.options.friction,
         stays: &stays,
-        states: states
+        joined: answer
+            .joints
             .iter()
-            .zip(&found)
+            .map(|(pair, kind)| JointDocument { parts: pair.map(name), by: reason(*kind) })
+            .collect(),
+        states: query
+            .states
+            .iter()
+            .zip(&answer.states)
             .enumerate()
             .map(|(after, (state, found))| described(after, state, found, name))
             .collect(),
@@ -101,8 +121,27 @@ pub(super) fn run(arguments: &StaticsArguments) -> Result<ExitCode, CliError> {
         written(file, text.as_bytes())?;
     }
     print(&table(plan, &document))?;
-    print(&format!("\n{}\n", hands(&found)))?;
+    print(&format!("\n{}\n", hands(&answer.states)))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Pairs of parts that an option names.
+fn pairs(plan: &PlanDocument, option: &str, named: &[String]) -> Result<Vec<[usize; 2]>, CliError> {
+    let number = |name: &String| {
+        let number = plan.parts.iter().position(|part| part == name);
+        number.ok_or_else(|| CliError::Refused(format!("{option}: the plan has no part `{name}`")))
+    };
+    let pair = |pair: &[String; 2]| Ok([number(&pair[0])?, number(&pair[1])?]);
+    named.as_chunks().0.iter().map(pair).collect()
+}
+
+fn reason(kind: JointKind) -> &'static str {
+    match kind {
+        JointKind::Named => "named",
+        JointKind::Overlap => "overlap",
+        JointKind::Fastener => "fastener",
+        JointKind::Thread => "thread",
+    }
 }
 
 /// What stays: as named, or as the plan has it.
@@ -207,8 +246,13 @@ fn described<'a>(
 
 fn table(plan: &PlanDocument, document: &StaticsDocument<'_>) -> String {
     let stays = document.stays.join(", ");
-    let mut text =
-        format!("{stays} stays; up is {}; friction {}\n\n", vector(&document.up), document.friction);
+    let mut text = format!("{stays} stays; up is {}; friction {}\n", vector(&document.up), document.friction);
+    let joined: Vec<String> = document.joined.iter().map(|joint| joint.parts.join(" and ")).collect();
+    if !joined.is_empty() {
+        let joined = listed(&joined.iter().map(String::as_str).collect::<Vec<_>>());
+        text.push_str(&format!("as one body while both stand: {joined}\n"));
+    }
+    text.push('\n');
     let mut table =
         TextTable::new(&["after", "moved", "standing", "needs friction", "margin", "hold", "or else"]);
     for state in &document.states {

@@ -20,7 +20,6 @@ mod store;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Weak};
 
@@ -37,7 +36,6 @@ use crate::scene::{HullStore, JoinedHulls};
 use crate::sdf::{FieldStore, keep_field, keep_rest_of_field};
 use crate::search::{Engine, PlanRequest, PlanSink, Staging, axes_of, least_travel};
 use crate::simulation::{Action, Axis, PenaltyParameters};
-use crate::statics::{Stability, StaticsOptions};
 use crate::termination::Termination;
 
 use entry::{Entry, engine_of};
@@ -45,7 +43,7 @@ use pools::Pools;
 pub use records::RECORD_KINDS;
 pub(crate) use records::{AnsweredQuestion, recent_answers, remember_answer, remembered_answer};
 use relay::Discard;
-pub use statics::StandingState;
+pub use statics::{JointKind, StandingState, StaticsAnswer, StaticsQuery};
 use store::AssemblyStore;
 pub use store::StoreStatistics;
 
@@ -393,30 +391,28 @@ impl Service {
         Ok(audit(rule, scene, &present, &*engine, &least, termination).ok())
     }
 
-    /// How the parts of an assembly stand under gravity in each of some states. `screwed`: parts that are screwed off,
-    /// which are one body with those that they share a thread with.
+    /// How the parts of an assembly stand under gravity in each of some states.
     ///
     /// # Errors
     /// The assembly is unknown, a part does not exist, or the termination condition became true (`Ok(None)`).
     pub fn statics(
         &self,
         id: AssemblyId,
-        options: &StaticsOptions,
-        states: &[StandingState],
-        screwed: &BTreeSet<usize>,
+        query: &StaticsQuery,
         termination: &Termination,
-    ) -> Result<Option<Vec<Stability>>, ServiceError> {
+    ) -> Result<Option<StaticsAnswer>, ServiceError> {
         let entry = self.entry(id, termination)?;
         let count = entry.assembly.parts.len();
-        check_parts(&[("screwed", screwed.iter().copied().collect())], count)?;
-        for state in states {
+        check_parts(&[("screwed", query.screwed.iter().copied().collect())], count)?;
+        check_parts(&[("join", query.join.concat()), ("apart", query.apart.concat())], count)?;
+        for state in &query.states {
             check_parts(&[("parts", state.parts.iter().map(|(part, _)| *part).collect())], count)?;
             check_parts(&[("stays", state.stays.clone())], count)?;
         }
         let cache = RequestCache::of(Arc::clone(&self.cache));
         let Ok((prepared, _)) = entry.prepared(termination, &cache) else { return Ok(None) };
         let (assembly, scene) = (&entry.assembly, &prepared.scene);
-        Ok(statics::stabilities(assembly, scene, options, states, screwed, termination).ok())
+        Ok(statics::answer(assembly, scene, query, termination).ok())
     }
 
     /// The blocking graphs of the assembled state along some axes, both ways each, without the `removed` parts

@@ -1,13 +1,16 @@
 //! How the parts of an assembly stand in some of its states.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
+use rayon::prelude::*;
+
+use crate::fasteners::Fastener;
 use crate::geometry::{Assembly, Pose};
 use crate::scene::Scene;
 use crate::simulation::NullTwist;
 use crate::statics::{Stability, Statics, StaticsOptions};
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{CLEARANCE_REACH, LEAST_PITCH};
+use crate::tolerances::{CLEARANCE_REACH, JOINED_OVERLAP, LEAST_PITCH};
 
 /// A state whose stability is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +22,43 @@ pub struct StandingState {
     pub stays: Vec<usize>,
 }
 
+/// How some states stand.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct StaticsQuery {
+    /// What the answers depend on besides the parts.
+    pub options: StaticsOptions,
+    /// The states.
+    pub states: Vec<StandingState>,
+    /// Parts that a plan screws off: they are joined to those that they share a thread with.
+    pub screwed: BTreeSet<usize>,
+    /// Pairs that are joined, whatever their shapes say.
+    pub join: Vec<[usize; 2]>,
+    /// Pairs that are not.
+    pub apart: Vec<[usize; 2]>,
+}
+
+/// The answer to a [`StaticsQuery`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct StaticsAnswer {
+    /// The pairs (the smaller number first) that are joined in some of the states, ascending.
+    pub joints: BTreeMap<[usize; 2], JointKind>,
+    /// By state, how it is held.
+    pub states: Vec<Stability>,
+}
+
+/// Why two parts count as one body while both stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JointKind {
+    /// It was asked for.
+    Named,
+    /// They overlap as assembled: a press fit, or a thread drawn as a cylinder.
+    Overlap,
+    /// One is a nut or a screw by its shape, and the other has the rod or the hole for it.
+    Fastener,
+    /// The plan screws one of them off, and their contacts leave only a helix.
+    Thread,
+}
+
 /// States with the same parts aside.
 struct SamePlaces {
     /// These parts, and how they have moved.
@@ -27,16 +67,18 @@ struct SamePlaces {
     states: Vec<usize>,
 }
 
-/// How each of some states is held. Parts that are screwed are one body with those that they share a thread with.
-pub(super) fn stabilities(
+/// How each of some states is held.
+pub(super) fn answer(
     assembly: &Assembly,
     scene: &Scene,
-    options: &StaticsOptions,
-    states: &[StandingState],
-    screwed: &BTreeSet<usize>,
+    query: &StaticsQuery,
     termination: &Termination,
-) -> Result<Vec<Stability>, Interrupt> {
-    let mut answers = vec![Stability::default(); states.len()];
+) -> Result<StaticsAnswer, Interrupt> {
+    let StaticsQuery { options, states, .. } = query;
+    let mut answer =
+        StaticsAnswer { joints: BTreeMap::new(), states: vec![Stability::default(); states.len()] };
+    let fasteners: Vec<Option<Fastener>> =
+        assembly.shapes.par_iter().map(|shape| Fastener::of(&shape.surface)).collect();
     // They share what is found about their contacts.
     let mut places: Vec<SamePlaces> = Vec::new();
     for (i, state) in states.iter().enumerate() {
@@ -48,25 +90,68 @@ pub(super) fn stabilities(
         }
     }
     for SamePlaces { aside, states: members } in places {
-        let aside: Vec<(usize, Pose)> = aside
+        let places: Vec<(usize, Pose)> = aside
             .iter()
             .map(|(part, motion)| {
                 (*part, scaled(motion, assembly.scale) * scene.bodies[*part].planning_from_shape)
             })
             .collect();
-        let scene = scene.with_placed(&aside);
-        let mut statics = Statics::of(&scene, assembly, options, termination)?;
-        for [a, b] in statics.touching().collect::<Vec<_>>() {
-            if (screwed.contains(&a) || screwed.contains(&b)) && shares_thread(&scene, a, b, termination)? {
-                statics.join(a, b);
-            }
-        }
+        let scene = scene.with_placed(&places);
+        let fastener = |part: usize| fasteners[assembly.parts[part].shape].as_ref();
+        // What is moved aside does not overlap as it did, but with what was moved along.
+        let motion = |part: usize| aside.iter().find(|(moved, _)| *moved == part).map(|(_, motion)| motion);
+        let is_assembled = |[a, b]: [usize; 2]| motion(a) == motion(b);
+        let joints = joints(&scene, query, fastener, is_assembled, termination)?;
+        let joined = joints.keys().copied().collect();
+        let mut statics = Statics::of(&scene, assembly, options, joined, termination)?;
         for i in members {
             let standing: Vec<usize> = states[i].parts.iter().map(|(part, _)| *part).collect();
-            answers[i] = statics.stability(&standing, &states[i].stays, termination)?;
+            answer.states[i] = statics.stability(&standing, &states[i].stays, termination)?;
         }
+        answer.joints.extend(joints);
     }
-    Ok(answers)
+    Ok(answer)
+}
+
+/// The pairs that are joined as the parts stand.
+fn joints<'f>(
+    scene: &Scene,
+    query: &StaticsQuery,
+    fastener: impl Fn(usize) -> Option<&'f Fastener> + Sync,
+    is_assembled: impl Fn([usize; 2]) -> bool + Sync,
+    termination: &Termination,
+) -> Result<BTreeMap<[usize; 2], JointKind>, Interrupt> {
+    let has = |pairs: &[[usize; 2]], [a, b]: [usize; 2]| pairs.contains(&[a, b]) || pairs.contains(&[b, a]);
+    let is_screwed = |[f, other]: [usize; 2]| {
+        let [of, at] = [f, other].map(|part| &scene.bodies[part]);
+        let pose = at.planning_from_shape.inverse() * of.planning_from_shape;
+        fastener(f).is_some_and(|fastener| fastener.is_screwed_to(&at.shape.surface, &pose))
+    };
+    let kind = |pair: [usize; 2]| {
+        let [a, b] = pair;
+        termination.check()?;
+        Ok(if has(&query.join, pair) {
+            Some(JointKind::Named)
+        } else if has(&query.apart, pair) {
+            None
+        } else if is_assembled(pair) && scene.allowed.of(a, b) > JOINED_OVERLAP {
+            Some(JointKind::Overlap)
+        } else if is_screwed([a, b]) || is_screwed([b, a]) {
+            Some(JointKind::Fastener)
+        } else if pair.iter().any(|part| query.screwed.contains(part))
+            && shares_thread(scene, pair, termination)?
+        {
+            Some(JointKind::Thread)
+        } else {
+            None
+        })
+    };
+    let named = query.join.iter().map(|&[a, b]| [a.min(b), a.max(b)]);
+    let pairs: BTreeSet<[usize; 2]> =
+        scene.broad_phase.pairs(0.0).into_iter().map(|(a, b)| [a, b]).chain(named).collect();
+    let kinds = pairs.into_par_iter().map(|pair| Ok((pair, kind(pair)?)));
+    let kinds = kinds.collect::<Result<Vec<_>, Interrupt>>()?;
+    Ok(kinds.into_iter().filter_map(|(pair, kind)| Some((pair, kind?))).collect())
 }
 
 /// A motion of the input's frame in the planning frame.
@@ -75,7 +160,7 @@ fn scaled(motion: &Pose, scale: f64) -> Pose {
 }
 
 /// Whether contact leaves two parts a helix to move along each other.
-fn shares_thread(scene: &Scene, a: usize, b: usize, termination: &Termination) -> Result<bool, Interrupt> {
+fn shares_thread(scene: &Scene, [a, b]: [usize; 2], termination: &Termination) -> Result<bool, Interrupt> {
     let pose = &scene.bodies[a].planning_from_shape;
     let (twist, _) = NullTwist::of(scene, a, pose, &[b], CLEARANCE_REACH, termination)?;
     let rise = twist.and_then(|twist| twist.rise);

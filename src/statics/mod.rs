@@ -2,8 +2,7 @@
 //!
 //! Data flow: a [`Scene`] → `contacts` (points at which two parts press on each other) → `equilibrium` (a conic program
 //! with friction cones, checked by substitution) → `stability` (the least friction, the margin, what falls, and which
-//! parts to hold). Parts are rigid. What overlaps as assembled, like a press fit, is one body; so is what shares a thread
-//! ([`Statics::join`]).
+//! parts to hold). Parts are rigid. Pairs that are joined, as by a press fit or a thread, are one body.
 
 mod contacts;
 mod equilibrium;
@@ -20,7 +19,7 @@ use rayon::prelude::*;
 use crate::geometry::Assembly;
 use crate::scene::{Body, Scene};
 use crate::termination::{Interrupt, Termination};
-use crate::tolerances::{CONTACT_GAP, JOINED_OVERLAP};
+use crate::tolerances::CONTACT_GAP;
 
 use contacts::{ContactPoint, contacts_between};
 use equilibrium::{ContactKey, HeldBody, HeldContact, System};
@@ -55,11 +54,15 @@ pub struct Statics<'a> {
     friction: f64,
     margins: bool,
     contacts: BTreeMap<[usize; 2], Vec<ContactPoint>>,
+    /// By part, the parts that it touches, ascending.
+    touching: Vec<Vec<usize>>,
     joined: BTreeSet<[usize; 2]>,
     /// By the bodies that are connected with each other, and the parts that stay beside them.
     known: HashMap<Connected, Arc<Stability>>,
     /// The same of bodies of which all beside them stays.
     known_loose: HashMap<Connected, Arc<Loose>>,
+    /// Whether contacts alone hold a body of which all beside it stays.
+    known_alone: HashMap<Connected, bool>,
     /// Forces that hold the bodies of the last states in which contacts alone hold them, in the weight of a mass of 1: of the
     /// next state they hold most.
     forces: HashMap<ContactKey, Vector3<f64>>,
@@ -73,6 +76,12 @@ struct Connected {
 }
 
 impl Connected {
+    /// Those bodies that are not marked, as if there were no others.
+    fn unmarked(&self, marks: &[bool]) -> Self {
+        let bodies = self.bodies.iter().zip(marks).filter(|(_, mark)| !**mark);
+        Self { bodies: bodies.map(|(body, _)| body.clone()).collect(), stays: self.stays.clone() }
+    }
+
     /// The same where some of the bodies stay.
     fn without(&self, fixed: &BTreeSet<Vec<usize>>) -> Self {
         let bodies = self.bodies.iter().filter(|body| !fixed.contains(*body)).cloned().collect();
@@ -84,7 +93,8 @@ impl Connected {
 }
 
 impl<'a> Statics<'a> {
-    /// Finds the contacts of all parts of a scene, in parallel.
+    /// Finds the contacts of all parts of a scene, in parallel. Joined pairs (the smaller number first) are one body while
+    /// both stand.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -92,6 +102,7 @@ impl<'a> Statics<'a> {
         scene: &'a Scene,
         assembly: &Assembly,
         options: &StaticsOptions,
+        joined: BTreeSet<[usize; 2]>,
         termination: &Termination,
     ) -> Result<Self, Interrupt> {
         let side = |part: usize| scene.bodies[part].shape.bounds().extents().max();
@@ -100,38 +111,33 @@ impl<'a> Statics<'a> {
             None => CONTACT_GAP * side(a).min(side(b)),
         };
         let widest = options.gap.map_or(CONTACT_GAP * scene.longest_side, |gap| gap * assembly.scale);
-        let pairs: Vec<[usize; 2]> =
-            scene.broad_phase.pairs(widest).into_iter().map(|(a, b)| [a, b]).collect();
-        let (joined, apart): (Vec<_>, Vec<_>) =
-            pairs.into_iter().partition(|[a, b]| scene.allowed.of(*a, *b) > JOINED_OVERLAP);
+        let pairs = scene.broad_phase.pairs(widest).into_iter().map(|(a, b)| [a, b]);
+        let apart: Vec<[usize; 2]> = pairs.filter(|pair| !joined.contains(pair)).collect();
         let contacts = apart
             .into_par_iter()
             .map(|pair| Ok((pair, contacts_between(scene, pair, gap(pair), termination)?)))
             .collect::<Result<Vec<_>, Interrupt>>()?;
-        let contacts = contacts.into_iter().filter(|(_, contacts)| !contacts.is_empty()).collect();
+        let contacts: BTreeMap<_, _> =
+            contacts.into_iter().filter(|(_, contacts)| !contacts.is_empty()).collect();
+        let mut touching = vec![Vec::new(); scene.bodies.len()];
+        for &[a, b] in contacts.keys() {
+            touching[a].push(b);
+            touching[b].push(a);
+        }
         let down = -options.up.into_inner();
-        let joined = joined.into_iter().collect();
         Ok(Self {
             scene,
             down,
             friction: options.friction,
             contacts,
+            touching,
             joined,
             margins: options.margin,
             known: HashMap::new(),
             known_loose: HashMap::new(),
+            known_alone: HashMap::new(),
             forces: HashMap::new(),
         })
-    }
-
-    /// The pairs that touch.
-    pub fn touching(&self) -> impl Iterator<Item = [usize; 2]> {
-        self.contacts.keys().copied()
-    }
-
-    /// Takes two parts for one body while both stand, because they share a thread.
-    pub fn join(&mut self, a: usize, b: usize) {
-        self.joined.insert([a.min(b), a.max(b)]);
     }
 
     /// How the parts that stand (ascending) are held, where some of them stay whatever happens.
@@ -191,14 +197,14 @@ impl<'a> Statics<'a> {
         let kept =
             connected.bodies.iter().zip(is_loose).filter(|(_, loose)| !**loose).map(|(body, _)| body.clone());
         let all = connected.without(&kept.collect());
-        let mut numbers = HashMap::new();
+        let mut numbers = BTreeMap::new();
         for (body, number) in all.bodies.iter().zip(0..) {
             numbers.extend(body.iter().map(|&part| (part, number)));
         }
         let mut touching = UnionFind::<usize>::new(all.bodies.len());
-        for pair in self.contacts.keys() {
-            if let [Some(&a), Some(&b)] = pair.map(|part| numbers.get(&part)) {
-                touching.union(a, b);
+        for (&part, &number) in &numbers {
+            for other in self.touching[part].iter().filter_map(|other| numbers.get(other)) {
+                touching.union(number, *other);
             }
         }
         let mut groups: BTreeMap<usize, Vec<Vec<usize>>> = BTreeMap::new();
@@ -211,18 +217,23 @@ impl<'a> Statics<'a> {
             .collect()
     }
 
-    /// Of parts that stay (ascending), those that touch bodies.
+    /// Of parts that stay (ascending), those that touch bodies, ascending.
     fn beside(&self, bodies: &[Vec<usize>], stays: &[usize]) -> Vec<usize> {
-        let parts: BTreeSet<usize> = bodies.iter().flatten().copied().collect();
-        let mut beside = BTreeSet::new();
-        for &[a, b] in self.contacts.keys() {
-            for (part, other) in [(a, b), (b, a)] {
-                if parts.contains(&part) && stays.binary_search(&other).is_ok() {
-                    beside.insert(other);
-                }
-            }
-        }
+        let touched = bodies.iter().flatten().flat_map(|&part| &self.touching[part]);
+        let beside: BTreeSet<usize> =
+            touched.copied().filter(|part| stays.binary_search(part).is_ok()).collect();
         beside.into_iter().collect()
+    }
+
+    /// One of connected bodies, with all beside it staying.
+    fn alone(&self, connected: &Connected, body: &[usize]) -> Connected {
+        let is_beside = |other: &usize| {
+            connected.stays.binary_search(other).is_ok()
+                || connected.bodies.iter().any(|parts| parts.binary_search(other).is_ok() && parts != body)
+        };
+        let touched = body.iter().flat_map(|&part| &self.touching[part]);
+        let stays: BTreeSet<usize> = touched.copied().filter(is_beside).collect();
+        Connected { bodies: vec![body.to_vec()], stays: stays.into_iter().collect() }
     }
 
     /// Connected bodies with the contacts among them and with what stays.
@@ -234,16 +245,20 @@ impl<'a> Statics<'a> {
             .flat_map(|(body, i)| body.iter().map(move |&p| (p, i)))
             .collect();
         let bodies = connected.bodies.iter().map(|parts| self.body(parts)).collect();
-        let counts = |part: &usize| place.contains_key(part) || connected.stays.binary_search(part).is_ok();
+        let mut pairs = BTreeSet::new();
+        for &part in place.keys() {
+            let counts =
+                |other: &&usize| place.contains_key(other) || connected.stays.binary_search(other).is_ok();
+            pairs.extend(
+                self.touching[part].iter().filter(counts).map(|&other| [part.min(other), part.max(other)]),
+            );
+        }
         let mut contacts = Vec::new();
-        for (pair, points) in self.contacts.iter().filter(|(pair, _)| pair.iter().all(counts)) {
+        for pair in pairs {
             let of = pair.map(|part| place.get(&part).copied());
             if of[0] != of[1] {
-                contacts.extend(points.iter().zip(0..).map(|(&at, i)| HeldContact {
-                    of,
-                    key: (*pair, i),
-                    at,
-                }));
+                let points = self.contacts.get(&pair).into_iter().flatten();
+                contacts.extend(points.zip(0..).map(|(&at, i)| HeldContact { of, key: (pair, i), at }));
             }
         }
         System { bodies, contacts, down: self.down, termination: termination.clone() }

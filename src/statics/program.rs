@@ -48,6 +48,10 @@ impl Program {
     pub(super) fn solve(self, termination: &Termination) -> Result<Option<Optimum>, Interrupt> {
         termination.check()?;
         let (rows, columns) = (self.right.len(), self.linear.len());
+        if columns == 0 {
+            // The solver does not expect it.
+            return Ok(Some(Optimum { point: Vec::new(), multipliers: vec![0.0; rows] }));
+        }
         let curved: Vec<usize> = (0..columns).filter(|&column| self.curvature[column] != 0.0).collect();
         let curvature = curved.iter().map(|&column| self.curvature[column]).collect();
         let quadratic = CscMatrix::new_from_triplets(columns, columns, curved.clone(), curved, curvature);

@@ -122,22 +122,20 @@ pub(super) fn answer(
     termination: &Termination,
 ) -> Result<Stability, Interrupt> {
     let system = statics.system(connected, termination);
-    let friction = statics.friction;
-    let margin = |system: &System| match statics.margins {
+    let (friction, is_wanted) = (statics.friction, statics.margins);
+    let margin = |system: &System| match is_wanted {
         true => margin(system, friction).map(Some),
         false => Ok(None),
     };
-    let smooth = match held_smoothly(&system, &mut statics.forces)? {
-        Balance::Held(_) => return Ok(Stability { margin: margin(&system)?, ..Stability::default() }),
-        Balance::Falls(smooth) => smooth,
-        Balance::Unknown => {
-            return Ok(Stability { unknown: connected.bodies.concat(), ..Stability::default() });
-        }
+    let Smooth { loose, forces } = match smooth(statics, connected, &system, termination)? {
+        Some(smooth) if smooth.loose.contains(&true) => smooth,
+        Some(_) => return Ok(Stability { margin: margin(&system)?, ..Stability::default() }),
+        None => return Ok(Stability { unknown: connected.bodies.concat(), ..Stability::default() }),
     };
     let mut found = Stability::default();
-    let mut held: HashMap<ContactKey, Vector3<f64>> = keyed(&system, smooth.forces.clone()).collect();
+    let mut held: HashMap<ContactKey, Vector3<f64>> = forces.into_iter().collect();
     let (mut fixed, mut leaning) = (BTreeSet::new(), BTreeSet::new());
-    for loose in statics.loose(connected, &is_loose(&smooth, &statics.down)) {
+    for loose in statics.loose(connected, &loose) {
         let judged = match statics.known_loose.get(&loose) {
             Some(judged) => Arc::clone(judged),
             None => Arc::new(judged(statics, &loose, termination)?),
@@ -215,12 +213,82 @@ fn keyed(system: &System, forces: Vec<Vector3<f64>>) -> impl Iterator<Item = (Co
     system.contacts.iter().map(|contact| contact.key).zip(forces)
 }
 
-/// Whether bodies are held without friction, given forces that may hold most of them, which are replaced by those that do.
+/// What holds connected bodies if nothing rubs.
+struct Smooth {
+    /// By body: whether nothing holds it.
+    loose: Vec<bool>,
+    /// What holds the others.
+    forces: Vec<(ContactKey, Vector3<f64>)>,
+}
+
+/// What holds connected bodies if nothing rubs; `None` if the solver found no answer.
+///
+/// What is not held although all beside it stays is loose: with less to lean on, less is held. So is what is not held
+/// without those. If all the rest is held, that is the answer, and little was asked that other states have not asked.
+/// A body that counts as loose although it is held does no harm: what is loose is judged anew.
+fn smooth(
+    statics: &mut Statics<'_>,
+    connected: &Connected,
+    system: &System,
+    termination: &Termination,
+) -> Result<Option<Smooth>, Interrupt> {
+    let mut loose = vec![false; connected.bodies.len()];
+    loop {
+        let rest = connected.unmarked(&loose);
+        let mut found = loose.clone();
+        for (body, loose) in connected.bodies.iter().zip(&mut found) {
+            *loose = *loose || !is_held_alone(statics, &rest, body, termination)?;
+        }
+        if found == loose {
+            break;
+        }
+        loose = found;
+    }
+    let is_any_loose = loose.contains(&true);
+    let rest = is_any_loose.then(|| statics.system(&connected.unmarked(&loose), termination));
+    let others = rest.as_ref().unwrap_or(system);
+    let balance = match held_smoothly(others, &mut statics.forces)? {
+        Balance::Held(forces) => {
+            return Ok(Some(Smooth { loose, forces: keyed(others, forces).collect() }));
+        }
+        _ if is_any_loose => system.balance(0.0, &Vector3::zeros())?,
+        balance => balance,
+    };
+    Ok(match balance {
+        Balance::Held(forces) => {
+            Some(Smooth { loose: vec![false; loose.len()], forces: keyed(system, forces).collect() })
+        }
+        Balance::Falls(falling) => {
+            let loose = is_loose(&falling, &statics.down);
+            Some(Smooth { loose, forces: keyed(system, falling.forces).collect() })
+        }
+        Balance::Unknown => None,
+    })
+}
+
+/// Whether contacts alone hold a body if all beside it stays.
+fn is_held_alone(
+    statics: &mut Statics<'_>,
+    connected: &Connected,
+    body: &[usize],
+    termination: &Termination,
+) -> Result<bool, Interrupt> {
+    let alone = statics.alone(connected, body);
+    if let Some(held) = statics.known_alone.get(&alone) {
+        return Ok(*held);
+    }
+    let held = is_held(&statics.system(&alone, termination), 0.0, &Vector3::zeros())?;
+    statics.known_alone.insert(alone, held);
+    Ok(held)
+}
+
+/// Whether bodies are held without friction. The forces of the last state that was held hold most of them, and are
+/// replaced by those that hold these.
 fn held_smoothly(
     system: &System,
-    forces: &mut HashMap<ContactKey, Vector3<f64>>,
+    last: &mut HashMap<ContactKey, Vector3<f64>>,
 ) -> Result<Balance, Interrupt> {
-    let known = |contact: &HeldContact| forces.get(&contact.key).copied();
+    let known = |contact: &HeldContact| last.get(&contact.key).copied();
     let given = system.contacts.iter().map(|contact| known(contact).unwrap_or_default()).collect();
     let is_begun = system.contacts.iter().any(|contact| known(contact).is_some());
     let mended = if is_begun { system.mended(given, 0.0)? } else { None };
@@ -229,7 +297,7 @@ fn held_smoothly(
         None => system.balance(0.0, &Vector3::zeros())?,
     };
     if let Balance::Held(held) = &found {
-        forces.extend(system.contacts.iter().map(|contact| contact.key).zip(held.iter().copied()));
+        last.extend(keyed(system, held.clone()));
     }
     Ok(found)
 }

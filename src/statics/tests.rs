@@ -22,11 +22,16 @@ fn case(meshes: impl IntoIterator<Item = SourceMesh>) -> Case {
 
 impl Case {
     fn with(&self, friction: f64) -> Stability {
+        self.with_staying(friction, &[0])
+    }
+
+    fn with_staying(&self, friction: f64, stays: &[usize]) -> Stability {
         let options = StaticsOptions { friction, margin: true, ..StaticsOptions::default() };
         let termination = Termination::default();
-        let mut statics = Statics::of(&self.scene, &self.assembly, &options, &termination).unwrap();
+        let mut statics =
+            Statics::of(&self.scene, &self.assembly, &options, BTreeSet::new(), &termination).unwrap();
         let standing: Vec<usize> = (0..self.scene.bodies.len()).collect();
-        statics.stability(&standing, &[0], &termination).unwrap()
+        statics.stability(&standing, stays, &termination).unwrap()
     }
 }
 
@@ -107,11 +112,7 @@ fn a_ladder_needs_friction_by_its_angle() {
         let ladder = turned(ladder, [0.0, 1.0, 0.0], lean, [-5.0 * sine - 0.005 * cosine, 0.0, 0.005 * sine]);
         let room = cuboid([-6.0, -2.0, -1.0], [0.0, 2.0, 0.0]);
         let wall = cuboid([0.0, -2.0, -1.0], [1.0, 2.0, 6.0]);
-        let case = case([room, wall, ladder]);
-        let options = StaticsOptions { friction: 0.8, ..StaticsOptions::default() };
-        let termination = Termination::default();
-        let mut statics = Statics::of(&case.scene, &case.assembly, &options, &termination).unwrap();
-        let found = statics.stability(&[0, 1, 2], &[0, 1], &termination).unwrap();
+        let found = case([room, wall, ladder]).with_staying(0.8, &[0, 1]);
         assert!(found.stands(), "{found:?}");
         near(found.needs_friction, (lean / 2.0).tan(), 0.02);
     }
@@ -218,13 +219,7 @@ fn what_lies_on_edges_of_others_stands_where_edges_cross() {
         let bar = cuboid([-length, 0.0, 0.0], [length, 1.0, 1.0]);
         turned(bar, [1.0, 0.0, 0.0], quarter, [0.0, 0.0, std::f64::consts::SQRT_2])
     };
-    let options = StaticsOptions { margin: true, ..StaticsOptions::default() };
-    let with = |x: f64| {
-        let case = case([rail(-2.0), rail(x), bar(3.0)]);
-        let mut statics =
-            Statics::of(&case.scene, &case.assembly, &options, &Termination::default()).unwrap();
-        statics.stability(&[0, 1, 2], &[0, 1], &Termination::default()).unwrap()
-    };
+    let with = |x: f64| case([rail(-2.0), rail(x), bar(3.0)]).with_staying(0.2, &[0, 1]);
     let found = with(2.0);
     assert_eq!((found.stands(), found.needs_friction), (true, 0.0), "{found:?}");
     assert!(found.margin.unwrap() < 0.01, "it rolls over its edge: {found:?}");

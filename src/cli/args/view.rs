@@ -85,6 +85,13 @@ pub(in crate::cli) struct StaticsArguments {
     /// A part that stays where it is whatever happens (repeatable) [default: the plan's base and fixed parts]
     #[arg(long, value_name = "PART")]
     pub(in crate::cli) stays: Vec<String>,
+    /// Two parts that are one body while both stand, as if glued (repeatable) [default: what overlaps, shares a thread, or is
+    /// a nut or screw by its shape]
+    #[arg(long, value_names = ["PART", "OTHER"], num_args = 2)]
+    pub(in crate::cli) join: Vec<String>,
+    /// Two parts that are not, though their shapes look so (repeatable)
+    #[arg(long, value_names = ["PART", "OTHER"], num_args = 2)]
+    pub(in crate::cli) apart: Vec<String>,
     /// Also find out how much of the weight may act sideways until something falls; it takes many times as long
     #[arg(long)]
     pub(in crate::cli) margin: bool,
