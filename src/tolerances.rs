@@ -549,13 +549,14 @@ pub(crate) const THREAD_OF_HEXAGON: [f64; 2] = [0.4, 0.8];
 /// The same of screws with a hexagon socket: 1.07 (M1.6) to 1.33 (M8) by ISO 4762, up to 2.3 of set screws by ISO 4026.
 /// Wider, a bush with a hexagonal hole is a screw.
 pub(crate) const THREAD_OF_SOCKET: [f64; 2] = [1.05, 2.5];
-/// The radius of a rod over that of the nut's hole. Threads are drawn at their outer diameter or at the core, 0.8 to 0.85
-/// of it, of a hole with play besides. Wider, nuts are screwed on rods that pass through them.
-pub(crate) const ROD_OF_NUT: [f64; 2] = [0.85, 1.25];
-/// The radius of a hole over that of a screw's shank. Holes that screws pass through have at least 1.03 (ISO 273, fine);
-/// tapped ones are drawn from the core's 0.8 to the thread's own diameter. At 1.03 and more, screws are fast in holes that
-/// they only pass through.
-pub(crate) const TAPPED_HOLE: [f64; 2] = [0.75, 1.015];
+/// The radius of a rod over that of the nut's hole. Either is drawn at the thread's outer diameter or at its core, 0.76
+/// (M1.6) to 0.85 (M12) of it, and a hole with play besides. Wider, nuts are screwed on rods that pass through them.
+pub(crate) const ROD_OF_NUT: [f64; 2] = [0.75, 1.3];
+/// The radius of a hole over that of a screw's shank. Tapped holes are drawn between the core's diameter, as above, and the
+/// thread's own, some with a little play. Holes that screws pass through have 1.05 of it (M8 to M20 by ISO 273, fine); this
+/// is half of that. At half the play, holes are not tapped that are drawn with play; at double, screws are fast in holes
+/// that they only pass through, as from M36 on (1.028).
+pub(crate) const TAPPED_HOLE: [f64; 2] = [0.75, 1.025];
 /// Share of the thread's radius along which it is at least engaged: one pitch of a coarse thread is 0.3 of the radius. At
 /// half, a screw counts as fast that a quarter of a turn frees; at double, the thinnest nuts hold nothing.
 pub(crate) const LEAST_ENGAGEMENT: f64 = 0.3;

@@ -66,6 +66,32 @@ fn a_beam_falls_once_its_counterweight_is_gone() {
 }
 
 #[test]
+fn nuts_are_joined_to_their_bolts_unless_they_are_named_as_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let bracket = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/assemblies/bolted-bracket-20");
+    let planned = sbdp(folder.path(), &["plan", bracket, "--embedded", "-q", "--json", "plan.json"]);
+    assert!(planned.status.success(), "{planned:?}");
+    let statics = |options: &[&str]| {
+        let found = sbdp(folder.path(), &[&["statics", "plan.json", "--json", "-"], options].concat());
+        assert!(found.status.success(), "{found:?}");
+        serde_json::from_slice::<Value>(&found.stdout).unwrap()
+    };
+    let joined = |document: &Value| document["joined"].as_array().unwrap().clone();
+    let found = statics(&[]);
+    assert_eq!(
+        joined(&found)[0],
+        serde_json::json!({"parts": ["back-bolt-1", "back-nut-1"], "by": "fastener"})
+    );
+    assert!(
+        found["states"].as_array().unwrap().iter().all(|state| state["unstable"] == serde_json::json!([]))
+    );
+    let apart = statics(&["--apart", "nut-1", "bolt-1", "--join", "nut-1", "nut-2"]);
+    assert_eq!(joined(&apart).len(), joined(&found).len());
+    assert!(joined(&apart).contains(&serde_json::json!({"parts": ["nut-1", "nut-2"], "by": "named"})));
+    assert!(joined(&apart).iter().all(|joint| joint["parts"] != serde_json::json!(["bolt-1", "nut-1"])));
+}
+
+#[test]
 fn an_assembly_plan_has_the_states_of_the_disassembly_backwards() {
     let folder = tempfile::tempdir().unwrap();
     let parts = [
@@ -88,6 +114,9 @@ fn questions_that_have_no_answer_are_refused_with_what_to_do() {
     states(folder.path(), &counterweight(), &["--base", "table"], &[]);
     for (arguments, words) in [
         (&["statics", "plan.json", "--stays", "nobody"][..], "no part `nobody`"),
+        (&["statics", "plan.json", "--join", "beam", "nobody"], "--join: the plan has no part `nobody`"),
+        (&["statics", "plan.json", "--apart", "nobody", "beam"], "--apart: the plan has no part `nobody`"),
+        (&["statics", "plan.json", "--join", "beam"], "2 values required"),
         (&["statics", "plan.json", "--friction", "-1"], "from 0 up"),
         (&["statics", "plan.json", "--friction", "nan"], "from 0 up"),
         (&["statics", "plan.json", "--up", "0,0,0"], "one is not 0"),

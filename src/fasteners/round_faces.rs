@@ -51,11 +51,12 @@ fn facet(surface: &Surface, triangle: u32, line: &CentreLine) -> Option<Facet> {
     }
     let corners = surface.corners(triangle);
     let away = corners.map(|p| line.to(&p));
-    let radius = away.iter().map(|v| v.norm()).sum::<f64>() / 3.0;
-    let outward = away.map(|v| v.dot(&normal) / radius);
-    let is_hole = outward[0] < 0.0;
-    let is_round = away.iter().all(|v| (v.norm() - radius).abs() <= ROUND_SPREAD * radius)
-        && outward.iter().all(|cosine| cosine.abs() >= ROUND_COSINE && (*cosine < 0.0) == is_hole);
+    let of_corners = away.iter().map(|v| v.norm()).sum::<f64>() / 3.0;
+    let outward = away[0].dot(&normal);
+    let is_round = away.iter().all(|v| (v.norm() - of_corners).abs() <= ROUND_SPREAD * of_corners)
+        && outward.abs() >= ROUND_COSINE * of_corners;
+    // The circle is around the facets, or inside them.
+    let (radius, is_hole) = ((of_corners + outward.abs()) / 2.0, outward < 0.0);
     let heights = corners.map(|p| line.along(&p));
     let along =
         [heights.into_iter().fold(f64::INFINITY, f64::min), heights.into_iter().fold(f64::MIN, f64::max)];

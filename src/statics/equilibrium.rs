@@ -291,7 +291,7 @@ impl System {
     }
 
     /// Bodies, and those that touch them.
-    fn with_neighbours(&self, bodies: &[bool]) -> Vec<bool> {
+    pub(super) fn with_neighbours(&self, bodies: &[bool]) -> Vec<bool> {
         let mut grown = bodies.to_vec();
         for contact in &self.contacts {
             if let [Some(a), Some(b)] = contact.of

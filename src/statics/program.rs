@@ -41,7 +41,7 @@ impl Program {
         }
     }
 
-    /// Solves it. `None` where the solver finds no answer.
+    /// Solves it, as well as the solver can: the caller has to check the point. `None` where there is none.
     ///
     /// # Errors
     /// The termination condition became true.
@@ -65,7 +65,15 @@ impl Program {
         solver.solve();
         termination.check()?;
         let solution = solver.solution;
-        let is_solved = matches!(solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved);
-        Ok(is_solved.then_some(Optimum { point: solution.x, multipliers: solution.z }))
+        // Where it got stuck, its last point may be right all the same.
+        let has_point = matches!(
+            solution.status,
+            SolverStatus::Solved
+                | SolverStatus::AlmostSolved
+                | SolverStatus::InsufficientProgress
+                | SolverStatus::NumericalError
+                | SolverStatus::MaxIterations
+        );
+        Ok(has_point.then_some(Optimum { point: solution.x, multipliers: solution.z }))
     }
 }

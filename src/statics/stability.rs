@@ -4,6 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use super::equilibrium::{Balance, ContactKey, Falling, HeldContact, System, Velocity};
 use super::{Connected, Statics};
@@ -379,7 +380,8 @@ fn margin(system: &System, friction: f64) -> Result<f64, Interrupt> {
     Ok(least)
 }
 
-/// The smallest sets of falling bodies that have to be held, each by one of its parts, the heaviest.
+/// The smallest sets of bodies that have to be held, each by one of its parts, the heaviest: of those that fall and those
+/// that touch them. A lid that stands by itself may have to be held against what it keeps in.
 fn holding(
     statics: &Statics<'_>,
     connected: &Connected,
@@ -402,28 +404,42 @@ fn holding(
         let standing = Standing::of(&rest, statics.friction)?;
         Ok::<_, Interrupt>(matches!(standing, Standing::Smooth(_) | Standing::Rubbing(_)))
     };
-    let pairs =
-        (0..falling.len()).flat_map(|i| (i + 1..falling.len()).map(move |j| vec![falling[i], falling[j]]));
-    for sets in [falling.iter().map(|&body| vec![body]).collect::<Vec<_>>(), pairs.collect()] {
+    let falls: Vec<bool> = (0..connected.bodies.len()).map(|body| falling.contains(&body)).collect();
+    let near = statics.system(connected, termination).with_neighbours(&falls);
+    let near: Vec<usize> = (0..near.len()).filter(|&body| near[body]).collect();
+    // One after the other is let go, light ones first, where the rest is enough. Where it is not, one of those that were let
+    // go has to be held, or this one.
+    let (mut held, mut needed) = (near.clone(), Vec::new());
+    let mut by_weight = near.clone();
+    let weight = |body: usize| connected.bodies[body].iter().map(volume).sum::<f64>();
+    by_weight.sort_by(|&a, &b| weight(a).total_cmp(&weight(b)));
+    for body in by_weight {
+        let rest: Vec<usize> = held.iter().copied().filter(|&other| other != body).collect();
+        // They fall if nobody holds any.
+        if !rest.is_empty() && is_enough(&rest)? {
+            held = rest;
+        } else {
+            needed.push(near.iter().copied().filter(|other| !rest.contains(other)).collect::<Vec<_>>());
+        }
+    }
+    let singles = near.iter().map(|&body| vec![body]);
+    let pairs = (0..near.len()).flat_map(|i| near[i + 1..].iter().map(move |&other| (i, other)));
+    let pairs = pairs.map(|(i, other)| vec![near[i], other]);
+    let meets = |set: &[usize], all: &[usize]| all.iter().any(|body| set.contains(body));
+    for sets in [singles.collect::<Vec<_>>(), pairs.collect()] {
+        let sets: Vec<_> = sets
+            .into_iter()
+            .filter(|set| set.len() <= held.len() && needed.iter().all(|all| meets(set, all)))
+            .collect();
         if sets.len() > HOLDING_SETS {
             continue;
         }
-        let mut found = Vec::new();
-        for held in sets {
-            if is_enough(&held)? {
-                found.push(named(&held));
-            }
-        }
+        let asked = sets.into_par_iter().map(|set| Ok((set == held || is_enough(&set)?, set)));
+        let asked = asked.collect::<Result<Vec<_>, Interrupt>>()?;
+        let found: Vec<_> =
+            asked.iter().filter(|(is_enough, _)| *is_enough).map(|(_, set)| named(set)).collect();
         if !found.is_empty() {
             return Ok(found);
-        }
-    }
-    // One after the other is let go, where the rest is enough.
-    let mut held = falling.to_vec();
-    for &body in falling {
-        let rest: Vec<usize> = held.iter().copied().filter(|&other| other != body).collect();
-        if is_enough(&rest)? {
-            held = rest;
         }
     }
     Ok(vec![named(&held)])
